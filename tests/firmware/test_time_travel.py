@@ -1,4 +1,4 @@
-"""Going back lands on the state that going forward had, the whole of it, whatever happened in between."""
+"""Going back restores the whole state that the machine had on the way forward."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from tests.fuzz.fuzz_reverse import APPS, walk
 def walked(
     machine: emu.Machine, rng: random.Random, stretches: int
 ) -> tuple[History, dict[int, bytes], dict[int, int]]:
-    """A recording with input in between; states before single steps, and the cycle each of those steps led to."""
+    """Return a recording with input, the states before single steps, and the cycle that each of those steps led to."""
     history = History(machine, period=300_000)
     states: dict[int, bytes] = {}
     follows: dict[int, int] = {}
@@ -37,8 +37,8 @@ def walked(
 
 
 @pytest.mark.parametrize("engine", ["jit", "plain"])
-def test_every_state_is_had_again_to_the_bit(image: Build, engine: str) -> None:
-    """Across preemption, interrupts, a camera's frames over I2C and its pixel port, and bytes from outside."""
+def test_every_state_is_restored_to_the_bit(image: Build, engine: str) -> None:
+    """Across preemption, interrupts, camera frames over I2C and the pixel port, and UART input."""
     machine = emu.load(image("clustering"), engine=engine, board=partial(Epuck, selector=START))
     assert machine.board.camera is not None
     machine.board.camera.show(np.full((480, 640, 3), (200, 20, 20), np.uint8))
@@ -60,13 +60,16 @@ def test_every_state_is_had_again_to_the_bit(image: Build, engine: str) -> None:
     assert not history.step_back()
     assert history.advance(end) is None
     assert machine.snapshot() == present
-    assert history.size < 20 * len(history._kept) * 1024 + (1 << 18)
+    assert history.size < 20 * len(history._states) * 1024 + (1 << 18)
 
 
 @pytest.mark.parametrize("seed", [7, 10, 1006])
-def test_random_walks_back_meet_what_was_there(image: Build, seed: int) -> None:
-    """Three of the campaign. In the first, input comes while the CPU sleeps, and a step back passes it; in the last a
-    kept state stands between an interrupt's entry and its first instruction."""
+def test_random_walks_back_restore_every_state(image: Build, seed: int) -> None:
+    """Three walks of the campaign (tests/fuzz/fuzz_reverse.py).
+
+    In the first, a step back passes input that arrives while the CPU sleeps. In the last, a stored state lies between
+    the entry of an interrupt and its first instruction.
+    """
     app = list(APPS)[seed % 5 == 0]
     tally: Counter[str] = Counter()
     walk(image(app), APPS[app], seed, tally)
@@ -86,12 +89,12 @@ def test_back_to_a_breakpoint_and_to_the_last_write(image: Build) -> None:
     history.advance(1_000_000)
     machine.poke("mistake", 9)
     history.advance(1_200_000)
-    told = len(calls)
+    count = len(calls)
     sleep = machine.program_address("Sys_Sleep")
     for expected in reversed(calls[-5:]):
         assert history.run_back([sleep]) == sleep
         assert machine.cycle == expected
-    assert len(calls) == told, "what was told is not told again"
+    assert len(calls) == count, "a replay must call no hook"
     history.seek(history.end)
     assert history.run_back([sleep], lambda: machine.w[0] == 5) == sleep
     assert machine.w[0] == 5
@@ -114,8 +117,8 @@ def test_back_to_a_breakpoint_and_to_the_last_write(image: Build) -> None:
     remove_calls()
 
 
-def test_the_first_instruction_of_a_handler_is_a_place_to_stand(image: Build) -> None:
-    """Entering an interrupt is a step of its own: forward from the instruction before, and back from the one behind."""
+def test_the_entry_of_an_interrupt_is_a_step_of_its_own(image: Build) -> None:
+    """Forward from the instruction before the interrupt, and back from the first instruction of the handler."""
     machine = emu.load(image("culprit", TARGET_APPS))
     machine.run(until="main")
     history = History(machine)
@@ -138,7 +141,7 @@ def test_the_first_instruction_of_a_handler_is_a_place_to_stand(image: Build) ->
     assert (machine.cycle, machine.snapshot()) == entered
 
 
-def test_a_change_in_the_past_is_a_new_present(image: Build) -> None:
+def test_a_change_in_the_past_makes_a_new_present(image: Build) -> None:
     machine = emu.load(image("culprit", TARGET_APPS))
     history = History(machine)
     assert history.advance(1_000_000) is None

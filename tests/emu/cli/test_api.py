@@ -1,4 +1,4 @@
-"""The Python interface does what its names and docstrings say."""
+"""Tests of the Python interface."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ main:
 
 @pytest.fixture
 def load(tmp_path):
-    """Machines with programs."""
+    """A function that assembles a program and loads it into a machine."""
 
     def make(source, vectors=None, **options):
         path = tmp_path / "program.elf"
@@ -54,7 +54,7 @@ def test_peek_of_registers_by_size(load):
 
 
 @pytest.mark.parametrize(("place", "size"), [(0x27FF, 2), (0x2800, 1), (-2, 2), (0x800, 0), (0xFFFF, 2)])
-def test_memory_that_is_not_there_is_refused(load, place, size):
+def test_unimplemented_memory_is_refused(load, place, size):
     machine = load(WORDS)
     with pytest.raises(ValueError, match="data space"):
         machine.peek(place, size)
@@ -63,7 +63,7 @@ def test_memory_that_is_not_there_is_refused(load, place, size):
 
 
 @pytest.mark.parametrize(("place", "size"), [(0x800, 4), (0x801, 2)])
-def test_read_and_write_access_as_an_instruction_can(load, place, size):
+def test_read_and_write_accept_what_an_instruction_can_access(load, place, size):
     machine = load(WORDS)
     with pytest.raises(ValueError, match="an instruction accesses"):
         machine.read(place, size)
@@ -71,7 +71,7 @@ def test_read_and_write_access_as_an_instruction_can(load, place, size):
         machine.write(place, 1, size)
 
 
-def test_hooks_and_runs_take_names(load):
+def test_hooks_and_runs_accept_names(load):
     machine = load(SPIN)
     seen = []
     remove = machine.hook_pc("spin", lambda: seen.append(machine.cycle))
@@ -85,7 +85,7 @@ def test_hooks_and_runs_take_names(load):
 
 
 @pytest.mark.parametrize("place", ["nothing", "counter"])
-def test_a_hook_that_could_never_fire_is_refused(load, place):
+def test_a_hook_at_no_instruction_is_refused(load, place):
     machine = load(SPIN)
     with pytest.raises(KeyError, match=place):
         machine.hook_pc(place, lambda: None)
@@ -97,8 +97,8 @@ def test_a_hook_that_could_never_fire_is_refused(load, place):
 
 
 @pytest.mark.parametrize("board", ["epuck", "none"])
-def test_everyone_who_listens_hears(load, board):
-    """With a robot around the chip, the radio listens as well."""
+def test_every_listener_receives_the_bytes(load, board):
+    """On an e-puck, the Bluetooth radio is a listener as well."""
     machine = load(HELLO, board=board)
     said: list[tuple[str, int]] = []
     removed = machine.uart[1].listen(lambda byte, _cycle: said.append(("removed", byte)))
@@ -165,7 +165,7 @@ def test_a_byte_reaches_a_program_through_either_end_of_the_radio(load):
     assert heard == b"bc"
 
 
-def test_help_names_what_there_is_in_lines_that_can_be_read():
+def test_help_lists_the_interface_in_short_lines():
     text = pydoc.plain(pydoc.render_doc(emu))
     for name in ("load(", "class Machine", "class Stop", "watch(", "FCY_HZ"):
         assert name in text

@@ -1,4 +1,4 @@
-"""Variables, call stacks, calls and expectations by the names of the source, on programs of our own compiler."""
+"""Variables, call stacks, function calls and UART expectations by source names, with compiled programs."""
 
 from __future__ import annotations
 
@@ -126,7 +126,7 @@ GLOBALS = [
     ("robot.gain * .1f == .05f && .1f * .1f != .1 * .1", 1),
     ("0.1f * 0.1f == (float)0.01", 0),
     ("1 ? -1 : 1u", 0xFFFF),
-    ("0 && sizeof(nobody)", 0),
+    ("0 && sizeof(unknown)", 0),
 ]
 
 
@@ -148,7 +148,7 @@ def build(tmp_path_factory):
 
 @pytest.fixture(params=["-O0", "-Os"])
 def machine(build, request):
-    """Stopped in `inner`, as deep as it goes."""
+    """A machine paused in the deepest call of `inner`."""
     made = emu.load(build(request.param))
     made.run(until="main")
     made.uart[1].expect("ready", within=20)
@@ -164,7 +164,7 @@ def test_expressions_of_c(machine, expression, value):
     ("expression", "value"), [("robot.speed[1]", -9), ("robot.place.mode", 30), ("robot.place.low", -8), ("small", 7),
                               ("robot.gain", 1.25), ("robot.big", 1 << 60), ("robot.u.parts[0]", 1), ("LATB", 0x1234)],
 )  # fmt: skip
-def test_what_is_set_is_had_back_and_nothing_else_changes(machine, expression, value):
+def test_an_assignment_changes_one_object_only(machine, expression, value):
     place = machine.value(expression)
     around = machine.peek_bytes(place.address - 2, 20) if place.address >= 0x800 else None
     machine.set_var(expression, value)
@@ -179,26 +179,26 @@ def test_what_is_set_is_had_back_and_nothing_else_changes(machine, expression, v
 
 @pytest.mark.parametrize(
     ("expression", "words"),
-    [("nobody", "nothing called 'nobody'"), ("robot.weight", "no member 'weight'"), ("robot +", "ends too early"),
+    [("unknown", "nothing called 'unknown'"), ("robot.weight", "no member 'weight'"), ("robot +", "ends too early"),
      ("robot * 2", "is no number"), ("hidden[3]", "elements 0 to 2"), ("1 / 0", "zero"), ("small small", "too much"),
      ("", "empty"), ("a ` b", "not understood"), ("&5", "no address"),
      ("&robot.place.mode", "no address"), ("09", "no number of C"), ("9" * 5000, "no number of C"),
      ("'\\q'", "no char"),
      ("1?" * 4000 + "1" + ":1" * 4000, "inside one another"), ("robot.speed + 1.5", "needs whole numbers"),
      ("robot.speed[1e0]", "needs whole numbers"),
-     ("(struct nobody *)0x800", "nothing called 'struct nobody'"), ("(long char)1", "'long char' is no type"),
+     ("(struct unknown *)0x800", "nothing called 'struct unknown'"), ("(long char)1", "'long char' is no type"),
      ("(int", "expected ')'"), ("(struct point)1", "no struct point"), ("(int)robot", "no int"),
      ("*(void *)0x800", "has no value"), ("sizeof robot.place.mode", "bit field has no size"),
      ("sizeof(void)", "size of void is not known"), ("(int)(1e308 * 10)", "inf is no whole"),
-     ("(int[0])1", "number of elements"), ("sizeof nobody", "nothing called 'nobody'"), ("(int)" * 99 + "1", "inside"),
+     ("(int[0])1", "number of elements"), ("sizeof unknown", "nothing called 'unknown'"), ("(int)" * 99 + "1", "inside"),
      ("5", "names no object")],
 )  # fmt: skip
-def test_what_means_nothing_is_refused(machine, expression, words):
+def test_invalid_expressions_are_refused(machine, expression, words):
     with pytest.raises(ValueError, match=re.escape(words)):
         machine.value(expression)
 
 
-def test_what_the_linker_left_out_is_said_to_be(build):
+def test_a_variable_removed_by_the_linker_is_reported(build):
     machine = emu.load(build("-O0"))
     with pytest.raises(Unavailable, match="nothing uses it"):
         machine.var("unused_one")
@@ -227,24 +227,24 @@ int main(void)
 """
 
 
-def test_who_is_interrupted_has_what_it_had_just_before(build):
-    """Also where a variable changes its place at that very instruction: there the frame does not wait for a call."""
+def test_an_interrupted_frame_keeps_its_locals(build):
+    """Also if a variable changes its place at the interrupted instruction: the frame is not inside a call."""
     machine = emu.load(build("-Os", source=INTERRUPTED), board=None)
     machine.run(until="main")
-    inside = machine.inspector
+    inspector = machine.inspector
 
     def locals_of(frame):
-        return [(one.name, shown(one, frame)) for one in inside.variables(frame)]
+        return [(one.name, shown(one, frame)) for one in inspector.variables(frame)]
 
     def shown(one, frame):
         with contextlib.suppress(Unavailable):
-            return inside.value(one, frame).get()
+            return inspector.value(one, frame).get()
         return None
 
     handler, history = machine.program_address("_T1Interrupt"), History(machine)
     interrupted: set[int] = set()
     before: list[tuple[str, int | None]] = []
-    for _ in range(3000):  # the timer's period changes, so interrupts fall on one instruction after the other
+    for _ in range(3000):  # the timer's period changes, so every instruction is interrupted at some time
         pc = machine.pc
         history.step()
         top, *callers = machine.backtrace()
@@ -274,7 +274,7 @@ def test_locals_of_every_frame_at_O0(build):
         wide += 2 * depth + 1
 
 
-def test_a_local_is_right_or_optimised_out(build):
+def test_a_local_is_correct_or_optimised_out(build):
     machine = emu.load(build("-Os"))
     machine.run(until="inner")
     start = machine.inspector.debug.function(machine.pc)
@@ -291,7 +291,7 @@ def test_a_local_is_right_or_optimised_out(build):
 
 @pytest.mark.parametrize("level", ["-O0", "-Os"])
 @pytest.mark.parametrize("engine", ["plain", "jit"])
-def test_a_function_is_called_and_the_program_goes_on_as_if_not(build, level, engine):
+def test_a_call_leaves_the_program_undisturbed(build, level, engine):
     machine = emu.load(build(level), engine=engine)
     machine.run(until="inner")
     assert machine.call("crc16", b"123456789", 9) == 0x4B37
@@ -300,12 +300,12 @@ def test_a_function_is_called_and_the_program_goes_on_as_if_not(build, level, en
         machine.call("crc16", 1)
     with pytest.raises(ValueError, match="does not fit"):
         machine.call("mixed", 1000, 0, 0, 0)
-    with pytest.raises(KeyError, match="nobody"):
-        machine.call("nobody")
+    with pytest.raises(KeyError, match="unknown"):
+        machine.call("unknown")
     assert machine.uart[1].expect(re.compile(rb"done (\d+)\n"), within=50)[1] == b"46"
 
 
-def test_a_function_that_does_not_return_is_told(build):
+def test_a_function_that_does_not_return_is_an_error(build):
     machine = emu.load(build("-Os"))
     machine.run(until="main")
     with pytest.raises(CallError, match="did not return: Stop\\(reason='limit'"):
@@ -316,7 +316,7 @@ def test_a_function_that_does_not_return_is_told(build):
         machine.call("broken")
 
 
-def test_expect_goes_on_behind_the_last_match_and_stops_at_the_byte(build):
+def test_expect_continues_after_the_last_match_and_stops_at_the_byte(build):
     machine = emu.load(build("-Os"))
     ends = []
     machine.uart[1].listen(lambda byte, start: ends.append((chr(byte), start)))
@@ -342,8 +342,8 @@ int main(void) { U1BRG = 7; U1MODE = 0x8000; U1STA = 0x400; PR1 = 9999; IEC0bits
 
 
 @pytest.mark.parametrize("engine", ["jit", "plain"])
-def test_expect_stops_at_the_byte_in_a_firmware_that_sleeps(build, engine):
-    """Native code went on to the end of the time."""
+def test_expect_stops_at_the_byte_while_the_firmware_sleeps(build, engine):
+    """Native code must not run past the byte."""
     machine = emu.load(build("-Os", source=SLEEPER), engine=engine)
     said = []
     machine.uart[1].listen(lambda byte, start: said.append(start))
@@ -352,13 +352,13 @@ def test_expect_stops_at_the_byte_in_a_firmware_that_sleeps(build, engine):
         assert machine.cycle - said[-1] == 10 * 16 * 8  # ten bits of 16 (U1BRG + 1) Tcy
 
 
-def test_expect_tells_a_fault(build):
+def test_expect_reports_a_fault(build):
     machine = emu.load(build("-O0", source="int main(void) { *(volatile int *)0x3001 = 1; return 0; }"))
     with pytest.raises(ExpectError, match=r"(?s)writing 2 bytes at 0x3001.*#0 main"):
         machine.uart[1].expect("anything", within=5)
 
 
-def test_looking_changes_nothing(machine):
+def test_inspection_changes_nothing(machine):
     before = machine.snapshot()
     machine.backtrace()
     machine.var("robot")

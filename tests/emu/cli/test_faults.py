@@ -1,4 +1,4 @@
-"""Faults are told so that one finds the bug: C programs with one mistake each, built with our own compiler."""
+"""Fault reports name the mistake: C programs with one mistake each, built with the project's compiler."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ CHECKS = {
 
 @pytest.fixture
 def build(tmp_path):
-    """Builds C and returns the image's path."""
+    """A function that compiles C source and returns the path of the image."""
 
     def make(source, *options):
         path = tmp_path / "program.c"
@@ -66,7 +66,7 @@ def build(tmp_path):
 
 
 def fault(path, **options):
-    """The fault of a run through the Python interface, which is that of the command line as well."""
+    """Return the fault of a run through the Python interface; the command line reports the same."""
     stop = emu.load(path).run(seconds=1, **options)
     assert stop.reason == "fault", stop
     assert stop.fault is not None
@@ -85,7 +85,7 @@ def test_a_division_by_zero_is_a_fault_in_python_too(build):
     assert dict(found.frames[0].variables) == {"n": "10"}
 
 
-def test_command_line_json_and_python_tell_the_same(build, capfd):
+def test_command_line_json_and_python_report_the_same(build, capfd):
     path = build(DIVISION)
     found = fault(path)
     assert main(["run", path, "--json"]) == 1
@@ -97,7 +97,7 @@ def test_command_line_json_and_python_tell_the_same(build, capfd):
 
 
 @pytest.mark.parametrize("level", ["-O0", "-Os"])
-def test_recursion_without_end_is_a_stack_overflow_in_the_function_that_recurs(build, level):
+def test_endless_recursion_is_a_stack_overflow_in_the_recursive_function(build, level):
     found = fault(build(RECURSION, level))
     assert found.cause.startswith("stack overflow: W15 is 0x2")
     assert "the limit 0x27f0" in found.cause
@@ -107,7 +107,7 @@ def test_recursion_without_end_is_a_stack_overflow_in_the_function_that_recurs(b
 
 @pytest.mark.parametrize("level", ["-O0", "-Os"])
 @pytest.mark.parametrize("where", [0x9876, 0x17F00])
-def test_a_jump_into_nowhere_is_told_with_where_it_came_from(build, level, where):
+def test_a_wild_jump_is_reported_with_its_origin(build, level, where):
     found = fault(
         build(
             WILD.replace("volatile unsigned where", "volatile unsigned long where").replace("WHERE", f"{where}ul"),
@@ -123,21 +123,21 @@ def test_a_jump_into_nowhere_is_told_with_where_it_came_from(build, level, where
 
 
 @pytest.mark.parametrize("level", ["-O0", "-Os"])
-def test_a_call_to_0_is_noticed_at_once(build, level):
+def test_a_call_to_address_0_is_reported_at_the_call(build, level):
     found = fault(build(WILD.replace("WHERE", "0"), level))
     assert found.cause == "call to address 0 (a null function pointer?)"
     assert found.branches[-1].source == found.pc
     assert found.line.endswith("program.c:4")
 
 
-def test_a_return_through_a_smashed_stack_is_told_as_such(build):
+def test_a_return_through_a_smashed_stack_is_reported(build):
     found = fault(build(RETURN.replace("WHERE", "0x7A")))
     assert "return to 0x7a007a" in found.cause
     assert found.function == "smash"
 
 
 @pytest.mark.parametrize("level", ["-O0", "-Os"])
-def test_a_bad_store_is_told_with_address_and_variables(build, level):
+def test_a_bad_store_is_reported_with_address_and_variables(build, level):
     found = fault(build(STORE, level))
     assert found.cause.startswith("address error trap: writing 2 bytes at 0x3001, an odd address")
     assert functions(found)[:2] == ["set", "main"]
@@ -159,13 +159,13 @@ def test_a_check_of_the_sanitizer_that_fails_is_a_fault(build, capfd, level, sou
     assert "undefined behaviour" in capfd.readouterr().err
 
 
-def test_a_trap_the_program_asks_for_is_a_fault_and_a_breakpoint_is_none(build):
+def test_builtin_trap_is_a_fault_and_a_software_breakpoint_is_none(build):
     assert fault(build("int main(void) { __builtin_trap(); }")).cause == "__builtin_trap(),"
     stop = emu.load(build("int main(void) { __builtin_software_breakpoint(); return 0; }")).run(seconds=1)
     assert (stop.reason, stop.fault) == ("breakpoint", None)
 
 
-def test_a_trap_in_an_interrupt_shows_whom_it_interrupted(build):
+def test_a_trap_in_an_interrupt_shows_the_interrupted_function(build):
     found = fault(build("""
 #include <p30F6014A.h>
 volatile int zero, seconds;
@@ -180,8 +180,8 @@ int main(void) { PR1 = 1000; IEC0bits.T1IE = 1; T1CON = 0x8000; wait(0); }
 
 
 @pytest.mark.parametrize("engine", ["plain", "jit"])
-def test_engines_and_pieces_tell_the_same(build, engine):
-    """However the run is cut and whatever runs it, and the machine stands afterwards as if nobody had looked."""
+def test_the_report_depends_on_neither_engine_nor_slices(build, engine):
+    """Any division of the run and any engine give the same stop, and the diagnosis does not change the machine."""
     path = build(DIVISION)
     whole = emu.load(path)
     expected = whole.run(seconds=1)
@@ -190,13 +190,13 @@ def test_engines_and_pieces_tell_the_same(build, engine):
         pass
     assert stop == expected
     assert machine.snapshot() == whole.snapshot()
-    unexplained = emu.load(path, engine=engine)
-    unexplained.image = None
-    unexplained.run(seconds=1)
-    assert machine.snapshot() == unexplained.snapshot()
+    undiagnosed = emu.load(path, engine=engine)
+    undiagnosed.diagnose = None
+    undiagnosed.run(seconds=1)
+    assert machine.snapshot() == undiagnosed.snapshot()
 
 
-def test_who_listens_is_not_told_twice(build):
+def test_the_diagnosis_calls_no_observer(build):
     machine = emu.load(build("""
 #include <stdio.h>
 volatile int zero;
@@ -211,8 +211,8 @@ int main(void) { printf("before\\n"); for (volatile int i = 0; i < 3000; i++) { 
     assert (len(calls), bytes(writes)) == (1, b"before\n")
 
 
-def test_input_that_a_listener_gave_spoils_no_report(build):
-    """What a callback feeds in the middle of a run cannot be known when it is run again: no branches, but the rest."""
+def test_input_from_a_callback_leaves_a_report_without_branches(build):
+    """A replay cannot repeat what a callback feeds during a run: the report has no branches, but all the rest."""
     machine = emu.load(build("""
 #include <p30F6014A.h>
 #include <stdio.h>

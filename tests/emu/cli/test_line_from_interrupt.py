@@ -67,7 +67,7 @@ def test_the_line_is_on_the_terminal(image: Path) -> None:
 
 @pytest.mark.parametrize("engine", ["plain", "jit"])
 def test_every_start_bit_is_on_the_next_edge_of_the_bit_clock(image: Path, engine: str) -> None:
-    """dspic30f6014a.md §10.1: the clock runs from the cycle behind the write of UARTEN; bytes come 2,000 Tcy apart."""
+    """The bit clock runs from the cycle after the write of UARTEN (dspic30f6014a.md §10.1)."""
     machine = load(image, engine=engine)
     enabled: list[int] = []
     written: list[int] = []

@@ -1,4 +1,4 @@
-"""Strict runs find what the hardware lets pass, and nothing in programs that are right."""
+"""Strict mode reports accesses that the hardware permits, and accepts correct programs."""
 
 from __future__ import annotations
 
@@ -16,9 +16,10 @@ MISTAKES = {
         "uninitialised read of 2 bytes",
     "int f(void) { volatile int a[8]; a[7] = 1; return a[7]; } int g(void) { volatile int b[8]; return b[7]; }"
     "int main(void) { f(); return g(); }": "uninitialised read of 2 bytes",
-    "int kept __attribute__((persistent)); int main(void) { return kept; }": "uninitialised read of 2 bytes at 0x0802 (kept)",
+    "int kept __attribute__((persistent)); int main(void) { return kept; }":
+        "uninitialised read of 2 bytes at 0x0802 (kept)",
 }  # fmt: skip
-RIGHT = """
+CORRECT = """
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -54,7 +55,7 @@ def build(tmp_path):
 
 
 @pytest.mark.parametrize(("source", "cause"), MISTAKES.items())
-def test_a_mistake_is_a_fault_only_if_strict(build, source, cause):
+def test_a_mistake_is_a_fault_in_strict_mode_only(build, source, cause):
     path = build(source)
     assert emu.load(path).run(seconds=0.1).reason == "halt"
     stop = emu.load(path, strict=True).run(seconds=0.1)
@@ -66,8 +67,8 @@ def test_a_mistake_is_a_fault_only_if_strict(build, source, cause):
 
 
 @pytest.mark.parametrize("level", ["-O0", "-O1", "-O2", "-Os"])
-def test_a_program_that_is_right_runs_as_ever(build, level):
-    path = build(RIGHT, level)
+def test_a_correct_program_runs_as_without_strict_mode(build, level):
+    path = build(CORRECT, level)
     plain, strict = emu.load(path), emu.load(path, strict=True)
     expected = plain.run(seconds=0.1)
     assert expected.reason == "halt"
@@ -75,7 +76,7 @@ def test_a_program_that_is_right_runs_as_ever(build, level):
     assert plain.w[0] == strict.w[0] == 13
 
 
-def test_memory_set_from_outside_is_written(build):
+def test_a_poke_initialises_memory(build):
     path = build("int kept __attribute__((persistent)); int main(void) { return kept; }")
     machine = emu.load(path, strict=True)
     machine.poke("kept", 7)
@@ -83,7 +84,7 @@ def test_memory_set_from_outside_is_written(build):
     assert machine.w[0] == 7
 
 
-def test_a_strict_run_has_the_plain_engine(build):
+def test_strict_mode_uses_the_plain_engine(build):
     path = build("int main(void) { return 0; }")
     assert emu.load(path, strict=True).engine == "plain"
     with pytest.raises(ValueError, match="plain"):

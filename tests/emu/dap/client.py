@@ -1,4 +1,4 @@
-"""A small client of the Debug Adapter Protocol over the standard streams of `emu debug` or another command."""
+"""Client of the Debug Adapter Protocol over the standard streams of `emu debug` or another command."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ PATIENCE = 200
 
 
 class Client:
-    """Sends requests, waits for responses, keeps events."""
+    """Sends requests, waits for responses and stores events."""
 
     def __init__(self, *words: str) -> None:
         command = [sys.executable, "-m", *(words or ("emu", "debug"))]
@@ -38,10 +38,10 @@ class Client:
         try:
             return self.inbox.get(timeout=PATIENCE)
         except Empty:
-            raise AssertionError("the adapter says nothing") from None
+            raise AssertionError("the adapter does not respond") from None
 
     def send(self, command: str, **arguments: Any) -> int:
-        """Send a request; its number."""
+        """Send a request and return its number."""
         self.seq += 1
         body = json.dumps({"seq": self.seq, "type": "request", "command": command, "arguments": arguments}).encode()
         assert self.process.stdin is not None
@@ -50,14 +50,14 @@ class Client:
         return self.seq
 
     def ask(self, command: str, **arguments: Any) -> dict[str, Any]:
-        """The body of the response to a request that must succeed."""
+        """Send a request that must succeed and return the body of the response."""
         reply = self.asked(command, **arguments)
         assert reply["success"], reply
         body: dict[str, Any] = reply["body"]
         return body
 
     def asked(self, command: str, **arguments: Any) -> dict[str, Any]:
-        """The whole response."""
+        """Send a request and return the whole response."""
         number = self.send(command, **arguments)
         while True:
             message = self._next()
@@ -66,7 +66,7 @@ class Client:
             self.events.append(message)
 
     def event(self, name: str) -> dict[str, Any]:
-        """The body of the next event of that name."""
+        """Return the body of the next event `name`."""
         while True:
             for place, message in enumerate(self.events):
                 if message["type"] == "event" and message["event"] == name:
@@ -76,25 +76,25 @@ class Client:
             self.events.append(self._next())
 
     def said(self) -> str:
-        """Output so far."""
+        """Return the output so far."""
         return "".join(e["body"]["output"] for e in self.events if e["type"] == "event" and e["event"] == "output")
 
     def start(self, program: str, **arguments: Any) -> None:
-        """Initialize and launch."""
+        """Initialize the adapter and launch a program."""
         self.ask("initialize", clientID="test", adapterID="emu", pathFormat="path")
         self.ask("launch", program=program, **arguments)
         self.event("initialized")
 
     def top(self) -> dict[str, Any]:
-        """The innermost frame."""
+        """Return the innermost frame."""
         frame: dict[str, Any] = self.ask("stackTrace", threadId=1, startFrame=0, levels=1)["stackFrames"][0]
         return frame
 
     def evaluate(self, expression: str, context: str = "watch") -> str:
-        """The text of an expression in the innermost frame."""
+        """Return the value of an expression in the innermost frame as text."""
         return str(self.ask("evaluate", expression=expression, context=context, frameId=self.top()["id"])["result"])
 
     def close(self) -> None:
-        """Leave."""
+        """Disconnect and wait for the adapter to end."""
         self.send("disconnect")
         assert self.process.wait(timeout=PATIENCE) == 0

@@ -1,4 +1,4 @@
-"""The protocol's test-support package from npm: a client that others wrote, run by mocha."""
+"""An independent client: the test-support package of the protocol from npm, run by mocha."""
 
 from __future__ import annotations
 
@@ -15,8 +15,10 @@ PACKAGES = ("@vscode/debugadapter-testsupport@1.68", "mocha@11")
 
 
 def node_modules(folder: Path) -> Path:
-    """A folder with the packages, installed in `folder`; those of EMU_DAP_NODE_MODULES if it is set. Skips the test if
-    that cannot be done."""
+    """Install the packages in `folder` and return their path; EMU_DAP_NODE_MODULES replaces it if set.
+
+    Skips the test if they cannot be installed.
+    """
     given = os.environ.get("EMU_DAP_NODE_MODULES")
     if given:
         return Path(given)
@@ -33,7 +35,7 @@ def node_modules(folder: Path) -> Path:
 
 
 def mocha(modules: Path, script: Path, **environment: str) -> str:
-    """What a script's tests printed; all must have passed."""
+    """Run the tests of a script, which must pass, and return their output."""
     given = {"NODE_PATH": str(modules), "EMU_PYTHON": sys.executable, "EMU_ROOT": str(ROOT), "PYTHONPATH": str(ROOT)}
     done = subprocess.run(
         ["node", str(modules / "mocha" / "bin" / "mocha.js"), str(script)],

@@ -1,4 +1,4 @@
-"""The same conversation by a client that others wrote: the protocol's test-support package from npm."""
+"""Conformance test with an independent client: the test-support package of the protocol from npm."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ def modules(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return node_modules(tmp_path_factory.mktemp("npm"))
 
 
-@pytest.mark.parametrize("way", ["stdio", "tcp"])
-def test_the_test_support_package_is_content(modules: Path, tmp_path: Path, way: str) -> None:
+@pytest.mark.parametrize("transport", ["stdio", "tcp"])
+def test_the_server_passes_the_test_support_package(modules: Path, tmp_path: Path, transport: str) -> None:
     image = tmp_path / "program.elf"
     assert driver.main(["-g", "-O0", str(SOURCE), "-o", str(image)]) == 0
     launcher = tmp_path / "launcher.py"
@@ -30,7 +30,7 @@ def test_the_test_support_package_is_content(modules: Path, tmp_path: Path, way:
     environment = {"EMU_LAUNCHER": str(launcher), "EMU_PROGRAM": str(image), "EMU_SOURCE": str(SOURCE),
                    "EMU_LINES": json.dumps(lines)}  # fmt: skip
     server = None
-    if way == "tcp":
+    if transport == "tcp":
         server = subprocess.Popen(
             [sys.executable, "-m", "emu", "debug", "--port", "0"], stderr=subprocess.PIPE, text=True, cwd=ROOT
         )
@@ -39,9 +39,9 @@ def test_the_test_support_package_is_content(modules: Path, tmp_path: Path, way:
         assert found is not None
         environment["EMU_PORT"] = found[1]
     try:
-        told = mocha(modules, Path(__file__).with_name("conformance.js"), **environment)
+        output = mocha(modules, Path(__file__).with_name("conformance.js"), **environment)
     finally:
         if server is not None:
             server.terminate()
             server.wait(timeout=30)
-    assert "3 passing" in told
+    assert "3 passing" in output

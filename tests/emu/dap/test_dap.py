@@ -1,4 +1,4 @@
-"""The Debug Adapter Protocol server, driven over its standard streams."""
+"""Tests of the Debug Adapter Protocol server over its standard streams."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ SOURCE = Path(__file__).parent / "program.c"
 
 
 def line_of(text: str) -> int:
-    """Line of the program that contains `text`."""
+    """Return the number of the line of the program that contains `text`."""
     return next(n for n, line in enumerate(SOURCE.read_text().splitlines(), 1) if text in line)
 
 
@@ -40,7 +40,7 @@ def client() -> Iterator[Client]:
 
 @pytest.fixture
 def stopped(client: Client, program: str) -> Callable[..., Client]:
-    """A client whose machine stands at the given line for the first time."""
+    """Return a client whose machine is paused at the first arrival at a line."""
 
     def stop(text: str, **more: Any) -> Client:
         client.start(program)
@@ -158,13 +158,13 @@ def test_back_by_line_instruction_and_breakpoint(stopped: Callable[..., Client])
     seen = []
     while True:
         client.ask("reverseContinue", threadId=1)
-        halt = client.event("stopped")
-        if halt["reason"] == "entry":
+        event = client.event("stopped")
+        if event["reason"] == "entry":
             break
-        assert halt["reason"] == "breakpoint"
+        assert event["reason"] == "breakpoint"
         seen.append((client.evaluate("a"), client.evaluate("b"), client.evaluate("total")))
     assert seen == [("1", "0", "0"), ("0", "0", "0"), ("0", "0", "0")]
-    assert halt["description"] == "start of recording"
+    assert event["description"] == "start of recording"
 
 
 def test_data_breakpoints_and_the_last_write(stopped: Callable[..., Client]) -> None:
@@ -173,13 +173,13 @@ def test_data_breakpoints_and_the_last_write(stopped: Callable[..., Client]) -> 
     assert info["accessTypes"] == ["read", "write", "readWrite"]
     client.ask("setDataBreakpoints", breakpoints=[{"dataId": info["dataId"], "accessType": "write"}])
     client.ask("continue", threadId=1)
-    halt = client.event("stopped")
-    assert halt["reason"] == "data breakpoint"
+    event = client.event("stopped")
+    assert event["reason"] == "data breakpoint"
     assert client.evaluate("(unsigned char)pairs[1].second") == "8"
     client.ask("setDataBreakpoints", breakpoints=[])
     client.ask("evaluate", expression="/lastwrite total", context="repl")
-    halt = client.event("stopped")
-    assert "0400 -> 0800" in halt["description"]
+    event = client.event("stopped")
+    assert "0400 -> 0800" in event["description"]
     assert (client.top()["name"], client.top()["line"]) == ("add", line_of("total = sum;"))
     assert client.evaluate("total") == "4"
     assert "before the present" in client.evaluate("/time", "repl")
@@ -189,9 +189,9 @@ def test_a_fault_is_an_exception_with_its_report(client: Client, program: str) -
     client.start(program)
     client.ask("setExceptionBreakpoints", filters=["fault"])
     client.ask("configurationDone")
-    halt = client.event("stopped")
-    assert halt["reason"] == "exception"
-    assert "reading 2 bytes at 0x3009, an odd address" in halt["text"]
+    event = client.event("stopped")
+    assert event["reason"] == "exception"
+    assert "reading 2 bytes at 0x3009, an odd address" in event["text"]
     assert "#0 main at" in client.ask("exceptionInfo", threadId=1)["description"]
     assert "total 8\n" in client.said()
 
@@ -277,7 +277,7 @@ def test_a_run_is_paused_and_breakpoints_change_while_it_runs(client: Client, tm
     assert client.top()["line"] == 5
 
 
-ODD: list[tuple[dict[str, Any], str]] = [
+INVALID_LAUNCHES: list[tuple[dict[str, Any], str]] = [
     ({"program": None}, "needs `program`"),
     ({"program": "/nowhere.elf"}, "cannot be read"),
     ({"program": 5}, "`program` must be the path of an ELF file, not 5"),
@@ -294,17 +294,17 @@ ODD: list[tuple[dict[str, Any], str]] = [
 ]
 
 
-def test_a_bad_launch_is_refused_in_words(client: Client) -> None:
+def test_invalid_launch_arguments_are_named(client: Client) -> None:
     client.ask("initialize", adapterID="emu")
-    for arguments, words in ODD:
+    for arguments, words in INVALID_LAUNCHES:
         reply = client.asked("launch", **({"program": "a.elf"} | arguments))
         assert not reply["success"]
         assert words in reply["message"]
     assert not client.asked("continue", threadId=1)["success"]
 
 
-def test_registers_are_told_by_peripheral_and_bit_field(stopped: Callable[..., Client]) -> None:
-    """The request `sfrs` of our own; every path is an expression, and looking changes nothing."""
+def test_registers_are_listed_by_peripheral_and_bit_field(stopped: Callable[..., Client]) -> None:
+    """Custom request `sfrs`: every path is an expression, and reading has no side effect."""
     client = stopped("total = sum;")
     groups = {one["name"]: one["parts"] for one in client.ask("sfrs")["groups"]}
     assert {"CPU core", "UART 1", "Timer 1", "I/O ports", "CAN 2"} <= set(groups)
@@ -319,31 +319,31 @@ def test_registers_are_told_by_peripheral_and_bit_field(stopped: Callable[..., C
     assert (prescaler["value"], client.evaluate(prescaler["path"])) == ("2", "2")
 
 
-def test_a_breakpoint_that_is_there_has_no_problem(client: Client, program: str) -> None:
+def test_a_valid_breakpoint_has_no_message(client: Client, program: str) -> None:
     client.start(program)
     made = client.ask("setFunctionBreakpoints", breakpoints=[{"name": "twice"}, {"name": "thrice"}])["breakpoints"]
     assert made[0] == {"id": 1, "verified": True}
     assert "thrice" in made[1]["message"]
 
 
-WRONG: list[tuple[str, dict[str, Any], str]] = [
+INVALID_REQUESTS: list[tuple[str, dict[str, Any], str]] = [
     ("scopes", {}, "scopes needs `frameId`"),
     ("scopes", {"frameId": 4242}, "frame 4242 is not valid at this stop"),
-    ("evaluate", {"expression": "total", "frameId": 4242}, "frame 4242 is none"),
-    ("variables", {"variablesReference": 4242}, "reference 4242 is none"),
+    ("evaluate", {"expression": "total", "frameId": 4242}, "frame 4242 is not valid"),
+    ("variables", {"variablesReference": 4242}, "reference 4242 is not valid"),
     ("stackTrace", {"threadId": 99}, "there is no thread 99 here"),
     ("setBreakpoints", {"source": {"path": "program.c"}, "breakpoints": [{}]}, "setBreakpoints needs `line`"),
     ("setFunctionBreakpoints", {}, "setFunctionBreakpoints needs `breakpoints`"),
     ("writeMemory", {"memoryReference": "0x800", "data": "!!!"}, "base64"),
-    ("setVariable", {"variablesReference": 4242, "name": "a", "value": "1"}, "reference 4242 is none"),
+    ("setVariable", {"variablesReference": 4242, "name": "a", "value": "1"}, "reference 4242 is not valid"),
 ]
 
 
-def test_requests_that_mean_nothing_are_refused_in_words(stopped: Callable[..., Client]) -> None:
-    """An old frame was taken for the innermost one, so a watch showed another function's variables."""
+def test_invalid_requests_are_refused_with_a_reason(stopped: Callable[..., Client]) -> None:
+    """A reference of an earlier stop is refused and does not denote the innermost frame."""
     client = stopped("total = sum;")
     frame = client.top()["id"]
-    for command, arguments, words in WRONG:
+    for command, arguments, words in INVALID_REQUESTS:
         reply = client.asked(command, **arguments)
         assert not reply["success"]
         assert words in reply["message"]
@@ -364,7 +364,7 @@ def test_requests_that_mean_nothing_are_refused_in_words(stopped: Callable[..., 
 
 
 def framed(command: str, **arguments: Any) -> bytes:
-    """A request as it goes over the wire."""
+    """Return a request as bytes with its header."""
     body = json.dumps({"seq": 1, "type": "request", "command": command, "arguments": arguments}).encode()
     return b"Content-Length: %d\r\n\r\n%s" % (len(body), body)
 
@@ -380,20 +380,20 @@ def framed(command: str, **arguments: Any) -> bytes:
         (framed("initialize")[:-5], 0, "the input ends after 66 of 71 bytes of a message"),
         (framed("initialize") + b"Content-Length: 5\r\n\r\n{nope", 1, "a message is not valid JSON: '{nope'"),
         (b"Content-Length: 6\r\n\r\n[1, 2]", 0, "a message is no JSON object: '[1, 2]'"),
-        (b"Content-Length: 90000\r\n\r\n" + b"[" * 90000, 0, "no JSON: '[[[["),
+        (b"Content-Length: 90000\r\n\r\n" + b"[" * 90000, 0, "not valid JSON: '[[[["),
         (framed("initialize").replace(b"\r\n", b"\n"), 0, "the input ends in a message header"),
     ],
 )
-def test_what_is_no_message_is_told(sent: bytes, replies: int, words: str) -> None:
-    """The server left without a word, and with a traceback at a restart before there was anything to restart."""
+def test_a_protocol_error_ends_the_server_with_a_message(sent: bytes, replies: int, words: str) -> None:
+    """Valid input gives status 0 and no error text; a restart before the launch is refused."""
     done = subprocess.run([sys.executable, "-m", "emu", "debug"], input=sent, capture_output=True, timeout=60)
     assert done.stdout.count(b"Content-Length") == replies
     assert done.returncode == (2 if words else 0), done.stderr
-    told = done.stderr.decode()
-    assert (words in told and told.count("\n") == 1) if words else not told
+    errors = done.stderr.decode()
+    assert (words in errors and errors.count("\n") == 1) if words else not errors
 
 
-def test_a_client_that_is_gone_in_mid_run_leaves_the_port_to_the_next(program: str, tmp_path: Path) -> None:
+def test_after_a_lost_connection_the_port_serves_the_next_client(program: str, tmp_path: Path) -> None:
     source, image = tmp_path / "talk.c", tmp_path / "talk.elf"
     source.write_text(
         "#include <p30F6014A.h>\nint main(void) { U1BRG = 7; U1MODE = 0x8000; U1STA = 0x400;"
@@ -406,7 +406,7 @@ def test_a_client_that_is_gone_in_mid_run_leaves_the_port_to_the_next(program: s
     assert server.stderr is not None
     try:
         port = int(server.stderr.readline().rsplit(":", 1)[1])
-        for reset in (b"\1\0\0\0\0\0\0\0", b"\0" * 8):  # with and without data that is thrown away
+        for reset in (b"\1\0\0\0\0\0\0\0", b"\0" * 8):  # with and without discarding unread data
             with socket.create_connection(("127.0.0.1", port), timeout=60) as gone:
                 gone.sendall(framed("launch", program=str(image)) + framed("configurationDone"))
                 seen = b""

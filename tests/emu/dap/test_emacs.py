@@ -1,4 +1,4 @@
-"""A whole session by a second client that others wrote: dap-mode of Emacs, by its own commands."""
+"""A complete session with another independent client: dap-mode of Emacs."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from toolchain.driver import driver
 
 ROOT = Path(__file__).resolve().parents[3]
 SITE = Path("/usr/share/emacs/site-lisp/elpa-src")
-"""Where Debian puts Emacs's packages."""
+"""Folder of Emacs packages on Debian."""
 
 
 def test_a_session_in_emacs(tmp_path: Path) -> None:
-    """Breakpoint, locals, a step, a step back, on, out, back to the breakpoint, and the end."""
+    """Breakpoint, locals, step, step back, continue, step out, reverse continue, disconnect."""
     emacs = shutil.which("emacs")
     if emacs is None or not list(SITE.glob("dap-mode-*")):
-        pytest.skip("Emacs with dap-mode is not there (Debian packages emacs-nox, elpa-dap-mode)")
+        pytest.skip("Emacs with dap-mode is not installed (Debian packages emacs-nox, elpa-dap-mode)")
     image = tmp_path / "program.elf"
     assert driver.main(["-g", "-O0", str(SOURCE), "-o", str(image)]) == 0
     environment = os.environ | {

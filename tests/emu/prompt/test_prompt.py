@@ -1,4 +1,4 @@
-"""The debugger in a terminal: by a script, by a person at a pseudo terminal, and what it shares with the server."""
+"""Tests of the debugger prompt: scripts, a pseudo terminal, and the commands of the server's console."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def program(tmp_path_factory: pytest.TempPathFactory) -> str:
 
 @pytest.fixture
 def play(program: str, capsys: pytest.CaptureFixture[str]) -> type:
-    """Plays scripts in this process: `play(script)` has the output by command, the errors and the exit status."""
+    """Runs scripts in this process: `play(*lines)` has output, errors and exit status."""
 
     class Played:
         def __init__(self, *lines: str) -> None:
@@ -50,10 +50,10 @@ def play(program: str, capsys: pytest.CaptureFixture[str]) -> type:
     return Played
 
 
-def test_a_script_stops_looks_and_goes_back(play: type) -> None:
+def test_a_script_stops_inspects_and_goes_back(play: type) -> None:
     total = line_of("total = sum;")
     played = play(
-        "# as gdb has it", "", f"break program.c:{total} if a == 3 && b == 3", "run", "bt", "p sum", "up", "p/x once",
+        "# a comment", "", f"break program.c:{total} if a == 3 && b == 3", "run", "bt", "p sum", "up", "p/x once",
         "info locals", f"tb {line_of('for (i = 0; i < 500')}", "info breakpoints", "delete 1", "c", "lastwrite total",
         "time", "reverse-finish", "info b",
     )  # fmt: skip
@@ -71,8 +71,8 @@ def test_a_script_stops_looks_and_goes_back(play: type) -> None:
     assert out.endswith("no breakpoints\n")
 
 
-def test_a_function_has_its_parameters_where_it_stops(play: type) -> None:
-    """Also in a condition; before they are stored, they are not told from what was there."""
+def test_a_breakpoint_at_a_function_is_after_the_prologue(play: type) -> None:
+    """Parameters are stored there, also for a condition. Before, they are shown as not set."""
     played = play("break add if a == 3", "run", "info locals", "reverse-stepi", "info locals", "delete",
                   f"break {line_of('int twice(int n)') + 1} if n == 2", "restart", "run", "info locals", "step",
                   "backtrace", "info locals")  # fmt: skip
@@ -95,7 +95,7 @@ def test_a_script_ends_with_the_first_command_that_fails(play: type) -> None:
 
 
 @pytest.mark.parametrize(
-    ("line", "told"),
+    ("line", "message"),
     [
         ("frobnicate", "there is no command frobnicate: try help"),
         ("re", "re is ambiguous: "),
@@ -111,16 +111,16 @@ def test_a_script_ends_with_the_first_command_that_fails(play: type) -> None:
         ("frame 99", "the frames are 0 to 0, not 99"),
         ("thread 9", "there is no thread 9: main"),
         ("goto tomorrow", "expected a number of cycles, not 'tomorrow'"),
-        ("info", "info breakpoints: all of them, by number; frame: "),
+        ("info", "info breakpoints: all breakpoints by number; frame: "),
         ("info sfr NOSUCH", "no register and no peripheral is called NOSUCH"),
         ("set total", "expected PLACE = EXPRESSION"),
         ("list 9", "there is no source here"),
     ],
 )
-def test_what_cannot_be_done_is_told_in_one_line(play: type, line: str, told: str) -> None:
+def test_a_refused_command_prints_one_line(play: type, line: str, message: str) -> None:
     played = play(line)
     assert played.status == 2
-    assert told in played.err
+    assert message in played.err
     assert played.err.count("\n") == 1
 
 
@@ -142,8 +142,8 @@ def test_a_script_that_ends_at_a_fault_has_its_status(play: type) -> None:
     assert play("run", "reverse-stepi").status == 0
 
 
-def test_stops_are_kept_by_number(play: type) -> None:
-    """A breakpoint goes on counting when another one is set; conditions, hit counts and switches can be changed."""
+def test_breakpoints_are_numbered_and_can_be_changed(play: type) -> None:
+    """A breakpoint keeps its hit count when another one is set. Conditions, hit counts and states can be changed."""
     total = line_of("total = sum;")
     played = play(
         f"b program.c:{total}", "hits 1 4", "log program.c:12 a is {a}", "disable 2", "run", "p a + b", "hits 1",
@@ -157,7 +157,7 @@ def test_stops_are_kept_by_number(play: type) -> None:
     assert "1: program.c:13, if a == 4 && b == 4, off\n2: program.c:12, log a is {a}\n3: pairs[1].sec" in played.out
     more = f"b {line_of('return sum;')}"
     counted = play(f"b program.c:{total}", "hits 1 ==6", "run", more, "delete 2", "restart", "c")
-    assert counted.out.count("breakpoint 1\nadd") == 1  # six hits are behind it
+    assert counted.out.count("breakpoint 1\nadd") == 1  # the sixth hit is in the past
 
 
 def test_memory_registers_instructions_sources(play: type) -> None:
@@ -186,9 +186,9 @@ def test_memory_registers_instructions_sources(play: type) -> None:
 def test_reverse_finish_goes_to_the_call(program: str) -> None:
     machine = emu.load(program)
     history = History(machine)
-    said: list[str] = []
+    output: list[str] = []
     prompt = Prompt("test", lambda client: Server(client, lambda _launch: machine, lambda _machine: history))
-    prompt.session.write = said.append  # type: ignore[misc]
+    prompt.session.write = output.append  # type: ignore[misc]
     prompt.session.start({})
     for line in ("break add if b == 2", "run", "next", "next", "reverse-finish"):
         execute(prompt.session, line)
@@ -199,7 +199,7 @@ def test_reverse_finish_goes_to_the_call(program: str) -> None:
 
 
 def test_reverse_step_goes_into_functions(play: type) -> None:
-    """From the second call of `add` through the end of the first into its caller."""
+    """Back from the second call of `add` through the end of the first call into its caller."""
     last = line_of("return add(once, n);")
     played = play(f"break program.c:{last} if n == 2", "run", *["reverse-step"] * 7)
     assert played.status == 0, played.err
@@ -237,7 +237,7 @@ int main(void)
 """
 
 
-def test_reverse_step_passes_interrupts_by(tmp_path: Path) -> None:
+def test_reverse_step_skips_interrupts(tmp_path: Path) -> None:
     source, image = tmp_path / "ticking.c", tmp_path / "ticking.elf"
     source.write_text(TICKING)
     assert driver.main(["-g", "-O0", str(source), "-o", str(image)]) == 0
@@ -288,7 +288,7 @@ def test_help_names_every_command_and_the_guide_every_kind(play: type) -> None:
 
 
 class Terminal:
-    """A program on a pseudo terminal."""
+    """A process on a pseudo terminal."""
 
     def __init__(self, folder: Path, *words: str) -> None:
         main, side = pty.openpty()
@@ -303,7 +303,7 @@ class Terminal:
         self._seen = ""
 
     def expect(self, text: str) -> str:
-        """What was shown up to and with `text`, without the terminal's control sequences."""
+        """Wait for `text` and return the output up to its end, without control sequences."""
         end = time.monotonic() + PATIENCE
         while text not in self._seen:
             assert time.monotonic() < end, self._seen
@@ -327,7 +327,7 @@ class Terminal:
 
 
 def test_at_a_terminal(program: str, tmp_path: Path) -> None:
-    """Completion, repetition, a mistake, an interrupt of what runs, and the history of the session before."""
+    """Completion, repetition by an empty line, an error, a fault, and the history file."""
     terminal = Terminal(tmp_path, "emu", "debug", "--tui", program)
     terminal.expect("(emu)")
     terminal.type("break twi\t")
@@ -355,7 +355,7 @@ def test_at_a_terminal(program: str, tmp_path: Path) -> None:
     assert "break twice" in (tmp_path / "openswarm" / "debug-history").read_text()
 
 
-def test_an_interrupt_makes_a_machine_stand(tmp_path: Path) -> None:
+def test_ctrl_c_pauses_a_running_machine(tmp_path: Path) -> None:
     source = tmp_path / "loop.c"
     source.write_text("volatile unsigned n;\nint main(void)\n{\n    for (;;)\n        n++;\n}\n")
     image = tmp_path / "loop.elf"
