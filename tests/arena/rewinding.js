@@ -1,4 +1,4 @@
-// A robot of a swarm debugged by the protocol's own test-support package: forward, back with the whole world, forward.
+// Debugs one robot of a swarm with the protocol's test-support package: forward, back with the whole world, forward.
 // Run by mocha from test_rewind.py: EMU_PYTHON, EMU_LAUNCHER (starts `arena debug`), EMU_ROOT and NODE_PATH are set.
 const assert = require('assert');
 const { DebugClient } = require('@vscode/debugadapter-testsupport');

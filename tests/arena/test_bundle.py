@@ -1,4 +1,4 @@
-"""A study as one file: packed alike each time, unpacked only as it was, computed again to the byte."""
+"""Bundles: reproducible archives, detection of modified files, verification by repeated trials."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from arena.trial.record import RecordError
 
 @pytest.fixture(scope="module")
 def study(tmp_path_factory: pytest.TempPathFactory, talking_image: Path) -> Path:
-    """Two scripted trials and one with firmware."""
+    """Create runs with two scripted trials and one with firmware."""
     folder = tmp_path_factory.mktemp("study")
     short = ["--minutes", "0.02", "--jobs", "1", "--robots", "2", "--objects", "3"]
     assert (
@@ -41,21 +41,21 @@ def study(tmp_path_factory: pytest.TempPathFactory, talking_image: Path) -> Path
 
 @pytest.fixture
 def packed(study: Path, tmp_path: Path) -> Path:
-    """The study's bundle."""
+    """Pack the study into a bundle."""
     path = tmp_path / "study.zip"
     bundle.pack([study / "script", study / "talk"], path)
     return path
 
 
 def test_the_same_runs_give_the_same_file(study: Path, packed: Path, tmp_path: Path) -> None:
-    """Whenever and in whatever order they are packed."""
+    """The bytes of a bundle do not depend on time or order of the runs."""
     again = tmp_path / "again.zip"
     bundle.pack([study / "talk", study / "script"], again)
     assert again.read_bytes() == packed.read_bytes()
 
 
 def test_a_bundle_is_computed_again_to_the_byte(packed: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """All trials, with firmware and without."""
+    """`verify` reproduces all trials, with firmware and scripted."""
     assert main(["verify", str(packed), "--trials", "9", "--strict"]) == 0
     said = capsys.readouterr().out.splitlines()
     assert said[:3] == [
@@ -69,7 +69,7 @@ def test_a_bundle_is_computed_again_to_the_byte(packed: Path, capsys: pytest.Cap
 def test_another_version_is_told_and_values_are_compared(
     packed: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The file names its versions, so its bytes cannot be the same; what happened can."""
+    """With other versions the bytes differ, because the record names them, but the values can be equal."""
     changed = versions.versions() | {"pymunk": "99"}
     monkeypatch.setattr(campaign, "versions", lambda: changed)
     assert main(["verify", str(packed)]) == 0
@@ -80,7 +80,7 @@ def test_another_version_is_told_and_values_are_compared(
 def test_a_light_bundle_says_as_much(
     study: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Hashes instead of records: equal to the byte, equal in all values, and different in which columns."""
+    """A light bundle distinguishes equal bytes, equal values, and the columns that differ."""
     light, whole = tmp_path / "light.zip", tmp_path / "whole.zip"
     runs = [str(study / "script"), str(study / "talk")]
     assert main(["bundle", "--light", str(light), *runs]) == main(["bundle", str(whole), *runs]) == 0
@@ -110,7 +110,7 @@ def test_a_light_bundle_says_as_much(
 def test_a_record_that_is_not_what_the_plan_gives_is_found(
     study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Somebody exchanged two trials before packing: hashes are right, but computing tells."""
+    """Two trials exchanged before packing have correct hashes, but a repeated trial differs."""
     run = tmp_path / "script"
     run.mkdir()
     for path in (study / "script").iterdir():
@@ -133,7 +133,7 @@ def rewritten(packed: Path, target: Path, change: dict[str, bytes]) -> Path:
 
 
 def listed(packed: Path, change: dict[str, bytes]) -> dict[str, bytes]:
-    """`change`, with the hashes in the bundle's list that it needs."""
+    """Return `change` together with a list of files that has the matching hashes."""
     with zipfile.ZipFile(packed) as archive:
         contents = json.loads(archive.read("bundle.json"))
     contents["files"] |= {name: hashlib.sha256(data).hexdigest() for name, data in change.items()}
@@ -141,7 +141,7 @@ def listed(packed: Path, change: dict[str, bytes]) -> dict[str, bytes]:
 
 
 def test_changed_files_and_archives_that_are_none_are_refused(packed: Path, tmp_path: Path) -> None:
-    """One line each; nothing is written outside the folder."""
+    """Each is refused with a message of one line; no file is written outside the folder."""
     with zipfile.ZipFile(packed) as archive:
         contents = json.loads(archive.read("bundle.json"))
     evil = contents["files"] | {"../evil": "0" * 64}
@@ -164,7 +164,7 @@ def test_changed_files_and_archives_that_are_none_are_refused(packed: Path, tmp_
 
 
 def test_only_runs_can_be_packed(study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Status 2."""
+    """A folder without a finished run is refused with status 2."""
     assert main(["bundle", str(tmp_path / "x.zip"), str(tmp_path)]) == 2
     assert "no finished run" in capsys.readouterr().err
     assert main(["bundle", str(tmp_path / "x.zip"), str(study / "talk"), str(study / "talk")]) == 2
@@ -180,7 +180,7 @@ def test_only_runs_can_be_packed(study: Path, tmp_path: Path, capsys: pytest.Cap
 def test_a_manifest_that_is_no_plan_is_refused(
     change: dict[str, object], said: str, packed: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """One line, status 2, although all hashes fit."""
+    """A manifest with invalid values is refused with one line and status 2, although all hashes match."""
     with zipfile.ZipFile(packed) as archive:
         manifest = json.loads(archive.read("script/manifest.json"))
     manifest["key"] |= change
@@ -198,7 +198,7 @@ DEEP = b"[" * 100_000 + b"]" * 100_000
 def test_nesting_encryption_and_other_compressions_are_refused(
     packed: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """What the readers of zip and JSON raise beside ValueError."""
+    """Exceptions of the zip and JSON readers other than ValueError are reported."""
     rewritten(packed, tmp_path / "list.zip", {"bundle.json": DEEP})
     rewritten(packed, tmp_path / "manifest.zip", listed(packed, {"script/manifest.json": DEEP}))
     flagged = bytearray(packed.read_bytes())
@@ -217,7 +217,7 @@ def test_nesting_encryption_and_other_compressions_are_refused(
 
 
 def test_a_run_without_trials_proves_nothing(packed: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Status 2, not "0 trials computed again"."""
+    """A run without trials is refused with status 2."""
     with zipfile.ZipFile(packed) as archive:
         names = [name for name in archive.namelist() if name.startswith("script/trial-")]
     path = tmp_path / "x.zip"

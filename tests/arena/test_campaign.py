@@ -1,4 +1,4 @@
-"""The command line: same bytes for any number of workers, resuming, bad input (docs/experiment.md)."""
+"""Command line: equal files for any number of workers, resumed runs, bad input (docs/experiment.md)."""
 
 import json
 import signal
@@ -29,7 +29,7 @@ def contents(folder: Path) -> dict[str, bytes]:
 
 
 def test_one_worker_two_workers_and_a_second_run_write_the_same_bytes(tmp_path: Path) -> None:
-    """issue "Must show" 5."""
+    """The number of workers does not affect a file."""
     for folder, jobs in (("one", 1), ("two", 2), ("again", 1)):
         assert run("--trials", 3, "--jobs", jobs, "--out", tmp_path / folder) == 0
     assert len(contents(tmp_path / "one")) == 3
@@ -37,7 +37,7 @@ def test_one_worker_two_workers_and_a_second_run_write_the_same_bytes(tmp_path: 
 
 
 def test_finished_trials_are_kept_and_an_unfinished_one_starts_from_its_seed(tmp_path: Path) -> None:
-    """As after an interrupt: one file missing, half a file of another run of the same trial beside it."""
+    """After an interruption: one file is missing, and a partial file of the trial is beside it."""
     run("--trials", 3, "--jobs", 1, "--out", tmp_path / "a")
     before = contents(tmp_path / "a")
     kept = tmp_path / "a" / "trial-0001.parquet"
@@ -50,14 +50,14 @@ def test_finished_trials_are_kept_and_an_unfinished_one_starts_from_its_seed(tmp
 
 
 def test_a_folder_of_another_run_is_left_alone(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Different seed, same folder: exit status 2."""
+    """A run with another seed in the same folder is refused with status 2."""
     run("--trials", 1, "--jobs", 1, "--out", tmp_path)
     assert run("--trials", 1, "--jobs", 1, "--seed", 9, "--out", tmp_path) == 2
     assert "holds another run (different seed)" in capsys.readouterr().err
 
 
 def test_a_trial_says_what_it_was_made_from(tmp_path: Path) -> None:
-    """Seed, scene, brain and versions."""
+    """A record holds seed, scene, brain and versions."""
     run("--trials", 1, "--jobs", 1, "--seed", 7, "--robots", 2, "--objects", 3, "--out", tmp_path)
     (trial,) = trials_in(tmp_path)
     assert trial.about["seed"] == 7
@@ -93,7 +93,7 @@ def test_bad_input_is_explained_without_a_traceback(
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    """Exit status 2."""
+    """Bad input is exit status 2 and a message."""
     monkeypatch.chdir(tmp_path)
     assert main(arguments) == 2
     assert message in capsys.readouterr().err
@@ -112,7 +112,7 @@ def test_bad_input_is_explained_without_a_traceback(
 def test_scene_files_with_mistakes_are_named(
     text: str, message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """File, key, expectation."""
+    """The message names file, key and expected value."""
     path = tmp_path / "my.toml"
     path.write_text(text)
     assert main(["run", str(path), *SHORT]) == 2
@@ -122,7 +122,7 @@ def test_scene_files_with_mistakes_are_named(
 
 
 def test_a_new_scene_needs_no_code(tmp_path: Path) -> None:
-    """A TOML file elsewhere is as good as one that comes along."""
+    """A scene file outside the package works like a built-in scene."""
     path = tmp_path / "small.toml"
     path.write_text('name = "small"\n[robots]\ncount = 1\n[objects]\ncount = 2\n')
     assert main(["run", str(path), *SHORT, "--trials", "1", "--out", str(tmp_path / "out")]) == 0
@@ -130,7 +130,7 @@ def test_a_new_scene_needs_no_code(tmp_path: Path) -> None:
 
 
 def test_a_full_disk_is_reported_and_leaves_no_file(tmp_path: Path, unwritable: set[str]) -> None:
-    """Every write is answered with ENOSPC, through a link where the unfinished file would be."""
+    """Every write fails with ENOSPC, through a link at the path of the unfinished file."""
     unwritable.add("trial-0001.parquet")
     rows = Rows()
     rows.add({"t": 0.0, "log": []})
@@ -140,18 +140,18 @@ def test_a_full_disk_is_reported_and_leaves_no_file(tmp_path: Path, unwritable: 
 
 
 def test_compare_finds_a_run_equivalent_to_itself(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """All differences are 0."""
+    """All differences of a run to itself are 0."""
     run("--trials", 2, "--jobs", 1, "--out", tmp_path)
     capsys.readouterr()
     assert main(["compare", str(tmp_path), str(tmp_path), "--at", "5", "--json"]) == 0
     result = json.loads(capsys.readouterr().out)
     assert all(row["equivalent"] and row["mean"] == 0 and row["wilcoxon_p"] == 1 for row in result["measures"])
-    assert main(["compare", str(tmp_path), str(tmp_path)]) == 2  # trials of 6 s have no share at 600 s
+    assert main(["compare", str(tmp_path), str(tmp_path)]) == 2  # trials of 6 s are too short for the default --at
     assert "less than --at 600" in capsys.readouterr().err
 
 
 def test_compare_tells_how_far_robots_of_one_seed_are_apart(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Twins: the same run is 0 cm from itself, another quantum is not."""
+    """Robots of the same run are 0 cm apart; those of a run with another quantum are not."""
     run("--trials", 2, "--jobs", 1, "--out", tmp_path / "a")
     run("--trials", 2, "--jobs", 1, "--set", "clock.scripted_quantum_ms=2", "--out", tmp_path / "b")
     apart = []
@@ -165,7 +165,7 @@ def test_compare_tells_how_far_robots_of_one_seed_are_apart(tmp_path: Path, caps
 
 
 def test_report_writes_tables_and_figures_into_a_document(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Between the two marks; again gives the same; without marks the document is left alone."""
+    """The report replaces the text between its marks; a document without marks is not changed."""
     document = tmp_path / "docs" / "page.md"
     document.parent.mkdir()
     document.write_text(f"before\n{BEGIN}\nold\n{END}\nafter\n")
@@ -188,12 +188,12 @@ def test_report_writes_tables_and_figures_into_a_document(tmp_path: Path, capsys
     assert document.read_text() == text
     document.write_text("no marks")
     assert main(command) == 2
-    assert "has no place for results" in capsys.readouterr().err
+    assert "has no marks for results" in capsys.readouterr().err
     assert document.read_text() == "no marks"
 
 
 def test_sweeps_run_every_combination(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Two by two."""
+    """Two values of two keys make four runs."""
     vary = ["--vary", "robots.count=1,2", "--vary", "camera.range_cm=100,inf"]
     out = ["--trials", "1", "--jobs", "1", "--out", str(tmp_path)]
     assert main(["sweep", "clustering", *SHORT, *vary, *out]) == 0
@@ -206,15 +206,15 @@ def test_sweeps_run_every_combination(tmp_path: Path, capsys: pytest.CaptureFixt
 
 
 def test_plot_draws_the_figures(tmp_path: Path) -> None:
-    """Snapshots, curves, trajectories; CPU load only of firmware."""
+    """Snapshots, curves and trajectories are drawn; CPU load only for firmware."""
     run("--trials", 2, "--jobs", 1, "--out", tmp_path / "run")
     assert main(["plot", str(tmp_path / "run"), "--out", str(tmp_path / "figures")]) == 0
     names = {path.name for path in (tmp_path / "figures").iterdir() if path.stat().st_size > 5000}
-    assert names == {"snapshots.png", "curves.png", "trajectories.png"}  # a script has no CPU
+    assert names == {"snapshots.png", "curves.png", "trajectories.png"}  # scripted robots have no CPU load
 
 
 def test_one_command_draws_all_figures_of_a_study(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Each controller over all its runs, scripts together; standard deviations are those of the tables."""
+    """One set of figures per controller, and one for the scripted runs."""
     for controller in "AB":
         command = ["run", "clustering", "--brain", "scripted", "--minutes", "0.05", "--controller", controller]
         assert main([*command, "--trials", "2", "--jobs", "1", "--out", str(tmp_path / f"scripted-{controller}")]) == 0
@@ -230,7 +230,7 @@ def test_one_command_draws_all_figures_of_a_study(tmp_path: Path, capsys: pytest
 
 
 def test_figures_show_what_is_there(tmp_path: Path) -> None:
-    """No single object filled, deviations of a sample that end where values do, a bar for the scale."""
+    """Single objects are not filled, deviations are clipped to possible values, a scale bar is drawn."""
     run("--trials", 3, "--jobs", 1, "--out", tmp_path / "run")
     trials = trials_in(tmp_path / "run")
     picture = plots.snapshots({"run": trials})
@@ -242,7 +242,7 @@ def test_figures_show_what_is_there(tmp_path: Path) -> None:
     assert len(filled) == sum(size for size in sizes if size > 1)
     assert any(text.get_text() == "100 cm" for axis in picture.axes for text in axis.texts)
     curves = plots.curves({"run": trials})
-    shares = np.array([100 * trial.course.curves["share"] for trial in trials])
+    shares = np.array([100 * trial.series.curves["share"] for trial in trials])
     above = curves.axes[0].lines[1].get_ydata()
     assert above == pytest.approx(np.minimum(shares.mean(axis=0) + shares.std(axis=0, ddof=1), 100))
     assert "86.5 %" in curves.axes[0].get_title()
@@ -257,7 +257,7 @@ def test_figures_show_what_is_there(tmp_path: Path) -> None:
 
 
 def test_sensitivity_prints_and_saves_a_table(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """experiment.md §5: one row per variant, one column per controller; finished trials are kept."""
+    """One row per variant, one column per controller; finished trials are kept (experiment-contract.md §5)."""
     command = ["sensitivity", "clustering", "--trials", "2", "--minutes", "0.05", "--jobs", "1", "--only", "axle",
                "--only", "mirrored", "--out", str(tmp_path / "runs"), "--save", str(tmp_path / "table.md")]  # fmt: skip
     assert main(command) == 0
@@ -275,7 +275,7 @@ def test_sensitivity_prints_and_saves_a_table(tmp_path: Path, capsys: pytest.Cap
 def test_a_disk_that_fills_up_during_a_run_ends_it_and_keeps_what_is_finished(
     tmp_path: Path, unwritable: set[str], capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Issue "Must show" 7: the second of three trials cannot be written; with room again the run goes on."""
+    """The second of three trials cannot be written; the same command continues once there is space."""
     unwritable.add("trial-0002.parquet")
     assert run("--trials", 3, "--jobs", 1, "--out", tmp_path) == 2
     assert "trial-0002.parquet: cannot be written: No space left" in " ".join(capsys.readouterr().err.split())
@@ -286,7 +286,7 @@ def test_a_disk_that_fills_up_during_a_run_ends_it_and_keeps_what_is_finished(
 
 
 def test_an_interrupted_run_keeps_finished_trials_and_leaves_no_half_ones(tmp_path: Path) -> None:
-    """Issue "Must show" 5: SIGINT while trials run; the same command goes on and gives the bytes of one go."""
+    """After SIGINT the same command continues, and the files equal those of an uninterrupted run."""
     command = ["run", "clustering", "--brain", "scripted", "--trials", "8", "--minutes", "1"]
     arguments = [*command, "--jobs", "1", "--out", str(tmp_path / "a")]
     code = f"import sys; from arena.cli import main; sys.exit(main({arguments!r}))"
@@ -314,12 +314,12 @@ def alive(process: str) -> bool:
         stat = Path(f"/proc/{process}/stat").read_text()
     except OSError:
         return False
-    return stat.rpartition(")")[2].split()[0] != "Z"  # a container without init may leave the dead unburied
+    return stat.rpartition(")")[2].split()[0] != "Z"  # a container without init may keep zombies
 
 
 @pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="only Linux's /proc tells a killed process's children")
 def test_workers_end_with_a_killed_run(tmp_path: Path) -> None:
-    """SIGKILL cannot be handled by the run itself; its workers would compute on for nobody."""
+    """Workers end when SIGKILL has ended their run."""
     command = [sys.executable, "-m", "arena", "run", "clustering", "--brain", "scripted", "--minutes", "600"]
     process = subprocess.Popen([*command, "--trials", "2", "--jobs", "2", "--out", str(tmp_path)],
                                stderr=subprocess.DEVNULL)  # fmt: skip
@@ -338,7 +338,7 @@ def test_workers_end_with_a_killed_run(tmp_path: Path) -> None:
 
 
 def test_a_film_of_one_robot_is_drawn_and_logged(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Issue "Must show" 1, the picture: changes of the wheels in time, and only robots there are."""
+    """The log has increasing times; a robot that does not exist is refused."""
     run("--trials", 1, "--jobs", 1, "--set", "clock.sample_s=0.1", "--out", tmp_path / "run")
     capsys.readouterr()
     assert main(["plot", str(tmp_path / "run"), "--film", "0", "--out", str(tmp_path)]) == 0
@@ -348,13 +348,13 @@ def test_a_film_of_one_robot_is_drawn_and_logged(tmp_path: Path, capsys: pytest.
     assert len(lines) > 2
     times = [float(line.split()[0]) for line in lines]
     assert times == sorted(times)
-    assert times[1] > 1.0  # the remote control's OK
+    assert times[1] > 1.0  # after the OK key of the remote control
     assert main(["plot", str(tmp_path / "run"), "--film", "5", "--out", str(tmp_path)]) == 2
     assert "has robots 0 to 4" in capsys.readouterr().err
 
 
 def test_one_command_runs_every_arm_and_reports(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Issue "Must show" 3, small: twice the same text, the second time without running anything."""
+    """The same command writes the same report again without running a trial."""
     command = ["experiment", "clustering", "--brains", "scripted", "--trials", "2", "--minutes", "0.05", "--twins", "0",
                "--at", "2", "--jobs", "1", "--out", str(tmp_path)]  # fmt: skip
     texts = []

@@ -1,4 +1,4 @@
-"""Trials on a Dask cluster: the same files as here."""
+"""Trials on a Dask cluster: the same files as on local workers."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ distributed = pytest.importorskip("distributed", reason="Dask is not installed (
 
 @pytest.fixture(scope="module")
 def address() -> Iterator[str]:
-    """Two worker processes on this machine."""
+    """Start a Dask cluster of two worker processes on this machine."""
     with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
         yield cluster.scheduler_address
 
@@ -27,7 +27,7 @@ def contents(folder: Path) -> dict[str, bytes]:
 def test_a_sweep_on_a_cluster_writes_the_same_bytes_as_here(
     address: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Two values, two trials each; what is finished is not run again."""
+    """Two values with two trials each; finished trials are not run again."""
     command = ["sweep", "clustering", "--brain", "scripted", "--minutes", "0.05", "--trials", "2", "--jobs", "1",
                "--vary", "camera.range_cm=100,inf", "--json"]  # fmt: skip
     assert main([*command, "--out", str(tmp_path / "here")]) == 0
@@ -42,7 +42,7 @@ def test_a_sweep_on_a_cluster_writes_the_same_bytes_as_here(
 def test_firmware_travels_to_the_workers(
     address: str, talking_image: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """A robot that stops there is reported here."""
+    """The fault of a robot on a worker is reported."""
     command = ["run", "clustering", "--brain", str(talking_image), "--robots", "1", "--trials", "1", "--minutes",
                "0.03", "--jobs", "1"]  # fmt: skip
     assert main([*command, "--out", str(tmp_path / "here")]) == 1
@@ -52,7 +52,7 @@ def test_firmware_travels_to_the_workers(
 
 
 def test_a_scheduler_that_is_not_there_is_reported(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Exit status 2: an address that is none, a port where nobody listens is refused at once."""
+    """An invalid address, and a port without a listener, are exit status 2."""
     command = ["run", "clustering", "--brain", "scripted", "--minutes", "0.05", "--trials", "1", "--out", str(tmp_path)]
     assert main([*command, "--scheduler", "nonsense://x"]) == 2
     assert "nonsense" in capsys.readouterr().err

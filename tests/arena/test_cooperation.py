@@ -1,4 +1,4 @@
-"""Swarms that compute together (docs/swarm.md): what their experiments measure, and that each agrees."""
+"""Cooperating swarms (docs/swarm.md): metrics of their experiments, and agreement of the robots."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ NAN = math.nan
 
 
 def samples(scene: str, seconds: list[float], lines: list[UartLine]) -> TrialSamples:
-    """Of a trial in which robots stand still and send `lines`."""
+    """Return the samples of a trial in which robots rest and send `lines`."""
     places = np.zeros((len(seconds), load_scene(scene).robots.count, 3))
     return TrialSamples(np.array(seconds), places, places[:, :0, :2], load_scene(scene), {}, lines)
 
 
 def test_what_robots_said_last_is_known_at_every_sample() -> None:
-    """From the sample on that follows; other words, and lines without a number, are ignored."""
+    """A value holds from the next sample on; other words, and lines without a number, are ignored."""
     lines = [
         UartLine(1, 0.2, "clock 7"),
         UartLine(1, 0.9, "clock x"),
@@ -42,7 +42,7 @@ def test_what_robots_said_last_is_known_at_every_sample() -> None:
 
 
 def test_the_dead_do_not_count() -> None:
-    """start.off of the scene; a robot alive that has lines nothing leaves the difference open."""
+    """Robots that are switched off are ignored; a robot without a report makes the range nan."""
     living = alive(samples("clocks", [0.0, 2.5, 2.75, 3.25], []))
     assert living.sum(axis=1).tolist() == [5, 5, 4, 3]
     values = np.array([[1.0, 4.0, 100.0], [1.0, 4.0, NAN]])
@@ -51,7 +51,7 @@ def test_the_dead_do_not_count() -> None:
 
 
 def test_agreement_counts_from_when_it_lasts() -> None:
-    """A sample that breaks it begins anew; what does not hold at the end is nan."""
+    """The time is that of the last change to true, and nan if the condition is false at the end."""
     series = MetricSeries(np.array([0.0, 1.0, 2.0, 3.0]), {})
     assert settled_at(series, np.array([True, False, True, True])) == 2.0
     assert settled_at(series, np.full(4, True)) == 0.0
@@ -59,7 +59,7 @@ def test_agreement_counts_from_when_it_lasts() -> None:
 
 
 def test_clocks_are_compared_with_the_arenas_time() -> None:
-    """Three that live agree at 3.3 s, and are 5 ms later against true time at 4 s."""
+    """Three robots agree at 3.3 s, and are 5 ms late against simulated time at 4 s."""
     lines = [UartLine(robot, 1.0, f"clock {1500 + robot}") for robot in range(3)] + [UartLine(3, 1.0, "clock 1600")]
     lines += [UartLine(4, 1.0, "clock 1500"), UartLine(3, 3.2, "clock 3700")]
     lines += [UartLine(robot, 3.6, "clock 4105") for robot in (2, 3, 4)]
@@ -70,7 +70,7 @@ def test_clocks_are_compared_with_the_arenas_time() -> None:
 
 
 def trial(tmp_path: Path, scene: str, seconds: float, *words: str) -> Trial:
-    """A short one without deaths, of few robots that stand near each other."""
+    """Run a short trial of few robots near each other, none of which is switched off."""
     text = (Path(__file__).parents[2] / "arena" / "scenes" / f"{scene}.toml").read_text()
     lines = [line for line in text.splitlines() if not line.startswith("off =")]
     path = tmp_path / f"{scene}.toml"
@@ -82,7 +82,7 @@ def trial(tmp_path: Path, scene: str, seconds: float, *words: str) -> Trial:
 
 
 def test_three_clocks_come_together(tmp_path: Path) -> None:
-    """0.12 s apart when they begin, they agree to a part of it; a third of all messages is lost."""
+    """Clocks that differ by 0.12 s approach each other although a third of all messages is lost."""
     made = trial(tmp_path, "clocks", 3.0, "--set", "start.spread_tcy=4423680")
     begun = [power_on_cycle(made.scene, 1, robot) / FCY for robot in range(3)]
     assert max(begun) - min(begun) > 0.1
@@ -90,7 +90,7 @@ def test_three_clocks_come_together(tmp_path: Path) -> None:
 
 
 def test_a_leader_is_one_who_lives() -> None:
-    """Who follows the dead, or a rank that nobody has, does not count; a rank drawn anew replaces the one before."""
+    """Followers of a robot that is off, or of an unknown rank, do not count; the last reported rank holds."""
     lines = [UartLine(robot, 0.2, f"rank {10 - robot}") for robot in range(5)]
     lines += [UartLine(robot, 0.4, "leader 10") for robot in range(5)]
     lines += [
@@ -105,7 +105,7 @@ def test_a_leader_is_one_who_lives() -> None:
 
 
 def test_three_robots_elect_one(tmp_path: Path) -> None:
-    """The one whose selector says so."""
+    """Three robots elect the robot whose selector makes it the leader."""
     made = trial(tmp_path, "leader", 2.0, "--set", "start.spread_tcy=1474560")
     assert made.series.last("following") == 1.0
     word, rank = made.samples.uart_lines[-1].text.split()
@@ -114,7 +114,7 @@ def test_three_robots_elect_one(tmp_path: Path) -> None:
 
 
 def test_who_has_stopped_says_so_and_stands() -> None:
-    """The dead do not count; the difference is known once all stand."""
+    """Robots that are off are ignored; the difference is known once all others have stopped."""
     lines = [UartLine(robot, 3.0 + robot / 100, f"halt {robot}") for robot in (2, 3)] + [UartLine(4, 3.35, "halt 4")]
     seen = samples("halt", [0.0, 2.9, 3.1, 3.2, 3.3, 3.5], lines)
     seen.robots[:, 3, 0] = [0.0, 3.0, 4.0, 4.0, 4.0, 4.0]
@@ -125,12 +125,12 @@ def test_who_has_stopped_says_so_and_stands() -> None:
 
 
 def test_three_robots_stop_together(tmp_path: Path) -> None:
-    """One of them knows when; without messages the others cannot (docs/swarm.md)."""
+    """One robot knows the time; the others stop by its messages (docs/swarm.md)."""
     assert trial(tmp_path, "halt", 4.5).series.last("between") < 0.1
 
 
 def test_a_mean_is_that_of_those_who_live() -> None:
-    """Hundredths against the values that robots say they have; the error is unknown until all have lines something."""
+    """Means in hundredths are compared with reported values; the error is nan until all have reported."""
     lines = [UartLine(robot, 0.5, f"value {robot}") for robot in range(5)]
     lines += [UartLine(robot, 0.6, "mean 200") for robot in range(4)] + [UartLine(4, 1.6, "mean 250")]
     lines += [UartLine(robot, 3.2, "mean 300") for robot in (2, 3)]
@@ -141,13 +141,13 @@ def test_a_mean_is_that_of_those_who_live() -> None:
 
 
 def test_robots_agree_on_a_mean(tmp_path: Path) -> None:
-    """Of 15, 9 and 2; the first to say so is right."""
+    """Robots with 15, 9 and 2 agree on the mean."""
     made = trial(tmp_path, "average", 1.5, "--set", "infrared.lost_share=0")
     assert any(one.text == "mean 867" for one in made.samples.uart_lines)
 
 
 def test_who_knows_the_answer_knows_that_all_is_done() -> None:
-    """A wrong answer is none, and the dead do not count."""
+    """A wrong answer does not count, nor does a robot that is off."""
     lines = [UartLine(robot, 0.5, "done 8") for robot in range(5)] + [
         UartLine(0, 1.1, "best 52527"),
         UartLine(0, 1.1, "done 32"),
@@ -162,7 +162,7 @@ def test_who_knows_the_answer_knows_that_all_is_done() -> None:
 
 
 def test_robots_share_a_search(tmp_path: Path) -> None:
-    """Somebody hears of parts of others at once, more than it has done itself."""
+    """A robot learns of several parts at once from its neighbours."""
     made = trial(tmp_path, "search", 1.5, "--set", "infrared.lost_share=0")
     lines = made.samples.uart_lines
     done = [

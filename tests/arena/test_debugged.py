@@ -1,4 +1,4 @@
-"""A debugger on one robot of a trial: it goes on, back and on again, and nothing of it can be seen in the record."""
+"""Debugger on one robot of a trial: it runs forward and back, and the record is unaffected."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ from toolchain.driver import driver
 SEED = ("--seed", "3")
 
 
-def moved(client: Client, request: str, **arguments: object) -> str:
-    """Let it go somewhere; the time it stands at."""
+def move(client: Client, request: str, **arguments: object) -> str:
+    """Execute a request that moves the machine, and return the time at which it pauses."""
     client.send(request, threadId=1, **arguments)
     client.event("stopped")
     return str(client.ask("evaluate", expression="/time", context="repl")["result"])
 
 
 def world(client: Client) -> str:
-    """What there is to see of all robots at this time, with a hash of everything that lives."""
+    """Return the state of all robots and objects, with a hash of the whole state."""
     told = str(client.ask("evaluate", expression="/world", context="repl")["result"])
     assert told.splitlines()[-1].startswith("state: ")
     return told
@@ -44,36 +44,37 @@ def world(client: Client) -> str:
 def test_a_record_is_the_same_with_a_debugger_on_a_robot(
     tmp_path: Path, clustering_image: Path, scene: str, brain: str, robot: int, place: str
 ) -> None:
-    """Byte for byte, after steps, steps back, breakpoints both ways and a look at the end. Wherever it goes back to,
-    the world and the other robots are as they were then."""
+    """The record is equal to the byte after steps, steps back, and breakpoints in both directions.
+
+    The world and the other robots go back with the robot."""
     trial = [scene, "--minutes", "0.02", "--brain", brain or str(clustering_image), *SEED]
-    trial += ["--set", "start.selector=8"] if scene == "clustering" else []  # it does not wait for the remote control
+    trial += ["--set", "start.selector=8"] if scene == "clustering" else []  # starts without the remote control
     client = Client("arena", "debug", *trial, "--robot", str(robot), "--out", str(tmp_path / "debugged"))
     client.ask("initialize", adapterID="openswarm")
     client.ask("launch", stopOnEntry=True)
     client.ask("setFunctionBreakpoints", breakpoints=[{"name": place}])
     client.ask("configurationDone")
     assert client.event("stopped")["reason"] == "entry"
-    first = moved(client, "continue")
+    first = move(client, "continue")
     world_there = world(client)
-    there = [moved(client, "next") for _ in range(3)]
+    there = [move(client, "next") for _ in range(3)]
     world_later = world(client)
     assert world_later != world_there
-    assert moved(client, "stepBack", granularity="instruction") != there[-1]
-    assert moved(client, "reverseContinue").startswith(first)
+    assert move(client, "stepBack", granularity="instruction") != there[-1]
+    assert move(client, "reverseContinue").startswith(first)
     assert world(client) == world_there
     assert "before the present" not in client.ask("evaluate", expression="/time", context="repl")["result"]
-    assert [moved(client, "next") for _ in range(3)] == there
+    assert [move(client, "next") for _ in range(3)] == there
     assert world(client) == world_later
     refused = client.asked("evaluate", expression="W0 = 3", context="repl")
     assert "the trial is being recorded" in refused["message"]
-    assert moved(client, "continue") != first
+    assert move(client, "continue") != first
     client.ask("setFunctionBreakpoints", breakpoints=[])
-    end = moved(client, "continue")
+    end = move(client, "continue")
     world_end = world(client)
-    assert moved(client, "stepBack", granularity="instruction") != end
+    assert move(client, "stepBack", granularity="instruction") != end
     assert world(client) != world_end
-    assert moved(client, "continue") == end
+    assert move(client, "continue") == end
     assert world(client) == world_end
     client.close()
     assert main(["run", *trial, "--trials", "1", "--jobs", "1", "--out", str(tmp_path / "alone")]) == 0
@@ -81,22 +82,22 @@ def test_a_record_is_the_same_with_a_debugger_on_a_robot(
     assert records[0] == records[1]
 
 
-def test_a_change_in_the_past_is_one_of_the_present_and_who_leaves_ends_the_trial(clustering_image: Path) -> None:
-    """What was changed before is changed again on the way."""
+def test_a_change_in_the_past_becomes_the_present(clustering_image: Path) -> None:
+    """A rewind repeats earlier changes; `terminate` ends the trial."""
     client = Client("arena", "debug", "clustering", "--minutes", "9", "--brain", str(clustering_image), "--robot", "0")
     client.ask("initialize", adapterID="openswarm", supportsInvalidatedEvent=True)
     client.ask("launch", stopOnEntry=True)
     client.ask("configurationDone")
     assert client.event("stopped")["reason"] == "entry"
     for _ in range(3):
-        moved(client, "stepIn", granularity="instruction")
+        move(client, "stepIn", granularity="instruction")
     assert client.ask("evaluate", expression="T1CON.TCKPS = 2", context="repl")["result"] == "2"
     for _ in range(2):
-        moved(client, "stepIn", granularity="instruction")
+        move(client, "stepIn", granularity="instruction")
     as_changed = world(client)
-    moved(client, "stepIn", granularity="instruction")
-    moved(client, "stepBack", granularity="instruction")
-    assert world(client) == as_changed, "the world has gone back with the robot"
+    move(client, "stepIn", granularity="instruction")
+    move(client, "stepBack", granularity="instruction")
+    assert world(client) == as_changed, "the world goes back with the robot"
     scopes = client.ask("scopes", frameId=client.top()["id"])["scopes"]
     lists = {one["name"]: one["variablesReference"] for one in scopes}
     shown = client.ask("variables", variablesReference=lists["World"])["variables"]
@@ -109,10 +110,10 @@ def test_a_change_in_the_past_is_one_of_the_present_and_who_leaves_ends_the_tria
     client.close()
 
 
-def test_a_client_that_leaves_in_the_middle_and_a_second_one(
+def test_a_client_that_disconnects_and_a_second_client(
     tmp_path: Path, clustering_image: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    """What is not a trial's is refused; who comes second too; a trial that is left while it runs goes to its end."""
+    """Launch arguments of `emu debug`, and a second client, are refused; the trial continues after a disconnect."""
     trial = ["clustering", "--minutes", "0.005", "--brain", str(clustering_image), *SEED, "--set", "start.selector=8"]
     client = Client("arena", "debug", *trial, "--robot", "1", "--out", str(tmp_path / "debugged"))
     client.ask("initialize", adapterID="openswarm")
@@ -137,26 +138,26 @@ def test_a_client_that_leaves_in_the_middle_and_a_second_one(
             with pytest.raises(ConnectionRefusedError):
                 socket.create_connection(("127.0.0.1", port))
         assert serving.wait(timeout=PATIENCE) == 0
-        assert "nothing is recorded" in serving.stderr.read()
+        assert "no record was written" in serving.stderr.read()
 
     assert main(["debug", *trial, "--minutes", "0.00001", "--robot", "1"]) == 0
-    assert "robot 1 got no power before the trial was over" in capfd.readouterr().err
+    assert "robot 1 was not switched on before the end of the trial" in capfd.readouterr().err
 
 
-def test_at_a_prompt_by_a_script(
+def test_the_prompt_executes_a_script(
     tmp_path: Path, clustering_image: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The trial goes on without it when it is detached, ends when it is not; a command that fails is the status."""
+    """After `detach` the trial continues, without it the trial ends; a failed command sets the exit status."""
     trial = ["--minutes", "0.01", "--brain", str(clustering_image), *SEED, "--set", "start.selector=8"]
     command = ["debug", "clustering", *trial, "--robot", "2", "--tui"]
 
-    def played(*lines: str, more: tuple[str, ...] = ()) -> int:
+    def play(*lines: str, more: tuple[str, ...] = ()) -> int:
         monkeypatch.setattr("sys.stdin", io.StringIO("\n".join(lines)))
         return main([*command, *more])
 
     out = ("--out", str(tmp_path / "debugged"))
     session = ("break react", "continue", "next 2", "reverse-stepi", "info locals", "threads", "detach")
-    assert played(*session, more=out) == 0
+    assert play(*session, more=out) == 0
     told = capsys.readouterr().out
     assert "react at " in told
     assert "thread 0 (main): " in told
@@ -164,15 +165,15 @@ def test_at_a_prompt_by_a_script(
     assert main(["run", "clustering", *trial, "--trials", "1", "--jobs", "1", "--out", str(tmp_path / "alone")]) == 0
     records = [(tmp_path / name / "trial-0001.parquet").read_bytes() for name in ("debugged", "alone")]
     assert records[0] == records[1]
-    assert played("stepi", "frob") == 2
+    assert play("stepi", "frob") == 2
     assert "line 2, frob: there is no command frob" in capsys.readouterr().err
-    assert played(more=("--port", "0")) == 2
+    assert play(more=("--port", "0")) == 2
 
 
-def test_a_robot_that_ends_can_be_gone_back_with(
+def test_a_rewind_from_a_fault_and_from_the_end(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Before its fault, at it, and when the trial is over: the way back leads to the same world."""
+    """A rewind from a fault, and from the end of the trial, restores the same world."""
     source, image = tmp_path / "bad.c", tmp_path / "bad.elf"
     source.write_text("volatile int n;\nint main(void)\n{\n    n = 0x3001;\n    return *(volatile int *)n;\n}\n")
     assert driver.main(["-g", "-O0", str(source), "-o", str(image)]) == 0
@@ -189,37 +190,37 @@ def test_a_robot_that_ends_can_be_gone_back_with(
     assert len(set(worlds)) == 1
 
 
-def test_a_robot_that_is_not_there_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_unknown_robot_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["debug", "clustering", "--brain", "scripted", "--robot", "7"]) == 2
     assert "robots 0 to 4" in capsys.readouterr().err
     assert main(["debug", "clustering", "--brain", "scripted", "--robot", "1", "--minutes", "0.01"]) == 2
     assert "no firmware" in capsys.readouterr().err
 
 
-def test_what_a_robot_was_shown_makes_its_past_the_same_to_the_bit(
+def test_logged_inputs_reproduce_the_past_to_the_bit(
     tmp_path: Path, tmp_path_factory: pytest.TempPathFactory
 ) -> None:
-    """Of the light at its infrared sensors, with what the board keeps of it, while the world stands still."""
+    """The past of a robot runs again from logged inputs: levels of infrared sensors and the stored light."""
     image = built_once(tmp_path_factory, "avoidance")
     plan = Plan(load_scene("avoidance"), "avoidance", "A", None, 1, 1.0, 3, None, (("avoidance", image),))
-    rng, met = random.Random(4), []
+    rng, is_equal = random.Random(4), []
 
-    def debugger(debugged: ControlledRobot) -> bool:
-        history = debugged.record(debugged.machine)
+    def debugger(controlled: ControlledRobot) -> bool:
+        history = controlled.record(controlled.machine)
         states = {}
         for _ in range(40):
-            history.advance(debugged.machine.cycle + rng.randrange(400_000))
-            states[debugged.machine.cycle] = debugged.machine.snapshot()
+            history.advance(controlled.machine.cycle + rng.randrange(400_000))
+            states[controlled.machine.cycle] = controlled.machine.snapshot()
         end = history.end
         for cycle in rng.sample(sorted(states), 20):
             history.seek(cycle)
-            met.append(debugged.machine.snapshot() == states[cycle])
+            is_equal.append(controlled.machine.snapshot() == states[cycle])
         history.seek(end)
-        met.append(debugged.machine.snapshot() == states[end])
+        is_equal.append(controlled.machine.snapshot() == states[end])
         return True
 
     robot = ControlledRobot(1, debugger, is_recorded=True)
     run_one(plan, 1, tmp_path, on_start=robot.attach)
     assert robot.finish()
-    assert len(met) == 21
-    assert all(met)
+    assert len(is_equal) == 21
+    assert all(is_equal)

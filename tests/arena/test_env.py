@@ -1,4 +1,4 @@
-"""The learning interface: the library's own tests, repeatability, a controller that is evolved and becomes firmware."""
+"""Learning environment: PettingZoo's own tests, reproducibility, evolution of a controller for firmware."""
 
 from __future__ import annotations
 
@@ -26,16 +26,16 @@ ROOT = Path(__file__).resolve().parents[2]
 
 
 def test_pettingzoos_own_tests_pass() -> None:
-    """API and seeding."""
+    """PettingZoo checks API and seeding."""
     parallel_api_test(ArenaEnv("aggregation", seconds=2.0), num_cycles=50)
     parallel_seed_test(lambda: ArenaEnv("aggregation", seconds=1.0), num_cycles=20)
 
 
 def test_the_same_seed_and_actions_give_the_same_numbers() -> None:
-    """Another seed others; without a seed the next one."""
+    """Equal seeds give equal numbers; without a seed, `reset` uses the next one."""
     env = ArenaEnv("foraging", seconds=2.0)
 
-    def course(seed: int | None) -> list[np.ndarray]:
+    def series(seed: int | None) -> list[np.ndarray]:
         observed, _ = env.reset(seed=seed)
         rng, found = np.random.default_rng(0), []
         while env.agents:
@@ -44,15 +44,15 @@ def test_the_same_seed_and_actions_give_the_same_numbers() -> None:
             found.append(np.stack(list(observed.values())))
         return found
 
-    first, again, other = course(5), course(5), course(None)
+    first, again, other = series(5), series(5), series(None)
     assert len(first) == 20
     assert all((one == two).all() for one, two in zip(first, again, strict=True))
     assert not all((one == two).all() for one, two in zip(first, other, strict=True))
-    assert all((one == two).all() for one, two in zip(other, course(6), strict=True))
+    assert all((one == two).all() for one, two in zip(other, series(6), strict=True))
 
 
 def test_robots_sense_what_stands_before_them_and_move_as_told() -> None:
-    """Robot, object, wall by infrared, light, speeds; 12.8 cm/s straight ahead."""
+    """Observations show robot, object, wall by infrared, light and speeds; full speed is 12.8 cm/s."""
     scene = load_scene("foraging").with_values(robots__wheel_noise=0.0, clock__scripted_quantum_ms=10.0)
     env = ArenaEnv(scene, seconds=5.0, decision_s=0.5)
     env.reset(seed=1)
@@ -67,8 +67,8 @@ def test_robots_sense_what_stands_before_them_and_move_as_told() -> None:
     assert seen.shape == (SIZE,)
     assert seen[:SENSED].argmax() == ROBOT
     assert seen[-2:].tolist() == [1.0, 1.0]
-    assert observed["robot_2"][SENSED] > 0.03  # sensor 0 looks at the wall, 6.3 cm away
-    assert observed["robot_2"][SENSED + 8 :][:8].min() < 0.9  # the lamp
+    assert observed["robot_2"][SENSED] > 0.03  # sensor 0 faces the wall at 6.3 cm
+    assert observed["robot_2"][SENSED + 8 :][:8].min() < 0.9  # a sensor that faces the lamp
     assert (sum(rewards.values()), any(over.values()), any(late.values())) == (0.0, False, False)
     env.stage.move_robot(1, 20, 140, 0.0)
     env.stage.move_object(0, 130, 75)
@@ -77,7 +77,7 @@ def test_robots_sense_what_stands_before_them_and_move_as_told() -> None:
 
 
 def test_food_brought_home_is_a_reward() -> None:
-    """The experiment's first metric, delivered food, grows by one; its supervisor works as in a trial."""
+    """Delivered food, the first metric of the experiment, is the reward; the supervisor acts as in a trial."""
     env = ArenaEnv("foraging", seconds=5.0, decision_s=0.2)
     env.reset(seed=1)
     env.stage.move_object(0, 100, 75)
@@ -92,24 +92,24 @@ def test_food_brought_home_is_a_reward() -> None:
 
 
 def test_robots_with_firmware_are_told_by_bluetooth(assembled: Callable[[str], Path]) -> None:
-    """In the robot's own text protocol; the firmware decides what it makes of it."""
+    """Firmware receives actions as commands of the robot's text protocol."""
     scene = load_scene("foraging").with_values(start__remote="")
     env = ArenaEnv(scene, seconds=1.0, decision_s=0.2, image=assembled(ECHO))
     env.reset(seed=1)
     env.step({agent: np.array([0.5, -0.25]) for agent in env.agents})
     env.step({})
-    for brain in env.brains:
-        brain.reading()
-        assert [line.text for line in brain.lines()] == ["D,500,-250", "D,0,0"]
+    for controller in env.brains:
+        controller.reading()
+        assert [line.text for line in controller.take_lines()] == ["D,500,-250", "D,0,0"]
     assert serial_command(1, -1) == b"D,1000,-1000\r"
     env.close()
 
 
 def test_what_cannot_be_is_refused() -> None:
-    """One line each."""
-    with pytest.raises(ValueError, match="shorter than a quantum"):
+    """Invalid arguments raise ValueError with a message."""
+    with pytest.raises(ValueError, match="expected a quantum or more"):
         ArenaEnv("aggregation", decision_s=0.001)
-    with pytest.raises(ValueError, match="not positive"):
+    with pytest.raises(ValueError, match="a positive number"):
         ArenaEnv("aggregation", seconds=0)
 
 
@@ -123,10 +123,10 @@ def example() -> ModuleType:
 
 
 def test_a_controller_is_evolved_and_becomes_firmware(tmp_path: Path) -> None:
-    """It does not get worse, is the same for the same seed, and its constants build."""
+    """The result improves or stays equal, depends on the seed only, and its constants compile."""
     evolve = example().evolve
-    best, course = evolve(4, [0], 10.0, 3)
-    assert course == sorted(course, reverse=True)
+    best, series = evolve(4, [0], 10.0, 3)
+    assert series == sorted(series, reverse=True)
     again, _ = evolve(4, [0], 10.0, 3)
     assert (best == again).all()
     defines = f"-DALONE={best[0]},{best[1]} -DAHEAD={best[2]},{best[3]}"

@@ -1,4 +1,4 @@
-"""Experiments: those that come along, one's own from an empty folder, supervisors, and what is wrong with either."""
+"""Experiments: built-in ones, a user's own, supervisors, and error messages."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def done(stage):
 
 
 def run(folder: Path, *words: str, scene: str = SCENE, metric: str = METRIC, status: int = 0) -> Path:
-    """One scripted trial of a scene and an experiment written into a folder."""
+    """Write a scene and an experiment into a folder and run one scripted trial."""
     (folder / "mine.toml").write_text(scene)
     (folder / "mine.py").write_text(metric)
     command = ["run", str(folder / "mine.toml"), "--brain", "scripted", "--trials", "1", "--minutes", "0.05"]
@@ -107,7 +107,7 @@ int main(void)
 
 
 def test_a_new_experiment_needs_a_scene_a_metric_and_some_c(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """From an empty folder, without a word in the package: its metric is what is printed, drawn and replayed."""
+    """A user's experiment in an empty folder is printed, drawn and replayed."""
     app = tmp_path / "apps" / "mine"
     app.mkdir(parents=True)
     (app / "main.c").write_text(FIRMWARE)
@@ -130,7 +130,7 @@ def test_a_new_experiment_needs_a_scene_a_metric_and_some_c(tmp_path: Path, caps
 def test_the_experiments_file_is_kept_and_belongs_to_the_run(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Changed afterwards it does not change what was measured; going on with another one is refused."""
+    """A later change of the file does not affect the record; a run with the changed file is refused."""
     path = run(tmp_path)
     before = read_trial(path).series.curves["apart"]
     (tmp_path / "mine.py").write_text(METRIC.replace("** 0.5", "** 0.5 + 1000"))
@@ -141,7 +141,7 @@ def test_the_experiments_file_is_kept_and_belongs_to_the_run(
 
 
 def test_a_supervisor_moves_things_notes_numbers_and_ends_the_trial(tmp_path: Path) -> None:
-    """Columns n_NAME; the same bytes again."""
+    """The record has the supervisor's numbers as columns n_NAME, and is reproducible."""
     path = run(tmp_path, metric=SUPERVISOR)
     trial = read_trial(path)
     assert trial.times[-1] == pytest.approx(2.1, abs=0.02)
@@ -174,7 +174,7 @@ def test_a_supervisor_moves_things_notes_numbers_and_ends_the_trial(tmp_path: Pa
 def test_what_is_wrong_with_an_experiment_is_said_in_one_line(
     metric: str, words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Status 2, no traceback."""
+    """A wrong experiment is status 2 and a message of one line."""
     run(tmp_path, metric=metric, status=2)
     said = [line for line in capsys.readouterr().err.splitlines() if not line.startswith("trial ")]
     assert len(said) == 1
@@ -182,7 +182,7 @@ def test_what_is_wrong_with_an_experiment_is_said_in_one_line(
 
 
 def test_experiments_that_are_not_there(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """By name and by file."""
+    """An unknown name and a missing file are refused."""
     run(tmp_path, scene=SCENE.replace("mine.py", "nothing"), status=2)
     assert "unknown experiment 'nothing'; known: aggregation, average, avoidance, clocks, " in (
         capsys.readouterr().err
@@ -191,12 +191,12 @@ def test_experiments_that_are_not_there(tmp_path: Path, capsys: pytest.CaptureFi
     assert "lost.py" in capsys.readouterr().err
 
 
-# -- those that come along --------------------------------------------------------------------------------------------
+# -- built-in experiments --------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("name", ["aggregation", "avoidance", "foraging"])
 def test_the_shipped_experiments_run_with_their_firmware(name: str, tmp_path: Path) -> None:
-    """Three seconds: nothing happens to a robot, robots move, the metrics are numbers, the curves are drawn."""
+    """In three seconds no robot has a fault, robots move, metrics are finite, and curves are drawn."""
     out = tmp_path / name
     assert main(["run", name, "--trials", "1", "--minutes", "0.05", "--jobs", "2", "--out", str(out)]) == 0
     trial = read_trial(out / "trial-0001.parquet")
@@ -208,7 +208,7 @@ def test_the_shipped_experiments_run_with_their_firmware(name: str, tmp_path: Pa
 
 
 class Listener:
-    """A robot that keeps what it is told."""
+    """Controller that stores the text it receives."""
 
     def __init__(self) -> None:
         self.heard: list[bytes] = []
@@ -218,7 +218,7 @@ class Listener:
 
 
 def test_foraging_counts_food_that_came_from_outside_to_the_nest() -> None:
-    """Touch, carry, deliver: each told to the robot once; food grows again where there is room."""
+    """The robot receives one message per touch and delivery; food reappears at a free place."""
     scene = load_scene("foraging")
     food = [(150.0, 30.0 + 18 * n) for n in range(6)]
     world = World.of(scene, 1, [(100, 20, 0.0), (100, 60, 0.0), (100, 120, 0.0)], food)
@@ -244,7 +244,7 @@ def test_foraging_counts_food_that_came_from_outside_to_the_nest() -> None:
 
 
 def test_aggregation_measures_robots(tmp_path: Path) -> None:
-    """Together: all in one group, little dispersion; apart: each alone."""
+    """Robots close together form one group with small dispersion; distant robots are single."""
     experiment, scene = experiment_of("aggregation"), load_scene("aggregation")
     near = np.array([(20.0 * 0.37 * n, 0.0, 0.0) for n in range(8)])
     far = np.array([(30.0 * n, 0.0, 0.0) for n in range(8)])
@@ -256,7 +256,7 @@ def test_aggregation_measures_robots(tmp_path: Path) -> None:
 
 
 def test_a_trial_without_supervisor_is_the_one_it_was() -> None:
-    """An experiment that only measures changes nothing."""
+    """An experiment without a supervisor does not affect the trial."""
     scene: Scene = scripted(load_scene("clustering"))
     rows = []
     for experiment in (None, experiment_of("clustering")):
@@ -266,7 +266,7 @@ def test_a_trial_without_supervisor_is_the_one_it_was() -> None:
 
 
 def test_names_of_experiments_are_checked() -> None:
-    """No module of anything else is taken for one."""
+    """The name of another module is not accepted."""
     for name in ("os", "__init__", "Plain", "a.b", ""):
         with pytest.raises(SceneError, match="unknown experiment"):
             experiment_of(name)

@@ -1,4 +1,4 @@
-"""A robot of the studio in a debugger's hands: it begins at the present moment, the world stands, the page lives on."""
+"""Debugger on a robot of a studio trial: it starts at the present time, and the studio stays responsive."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ SECONDS = 2.0
 
 
 class Connected(Client):
-    """The client on a TCP port."""
+    """Client of the Debug Adapter Protocol on a TCP port."""
 
     def __init__(self, port: int) -> None:
         self.socket = socket.create_connection(("127.0.0.1", port))
@@ -36,8 +36,8 @@ class Connected(Client):
         threading.Thread(target=self._listen, daemon=True).start()
 
 
-def given(studio: Studio, robot: int) -> Connected:
-    """A client that has a robot, which stands."""
+def attached_client(studio: Studio, robot: int) -> Connected:
+    """Attach a debugger to a robot and return its client; the robot is paused."""
     studio.ask("debug", robot)
     client = Connected(studio.ask("status")["debugger"]["port"])
     client.ask("initialize", adapterID="openswarm")
@@ -47,14 +47,14 @@ def given(studio: Studio, robot: int) -> Connected:
     return client
 
 
-def test_a_robot_is_debugged_from_the_present_on(clustering_image: Path) -> None:
-    """Breakpoint, a step back, what is refused meanwhile; left alone, the trial is recorded as ever."""
+def test_a_robot_can_be_debugged_from_the_present_on(clustering_image: Path) -> None:
+    """Breakpoints and steps back work, commands are refused, and the record is unaffected."""
     plan = Plan(scene_of(2, 4), "openswarm", "A", clustering_image, 1, SECONDS, 3)
     with controllers_of(plan, 3) as (controllers, channel):
         whole = run_trial(plan.scene, 3, controllers, SECONDS, channel=channel, experiment=plan.loaded_experiment)
     with studio_of(plan) as studio:
         do(studio, "step", 1100)
-        client = given(studio, 1)
+        client = attached_client(studio, 1)
         now = studio.ask("status")
         assert (now["tick"], now["state"]) == (1100, "in a debugger")
         assert (now["debugger"]["robot"], now["debugger"]["is_connected"]) == (1, True)
@@ -81,19 +81,19 @@ def test_a_robot_is_debugged_from_the_present_on(clustering_image: Path) -> None
             studio.ask("debug", 0)
 
 
-def test_a_robot_is_taken_back_whether_a_client_came_or_not(clustering_image: Path) -> None:
+def test_the_debugger_is_detached_with_and_without_a_client(clustering_image: Path) -> None:
     plan = Plan(scene_of(2, 4), "openswarm", "A", clustering_image, 1, SECONDS, 3)
     with studio_of(plan) as studio:
         do(studio, "step", 200)
         studio.ask("debug", 0)
         assert studio.ask("status")["debugger"]["is_connected"] is False
         assert do(studio, "debug", 0)["debugger"] is None
-        given(studio, 1)
+        attached_client(studio, 1)
         assert do(studio, "debug", 1)["debugger"] is None
-        given(studio, 0)  # and the studio is closed while a client has a robot
+        attached_client(studio, 0)  # the studio is closed while a client is attached
 
 
-def test_a_script_is_not_debugged() -> None:
+def test_a_scripted_robot_cannot_be_debugged() -> None:
     with studio_of(scripted_plan()) as studio, pytest.raises(CommandRefusedError, match="robot 0 is scripted"):
         studio.ask("debug", 0)
 
@@ -104,7 +104,7 @@ const until = async seen => { while (!seen()) { await ask("inspect?robot=0"); aw
 const word = id => el(id).textContent;
 (async () => {
   found.button = word("debug");
-  el("debug").click(); await until(() => word("error")); found.nobody = word("error");
+  el("debug").click(); await until(() => word("error")); found.none = word("error");
   choose(1); el("debug").click(); await until(() => d.studio.now.debugger);
   found.waits = word("status"); found.port = d.studio.now.debugger.port; found.back = word("debug");
   await until(() => d.studio.now.debugger.is_connected && word("inspector").includes("Sys_Send_Event"));
@@ -114,25 +114,25 @@ const word = id => el(id).textContent;
   found.tick = d.studio.now.tick; found.again = word("debug");
   el("step").click(); await until(() => d.studio.now.tick > found.tick); found.stepped = d.studio.now.tick;
   document.getElementById("result").textContent = JSON.stringify(found);
-  window.setTimeout = () => 0;           // nothing more is due: the browser need not wait
+  window.setTimeout = () => 0;           // ends the virtual time of the browser
 })().catch(error => { document.getElementById("result").textContent = JSON.stringify({error: error.stack}); });
 </script></html>"""
 
 
 @needs_browser
-def test_the_page_gives_a_robot_to_a_debugger_and_takes_it_back(
+def test_the_page_attaches_and_detaches_a_debugger(
     clustering_image: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The button, the port it shows, what a client's breakpoint shows in the page, and the button again."""
+    """The page attaches a debugger, shows its port and the paused robot, and detaches it again."""
     plan = Plan(scene_of(2, 4), "openswarm", "A", clustering_image, 1, SECONDS, 3)
     with serving(plan) as one:
         studio = one.studio
         do(studio, "step", 1100)
 
         def debugs() -> None:
-            while (handed := studio.ask("status")["debugger"]) is None:
+            while (attached := studio.ask("status")["debugger"]) is None:
                 time.sleep(0.05)
-            client = Connected(handed["port"])
+            client = Connected(attached["port"])
             client.ask("initialize", adapterID="openswarm")
             client.ask("attach", stopOnEntry=False)
             client.ask("setFunctionBreakpoints", breakpoints=[{"name": "Sys_Send_Event"}])
@@ -140,7 +140,7 @@ def test_the_page_gives_a_robot_to_a_debugger_and_takes_it_back(
 
         threading.Thread(target=debugs, daemon=True).start()
         found = browsed(one, PROBE, tmp_path, monkeypatch)
-    assert (found["button"], found["nobody"]) == ("Attach debugger", "select a robot first")
+    assert (found["button"], found["none"]) == ("Attach debugger", "select a robot first")
     assert found["back"] == "Detach debugger"
     assert found["waits"].endswith(f"waits for a client of the Debug Adapter Protocol on 127.0.0.1:{found['port']}")
     assert found["has"].startswith("in a debugger, quantum 1")

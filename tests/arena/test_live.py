@@ -1,4 +1,4 @@
-"""Following a trial that goes on: rows in a file while it runs, a server for this machine, a page that grows."""
+"""Live feed of a running trial: file of rows, HTTP server, page that polls for new samples."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ setTimeout(() => {
 
 @pytest.fixture(scope="module")
 def recorded() -> tuple[dict[str, Any], list[dict[str, Any]]]:
-    """What a trial of two scripted robots over six seconds is, and its rows."""
+    """Return metadata and rows of a trial with two scripted robots over six seconds."""
     scene = scripted(load_scene("clustering").with_values(robots__count=2))
     plan = Plan(scene, "scripted", "A", None, 1, 6.0, 1)
     rows: list[dict[str, Any]] = []
@@ -51,7 +51,7 @@ def recorded() -> tuple[dict[str, Any], list[dict[str, Any]]]:
 
 
 def finish(folder: Path, live: LiveFile, about: dict[str, Any], rows: list[dict[str, Any]]) -> None:
-    """As a run does at the end of a trial."""
+    """Write the record and close the live file, as a run does at the end of a trial."""
     columns = Rows()
     for row in rows:
         columns.add(row)
@@ -71,7 +71,7 @@ def serving(follower: Follower) -> Iterator[str]:
 def test_a_follower_gets_the_samples_of_the_finished_file_piece_by_piece(
     tmp_path: Path, recorded: tuple[dict[str, Any], list[dict[str, Any]]]
 ) -> None:
-    """Running, then done; a half line is left for the next time."""
+    """The state is running, then done; an incomplete line is read later."""
     about, rows = recorded
     live = LiveFile(live_path(tmp_path, 1), about)
     for row in rows[:4]:
@@ -93,7 +93,7 @@ def test_a_follower_gets_the_samples_of_the_finished_file_piece_by_piece(
 
 
 def test_a_run_that_is_ended_is_told(tmp_path: Path, recorded: tuple[dict[str, Any], list[dict[str, Any]]]) -> None:
-    """The file goes, no trial comes."""
+    """The state is aborted when the live file disappears without a record."""
     about, rows = recorded
     live = LiveFile(live_path(tmp_path, 1), about)
     live.write(rows[0])
@@ -107,7 +107,7 @@ def test_a_run_that_is_ended_is_told(tmp_path: Path, recorded: tuple[dict[str, A
 def test_a_disk_too_full_for_the_rows_does_not_stop_the_trial(
     tmp_path: Path, full_disk: Path, recorded: tuple[dict[str, Any], list[dict[str, Any]]]
 ) -> None:
-    """Every write is answered with ENOSPC."""
+    """Every write fails with ENOSPC."""
     live_path(tmp_path, 1).symlink_to(full_disk)
     about, rows = recorded
     live = LiveFile(live_path(tmp_path, 1), about)
@@ -118,7 +118,7 @@ def test_a_disk_too_full_for_the_rows_does_not_stop_the_trial(
 
 
 def test_a_trial_with_firmware_can_be_followed_while_it_runs(talking_image: Path, tmp_path: Path) -> None:
-    """The rows so far are those of the file that comes at the end; the fault shows there."""
+    """The rows so far equal those of the record; the record has the fault."""
     scene = load_scene("clustering").with_values(robots__count=1, objects__count=3)
     plan = Plan(scene, "talking", "A", talking_image, 1, 3.0, 1)
     seen: list[dict[str, Any]] = []
@@ -135,7 +135,7 @@ def test_a_trial_with_firmware_can_be_followed_while_it_runs(talking_image: Path
 def test_the_server_answers_its_two_places_only(
     tmp_path: Path, recorded: tuple[dict[str, Any], list[dict[str, Any]]]
 ) -> None:
-    """404 elsewhere, 503 before the first sample."""
+    """Unknown paths are status 404; before the first sample the page is status 503."""
     about, rows = recorded
     live = LiveFile(live_path(tmp_path, 1), about)
     with serving(Follower(tmp_path)) as address:
@@ -152,7 +152,7 @@ def test_the_server_answers_its_two_places_only(
 def test_the_command_serves_until_it_is_interrupted(
     tmp_path: Path, recorded: tuple[dict[str, Any], list[dict[str, Any]]]
 ) -> None:
-    """It names its address; Ctrl-C is the ordinary end."""
+    """The command prints its address and ends without a message on Ctrl-C."""
     about, rows = recorded
     live = LiveFile(live_path(tmp_path, 1), about)
     live.write(rows[0])
@@ -171,14 +171,14 @@ def test_the_command_serves_until_it_is_interrupted(
 
 
 def test_live_needs_a_run_that_goes_on(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Exit status 2."""
+    """A folder without a running trial is exit status 2."""
     assert main(["replay", str(tmp_path), "--live"]) == 2
     assert "no trial is running here" in capsys.readouterr().err
 
 
 @needs_browser
 def test_the_page_grows_in_a_browser(tmp_path: Path, recorded: tuple[dict[str, Any], list[dict[str, Any]]]) -> None:
-    """It begins with four samples, asks, and follows to the last one when the trial is done."""
+    """The page starts with four samples and polls until the trial is done."""
     about, rows = recorded
     live = LiveFile(live_path(tmp_path, 1), about)
     for row in rows[:4]:

@@ -1,4 +1,4 @@
-"""Films of trials: GIF from Pillow alone, MP4 by ffmpeg."""
+"""Videos of trials: GIF with Pillow, MP4 with ffmpeg."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from arena.trial.record import read_trial
 
 @pytest.fixture(scope="module")
 def trial(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Eight seconds of two robots."""
+    """Run eight simulated seconds of two robots."""
     out = tmp_path_factory.mktemp("run")
     arguments = ["--brain", "scripted", "--trials", "1", "--minutes", "0.1333", "--robots", "2", "--jobs", "1"]
     assert main(["run", "clustering", *arguments, "--out", str(out)]) == 0
@@ -25,7 +25,7 @@ def trial(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_a_gif_has_a_frame_for_every_time_it_shows(trial: Path, tmp_path: Path) -> None:
-    """8 s at 4 x real time and 12.5 frames per second: 25 frames of 80 ms, and the first."""
+    """8 s at 4 times real time and 12.5 frames per second are 26 frames of 80 ms."""
     out = tmp_path / "trial.gif"
     assert main(["replay", str(trial), "--export", str(out), "--speed", "4"]) == 0
     with Image.open(out) as film:
@@ -34,13 +34,13 @@ def test_a_gif_has_a_frame_for_every_time_it_shows(trial: Path, tmp_path: Path) 
             film.seek(frame)
             durations.append(film.info["duration"])
         assert sum(durations) in (25 * 80, 26 * 80)
-        assert len(durations) >= 17  # one per sample; equal frames are one of twice the time
+        assert len(durations) >= 17  # one per sample; equal frames are merged
         assert film.size[0] == round(400 * SCALE)
     assert [path.name for path in tmp_path.iterdir()] == ["trial.gif"]
 
 
 def test_frames_show_the_objects_where_the_record_has_them(trial: Path) -> None:
-    """A disc of an object's or cluster's colour at its place; the wheel's place is white before and after."""
+    """A disc in the colour of the object or cluster is at its position."""
     record = read_trial(trial)
     (first, last) = frames(record, [0.0, 8.0])
     for picture, sample in ((first, 0), (last, -1)):
@@ -52,7 +52,7 @@ def test_frames_show_the_objects_where_the_record_has_them(trial: Path) -> None:
 
 
 def test_an_object_of_a_kind_is_as_large_as_its_kind(trial: Path) -> None:
-    """Whatever radius `[objects]` gives."""
+    """The radius of a kind of object overrides that of `[objects]`."""
     record = read_trial(trial)
     kind = record.scene.kind_of(0)
     large = replace(kind, radius_cm=3 * kind.radius_cm, count=record.scene.objects.count)
@@ -64,7 +64,7 @@ def test_an_object_of_a_kind_is_as_large_as_its_kind(trial: Path) -> None:
 
 
 def test_a_gif_keeps_the_colours_of_clusters(trial: Path, tmp_path: Path) -> None:
-    """They come up only when objects meet, long after the first frame."""
+    """Colours that appear only after the first frame are in the palette."""
     record = read_trial(trial)
     for axis, away in (("x", 10.0), ("y", 0.0)):
         met = record.columns[f"o0_{axis}"] + away
@@ -79,8 +79,8 @@ def test_a_gif_keeps_the_colours_of_clusters(trial: Path, tmp_path: Path) -> Non
 
 
 def test_an_mp4_plays_the_same_frames(trial: Path, tmp_path: Path) -> None:
-    """Decoded again by the same ffmpeg: as many frames, the same size."""
-    encoder = video._ffmpeg()  # `make test` installs one (extra: film)
+    """The MP4, decoded by the same ffmpeg, has the expected frames and size."""
+    encoder = video._ffmpeg()  # `make test` installs ffmpeg (extra: film)
     out = tmp_path / "trial.mp4"
     assert main(["replay", str(trial), "--export", str(out), "--speed", "4", "--seconds", "4"]) == 0
     command = [encoder, "-i", str(out), "-f", "rawvideo", "-pix_fmt", "rgb24", "-loglevel", "error", "-"]
@@ -92,7 +92,7 @@ def test_an_mp4_plays_the_same_frames(trial: Path, tmp_path: Path) -> None:
 def test_without_ffmpeg_an_mp4_is_refused_with_what_to_install(
     trial: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Exit status 2; a GIF needs nothing."""
+    """Without ffmpeg an MP4 is exit status 2; a GIF is written."""
     monkeypatch.setattr(video.shutil, "which", lambda _name: None)
     monkeypatch.setitem(video.__dict__, "importlib", _NothingInstalled())
     assert main(["replay", str(trial), "--export", str(tmp_path / "a.mp4")]) == 2
@@ -123,7 +123,7 @@ def test_films_that_cannot_be_are_explained(
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    """Exit status 2, nothing left behind."""
+    """Wrong options are exit status 2, and no file is left."""
     monkeypatch.chdir(tmp_path)
     assert main(["replay", str(trial), *arguments]) == 2
     assert message in capsys.readouterr().err
@@ -133,7 +133,7 @@ def test_films_that_cannot_be_are_explained(
 def test_a_full_disk_is_reported_and_leaves_no_half_film(
     trial: Path, tmp_path: Path, unwritable: set[str], capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Every write is answered with ENOSPC."""
+    """Every write fails with ENOSPC."""
     unwritable.add("film.gif")
     assert main(["replay", str(trial), "--export", str(tmp_path / "film.gif")]) == 2
     assert "film.gif: cannot be written: No space left" in capsys.readouterr().err

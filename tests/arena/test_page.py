@@ -1,4 +1,4 @@
-"""The replay page in a real browser: loads from disk, scrubs, plays, and shows the poses of the Parquet file."""
+"""Replay page in a browser: loading from disk, scrubbing, playback, and poses of the record."""
 
 import json
 import re
@@ -36,14 +36,14 @@ setTimeout(() => {
 
 @pytest.fixture
 def trial(tmp_path: Path) -> Path:
-    """Eight seconds of two robots."""
+    """Run eight simulated seconds of two robots."""
     arguments = ["--brain", "scripted", "--trials", "1", "--minutes", "0.1333", "--robots", "2", "--jobs", "1"]
     assert main(["run", "clustering", *arguments, "--out", str(tmp_path)]) == 0
     return tmp_path / "trial-0001.parquet"
 
 
 def test_the_page_holds_the_file_and_loads_nothing_from_elsewhere(trial: Path) -> None:
-    """Self-contained: no address in it, data equal to the record."""
+    """The page has no external addresses, and its data equal the record."""
     assert main(["replay", str(trial)]) == 0
     text = trial.with_suffix(".html").read_text()
     assert not re.search(r"https?:|src=|href=|@import", text)
@@ -56,7 +56,7 @@ def test_the_page_holds_the_file_and_loads_nothing_from_elsewhere(trial: Path) -
 
 
 def test_text_from_robots_cannot_end_the_page(trial: Path) -> None:
-    """A firmware may say anything."""
+    """Text from firmware that contains HTML tags does not break the page."""
     record = read_trial(trial)
     record.columns["log"][0] = [{"robot": 0, "cycle": 1, "text": "</script><b>"}]
     assert page(record).count("</script>") == 2
@@ -64,7 +64,7 @@ def test_text_from_robots_cannot_end_the_page(trial: Path) -> None:
 
 @needs_browser
 def test_the_page_loads_scrubs_and_plays_in_a_browser(trial: Path, tmp_path: Path) -> None:
-    """Issue "Must show" 6."""
+    """The page loads, scrubs and plays."""
     main(["replay", str(trial)])
     found = browsed(trial.with_suffix(".html").read_text().replace("</html>", PROBE % SAMPLE), tmp_path)
     record = read_trial(trial)
@@ -74,7 +74,7 @@ def test_the_page_loads_scrubs_and_plays_in_a_browser(trial: Path, tmp_path: Pat
     expected = [[record.columns[f"r{i}_{key}"][SAMPLE] for key in ("x", "y", "heading")] for i in range(2)]
     assert found["robots"] == expected
     assert found["corner"] == [0, 0, 0, 0]
-    assert all(pixel[3] == 255 for pixel in found["pixels"])  # something is drawn where the robots are
+    assert all(pixel[3] == 255 for pixel in found["pixels"])  # the robots are drawn at their positions
     assert found["playing"] == "Pause"
     assert found["after"] == len(record.times) - 1
     assert found["end"] == "Play"
@@ -94,7 +94,7 @@ document.getElementById("result").textContent = JSON.stringify({
 
 @needs_browser
 def test_the_page_shows_strips_leds_and_what_was_said(trial: Path, tmp_path: Path) -> None:
-    """A robot blinks its front LED within a sample and says a line; its camera's line has three colours."""
+    """The page shows a short flash of the front LED, a line of text, and a camera line in three colours."""
     record = read_trial(trial)
     record.columns["log"][SAMPLE] = [{"robot": 0, "cycle": 49_152_000, "text": "hello"}]
     record.columns["lights"][SAMPLE] = [{"robot": 0, "cycle": 49_152_001, "leds": 256},
@@ -104,12 +104,12 @@ def test_the_page_shows_strips_leds_and_what_was_said(trial: Path, tmp_path: Pat
     found = browsed(page(record).replace("</html>", SHOWN % SAMPLE), tmp_path)
     assert found["strip"] == [[90, 14, 14], [10, 48, 14], [112, 100, 100]]
     assert found["later"] == 256
-    assert found["front"] == pytest.approx([255, 187, 0], abs=20)  # the disc's edge is smoothed
+    assert found["front"] == pytest.approx([255, 187, 0], abs=20)  # the edge of the disc is antialiased
     lines = found["log"].splitlines()
     assert lines[0].endswith("robot 0  LEDs off")
     assert lines[1].endswith("robot 0  LEDs front")
     assert lines[2] == "3.333 s  robot 0  hello"
-    assert found["seen"][0] in (0, 1, 2)  # shown what stands before it
+    assert found["seen"][0] in (0, 1, 2)  # computed from the poses
 
 
 LAYOUT = """<pre id="result"></pre><script>
@@ -149,8 +149,7 @@ document.getElementById("result").textContent = JSON.stringify(found);
 @needs_browser
 @pytest.mark.parametrize("size", ["1280,720", "700,900"])
 def test_everything_can_be_reached_by_hand_and_key(trial: Path, tmp_path: Path, size: str) -> None:
-    """Controls, arena, plot and log are all on the screen; keys and clicks do what they say; robots move between
-    samples."""
+    """All controls and views fit on the screen; keys and clicks work; robots are interpolated between samples."""
     found = browsed(page(read_trial(trial)).replace("</html>", LAYOUT), tmp_path, size)
     width, height = found["inner"]
     for name, (left, top, right, bottom) in found["boxes"].items():
@@ -171,7 +170,7 @@ def test_everything_can_be_reached_by_hand_and_key(trial: Path, tmp_path: Path, 
 
 
 def browsed(text: str, folder: Path, size: str = "1280,720") -> Any:
-    """What a page that ends in a probe found out."""
+    """Open a page that ends in a probe script, and return the result of the probe."""
     path = folder / "probed.html"
     path.write_text(text)
     command = [str(BROWSER), "--headless", "--no-sandbox", "--disable-gpu", f"--user-data-dir={folder / 'profile'}",

@@ -1,4 +1,4 @@
-"""A debugged trial goes back as a whole: robots, bodies, light and chance; from moments that are kept, or its seed."""
+"""A debugged trial goes back as a whole, with bodies, light and random numbers: from checkpoints, or from its seed."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from tests.firmware.conftest import built_once
 from tests.fuzz.fuzz_rewind import SWARMS, Swarm, plan_of, walk
 
 FEW = Swarm("clustering", 1.0, (), (), {"robots__count": 2, "objects__count": 2, "start__selector": 8})
-needs_copies = pytest.mark.skipif(not checkpoints.CAN_COPY, reason="moments are kept on Linux only")
+needs_fork = pytest.mark.skipif(not checkpoints.CAN_COPY, reason="checkpoints exist on Linux only")
 
 
 @pytest.fixture
@@ -38,7 +38,7 @@ def image_of(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
 
 
 class Debugger(Client):
-    """A client of a session that keeps events and says nothing."""
+    """Client of a debug session that stores events and output."""
 
     def __init__(self, session: DebugSession) -> None:
         self.events: list[tuple[str, Any]] = []
@@ -52,18 +52,18 @@ class Debugger(Client):
             self.events.append((message["event"], message["body"]))
         super().send(message)
 
-    def told(self, text: str) -> str:
+    def evaluate(self, text: str) -> str:
         return str(self.ask("evaluate", expression=text, context="repl")["result"])
 
     @property
     def cycle(self) -> int:
-        """At which the robot stands."""
-        return int(self.told("/time").removeprefix("cycle ").partition(", ")[0].replace(",", ""))
+        """Cycle at which the robot is paused."""
+        return int(self.evaluate("/time").removeprefix("cycle ").partition(", ")[0].replace(",", ""))
 
     def to(self, cycle: int) -> str:
-        """Go to a cycle; the world there."""
+        """Go to a cycle and return the state of the world."""
         assert self.resume("evaluate", expression=f"/goto {cycle}", context="repl")["reason"] == "goto"
-        return self.told("/world")
+        return self.evaluate("/world")
 
 
 @contextmanager
@@ -76,28 +76,30 @@ def session_of(plan: Plan, folder: Path, **how: Any) -> Iterator[tuple[DebugSess
 
 
 @pytest.mark.parametrize("swarm", SWARMS, ids=[one.scene for one in SWARMS])
-def test_random_walks_meet_the_world_that_was_there(swarm: Swarm, image_of: Callable[[str], Path]) -> None:
-    """Robots with cameras that push things, robots that avoid each other, and such that talk. A sample of the
-    campaign: worlds by hash at equal times, the record byte for byte."""
+def test_random_walks_restore_equal_worlds(swarm: Swarm, image_of: Callable[[str], Path]) -> None:
+    """Random forward and backward runs restore equal worlds, by hash, and leave the record unaffected.
+
+    A sample of the fuzz campaign, with robots that use cameras, infrared sensors and Bluetooth."""
     tally: Counter[str] = Counter()
     walk(5, image_of, 12, tally, swarm)
     assert tally["met again"] >= 2
     assert tally["back"] + tally["reverse"] + tally["last write"] >= 3
 
 
-def test_others_stand_in_the_middle_of_a_quantum_where_they_stood(image_of: Callable[[str], Path]) -> None:
-    """A walk that stands there twice. Run by compiled code, others would have come as far as native code that happened
-    to be ready took them."""
+def test_other_robots_are_restored_in_the_middle_of_a_quantum(image_of: Callable[[str], Path]) -> None:
+    """A walk that pauses in the middle of a quantum twice.
+
+    With native code the progress of the other robots would depend on which code is compiled already."""
     tally: Counter[str] = Counter()
     walk(249942260, image_of, 40, tally)
     assert tally["met again"] > 20
 
 
-@needs_copies
-def test_an_editors_client_takes_the_whole_world_back(
+@needs_fork
+def test_an_editor_client_moves_the_whole_world(
     tmp_path: Path, tmp_path_factory: pytest.TempPathFactory, clustering_image: Path
 ) -> None:
-    """The protocol's own test-support package; the record afterwards is that of a trial nobody debugged."""
+    """The protocol's test-support package moves the whole world; the record equals that of an undebugged trial."""
     modules = node_modules(tmp_path_factory.mktemp("npm"))
     trial = ["clustering", "--minutes", "0.02", "--brain", str(clustering_image), "--seed", "3",
              "--set", "start.selector=8"]  # fmt: skip
@@ -112,9 +114,9 @@ def test_an_editors_client_takes_the_whole_world_back(
     assert trial_path(debugged, 1).read_bytes() == trial_path(tmp_path / "alone", 1).read_bytes()
 
 
-@needs_copies
-def test_without_its_moments_a_trial_begins_again(tmp_path: Path, image_of: Callable[[str], Path]) -> None:
-    """Not more are kept than so many; the same worlds from the seed when they are lost."""
+@needs_fork
+def test_without_checkpoints_a_trial_runs_again(tmp_path: Path, image_of: Callable[[str], Path]) -> None:
+    """The number of checkpoints is limited; without them the trial runs again from its seed to equal worlds."""
     with session_of(plan_of(FEW, 7, image_of), tmp_path, every_s=0.03) as (session, debugger):
         seen = {cycle: debugger.to(cycle) for cycle in (3_000_000, 6_000_000, 9_000_000)}
         assert session.checkpoint_count == checkpoints.KEPT
@@ -123,25 +125,25 @@ def test_without_its_moments_a_trial_begins_again(tmp_path: Path, image_of: Call
         session._checkpoints.forget(-1)
         assert debugger.to(3_000_000) == seen[3_000_000]
         assert [text for kind, text in debugger.events if kind == "said" and "run again" in text]
-        assert session.checkpoint_count > 0, "they are kept on the way"
+        assert session.checkpoint_count > 0, "the replay takes checkpoints"
         assert debugger.to(9_000_000) == seen[9_000_000]
         assert debugger.to(2_999_000) != debugger.to(3_000_001)
 
 
-@needs_copies
-def test_what_was_changed_is_changed_again_on_the_way_from_a_moment(
+@needs_fork
+def test_changes_are_repeated_after_a_checkpoint(
     tmp_path: Path, image_of: Callable[[str], Path]
 ) -> None:
-    """Changes before and after a moment; of the past they are, when it is gone back behind, never made."""
+    """Changes before and after a checkpoint are repeated; a rewind to before a change discards it."""
     with session_of(plan_of(FEW, 7, image_of), tmp_path, every_s=0.1) as (session, debugger):
         plain = debugger.to(4_000_000)
         debugger.to(1_000_000)
-        assert debugger.told("T1CON.TCKPS = 2") == "2"
+        assert debugger.evaluate("T1CON.TCKPS = 2") == "2"
         assert debugger.to(4_000_000) != plain
         debugger.ask("writeMemory", memoryReference="0x1f00", data="AQI=")
         changed = debugger.to(8_000_000)
         debugger.to(5_000_000)
-        assert debugger.told("*(unsigned *)0x1f00") == "513"
+        assert debugger.evaluate("*(unsigned *)0x1f00") == "513"
         assert debugger.to(8_000_000) == changed
         debugger.to(4_000_001)
         assert debugger.to(8_000_000) == changed
@@ -152,9 +154,9 @@ def test_what_was_changed_is_changed_again_on_the_way_from_a_moment(
         assert session.checkpoint_count > 1
 
 
-@needs_copies
-def test_rows_of_a_trial_that_goes_back_are_written_once(tmp_path: Path, image_of: Callable[[str], Path]) -> None:
-    """Whoever follows the running trial reads what its file has at the moment."""
+@needs_fork
+def test_rows_of_a_rewound_trial_are_written_once(tmp_path: Path, image_of: Callable[[str], Path]) -> None:
+    """The live file has increasing times after each rewind."""
     plan = plan_of(FEW, 7, image_of)
     with session_of(plan, tmp_path, every_s=0.1) as (_, debugger):
         for cycle in (12_000_000, 5_000_000, 11_000_000, 2_000_000, 12_500_000):
@@ -164,59 +166,59 @@ def test_rows_of_a_trial_that_goes_back_are_written_once(tmp_path: Path, image_o
             assert all(one["t"] < other["t"] for one, other in pairwise(rows))
 
 
-def test_the_end_is_met_again(tmp_path: Path, image_of: Callable[[str], Path]) -> None:
-    """With what the last sample did to the robot: it looked how far the motors had come."""
+def test_the_end_is_restored(tmp_path: Path, image_of: Callable[[str], Path]) -> None:
+    """A rewind restores the effects of the last sample, which reads the motor positions."""
     with session_of(plan_of(FEW, 7, image_of), tmp_path) as (_, debugger):
         halt = debugger.resume("continue", threadId=1)
         assert halt["description"] == OVER
-        end, cycle = debugger.told("/world"), debugger.cycle
+        end, cycle = debugger.evaluate("/world"), debugger.cycle
         assert debugger.to(cycle) == end
         assert debugger.to(cycle - 500_000) != end
         assert debugger.resume("continue", threadId=1)["description"] == OVER
-        assert debugger.told("/world") == end
+        assert debugger.evaluate("/world") == end
 
 
-def test_where_no_moments_are_kept_the_world_follows_who_looks(
+def test_without_fork_the_world_goes_back_on_inspection(
     tmp_path: Path, image_of: Callable[[str], Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The robot goes back alone; the trial is run again when the world is looked at, or the past changed."""
+    """The robot goes back alone; the trial runs again when the world is inspected or the past changed."""
     monkeypatch.setattr(server, "CAN_COPY", False)
     monkeypatch.setattr(debugsession, "context", partial(multiprocessing.get_context, "fork"))
     with session_of(plan_of(FEW, 7, image_of), tmp_path) as (session, debugger):
         first = debugger.to(3_000_000)
-        assert debugger.told("T1CON.TCKPS = 2") == "2"
+        assert debugger.evaluate("T1CON.TCKPS = 2") == "2"
         second = debugger.to(5_000_000)
         for _ in range(2):
             debugger.resume("evaluate", expression="/goto 3000000", context="repl")
-            assert "before the present" in debugger.told("/time")
+            assert "before the present" in debugger.evaluate("/time")
             assert not [kind for kind, _ in debugger.events if kind == "invalidated"]
-        assert debugger.told("/world") != first, "what was changed is"
+        assert debugger.evaluate("/world") != first, "the change is repeated"
         assert [kind for kind, _ in debugger.events if kind == "invalidated"]
-        assert "before the present" not in debugger.told("/time")
+        assert "before the present" not in debugger.evaluate("/time")
         assert debugger.to(5_000_000) == second
         debugger.resume("evaluate", expression="/goto 2000000", context="repl")
-        assert debugger.told("T1CON.TCKPS = 1") == "1"
+        assert debugger.evaluate("T1CON.TCKPS = 1") == "1"
         assert debugger.to(3_000_000) != first
         assert session.checkpoint_count == 0
 
 
-@needs_copies
-def test_it_can_be_told_to_stand_on_the_way_back(tmp_path: Path, image_of: Callable[[str], Path]) -> None:
-    """Between the moment and the time wanted; from there it goes on as ever."""
+@needs_fork
+def test_a_rewind_can_be_paused(tmp_path: Path, image_of: Callable[[str], Path]) -> None:
+    """`pause` stops a rewind between checkpoint and target; the trial continues from there."""
     plan = plan_of(Swarm("clustering", 60.0, (), (), FEW.values), 7, image_of)
     with session_of(plan, tmp_path, every_s=1000.0) as (session, debugger):
         early = debugger.to(10_000_000)
         debugger.to(200_000_000)
         pause: Message = {"type": "request", "seq": 0, "command": "pause"}
-        hear = session.receive
+        receive = session.receive
 
-        def heard() -> tuple[Any, ...]:
-            told = hear()
-            if told[0] == "rewind":
+        def receive_and_pause() -> tuple[Any, ...]:
+            received = receive()
+            if received[0] == "rewind":
                 debugger.inbox.put(pause)
-            return told
+            return received
 
-        session.receive = heard  # type: ignore[method-assign]
+        session.receive = receive_and_pause  # type: ignore[method-assign]
         halt = debugger.resume("evaluate", expression="/goto 199000000", context="repl")
         assert (halt["reason"], halt["description"]) == ("pause", "interrupted while rewinding")
         assert debugger.cycle < 199_000_000

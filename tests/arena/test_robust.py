@@ -163,7 +163,7 @@ time.sleep(600)
 
 
 def test_a_page_that_follows_a_killed_run_says_that_it_is_gone(tmp_path: Path) -> None:
-    """SIGKILL leaves the file of the running trial behind; the page is not to wait for ever."""
+    """SIGKILL leaves the file of the running trial behind; the page must not wait for ever."""
     path = live_path(tmp_path, 1)
     with subprocess.Popen([sys.executable, "-c", WRITER, str(path)], stdout=subprocess.PIPE, cwd=ROOT) as writer:
         assert writer.stdout is not None
@@ -175,7 +175,7 @@ def test_a_page_that_follows_a_killed_run_says_that_it_is_gone(tmp_path: Path) -
             os.kill(writer.pid, signal.SIGKILL)
             writer.wait()
     assert path.exists()
-    assert follower.more(99)["state"] == "gone"
+    assert follower.more(99)["state"] == "aborted"
 
 
 def test_a_trial_that_ends_takes_its_lock_away(tmp_path: Path) -> None:
@@ -246,7 +246,7 @@ def test_a_worker_of_another_version_is_refused() -> None:
     """It says which, instead of sending a record that differs."""
     plan = Plan(scripted(load_scene("clustering")), "scripted", "A", None, 1, 1.0, 1)
     with pytest.raises(ValueError, match=r"worker on .* has pymunk .* instead of 0\.1"):
-        cluster.trial_elsewhere(plan, cluster.Files(None, None, []), 1, versions.versions() | {"pymunk": "0.1"})
+        cluster.run_remote_trial(plan, cluster.Files(None, None, []), 1, versions.versions() | {"pymunk": "0.1"})
 
 
 def test_a_scheduler_that_dies_is_one_line_and_what_is_finished_stays(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""The studio: a trial that stands, steps and goes back to the byte; a server for its own page alone; the page."""
+"""Studio: an interactive trial that steps and rewinds to the byte, the HTTP server, and the page."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def studio_of(plan: Plan) -> Iterator[Studio]:
 
 
 def settled(studio: Studio, state: str = "paused") -> dict[str, Any]:
-    """`now`, once the trial is in a state."""
+    """Return the status once the trial is in `state` or over."""
     for _ in range(1200):
         now = studio.ask("status")
         if now["state"] in (state, "over"):
@@ -68,8 +68,8 @@ def do(studio: Studio, name: str, *arguments: Any) -> dict[str, Any]:
     return settled(studio)
 
 
-def test_a_trial_that_was_stopped_and_stepped_is_recorded_as_any_other() -> None:
-    """However it is cut, the rows are those of `run_trial`."""
+def test_a_stepped_trial_has_the_rows_of_run_trial() -> None:
+    """The rows of a stepped trial equal those of `run_trial`."""
     plan = scripted_plan()
     whole = run_trial(plan.scene, 3, [ScriptedController(plan.scene, 3, robot, "A") for robot in range(2)], SECONDS,
                       experiment=plan.loaded_experiment)  # fmt: skip
@@ -81,8 +81,8 @@ def test_a_trial_that_was_stopped_and_stepped_is_recorded_as_any_other() -> None
         assert studio.ask("trial").columns == whole.rows.columns
 
 
-def test_going_back_leads_to_the_first_pass_to_the_byte(clustering_image: Path) -> None:
-    """Two robots with firmware, an object moved on the way: bodies, speeds and whole machines by hash."""
+def test_a_rewind_restores_the_state_to_the_byte(clustering_image: Path) -> None:
+    """A rewind restores bodies, speeds and machines, by hash, for two robots with firmware and a moved object."""
     plan = Plan(scene_of(2, 4), "openswarm", "A", clustering_image, 1, SECONDS, 3)
     with studio_of(plan) as studio:
         do(studio, "step", 1300)
@@ -98,16 +98,16 @@ def test_going_back_leads_to_the_first_pass_to_the_byte(clustering_image: Path) 
         assert (again["tick"], again["epoch"]) == (here["tick"], here["epoch"] + 1)
         assert studio.ask("digest") == first
         assert studio.ask("trial").columns == rows
-        assert studio.ask("more", 2, here["epoch"])["from"] == 0, "samples of another epoch"
+        assert studio.ask("more", 2, here["epoch"])["from"] == 0, "all samples, because the epoch is another one"
 
 
-def on_the_way_back(studio: Studio, goal: int, name: str, *arguments: Any) -> None:
-    """Begin to go back to `goal`, and do something before anything of that has been done again."""
+def during_rewind(studio: Studio, goal: int, name: str, *arguments: Any) -> None:
+    """Start a rewind to `goal`, and execute a command before it has replayed an action."""
     studio.ask_all(Call("rewind", (goal,)), Call(name, arguments))
 
 
-def test_what_is_done_on_the_way_back_is_done_in_order() -> None:
-    """Moved at 20 and 300; going back to 400, somebody stops at 0: neither move has happened, nor will it."""
+def test_commands_during_a_rewind_discard_later_actions() -> None:
+    """Objects are moved at quanta 20 and 300. A pause at quantum 0 of a rewind discards both actions."""
     plan = scripted_plan()
     with studio_of(plan) as untouched:
         do(untouched, "step", 1)
@@ -125,34 +125,35 @@ def test_what_is_done_on_the_way_back_is_done_in_order() -> None:
     with studio_of(plan) as studio:
         moved(studio)
         with pytest.raises(CommandRefusedError, match="rewinding; pause it first"):
-            on_the_way_back(studio, 400, "move", "object", 0, 50.0, 50.0)
+            during_rewind(studio, 400, "move", "object", 0, 50.0, 50.0)
         settled(studio)
-        on_the_way_back(studio, 390, "pause")
+        during_rewind(studio, 390, "pause")
         do(studio, "step", 400)
         assert studio.ask("digest") == last
     with studio_of(plan) as studio:
         moved(studio)
-        on_the_way_back(studio, 400, "step", 1)
+        during_rewind(studio, 400, "step", 1)
         assert settled(studio)["tick"] == 1
         assert studio.ask("digest") == first
         do(studio, "step", 399)
         assert studio.ask("digest") == last
     with studio_of(plan) as studio:
         moved(studio)
-        on_the_way_back(studio, 400, "rewind", 10)
+        during_rewind(studio, 400, "rewind", 10)
         assert settled(studio)["tick"] == 10
         do(studio, "step", 390)
-        assert studio.ask("digest") == last, "what was done later is forgotten"
+        assert studio.ask("digest") == last, "later actions are discarded"
 
 
-@pytest.mark.skipif(not checkpoints.CAN_COPY, reason="moments are kept on Linux only")
-def test_kept_moments_lead_to_the_first_pass_to_the_byte(
+@pytest.mark.skipif(not checkpoints.CAN_COPY, reason="checkpoints exist on Linux only")
+def test_a_checkpoint_restores_the_state_to_the_byte(
     clustering_image: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A thing moved after each moment that is kept: from there on as from the seed. What is gone back behind is no
-    longer kept, what was moved then is not moved again, breakpoints stay, nobody is left at the end."""
-    ended, close = [], checkpoints.PipeEnd.close
-    monkeypatch.setattr(checkpoints.PipeEnd, "close", lambda line: ended.append(close(line)))
+    """A checkpoint continues as the first pass did, with an object moved after each checkpoint.
+
+    A rewind discards later checkpoints and actions, and keeps breakpoints. All processes end with the studio."""
+    closed, close = [], checkpoints.PipeEnd.close
+    monkeypatch.setattr(checkpoints.PipeEnd, "close", lambda end: closed.append(close(end)))
     monkeypatch.setattr(checkpoints, "EVERY_S", 1e9)
     plan = Plan(scene_of(2, 4), "openswarm", "A", clustering_image, 1, SECONDS, 3)
     with studio_of(plan) as studio:
@@ -174,36 +175,36 @@ def test_kept_moments_lead_to_the_first_pass_to_the_byte(
             if tick in seen:
                 assert (studio.ask("digest"), studio.ask("trial").columns) == seen[tick]
         do(studio, "step", 100)
-        assert studio.ask("digest") != seen[1100][0], "what was moved then is forgotten"
+        assert studio.ask("digest") != seen[1100][0], "later actions are discarded"
         studio.ask("toggle_breakpoint", 1, "Sys_Send_Event")
         assert do(studio, "rewind", 900)["breakpoints"] == ["1 main", "1 Sys_Send_Event"]
         assert studio.ask("digest") == seen[900][0]
         studio.ask("run", 1000.0)
         assert settled(studio, "at a breakpoint")["hit"] == "robot 1 is at Sys_Send_Event"
-    assert len(ended) == 9
-    assert all(ended), "four moments, four that were left for one, and the last"
+    assert len(closed) == 9
+    assert all(closed), "four checkpoints, four abandoned processes, and the last one"
 
 
-def test_moments_are_kept_more_coarsely_the_older_they_are() -> None:
-    """At most so many; those that go are closed."""
-    kept, lines = checkpoints.CheckpointPool(), []
+def test_older_checkpoints_have_larger_distances() -> None:
+    """The pool has a limit; evicted checkpoints are closed."""
+    pool, ends = checkpoints.CheckpointPool(), []
     for ten in range(1, 61):
-        assert kept.is_due(10.0 * ten)
-        assert not kept.is_due(10.0 * ten - 1)
+        assert pool.is_due(10.0 * ten)
+        assert not pool.is_due(10.0 * ten - 1)
         here, there = checkpoints.pipe()
         there.drop()
-        lines.append(here)
-        kept.add(checkpoints.Checkpoint(ten * 1000, 10.0 * ten, here))
-    assert len(kept) == checkpoints.KEPT
-    assert sum(line.fileno() >= 0 for line in lines) == checkpoints.KEPT
-    times = [moment.seconds for moment in (kept.before(tick) for tick in range(0, 60001, 500)) if moment is not None]
+        ends.append(here)
+        pool.add(checkpoints.Checkpoint(ten * 1000, 10.0 * ten, here))
+    assert len(pool) == checkpoints.KEPT
+    assert sum(end.fileno() >= 0 for end in ends) == checkpoints.KEPT
+    times = [moment.seconds for moment in (pool.before(tick) for tick in range(0, 60001, 500)) if moment is not None]
     ages = sorted({600.0 - one for one in times})
     assert ages[:3] == [0.0, 10.0, 20.0]
     assert all(far - near <= max(far * 0.6, 10.0) for near, far in pairwise(ages)), ages
 
 
-def test_a_breakpoint_holds_the_whole_world(clustering_image: Path) -> None:
-    """Nobody moves while a robot stands; what is inside it can be read; afterwards all is as without it."""
+def test_a_breakpoint_pauses_the_whole_world(clustering_image: Path) -> None:
+    """The world is paused while a robot is at a breakpoint and can be inspected; the record is unaffected."""
     plan = Plan(scene_of(2, 4), "openswarm", "A", clustering_image, 1, SECONDS, 3)
     with controllers_of(plan, 3) as (controllers, channel):
         whole = run_trial(plan.scene, 3, controllers, SECONDS, channel=channel, experiment=plan.loaded_experiment)
@@ -229,8 +230,8 @@ def test_a_breakpoint_holds_the_whole_world(clustering_image: Path) -> None:
         assert studio.ask("trial").columns == whole.rows.columns
 
 
-def test_what_is_told_arrives(assembled: Callable[[str], Path]) -> None:
-    """A robot that echoes what it hears by Bluetooth."""
+def test_bluetooth_text_arrives(assembled: Callable[[str], Path]) -> None:
+    """Text sent by Bluetooth arrives at a robot that echoes it."""
     plan = Plan(scene_of(1, 0), "echo", "A", assembled(ECHO), 1, SECONDS, 1)
     with studio_of(plan) as studio:
         do(studio, "step", 100)
@@ -241,8 +242,8 @@ def test_what_is_told_arrives(assembled: Callable[[str], Path]) -> None:
         assert [line["text"] for row in studio.ask("trial").columns["log"] for line in row] == ["hello"]
 
 
-def test_a_supervisor_that_fails_leaves_the_moment_before(tmp_path: Path) -> None:
-    """It is told; looking and going back are still possible, going on is not."""
+def test_a_trial_can_be_rewound_after_its_supervisor_fails(tmp_path: Path) -> None:
+    """The failure is reported; the trial can be inspected and rewound, but not run."""
     own = tmp_path / "own.py"
     own.write_text(FAILING)
     plan = Plan(scripted(scene_of(2, 4)), "scripted", "A", None, 1, SECONDS, 3, own)
@@ -295,17 +296,17 @@ def asked(one: StudioServer, path: str, body: bytes | None = None, **headers: st
         return error.code, error.read().decode()
 
 
-def test_strangers_are_refused() -> None:
-    """Another page's origin, a name that leads here, a missing or wrong token: 403, and nothing is done."""
+def test_unauthorised_requests_are_refused() -> None:
+    """Requests with another origin, another host name, or without the token are status 403 and have no effect."""
     step = json.dumps({"do": "step", "quanta": 5}).encode()
     with serving() as one:
         assert asked(one, "/", **{HEADER: ""})[0] == 403
         assert asked(one, f"/?token={one.token}", **{HEADER: ""})[0] == 200
         assert asked(one, f"/more?from=0&epoch=1&token={one.token}", **{HEADER: ""})[0] == 403
-        for strange in ({HEADER: ""}, {HEADER: one.token[:-1]}, {"Origin": "http://example.org"}, {"Origin": "null"},
+        for foreign in ({HEADER: ""}, {HEADER: one.token[:-1]}, {"Origin": "http://example.org"}, {"Origin": "null"},
                         {"Host": f"example.org:{one.server_port}"}):  # fmt: skip
-            status, text = asked(one, "/do", step, **strange)
-            assert status == 403, strange
+            status, text = asked(one, "/do", step, **foreign)
+            assert status == 403, foreign
             assert text.endswith("use the address that `arena studio` printed")
         assert json.loads(asked(one, "/more?from=0&epoch=1")[1])["now"]["tick"] == 0
         status, text = asked(one, "/do", step, Origin=f"http://{one.hosts[1]}")
@@ -334,8 +335,8 @@ def test_strangers_are_refused() -> None:
         (b'{"do": "pause", "more": 1}', "expected no parameters"),
     ],
 )
-def test_bad_requests_are_told_in_one_line(body: bytes, said: str) -> None:
-    """409, and the studio goes on."""
+def test_bad_requests_are_reported_in_one_line(body: bytes, said: str) -> None:
+    """A bad request is status 409, and the studio continues."""
     with serving() as one:
         status, text = asked(one, "/do", body)
         assert (status, text.count("\n")) == (409, 0)
@@ -346,7 +347,7 @@ def test_bad_requests_are_told_in_one_line(body: bytes, said: str) -> None:
 
 
 def test_the_command_ends_with_ctrl_c() -> None:
-    """It names its address; a bad scene is one line and status 2."""
+    """The command prints its address; a bad scene is one line and status 2."""
     words = [sys.executable, "-m", "arena", "studio", "clustering", "--brain", "scripted", "--port", "0"]
     with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=ROOT) as process:
         assert process.stdout is not None
@@ -386,15 +387,15 @@ const still = async () => { await rest(100); await until(() => d.studio.now.stat
   await until(() => el("error").textContent);
   found.refused = el("error").textContent; found.samples = d.t.length;
   document.getElementById("result").textContent = JSON.stringify(found);
-  window.setTimeout = () => 0;           // nothing more is due: the browser need not wait
+  window.setTimeout = () => 0;           // ends the virtual time of the browser
 })().catch(error => { document.getElementById("result").textContent = JSON.stringify({error: error.stack}); });
 </script></html>"""
 
 
 @needs_browser
-def test_the_page_takes_the_trial_in_hand(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Step, run, stand, drag, back to the moment of the drag, look inside, and what is refused is told."""
-    with serving(replace(scripted_plan(), seconds=600.0)) as one:  # it is not over before it stands
+def test_the_page_controls_the_trial(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Step, run, pause, drag an object, rewind, inspect a robot, and show the reason of a refused command."""
+    with serving(replace(scripted_plan(), seconds=600.0)) as one:  # long enough to pause it
         found = browsed(one, PROBE, tmp_path, monkeypatch)
     assert (found["first"], found["stepped"]) == (0, 1)
     assert found["ran"] > 10
@@ -406,7 +407,9 @@ def test_the_page_takes_the_trial_in_hand(tmp_path: Path, monkeypatch: pytest.Mo
 
 
 def browsed(one: StudioServer, probe: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
-    """What the studio's page found out when it ended in a probe. Timers do not wait for the clock, requests do."""
+    """Open the studio's page with a probe script, and return the result of the probe.
+
+    The browser's timers run in virtual time; requests do not."""
     plain = command.page
     monkeypatch.setattr(command, "page", lambda *given, **more: plain(*given, **more).replace("</html>", probe))
     words = [str(BROWSER), "--headless", "--no-sandbox", "--disable-gpu", "--disable-background-networking",
