@@ -17,7 +17,7 @@ Places = NDArray[np.float64]
 
 CLUSTER_RULES: Final = {"4r": 4.0, "12cm": None}
 """Objects belong together if their centres are nearer than 4 radii, so that no other fits between them (epuck.md §8),
-or nearer than 12 cm, whatever the radius (experiment.md §3)."""
+or nearer than 12 cm, whatever the radius (experiment-contract.md §3)."""
 
 
 def reach_of(rule: str, radius_cm: float) -> float:
@@ -109,7 +109,7 @@ HALF_QUANTUM_S: Final = 0.011
 
 
 @dataclass(frozen=True)
-class Course:
+class MetricSeries:
     """Metrics of one trial over time: `curves` by name, one value per sample."""
 
     times: NDArray[np.float64]
@@ -127,10 +127,10 @@ class Course:
         """First time at which a curve is at least at a level; nan if never."""
         return time_to(self.times, self.curves[name], level)
 
-    def until(self, seconds: float) -> Course:
+    def until(self, seconds: float) -> MetricSeries:
         """The same up to `seconds`."""
         count = int(np.searchsorted(self.times, seconds + HALF_QUANTUM_S))
-        return Course(self.times[:count], {name: values[:count] for name, values in self.curves.items()})
+        return MetricSeries(self.times[:count], {name: values[:count] for name, values in self.curves.items()})
 
     def mean(self, name: str) -> float:
         """Mean over the trial's time: the area under a curve divided by its length."""

@@ -1,7 +1,7 @@
 """Time per simulated second in the arena: physics, rendering, emulation, and the rest; with what a trial takes.
 
-In: nothing (the clustering firmware is built). Out: CPU seconds of this process; for one trial whose robots live in two
-processes, wall seconds, and the memory of all processes together (PSS: what is shared is counted once; Linux only).
+In: nothing (the clustering firmware is built). Out: CPU seconds of this process; for one trial that two
+threads run, wall seconds, and the memory of all processes together (PSS: shared pages count once; Linux only).
 """
 
 from __future__ import annotations
@@ -17,10 +17,10 @@ from typing import Any
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from arena.campaign.campaign import Plan, brains_of
+from arena.campaign.campaign import Plan, controllers_of
 from arena.lockstep.scheduler import LockStep
-from arena.robots.controller import Brain, ScriptedBrain
-from arena.robots.firmware_controller import EmulatedBrain
+from arena.robots.controller import Controller, ScriptedController
+from arena.robots.firmware_controller import FirmwareController
 from arena.robots.images import image_for
 from arena.scene.loader import Scene, load_scene, scripted
 from arena.trial.trial import run_trial
@@ -46,7 +46,7 @@ class Clock:
         return timed
 
 
-def measured(scene: Scene, make: Callable[[], list[Brain]], seconds: float, warm_up: float) -> dict[str, float]:
+def measured(scene: Scene, make: Callable[[], list[Controller]], seconds: float, warm_up: float) -> dict[str, float]:
     """CPU seconds per simulated second, and the shares of physics and rendering in it: of these by a second run in
     which Python calls both, so that they come out rather too large."""
     cpu, _, _ = measure(scene, make(), seconds, warm_up, True)
@@ -62,18 +62,18 @@ def measured(scene: Scene, make: Callable[[], list[Brain]], seconds: float, warm
 
 
 def measure(
-    scene: Scene, brains: list[Brain], seconds: float, warm_up: float, is_native: bool
+    scene: Scene, controllers: list[Controller], seconds: float, warm_up: float, is_native: bool
 ) -> tuple[float, float, float]:
     """CPU seconds per simulated second: all; physics and rendering, unless they are called in compiled code."""
     world = World(scene, 1)
     physics, rendering = Clock(), Clock()
-    robots = [brain for brain in brains if isinstance(brain, EmulatedBrain)]
+    robots = [controller for controller in controllers if isinstance(controller, FirmwareController)]
     if not is_native:
         for robot in robots:
-            sight = robot._sight  # not `_pixels`: other robots are run inside it
-            sight.line = rendering.around(sight.line)  # type: ignore[method-assign]
+            renderer = robot._renderer  # not `_pixels`: other robots run inside it
+            renderer.render_line = rendering.around(renderer.render_line)  # type: ignore[method-assign]
         world.step = physics.around(world.step)  # type: ignore[method-assign]
-        world.go = physics.around(world.go)  # type: ignore[method-assign]
+        world.run_quanta = physics.around(world.run_quanta)  # type: ignore[method-assign]
     lockstep = LockStep(world, robots, is_native=is_native) if robots else None
     sample = round(scene.clock.sample_s / world.dt)
     for tick in range(0, round((warm_up + seconds) / world.dt), sample):
@@ -84,20 +84,22 @@ def measure(
             lockstep.advance(tick + sample)
         else:
             for one in range(tick, tick + sample):
-                world.step([brain.think(one, world.poses) for brain in brains])
-        for brain in brains:
-            brain.reading(), brain.lines(), brain.lights()
+                world.step([controller.control_step(one, world.poses) for controller in controllers])
+        for controller in controllers:
+            controller.reading(), controller.take_lines(), controller.take_led_changes()
     cpu, wall = time.process_time() - start[0], time.perf_counter() - start[1]
     share = cpu / wall / seconds  # clocks run while others have the CPU
     return cpu / seconds, physics.seconds * share, rendering.seconds * share
 
 
-def in_two_processes(scene: Scene, image: Path, seconds: float, warm_up: float) -> dict[str, float]:
-    """Wall seconds per simulated second of a trial, and megabytes of its processes."""
+def with_two_threads(scene: Scene, image: Path, seconds: float, warm_up: float) -> dict[str, float]:
+    """Wall seconds per simulated second of a trial that two threads run, and megabytes of memory."""
     plan = Plan(scene, "openswarm", "A", image, 1, warm_up + seconds, 1)
     times: list[float] = []
-    with brains_of(plan, 1, 2) as (brains, crews, ether):
-        run_trial(scene, 1, brains, plan.seconds, lambda _: times.append(time.perf_counter()), None, None, crews, ether)
+    with controllers_of(plan, 1) as (controllers, channel):
+        run_trial(
+            scene, 1, controllers, plan.seconds, lambda _: times.append(time.perf_counter()), channel=channel, threads=2
+        )
         megabytes = sum(map(proportional_share, family(os.getpid()))) / 1024
     wall = (times[-1] - times[round(warm_up)]) / (len(times) - 1 - round(warm_up))
     return {"wall_s": wall, "trial_wall_s": TRIAL_S * wall, "memory_mb": megabytes}
@@ -137,24 +139,24 @@ def main() -> int:
     quick = scripted(scene)
     image = image_for("openswarm")
     assert image is not None
-    together = in_two_processes(scene, image, options.seconds, 3.0)  # first: its memory is not to be that of the others
+    together = with_two_threads(scene, image, options.seconds, 3.0)  # first: its memory is not to be that of the others
     results = {
         "scripted": measured(
-            quick, lambda: [ScriptedBrain(quick, 1, i, "A") for i in robots], 20 * options.seconds, 5.0
+            quick, lambda: [ScriptedController(quick, 1, i, "A") for i in robots], 20 * options.seconds, 5.0
         ),
         "openswarm": measured(
-            scene, lambda: [EmulatedBrain(scene, 1, i, image, 8) for i in robots], options.seconds, 3.0
+            scene, lambda: [FirmwareController(scene, 1, i, image, 8) for i in robots], options.seconds, 3.0
         ),
     }
     if options.json:
-        print(json.dumps(results | {"openswarm, two processes": together}))
+        print(json.dumps(results | {"openswarm, two threads": together}))
         return 0
     for name, one in results.items():
         print(f"{name:10} {one['cpu_s'] * 1000:7.1f} ms CPU per simulated second ({one['real_time']:.1f} x real time): "
               f"physics {one['physics']:.0%}, rendering {one['rendering']:.0%}; "
               f"{one['by_python_cpu_s'] * 1000:.1f} ms if Python sees each look; "
               f"{len(robots)} robots, 15 min: {one['trial_cpu_s']:.0f} s of one core")  # fmt: skip
-    print(f"one trial in two processes: {together['wall_s'] * 1000:.1f} ms per simulated second, 15 min: "
+    print(f"one trial by two threads: {together['wall_s'] * 1000:.1f} ms per simulated second, 15 min: "
           f"{together['trial_wall_s']:.0f} s; {together['memory_mb']:.0f} MB in all")  # fmt: skip
     return 0
 

@@ -1,1 +1,1 @@
-"""What a robot's camera sees: lens, appearance of objects, the native renderer and its slower reference."""
+"""The camera of a robot: lens, appearance of bodies, and the native renderer."""

@@ -1,7 +1,7 @@
-"""From pixels to rays: pinhole, and what a real camera adds to it (epuck.md §7.6). What enters: columns and rows of the
-upright 640 x 480 picture; what leaves: directions as (left per ahead, up per ahead).
+"""Lens model: rays of pixels by a pinhole camera with pitch, mirroring, distortion and vignetting (epuck.md §7.6).
 
-Without pitch, mirror and distortion it is u = 320 - 602 left, v = 240 - 602 up.
+Input: columns and rows of the upright 640 x 480 picture. Output: directions as (left per ahead, up per ahead). Without
+pitch, mirroring and distortion u = 320 - 602 left and v = 240 - 602 up.
 """
 
 from __future__ import annotations
@@ -21,8 +21,11 @@ Floats = NDArray[np.float64]
 
 
 class Lens:
-    """A camera as it is mounted: `pitch_deg` up positive, `mirrored` as if the sensor stood on its head, `distortion`
-    k: a pixel at distance r (in focal lengths) from the axis shows what is at r (1 + k r^2); positive is a barrel."""
+    """Lens of a mounted camera.
+
+    `pitch_deg` is positive upwards. `mirrored` turns the sensor by 180 degrees. `distortion` is k: a pixel at distance
+    r (in focal lengths) from the axis shows the point at r (1 + k r^2); positive values are a barrel distortion.
+    """
 
     def __init__(self, pitch_deg: float = 0.0, mirrored: bool = False, distortion: float = 0.0) -> None:
         self._sin, self._cos = math.sin(math.radians(pitch_deg)), math.cos(math.radians(pitch_deg))
@@ -30,11 +33,11 @@ class Lens:
         self._distortion = distortion
         edges = [self.line(v, np.array([0, _LAST_COLUMN])) for v in (0, _LAST_ROW)]
         self.widest: Final = max(float(np.abs(left).max()) for left, _ in edges) + 0.01
-        """No ray of the picture has a larger slope to the side."""
+        """Bound of the lateral slope of all rays of the picture."""
         self._columns: dict[tuple[float, tuple[int, ...]], list[tuple[float, float]]] = {}
 
     def column(self, u: float, rows: tuple[int, ...]) -> list[tuple[float, float]]:
-        """The rays (left, up) through some rows of a column."""
+        """Return the rays (left, up) through some rows of a column."""
         rays = self._columns.get((u, rows))
         if rays is None:
             lines = [self.line(v, np.array([u], dtype=np.float64)) for v in rows]
@@ -42,7 +45,7 @@ class Lens:
         return rays
 
     def line(self, v: float, columns: NDArray[np.intp] | Floats) -> tuple[Floats, Floats]:
-        """The rays (left, up) through some columns of a row."""
+        """Return the rays (left, up) through some columns of a row."""
         if self._mirrored:
             v, columns = _LAST_ROW - v, _LAST_COLUMN - columns
         left: Floats = (dimensions.CENTRE_X - columns.astype(np.float64)) / dimensions.FOCAL_PIXELS
@@ -56,7 +59,7 @@ class Lens:
         return left, up
 
     def vignetting(self, v: float, columns: NDArray[np.intp], share: float) -> Floats:
-        """Brightness of some pixels of a row if the corners of the picture are darker by `share`."""
+        """Return the brightness of some pixels of a row if the corners of the picture are darker by `share`."""
         across, down = columns.astype(np.float64) - dimensions.CENTRE_X, v - dimensions.CENTRE_Y
         corner = dimensions.CENTRE_X * dimensions.CENTRE_X + dimensions.CENTRE_Y * dimensions.CENTRE_Y
         bright: Floats = 1 - share / corner * (across * across + down * down)
@@ -69,6 +72,5 @@ def _lens(pitch_deg: float, mirrored: bool, distortion: float) -> Lens:
 
 
 def lens_of(camera: CameraSetting, pitch_deg: float = 0.0) -> Lens:
-    """The lens of a scene's camera, of a robot whose camera looks up by so much more; one per process for the same
-    values."""
+    """Return the lens of a scene's camera with `pitch_deg` of additional pitch; equal lenses are one object."""
     return _lens(camera.pitch_deg + pitch_deg, camera.mirrored, camera.distortion)

@@ -1,6 +1,7 @@
-// What a robot's camera sees, as vision.py defines it: the same arithmetic in the same order. Lengths cm.
+// Renderer of a robot's camera. tests/arena/reference_camera.py is its specification in Python: the same arithmetic in
+// the same order. Lengths cm.
 //
-// A view is collected once for a pose (what is near enough and ahead, in the camera's axes), then asked for rays.
+// `set_viewpoint` collects the bodies in view for a pose, in the camera frame. The other functions cast rays.
 
 #include <stdint.h>
 
@@ -13,42 +14,42 @@ extern f64 fabs(f64);
 extern f64 sqrt(f64);
 extern f64 rint(f64);
 
-enum kind { NOTHING, OBJECT, ROBOT, WALL, FLOOR, ABOVE }; // as in look.py
+enum pixel_class { NOTHING, OBJECT, ROBOT, WALL, FLOOR, ABOVE }; // as in appearance.py
 
 struct disc {
-    f64 ahead, left, radius, height; // in a scene's list: x and y for the first two
-    i64 kind;
-    i64 leds;     // of a robot, bit n: that of `struct lamp` n is lit; the last is the body's
-    f64 cos, sin; // of its heading, seen from the camera
+    f64 ahead, left, radius, height; // in the list of a scene: x and y for the first two
+    i64 class;
+    i64 leds;     // of a robot, bit n: LED n of `led_positions` is lit; the bit after the last one: the body LED
+    f64 cos, sin; // of a robot's heading, in the camera frame
 };
 
-// Where a robot's LED shines: its direction from the middle (forward, left), and heights.
-struct lamp {
+// Position of a LED on a robot's edge: its direction from the centre (forward, left), and from which to which height.
+struct led {
     f64 forward, left, low, high;
 };
 
 struct side {
     f64 ax, ay, bx, by, height;
-    i64 kind;
+    i64 class;
 };
 
 struct patch {
     f64 x, y, radius; // no radius: a polygon
     const f64 *corners;
-    i64 count, kind;
+    i64 count, class;
 };
 
-// A camera in a scene. The second half is what `collect` leaves.
+// A camera in a scene. `set_viewpoint` sets the fields from `discs` on.
 struct view {
     f64 camera_ahead, camera_height, wall_height, nearest;
     f64 width, height, range, widest, yaw;
     i64 own, robots, objects, is_furnished;
-    const i64 *leds; // of each robot, null if cameras do not see them
-    const struct lamp *lamps;
-    i64 lamp_count, led_kind, body_kind;
-    f64 led_cos; // of half the angle a LED takes of the body's edge
+    const i64 *lit; // lit LEDs of each robot; null if cameras do not see LEDs
+    const struct led *led_positions;
+    i64 led_count, led_class, body_class;
+    f64 led_cos; // cosine of half the angle of the edge that a LED lights
     struct disc robot;
-    const struct disc *things;
+    const struct disc *object_discs;
     const struct disc *fixed;
     i64 fixed_count;
     const struct side *outlines;
@@ -62,13 +63,13 @@ struct view {
     f64 x, y, cos, sin;
 };
 
-// Rays, with room for what they meet: a class each, and what it looks like. `bright` darkens each pixel, null for none.
+// Rays with their results: the pixel class and the pixel of each. `brightness` are factors of the pixels, null for none.
 struct rays {
     const f64 *left, *up;
     i64 count;
     f64 right_most, left_most;
     uint8_t *seen, *pixels;
-    const f64 *bright;
+    const f64 *brightness;
 };
 
 static int is_before(const struct disc *one, const struct disc *other)
@@ -81,7 +82,7 @@ static int is_before(const struct disc *one, const struct disc *other)
         return one->radius < other->radius;
     if (one->height != other->height)
         return one->height < other->height;
-    return one->kind < other->kind;
+    return one->class < other->class;
 }
 
 static void sort(struct disc *discs, i64 count)
@@ -99,22 +100,22 @@ static void sort(struct disc *discs, i64 count)
         }
 }
 
-// Keep a disc that the picture's widest ray can touch within range.
-static void keep(struct view *v, f64 x, f64 y, const struct disc *like)
+// Add a disc if a ray of the picture can hit it within range.
+static void add_disc(struct view *v, f64 x, f64 y, const struct disc *like)
 {
     f64 dx = x - v->x, dy = y - v->y, radius = like->radius;
     f64 ahead = dx * v->cos + dy * v->sin;
     if (!(-radius < ahead && ahead < v->range + radius))
         return;
     f64 left = dy * v->cos - dx * v->sin;
-    if (fabs(left) - 1.2 * radius < v->widest * (ahead + radius)) // 1.2: the ray's slope to the rim
+    if (fabs(left) - 1.2 * radius < v->widest * (ahead + radius)) // 1.2: for the slope of a ray to the rim
         v->discs[v->disc_count++] =
-            (struct disc){ahead, left, radius, like->height, like->kind, like->leds, like->cos, like->sin};
+            (struct disc){ahead, left, radius, like->height, like->class, like->leds, like->cos, like->sin};
 }
 
-// Look from a pose extrapolated by `quanta` beyond that in `poses`; both tables hold x, y, heading of the robots, then
-// x, y of the objects.
-void collect(struct view *v, const f64 *poses, const f64 *before, f64 quanta)
+// Set the viewpoint to the own pose in `poses`, extrapolated by `quanta` of the motion since `before`, and collect what
+// is in view. Both tables hold x, y, heading of the robots, then x, y of the objects.
+void set_viewpoint(struct view *v, const f64 *poses, const f64 *before, f64 quanta)
 {
     const f64 *now = poses + 3 * v->own, *then = before + 3 * v->own;
     f64 x = now[0] + quanta * (now[0] - then[0]), y = now[1] + quanta * (now[1] - then[1]);
@@ -126,23 +127,23 @@ void collect(struct view *v, const f64 *poses, const f64 *before, f64 quanta)
     v->disc_count = v->side_count = 0;
     const f64 *objects = poses + 3 * v->robots;
     for (i64 i = 0; i < v->objects; i++)
-        keep(v, objects[2 * i], objects[2 * i + 1], &v->things[i]);
+        add_disc(v, objects[2 * i], objects[2 * i + 1], &v->object_discs[i]);
     for (i64 i = 0; i < v->robots; i++) {
         if (i == v->own)
             continue;
-        if (v->leds) {
+        if (v->lit) {
             f64 c = cos(poses[3 * i + 2]), s = sin(poses[3 * i + 2]);
-            v->robot.leds = v->leds[i];
+            v->robot.leds = v->lit[i];
             v->robot.cos = c * v->cos + s * v->sin, v->robot.sin = s * v->cos - c * v->sin;
         }
-        keep(v, poses[3 * i], poses[3 * i + 1], &v->robot);
+        add_disc(v, poses[3 * i], poses[3 * i + 1], &v->robot);
     }
     sort(v->discs, v->disc_count);
     for (i64 i = 0; i < v->outline_count; i++) {
         const struct side *one = &v->outlines[i];
         f64 x1 = one->ax - v->x, y1 = one->ay - v->y, x2 = one->bx - v->x, y2 = one->by - v->y;
         struct side turned = {x1 * v->cos + y1 * v->sin, y1 * v->cos - x1 * v->sin, x2 * v->cos + y2 * v->sin,
-                              y2 * v->cos - x2 * v->sin, one->height,               one->kind};
+                              y2 * v->cos - x2 * v->sin, one->height,               one->class};
         if (turned.ax > 0 || turned.bx > 0)
             v->sides[v->side_count++] = turned;
     }
@@ -159,8 +160,8 @@ static int contains(const struct patch *patch, f64 x, f64 y)
     return inside;
 }
 
-// The floor a ray meets: the last patch that covers the place.
-static i64 floor_of(const struct view *v, f64 ray, f64 rise)
+// Class of the floor where a ray hits it: that of the last patch that covers the point.
+static i64 floor_class(const struct view *v, f64 ray, f64 rise)
 {
     i64 found = FLOOR;
     if (!v->patch_count)
@@ -171,22 +172,22 @@ static i64 floor_of(const struct view *v, f64 ray, f64 rise)
         const struct patch *one = &v->patches[i];
         f64 dx = x - one->x, dy = y - one->y;
         if (one->count ? contains(one, x, y) : sqrt(dx * dx + dy * dy) < one->radius)
-            found = one->kind;
+            found = one->class;
     }
     return found;
 }
 
-static f64 most(f64 one, f64 other)
+static f64 max(f64 one, f64 other)
 {
     return one > other ? one : other;
 }
 
-static f64 least(f64 one, f64 other)
+static f64 min(f64 one, f64 other)
 {
     return one < other ? one : other;
 }
 
-// Depth at which a ray meets a disc, negative if it does not; `a` is 1 + slope squared.
+// Depth at which a ray hits a disc, negative if it does not; `a` is 1 + slope squared.
 static f64 disc_depth(const struct view *v, const struct disc *disc, f64 slope, f64 a)
 {
     f64 b = disc->ahead + slope * disc->left;
@@ -194,9 +195,10 @@ static f64 disc_depth(const struct view *v, const struct disc *disc, f64 slope, 
     f64 root = b * b - a * c;
     if (!(root > 0) || !(b > 0))
         return -1;
-    return most((b - sqrt(root)) / a, v->nearest);
+    return max((b - sqrt(root)) / a, v->nearest);
 }
 
+// Depth at which a ray hits a side, negative if it does not.
 static f64 side_depth(const struct view *v, const struct side *side, f64 slope)
 {
     f64 across = (side->by - side->ay) - slope * (side->bx - side->ax);
@@ -204,10 +206,11 @@ static f64 side_depth(const struct view *v, const struct side *side, f64 slope)
         return -1;
     f64 depth = (side->ax * (side->by - side->ay) - side->ay * (side->bx - side->ax)) / across;
     f64 part = (side->ax * slope - side->ay) / across;
-    return depth > 0 && 0 <= part && part <= 1 ? most(depth, v->nearest) : -1;
+    return depth > 0 && 0 <= part && part <= 1 ? max(depth, v->nearest) : -1;
 }
 
-static struct disc seen_from(const struct view *v, const struct disc *fixed)
+// A fixed disc in the camera frame.
+static struct disc in_camera_frame(const struct view *v, const struct disc *fixed)
 {
     f64 dx = fixed->ahead - v->x, dy = fixed->left - v->y;
     struct disc found = *fixed;
@@ -215,78 +218,80 @@ static struct disc seen_from(const struct view *v, const struct disc *fixed)
     return found;
 }
 
-static int may_meet(const struct disc *disc, f64 right, f64 left)
+// Whether a ray with a slope from `right` to `left` can hit a disc. Errs on the side of yes.
+static int can_hit(const struct disc *disc, f64 right, f64 left)
 {
     return disc->left - 1.1 * disc->radius <= left * disc->ahead &&
            disc->left + 1.1 * disc->radius >= right * disc->ahead;
 }
 
-// What of a ray is not hidden yet.
+// A pixel in progress: the slope upwards of its ray, the depth of the nearest hit so far, and the class seen there.
 struct pixel {
     f64 rise, blocked;
     i64 seen;
 };
 
-static int meet(const struct view *v, struct pixel *p, f64 depth, f64 height, i64 kind)
+// Record a hit if it is nearer than all before and the body is tall enough. Return whether it is.
+static int occlude(const struct view *v, struct pixel *p, f64 depth, f64 height, i64 class)
 {
     f64 z = v->camera_height + p->rise * depth;
     if (!(z <= height && depth < p->blocked))
         return 0;
-    p->seen = z < 0 ? FLOOR : kind;
+    p->seen = z < 0 ? FLOOR : class;
     p->blocked = depth;
     return 1;
 }
 
-// Class of the place where a ray meets a robot with LEDs lit.
-static i64 glow(const struct view *v, const struct disc *robot, f64 slope, f64 rise, f64 depth)
+// Class of the point where a ray hits a robot with lit LEDs.
+static i64 robot_class(const struct view *v, const struct disc *robot, f64 slope, f64 rise, f64 depth)
 {
     f64 z = v->camera_height + rise * depth, ahead = depth - robot->ahead, left = slope * depth - robot->left;
     f64 forward = ahead * robot->cos + left * robot->sin, aside = left * robot->cos - ahead * robot->sin;
-    for (i64 i = 0; i < v->lamp_count; i++) {
-        const struct lamp *one = &v->lamps[i];
+    for (i64 i = 0; i < v->led_count; i++) {
+        const struct led *one = &v->led_positions[i];
         if (robot->leds >> i & 1 && one->low <= z && z <= one->high &&
             forward * one->forward + aside * one->left >= robot->radius * v->led_cos)
-            return v->led_kind;
+            return v->led_class;
     }
-    return robot->leds >> v->lamp_count & 1 ? v->body_kind : robot->kind;
+    return robot->leds >> v->led_count & 1 ? v->body_class : robot->class;
 }
 
-// Classes of the pixels of some rays.
-void classes(const struct view *v, const struct rays *rays)
+// Set the pixel class of each ray.
+void classify_rays(const struct view *v, const struct rays *rays)
 {
-    f64 east = 1 / most(v->width - v->x, v->nearest), west = -1 / most(v->x, v->nearest);
-    f64 north = 1 / most(v->height - v->y, v->nearest), south = -1 / most(v->y, v->nearest);
+    f64 east = 1 / max(v->width - v->x, v->nearest), west = -1 / max(v->x, v->nearest);
+    f64 north = 1 / max(v->height - v->y, v->nearest), south = -1 / max(v->y, v->nearest);
     f64 over = v->wall_height - v->camera_height;
     for (i64 i = 0; i < rays->count; i++) {
         f64 slope = rays->left[i], a = 1 + slope * slope, length = sqrt(a);
-        f64 near = most(most(v->cos * east + -v->sin * east * slope, v->cos * west + -v->sin * west * slope),
-                        most(v->sin * north + v->cos * north * slope, v->sin * south + v->cos * south * slope));
-        near = least(near, 1 / v->nearest);
-        struct pixel p = {rays->up[i], v->is_furnished ? 1 / most(near, 1e-12) : __builtin_inf(), WALL};
+        f64 near = max(max(v->cos * east + -v->sin * east * slope, v->cos * west + -v->sin * west * slope),
+                       max(v->sin * north + v->cos * north * slope, v->sin * south + v->cos * south * slope));
+        near = min(near, 1 / v->nearest);
+        struct pixel p = {rays->up[i], v->is_furnished ? 1 / max(near, 1e-12) : __builtin_inf(), WALL};
         if (p.rise > over * near)
             p.seen = ABOVE;
         else if (p.rise < -v->camera_height * near)
             p.seen = FLOOR;
         for (i64 d = 0; d < v->disc_count; d++) {
-            if (!may_meet(&v->discs[d], rays->right_most, rays->left_most))
+            if (!can_hit(&v->discs[d], rays->right_most, rays->left_most))
                 continue;
             f64 depth = disc_depth(v, &v->discs[d], slope, a);
             if (depth > 0 && depth * length <= v->range &&
-                meet(v, &p, depth, v->discs[d].height, v->discs[d].kind) && v->discs[d].leds && p.seen != FLOOR)
-                p.seen = glow(v, &v->discs[d], slope, p.rise, depth);
+                occlude(v, &p, depth, v->discs[d].height, v->discs[d].class) && v->discs[d].leds && p.seen != FLOOR)
+                p.seen = robot_class(v, &v->discs[d], slope, p.rise, depth);
         }
         for (i64 d = 0; d < v->fixed_count; d++) {
-            struct disc disc = seen_from(v, &v->fixed[d]);
+            struct disc disc = in_camera_frame(v, &v->fixed[d]);
             f64 depth = disc_depth(v, &disc, slope, a);
             if (depth > 0)
-                meet(v, &p, depth, disc.height, disc.kind);
+                occlude(v, &p, depth, disc.height, disc.class);
         }
         for (i64 s = 0; s < v->side_count; s++) {
             f64 depth = side_depth(v, &v->sides[s], slope);
             if (depth > 0)
-                meet(v, &p, depth, v->sides[s].height, v->sides[s].kind);
+                occlude(v, &p, depth, v->sides[s].height, v->sides[s].class);
         }
-        rays->seen[i] = (uint8_t)(p.seen == FLOOR ? floor_of(v, slope, p.rise) : p.seen);
+        rays->seen[i] = (uint8_t)(p.seen == FLOOR ? floor_class(v, slope, p.rise) : p.seen);
     }
 }
 
@@ -295,78 +300,77 @@ static f64 wall_depth(const struct view *v, f64 slope)
     f64 east = v->cos - slope * v->sin, north = v->sin + slope * v->cos, inf = __builtin_inf();
     f64 to_x = east > 0 ? (v->width - v->x) / east : east < 0 ? -v->x / east : inf;
     f64 to_y = north > 0 ? (v->height - v->y) / north : north < 0 ? -v->y / north : inf;
-    return most(least(to_x, to_y), v->nearest);
+    return max(min(to_x, to_y), v->nearest);
 }
 
-// The first thing a ray meets that is not lower than the ray is there, or that lies behind where it meets the floor.
+// The nearest hit at which the ray is not above the body, or is below the floor.
 struct hit {
     f64 depth, height;
-    i64 kind;
+    i64 class;
 };
 
-static void offer(const struct view *v, struct hit *best, f64 rise, f64 depth, f64 height, i64 kind)
+static void offer_hit(const struct view *v, struct hit *best, f64 rise, f64 depth, f64 height, i64 class)
 {
     f64 z = v->camera_height + rise * depth;
     if (z >= 0 && z > height)
         return;
     if (depth < best->depth || (depth == best->depth && (height < best->height ||
-                                                         (height == best->height && kind < best->kind))))
-        *best = (struct hit){depth, height, kind};
+                                                         (height == best->height && class < best->class))))
+        *best = (struct hit){depth, height, class};
 }
 
-// As `Eye.column` for every ray.
+// Pixel class of one ray, exactly as `ReferenceCamera.column` computes it.
 static i64 ray_class(const struct view *v, const struct rays *rays, f64 slope, f64 rise)
 {
     f64 a = 1 + slope * slope, reach = v->range / sqrt(a), inf = __builtin_inf();
     struct hit best = {inf, inf, 0};
     for (i64 d = 0; d < v->disc_count; d++) {
-        if (!may_meet(&v->discs[d], rays->right_most, rays->left_most))
+        if (!can_hit(&v->discs[d], rays->right_most, rays->left_most))
             continue;
         f64 depth = disc_depth(v, &v->discs[d], slope, a);
         if (depth > 0 && depth <= reach)
-            offer(v, &best, rise, depth, v->discs[d].height, v->discs[d].kind);
+            offer_hit(v, &best, rise, depth, v->discs[d].height, v->discs[d].class);
     }
     for (i64 s = 0; s < v->side_count; s++) {
         f64 depth = side_depth(v, &v->sides[s], slope);
         if (depth > 0)
-            offer(v, &best, rise, depth, v->sides[s].height, v->sides[s].kind);
+            offer_hit(v, &best, rise, depth, v->sides[s].height, v->sides[s].class);
     }
     for (i64 d = 0; d < v->fixed_count; d++) {
-        struct disc disc = seen_from(v, &v->fixed[d]);
+        struct disc disc = in_camera_frame(v, &v->fixed[d]);
         f64 depth = disc_depth(v, &disc, slope, a);
         if (depth > 0)
-            offer(v, &best, rise, depth, disc.height, disc.kind);
+            offer_hit(v, &best, rise, depth, disc.height, disc.class);
     }
     f64 z = v->camera_height + rise * (best.depth < inf ? best.depth : wall_depth(v, slope));
     if (z < 0)
-        return floor_of(v, slope, rise);
-    return best.depth < inf ? best.kind : z <= v->wall_height ? WALL : ABOVE;
+        return floor_class(v, slope, rise);
+    return best.depth < inf ? best.class : z <= v->wall_height ? WALL : ABOVE;
 }
 
-// Votes of the sensor's window: pixels that show an object times 256, and those that show a robot. `sensed` says what
-// each class is taken for.
-i64 votes(const struct view *v, const struct rays *rays, const uint8_t *sensed)
+// Votes of the sensor window: 256 times the pixels that show an object, plus the pixels that show a robot.
+// `sensor_classes` maps each pixel class to the class that the sensor takes it for.
+i64 window_votes(const struct view *v, const struct rays *rays, const uint8_t *sensor_classes)
 {
     i64 found = 0;
     for (i64 i = 0; i < rays->count; i++) {
-        i64 seen = sensed[ray_class(v, rays, rays->left[i], rays->up[i])];
+        i64 seen = sensor_classes[ray_class(v, rays, rays->left[i], rays->up[i])];
         found += seen == OBJECT ? 256 : seen == ROBOT;
     }
     return found;
 }
 
-// A line of a picture for a pose: collected, classified and painted. `noise` goes on from value to value. Returns its
-// pixels.
-const uint8_t *line(struct view *v, const f64 *poses, const f64 *before, f64 quanta, const struct rays *rays,
+// Render a line of the picture from a pose and return its pixels. `noise` has one value per colour of each pixel.
+const uint8_t *render_line(struct view *v, const f64 *poses, const f64 *before, f64 quanta, const struct rays *rays,
                     const int16_t *colours, const int16_t *noise)
 {
-    collect(v, poses, before, quanta);
-    classes(v, rays);
+    set_viewpoint(v, poses, before, quanta);
+    classify_rays(v, rays);
     for (i64 i = 0; i < rays->count; i++)
         for (i64 c = 0; c < 3; c++) {
             i64 value = colours[3 * rays->seen[i] + c];
-            if (rays->bright)
-                value = (i64)rint((f64)value * rays->bright[i]);
+            if (rays->brightness)
+                value = (i64)rint((f64)value * rays->brightness[i]);
             value += noise[3 * i + c];
             rays->pixels[3 * i + c] = (uint8_t)(value < 0 ? 0 : value > 255 ? 255 : value);
         }

@@ -1,1 +1,1 @@
-"""Infrared light between robots: the proximity ring, propagation, and the channel that all emitters share."""
+"""Infrared light between robots: the sensor ring, propagation, and the channel that all robots share."""

@@ -1,5 +1,5 @@
-// Light of other robots' emitters as a sensor sees it, for the sensors of the ring (emu/boards/epuck/ring.c): what was
-// switched when (ether.py), what of it reaches whom (optics.py), and what infrared.py adds to it.
+// Light of other robots' emitters at an infrared sensor, for emu/boards/epuck/ring.c. channel.py has the histories of
+// the emitters, propagation.py their strength at the sensors, ring.py loss, ripple and noise.
 
 #include <stdint.h>
 
@@ -16,22 +16,23 @@ extern f64 sqrt(f64);
 enum { LINES = 4, SENSORS = 8 };
 static const f64 TAU = 6.28318530717958647693;
 
-// A robot's pulse lines: lit[0] before the first switch, lit[n + 1] behind switch n; when its transmission began.
-struct track {
+// Changes of a robot's pulse lines: lit[0] before the first change, lit[n + 1] after change n; begun[n]: the cycle at
+// which the transmission of change n began.
+struct history {
     const i64 *cycles, *begun;
     const uint8_t *lit;
-    i64 count, known; // the cycle of a switch, and how far receivers had followed in it
-    f64 followed[LINES];
+    i64 count, cached_at; // cached levels: at the cycle of a change
+    f64 cached[LINES];
 };
 
-// How receivers follow: first order; what is longer ago is forgotten.
+// Response of the receivers: a first-order low-pass with time constant `tau`, settled after `settled` cycles.
 struct receivers {
     f64 tau;
     i64 settled;
 };
 
-// Switches at or before a cycle.
-static i64 switches_by(const struct track *t, i64 cycle)
+// Number of changes at or before a cycle.
+static i64 changes_by(const struct history *t, i64 cycle)
 {
     i64 low = 0, high = t->count;
     while (low < high) {
@@ -49,41 +50,42 @@ static f64 steady(unsigned lit, i64 line)
     return lit >> line & 1;
 }
 
-static void follow(f64 *shares, unsigned lit, i64 age, f64 tau)
+// Let receivers settle for `age` cycles with the lines `lit`.
+static void settle(f64 *levels, unsigned lit, i64 age, f64 tau)
 {
     f64 left = exp((f64)-age / tau);
     for (i64 line = 0; line < LINES; line++)
-        shares[line] = steady(lit, line) + (shares[line] - steady(lit, line)) * left;
+        levels[line] = steady(lit, line) + (levels[line] - steady(lit, line)) * left;
 }
 
-// How far receivers had followed when a switch was made, from those shortly before it.
-static void follow_to(struct track *t, const struct receivers *r, i64 place)
+// Cache the levels at change `place`, from the changes shortly before it.
+static void cache_levels(struct history *t, const struct receivers *r, i64 place)
 {
-    i64 first = switches_by(t, t->cycles[place] - r->settled);
+    i64 first = changes_by(t, t->cycles[place] - r->settled);
     for (i64 line = 0; line < LINES; line++)
-        t->followed[line] = steady(t->lit[first], line);
+        t->cached[line] = steady(t->lit[first], line);
     for (i64 i = first; i < place; i++)
-        follow(t->followed, t->lit[i + 1], t->cycles[i + 1] - t->cycles[i], r->tau);
-    t->known = t->cycles[place];
+        settle(t->cached, t->lit[i + 1], t->cycles[i + 1] - t->cycles[i], r->tau);
+    t->cached_at = t->cycles[place];
 }
 
-// Of each line how far receivers have followed it in a cycle.
-void shares(struct track *t, const struct receivers *r, i64 cycle, f64 *found)
+// Levels of the receivers at a cycle, for each line: 0 dark, 1 settled at full light.
+void levels(struct history *t, const struct receivers *r, i64 cycle, f64 *found)
 {
-    i64 index = switches_by(t, cycle), age = index ? cycle - t->cycles[index - 1] : r->settled;
+    i64 index = changes_by(t, cycle), age = index ? cycle - t->cycles[index - 1] : r->settled;
     if (age >= r->settled) {
         for (i64 line = 0; line < LINES; line++)
             found[line] = steady(t->lit[index], line);
         return;
     }
-    if (t->known != t->cycles[index - 1])
-        follow_to(t, r, index - 1);
+    if (t->cached_at != t->cycles[index - 1])
+        cache_levels(t, r, index - 1);
     for (i64 line = 0; line < LINES; line++)
-        found[line] = t->followed[line];
-    follow(found, t->lit[index], age, r->tau);
+        found[line] = t->cached[line];
+    settle(found, t->lit[index], age, r->tau);
 }
 
-// 64 bits of a seed, channel and cycle, as emu/boards/noise.py has them.
+// Hash of a seed, channel and cycle to 64 bits, the same as in emu/boards/noise.py.
 static u64 mixed(u64 seed, u64 channel, u64 cycle)
 {
     u64 x = seed + (cycle << 8 | channel) * 0x9E3779B97F4A7C15;
@@ -103,49 +105,50 @@ static f64 uniform(u64 seed, i64 channel, i64 cycle)
     return (f64)(mixed(seed, (u64)channel, (u64)cycle) >> 11) / 9007199254740992.0;
 }
 
-// A robot whose light may arrive: counts of each of its lines, shares of the own sensors.
-struct heard {
+// A robot whose light can arrive: counts of each of its lines, share of each own sensor.
+struct source {
     f64 counts[LINES], shares[SENSORS];
     i64 robot;
-    struct track *track;
+    struct history *history;
 };
 
-struct moment {
+struct source_list {
     i64 count;
-    const struct heard *heard;
+    const struct source *sources;
 };
 
-// What shines on a robot. Its board's cycles are `on_at` behind, light is `late`; before cycle `begin` it was `past`.
+// The light at one robot. Its board is powered on at cycle `on_at` of the trial; light arrives `delay` cycles late. From
+// cycle `begin` of the board the sources are `now`, before it `past`.
 struct light {
     struct receivers receivers;
-    i64 on_at, late, begin;
-    struct moment now, past;
+    i64 on_at, delay, begin;
+    struct source_list now, past;
     f64 lost_share, ripple_counts, ripple, noise_counts;
-    i64 lost_seen, lost_period; // cycles: of a lost transmission so many are seen, in each so many
+    i64 lost_seen, lost_period; // a lost transmission is seen for `lost_seen` cycles in each `lost_period`
     u64 seed;
 };
 
-// Whether another robot's transmission is lost here, and this is not one of the moments in which it is seen.
-static int misses(const struct light *l, const struct heard *other, i64 now)
+// Whether a transmission of another robot is lost here and invisible at this cycle.
+static int is_lost(const struct light *l, const struct source *other, i64 now)
 {
-    const struct track *t = other->track;
-    i64 then = now - l->late, index = switches_by(t, then), begun = index ? t->begun[index - 1] : then;
+    const struct history *t = other->history;
+    i64 then = now - l->delay, index = changes_by(t, then), begun = index ? t->begun[index - 1] : then;
     if ((then - begun) % l->lost_period < l->lost_seen)
         return 0;
     return uniform(l->seed + (u64)other->robot, SENSORS, begun) < l->lost_share;
 }
 
-// Counts taken off a sensor in a cycle of the board.
+// Counts by which the light lowers a sensor at a cycle of the board.
 f64 light(const struct light *l, i64 sensor, i64 cycle)
 {
-    const struct moment *m = cycle < l->begin ? &l->past : &l->now;
+    const struct source_list *m = cycle < l->begin ? &l->past : &l->now;
     i64 now = l->on_at + cycle;
     f64 sum = 0;
-    for (const struct heard *other = m->heard; other != m->heard + m->count; other++) {
+    for (const struct source *other = m->sources; other != m->sources + m->count; other++) {
         f64 lit[LINES], counts = 0;
-        if (other->shares[sensor] == 0 || (l->lost_share != 0 && misses(l, other, now)))
+        if (other->shares[sensor] == 0 || (l->lost_share != 0 && is_lost(l, other, now)))
             continue;
-        shares(other->track, &l->receivers, now - l->late, lit);
+        levels(other->history, &l->receivers, now - l->delay, lit);
         for (i64 line = 0; line < LINES; line++)
             counts += other->counts[line] * lit[line];
         sum += other->shares[sensor] * counts;

@@ -1,5 +1,5 @@
-// Infrared light in the world: from robot to robot, and what a sensor sees of its own light, as optics.py tells it. The
-// tests have the plain text. Lengths cm.
+// Propagation of infrared light: from robot to robot, and the surface that a sensor faces. propagation.py explains the
+// model; the tests have a reference implementation in Python. Lengths cm.
 
 #include <stdint.h>
 
@@ -17,7 +17,7 @@ enum { SENSORS = 8, LINES = 4 };
 static const f64 PI = 3.14159265358979323846;
 
 struct disc {
-    f64 x, y, radius, share; // of the robot and of objects without x and y
+    f64 x, y, radius, share; // x and y are not set in `robot` and `objects`
 };
 
 struct side {
@@ -25,7 +25,7 @@ struct side {
 };
 
 struct optics {
-    f64 law_counts, law_from, law_power, most, least; // as in optics.py
+    f64 law_counts, law_from, law_power, max_counts, min_counts; // as in propagation.py
     f64 gain, per_emitter, emitter_power, receiver_power;
     f64 width, height, wall_share, range;
     f64 bearings[SENSORS];
@@ -37,13 +37,13 @@ struct optics {
     i64 side_count;
 };
 
-// Everything in the world: robots as x, y, heading, then objects as x, y.
+// Poses of all bodies: x, y, heading of the robots, then x, y of the objects.
 struct poses {
     const f64 *values;
     i64 robots, objects;
 };
 
-// The discs in turn: robots, objects, what stands fast.
+// Disc number `number` of all: the robots, then the objects, then the round obstacles.
 static struct disc disc_of(const struct optics *o, const struct poses *p, i64 number)
 {
     if (number < p->robots) {
@@ -60,8 +60,8 @@ static struct disc disc_of(const struct optics *o, const struct poses *p, i64 nu
     return object;
 }
 
-// How far along a ray a side is met, negative if it is not.
-static f64 meeting(const struct side *s, f64 x, f64 y, f64 east, f64 north)
+// Distance along a ray at which it hits a side, negative if it does not.
+static f64 hit_distance(const struct side *s, f64 x, f64 y, f64 east, f64 north)
 {
     f64 ex = s->bx - s->ax, ey = s->by - s->ay, across = east * ey - north * ex;
     if (across == 0)
@@ -71,7 +71,8 @@ static f64 meeting(const struct side *s, f64 x, f64 y, f64 east, f64 north)
     return along > 0 && 0 <= part && part <= 1 ? along : -1;
 }
 
-static int is_hidden(const struct optics *o, const struct poses *p, i64 own, i64 other)
+// Whether a body or wall is between two robots.
+static int is_occluded(const struct optics *o, const struct poses *p, i64 own, i64 other)
 {
     const f64 *here = p->values + 3 * own, *there = p->values + 3 * other;
     f64 dx = there[0] - here[0], dy = there[1] - here[1], apart2 = dx * dx + dy * dy;
@@ -85,7 +86,7 @@ static int is_hidden(const struct optics *o, const struct poses *p, i64 own, i64
             return 1;
     }
     for (i64 i = 0; i < o->side_count; i++) {
-        f64 along = meeting(&o->sides[i], here[0], here[1], dx, dy);
+        f64 along = hit_distance(&o->sides[i], here[0], here[1], dx, dy);
         if (along >= 0 && along < 1)
             return 1;
     }
@@ -98,15 +99,15 @@ static f64 beam(f64 angle, f64 power)
     return facing > 0 ? pow(facing, power) : power == 0;
 }
 
-// What robot `own` can get of the light of another: counts of each pulse line, then shares of its sensors. Whether it
-// is anything.
+// Compute what robot `own` receives of another robot's light: counts of each pulse line, then shares of the own sensors.
+// Return 0 if it receives nothing.
 i64 signal(const struct optics *o, const struct poses *p, i64 own, i64 other, f64 *found)
 {
     const f64 *here = p->values + 3 * own, *there = p->values + 3 * other;
     f64 dx = there[0] - here[0], dy = there[1] - here[1], beyond = sqrt(dx * dx + dy * dy) - o->law_from;
-    f64 strength = beyond > 0 ? o->law_counts * pow(beyond, o->law_power) : o->most;
-    strength = o->gain * (strength < o->most ? strength : o->most);
-    if (strength < o->least || is_hidden(o, p, own, other))
+    f64 strength = beyond > 0 ? o->law_counts * pow(beyond, o->law_power) : o->max_counts;
+    strength = o->gain * (strength < o->max_counts ? strength : o->max_counts);
+    if (strength < o->min_counts || is_occluded(o, p, own, other))
         return 0;
     f64 towards = atan2(dy, dx);
     for (i64 line = 0; line < LINES; line++) {
@@ -119,22 +120,22 @@ i64 signal(const struct optics *o, const struct poses *p, i64 own, i64 other, f6
     return 1;
 }
 
-static f64 to_wall(f64 at, f64 direction, f64 size)
+static f64 wall_distance(f64 at, f64 direction, f64 size)
 {
     return direction == 0 ? __builtin_inf() : ((direction > 0 ? size : 0) - at) / direction;
 }
 
-// What the axis of a robot's sensor meets: cm from the robot's edge and share of a white surface's reflection; infinity
+// Compute what the axis of a sensor hits: cm from the robot's edge, and reflection as a share of white paper's; infinity
 // and 0 out of range.
 static void surface(const struct optics *o, const struct poses *p, i64 own, i64 sensor, f64 *found)
 {
     const f64 *here = p->values + 3 * own;
     f64 x = here[0], y = here[1], angle = here[2] - o->bearings[sensor], east = cos(angle), north = sin(angle);
-    f64 to_x = to_wall(x, east, o->width), to_y = to_wall(y, north, o->height);
+    f64 to_x = wall_distance(x, east, o->width), to_y = wall_distance(y, north, o->height);
     f64 distance = to_x < to_y ? to_x : to_y, share = o->wall_share * fabs(to_x < to_y ? east : north);
     for (i64 i = 0; i < o->side_count; i++) {
         const struct side *one = &o->sides[i];
-        f64 along = meeting(one, x, y, east, north);
+        f64 along = hit_distance(one, x, y, east, north);
         if (along < 0 || along >= distance)
             continue;
         f64 dx = one->bx - one->ax, dy = one->by - one->ay;
@@ -157,7 +158,7 @@ static void surface(const struct optics *o, const struct poses *p, i64 own, i64 
     found[1] = gap <= o->range ? share : 0;
 }
 
-// Those of all sensors in turn.
+// Compute `surface` for all sensors in turn.
 void surfaces(const struct optics *o, const struct poses *p, i64 own, f64 *found)
 {
     for (i64 sensor = 0; sensor < SENSORS; sensor++)

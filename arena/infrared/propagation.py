@@ -1,9 +1,9 @@
-"""Infrared light from robot to robot: strength by distance, by the angles of emitter and receiver, and what is between.
+"""Propagation of infrared light between robots: strength by distance, angles of emitter and receiver, and occlusion.
 
 The only published measurement between e-pucks is libIrcom's table of amplitudes by distance (swarmcom.md §3.1). The
-shape of the beams is assumed (§7). Distances and angles are those of the line between the robots' centres, as the
-published calibration takes them; only robots that touch would notice a difference. Nothing here depends on time:
-`ether.py` knows what is lit, `infrared.py` adds it up.
+shape of the beams is assumed (§7). Distances and angles are those of the line between the robots' centres, as in the
+published calibration; this differs only for robots that touch. Nothing here depends on time: `channel.py` has the
+states of the emitters, `ring.py` combines both.
 """
 
 from __future__ import annotations
@@ -27,29 +27,31 @@ PUBLISHED: Final = (
     (14.5, 69.4), (15.0, 66.1), (15.5, 51.4), (16.0, 44.0), (16.5, 38.5), (17.0, 35.0), (17.5, 31.7), (18.0, 28.0),
     (18.5, 25.9), (19.0, 23.4), (19.5, 22.0), (20.0, 20.0), (20.5, 18.3), (21.0, 17.1), (21.5, 16.1), (22.0, 14.6),
 )  # fmt: skip
-"""libIrcom's table: distance of the centres in cm (UNVERIFIED: inferred from the first entry, robots that touch), and
-counts between dark and lit (swarmcom.md §3.1)."""
+"""libIrcom's table: distance of the centres in cm, and counts between dark and lit (swarmcom.md §3.1). That distances
+are between centres is UNVERIFIED: it is inferred from the first entry, robots that touch."""
 LAW_COUNTS, LAW_FROM_CM, LAW_POWER = 10_269.0, 6.0, -2.354
-"""A(d) = 10269 (d - 6)^-2.354, fitted to that table: 6.3 % (swarmcom.md §3.1). UNVERIFIED beyond 22 cm."""
-MOST_COUNTS: Final = 3500.0
-"""No robot takes off more: the table saturates there (swarmcom.md §3.1)."""
-LEAST_COUNTS: Final = 0.1
-"""Weaker senders are left out, those farther than 140 cm: all robots of a swarm together would not make a count."""
+"""A(d) = 10269 (d - 6)^-2.354, fitted to that table, error 6.3 % (swarmcom.md §3.1). UNVERIFIED beyond 22 cm."""
+MAX_COUNTS: Final = 3500.0
+"""Greatest effect of one robot: the table saturates there (swarmcom.md §3.1)."""
+MIN_COUNTS: Final = 0.1
+"""Weaker senders, farther than 140 cm, are omitted: all robots of a swarm together would not reach one count."""
 _LINES: Final = len(PULSE_PINS)
 _BEARINGS: Final = tuple(math.radians(bearing) for bearing in dimensions.IR_BEARINGS_DEG)
 
 
 class Surface(NamedTuple):
-    """What a sensor's axis meets: mm from the robot's edge, and reflection as a share of a white perpendicular
-    surface's. Askew it reflects by the cosine (Lambert, UNVERIFIED); beyond `bodies.IR_RANGE` is nothing (inf)."""
+    """The surface that a sensor's axis hits.
+
+    `millimetres` is the distance from the robot's edge, inf beyond `dimensions.IR_RANGE`. `share` is the reflection as
+    a share of a white perpendicular surface's; at an angle it falls with the cosine (Lambert, UNVERIFIED).
+    """
 
     millimetres: float
     share: float
 
 
 class Signal(NamedTuple):
-    """What a robot can get of another's light: counts of each pulse line on a sensor that faces it, times the sensor's
-    share."""
+    """Light of `robot` at another one: counts of each pulse line on a sensor that faces it, and each sensor's share."""
 
     robot: int
     counts: tuple[float, ...]
@@ -57,46 +59,54 @@ class Signal(NamedTuple):
 
 
 def amplitude(distance_cm: float) -> float:
-    """Counts between dark and lit: all emitters of a robot, seen by one that faces it, their centres so far apart."""
+    """Return the counts between dark and lit of all emitters of a robot, at a robot that faces it."""
     beyond = distance_cm - LAW_FROM_CM
-    return min(LAW_COUNTS * float(beyond**LAW_POWER), MOST_COUNTS) if beyond > 0 else MOST_COUNTS
+    return min(LAW_COUNTS * float(beyond**LAW_POWER), MAX_COUNTS) if beyond > 0 else MAX_COUNTS
 
 
 def distance_of(counts: float) -> float:
-    """Where the amplitude is so much, in cm: the inverse."""
+    """Return the distance in cm at which the amplitude is `counts`: the inverse of `amplitude`."""
     return LAW_FROM_CM + float((counts / LAW_COUNTS) ** (1 / LAW_POWER))
 
 
 def beam(towards: float, power: float) -> list[float]:
-    """Shares of the eight emitters or receivers for light in a direction, rad counter-clockwise from the robot's
-    front."""
+    """Return the shares of the eight emitters or receivers for a direction, rad counter-clockwise from the front."""
     return [max(math.cos(towards + bearing), 0.0) ** power for bearing in _BEARINGS]
 
 
 @cache
 def brightest(power: float) -> float:
-    """All emitters together in their best direction, between two neighbours: what the law's amplitude belongs to."""
+    """Return the sum of all emitters in their strongest direction, to which the amplitude of the law refers."""
     return max(sum(beam(math.radians(degrees / 4), power)) for degrees in range(4 * 360))
 
 
 class _Disc(Structure):
+    """`struct disc` of propagation.c."""
+
     _fields_ = [(name, c_double) for name in ("x", "y", "radius", "share")]
 
 
 class _Side(Structure):
+    """`struct side` of propagation.c."""
+
     _fields_ = [(name, c_double) for name in ("ax", "ay", "bx", "by", "share")]
 
 
 class _Optics(Structure):
+    """`struct optics` of propagation.c."""
+
     _fields_ = [
-        *((name, c_double) for name in ("law_counts", "law_from", "law_power", "most", "least", "gain", "per_emitter",
-                                        "emitter_power", "receiver_power", "width", "height", "wall_share", "range")),
+        *((name, c_double) for name in ("law_counts", "law_from", "law_power", "max_counts", "min_counts", "gain",
+                                        "per_emitter", "emitter_power", "receiver_power", "width", "height",
+                                        "wall_share", "range")),
         ("bearings", c_double * SENSORS), ("robot", _Disc), ("objects", POINTER(_Disc)),
         ("fixed", POINTER(_Disc)), ("fixed_count", c_int64), ("sides", POINTER(_Side)), ("side_count", c_int64),
     ]  # fmt: skip
 
 
 class _Poses(Structure):
+    """`struct poses` of propagation.c."""
+
     _fields_ = [("values", c_void_p), ("robots", c_int64), ("objects", c_int64)]
 
 
@@ -109,7 +119,7 @@ def _code() -> dict[str, Callable[..., Any]]:
 
 
 class Optics:
-    """A scene as light sees it, by compiled code (`optics.c`); the tests have the plain text beside it."""
+    """Propagation of infrared light in a scene, computed by native code (propagation.c)."""
 
     def __init__(self, scene: Scene) -> None:
         code, setting = _code(), scene.infrared
@@ -122,7 +132,7 @@ class Optics:
         sides = [_Side(*side, share) for shape, share in shapes if shape for side in geometry.sides(shape)]
         self._sides = (_Side * len(sides))(*sides)
         self._optics = _Optics(
-            LAW_COUNTS, LAW_FROM_CM, LAW_POWER, MOST_COUNTS, LEAST_COUNTS,
+            LAW_COUNTS, LAW_FROM_CM, LAW_POWER, MAX_COUNTS, MIN_COUNTS,
             setting.signal_gain, 1 / brightest(setting.emitter_power), setting.emitter_power, setting.receiver_power,
             scene.arena.width_cm, scene.arena.height_cm, setting.wall_share, dimensions.IR_RANGE,
             (c_double * SENSORS)(*_BEARINGS), _Disc(0, 0, dimensions.ROBOT_RADIUS, setting.robot_share), self._objects,
@@ -134,15 +144,16 @@ class Optics:
         self._found = (c_double * (2 * SENSORS))()
         self._found_at = addressof(self._found)
 
-    def _look(self, poses: Poses) -> None:
+    def _set_poses(self, poses: Poses) -> None:
+        """Pass the poses to native code. Raises ValueError if they have more objects than the scene."""
         robots, objects = poses.counts
         if objects > len(self._objects):
             raise ValueError(f"{objects} objects are more than the scene has")
         self._poses.values, self._poses.robots, self._poses.objects = poses.address, robots, objects
 
     def signals(self, poses: Poses, robot: int, others: Iterable[int]) -> list[Signal]:
-        """What a robot can get of the light of others, of those of whom it gets any."""
-        self._look(poses)
+        """Return the light of `others` at a robot, without those it receives nothing of."""
+        self._set_poses(poses)
         found: list[Signal] = []
         for other in others:
             if self._signal(self._at, self._poses_at, robot, other, self._found_at):
@@ -151,8 +162,8 @@ class Optics:
         return found
 
     def surfaces(self, poses: Poses, robot: int) -> list[Surface]:
-        """What the sensors' axes meet: wall, object or robot."""
-        self._look(poses)
+        """Return the surface that the axis of each sensor hits: wall, obstacle, object or robot."""
+        self._set_poses(poses)
         self._surfaces(self._at, self._poses_at, robot, self._found_at)
         found = iter(self._found)
         return [Surface(10 * centimetres, share) for centimetres, share in zip(found, found, strict=True)]

@@ -1,9 +1,9 @@
-"""Demand lock-step: robots run ahead until they look at something, the world follows the slowest of them.
+"""Demand lock-step: each robot runs ahead until it observes the world; the world follows the slowest robot.
 
-A robot whose firmware reads a line of its camera needs poses of that quantum; the world can only tell them when all
-robots have lived until then. So each robot is a greenlet: one that looks is left where it stands, in the middle of its
-run, until the others have come as far. Nothing that is recorded can tell this from quantum after quantum: a robot sees
-the same poses either way.
+A robot whose firmware reads a camera line needs the poses of that quantum. The world can compute them only when all
+robots have finished the quanta before. So each robot runs in a greenlet of its own: a robot that needs poses is
+suspended in the middle of its run until the others have caught up. A robot sees the same poses as in a run quantum
+after quantum, so the record is the same.
 """
 
 from __future__ import annotations
@@ -15,164 +15,171 @@ from typing import Final, Protocol, runtime_checkable
 
 from greenlet import getcurrent, greenlet
 
-from arena.infrared.channel import Ether
-from arena.lockstep.threads import OVER, WORLD, Swarm
-from arena.robots.native_robot import AWAY, LOOKS, RUNS, Ahead
-from arena.world.physics import Poses, Stretch, World
+from arena.infrared.channel import OpticalChannel
+from arena.lockstep.threads import NEEDS_WORLD, REACHED, NativeScheduler
+from arena.robots.native_robot import AWAITS_POSES, IN_PYTHON, RUNNABLE, NativeRobot
+from arena.world.physics import PoseBlock, Poses, World
 from arena.world.wheels import ROOM, Wheels
+
+_RUN: Final = -1
+"""Value that a greenlet passes to the scheduler to have its native code run; every other value is a tick."""
 
 
 @runtime_checkable
-class Runner(Protocol):
-    """A robot that can run ahead: `arena.robots.firmware_controller.EmulatedBrain`."""
+class RunAheadRobot(Protocol):
+    """A robot that can run ahead: `arena.robots.firmware_controller.FirmwareController`."""
 
-    lived: int
-    """Quanta that are over for it."""
+    @property
+    def ticks_done(self) -> int:
+        """Quanta the robot has finished."""
 
-    def live(self, ticks: int) -> None:
-        """Live until so many quanta are over."""
+    @property
+    def wheels(self) -> Wheels:
+        """Wheel speeds in the finished quanta."""
 
-    wheels: Wheels
-    """How fast they turned in quanta that are over."""
+    @property
+    def native(self) -> NativeRobot:
+        """The robot as native code sees it."""
 
-    ahead: Ahead
-    """What compiled code knows of it."""
+    def run_until(self, ticks: int) -> None:
+        """Run until `ticks` quanta are finished."""
 
-    def lend(self, ride: Callable[[], int]) -> None:
-        """Let `ride` run native code from now on, where there is any: called in the greenlet in which the robot lives,
-        it gives what native code came back for."""
+    def use_native_runner(self, run_native: Callable[[], int]) -> None:
+        """Run native code by `run_native` from now on. It is called in the robot's greenlet and returns the exit
+        reason."""
 
-    def join(self, look_at: Callable[[int], tuple[Poses, Poses]]) -> None:
-        """Get poses from `look_at` from now on: those at the beginning of a quantum, and a quantum before. All quanta
-        before it must be over for the robot when it asks."""
+    def use_poses(self, poses_at: Callable[[int], tuple[Poses, Poses]]) -> None:
+        """Take poses from `poses_at(tick)` from now on: those at the start of quantum `tick` and of the quantum
+        before. When it asks, the robot must have finished all quanta before `tick`."""
 
 
 class LockStep:
-    """`world`, the robots that are in it, all of them, and what carries their infrared light. So many `threads` run
-    native code. Without `is_native` Python runs it and the world and sees each look: the same, more slowly.
+    """Demand lock-step of `world` and all its `robots`.
+
+    `channel` carries the light between the robots. `threads` threads run native code. With `is_native` false, Python
+    runs the native code of each robot and the world, which gives the same record but takes more time.
     """
 
     def __init__(
-        self, world: World, robots: Sequence[Runner], ether: Ether | None = None, is_native: bool = True,
-        threads: int = 1,
+        self, world: World, robots: Sequence[RunAheadRobot], channel: OpticalChannel | None = None,
+        is_native: bool = True, threads: int = 1,
     ) -> None:  # fmt: skip
         self._world: Final = world
         self._robots: Final = robots
-        self._ether: Final = ether or Ether.of(world.scene)
-        self._ether.slowest = 0
-        self._past: Final[dict[int, Poses]] = {world.ticks: world.poses}
-        self._stretches: list[Stretch] = []
+        self._channel: Final = channel or OpticalChannel.of(world.scene)
+        self._channel.slowest = 0
+        self._known_poses: Final[dict[int, Poses]] = {world.ticks: world.poses}
+        self._blocks: list[PoseBlock] = []
         self._is_native: Final = is_native
         self._hub: greenlet = getcurrent()
-        self._lives: list[greenlet | None] = [None] * len(robots)
-        self._is_left = False
+        self._greenlets: list[greenlet | None] = [None] * len(robots)
+        self._is_aborted = False
         self._speeds: Final = (c_void_p * len(robots))(*(robot.wheels.address for robot in robots))
-        self._speeds_at: Final = addressof(self._speeds)
-        aheads = [robot.ahead for robot in robots]
-        self.swarm: Final = Swarm(aheads, self._speeds_at, ROOM, addressof(world.ground), threads)
-        for place, robot in enumerate(robots):
-            robot.join(self.look_at)
+        self._speeds_address: Final = addressof(self._speeds)
+        self.scheduler: Final = NativeScheduler(
+            [robot.native for robot in robots], self._speeds_address, ROOM, addressof(world.native), threads
+        )
+        for number, robot in enumerate(robots):
+            robot.use_poses(self.poses_at)
             if is_native:
-                robot.lend(partial(self._ride, place))
+                robot.use_native_runner(partial(self._request_native_run, number))
 
     def advance(self, ticks: int) -> list[tuple[float, float]]:
-        """Let so many quanta be over for everybody; wheel speeds of the last of them. Raises RuntimeError if an
-        exception has ended an earlier call: robots were left in the middle of a run."""
-        if self._is_left:
+        """Run all robots and the world until `ticks` quanta are over; return the wheel speeds in the last of them.
+
+        Raises RuntimeError after a call that ended by an exception: it left robots in the middle of a quantum.
+        """
+        if self._is_aborted:
             raise RuntimeError("an exception has left robots in the middle of a quantum: begin another trial")
         try:
             while self._world.ticks < ticks:
-                self._live(min(ticks, self._world.ticks + ROOM))
+                self._advance_within_room(min(ticks, self._world.ticks + ROOM))
         except BaseException:
-            self._leave()
+            self._abort()
             raise
         return [robot.wheels.speed(ticks - 1) for robot in self._robots]
 
-    def _leave(self) -> None:
-        """Let no robot stay in the middle of its run: its greenlet would keep it, and all others, for ever."""
-        self._is_left = True
-        for life in self._lives:
-            if life is not None:
-                life.throw()
-        self._lives = [None] * len(self._lives)
+    def _abort(self) -> None:
+        """End all greenlets. A suspended greenlet would keep its robot, and all others, alive for ever."""
+        self._is_aborted = True
+        for running in self._greenlets:
+            if running is not None:
+                running.throw()
+        self._greenlets = [None] * len(self._greenlets)
 
-    def _live(self, ticks: int) -> None:
-        """As `advance`, at most ROOM quanta."""
+    def _advance_within_room(self, ticks: int) -> None:
+        """As `advance`, for at most ROOM quanta."""
         self._hub = getcurrent()
-        for place, robot in enumerate(self._robots):
-            robot.ahead.stands = AWAY
-            if robot.lived < ticks:
-                self._lives[place] = greenlet(robot.live)
-                self._go_on(place, ticks)
-        while (needed := self._next(ticks)) != OVER:
-            if needed == WORLD:
-                self._step_to(self.swarm.wanted)
+        for number, robot in enumerate(self._robots):
+            robot.native.state = IN_PYTHON
+            if robot.ticks_done < ticks:
+                self._greenlets[number] = greenlet(robot.run_until)
+                self._resume(number, ticks)
+        while (needed := self._run_native(ticks)) != REACHED:
+            if needed == NEEDS_WORLD:
+                self._step_world(self.scheduler.world_goal)
             else:
-                self._go_on(needed, self._robots[needed].ahead.why)
-        for tick in [tick for tick in self._past if tick < ticks - 1]:
-            del self._past[tick]
-        self._stretches = [stretch for stretch in self._stretches if stretch.last >= ticks - 1]
+                self._resume(needed, self._robots[needed].native.exit_reason)
+        for tick in [tick for tick in self._known_poses if tick < ticks - 1]:
+            del self._known_poses[tick]
+        self._blocks = [block for block in self._blocks if block.last >= ticks - 1]
 
-    def _next(self, ticks: int) -> int:
-        """Run all robots in compiled code, and the world behind them, until Python is needed; for whom."""
+    def _run_native(self, ticks: int) -> int:
+        """Run robots and world in native code until Python is needed; return the result of `NativeScheduler.run`."""
         world = self._world
-        world.lend(self._poses(world.ticks), self._poses(world.ticks - 1), self._is_native)
-        needed = self.swarm.run(ticks)
-        self._note(world.take())
+        world.prepare_native(self._poses(world.ticks), self._poses(world.ticks - 1), self._is_native)
+        needed = self.scheduler.run(ticks)
+        self._keep(world.collect_native())
         return needed
 
-    def _go_on(self, place: int, answer: int) -> None:
-        """Let Python go on with a robot until it is to be run, waits for poses, or is through."""
-        life, ahead = self._lives[place], self._robots[place].ahead
-        assert life is not None
-        tick = life.switch(answer)
-        if life.dead:
-            self._lives[place] = None
+    def _resume(self, number: int, answer: int) -> None:
+        """Resume the greenlet of a robot with `answer` until it requests a native run, waits for poses or ends."""
+        running, native = self._greenlets[number], self._robots[number].native
+        assert running is not None
+        tick = running.switch(answer)
+        if running.dead:
+            self._greenlets[number] = None
         elif tick == _RUN:
-            ahead.stands = RUNS
+            native.state = RUNNABLE
         else:
-            ahead.stands, ahead.tick = LOOKS, tick
+            native.state, native.tick = AWAITS_POSES, tick
 
-    def _ride(self, place: int) -> int:
-        """Native code of a robot is to be run."""
-        why: int = self._hub.switch(_RUN)
-        return why
+    def _request_native_run(self, number: int) -> int:
+        """Suspend the robot's greenlet until its native code has run; return the exit reason."""
+        exit_reason: int = self._hub.switch(_RUN)
+        return exit_reason
 
-    def look_at(self, tick: int) -> tuple[Poses, Poses]:
-        """Poses at the beginning of a quantum, and a quantum before."""
+    def poses_at(self, tick: int) -> tuple[Poses, Poses]:
+        """Return the poses at the start of quantum `tick` and of the quantum before; wait for them if necessary."""
         if tick > self._world.ticks:
             self._hub.switch(tick)
         return self._poses(tick), self._poses(tick - 1)
 
     def _poses(self, tick: int) -> Poses:
-        """Poses at the beginning of a quantum; the oldest that are kept if they are older."""
-        poses = self._past.get(tick)
+        """Return the poses at the start of quantum `tick`, or the oldest known ones if those are later."""
+        poses = self._known_poses.get(tick)
         if poses is None:
-            for stretch in reversed(self._stretches):
-                if stretch.first <= tick <= stretch.last:
-                    poses = self._past[tick] = self._world.at(stretch, tick)
+            for block in reversed(self._blocks):
+                if block.first <= tick <= block.last:
+                    poses = self._known_poses[tick] = self._world.poses_in(block, tick)
                     break
             else:
-                return self._past[tick + 1]
+                return self._known_poses[tick + 1]
         return poses
 
-    def moved(self) -> None:
-        """Something was put somewhere else between two quanta."""
-        self._past[self._world.ticks] = self._world.poses
+    def refresh_poses(self) -> None:
+        """Take over the poses of the world after a body was moved between two quanta."""
+        self._known_poses[self._world.ticks] = self._world.poses
 
-    def _step_to(self, ticks: int) -> None:
-        """Let the world make the quanta that all robots have lived."""
+    def _step_world(self, ticks: int) -> None:
+        """Advance the world to a tick that all robots have reached."""
         if ticks > self._world.ticks:
-            self._note(self._world.go(self._speeds_at, ROOM, ticks - self._world.ticks))
+            self._keep(self._world.run_quanta(self._speeds_address, ROOM, ticks - self._world.ticks))
 
-    def _note(self, made: list[Stretch]) -> None:
-        """Quanta have been made."""
+    def _keep(self, made: list[PoseBlock]) -> None:
+        """Keep the poses of new quanta and move the channel's horizon."""
         world = self._world
         if made:
-            self._stretches += made
-            self._past[world.ticks] = world.poses  # whoever looks looks at these
-        self._ether.slowest = world.ticks * self._ether.quantum
-
-
-_RUN: Final = -1
-"""What a robot says that is to be run: no tick."""
+            self._blocks += made
+            self._known_poses[world.ticks] = world.poses
+        self._channel.slowest = world.ticks * self._channel.quantum

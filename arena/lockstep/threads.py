@@ -1,7 +1,7 @@
-"""`Swarm`: all robots of a world, run in compiled code (lockstep.c) by as many threads as there are cores for it.
+"""`NativeScheduler`: run all robots of a world in native code (lockstep.c), by one or several threads.
 
-In: robots as compiled code knows them (`Ahead`), where their speeds and the world are. Out: for whom Python is needed.
-Which thread runs a robot cannot show: between two steps of the world a robot touches nothing but itself.
+Input: the robots (`NativeRobot`), the addresses of their speeds and of the world. Output: which robot needs Python.
+Between two steps of the world, robots share no state. So the record does not depend on which thread runs a robot.
 """
 
 from __future__ import annotations
@@ -27,86 +27,90 @@ from threading import Event, Thread
 from typing import Any, Final
 from weakref import finalize
 
-from arena.robots.native_robot import Ahead
+from arena.robots.native_robot import NativeRobot
 from emu.native_library import ADDRESS, INT, address_of, functions
 
-OVER, WORLD = -1, -2
-"""Results of `Swarm.run` that are no robot's number."""
+REACHED, NEEDS_WORLD = -1, -2
+"""Results of `NativeScheduler.run` other than a robot's number."""
 _ALLOCATE: Final = PYFUNCTYPE(c_void_p)(("PyThread_allocate_lock", pythonapi))
 _FREE: Final = PYFUNCTYPE(None, c_void_p)(("PyThread_free_lock", pythonapi))
 _ACQUIRE: Final = PYFUNCTYPE(c_int, c_void_p, c_int)(("PyThread_acquire_lock", pythonapi))
 _RELEASE: Final = PYFUNCTYPE(None, c_void_p)(("PyThread_release_lock", pythonapi))
 
 
-class _Helper(Structure):
-    """`struct helper`."""
+class _Worker(Structure):
+    """`struct worker` of lockstep.c."""
 
-    _fields_ = [("lock", c_void_p), ("sleeps", c_int64), ("runs", c_int64)]
+    _fields_ = [("lock", c_void_p), ("is_asleep", c_int64), ("runs", c_int64)]
     lock: int
     runs: int
 
 
-class _Swarm(Structure):
-    """`struct swarm`."""
+class _Scheduler(Structure):
+    """`struct scheduler` of lockstep.c."""
 
     _fields_ = [("count", c_int64), *((name, c_void_p) for name in ("robots", "speeds")), ("room", c_int64),
-                ("ground", c_void_p), *((name, c_int64) for name in ("wanted", "helpers")),
-                *((name, c_void_p) for name in ("helper", "acquire", "release", "ready")),
-                *((name, c_int64) for name in ("left", "through", "rounds", "is_over"))]  # fmt: skip
-    wanted: int
+                ("native_world", c_void_p), *((name, c_int64) for name in ("world_goal", "worker_count")),
+                *((name, c_void_p) for name in ("workers", "acquire", "release", "ready")),
+                *((name, c_int64) for name in ("unclaimed", "finished", "round", "is_stopping"))]  # fmt: skip
+    world_goal: int
 
 
-class Swarm:
-    """`robots` of the world that compiled code knows at `ground`, whose wheels' speeds lie at `speeds` (of each robot,
-    `room` quanta of them), run by so many `threads`, of which the caller's is one."""
+class NativeScheduler:
+    """Scheduler of `robots` and of the `struct native_world` at address `world`.
 
-    def __init__(self, robots: Sequence[Ahead], speeds: int, room: int, ground: int, threads: int = 1) -> None:
-        count, helping = len(robots), max(min(threads, len(robots)) - 1, 0)
-        self._aheads: Final = (POINTER(Ahead) * count)(*map(pointer, robots))
+    `speeds` is the address of a table with the address of each robot's wheel speeds, `room` quanta of them. `threads`
+    includes the thread of the caller.
+    """
+
+    def __init__(self, robots: Sequence[NativeRobot], speeds: int, room: int, world: int, threads: int = 1) -> None:
+        count, workers = len(robots), max(min(threads, len(robots)) - 1, 0)
+        self._robots: Final = (POINTER(NativeRobot) * count)(*map(pointer, robots))
         self._ready: Final = (c_void_p * count)()
-        self._helpers: Final = (_Helper * helping)(*(_Helper(_new_lock(), 0, 0) for _ in range(helping)))
-        self._swarm: Final = _Swarm(
-            count, addressof(self._aheads), speeds, room, ground, 0, helping, addressof(self._helpers),
+        self._workers: Final = (_Worker * workers)(*(_Worker(_new_lock(), 0, 0) for _ in range(workers)))
+        self._scheduler: Final = _Scheduler(
+            count, addressof(self._robots), speeds, room, world, 0, workers, addressof(self._workers),
             cast(_ACQUIRE, c_void_p).value, cast(_RELEASE, c_void_p).value, addressof(self._ready),
         )  # fmt: skip
-        self._at: Final = addressof(self._swarm)
+        self._address: Final = addressof(self._scheduler)
         self._run_all: Final = _code()["run_all"]
-        gone = Event()
-        for helper in self._helpers:
-            Thread(target=_help, args=(self._swarm, self._helpers, helper, gone), daemon=True).start()
-        finalize(self, _dismiss, self._swarm, gone)
+        stopped = Event()
+        for worker in self._workers:
+            Thread(target=_run_worker, args=(self._scheduler, self._workers, worker, stopped), daemon=True).start()
+        finalize(self, _stop_workers, self._scheduler, stopped)
 
     def run(self, goal: int) -> int:
-        """Until `goal` quanta are over, or Python is needed: for the robot with that number, or for the WORLD."""
-        needed: int = self._run_all(self._at, goal)
+        """Run until `goal` quanta are over or Python is needed. Return the robot that needs Python, NEEDS_WORLD or
+        REACHED."""
+        needed: int = self._run_all(self._address, goal)
         return needed
 
     @property
-    def helped(self) -> int:
-        """How often another thread has run a robot."""
-        return sum(helper.runs for helper in self._helpers)
+    def worker_runs(self) -> int:
+        """How many times a thread other than the caller's has run a robot."""
+        return sum(worker.runs for worker in self._workers)
 
     @property
-    def wanted(self) -> int:
-        """How far the WORLD is to go, in quanta."""
-        return self._swarm.wanted
+    def world_goal(self) -> int:
+        """Tick to which the world must advance after NEEDS_WORLD."""
+        return self._scheduler.world_goal
 
 
-def _help(swarm: _Swarm, helpers: Array[_Helper], helper: _Helper, gone: Event) -> None:
-    """The life of a thread. What it was given is kept until it ends, `helpers` among it."""
-    CFUNCTYPE(None, ADDRESS, ADDRESS)(address_of(_code()["help"]))(addressof(swarm), addressof(helper))
-    gone.wait()
-    _FREE(helper.lock)
+def _run_worker(scheduler: _Scheduler, workers: Array[_Worker], worker: _Worker, stopped: Event) -> None:
+    """Run a worker thread to its end. Its arguments, `workers` among them, keep the memory it uses alive."""
+    CFUNCTYPE(None, ADDRESS, ADDRESS)(address_of(_code()["worker_main"]))(addressof(scheduler), addressof(worker))
+    stopped.wait()
+    _FREE(worker.lock)
 
 
-def _dismiss(swarm: _Swarm, gone: Event) -> None:
-    """Let the threads end."""
-    _code()["dismiss"](addressof(swarm))
-    gone.set()
+def _stop_workers(scheduler: _Scheduler, stopped: Event) -> None:
+    """Let the worker threads end."""
+    _code()["stop_workers"](addressof(scheduler))
+    stopped.set()
 
 
 def _new_lock() -> int:
-    """One of Python's locks, taken."""
+    """Return a new lock of the Python library, already acquired."""
     lock: int = _ALLOCATE()
     _ACQUIRE(lock, 1)
     return lock
@@ -115,5 +119,6 @@ def _new_lock() -> int:
 @cache
 def _code() -> dict[str, Callable[..., Any]]:
     return functions(Path(__file__).with_name("lockstep.c"), {
-        "run_all": (INT, (ADDRESS, INT)), "help": (None, (ADDRESS, ADDRESS)), "dismiss": (None, (ADDRESS,)),
+        "run_all": (INT, (ADDRESS, INT)), "worker_main": (None, (ADDRESS, ADDRESS)),
+        "stop_workers": (None, (ADDRESS,)),
     })  # fmt: skip

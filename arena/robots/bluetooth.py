@@ -1,7 +1,7 @@
-"""Bluetooth between robots: what one writes to UART1 its partners read there, a period later.
+"""Bluetooth links between robots: what a robot sends on UART1 reaches its partners one period later.
 
-In: brains and the scene's links. Out: messages for the record. All robots have lived equally long when something is
-carried, so neither their order nor the number of processes can show.
+Input: the controllers and the links of the scene. Output: messages for the record. At a delivery all robots have
+finished the same number of quanta. So the record depends neither on their order nor on the number of threads.
 """
 
 from __future__ import annotations
@@ -9,15 +9,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, Final
 
-from arena.robots.controller import Brain
+from arena.robots.controller import Controller
 from arena.scene.loader import Scene
 
 
-class Links:
-    """The connections of a scene's robots; nothing where there are none."""
+class BluetoothLinks:
+    """The serial connections between the robots of a scene; inactive if the scene has none."""
 
-    def __init__(self, scene: Scene, brains: Sequence[Brain]) -> None:
-        self._brains: Final = brains
+    def __init__(self, scene: Scene, controllers: Sequence[Controller]) -> None:
+        self._controllers: Final = controllers
         self._quantum: Final = scene.clock.quantum_tcy
         self._period: Final = max(round(scene.bluetooth.period_ms / scene.clock.quantum_ms), 1)
         self._partners: Final[dict[int, list[int]]] = {}
@@ -26,24 +26,24 @@ class Links:
             self._partners.setdefault(one, []).append(other)
             self._partners.setdefault(other, []).append(one)
         for robot in self._partners:
-            brains[robot].spoken()  # from now on it is kept
-        self._carried: list[dict[str, Any]] = []
+            controllers[robot].take_uart()  # the first call begins the collection of bytes
+        self._delivered: list[dict[str, Any]] = []
 
     def is_due(self, tick: int) -> bool:
-        """Whether something may arrive after so many quanta."""
+        """Whether a delivery period ends after `tick` quanta."""
         return bool(self._partners) and tick % self._period == 0
 
-    def carry(self, tick: int) -> None:
-        """What was said since the last time arrives."""
-        for robot, said in [(robot, self._brains[robot].spoken()) for robot in sorted(self._partners)]:
-            for partner in sorted(self._partners[robot]) if said else ():
-                self._brains[partner].tell(said)
-                text = said.decode("ascii", "backslashreplace")
-                self._carried.append({"robot": robot, "to": partner, "cycle": tick * self._quantum, "text": text})
+    def deliver(self, tick: int) -> None:
+        """Deliver to each partner what was sent since the last delivery."""
+        for robot, sent in [(robot, self._controllers[robot].take_uart()) for robot in sorted(self._partners)]:
+            for partner in sorted(self._partners[robot]) if sent else ():
+                self._controllers[partner].feed_uart(sent)
+                text = sent.decode("ascii", "backslashreplace")
+                self._delivered.append({"robot": robot, "to": partner, "cycle": tick * self._quantum, "text": text})
 
-    def messages(self) -> dict[str, list[dict[str, Any]]]:
-        """The record's column of what has arrived since the last call: sender, receiver, Tcy of the trial, text."""
+    def take_messages(self) -> dict[str, list[dict[str, Any]]]:
+        """Return the record's column of messages delivered since the last call: sender, receiver, trial cycle, text."""
         if not self._partners:
             return {}
-        carried, self._carried = self._carried, []
-        return {"messages": carried}
+        delivered, self._delivered = self._delivered, []
+        return {"messages": delivered}

@@ -1,6 +1,6 @@
-"""What moves a robot: `Brain`, and the one that is a few lines of Python.
+"""The controller interface of a robot, and the scripted controller in Python.
 
-Once per quantum a brain sees the world as it is at the quantum's start and says how fast the wheels turn during it.
+Once per quantum a controller takes the poses at the start of the quantum and returns the wheel speeds during it.
 """
 
 from __future__ import annotations
@@ -9,37 +9,43 @@ from dataclasses import dataclass
 from typing import Final, NamedTuple, Protocol
 
 from arena.camera.appearance import NOTHING, OBJECT
-from arena.camera.renderer import Sight
+from arena.camera.renderer import Renderer
 from arena.robots.reactive import steps_per_second
 from arena.scene import dimensions
 from arena.scene.loader import FCY, Scene
 from arena.world.physics import STREAM_SENSORS, STREAM_START, Poses, generator, traits_of
 
 LATENCY_TCY: Final = 258_484
-"""From the middle of the window's rows to the new wheel speed, 17.5 ms, and"""
-FIRST_LOOK_TCY: Final = 853_232
-"""from power-on to the first such row: both as the `clustering` firmware does it, which reads the region to its end
-(16.4 ms) before it answers. tests/arena/test_emulated.py measures both. Published trials were run with these numbers,
-so they stay; the firmware looks at 855,484, 0.15 ms later, since its camera has a register's value with the last bit.
+"""Time from the middle of the sensor window's rows to the new wheel speed, 17.5 ms.
+
+The `clustering` firmware reads the picture region to its end (16.4 ms) before it answers.
+"""
+FIRST_FRAME_TCY: Final = 853_232
+"""Time from power-on to the first middle of the sensor window.
+
+tests/arena/robots/test_emulated.py measures this value and LATENCY_TCY on the `clustering` firmware. The published
+trials used them, so they stay. The firmware is 0.15 ms later, at 855,484 Tcy: the camera model includes the last bit
+of a register's value.
 """
 OK_DECODED_TCY: Final = 354_275
-"""From there until the `clustering` firmware has understood it, 24.0 ms; the bare one needs 345,804."""
+"""Time from the remote control's key until the `clustering` firmware has decoded it, 24.0 ms (bare: 345,804)."""
 NEVER: Final = 1 << 62
+"""A cycle after the end of every trial."""
 STRIP_COLUMNS: Final = range(240, 400)
 STRIP_PIXELS: Final = 20
-"""Recorded strips of the camera's picture: the region the clustering firmware reads, 160 columns of the 640 in 20
+"""Recorded strip of the camera picture: the region that the clustering firmware reads, 160 of 640 columns in 20
 pixels (openswarm-original.md §8)."""
 
 
-class Line(NamedTuple):
-    """A line a robot said by Bluetooth: Tcy since the trial's start at its first byte."""
+class UartLine(NamedTuple):
+    """A line that a robot sent on UART1; `cycle` of the trial is that of its first byte."""
 
     cycle: int
     text: str
 
 
-class Lights(NamedTuple):
-    """A robot's LEDs changed: Tcy since the trial's start; bit n: ring LED n, 8 front, 9 body."""
+class LedChange(NamedTuple):
+    """The state of a robot's LEDs after a change at `cycle` of the trial; bit n: ring LED n, 8 front, 9 body."""
 
     cycle: int
     leds: int
@@ -47,10 +53,10 @@ class Lights(NamedTuple):
 
 @dataclass(slots=True)
 class Reading:
-    """What can be told about a robot at a sample, beside its pose."""
+    """What a sample records of a robot, beside its pose."""
 
     seen: int = NOTHING
-    """Last answer of the line-of-sight sensor; -1 if the brain keeps it to itself."""
+    """Last answer of the line-of-sight sensor; -1 if the controller does not publish it."""
     load: float = 0.0
     """Share of the CPU's cycles since the last sample that were not idle."""
     leds: int = 0
@@ -64,115 +70,116 @@ class Reading:
     """Why the robot's firmware stopped; empty while it runs."""
 
 
-class Brain(Protocol):
-    """One robot's controller."""
+class Controller(Protocol):
+    """The controller of one robot."""
 
-    def think(self, tick: int, poses: Poses) -> tuple[float, float]:
-        """Live through quantum `tick`, which begins with `poses`; wheel speeds (left, right) in cm/s during it."""
+    def control_step(self, tick: int, poses: Poses) -> tuple[float, float]:
+        """Run quantum `tick`, which begins with `poses`; return the wheel speeds (left, right) in cm/s during it."""
 
     def reading(self) -> Reading:
-        """What to record; ends the period of `load`."""
+        """Return the values to record, and begin the next period of `load`."""
 
-    def lines(self) -> list[Line]:
-        """What was said since the last call."""
+    def take_lines(self) -> list[UartLine]:
+        """Return the lines sent on UART1 since the last call."""
 
-    def lights(self) -> list[Lights]:
-        """Changes of the LEDs since the last call."""
+    def take_led_changes(self) -> list[LedChange]:
+        """Return the LED changes since the last call."""
 
-    def tell(self, data: bytes) -> None:
-        """What a host or another robot sends it by Bluetooth."""
+    def feed_uart(self, data: bytes) -> None:
+        """Send bytes to the robot's UART1, as a host or another robot does by Bluetooth."""
 
-    def spoken(self) -> bytes:
-        """What it wrote to UART1 since the last call; kept from the first call on."""
+    def take_uart(self) -> bytes:
+        """Return the bytes sent on UART1 since the last call; they are kept from the first call on."""
 
     def close(self) -> None:
-        """Give back processes and memory."""
+        """Release processes and memory."""
 
 
-def switched_on(scene: Scene, seed: int, robot: int) -> int:
-    """Tcy after the trial's start at which a robot gets power."""
+def power_on_cycle(scene: Scene, seed: int, robot: int) -> int:
+    """Return the cycle of the trial at which a robot gets power."""
     return int(generator(seed, STREAM_START, robot).integers(scene.start.spread_tcy))
 
 
-def told_at(scene: Scene) -> int:
-    """Tcy after the trial's start at which somebody presses the remote control's key (experiment.md §4)."""
+def remote_key_cycle(scene: Scene) -> int:
+    """Return the cycle of the trial at which the remote control's key is pressed (experiment-contract.md §4)."""
     return round(scene.start.remote_at_s * FCY)
 
 
-class ScriptedBrain:
-    """The clustering controller in Python, on the same sensor geometry and frame rate as the firmware's camera.
+class ScriptedController:
+    """The clustering controller in Python, with the sensor geometry and the frame rate of the firmware's camera.
 
-    It looks once per frame, at the pose extrapolated to that cycle; `LATENCY_TCY` later the wheels turn accordingly.
-    Both happen at their own cycle within a quantum. `FIRST_LOOK_TCY` after power-on comes the first look; it stands
-    still until the remote control's key is understood.
+    It senses once per frame, at the pose extrapolated to that cycle. `LATENCY_TCY` later the wheels turn accordingly.
+    Both happen at a cycle within a quantum. The first frame comes `FIRST_FRAME_TCY` after power-on. The robot stays at
+    rest until it has decoded the remote control's key.
     """
 
     def __init__(self, scene: Scene, seed: int, robot: int, controller: str) -> None:
         self._scene = scene
         self._robot = robot
-        self._controller = controller
+        self._table = controller
         self._quantum = scene.clock.quantum_tcy
-        self._next_look = switched_on(scene, seed, robot) + FIRST_LOOK_TCY
-        self._goes_at = told_at(scene) + OK_DECODED_TCY if scene.start_of(robot).remote else 0
-        self._sight = Sight(scene, robot, traits_of(scene, seed, robot))
+        self._next_frame = power_on_cycle(scene, seed, robot) + FIRST_FRAME_TCY
+        self._starts_at = remote_key_cycle(scene) + OK_DECODED_TCY if scene.start_of(robot).remote else 0
+        self._renderer = Renderer(scene, robot, traits_of(scene, seed, robot))
         self._rng = generator(seed, STREAM_SENSORS, robot)
-        self._missing = scene.camera.false_negative
-        self._inventing = scene.camera.false_positive
+        self._false_negative = scene.camera.false_negative
+        self._false_positive = scene.camera.false_positive
         self._reading = Reading()
         self._off_tick = scene.off_tick(robot)
-        self._wheels = self._wanted = (0.0, 0.0)
+        self._wheels = self._next_wheels = (0.0, 0.0)
         self._change_at = NEVER
         self._before: Poses | None = None
 
-    def think(self, tick: int, poses: Poses) -> tuple[float, float]:
-        """As `Brain.think`. A change in the middle of the quantum counts with its share."""
+    def control_step(self, tick: int, poses: Poses) -> tuple[float, float]:
+        """As `Controller.control_step`. A change within the quantum counts by its share of the quantum."""
         if tick >= self._off_tick:
             self._reading = Reading()
             return 0.0, 0.0
         start = tick * self._quantum
         end = start + self._quantum
-        if self._next_look < end:
-            self._sight.look(poses, self._before, max(self._next_look - start, 0) / self._quantum)
-            self._reading.seen = seen = self._sensed()
-            if self._next_look + LATENCY_TCY >= self._goes_at:
-                left, right = steps_per_second(self._controller, seen)
-                self._wanted = left * dimensions.CM_PER_STEP, right * dimensions.CM_PER_STEP
-                self._change_at = self._next_look + LATENCY_TCY
-            self._next_look += self._scene.camera.frame_tcy
+        if self._next_frame < end:
+            self._renderer.set_viewpoint(poses, self._before, max(self._next_frame - start, 0) / self._quantum)
+            self._reading.seen = seen = self._sense()
+            if self._next_frame + LATENCY_TCY >= self._starts_at:
+                left, right = steps_per_second(self._table, seen)
+                self._next_wheels = left * dimensions.CM_PER_STEP, right * dimensions.CM_PER_STEP
+                self._change_at = self._next_frame + LATENCY_TCY
+            self._next_frame += self._scene.camera.frame_tcy
         self._before = poses
         if self._change_at >= end:
             return self._wheels
-        old, new = self._wheels, self._wanted
+        old, new = self._wheels, self._next_wheels
         share = min((end - self._change_at) / self._quantum, 1.0)
         self._wheels, self._change_at = new, NEVER
         return old[0] + share * (new[0] - old[0]), old[1] + share * (new[1] - old[1])
 
-    def _sensed(self) -> int:
-        seen = self._sight.sensor()
-        if seen != NOTHING and self._missing and self._rng.random() < self._missing:
+    def _sense(self) -> int:
+        """Return the answer of the line-of-sight sensor, with the false answers of the scene."""
+        seen = self._renderer.line_of_sight()
+        if seen != NOTHING and self._false_negative and self._rng.random() < self._false_negative:
             return NOTHING
-        if seen == NOTHING and self._inventing and self._rng.random() < self._inventing:
+        if seen == NOTHING and self._false_positive and self._rng.random() < self._false_positive:
             return OBJECT
         return seen
 
     def reading(self) -> Reading:
-        """As `Brain.reading`."""
+        """As `Controller.reading`."""
         return self._reading
 
-    def lines(self) -> list[Line]:
-        """A script says nothing."""
+    def take_lines(self) -> list[UartLine]:
+        """Return no lines: a scripted controller has no UART."""
         return []
 
-    def lights(self) -> list[Lights]:
-        """A script has no LEDs."""
+    def take_led_changes(self) -> list[LedChange]:
+        """Return no changes: a scripted controller has no LEDs."""
         return []
 
-    def tell(self, data: bytes) -> None:
-        """A script does not listen."""
+    def feed_uart(self, data: bytes) -> None:
+        """Ignore the bytes: a scripted controller has no UART."""
 
-    def spoken(self) -> bytes:
-        """A script says nothing."""
+    def take_uart(self) -> bytes:
+        """Return no bytes: a scripted controller has no UART."""
         return b""
 
     def close(self) -> None:
-        """Nothing to give back."""
+        """Do nothing: there is nothing to release."""

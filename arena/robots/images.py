@@ -1,4 +1,4 @@
-"""Which image a brain is: builds the project's own applications, takes any file."""
+"""Find the image of a `--brain`: build an application of the project, or take the file."""
 
 from __future__ import annotations
 
@@ -12,11 +12,15 @@ import emu
 from emu.host import paths
 
 APPLICATIONS: Final = {"openswarm": "clustering", "bare": "clustering-bare"}
+"""Applications of firmware/apps with a name of their own as a brain."""
 
 
 def image_for(brain: str, home: Path = Path()) -> Path | None:
-    """The image of a brain, built if it is one of ours, or the file at a path from `home` on; None for `scripted`.
-    Raises LoadError for a file that is no image, ValueError for a name that is none or what cannot be built."""
+    """Return the image of a brain: an application of the project, which is built, or a file, relative to `home`.
+
+    Returns None for `scripted`. Raises LoadError if the file is not an image, ValueError for an unknown name or a
+    failed build.
+    """
     if brain == "scripted":
         return None
     application = APPLICATIONS.get(brain, brain)
@@ -25,19 +29,19 @@ def image_for(brain: str, home: Path = Path()) -> Path | None:
         path = home / brain
         if not path.exists():
             known = ", ".join(("scripted", *APPLICATIONS, "an application of firmware/apps"))
-            raise ValueError(f"--brain {brain}: no such file, and none of {known}")
-        emu.load(path)  # says at once what is wrong with it
+            raise ValueError(f"--brain {brain}: no such file; expected a file or one of {known}")
+        emu.load(path)  # report an unusable image before the run begins
         return path
     if not is_own:
         raise ValueError(f"--brain {brain}: there is no firmware/apps/{application} beside this package")
     folder = paths.firmware()
-    # a package that was installed may belong to another user or to many: what is built goes into the user's cache
+    # an installed package may not be writable: images then go into the user's cache
     out = folder / "build" / application if paths.in_checkout() else paths.images() / application
     command = ["make", "-C", str(folder), f"APP={application}", f"OUT={out}", f"PYTHON={sys.executable}"]
     try:
         built = subprocess.run(command, capture_output=True, text=True, check=False)
     except OSError as error:
-        raise ValueError(f"--brain {brain}: make cannot be run: {error}") from None
+        raise ValueError(f"--brain {brain}: `make` does not run: {error}") from None
     if built.returncode:
         raise ValueError(f"--brain {brain}: {' '.join(command)} failed:\n{built.stderr.strip()}")
     return out / "firmware.elf"

@@ -1,5 +1,7 @@
-"""The reactive tables: what is seen to wheel speeds, no memory (epuck.md §8). Percent of 129 mm/s, truncated to whole
-mm/s as the firmware does (openswarm-original.md §8)."""
+"""The reactive controllers A and B: tables from sensor answer to wheel speeds, without memory (epuck.md §8).
+
+Speeds are percentages of 129 mm/s, truncated to whole mm/s as in the firmware (openswarm-original.md §8).
+"""
 
 from __future__ import annotations
 
@@ -10,7 +12,7 @@ from arena.camera.appearance import NOTHING, OBJECT, ROBOT
 MAXIMUM_MM_S: Final = 129
 STEPS_PER_S: Final = 1000
 """Motor steps per second at MAXIMUM_MM_S (openswarm-original.md §5.2)."""
-CONTROLLERS: Final = {
+SPEED_TABLES: Final = {
     "A": {NOTHING: (50, 100), OBJECT: (100, 50), ROBOT: (10, 50)},
     "B": {NOTHING: (55, 99), OBJECT: (98, 50), ROBOT: (89, 53)},
 }
@@ -18,6 +20,6 @@ CONTROLLERS: Final = {
 
 
 def steps_per_second(controller: str, seen: int) -> tuple[float, float]:
-    """Motor steps per second, left and right. Raises KeyError for an unknown controller."""
-    left, right = (percent * MAXIMUM_MM_S // 100 for percent in CONTROLLERS[controller][seen])
+    """Return the motor steps per second, left and right. Raises KeyError for an unknown controller."""
+    left, right = (percent * MAXIMUM_MM_S // 100 for percent in SPEED_TABLES[controller][seen])
     return left * STEPS_PER_S / MAXIMUM_MM_S, right * STEPS_PER_S / MAXIMUM_MM_S

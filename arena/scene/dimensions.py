@@ -24,7 +24,7 @@ CM_PER_STEP: Final = 0.0128
 WHEEL_SPEED: Final = 12.8
 """Fastest wheel, cm/s (epuck.md §3)."""
 THRUST: Final = 1.0
-"""N, both wheels together: 0.7 m g = 1.04, ARGoS limits to 1.5 (epuck.md §3); experiment.md §3 takes 1.0."""
+"""N, both wheels together: 0.7 m g = 1.04, ARGoS limits to 1.5 (epuck.md §3); experiment-contract.md §3 takes 1.0."""
 BRAKE: Final = 1.04
 """N it takes to push a robot whose wheels stand still: its tyres have to slip, 0.7 m g (epuck.md §3). The gears do not
 turn backwards, and less drives it than holds it: otherwise one robot would push another for ever."""

@@ -153,7 +153,7 @@ def _nth(kinds: tuple[K, ...], number: int) -> K:
 
 
 def scripted(scene: Scene) -> Scene:
-    """The scene as scripted brains live in it: with their own, longer quantum."""
+    """The scene as scripted controllers live in it: with their own, longer quantum."""
     return scene.with_values(clock__quantum_ms=scene.clock.scripted_quantum_ms)
 
 

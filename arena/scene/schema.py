@@ -1,4 +1,4 @@
-"""The tables of a scene: what each value means, and which values it can have. Pure data, of no physics."""
+"""The tables of a scene: meaning, default and limits of each value. Pure data."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 Points = tuple[tuple[float, ...], ...]
-"""(x, y) in cm, of poses (x, y, heading in degrees)."""
+"""Points (x, y) in cm, or poses (x, y, heading in degrees)."""
 FCY: Final = 14_745_600
 """Tcy per second of the e-puck (epuck.md)."""
 
 
 @dataclass(frozen=True, slots=True)
 class Arena:
-    """Inner size between the walls, or the corners of a room of any shape, which gives the size."""
+    """Inner size between the walls, or the corners of a room of any shape. A polygon determines the size."""
 
     width_cm: float = 400.0
     height_cm: float = 300.0
@@ -33,11 +33,12 @@ class Marks:
 
 @dataclass(frozen=True, slots=True)
 class Robots:
-    """The e-pucks. Wheels that turn pull with `thrust_n` at most, those that stand hold with `brake_n`.
-    `wheel_noise` is a share of the speed, drawn anew every `noise_period_s`.
+    """The e-pucks. Turning wheels pull with at most `thrust_n`, wheels at rest hold with `brake_n`.
 
-    Robots differ from each other by what is drawn once per robot and trial, normally distributed: how the camera is
-    turned to the left and up, and by which share each wheel is faster than the other robots'."""
+    `wheel_noise` is a share of the speed, drawn every `noise_period_s`. The `_sd` values are standard deviations of
+    normal distributions, drawn once per robot and trial: yaw (to the left) and pitch (upwards) of the camera, and the
+    share by which each wheel is faster.
+    """
 
     count: int = 5
     axle_cm: float = 5.1
@@ -52,7 +53,7 @@ class Robots:
 
 @dataclass(frozen=True, slots=True)
 class Objects:
-    """What can be pushed: discs seen from above."""
+    """Movable objects: discs seen from above."""
 
     count: int = 20
     radius_cm: float = 5.0
@@ -62,8 +63,11 @@ class Objects:
 
 @dataclass(frozen=True, slots=True)
 class CameraSetting:
-    """The sensor in front; how it is mounted and its lens are explained in `lens.py`. `false_*` are chances per frame
-    and hold for scripted brains only. With `sees_leds` other robots' LEDs show in the picture, a quantum late."""
+    """The camera in front; `lens.py` explains its mounting and its lens.
+
+    `false_*` are probabilities per frame, for scripted controllers only. With `sees_leds` the picture shows other
+    robots' LEDs, one quantum late.
+    """
 
     sensor: str = "PO6030K"
     frame_tcy: int = 1_600_000
@@ -80,16 +84,22 @@ class CameraSetting:
 
 @dataclass(frozen=True, slots=True)
 class InfraredSetting:
-    """Reflection of surfaces as a share of white paper's. UNVERIFIED but for white walls; black is 0.1 to 0.3.
+    """Infrared light: reflection of surfaces, light between robots, noise and loss.
 
-    Light between robots (optics.py) is `signal_gain` times the published amplitude. It falls off an emitter's and a
-    receiver's axis as powers of the cosine: 20 and 3.3 halve it at 15 and 36 degrees. Receivers follow with `tau_us`.
-    Each sample has Gaussian noise of `noise_counts` and `ripple_counts` of 100 Hz from lamps on the mains. UNVERIFIED:
-    nobody has published a measurement; 1 to 4 counts of noise and 0 to 5 of ripple are plausible (swarmcom.md §7).
+    The `_share` values of surfaces are reflections as a share of white paper's; black is 0.1 to 0.3. UNVERIFIED except
+    for white walls.
 
-    `lost_share` of the messages of others a robot loses, drawn for each robot and transmission: what that robot's
-    light does until it has been dark for 15.5 ms. Of one that is lost it sees 0.8 ms in each 2.4, so that somebody
-    sends, but never enough to begin a frame."""
+    Light between robots (infrared/propagation.py) is `signal_gain` times the published amplitude. It falls with the
+    angle to the axes of emitter and receiver as powers of the cosine: 20 and 3.3 halve it at 15 and 36 degrees.
+    Receivers are low-passes with the time constant `tau_us`.
+
+    Each sample has Gaussian noise of `noise_counts`, and `ripple_counts` of 100 Hz from lamps on the mains. UNVERIFIED:
+    there is no published measurement; 1 to 4 counts of noise and 0 to 5 of ripple are plausible (swarmcom.md §7).
+
+    `lost_share` is the share of other robots' transmissions that a robot loses, drawn for each robot and transmission.
+    A transmission ends when the sender has been dark for 15.5 ms. Of a lost one the robot sees 0.8 ms in each 2.4 ms:
+    it detects a sender, but never the start of a frame.
+    """
 
     wall_share: float = 1.0
     object_share: float = 0.8
@@ -105,9 +115,12 @@ class InfraredSetting:
 
 @dataclass(frozen=True, slots=True)
 class Light:
-    """`brightness` of the scene for cameras, 1 = as their colours say. For infrared sensors: raw counts in the room
-    (falling with light), by how much sensors differ (standard deviation, drawn once per sensor and trial), and what a
-    lamp takes off at 1 m from a sensor that faces it; 0 = no lamp."""
+    """Room light. `brightness` scales the colours of the cameras; 1 is nominal.
+
+    For infrared sensors: `ambient_counts` are the raw counts in the room, which fall with light. `ambient_sd_counts` is
+    the standard deviation between sensors, drawn once per sensor and trial. A lamp lowers the counts of a sensor that
+    faces it at 1 m by `lamp_counts`; 0: no lamp.
+    """
 
     brightness: float = 1.0
     ambient_counts: int = 3800
@@ -119,7 +132,7 @@ class Light:
 
 @dataclass(frozen=True, slots=True)
 class BatterySetting:
-    """Voltage at the trial's start, and hours until it has fallen in a line from full (4.2 V) to low (3.4 V)."""
+    """Voltage at the start of the trial, and hours of the linear fall from full (4.2 V) to low (3.4 V)."""
 
     volts: float = 4.0
     hours: float = 3.0
@@ -127,16 +140,18 @@ class BatterySetting:
 
 @dataclass(frozen=True, slots=True)
 class Start:
-    """How robots come to life. Each is switched on at its own moment within `spread_tcy` (one camera frame), its switch
-    of 16 positions at `selector` (-1: as the run's controller asks, 0 = A, 1 = B). Somebody holds `remote`, a key's
-    name or RC-5 code ("" = nobody does), for `remote_held_s`: frames repeat every 113.8 ms (epuck.md §6).
-    `stimulus` is a script of more (emu/boards/epuck/stimulus.py): what the robot is told by UART, the state of its
-    battery, another position of its switch; its times are those of the trial.
+    """Power-on and inputs of the robots.
 
-    `off`: pairs of a robot, numbered from 0, and the second at which its battery is taken out: it stands, dark, till
-    the end.
-
-    A robot without a motor step, a change of LEDs or a byte on UART1 for `silent_s` is reported."""
+    - Each robot is powered on at a random cycle within `spread_tcy` (one camera frame).
+    - `selector` is the position of its switch, 0 to 15; -1: as the run's controller needs, 0 = A, 1 = B.
+    - `remote` is the key of the remote control that is pressed, a name or an RC-5 code; "": none. It is held for
+      `remote_held_s`; frames repeat every 113.8 ms (epuck.md §6).
+    - `stimulus` is a script of further inputs (emu/boards/epuck/stimulus.py), such as bytes on UART1, the state of the
+      battery or the position of the switch. Its times are those of the trial.
+    - `off` are pairs of a robot, numbered from 0, and the second at which its battery is removed. From then on it stays
+      at rest and dark.
+    - A robot without a motor step, a LED change or a byte on UART1 for `silent_s` is reported.
+    """
 
     spread_tcy: int = 1_600_000
     selector: int = -1
@@ -150,8 +165,11 @@ class Start:
 
 @dataclass(frozen=True, slots=True)
 class Bluetooth:
-    """`links`: pairs of robots, numbered from 0, joined by a serial port connection: what one writes to UART1 the other
-    reads there. What is said within a period arrives at its end (UNVERIFIED: radios of the time took 10 to 50 ms)."""
+    """Serial connections between robots. `links` are pairs of robots, numbered from 0.
+
+    What one robot of a pair sends on UART1 reaches UART1 of the other one at the end of the period (UNVERIFIED: radios
+    of the time took 10 to 50 ms).
+    """
 
     links: Points = ()
     period_ms: float = 20.0
@@ -159,7 +177,7 @@ class Bluetooth:
 
 @dataclass(frozen=True, slots=True)
 class Clock:
-    """Lock-step of world and brains, another one when all brains are scripted, and how often rows are written."""
+    """Quantum of the lock-step, the quantum if all controllers are scripted, and time between two samples."""
 
     quantum_ms: float = 1.0
     scripted_quantum_ms: float = 10.0
@@ -172,16 +190,20 @@ class Clock:
 
 
 INHERIT: Final = "as in [start]"
+"""Value of a group's key that stands for the value in [start]."""
 
 
 @dataclass(frozen=True, slots=True)
 class Placed:
-    """Where several things of one kind stand at the start.
+    """Start positions of `count` robots or objects of one kind. `place` is one of:
 
-    `place` is one of `marks` (free marks of the grid), `uniform` (in a rectangle `width_cm` x `depth_cm` around the
-    centre; 0: the whole arena), `normal` (`sd_cm` around the centre), `circle` (`circle_cm` from the centre, at equal
-    distances) or `poses` (as in `poses`: x, y, for robots the heading in degrees). The centre is `x_cm`, `y_cm`, by
-    default the arena's.
+    - `marks`: free marks of the grid
+    - `uniform`: in a rectangle `width_cm` x `depth_cm` around the centre; 0: the whole arena
+    - `normal`: normally distributed around the centre, standard deviation `sd_cm`
+    - `circle`: at equal distances on a circle of radius `circle_cm` around the centre
+    - `poses`: the list `poses` of x, y, and for robots the heading in degrees
+
+    The centre is (`x_cm`, `y_cm`), by default that of the arena.
     """
 
     name: str = ""
@@ -198,9 +220,14 @@ class Placed:
 
 @dataclass(frozen=True, slots=True)
 class RobotGroup(Placed):
-    """Robots of one kind. `image` is their brain (as `--brain`; a path from the scene's file on; empty: the run's),
-    `controller` A or B (empty: the run's), `id_first` the first one's number, counted on: `{id}` in `stimulus` becomes
-    it. `heading_deg` is theirs at the start, nan: any. The rest as in [start], where it is not given."""
+    """Robots of one kind.
+
+    - `image`: their controller, as `--brain`; a path is relative to the scene file; empty: that of the run
+    - `controller`: A or B; empty: that of the run
+    - `id_first`: number of the first robot; the next ones count up. `{id}` in `stimulus` stands for the number.
+    - `heading_deg`: heading at the start; nan: random
+    - `selector`, `remote`, `stimulus`: as in [start]
+    """
 
     image: str = ""
     controller: str = ""
@@ -213,8 +240,11 @@ class RobotGroup(Placed):
 
 @dataclass(frozen=True, slots=True)
 class ObjectKind(Placed):
-    """Discs that can be pushed. `colour` is a name of `NAMED` or red, green and blue as `#rrggbb`, as a camera
-    shows them; `share` what they reflect in infrared, of white paper's."""
+    """Movable discs of one kind.
+
+    `colour` is a name of `NAMED`, or red, green and blue as `#rrggbb`, as a camera shows them. `share` is their
+    infrared reflection as a share of white paper's.
+    """
 
     radius_cm: float = 5.0
     height_cm: float = 10.0
@@ -226,7 +256,7 @@ class ObjectKind(Placed):
 
 @dataclass(frozen=True, slots=True)
 class Obstacle:
-    """What stands fast: a polygon, or a disc of `radius_cm` at `x_cm`, `y_cm`."""
+    """Immovable obstacle: a polygon, or a disc of `radius_cm` at `x_cm`, `y_cm`."""
 
     name: str = ""
     polygon: Points = ()
@@ -240,7 +270,7 @@ class Obstacle:
 
 @dataclass(frozen=True, slots=True)
 class Patch:
-    """A coloured piece of floor, which nothing bumps into."""
+    """Coloured patch of the floor, without height."""
 
     name: str = ""
     polygon: Points = ()
@@ -252,7 +282,7 @@ class Patch:
 
 @dataclass(frozen=True, slots=True)
 class Lamp:
-    """As the one of [light]: what it takes off the infrared sensors' counts at 1 m."""
+    """Lamp as in [light]: `counts` are the counts by which it lowers an infrared sensor at 1 m."""
 
     x_cm: float = 0.0
     y_cm: float = 0.0
@@ -279,8 +309,8 @@ LISTS: Final[Mapping[str, type[Any]]] = {
     "patches": Patch,
     "lamps": Lamp,
 }
-"""Tables of which there can be several. In a file groups are [[robots]] and kinds [[objects]]; what all robots have in
-common is then [chassis]."""
+"""Tables of which a scene can have several. In a file `groups` are [[robots]] and `kinds` are [[objects]]; [chassis]
+has the values that all robots share."""
 
 _CENTRE: Final = (-10_000, 10_000)
 _PLACED: Final = {
@@ -352,7 +382,7 @@ LIMITS: Final[Mapping[type[Any], Mapping[str, tuple[float, float]]]] = {
     Patch: {"x_cm": _CENTRE, "y_cm": _CENTRE, "radius_cm": (0, 10_000)},
     Lamp: {"x_cm": _CENTRE, "y_cm": _CENTRE, "counts": (0, 1_000_000)},
 }  # fmt: skip
-"""Least and greatest value of each number."""
+"""Minimum and maximum of each number."""
 NAMED: Final = {
     "red": (90, 14, 14),
     "green": (10, 48, 14),
@@ -364,7 +394,7 @@ NAMED: Final = {
     "wall": (112, 100, 100),
     "floor": (100, 90, 88),
 }
-"""Colours by name as a camera shows them in the experiment's light; red, green and wall are those of `look.COLOURS`.
-UNVERIFIED on a robot."""
+"""Colours by name as a camera shows them in the experiment's light; red, green and wall are those of
+`appearance.COLOURS`. UNVERIFIED on a robot."""
 
 PLACES: Final = ("marks", "uniform", "normal", "circle", "poses")

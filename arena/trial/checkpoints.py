@@ -28,18 +28,18 @@ PATIENCE_S: Final = 5.0
 _HEAD: Final = struct.Struct("<Q")
 
 
-class GoneError(ConnectionError):
+class PipeClosedError(ConnectionError):
     """The other end of a line was closed."""
 
 
-class Line:
+class PipeEnd:
     """One end of a line between two processes, along which go objects, and ends of other lines."""
 
     def __init__(self, end: socket.socket) -> None:
         self.end: Final = end
 
-    def send(self, what: Any, end: Line | None = None) -> None:
-        """Raises GoneError."""
+    def send(self, what: Any, end: PipeEnd | None = None) -> None:
+        """Raises PipeClosedError."""
         body = pickle.dumps(what)
         head = _HEAD.pack(len(body))
         try:
@@ -49,27 +49,27 @@ class Line:
                 socket.send_fds(self.end, [head], [end.fileno()])
             self.end.sendall(body)
         except OSError as error:
-            raise GoneError(str(error)) from None
+            raise PipeClosedError(str(error)) from None
 
-    def receive(self) -> tuple[Any, Line | None]:
-        """The next object, and the end that came with it. Raises GoneError."""
+    def receive(self) -> tuple[Any, PipeEnd | None]:
+        """The next object, and the end that came with it. Raises PipeClosedError."""
         try:
             head, ends, _, _ = socket.recv_fds(self.end, _HEAD.size, 1)
             end = socket.socket(fileno=ends[0]) if ends else None
             (size,) = _HEAD.unpack(head + self._exactly(_HEAD.size - len(head)))
             body = self._exactly(size)
         except OSError as error:
-            raise GoneError(str(error)) from None
+            raise PipeClosedError(str(error)) from None
         if end is not None:
             end.set_inheritable(False)
-        return pickle.loads(body), Line(end) if end is not None else None
+        return pickle.loads(body), PipeEnd(end) if end is not None else None
 
     def _exactly(self, count: int) -> bytes:
         parts = []
         while count:
             parts.append(self.end.recv(min(count, 1 << 20)))
             if not parts[-1]:
-                raise GoneError("closed")
+                raise PipeClosedError("closed")
             count -= len(parts[-1])
         return b"".join(parts)
 
@@ -96,10 +96,10 @@ class Line:
         self.end.close()
 
 
-def line() -> tuple[Line, Line]:
+def pipe() -> tuple[PipeEnd, PipeEnd]:
     """Both ends of a new line."""
     one, other = socket.socketpair()
-    return Line(one), Line(other)
+    return PipeEnd(one), PipeEnd(other)
 
 
 def context() -> SpawnContext | ForkServerContext:
@@ -111,17 +111,17 @@ def context() -> SpawnContext | ForkServerContext:
     return made
 
 
-class Copies:
+class ProcessForker:
     """In the process that is copied: the copies that are its children."""
 
     def __init__(self) -> None:
         self._children: list[int] = []
 
-    def make(self) -> tuple[Line, bool]:
+    def make(self) -> tuple[PipeEnd, bool]:
         """Copy this process. Comes back twice: in this one with the line to the copy and false, in the copy with its
         own end and true. Raises OSError."""
         self._children = [one for one in self._children if os.waitpid(one, os.WNOHANG)[0] == 0]
-        here, there = line()
+        here, there = pipe()
         child = os.fork()
         if child:
             there.drop()
@@ -132,19 +132,19 @@ class Copies:
         return there, True
 
 
-class Moment(NamedTuple):
+class Checkpoint(NamedTuple):
     """A copy that sleeps."""
 
     tick: int
     seconds: float
-    line: Line
+    pipe: PipeEnd
 
 
-class Moments:
+class CheckpointPool:
     """The moments of one trial, the oldest first."""
 
     def __init__(self) -> None:
-        self._moments: Final[list[Moment]] = []
+        self._moments: Final[list[Checkpoint]] = []
 
     def __len__(self) -> int:
         return len(self._moments)
@@ -153,7 +153,7 @@ class Moments:
         """Whether that time is far enough from the newest moment, or the beginning."""
         return seconds - (self._moments[-1].seconds if self._moments else 0.0) >= EVERY_S
 
-    def add(self, moment: Moment) -> None:
+    def add(self, moment: Checkpoint) -> None:
         """Keep it. If there are too many then, the one goes that leaves the smallest gap, for its age: what is long ago
         is kept more coarsely."""
         self._moments.append(moment)
@@ -161,17 +161,17 @@ class Moments:
             times = [0.0, *(one.seconds for one in self._moments)]
             now = times[-1]
             gaps = [(times[i + 1] - times[i - 1]) / (now - times[i]) for i in range(1, len(times) - 1)]
-            self._moments.pop(gaps.index(min(gaps))).line.close()
+            self._moments.pop(gaps.index(min(gaps))).pipe.close()
 
-    def before(self, tick: int) -> Moment | None:
+    def before(self, tick: int) -> Checkpoint | None:
         """The latest that is not after `tick`."""
         return next((one for one in reversed(self._moments) if one.tick <= tick), None)
 
-    def pop(self, moment: Moment) -> None:
+    def pop(self, moment: Checkpoint) -> None:
         """It is awake now."""
         self._moments.remove(moment)
 
     def forget(self, tick: int) -> None:
         """What was after `tick` will never be."""
         while self._moments and self._moments[-1].tick > tick:
-            self._moments.pop().line.close()
+            self._moments.pop().pipe.close()

@@ -16,12 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from arena.camera.appearance import NOTHING, OBJECT, ROBOT
-from arena.experiments import Experiment, Moments, Said, experiment_of
-from arena.metrics import Course
+from arena.experiments import Experiment, TrialSamples, UartLine, experiment_of
+from arena.metrics import MetricSeries
 from arena.scene.loader import FCY, Scene, scene_of
 from arena.trial.json_numbers import misfit
 from arena.trial.trial import Rows
-from emu.host.files import is_standard, read_file, whole_file
+from emu.host.files import atomic_file, is_standard, read_file
 
 if TYPE_CHECKING:  # pyarrow is 30 MB in every process that loads it; those that only carry robots need none
     import pyarrow as pa
@@ -99,21 +99,21 @@ class Trial:
         return experiment_of(str(beside.resolve()) if name.endswith(".py") and beside.exists() else name)
 
     @cached_property
-    def course(self) -> Course:
+    def series(self) -> MetricSeries:
         """The metrics over time."""
-        return self.experiment.course(self.moments)
+        return self.experiment.series(self.samples)
 
     @property
-    def moments(self) -> Moments:
+    def samples(self) -> TrialSamples:
         """All samples as the experiment sees them."""
         headings = [np.asarray(self.columns[f"r{i}_heading"]) for i in range(self.robots.shape[1])]
         turned = np.stack(headings, axis=1)[:, :, None] if headings else np.zeros((len(self.times), 0, 1))
         noted = {name[2:]: np.asarray(values) for name, values in self.columns.items() if name.startswith("n_")}
         lines = [line for sample in self.columns.get("log", []) for line in sample or ()]
-        said = [Said(line["robot"], line["cycle"] / FCY, line["text"]) for line in lines]
+        said = [UartLine(line["robot"], line["cycle"] / FCY, line["text"]) for line in lines]
         said.sort(key=lambda one: one.seconds)
         robots = np.concatenate([self.robots, turned], axis=2)
-        return Moments(self.times, robots, self.objects, self.scene, noted, said)
+        return TrialSamples(self.times, robots, self.objects, self.scene, noted, said)
 
     def _places(self, letter: str, count: int) -> NDArray[np.float64]:
         if not count:
@@ -133,7 +133,7 @@ def write_trial(path: Path, rows: Rows, about: dict[str, Any]) -> None:
         arrays[name] = pa.array(values, kind_of(name))
     table = pa.table(arrays).replace_schema_metadata({"arena": json.dumps(about, sort_keys=True)})
     try:
-        with whole_file(path) as part:
+        with atomic_file(path) as part:
             pq.write_table(table, part, compression="zstd")
     except OSError as error:
         raise RecordError(f"{path}: cannot be written: {reason_of(error)}") from None
@@ -233,7 +233,7 @@ def write_text(path: Path, text: str) -> None:
 def write_bytes(path: Path, data: bytes) -> None:
     """Write a file whole or not at all; a device or pipe as it is. Raises RecordError."""
     try:
-        with whole_file(path) as part:
+        with atomic_file(path) as part:
             part.write_bytes(data)
     except OSError as error:
         raise RecordError(f"{path}: cannot be written: {reason_of(error)}") from None

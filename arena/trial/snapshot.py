@@ -8,21 +8,21 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Sequence
 
-from arena.robots.controller import Brain
-from arena.robots.firmware_controller import EmulatedBrain
+from arena.robots.controller import Controller
+from arena.robots.firmware_controller import FirmwareController
 from arena.world.physics import World
 from emu.machine.machine import Machine
 
 
-def digest(world: World, brains: Sequence[Brain]) -> str:
+def digest(world: World, controllers: Sequence[Controller]) -> str:
     """SHA-256 of everything that lives: bodies with their speeds, and every machine's whole state."""
     found = hashlib.sha256(world.poses.values.tobytes())
     for body in (*world.robots, *world.objects):
         moves = tuple(body.position), body.angle, tuple(body.velocity), body.angular_velocity
         found.update(repr(moves).encode())
-    for brain in brains:
-        if isinstance(brain, EmulatedBrain):
-            found.update(brain.machine.snapshot())
+    for controller in controllers:
+        if isinstance(controller, FirmwareController):
+            found.update(controller.machine.snapshot())
     return found.hexdigest()
 
 
@@ -31,18 +31,18 @@ def place_of(machine: Machine) -> str:
     return machine.image.symbols.text(machine.pc) if machine.image else ""
 
 
-def seen(world: World, brains: Sequence[Brain], robot: int) -> list[tuple[str, str]]:
+def seen(world: World, controllers: Sequence[Controller], robot: int) -> list[tuple[str, str]]:
     """Names and values for whoever debugs `robot`; cm, rad, s. A robot that has looked at the world waits there for
     those that have not lived as long."""
     poses = world.poses
     rows = [("world", f"t = {world.seconds:.4f} s, {world.ticks} quanta are over")]
-    for number, ((x, y, heading), brain) in enumerate(zip(poses.robots, brains, strict=True)):
+    for number, ((x, y, heading), controller) in enumerate(zip(poses.robots, controllers, strict=True)):
         at = "a script"
-        if isinstance(brain, EmulatedBrain):
-            machine = brain.machine
+        if isinstance(controller, FirmwareController):
+            machine = controller.machine
             sleeps = ", asleep" if machine.is_asleep else ""
             at = f"{place_of(machine) or f'{machine.pc:#08x}'}, cycle {machine.cycle:,}{sleeps}"
         mine = " (this one)" if number == robot else ""
         rows.append((f"robot {number}", f"x {x:.2f}, y {y:.2f}, heading {heading:.3f}; {at}{mine}"))
     rows += [(f"object {number}", f"x {x:.2f}, y {y:.2f}") for number, (x, y) in enumerate(poses.objects)]
-    return [*rows, ("state", digest(world, brains))]
+    return [*rows, ("state", digest(world, controllers))]

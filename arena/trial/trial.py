@@ -1,6 +1,7 @@
-"""One trial: a world, its brains, and rows of what happened. A quantum is: think, act, physics, record, in this order.
+"""One trial: a world, its controllers, and the record of what happens. Each quantum runs the controllers, then the
+physics, then the recorder.
 
-Robots think in the order of their numbers; none sees a half-moved world.
+The controllers run in the order of the robots' numbers. All of them see the poses at the start of the quantum.
 """
 
 from __future__ import annotations
@@ -11,16 +12,16 @@ from dataclasses import dataclass, field
 from typing import Any, Final
 
 from arena.experiments import Experiment
-from arena.experiments.supervisor import Stage, Supervised
-from arena.infrared.channel import Ether
-from arena.lockstep.processes import Crew
-from arena.lockstep.scheduler import LockStep, Runner
-from arena.robots.bluetooth import Links
-from arena.robots.controller import Brain
+from arena.experiments.supervisor import Supervisor, SupervisorHooks
+from arena.infrared.channel import OpticalChannel
+from arena.lockstep.scheduler import LockStep, RunAheadRobot
+from arena.robots.bluetooth import BluetoothLinks
+from arena.robots.controller import Controller
 from arena.scene.loader import Scene
 from arena.world.physics import World
 
 STOPPED: Final = (0.0, 0.0)
+"""Wheel speeds of a robot at rest."""
 
 
 @dataclass
@@ -36,184 +37,187 @@ class Rows:
 
 
 @dataclass
-class Result:
-    """What a trial leaves: rows, and what happened to robots (robot, seconds, what)."""
+class TrialResult:
+    """The rows of a trial and the faults of its robots as (robot, seconds, description)."""
 
     rows: Rows
     faults: list[tuple[int, float, str]]
 
 
-class Running:
-    """A trial that goes on when it is told to: a world, its brains, and what of it is recorded.
+class RunningTrial:
+    """A trial that advances from event to event: its world, its controllers, and its record so far.
 
-    Some of the brains may live in other processes, `crews`; `ether` is that of the brains of this one, and so many
-    `threads` run them if they can run ahead. A robot whose firmware stops stands still; the others go on. `experiment`
-    may have a supervisor (stage.py), who can end the trial. `on_row(row)` is called for every sample. Raises SceneError
-    if there is no room or the supervisor fails.
+    `channel` carries the light between the robots. `threads` threads run the robots if all of them can run ahead. A
+    robot whose firmware stops stays where it is; the others continue. `experiment` may have a supervisor
+    (supervisor.py), which can end the trial. `on_row(row)` is called for every sample. Raises SceneError if the world
+    has no room for all bodies or the supervisor fails.
     """
 
     def __init__(
         self,
         scene: Scene,
         seed: int,
-        brains: Sequence[Brain],
+        controllers: Sequence[Controller],
         seconds: float,
         world: World | None = None,
         on_row: Callable[[dict[str, Any]], None] | None = None,
-        crews: Sequence[Crew] = (),
-        ether: Ether | None = None,
+        channel: OpticalChannel | None = None,
         experiment: Experiment | None = None,
         threads: int = 1,
     ) -> None:
         self.world: Final = world or World(scene, seed)
-        self.brains: Final = brains
+        self.controllers: Final = controllers
         self.quanta: Final = math.ceil(seconds / self.world.dt - 0.5)
-        """After which the trial is over."""
+        """Length of the trial in quanta."""
         self.per_second: Final = max(round(1 / self.world.dt), 1)
-        self._crews: Final = crews
-        self._ether: Final = ether
-        self._supervised: Final = Supervised(experiment, Stage(self.world, brains, seed))
-        self.stage: Final = self._supervised.stage
-        self._links: Final = Links(scene, brains)
-        self._recorder: Final = _Recorder(self.world, brains, on_row, self.stage.noted, self._links)
+        """Quanta per second."""
+        self._hooks: Final = SupervisorHooks(experiment, Supervisor(self.world, controllers, seed))
+        self.supervisor: Final = self._hooks.supervisor
+        self._links: Final = BluetoothLinks(scene, controllers)
+        self._recorder: Final = _Recorder(self.world, controllers, on_row, self.supervisor.noted, self._links)
         self._sample_s: Final = scene.clock.sample_s
-        self._recorder.sample([STOPPED] * len(brains))
+        self._recorder.sample([STOPPED] * len(controllers))
         self._samples = 1
-        self._ahead: Final = None if crews else _together(self.world, brains, ether, threads)
-        self._is_over = False
+        self._lockstep: Final = _lockstep_of(self.world, controllers, channel, threads)
+        self._is_ended = False
 
     @property
     def is_over(self) -> bool:
-        """Whether its time is up or its supervisor has ended it."""
-        return self._is_over or self.world.ticks >= self.quanta
+        """Whether the time is up or the supervisor has ended the trial."""
+        return self._is_ended or self.world.ticks >= self.quanta
 
     @property
-    def result(self) -> Result:
-        """What it has left so far."""
-        return Result(self._recorder.rows, self._recorder.faults)
+    def result(self) -> TrialResult:
+        """The rows and faults so far."""
+        return TrialResult(self._recorder.rows, self._recorder.faults)
 
-    def go_on(self, limit: int | None = None) -> None:
-        """To the next moment at which something is due from outside (a sample, the supervisor, a whole second), at most
-        until `limit` quanta are over."""
+    def advance(self, limit: int | None = None) -> None:
+        """Run to the next event (a sample, a supervisor step, a delivery, a whole second), at most to quantum
+        `limit`."""
         world = self.world
-        if self._ahead is not None:
+        if self._lockstep is not None:
             until = world.ticks + 1
             last = self.quanta if limit is None else min(self.quanta, limit)
             while until < last and not self._is_due(until):
                 until += 1
-            wheels = self._ahead.advance(until)
+            wheels = self._lockstep.advance(until)
         else:
-            wheels = _quantum(world, self.brains, self._crews, self._ether)
+            wheels = [controller.control_step(world.ticks, world.poses) for controller in self.controllers]
+            world.step(wheels)
         if self._links.is_due(world.ticks):
-            self._links.carry(world.ticks)
-        self._is_over = self._supervised.is_over()
-        self.touched()
-        if self._is_over or self._is_sample(world.ticks):
+            self._links.deliver(world.ticks)
+        self._is_ended = self._hooks.step()
+        self.refresh_poses()
+        if self._is_ended or self._is_sample(world.ticks):
             self._recorder.sample(wheels)
             self._samples += 1
 
-    def touched(self) -> None:
-        """Somebody may have moved something since the last quantum."""
-        if self._ahead is not None:
-            self._ahead.moved()
+    def refresh_poses(self) -> None:
+        """Take over the poses of the world after a body was moved between two quanta."""
+        if self._lockstep is not None:
+            self._lockstep.refresh_poses()
 
     def _is_due(self, tick: int) -> bool:
-        mine = tick % self.per_second == 0 or self._is_sample(tick)
-        return mine or self._supervised.is_due(tick) or self._links.is_due(tick)
+        """Whether the trial must stop after `tick` quanta, before the next one."""
+        is_own = tick % self.per_second == 0 or self._is_sample(tick)
+        return is_own or self._hooks.is_due(tick) or self._links.is_due(tick)
 
     def _is_sample(self, tick: int) -> bool:
-        """A sample is the end of the quantum nearest to the time asked."""
+        """Whether the end of this quantum is the nearest one to the time of the next sample."""
         return self.world.seconds_at(tick) >= self._samples * self._sample_s - self.world.dt / 2
 
 
 def run_trial(
     scene: Scene,
     seed: int,
-    brains: Sequence[Brain],
+    controllers: Sequence[Controller],
     seconds: float,
     progress: Callable[[float], None] | None = None,
     world: World | None = None,
     on_row: Callable[[dict[str, Any]], None] | None = None,
-    crews: Sequence[Crew] = (),
-    ether: Ether | None = None,
+    channel: OpticalChannel | None = None,
     experiment: Experiment | None = None,
     threads: int = 1,
-) -> Result:
-    """Let `brains` live in a new world for `seconds`; `progress(seconds)` is called once per simulated second. The rest
-    is that of `Running`, which says what it raises."""
-    running = Running(scene, seed, brains, seconds, world, on_row, crews, ether, experiment, threads)
+) -> TrialResult:
+    """Run a trial of `seconds` to its end; call `progress(seconds)` once per simulated second.
+
+    The other parameters and the exceptions are those of `RunningTrial`.
+    """
+    running = RunningTrial(scene, seed, controllers, seconds, world, on_row, channel, experiment, threads)
     while not running.is_over:
-        running.go_on()
+        running.advance()
         if progress is not None and running.world.ticks % running.per_second == 0:
             progress(running.world.seconds)
     return running.result
 
 
-def _together(world: World, brains: Sequence[Brain], ether: Ether | None, threads: int) -> LockStep | None:
-    """Demand lock-step, if all robots can run ahead."""
-    robots = [brain for brain in brains if isinstance(brain, Runner)]
-    return LockStep(world, robots, ether, threads=threads) if brains and len(robots) == len(brains) else None
-
-
-def _quantum(
-    world: World, brains: Sequence[Brain], crews: Sequence[Crew], ether: Ether | None
-) -> list[tuple[float, float]]:
-    """Think, act, physics; wheel speeds."""
-    tick, poses = world.ticks, world.poses
-    if crews:
-        switches = ether.take() if ether is not None else []
-        for crew in crews:
-            crew.begin(tick, poses, switches)
-    wheels = [brain.think(tick, poses) for brain in brains]
-    world.step(wheels)
-    return wheels
+def _lockstep_of(
+    world: World, controllers: Sequence[Controller], channel: OpticalChannel | None, threads: int
+) -> LockStep | None:
+    """Return demand lock-step if every robot can run ahead, else None."""
+    robots = [controller for controller in controllers if isinstance(controller, RunAheadRobot)]
+    if not controllers or len(robots) < len(controllers):
+        return None
+    return LockStep(world, robots, channel, threads=threads)
 
 
 class _Recorder:
-    """Turns the present state into one row."""
+    """Turns the present state into rows of the record."""
 
     def __init__(
         self,
         world: World,
-        brains: Sequence[Brain],
+        controllers: Sequence[Controller],
         on_row: Callable[[dict[str, Any]], None] | None,
         noted: Mapping[str, float],
-        links: Links,
+        links: BluetoothLinks,
     ) -> None:
         self._on_row = on_row
         self._noted = noted
         self._links = links
         self._world = world
-        self._brains = brains
+        self._controllers = controllers
         self.rows = Rows()
         self.faults: list[tuple[int, float, str]] = []
 
     def sample(self, wheels: Sequence[tuple[float, float]]) -> None:
-        """One row, rounded to 1e-4 cm and rad: far below what matters, and it halves the file."""
+        """Add one row. Values are rounded to 1e-4 cm and rad, which halves the file and is far below any effect."""
         world = self._world
         row: dict[str, Any] = {"t": round(world.seconds, 6)}
         for index, (x, y) in enumerate(world.poses.objects):
             row[f"o{index}_x"], row[f"o{index}_y"] = round(x, 4), round(y, 4)
-        said, lit = [], []
-        for index, ((x, y, heading), (left, right), brain) in enumerate(
-            zip(world.poses.robots, wheels, self._brains, strict=True)
-        ):
-            reading = brain.reading()
-            row[f"r{index}_x"], row[f"r{index}_y"] = round(x, 4), round(y, 4)
-            row[f"r{index}_heading"] = round(heading, 4)
-            row[f"r{index}_left"], row[f"r{index}_right"] = round(left, 4), round(right, 4)
-            row[f"r{index}_seen"] = reading.seen
-            row[f"r{index}_load"] = round(reading.load, 4)
-            row[f"r{index}_leds"] = reading.leds
-            row[f"r{index}_strip"] = reading.strip
-            row[f"r{index}_infrared"] = reading.infrared
-            if reading.fault and (index, reading.fault) not in {(robot, why) for robot, _, why in self.faults}:
-                self.faults.append((index, world.seconds, reading.fault))
-            said += [{"robot": index, "cycle": line.cycle, "text": line.text} for line in brain.lines()]
-            lit += [{"robot": index, "cycle": change.cycle, "leds": change.leds} for change in brain.lights()]
-        row["log"], row["lights"] = said, lit
-        row |= self._links.messages()
+        log, lights = [], []
+        for index, controller in enumerate(self._controllers):
+            row |= self._robot_columns(index, controller, world.poses.robots[index], wheels[index])
+            log += [{"robot": index, "cycle": line.cycle, "text": line.text} for line in controller.take_lines()]
+            lights += [
+                {"robot": index, "cycle": change.cycle, "leds": change.leds}
+                for change in controller.take_led_changes()
+            ]  # fmt: skip
+        row["log"], row["lights"] = log, lights
+        row |= self._links.take_messages()
         row |= {f"n_{name}": value for name, value in self._noted.items()}
         self.rows.add(row)
         if self._on_row is not None:
             self._on_row(row)
+
+    def _robot_columns(
+        self, index: int, controller: Controller, pose: tuple[float, float, float], speeds: tuple[float, float]
+    ) -> dict[str, Any]:
+        """Return the columns of one robot, and keep its fault if it is new."""
+        reading = controller.reading()
+        if reading.fault and (index, reading.fault) not in {(robot, fault) for robot, _, fault in self.faults}:
+            self.faults.append((index, self._world.seconds, reading.fault))
+        columns = {
+            "x": round(pose[0], 4),
+            "y": round(pose[1], 4),
+            "heading": round(pose[2], 4),
+            "left": round(speeds[0], 4),
+            "right": round(speeds[1], 4),
+            "seen": reading.seen,
+            "load": round(reading.load, 4),
+            "leds": reading.leds,
+            "strip": reading.strip,
+            "infrared": reading.infrared,
+        }
+        return {f"r{index}_{name}": value for name, value in columns.items()}

@@ -1,5 +1,5 @@
-// Quanta of the world in a row: wheel speeds in, poses out. Chipmunk's own functions do the physics; what is set before
-// each of its steps is `World`'s rule (world.py). Lengths cm, time s.
+// Quanta of the world in a row: wheel speeds in, poses out. Chipmunk's own functions do the physics; this file sets the
+// bodies before each step, by the rules of `World` (physics.py). Lengths cm, time s.
 
 #include <stdint.h>
 
@@ -26,44 +26,44 @@ struct chipmunk {
     f64 (*impulse)(void *joint);
     void *(*add)(void *space, void *joint);
     void (*remove)(void *space, void *joint);
-    void (*each_arbiter)(void *body, void (*tell)(void *body, void *arbiter, void *data), void *data);
+    void (*each_arbiter)(void *body, void (*visit)(void *body, void *arbiter, void *data), void *data);
     struct vect (*total_impulse)(const void *arbiter);
 };
 
-// A disc that can be pushed. The joints of an object are its friction on the floor. Where everything about it is zero
-// they change nothing, to the bit, until something else touches it: then they are out of the solver.
+// A disc that can be pushed. The two joints of an object are its friction on the floor. While everything about it is
+// zero, they change nothing, to the bit, until another body touches it: then they are not in the solver.
 struct disc {
-    void *body, *grip, *hold;
+    void *body, *slide_joint, *spin_joint;
     f64 radius;
-    struct vect seen; // where it was when somebody last looked for what is near
-    i64 is_known, rests, may_rest;
+    struct vect checked_at; // position at the last check of its neighbours
+    i64 is_checked, is_resting, can_rest;
 };
 
 struct robot {
-    void *body, *moved, *push, *turn; // what is pushed, what the wheels move; no joints: wheels that never slip
+    void *body, *driven_body, *push_joint, *turn_joint; // pushed body, body the wheels move; no joints: no slip
     f64 bias[2], noise[2];
-    i64 rests;
+    i64 is_braked;
 };
 
 struct world {
     struct chipmunk c;
     void *space;
-    f64 dt, axle, thrust, thrust_turning, brake, brake_turning;
+    f64 dt, axle, thrust, thrust_torque, brake, brake_torque;
     i64 robot_count, object_count;
     struct robot *robots;
     struct disc *discs; // the robots', then the objects
     i64 steps;
 };
 
-// What is so near (edge to edge) may be touched before anybody looks again, which is when something has come half as far
-// by more than the way of a third: so two of them come nearer by two thirds. cm
+// Bodies so near (edge to edge) can touch before the next check. A check is due when a body has come WAY, a third of
+// NEAR. So two of them come nearer by at most two thirds. cm
 static const f64 NEAR = 3, WAY = 1;
 
-// Steps between two looks for objects that may rest.
-enum { PATIENCE = 64 };
+// Steps between two searches for objects that can rest.
+enum { REST_PERIOD = 64 };
 
-// Where everything is: x, y, heading of the robots, then x, y of the objects.
-void poses(const struct world *w, f64 *out)
+// Write the pose of every body: x, y, heading of the robots, then x, y of the objects.
+void read_poses(const struct world *w, f64 *out)
 {
     for (i64 i = 0; i < w->robot_count; i++) {
         struct vect at = w->c.position(w->robots[i].body);
@@ -75,12 +75,13 @@ void poses(const struct world *w, f64 *out)
     }
 }
 
-static void hold(const struct world *w, const struct robot *r)
+// Limit the joints of a robot to the force of its turning wheels or of its brakes.
+static void set_grip(const struct world *w, const struct robot *r)
 {
-    if (!r->push)
+    if (!r->push_joint)
         return;
-    w->c.set_max_force(r->push, r->rests ? w->brake : w->thrust);
-    w->c.set_max_force(r->turn, r->rests ? w->brake_turning : w->thrust_turning);
+    w->c.set_max_force(r->push_joint, r->is_braked ? w->brake : w->thrust);
+    w->c.set_max_force(r->turn_joint, r->is_braked ? w->brake_torque : w->thrust_torque);
 }
 
 static f64 square(f64 x)
@@ -88,24 +89,24 @@ static f64 square(f64 x)
     return x * x;
 }
 
-static f64 between(struct vect one, struct vect other)
+static f64 distance_squared(struct vect one, struct vect other)
 {
     return square(one.x - other.x) + square(one.y - other.y);
 }
 
 static int is_near(const struct disc *one, const struct disc *other)
 {
-    return between(one->seen, other->seen) <= square(one->radius + other->radius + NEAR);
+    return distance_squared(one->checked_at, other->checked_at) <= square(one->radius + other->radius + NEAR);
 }
 
-static void rouse(struct world *w, struct disc *d)
+static void wake(struct world *w, struct disc *d)
 {
-    d->rests = 0;
-    w->c.add(w->space, d->grip), w->c.add(w->space, d->hold);
+    d->is_resting = 0;
+    w->c.add(w->space, d->slide_joint), w->c.add(w->space, d->spin_joint);
 }
 
-// Before a step: objects near something that moves get their joints back, and those near them.
-static void look(struct world *w)
+// Before a step: wake resting objects near a body that moves, and in turn the objects near those.
+static void wake_neighbours(struct world *w)
 {
     i64 count = w->robot_count + w->object_count, found = 1;
     while (found) {
@@ -114,22 +115,24 @@ static void look(struct world *w)
             struct disc *d = &w->discs[i];
             struct vect at = w->c.position(d->body), by = w->c.velocity(d->body);
             struct vect next = {at.x + by.x * w->dt, at.y + by.y * w->dt};
-            if (d->is_known && between(next, d->seen) <= WAY * WAY && !(d->rests && (by.x != 0 || by.y != 0)))
+            i64 is_pushed = d->is_resting && (by.x != 0 || by.y != 0);
+            if (d->is_checked && distance_squared(next, d->checked_at) <= WAY * WAY && !is_pushed)
                 continue;
-            d->seen = at, d->is_known = 1;
-            if (d->rests)
-                rouse(w, d);
+            d->checked_at = at, d->is_checked = 1;
+            if (d->is_resting)
+                wake(w, d);
             for (i64 k = w->robot_count; k < count; k++)
-                if (w->discs[k].rests && is_near(d, &w->discs[k])) {
-                    rouse(w, &w->discs[k]);
-                    w->discs[k].is_known = 0; // it looks for what is near itself
+                if (w->discs[k].is_resting && is_near(d, &w->discs[k])) {
+                    wake(w, &w->discs[k]);
+                    w->discs[k].is_checked = 0; // its neighbours are checked in the next pass
                     found = 1;
                 }
         }
     }
 }
 
-static void add_up(void *body, void *arbiter, void *data)
+// Callback for `each_arbiter`: clear *data if the contact has an impulse.
+static void find_impulse(void *body, void *arbiter, void *data)
 {
     (void)body;
     const struct world *w = *(struct world **)data;
@@ -138,33 +141,33 @@ static void add_up(void *body, void *arbiter, void *data)
         *(struct world **)data = 0;
 }
 
-// Whether the solver leaves everything about an object as it is: zero.
+// Whether all velocities and impulses of an object are zero, so that the solver leaves it as it is.
 static int is_still(struct world *w, const struct disc *d)
 {
     struct vect by = w->c.velocity(d->body);
-    if (by.x != 0 || by.y != 0 || w->c.turning(d->body) != 0 || w->c.impulse(d->grip) != 0 ||
-        w->c.impulse(d->hold) != 0)
+    if (by.x != 0 || by.y != 0 || w->c.turning(d->body) != 0 || w->c.impulse(d->slide_joint) != 0 ||
+        w->c.impulse(d->spin_joint) != 0)
         return 0;
     struct world *none = w;
-    w->c.each_arbiter(d->body, add_up, (void *)&none);
+    w->c.each_arbiter(d->body, find_impulse, (void *)&none);
     return none != 0;
 }
 
-// Objects rest that are still, with nothing near that is awake and does not rest now, too.
-static void settle(struct world *w)
+// Put to rest every object that is still and has only resting bodies near it.
+static void put_to_rest(struct world *w)
 {
     i64 count = w->robot_count + w->object_count, changed = 1;
     for (i64 i = w->robot_count; i < count; i++)
-        w->discs[i].may_rest = !w->discs[i].rests && is_still(w, &w->discs[i]);
+        w->discs[i].can_rest = !w->discs[i].is_resting && is_still(w, &w->discs[i]);
     while (changed) {
         changed = 0;
         for (i64 i = w->robot_count; i < count; i++) {
-            if (!w->discs[i].may_rest)
+            if (!w->discs[i].can_rest)
                 continue;
             for (i64 k = 0; k < count; k++) {
                 const struct disc *other = &w->discs[k];
-                if (!other->rests && !other->may_rest && is_near(&w->discs[i], other)) {
-                    w->discs[i].may_rest = 0;
+                if (!other->is_resting && !other->can_rest && is_near(&w->discs[i], other)) {
+                    w->discs[i].can_rest = 0;
                     changed = 1;
                     break;
                 }
@@ -172,44 +175,44 @@ static void settle(struct world *w)
         }
     }
     for (i64 i = w->robot_count; i < count; i++)
-        if (w->discs[i].may_rest) {
-            w->discs[i].rests = 1;
-            w->c.remove(w->space, w->discs[i].grip), w->c.remove(w->space, w->discs[i].hold);
+        if (w->discs[i].can_rest) {
+            w->discs[i].is_resting = 1;
+            w->c.remove(w->space, w->discs[i].slide_joint), w->c.remove(w->space, w->discs[i].spin_joint);
         }
 }
 
-// One quantum with speeds (left, right) of each robot as commanded.
-void quantum(struct world *w, const f64 *wheels)
+// Run one quantum with the commanded speeds (left, right) of each robot.
+void run_quantum(struct world *w, const f64 *wheels)
 {
     for (i64 i = 0; i < w->robot_count; i++) {
         struct robot *r = &w->robots[i];
         f64 left = wheels[2 * i], right = wheels[2 * i + 1];
-        i64 rests = left == 0 && right == 0;
-        if (rests != r->rests) {
-            r->rests = rests;
-            hold(w, r);
+        i64 is_braked = left == 0 && right == 0;
+        if (is_braked != r->is_braked) {
+            r->is_braked = is_braked;
+            set_grip(w, r);
         }
         left = left * r->noise[0] * r->bias[0], right = right * r->noise[1] * r->bias[1];
         f64 turn = (right - left) / w->axle, ahead = (left + right) / 2;
         f64 heading = w->c.angle(r->body) + turn * w->dt / 2;
-        w->c.set_velocity(r->moved, (struct vect){ahead * cos(heading), ahead * sin(heading)});
-        w->c.set_turning(r->moved, turn);
+        w->c.set_velocity(r->driven_body, (struct vect){ahead * cos(heading), ahead * sin(heading)});
+        w->c.set_turning(r->driven_body, turn);
     }
-    look(w);
-    if (++w->steps % PATIENCE == 0)
-        settle(w);
+    wake_neighbours(w);
+    if (++w->steps % REST_PERIOD == 0)
+        put_to_rest(w);
     w->c.step(w->space, w->dt);
 }
 
-// Quanta in a row, from number `first` on. Speeds of robot r in quantum n: speeds[r] + 2 (n mod room). What `wheels` and
-// `out` hold: speeds of one quantum, poses at the end of each, `numbers` of them.
-void quanta(struct world *w, const f64 *const *speeds, i64 room, i64 first, i64 count, f64 *wheels, f64 *out,
-            i64 numbers)
+// Run `count` quanta from number `first` on. Speeds of robot r in quantum n: speeds[r] + 2 (n mod room). `wheels` is
+// room for the speeds of one quantum; `out` gets the poses at the end of each, `width` numbers per quantum.
+void run_quanta(struct world *w, const f64 *const *speeds, i64 room, i64 first, i64 count, f64 *wheels, f64 *out,
+                i64 width)
 {
-    for (i64 n = first; n < first + count; n++, out += numbers) {
+    for (i64 n = first; n < first + count; n++, out += width) {
         for (i64 r = 0; r < w->robot_count; r++)
             wheels[2 * r] = speeds[r][2 * (n % room)], wheels[2 * r + 1] = speeds[r][2 * (n % room) + 1];
-        quantum(w, wheels);
-        poses(w, out);
+        run_quantum(w, wheels);
+        read_poses(w, out);
     }
 }

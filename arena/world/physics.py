@@ -1,7 +1,7 @@
-"""The world seen from above: walls, discs that rub on the floor, e-pucks with force-limited wheels (epuck.md §4).
+"""The world in two dimensions: walls, discs with floor friction, e-pucks with force-limited wheels (epuck.md §4).
 
-Lengths cm, masses kg, time s. One `step` is one quantum, always of the same length; what acts on the bodies between two
-steps is only the wheel speeds given to it. The same calls give the same numbers, to the bit.
+Lengths cm, masses kg, time s. One `step` is one quantum, always of the same length. Only the wheel speeds act on the
+bodies between two steps. The same calls give the same numbers, to the bit.
 """
 
 from __future__ import annotations
@@ -25,23 +25,26 @@ from arena.scene.schema import ObjectKind
 from emu.native_library import ADDRESS, INT, address_of, functions
 
 ITERATIONS: Final = 20
-"""Of the constraint solver (epuck.md §4)."""
+"""Iterations of the constraint solver (epuck.md §4)."""
 ROWS: Final = 256
-"""Poses that lie in one piece of memory."""
+"""Poses in one sheet of memory."""
 WALL_THICKNESS: Final = 20.0
-"""Half thickness of the walls' segments in cm: nothing tunnels through."""
+"""Half thickness of the wall segments in cm: too thick for any body to tunnel through."""
 STREAM_WORLD, STREAM_WHEELS, STREAM_SENSORS, STREAM_START, STREAM_TRAITS, STREAM_EXPERIMENT, STREAM_INFRARED = range(7)
-"""Independent generators of a trial: `generator(seed, stream, robot)`."""
+"""Streams of independent random numbers in a trial: `generator(seed, stream, robot)`."""
 
 
 def generator(seed: int, stream: int, robot: int = 0) -> np.random.Generator:
-    """The generator of one purpose and robot, independent of all others."""
+    """Return the random generator of one stream and robot, independent of all others."""
     return np.random.default_rng([seed, stream, robot])
 
 
 class Traits(NamedTuple):
-    """How one robot differs from the others: its camera turned to the left and up, in rad and degrees; how much faster
-    its wheels (left, right) are than commanded, as factors."""
+    """Deviations of one robot from the nominal one.
+
+    `yaw` and `pitch_deg` turn its camera to the left and up. `bias` are factors on the commanded speed of its left and
+    right wheel.
+    """
 
     yaw: float = 0.0
     pitch_deg: float = 0.0
@@ -49,7 +52,7 @@ class Traits(NamedTuple):
 
 
 def traits_of(scene: Scene, seed: int, robot: int) -> Traits:
-    """What is drawn once for a robot of a trial. Without spread nothing differs, to the bit."""
+    """Draw the deviations of a robot in a trial. With zero spread they are exactly those of the nominal robot."""
     spread = scene.robots
     yaw, pitch, left, right = generator(seed, STREAM_TRAITS, robot).normal(0.0, 1.0, 4).tolist()
     bias = (1.0 + spread.wheel_bias_sd * left, 1.0 + spread.wheel_bias_sd * right)
@@ -57,7 +60,7 @@ def traits_of(scene: Scene, seed: int, robot: int) -> Traits:
 
 
 class Poses:
-    """Where everything is, never changed. Robots: x, y, heading; objects: x, y. cm and rad."""
+    """Immutable poses of all bodies. Robots: x, y, heading; objects: x, y. cm and rad."""
 
     __slots__ = ("_objects", "_robots", "address", "counts", "values")
 
@@ -68,27 +71,27 @@ class Poses:
 
     def _begin(self, values: NDArray[np.float64], robots: int, address: int) -> None:
         self.values = values
-        """Robots, then objects, number after number."""
+        """The numbers of the robots, then those of the objects."""
         self.counts = robots, (len(values) - 3 * robots) // 2
         self.address = address
-        """Where they are in the host's memory."""
+        """Address of the values in the host's memory."""
         self._robots: list[tuple[float, float, float]] | None = None
         self._objects: list[tuple[float, float]] | None = None
 
     @classmethod
     def of(cls, values: NDArray[np.float64], robots: int, address: int | None = None) -> Poses:
-        """What is in `values`, which is not copied, of so many robots. Who knows its address saves asking."""
+        """Return poses of `robots` robots over `values`, without a copy. A known `address` of `values` saves time."""
         poses = cls.__new__(cls)
         poses._begin(values, robots, values.ctypes.data if address is None else address)
         return poses
 
     def __reduce__(self) -> tuple[Callable[..., Poses], tuple[NDArray[np.float64], int]]:
-        """Copies and other processes have the numbers elsewhere in memory."""
+        """Copy and pickle by value: the address is valid in one process only."""
         return Poses.of, (self.values, self.counts[0])
 
     @property
     def robots(self) -> list[tuple[float, float, float]]:
-        """Poses of the robots."""
+        """Poses of the robots: x, y, heading."""
         if self._robots is None:
             count = 3 * self.counts[0]
             numbers = self.values[:count].tolist()
@@ -97,27 +100,28 @@ class Poses:
 
     @property
     def objects(self) -> list[tuple[float, float]]:
-        """Places of the objects."""
+        """Positions of the objects: x, y."""
         if self._objects is None:
             numbers = self.values[3 * self.counts[0] :].tolist()
             self._objects = list(zip(numbers[::2], numbers[1::2], strict=True))
         return self._objects
 
 
-class Stretch(NamedTuple):
-    """Quanta in a row whose poses are in memory one after the other."""
+class PoseBlock(NamedTuple):
+    """Consecutive quanta whose poses are contiguous in memory."""
 
     first: int
     last: int
-    """How many quanta were over at the end of the first and last of them."""
+    """Ticks at the end of the first and the last quantum."""
     sheet: NDArray[np.float64]
     row: int
-    """Where in the sheet those of the first are."""
+    """Row of the sheet with the poses of the first quantum."""
     address: int
+    """Address of that row."""
 
 
 class _Chipmunk(Structure):
-    """The physics library's functions that `world.c` calls, by their names there."""
+    """`struct chipmunk` of physics.c: functions of the physics library, by their names there."""
 
     NAMES: Final = ("cpSpaceStep", "cpBodySetVelocity", "cpBodySetAngularVelocity", "cpBodyGetPosition",
                     "cpBodyGetAngle", "cpConstraintSetMaxForce", "cpBodyGetVelocity", "cpBodyGetAngularVelocity",
@@ -127,54 +131,60 @@ class _Chipmunk(Structure):
 
 
 class _Robot(Structure):
+    """`struct robot` of physics.c."""
+
     _fields_ = [
-        *((name, c_void_p) for name in ("body", "moved", "push", "turn")),
-        ("bias", c_double * 2), ("noise", c_double * 2), ("rests", c_int64),
+        *((name, c_void_p) for name in ("body", "driven_body", "push_joint", "turn_joint")),
+        ("bias", c_double * 2), ("noise", c_double * 2), ("is_braked", c_int64),
     ]  # fmt: skip
 
 
 class _Disc(Structure):
+    """`struct disc` of physics.c."""
+
     _fields_ = [
-        *((name, c_void_p) for name in ("body", "grip", "hold")), ("radius", c_double), ("seen", c_double * 2),
-        *((name, c_int64) for name in ("is_known", "rests", "may_rest")),
+        *((name, c_void_p) for name in ("body", "slide_joint", "spin_joint")), ("radius", c_double),
+        ("checked_at", c_double * 2), *((name, c_int64) for name in ("is_checked", "is_resting", "can_rest")),
     ]  # fmt: skip
 
 
 class _World(Structure):
+    """`struct world` of physics.c."""
+
     _fields_ = [
         ("chipmunk", _Chipmunk), ("space", c_void_p),
-        *((name, c_double) for name in ("dt", "axle", "thrust", "thrust_turning", "brake", "brake_turning")),
+        *((name, c_double) for name in ("dt", "axle", "thrust", "thrust_torque", "brake", "brake_torque")),
         ("robot_count", c_int64), ("object_count", c_int64),
         ("robots", POINTER(_Robot)), ("discs", POINTER(_Disc)), ("steps", c_int64),
     ]  # fmt: skip
 
 
-class Ground(Structure):
-    """For compiled code that makes quanta itself: `struct ground` of lockstep.c."""
+class NativeWorld(Structure):
+    """`struct native_world` of lockstep.c: the world as native code runs it."""
 
     _fields_ = [
-        *((name, c_void_p) for name in ("quanta", "world", "wheels")), ("numbers", c_int64),
-        ("ticks", c_int64),  # quanta that are over
-        ("until", c_int64),  # how far it may go
-        *((name, c_void_p) for name in ("row", "now", "before")),  # poses: room for the next, the present, those before
+        *((name, c_void_p) for name in ("quanta", "world", "wheels")), ("width", c_int64),
+        ("ticks", c_int64),  # finished quanta
+        ("limit", c_int64),  # tick up to which native code can run
+        *((name, c_void_p) for name in ("row", "now", "before")),  # poses: room for the next, current, one quantum ago
     ]  # fmt: skip
 
 
 @cache
 def _code() -> dict[str, Callable[..., Any]]:
     return functions(Path(__file__).with_name("physics.c"), {
-        "quantum": (None, (ADDRESS, ADDRESS)), "poses": (None, (ADDRESS, ADDRESS)),
-        "quanta": (None, (ADDRESS, ADDRESS, INT, INT, INT, ADDRESS, ADDRESS, INT)),
+        "run_quantum": (None, (ADDRESS, ADDRESS)), "read_poses": (None, (ADDRESS, ADDRESS)),
+        "run_quanta": (None, (ADDRESS, ADDRESS, INT, INT, INT, ADDRESS, ADDRESS, INT)),
     })  # fmt: skip
 
 
 def _address(thing: Any) -> int:
-    """Where an object or a function of the physics library is."""
+    """Return the address of an object or function of the physics library."""
     return int(ffi.cast("intptr_t", thing))
 
 
 class World:
-    """One arena with everything in it, placed by `seed`. Raises SceneError if there is no room."""
+    """One arena with all its bodies, placed by `seed`. Raises SceneError if it has no room for them."""
 
     def __init__(self, scene: Scene, seed: int) -> None:
         robots, objects = place_all(scene, generator(seed, STREAM_WORLD))
@@ -188,7 +198,7 @@ class World:
         robots: Sequence[tuple[float, float, float]],
         objects: Sequence[tuple[float, float]],
     ) -> World:
-        """A world with everything at given places (cm, rad): for calibrations and tests."""
+        """Return a world with the bodies at given poses (cm, rad), for calibrations and tests."""
         world = cls.__new__(cls)
         world._build(scene, seed, robots, objects)
         return world
@@ -203,7 +213,7 @@ class World:
         self.scene = scene
         self.dt = scene.clock.quantum_tcy / 14_745_600
         self.ticks = 0
-        """Steps made so far."""
+        """Finished quanta."""
         self.space = pymunk.Space()
         self.space.iterations = ITERATIONS
         self.space.collision_slop = 0.01
@@ -216,27 +226,29 @@ class World:
         self.objects = [self._add_object(scene.kind_of(number), x, y) for number, (x, y) in enumerate(objects)]
         self._wheel_rng = [generator(seed, STREAM_WHEELS, robot) for robot in range(len(robots))]
         self._noise_ticks = max(round(scene.robots.noise_period_s / self.dt), 1)
-        self._hand_over(seed, drives)
+        self._fill_structs(seed, drives)
         self.poses = self._read()
 
-    def _hand_over(self, seed: int, drives: Sequence[pymunk.Body | None]) -> None:
-        """Tell `world.c` what it moves. The bodies stay as long as the world does."""
+    def _fill_structs(self, seed: int, drives: Sequence[pymunk.Body | None]) -> None:
+        """Fill the structs of physics.c. The bodies exist as long as the world."""
         code = _code()
-        self._quantum, self._quanta, self._tell_poses = code["quantum"], code["quanta"], code["poses"]
+        self._run_quantum, self._run_quanta, self._read_poses = (
+            code[name] for name in ("run_quantum", "run_quanta", "read_poses")
+        )
         self._robots = (_Robot * len(self.robots))()
         parts = zip(self._robots, self.robots, drives, self._joints, strict=True)
         for number, (robot, body, drive, joints) in enumerate(parts):
-            robot.body, robot.moved = _address(body._body), _address((drive or body)._body)
+            robot.body, robot.driven_body = _address(body._body), _address((drive or body)._body)
             if joints is not None:
-                robot.push, robot.turn = (_address(joint._constraint) for joint in joints)
+                robot.push_joint, robot.turn_joint = (_address(joint._constraint) for joint in joints)
             robot.bias[:] = traits_of(self.scene, seed, number).bias
             robot.noise[:] = 1.0, 1.0
         setting = self.scene.robots
         forces = [force for newtons in (setting.thrust_n, setting.brake_n) for force in self._grip(newtons)]
         discs = [_Disc(robot.body, None, None, dimensions.ROBOT_RADIUS) for robot in self._robots]
         for number, (body, joints) in enumerate(zip(self.objects, self._floor, strict=True)):
-            held = (_address(joint._constraint) for joint in joints)
-            discs.append(_Disc(_address(body._body), *held, self.scene.kind_of(number).radius_cm))
+            addresses = (_address(joint._constraint) for joint in joints)
+            discs.append(_Disc(_address(body._body), *addresses, self.scene.kind_of(number).radius_cm))
         self._discs = (_Disc * len(discs))(*discs)
         self._world = _World(
             _Chipmunk(*(_address(ffi.addressof(lib, name)) for name in _Chipmunk.NAMES)), _address(self.space._space),
@@ -245,11 +257,11 @@ class World:
         self._at = addressof(self._world)
         self._wheels = np.zeros((len(self.robots), 2))
         self._wheels_at = self._wheels.ctypes.data
-        self._numbers = 3 * len(self.robots) + 2 * len(self.objects)
-        self._sheet, self._sheet_at, self._row = np.empty((0, self._numbers)), 0, 0
-        self._row_bytes = self._sheet.itemsize * self._numbers
-        self.ground = Ground(address_of(self._quanta), self._at, self._wheels_at, self._numbers)
-        """What `lend` leaves."""
+        self._width = 3 * len(self.robots) + 2 * len(self.objects)
+        self._sheet, self._sheet_at, self._row = np.empty((0, self._width)), 0, 0
+        self._row_bytes = self._sheet.itemsize * self._width
+        self.native = NativeWorld(address_of(self._run_quanta), self._at, self._wheels_at, self._width)
+        """The world as native code runs it, after `prepare_native`."""
 
     # -- building ----------------------------------------------------------------------------------------------------
 
@@ -262,7 +274,7 @@ class World:
             self.space.add(wall)
 
     def _add_obstacles(self) -> None:
-        """The room's own shape and what stands fast in it: outlines as thin walls, and discs."""
+        """Add the outline of the room and its obstacles: polygons as thin walls, and discs."""
         fixed, shapes = self.space.static_body, [self.scene.arena.polygon]
         shapes += [one.polygon for one in self.scene.obstacles]
         outlines = [side for shape in shapes if shape for side in geometry.sides(shape)]
@@ -287,7 +299,7 @@ class World:
         return body
 
     def _add_drive(self, robot: pymunk.Body) -> pymunk.Body | None:
-        """The wheels: a body that moves as commanded and pulls the robot along with at most the tyres' grip."""
+        """Add the wheels: a body that moves as commanded and pulls the robot with at most the grip of the tyres."""
         if math.isinf(self.scene.robots.thrust_n):
             self._joints.append(None)
             return None
@@ -303,86 +315,90 @@ class World:
         return wheels
 
     def _grip(self, force_n: float) -> tuple[float, float]:
-        """Greatest force and torque with which wheels pull or hold a robot."""
+        """Return the greatest force and torque with which the wheels pull or hold a robot."""
         return dimensions.newton(force_n), dimensions.newton(force_n) * self.scene.robots.axle_cm / 2
 
     def _add_object(self, setting: ObjectKind, x: float, y: float) -> pymunk.Body:
-        """Its friction on the floor is two joints of limited force that want it to stand still."""
+        """Add an object. Its floor friction is two joints of limited force that hold it at rest."""
         body = self._disc(setting.mass_kg, setting.radius_cm, x, y)
-        grip = pymunk.PivotJoint(self.space.static_body, body, (0, 0), (0, 0))
-        hold = pymunk.GearJoint(self.space.static_body, body, 0.0, 1.0)
+        slide = pymunk.PivotJoint(self.space.static_body, body, (0, 0), (0, 0))
+        spin = pymunk.GearJoint(self.space.static_body, body, 0.0, 1.0)
         mu = setting.floor_friction
-        grip.max_force = dimensions.floor_force(setting.mass_kg, mu)
-        hold.max_force = dimensions.floor_torque(setting.mass_kg, setting.radius_cm, mu)
-        for joint in (grip, hold):
+        slide.max_force = dimensions.floor_force(setting.mass_kg, mu)
+        spin.max_force = dimensions.floor_torque(setting.mass_kg, setting.radius_cm, mu)
+        for joint in (slide, spin):
             joint.max_bias = 0.0
             self.space.add(joint)
-        self._floor.append((grip, hold))
+        self._floor.append((slide, spin))
         return body
 
     # -- one quantum -------------------------------------------------------------------------------------------------
 
     def step(self, wheels: Sequence[tuple[float, float]]) -> None:
-        """Act and physics: wheel speeds (left, right) in cm/s as commanded, for one quantum."""
+        """Run one quantum with the commanded wheel speeds (left, right) in cm/s."""
         self._draw_noise()
         self._wheels[:] = np.reshape(wheels, (-1, 2))
-        self._quantum(self._at, self._wheels_at)
+        self._run_quantum(self._at, self._wheels_at)
         self.ticks += 1
         self.poses = self._read()
 
-    def go(self, speeds: int, room: int, count: int) -> list[Stretch]:
-        """So many quanta at wheel speeds that lie where `Wheels` keeps them, `room` per robot: `speeds` is the address
-        of a table of addresses. Where poses at the end of each are."""
+    def run_quanta(self, speeds: int, room: int, count: int) -> list[PoseBlock]:
+        """Run `count` quanta with the wheel speeds that `Wheels` keeps; return the blocks of poses at their ends.
+
+        `speeds` is the address of a table with the address of each robot's speeds, `room` quanta of them.
+        """
         made = []
         while count:
             self._draw_noise()
             row = self._room()
             more = min(count, self._noise_ticks - self.ticks % self._noise_ticks, ROWS - row)
             at = self._sheet_at + row * self._row_bytes
-            self._quanta(self._at, speeds, room, self.ticks, more, self._wheels_at, at, self._numbers)
-            made.append(Stretch(self.ticks + 1, self.ticks + more, self._sheet, row, at))
+            self._run_quanta(self._at, speeds, room, self.ticks, more, self._wheels_at, at, self._width)
+            made.append(PoseBlock(self.ticks + 1, self.ticks + more, self._sheet, row, at))
             self._row += more
             self.ticks += more
             count -= more
         if made:
-            self.poses = self.at(made[-1], self.ticks)
+            self.poses = self.poses_in(made[-1], self.ticks)
         return made
 
-    def lend(self, now: Poses, before: Poses, is_lent: bool = True) -> None:
-        """Let compiled code make quanta by `ground` up to where noise is drawn, or poses need another sheet, or none;
-        `before` are the poses a quantum before those of now."""
-        ground, row = self.ground, self._room()
-        noisy = self.ticks % self._noise_ticks
-        may = is_lent and (noisy or not self.scene.robots.wheel_noise)
-        more = min(self._noise_ticks - noisy, ROWS - row) if may else 0
-        ground.ticks, ground.until = self.ticks, self.ticks + more
-        ground.row, ground.now, ground.before = self._sheet_at + row * self._row_bytes, now.address, before.address
+    def prepare_native(self, now: Poses, before: Poses, is_enabled: bool = True) -> None:
+        """Let native code run quanta by `native` until noise is due or the sheet is full; none if not `is_enabled`.
 
-    def take(self) -> list[Stretch]:
-        """What has been made by `ground` since."""
-        ticks, count = self.ground.ticks, self.ground.ticks - self.ticks
+        `now` are the current poses, `before` those one quantum earlier.
+        """
+        native, row = self.native, self._room()
+        noisy = self.ticks % self._noise_ticks
+        can_run = is_enabled and (noisy or not self.scene.robots.wheel_noise)
+        more = min(self._noise_ticks - noisy, ROWS - row) if can_run else 0
+        native.ticks, native.limit = self.ticks, self.ticks + more
+        native.row, native.now, native.before = self._sheet_at + row * self._row_bytes, now.address, before.address
+
+    def collect_native(self) -> list[PoseBlock]:
+        """Take over the quanta that native code has run since `prepare_native`; return their poses."""
+        ticks, count = self.native.ticks, self.native.ticks - self.ticks
         if not count:
             return []
-        made = Stretch(self.ticks + 1, ticks, self._sheet, self._row, self._sheet_at + self._row * self._row_bytes)
+        made = PoseBlock(self.ticks + 1, ticks, self._sheet, self._row, self._sheet_at + self._row * self._row_bytes)
         self._row += count
         self.ticks = ticks
-        self.poses = self.at(made, ticks)
+        self.poses = self.poses_in(made, ticks)
         return [made]
 
-    def at(self, stretch: Stretch, tick: int) -> Poses:
-        """Poses at the end of so many quanta, which are in that stretch."""
-        row = tick - stretch.first
-        return Poses.of(stretch.sheet[stretch.row + row], len(self.robots), stretch.address + row * self._row_bytes)
+    def poses_in(self, block: PoseBlock, tick: int) -> Poses:
+        """Return the poses after `tick` quanta, which must be in the block."""
+        row = tick - block.first
+        return Poses.of(block.sheet[block.row + row], len(self.robots), block.address + row * self._row_bytes)
 
     def _room(self) -> int:
-        """A free row for poses. Sheets are never written twice: poses stay what they were."""
+        """Return a free row for poses. Rows are never written twice, because `Poses` are immutable."""
         if self._row == len(self._sheet):
-            self._sheet, self._row = np.empty((ROWS, self._numbers)), 0
+            self._sheet, self._row = np.empty((ROWS, self._width)), 0
             self._sheet_at = self._sheet.ctypes.data
         return self._row
 
     def move(self, body: pymunk.Body, x: float, y: float, heading: float | None = None) -> None:
-        """Put a robot or object somewhere else, at rest; cm, rad."""
+        """Move a robot or object to another pose, at rest; cm, rad."""
         body.position, body.velocity, body.angular_velocity = (x, y), (0.0, 0.0), 0.0
         if heading is not None:
             body.angle = heading
@@ -390,6 +406,7 @@ class World:
         self.poses = self._read()
 
     def _draw_noise(self) -> None:
+        """Draw new wheel noise if its period has ended."""
         share = self.scene.robots.wheel_noise
         if not share or self.ticks % self._noise_ticks:
             return
@@ -397,21 +414,22 @@ class World:
             robot.noise[:] = rng.uniform(1 - share, 1 + share, 2).tolist()
 
     def _read(self) -> Poses:
+        """Return the current poses."""
         row = self._room()
         self._row += 1
         at = self._sheet_at + row * self._row_bytes
-        self._tell_poses(self._at, at)
+        self._read_poses(self._at, at)
         return Poses.of(self._sheet[row], len(self.robots), at)
 
     @property
     def seconds(self) -> float:
-        """Time since the start."""
+        """Time since the start of the trial."""
         return self.seconds_at(self.ticks)
 
     def seconds_at(self, tick: int) -> float:
-        """Time of the beginning of a quantum."""
+        """Return the time at the start of quantum `tick`."""
         return tick * self.scene.clock.quantum_tcy / 14_745_600
 
     def object_places(self) -> NDArray[np.float64]:
-        """Objects' centres, n x 2, cm."""
+        """Return the centres of the objects, n x 2, cm."""
         return np.array(self.poses.objects, dtype=float).reshape(-1, 2)

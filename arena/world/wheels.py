@@ -1,7 +1,7 @@
-"""`Wheels`: how fast a robot's wheels turned in each quantum, by the steps of its motors; where the physics reads it.
+"""`Wheels`: the wheel speeds of a robot in each quantum, computed from its motor steps.
 
-Single steps would jerk a drive of limited force, so a speed is that of a few quanta together. In: steps made by the
-ends of quanta. Out: cm/s, kept for as long as nobody runs further ahead than `ROOM` quanta.
+Input: motor steps at the ends of quanta. Output: speeds in cm/s for the physics, of the last `ROOM` quanta. A speed is
+the mean over a few quanta, because single steps would jerk a drive of limited force.
 """
 
 from __future__ import annotations
@@ -18,24 +18,26 @@ from arena.scene.loader import FCY
 from emu.native_library import ADDRESS, INT, address_of, functions
 
 WINDOW_S: Final = 0.010
-"""Motor steps are counted over at least this long to make a speed."""
+"""Time over which motor steps are averaged to a speed, at least one quantum."""
 ROOM: Final = 4096
-"""Quanta that are kept."""
+"""Quanta whose speeds are kept."""
 
 
 class _Drive(Structure):
-    _fields_ = [*((name, c_int64) for name in ("room", "most", "filled", "newest")),
+    """`struct drive` of wheels.c."""
+
+    _fields_ = [*((name, c_int64) for name in ("room", "window", "filled", "newest")),
                 *((name, c_void_p) for name in ("counts", "rates", "speeds"))]  # fmt: skip
 
 
 @cache
-def _turned() -> Callable[..., Any]:
+def _add_steps() -> Callable[..., Any]:
     arguments = (ADDRESS, INT, INT, ADDRESS)
-    return functions(Path(__file__).with_name("wheels.c"), {"turned": (None, arguments)})["turned"]
+    return functions(Path(__file__).with_name("wheels.c"), {"add_steps": (None, arguments)})["add_steps"]
 
 
 class Wheels:
-    """Of one robot, whose quanta last `quantum` Tcy."""
+    """Wheel speeds of one robot, whose quanta last `quantum` Tcy."""
 
     def __init__(self, quantum: int) -> None:
         window = max(round(WINDOW_S / (quantum / FCY)), 1)
@@ -46,23 +48,23 @@ class Wheels:
         addresses = addressof(self._counts), addressof(self._rates), addressof(self._speeds)
         self._drive: Final = _Drive(ROOM, window + 1, 1, 0, *addresses)
         self._at: Final = addressof(self._drive)
-        self._turned: Final = _turned()
+        self._add_steps: Final = _add_steps()
         self.address: Final = addressof(self._speeds)
-        """Speeds (left, right) of quantum n, at place n modulo ROOM."""
+        """Address of the speeds: (left, right) of quantum n at index n modulo ROOM."""
 
-    def turned(self, first: int, steps: array[int]) -> None:
-        """Quanta from `first` on are over, by whose ends the motors had made `steps`, left and right in turn."""
-        self._turned(self._at, first, len(steps) >> 1, steps.buffer_info()[0])
+    def add_steps(self, first: int, steps: array[int]) -> None:
+        """Add the motor steps at the ends of quanta from `first` on, left and right in turn."""
+        self._add_steps(self._at, first, len(steps) >> 1, steps.buffer_info()[0])
 
-    def lend(self) -> tuple[int, int]:
-        """For compiled code: where `turned` of wheels.c is, and `struct drive`."""
-        return address_of(self._turned), self._at
+    def native_handle(self) -> tuple[int, int]:
+        """Return the addresses of `add_steps` of wheels.c and of the `struct drive`."""
+        return address_of(self._add_steps), self._at
 
-    def rested(self, tick: int) -> None:
-        """A quantum is over in which the robot was off or stopped: nothing turns."""
+    def set_stopped(self, tick: int) -> None:
+        """Set the speeds of a quantum in which the robot was off or its firmware stopped to zero."""
         self._speeds[2 * (tick % ROOM)] = self._speeds[2 * (tick % ROOM) + 1] = 0.0
 
     def speed(self, tick: int) -> tuple[float, float]:
-        """Left and right in cm/s during a quantum that is over."""
+        """Return left and right speed in cm/s during a finished quantum."""
         left = 2 * (tick % ROOM)
         return self._speeds[left], self._speeds[left + 1]

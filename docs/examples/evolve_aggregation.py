@@ -39,14 +39,14 @@ def evolve(generations: int, seeds: list[int], seconds: float, seed: int) -> tup
     env = ArenaEnv(scene, seconds=seconds, decision_s=0.1)
     best: NDArray[np.int64] = rng.integers(-100, 101, 4)
     value = float(np.mean([dispersion(env, best, one) for one in seeds]))
-    course = [value]
+    series = [value]
     for _ in range(generations):
         child = np.clip(best + np.rint(rng.normal(0, 30, 4)).astype(int), -100, 100)
         found = float(np.mean([dispersion(env, child, one) for one in seeds]))
         if found <= value:
             best, value = child, found
-        course.append(value)
-    return best, course
+        series.append(value)
+    return best, series
 
 
 def main() -> None:
@@ -57,9 +57,9 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, default=60.0)
     parser.add_argument("--seed", type=int, default=1)
     options = parser.parse_args()
-    best, course = evolve(options.generations, list(range(options.seeds)), options.seconds, options.seed)
+    best, series = evolve(options.generations, list(range(options.seeds)), options.seconds, options.seed)
     alone, ahead = (f"{left},{right}" for left, right in (best[:2], best[2:]))
-    print(json.dumps({"spread_cm": [round(value, 1) for value in course]}))
+    print(json.dumps({"spread_cm": [round(value, 1) for value in series]}))
     print(f'make -C firmware APP=aggregation DEFINES="-DALONE={alone} -DAHEAD={ahead}"')
 
 

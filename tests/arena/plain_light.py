@@ -6,7 +6,7 @@ import math
 from bisect import bisect_right
 from collections.abc import Sequence
 
-from arena.infrared.channel import LINES, PAUSE_S
+from arena.infrared.channel import GAP_S, LINES
 from arena.scene.loader import FCY
 
 ONES = (1 << 64) - 1
@@ -60,7 +60,7 @@ def light(
         index = bisect_right(cycles, now - late)
         begun, before = now - late, 0
         for place, cycle in enumerate(cycles[:index]):
-            if place == 0 or (not lit[place] and cycle - before > PAUSE_S * FCY):
+            if place == 0 or (not lit[place] and cycle - before > GAP_S * FCY):
                 begun = cycle
             before = cycle
         if (now - late - begun) % loss[2] >= loss[1] and uniform(seed + robot, 8, begun) < loss[0]:

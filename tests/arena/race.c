@@ -1,8 +1,8 @@
-// Rounds of lockstep.c between threads, for a sanitizer: robots that count what is done to them, no Python.
+// Rounds of lockstep.c between threads, for a sanitizer: robots that count their runs, without Python.
 //
 //     cc -fsanitize=thread -include lockstep.c race.c -lpthread
 //
-// Says nothing and ends with 0 if each robot was run once in every round, and no thread twice at a time.
+// Prints the runs by workers. Exits with 0 if every robot ran once in each round, and never in two threads at a time.
 
 extern int printf(const char *, ...);
 extern int pthread_create(unsigned long *, const void *, void *(*)(void *), void *);
@@ -12,16 +12,16 @@ extern int sem_wait(void *);
 extern int sem_post(void *);
 extern int sched_yield(void);
 
-enum { ROBOTS = 7, HELPERS = 3, ROUNDS = 20000 };
+enum { ROBOTS = 7, WORKERS = 3, ROUNDS = 20000 };
 
 static i64 runs[ROBOTS];
 static struct native natives[ROBOTS];
 static struct robot robots[ROBOTS], *all[ROBOTS], *ready[ROBOTS];
-static struct helper helpers[HELPERS];
-static char locks[HELPERS][64];
+static struct worker workers[WORKERS];
+static char locks[WORKERS][64];
 static u64 begins[ROBOTS];
-static struct ground ground;
-static struct swarm swarm;
+static struct native_world native_world;
+static struct scheduler scheduler;
 
 static i64 entry(void *record, void *env)
 {
@@ -41,54 +41,54 @@ static void release(void *lock)
     sem_post(lock);
 }
 
-static void *life(void *helper)
+static void *thread_main(void *worker)
 {
-    help(&swarm, helper);
+    worker_main(&scheduler, worker);
     return 0;
 }
 
 int main(void)
 {
-    unsigned long threads[HELPERS];
+    unsigned long threads[WORKERS];
     for (i64 i = 0; i < ROBOTS; i++) {
         natives[i].entry = entry, natives[i].record = &runs[i], natives[i].begins = &begins[i];
         natives[i].interpret = 1, natives[i].service = 2;
         robots[i].native = &natives[i];
         all[i] = &robots[i];
     }
-    for (i64 i = 0; i < HELPERS; i++) {
+    for (i64 i = 0; i < WORKERS; i++) {
         sem_init(locks[i], 0, 0);
-        helpers[i].lock = locks[i];
+        workers[i].lock = locks[i];
     }
-    swarm = (struct swarm){.count = ROBOTS,
-                           .robots = all,
-                           .ground = &ground,
-                           .helpers = HELPERS,
-                           .helper = helpers,
-                           .acquire = acquire,
-                           .release = release,
-                           .ready = ready};
-    for (i64 i = 0; i < HELPERS; i++)
-        pthread_create(&threads[i], 0, life, &helpers[i]);
+    scheduler = (struct scheduler){.count = ROBOTS,
+                                   .robots = all,
+                                   .native_world = &native_world,
+                                   .worker_count = WORKERS,
+                                   .workers = workers,
+                                   .acquire = acquire,
+                                   .release = release,
+                                   .ready = ready};
+    for (i64 i = 0; i < WORKERS; i++)
+        pthread_create(&threads[i], 0, thread_main, &workers[i]);
     i64 expected[ROBOTS] = {0}, wrong = 0;
     for (i64 round = 0; round < ROUNDS; round++) {
         for (i64 i = 0; i < ROBOTS; i++)
             if ((round * 31 + i * 17) % 5) // another choice of robots in each round
-                robots[i].stands = RUNS, expected[i]++;
-        for (i64 i; (i = run_all(&swarm, 0)) != OVER;)
-            wrong += robots[i].stands != AWAY || robots[i].why != 7;
-        if (round % 1000 == 0) // long enough for helpers to fall asleep
+                robots[i].state = RUNNABLE, expected[i]++;
+        for (i64 i; (i = run_all(&scheduler, 0)) != REACHED;)
+            wrong += robots[i].state != IN_PYTHON || robots[i].exit_reason != 7;
+        if (round % 1000 == 0) // time for the workers to fall asleep
             for (i64 i = 0; i < 20000; i++)
                 sched_yield();
     }
-    dismiss(&swarm);
-    i64 helped = 0;
-    for (i64 i = 0; i < HELPERS; i++) {
+    stop_workers(&scheduler);
+    i64 worker_runs = 0;
+    for (i64 i = 0; i < WORKERS; i++) {
         pthread_join(threads[i], 0);
-        helped += helpers[i].runs;
+        worker_runs += workers[i].runs;
     }
     for (i64 i = 0; i < ROBOTS; i++)
         wrong += runs[i] != expected[i];
-    printf("%ld\n", (long)helped);
-    return wrong || !helped;
+    printf("%ld\n", (long)worker_runs);
+    return wrong || !worker_runs;
 }

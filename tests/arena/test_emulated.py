@@ -9,17 +9,18 @@ import pytest
 
 import emu
 from arena.camera.appearance import COLOURS
-from arena.camera.reference import WINDOW_ROWS, Eye
+from arena.camera.renderer import WINDOW_ROWS
 from arena.campaign.campaign import SELECTOR
 from arena.cli import main
 from arena.commands.reaction import OK_AT_TCY, SPEED_WORDS, Show, reaction
-from arena.robots.controller import FIRST_LOOK_TCY, LATENCY_TCY, OK_DECODED_TCY, ScriptedBrain, switched_on
-from arena.robots.firmware_controller import EmulatedBrain
+from arena.robots.controller import FIRST_FRAME_TCY, LATENCY_TCY, OK_DECODED_TCY, ScriptedController, power_on_cycle
+from arena.robots.firmware_controller import FirmwareController
 from arena.scene.loader import FCY, Scene, load_scene
 from arena.trial.record import read_trial
 from arena.trial.trial import run_trial
 from arena.world.physics import World
 from emu.boards.epuck.board import Epuck
+from tests.arena.reference_camera import ReferenceCamera
 
 AT_ONCE = 8
 """Selector bit with which the project's firmware does not wait for the remote control."""
@@ -38,13 +39,13 @@ def test_a_robot_turns_as_its_controller_says_for_what_its_camera_sees(
     """Issue "Must show" 1: nothing ahead, then an object that is put there; wheel speeds in mm/s (epuck.md §8)."""
     scene = alone.with_values(objects__count=1, robots__thrust_n="inf")
     for place, speeds in (((20.0, 20.0), wanted[:2]), ((240.0, 150.0), wanted[2:])):
-        brain = EmulatedBrain(scene, 1, 0, clustering_image, SELECTOR[controller] | AT_ONCE)
+        firmware = FirmwareController(scene, 1, 0, clustering_image, SELECTOR[controller] | AT_ONCE)
         world = World.of(scene, 1, [(200, 150, 0.0)], [place])
         poses = world.poses  # the world stands still: the same picture all the time
-        wheels = [brain.think(tick, poses) for tick in range(400)]
+        wheels = [firmware.control_step(tick, poses) for tick in range(400)]
         mean = np.mean(wheels[-200:], axis=0)
         assert mean * 10 / 0.128 * 0.129 == pytest.approx(speeds, rel=0.03)
-        strip = np.frombuffer(brain.reading().strip, np.uint8).reshape(20, 3).astype(int)
+        strip = np.frombuffer(firmware.reading().strip, np.uint8).reshape(20, 3).astype(int)
         red = strip[:, 0] - strip[:, 1] > 40
         half = math.asin(5 / (240 - 200 - 3.3)) if place == (240.0, 150.0) else 0.0
         assert red.sum() == pytest.approx(2 * 602 * math.tan(half) / 8, abs=1)
@@ -57,15 +58,15 @@ def test_pixels_are_the_colours_of_what_is_seen_with_noise(
 ) -> None:
     """docs/experiment.md §2: normal noise of sd 3 in each channel, in rows of one class and of several."""
     scene = alone.with_values(objects__count=1, camera__vignetting=vignetting)
-    brain = EmulatedBrain(scene, 1, 0, clustering_image)
+    firmware = FirmwareController(scene, 1, 0, clustering_image)
     poses = World.of(scene, 1, [(200, 150, 0.0)], [(240.0, 150.0)]).poses
-    brain.think(1000, poses)
+    firmware.control_step(1000, poses)
     columns = np.arange(0, 640, 3)
     left_over = []
     for y in (0, 100, 240, 300, 470):
-        classes = [Eye(scene, poses, 0).column(int(u), (y,))[0] for u in columns]
-        bright = Eye(scene, poses, 0).lens.vignetting(y, columns, vignetting)
-        left_over.append(brain._pixels(y, columns, 0) - COLOURS[classes] * bright[:, None])
+        classes = [ReferenceCamera(scene, poses, 0).column(int(u), (y,))[0] for u in columns]
+        bright = ReferenceCamera(scene, poses, 0).lens.vignetting(y, columns, vignetting)
+        left_over.append(firmware._pixels(y, columns, 0) - COLOURS[classes] * bright[:, None])
     assert np.abs(np.mean(left_over, axis=(0, 1))) == pytest.approx(0, abs=0.5)
     assert np.std(left_over, axis=(0, 1)) == pytest.approx(3.0, abs=0.3)
 
@@ -73,11 +74,11 @@ def test_pixels_are_the_colours_of_what_is_seen_with_noise(
 def test_the_scripted_sensor_has_the_firmwares_first_look_and_latency(clustering_image: Path, alone: Scene) -> None:
     """docs/experiment.md §2: both were measured on the firmware, the look to a fifth of a millisecond; the latency
     changes with the kernel, to a quarter."""
-    brain = EmulatedBrain(alone, 1, 0, clustering_image, SELECTOR["A"] | AT_ONCE)
+    firmware = FirmwareController(alone, 1, 0, clustering_image, SELECTOR["A"] | AT_ONCE)
     world = World(alone, 1)
     rows: dict[int, int] = {}
-    camera = brain.machine.board.camera
-    pixels = brain._pixels
+    camera = firmware.machine.board.camera
+    pixels = firmware._pixels
 
     def watched(y: int, columns: object, cycle: int) -> object:
         rows.setdefault(y, cycle)
@@ -85,30 +86,30 @@ def test_the_scripted_sensor_has_the_firmwares_first_look_and_latency(clustering
 
     camera.sample(watched)
     tick = 0
-    while not brain.machine.peek("stepper_left"):
-        brain.think(tick, world.poses)
+    while not firmware.machine.peek("stepper_left"):
+        firmware.control_step(tick, world.poses)
         tick += 1
         assert tick < 1000
     middle = (WINDOW_ROWS[0] + WINDOW_ROWS[-1]) // 2
-    assert rows[middle] == pytest.approx(FIRST_LOOK_TCY, abs=FCY // 5_000)
-    seen = brain.machine.cycle  # within the quantum in which it happened
+    assert rows[middle] == pytest.approx(FIRST_FRAME_TCY, abs=FCY // 5_000)
+    seen = firmware.machine.cycle  # within the quantum in which it happened
     margin = FCY // 4_000
-    assert seen - alone.clock.quantum_tcy - margin <= FIRST_LOOK_TCY + LATENCY_TCY <= seen + margin
+    assert seen - alone.clock.quantum_tcy - margin <= FIRST_FRAME_TCY + LATENCY_TCY <= seen + margin
 
 
 def test_the_remote_controls_ok_starts_all_robots_together(clustering_image: Path) -> None:
-    """experiment.md §4: firmware and script understand it at the same cycle of the trial and stand still before."""
+    """experiment-contract.md §4: firmware and script decode it at the same cycle of the trial and rest before it."""
     scene = load_scene("clustering").with_values(robots__count=2, objects__count=0)
-    brains = [EmulatedBrain(scene, 1, robot, clustering_image, SELECTOR["A"]) for robot in range(2)]
+    controllers = [FirmwareController(scene, 1, robot, clustering_image, SELECTOR["A"]) for robot in range(2)]
     started: list[int] = []
-    for robot, brain in enumerate(brains):
-        on_at = switched_on(scene, 1, robot)
-        brain.machine.board.leds.listen(lambda _name, _lit, cycle, on_at=on_at: started.append(on_at + cycle))
-    scripts = [ScriptedBrain(scene, 1, robot, "A") for robot in range(2)]
+    for robot, firmware in enumerate(controllers):
+        on_at = power_on_cycle(scene, 1, robot)
+        firmware.machine.board.leds.listen(lambda _name, _lit, cycle, on_at=on_at: started.append(on_at + cycle))
+    scripts = [ScriptedController(scene, 1, robot, "A") for robot in range(2)]
     poses = World(scene, 1).poses
     for tick in range(1200):
-        emulated = [brain.think(tick, poses) for brain in brains]
-        scripted = [brain.think(tick, poses) for brain in scripts]
+        emulated = [firmware.control_step(tick, poses) for firmware in controllers]
+        scripted = [firmware.control_step(tick, poses) for firmware in scripts]
         if (tick + 1) * scene.clock.quantum_tcy < OK_AT_TCY + OK_DECODED_TCY:
             assert emulated == scripted == [(0.0, 0.0)] * 2
     assert started == pytest.approx([OK_AT_TCY + OK_DECODED_TCY] * 2, abs=FCY // 10_000)
@@ -120,11 +121,13 @@ def test_twins_start_alike(clustering_image: Path) -> None:
     scene = load_scene("clustering")
     paths = []
     for scripted in (False, True):
-        brains = [
-            ScriptedBrain(scene, 1, robot, "A") if scripted else EmulatedBrain(scene, 1, robot, clustering_image, 0)
+        controllers = [
+            ScriptedController(scene, 1, robot, "A")
+            if scripted
+            else FirmwareController(scene, 1, robot, clustering_image, 0)
             for robot in range(5)
         ]
-        rows = run_trial(scene, 1, brains, 6).rows.columns
+        rows = run_trial(scene, 1, controllers, 6).rows.columns
         paths.append(np.array([[rows[f"r{i}_x"], rows[f"r{i}_y"]] for i in range(5)]))
     apart = np.hypot(*(paths[0] - paths[1]).transpose(1, 0, 2)).max(axis=0)
     assert apart[2] == 0.0
@@ -135,14 +138,14 @@ def test_twins_start_alike(clustering_image: Path) -> None:
 
 def test_steps_become_the_distance_they_are_worth(clustering_image: Path, alone: Scene) -> None:
     """epuck.md §3: 0.128 mm per step, summed over a drive in a circle, at a 1 ms lock-step."""
-    brain = EmulatedBrain(alone, 1, 0, clustering_image, AT_ONCE)
+    firmware = FirmwareController(alone, 1, 0, clustering_image, AT_ONCE)
     world = World.of(alone, 1, [(200, 150, 0.0)], [])
     path = 0.0
     for tick in range(3000):
         before = world.poses.robots[0]
-        world.step([brain.think(tick, world.poses)])
+        world.step([firmware.control_step(tick, world.poses)])
         path += math.dist(before[:2], world.poses.robots[0][:2])
-    motors = brain.machine.board.motors
+    motors = firmware.machine.board.motors
     assert path == pytest.approx((motors.left.steps + motors.right.steps) / 2 * 0.0128, rel=0.01)
 
 
@@ -160,14 +163,14 @@ def test_a_robot_whose_firmware_traps_stops_and_the_trial_goes_on(
     assert [fault[0] for fault in trial.about["faults"]] == [0, 1]
     scene = load_scene("clustering")
     for robot, seconds, why in trial.about["faults"]:
-        assert 1 + switched_on(scene, 1, robot) / FCY <= seconds <= 2 + switched_on(scene, 1, robot) / FCY
+        assert 1 + power_on_cycle(scene, 1, robot) / FCY <= seconds <= 2 + power_on_cycle(scene, 1, robot) / FCY
         assert why.startswith("stopped: fault at 0x")
     lines = [(line["robot"], line["text"]) for row in trial.columns["log"] for line in row]
     assert sorted(lines) == [(0, "hi"), (1, "hi")]
     assert trial.columns["r0_leds"][1] == 1
     lit, dark = (change for row in trial.columns["lights"] for change in row if change["robot"] == 0)
     assert (lit["leds"], dark["leds"]) == (1, 0)  # the trap resets the chip
-    assert 0 < lit["cycle"] - switched_on(scene, 1, 0) < 10_000
+    assert 0 < lit["cycle"] - power_on_cycle(scene, 1, 0) < 10_000
     assert dark["cycle"] - lit["cycle"] == pytest.approx(FCY, abs=1000)
     assert trial.columns["r0_strip"][1] == b""
     assert trial.columns["r0_infrared"][1] is None
@@ -194,16 +197,16 @@ def test_the_scenes_light_reaches_the_camera(talking_image: Path, alone: Scene) 
     """Half the light, half the values, before the sensor's automatic exposure has followed (epuck.md §7.6)."""
     pictures = []
     for brightness in (1.0, 0.5):
-        brain = EmulatedBrain(alone.with_values(light__brightness=brightness), 1, 0, talking_image)
+        firmware = FirmwareController(alone.with_values(light__brightness=brightness), 1, 0, talking_image)
         poses = World.of(alone, 1, [(200, 150, 0.0)], []).poses
-        brain._see(0, poses, poses)
-        pictures.append(brain.machine.board.camera.frame(cycle=0).astype(int))
+        firmware._see(0, poses, poses)
+        pictures.append(firmware.machine.board.camera.frame(cycle=0).astype(int))
     lit, dim = (picture[:, :, 0].mean() for picture in pictures)
     assert dim == pytest.approx(lit / 2, rel=0.1)
 
 
 def test_reaction_finds_the_latency_and_no_missed_frame(clustering_image: Path) -> None:
-    """experiment.md §4: what an independent look at the wheel's word finds for 5 frames, to the 5 us it polls at."""
+    """experiment-contract.md §4: reaction times equal those of polling the wheel's word, within the polling period of 5 us."""
     found = reaction(clustering_image, SPEED_WORDS["openswarm"], 0, 10, 1)
     assert found["frames_missed"] == 0
     assert found["changes"] in (9, 10)
@@ -238,7 +241,7 @@ def test_firmware_without_the_word_or_without_wheels_is_refused(
 @pytest.mark.parametrize("end", [1 << 10, 294_912, 3 << 30])
 def test_moments_of_probes_are_those_the_generator_would_draw(clustering_image: Path, alone: Scene, end: int) -> None:
     """Also where a third of what is drawn is refused."""
-    brain = EmulatedBrain(alone, 1, 0, clustering_image)
+    firmware = FirmwareController(alone, 1, 0, clustering_image)
     twin = np.random.default_rng()
-    twin.bit_generator.state = brain._rng.bit_generator.state
-    assert [brain._below(end) for _ in range(2000)] == [int(twin.integers(end)) for _ in range(2000)]
+    twin.bit_generator.state = firmware._rng.bit_generator.state
+    assert [firmware._below(end) for _ in range(2000)] == [int(twin.integers(end)) for _ in range(2000)]

@@ -17,10 +17,10 @@ from pathlib import Path
 import pytest
 
 from arena.cli import main
-from arena.infrared.channel import Ether, light_code
+from arena.infrared.channel import OpticalChannel, light_code
 from arena.infrared.propagation import PUBLISHED, Optics, amplitude, beam, brightest, distance_of
 from arena.infrared.ring import Ring, ambient
-from arena.robots.firmware_controller import EmulatedBrain, volts_after
+from arena.robots.firmware_controller import FirmwareController, volts_after
 from arena.scene import dimensions, geometry
 from arena.scene.loader import FCY, Scene, SceneError, load_scene
 from arena.world.physics import Poses, World
@@ -301,16 +301,16 @@ def test_the_compiled_optics_is_the_plain_one() -> None:
 
 def test_light_arrives_a_quantum_late_whoever_lived_first() -> None:
     """trial.py: no robot depends on the order of the others."""
-    ether = Ether(2, 1000, tau=1e-3)
-    ether.switch(1, 5000, 2, lit=True)
-    ether.switch(1, 6500, 2, lit=False)
-    assert [ether.shares(1, cycle)[2] for cycle in (6063, 6065, 7563, 7565)] == [0, 1, 1, 0]
-    assert [ether.is_dark(1, *span) for span in ((6000, 6063), (6000, 6064), (7563, 9000), (7565, 9000))] == [
+    channel = OpticalChannel(2, 1000, tau=1e-3)
+    channel.switch(1, 5000, 2, lit=True)
+    channel.switch(1, 6500, 2, lit=False)
+    assert [channel.levels(1, cycle)[2] for cycle in (6063, 6065, 7563, 7565)] == [0, 1, 1, 0]
+    assert [channel.is_dark(1, *span) for span in ((6000, 6063), (6000, 6064), (7563, 9000), (7565, 9000))] == [
         True, False, False, True]  # fmt: skip
     for cycle in range(10_000, 900_000, 1000):
-        ether.switch(1, cycle, 0, lit=bool(cycle // 1000 % 2))
-    assert ether.shares(1, 900_500)[0] == 1
-    assert ether.pulses(1).count <= 257
+        channel.switch(1, cycle, 0, lit=bool(cycle // 1000 % 2))
+    assert channel.levels(1, 900_500)[0] == 1
+    assert channel.emitter(1).count <= 257
 
 
 def test_receivers_follow_as_a_first_order_whatever_was_asked_before() -> None:
@@ -330,26 +330,26 @@ def test_receivers_follow_as_a_first_order_whatever_was_asked_before() -> None:
             share, now, lit, change = lit + (share - lit) * math.exp(-(change - now) / tau), change, 1 - lit, next(turn)
         truth[cycle] = lit + (share - lit) * math.exp(-(cycle - now) / tau)
     for shuffled in (False, True):
-        ether = Ether(1, quantum, tau=tau)
-        ether.slowest = switches[-600]
+        channel = OpticalChannel(1, quantum, tau=tau)
+        channel.slowest = switches[-600]
         for number, cycle in enumerate(switches):
-            ether.switch(0, cycle, 3, lit=number % 2 == 0)
+            channel.switch(0, cycle, 3, lit=number % 2 == 0)
         order = rng.sample(asked, len(asked)) if shuffled else asked
         late = quantum + 64
         for cycle in order:
-            assert ether.shares(0, cycle + late)[3] == pytest.approx(truth[cycle], abs=1e-6)
-            assert not (ether.is_dark(0, cycle + late, cycle + late) and truth[cycle] > 1e-6)
+            assert channel.levels(0, cycle + late)[3] == pytest.approx(truth[cycle], abs=1e-6)
+            assert not (channel.is_dark(0, cycle + late, cycle + late) and truth[cycle] > 1e-6)
 
 
 def test_firmware_reads_reflections_and_another_robots_light(scene: Scene, tmp_path: Path) -> None:
     """Sensor 2 converts with its emitter off and on, beside an object, then beside a robot that blinks."""
     listener, sender = built(tmp_path, LISTENER, "listener"), built(tmp_path, SENDER, "sender")
-    ether = Ether(2, scene.clock.quantum_tcy)
-    ears = EmulatedBrain(scene, 1, 0, listener, 0, ether)
-    mouth = EmulatedBrain(scene, 1, 1, sender, 0, ether)
+    channel = OpticalChannel(2, scene.clock.quantum_tcy)
+    ears = FirmwareController(scene, 1, 0, listener, 0, channel)
+    mouth = FirmwareController(scene, 1, 1, sender, 0, channel)
     beside_object = Poses([(100.0, 150.0, UP), (300.0, 150.0, 0.0)], [(100 + 3.7 + 2.0 + 5.0, 150.0)])
     for tick in range(200):
-        assert ears.think(tick, beside_object) == (0.0, 0.0)
+        assert ears.control_step(tick, beside_object) == (0.0, 0.0)
     assert ears.machine.peek("count") > 40
     difference = ears.machine.peek("dark") - ears.machine.peek("lit")
     assert difference == pytest.approx(reflection_at(20.0) * scene.infrared.object_share, abs=2)
@@ -359,8 +359,8 @@ def test_firmware_reads_reflections_and_another_robots_light(scene: Scene, tmp_p
     beside_robot = Poses([(100.0, 150.0, UP), (100 + 7.4 + 12.5, 150.0, -UP)], [(300.0, 20.0)])
     dark = set()
     for tick in range(200, 300):
-        ears.think(tick, beside_robot)
-        mouth.think(tick, beside_robot)
+        ears.control_step(tick, beside_robot)
+        mouth.control_step(tick, beside_robot)
         dark.add(ears.machine.peek("dark"))
     assert max(dark) == scene.light.ambient_counts
     assert min(dark) == pytest.approx(scene.light.ambient_counts - amplitude(19.9) / brightest(20.0), abs=1)
@@ -372,12 +372,12 @@ def test_samples_have_the_scenes_noise_ripple_and_spread(scene: Scene, tmp_path:
     poses = Poses([(100.0, 150.0, UP), (300.0, 150.0, 0.0)], [(300.0, 20.0)])
 
     def dark(seed: int, robot: int, **keys: float) -> list[int]:
-        brain = EmulatedBrain(scene.with_values(**keys), seed, robot, listener)
+        controller = FirmwareController(scene.with_values(**keys), seed, robot, listener)
         found = []
         for tick in range(600):
-            brain.think(tick, poses)
-            if brain.machine.peek("dark"):
-                found.append(brain.machine.peek("dark"))
+            controller.control_step(tick, poses)
+            if controller.machine.peek("dark"):
+                found.append(controller.machine.peek("dark"))
         return found[10:]
 
     noisy = dark(1, 0, infrared__noise_counts=8.0)
@@ -397,19 +397,19 @@ def test_samples_have_the_scenes_noise_ripple_and_spread(scene: Scene, tmp_path:
 def lit_of_frames(scene: Scene, seed: int, share: float) -> list[list[int]]:
     """Of a frame that another robot sends 30 times, 100 ms apart: scans of 0.25 ms in which a sensor sees it. A flash
     for proximity ends 2 ms before; darkness in the frame lasts up to 20 bits, with a one of 0.73 ms between."""
-    scene, ether = scene.with_values(infrared__lost_share=share), Ether.of(scene)
-    ring = Ring(scene, seed, (board := Machine(DSPIC30F6014A, board=Epuck).board), ether, 0, 0)
+    scene, channel = scene.with_values(infrared__lost_share=share), OpticalChannel.of(scene)
+    ring = Ring(scene, seed, (board := Machine(DSPIC30F6014A, board=Epuck).board), channel, 0, 0)
     poses = Poses([(100.0, 150.0, UP), (100 + 7.4 + 12.5, 150.0, -UP)], [(300.0, 20.0)])
     scan, frame = FCY // 4096, "111111" + "".join("0" * dark + "1" for dark in (1, 4, 9, 15, 20, 4, 5, 12))
     found = []
     for start in range(FCY // 10, FCY // 10 * 31, FCY // 10):
-        ether.slowest = start
-        ether.switch(1, start - 12 * scan, 2, True)
-        ether.switch(1, start - 9 * scan, 2, False)
+        channel.slowest = start
+        channel.switch(1, start - 12 * scan, 2, True)
+        channel.switch(1, start - 9 * scan, 2, False)
         for place, (bit, before) in enumerate(zip(frame + "0", "0" + frame, strict=True)):
             if bit != before:
-                ether.switch(1, start + 3 * scan * place, 2, bit == "1")
-        board.ir.events.now = now = start + ether.late
+                channel.switch(1, start + 3 * scan * place, 2, bit == "1")
+        board.ir.events.now = now = start + channel.delay
         ring.move(poses)
         board.ir._level(0, now)
         times = range(now, now + 3 * scan * len(frame), scan)
@@ -439,14 +439,14 @@ def test_a_robot_without_battery_stands_in_the_dark(scene: Scene, tmp_path: Path
     """From the second the scene names; nothing has happened to it that would be a fault."""
     sender = built(tmp_path, SENDER, "sender")
     scene = scene.with_values(start__off=[[1, 0.2]], start__silent_s=0.1)
-    ether = Ether.of(scene)
-    mouth = EmulatedBrain(scene, 1, 1, sender, 0, ether)
+    channel = OpticalChannel.of(scene)
+    mouth = FirmwareController(scene, 1, 1, sender, 0, channel)
     poses = Poses([(100.0, 150.0, UP), (200.0, 150.0, -UP)], [(300.0, 20.0)])
     lit = []
     for tick in range(300):
-        assert mouth.think(tick, poses) == (0.0, 0.0)
+        assert mouth.control_step(tick, poses) == (0.0, 0.0)
         if tick % 4 == 0:
-            lit.append(not ether.is_dark(1, tick * scene.clock.quantum_tcy, (tick + 4) * scene.clock.quantum_tcy))
+            lit.append(not channel.is_dark(1, tick * scene.clock.quantum_tcy, (tick + 4) * scene.clock.quantum_tcy))
     assert any(lit[:50])
     assert not any(lit[52:])
     assert mouth.machine.cycle < 0.201 * FCY
@@ -459,8 +459,8 @@ def test_the_compiled_light_is_the_plain_one_to_the_bit(scene: Scene) -> None:
     rng, checked = random.Random(3), 0
     scene = scene.with_values(robots__count=4, infrared__lost_share=0.3, infrared__noise_counts=2.0)
     for trial in range(6):
-        ether = Ether.of(scene)
-        brain = Ring(scene, trial, (board := Machine(DSPIC30F6014A, board=Epuck).board), ether, 0, 5000)
+        channel = OpticalChannel.of(scene)
+        ring = Ring(scene, trial, (board := Machine(DSPIC30F6014A, board=Epuck).board), channel, 0, 5000)
         poses = Poses([(100 + 12 * i, 150 + 9 * (i % 2), rng.uniform(-3, 3)) for i in range(4)], [(20.0, 20.0)])
         tracks: dict[int, tuple[list[int], list[int]]] = {}
         for robot in (1, 2, 3):
@@ -469,23 +469,23 @@ def test_the_compiled_light_is_the_plain_one_to_the_bit(scene: Scene) -> None:
             for _ in range(rng.choice((5, 100, 700))):
                 at += rng.choice((2, 300, 2500, 11_000, 60_000))
                 line = rng.randrange(4)
-                ether.switch(robot, at, line, lit=not lit[-1] >> line & 1)
+                channel.switch(robot, at, line, lit=not lit[-1] >> line & 1)
                 cycles.append(at)
                 lit.append(lit[-1] ^ 1 << line)
         last = max(cycles[-1] for cycles, _ in tracks.values())
-        ether.slowest = last - 200_000
+        channel.slowest = last - 200_000
         board.ir.events.now = now = last - 100_000
-        brain.move(poses)
+        ring.move(poses)
         board.ir._level(0, now - 4000)
         seen, light = {one.robot: one for one in Optics(scene).signals(poses, 0, [1, 2, 3])}, light_code()["light"]
-        setting = brain._light
+        setting = ring._light
         for _ in range(200):
-            cycle, sensor = now - 4000 + rng.randrange(ether.quantum), rng.randrange(8)
+            cycle, sensor = now - 4000 + rng.randrange(channel.quantum), rng.randrange(8)
             heard = [(robot, seen[robot].counts, seen[robot].shares[sensor], *track)
                      for robot, track in tracks.items() if robot in seen and seen[robot].shares[sensor]]  # fmt: skip
-            receivers = ether.tau, ether.receivers.settled
+            receivers = channel.tau, channel.receivers.settled
             loss = setting.lost_share, setting.lost_seen, setting.lost_period
-            plain = plain_light.light(heard, cycle + 5000, setting.seed, ether.late, receivers, loss)
+            plain = plain_light.light(heard, cycle + 5000, setting.seed, channel.delay, receivers, loss)
             checked += plain != 0
             plain += 2.0 * plain_light.gaussian(setting.seed, sensor, cycle + 5000)
             assert light(addressof(setting), sensor, cycle) == plain, f"trial {trial}"
@@ -533,9 +533,9 @@ def test_native_code_converts_as_python_does(scene: Scene, tmp_path: Path, monke
             monkeypatch.setattr(Infrared, "answer", lambda _ir, _ready: None)
         else:
             monkeypatch.undo()
-        ether, count = Ether.of(scene), [0]
-        ears = EmulatedBrain(scene, 1, 0, scanner, 0, ether)
-        mouth = EmulatedBrain(scene, 1, 1, sender, 0, ether)
+        channel, count = OpticalChannel.of(scene), [0]
+        ears = FirmwareController(scene, 1, 0, scanner, 0, channel)
+        mouth = FirmwareController(scene, 1, 1, sender, 0, channel)
         ears.machine.runner.threshold, ears.machine.runner.wait = 1, True
         level = ears._board.ir._level_of
 
@@ -546,8 +546,8 @@ def test_native_code_converts_as_python_does(scene: Scene, tmp_path: Path, monke
         ears._board.ir._level_of = counted  # type: ignore[misc]
         for tick in range(150):
             poses = Poses([(100.0, 150.0, UP), (125.0 - tick / 20, 150.0, -UP)], [(300.0, 20.0)])
-            ears.think(tick, poses)
-            mouth.think(tick, poses)
+            ears.control_step(tick, poses)
+            mouth.control_step(tick, poses)
         assert ears.machine.peek("rounds") > 350
         found.append(ears.machine.snapshot())
         asked.append(count[0])
@@ -586,14 +586,14 @@ def test_the_battery_runs_down_in_a_line_and_its_pin_falls(scene: Scene) -> None
 def test_a_low_battery_shows_on_the_pin(scene: Scene, tmp_path: Path) -> None:
     """Half a second empties a battery that lasts a second from 3.5 V."""
     low = scene.with_values(battery__volts=3.45, battery__hours=0.01)
-    brain = EmulatedBrain(low, 1, 0, built(tmp_path, SENDER, "sender"))
+    controller = FirmwareController(low, 1, 0, built(tmp_path, SENDER, "sender"))
     pins = []
     poses = Poses([(100.0, 150.0, 0.0), (200.0, 150.0, 0.0)], [(300.0, 20.0)])
     for tick in range(4000):
-        brain.think(tick, poses)
+        controller.control_step(tick, poses)
         if tick % 500 == 499:
-            brain.reading()
-            pins.append(brain.machine.peek("PORTF") >> 1 & 1)
-    assert brain.machine.cycle > 3 * FCY
+            controller.reading()
+            pins.append(controller.machine.peek("PORTF") >> 1 & 1)
+    assert controller.machine.cycle > 3 * FCY
     assert pins[0] == 1
     assert pins[-1] == 0

@@ -9,17 +9,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from arena.camera.appearance import LED_COLOURS, ROBOT, colours_of, led_kinds
-from arena.camera.reference import Eye
-from arena.camera.renderer import Sight
+from arena.camera.appearance import LED_COLOURS, ROBOT, colours_of, led_classes
+from arena.camera.renderer import Renderer
 from arena.campaign.campaign import SELECTOR
 from arena.cli import main
-from arena.infrared.channel import LINES, Ether
-from arena.robots.firmware_controller import EmulatedBrain
+from arena.infrared.channel import LINES, OpticalChannel
+from arena.robots.firmware_controller import FirmwareController
 from arena.scene import dimensions
 from arena.scene.loader import Scene, load_scene
 from arena.trial.record import read_trial
 from arena.world.physics import Poses
+from tests.arena.reference_camera import ReferenceCamera
 from tests.arena.test_emulated import AT_ONCE
 
 BLINKER = """
@@ -56,30 +56,30 @@ def facing(centimetres: float, turned_deg: float = 0.0) -> Poses:
 @pytest.mark.parametrize("led", range(8))
 def test_a_led_of_the_ring_shines_at_its_bearing_and_height(scene: Scene, led: int) -> None:
     """Clockwise from the front in steps of 45 degrees; a centimetre wide and high, in the middle of what it faces."""
-    red, _ = led_kinds(scene)
+    red, _ = led_classes(scene)
     lens_to_edge = 20.0
-    eye = Eye(scene, facing(lens_to_edge, 45.0 * led), 0, leds=(0, 1 << led))
+    camera = ReferenceCamera(scene, facing(lens_to_edge, 45.0 * led), 0, leds=(0, 1 << led))
     rows = tuple(range(480))
     per_cm = dimensions.FOCAL_PIXELS / lens_to_edge
     lit = [240 + (dimensions.CAMERA_HEIGHT - z) * per_cm for z in dimensions.RING_HEIGHTS]
-    found = [row for row, kind in zip(rows, eye.column(320, rows), strict=True) if kind == red]
+    found = [row for row, kind in zip(rows, camera.column(320, rows), strict=True) if kind == red]
     assert (found[0], found[-1]) == (pytest.approx(lit[1], abs=1), pytest.approx(lit[0], abs=1))
     middle = round((lit[0] + lit[1]) / 2)
-    columns = [u for u in range(640) if eye.column(u, (middle,)) == [red]]
+    columns = [u for u in range(640) if camera.column(u, (middle,)) == [red]]
     assert len(columns) == pytest.approx(dimensions.FOCAL_PIXELS / lens_to_edge, abs=2)
     assert np.mean(columns) == pytest.approx(320, abs=1)
 
 
 def test_a_body_is_lit_as_a_whole_and_a_led_behind_is_not_seen(scene: Scene) -> None:
-    _, green = led_kinds(scene)
-    kinds = {leds: set(Eye(scene, facing(20.0), 0, leds=(0, leds)).column(320, tuple(range(170, 300))))
+    _, green = led_classes(scene)
+    kinds = {leds: set(ReferenceCamera(scene, facing(20.0), 0, leds=(0, leds)).column(320, tuple(range(170, 300))))
              for leds in (0, 1 << 9, 1 << 4, 1 << 8)}  # fmt: skip
     assert green in kinds[1 << 9]
     assert ROBOT not in kinds[1 << 9]
     assert ROBOT in kinds[0]
     assert kinds[1 << 4] == kinds[0]
     assert len(kinds[1 << 8]) == len(kinds[0]) + 1
-    assert colours_of(scene)[list(led_kinds(scene))].tolist() == [list(one) for one in LED_COLOURS]
+    assert colours_of(scene)[list(led_classes(scene))].tolist() == [list(one) for one in LED_COLOURS]
 
 
 def test_two_ways_to_see_leds_agree() -> None:
@@ -95,25 +95,25 @@ def test_two_ways_to_see_leds_agree() -> None:
         poses = Poses([(float(x), float(y), float(a)) for x, y, a in at],
                       [(float(x), float(y)) for x, y in rng.uniform((180, 130), (260, 170), (6, 2))])  # fmt: skip
         leds = [int(one) for one in rng.integers(1 << 10, size=6)]
-        eye, sight = Eye(scene, poses, 0, leds=leds), Sight(scene, 0)
-        sight.leds[:] = leds
-        sight.look(poses)
+        camera, renderer = ReferenceCamera(scene, poses, 0, leds=leds), Renderer(scene, 0)
+        renderer.leds[:] = leds
+        renderer.set_viewpoint(poses)
         for row in (200, 215, 225, 240, 262):
-            seen = sight.classes(row, columns).tolist()
-            assert seen == [eye.column(int(u), (row,))[0] for u in columns]
+            seen = renderer.classify_row(row, columns).tolist()
+            assert seen == [camera.column(int(u), (row,))[0] for u in columns]
             found |= set(seen)
-    assert found >= {ROBOT, *led_kinds(scene)}
+    assert found >= {ROBOT, *led_classes(scene)}
 
 
 def test_leds_are_seen_a_quantum_late() -> None:
-    ether = Ether(2, 1000)
-    ether.switch(1, 5000, LINES + 9, lit=True)
-    assert [ether.leds(1, cycle) for cycle in (6063, 6064)] == [0, 1 << 9]
-    assert ether.is_dark(1, 0, 1 << 40)
+    channel = OpticalChannel(2, 1000)
+    channel.switch(1, 5000, LINES + 9, lit=True)
+    assert [channel.leds(1, cycle) for cycle in (6063, 6064)] == [0, 1 << 9]
+    assert channel.is_dark(1, 0, 1 << 40)
     for cycle in range(10_000, 900_000, 1000):
-        ether.switch(1, cycle, LINES, lit=bool(cycle // 1000 % 2))
-    assert ether.leds(1, 900_500) == 1 | 1 << 9
-    assert len(ether._leds[1]) <= 310
+        channel.switch(1, cycle, LINES, lit=bool(cycle // 1000 % 2))
+    assert channel.leds(1, 900_500) == 1 | 1 << 9
+    assert len(channel._leds[1]) <= 310
 
 
 def test_firmware_turns_to_another_robot_whose_red_led_is_lit(
@@ -125,15 +125,15 @@ def test_firmware_turns_to_another_robot_whose_red_led_is_lit(
     poses = facing(14.0)
     for sees, until in ((True, 1200), (False, 800)):
         one = scene.with_values(camera__sees_leds=sees)
-        ether = Ether.of(one)
-        sees_it = EmulatedBrain(one, 1, 0, clustering_image, SELECTOR["A"] | AT_ONCE, ether)
-        blinks = EmulatedBrain(one, 1, 1, blinker, 0, ether)
+        channel = OpticalChannel.of(one)
+        sees_it = FirmwareController(one, 1, 0, clustering_image, SELECTOR["A"] | AT_ONCE, channel)
+        blinks = FirmwareController(one, 1, 1, blinker, 0, channel)
         left = []
         for tick in range(until):
-            left.append(sees_it.think(tick, poses)[0] / dimensions.WHEEL_SPEED)
-            blinks.think(tick, poses)
+            left.append(sees_it.control_step(tick, poses)[0] / dimensions.WHEEL_SPEED)
+            blinks.control_step(tick, poses)
         blinks.reading()
-        assert [change.leds for change in blinks.lights()] == ([1, 0, 1] if sees else [1, 0])
+        assert [change.leds for change in blinks.take_led_changes()] == ([1, 0, 1] if sees else [1, 0])
         lit = float(np.median(left[300:500])), float(np.median(left[750:800]))
         assert lit == pytest.approx((1.0, 0.1) if sees else (0.1, 0.1), abs=0.05)
 

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from arena.lockstep.scheduler import LockStep
-from arena.robots.firmware_controller import EmulatedBrain
+from arena.robots.firmware_controller import FirmwareController
 from arena.scene.loader import load_scene
 from arena.world.physics import World
 from tests.arena.images import BEGIN
@@ -25,7 +25,7 @@ FIRST_LINES = 3
 """Lines that are seen before somebody has had enough."""
 
 
-def interrupted(robot: EmulatedBrain) -> None:
+def interrupted(robot: FirmwareController) -> None:
     """Let the robot's camera be interrupted after some lines."""
     camera, paint = robot.machine.board.camera, robot._pixels
     lines = 0
@@ -45,7 +45,7 @@ def test_a_swarm_that_was_interrupted_is_let_go(assembled: Callable[[str], Path]
     """Others wait for poses or are to be run: their machines, the world and the threads go with the swarm."""
     before = set(enumerate_threads())
     scene = load_scene("clustering").with_values(robots__count=3)
-    robots = [EmulatedBrain(scene, 1, i, assembled(LOOKING), 0) for i in range(3)]
+    robots = [FirmwareController(scene, 1, i, assembled(LOOKING), 0) for i in range(3)]
     interrupted(robots[1])
     lockstep = LockStep(World(scene, 1), robots, is_native=is_native, threads=3)
     with pytest.raises(KeyboardInterrupt):
@@ -65,7 +65,7 @@ def test_a_swarm_that_was_interrupted_is_let_go(assembled: Callable[[str], Path]
 
 def test_a_machine_that_was_interrupted_has_no_limits_of_another_run(assembled: Callable[[str], Path]) -> None:
     scene = load_scene("clustering").with_values(robots__count=1)
-    robot = EmulatedBrain(scene, 1, 0, assembled(LOOKING), 0)
+    robot = FirmwareController(scene, 1, 0, assembled(LOOKING), 0)
     interrupted(robot)
     with pytest.raises(KeyboardInterrupt):
         LockStep(World(scene, 1), [robot]).advance(300)

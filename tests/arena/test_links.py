@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from arena.cli import main
-from arena.replay.page import head_of, samples_of
+from arena.replay.page import sample_data, trial_data
 from arena.scene.loader import FCY, SceneError, load_scene
 from arena.trial.record import Trial, kind_of, read_trial
 from tests.arena.images import ECHO
@@ -48,8 +48,8 @@ def test_words_pass_from_robot_to_robot(assembled: Callable[[str], Path], tmp_pa
     assert (1, 0, 350, "go") in said
     assert {(one, other) for one, other, _, _ in said} == {(2, 0), (0, 2), (0, 1), (1, 0)}
     assert all(time % 50 == 0 for *_, time, _ in said)
-    assert head_of(trial)["links"] == ((2.0, 0.0), (0.0, 1.0))
-    assert samples_of(trial)["messages"] == trial.columns["messages"]
+    assert trial_data(trial)["links"] == ((2.0, 0.0), (0.0, 1.0))
+    assert sample_data(trial)["messages"] == trial.columns["messages"]
 
 
 def test_the_number_of_processes_does_not_show(assembled: Callable[[str], Path], tmp_path: Path) -> None:
@@ -65,7 +65,7 @@ def test_without_links_there_is_no_column_of_messages(assembled: Callable[[str],
     """Records of other scenes are what they were."""
     trial = played(tmp_path, assembled(ECHO), text=SCENE[: SCENE.index("[bluetooth]")])
     assert "messages" not in trial.columns
-    assert samples_of(trial)["messages"] == [[] for _ in trial.times]
+    assert sample_data(trial)["messages"] == [[] for _ in trial.times]
 
 
 @pytest.mark.parametrize(

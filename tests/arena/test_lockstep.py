@@ -13,10 +13,10 @@ from typing import Any
 import pytest
 
 import arena
-from arena.infrared.channel import Ether
+from arena.infrared.channel import OpticalChannel
 from arena.lockstep.scheduler import LockStep
-from arena.robots.controller import Brain, Lights, Line, Reading
-from arena.robots.firmware_controller import EmulatedBrain
+from arena.robots.controller import Controller, LedChange, Reading, UartLine
+from arena.robots.firmware_controller import FirmwareController
 from arena.scene.loader import Scene, load_scene
 from arena.trial.trial import run_trial
 from arena.world.physics import Poses, World
@@ -28,33 +28,33 @@ from tests.arena.images import BEGIN
 class Stepwise:
     """A robot that is told the poses of every quantum: it cannot run ahead."""
 
-    def __init__(self, brain: EmulatedBrain) -> None:
-        self._brain = brain
+    def __init__(self, controller: FirmwareController) -> None:
+        self._controller = controller
 
-    def think(self, tick: int, poses: Poses) -> tuple[float, float]:
-        return self._brain.think(tick, poses)
+    def control_step(self, tick: int, poses: Poses) -> tuple[float, float]:
+        return self._controller.control_step(tick, poses)
 
     def reading(self) -> Reading:
-        return self._brain.reading()
+        return self._controller.reading()
 
-    def lines(self) -> list[Line]:
-        return self._brain.lines()
+    def take_lines(self) -> list[UartLine]:
+        return self._controller.take_lines()
 
-    def lights(self) -> list[Lights]:
-        return self._brain.lights()
+    def take_led_changes(self) -> list[LedChange]:
+        return self._controller.take_led_changes()
 
-    def tell(self, data: bytes) -> None:
-        self._brain.tell(data)
+    def feed_uart(self, data: bytes) -> None:
+        self._controller.feed_uart(data)
 
     def close(self) -> None:
-        self._brain.close()
+        self._controller.close()
 
 
 def trial(scene: Scene, seed: int, image: Path, selector: int, seconds: float, ahead: bool) -> dict[str, list[Any]]:
-    ether = Ether(scene.robots.count, scene.clock.quantum_tcy)
-    robots = [EmulatedBrain(scene, seed, i, image, selector, ether) for i in range(scene.robots.count)]
-    brains: list[Brain] = list(robots) if ahead else [Stepwise(robot) for robot in robots]
-    result = run_trial(scene, seed, brains, seconds, ether=ether)
+    channel = OpticalChannel(scene.robots.count, scene.clock.quantum_tcy)
+    robots = [FirmwareController(scene, seed, i, image, selector, channel) for i in range(scene.robots.count)]
+    controllers: list[Controller] = list(robots) if ahead else [Stepwise(robot) for robot in robots]
+    result = run_trial(scene, seed, controllers, seconds, channel=channel)
     return result.rows.columns | {"faults": result.faults}
 
 
@@ -75,17 +75,17 @@ def test_records_are_those_of_quantum_after_quantum(
 def test_robots_do_run_ahead(clustering_image: Path) -> None:
     """Otherwise the comparison above compares nothing: one robot is far in front of the world when it first looks."""
     scene = load_scene("clustering").with_values(robots__count=2)
-    robots = [EmulatedBrain(scene, 1, i, clustering_image, 8) for i in range(2)]
+    robots = [FirmwareController(scene, 1, i, clustering_image, 8) for i in range(2)]
     world = World(scene, 1)
     gaps: list[int] = []
     lockstep = LockStep(world, robots)
 
-    def look_at(tick: int) -> tuple[Poses, Poses]:
+    def poses_at(tick: int) -> tuple[Poses, Poses]:
         gaps.append(tick - world.ticks)
-        return lockstep.look_at(tick)
+        return lockstep.poses_at(tick)
 
     for robot in robots:
-        robot.join(look_at)
+        robot.use_poses(poses_at)
     lockstep.advance(400)
     assert world.ticks == 400
     assert max(gaps) > 20
@@ -97,7 +97,7 @@ def samples(
     """What robots read and where everything is, twice a second; how often Python painted a line, and ran an instruction
     in place of native code, in the last second."""
     scene = load_scene("clustering").with_values(robots__count=count, objects__count=8)
-    robots = [EmulatedBrain(scene, 5, i, image, 0) for i in range(count)]
+    robots = [FirmwareController(scene, 5, i, image, 0) for i in range(count)]
     painted = interpreted = 0
     found: list[Any] = []
     for robot in robots:
@@ -110,16 +110,16 @@ def samples(
             painted += 1
             return paint(*line)
 
-        camera.sample(counted, is_lent=True)
+        camera.sample(counted, has_native_source=True)
     world = World(scene, 5)
     lockstep = LockStep(world, robots, is_native=is_native, threads=threads)
     for moment in range(500, round(seconds * 1000) + 1, 500):
         if moment == round(seconds * 1000) - 500:
             painted, interpreted = 0, sum(robot.machine.runner.counts.interpreted for robot in robots)
         wheels = lockstep.advance(moment)
-        readings = [(robot.reading(), robot.lines(), robot.lights()) for robot in robots]
+        readings = [(robot.reading(), robot.take_lines(), robot.take_led_changes()) for robot in robots]
         found.append((wheels, readings, world.poses.values.tolist()))
-    assert (lockstep.swarm.helped > 0) == (threads > 1)
+    assert (lockstep.scheduler.worker_runs > 0) == (threads > 1)
     return found, painted, sum(robot.machine.runner.counts.interpreted for robot in robots) - interpreted
 
 
@@ -147,7 +147,7 @@ def test_it_cannot_show_which_thread_runs_a_robot(clustering_image: Path) -> Non
 def test_threads_end_with_their_swarm(clustering_image: Path) -> None:
     before = set(enumerate_threads())
     scene = load_scene("clustering").with_values(robots__count=3)
-    robots = [EmulatedBrain(scene, 1, i, clustering_image, 8) for i in range(3)]
+    robots = [FirmwareController(scene, 1, i, clustering_image, 8) for i in range(3)]
     lockstep = LockStep(World(scene, 1), robots, threads=3)
     lockstep.advance(50)
     helpers = set(enumerate_threads()) - before
@@ -179,7 +179,7 @@ LOOKING = f"""{BEGIN}
 """
 
 
-def write(robot: EmulatedBrain, register: int, value: int) -> None:
+def write(robot: FirmwareController, register: int, value: int) -> None:
     """Give the camera's register another value, as over I2C."""
     machine = robot.machine
     machine.board.camera.start(False, machine.cycle)
@@ -190,7 +190,7 @@ def write(robot: EmulatedBrain, register: int, value: int) -> None:
 def test_there_is_noise_for_the_widest_line_a_camera_sends(assembled: Callable[[str], Path]) -> None:
     """A window of 1024 columns: noise of a line may begin at each of the values drawn, and lasts to the line's end."""
     scene = load_scene("clustering").with_values(robots__count=1, camera__sensor="PO3030K")
-    robot = EmulatedBrain(scene, 5, 0, assembled(LOOKING), 0)
+    robot = FirmwareController(scene, 5, 0, assembled(LOOKING), 0)
     LockStep(World(scene, 5), [robot]).advance(200)
     for register, value in ((0x04, 8), (0x08, 0), (0x09, 0), (0x0C, 7), (0x0D, 255)):
         write(robot, register, value)
@@ -208,13 +208,13 @@ def test_the_camera_of_a_robot_without_power_sees_the_world_as_it_is(
         robots__count=1, objects__count=1, robots__wheel_noise=0.0, start__off=[[0, off_s]]
     )
     world = World.of(scene, 1, [(200, 150, 0.0)], [(20, 20)])
-    robot = EmulatedBrain(scene, 1, 0, assembled(LOOKING), 0)
+    robot = FirmwareController(scene, 1, 0, assembled(LOOKING), 0)
     lockstep = LockStep(world, [robot])
     reds = []
     for ticks, place in ((2000, (240, 150)), (2200, (20, 20)), (2400, (240, 150))):
         lockstep.advance(ticks)
         world.move(world.objects[0], *place)
-        lockstep.moved()
+        lockstep.refresh_poses()
         lockstep.advance(ticks + 2)
         frame = robot.machine.board.camera.frame().astype(int)
         reds.append((frame[:, :, 0] - frame[:, :, 1] > 40).mean())
@@ -227,7 +227,7 @@ def test_the_strip_is_the_last_line_of_a_window_that_is_left_in_its_middle(assem
     scene = load_scene("clustering").with_values(robots__count=1, camera__sensor="PO3030K")
     strips = []
     for is_native in (True, False):
-        robot = EmulatedBrain(scene, 5, 0, image, 0)
+        robot = FirmwareController(scene, 5, 0, image, 0)
         assert isinstance(robot.machine.runner, JitEngine)
         robot.machine.runner.wait = True
         lockstep, camera = LockStep(World(scene, 5), [robot], is_native=is_native), robot.machine.board.camera

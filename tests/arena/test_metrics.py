@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from arena.analysis.statistics import _typical, bootstrap_band, equivalence, exact, pairs_needed, remark, signed_rank_p
-from arena.experiments import Moments, experiment_of
+from arena.experiments import TrialSamples, experiment_of
 from arena.metrics import (
     SMALL,
-    Course,
+    MetricSeries,
     _largest_shares,
     clusters,
     compactness,
@@ -60,10 +60,12 @@ def test_time_to_a_share_is_the_first_sample_that_has_it() -> None:
 MEETING = np.array([[(0, 0), (100, 0)], [(0, 0), (60, 0)], [(0, 0), (10, 0)]], float)
 
 
-def course_of(places: np.ndarray, times: list[float]) -> Course:
+def course_of(places: np.ndarray, times: list[float]) -> MetricSeries:
     """As the clustering experiment measures it."""
     robots = np.zeros((len(times), 0, 3))
-    return experiment_of("clustering").course(Moments(np.array(times), robots, places, load_scene("clustering"), {}))
+    return experiment_of("clustering").series(
+        TrialSamples(np.array(times), robots, places, load_scene("clustering"), {})
+    )
 
 
 def test_a_course_follows_objects_that_meet() -> None:
@@ -76,7 +78,7 @@ def test_a_course_follows_objects_that_meet() -> None:
 
 
 def test_equal_runs_are_equivalent_and_different_ones_are_not() -> None:
-    """experiment.md §5: 90 % interval within the margin."""
+    """experiment-contract.md §5: 90 % interval within the margin."""
     rng = np.random.default_rng(0)
     base = rng.normal(0.9, 0.05, 10)
     near, far = base + rng.normal(0, 0.02, 10), base - 0.15
@@ -117,7 +119,7 @@ def test_shares_of_all_samples_at_once_are_those_one_by_one() -> None:
 
 
 def test_the_pairs_needed_are_those_of_the_plan() -> None:
-    """experiment.md §5: at a standard deviation of 0.25 about 107 trials per arm, at 0.06 seven (independent arms)."""
+    """experiment-contract.md §5: standard deviation 0.25 needs about 107 trials per arm, 0.06 seven (independent arms)."""
     assert pairs_needed(0.25 * 2**0.5, 0.1) == pytest.approx(107, abs=1)
     assert pairs_needed(0.06 * 2**0.5, 0.1) == 7
     assert pairs_needed(0.0, 0.1) == 2
@@ -165,15 +167,15 @@ def test_the_distance_of_the_rule_itself_is_not_near() -> None:
 METER = """
 import resource, sys
 import numpy as np
-from arena.experiments import Moments, experiment_of
+from arena.experiments import TrialSamples, experiment_of
 from arena.scene.loader import load_scene
 objects, samples = map(int, sys.argv[1:])
 rng = np.random.default_rng(1)
 places = rng.uniform(0, 1000, (1, objects, 2)) + rng.normal(0, 5, (samples, objects, 2)).cumsum(axis=0) / 30
 before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-course = experiment_of("clustering").course(
-    Moments(np.arange(samples) / 2, np.zeros((samples, 0, 3)), places, load_scene("clustering"), {}))
-assert 0 < course.curves["share"].max() < 1
+series = experiment_of("clustering").series(
+    TrialSamples(np.arange(samples) / 2, np.zeros((samples, 0, 3)), places, load_scene("clustering"), {}))
+assert 0 < series.curves["share"].max() < 1
 print((resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) // 1024)
 """
 

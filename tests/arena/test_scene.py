@@ -10,20 +10,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from arena.camera.appearance import FLOOR, OBJECT, WALL, colours_of, look_of
-from arena.camera.reference import Eye, sensor_of
-from arena.camera.renderer import Sight
+from arena.camera.appearance import FLOOR, OBJECT, WALL, appearance_of, colours_of
+from arena.camera.renderer import Renderer
 from arena.campaign.campaign import Plan
 from arena.cli import main
 from arena.infrared.propagation import Optics
 from arena.infrared.ring import ambient
-from arena.robots.controller import ScriptedBrain
+from arena.robots.controller import ScriptedController
 from arena.scene import dimensions, geometry
 from arena.scene.loader import FCY, Scene, SceneError, load_scene, scene_of
 from arena.scene.schema import NAMED
 from arena.trial.record import read_trial
 from arena.world.physics import Poses, World, traits_of
 from tests.arena.images import BEGIN, REPEATING
+from tests.arena.reference_camera import ReferenceCamera, sensor_of
 
 FULL = """name = "yard"
 description = "everything a scene can have"
@@ -160,23 +160,23 @@ def test_two_ways_to_see_a_furnished_scene_agree(yard: Scene, pitch: float) -> N
         x, y, _ = poses.robots[seed % 4]
         pose = x, y, float(rng.uniform(-math.pi, math.pi))
         turned = Poses([pose if robot == seed % 4 else one for robot, one in enumerate(poses.robots)], poses.objects)
-        eye, sight = Eye(scene, poses, seed % 4, pose), Sight(scene, seed % 4)
-        sight.look(turned)
-        assert sight.sensor() == sensor_of(eye)
+        camera, renderer = ReferenceCamera(scene, poses, seed % 4, pose), Renderer(scene, seed % 4)
+        renderer.set_viewpoint(turned)
+        assert renderer.line_of_sight() == sensor_of(camera)
         for row in (30, 208, 216, 238, 245, 255, 262, 300, 420):
-            slow = [eye.column(int(u), (row,))[0] for u in columns]
-            assert sight.classes(row, columns).tolist() == slow, f"seed {seed}, row {row}"
+            slow = [camera.column(int(u), (row,))[0] for u in columns]
+            assert renderer.classify_row(row, columns).tolist() == slow, f"seed {seed}, row {row}"
             kinds |= set(slow)
-    assert kinds >= {OBJECT, WALL, FLOOR} | set(range(6, len(look_of(scene).colours)))
+    assert kinds >= {OBJECT, WALL, FLOOR} | set(range(6, len(appearance_of(scene).colours)))
 
 
 def test_colours_and_heights_are_seen(yard: Scene) -> None:
     """A low block hides the floor behind it but not the wall; a patch is seen where it lies."""
     colours = [tuple(one) for one in colours_of(yard).tolist()]
     yellow, blue = colours.index(NAMED["yellow"]), colours.index(NAMED["blue"])
-    eye = Eye(yard, Poses([(100.0, 35.0, 0.0)] * 4, [(300.0, 300.0)] * 6), 0)
-    assert eye.column(320, (240, 250, 200)) == [yellow, yellow, WALL]
-    look = look_of(yard)
+    camera = ReferenceCamera(yard, Poses([(100.0, 35.0, 0.0)] * 4, [(300.0, 300.0)] * 6), 0)
+    assert camera.column(320, (240, 250, 200)) == [yellow, yellow, WALL]
+    look = appearance_of(yard)
     assert look.floor_at(240, 60) == colours.index((0x20, 0x40, 0x60))
     assert look.floor_at(20, 20) == colours.index(NAMED["white"])
     assert look.floor_at(100, 100) == FLOOR
@@ -410,9 +410,9 @@ def test_a_turned_camera_sees_to_the_side_and_a_biased_wheel_turns_the_robot() -
     turned = scene.with_values(robots__camera_yaw_sd_deg=5.0, robots__camera_pitch_sd_deg=2.0)
     traits = traits_of(turned, 4, 0)
     x, y = 100 + 60 * math.cos(traits.yaw), 150 + 60 * math.sin(traits.yaw)
-    eye = Eye(turned, Poses([(100.0, 150.0, 0.0)], [(x, y)]), 0, None, traits)
+    camera = ReferenceCamera(turned, Poses([(100.0, 150.0, 0.0)], [(x, y)]), 0, None, traits)
     row = 240 + 602 * math.tan(math.radians(traits.pitch_deg))
-    seen = [eye.column(u, (round(row - 20),))[0] == OBJECT for u in range(640)]
+    seen = [camera.column(u, (round(row - 20),))[0] == OBJECT for u in range(640)]
     assert np.mean(np.flatnonzero(seen)) == pytest.approx(320, abs=3)
     biased = scene.with_values(robots__wheel_bias_sd=0.05)
     world = World.of(biased, 2, [(100.0, 150.0, 0.0)], [(350.0, 20.0)])
@@ -434,5 +434,8 @@ def test_a_scripted_trial_runs_in_a_furnished_scene(tmp_path: Path) -> None:
     assert np.abs(trial.robots[-1] - trial.robots[0]).max() > 5
     assert main(["replay", str(trial.path)]) == 0
     assert main(["plot", str(out), "--out", str(tmp_path)]) == 0
-    brain = ScriptedBrain(trial.scene, 1, 3, "A")
-    assert brain.think(int(0.5 * FCY / trial.scene.clock.quantum_tcy), World(trial.scene, 1).poses) == (0.0, 0.0)
+    controller = ScriptedController(trial.scene, 1, 3, "A")
+    assert controller.control_step(int(0.5 * FCY / trial.scene.clock.quantum_tcy), World(trial.scene, 1).poses) == (
+        0.0,
+        0.0,
+    )

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from arena.cli import main
-from arena.robots.firmware_controller import EmulatedBrain
+from arena.robots.firmware_controller import FirmwareController
 from arena.scene.loader import FCY, load_scene
 from arena.trial.record import Trial, read_trial
 from arena.world.physics import World
@@ -111,12 +111,12 @@ def test_a_silent_robot_is_noticed_after_the_stated_time(assembled: Assembled, t
 def test_the_remote_control_repeats_its_frame_while_the_key_is_held(talking_image: Path) -> None:
     """Every 113.8 ms (epuck.md §6): a robot that misses the first has others."""
     scene = load_scene("clustering").with_values(robots__count=1, objects__count=0, start__remote_held_s=0.5)
-    brain = EmulatedBrain(scene, 1, 0, talking_image)
+    controller = FirmwareController(scene, 1, 0, talking_image)
     edges: list[int] = []
-    brain.machine.peripherals.pins.watch("RF6", lambda cycle, _changed, _levels: edges.append(cycle))
+    controller.machine.peripherals.pins.watch("RF6", lambda cycle, _changed, _levels: edges.append(cycle))
     poses = World(scene, 1).poses
     for tick in range(2000):
-        brain.machine.run_until((tick + 1) * scene.clock.quantum_tcy)
+        controller.machine.run_until((tick + 1) * scene.clock.quantum_tcy)
     assert poses.robots
     begins = [cycle for before, cycle in zip([-FCY, *edges], edges, strict=False) if cycle - before > FCY // 20]
     assert len(begins) == 5
@@ -129,12 +129,14 @@ def test_a_robot_switched_on_while_the_key_is_held_gets_the_frames_that_are_left
     values = {"robots__count": 1, "objects__count": 0, "start__remote_at_s": 0.0, "start__spread_tcy": 4 * 1_600_000}
     scene = load_scene("clustering").with_values(**values)
     for seed in range(1, 6):
-        brain = EmulatedBrain(scene, seed, 0, talking_image)
+        controller = FirmwareController(scene, seed, 0, talking_image)
         edges: list[int] = []
-        brain.machine.peripherals.pins.watch("RF6", lambda cycle, _changed, _levels, edges=edges: edges.append(cycle))
-        brain.machine.run_until(FCY)
+        controller.machine.peripherals.pins.watch(
+            "RF6", lambda cycle, _changed, _levels, edges=edges: edges.append(cycle)
+        )
+        controller.machine.run_until(FCY)
         begins = [cycle for before, cycle in zip([-FCY, *edges], edges, strict=False) if cycle - before > FCY // 20]
-        on_at = brain._on_at
+        on_at = controller._on_at
         left = [n * 0.1138 for n in range(5) if n * 0.1138 * FCY >= on_at]
         assert [(cycle + on_at) / FCY for cycle in begins] == pytest.approx(left, abs=1e-3)
 

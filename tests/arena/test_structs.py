@@ -24,9 +24,10 @@ from emu.system.native_handle import Native
 ARENA, BOARD = Path(arena.__path__[0]), Path(emu.boards.epuck.__path__[0])
 
 TWINS: dict[Path, dict[str, type[Structure]]] = {
-    ARENA / "lockstep/lockstep.c": {"native": Native, "code": native_robot._Code, "robot": native_robot.Ahead,
-                           "ground": physics.Ground, "helper": threads._Helper, "swarm": threads._Swarm},
-    ARENA / "camera/renderer.c": {"disc": renderer._Disc, "lamp": renderer._Lamp, "side": renderer._Side,
+    ARENA / "lockstep/lockstep.c": {"native": Native, "code": native_robot._Code, "robot": native_robot.NativeRobot,
+                           "native_world": physics.NativeWorld, "worker": threads._Worker,
+                           "scheduler": threads._Scheduler},
+    ARENA / "camera/renderer.c": {"disc": renderer._Disc, "led": renderer._Led, "side": renderer._Side,
                         "patch": renderer._Patch,
                         "view": renderer._View, "rays": renderer._Rays},
     ARENA / "world/wheels.c": {"drive": wheels._Drive},
@@ -35,9 +36,9 @@ TWINS: dict[Path, dict[str, type[Structure]]] = {
     ARENA / "infrared/propagation.c": {"disc": propagation._Disc, "side": propagation._Side,
                          "optics": propagation._Optics,
                          "poses": propagation._Poses},
-    ARENA / "infrared/light.c": {"track": channel._Track, "receivers": channel.Receivers, "heard": ring._Heard,
-                        "moment": ring._Moment, "light": ring._Light},
-    BOARD / "camera/line.c": {"camera": native_camera.LentCamera},
+    ARENA / "infrared/light.c": {"history": channel._History, "receivers": channel.Receivers, "source": ring._Source,
+                        "source_list": ring._SourceList, "light": ring._Light},
+    BOARD / "camera/line.c": {"camera": native_camera.NativeCamera},
     BOARD / "motors.c": {"history": motors._History, "motor": motors._Motor, "pair": motors._Pair},
     BOARD / "ring.c": {"ring": analog._Ring},
 }  # fmt: skip

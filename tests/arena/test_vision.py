@@ -1,4 +1,4 @@
-"""The camera's view and the line-of-sight sensor (epuck.md §7.6; openswarm-original.md §8)."""
+"""The camera's view and the line-of-renderer sensor (epuck.md §7.6; openswarm-original.md §8)."""
 
 import math
 from itertools import pairwise
@@ -8,11 +8,11 @@ import pytest
 
 from arena.camera.appearance import ABOVE, FLOOR, NOTHING, OBJECT, ROBOT, WALL
 from arena.camera.lens import Lens
-from arena.camera.reference import Eye, sensor_of
-from arena.camera.renderer import Sight
+from arena.camera.renderer import Renderer
 from arena.scene import dimensions
 from arena.scene.loader import Scene, load_scene
 from arena.world.physics import Poses, World
+from tests.arena.reference_camera import ReferenceCamera, sensor_of
 
 ROBOT_AT = (20.0, 150.0, 0.0)
 LENS_X = ROBOT_AT[0] + dimensions.CAMERA_AHEAD
@@ -31,34 +31,34 @@ def one_object(distance_cm: float, bearing: float = 0.0) -> Poses:
 
 def test_rows_show_heights_by_the_pinhole_formula(scene: Scene) -> None:
     """v = 240 + 602 (28 - z)/d in mm: an object 1 m away shows its top in row 197 and its foot in row 256."""
-    eye = Eye(scene, one_object(100.0), 0)
+    camera = ReferenceCamera(scene, one_object(100.0), 0)
     top = 240 + 602 * (28 - 100) / 1000
     foot = 240 + 602 * 28 / 1000
     rows = (math.floor(top) - 1, math.ceil(top), math.floor(foot), math.ceil(foot))
-    assert eye.column(320, rows) == [WALL, OBJECT, OBJECT, FLOOR]
+    assert camera.column(320, rows) == [WALL, OBJECT, OBJECT, FLOOR]
 
 
 def test_columns_show_bearings_by_the_pinhole_formula(scene: Scene) -> None:
     """u = 320 - 602 tan a, left positive: the edges of an object are where its tangents are."""
-    eye = Eye(scene, one_object(95.0), 0)
+    camera = ReferenceCamera(scene, one_object(95.0), 0)
     half = math.asin(dimensions.OBJECT_RADIUS / 100.0)
     edge = 602 * math.tan(half)
-    assert [eye.column(320 + du, (240,))[0] for du in (-edge - 1, -edge + 1, edge - 1, edge + 1)] == [
+    assert [camera.column(320 + du, (240,))[0] for du in (-edge - 1, -edge + 1, edge - 1, edge + 1)] == [
         WALL, OBJECT, OBJECT, WALL]  # fmt: skip
 
 
 def test_a_pitched_camera_sees_everything_lower_by_its_angle(scene: Scene) -> None:
     """epuck.md §7.6: up to 3 degrees of mounting error; on the axis a degree is 602 tan 1 deg = 10.5 rows."""
-    plain, pitched = (Eye(scene.with_values(camera__pitch_deg=a), one_object(100.0), 0) for a in (0.0, 1.0))
+    plain, pitched = (ReferenceCamera(scene.with_values(camera__pitch_deg=a), one_object(100.0), 0) for a in (0.0, 1.0))
     rows = tuple(range(180, 280))
-    first = [eye.column(320, rows).index(OBJECT) for eye in (plain, pitched)]
+    first = [camera.column(320, rows).index(OBJECT) for camera in (plain, pitched)]
     assert first[1] - first[0] == pytest.approx(602 * math.tan(math.pi / 180), abs=1)
 
 
 def test_a_mirrored_camera_sees_left_as_right_and_up_as_down(scene: Scene) -> None:
-    """experiment.md §5: the mirror is part of the sensitivity table."""
+    """experiment-contract.md §5: the mirror is part of the sensitivity table."""
     poses = one_object(60.0, bearing=0.2)
-    plain, mirrored = (Eye(scene.with_values(camera__mirrored=one), poses, 0) for one in (False, True))
+    plain, mirrored = (ReferenceCamera(scene.with_values(camera__mirrored=one), poses, 0) for one in (False, True))
     for u in range(0, 640, 40):
         for v in range(160, 320, 16):
             assert plain.column(u, (v,)) == mirrored.column(639 - u, (479 - v,))
@@ -68,8 +68,8 @@ def test_a_mirrored_camera_sees_left_as_right_and_up_as_down(scene: Scene) -> No
 def test_a_barrel_shows_the_same_angle_nearer_to_the_axis(scene: Scene) -> None:
     """lens.py: what is at r (1 + k r^2) appears at r."""
     bearing = 0.3
-    eye = Eye(scene.with_values(camera__distortion=0.2), one_object(95.0, bearing), 0)
-    columns = [u for u in range(640) if eye.column(u, (240,))[0] == OBJECT]
+    camera = ReferenceCamera(scene.with_values(camera__distortion=0.2), one_object(95.0, bearing), 0)
+    columns = [u for u in range(640) if camera.column(u, (240,))[0] == OBJECT]
     half = math.asin(dimensions.OBJECT_RADIUS / 100.0)
     for u, angle in ((columns[0], bearing + half), (columns[-1], bearing - half)):
         r = (320 - u) / 602
@@ -89,7 +89,7 @@ def test_what_is_near_hides_what_is_far_but_not_what_is_taller(scene: Scene) -> 
     """A robot of 55 mm before an object of 100 mm: the object shows above it, the room above the wall."""
     poses = Poses([ROBOT_AT, (LENS_X + 50, 150, 0.0)], [(LENS_X + 80, 150)])
     rows = (0, 190, 200, 240, 265, 400)
-    assert Eye(scene, poses, 0).column(320, rows) == [ABOVE, OBJECT, OBJECT, ROBOT, ROBOT, FLOOR]
+    assert ReferenceCamera(scene, poses, 0).column(320, rows) == [ABOVE, OBJECT, OBJECT, ROBOT, ROBOT, FLOOR]
 
 
 LENSES = [
@@ -108,27 +108,27 @@ def test_a_row_at_once_is_the_same_as_column_by_column(lens: dict[str, object]) 
     columns = np.arange(0, 640, 7)
     kinds = set()
     for robot in range(5):
-        eye, sight = Eye(scene, world.poses, robot), Sight(scene, robot)
-        sight.look(world.poses)
+        camera, renderer = ReferenceCamera(scene, world.poses, robot), Renderer(scene, robot)
+        renderer.set_viewpoint(world.poses)
         for v in (10, 150, 200, 232, 240, 248, 272, 330):
-            slow = [eye.column(int(u), (v,))[0] for u in columns]
-            assert sight.classes(v, columns).tolist() == slow
+            slow = [camera.column(int(u), (v,))[0] for u in columns]
+            assert renderer.classify_row(v, columns).tolist() == slow
             kinds |= set(slow)
     assert kinds >= {OBJECT, ROBOT, WALL, FLOOR}
 
 
 def test_objects_are_detected_to_150_cm(scene: Scene) -> None:
-    """experiment.md §1: at least 95 % at 150 cm; by geometry to about 270 cm, where one row is left."""
+    """experiment-contract.md §1: at least 95 % at 150 cm; by geometry to about 270 cm, where one row is left."""
     rng = np.random.default_rng(1)
     for distance, low, high in ((20, 0.95, 1), (80, 0.95, 1), (149, 0.95, 1), (240, 0.9, 1), (300, 0, 0.05)):
         bearings = rng.uniform(-1, 1, 200) * math.pi / 180
-        seen = [sensor_of(Eye(scene, one_object(distance, one), 0)) == OBJECT for one in bearings]
+        seen = [sensor_of(ReferenceCamera(scene, one_object(distance, one), 0)) == OBJECT for one in bearings]
         assert low <= np.mean(seen) <= high, distance
 
 
 def test_the_range_ends_detection(scene: Scene) -> None:
     """docs/experiment.md §2: beyond it things look like the wall."""
-    near, far = (Eye(scene.with_values(camera__range_cm=150.0), one_object(cm), 0) for cm in (149.0, 151.0))
+    near, far = (ReferenceCamera(scene.with_values(camera__range_cm=150.0), one_object(cm), 0) for cm in (149.0, 151.0))
     assert (sensor_of(near), sensor_of(far)) == (OBJECT, NOTHING)
 
 
@@ -140,7 +140,7 @@ def test_robots_are_detected_nearer_than_objects(scene: Scene) -> None:
         angles = rng.uniform(-1, 1, 200) * math.pi / 180
         centre = distance + dimensions.ROBOT_RADIUS
         places = [(LENS_X + centre * math.cos(a), 150 + centre * math.sin(a), 0.0) for a in angles]
-        seen = [sensor_of(Eye(scene, Poses([ROBOT_AT, place], []), 0)) == ROBOT for place in places]
+        seen = [sensor_of(ReferenceCamera(scene, Poses([ROBOT_AT, place], []), 0)) == ROBOT for place in places]
         shares.append(float(np.mean(seen)))
     assert shares[0] == shares[1] == 1.0
     assert shares[2] < 0.5
@@ -161,11 +161,11 @@ def test_pitch_decides_how_far_robots_are_seen(
     centre = distance + dimensions.ROBOT_RADIUS
     angles = rng.uniform(-1, 1, 200) * math.pi / 180
     places = [(LENS_X + centre * math.cos(a), 150 + centre * math.sin(a), 0.0) for a in angles]
-    seen = [sensor_of(Eye(pitched, Poses([ROBOT_AT, place], []), 0)) == ROBOT for place in places]
+    seen = [sensor_of(ReferenceCamera(pitched, Poses([ROBOT_AT, place], []), 0)) == ROBOT for place in places]
     assert low <= np.mean(seen) <= high
 
 
 def test_an_object_before_a_robot_wins_the_vote(scene: Scene) -> None:
     """openswarm-original.md §8: red is asked first."""
     poses = Poses([ROBOT_AT, (LENS_X + 40, 152, 0.0)], [(LENS_X + 60, 146)])
-    assert sensor_of(Eye(scene, poses, 0)) == OBJECT
+    assert sensor_of(ReferenceCamera(scene, poses, 0)) == OBJECT

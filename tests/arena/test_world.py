@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from arena.camera.appearance import NOTHING, OBJECT, ROBOT
-from arena.camera.renderer import Sight
-from arena.robots.controller import ScriptedBrain
+from arena.camera.renderer import Renderer
+from arena.robots.controller import ScriptedController
 from arena.robots.reactive import steps_per_second
 from arena.scene import dimensions
 from arena.scene.loader import Scene, SceneError, load_scene
@@ -63,7 +63,7 @@ def test_circles_have_the_radius_of_the_kinematics(empty: Scene, controller: str
 
 @pytest.mark.parametrize(("objects", "moves"), [(4, True), (5, True), (6, False)])
 def test_one_robot_pushes_five_objects_but_not_six(empty: Scene, objects: int, moves: bool) -> None:
-    """experiment.md §1 and epuck.md §4: 1.0 N against 0.199 N per object."""
+    """experiment-contract.md §1 and epuck.md §4: 1.0 N against 0.199 N per object."""
     scene = empty.with_values(objects__count=objects)
     world = World.of(scene, 1, [(20, 150, 0.0)], [(28.71 + 10 * k, 150) for k in range(objects)])
     drive(world, (12.8, 12.8), 2)
@@ -156,10 +156,10 @@ def test_wheel_noise_stays_within_its_share() -> None:
 
 
 def test_two_copies_live_the_same_life_to_the_bit() -> None:
-    """design.md §7: seeded, repeatable."""
+    """engines.md §7: seeded, repeatable."""
     scene = load_scene("clustering").with_values(clock__quantum_ms=10.0)
-    rows = [run_trial(scene, 5, [ScriptedBrain(scene, 5, i, "A") for i in range(5)], 20).rows for _ in range(2)]
-    other = run_trial(scene, 6, [ScriptedBrain(scene, 6, i, "A") for i in range(5)], 20).rows
+    rows = [run_trial(scene, 5, [ScriptedController(scene, 5, i, "A") for i in range(5)], 20).rows for _ in range(2)]
+    other = run_trial(scene, 6, [ScriptedController(scene, 6, i, "A") for i in range(5)], 20).rows
     assert rows[0].columns == rows[1].columns
     assert rows[0].columns["r0_x"] != other.columns["r0_x"]
 
@@ -249,7 +249,7 @@ def test_copied_poses_are_where_their_numbers_are(again) -> None:
 @pytest.mark.parametrize(("robots", "objects"), [(3, 0), (0, 3), (3, 3)])
 def test_a_camera_has_room_for_its_scene_alone(robots: int, objects: int) -> None:
     """Each of both is counted: the light of a robot's LEDs is found by its number."""
-    sight = Sight(load_scene("clustering").with_values(robots__count=2, objects__count=2), 0)
+    sight = Renderer(load_scene("clustering").with_values(robots__count=2, objects__count=2), 0)
     with pytest.raises(ValueError, match=f"{robots} robots and {objects} objects are more than the scene has"):
         sight.look(Poses([(9.0 * n, 9.0, 0.0) for n in range(robots)], [(50.0, 50.0)] * objects))
 

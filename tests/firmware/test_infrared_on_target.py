@@ -7,8 +7,8 @@ import struct
 
 import numpy as np
 
-from arena.infrared.channel import Ether
-from arena.robots.firmware_controller import EmulatedBrain
+from arena.infrared.channel import OpticalChannel
+from arena.robots.firmware_controller import FirmwareController
 from arena.scene.loader import FCY, load_scene
 from arena.world.physics import Poses
 from emu.machine.machine import Machine
@@ -58,15 +58,17 @@ def test_an_event_of_one_robot_is_sent_on_another(image: Build) -> None:
     """openswarm_remote.h: the selector of one robot lights the body LED of the other too, over the arena's channel."""
     values = {"robots__count": 2, "objects__count": 0, "infrared__noise_counts": 2.0}
     scene = load_scene("clustering").with_values(**values)
-    ether = Ether(2, scene.clock.quantum_tcy)
-    brains = [EmulatedBrain(scene, 1, number, image("infrared", TARGET_APPS), 0, ether) for number in range(2)]
+    channel = OpticalChannel(2, scene.clock.quantum_tcy)
+    controllers = [
+        FirmwareController(scene, 1, number, image("infrared", TARGET_APPS), 0, channel) for number in range(2)
+    ]
     poses = Poses([(150.0, 150.0, math.pi / 2), (162.0, 150.0, math.pi / 2)], [])
     ticks = [math.ceil(seconds * FCY / scene.clock.quantum_tcy) for seconds in (0.4, 0.55)]
     for tick in range(ticks[1]):
         if tick == ticks[0]:
-            assert [brain.reading().leds for brain in brains] == [0, 0]
-            brains[0].machine.board.selector.position = 5
-        for brain in brains:
-            brain.think(tick, poses)
-    assert all("body" in brain.machine.board.leds.lit for brain in brains)
-    assert [statistics(brain.machine)[RECEIVED] for brain in brains] == [1, 2]  # the first beacons
+            assert [controller.reading().leds for controller in controllers] == [0, 0]
+            controllers[0].machine.board.selector.position = 5
+        for controller in controllers:
+            controller.control_step(tick, poses)
+    assert all("body" in controller.machine.board.leds.lit for controller in controllers)
+    assert [statistics(controller.machine)[RECEIVED] for controller in controllers] == [1, 2]  # the first beacons

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from arena.robots.firmware_controller import EmulatedBrain
+from arena.robots.firmware_controller import FirmwareController
 from arena.scene.loader import load_scene
 from arena.world.physics import World
 from tests.firmware.conftest import Build
@@ -134,14 +134,14 @@ def test_the_controller_drives_as_its_table_says(image: Build, scene: str, speed
 def test_in_the_arena_its_robot_turns_at_an_object(image: Build, objects: list[tuple[float, float]], turn: int) -> None:
     """It drives a curve to the left; with an object ahead it turns to the right instead (paper §IV)."""
     scene = ALONE.with_values(objects__count=len(objects))
-    brain = EmulatedBrain(scene, 1, 0, image("listing1"), 0)
+    controller = FirmwareController(scene, 1, 0, image("listing1"), 0)
     world = World.of(scene, 1, [(200.0, 150.0, 0.0)], objects)
     angles = []
     for tick in range(1000):
-        world.step([brain.think(tick, world.poses)])
+        world.step([controller.control_step(tick, world.poses)])
         angles.append(world.poses.robots[0][2])
     moved = math.hypot(world.poses.robots[0][0] - 200, world.poses.robots[0][1] - 150)
     assert moved > 2
     turned = min(angles) if turn < 0 else max(angles)
     assert turned * turn > 0.1, "radians"
-    assert place(brain.machine, "reactiveController")
+    assert place(controller.machine, "reactiveController")

@@ -126,7 +126,7 @@ class Trial:
             tally["wheels turning"] += sum(map(any, wheels))
             seen.append([until, wheels, *map(partial(look, until, tally), robots), world.poses.values.tolist()])
             if what == 0:
-                robots[who].tell(b"hello\n")
+                robots[who].feed_uart(b"hello\n")
             elif what == 1:
                 width, height = scene.arena.width_cm, scene.arena.height_cm
                 world.move(world.robots[who], 10 + where * (width - 20), height / 2, 6 * where)
@@ -139,7 +139,7 @@ class Trial:
         tally["robots away"] += sum(scene.off_tick(number) < self.quanta for number in range(len(robots)))
         tally[f"painted, {way}"] += sum(robot.painted for robot in robots)
         if lockstep is not None:
-            tally["turns of other threads"] += lockstep.swarm.helped
+            tally["turns of other threads"] += lockstep.scheduler.worker_runs
         return seen
 
 
