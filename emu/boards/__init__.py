@@ -1,4 +1,4 @@
-"""Boards: what a robot adds to the chip, by name."""
+"""Boards by name: the hardware that a robot adds to the chip."""
 
 from __future__ import annotations
 
@@ -6,17 +6,17 @@ from collections.abc import Callable
 from importlib import import_module
 from typing import Any, Final
 
-_MADE_BY: Final = {"epuck": "emu.boards.epuck.board:Epuck", "none": ""}
-"""Module and name of what is called with the chip's peripherals; nothing for bare pins."""
+_CONSTRUCTORS: Final = {"epuck": "emu.boards.epuck.board:Epuck", "none": ""}
+"""Module and class of each board; empty for bare pins."""
 
-BOARDS: Final = tuple(_MADE_BY)
-"""What can be around a chip, by name, the default first; "none" is bare pins."""
+BOARDS: Final = tuple(_CONSTRUCTORS)
+"""Names of the boards, the default first; "none" is bare pins."""
 
 
 def board_named(name: str) -> Callable[..., Any] | None:
-    """What `Machine(board=...)` wants for a board; None for bare pins. Raises ValueError for an unknown name."""
-    if name not in _MADE_BY:
+    """Return the constructor of a board, for `Machine(board=...)`; None for bare pins. Raises ValueError if unknown."""
+    if name not in _CONSTRUCTORS:
         raise ValueError(f"there is no board {name!r}; expected one of {', '.join(BOARDS)}")
-    module, _, maker = _MADE_BY[name].partition(":")
-    made: Callable[..., Any] | None = getattr(import_module(module), maker) if maker else None
+    module, _, name_in_module = _CONSTRUCTORS[name].partition(":")
+    made: Callable[..., Any] | None = getattr(import_module(module), name_in_module) if name_in_module else None
     return made

@@ -1,19 +1,19 @@
-"""Repeatable noise without state: a function of seed, channel and cycle, so that looking twice gives the same value."""
+"""Repeatable noise without state: a function of seed, channel and cycle, so repeated reads give the same value."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from typing import Final
 
-from emu.peripherals.base import Cell
+from emu.peripherals.base import StateCell
 from emu.system.record import Record
 
 _ONES: Final = (1 << 64) - 1
 _SCALE_ONE: Final = 1 << 16
 
 
-def _mixed(seed: int, channel: int, cycle: int) -> int:
-    """64 bits (SplitMix64)."""
+def _splitmix64(seed: int, channel: int, cycle: int) -> int:
+    """Return 64 pseudo-random bits (SplitMix64)."""
     x = (seed + (cycle << 8 | channel) * 0x9E37_79B9_7F4A_7C15) & _ONES
     x = (x ^ x >> 30) * 0xBF58_476D_1CE4_E5B9 & _ONES
     x = (x ^ x >> 27) * 0x94D0_49BB_1331_11EB & _ONES
@@ -21,32 +21,36 @@ def _mixed(seed: int, channel: int, cycle: int) -> int:
 
 
 class Noise:
-    """Gaussian noise for analog inputs. Its strength, 0 (off, the default) or 1 (as the reference says) or between,
-    and its seed are in the record."""
+    """Approximately Gaussian noise for analog inputs. Strength and seed are in the record.
+
+    Strength 0 (the default) means no noise, 1 the deviations of the reference.
+    """
 
     def __init__(self, record: Record, seed: int = 0) -> None:
-        self._seed: Final = Cell(record, "noise.seed", "Q", seed & _ONES)
-        self._strength: Final = Cell(record, "noise.strength", "Q")
+        self._seed: Final = StateCell(record, "noise.seed", "Q", seed & _ONES)
+        self._strength: Final = StateCell(record, "noise.strength", "Q")
         self.on_change: Final[list[Callable[[], None]]] = []
-        """Called before another strength begins to hold and once it does, by those who predict levels."""
+        """Callbacks before and after a change of the strength, for parts that predict levels."""
 
     @property
     def strength(self) -> float:
-        """Factor on every deviation."""
+        """Factor on every standard deviation."""
         return self._strength.value / _SCALE_ONE
 
     @strength.setter
     def strength(self, strength: float) -> None:
-        for told in self.on_change:
-            told()
+        for callback in self.on_change:
+            callback()
         self._strength.value = round(strength * _SCALE_ONE)
-        for told in self.on_change:
-            told()
+        for callback in self.on_change:
+            callback()
 
     def at(self, channel: int, cycle: int, deviation: float) -> float:
-        """Noise of standard deviation `deviation` on a channel in a cycle."""
+        """Return noise with standard deviation `deviation` on a channel in a cycle."""
         if not self._strength.value:
             return 0.0
-        x = _mixed(self._seed.value, channel, cycle)
-        uniform = sum(x >> shift & 0xFFFF for shift in (0, 16, 32, 48)) / 0x10000 - 2  # four of variance 1/12
+        x = _splitmix64(self._seed.value, channel, cycle)
+        uniform = (
+            sum(x >> shift & 0xFFFF for shift in (0, 16, 32, 48)) / 0x10000 - 2
+        )  # the sum of four uniform numbers of variance 1/12
         return uniform * 3**0.5 * deviation * self.strength

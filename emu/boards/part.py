@@ -1,6 +1,6 @@
-"""Base of the parts on a board: state in the record, event slots, and the chip's pins.
+"""Base class of the parts on a board: state in the record, event slots, and the chip's pins.
 
-Parts belong to the outside: they neither stop when the chip sleeps nor change when it is reset.
+Parts are outside the chip: they neither stop when the chip sleeps nor change when it is reset.
 """
 
 from __future__ import annotations
@@ -9,14 +9,14 @@ from collections.abc import Callable
 from typing import Final
 
 from emu.peripherals import Peripherals
-from emu.peripherals.base import Cell
+from emu.peripherals.base import StateCell
 from emu.peripherals.pins import Pins
 from emu.system.events import Events
 from emu.system.record import Record
 
 
 class BoardPart:
-    """One part of a board."""
+    """Base class of a board's parts."""
 
     def __init__(self, name: str, chip: Peripherals) -> None:
         self.name: Final = name
@@ -30,9 +30,9 @@ class BoardPart:
         """Cycle of the access or event being handled, in Tcy."""
         return self.events.now
 
-    def cell(self, purpose: str, kind: str = "I", initial: int = 0) -> Cell:
+    def cell(self, purpose: str, kind: str = "I", initial: int = 0) -> StateCell:
         """Reserve a scalar of state under `<part>.<purpose>`."""
-        return Cell(self.record, f"{self.name}.{purpose}", kind, initial)
+        return StateCell(self.record, f"{self.name}.{purpose}", kind, initial)
 
     def array(self, purpose: str, kind: str, count: int) -> memoryview[int]:
         """Reserve `count` elements of state ("B", "H", "I" or "Q") under `<part>.<purpose>`."""
@@ -41,9 +41,9 @@ class BoardPart:
         return view[field.index : field.index + count]
 
     def slot(self, purpose: str, fire: Callable[[int], None]) -> int:
-        """Claim an event slot."""
+        """Reserve an event slot."""
         return self.events.slot(f"{self.name}.{purpose}", fire)
 
     def cycles(self, seconds: float) -> int:
-        """Tcy in `seconds` at the present clock."""
+        """Return the Tcy in `seconds` at the current clock."""
         return round(seconds * self.chip.fcy)

@@ -1,4 +1,4 @@
-"""Picture files: what a camera is shown, and what it delivered."""
+"""Reading and writing of picture files."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ if TYPE_CHECKING:
 
 
 def read_picture(path: str | os.PathLike[str]) -> NDArray[np.uint8]:
-    """The picture in a PNG, JPEG or similar file: height x width x 3, red, green, blue.
+    """Read the picture in a PNG, JPEG or similar file: height x width x 3, red, green, blue.
 
-    Raises OSError if the file cannot be read, ValueError if it holds no picture.
+    Raises OSError if the file cannot be read, ValueError if it does not contain a picture.
     """
     import numpy as np
     from PIL import Image, UnidentifiedImageError
@@ -32,10 +32,7 @@ def read_picture(path: str | os.PathLike[str]) -> NDArray[np.uint8]:
 
 
 def write_picture(path: str | os.PathLike[str], pixels: NDArray[np.uint8], enlarge: int = 1) -> None:
-    """Write height x width x 3 pixels as PNG, every pixel `enlarge` x `enlarge` large, whole or not at all.
-
-    Raises OSError.
-    """
+    """Write height x width x 3 pixels as PNG, every pixel `enlarge` x `enlarge` large, atomically. Raises OSError."""
     import numpy as np
     from PIL import Image
 

@@ -87,7 +87,7 @@ def board_of(options: argparse.Namespace) -> Callable[[Peripherals], Any] | None
 
 def _bare(crystal: int, chip: Peripherals) -> None:
     """Nothing around the chip but a crystal."""
-    chip.fit(crystal=crystal)
+    chip.configure(crystal=crystal)
 
 
 def set_up(machine: Machine, options: argparse.Namespace) -> None:

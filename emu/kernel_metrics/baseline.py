@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
-from emu.host.files import read_file, atomic_text_file
+from emu.host.files import atomic_text_file, read_file
 
 GREW_SHOWN: Final = 4
 """Places shown for a number that grew."""

@@ -38,7 +38,7 @@ KERNEL_EVENTS: Final = (0x01, 0x07)
 """Events Sys_Init_Kernel registers for itself: termination and 1 ms (openswarm.h)."""
 EVENT: Final = 6
 """Bytes of a registered event (kernel.h)."""
-_PIECES: Final = (("low", "high"), ("run", "run_end"))
+_PIECES: Final = (("reserve_begin", "reserve_end"), ("free_run", "free_run_end"))
 """Variables that hold the ends of free pieces that are no holes: the reserve, and what is given back in this moment."""
 _SIZE: Final = 4
 """Offset of the size in a hole (kernel/memory.c)."""

@@ -1,4 +1,4 @@
-"""All peripherals of a chip, wired to each other: what the machine builds, resets, and puts to sleep."""
+"""All peripherals of a chip, connected to each other. The machine builds them, resets them and puts them to sleep."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Final
 
 from emu.chips.chip import Chip
 from emu.peripherals.adc.adc import Adc
-from emu.peripherals.base import IDLE, SLEEP, Cell, ChipContext, Peripheral, CpuSignals
+from emu.peripherals.base import IDLE, SLEEP, StateCell, ChipContext, CpuSignals, Peripheral
 from emu.peripherals.can.can import Can
 from emu.peripherals.i2c.i2c import I2c
 from emu.peripherals.interrupt_lines import Interrupts
@@ -29,16 +29,16 @@ from emu.system.bus import Bus
 from emu.system.program import ProgramMemory
 
 CRYSTAL_HZ: Final = 7_372_800
-"""Crystal of a bare chip, in Hz, unless somebody fits another one: UARTs make exact rates of it."""
+"""Default crystal of a bare chip in Hz: UARTs derive exact baud rates from it."""
 CONFIG: Final[Mapping[str, int]] = MappingProxyType({"FWDT": 0x7FFF})
-"""Configuration words of a bare chip for images without: watchdog off. An erased word has it on, and a program that
-sleeps would never come to an end."""
+"""Default configuration words of a bare chip, for images without any: watchdog off. In an erased word the watchdog is
+on, and a program that sleeps would be woken forever."""
 
 _CHANGE_NOTICE_IRQ: Final = "CN"
 
 
 class Peripherals:
-    """The devices by role. Order of construction is the priority of events that fall due in the same cycle."""
+    """All devices of a chip. The order of construction is the priority of events that are due in the same cycle."""
 
     def __init__(self, context: ChipContext) -> None:
         self.context: Final = context
@@ -50,7 +50,9 @@ class Peripherals:
         self.resets: Final = Resets(context)
         self.watchdog: Final = Watchdog(context, self.resets)
         self.lvd: Final = (
-            LowVoltageDetect(context, self.interrupts, self.resets.rcon, chip.lvd_irq) if chip.lvd_irq is not None else None
+            LowVoltageDetect(context, self.interrupts, self.resets.rcon, chip.lvd_irq)
+            if chip.lvd_irq is not None
+            else None
         )
         self.nvm: Final = Nvm(context, self.interrupts)
         self.ports: Final = {PORTS.index(letter): Port(letter, context) for letter in chip.ports}
@@ -63,7 +65,9 @@ class Peripherals:
         self.oscillator.before_change.append(self.adc.clock_changes)
         self.oscillator.on_change.extend((self.adc.clock_changed, self.nvm.clock_changed))
         self.spi: Final = {site.number: Spi(site, context, self.interrupts, self.ports) for site in chip.spis}
-        self.capture: Final = {site.number: Capture(site, context, self.interrupts, self.timer) for site in chip.captures}
+        self.capture: Final = {
+            site.number: Capture(site, context, self.interrupts, self.timer) for site in chip.captures
+        }
         self.compare: Final = {
             site.number: Compare(site, context, self.interrupts, self.timer, self.ports) for site in chip.compares
         }
@@ -95,17 +99,17 @@ class Peripherals:
             self.pmd,
         )
         self.all: Final[tuple[Peripheral, ...]] = tuple(part for part in parts if part is not None)
-        self._stopped: Final = Cell(context.bus.record, "power.stopped", "B")
+        self._stopped: Final = StateCell(context.bus.record, "power.stopped", "B")
         self.config: Mapping[int, int] = {}
-        """Configuration words that the chip keeps when an image brings none, by program address."""
-        self.fit(crystal=context.crystal)
+        """Configuration words used if the image contains none, by program address."""
+        self.configure(crystal=context.crystal)
         self.on_restored: Final[list[Callable[[], None]]] = []
-        """Parts of a board that keep something derived from the record."""
+        """Callbacks of board parts that must rebuild state derived from the record."""
         self.on_synchronize: Final[list[Callable[[], None]]] = []
-        """Parts of a board that find out late, when somebody looks, what has happened."""
+        """Callbacks of board parts that evaluate pin changes lazily."""
 
     def _modules(self) -> dict[str, Peripheral]:
-        """Peripherals by the name their PMD bit carries."""
+        """Return the peripherals by the name of their PMD bit."""
         modules: dict[str, Peripheral] = {"ADC": self.adc}
         modules |= {name: device for name, device in (("DCI", self.dci), ("I2C", self.i2c)) if device is not None}
         modules |= {f"T{number}": timer for number, timer in self.timer.items()}
@@ -116,16 +120,16 @@ class Peripherals:
         modules |= {f"U{number}": uart for number, uart in self.uart.items()}
         return modules
 
-    def fit(self, *, crystal: int, config: Mapping[str, int] = CONFIG) -> None:
-        """A board's part of the chip: the frequency at OSC1 in Hz, and configuration words by name for images without.
+    def configure(self, *, crystal: int, config: Mapping[str, int] = CONFIG) -> None:
+        """Set the crystal frequency in Hz and the default configuration words by name. Boards call this.
 
-        To be called before the first reset. Raises KeyError for a word that the chip does not have.
+        Call it before the first reset. Raises KeyError for a word that the chip does not have.
         """
         self.context.crystal = crystal
         self.config = {self.context.chip.config[name].address: word for name, word in config.items()}
 
     def reset(self, cause: str) -> None:
-        """Every peripheral register to its reset value, every device to its reset state; RCON tells the cause.
+        """Reset all peripheral registers and devices, and record the cause in RCON.
 
         `cause` is an RCON bit name: POR, BOR, EXTR, SWR, WDTO, TRAPR or IOPUWR (§4). The CPU resets its own registers
         (below INTCON1). Raises ValueError for another cause.
@@ -146,7 +150,7 @@ class Peripherals:
             self.oscillator.reselect()
 
     def sleep(self, mode: int, cycle: int) -> None:
-        """PWRSAV in `cycle`: `mode` 1 = Idle, 2 = Sleep. RCON tells, the watchdog restarts, clocks stop (§17)."""
+        """Handle PWRSAV in `cycle`: `mode` 1 = Idle, 2 = Sleep. Set RCON, restart the watchdog, stop clocks (§17)."""
         if mode == IDLE and self.context.bus.integers.fire(self.watchdog.idling):
             return
         self.watchdog.clear(cycle)
@@ -161,7 +165,7 @@ class Peripherals:
                 device.freeze(cycle, mode)
 
     def wake(self, cycle: int) -> None:
-        """The CPU runs again; `cycle` is the first in which the stopped clocks tick."""
+        """Handle the wake-up of the CPU; `cycle` is the first in which the stopped clocks tick."""
         self.watchdog.power_mode(0)
         if not self._stopped.value:
             return
@@ -171,38 +175,38 @@ class Peripherals:
                 device.thaw(cycle)
 
     def clear_watchdog(self, cycle: int) -> None:
-        """CLRWDT in `cycle`."""
+        """Handle CLRWDT in `cycle`."""
         self.watchdog.clear(cycle)
 
-    def tell(self) -> None:
-        """Tell who listens to UARTs what native code has sent."""
+    def deliver_uart_output(self) -> None:
+        """Deliver the characters that native code has sent to the UARTs' lazy listeners."""
         for uart in self.uart.values():
-            uart.tell()
+            uart.deliver_sent()
 
-    def settle(self) -> None:
-        """Have found out what would be found out late, so that the record does not depend on who has looked."""
+    def synchronize(self) -> None:
+        """Evaluate all lazily evaluated board state, so that the record does not depend on earlier reads."""
         for listener in self.on_synchronize:
             listener()
 
     def restored(self) -> None:
-        """Call after the record was replaced by a snapshot."""
+        """Rebuild derived state after the record was replaced by a snapshot."""
         for device in self.all:
             device.restored()
         for listener in self.on_restored:
             listener()
 
     def seconds(self, cycle: int) -> float:
-        """Seconds since power-on at `cycle`."""
+        """Return the seconds from power-on to `cycle`."""
         return self.oscillator.seconds(cycle)
 
     @property
     def fcy(self) -> float:
-        """Instruction cycles per second at present."""
+        """Instruction cycles per second at the current clock."""
         return self.oscillator.fcy()
 
 
 def configure_bus(chip: Chip, bus: Bus) -> None:
-    """Tell the bus which bits exist, which of them software can change, and what a reset makes of them."""
+    """Enter the implemented bits, the writable bits and the reset value of every register into the bus."""
     for sfr in chip.sfrs.values():
         if sfr.size != 2:
             continue
@@ -216,7 +220,7 @@ def configure_bus(chip: Chip, bus: Bus) -> None:
 def build(
     chip: Chip, bus: Bus, program: ProgramMemory, cpu_signals: CpuSignals | None = None, crystal: int = CRYSTAL_HZ
 ) -> Peripherals:
-    """Fill in the bus from the chip's data and put every device on it. `crystal` in Hz.
+    """Configure the bus from the chip's data and construct all devices on it. `crystal` in Hz.
 
     The caller keeps `cpu_signals` and may fill in its callbacks later. Call `reset("POR")` once before the first cycle.
     """

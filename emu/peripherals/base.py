@@ -1,8 +1,8 @@
-"""What every peripheral is built with: the chip's data, the bus, the pins, and the few wires that lead to the CPU.
+"""Base class of the peripherals, their context (chip, bus, pins, CPU signals) and their cells in the record.
 
-Hidden state lives in the record only, in cells reserved by name, so a snapshot is complete. Cells that hold a cycle
-number are reserved as *moments*: when a device's clock stops (Sleep, or Idle with its SIDL bit set) and starts again,
-its moments and pending events move by the time lost, and the device never notices.
+A device keeps its state only in cells of the record, so a snapshot is complete. Cells that hold a cycle number are
+*timestamps*. When a device's clock stops (Sleep, or Idle with its SIDL bit set) and resumes, `thaw` shifts its
+timestamps and pending events by the time lost.
 """
 
 from __future__ import annotations
@@ -18,38 +18,39 @@ from emu.system.device import Device, Irq, Register
 from emu.system.events import NEVER
 from emu.system.program import ProgramMemory
 from emu.system.record import Record
-from emu.system.rules import Rule, place_of
+from emu.system.rules import Rule, cell_of
 
 IDLE: Final = 1
-"""Power mode after PWRSAV #1: the CPU stands, peripherals run unless their SIDL bit is set (§17)."""
+"""Power mode after PWRSAV #1: the CPU is stopped, peripherals run unless their SIDL bit is set (§17)."""
 SLEEP: Final = 2
-"""Power mode after PWRSAV #0: the system clock stands (§17)."""
+"""Power mode after PWRSAV #0: the system clock is stopped (§17)."""
 
 
-def _nothing(*_arguments: object) -> None:
-    """Default of a wire nobody listens to."""
+def _ignore(*_arguments: object) -> None:
+    """Ignore a signal: the default of every callback."""
 
 
 @dataclass
 class CpuSignals:
-    """Lines from the peripherals to the CPU. The machine fills in what it has; the defaults ignore the signal."""
+    """Signals from the peripherals to the CPU. The machine sets the callbacks; the defaults ignore the signal."""
 
-    reset: Callable[[str], None] = _nothing
+    reset: Callable[[str], None] = _ignore
     """reset(cause): a peripheral resets the chip; cause is an RCON bit name, for example "WDTO"."""
-    wake: Callable[[], None] = _nothing
+    wake: Callable[[], None] = _ignore
     """The watchdog ran out while the CPU slept: execution continues (§4)."""
-    stall_until: Callable[[int], None] = _nothing
-    """stall_until(cycle): no instruction starts before that cycle (flash is being programmed, §16)."""
-    run: Callable[[int], Any] = _nothing
-    """run(cycles): let the machine run so long; whoever asks stands outside it. Returns how that ended."""
-    end_run: Callable[[], None] = _nothing
-    """Such a run ends at its next boundary."""
-    trap: Callable[[str], None] = _nothing
+    stall_until: Callable[[int], None] = _ignore
+    """stall_until(cycle): the CPU starts no instruction before that cycle while flash is programmed (§16)."""
+    run: Callable[[int], Any] = _ignore
+    """run(cycles): run the machine for at most that many cycles; only for callers outside the machine. Returns a
+    `Stop`."""
+    end_run: Callable[[], None] = _ignore
+    """End the current `run` at the next instruction boundary."""
+    trap: Callable[[str], None] = _ignore
     """trap(flag): set a trap flag of INTCON1; flag is its name, for example "OSCFAIL" (§5.1)."""
 
 
-class Cell:
-    """One scalar in the record."""
+class StateCell:
+    """One scalar in the machine's record."""
 
     __slots__ = ("_view", "index", "place")
 
@@ -57,12 +58,12 @@ class Cell:
         self.index: Final = record.reserve(name, kind).index
         self._view: Final = {"B": record.u8, "H": record.u16, "I": record.u32, "Q": record.u64, "q": record.s64}[kind]
         self._view[self.index] = initial
-        self.place: Final = place_of(record, name)
-        """For rules."""
+        self.place: Final = cell_of(record, name)
+        """Operand for rules."""
 
     @property
     def value(self) -> int:
-        """The number held, in the range of its kind."""
+        """The stored number, in the range of its kind."""
         return self._view[self.index]
 
     @value.setter
@@ -70,13 +71,13 @@ class Cell:
         self._view[self.index] = number
 
     def set(self, number: int) -> None:
-        """As an assignment to `value`."""
+        """Assign `value`; for use as a callback."""
         self._view[self.index] = number
 
 
 @dataclass
 class ChipContext:
-    """Everything a peripheral may touch."""
+    """Context of the peripherals: the shared objects that a device may use."""
 
     chip: Chip
     bus: Bus
@@ -86,24 +87,24 @@ class ChipContext:
     crystal: int
     """Frequency at OSC1 in Hz."""
     fcy: Callable[[], float] = lambda: 0.0
-    """Tcy per second at present; supplied by the oscillator."""
+    """Tcy per second at the current clock; set by the oscillator."""
     power_mode: Callable[[], int] = lambda: 0
-    """0 while the CPU runs, IDLE or SLEEP; supplied by the watchdog."""
+    """0 while the CPU runs, else IDLE or SLEEP; set by the watchdog."""
     in_seconds: list[int] = field(default_factory=list)
-    """Event slots that are due after a time in seconds: the oscillator moves them when it changes the Tcy."""
+    """Event slots whose delay is a time in seconds: the oscillator reschedules them when it changes the Tcy."""
 
 
 class Peripheral(Device):
-    """Base of the peripherals: registers, interrupt lines, cells and event slots by name."""
+    """Base class of the peripherals: registers, interrupt lines, cells and event slots by name."""
 
     idle_bit: tuple[Register, str] | None = None
-    """Control register and name of the bit that stops the device in Idle."""
+    """Control register and name of the bit (xSIDL) that stops the device in Idle."""
 
     def __init__(self, name: str, context: ChipContext) -> None:
         super().__init__(name, context.bus)
         self.context: Final = context
-        self._moments: Final[list[Cell]] = []
-        self._slots: Final[list[tuple[int, Cell]]] = []
+        self._timestamps: Final[list[StateCell]] = []
+        self._slots: Final[list[tuple[int, StateCell]]] = []
         self._frozen: Final = self.cell("frozen", "Q", NEVER)
 
     def register(self, name: str) -> Register:
@@ -116,9 +117,9 @@ class Peripheral(Device):
         flag, bit = self.context.chip.interrupts[number].flag
         return Irq(self.record, self.events, self.context.chip.sfrs[flag].address, bit)
 
-    def cell(self, purpose: str, kind: str = "I", initial: int = 0) -> Cell:
+    def cell(self, purpose: str, kind: str = "I", initial: int = 0) -> StateCell:
         """Reserve a scalar of hidden state under `<device>.<purpose>`."""
-        return Cell(self.record, f"{self.name}.{purpose}", kind, initial)
+        return StateCell(self.record, f"{self.name}.{purpose}", kind, initial)
 
     def array(self, purpose: str, kind: str, count: int) -> memoryview[int]:
         """Reserve `count` elements of hidden state ("B", "H", "I" or "Q") under `<device>.<purpose>`."""
@@ -126,24 +127,26 @@ class Peripheral(Device):
         view = {"B": self.record.u8, "H": self.record.u16, "I": self.record.u32, "Q": self.record.u64}[kind]
         return view[field.index : field.index + count]
 
-    def moment(self, purpose: str, initial: int = 0) -> Cell:
-        """Reserve a cell that holds a cycle number of this device's own clock."""
+    def timestamp(self, purpose: str, initial: int = 0) -> StateCell:
+        """Reserve a timestamp: a cell that holds a cycle number of this device's own clock."""
         cell = self.cell(purpose, "Q", initial)
-        self._moments.append(cell)
+        self._timestamps.append(cell)
         return cell
 
     def slot(self, purpose: str, fire: Callable[[int], None], *, in_seconds: bool = False) -> int:
-        """Claim an event slot that belongs to this device's clock. `in_seconds`: another Tcy does not change how long
-        it takes."""
+        """Reserve an event slot on this device's clock.
+
+        `in_seconds`: its delay does not depend on the length of a Tcy.
+        """
         slot = self.events.slot(f"{self.name}.{purpose}", fire)
         self._slots.append((slot, self.cell(f"{purpose}.held", "Q", NEVER)))
         if in_seconds:
             self.context.in_seconds.append(slot)
         return slot
 
-    def ruled(self, slot: int, rule: Rule) -> None:
-        """Events of `slot` follow `rule` where it can say what they do."""
-        self.events.ruled(slot, rule, self.bus.integers.fire)
+    def set_event_rule(self, slot: int, rule: Rule) -> None:
+        """Let `rule` handle the events of `slot` wherever its conditions hold."""
+        self.events.set_rule(slot, rule, self.bus.integers.fire)
 
     @property
     def clock(self) -> int:
@@ -151,7 +154,7 @@ class Peripheral(Device):
         return min(self.events.now, self._frozen.value)
 
     def power_up(self, power_on: bool) -> None:
-        """Forget stopped clocks and pending events, then come up as after a reset."""
+        """Restart the clock, cancel pending events and reset the device."""
         self._frozen.value = NEVER
         for slot, held in self._slots:
             self.events.cancel(slot)
@@ -159,39 +162,39 @@ class Peripheral(Device):
         self.reset(power_on)
 
     def remaining_delay(self, slot: int) -> int:
-        """How many Tcy behind the stop of this device's clock `slot` is due, NEVER if nothing of it waits."""
+        """Return the remaining delay of `slot` in Tcy when the device's clock stopped, NEVER if it was not pending."""
         held = next(cell.value for one, cell in self._slots if one == slot)
         return NEVER if held == NEVER else held - self._frozen.value
 
     def restart(self) -> None:
-        """As after a reset of this device alone, which has lost what its registers held."""
+        """Reset this device alone after PMD has cleared its registers."""
         self.power_up(power_on=False)
         self.release_pins()
 
     def release_pins(self) -> None:
-        """Leave pins the device has taken to LAT and TRIS. A reset of the chip does that by itself (§6)."""
+        """Return the device's pins to LAT and TRIS. A chip reset does that through the ports (§6)."""
 
     def before_disable(self) -> None:
-        """PMD is about to clear the device's registers."""
+        """Prepare for PMD clearing the device's registers."""
 
     def stops_in(self, mode: int) -> bool:
-        """Whether the device's clock stands in power mode `mode`."""
+        """Whether the device's clock stops in power mode `mode`."""
         if mode == SLEEP:
             return True
         return mode == IDLE and self.idle_bit is not None and bool(self.idle_bit[0][self.idle_bit[1]])
 
     def freeze(self, cycle: int, mode: int) -> None:
-        """The device's clock stops in power mode `mode`: what is due later waits."""
+        """Stop the device's clock in power mode `mode` and suspend its pending events."""
         self._frozen.value = cycle
         for slot, held in self._slots:
             held.value = self.events.due(slot)
             self.events.cancel(slot)
 
     def thaw(self, cycle: int) -> None:
-        """The device's clock runs again from `cycle`; moments and pending events move by the time lost."""
+        """Resume the device's clock in `cycle`; shift timestamps and pending events by the time lost."""
         lost = cycle - self._frozen.value
         self._frozen.value = NEVER
-        for cell in self._moments:
+        for cell in self._timestamps:
             if cell.value != NEVER:
                 cell.value += lost
         for slot, held in self._slots:
@@ -201,8 +204,8 @@ class Peripheral(Device):
 
     @property
     def is_frozen(self) -> bool:
-        """Whether the device's clock stands."""
+        """Whether the device's clock is stopped."""
         return self._frozen.value != NEVER
 
     def restored(self) -> None:
-        """The record was replaced by a snapshot: rebuild whatever is derived from it."""
+        """Rebuild state derived from the record after a snapshot replaced it."""

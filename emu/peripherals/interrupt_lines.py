@@ -1,7 +1,7 @@
 """The request lines of a chip's interrupt controller (§5).
 
-The flags are plain storage OR-ed with hardware sets; who is accepted, and every other register of the controller, is
-the CPU's business. A line requested by a register write becomes visible one cycle later (see `emu.system.device.Irq`).
+A device sets the flags, which are otherwise plain storage. The CPU handles priorities and the controller's other
+registers. A line requested by a register write becomes visible one cycle later (see `emu.system.device.Irq`).
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from emu.system.device import Irq
 
 
 class Interrupts:
-    """One line per implemented source."""
+    """Request lines, one per implemented source."""
 
     def __init__(self, context: ChipContext) -> None:
         sfrs = context.chip.sfrs
@@ -23,5 +23,5 @@ class Interrupts:
         }
 
     def line(self, number: int) -> Irq:
-        """The request line of interrupt `number` (natural order). Raises KeyError for a reserved number."""
+        """Return the request line of interrupt `number` (natural order). Raises KeyError for a reserved number."""
         return self._lines[number]

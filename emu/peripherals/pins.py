@@ -1,18 +1,18 @@
-"""The package pins: the interface between the chip and the world around it.
+"""The package pins: the interface between the chip and its environment.
 
-Everything is an array in the record with one word per port (A..G = 0..6), so a simulation reads and writes levels
-without calls per pin:
+All levels are arrays in the record with one word per port (A..G = 0..6), so a simulation reads and writes levels
+without a call per pin:
 
-- `input`: level the outside applies; `open`: 1 where nothing outside drives the pin low, so that a pull-up can lift it;
-- `drive`, `output`: what the chip drives, and with which level;
-- `level`: what the digital input buffers see (0 where the pin is analog).
+- `input`: level applied from outside; `open`: 1 where nothing outside drives the pin, so that a pull-up can lift it;
+- `drive`, `output`: pins driven by the chip, and their levels;
+- `level`: levels at the digital input buffers (0 where the pin is analog).
 
 A simulation that writes `input` calls `apply(port, cycle)` once afterwards, or uses `set`. A fast input (a pixel bus)
-is not pushed edge by edge: it is attached as a `Waveform`, a function of the cycle.
+is attached as a `Waveform`, a function of the cycle, instead of being written edge by edge.
 
-Watchers of pins are eager (told at once: interrupts, clocks, gates) or lazy (told in order, some time later: motors,
-LEDs). Native code may write a latch by itself as long as only lazy pins change; it leaves the new levels in `ring`, and
-`flush` tells. Whoever reports what a lazy watcher has counted calls `flush` first.
+Eager watchers (interrupts, clocks, gates) are called at the edge. Lazy watchers (motors, LEDs) are called in order, but
+later. Native code may write a latch by itself as long as only lazy pins change: it appends the new levels to `ring`,
+and `flush` calls the watchers. Call `flush` before reading a result that a lazy watcher computes.
 """
 
 from __future__ import annotations
@@ -22,51 +22,53 @@ from typing import Any, Final, Protocol
 
 from emu.system.events import Events
 from emu.system.record import Record
-from emu.system.rules import Number, Place
+from emu.system.rules import Cell, Number
 
 PORTS: Final = "ABCDEFG"
 RING: Final = 256
-"""Changes native code can leave behind before it must call Python."""
+"""Capacity of the ring: changes that native code can store before it must call Python."""
 
 RingReader = Callable[[int, int], None]
-"""Called as reader(address, count) with so many changes as native code leaves them in `Pins.ring`, of any port."""
+"""reader(address, count): processes `count` entries of `Pins.ring`, of any port."""
 Watcher = Callable[[int, int, int], None]
-"""Called as watcher(cycle, changed, levels): pins in `changed` have the given levels from `cycle` on."""
+"""watcher(cycle, changed, levels): pins in `changed` have the given levels from `cycle` on."""
 
 
 class Waveform(Protocol):
     """Levels of some pins of one port as a function of the cycle."""
 
     def bits(self, cycle: int) -> int:
-        """Levels of the port's pins in `cycle`; only bits of the attached mask count."""
+        """Return the levels of the port's pins in `cycle`; only bits of the attached mask count."""
 
     def rises(self, mask: int, after: int, until: int) -> int:
-        """Number of rising edges of the one pin in `mask` in cycles after < c <= until."""
+        """Return the number of rising edges of the one pin in `mask` in cycles after < c <= until."""
 
     def nth_rise(self, mask: int, after: int, count: int) -> int:
-        """Cycle of the `count`-th rising edge (1 = next) of the pin in `mask` behind cycle `after`, or NEVER."""
+        """Return the cycle of the `count`-th rising edge (1 = next) of the pin in `mask` after `after`, or NEVER."""
 
     def constant_until(self, cycle: int) -> int:
-        """First cycle behind `cycle` in which `bits` may differ from those in `cycle`, if nobody calls
-        `Pins.invalidate`; `cycle` itself if nothing is promised."""
+        """Return the first cycle after `cycle` in which `bits` may change, unless `Pins.invalidate` is called.
+
+        Return `cycle` itself if the waveform gives no guarantee.
+        """
 
 
 class RuleWaveform(Protocol):
-    """A waveform that also says as text for every engine (emu/system/rules.py) when it rises."""
+    """A waveform whose rising edges are also available as a rule (emu/system/rules.py)."""
 
     def nth_rise_rule(self, m: Any, mask: int, after: Number, count: Number) -> Number:
-        """`Waveform.nth_rise`."""
+        """Return `Waveform.nth_rise` as a rule expression."""
 
 
 def parse_pin(name: str) -> tuple[int, int]:
-    """("RC14") -> (port index, bit mask). Raises ValueError for anything that is not a pin name."""
+    """Convert a pin name such as "RC14" to (port index, bit mask). Raises ValueError for any other text."""
     if len(name) >= 3 and name[0] == "R" and name[1] in PORTS and name[2:].isdecimal() and int(name[2:]) < 16:
         return PORTS.index(name[1]), 1 << int(name[2:])
     raise ValueError(f"{name!r} is not a pin name like RC14")
 
 
 class Pins:
-    """Levels of all pins, who drives them, and who wants to hear of edges."""
+    """Levels and drivers of all pins, and the watchers of their edges."""
 
     def __init__(self, record: Record, events: Events) -> None:
         self._events: Final = events
@@ -81,63 +83,63 @@ class Pins:
         self.output: Final = words("output")
         self.level: Final = words("level")
         self.pullup: Final = words("pullup")
-        self.described: Final[dict[tuple[int, int], tuple[RuleWaveform, Place]]] = {}
-        """By port and mask of one pin; see `describe`."""
+        self.described: Final[dict[tuple[int, int], tuple[RuleWaveform, Cell]]] = {}
+        """Rule waveforms by port and mask of one pin; see `describe`."""
         for port in range(len(PORTS)):
             self.open[port] = 0xFFFF  # nothing is connected yet
         self.analog: Final = words("analog")
         self.before: Final = words("before")
-        """What PORT reads still return in the cycle after the chip changed its outputs (§6)."""
+        """Previous levels: PORT reads return them in the cycle after the chip changed its outputs (§6)."""
         first = record.reserve("pins.changed", "Q", len(PORTS)).index
         self.changed: Final = record.u64[first : first + len(PORTS)]
         """First cycle of the newest output levels."""
         self.eager: Final = words("eager")
-        """Pins whose changes Python must hear of at once."""
+        """Pins with eager watchers: native code must call Python for their changes."""
         self.lazy: Final = words("lazy")
-        """Pins whose changes may wait in `ring`."""
+        """Pins with lazy watchers only: native code may store their changes in `ring`."""
         self.waveform_pins: Final = words("waveform_pins")
-        """Pins whose levels an attached waveform supplies."""
+        """Pins whose levels come from an attached waveform."""
         self.constant_levels: Final = words("constant_levels")
-        """Levels of the waveform_pins pins that hold before the cycle in `constant_until`, so that native code can read them."""
+        """Levels of the waveform pins, valid before the cycle in `constant_until`; native code reads them."""
         first = record.reserve("pins.constant_until", "Q", len(PORTS)).index
         self.constant_until: Final = record.u64[first : first + len(PORTS)]
-        self._told: Final = words("told")
-        """Levels the lazy watchers know."""
+        self._reported: Final = words("reported")
+        """Levels last reported to the lazy watchers."""
         ring = record.reserve("pins.ring", "Q", RING).index
         self.ring: Final = record.u64[ring : ring + RING]
-        """Changes made by native code: cycle << 24 | port << 16 | levels."""
+        """Changes made by native code, each as cycle << 24 | port << 16 | levels."""
         self._u64: Final = record.u64
         self._count: Final = record.reserve("pins.ring_count", "Q").index
         self._edges: list[tuple[int, int, int]] | None = None
         self.frames: list[tuple[int, int, int, int, int, int]] | None = None
-        """Set to a list to have the frames of UARTs there instead of among the edges: first cycle, port, mask of the
-        pin, levels from bit 0 on, how many, cycles of one."""
+        """Set to a list to log UART frames there instead of as edges. Entries: first cycle, port, pin mask, levels from
+        bit 0 on, number of levels, cycles per level."""
         self._eager_before_log: list[int] = []
         self._watchers: Final[list[list[tuple[int, Watcher]]]] = [[] for _ in PORTS]
         self._lazy_watchers: Final[list[list[tuple[int, Watcher]]]] = [[] for _ in PORTS]
         self._ring_watchers: Final[list[list[tuple[int, Watcher]]]] = [[] for _ in PORTS]
-        """Lazy watchers that are told what is in the ring; the others read it."""
+        """Lazy watchers without a ring reader: `flush` calls them for each ring entry."""
         self._readers: Final[list[RingReader]] = []
         self._clean: Final = memoryview(bytes(8 * RING)).cast("Q")
         self._ring_address: Final = record.address + 8 * ring
         self.ring_addresses: Final = tuple(
-            record.address + record.fields[f"pins.{name}"].offset for name in ("ring", "ring_count", "told")
+            record.address + record.fields[f"pins.{name}"].offset for name in ("ring", "ring_count", "reported")
         )
-        """Addresses of the host, for a reader that is compiled code: `ring`, how many changes are in it, and the levels
-        of each port that have been told; whoever reads leaves the ring clean as `flush` does."""
-        self._heard = 0
+        """Host addresses for a native ring reader: `ring`, the number of its entries, and the reported levels of each
+        port. Such a reader must clear the ring as `flush` does."""
+        self._ports_with_ring_watchers = 0
         self._waveforms: Final[list[list[tuple[int, Waveform]]]] = [[] for _ in PORTS]
         self._on_waveform: Final[list[tuple[Callable[[int], None], Callable[[], None]]]] = []
 
     @property
     def edges(self) -> list[tuple[int, int, int]] | None:
-        """Set to a list to log (cycle, port, levels) at every change, to None to stop."""
+        """Log of pin changes: a list that receives (cycle, port, levels), or None."""
         return self._edges
 
     @edges.setter
     def edges(self, log: list[tuple[int, int, int]] | None) -> None:
         self.flush()
-        if log is not None and self._edges is None:  # every change must come by
+        if log is not None and self._edges is None:  # every change must call Python
             self._eager_before_log = self.eager.tolist()
             for port in range(len(PORTS)):
                 self.eager[port] = 0xFFFF
@@ -147,7 +149,7 @@ class Pins:
         self._edges = log
 
     def watch(self, name: str, watcher: Watcher, *, lazy: bool = False) -> None:
-        """Tell `watcher` of every edge on one pin; `lazy`: not necessarily at once."""
+        """Call `watcher` for every edge on one pin; `lazy`: possibly later."""
         port, mask = parse_pin(name)
         self.watch_port(port, mask, watcher, lazy=lazy)
 
@@ -161,28 +163,28 @@ class Pins:
         inputs_only: bool = False,
         reader: RingReader | None = None,
     ) -> None:
-        """Tell `watcher` of every edge on the pins in `mask` of a port.
+        """Call `watcher` for every edge on the pins in `mask` of a port.
 
-        `inputs_only`: it ignores edges on pins the port drives, so latch writes need not come by. A lazy watcher may
-        have a `reader`, which is given what native code has done instead.
+        `inputs_only`: the watcher ignores pins that the port drives, so latch writes need not call it. A lazy watcher
+        may have a `reader`, which processes the ring entries instead.
         """
         (self._lazy_watchers if lazy else self._watchers)[port].append((mask, watcher))
         if lazy:
-            self._told[port] = self.level[port]
+            self._reported[port] = self.level[port]
             if reader is not None:
                 self._readers.append(reader)
             else:
                 self._ring_watchers[port].append((mask, watcher))
-                self._heard |= 1 << port
+                self._ports_with_ring_watchers |= 1 << port
         table = self.lazy if lazy else self.eager
         table[port] |= 0 if inputs_only else mask
 
     def watched_ports(self, readers: int) -> int:
-        """Bit n: what the ring has of port n is to be told to somebody else than so many readers, who ask."""
-        return self._heard if len(self._readers) == readers else -1
+        """Return a bit mask of the ports whose ring entries have consumers besides `readers` ring readers."""
+        return self._ports_with_ring_watchers if len(self._readers) == readers else -1
 
     def flush(self) -> None:
-        """Tell the lazy watchers what native code has done to the pins. The ring is left clean, as if never used."""
+        """Report the changes in the ring to the lazy watchers, then clear the ring to its initial state."""
         count = self._u64[self._count]
         if not count:
             return
@@ -195,53 +197,53 @@ class Pins:
             port = entry >> 16 & 0xFF
             watchers = self._ring_watchers[port]
             if watchers:
-                self._tell_lazy(entry >> 24, port, entry & 0xFFFF, watchers)
+                self._notify_lazy(entry >> 24, port, entry & 0xFFFF, watchers)
             else:
-                self._told[port] = entry & 0xFFFF
+                self._reported[port] = entry & 0xFFFF
 
-    def _tell_lazy(self, cycle: int, port: int, level: int, watchers: list[tuple[int, Watcher]]) -> None:
-        changed = self._told[port] ^ level
-        self._told[port] = level
+    def _notify_lazy(self, cycle: int, port: int, level: int, watchers: list[tuple[int, Watcher]]) -> None:
+        changed = self._reported[port] ^ level
+        self._reported[port] = level
         for mask, watcher in watchers:
             if changed & mask:
                 watcher(cycle, changed & mask, level)
 
     def attach(self, port: int, mask: int, waveform: Waveform) -> None:
-        """Let a function of the cycle supply the levels of the pins in `mask`; edge watchers do not hear of them."""
+        """Let `waveform` supply the levels of the pins in `mask`. Its edges do not call watchers."""
         if all(entry[1] is not waveform for entry in self._waveforms[port]):
             self._waveforms[port].append((mask, waveform))
-            self._wave(port)
+            self._update_waveform_pins(port)
 
-    def describe(self, port: int, mask: int, waveform: RuleWaveform, attached: Place) -> None:
-        """While the number at `attached` is not 0, the waveform on the pins in `mask` is this one."""
+    def describe(self, port: int, mask: int, waveform: RuleWaveform, attached: Cell) -> None:
+        """Register a rule waveform for the pins in `mask`; it is in force while the number at `attached` is not 0."""
         for bit in range(16):
             if mask >> bit & 1:
                 self.described[port, 1 << bit] = (waveform, attached)
 
     def detach(self, port: int, waveform: Waveform) -> None:
-        """Undo `attach`."""
+        """Remove an attached waveform."""
         self._waveforms[port] = [entry for entry in self._waveforms[port] if entry[1] is not waveform]
-        self._wave(port)
+        self._update_waveform_pins(port)
 
-    def _wave(self, port: int) -> None:
-        """The set of waveform_pins pins of `port` follows the list; after a restore the record has it already."""
-        waveform_pins = 0
+    def _update_waveform_pins(self, port: int) -> None:
+        """Recompute the set of waveform pins of `port`. After a restore the record already holds it."""
+        mask_of_all = 0
         for mask, _waveform in self._waveforms[port]:
-            waveform_pins |= mask
-        if waveform_pins != self.waveform_pins[port]:
-            self.waveform_pins[port] = waveform_pins
+            mask_of_all |= mask
+        if mask_of_all != self.waveform_pins[port]:
+            self.waveform_pins[port] = mask_of_all
             self.invalidate(port)
 
     def waveform(self, port: int, mask: int) -> Waveform | None:
-        """The waveform on the pins in `mask`, if one is attached."""
+        """Return the waveform attached to the pins in `mask`, if any."""
         return next((wave for pins, wave in self._waveforms[port] if pins & mask), None)
 
     def on_waveform_change(self, before: Callable[[int], None], after: Callable[[], None]) -> None:
-        """Have `before(cycle)` and `after()` called around every change of a waveform's future."""
+        """Call `before(cycle)` and `after()` around every `change_waveform`."""
         self._on_waveform.append((before, after))
 
     def change_waveform(self, cycle: int, change: Callable[[], None]) -> None:
-        """Run `change`, which gives an attached waveform a new future from `cycle` on; clocks keep their counts."""
+        """Run `change`, which alters an attached waveform from `cycle` on; timers clocked by it keep their counts."""
         for before, _ in self._on_waveform:
             before(cycle)
         change()
@@ -251,34 +253,34 @@ class Pins:
             after()
 
     def invalidate(self, port: int) -> None:
-        """A waveform on `port` has got a new future, or what it depends on has changed: forget what it promised."""
+        """Discard the cached levels of `port` after its waveforms, or the state they depend on, have changed."""
         self.constant_until[port] = 0
 
     def set(self, name: str, level: int, cycle: int | None = None) -> None:
-        """The outside drives one pin with `level` (0 or 1) from `cycle` on (default: now)."""
+        """Drive one pin from outside with `level` (0 or 1) from `cycle` on (default: now)."""
         port, mask = parse_pin(name)
         self.set_port(port, mask, mask if level else 0, cycle)
 
     def set_port(self, port: int, mask: int, levels: int, cycle: int | None = None) -> None:
-        """The outside drives the pins in `mask` of a port."""
+        """Drive the pins in `mask` of a port from outside."""
         self.input[port] = self.input[port] & ~mask | levels & mask
         self.open[port] &= ~mask
         self.apply(port, self._events.now if cycle is None else cycle)
 
     def release(self, name: str, cycle: int | None = None) -> None:
-        """The outside lets go of one pin."""
+        """Stop driving one pin from outside."""
         port, mask = parse_pin(name)
         self.open[port] |= mask
         self.input[port] &= ~mask
         self.apply(port, self._events.now if cycle is None else cycle)
 
     def get(self, name: str) -> int:
-        """Level of one pin in the current cycle, 0 or 1."""
+        """Return the level of one pin in the current cycle, 0 or 1."""
         port, mask = parse_pin(name)
         return int(bool(self.levels(port, self._events.now) & mask))
 
     def levels(self, port: int, cycle: int) -> int:
-        """Digital levels of a port in `cycle` (the present or, on waveforms, any cycle)."""
+        """Return the digital levels of a port in `cycle` (the current one; for waveforms, any)."""
         return self._with_waveforms(port, cycle, self.level[port])
 
     def _with_waveforms(self, port: int, cycle: int, level: int) -> int:
@@ -287,13 +289,13 @@ class Pins:
         return level
 
     def read_port(self, port: int, cycle: int) -> int:
-        """What an instruction reads from PORT in `cycle`: outputs show one cycle late (§6)."""
+        """Return what an instruction reads from PORT in `cycle`: outputs appear one cycle late (§6)."""
         level = (self.before if cycle <= self.changed[port] else self.level)[port]
-        waveform_pins = self.waveform_pins[port]
-        if not waveform_pins:
+        from_waveform = self.waveform_pins[port]
+        if not from_waveform:
             return level
         if cycle < self.constant_until[port]:
-            return level & ~waveform_pins | self.constant_levels[port]
+            return level & ~from_waveform | self.constant_levels[port]
         waveforms = self._waveforms[port]
         if len(waveforms) == 1:
             ((mask, wave),) = waveforms
@@ -303,10 +305,10 @@ class Pins:
             until = min(wave.constant_until(cycle) for _, wave in waveforms)
         if until > cycle:
             self.constant_levels[port], self.constant_until[port] = waved, until
-        return level & ~waveform_pins | waved
+        return level & ~from_waveform | waved
 
     def apply(self, port: int, cycle: int, by_chip: bool = False) -> None:
-        """Recompute a port's levels after any of the arrays changed; they hold from `cycle` on."""
+        """Recompute a port's levels after any of the arrays changed; the new levels hold from `cycle` on."""
         outside = self.input[port] | self.pullup[port] & self.open[port]
         drive = self.drive[port]
         level = (self.output[port] & drive | outside & ~drive) & ~self.analog[port]
@@ -323,7 +325,7 @@ class Pins:
             self._edges.append((cycle, port, level))
         if self._lazy_watchers[port]:
             self.flush()
-            self._tell_lazy(cycle, port, level, self._lazy_watchers[port])
+            self._notify_lazy(cycle, port, level, self._lazy_watchers[port])
         for mask, watcher in self._watchers[port]:
             if changed & mask:
                 watcher(cycle, changed & mask, level)

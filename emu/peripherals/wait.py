@@ -1,6 +1,6 @@
-"""Waiting for what a firmware says, in simulated time.
+"""Wait for output of the firmware, in simulated time.
 
-What enters: a pattern, a time. What leaves: the match, at the cycle in which its last byte has left the pin. Waiting is
+Input: a pattern and a time limit. Output: the match, at the cycle in which its last byte has left the pin. The wait is
 deterministic: the same firmware and input give the same cycle.
 """
 
@@ -13,64 +13,66 @@ from typing import Any, Final
 from emu.peripherals.base import CpuSignals
 
 Pattern = str | bytes | re.Pattern[bytes]
-SHOWN: Final = 200
-"""Bytes of what was heard that a message quotes."""
+QUOTED_BYTES: Final = 200
+"""Number of received bytes that an error message quotes."""
 
 
 class ExpectError(AssertionError):
-    """What was expected was not said in time; the text tells what was."""
+    """The expected output did not arrive in time; the message quotes what arrived instead."""
 
 
 class OutputMatcher:
-    """Listens to one line from its first use on."""
+    """Collects the output of one UART and searches it for patterns."""
 
     def __init__(self, name: str, wires: CpuSignals, fcy: Callable[[], float], now: Callable[[], int]) -> None:
         self._name: Final = name
         self._wires: Final = wires
         self._fcy: Final = fcy
         self._now: Final = now
-        self._wanted: re.Pattern[bytes] | None = None
-        self.heard: Final = bytearray()
-        """Everything said since then."""
-        self.place = 0
-        """What lies before has been matched."""
+        self._pattern: re.Pattern[bytes] | None = None
+        self.received: Final = bytearray()
+        """All bytes received since the matcher was created."""
+        self.position = 0
+        """Offset behind the last match; the next search starts here."""
 
-    def hear(self, byte: int, _cycle: int) -> None:
-        """A byte was said."""
-        self.heard.append(byte & 0xFF)
-        if self._wanted is not None and self._wanted.search(self.heard, self.place):
+    def on_byte(self, byte: int, _cycle: int) -> None:
+        """Append a received byte; end the run if the pattern matches."""
+        self.received.append(byte & 0xFF)
+        if self._pattern is not None and self._pattern.search(self.received, self.position):
             self._wires.end_run()
 
     def expect(self, pattern: Pattern, within: float, drain: Callable[[], None]) -> re.Match[bytes]:
-        """See `Uart.expect`."""
-        wanted = compiled(pattern)
+        """Run the machine until `pattern` matches; see `Uart.expect`."""
+        wanted = compile_pattern(pattern)
         cycles = max(1, round(within * self._fcy() / 1000))
         end = self._now() + cycles
         stop: Any = None
-        while (found := wanted.search(self.heard, self.place)) is None:
+        while (found := wanted.search(self.received, self.position)) is None:
             if self._now() >= end or (stop is not None and stop.reason not in ("limit", "interrupted")):
-                raise ExpectError(self._failed(wanted, within, stop))
-            self._wanted = wanted
+                raise ExpectError(self._failure_message(wanted, within, stop))
+            self._pattern = wanted
             try:
                 stop = self._wires.run(end - self._now())
             finally:
-                self._wanted = None
+                self._pattern = None
             if stop.reason == "halt":
                 drain()
-        self.place = found.end()
+        self.position = found.end()
         return found
 
-    def _failed(self, wanted: re.Pattern[bytes], within: float, stop: Any) -> str:
-        said = bytes(self.heard[self.place :])
-        quoted = repr(said[-SHOWN:])[1:] + (f" (the last {SHOWN} of {len(said)} bytes)" if len(said) > SHOWN else "")
-        text = f"{self._name} did not say {wanted.pattern!r} within {within:g} ms, but {quoted}"
+    def _failure_message(self, wanted: re.Pattern[bytes], within: float, stop: Any) -> str:
+        output = bytes(self.received[self.position :])
+        quoted = repr(output[-QUOTED_BYTES:])[1:] + (
+            f" (the last {QUOTED_BYTES} of {len(output)} bytes)" if len(output) > QUOTED_BYTES else ""
+        )
+        text = f"{self._name} did not send {wanted.pattern!r} within {within:g} ms; it sent {quoted}"
         if stop is not None and stop.fault is not None:
             return f"{text}\n{stop.fault.report()}"
         return text + (f"; the run ended: {stop.reason}" if stop is not None and stop.reason != "limit" else "")
 
 
-def compiled(pattern: Pattern) -> re.Pattern[bytes]:
-    """Text and bytes mean themselves, compiled patterns are searched."""
+def compile_pattern(pattern: Pattern) -> re.Pattern[bytes]:
+    """Return a regular expression: text and bytes match literally, compiled patterns are used as they are."""
     if isinstance(pattern, re.Pattern):
         return pattern
     return re.compile(re.escape(pattern.encode("latin-1") if isinstance(pattern, str) else bytes(pattern)))

@@ -1,7 +1,7 @@
 """Who called whom while a program ran, through interrupts and threads; the work is done by follow.c.
 
-What enters: notes of a ledger. What leaves: `CallEdge`s, one for every place that called something, and if wanted `CallEvent`s,
-everything that happened in order.
+What enters: notes of a ledger. What leaves: `CallEdge`s, one for every place that called something, and if wanted
+`CallEvent`s, everything that happened in order.
 """
 
 from __future__ import annotations

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from emu.debug.inspector import Inspector
-from emu.dspic30f.cycle_accounting import Ledger
+from emu.dspic30f.cycle_accounting import CycleAccounting
 from emu.image.model import Image
 from emu.profile.call_graph import CallEdge, CallEvent, CallGraph
 
@@ -107,7 +107,7 @@ class Profiler:
         self._native: Final = self._runner if isinstance(self._runner, JitEngine) else None
         self._timed: Final = timed
         self._tree: Final = CallGraph(machine.cycle, machine.pc, timed)
-        self._ledger: Final = Ledger(machine.core, self._tree.take)
+        self._accounting: Final = CycleAccounting(machine.core, self._tree.take)
         self._rows: Final[dict[int, int]] = {}
         self._inside: Final[dict[int, frozenset[str]]] = {}
         self._places: Final[dict[int, Place]] = {}
@@ -120,12 +120,12 @@ class Profiler:
 
     def run(self, until: int, skip: int = 0) -> Profile:
         """Run to cycle `until`, and count from cycle `skip` on; ends earlier with whatever stops the machine."""
-        machine, ledger, entry = self._machine, self._ledger, self._machine.pc
+        machine, accounting, entry = self._machine, self._accounting, self._machine.pc
         close = self._open()
         try:
             stop = self._advance(skip) if skip > machine.cycle else None
-            ledger.drain()
-            ledger.clear()
+            accounting.flush_log()
+            accounting.clear()
             self._tree.clear(machine.cycle)
             profile = Profile(entry, machine.cycle)
             profile.stop = stop or self._advance(until)
@@ -148,9 +148,9 @@ class Profiler:
 
     def _open(self) -> Callable[[], None]:
         if self._native is not None:
-            return self._native.keep(self._ledger, self.row_of)
-        self._ledger.open()
-        return self._ledger.close
+            return self._native.start_accounting(self._accounting, self.row_of)
+        self._accounting.start()
+        return self._accounting.stop
 
     def _advance(self, until: int) -> Stop | None:
         self._machine.events.kick()  # no cycle passes unseen
@@ -158,8 +158,8 @@ class Profiler:
 
     def _read(self, profile: Profile) -> None:
         profile.end = self._machine.cycle
-        cells = self._ledger.cells
-        profile.idle = self._ledger.idle
+        cells = self._accounting.cells
+        profile.idle = self._accounting.idle
         for level, cycles in enumerate(cells.sum(axis=1).tolist()):
             if cycles:
                 profile.levels[level] = cycles

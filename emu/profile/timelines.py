@@ -16,7 +16,7 @@ from emu.profile.cycle_shares import Place
 from emu.profile.tracks import MAIN, Track, Tracks
 
 SENDS: Final = ("Sys_Send_Event", "Sys_Send_IntEvent")
-DELIVERIES: Final = frozenset({"run_handlers", "ask_waiters"})
+DELIVERIES: Final = frozenset({"run_handlers", "evaluate_conditions"})
 """Of the kernel, inlined or not: what calls the listeners of an event (firmware/openswarm/kernel/event.c)."""
 ROBOT: Final = 1
 """Process number of the one robot."""

@@ -1,8 +1,8 @@
 """What happened in order, as tracks: one for every stack of the firmware and one for every interrupt level.
 
-What enters: turns. What leaves: `TrackEvent`s in the order of time: something begins or ends on a track. While a track does
-not run nothing is open on it; what was open is opened again when it goes on. So the open time of all tracks is the time
-in which the CPU worked.
+What enters: turns. What leaves: `TrackEvent`s in the order of time: something begins or ends on a track. While a track
+does not run nothing is open on it; what was open is opened again when it goes on. So the open time of all tracks is the
+time in which the CPU worked.
 """
 
 from __future__ import annotations

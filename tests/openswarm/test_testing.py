@@ -86,9 +86,9 @@ def called(folder: Path, *words: str) -> str:
 def test_a_failure_says_where_and_leaves_a_waveform(tests, how):
     said = called(tests, "--junitxml", "out.xml", "-o", "junit_family=xunit1", *how)
     assert "2 failed, 3 passed" in said
-    assert "FirmwareFault: UART1 did not say b'alive' within 50 ms, but" in said
+    assert "FirmwareFault: UART1 did not send b'alive' within 50 ms; it sent" in said
     assert re.search(r"address error trap: writing 2 bytes at 0x3001.*\(store\+0x\w+, .*main\.c:3\)", said)
-    assert "did not say b'ready' within 50 ms, but '\\r\\n'" in said
+    assert "did not send b'ready' within 50 ms; it sent '\\r\\n'" in said
     assert "the test failed; at" in said
     folder = tests / "robot-artefacts" / "test_it.py_test_it_survives_an_answer"
     assert f"waveform: {folder / 'waves.vcd'}" in said

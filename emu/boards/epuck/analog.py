@@ -24,9 +24,9 @@ PULSE_PINS: Final = ("RF7", "RF8", "RG0", "RG1")
 TAU_SECONDS: Final = 60e-6
 """Time constant of the receiver behind its emitter (epuck.md §10)."""
 _SETTLED: Final = 9.2
-"""Time constants after which less than half a count is missing of the largest reflection."""
-_GONE: Final = 45.0
-"""Time constants after which nothing of a switch is left in a sum of counts: 4095 e^-45 is 1e-16."""
+"""Time constants after which the largest reflection has settled to within half a count."""
+_DECAYED: Final = 45.0
+"""Time constants after which a switch no longer affects a sum of counts: 4095 e^-45 is 1e-16."""
 _FASTEST_HZ: Final = 30e6
 """The fastest clock (chip §3)."""
 AMBIENT: Final = 3800  # UNVERIFIED: 3500 to 4000 indoors (epuck.md §5)
@@ -42,17 +42,17 @@ RESPONSE: Final = (  # distance in mm, reflection in counts: OpenSwarm's table (
 
 _NEAR: Final = tuple(distance for distance, _ in RESPONSE)
 _SLOPE: Final = tuple(math.log(low / high) / (far - near) for (near, high), (far, low) in pairwise(RESPONSE))
-"""Of the logarithm, per mm, behind each point of the table."""
+"""Slope of the logarithm per mm, after each point of the table."""
 
 
 def reflection_at(distance_mm: float) -> float:
-    """Reflection in counts of a white surface at `distance_mm`, interpolated on a log scale; 0 behind the table."""
+    """Return the reflection of a white surface in counts, interpolated on a log scale; 0 beyond the table."""
     if distance_mm <= _NEAR[0]:
         return RESPONSE[0][1]
     if not distance_mm <= _NEAR[-1]:
         return 0.0
-    place = bisect_left(_NEAR, distance_mm) - 1
-    return RESPONSE[place][1] * math.exp(_SLOPE[place] * (distance_mm - _NEAR[place]))
+    index = bisect_left(_NEAR, distance_mm) - 1
+    return RESPONSE[index][1] * math.exp(_SLOPE[index] * (distance_mm - _NEAR[index]))
 
 
 class _Ring(Structure):
@@ -60,7 +60,7 @@ class _Ring(Structure):
 
     _fields_ = [
         *((name, c_int64) for name in ("ambient", "reflection", "lit", "since", "from", "tau", "seed", "strength")),
-        *((name, c_double) for name in ("gone", "noise_counts", "noise_share")), ("begin", c_int64),
+        *((name, c_double) for name in ("decayed", "noise_counts", "noise_share")), ("begin", c_int64),
         ("past_ambient", c_uint16 * SENSORS), ("past_reflection", c_uint16 * SENSORS),
         ("outside", c_void_p), ("light", c_void_p),
     ]  # fmt: skip
@@ -75,7 +75,7 @@ def _code() -> dict[str, Callable[..., int]]:
 
 
 class Infrared(BoardPart):
-    """Eight reflective sensors: raw = ambient - reflection x how far the receiver has settled - `shine`'s (ring.c)."""
+    """Eight reflective sensors: raw = ambient - reflection x settled share - external light (ring.c)."""
 
     def __init__(self, chip: Peripherals, noise: Noise) -> None:
         super().__init__("ir", chip)
@@ -84,24 +84,24 @@ class Infrared(BoardPart):
         self._prepare: Callable[[int], None] | None = None
         self._is_ready = False
         self.ambient: Final = self.array("ambient", "H", SENSORS)
-        """Raw counts with the emitter off, per sensor. Falls with light."""
+        """Raw counts with the emitter off, per sensor; more light gives fewer counts."""
         self.reflection: Final = self.array("reflection", "H", SENSORS)
-        """Counts by which the emitter's own light lowers them when settled, per sensor."""
+        """Counts by which the sensor's own emitter lowers them once settled, per sensor."""
         self._lit: Final = self.array("lit", "B", len(PULSE_PINS))
         self._since: Final = self.array("since", "Q", len(PULSE_PINS))
         self._from: Final = self.array("from", "H", len(PULSE_PINS))
         """Settled share at the last switch, in 1/65535."""
         self._tau: Final = self.cell("tau", "Q")
-        """`tau_seconds` in Tcy, the bits of a double."""
+        """`tau_seconds` in Tcy, stored as the bits of a double."""
         own = ("ir.ambient", "ir.reflection", "ir.lit", "ir.since", "ir.from", "ir.tau")
         places = [self.record.fields[name].offset for name in (*own, "noise.seed", "noise.strength")]
-        gone = _GONE * self._tau_seconds * _FASTEST_HZ
-        self._ring: Final = _Ring(*places, gone, NOISE_COUNTS, NOISE_SHARE)
+        decayed = _DECAYED * self._tau_seconds * _FASTEST_HZ
+        self._ring: Final = _Ring(*places, decayed, NOISE_COUNTS, NOISE_SHARE)
         self._ring_at: Final = addressof(self._ring)
         self._level_of, self._settled = _code()["level"], _code()["settled"]
-        self._answers: Final = address_of(self._level_of)
-        self._retime()
-        chip.oscillator.on_change.append(self._retime)
+        self._native_source: Final = address_of(self._level_of)
+        self._update_tau()
+        chip.oscillator.on_change.append(self._update_tau)
         self._sources: Final = [partial(self._level, sensor) for sensor in range(SENSORS)]
         for sensor in range(SENSORS):
             self.ambient[sensor] = AMBIENT
@@ -109,7 +109,7 @@ class Infrared(BoardPart):
         for line, pin in enumerate(PULSE_PINS):
             self.pins.watch(pin, partial(self._switched, line))
             self._predict(line)
-        self.answer(True)
+        self.set_native_ready(True)
         noise.on_change.append(self._predict_all)
 
     @property
@@ -120,61 +120,64 @@ class Infrared(BoardPart):
     @tau_seconds.setter
     def tau_seconds(self, seconds: float) -> None:
         self._tau_seconds = seconds
-        self._ring.gone = _GONE * seconds * _FASTEST_HZ
-        self._retime()
+        self._ring.decayed = _DECAYED * seconds * _FASTEST_HZ
+        self._update_tau()
 
-    def _retime(self) -> None:
+    def _update_tau(self) -> None:
         (self._tau.value,) = struct.unpack("<Q", struct.pack("<d", self._tau_seconds * self.chip.fcy))
 
     def set_external_light(self, prepare: Callable[[int], None], light: int, data: int) -> None:
-        """From now on each conversion asks host code for the counts taken off by whatever else shines on a sensor:
-        double light(data, sensor, cycle). Before, `prepare(cycle)` is called, which may set `ambient` and `reflection`,
-        unless `answer` has said that there is no need."""
+        """Subtract external light: native code double light(data, sensor, cycle) returns the counts to subtract.
+
+        Each conversion first calls `prepare(cycle)`, which may set `ambient` and `reflection`, unless
+        `set_native_ready(True)` is in force.
+        """
         self._prepare = prepare
         self._ring.outside, self._ring.light = light, data
-        self.answer(False)
+        self.set_native_ready(False)
         self._predict_all()
 
-    def answer(self, is_ready: bool) -> None:
-        """Whether the levels of all cycles up to the next call are known without preparation, so that native code may
-        ask for them by itself."""
+    def set_native_ready(self, is_ready: bool) -> None:
+        """Declare whether native code may compute levels without `prepare`, until the next call."""
         if is_ready == self._is_ready:
             return
         self._is_ready = is_ready
         for sensor, source in enumerate(self._sources):
-            code = self._answers if is_ready else 0
-            self.chip.adc.source.answer(_FIRST_CHANNEL + sensor, source, code, self._ring_at)
+            code = self._native_source if is_ready else 0
+            self.chip.adc.source.set_native(_FIRST_CHANNEL + sensor, source, code, self._ring_at)
 
     def start_segment(self, cycle: int) -> None:
-        """What `ambient` and `reflection` become now holds from `cycle` on; for conversions before it they stay what
-        they are. Those before the cycle said last must have been carried out."""
+        """Start a new segment: values set from now on hold from `cycle` on; earlier conversions use the current ones.
+
+        All conversions before the previous segment's start must be complete.
+        """
         ring = self._ring
         ring.begin = cycle
         ring.past_ambient[:], ring.past_reflection[:] = self.ambient, self.reflection
 
     def set_distance(self, sensor: int, millimetres: float, share: float = 1.0) -> None:
-        """Put a surface in front of a sensor (0..7); `share` scales for colour and angle (0..1, black about 0.2)."""
+        """Place a surface in front of a sensor (0..7); `share` scales for colour and angle (0..1, black about 0.2)."""
         self.set_distances([(sensor, millimetres, share)])
 
     def set_distances(self, surfaces: Iterable[tuple[int, float, float]]) -> None:
-        """As `set_distance` for several (sensor, millimetres, share)."""
+        """Place several surfaces, each (sensor, millimetres, share); see `set_distance`."""
         self.chip.adc.catch_up(self.now)
         for sensor, millimetres, share in surfaces:
             self.reflection[sensor] = round(reflection_at(millimetres) * share)
         self._predict_all()
 
     def set_ambient(self, sensor: int, counts: int) -> None:
-        """Ambient light at a sensor as raw counts 0..4095 (dark is high)."""
+        """Set the ambient light at a sensor as raw counts 0..4095 (dark is high)."""
         self.chip.adc.catch_up(self.now)
         self.ambient[sensor] = counts
         self._predict(sensor % len(PULSE_PINS))
 
     def is_lit(self, sensor: int) -> bool:
-        """Whether the emitter of a sensor is on: other robots may see it."""
+        """Whether the emitter of a sensor is on, for other robots' sensors."""
         return bool(self._lit[sensor % len(PULSE_PINS)])
 
     def lines_lit(self) -> list[bool]:
-        """Whether each pulse line lights its two emitters."""
+        """Return, for each pulse line, whether its two emitters are on."""
         return [bool(lit) for lit in self._lit]
 
     def _switched(self, line: int, cycle: int, changed: int, levels: int) -> None:
@@ -191,7 +194,7 @@ class Infrared(BoardPart):
             self._predict(line)
 
     def _predict(self, line: int) -> None:
-        """Tell the converter what the receivers of a line will show once they have settled: without noise a number."""
+        """Predict the levels of a line's receivers once settled; without noise they are constant."""
         for sensor in (line, line + len(PULSE_PINS)):
             raw = self.ambient[sensor] - self.reflection[sensor] * bool(self._lit[line])
             level = None if self._noise.strength or self._prepare else min(max(raw, 0), 4095) << 4
@@ -205,7 +208,7 @@ class Infrared(BoardPart):
 
 
 class Accelerometer(BoardPart):
-    """The analog part of hardware up to 1.2 on AN5..AN7: 2048 at 0 g, 800 counts per g (epuck.md §6)."""
+    """Analog accelerometer of hardware up to 1.2, on AN5..AN7: 2048 at 0 g, 800 counts per g (epuck.md §6)."""
 
     ZERO: Final = 2048
     PER_G: Final = 800
@@ -216,7 +219,7 @@ class Accelerometer(BoardPart):
         self.set_g(0.0, 0.0, 1.0)
 
     def set_g(self, x: float, y: float, z: float) -> None:
-        """Acceleration in g: x to the right, y backward, z up (1 at rest). UNVERIFIED signs of x and y."""
+        """Set the acceleration in g: x to the right, y backward, z up (1 at rest). UNVERIFIED signs of x and y."""
         for axis, value in enumerate((x, y, z)):
             code = round(self.ZERO + self.PER_G * value)
             self.chip.adc.set_input(self._FIRST + axis, min(max(code, 0), 4095) << 4)
@@ -239,7 +242,7 @@ class Microphones(BoardPart):
         noise.on_change.append(self._predict)
 
     def play(self, microphone: int, sound: Callable[[int], float] | None) -> None:
-        """Let `sound(cycle)` (in counts around 0) reach microphone 0..2 (right, left, back), or None for silence."""
+        """Play sound(cycle), in counts around 0, at microphone 0..2 (right, left, back); None means silence."""
         self.chip.adc.catch_up(self.now)
         channel = self._FIRST + microphone
         loud = partial(self._level, channel, sound)
@@ -247,12 +250,12 @@ class Microphones(BoardPart):
         self._predict()
 
     def _predict(self) -> None:
-        """Silence without noise is a number."""
+        """Predict the level of silent microphones, which is constant without noise."""
         self.chip.adc.catch_up(self.now)
         for microphone, quiet in enumerate(self._quiet):
             level = None if self._noise.strength else self.ZERO << 4
             self.chip.adc.source.predict(self._FIRST + microphone, quiet, level)
 
     def _level(self, channel: int, sound: Callable[[int], float] | None, cycle: int) -> int:
-        heard = self.ZERO + self._noise.at(channel, cycle, self.DEVIATION) + (sound(cycle) if sound is not None else 0)
-        return min(max(round(heard), 0), 4095) << 4
+        counts = self.ZERO + self._noise.at(channel, cycle, self.DEVIATION) + (sound(cycle) if sound is not None else 0)
+        return min(max(round(counts), 0), 4095) << 4

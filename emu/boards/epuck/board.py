@@ -1,63 +1,35 @@
-"""The whole robot: every part of the e-puck joined to a chip's pins (epuck.md §1, §2, §10)."""
+"""The e-puck: its parts, its stimulus player, and its inputs and outputs as arrays."""
 
 from __future__ import annotations
 
 from functools import cached_property
 from typing import TYPE_CHECKING, Final
 
-from emu.boards.epuck.analog import Accelerometer, Infrared, Microphones
-from emu.boards.epuck.camera.camera import Camera
-from emu.boards.epuck.config import CHIP, CONFIG, CRYSTAL_HZ
-from emu.boards.epuck.motors import Motors
-from emu.boards.epuck.remote import Remote
-from emu.boards.epuck.simple import Battery, Bluetooth, Codec, Leds, Selector
+from emu.boards.epuck.hardware import EpuckHardware
 from emu.boards.epuck.stimulus import Stimulus
-from emu.boards.noise import Noise
 from emu.peripherals import Peripherals
 
-if TYPE_CHECKING:  # arrays are loaded when somebody asks for them
+if TYPE_CHECKING:  # numpy is imported on the first use of the arrays
     from emu.boards.epuck.exchange import Inputs, Outputs
 
 
-class Epuck:
-    """An e-puck of hardware version 1.1 or 1.2: analog accelerometer, nothing at I2C address 0x3C.
-
-    `chip` is `machine.peripherals`. `camera` names the sensor (PO3030K, PO6030K, PO8030D), None leaves it unplugged.
-    `seed` chooses noise and radio losses, which are off until asked for (`noise.strength`, `bluetooth.loss`).
-    Raises ValueError for an unknown sensor or selector position, and for a chip that no e-puck carries.
-    """
+class Epuck(EpuckHardware):
+    """An e-puck of hardware version 1.1 or 1.2; see `EpuckHardware` for the parameters."""
 
     def __init__(self, chip: Peripherals, *, camera: str | None = "PO6030K", selector: int = 0, seed: int = 0) -> None:
-        if chip.context.chip.name != CHIP:
-            raise ValueError(f"an e-puck carries a {CHIP}, not a {chip.context.chip.name}")
-        chip.fit(crystal=CRYSTAL_HZ, config=CONFIG)
-        self.chip: Final = chip
-        self.noise: Final = Noise(chip.context.bus.record, seed)
-        self.leds: Final = Leds(chip)
-        self.motors: Final = Motors(chip)
-        self.selector: Final = Selector(chip, selector)
-        self.battery: Final = Battery(chip)
-        self.ir: Final = Infrared(chip, self.noise)
-        self.accelerometer: Final = Accelerometer(chip)
-        self.microphones: Final = Microphones(chip, self.noise)
-        self.remote: Final = Remote(chip)
-        self.bluetooth: Final = Bluetooth(chip, seed=seed)
-        self.codec: Final = Codec(chip)
-        self.camera: Final = Camera(chip, camera) if camera is not None else None
-        if self.camera is not None:
-            chip.on_restored.append(self.camera.restored)
+        super().__init__(chip, camera=camera, selector=selector, seed=seed)
         self.stimulus: Final = Stimulus(self)
 
     @cached_property
     def outputs(self) -> Outputs:
-        """What the robot does, as arrays."""
+        """The robot's outputs as arrays."""
         from emu.boards.epuck.exchange import Outputs
 
         return Outputs(self)
 
     @cached_property
     def inputs(self) -> Inputs:
-        """What the robot feels, as arrays."""
+        """The robot's inputs as arrays."""
         from emu.boards.epuck.exchange import Inputs
 
         return Inputs(self)

@@ -1,4 +1,4 @@
-"""The e-puck as data: its chip, its crystal, and the configuration words kept when firmware arrives without any."""
+"""The e-puck as data: its chip, its crystal, and the configuration words for firmware without any."""
 
 from __future__ import annotations
 
@@ -19,5 +19,5 @@ CONFIG: Final[Mapping[str, int]] = MappingProxyType(
         "FGS": 0xFFFF,  # no code protection
     }
 )
-"""What the robot's library and boot loader program (dspic30f6014a.md §2). Firmware images often leave these words out,
-because a boot loader cannot write them; an erased FWDT would mean a running watchdog."""
+"""What the robot's library and boot loader program (dspic30f6014a.md §2). Firmware images often omit these words,
+because a boot loader cannot write them; an erased FWDT would enable the watchdog."""

@@ -1,42 +1,40 @@
-"""What a simulated world and a robot tell each other, as arrays: read `Outputs`, move the world, write `Inputs`.
+"""Exchange between a robot and a simulated world, as arrays: read `Outputs`, move the world, write `Inputs`.
 
     machine.run_until(cycle)
-    robot.outputs.update()          # steps, LEDs, emitters ... as of now
+    robot.outputs.update()          # steps, LEDs, emitters ... at the current cycle
     ...                             # the world moves
     robot.inputs.distance[:] = ...
-    robot.inputs.apply()            # holds from now on
+    robot.inputs.apply()            # holds from the current cycle on
 
-The camera asks by itself when a line is read out (`Camera.sample`); the remote control is `Remote.press`.
+The camera calls its pixel source when a line is read out (`Camera.sample`). The remote control is `Remote.press`.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from emu.boards.epuck.analog import PULSE_PINS, SENSORS
+from emu.boards.epuck.hardware import EpuckHardware
 from emu.boards.epuck.simple import LED_PINS
-
-if TYPE_CHECKING:
-    from emu.boards.epuck.board import Epuck
 
 LEFT, RIGHT = 0, 1
 """Index of the wheels."""
 
 
 class Outputs:
-    """What the robot does. Arrays keep their identity; `update` fills them."""
+    """Outputs of the robot. `update` fills the arrays in place."""
 
-    def __init__(self, board: Epuck) -> None:
+    def __init__(self, board: EpuckHardware) -> None:
         self._board: Final = board
         self.steps: Final[NDArray[np.int64]] = np.zeros(2, np.int64)
         """Motor steps since power-on, left and right, forward positive; 1000 make one turn (epuck.md §3)."""
         self.lost: Final[NDArray[np.int64]] = np.zeros(2, np.int64)
         """Steps lost by jumps of two phases."""
         self.illegal: Final[NDArray[np.int64]] = np.zeros(2, np.int64)
-        """Patterns that are no phase."""
+        """Coil patterns that are not a phase."""
         self.coil_cycles: Final[NDArray[np.int64]] = np.zeros(2, np.int64)
         """Tcy during which coils were on."""
         self.leds: Final[NDArray[np.bool_]] = np.zeros(len(LED_PINS), np.bool_)
@@ -44,12 +42,12 @@ class Outputs:
         self.emitters: Final[NDArray[np.bool_]] = np.zeros(len(PULSE_PINS), np.bool_)
         """Infrared pulse lines; line n lights the emitters of sensors n and n + 4."""
         self.camera_running = False
-        """The camera is plugged in and out of reset."""
+        """Whether the camera is plugged in and not in reset."""
         self.speaker_on = False
         self._levels = b""
 
     def update(self) -> None:
-        """Take over the present state, and make the past final: what the ADC sampled up to now is done."""
+        """Read the current state. Complete all conversions that sampled earlier, so later inputs cannot affect them."""
         board = self._board
         board.chip.adc.catch_up(board.chip.adc.now)
         left, right = board.motors.left.counts(), board.motors.right.counts()
@@ -67,26 +65,29 @@ class Outputs:
 
 
 class Inputs:
-    """What the robot feels. Write the arrays and attributes, then call `apply`."""
+    """Inputs of the robot. Write the arrays and attributes, then call `apply`."""
 
-    def __init__(self, board: Epuck) -> None:
+    def __init__(self, board: EpuckHardware) -> None:
         self._board: Final = board
         self.distance: Final[NDArray[np.float64]] = np.full(SENSORS, np.inf)
-        """mm from each infrared sensor's front to the nearest surface; inf = nothing."""
+        """Distance in mm from each infrared sensor to the nearest surface; inf = none."""
         self.share: Final[NDArray[np.float64]] = np.ones(SENSORS)
-        """Reflection as a share of that of a white perpendicular surface, 0..1."""
+        """Reflection relative to a white perpendicular surface, 0..1."""
         self.ambient: Final[NDArray[np.int64]] = np.array(board.ir.ambient, np.int64)
         """Raw counts 0..4095 with the emitter off; dark is high."""
         self.acceleration: Final[NDArray[np.float64]] = np.array([0.0, 0.0, 1.0])
-        """g, as `Accelerometer.set_g`."""
+        """Acceleration in g; see `Accelerometer.set_g`."""
         self.selector = board.selector.position
-        """0..15."""
+        """Position of the selector, 0..15."""
         self.battery = board.battery.volts
-        """V."""
+        """Battery voltage in V."""
         self._surfaces = self._light = self._motion = b""
 
     def apply(self) -> None:
-        """Let what has changed since the last time hold from the present cycle on. Raises ValueError out of range."""
+        """Apply all changes since the last call from the current cycle on.
+
+        Raises ValueError for a value out of range.
+        """
         board = self._board
         surfaces = self.distance.tobytes() + self.share.tobytes()
         if surfaces != self._surfaces:

@@ -1,5 +1,5 @@
-// Phases of a stepper motor to steps (epuck.md §3). A pattern counts once it has stood for SETTLE Tcy; nothing is posted
-// for that: what is due is settled when the next pattern comes or somebody looks.
+// Conversion of a stepper motor's phases to steps (epuck.md §3). A pattern counts once it has been constant for SETTLE
+// Tcy. No event is posted for that: the next pattern or the next read evaluates it.
 
 #include <stdint.h>
 
@@ -7,12 +7,12 @@ typedef int64_t i64;
 
 enum { SETTLE = 15, NOWHERE = 4, ILLEGAL = -1, ROOM = 4096 };
 
-// A motor's part of the machine's record.
+// State of a motor in the machine's record.
 struct state {
     i64 steps, lost, illegals, index, nibble, since, settled, on_time;
 };
 
-// When `steps` became what, for somebody who asks later. `before`: what it was in front of the first entry.
+// Step history: the value of `steps` by cycle. `before`: its value before the first entry.
 struct history {
     i64 before, count, cycle[ROOM], steps[ROOM];
 };
@@ -20,20 +20,20 @@ struct history {
 struct motor {
     struct state *state;
     i64 shift, forward;
-    struct history *history; // null: nobody asks
+    struct history *history; // null: no history is kept
 };
 
-// Phase index of a nibble; NOWHERE for all coils off, ILLEGAL for what is no phase.
+// Phase index of a nibble; NOWHERE for all coils off, ILLEGAL for a pattern that is not a phase.
 static const int8_t meaning[16] = {NOWHERE, -1, -1, -1, -1, 2, 1, -1, -1, 3, 0, -1, -1, -1, -1, -1};
 
-// The present pattern has stood long enough to count.
+// Count the present pattern, which has been constant long enough.
 static void settle(const struct motor *m)
 {
     struct state *s = m->state;
     i64 index = meaning[s->nibble];
     s->settled = 1;
     if (index == NOWHERE)
-        return; // all off: friction in the gear keeps the rotor where it is
+        return; // all coils off: friction in the gear holds the rotor
     if (index == ILLEGAL) {
         s->illegals++;
         return;
@@ -54,14 +54,14 @@ static void settle(const struct motor *m)
     h->steps[h->count++] = s->steps;
 }
 
-// What has stood long enough by cycle `now` counts.
+// Count the present pattern if it has been constant long enough by cycle `now`.
 void settle_by(const struct motor *m, i64 now)
 {
     if (!m->state->settled && now - m->state->since >= SETTLE)
         settle(m);
 }
 
-// From `cycle` on the port has `levels`.
+// Record that the port has `levels` from `cycle` on.
 void change(const struct motor *m, i64 cycle, i64 levels)
 {
     struct state *s = m->state;
@@ -73,7 +73,7 @@ void change(const struct motor *m, i64 cycle, i64 levels)
     s->settled = 0;
 }
 
-// Changes of ports in their order, each cycle << 24 | port << 16 | levels.
+// Process changes of ports in order, each cycle << 24 | port << 16 | levels.
 void decode(const struct motor *m, const uint64_t *changes, i64 count, i64 port)
 {
     for (i64 i = 0; i < count; i++)
@@ -81,7 +81,7 @@ void decode(const struct motor *m, const uint64_t *changes, i64 count, i64 port)
             change(m, (i64)(changes[i] >> 24), (i64)(changes[i] & 0xFFFF));
 }
 
-// Steps made by each of some cycles, which rise and are not behind the present; what is older is forgotten.
+// Write the steps made by each of the given cycles, which are increasing and not in the future; drop older history.
 static void steps_by(const struct motor *m, const i64 *cycles, i64 count, i64 *steps)
 {
     struct history *h = m->history;
@@ -96,28 +96,28 @@ static void steps_by(const struct motor *m, const i64 *cycles, i64 count, i64 *s
         h->cycle[i] = h->cycle[place + i], h->steps[i] = h->steps[place + i];
 }
 
-// Both motors, and what native code has done to the pins (pins.py), in order; `heard`: ports whose changes others are
-// told too.
+// Both motors and the ring of pin changes made by native code (pins.py). `watched`: ports whose changes have other
+// consumers.
 struct pair {
     const struct motor *left, *right;
     i64 port;
     uint64_t *changes, *count;
-    uint16_t *told;
-    i64 heard;
+    uint16_t *reported;
+    i64 watched;
 };
 
-// Both motors' steps, left, right, left and so on, once both know what is in the ring, and what counts by cycle `now`.
-// 0, and nothing is done, if others want to know of it.
+// Process the ring up to cycle `now`, then write both motors' steps at the given cycles: left, right, left and so on.
+// Return 0 without any effect if the ring holds changes with other consumers.
 i64 steps_of_both(const struct pair *p, i64 now, const i64 *cycles, i64 count, i64 *steps)
 {
     i64 changes = (i64)*p->count;
     for (i64 i = 0; i < changes; i++)
-        if (p->heard >> (p->changes[i] >> 16 & 0xFF) & 1)
+        if (p->watched >> (p->changes[i] >> 16 & 0xFF) & 1)
             return 0;
     decode(p->left, p->changes, changes, p->port);
     decode(p->right, p->changes, changes, p->port);
     for (i64 i = 0; i < changes; i++) {
-        p->told[p->changes[i] >> 16 & 0xFF] = (uint16_t)p->changes[i];
+        p->reported[p->changes[i] >> 16 & 0xFF] = (uint16_t)p->changes[i];
         p->changes[i] = 0;
     }
     *p->count = 0;

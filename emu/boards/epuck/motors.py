@@ -1,7 +1,7 @@
 """The two stepper motors (epuck.md §3): phases to steps, lost and illegal sequences, coil time.
 
-Software writes the four phase bits one after the other, so intermediate nibbles appear for a few cycles: a nibble
-counts once it has stood for `SETTLE` Tcy. Nothing is posted for that; what is due is settled when somebody looks.
+Software writes the four phase bits one after the other, so intermediate nibbles appear for a few cycles. A nibble
+counts once it has been constant for `SETTLE` Tcy. No event is posted for that: the next pattern or read evaluates it.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ MM_PER_STEP: Final = 0.128
 _NOWHERE: Final = 4
 """Index before the first pattern."""
 _STEPS, _LOST, _ILLEGALS, _INDEX, _NIBBLE, _SINCE, _SETTLED, _ON_TIME = range(8)
-"""Places in `motor.<side>.state`: `struct state` of motors.c."""
+"""Indices in `motor.<side>.state`; twin of `struct state` in motors.c."""
 
 
 class _History(Structure):
@@ -41,7 +41,7 @@ class _Motor(Structure):
 
 class _Pair(Structure):
     _fields_ = [("left", c_void_p), ("right", c_void_p), ("port", c_int64),
-                *((name, c_void_p) for name in ("changes", "count", "told")), ("heard", c_int64)]  # fmt: skip
+                *((name, c_void_p) for name in ("changes", "count", "reported")), ("watched", c_int64)]  # fmt: skip
 
 
 @cache
@@ -55,9 +55,9 @@ def _code() -> dict[str, Callable[..., int]]:
 
 
 class Stepper(BoardPart):
-    """One motor. `steps` counts full steps, forward positive.
+    """A stepper motor. `steps` counts full steps, forward positive.
 
-    State is one run of signed 64-bit numbers in the record, because edges come by the thousand per second.
+    The state is an array of signed 64-bit numbers in the record, which the decoder in motors.c reads and writes.
     """
 
     def __init__(self, name: str, chip: Peripherals, shift: int, forward: int) -> None:
@@ -74,8 +74,8 @@ class Stepper(BoardPart):
         self._decode = code["decode"]
         self._motor: Final = _Motor(self.record.address + field.offset, shift, forward)
         self._history: _History | None = None
-        self.at: Final = addressof(self._motor)
-        """Where `struct motor` of motors.c is."""
+        self.address: Final = addressof(self._motor)
+        """Host address of `struct motor` of motors.c."""
         self.pins.watch_port(PORT, 0xF << shift, self._changed, lazy=True, reader=self._read)
         chip.on_synchronize.append(self._catch_up)
 
@@ -87,45 +87,44 @@ class Stepper(BoardPart):
 
     @property
     def lost(self) -> int:
-        """Jumps by two phases: the rotor does not follow."""
+        """Jumps by two phases, which the rotor does not follow."""
         self._catch_up()
         return self._state[_LOST]
 
     @property
     def illegal(self) -> int:
-        """Patterns that are no phase and stood for 1 us or more."""
+        """Patterns that are not a phase and were constant for 1 us or more."""
         self._catch_up()
         return self._state[_ILLEGALS]
 
     @property
     def coil_cycles(self) -> int:
-        """Tcy during which at least one coil was on: what the battery pays for."""
+        """Tcy during which at least one coil was on, a measure of energy use."""
         self._catch_up()
         state = self._state
         running = max(self.now - state[_SINCE], 0) if state[_NIBBLE] else 0
         return state[_ON_TIME] + running
 
     def counts(self) -> tuple[int, int, int, int]:
-        """`steps`, `lost`, `illegal` and `coil_cycles` in one call."""
+        """Return `steps`, `lost`, `illegal` and `coil_cycles`."""
         coil_cycles = self.coil_cycles
         state = self._state
         return state[_STEPS], state[_LOST], state[_ILLEGALS], coil_cycles
 
     def listen(self, on_step: Callable[[int, int], None]) -> None:
-        """Call on_step(cycle, direction) at each step, when the next pattern shows that it was one; `cycle` is when
-        the step's pattern appeared."""
+        """Call on_step(cycle, direction) for each step; `cycle` is when its pattern appeared."""
         self._on_step = on_step
-        self.pins.watch_port(PORT, 0xF << self._shift, lambda *_edge: None)  # so that edges come by as they happen
+        self.pins.watch_port(PORT, 0xF << self._shift, lambda *_edge: None)  # an eager watcher: every edge calls Python
 
     def record_history(self) -> None:
-        """Keep from now on when steps were made, for `Motors.steps_by`."""
+        """Record the cycles of steps from now on, for `Motors.steps_by`."""
         self._catch_up()
         self._history = _History(self._state[_STEPS], 0)
         self._motor.history = pointer(self._history)
 
     @contextmanager
     def history_paused(self) -> Iterator[None]:
-        """As `Motors.history_paused`."""
+        """Suspend the step history inside the block; see `Motors.history_paused`."""
         kept, self._motor.history = self._history, None
         try:
             yield
@@ -137,85 +136,89 @@ class Stepper(BoardPart):
         self.settled_steps(self.now)
 
     def settled_steps(self, now: int) -> int:
-        """Steps up to cycle `now`, once the pins have told all edges."""
+        """Return the steps up to cycle `now`; the pin changes must be flushed."""
         state = self._state
         if not state[_SETTLED]:
-            self._telling(self._settle_by, now)
+            self._run_and_notify(self._settle_by, now)
         return state[_STEPS]
 
     def _changed(self, cycle: int, _changed: int, levels: int) -> None:
-        """A new pattern: what the last one was is known now."""
-        self._telling(self._change, cycle, levels)
+        """Handle a new pattern, which completes the previous one."""
+        self._run_and_notify(self._change, cycle, levels)
 
     @property
     def has_listener(self) -> bool:
-        """Whether somebody hears of each step."""
+        """Whether a listener is called for each step."""
         return self._on_step is not None
 
-    def _telling(self, work: Callable[..., int], *arguments: int) -> None:
-        """Do what may find that a step was made, and tell."""
+    def _run_and_notify(self, work: Callable[..., int], *arguments: int) -> None:
+        """Run a decoder function and call the listener if it has counted a step."""
         state = self._state
         before, since = state[_STEPS], state[_SINCE]
-        work(self.at, *arguments)
+        work(self.address, *arguments)
         if state[_STEPS] != before and self._on_step is not None and not self.events.quiet:
             self._on_step(since, state[_STEPS] - before)
 
     def _read(self, changes: int, count: int) -> None:
-        """What native code has done; nobody listens for steps then."""
-        self._decode(self.at, changes, count, PORT)
+        """Process the ring; it is only used while no step listener exists."""
+        self._decode(self.address, changes, count, PORT)
 
 
 class Motors:
-    """Left and right (forward: left index falls, right index rises; epuck.md §3)."""
+    """Both motors. Forward: the left phase index falls, the right one rises (epuck.md §3)."""
 
     def __init__(self, chip: Peripherals) -> None:
         self.left: Final = Stepper("motor.left", chip, 0, -1)
         self.right: Final = Stepper("motor.right", chip, 4, 1)
         self._both_by: Final = _code()["steps_of_both"]
         self._pins: Final = chip.pins
-        self._pair: Final = _Pair(self.left.at, self.right.at, PORT, *chip.pins.ring_addresses, 0)
-        self._pair_at: Final = addressof(self._pair)
+        self._pair: Final = _Pair(self.left.address, self.right.address, PORT, *chip.pins.ring_addresses, 0)
+        self._pair_address: Final = addressof(self._pair)
 
     def steps(self) -> tuple[int, int]:
-        """Steps of both made so far (left, right): what `Stepper.steps` of each says, in one look."""
+        """Return the steps of both motors so far (left, right)."""
         left = self.left
         left.pins.flush()
         now = left.events.now
         return left.settled_steps(now), self.right.settled_steps(now)
 
     def record_history(self) -> None:
-        """As `Stepper.record_history`."""
+        """Record the cycles of both motors' steps from now on."""
         self.left.record_history()
         self.right.record_history()
 
     @contextmanager
     def history_paused(self) -> Iterator[None]:
-        """Steps made inside the block are not kept for `steps_by`: they have been made before, and are made again."""
+        """Suspend the step history inside the block, for a replay of steps that are already recorded."""
         with self.left.history_paused(), self.right.history_paused():
             yield
 
     @property
     def code(self) -> int:
-        """Where `steps_of_both` of motors.c is."""
+        """Host address of the function `steps_of_both` of motors.c."""
         return address_of(self._both_by)
 
     def native_pair(self) -> int:
-        """For compiled code that calls it: where `struct pair` is, up to date until somebody begins or ceases to watch
-        pins; 0 while somebody is told of each step."""
-        self._pair.heard = self._pins.watched_ports(2)
-        return 0 if self.left.has_listener or self.right.has_listener else self._pair_at
+        """Return the host address of `struct pair` for native code, 0 while a step listener exists.
+
+        The struct is up to date until a pin watcher is added or removed.
+        """
+        self._pair.watched = self._pins.watched_ports(2)
+        return 0 if self.left.has_listener or self.right.has_listener else self._pair_address
 
     def steps_by(self, cycles: Sequence[int]) -> array[int]:
-        """Steps of both (left, right, left and so on) as they were in some cycles, which rise from call to call; see
-        `remember`."""
+        """Return the steps of both motors at the given cycles, as left, right, left and so on.
+
+        The cycles must increase from call to call. Needs `record_history`.
+        """
         left, right, pins = self.left, self.right, self._pins
         if left.has_listener or right.has_listener:
             self.steps()
         count = len(cycles)
-        asked, made = array("q", cycles), array("q", bytes(16 * count))
-        self._pair.heard = pins.watched_ports(2)
-        arguments = self._pair_at, left.events.now, asked.buffer_info()[0], count, made.buffer_info()[0]
+        at, steps = array("q", cycles), array("q", bytes(16 * count))
+        self._pair.watched = pins.watched_ports(2)
+        arguments = self._pair_address, left.events.now, at.buffer_info()[0], count, steps.buffer_info()[0]
         if not self._both_by(*arguments):
             pins.flush()
             self._both_by(*arguments)
-        return made
+        return steps

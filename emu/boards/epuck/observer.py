@@ -1,4 +1,4 @@
-"""What a person standing beside the robot would see, as lines of text."""
+"""Report of the robot's visible and audible outputs, as lines of text."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _PAUSE_SECONDS: Final = 0.1
 
 
 class RobotObserver:
-    """Writes a line, with its time, when something visible changes. `write` gets lines without newline.
+    """Writes a line with its time when an observed output changes. `write` gets lines without newline.
 
     Raises ValueError for a topic that is not one of TOPICS.
     """
@@ -31,7 +31,7 @@ class RobotObserver:
         self._text: Final = {1: bytearray(), 2: bytearray()}
         for topic in topics:
             if topic not in TOPICS:
-                raise ValueError(f"cannot watch {topic!r}; expected some of {', '.join(TOPICS)}")
+                raise ValueError(f"cannot watch {topic!r}; expected one of {', '.join(TOPICS)}")
             getattr(self, f"_watch_{topic}")()
 
     def _line(self, cycle: int, text: str) -> None:
@@ -48,12 +48,14 @@ class RobotObserver:
             motor.listen(self._stepped)
 
     def _stepped(self, cycle: int, _direction: int) -> None:
-        """The step being reported is counted already."""
+        """Report both step counts after a step; the count includes it already."""
         if cycle < self._next_report:
             return
         second = self._board.chip.fcy
         last, self._last_report = self._last_report, cycle
-        self._next_report = cycle + round(_PAUSE_SECONDS * second)  # reading the other motor may report its step
+        self._next_report = cycle + round(
+            _PAUSE_SECONDS * second
+        )  # set first: reading the other motor may call this method
         steps = [self._board.motors.left.steps, self._board.motors.right.steps]
         text = f"motors {steps[0]} {steps[1]} steps"
         if last is not None:
@@ -72,7 +74,7 @@ class RobotObserver:
         line.listen(lambda byte, start: self._byte(number, byte, start))
 
     def _byte(self, number: int, byte: int, start: int) -> None:
-        """Text is reported by lines."""
+        """Collect a byte; report the text at the end of a line."""
         text = self._text[number]
         if byte not in (0x0A, 0x0D):
             text.append(byte & 0xFF)
@@ -81,14 +83,14 @@ class RobotObserver:
             text.clear()
 
     def finish(self) -> None:
-        """The run is over: print what is still open."""
+        """Report incomplete lines and totals at the end of the run."""
         now = self._board.chip.context.bus.events.now
         for number, text in self._text.items():
             if text:
                 self._line(now, f"uart{number} {text.decode('latin-1')!r}")
         if self._watches_motors:
             left, right = self._board.motors.left, self._board.motors.right
-            self._line(now, f"motors {left.steps} {right.steps} steps in all")
+            self._line(now, f"motors {left.steps} {right.steps} steps in total")
             for side, motor in (("left", left), ("right", right)):
                 if motor.lost or motor.illegal:
                     self._line(now, f"{side} motor: {motor.lost} steps lost, {motor.illegal} illegal patterns")
@@ -97,7 +99,7 @@ class RobotObserver:
         self._board.codec.on_sample = self._sample
 
     def _sample(self, sample: int, cycle: int) -> None:
-        """Sound is told like motors: the loudest sample of a tenth of a second."""
+        """Report the loudest sample of each tenth of a second."""
         self._loudest = max(self._loudest, abs(sample))
         if cycle >= self._next_sound:
             if self._loudest:

@@ -14,14 +14,14 @@ HALF_BIT_SECONDS: Final = 0.889e-3
 REPEAT_SECONDS: Final = 113.8e-3
 _BITS: Final = 14
 _WAITING: Final = 64
-"""Frames that can wait for their turn."""
+"""Capacity of the frame queue."""
 
 KEYS: Final = {"standby": 12, "swap": 34, "sleep": 42, "ok": 53}
 """Command codes the demonstration programs use (openswarm-original.md §5.6)."""
 
 
 class Remote(BoardPart):
-    """A hand-held sender. Frames wait for each other; those on their way when a snapshot is taken are part of it."""
+    """The remote control. Frames are queued; snapshots contain the queue and the frame being sent."""
 
     def __init__(self, chip: Peripherals) -> None:
         super().__init__("remote", chip)
@@ -40,14 +40,14 @@ class Remote(BoardPart):
     def press(self, command: int | str, address: int = 0, cycle: int | None = None, repeat: int = 1) -> None:
         """Send a command (0..63, or a name of `KEYS`) to a device address (0..31), `repeat` frames of one key press.
 
-        The first frame begins at `cycle` (default: now) or when the last one is over. Raises ValueError for numbers
-        out of range or more than 64 frames waiting, KeyError for an unknown name.
+        The first frame begins at `cycle` (default: now) or after the previous frame. Raises ValueError for numbers out
+        of range or more than 64 queued frames, KeyError for an unknown name.
         """
         code = KEYS[command] if isinstance(command, str) else command
         if not 0 <= code < 64 or not 0 <= address < 32:
             raise ValueError(f"RC-5 has commands 0..63 and addresses 0..31, not {code} and {address}")
         if self._count.value + repeat > _WAITING:
-            raise ValueError(f"more than {_WAITING} remote control frames are waiting")
+            raise ValueError(f"more than {_WAITING} remote control frames are queued")
         self._toggle.value ^= 1
         frame = 3 << 12 | self._toggle.value << 11 | address << 6 | code
         begin = max(self.now + 1 if cycle is None else cycle, self._busy_until.value)
@@ -57,9 +57,9 @@ class Remote(BoardPart):
             self._count.value += 1
         self._busy_until.value = begin + repeat * self.cycles(REPEAT_SECONDS)
         if self.events.due(self._edge) == NEVER:
-            self._take()
+            self._start_next()
 
-    def _take(self) -> None:
+    def _start_next(self) -> None:
         if self._count.value:
             head = self._head.value
             self._start.value, self._frame.value = self._at[head], self._frames[head]
@@ -68,12 +68,12 @@ class Remote(BoardPart):
             self.events.set(self._edge, self._start.value)
 
     def _next_half(self, due: int) -> None:
-        """Level of one half bit: a 1 is high then low, a 0 low then high (carrier pulls the pin low)."""
+        """Output one half bit: a 1 is high then low, a 0 low then high (the carrier pulls the pin low)."""
         half = self._half.value
         if half == 2 * _BITS:
             self.pins.set(PIN, 1, due)
             self._half.value = 0
-            self._take()
+            self._start_next()
             return
         bit = self._frame.value >> _BITS - 1 - half // 2 & 1
         self.pins.set(PIN, bit ^ half & 1, due)

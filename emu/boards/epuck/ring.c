@@ -1,6 +1,5 @@
-// What the eight infrared sensors show (epuck.md §5, §10): ambient light, less the own emitter's reflection as far as
-// the receiver has settled, less what else shines on the sensor; noise. Levels as the converter takes them: counts
-// << 4.
+// Levels of the eight infrared sensors (epuck.md §5, §10): ambient light, less the own emitter's reflection times the
+// settled share, less external light, plus noise. Levels are in the unit of the ADC: counts << 4.
 
 #include <stdint.h>
 
@@ -14,31 +13,31 @@ extern f64 rint(f64);
 enum { SENSORS = 8, LINES = 4, FIRST_CHANNEL = 8, FULL = 4095 };
 static const f64 ROOT_3 = 1.73205080756887729353;
 
-struct light; // of somebody else
+struct light; // defined by the provider of the external light
 
-// Byte offsets in the machine's record first. What is shone, reflected and ambient before cycle `begin` is `past`.
+// The first eight members are byte offsets in the machine's record. `past_*` hold before cycle `begin`.
 struct ring {
     i64 ambient, reflection, lit, since, from, tau, seed, strength;
-    f64 gone; // Tcy after which nothing of a switch is left, at any clock
+    f64 decayed; // Tcy after which a switch has no effect, at any clock
     f64 noise_counts, noise_share;
     i64 begin;
     uint16_t past_ambient[SENSORS], past_reflection[SENSORS];
-    f64 (*outside)(const struct light *, i64 sensor, i64 cycle); // counts taken off; null: nothing
+    f64 (*outside)(const struct light *, i64 sensor, i64 cycle); // counts to subtract; null: none
     const struct light *light;
 };
 
-// How far the receivers of a line have settled to full light, 0 to 1.
+// Settled share of a line's receivers, 0 to 1.
 f64 settled(const uint8_t *record, const struct ring *r, i64 line, i64 cycle)
 {
     f64 target = record[r->lit + line] ? 1 : 0, tau = *(const f64 *)(record + r->tau);
     i64 age = cycle - ((const i64 *)(record + r->since))[line];
-    if ((f64)age > r->gone)
+    if ((f64)age > r->decayed)
         return target;
     f64 start = ((const uint16_t *)(record + r->from))[line] / 65535.0;
     return target + (start - target) * exp((f64)(age > 0 ? -age : 0) / tau);
 }
 
-// Noise of a deviation on a channel in a cycle, as emu/boards/noise.py has it.
+// Noise with a standard deviation, on a channel in a cycle; equal to emu/boards/noise.py.
 static f64 noise(const uint8_t *record, const struct ring *r, i64 channel, i64 cycle, f64 deviation)
 {
     u64 strength = *(const u64 *)(record + r->strength);
@@ -52,7 +51,7 @@ static f64 noise(const uint8_t *record, const struct ring *r, i64 channel, i64 c
     return ((f64)sum / 65536.0 - 2) * ROOT_3 * deviation * ((f64)strength / 65536.0);
 }
 
-// A channel of the converter in a cycle.
+// Level of an ADC channel in a cycle.
 i64 level(const uint8_t *record, const struct ring *r, i64 channel, i64 cycle)
 {
     i64 sensor = channel - FIRST_CHANNEL, is_past = cycle < r->begin;

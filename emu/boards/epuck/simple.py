@@ -26,10 +26,10 @@ class Leds(BoardPart):
 
     def __init__(self, chip: Peripherals) -> None:
         super().__init__("leds", chip)
-        self._places: Final = {name: parse_pin(pin) for name, pin in LED_PINS.items()}
+        self._pins_by_name: Final = {name: parse_pin(pin) for name, pin in LED_PINS.items()}
 
     def listen(self, on_change: Callable[[str, bool, int], None]) -> None:
-        """Call on_change(name, lit, cycle) whenever an LED goes on or off."""
+        """Call on_change(name, lit, cycle) whenever an LED changes."""
         for name, pin in LED_PINS.items():
             self.pins.watch(pin, partial(self._changed, on_change, name))
 
@@ -41,7 +41,7 @@ class Leds(BoardPart):
 
     def __getitem__(self, name: str) -> bool:
         """Whether an LED ("led0".."led7", "front", "body") is lit. Raises KeyError for another name."""
-        port, mask = self._places[name]
+        port, mask = self._pins_by_name[name]
         return bool(self.pins.level[port] & mask)
 
     @property
@@ -50,9 +50,9 @@ class Leds(BoardPart):
         return tuple(name for name in LED_PINS if self[name])
 
     def states(self) -> list[bool]:
-        """Whether each LED is lit: ring LEDs 0-7, front, body."""
+        """Return whether each LED is lit: ring LEDs 0-7, front, body."""
         level = self.pins.level
-        return [level[port] & mask != 0 for port, mask in self._places.values()]
+        return [level[port] & mask != 0 for port, mask in self._pins_by_name.values()]
 
 
 class Selector(BoardPart):
@@ -64,7 +64,7 @@ class Selector(BoardPart):
 
     @property
     def position(self) -> int:
-        """0..15. Setting it raises ValueError for another number."""
+        """Position of the switch, 0..15. Setting it raises ValueError for another number."""
         port, _ = parse_pin("RG6")
         return self.pins.input[port] >> 6 & 0xF
 
@@ -107,10 +107,10 @@ class Battery(BoardPart):
 
 
 class Codec(BoardPart):
-    """The Si3000 behind the DCI: takes samples and control words, returns silence; RF0 low holds it in reset
-    (epuck.md §6). A sample with bit 0 set asks for a secondary frame: the next word is a control word.
+    """The Si3000 codec on the DCI: accepts samples and control words, returns silence.
 
-    UNVERIFIED layout of control words: register number in bits 12:8, value in bits 7:0.
+    RF0 low holds it in reset (epuck.md §6). After a sample with bit 0 set, the next word is a control word (secondary
+    frame). UNVERIFIED layout of control words: register number in bits 12:8, value in bits 7:0.
     """
 
     _REGISTERS: Final = 32
@@ -121,18 +121,18 @@ class Codec(BoardPart):
         self._last: Final = self.cell("last", "H")
         self._control_next: Final = self.cell("control_next", "B")
         self.registers: Final = self.array("registers", "B", self._REGISTERS)
-        """What control words have written."""
+        """Codec registers as written by control words."""
         self.on_sample: Callable[[int, int], None] | None = None
-        """on_sample(sample, cycle), sample -32768..32767: for players and recorders."""
+        """on_sample(sample, cycle): called with each sample, -32768..32767."""
         assert chip.dci is not None
-        chip.dci.on_word = self._take
+        chip.dci.on_word = self._accept_word
         chip.dci.source = lambda _slot, _cycle: 0
         self._port, self._pin = parse_pin("RF0")
-        self.pins.watch("RF0", self._reset_moved)
+        self.pins.watch("RF0", self._reset_pin_changed)
 
     @property
     def is_on(self) -> bool:
-        """AUDIO_ON."""
+        """Whether AUDIO_ON (RF0) is driven high."""
         return bool(self.pins.drive[self._port] & self.pins.output[self._port] & self._pin)
 
     @property
@@ -145,7 +145,7 @@ class Codec(BoardPart):
         """The newest word."""
         return self._last.value
 
-    def _take(self, word: int, _slot: int, cycle: int) -> None:
+    def _accept_word(self, word: int, _slot: int, cycle: int) -> None:
         if not self.is_on:
             return
         self._words.value += 1
@@ -158,7 +158,7 @@ class Codec(BoardPart):
         if self.on_sample is not None and not self.events.quiet:
             self.on_sample(word - (word >> 15 << 16), cycle)
 
-    def _reset_moved(self, _cycle: int, changed: int, levels: int) -> None:
+    def _reset_pin_changed(self, _cycle: int, changed: int, levels: int) -> None:
         if not changed & levels:
             self._control_next.value = 0
             for number in range(self._REGISTERS):
@@ -166,64 +166,66 @@ class Codec(BoardPart):
 
 
 class Bluetooth(BoardPart):
-    """UART1 as a byte pipe to a computer. Bytes can get lost: while the link is down, or at random (seeded).
+    """Bluetooth link: UART1 as a byte pipe to a computer. Bytes are lost while the link is down, or at random (seeded).
 
-    It has the interface of a `Uart` seen from outside: `on_byte` and `feed`.
+    It has the external interface of a `Uart`: `on_byte`, `listen` and `feed`.
     """
 
     def __init__(self, chip: Peripherals, loss: float = 0.0, seed: int = 0) -> None:
         super().__init__("bluetooth", chip)
         self._uart: Final = chip.uart[1]
         self._uart.listen(self._from_robot, part=True, lazy=True)
-        self._no_longer: Callable[[], None] | None = None
-        """How to tell the UART that nobody beyond the link must hear at once."""
+        self._remove_listener: Callable[[], None] | None = None
+        """Removes the eager UART listener that exists while the link has an eager listener."""
         self.loss = loss
         """Probability that a byte is lost, each way, 0..1."""
         self.dropouts: Final[list[tuple[int, int]]] = []
-        """Half-open windows of cycles in which nothing passes."""
-        self._reached: Final[Listeners[[int, int]]] = Listeners(self.events, self._hurry)
+        """Half-open ranges of cycles in which all bytes are lost."""
+        self._listeners: Final[Listeners[[int, int]]] = Listeners(self.events, self._urgency_changed)
         self._down: Final = self.cell("down", "B")
         self._random: Final = self.cell("random", "Q", seed * 2 + 1 & _ONES)
         self._lost: Final = self.cell("lost")
 
     @property
     def connected(self) -> bool:
-        """Whether the radio link is up. Set it to lose and regain the computer."""
+        """Whether the radio link is up; assign it to interrupt and restore the link."""
         return not self._down.value
 
     @connected.setter
     def connected(self, up: bool) -> None:
-        self._uart.tell()
+        self._uart.deliver_sent()
         self._down.value = not up
 
     @property
     def lost(self) -> int:
-        """Bytes that did not get through, both directions."""
+        """Number of bytes lost, in both directions."""
         return self._lost.value
 
     def listen(self, listener: Callable[[int, int], object], *, lazy: bool = False) -> Callable[[], None]:
-        """Call listener(byte, start_cycle) for what reaches the computer. Returns how to remove it. `lazy`: see
-        `Uart.listen`."""
-        return self._reached.add(listener, lazy=lazy)
+        """Call listener(byte, start_cycle) for each byte that reaches the computer. Return a function that removes it.
 
-    def _hurry(self, urgent: bool) -> None:
-        if self._no_longer is not None:
-            self._no_longer()
-        self._no_longer = self._uart.listen(lambda _byte, _start: None) if urgent else None
+        `lazy`: see `Uart.listen`.
+        """
+        return self._listeners.add(listener, lazy=lazy)
+
+    def _urgency_changed(self, urgent: bool) -> None:
+        if self._remove_listener is not None:
+            self._remove_listener()
+        self._remove_listener = self._uart.listen(lambda _byte, _start: None) if urgent else None
 
     @property
     def on_byte(self) -> Callable[[int, int], object] | None:
-        """One listener that an assignment replaces; those of `listen` hear as well."""
-        return self._reached.assigned
+        """A single listener, replaced by assignment, in addition to those added by `listen`."""
+        return self._listeners.assigned
 
     @on_byte.setter
     def on_byte(self, listener: Callable[[int, int], object] | None) -> None:
-        self._reached.assigned = listener
+        self._listeners.assigned = listener
 
     def feed(self, data: bytes | Iterable[int], cycle: int | None = None, *, errors: int = 0) -> None:
-        """The computer sends; see `Uart.feed` for `cycle` and `errors`."""
+        """Send bytes from the computer; see `Uart.feed` for `cycle` and `errors`."""
         at = self.now if cycle is None else cycle
-        self._uart.tell()
+        self._uart.deliver_sent()
         self._uart.feed([byte for byte in data if not self._drops(at)], cycle, errors=errors)
 
     def _drops(self, cycle: int) -> bool:
@@ -233,7 +235,7 @@ class Bluetooth(BoardPart):
         return dropped
 
     def _draw(self) -> float:
-        """Uniform in 0..1 from a xorshift generator whose state is in the record."""
+        """Return a uniform random number in 0..1, from a xorshift generator with its state in the record."""
         x = self._random.value
         x ^= x << 13 & _ONES
         x ^= x >> 7
@@ -243,4 +245,4 @@ class Bluetooth(BoardPart):
 
     def _from_robot(self, byte: int, start: int) -> None:
         if not self._drops(start):
-            self._reached(byte, start)
+            self._listeners(byte, start)

@@ -1,4 +1,4 @@
-"""A script of what happens to the robot: one event per line, with its time.
+"""Stimulus scripts: external events for the robot, one per line with its time.
 
     # time  what      arguments
     0.5s    selector  3
@@ -15,11 +15,12 @@
     6.0s    lamp      0.5             brightness of the scene, 1 = as in the picture
     7.0s    bluetooth down            or: up
     8.0s    i2c       sda 5           SDA is held low for 5 clocks (0: until `free`); or: scl, free
-    0       noise     1               sensor noise as the reference says; 0 = none
+    0       noise     1               sensor noise as in the reference; 0 = none
 
-Waveforms are scripts too: files called *.vcd and *.csv (waveform.py).
+Files called *.vcd and *.csv are waveforms, which are converted to the same events (waveform.py).
 
-Times are in s, ms or us (`1.5s`) or cycles (`22118400`). Lines may be in any order; equal times keep theirs.
+Times are in s, ms or us (`1.5s`) or cycles (`22118400`). Lines may be in any order; lines with equal times keep their
+order.
 """
 
 from __future__ import annotations
@@ -31,72 +32,70 @@ from contextlib import suppress
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
+from emu.boards.epuck.hardware import EpuckHardware
 from emu.boards.epuck.remote import KEYS
-from emu.boards.epuck.waveform import WaveformError, moment, read_csv, read_vcd
+from emu.boards.epuck.waveform import WaveformError, parse_time, read_csv, read_vcd
 from emu.boards.part import BoardPart
 from emu.boards.picture import read_picture
 from emu.host.files import read_file
 from emu.peripherals.pins import parse_pin
 from emu.peripherals.uart.rx_line import BREAK, FRAMING_ERROR, PARITY_ERROR
 
-if TYPE_CHECKING:
-    from emu.boards.epuck.board import Epuck
-
 Action = Callable[[], None]
 
 _ERRORS: Final = {"framing": FRAMING_ERROR, "parity": PARITY_ERROR, "break": BREAK}
-"""What can be wrong with a character on a serial line."""
+"""Transmission errors of a character, by name."""
 
 
 class StimulusError(ValueError):
-    """A stimulus file is wrong: the message names file, line and what was expected."""
+    """A stimulus file is invalid: the message names file, line and what was expected."""
 
 
 @dataclass(frozen=True, slots=True)
-class Step:
-    """One line: what to do at `cycle`."""
+class StimulusStep:
+    """One event: the action at `cycle`, and its line in the file."""
 
     cycle: int
     line: int
     action: Action
 
 
-def parse(board: Epuck, text: str, name: str = "stimulus") -> list[Step]:
-    """Steps in order of time. Raises StimulusError."""
+def parse(board: EpuckHardware, text: str, name: str = "stimulus") -> list[StimulusStep]:
+    """Parse a script and return its steps in order of time. Raises StimulusError."""
     steps = []
     for number, line in enumerate(text.splitlines(), start=1):
         try:
             words = shlex.split(line, comments=True, posix=False)
             if words:
-                steps.append(Step(_time(board, words[0]), number, _action(board, words[1:])))
+                steps.append(StimulusStep(_time(board, words[0]), number, _action(board, words[1:])))
         except (ValueError, SyntaxError, LookupError) as error:
             raise StimulusError(f"{name}:{number}: {error}") from None
     return sorted(steps, key=lambda step: step.cycle)
 
 
-def decoded(data: bytes, name: str) -> str:
-    """Text of a stimulus file. Raises StimulusError."""
+def decode_text(data: bytes, name: str) -> str:
+    """Return the text of a stimulus file. Raises StimulusError if it is not UTF-8."""
     try:
         return data.decode()
     except UnicodeDecodeError as error:
-        raise StimulusError(f"{name}: offset {error.start}: expected text, in UTF-8") from None
+        raise StimulusError(f"{name}: offset {error.start}: expected UTF-8 text") from None
 
 
 def _lines(path: Path) -> Iterator[tuple[int, Fraction, list[str]]]:
     data = path.read_bytes()
-    return read_vcd(data) if path.suffix == ".vcd" else read_csv(decoded(data, str(path)))
+    return read_vcd(data) if path.suffix == ".vcd" else read_csv(decode_text(data, str(path)))
 
 
-def waveform(board: Epuck, path: Path) -> list[Step]:
-    """Steps of a VCD or CSV file in order of time. Raises StimulusError, OSError."""
-    steps: list[Step] = []
+def load_waveform(board: EpuckHardware, path: Path) -> list[StimulusStep]:
+    """Read a VCD or CSV file and return its steps in order of time. Raises StimulusError, OSError."""
+    steps: list[StimulusStep] = []
     number = 1
     try:
         lines = _lines(path)
         for number, time, words in lines:
-            steps.append(Step(_cycle(board, time), number, _action(board, words)))
+            steps.append(StimulusStep(_cycle(board, time), number, _action(board, words)))
     except StimulusError:
         raise
     except WaveformError as error:
@@ -110,25 +109,25 @@ LATEST: Final = 10**18
 _UNITS: Final = {"ms": Fraction(1, 1000), "us": Fraction(1, 1_000_000), "s": Fraction(1)}
 
 
-def _time(board: Epuck, word: str) -> int:
-    """Cycle of a time. Fractions are exact, so 0.1s is the same cycle on every host."""
+def _time(board: EpuckHardware, word: str) -> int:
+    """Return the cycle of a time. Fractions are exact, so 0.1s is the same cycle on every host."""
     unit = next((unit for unit in _UNITS if word.endswith(unit)), "")
-    value = moment(word.removesuffix(unit))
+    value = parse_time(word.removesuffix(unit))
     if value < 0 or not (unit or value.denominator == 1):
         raise ValueError(f"a line begins with its time, like 1.5s, 200ms, 50us or a number of cycles, not {word!r}")
     return _cycle(board, value * _UNITS[unit]) if unit else int(value)
 
 
-def _cycle(board: Epuck, seconds: Fraction) -> int:
-    """Raises ValueError for a time that no clock reaches."""
+def _cycle(board: EpuckHardware, seconds: Fraction) -> int:
+    """Return the cycle of a time in seconds. Raises ValueError beyond `LATEST`."""
     cycle = round(seconds * Fraction(board.chip.fcy))
     if cycle > LATEST:
-        raise ValueError("that is later than 10^18 cycles")
+        raise ValueError("expected a time of at most 10^18 cycles")
     return cycle
 
 
-def _action(board: Epuck, words: list[str]) -> Action:
-    kinds: dict[str, Callable[[Epuck, list[str]], Action]] = {
+def _action(board: EpuckHardware, words: list[str]) -> Action:
+    kinds: dict[str, Callable[[EpuckHardware, list[str]], Action]] = {
         "selector": _selector,
         "remote": _remote,
         "ir": lambda b, w: _two(w, lambda sensor, mm: b.ir.set_distance(_sensor(sensor), mm)),
@@ -168,7 +167,7 @@ def _two(words: list[str], action: Callable[[float, float], None]) -> Action:
     return lambda: action(first, second)
 
 
-def _selector(board: Epuck, words: list[str]) -> Action:
+def _selector(board: EpuckHardware, words: list[str]) -> Action:
     _count(words, 1)
     position = int(words[0])
     if not 0 <= position < 16:
@@ -176,7 +175,7 @@ def _selector(board: Epuck, words: list[str]) -> Action:
     return lambda: setattr(board.selector, "position", position)
 
 
-def _remote(board: Epuck, words: list[str]) -> Action:
+def _remote(board: EpuckHardware, words: list[str]) -> Action:
     _count(words, 1, 2)
     command = KEYS[words[0]] if words[0] in KEYS else int(words[0])
     address = int(words[1]) if len(words) > 1 else 0
@@ -184,13 +183,13 @@ def _remote(board: Epuck, words: list[str]) -> Action:
         raise ValueError("RC-5 has commands 0 to 63 and addresses 0 to 31")
 
     def press() -> None:
-        with suppress(ValueError):  # too many at once: nobody's thumb is that fast
+        with suppress(ValueError):  # the queue is full: drop the key press
             board.remote.press(command, address)
 
     return press
 
 
-def _battery(board: Epuck, words: list[str]) -> Action:
+def _battery(board: EpuckHardware, words: list[str]) -> Action:
     _count(words, 1)
     volts = float(words[0])
     if not 0 <= volts <= 5:
@@ -198,13 +197,13 @@ def _battery(board: Epuck, words: list[str]) -> Action:
     return lambda: setattr(board.battery, "volts", volts)
 
 
-def _tilt(board: Epuck, words: list[str]) -> Action:
+def _tilt(board: EpuckHardware, words: list[str]) -> Action:
     _count(words, 3)
     x, y, z = (float(word) for word in words)
     return lambda: board.accelerometer.set_g(x, y, z)
 
 
-def _uart(board: Epuck, number: int, words: list[str]) -> Action:
+def _uart(board: EpuckHardware, number: int, words: list[str]) -> Action:
     _count(words, 1, 2)
     text = ast.literal_eval(words[0])
     if not isinstance(text, str):
@@ -217,7 +216,7 @@ def _uart(board: Epuck, number: int, words: list[str]) -> Action:
     return lambda: line.feed(data, line.now + 1, errors=errors)
 
 
-def _pin(board: Epuck, words: list[str]) -> Action:
+def _pin(board: EpuckHardware, words: list[str]) -> Action:
     _count(words, 2)
     name, level = words
     parse_pin(name)
@@ -226,7 +225,7 @@ def _pin(board: Epuck, words: list[str]) -> Action:
     return lambda: board.chip.pins.set(name, int(level))
 
 
-def _camera(board: Epuck, words: list[str]) -> Action:
+def _camera(board: EpuckHardware, words: list[str]) -> Action:
     _count(words, 1)
     camera = board.camera
     if camera is None or words[0] not in ("plug", "unplug"):
@@ -234,7 +233,7 @@ def _camera(board: Epuck, words: list[str]) -> Action:
     return camera.plug if words[0] == "plug" else camera.unplug
 
 
-def _picture(board: Epuck, words: list[str]) -> Action:
+def _picture(board: EpuckHardware, words: list[str]) -> Action:
     _count(words, 1)
     camera = board.camera
     if camera is None:
@@ -243,7 +242,7 @@ def _picture(board: Epuck, words: list[str]) -> Action:
     return lambda: camera.show(picture)
 
 
-def _lamp(board: Epuck, words: list[str]) -> Action:
+def _lamp(board: EpuckHardware, words: list[str]) -> Action:
     _count(words, 1)
     brightness = float(words[0])
     camera = board.camera
@@ -252,14 +251,14 @@ def _lamp(board: Epuck, words: list[str]) -> Action:
     return lambda: setattr(camera, "lamp", brightness)
 
 
-def _bluetooth(board: Epuck, words: list[str]) -> Action:
+def _bluetooth(board: EpuckHardware, words: list[str]) -> Action:
     _count(words, 1)
     if words[0] not in ("up", "down"):
         raise ValueError(f"the link is `up` or `down`, not {words[0]!r}")
     return lambda: setattr(board.bluetooth, "connected", words[0] == "up")
 
 
-def _noise(board: Epuck, words: list[str]) -> Action:
+def _noise(board: EpuckHardware, words: list[str]) -> Action:
     _count(words, 1)
     strength = float(words[0])
     if not 0 <= strength <= 100:
@@ -267,7 +266,7 @@ def _noise(board: Epuck, words: list[str]) -> Action:
     return lambda: setattr(board.noise, "strength", strength)
 
 
-def _i2c(board: Epuck, words: list[str]) -> Action:
+def _i2c(board: EpuckHardware, words: list[str]) -> Action:
     assert board.chip.i2c is not None
     wire = board.chip.i2c.wire
     if words == ["free"]:
@@ -281,25 +280,27 @@ def _i2c(board: Epuck, words: list[str]) -> Action:
 
 
 class Stimulus(BoardPart):
-    """Plays a script on a board. The position is in the record, so snapshots continue where they were taken."""
+    """Plays a script on a board. The position is in the record, so a restored snapshot continues the script."""
 
-    def __init__(self, board: Epuck) -> None:
+    def __init__(self, board: EpuckHardware) -> None:
         super().__init__("stimulus", board.chip)
         self._board: Final = board
-        self._steps: list[Step] = []
+        self._steps: list[StimulusStep] = []
         self._next: Final = self.cell("next")
         self._due: Final = self.slot("next", self._play)
 
     def load(self, path: Path) -> None:
-        """Play the file at `path`, a script or a waveform. Call it when the machine has its image, whose clock
-        setting turns seconds into cycles. Raises StimulusError, OSError."""
-        if path.suffix in (".vcd", ".csv"):
-            self.play(waveform(self._board, path))
-        else:
-            self.play(parse(self._board, decoded(read_file(path), str(path)), str(path)))
+        """Play the file at `path`, a script or a waveform. Raises StimulusError, OSError.
 
-    def play(self, steps: list[Step]) -> None:
-        """Do `steps`, in order of time, from now on; steps of the past happen at once. Replaces an earlier script."""
+        Call it after the image is loaded: its clock setting converts seconds to cycles.
+        """
+        if path.suffix in (".vcd", ".csv"):
+            self.play(load_waveform(self._board, path))
+        else:
+            self.play(parse(self._board, decode_text(read_file(path), str(path)), str(path)))
+
+    def play(self, steps: list[StimulusStep]) -> None:
+        """Play `steps`, in order of time; steps in the past are executed at once. Replaces an earlier script."""
         self._steps = steps
         self._next.value = 0
         if steps:

@@ -1,9 +1,9 @@
-"""Waveforms as stimulus: what a file says of pins becomes steps of a script.
+"""Waveform files as stimulus: conversion of CSV and VCD files to stimulus events.
 
-CSV   a line of names, then one line for every time: `time` in s, then pins and uart1, uart2 (a byte, 0 to 255). An
+CSV   a header line with names, then one line per time: `time` in s, then pins and uart1, uart2 (a byte, 0 to 255). An
       empty cell changes nothing.
-VCD   wires of one bit whose names begin with a pin's (`RB3`, `RC1_front`), in any scope; the rest is passed over,
-      and so are x and z. What `emu run --vcd` writes is such a file.
+VCD   one-bit wires whose names begin with a pin name (`RB3`, `RC1_front`), in any scope. Other variables and the
+      values x and z are ignored. `emu run --vcd` writes such files.
 """
 
 from __future__ import annotations
@@ -18,25 +18,25 @@ from io import BytesIO, StringIO
 from emu.peripherals.pins import parse_pin
 
 UARTS = ("uart1", "uart2")
-MOMENT = re.compile(
+TIME_PATTERN = re.compile(
     r"\s*\+?(?:(?:\d{1,18}(?:\.\d{0,40})?|\.\d{1,40})(?:[eE][-+]?\d{1,2})?|\d{1,18}/\d{1,18})\s*", re.ASCII
 )
-"""A time. Its exponent has an end: 1e999999999 would be computed for hours."""
-Line = tuple[int, Fraction, list[str]]
-"""Line of the file, time in s, and what happens, in the words of a script."""
+"""Syntax of a time. The exponent is limited because 1e999999999 would take hours to compute."""
+StimulusLine = tuple[int, Fraction, list[str]]
+"""Line number in the file, time in s, and the event as words of a stimulus script."""
 
 
 class WaveformError(ValueError):
-    """A file is wrong: `line` of it, and what was expected."""
+    """A waveform file is invalid: the line number, and what was expected there."""
 
     def __init__(self, line: int, expected: str) -> None:
         super().__init__(expected)
         self.line = line
 
 
-def moment(text: str) -> Fraction:
-    """A time as it is written, exactly; -1 for what is none, or not below 10^18."""
-    if MOMENT.fullmatch(text):
+def parse_time(text: str) -> Fraction:
+    """Return a written time exactly; -1 for invalid text or a time not below 10^18."""
+    if TIME_PATTERN.fullmatch(text):
         with suppress(ZeroDivisionError):
             time = Fraction(text)
             return time if time < 10**18 else Fraction(-1)
@@ -44,7 +44,7 @@ def moment(text: str) -> Fraction:
 
 
 def _rows(text: str) -> Iterator[tuple[int, list[str]]]:
-    """Number of the last line and cells of each row. Raises WaveformError."""
+    """Yield the line number and the cells of each row. Raises WaveformError."""
     rows = csv.reader(StringIO(text), skipinitialspace=True)
     try:
         for row in rows:
@@ -53,12 +53,12 @@ def _rows(text: str) -> Iterator[tuple[int, list[str]]]:
         raise WaveformError(rows.line_num, str(error)) from None
 
 
-def read_csv(text: str) -> Iterator[Line]:
-    """Raises WaveformError."""
+def read_csv(text: str) -> Iterator[StimulusLine]:
+    """Yield the events of a CSV file. Raises WaveformError."""
     rows = _rows(text)
     _, names = next(rows, (1, []))
     if not names or names[0] != "time" or len(names) < 2:
-        raise WaveformError(1, "expected names of columns: time, then pins, uart1 or uart2")
+        raise WaveformError(1, "expected column names: time, then pins, uart1 or uart2")
     for name in names[1:]:
         if name not in UARTS:
             _pin(name, 1)
@@ -67,7 +67,7 @@ def read_csv(text: str) -> Iterator[Line]:
             continue
         if len(row) != len(names):
             raise WaveformError(line, f"expected {len(names)} cells, found {len(row)}")
-        time = moment(row[0])
+        time = parse_time(row[0])
         if time < 0:
             raise WaveformError(line, f"expected a time in s, not {row[0]!r}")
         for name, cell in zip(names[1:], row[1:], strict=True):
@@ -81,8 +81,8 @@ def read_csv(text: str) -> Iterator[Line]:
                 yield line, time, ["pin", name, cell]
 
 
-def read_vcd(data: bytes) -> Iterator[Line]:
-    """Raises WaveformError."""
+def read_vcd(data: bytes) -> Iterator[StimulusLine]:
+    """Yield the events of a VCD file. Raises WaveformError."""
     from vcd.common import Timescale
     from vcd.reader import TokenKind, VCDParseError, tokenize
 
@@ -106,7 +106,7 @@ def read_vcd(data: bytes) -> Iterator[Line]:
     except VCDParseError as error:
         raise WaveformError(error.loc.line, f"expected a VCD file: {error}") from None
     if not pins:
-        raise WaveformError(1, "expected a VCD file with wires of one bit that have names of pins, like RB3")
+        raise WaveformError(1, "expected a VCD file with one-bit wires named after pins, such as RB3")
 
 
 def _unit(name: str) -> Fraction:

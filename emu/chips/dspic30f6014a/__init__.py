@@ -1,4 +1,4 @@
-"""The dsPIC30F6014A as data. Sources: dspic30f6014a.md (sections cited), sfr.csv, abi-elf.md §2.7, isa.md §14.
+"""The dsPIC30F6014A as data. Sources: dspic30f6014a.md (sections cited), registers.csv, abi-elf.md §2.7, isa.md §14.
 
 Registers are in `registers.csv` beside this file.
 """

@@ -1,7 +1,7 @@
 """12-bit ADC (§13): sampling, conversion in TAD, scan, alternating inputs, SMPI, buffer halves, triggers.
 
-Times are kept in half Tcy, because TAD is (ADCS + 1) half Tcy. Conversions between two interrupts are not events: they
-are caught up when a register is read, an input is about to change, or the interrupt falls due. Analog levels are
+Times are kept in half Tcy, because TAD is (ADCS + 1) half Tcy. Conversions between two interrupts post no events.
+They are computed when a register is read, before an input changes, or when the interrupt is due. Analog levels are
 ratiometric: 0..65535 of AVDD, so a level of `code << 4` converts to `code`.
 """
 
@@ -24,19 +24,19 @@ from emu.peripherals.adc.rules import (
     write_con1,
     write_scan,
 )
-from emu.peripherals.adc.schedule import FOREVER, ConversionSettings, AnalogInputs, PublishedSettings
+from emu.peripherals.adc.schedule import FOREVER, AnalogInputs, ConversionSettings, PublishedSettings
 from emu.peripherals.base import SLEEP, ChipContext, Peripheral
 from emu.peripherals.interrupt_lines import Interrupts
 from emu.peripherals.pins import parse_pin
 from emu.peripherals.timers.timers import Timer
 from emu.system.device import Register
 from emu.system.events import NEVER
-from emu.system.rules import Rule, place_of, slot_of
+from emu.system.rules import Rule, cell_of, event_slot
 
 FULL_SCALE: Final = 0x10000
 """AVDD in units of analog level."""
 _SETTINGS_CACHE_SIZE: Final = 64
-"""Register settings remembered; firmware has a handful."""
+"""Number of decoded register settings in the cache; firmware uses a handful."""
 _RC_TAD_SECONDS: Final = 1.5e-6  # UNVERIFIED: 1.2 to 1.5 us (§13)
 
 _MANUAL, _INT0, _TIMER3, _AUTO = 0, 1, 2, 7
@@ -61,7 +61,7 @@ class Adc(Peripheral):
             register.computed(partial(self._read, register))
         word = self.con1.address >> 1
         self._clear_only: Final = self.bus.clear_only[word]
-        self.bus.writable[word] |= self._clear_only  # whether DONE is set is known once time is caught up
+        self.bus.writable[word] |= self._clear_only  # the value of DONE is known after `catch_up`
         self.bus.clear_only[word] = 0
         self.con1.written_by(self._con1_written)
         for register in (self.con2, self.con3, self.chs, self.cssl):
@@ -69,14 +69,15 @@ class Adc(Peripheral):
         self.pcfg.written_by(lambda _old, _new, _lanes: self._route(self.now + 1))
         self._port: Final = parse_pin(site.pins[0])[0]
         self.source: Final = AnalogInputs(self, CHANNELS)
-        """By channel a function of the cycle that replaces its level; call `catch_up` before it changes its settings."""
+        """Analog source of each channel: a function of the cycle that replaces its level. Call `catch_up` before the
+        function changes."""
         self.input: Final = self.source.level
         """Analog level of each channel; change it through `set_input`."""
         self._published: Final = PublishedSettings(self, CHANNELS)
         self._vref_high: Final = self.cell("vref_high", "I", FULL_SCALE)
         self._vref_low: Final = self.cell("vref_low", "I", 0)
         self._state: Final = self.cell("state", "B")
-        self._mark: Final = self.moment("mark")
+        self._mark: Final = self.timestamp("mark")
         """Cycle the present state began at or before (plus `half` half Tcy)."""
         self._half: Final = self.cell("half", "B")
         self._held: Final = self.cell("held", "H")
@@ -84,22 +85,23 @@ class Adc(Peripheral):
         self._use_b: Final = self.cell("use_b", "B")
         self._next: Final = self.cell("next", "B")
         self._count: Final = self.cell("count", "B")
-        self._stands: Final = self.moment("constant_until", FOREVER)
+        self._stands: Final = self.timestamp("constant_until", FOREVER)
         """First cycle in which ADCBUFx, ADCON1 and ADCON2 may differ from what is stored."""
         self._step: Final = self.slot("step", self._due)
+        sfrs = context.chip.sfrs
         self._settings: Final = tuple(
-            (register.address >> 1, ~sum(1 << context.chip.sfrs[register.name].fields[bit][0] for bit in owned) & 0xFFFF)
+            (register.address >> 1, ~sum(1 << sfrs[register.name].fields[bit][0] for bit in owned) & 0xFFFF)
             for register, owned in (
                 (self.con1, ("SAMP", "DONE")), (self.con2, ("BUFS",)), (self.con3, ()), (self.chs, ()), (self.cssl, ()))
         )  # fmt: skip
-        """Record words and bits the settings depends on."""
+        """Record words and masks on which the conversion settings depend."""
         self._settings_cache: Final[dict[tuple[int, ...], ConversionSettings]] = {}
         for register in (*self._buffers, self.con2):
-            register.ruled(Rule(StableRegister(register.place, self._stands.place), read_stable))
+            register.set_rule(Rule(StableRegister(register.place, self._stands.place), read_stable))
         places = self._places()
-        self.con1.ruled(Rule(places, read_stable, write_con1))
-        self.cssl.ruled(Rule(places, None, write_scan))
-        self.ruled(self._step, Rule(places, fires=fire_round))
+        self.con1.set_rule(Rule(places, read_stable, write_con1))
+        self.cssl.set_rule(Rule(places, None, write_scan))
+        self.set_event_rule(self._step, Rule(places, fires=fire_round))
 
     def _places(self) -> AdcOperands:
         sfrs, record = self.context.chip.sfrs, self.record
@@ -120,11 +122,11 @@ class Adc(Peripheral):
             cscna=1 << sfrs["ADCON2"].fields["CSCNA"][0],
             done=done,
             buffer=self._buffers[0].place,
-            level=place_of(record, "adc.input"),
-            step=slot_of(record, self._step),
-            asked=self.source.asked,
+            level=cell_of(record, "adc.input"),
+            step=event_slot(record, self._step),
+            native_source=self.source.native_source,
             line=self._line.line,
-            **{name: place_of(record, f"adc.{name}") for name in cells},
+            **{name: cell_of(record, f"adc.{name}") for name in cells},
         )
 
     # -- inputs ------------------------------------------------------------------------------------------------------
@@ -136,7 +138,7 @@ class Adc(Peripheral):
 
     @property
     def samples_from(self) -> int | None:
-        """No conversion that was not carried out samples before this cycle; None: none is under way."""
+        """First cycle in which a pending conversion may sample an input; None if the converter is idle."""
         return self._mark.value if self._state.value > WAITING and not self.is_frozen else None
 
     def set_references(self, low: int, high: int) -> None:
@@ -145,7 +147,7 @@ class Adc(Peripheral):
         self._vref_low.value, self._vref_high.value = low, high
 
     def _current_settings(self) -> ConversionSettings:
-        """The present settings, remembered by the contents of the registers."""
+        """The current settings, cached by the register contents."""
         u16 = self.record.u16
         key = tuple([u16[word] & bits for word, bits in self._settings])
         settings = self._settings_cache.get(key)
@@ -153,7 +155,9 @@ class Adc(Peripheral):
             if len(self._settings_cache) >= _SETTINGS_CACHE_SIZE:
                 self._settings_cache.clear()
             settings = self._settings_cache[key] = self._decode_settings()
-        return settings if not self.con3["ADRC"] else self._decode_settings()  # Fcy is no register
+        return (
+            settings if not self.con3["ADRC"] else self._decode_settings()
+        )  # these also depend on Fcy, which is not part of the key
 
     def _decode_settings(self) -> ConversionSettings:
         tad = max(round(2 * _RC_TAD_SECONDS * self.context.fcy()), 1) if self.con3["ADRC"] else self.con3["ADCS"] + 1
@@ -161,7 +165,7 @@ class Adc(Peripheral):
         return ConversionSettings(
             tad=tad,
             sampling=self.con3["SAMC"] * tad if self.con1["SSRC"] == _AUTO else NEVER,
-            again=bool(self.con1["ASAM"]),
+            auto_sample=bool(self.con1["ASAM"]),
             scanned=tuple(number for number in range(16) if con2["CSCNA"] and self.cssl.value >> number & 1),
             inputs=((chs["CH0SA"], chs["CH0NA"]), (chs["CH0SB"], chs["CH0NB"])),
             alternates=bool(con2["ALTS"]),
@@ -172,13 +176,16 @@ class Adc(Peripheral):
         )
 
     def _references(self, vcfg: int) -> tuple[int, int]:
-        """VCFG (§13): bit 0 selects VREF+, bit 1 VREF-; 1xx are the supplies."""
+        """Return the low and high reference level.
+
+        VCFG (§13): bit 0 selects VREF+, bit 1 VREF-; 1xx are the supplies.
+        """
         if vcfg & 4:
             return 0, FULL_SCALE
         return self._vref_low.value if vcfg & 2 else 0, self._vref_high.value if vcfg & 1 else FULL_SCALE
 
-    def _sampled(self, settings: ConversionSettings, channel: int, negative: int, cycle: int) -> int:
-        """Code of an input, 0..4095."""
+    def _sample(self, settings: ConversionSettings, channel: int, negative: int, cycle: int) -> int:
+        """Return the conversion result for an input in `cycle`, 0..4095."""
         low, high = self._references(settings.references)
         zero = self.source.at(1, cycle) if negative else low
         return min(max((self.source.at(channel, cycle) - zero) * 4096 // max(high - low, 1), 0), 4095)
@@ -186,7 +193,7 @@ class Adc(Peripheral):
     # -- time --------------------------------------------------------------------------------------------------------
 
     def _duration(self, settings: ConversionSettings, state: int) -> int:
-        """Half Tcy after which a state ends by itself, or NEVER."""
+        """Return the duration of a state in half Tcy, NEVER if the state waits for a trigger or for software."""
         if state == CONVERTING:
             return settings.conversion
         return settings.sampling if state == SAMPLING else NEVER
@@ -199,17 +206,22 @@ class Adc(Peripheral):
         if state == CONVERTING:
             self.con1["DONE"] = 0
             settings = self._current_settings()
-            channel, negative, self._scan.value, self._use_b.value = settings.turn(self._scan.value, self._use_b.value)
-            self._held.value = self._sampled(settings, channel, negative, halves + 1 >> 1)
+            channel, negative, self._scan.value, self._use_b.value = settings.next_input(
+                self._scan.value, self._use_b.value
+            )
+            self._held.value = self._sample(settings, channel, negative, halves + 1 >> 1)
 
     def catch_up(self, cycle: int) -> None:
-        """Carry out every conversion that ends at or before `cycle`, but for the one that raises the interrupt: that is
-        its event's, which has not happened yet if it is due now. Nothing ends while the converter's clock stands."""
+        """Complete every conversion that ends at or before `cycle`, except the one that raises the interrupt.
+
+        The event handler completes that one; it has not run yet if the event is due now. Nothing ends while the
+        converter's clock is stopped.
+        """
         if not self.is_frozen:
             self._convert_by(min(cycle, self.events.due(self._step) - 1))
 
     def _convert_by(self, cycle: int) -> bool:
-        """Carry out every conversion that ends at or before `cycle`. True if one of them raised the interrupt."""
+        """Complete every conversion that ends at or before `cycle`. Return whether one of them raised the interrupt."""
         state = self._state.value
         if state <= WAITING:
             return False
@@ -226,12 +238,12 @@ class Adc(Peripheral):
             moved = True
             if state == SAMPLING:
                 state, done = CONVERTING, 0
-                channel, negative, scan, use_b = settings.turn(scan, use_b)
-                held = self._sampled(settings, channel, negative, begun + 1 >> 1)
+                channel, negative, scan, use_b = settings.next_input(scan, use_b)
+                held = self._sample(settings, channel, negative, begun + 1 >> 1)
             else:
                 if self._store(settings, held):
-                    interrupted, scan = True, 0  # the scan starts again behind every interrupt (§13)
-                state, done = (SAMPLING if settings.again else WAITING), 1
+                    interrupted, scan = True, 0  # the scan restarts after every interrupt (§13)
+                state, done = (SAMPLING if settings.auto_sample else WAITING), 1
         if moved:
             self._state.value, self._held.value = state, held
             self._scan.value, self._use_b.value = scan, use_b
@@ -242,7 +254,7 @@ class Adc(Peripheral):
         return interrupted
 
     def _store(self, settings: ConversionSettings, code: int) -> bool:
-        """A conversion is complete: buffer, pointer, halves; True at every SMPI + 1 results."""
+        """Store a result and advance the buffer pointer. Return True after every SMPI + 1 results."""
         value = code - 2048 if settings.form & 1 else code
         place = self._next.value
         self._buffers[place].value = value << 4 if settings.form & 2 else value
@@ -260,7 +272,7 @@ class Adc(Peripheral):
         return True
 
     def _plan(self) -> None:
-        """Post the next interrupt, or the end of the state if what follows depends on somebody else."""
+        """Post the next interrupt event. If software or a trigger ends sampling, post the end of the current state."""
         settings, state = self._current_settings(), self._state.value
         self._published.publish(settings, changes_by_itself=bool(self.con3["ADRC"]))
         duration = self._duration(settings, state)
@@ -269,13 +281,13 @@ class Adc(Peripheral):
             self._stands.value = FOREVER
             return
         end = 2 * self._mark.value + self._half.value + duration
-        if end + 1 >> 1 <= self.now:  # a shorter setting: the state has been long enough, and ends with the next cycle
+        if end + 1 >> 1 <= self.now:  # the new setting is shorter: the state ends in the next cycle
             end = 2 * (self.now + 1)
             self._mark.value, self._half.value = end - duration >> 1, end - duration & 1
         self._stands.value = end + 1 >> 1
         if state == SAMPLING:
             end += settings.conversion
-        if settings.again and settings.sampling != NEVER:
+        if settings.auto_sample and settings.sampling != NEVER:
             missing = max(settings.results - 1 - self._count.value, 0)
             end += missing * (settings.sampling + settings.conversion)
         self.events.set(self._step, end + 1 >> 1)
@@ -290,7 +302,7 @@ class Adc(Peripheral):
         return register.value
 
     def _catch_up_now(self) -> None:
-        """Bring the registers to the current cycle; an interrupt cannot fall due here before its event."""
+        """Bring the registers up to the current cycle. The interrupt itself is left to its event."""
         if self._state.value > WAITING:
             self.catch_up(self.now)
 
@@ -311,14 +323,17 @@ class Adc(Peripheral):
         elif self._state.value == WAITING and (new & samp or self.con1["ASAM"]):
             self._enter(SAMPLING, start)
         elif self._state.value == SAMPLING and not new & samp:
-            self._sampling_ended_by_software(start)
+            self._end_sampling_by_software(start)
         elif self._state.value == CONVERTING:
             self.con1["SAMP"] = 0  # UNVERIFIED: SAMP = 1 while converting is ignored (§13)
         self.restored()
         self._plan()
 
-    def _sampling_ended_by_software(self, start: int) -> None:
-        """SAMP = 0 starts the conversion if nothing else does. UNVERIFIED: otherwise it only ends sampling (§13)."""
+    def _end_sampling_by_software(self, start: int) -> None:
+        """Handle SAMP = 0: with SSRC = 0 it starts the conversion.
+
+        UNVERIFIED: otherwise it only ends sampling (§13).
+        """
         if self.con1["SSRC"] == _MANUAL:
             self._enter(CONVERTING, start)
         elif self.con1["ASAM"]:
@@ -327,7 +342,7 @@ class Adc(Peripheral):
             self._enter(WAITING, start)
 
     def _switch_off(self) -> None:
-        """ADON = 0 aborts without a result; ADCBUF stays (§13)."""
+        """Handle ADON = 0: abort the conversion without a result and keep ADCBUF (§13)."""
         self._state.value = OFF
         self.con1["SAMP"] = 0
         self.events.cancel(self._step)
@@ -337,8 +352,10 @@ class Adc(Peripheral):
         self._plan()
 
     def _settle(self, register: Register, old: int, new: int, lanes: int) -> int:
-        """What happened before this write happened under the old setting. Returns what the register held in the end,
-        which is what it keeps outside `lanes`."""
+        """Complete earlier conversions with the old register value, then apply the write.
+
+        Return the value that the register held before the write; bits outside `lanes` keep it.
+        """
         register.value = old
         self._catch_up_now()
         left, hardware = register.value, self.con2["BUFS"]
@@ -347,43 +364,43 @@ class Adc(Peripheral):
         return left
 
     def int0(self, due: int) -> None:
-        """INT0 rose in cycle `due`."""
+        """Handle the INT0 flag rising in cycle `due`: a conversion trigger if SSRC selects it."""
         if self.con1["SSRC"] == _INT0:
-            self._triggered(due)
+            self._start_conversion(due)
 
     def _timer_matched(self, due: int) -> None:
         if self.con1["SSRC"] == _TIMER3:
-            self._triggered(due)
+            self._start_conversion(due)
 
     def _wide_timer_matched(self, due: int) -> None:
         if self._timers[2].is_wide:
             self._timer_matched(due)
 
-    def _triggered(self, cycle: int) -> None:
-        """Sampling ends, conversion begins (SSRC = 1, 2)."""
+    def _start_conversion(self, cycle: int) -> None:
+        """Handle a trigger (SSRC = 1, 2): end sampling and start the conversion."""
         if self._state.value == SAMPLING and not self.is_frozen:
             self._enter(CONVERTING, 2 * cycle)
             self._plan()
 
     def clock_changes(self) -> None:
-        """Carry out what ends at the present clock; a reset has cleared ADON, and nothing ends."""
+        """Complete conversions before the clock frequency changes. After a reset ADON is 0 and nothing is pending."""
         if self.con1["ADON"]:
             self.catch_up(self.now)
 
     def clock_changed(self) -> None:
-        """The internal RC oscillator has another number of Tcy to a TAD."""
+        """Reschedule after a change of Fcy: the TAD of the internal RC oscillator is a different number of Tcy."""
         if self.con1["ADON"] and self.con3["ADRC"] and not self.is_frozen:
             self._plan()
 
     def _route(self, cycle: int) -> None:
-        """ADPCFG = 0 makes a pin analog: its digital input reads 0 (§6)."""
+        """Apply ADPCFG: a 0 bit makes a pin analog, and its digital input reads 0 (§6)."""
         self.context.pins.analog[self._port] = ~self.pcfg.value & 0xFFFF
         self.context.pins.apply(self._port, cycle)
 
     # -- power and reset ---------------------------------------------------------------------------------------------
 
     def reset(self, power_on: bool) -> None:
-        """Off; all channels analog."""
+        """Reset to off, with all channels analog."""
         self._state.value = OFF
         self._stands.value = FOREVER
         self._route(self.now)
@@ -391,16 +408,16 @@ class Adc(Peripheral):
         self._plan()
 
     def stops_in(self, mode: int) -> bool:
-        """With its own RC oscillator it runs in Sleep."""
+        """Whether the converter stops: with its own RC oscillator it runs in Sleep."""
         return not self.con3["ADRC"] if mode == SLEEP else super().stops_in(mode)
 
     def freeze(self, cycle: int, mode: int) -> None:
-        """What was converted before counts."""
+        """Complete conversions up to `cycle`, then stop the clock."""
         self.catch_up(cycle)
         super().freeze(cycle, mode)
 
     def restored(self) -> None:
-        """Listen to timer 3 only while it triggers, so that its matches stay simple otherwise."""
+        """Subscribe to timer 3 only while it triggers conversions: a timer with listeners has no native match rule."""
         wanted = self.con1["SSRC"] == _TIMER3 and bool(self.con1["ADON"])
         self._timers[3].listen(self._timer_matched, wanted)
         self._timers[2].listen(self._wide_timer_matched, wanted)

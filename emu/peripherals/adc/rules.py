@@ -1,4 +1,4 @@
-"""The converter (§13) in the common case: registers that stand, ADON switched, whole rounds of conversions."""
+"""Rules of the 12-bit ADC (§13): reads of stable registers, ADON, ADCSSL and whole conversion sequences."""
 
 from __future__ import annotations
 
@@ -7,92 +7,95 @@ from typing import Final
 
 from emu.peripherals.adc.schedule import FOREVER
 from emu.system.events import NEVER
-from emu.system.rules import Line, Number, Place, Reader, Slot, request
+from emu.system.rules import Cell, EventSlot, InterruptLine, Number, RuleBuilder, request
 
 BUFFERS: Final = 16
-"""Results that are kept."""
+"""Number of result buffers."""
 CHANNELS: Final = 16
-"""Positions of the multiplexer; those without a pin read 0. UNVERIFIED."""
+"""Positions of the multiplexer. UNVERIFIED: positions without a pin read 0."""
 OFF, WAITING, SAMPLING, CONVERTING = range(4)
-"""States: ADON = 0; nothing connected; SAMP = 1; SAMP = 0 and the converter at work."""
+"""States: ADON = 0; on and idle; SAMP = 1; converting."""
 
 
 @dataclass(frozen=True, slots=True)
 class StableRegister:
-    """A register the converter changes by itself, but not before a cycle it has published."""
+    """A register that the converter changes by itself, but not before the cycle stored at `until`."""
 
-    register: Place
-    until: Place
+    register: Cell
+    until: Cell
 
 
-def read_stable(m: Reader, p: StableRegister) -> Number:
-    """What is stored, until then."""
-    m.need(m.now < m.get(p.until))
+def read_stable(m: RuleBuilder, p: StableRegister) -> Number:
+    """Read the stored value, which is valid before cycle `until`."""
+    m.require(m.now < m.get(p.until))
     return m.get(p.register)
 
 
 @dataclass(frozen=True, slots=True)
 class AdcOperands:
-    """ADCON1 and ADCON2 with their bits, and cells of the converter."""
+    """Operands of the ADC's rules: ADCON1 and ADCON2 with their bits, and the converter's cells."""
 
-    register: Place
-    until: Place
-    con2: Place
+    register: Cell
+    until: Cell
+    con2: Cell
     writable: int
     clear_only: int
     adon: int
     samp: int
     bufs: int
-    cssl: Place
+    cssl: Cell
     scannable: int
-    """Bits of ADCSSL."""
+    """Implemented bits of ADCSSL."""
     cscna: int
-    native: Place
-    frozen: Place
-    sampling: Place
-    conversion: Place
-    results: Place
-    halves: Place
-    """Whether every interrupt turns to the other half of the results."""
-    state: Place
-    mark: Place
-    half: Place
-    scan: Place
-    use_b: Place
-    next: Place
-    count: Place
-    held: Place
-    length: Place
-    channels: Place
-    """The first of the inputs in turn."""
-    level: Place
-    """Of channel 0."""
-    level_from: Place
-    """Of channel 0: first cycle in which `level` is what it shows."""
-    asked: Place
-    """Of channel 0: host code that knows its level before that, and behind it that code's data."""
-    buffer: Place
+    native: Cell
+    frozen: Cell
+    sampling: Cell
+    conversion: Cell
+    results: Cell
+    halves: Cell
+    """BUFM: whether every interrupt switches to the other half of the result buffer."""
+    state: Cell
+    mark: Cell
+    half: Cell
+    scan: Cell
+    use_b: Cell
+    next: Cell
+    count: Cell
+    held: Cell
+    length: Cell
+    channels: Cell
+    """First element of the scan sequence."""
+    level: Cell
+    """Level of channel 0; the other channels follow."""
+    level_from: Cell
+    """First cycle from which `level` of channel 0 is valid; the other channels follow."""
+    native_source: Cell
+    """Native source of channel 0: function address, then its data pointer; the other channels follow."""
+    buffer: Cell
     """ADCBUF0."""
     done: int
-    step: Slot
-    line: Line
+    step: EventSlot
+    line: InterruptLine
 
 
-def write_con1(m: Reader, p: AdcOperands, value: Number, lanes: int) -> bool:
-    """ADON changes and no setting does. On: sampling begins with the next cycle, from the first channel on. Off: the
-    conversion under way is lost. SAMP is the converter's in both cases."""
+def write_con1(m: RuleBuilder, p: AdcOperands, value: Number, lanes: int) -> bool:
+    """Write ADCON1 when only ADON changes.
+
+    On: sampling starts in the next cycle with the first channel. Off: a running conversion is lost. The converter sets
+    SAMP in both cases.
+    """
     old = m.get(p.register)
     free, kept = p.writable & lanes, p.clear_only & lanes
     new = (old & (0xFFFF & ~(free | kept))) | (value & free) | (old & value & kept)
     plain = (m.get(p.native) != 0) & (m.get(p.frozen) == NEVER)
     settings = 0xFFFF & ~(p.samp | p.done)
-    m.need((((old ^ new) & settings) == p.adon) & plain & (m.now < m.get(p.until)))
+    m.require((((old ^ new) & settings) == p.adon) & plain & (m.now < m.get(p.until)))
     starts, con2 = (new & p.adon) != 0, m.get(p.con2)
     sampling = m.get(p.sampling)
     begun = (m.now + 1) << 1
     end = begun + m.get(p.results) * (sampling + m.get(p.conversion))
-    anew = ((place, 0) for place in (p.half, p.scan, p.use_b, p.next, p.count))
-    for place, first in ((p.mark, m.now + 1), *anew):
+    cleared = ((place, 0) for place in (p.half, p.scan, p.use_b, p.next, p.count))
+    for place, first in ((p.mark, m.now + 1), *cleared):
         m.put(place, m.select(starts, first, m.get(place)))
     m.put(p.register, m.select(starts, new | p.samp, new & (0xFFFF & ~p.samp)))
     m.put(p.con2, m.select(starts, con2 & (0xFFFF & ~p.bufs), con2))
@@ -102,12 +105,12 @@ def write_con1(m: Reader, p: AdcOperands, value: Number, lanes: int) -> bool:
     return True
 
 
-def write_scan(m: Reader, p: AdcOperands, value: Number, lanes: int) -> bool:
-    """ADCSSL written while the converter is off: the channels in turn from now on."""
+def write_scan(m: RuleBuilder, p: AdcOperands, value: Number, lanes: int) -> bool:
+    """Write ADCSSL while the converter is off: rebuild the scan sequence."""
     if lanes != 0xFFFF:
         return False
     chosen = value & p.scannable
-    m.need((m.get(p.native) != 0) & (m.get(p.state) == OFF) & ((m.get(p.con2) & p.cscna) != 0) & (chosen != 0))
+    m.require((m.get(p.native) != 0) & (m.get(p.state) == OFF) & ((m.get(p.con2) & p.cscna) != 0) & (chosen != 0))
     length: Number = 0
     for channel in range(CHANNELS):
         is_chosen = (chosen >> channel) & 1
@@ -118,34 +121,36 @@ def write_scan(m: Reader, p: AdcOperands, value: Number, lanes: int) -> bool:
     return True
 
 
-def fire_round(m: Reader, p: AdcOperands) -> None:
-    """All conversions up to the interrupt that is due: automatic, one multiplexer, inputs that hold, were predicted to,
-    or are known to host code."""
+def fire_round(m: RuleBuilder, p: AdcOperands) -> None:
+    """Complete all conversions up to the interrupt that is due.
+
+    Conditions: automatic sampling, one multiplexer, and inputs that are constant or have a native source.
+    """
     sampling, results, length = m.get(p.sampling), m.get(p.results), m.get(p.length)
     step, scan, count, following = sampling + m.get(p.conversion), m.get(p.scan), m.get(p.count), m.get(p.next)
     begun, missing = (m.get(p.mark) << 1) + m.get(p.half), results - count
     end = begun + missing * step
     plain = (m.get(p.native) != 0) & (m.get(p.state) == SAMPLING) & (m.get(p.use_b) == 0)
-    m.need(plain & (count < results) & (scan < length) & ((end + 1) >> 1 == m.now))
+    m.require(plain & (count < results) & (scan < length) & ((end + 1) >> 1 == m.now))
 
-    def behind(place: Number) -> Number:
+    def next_place(place: Number) -> Number:
         return m.select(place + 1 < length, place + 1, 0)
 
-    def known(_turn: Number, place: Number, cycle: Number) -> tuple[Number, ...]:
+    def is_known(_turn: Number, place: Number, cycle: Number) -> tuple[Number, ...]:
         channel = m.get(p.channels, place)
         holds = m.get(p.level_from, channel) <= (cycle + sampling + 1) >> 1
-        m.need(holds | m.can_ask(m.get(p.asked, channel << 1)))
-        return behind(place), cycle + step
+        m.require(holds | m.can_call(m.get(p.native_source, channel << 1)))
+        return next_place(place), cycle + step
 
     def convert(turn: Number, place: Number, cycle: Number, _held: Number) -> tuple[Number, ...]:
         channel, sampled = m.get(p.channels, place), (cycle + sampling + 1) >> 1
-        code, data = m.get(p.asked, channel << 1), m.get(p.asked, (channel << 1) + 1)
-        (level,) = m.either(m.get(p.level_from, channel) > sampled,
-                            lambda: (m.ask(code, data, channel, sampled),), m.get(p.level, channel))  # fmt: skip
+        code, data = m.get(p.native_source, channel << 1), m.get(p.native_source, (channel << 1) + 1)
+        (level,) = m.lazy_select(m.get(p.level_from, channel) > sampled,
+                            lambda: (m.call(code, data, channel, sampled),), m.get(p.level, channel))  # fmt: skip
         m.put(p.buffer, level >> 4, (following + turn) & (BUFFERS - 1))
-        return behind(place), cycle + step, level >> 4
+        return next_place(place), cycle + step, level >> 4
 
-    m.loop(missing, known, scan, begun)
+    m.loop(missing, is_known, scan, begun)
     _place, _cycle, held = m.loop(missing, convert, scan, begun, 0)
     con2, halves = m.get(p.con2), m.get(p.halves) != 0
     turned = m.select(halves, con2 ^ p.bufs, con2)

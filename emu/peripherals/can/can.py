@@ -1,8 +1,8 @@
 """CAN1/2 (§15): modes, transmit buffers, filters and masks, receive buffers, interrupts, loopback.
 
-The outside is frames: `on_frame(frame, cycle)` acknowledges (returns True) what was sent, `receive(frame)` delivers.
-Without a listener nobody acknowledges: TXERR is set, TEC rises to 128 and the message stays pending, as for a node
-alone on the bus; it is tried again when the registers are written next. Deliberate limits: no arbitration with
+The environment exchanges frames: `on_frame(frame, cycle)` returns True to acknowledge a sent frame, `receive(frame)`
+delivers one. Without a listener no frame is acknowledged, as for a node alone on the bus: TXERR is set, TEC rises to
+128 and the message stays pending until the next write to the module's registers. Deliberate limits: no arbitration with
 other nodes, no error frames, no bus-off.
 """
 
@@ -23,11 +23,11 @@ _NORMAL, _DISABLE, _LOOPBACK, _LISTEN, _CONFIGURE, _LISTEN_ALL = 0, 1, 2, 3, 4, 
 """REQOP and OPMODE (§15)."""
 _MODE_DELAY: Final = 4  # UNVERIFIED: "a few Tcy" (§15)
 _ALONE_TEC: Final = 128
-"""Transmit error count of a node whose frames nobody acknowledges: it stays error-passive."""
+"""Transmit error count of a node whose frames are not acknowledged: it stays error-passive."""
 _ICODES: Final = (("ERRIF", 1), ("WAKIF", 7), ("TXB0IF", 4), ("TXB1IF", 3), ("TXB2IF", 2), ("RXB0IF", 6), ("RXB1IF", 5))
 """ICODE by pending interrupt, highest priority first. UNVERIFIED order."""
 _FILTERS: Final = {0: (0, 1), 1: (2, 3, 4, 5)}
-"""Filters of each receive buffer; mask n belongs to buffer n (§15)."""
+"""Filter numbers of each receive buffer; mask n belongs to buffer n (§15)."""
 
 
 class Can(Peripheral):
@@ -51,7 +51,7 @@ class Can(Peripheral):
         port, self._tx_pin = parse_pin(site.tx_pin)
         self._tx_port: Final = ports[port]
         self._sending: Final = self.cell("sending", "B")
-        """1 + number of the transmit buffer on the wire, 0 = none."""
+        """1 + number of the transmit buffer being sent, 0 = none."""
         self._wire: Final = self.slot("wire", self._sent)
         self._mode: Final = self.slot("mode", self._mode_changed)
 
@@ -59,27 +59,27 @@ class Can(Peripheral):
 
     @property
     def bit_time(self) -> float:
-        """Length of a bit in Tcy. Fcan is Fcy with CANCKS = 1, else 4 Fcy (§15)."""
+        """Bit time in Tcy. Fcan is Fcy with CANCKS = 1, else 4 Fcy (§15)."""
         cfg1, cfg2 = self._r["CFG1"], self._r["CFG2"]
         quantum = 2 * (cfg1["BRP"] + 1) / (1 if self.ctrl["CANCKS"] else 4)
         return quantum * (1 + cfg2["PRSEG"] + 1 + cfg2["SEG1PH"] + 1 + cfg2["SEG2PH"] + 1)
 
     def _ctrl_written(self, old: int, new: int, _lanes: int) -> None:
         if self.ctrl["CANCAP"]:
-            self.bus.lacks(f"{self.ctrl.name}.CANCAP, no timer captures frames")
+            self.bus.lacks(f"{self.ctrl.name}.CANCAP: capture of received frames by a timer")
         if self.ctrl["ABAT"]:
             self._abort_all()
         if self.ctrl["REQOP"] != self.ctrl["OPMODE"] and self.events.due(self._mode) == NEVER:
             self.events.set(self._mode, self.now + 1 + _MODE_DELAY)
 
     def _mode_changed(self, due: int) -> None:
-        """The new mode waits for the frame on the wire."""
+        """Enter the requested mode, after the frame being sent has ended."""
         if self._sending.value:
             self.events.set(self._mode, self.events.due(self._wire) + _MODE_DELAY)
             return
         mode = self.ctrl["REQOP"]
         self.ctrl["OPMODE"] = mode
-        if mode in (_NORMAL, _LOOPBACK):  # the module takes CiTX, recessive while idle
+        if mode in (_NORMAL, _LOOPBACK):  # the module drives CiTX, recessive while idle
             self._tx_port.own_now(self._tx_pin, drive=True, level=1)
         else:
             self._tx_port.release(self._tx_pin)
@@ -92,7 +92,7 @@ class Can(Peripheral):
             self._start_next(self.now + 1)
 
     def _start_next(self, cycle: int) -> None:
-        """The pending buffer with the highest TXPRI, then the highest number, goes on the wire."""
+        """Start sending the pending buffer with the highest TXPRI; among equals the highest number."""
         if self.ctrl["OPMODE"] not in (_NORMAL, _LOOPBACK) or self.is_frozen:
             return
         pending = [number for number in range(3) if self._r[f"TX{number}CON"]["TXREQ"]]
@@ -105,7 +105,7 @@ class Can(Peripheral):
         self.events.set(self._wire, cycle + round(self.frame(number).wire_bits() * self.bit_time))
 
     def frame(self, number: int) -> CanFrame:
-        """The message in transmit buffer 0..2."""
+        """Return the message in transmit buffer 0..2."""
         sid, eid, dlc = (self._r[f"TX{number}{part}"] for part in ("SID", "EID", "DLC"))
         identifier = sid["SID10_6"] << 6 | sid["SID5_0"]
         extended = bool(sid["TXIDE"])
@@ -140,7 +140,7 @@ class Can(Peripheral):
             self._raise("ERRIF")
 
     def _abort_all(self) -> None:
-        """ABAT: what is pending but not on the wire is dropped."""
+        """Handle ABAT: drop pending messages except the one being sent."""
         for number in range(3):
             con = self._r[f"TX{number}CON"]
             if con["TXREQ"] and self._sending.value != number + 1:
@@ -151,7 +151,7 @@ class Can(Peripheral):
     # -- receive -----------------------------------------------------------------------------------------------------
 
     def receive(self, frame: CanFrame) -> bool:
-        """A frame of another node has ended. True if this node acknowledged it."""
+        """Receive a frame of another node. Return whether this node acknowledged it."""
         mode = self.ctrl["OPMODE"]
         if mode not in (_NORMAL, _LISTEN, _LISTEN_ALL) or self.is_frozen:
             return False
@@ -175,7 +175,7 @@ class Can(Peripheral):
         return not (frame.extended and (frame.identifier ^ self._eid(f"RXF{number}")) & self._eid(f"RXM{mask}"))
 
     def _eid(self, name: str) -> int:
-        """Extended identifier bits 17:0 of a filter or mask."""
+        """Return the extended identifier bits 17:0 of a filter or mask."""
         return self._r[name + "EIDH"].value << 6 | self._r[name + "EIDL"]["EID5_0"]
 
     def _store(self, frame: CanFrame, buffer: int, number: int) -> None:
@@ -207,7 +207,7 @@ class Can(Peripheral):
 
     def _enables_written(self) -> None:
         if self.inte["WAKIE"]:
-            self.bus.lacks(f"{self.inte.name}.WAKIE, activity on the bus does not wake the chip")
+            self.bus.lacks(f"{self.inte.name}.WAKIE: wake-up by activity on the bus")
         self._signal(self.intf.value & 0xFF)
 
     def _raise(self, flag: str) -> None:
@@ -215,7 +215,7 @@ class Can(Peripheral):
         self._signal(1 << self.context.chip.sfrs[self.intf.name].fields[flag][0])
 
     def _signal(self, flags: int) -> None:
-        """CiIF rises with a flag whose enable is set (§15)."""
+        """Raise CiIF for flags whose enable bit is set (§15)."""
         self._show_icode()
         if flags & self.inte.value:
             self._line.request()
@@ -225,9 +225,9 @@ class Can(Peripheral):
         self.ctrl["ICODE"] = next(pending, 0)
 
     def release_pins(self) -> None:
-        """CiTX."""
+        """Return the CiTX pin to LAT and TRIS."""
         self._tx_port.disown(self._tx_pin)
 
     def reset(self, power_on: bool) -> None:
-        """Configuration mode (CiCTRL resets to 0x0480)."""
+        """Reset to configuration mode (CiCTRL = 0x0480)."""
         self._sending.value = 0

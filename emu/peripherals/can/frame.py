@@ -1,4 +1,4 @@
-"""CAN frames as bits: how long a frame is on the wire (CAN 2.0 part A §3, part B §3)."""
+"""CAN frames as bits, and the duration of a frame (CAN 2.0 part A §3, part B §3)."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Final
 _POLYNOMIAL: Final = 0x4599
 """CRC-15 generator of CAN 2.0."""
 _TAIL_BITS: Final = 1 + 1 + 1 + 7 + 3
-"""CRC delimiter, ACK slot, ACK delimiter, end of frame, intermission: never stuffed."""
+"""CRC delimiter, ACK slot, ACK delimiter, end of frame and intermission; these bits are never stuffed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,7 +23,7 @@ class CanFrame:
     data: bytes
 
     def wire_bits(self) -> int:
-        """Bit times from the start of frame to the end of the intermission, stuff bits included."""
+        """Return the bit times from the start of frame to the end of the intermission, stuff bits included."""
         bits = self._header()
         if not self.remote:
             bits += "".join(f"{byte:08b}" for byte in self.data)
@@ -31,7 +31,7 @@ class CanFrame:
         return len(bits) + _stuff_bits(bits) + _TAIL_BITS
 
     def _header(self) -> str:
-        """Start of frame to DLC: dominant bits are 0."""
+        """Return the bits from the start of frame to the DLC; dominant bits are 0."""
         remote = "1" if self.remote else "0"
         if not self.extended:
             return f"0{self.identifier & 0x7FF:011b}{remote}00{self.length:04b}"
@@ -50,7 +50,7 @@ def _crc(bits: str) -> int:
 
 
 def _stuff_bits(bits: str) -> int:
-    """Complementary bits inserted after five equal ones; an inserted bit counts for the next run."""
+    """Count the stuff bits: a complementary bit after five equal ones, which counts for the next run."""
     count, run, last = 0, 0, ""
     for bit in bits:
         run = run + 1 if bit == last else 1

@@ -1,7 +1,6 @@
-"""The two wires outside the chip: slaves with addresses, stuck lines, and an outside master.
+"""The I2C bus outside the chip: slaves with addresses, and lines held low.
 
-Slaves answer byte by byte. Their own state is the outside's affair: a device that must survive snapshots keeps it in
-the record, as the boards do.
+Slaves answer byte by byte. A slave whose state must be part of snapshots keeps it in the record, as the boards do.
 """
 
 from __future__ import annotations
@@ -13,33 +12,33 @@ from emu.system.events import Events
 
 
 class I2cDevice:
-    """A slave. The defaults are those of a device that acknowledges everything and sends 0xFF."""
+    """Base class of slaves. The defaults acknowledge everything and send 0xFF."""
 
     def start(self, read: bool, cycle: int) -> bool:
-        """The device is addressed for reading or writing. True acknowledges."""
+        """Handle being addressed for reading or writing. Return True to acknowledge."""
         return True
 
     def write(self, byte: int, cycle: int) -> bool:
-        """The master sent a byte. True acknowledges."""
+        """Handle a byte from the master. Return True to acknowledge."""
         return True
 
     def read(self, cycle: int) -> int:
-        """The next byte for the master."""
+        """Return the next byte for the master."""
         return 0xFF
 
     def acknowledged(self, more: bool, cycle: int) -> None:
-        """The master acknowledged a byte that was read (`more`), or not."""
+        """Handle the master's ACK (`more`) or NACK after a byte it read."""
 
     def stop(self, cycle: int) -> None:
-        """The transaction ended with Stop or with the Start of another."""
+        """Handle the end of the transaction: Stop, or the Start of another one."""
 
     def stretch(self, cycle: int) -> int:
-        """Tcy by which the device delays the first clock of the coming byte."""
+        """Return the Tcy by which the device delays the first clock of the next byte."""
         return 0
 
 
 class I2cBus:
-    """Who is on the bus, and which lines something holds low. Both lines have pull-ups."""
+    """Slaves on the bus, and lines held low from outside. Both lines have pull-ups."""
 
     def __init__(self, pins: Pins, events: Events, sda_pin: str, scl_pin: str) -> None:
         self._pins: Final = pins
@@ -55,40 +54,40 @@ class I2cBus:
         pins.watch(scl_pin, self._clocked)
 
     def attach(self, address: int, device: I2cDevice) -> None:
-        """Put a slave at a 7-bit address (0..127). Raises ValueError if it is taken."""
+        """Attach a slave at a 7-bit address (0..127). Raises ValueError if the address is in use or out of range."""
         if not 0 <= address < 128 or address in self.devices:
-            raise ValueError(f"I2C address {address:#04x} is taken or out of range")
+            raise ValueError(f"I2C address {address:#04x} is in use or out of range")
         self.devices[address] = device
 
     @property
     def sda_high(self) -> bool:
-        """Level of SDA with the chip's own driver."""
+        """Level of SDA, the chip's own driver included."""
         return bool(self._pins.level[self.port] & self.sda)
 
     @property
     def scl_high(self) -> bool:
-        """Level of SCL with the chip's own driver."""
+        """Level of SCL, the chip's own driver included."""
         return bool(self._pins.level[self.port] & self.scl)
 
     def hold(self, *, sda: bool = False, scl: bool = False, clocks: int = 0) -> None:
-        """Something holds lines low from now on; with `clocks`, SDA is let go after that many SCL pulses."""
+        """Hold lines low from outside; with `clocks`, release SDA after that many SCL pulses."""
         self._stuck_clocks = clocks if sda else 0
         mask = self.sda | self.scl
         free = (0 if sda else self.sda) | (0 if scl else self.scl)
         self._pins.set_port(self.port, mask, free)
 
     def release(self) -> None:
-        """Both lines are free again."""
+        """Release both lines."""
         self.hold()
 
     def pulses(self, count: int) -> None:
-        """The chip's master has given `count` clock pulses: a slave stuck in the middle of a byte moves on."""
+        """Count `count` clock pulses of the chip's master towards the release of a held SDA."""
         if self._stuck_clocks:
             self._stuck_clocks = max(self._stuck_clocks - count, 0)
             if not self._stuck_clocks:
                 self.release()
 
     def _clocked(self, _cycle: int, _changed: int, levels: int) -> None:
-        """SCL moved as a port pin: software recovers a stuck bus by hand."""
+        """Count an SCL pulse made through the port: software recovers a held bus this way."""
         if levels & self.scl:
             self.pulses(1)

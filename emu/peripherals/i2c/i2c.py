@@ -1,6 +1,6 @@
 """I2C master and slave (§11). Times are multiples of Tbrg, half a bit: (BRG + 1) / 2 Tcy, rounded down per edge.
 
-UNVERIFIED: the pin-filter delay of silicon (about 0.9 us per bit) is left out, as §11 recommends: a bit is BRG + 1 Tcy.
+UNVERIFIED: the pin-filter delay of silicon (about 0.9 us per bit) is omitted, as §11 recommends: a bit is BRG + 1 Tcy.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ _SEQUENCE: Final = 0x1F
 
 
 class I2c(Peripheral):
-    """The module as master. `wire` is the bus outside, `slave` the module's other half."""
+    """The I2C module as master. `wire` is the bus outside the chip, `slave` the module's slave half."""
 
     def __init__(self, site: I2cSite, context: ChipContext, interrupts: Interrupts, ports: dict[int, Port]) -> None:
         super().__init__("i2c", context)
@@ -41,23 +41,23 @@ class I2c(Peripheral):
         self.wire: Final = I2cBus(context.pins, self.events, site.sda_pin, site.scl_pin)
         self._port: Final = ports[self.wire.port]
         self._operation: Final = self.cell("operation", "B")
-        self._begun: Final = self.moment("begun", NEVER)
-        """Cycle the operation began (later by the time a slave stretched the clock)."""
+        self._begun: Final = self.timestamp("begun", NEVER)
+        """Cycle in which the operation began, clock stretching by a slave included."""
         self._half_bit: Final = self.cell("half_bit", "H")
         """BRG + 1 of the operation: Tbrg in half Tcy."""
         self._byte: Final = self.cell("byte", "B")
         self._collides: Final = self.cell("collides", "B")
-        """1 + Tbrg at which the operation ends in a collision."""
+        """1 + Tbrg at which the operation ends in a collision, 0 for none."""
         self._ack: Final = self.cell("ack", "B")
         self._address_next: Final = self.cell("address_next", "B")
         self._selected: Final = self.cell("selected", "B")
-        """1 + address of the slave in the present transaction."""
+        """1 + address of the slave in the current transaction, 0 for none."""
         self._reading: Final = self.cell("reading", "B")
         self._owns: Final = self.cell("owns", "B")
-        """Between Start and Stop: SCL rests low."""
+        """Whether a transaction is open (between Start and Stop): SCL idles low."""
         self._stalled: Final = self.cell("stalled", "B")
         self._step: Final = self.slot("step", self._due)
-        context.pins.watch(site.scl_pin, self._scl_moved)
+        context.pins.watch(site.scl_pin, self._scl_changed)
         registers = I2cRegisters(self.rcv, self.trn, self.con, self.stat, self.add)
         self.slave: Final = I2cSlave(
             registers, interrupts.line(site.slave_irq), self.cell("slave.state", "B"), self.cell("slave.ten_bit", "B")
@@ -66,7 +66,7 @@ class I2c(Peripheral):
     # -- lines -------------------------------------------------------------------------------------------------------
 
     def _edge(self, count: int) -> int:
-        """Cycle of the operation's edge number `count`, in Tbrg from its beginning."""
+        """Return the cycle that lies `count` Tbrg after the start of the operation."""
         return self._begun.value + count * self._half_bit.value // 2
 
     def _device(self) -> I2cDevice | None:
@@ -74,13 +74,13 @@ class I2c(Peripheral):
         return self.wire.devices.get(selected - 1) if selected else None
 
     def bits(self, cycle: int) -> int:
-        """SDA and SCL while the module drives them."""
+        """Return the levels of SDA and SCL while the module is on."""
         outside = self.context.pins.level[self.wire.port]
         scl, sda = self._own_levels(cycle)
         return outside & ((self.wire.scl if scl else 0) | (self.wire.sda if sda else 0))
 
     def _own_levels(self, cycle: int) -> tuple[int, int]:
-        """(SCL, SDA) as the master lets them be; 1 = released."""
+        """Return (SCL, SDA) as driven by the master; 1 = released."""
         operation = self._operation.value
         if operation == _NONE or self._stalled.value or cycle < self._begun.value:
             return (0, 1) if self._owns.value else (1, 1)
@@ -98,19 +98,19 @@ class I2c(Peripheral):
         return (passed & 1, wire >> 8 - bit & 1)
 
     def rises(self, mask: int, after: int, until: int) -> int:
-        """The bus clocks nothing else inside the chip."""
+        """No other device is clocked by these pins."""
         return 0
 
     def nth_rise(self, mask: int, after: int, count: int) -> int:
-        """The bus clocks nothing else inside the chip."""
+        """No other device is clocked by these pins."""
         return NEVER
 
     def constant_until(self, cycle: int) -> int:
-        """Between operations nothing moves."""
+        """Between operations the lines are constant."""
         return NEVER if self._operation.value == _NONE or self._stalled.value else cycle
 
     def restored(self) -> None:
-        """The pins carry the waveform while the module is on."""
+        """Attach the waveform to the pins while the module is on."""
         if self.con["I2CEN"]:
             self.context.pins.attach(self.wire.port, self.wire.sda | self.wire.scl, self)
         else:
@@ -120,7 +120,9 @@ class I2c(Peripheral):
 
     def _con_written(self, old: int, new: int, _lanes: int) -> None:
         enable = 1 << self.context.chip.sfrs["I2CCON"].fields["I2CEN"][0]
-        if old & ~new & self._sclrel and not self.con["STREN"]:  # UNVERIFIED: §11 does not say who may clear SCLREL
+        if (
+            old & ~new & self._sclrel and not self.con["STREN"]
+        ):  # UNVERIFIED: §11 does not say when software may clear SCLREL
             new |= self._sclrel
             self.con.value = new
         if (old ^ new) & enable:
@@ -129,7 +131,7 @@ class I2c(Peripheral):
         wanted = new & _SEQUENCE
         if not new & enable:
             self.con.value = new & ~_SEQUENCE
-        elif busy:  # the running operation stays, requests during it are ignored (§11)
+        elif busy:  # requests during a running operation are ignored (§11)
             self.con.value = new & ~_SEQUENCE | old & _SEQUENCE
         elif wanted:
             operation = next(op for op, name in _BITS.items() if self.con[name])
@@ -139,7 +141,10 @@ class I2c(Peripheral):
         self.slave.control_written(old, new)
 
     def _enabled(self, on: bool) -> None:
-        """I2CEN takes the pins. Both lines rising to high reads as a Stop (§11, required by e-puck firmware)."""
+        """Handle a change of I2CEN: take or return the pins.
+
+        Both lines high count as a Stop (§11; e-puck firmware needs it).
+        """
         lines = self.wire.sda | self.wire.scl
         self._abort()
         self.slave.reset()
@@ -177,7 +182,7 @@ class I2c(Peripheral):
         self._begin(_SEND)
 
     def _begin(self, operation: int) -> None:
-        """Start an operation in the next cycle; a line that something holds low may end it at once."""
+        """Start an operation in the next cycle; a line held low from outside may end it at once."""
         lines = self.wire
         self._invalidate_pins()
         self._operation.value = operation
@@ -186,7 +191,7 @@ class I2c(Peripheral):
         if operation == _START and not (lines.sda_high and lines.scl_high):
             self._collision()
             return
-        if not lines.scl_high:  # somebody stretches the clock without end
+        if not lines.scl_high:  # SCL is held low from outside
             self._stalled.value = 1
             return
         self._run(self.now + 1)
@@ -200,14 +205,14 @@ class I2c(Peripheral):
         self._collides.value = self._first_collision() if stuck else 0
         self._ack.value = 0
         if self._operation.value == _RECEIVE and not self._collides.value:
-            self._byte.value = 0 if stuck else self._asked(cycle)
+            self._byte.value = 0 if stuck else self._read_from_slave(cycle)
         end = _EIGHTH_EDGE if self._operation.value == _SEND else _LENGTH[self._operation.value]
         end = self._collides.value - 1 if self._collides.value else end
         self.events.set(self._step, self._edge(end))
         self._log_edges(0, end)
 
     def _first_collision(self) -> int:
-        """1 + Tbrg at which the module finds SDA low that it let go, 0 if it never lets go (§11)."""
+        """Return 1 + Tbrg at which the module releases SDA but reads it low, 0 if it never releases SDA (§11)."""
         operation = self._operation.value
         if operation == _SEND:
             ones = [bit for bit in range(8) if self._byte.value >> 7 - bit & 1]
@@ -216,13 +221,13 @@ class I2c(Peripheral):
             return 2 if self.con["ACKDT"] else 0
         return {_RESTART: 2, _STOP: 4}.get(operation, 0)
 
-    def _asked(self, cycle: int) -> int:
-        """The byte of the addressed slave; nobody there leaves SDA high."""
+    def _read_from_slave(self, cycle: int) -> int:
+        """Return the next byte of the addressed slave, 0xFF if no slave is addressed."""
         device = self._device()
         return device.read(cycle) & 0xFF if device is not None and self._reading.value else 0xFF
 
-    def _offer(self, cycle: int) -> bool:
-        """The addressed slave's answer to the byte it has just got whole."""
+    def _deliver_byte(self, cycle: int) -> bool:
+        """Deliver a complete byte to the addressed slave. Return whether it acknowledges."""
         byte = self._byte.value
         if self._address_next.value:
             self._address_next.value = 0
@@ -241,7 +246,7 @@ class I2c(Peripheral):
             self._collision()
         elif operation == _SEND and self.stat["TBF"]:
             self.stat["TBF"] = 0  # the eighth falling edge; the ninth ends it
-            self._ack.value = not self.wire.sda_high or self._offer(due)
+            self._ack.value = not self.wire.sda_high or self._deliver_byte(due)
             self.events.set(self._step, self._edge(_LENGTH[_SEND]))
             self._log_edges(_EIGHTH_EDGE, _LENGTH[_SEND])
         else:
@@ -292,7 +297,7 @@ class I2c(Peripheral):
             device.stop(self.now if cycle is None else cycle)
 
     def _collision(self) -> None:
-        """BCL and MI2CIF, lines released, the operation forgotten (§11)."""
+        """Handle a bus collision: set BCL and MI2CIF, release the lines, abort the operation (§11)."""
         operation = self._operation.value
         self._abort()
         if operation in _BITS:
@@ -301,15 +306,15 @@ class I2c(Peripheral):
         self.stat["BCL"] = 1
         self._line.request()
 
-    def _scl_moved(self, cycle: int, _changed: int, levels: int) -> None:
-        """SCL is free again: an operation that waited for it goes on."""
+    def _scl_changed(self, cycle: int, _changed: int, levels: int) -> None:
+        """Continue a stalled operation when SCL is released."""
         if levels & self.wire.scl and self._stalled.value and not self.is_frozen:
             self._stalled.value = 0
             self._invalidate_pins()
             self._run(cycle + 1)
 
     def _log_edges(self, first: int, end: int) -> None:
-        """Write the operation's own edges to the pins' log, from Tbrg `first` on."""
+        """Write the edges of the operation from Tbrg `first` on to the log of pin changes."""
         log = self.context.pins.edges
         if log is None:
             return
@@ -322,16 +327,16 @@ class I2c(Peripheral):
     # -- power and reset ---------------------------------------------------------------------------------------------
 
     def thaw(self, cycle: int) -> None:
-        """SCL may have come free meanwhile."""
+        """Resume the clock; SCL may have been released meanwhile."""
         super().thaw(cycle)
-        self._scl_moved(cycle, 0, self.wire.scl if self.wire.scl_high else 0)
+        self._scl_changed(cycle, 0, self.wire.scl if self.wire.scl_high else 0)
 
     def release_pins(self) -> None:
-        """Both lines."""
+        """Return SDA and SCL to LAT and TRIS."""
         self._port.disown(self.wire.sda | self.wire.scl)
 
     def reset(self, power_on: bool) -> None:
-        """Off; the lines were given back by the port."""
+        """Reset to off; the port has already released the lines."""
         self._abort()
         self.slave.reset()
         self.restored()

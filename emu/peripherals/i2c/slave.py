@@ -1,6 +1,6 @@
-"""The I2C module as slave (§11), and an outside master to drive it.
+"""The I2C module as slave (§11), and an external master to drive it.
 
-Everything happens at the ninth falling clock edge of a byte: address match, acknowledge, flags, SI2CIF.
+All effects occur at the ninth falling clock edge of a byte: address match, acknowledge, flags, SI2CIF.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import Final
 
-from emu.peripherals.base import Cell
+from emu.peripherals.base import StateCell
 from emu.system.device import Irq, Register
 from emu.system.events import Events
 
@@ -21,7 +21,7 @@ _TEN_BIT: Final = 0b11110
 
 @dataclass(frozen=True, slots=True)
 class I2cRegisters:
-    """What both halves of the module share."""
+    """Registers shared by the master half and the slave half of the module."""
 
     rcv: Register
     trn: Register
@@ -31,54 +31,54 @@ class I2cRegisters:
 
 
 class I2cSlave:
-    """Reacts to bytes an outside master puts on the bus."""
+    """The slave half of the I2C module: it handles bytes from an external master."""
 
-    def __init__(self, registers: I2cRegisters, line: Irq, state: Cell, ten_bit: Cell) -> None:
+    def __init__(self, registers: I2cRegisters, line: Irq, state: StateCell, ten_bit: StateCell) -> None:
         self._r: Final = registers
         self._line: Final = line
         self._state: Final = state
         self._ten_bit: Final = ten_bit
-        """The 10-bit address matched in this transaction: a repeated start may turn it into a read."""
+        """The 10-bit address has matched in this transaction: a repeated Start may turn it into a read."""
         self.on_release: Callable[[], None] | None = None
-        """SCLREL was set: the outside master may go on."""
+        """Called when SCLREL is set: the external master may continue."""
 
     @property
     def is_enabled(self) -> bool:
-        """I2CEN."""
+        """Whether I2CEN is set."""
         return bool(self._r.con["I2CEN"])
 
     @property
     def transmits(self) -> bool:
-        """A master reads from this module: a write to I2CTRN loads the answer."""
+        """Whether a master reads from this module: a write to I2CTRN loads the byte to send."""
         return self._state.value == _TRANSMITTING
 
     @property
     def stretches(self) -> bool:
-        """The module holds SCL low until software sets SCLREL."""
+        """Whether the module stretches the clock: it holds SCL low until software sets SCLREL."""
         return self._state.value != _IDLE and not self._r.con["SCLREL"]
 
     def reset(self) -> None:
-        """Not addressed."""
+        """Return to the idle state: not addressed."""
         self._state.value = _IDLE
         self._ten_bit.value = 0
 
     def control_written(self, old: int, _new: int) -> None:
-        """SCLREL 0 -> 1 lets the clock go."""
+        """Handle a write to I2CCON: SCLREL 0 -> 1 releases the clock."""
         con = self._r.con
         was_released = old >> 12 & 1
         if not was_released and con["SCLREL"] and self.on_release is not None:
             self.on_release()
 
-    # -- what the outside master does --------------------------------------------------------------------------------
+    # -- actions of the external master ------------------------------------------------------------------------------
 
     def start(self) -> None:
-        """Start or repeated start."""
+        """Handle a Start or repeated Start condition."""
         if self.is_enabled:
             self._state.value = _ADDRESS
             self._r.stat["S"], self._r.stat["P"] = 1, 0
 
     def stop(self) -> None:
-        """Stop."""
+        """Handle a Stop condition."""
         self.reset()
         if not self.is_enabled:
             return
@@ -87,23 +87,23 @@ class I2cSlave:
         stat["GCSTAT"] = stat["ADD10"] = 0
 
     def byte(self, value: int) -> bool:
-        """Nine clocks with a byte from the master. True = acknowledged."""
+        """Handle a byte from the master. Return whether it is acknowledged."""
         state = self._state.value
         if state == _ADDRESS:
             return self._first_byte(value)
         if state == _LOW_ADDRESS:
             return self._second_byte(value)
         if state == _RECEIVING:
-            return self._take(value, data=True)
+            return self._store_received(value, data=True)
         return False
 
     def answer(self) -> int:
-        """The byte the module sends; it had to be loaded and SCLREL set."""
+        """Return the byte that the module sends; software has loaded it and set SCLREL."""
         self._r.stat["TBF"] = 0
         return self._r.trn.value & 0xFF
 
     def answered(self, more: bool) -> None:
-        """The master's acknowledge of the byte sent: with `more` the module stretches for the next."""
+        """Handle the master's ACK (`more`) or NACK of a sent byte. After an ACK the module stretches the clock."""
         self._r.stat["ACKSTAT"] = not more
         if more:
             self._r.con["SCLREL"] = 0
@@ -143,14 +143,14 @@ class I2cSlave:
     def _addressed(self, value: int, read: int) -> bool:
         stat = self._r.stat
         stat["R_NOT_W"] = read
-        acknowledged = self._take(value, data=False)
+        acknowledged = self._store_received(value, data=False)
         self._state.value = _TRANSMITTING if read else _RECEIVING
         if read:
             self._r.con["SCLREL"] = 0
         return acknowledged
 
-    def _take(self, value: int, data: bool) -> bool:
-        """A byte goes to I2CRCV; a full register or a standing overflow refuses it (§11)."""
+    def _store_received(self, value: int, data: bool) -> bool:
+        """Store a byte in I2CRCV. Return False if the register is full or an overflow is pending (§11)."""
         stat = self._r.stat
         stat["D_NOT_A"] = data
         accepted = not stat["RBF"] and not stat["I2COV"]
@@ -167,7 +167,7 @@ class I2cSlave:
 
 @dataclass
 class Transfer:
-    """What an outside master did: bytes acknowledged, bytes read, and whether it is over."""
+    """Result of an external master's transfer: acknowledge bits, bytes read, and whether it has ended."""
 
     acknowledged: list[bool] = field(default_factory=list)
     received: list[int] = field(default_factory=list)
@@ -175,19 +175,25 @@ class Transfer:
 
 
 class ExternalMaster:
-    """Another master on the bus, for tests and for robots whose extension board polls the dsPIC. Host-side state."""
+    """Another master on the bus, for tests and for extension boards that poll the dsPIC.
+
+    Its state is not in snapshots.
+    """
 
     def __init__(self, slave: I2cSlave, events: Events, bit_tcy: int = 151) -> None:
         self._slave: Final = slave
         self._events: Final = events
         self._bit: Final = bit_tcy
-        self._slot: Final = events.slot("i2c.outside", self._due)
+        self._slot: Final = events.slot("i2c.external", self._due)
         self._script: Final[list[Callable[[], bool]]] = []
         self._transfer = Transfer()
         slave.on_release = self._resume
 
     def transfer(self, first: list[int], read_first: list[int] | None = None, count: int = 0) -> Transfer:
-        """Start, send `first`; with `read_first` repeat the start, send that and read `count` bytes; stop."""
+        """Start a transfer and return its result object.
+
+        Send `first`; with `read_first`, repeat the Start, send it and read `count` bytes; then send Stop.
+        """
         self._transfer = result = Transfer()
         self._script.clear()
         self._script.append(self._start)
@@ -202,7 +208,7 @@ class ExternalMaster:
 
     def _due(self, due: int) -> None:
         if self._slave.stretches:
-            return  # `_resume` goes on
+            return  # `_resume` continues
         if self._script:
             takes_bits = self._script.pop(0)()
             if self._script or not self._transfer.done:

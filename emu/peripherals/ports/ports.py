@@ -9,19 +9,19 @@ from typing import Final
 from emu.peripherals.base import ChipContext, Peripheral
 from emu.peripherals.interrupt_lines import Interrupts
 from emu.peripherals.pins import PORTS, parse_pin
-from emu.peripherals.ports.rules import PortOperands, Stretch, read_port, write_latch, write_port
+from emu.peripherals.ports.rules import ByteStream, PortOperands, read_port, write_latch, write_port
 from emu.system.events import NEVER
-from emu.system.rules import Rule, place_of
+from emu.system.rules import Rule, cell_of
 
 
 class Port(Peripheral):
-    """One port: TRIS, PORT and LAT, and the pins that other peripherals have taken over."""
+    """One port: TRIS, PORT and LAT, and the pins that other peripherals own."""
 
     def __init__(self, letter: str, context: ChipContext) -> None:
         super().__init__("port" + letter, context)
         self.index: Final = PORTS.index(letter)
         self.mask: Final = context.chip.sfrs["TRIS" + letter].mask
-        context.pins.analog[self.index] = ~self.mask & 0xFFFF  # pins the package does not have read 0
+        context.pins.analog[self.index] = ~self.mask & 0xFFFF  # pins missing on the package read 0
         self.tris: Final = self.register("TRIS" + letter)
         self.port: Final = self.register("PORT" + letter)
         self.lat: Final = self.register("LAT" + letter)
@@ -32,70 +32,70 @@ class Port(Peripheral):
         self._owned: Final = self.cell("owned", "H")
         self._own_drive: Final = self.cell("own_drive", "H")
         self._own_level: Final = self.cell("own_level", "H")
-        self._rule()
+        self._set_rules()
 
-    def _rule(self, stretch: Stretch | None = None) -> None:
-        """The common case of accesses to PORT and LAT; `stretch`: bytes that something shows on the pins."""
+    def _set_rules(self, byte_stream: ByteStream | None = None) -> None:
+        """Set the rules of PORT and LAT; `byte_stream`: bytes that an external device outputs on the pins."""
         record = self.record
-        arrays = ("output", "level", "drive", "analog", "eager", "lazy", "before", "waveform_pins", "constant_levels", "constant_until",
-                  "changed")  # fmt: skip
+        arrays = ("output", "level", "drive", "analog", "eager", "lazy", "before", "waveform_pins", "constant_levels",
+                  "constant_until", "changed")  # fmt: skip
         places = PortOperands(
             number=self.index,
             implemented=self.context.chip.sfrs[self.lat.name].writable,
             lat=self.lat.place,
             port=self.port.place,
             owned=self._owned.place,
-            ring=place_of(record, "pins.ring"),
+            ring=cell_of(record, "pins.ring"),
             ring_size=record.fields["pins.ring"].count,
-            ring_count=place_of(record, "pins.ring_count"),
-            stretch=stretch,
-            **{name: place_of(record, f"pins.{name}", self.index) for name in arrays},
+            ring_count=cell_of(record, "pins.ring_count"),
+            byte_stream=byte_stream,
+            **{name: cell_of(record, f"pins.{name}", self.index) for name in arrays},
         )
-        self.lat.ruled(Rule(places, None, write_latch))
-        self.port.ruled(Rule(places, read_port, write_port))
+        self.lat.set_rule(Rule(places, None, write_latch))
+        self.port.set_rule(Rule(places, read_port, write_port))
 
-    def show(self, stretch: Stretch, refresh: Callable[[int], bool]) -> None:
-        """Something outside shows bytes of the record on pins it drives as a waveform; `refresh` is that of `Bus`."""
-        self._rule(stretch)
+    def attach_byte_stream(self, byte_stream: ByteStream, refresh: Callable[[int], bool]) -> None:
+        """Let rules read the bytes of an attached waveform from the record; `refresh`: see `Bus.refresh`."""
+        self._set_rules(byte_stream)
         self.bus.refresh[self.port.address >> 1] = refresh
 
     def stops_in(self, mode: int) -> bool:
-        """Never: latches hold and pins are watched in every power mode."""
+        """Never stops: latches and pin watchers work in every power mode."""
         return False
 
     def reset(self, power_on: bool) -> None:
-        """All pins are inputs (TRIS was reset to ones); no peripheral owns one. LAT is unaffected but undefined."""
+        """Reset: all pins are inputs (TRIS = ones), no peripheral owns a pin. LAT is unaffected but undefined."""
         self._owned.value = 0
         self._own_drive.value = 0
         self._own_level.value = 0
         self._drive(self.now)
 
     def own(self, mask: int, drive: bool, level: int) -> None:
-        """A peripheral takes pins: it drives them with `level`, or lets them go (input or open drain)."""
+        """Take pins for a peripheral from the next cycle on: drive them with `level`, or leave them undriven."""
         self._owned.value |= mask
         self._own_drive.value = self._own_drive.value & ~mask | (mask if drive else 0)
         self._own_level.value = self._own_level.value & ~mask | (mask if level else 0)
         self._drive(self.now + 1)
 
     def release(self, mask: int) -> None:
-        """As `disown`, by an event of the current cycle."""
+        """Return pins to LAT and TRIS in the current cycle; called by events."""
         self._owned.value &= ~mask
         self._drive(self.now)
 
     def own_now(self, mask: int, drive: bool, level: int) -> None:
-        """As `own`, by an event of the current cycle: the pins change in this cycle."""
+        """Take pins for a peripheral in the current cycle; called by events."""
         self._owned.value |= mask
         self._own_drive.value = self._own_drive.value & ~mask | (mask if drive else 0)
         self._own_level.value = self._own_level.value & ~mask | (mask if level else 0)
         self._drive(self.now)
 
     def disown(self, mask: int) -> None:
-        """Give pins back to LAT and TRIS."""
+        """Return pins to LAT and TRIS from the next cycle on."""
         self._owned.value &= ~mask
         self._drive(self.now + 1)
 
     def _port_written(self, _old: int, new: int, lanes: int) -> None:
-        """Writing PORT writes the latch; read-modify-write instructions therefore copy pins to latches (§6)."""
+        """Handle a write to PORT: it writes LAT. Read-modify-write instructions so copy pin levels to LAT (§6)."""
         self.lat.value = (self.lat.value & ~lanes | new & lanes) & self.mask
         self._drive(self.now + 1)
 
@@ -128,15 +128,18 @@ class ChangeNotice(Peripheral):
             context.pins.watch_port(port, mask, partial(self._edge, port), inputs_only=True)
 
     def stops_in(self, mode: int) -> bool:
-        """Never: change notification wakes from Sleep."""
+        """Never stops: change notification wakes from Sleep."""
         return False
 
     def reset(self, power_on: bool) -> None:
-        """Pull-ups are off."""
+        """Reset: all pull-ups are off."""
         self._pull(0, 0, 0)
 
     def _edge(self, port: int, cycle: int, changed: int, _levels: int) -> None:
-        """UNVERIFIED: silicon compares with the level at the last PORT read; here with the level one Tcy earlier."""
+        """Schedule CNIF for a change of an enabled input pin.
+
+        UNVERIFIED: silicon compares with the level at the last PORT read; here with the level one Tcy earlier.
+        """
         inputs = changed & self.record.u16[self._tris[port]]
         enabled = self._enables[0].value | self._enables[1].value << 16
         for number, pin_port, bit in self._pins:
@@ -155,7 +158,7 @@ class ChangeNotice(Peripheral):
 
 
 class ExternalInterrupts(Peripheral):
-    """INT0-INT4: the flag rises one cycle after the chosen edge on the pin, whoever drives it (§5.5)."""
+    """INT0-INT4: the flag rises one cycle after the selected edge on the pin, whatever drives it (§5.5)."""
 
     def __init__(self, context: ChipContext, interrupts: Interrupts) -> None:
         super().__init__("int", context)
@@ -165,16 +168,16 @@ class ExternalInterrupts(Peripheral):
         self._flag: Final = self.slot("flag", self._raise)
         self._irqs: Final = [irq for _, irq in context.chip.external_pins]
         self.on_int0: Callable[[int], None] | None = None
-        """Called with the cycle the INT0 flag rises: an ADC trigger (§13)."""
+        """Called with the cycle in which the INT0 flag rises: an ADC trigger (§13)."""
         for number, (pin, _) in enumerate(context.chip.external_pins):
             context.pins.watch(pin, partial(self._edge, number))
 
     def stops_in(self, mode: int) -> bool:
-        """Never: external interrupts wake from Sleep."""
+        """Never stops: external interrupts wake from Sleep."""
         return False
 
     def reset(self, power_on: bool) -> None:
-        """No edge is on its way."""
+        """Reset: no edge is pending."""
         self._waiting.value = 0
 
     def _edge(self, number: int, cycle: int, changed: int, levels: int) -> None:

@@ -1,9 +1,9 @@
 """Data converter interface (§14): bit clock, frames, word slots, buffering, interrupts; enough for a codec.
 
-The outside is words: `on_word(word, slot, cycle)` for each transmitted one, `source(slot, cycle)` for each received
-one, both left-aligned in 16 bits as in TXBUF and RXBUF. As clock slave (CSCKD = 1) nothing moves, because no outside
-clock exists; AC-Link modes are framed like the multichannel mode. UNVERIFIED: TXBUF moves to the shadow registers
-when DCIEN is set, without an interrupt.
+The environment exchanges words: `on_word(word, slot, cycle)` for each transmitted one, `source(slot, cycle)` for each
+received one, both left-aligned in 16 bits as in TXBUF and RXBUF. As clock slave (CSCKD = 1) it transfers nothing,
+because no external clock exists; AC-Link modes are framed like the multichannel mode. UNVERIFIED: TXBUF moves to the
+shadow registers when DCIEN is set, without an interrupt.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ class Dci(Peripheral):
         self._txbuf: Final = [self.register(f"TXBUF{index}") for index in range(_BUFFERS)]
         self.con1.written_by(self._con1_written)
         for register in (self.con2, self.con3, self.tscon, self.rscon):
-            register.written_by(lambda _old, _new, _lanes: self._course_written())
+            register.written_by(lambda _old, _new, _lanes: self._settings_written())
         self.stat.computed(self._read_stat)
         for register in self._rxbuf:
             register.read_by(partial(self._rx_read, register))
@@ -51,20 +51,20 @@ class Dci(Peripheral):
         self._tx_shadow: Final = self.array("tx_shadow", "H", _BUFFERS)
         self._rx_shadow: Final = self.array("rx_shadow", "H", _BUFFERS)
         self._place: Final = self.cell("place", "B")
-        """Words moved since the last buffer exchange."""
+        """Words transferred since the last buffer exchange."""
         self._slot: Final = self.cell("slot", "B")
-        """Slot whose word the posted event completes."""
-        self._frame: Final = self.moment("frame", NEVER)
-        """First cycle of the frame that holds the posted event."""
-        self._stop: Final = self.moment("stop", NEVER)
-        """DCIEN fell: first cycle behind the last frame."""
+        """Slot whose word is complete at the posted event."""
+        self._frame: Final = self.timestamp("frame", NEVER)
+        """First cycle of the frame that contains the posted event."""
+        self._stop: Final = self.timestamp("stop", NEVER)
+        """First cycle after the last frame, once DCIEN was cleared."""
         self._word_event: Final = self.slot("word", self._word_done)
 
     # -- time --------------------------------------------------------------------------------------------------------
 
     @property
     def bit_time(self) -> int:
-        """Bit clock period in Tcy, 0 while the generator stands (BCG = 0 or an outside clock is chosen)."""
+        """Bit clock period in Tcy, 0 while the generator is stopped (BCG = 0 or an external clock is selected)."""
         return 0 if self.con1["CSCKD"] or not self.con3["BCG"] else 2 * (self.con3["BCG"] + 1)
 
     @property
@@ -98,7 +98,7 @@ class Dci(Peripheral):
         self.events.set(self._word_event, max(frame + (slot + 1) * self._slot_time, self.now + 1))
 
     def _word_done(self, due: int) -> None:
-        """One slot has passed: a word went out, a word came in."""
+        """Handle the end of a slot: one word was sent, one received."""
         slot, place = self._slot.value, self._place.value
         mask = ~((1 << 15 - self.con2["WS"]) - 1) & 0xFFFF
         out = self._tx_shadow[place] & mask
@@ -113,7 +113,7 @@ class Dci(Peripheral):
         self._post(self._frame.value, slot + 1)
 
     def _exchange(self) -> None:
-        """BLEN + 1 words have passed: shadows and buffers change places (§14)."""
+        """Exchange shadow registers and buffers after BLEN + 1 words (§14)."""
         self._place.value = 0
         if self.stat["RFUL"]:
             self.stat["ROV"] = 1
@@ -124,7 +124,7 @@ class Dci(Peripheral):
         self._line.request()
 
     def _load(self) -> None:
-        """TXBUF to the shadow registers; nothing new is an underflow: zeros, or the last words again (UNFM)."""
+        """Copy TXBUF to the shadow registers. Without new data it is an underflow: send zeros, or repeat (UNFM)."""
         if self.stat["TMPTY"]:
             self.stat["TUNF"] = 1
             if not self.con1["UNFM"]:
@@ -145,7 +145,7 @@ class Dci(Peripheral):
         self.stat["TMPTY"] = self.stat["TUNF"] = 0
 
     def _read_stat(self) -> int:
-        """SLOT is the slot on the wire now."""
+        """Read DCISTAT; SLOT is the slot being transferred."""
         stored = self.stat.value & 0xFF
         if self._frame.value == NEVER or not self.frame_time:
             return stored
@@ -155,19 +155,18 @@ class Dci(Peripheral):
     def _con1_written(self, old: int, new: int, _lanes: int) -> None:
         enable = 1 << self.context.chip.sfrs["DCICON1"].fields["DCIEN"][0]
         if new & enable and self.con1["CSCKD"]:
-            self.bus.lacks("DCICON1.CSCKD, nobody clocks the codec port from outside: it stands still")
+            self.bus.lacks("DCICON1.CSCKD: no external clock exists, the codec port transfers nothing")
         if new & enable and self.con1["COFSM"] & 2:
-            self.bus.lacks("DCICON1.COFSM, AC-Link frames are those of the multichannel mode")
+            self.bus.lacks("DCICON1.COFSM: AC-Link frames are sent as multichannel frames")
         if new & ~old & enable:
             self._start()
         elif old & ~new & enable:
             self._finish_frame()
         else:
-            self._course_written()
+            self._settings_written()
 
-    def _course_written(self) -> None:
-        """The bit clock or the slots may have been chosen only now, or the clock stopped; else what changed holds from
-        the next word on."""
+    def _settings_written(self) -> None:
+        """Apply new clock or slot settings: start or stop transfers; other changes hold from the next word on."""
         if not self.con1["DCIEN"]:
             return
         if self._frame.value == NEVER:
@@ -189,20 +188,20 @@ class Dci(Peripheral):
         self._post(self.now + 1, 0)
 
     def _finish_frame(self) -> None:
-        """DCIEN = 0: the frame on the wire is the last (§14); without a clock it ends at once."""
+        """Handle DCIEN = 0: the current frame is the last (§14); without a clock it ends at once."""
         if not self.frame_time or self._frame.value == NEVER:
             self._frame.value = NEVER
             self._release()
             return
         behind = max(self.now + 1 - self._frame.value, 0)
         self._stop.value = self._frame.value + -(-behind // self.frame_time) * self.frame_time
-        if self._frame.value >= self.now + 1:  # the posted word belongs to a frame that will not come
+        if self._frame.value >= self.now + 1:  # the posted word belongs to a frame that is not sent
             self._frame.value = NEVER
             self.events.cancel(self._word_event)
             self._release()
 
     def release_pins(self) -> None:
-        """All four pins."""
+        """Return all four pins to LAT and TRIS."""
         self._release()
 
     def _release(self) -> None:
@@ -211,6 +210,6 @@ class Dci(Peripheral):
             self._ports[port].disown(pin)
 
     def reset(self, power_on: bool) -> None:
-        """Off; flags were reset with DCISTAT."""
+        """Reset to off; the flags were reset with DCISTAT."""
         self._frame.value = self._stop.value = NEVER
         self._place.value = 0

@@ -1,8 +1,8 @@
 """SPI1/2 (§12): master and slave, 8 and 16 bits, double-buffered.
 
-The outside is words: as master, `exchange(word, bits)` is asked for the answer at the end of each transfer; as slave,
-the outside calls `clock_word(word, bit_tcy)`. SCK and SDO levels are functions of the cycle. What happens inside is
-the text of `spirules.py`.
+The environment exchanges words. As master, the module calls `exchange(word, bits)` at the end of each transfer; as
+slave, an external master calls `clock_word(word, bit_tcy)`. SCK and SDO levels are functions of the cycle. The module's
+logic is in `rules.py`.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from emu.peripherals.spi.rules import (
     word_bits,
 )
 from emu.system.events import NEVER
-from emu.system.rules import Rule, place_of, slot_of
+from emu.system.rules import Rule, cell_of, event_slot
 
 
 class Spi(Peripheral):
@@ -46,9 +46,9 @@ class Spi(Peripheral):
         self.con.written_by(self._con_written)
         self.buf.computed(lambda: self._received.value)
         self._exchange: Callable[[int, int], int] | None = None
-        self._answered: Final = self.cell("answered", "B")
+        self._has_device: Final = self.cell("has_device", "B")
         self.on_slave_word: Callable[[int, int], None] | None = None
-        """on_slave_word(word, cycle): what an outside master has clocked out of this module."""
+        """on_slave_word(word, cycle): called with each word that an external master has clocked out of this module."""
         self._pins: Final = {role: parse_pin(getattr(site, f"{role}_pin")) for role in ("sck", "sdi", "sdo", "ss")}
         self._ports: Final = ports
         self._waiting: Final = self.cell("waiting", "H")
@@ -56,54 +56,53 @@ class Spi(Peripheral):
         self._reply: Final = self.cell("reply", "H")
         self._received: Final = self.cell("received", "H")
         self._busy: Final = self.cell("busy", "B")
-        self._start: Final = self.moment("start", NEVER)
+        self._start: Final = self.timestamp("start", NEVER)
         self._bit: Final = self.cell("bit", "I")
         self._step: Final = self.slot("step", self._due)
-        self._places: Final = self._registers()
+        self._places: Final = self._rule_operands()
         integers, places = self.bus.integers, self._places
-        self.buf.ruled(Rule(places, writes=push, takes=take))
+        self.buf.set_rule(Rule(places, writes=push, reads_with_effect=take))
         self.buf.read_by(lambda: take(integers, places))
         self.buf.written_by(self._push)
-        self.ruled(self._step, Rule(places, fires=fire))
+        self.set_event_rule(self._step, Rule(places, fires=fire))
 
-    def _registers(self) -> SpiOperands:
+    def _rule_operands(self) -> SpiOperands:
         sfrs, (port, pin) = self.context.chip.sfrs, self._pins["sdi"]
         fields = {**sfrs[self.stat.name].fields, **sfrs[self.con.name].fields}
-        cells = {name: name for name in ("waiting", "shift", "received", "busy", "start", "answered")}
+        cells = {name: name for name in ("waiting", "shift", "received", "busy", "start", "has_device")}
         return SpiOperands(
             stat=self.stat.place,
             con=self.con.place,
             buf=self.buf.place,
             bit={name: ((1 << width) - 1) << lsb for name, (lsb, width) in fields.items()},
             spre=fields["SPRE"][0],
-            level=place_of(self.record, "pins.level", port),
+            level=cell_of(self.record, "pins.level", port),
             sdi=pin,
-            step=slot_of(self.record, self._step),
+            step=event_slot(self.record, self._step),
             line=self._line.line,
             **{
-                cell: place_of(self.record, f"{self.name}.{name}")
-                for cell, name in (cells | {"bit_tcy": "bit"}).items()
+                cell: cell_of(self.record, f"{self.name}.{name}") for cell, name in (cells | {"bit_tcy": "bit"}).items()
             },
         )
 
     @property
     def exchange(self) -> Callable[[int, int], int] | None:
-        """exchange(word, bits) -> word: the device at the other end, when this module is master."""
+        """exchange(word, bits) -> word: the connected device, while this module is master."""
         return self._exchange
 
     @exchange.setter
     def exchange(self, device: Callable[[int, int], int] | None) -> None:
         self._exchange = device
-        self._answered.value = device is not None
+        self._has_device.value = device is not None
 
     @property
     def word_bits(self) -> int:
-        """8 or 16 (MODE16)."""
+        """Word length, 8 or 16 bits (MODE16)."""
         return int(word_bits(self.bus.integers, self._places))
 
     @property
     def bit_time(self) -> int:
-        """Length of a bit as master in Tcy."""
+        """Bit time as master in Tcy."""
         return int(bit_time(self.bus.integers, self._places))
 
     # -- transfers ---------------------------------------------------------------------------------------------------
@@ -112,7 +111,7 @@ class Spi(Peripheral):
         push(self.bus.integers, self._places, new, lanes)
 
     def _due(self, due: int) -> None:
-        text, places = self.bus.integers, self._places
+        rules, places = self.bus.integers, self._places
         if self._busy.value:
             out = self._shift.value
             if not self.con["MSTEN"]:
@@ -120,13 +119,13 @@ class Spi(Peripheral):
                 if self.on_slave_word is not None:
                     self.on_slave_word(out, due)
             else:
-                word = int(open_end(text, places)) if self.exchange is None else self.exchange(out, self.word_bits)
-            finish(text, places, word)
-        if waits_to_begin(text, places):
-            begin(text, places, due, self.bit_time)
+                word = int(open_end(rules, places)) if self.exchange is None else self.exchange(out, self.word_bits)
+            finish(rules, places, word)
+        if waits_to_begin(rules, places):
+            begin(rules, places, due, self.bit_time)
 
     def clock_word(self, word: int, bit_tcy: int = 16) -> bool:
-        """An outside master clocks one word through this module, starting now. False if it is not listening."""
+        """Clock one word through this module as an external master, starting now. Return False if it cannot receive."""
         port, pin = self._pins["ss"]
         selected = not self.con["SSEN"] or not self.context.pins.level[port] & pin
         if not self.stat["SPIEN"] or self.con["MSTEN"] or self._busy.value or self.is_frozen or not selected:
@@ -138,7 +137,7 @@ class Spi(Peripheral):
     # -- pins --------------------------------------------------------------------------------------------------------
 
     def _take_pins(self) -> None:
-        """SPIEN takes SCK, SDI and (unless DISSDO) SDO (§12)."""
+        """Take or return the pins as SPIEN says: SCK, SDI and, unless DISSDO, SDO (§12)."""
         if not self.stat["SPIEN"]:
             for port, pin in self._pins.values():
                 self._ports[port].disown(pin)
@@ -153,7 +152,10 @@ class Spi(Peripheral):
         self.restored()
 
     def bits(self, cycle: int) -> int:
-        """Levels of SCK and SDO (§12: CKP idle level, CKE 1 = data changes on the edge from active to idle)."""
+        """Return the levels of SCK and SDO (§12:
+
+        CKP idle level, CKE 1 = data changes on the edge from active to idle).
+        """
         idle = self.con["CKP"]
         clock, data = idle, 0
         if self._busy.value and cycle >= self._start.value:
@@ -164,20 +166,20 @@ class Spi(Peripheral):
         return (self._pins["sck"][1] if clock else 0) | (self._pins["sdo"][1] if data else 0)
 
     def rises(self, mask: int, after: int, until: int) -> int:
-        """SCK clocks nothing else inside the chip."""
+        """No other device is clocked by SCK."""
         return 0
 
     def nth_rise(self, mask: int, after: int, count: int) -> int:
-        """SCK clocks nothing else inside the chip."""
+        """No other device is clocked by SCK."""
         return NEVER
 
     def constant_until(self, cycle: int) -> int:
-        """Nothing is promised: idle levels follow control bits that are plain storage."""
+        """No guarantee: idle levels follow control bits that are plain storage."""
         return cycle
 
     def restored(self) -> None:
-        """SCK (as master) and SDO carry the waveform while the module is on."""
-        self._answered.value = self._exchange is not None
+        """Attach the waveform to SCK (as master) and SDO while the module is on."""
+        self._has_device.value = self._exchange is not None
         port = self._pins["sck"][0]
         self.context.pins.detach(port, self)
         mask = self._pins["sck"][1] if self.con["MSTEN"] else 0
@@ -189,7 +191,7 @@ class Spi(Peripheral):
 
     def _con_written(self, _old: int, _new: int, _lanes: int) -> None:
         if self.con["FRMEN"]:
-            self.bus.lacks(f"{self.con.name}.FRMEN, frame sync pulses are neither made nor awaited")
+            self.bus.lacks(f"{self.con.name}.FRMEN: frame sync pulses")
         self._take_pins()
 
     def _stat_written(self, old: int, new: int, _lanes: int) -> None:
@@ -200,7 +202,7 @@ class Spi(Peripheral):
             self._take_pins()
 
     def _clear(self) -> None:
-        """SPIEN = 0 clears buffers and flags (§12)."""
+        """Clear buffers and flags, as SPIEN = 0 does (§12)."""
         for flag in ("SPITBF", "SPIRBF", "SPIROV"):
             self.stat[flag] = 0
         self._busy.value = 0
@@ -208,28 +210,31 @@ class Spi(Peripheral):
         self.events.cancel(self._step)
 
     def release_pins(self) -> None:
-        """All pins: SPIEN is 0."""
+        """Return all pins to LAT and TRIS; SPIEN is 0."""
         self._take_pins()
 
     def stops_in(self, mode: int) -> bool:
-        """A slave lives by the outside's clock and goes on. UNVERIFIED: §12 says nothing of Sleep."""
+        """Whether the clock stops: a slave is clocked externally and continues.
+
+        UNVERIFIED: §12 does not cover Sleep.
+        """
         return bool(self.con["MSTEN"]) and super().stops_in(mode)
 
     def freeze(self, cycle: int, mode: int) -> None:
-        """A word under way is cut off for good; the one in TXB waits. UNVERIFIED as above."""
+        """Abort the current word; the word in TXB waits. UNVERIFIED: §12 does not cover Sleep."""
         self._busy.value = 0
         self._start.value = NEVER
         self.events.cancel(self._step)
         super().freeze(cycle, mode)
 
     def thaw(self, cycle: int) -> None:
-        """The word that waited is sent."""
+        """Resume the clock and send the waiting word."""
         super().thaw(cycle)
         if self.stat["SPITBF"]:
             self.events.set(self._step, cycle + 1)
 
     def reset(self, power_on: bool) -> None:
-        """Off and empty."""
+        """Reset to off, with empty buffers."""
         self._clear()
         self._received.value = 0
         self.restored()

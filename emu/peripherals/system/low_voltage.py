@@ -18,7 +18,10 @@ _BAND_GAP_SECONDS: Final = 20e-6
 
 
 class LowVoltageDetect(Peripheral):
-    """LVDIF rises when the supply falls below the chosen threshold; LVDEN and LVDL live in RCON."""
+    """Low-voltage detect:
+
+    LVDIF rises when the supply falls below the selected threshold. LVDEN and LVDL are in RCON.
+    """
 
     def __init__(self, context: ChipContext, interrupts: Interrupts, rcon: Register, irq: int) -> None:
         super().__init__("lvd", context)
@@ -27,7 +30,7 @@ class LowVoltageDetect(Peripheral):
         self._supply: Final = self.cell("supply", "H", 5000)
         self._stable: Final = self.slot("stable", self._band_gap_stable, in_seconds=True)
         self._below: Final = self.cell("below", "B")
-        """The supply was below the threshold when somebody last looked."""
+        """Result of the last comparison: whether the supply was below the threshold."""
         before = context.bus.on_write[rcon.address >> 1]
 
         def written(old: int, new: int, lanes: int) -> None:
@@ -38,16 +41,16 @@ class LowVoltageDetect(Peripheral):
         rcon.written_by(written)
 
     def stops_in(self, mode: int) -> bool:
-        """Never: it watches the supply in every power mode."""
+        """Never stops: it compares the supply in every power mode."""
         return False
 
     def set_supply(self, millivolts: int) -> None:
-        """The supply voltage changes now (0..65535 mV; LVDIN when LVDL = 15)."""
+        """Change the supply voltage now (0..65535 mV; LVDIN when LVDL = 15)."""
         self._supply.value = millivolts
-        self._look()
+        self._compare()
 
-    def _look(self) -> None:
-        """Supply, threshold or band gap have changed: LVDIF rises when the supply comes to be too low."""
+    def _compare(self) -> None:
+        """Compare the supply with the threshold after either changed; request LVDIF on the transition to low."""
         low = self._is_low
         if low and not self._below.value:
             self._line.request()
@@ -65,13 +68,13 @@ class LowVoltageDetect(Peripheral):
             self.events.cancel(self._stable)
         elif not self._rcon["BGST"] and self.events.due(self._stable) == NEVER:
             self.events.set(self._stable, self.now + 1 + round(_BAND_GAP_SECONDS * self.context.fcy()))
-        self._look()
+        self._compare()
 
     def _band_gap_stable(self, _due: int) -> None:
         self._rcon["BGST"] = 1
-        self._look()
+        self._compare()
 
     def reset(self, power_on: bool) -> None:
-        """A band gap that was on stays on, RCON is kept by every reset but power-on."""
+        """Reset; every reset but power-on keeps RCON, and so an enabled band gap."""
         self._below.value = self._is_low
         self._enable_changed()

@@ -1,4 +1,4 @@
-"""Peripheral module disable (§17): a module switched off reads 0, ignores writes and forgets its state."""
+"""Peripheral module disable (§17): a disabled module reads 0, ignores writes and loses its state."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ _PREFIXES: Final = {
     "ADC": ("ADCBUF", "ADCON", "ADCHS", "ADCSSL"),
     "DCI": ("DCI", "TSCON", "RSCON", "RXBUF", "TXBUF"),
 }
-"""Modules whose registers do not start with the module's own name."""
+"""Prefixes of registers whose names do not start with the module's name."""
 
 
 def _zero() -> int:
@@ -23,7 +23,7 @@ _OFF: Final = Access(0, 0, _zero, None, None, None)
 
 
 class ModuleDisable(Peripheral):
-    """PMD1 and PMD2. What is off follows from the registers, so a restored record needs no more than `restored`."""
+    """PMD1 and PMD2. The registers determine which modules are off, so `restored` suffices after a snapshot."""
 
     def __init__(self, context: ChipContext, modules: dict[str, Peripheral]) -> None:
         super().__init__("pmd", context)
@@ -42,7 +42,7 @@ class ModuleDisable(Peripheral):
             self.register("PMD3")
 
     def stops_in(self, mode: int) -> bool:
-        """Never: these are switches."""
+        """Never stops: the device has no clock."""
         return False
 
     def _words_of(self, module: str) -> list[int]:
@@ -64,7 +64,7 @@ class ModuleDisable(Peripheral):
         self.restored()
 
     def _clear(self, module: str) -> None:
-        """The module loses its state, as by a reset of its own."""
+        """Reset one module and its registers."""
         device = self._modules.get(module)
         if device is not None:
             device.before_disable()
@@ -74,30 +74,30 @@ class ModuleDisable(Peripheral):
             device.restart()
 
     def restored(self) -> None:
-        """Wire the registers of each module as its bit says."""
+        """Connect or disconnect the registers of each module as its PMD bit says."""
         for is_off, module in self._bits:
             off = bool(is_off())
             for word in self._words[module]:
                 if off and word not in self._off:
-                    self._cut(word)
+                    self._disconnect(word)
                 elif not off and word in self._off:
-                    self._mend(word)
+                    self._reconnect(word)
 
     def reset(self, power_on: bool) -> None:
-        """All modules on."""
+        """Reset: all modules are enabled."""
         self.restored()
 
-    def _cut(self, word: int) -> None:
+    def _disconnect(self, word: int) -> None:
         self._off[word] = self.bus.access(word)
         self.bus.rewire(word, _OFF)
         self.bus.off |= {word}
 
-    def _mend(self, word: int) -> None:
+    def _reconnect(self, word: int) -> None:
         self.bus.off -= {word}
         self.bus.rewire(word, self._off.pop(word))
 
 
 def register_fields(context: ChipContext, name: str) -> list[str]:
-    """Field names of a register, least significant first."""
+    """Return the field names of a register, least significant first."""
     fields = context.chip.sfrs[name].fields
     return sorted(fields, key=lambda field: fields[field][0])

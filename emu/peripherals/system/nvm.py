@@ -1,8 +1,8 @@
 """Run-time programming of flash and EEPROM (§16): NVMCON, NVMADR, NVMADRU, NVMKEY.
 
-An operation reads its row address and latches when it starts and changes the cells when it ends, 2 ms later. Flash
-operations stop the CPU for that time; EEPROM operations do not. A reset in between leaves a partly done row behind
-(§16: WRERR) : erased, but not programmed.
+An operation reads its row address and latches when it starts, and changes the memory when it ends 2 ms later. Flash
+operations stall the CPU for that time; EEPROM operations do not. A reset during an operation sets WRERR and leaves the
+row erased but not programmed (§16).
 """
 
 from __future__ import annotations
@@ -17,10 +17,10 @@ BUSY_SECONDS: Final = 2e-3
 """Typical time of every operation (§16)."""
 _KEY: Final = (0x55, 0xAA)
 _WINDOW: Final = 3
-"""Tcy by which the next step of the key sequence may follow the last one.
+"""Maximum Tcy between two steps of the key sequence.
 
-UNVERIFIED: the manual asks for consecutive instructions with a literal load between the two keys at most; an interrupt
-in between costs more than this, so it breaks the sequence as on silicon (§16).
+UNVERIFIED: the manual requires consecutive instructions, with at most a literal load between the two keys. An interrupt
+in between takes longer than this limit, so it breaks the sequence as on silicon (§16).
 """
 
 ERASE_FLASH_ROW, PROGRAM_FLASH_ROW = 0x41, 0x01
@@ -29,13 +29,13 @@ PROGRAM_WORD, PROGRAM_ROW = 0x04, 0x05
 WRITE_CONFIG: Final = 0x08
 """PROGOP codes (§16)."""
 _ERASING: Final = 0x40
-"""Set in the codes that erase."""
+"""Bit that is set in the codes of erase operations."""
 _FLASH: Final = (ERASE_FLASH_ROW, PROGRAM_FLASH_ROW)
 _EEPROM: Final = (ERASE_WORD, ERASE_ROW, ERASE_ALL, PROGRAM_WORD, PROGRAM_ROW)
 
 
 class Nvm(Peripheral):
-    """The programming state machine."""
+    """State machine of flash and EEPROM programming."""
 
     def __init__(self, context: ChipContext, interrupts: Interrupts) -> None:
         super().__init__("nvm", context)
@@ -57,16 +57,16 @@ class Nvm(Peripheral):
         context.program.captured_in = self.adr.address, self.adru.address
 
     def stops_in(self, mode: int) -> bool:
-        """Never: programming is timed by the array itself."""
+        """Never stops: the memory array times the operation."""
         return False
 
     def reset(self, power_on: bool) -> None:
-        """NVMCON was reset; an operation that was under way is cut off and WRERR tells (§16)."""
+        """Reset: abort a running operation and set WRERR (§16)."""
         if self._operation.value and not power_on:
             if not self._operation.value & _ERASING:
                 self._operation.value = 0
             else:
-                self._apply()  # a row erased half way reads as erased
+                self._apply()  # a partly erased row reads as erased
             self.con["WRERR"] = 1
         self._operation.value = 0
         self._stage.value = 0
@@ -74,7 +74,7 @@ class Nvm(Peripheral):
 
     @property
     def is_busy(self) -> bool:
-        """An operation is under way."""
+        """Whether an operation is running."""
         return bool(self.con["WR"])
 
     def _key_written(self, _old: int, new: int, _lanes: int) -> None:
@@ -111,7 +111,7 @@ class Nvm(Peripheral):
             self.context.cpu_signals.stall_until(end)
 
     def clock_changed(self) -> None:
-        """A switch ended while the CPU stands: it stands until the array is done, however many Tcy that is now."""
+        """Adjust the CPU stall of a flash operation to the rescheduled end of the operation."""
         if self.is_busy and self._operation.value in _FLASH:
             self.context.cpu_signals.stall_until(self.events.due(self._done))
 
@@ -134,7 +134,7 @@ class Nvm(Peripheral):
             self.context.program.clear_latches()
 
     def _apply_flash(self, operation: int, row: int) -> None:
-        """Rows outside the array are ignored; programming only clears bits (§16)."""
+        """Erase or program a flash row. Rows outside the array are ignored; programming only clears bits (§16)."""
         program = self.context.program
         if row not in self.context.chip.program["flash"]:
             return

@@ -1,7 +1,7 @@
-"""Clock sources, PLL, postscaler and the OSCCON key sequence (§3). Gives the machine its seconds.
+"""Clock sources, PLL, postscaler and the OSCCON key sequence (§3); conversion of cycles to seconds.
 
-Time everywhere else is in Tcy. A clock switch or a new postscaler changes how long a Tcy is: the seconds passed until
-then are kept, in picoseconds, together with the cycle of the change.
+All other modules count time in Tcy. A clock switch or a new postscaler changes the length of a Tcy. At each change the
+oscillator stores the elapsed time in picoseconds, together with the cycle of the change.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ _MULTIPLIERS: Final = {  # FPR with FOS = 7: (source, multiplier of its frequenc
 }
 
 _UNPROGRAMMED: Final = ("crystal", 8.0)
-"""Reserved FPR codes, so also an image without configuration words: run as the e-puck's library sets it up (§2)."""
+"""Setting for reserved FPR codes and for images without configuration words: as the e-puck's library sets it (§2)."""
 
 _KEYS: Final = {0xFF00: (0x78, 0x9A), 0x00FF: (0x46, 0x57)}
 """Unlock bytes for OSCCONH and OSCCONL, by byte lane (§3)."""
@@ -55,7 +55,7 @@ _PS: Final = 10**12
 
 
 class Oscillator(Peripheral):
-    """OSCCON, OSCTUN and the length of a Tcy."""
+    """Oscillator: OSCCON, OSCTUN and the length of a Tcy."""
 
     def __init__(self, context: ChipContext) -> None:
         super().__init__("osc", context)
@@ -73,18 +73,18 @@ class Oscillator(Peripheral):
         self._key_count: Final = self.cell("key_count", "B")
         self._key_cycle: Final = self.cell("key_cycle", "Q")
         self._since: Final = self.cell("since", "Q")
-        """Cycle the present Tcy came into force."""
+        """Cycle in which the current length of a Tcy came into force."""
         self._elapsed: Final = self.cell("elapsed", "Q")
         """Picoseconds from power-on to that cycle."""
         self._tcy_fs: Final = self.cell("tcy", "Q")
         """Length of a Tcy in femtoseconds, for reports; `fcy` is exact."""
         self._current: Final = self.cell("current", "Q")
-        """Clock selection in force: COSC, POST and OSCTUN packed, so that `fcy` is a function of the record."""
+        """Current clock selection: COSC, POST and OSCTUN packed, so that `fcy` is a function of the record."""
         self._switch: Final = self.slot("switch", self._switched, in_seconds=True)
         self.on_change: Final[list[Callable[[], None]]] = []
-        """Called once another `fcy` holds."""
+        """Callbacks after a change of `fcy`."""
         self.before_change: Final[list[Callable[[], None]]] = []
-        """Called while the `fcy` before that still holds."""
+        """Callbacks before a change of `fcy`."""
         context.fcy = self.fcy
 
     # -- rates -------------------------------------------------------------------------------------------------------
@@ -100,28 +100,28 @@ class Oscillator(Peripheral):
         return {_LP: LP_HZ, _FRC: frc, _LPRC: LPRC_HZ}.get(code, self.context.crystal)
 
     def fcy(self) -> float:
-        """Instruction cycles per second at present: a quarter of the oscillator behind the postscaler (§3)."""
+        """Return the current instruction cycles per second: a quarter of the postscaled oscillator frequency (§3)."""
         packed = self._current.value
         return self._source_hz(packed >> 2 & 7, packed >> 5) / 4 / _POST[packed & 3]
 
     def seconds(self, cycle: int) -> float:
-        """Seconds from power-on to `cycle`, which is not before the last change of the clock."""
+        """Return the seconds from power-on to `cycle`, which must not lie before the last clock change."""
         return self._elapsed.value / _PS + (cycle - self._since.value) / self.fcy()
 
     def _rate_changed(self, cycle: int) -> None:
-        for told in self.before_change:
-            told()
+        for callback in self.before_change:
+            callback()
         self._elapsed.value = round(self.seconds(cycle) * _PS)
         self._since.value = cycle
         before = self.fcy()
         self._current.value = (self.tun.value & 0xF) << 5 | self.con["COSC"] << 2 | self.con["POST"]
         self._tcy_fs.value = round(10**15 / self.fcy())
-        self._stretch(cycle, self.fcy() / before)
-        for told in self.on_change:
-            told()
+        self._reschedule(cycle, self.fcy() / before)
+        for callback in self.on_change:
+            callback()
 
-    def _stretch(self, cycle: int, factor: float) -> None:
-        """What is due after a time in seconds takes `factor` times as many Tcy from `cycle` on."""
+    def _reschedule(self, cycle: int, factor: float) -> None:
+        """Scale the remaining delay of slots timed in seconds: `factor` times as many Tcy from `cycle` on."""
         if factor == 1:
             return
         for slot in self.context.in_seconds:
@@ -132,7 +132,7 @@ class Oscillator(Peripheral):
     # -- OSCCON ------------------------------------------------------------------------------------------------------
 
     def _con_written(self, old: int, new: int, lanes: int) -> None:
-        """Byte writes behind their two key bytes, each in the very next cycle; anything else changes nothing (§3)."""
+        """Handle writes to OSCCON: only a byte write directly after its two key bytes has an effect (§3)."""
         self.con.value = old
         if lanes not in _KEYS:
             self._key_count.value = 0
@@ -154,7 +154,7 @@ class Oscillator(Peripheral):
         flags = self._flags & lanes
         self.con.value = (old & ~free | new & free) & (new | ~flags)
         if self.con["LPOSCEN"]:
-            self.bus.lacks("OSCCON.LPOSCEN, no 32 kHz crystal is fitted: timer 1 counts what others drive on its pin")
+            self.bus.lacks("OSCCON.LPOSCEN: no 32 kHz crystal is fitted; timer 1 counts edges driven on its pin")
         if self.con["OSWEN"] and not old & 1:
             self._request_switch()
         elif not self.con["OSWEN"]:
@@ -163,15 +163,14 @@ class Oscillator(Peripheral):
             self._rate_changed(self.now + 1)
 
     def _request_switch(self) -> None:
-        """FCKSM = 1x ignores the request, OSWEN reads 0 at once (§3). UNVERIFIED on silicon. So does a request for the
-        source that runs."""
+        """Start a clock switch. With FCKSM = 1x, or for the current source, OSWEN reads 0 at once (§3). UNVERIFIED."""
         if self._config("FCKSM") & 2 or self.con["NOSC"] == self.con["COSC"]:
             self.con["OSWEN"] = 0
             return
         self.events.set(self._switch, self.now + 1 + self._start_tcy(self.con["NOSC"]))
 
     def _start_tcy(self, code: int) -> int:
-        """Present Tcy until a source that was off runs: start-up timer of crystals, then the PLL's lock (§3)."""
+        """Return the start-up time of a source in current Tcy: start-up timer of crystals, then the PLL lock (§3)."""
         wait = 0.0
         if code in (_LP, _EXTERNAL, _PLL):
             wait = _START_PERIODS / (LP_HZ if code == _LP else self.context.crystal)
@@ -180,7 +179,7 @@ class Oscillator(Peripheral):
         return round(wait * self.fcy())
 
     def wake_tcy(self) -> int:
-        """Tcy from the end of Sleep to the first one that counts: the source in force starts anew (§17)."""
+        """Return the Tcy from the end of Sleep to the first instruction cycle: the current source restarts (§17)."""
         return self._start_tcy(self.con["COSC"])
 
     def _switched(self, due: int) -> None:
@@ -193,17 +192,17 @@ class Oscillator(Peripheral):
         self._rate_changed(cycle)
 
     def abandon_switch(self) -> None:
-        """Sleep and the clock monitor end a switch that is under way; the source in force stays (§3)."""
+        """Abort a running clock switch (Sleep, clock monitor); the current source stays (§3)."""
         self.events.cancel(self._switch)
         self.con["OSWEN"] = 0
 
     def reselect(self) -> None:
-        """A brown-out takes the source of the configuration, as a power-on does. UNVERIFIED: §4 does not say."""
+        """Select the configured source after a brown-out, as after power-on. UNVERIFIED: §4 does not say."""
         self.con["NOSC"] = self._config("FOS")
         self._run_from(self.con["NOSC"], self.now)
 
     def fail(self) -> None:
-        """The clock source dies: with the monitor enabled (FCKSM = 00) the chip runs on from the FRC and traps (§3)."""
+        """Simulate a clock failure: with FCKSM = 00 the chip switches to the FRC and traps (§3)."""
         if self._config("FCKSM") == 0:
             self.abandon_switch()
             self._run_from(_FRC, self.now + 1)
@@ -213,18 +212,21 @@ class Oscillator(Peripheral):
     # -- power and reset ---------------------------------------------------------------------------------------------
 
     def stops_in(self, mode: int) -> bool:
-        """Never: it is the clock."""
+        """Never stops: it is the clock source."""
         return False
 
     def power_up(self, power_on: bool) -> None:
-        """Resets that keep OSCCON keep a switch that is under way (§4)."""
+        """Reset; a reset that keeps OSCCON also keeps a running clock switch (§4)."""
         pending = self.events.due(self._switch)
         super().power_up(power_on)
         if self.con["OSWEN"] and pending != NEVER:
             self.events.set(self._switch, pending)
 
     def reset(self, power_on: bool) -> None:
-        """Power-on takes the source from FOSC; other resets keep it (§4). Emulation starts with the PLL locked."""
+        """Reset: power-on selects the source in FOSC; other resets keep it (§4).
+
+        Emulation starts with the PLL locked.
+        """
         code = self._config("FOS") if power_on else self._current.value >> 2 & 7
         if power_on:
             self.con["NOSC"] = code

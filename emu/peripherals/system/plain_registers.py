@@ -1,4 +1,4 @@
-"""Registers that behave as plain masked storage because nothing stands behind them, and why (`report` prints it)."""
+"""Registers that are plain masked storage without a modelled function, with reasons; `report` prints the list."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ PLAIN: Final[Mapping[str, str]] = MappingProxyType(
         "PMD3": "reserved address, no bits on this part",
     }
 )
-"""Name to reason. Everything else in a chip's table is read, written or computed by the CPU or a device."""
+"""Reason by register name. The CPU or a device reads, writes or computes every other register of a chip's table."""
 
 
 def kind(bus: Bus, word: int) -> str:
-    """How the register at word index `word` is wired, for the printed list."""
+    """Return how the register at word index `word` is modelled, for the printed list."""
     if bus.on_read[word] is not None:
         return "read and write have effects" if bus.on_write[word] is not None else "read has an effect"
     if bus.compute[word] is not None:
         return "computed, write has an effect" if bus.on_write[word] is not None else "computed"
-    return "write has an effect" if bus.on_write[word] is not None else "storage its device looks at"
+    return "write has an effect" if bus.on_write[word] is not None else "storage read by its device"
 
 
 def report(chip: Chip, bus: Bus) -> str:
-    """The list as Markdown: plain registers with their reasons, then how every other register is modelled."""
+    """Return the list as Markdown: plain registers with reasons, then how each other register is modelled."""
     plain, groups = [], dict[str, list[str]]()
     for sfr in chip.sfrs.values():
         if sfr.size != 2:

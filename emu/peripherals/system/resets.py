@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Final
 
 from emu.peripherals.base import IDLE, SLEEP, ChipContext, Peripheral
-from emu.peripherals.system.power_rules import any_bit, clear_watchdog, idle, places_of
+from emu.peripherals.system.power_rules import any_bit, clear_watchdog, idle, power_operands
 from emu.system.events import NEVER
 from emu.system.rules import Rule
 
@@ -19,30 +19,30 @@ CAUSES: Final = ("TRAPR", "IOPUWR", "EXTR", "SWR", "WDTO", "BOR", "POR")
 
 
 class Resets(Peripheral):
-    """RCON: why the chip was reset, and what it slept through. Bits stay until software clears them."""
+    """RCON: flags of reset causes and of Sleep and Idle. They stay set until software clears them."""
 
     def __init__(self, context: ChipContext) -> None:
         super().__init__("rcon", context)
         self.rcon: Final = self.register("RCON")
 
     def stops_in(self, mode: int) -> bool:
-        """Never."""
+        """Never stops: the device has no clock."""
         return False
 
     def record_cause(self, cause: str, kept: int) -> None:
-        """RCON after a reset by `cause`; `kept` is its value before. A power-on clears everything else (§4)."""
+        """Set RCON after a reset by `cause`; `kept` is its value before. Power-on clears all other bits (§4)."""
         if cause not in CAUSES:
-            raise ValueError(f"{cause!r} is no reset cause; expected one of {', '.join(CAUSES)}")
+            raise ValueError(f"{cause!r} is not a reset cause; expected one of {', '.join(CAUSES)}")
         if cause == "POR":  # POR and BOR set, LVDL = 0101
             self.rcon.value = self.context.chip.sfrs["RCON"].reset
             return
         self.rcon.value = kept
-        self.rcon["SWDTEN"] = 0  # the watchdog that software switched on ends with every reset
+        self.rcon["SWDTEN"] = 0  # every reset disables a watchdog that software enabled
         self.rcon[cause] = 1
 
 
 class Watchdog(Peripheral):
-    """Free-running from the LPRC: resets the running chip, wakes the sleeping one."""
+    """Watchdog timer, clocked by the LPRC: resets a running chip, wakes a sleeping one."""
 
     def __init__(self, context: ChipContext, resets: Resets) -> None:
         super().__init__("wdt", context)
@@ -53,34 +53,34 @@ class Watchdog(Peripheral):
         context.power_mode = lambda: self._mode.value
         fields = context.chip.sfrs["RCON"].fields
         self._swdten, self._sleep = (1 << fields[name][0] for name in ("SWDTEN", "SLEEP"))
-        self._places: Final = places_of(self.bus.record, context.chip, self._timeout, self._mode.place)
+        self._places: Final = power_operands(self.bus.record, context.chip, self._timeout, self._mode.place)
         self.clearing: Final = Rule(self._places, fires=clear_watchdog)
         self.idling: Final = Rule(self._places, fires=idle)
 
     def stops_in(self, mode: int) -> bool:
-        """Never: the LPRC runs in every power mode."""
+        """Never stops: the LPRC runs in every power mode."""
         return False
 
     @property
     def is_enabled(self) -> bool:
-        """FWDTEN in the configuration word, or SWDTEN."""
+        """Whether the watchdog runs: FWDTEN in the configuration word, or SWDTEN."""
         return bool(any_bit(self.bus.integers, self._places.enables))
 
     @property
     def stops_devices(self) -> bool:
-        """Whether some device would stop in Idle."""
+        """Whether some device stops in Idle."""
         return bool(any_bit(self.bus.integers, self._places.stops))
 
     @property
     def period(self) -> int:
-        """Time-out in Tcy, at least 1: 2 ms x A x B (§4), where a Tcy may take 8 ms."""
+        """Time-out in Tcy: 2 ms x A x B (§4). At least 1, because a Tcy may take 8 ms."""
         word = self.context.chip.config["FWDT"]
         stored = self.context.program.setting("FWDT")
         counts = _COUNTER * _PRESCALE_A[word.field(stored, "FWPSA")] * (word.field(stored, "FWPSB") + 1)
         return max(round(counts / WDT_HZ * self.context.fcy()), 1)
 
     def clear(self, cycle: int) -> None:
-        """CLRWDT or PWRSAV in `cycle`: counter and prescalers restart, WDTO falls (§4)."""
+        """Handle CLRWDT or PWRSAV in `cycle`: restart counter and prescalers, clear WDTO (§4)."""
         if not self.bus.integers.fire(self.clearing):
             self._resets.rcon.value &= ~self._places.wdto
             self._arm(cycle)
@@ -96,7 +96,7 @@ class Watchdog(Peripheral):
             self._arm(self.now)
 
     def power_mode(self, mode: int) -> None:
-        """The CPU goes to sleep (IDLE or SLEEP) or runs again (0)."""
+        """Record the CPU's power mode: IDLE, SLEEP, or 0 for running."""
         self._mode.value = mode
         if mode:
             self._resets.rcon.value |= self._sleep if mode == SLEEP else self._places.idle
@@ -110,6 +110,6 @@ class Watchdog(Peripheral):
             self.context.cpu_signals.reset("WDTO")
 
     def reset(self, power_on: bool) -> None:
-        """Any reset clears the counter and both prescalers (§4)."""
+        """Reset: clear the counter and both prescalers (§4)."""
         self._mode.value = 0
         self._arm(self.now)

@@ -1,4 +1,4 @@
-"""The arithmetic of a timer's counter (§7 rules 1, 4, 5), in closed form."""
+"""Arithmetic of a timer's counter (§7 rules 1, 4, 5), in closed form."""
 
 from __future__ import annotations
 
@@ -9,7 +9,10 @@ PRESCALE: Final = (1, 8, 64, 256)
 
 
 def advance(start: int, counts: int, period: int, top: int) -> int:
-    """Count `counts` steps from `start`; after `period` (PR) comes 0, after `top` (all ones) comes 0 too."""
+    """Return the count after `counts` steps from `start`.
+
+    The counter wraps to 0 after `period` (PR) and after `top`.
+    """
     if start > period:
         if start + counts <= top:
             return start + counts
@@ -19,7 +22,7 @@ def advance(start: int, counts: int, period: int, top: int) -> int:
 
 
 def counts_until(start: int, target: int, period: int, top: int) -> int | None:
-    """Counts (at least 1) until the counter becomes `target`, or None if it never does."""
+    """Return the number of counts (at least 1) until the counter becomes `target`, None if it never does."""
     if start > period:
         if start < target:
             return target - start

@@ -21,7 +21,9 @@ _DIVIDE: Final = {_FOURTH: 4, _SIXTEENTH: 16}
 class Capture(Peripheral):
     """One capture channel."""
 
-    def __init__(self, site: CaptureSite, context: ChipContext, interrupts: Interrupts, timers: dict[int, Timer]) -> None:
+    def __init__(
+        self, site: CaptureSite, context: ChipContext, interrupts: Interrupts, timers: dict[int, Timer]
+    ) -> None:
         super().__init__(f"ic{site.number}", context)
         self._line: Final = interrupts.line(site.irq)
         self._timers: Final = timers
@@ -37,11 +39,11 @@ class Capture(Peripheral):
         """Rising edges seen by the prescaler."""
         self._captures: Final = self.cell("captures", "B")
         """Captures since the last interrupt."""
-        self._second: Final = self.moment("second", NEVER)
-        """Cycle of a second capture while the first is on its way."""
+        self._second: Final = self.timestamp("second", NEVER)
+        """Cycle of a second capture while the first is pending, else NEVER."""
         self._capture: Final = self.slot("capture", self._due)
         self.autobaud = False
-        """The UART's receive pin is connected instead of the channel's own."""
+        """Whether the UART's receive pin is connected instead of the channel's own pin."""
         context.pins.watch(site.pin, lambda cycle, changed, levels: self._own_edge(cycle, bool(levels & changed)))
 
     def _own_edge(self, cycle: int, rising: bool) -> None:
@@ -49,18 +51,18 @@ class Capture(Peripheral):
             self.edge(cycle, rising)
 
     def edge(self, cycle: int, rising: bool) -> None:
-        """The pin changes in `cycle`."""
+        """Handle an edge of the pin in `cycle`."""
         mode = self.con["ICM"]
         if mode == _WAKE and rising and self.context.power_mode():
             self._line.request()
-        if self.is_frozen or not self._wants(mode, rising):
+        if self.is_frozen or not self._captures_edge(mode, rising):
             return
         if self.events.due(self._capture) == NEVER:
             self.events.set(self._capture, cycle + _LATENCY)
         else:
             self._second.value = cycle + _LATENCY
 
-    def _wants(self, mode: int, rising: bool) -> bool:
+    def _captures_edge(self, mode: int, rising: bool) -> bool:
         if mode in _DIVIDE and rising:
             self._edges.value = (self._edges.value + 1) % _DIVIDE[mode]
             return self._edges.value == 0
@@ -71,7 +73,7 @@ class Capture(Peripheral):
             self.events.set(self._capture, self._second.value)
             self._second.value = NEVER
         if self.con["ICOV"]:
-            return  # nothing is captured before the FIFO has been read out (§8)
+            return  # no capture until software has emptied the FIFO (§8)
         every = self.con["ICM"] == _EVERY_EDGE
         if self._count.value == _FIFO:
             if not every:  # UNVERIFIED: in mode 1 a value that finds the FIFO full is lost without a flag
@@ -88,7 +90,7 @@ class Capture(Peripheral):
             self._line.request()
 
     def _read(self) -> int:
-        """Reading pops; an empty FIFO returns the last value again. UNVERIFIED."""
+        """Read ICxBUF, which removes a FIFO entry. UNVERIFIED: an empty FIFO returns the last value again."""
         value = self._fifo[0]
         count = self._count.value
         if count:
@@ -108,6 +110,6 @@ class Capture(Peripheral):
             self._edges.value = 0
 
     def reset(self, power_on: bool) -> None:
-        """Empty."""
+        """Reset: empty the FIFO."""
         self._count.value = self._edges.value = self._captures.value = 0
         self._second.value = NEVER

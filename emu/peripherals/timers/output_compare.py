@@ -18,7 +18,7 @@ _FLAG_DELAY: Final = 2
 """OCxIF follows the pin by two Tcy (§9)."""
 
 _RISE, _FALL, _DONE = range(3)
-"""What the pulse modes and PWM wait for."""
+"""Next pin change in the pulse modes and PWM."""
 
 
 class Compare(Peripheral):
@@ -59,19 +59,19 @@ class Compare(Peripheral):
     def _is_pwm(self) -> bool:
         return self.con["OCM"] in (_PWM, _PWM_FAULT)
 
-    # -- course ------------------------------------------------------------------------------------------------------
+    # -- pin changes -------------------------------------------------------------------------------------------------
 
     def _plan(self) -> None:
-        """Post the next change of the pin from what the timer will do."""
+        """Post the next change of the pin, from the timer's next matches."""
         if self.con["OCM"] == _OFF or self.is_frozen:
             return
         if self.events.due(self._pin_event) == self.now + 1 and not (self._is_pwm and self._timer.is_frozen):
-            return  # decided in the current cycle
+            return  # already determined in the current cycle
         cycle = self._next_change(self.now)
         self.events.set(self._pin_event, cycle) if cycle != NEVER else self.events.cancel(self._pin_event)
 
     def _next_change(self, after: int) -> int:
-        """Cycle of the next change for a match behind cycle `after`."""
+        """Return the cycle of the next pin change, for a match after cycle `after`."""
         timer, phase = self._timer, self._phase.value
         if phase == _DONE:
             return NEVER
@@ -105,7 +105,7 @@ class Compare(Peripheral):
             self.events.set(self._pin_event, cycle)
 
     def _pwm_step(self, due: int) -> None:
-        """A new period loads the duty from OCxRS; OCxRS = 0 keeps the pin low, above PR keeps it high (§9)."""
+        """Handle a PWM match. A new period loads the duty cycle from OCxRS; 0 keeps the pin low, above PR high (§9)."""
         if self._timer.count(due) == 0:
             self.r.value = self.rs.value
             self._drive(self.r.value != 0)
@@ -122,11 +122,11 @@ class Compare(Peripheral):
 
     def _r_written(self, old: int, _new: int, _lanes: int) -> None:
         if self._is_pwm:
-            self.r.value = old  # read-only: it holds the duty in force (§9)
+            self.r.value = old  # read-only in PWM mode: it holds the current duty cycle (§9)
         self._plan()
 
     def _con_written(self, _old: int, _new: int, _lanes: int) -> None:
-        """Any write restarts the module; the pin takes its first level (§9)."""
+        """Handle a write to OCxCON: it restarts the module and sets the pin to its initial level (§9)."""
         for event in (self._pin_event, self._flag_event):
             self.events.cancel(event)
         mode = self.con["OCM"]
@@ -149,7 +149,7 @@ class Compare(Peripheral):
             self._fault()
 
     def _fault(self) -> None:
-        """The fault pin is low: the output floats until it is high and OCM has been written again (§9)."""
+        """Handle a low fault pin: the output floats until the pin is high and software writes OCM again (§9)."""
         self.con["OCFLT"] = 1
         self._phase.value = _DONE
         self.events.cancel(self._pin_event)
@@ -157,26 +157,29 @@ class Compare(Peripheral):
         self._line.request()
 
     def reset(self, power_on: bool) -> None:
-        """Off; the pins were given back by the ports."""
+        """Reset to off; the ports have already released the pins."""
         self._level.value = 0
         self._phase.value = _RISE
         self.restored()
 
     def thaw(self, cycle: int) -> None:
-        """The time base may have gone on alone. A change decided when the clock stopped still happens (§9): with PWM
-        the pin moves in the cycle of the match, else in the next."""
+        """Resume the clock; the time base may have continued meanwhile.
+
+        A change determined before the clock stopped still occurs (§9): with PWM in the cycle of the match, else one
+        cycle later.
+        """
         waiting = self.remaining_delay(self._pin_event)
         super().thaw(cycle)
         if waiting > (not self._is_pwm):
             self._plan()
 
     def release_pins(self) -> None:
-        """The channel's pin."""
+        """Return the channel's pin to LAT and TRIS."""
         self._port.disown(self._pin)
 
     def restored(self) -> None:
-        """Follow the time base only while the channel is on."""
-        on, chosen = self.con["OCM"] != _OFF, self._timer
+        """Listen to changes of the time base only while the channel is on."""
+        on, selected = self.con["OCM"] != _OFF, self._timer
         for number in (2, 3):
             timer = self._timers[number]
-            timer.listen_to_changes(self._plan, on and timer is chosen)
+            timer.listen_to_changes(self._plan, on and timer is selected)

@@ -1,7 +1,7 @@
-"""What instructions do to a plainly running timer (§7): TMR read and written, PR written; and its match.
+"""Rules of a 16-bit timer (§7): TMR read and written, PR and TON written, and the match.
 
-The stored TMR word is the count at cycle `base`; `tick` Tcy make one count. A match is posted for the cycle in which
-the flag is first 1. Wide, gated and pushed timers, and those that an output compare plans by, are `timers.py`'s.
+The stored TMR word is the count at cycle `base`; one count takes `tick` Tcy. A match is posted for the cycle in which
+the flag is first 1. `timers.py` handles 32-bit and gated timers, those clocked by pin edges, and those with listeners.
 """
 
 from __future__ import annotations
@@ -12,54 +12,54 @@ from dataclasses import dataclass
 from emu.peripherals.pins import RuleWaveform
 from emu.peripherals.timers.arithmetic import PRESCALE
 from emu.system.events import NEVER
-from emu.system.rules import Line, Number, Place, Reader, Slot, request
+from emu.system.rules import Cell, EventSlot, InterruptLine, Number, RuleBuilder, request
 
-STOPPED, TCY, PIN, WAVE = range(4)
-"""Clock sources: none, the instruction clock, edges pushed by a pin, edges of a described waveform."""
+STOPPED, TCY, PIN, WAVEFORM = range(4)
+"""Clock sources: none, the instruction clock, edges written to a pin, edges of an attached waveform."""
 
 
 @dataclass(frozen=True, slots=True)
 class TimerOperands:
-    """Registers and cells of one timer."""
+    """Operands of the rules: registers and cells of one timer."""
 
-    tmr: Place
-    pr: Place
-    base: Place
-    tick: Place
-    """0 unless the timer counts Tcy by itself, 16 bits wide."""
-    period: Place
-    """0 unless it also interrupts periodically."""
-    before: Place
-    phase: Place
-    clear_from: Place
-    clear_until: Place
-    clear_due: Place
-    listeners: Place
-    """How many devices plan by this timer."""
-    frozen: Place
-    source: Place
-    pair: Place
-    """The TxCON that T32 is in."""
+    tmr: Cell
+    pr: Cell
+    base: Cell
+    tick: Cell
+    """Tcy per count; 0 unless a 16-bit timer counts Tcy."""
+    period: Cell
+    """Tcy between matches; 0 unless the timer interrupts periodically."""
+    before: Cell
+    phase: Cell
+    clear_from: Cell
+    clear_until: Cell
+    clear_due: Cell
+    listeners: Cell
+    """Number of devices that listen to this timer."""
+    frozen: Cell
+    source: Cell
+    pair: Cell
+    """TxCON register that holds T32."""
     t32: int
-    """T32, 0 for a timer that is not one of a pair."""
-    match: Slot
-    line: Line
+    """Mask of T32; 0 for a timer that is not part of a pair."""
+    match: EventSlot
+    line: InterruptLine
 
 
-def read_count(m: Reader, t: TimerOperands) -> Number:
-    """TMR as it is read: (stored + ticks since base) modulo (PR + 1), while the stored count is not above PR."""
+def read_count(m: RuleBuilder, t: TimerOperands) -> Number:
+    """Read TMR: (stored + ticks since base) modulo (PR + 1), if the stored count is not above PR."""
     tick, stored, top = m.get(t.tick), m.get(t.tmr), m.get(t.pr)
-    m.need((tick != 0) & (stored <= top) & (m.get(t.frozen) == NEVER))
+    m.require((tick != 0) & (stored <= top) & (m.get(t.frozen) == NEVER))
     passed = m.now - m.get(t.base)
     clocks = m.div(m.select(passed < 0, 0, passed), tick)
     return m.mod(stored + clocks, top + 1)
 
 
-def write_count(m: Reader, t: TimerOperands, value: Number, lanes: int) -> bool:
-    """The written count stands from the next cycle, with an empty prescaler (§7 rules 6, 8).
+def write_count(m: RuleBuilder, t: TimerOperands, value: Number, lanes: int) -> bool:
+    """Write TMR: the count holds from the next cycle, with an empty prescaler (§7 rules 6, 8).
 
-    Of a timer on a described clock only clearing is here, where the device has predicted what that leads to; of one that
-    stands with no match on its way, all.
+    A timer clocked by a waveform supports only clearing, with a match that the device has predicted. A stopped timer
+    without a pending match supports every value.
     """
     if lanes != 0xFFFF:
         return False
@@ -68,88 +68,88 @@ def write_count(m: Reader, t: TimerOperands, value: Number, lanes: int) -> bool:
     plain = (period != 0) & (limit != 0)
     known = m.below(m.now, m.get(t.clear_until)) & (m.get(t.clear_from) <= m.now) & (due != following)
     predicted = (start == 0) & known
-    still = (m.get(t.source) == STOPPED) & ((m.get(t.pair) & t.t32) == 0) & (due == NEVER)
-    m.need((plain | predicted | still) & _alone(m, t))
-    stands = plain & (due == following)
+    stopped = (m.get(t.source) == STOPPED) & ((m.get(t.pair) & t.t32) == 0) & (due == NEVER)
+    m.require((plain | predicted | stopped) & _has_no_listener(m, t))
+    is_fixed = plain & (due == following)
     m.put(t.before, m.select(plain, m.get(t.before), start))
     m.put(t.phase, m.select(plain, m.get(t.phase), 0))
     posted = m.select(predicted, m.get(t.clear_due), following + _counts_until(m, start, limit) * tick + 1)
-    posted = m.select(still, NEVER, posted)
+    posted = m.select(stopped, NEVER, posted)
     m.put(t.tmr, start)
     m.put(t.base, following)
-    m.put(t.clear_until, m.select(still, 0, m.get(t.clear_until)))
-    m.put(t.period, m.select(predicted | still | stands, 0, (limit + 1) * tick))
-    m.post(t.match, m.select(stands, due, posted))
+    m.put(t.clear_until, m.select(stopped, 0, m.get(t.clear_until)))
+    m.put(t.period, m.select(predicted | stopped | is_fixed, 0, (limit + 1) * tick))
+    m.post(t.match, m.select(is_fixed, due, posted))
     return True
 
 
-def write_period(m: Reader, t: TimerOperands, value: Number, lanes: int) -> bool:
-    """Count up to the next cycle with the old PR, then go on with the new one."""
+def write_period(m: RuleBuilder, t: TimerOperands, value: Number, lanes: int) -> bool:
+    """Write PR: count up to the next cycle with the old PR, then continue with the new one."""
     if lanes != 0xFFFF:
         return False
     limit, following, due = value & 0xFFFF, m.now + 1, m.get(t.match.due)
     tick, stored, old, base = m.get(t.tick), m.get(t.tmr), m.get(t.pr), m.get(t.base)
-    m.need((m.get(t.period) != 0) & (limit != 0) & (stored <= old) & (base <= following) & _alone(m, t))
+    m.require((m.get(t.period) != 0) & (limit != 0) & (stored <= old) & (base <= following) & _has_no_listener(m, t))
     passed = following - base
     start, begun = m.mod(stored + m.div(passed, tick), old + 1), following - m.mod(passed, tick)
-    stands = (due == following) | ((due == following + 1) & (start == limit))
+    is_fixed = (due == following) | ((due == following + 1) & (start == limit))
     m.put(t.pr, limit)
     m.put(t.tmr, start)
     m.put(t.base, begun)
-    m.put(t.period, m.select(stands, 0, (limit + 1) * tick))
-    m.post(t.match, m.select(stands, due, begun + _counts_until(m, start, limit) * tick + 1))
+    m.put(t.period, m.select(is_fixed, 0, (limit + 1) * tick))
+    m.post(t.match, m.select(is_fixed, due, begun + _counts_until(m, start, limit) * tick + 1))
     return True
 
 
 @dataclass(frozen=True, slots=True)
 class ClockPin:
-    """Where a timer's clock comes in."""
+    """Clock input of a timer."""
 
-    pins: Mapping[tuple[int, int], tuple[RuleWaveform, Place]]
+    pins: Mapping[tuple[int, int], tuple[RuleWaveform, Cell]]
     name: tuple[int, int]
 
     @property
-    def described(self) -> tuple[RuleWaveform, Place] | None:
-        """The waveform on it that every engine can read, and the place that says whether it is there."""
+    def described(self) -> tuple[RuleWaveform, Cell] | None:
+        """The rule waveform on the pin, and the number that says whether it is attached; None without one."""
         return self.pins.get(self.name)
 
     def __repr__(self) -> str:
-        """The same in every process: native code is named by it."""
+        """Return a text that is equal in every process: the key of cached native code contains it."""
         wave = self.described
         return f"ClockPin({self.name}, {wave and (type(wave[0]).__name__, wave[1])})"
 
 
 @dataclass(frozen=True, slots=True)
 class MatchOperands:
-    """What a match looks at, too."""
+    """Operands of the match rule and of the TON rule."""
 
     timer: TimerOperands
-    con: Place
+    con: Cell
     writable: int
     ton: int
     tcs: int
     tckps: int
-    """Its lowest bit."""
+    """Lowest bit of TCKPS."""
     clock: ClockPin
     pin: int
 
 
-def fire_match(m: Reader, p: MatchOperands) -> None:
-    """A match of a timer that interrupts periodically (§7 rule 2), or on a described clock."""
+def fire_match(m: RuleBuilder, p: MatchOperands) -> None:
+    """Handle the match of a timer that interrupts periodically (§7 rule 2) or is clocked by a rule waveform."""
     t, clock = p.timer, p.clock.described
     period = m.get(t.period)
     if clock is None:
-        m.need(period != 0)
+        m.require(period != 0)
         m.post(t.match, m.now + period)
     else:
         wave, attached = clock
         narrow = (m.get(t.pair) & t.t32) == 0
-        counts = (m.get(t.source) == WAVE) & narrow & (m.get(attached) != 0)
-        waves = counts & (m.get(t.pr) != 0) & (m.get(t.listeners) == 0) & (period == 0)
-        m.need((period != 0) | waves)
+        counts = (m.get(t.source) == WAVEFORM) & narrow & (m.get(attached) != 0)
+        on_waveform = counts & (m.get(t.pr) != 0) & (m.get(t.listeners) == 0) & (period == 0)
+        m.require((period != 0) | on_waveform)
         cells = (t.clear_from, t.clear_until, t.clear_due)
-        due, *predicted = m.either(
-            waves, lambda: next_edges(m, p, lambda after, count: wave.nth_rise_rule(m, p.pin, after, count)),
+        due, *predicted = m.lazy_select(
+            on_waveform, lambda: next_edges(m, p, lambda after, count: wave.nth_rise_rule(m, p.pin, after, count)),
             m.now + period, *(m.get(cell) for cell in cells))  # fmt: skip
         for cell, value in zip(cells, predicted, strict=True):
             m.put(cell, value)
@@ -157,9 +157,12 @@ def fire_match(m: Reader, p: MatchOperands) -> None:
     request(m, t.line, m.now)
 
 
-def next_edges(m: Reader, p: MatchOperands, nth_rise: Callable[[Number, Number], Number]) -> tuple[Number, ...]:
-    """After a match on a described clock: when the next one is due, and what clearing TMR leads to, because firmware
-    that counts lines does that now: from when until when, and the match it leads to."""
+def next_edges(m: RuleBuilder, p: MatchOperands, nth_rise: Callable[[Number, Number], Number]) -> tuple[Number, ...]:
+    """Return the due cycle of the next match on a waveform clock, and a prediction for clearing TMR.
+
+    Firmware that counts camera lines clears TMR after a match. The prediction has three parts: first cycle and end of
+    the interval in which clearing is covered, and the due cycle of the match it leads to.
+    """
     limit = m.get(p.timer.pr)
     prescale = m.table(PRESCALE, m.get(p.con) >> p.tckps & len(PRESCALE) - 1)
 
@@ -170,10 +173,12 @@ def next_edges(m: Reader, p: MatchOperands, nth_rise: Callable[[Number, Number],
     return due(m.now - 2, (limit + 1) * prescale), m.now, nth_rise(m.now, 1), due(m.now, limit * prescale)
 
 
-def switch(m: Reader, p: MatchOperands, value: Number, lanes: int) -> bool:
-    """TON changes and nothing else, on a described clock. Off: the count is known if there was no edge since it was
-    written, or just those to the match. On: counting begins with the next cycle. The prescaler is empty (§7 rule 6).
-    Nothing changes: that is no new course."""
+def write_ton(m: RuleBuilder, p: MatchOperands, value: Number, lanes: int) -> bool:
+    """Write TxCON of a timer on a waveform clock when only TON changes, or nothing.
+
+    Off: the count is known if no edge has occurred since the last write, or exactly those up to the match. On: counting
+    starts in the next cycle. The prescaler is empty in both cases (§7 rule 6).
+    """
     t, clock = p.timer, p.clock.described
     if clock is None or not lanes & p.ton:
         return False
@@ -183,33 +188,33 @@ def switch(m: Reader, p: MatchOperands, value: Number, lanes: int) -> bool:
     new = (old & (0xFFFF & ~free)) | (value & free)
     starts = (new & p.ton) != 0
     same = old == new
-    counts = ((new & p.tcs) != 0) & (source == m.select(starts, STOPPED, WAVE)) & ((m.get(t.pair) & t.t32) == 0)
-    m.need(same | (((old ^ new) == p.ton) & counts & (m.get(attached) != 0) & (limit != 0) & _alone(m, t)))
+    counts = ((new & p.tcs) != 0) & (source == m.select(starts, STOPPED, WAVEFORM)) & ((m.get(t.pair) & t.t32) == 0)
+    m.require(same | (((old ^ new) == p.ton) & counts & (m.get(attached) != 0) & (limit != 0) & _has_no_listener(m, t)))
     prescale = m.table(PRESCALE, new >> p.tckps & len(PRESCALE) - 1)
     clocks = _counts_until(m, tmr, limit) * prescale - m.select(starts, 0, m.get(t.phase))
     after = m.select(starts, m.now, m.get(t.base) - 1)
     edge = wave.nth_rise_rule(m, p.pin, after, clocks)
     matched = m.select(starts, 0, m.below(m.now, edge) == 0)
     following = wave.nth_rise_rule(m, p.pin, after, m.select(matched, clocks, 0) + 1)
-    m.need(same | starts | m.below(m.now, following))
+    m.require(same | starts | m.below(m.now, following))
     count, due = m.select(matched, limit, tmr), m.get(t.match.due)
-    stands = (due == m.now + 1) | (starts & (due == m.now + 2) & (count == limit))
+    is_fixed = (due == m.now + 1) | (starts & (due == m.now + 2) & (count == limit))
     posted = m.select(starts & (edge != NEVER), edge + 2, NEVER)
     m.put(p.con, new)
-    changed = [(t.tmr, count), (t.base, m.now + 1), (t.before, count), (t.source, m.select(starts, WAVE, STOPPED))]
+    changed = [(t.tmr, count), (t.base, m.now + 1), (t.before, count), (t.source, m.select(starts, WAVEFORM, STOPPED))]
     changed += [(place, 0) for place in (t.phase, t.tick, t.period, t.clear_until)]
     for place, value in changed:
         m.put(place, m.select(same, m.get(place), value))
-    m.post(t.match, m.select(same | stands, due, posted))
+    m.post(t.match, m.select(same | is_fixed, due, posted))
     return True
 
 
-def _alone(m: Reader, t: TimerOperands) -> Number:
-    """Nobody need be told of changes, and the clock runs."""
+def _has_no_listener(m: RuleBuilder, t: TimerOperands) -> Number:
+    """Whether no device listens to the timer and its clock runs."""
     return (m.get(t.listeners) == 0) & (m.get(t.frozen) == NEVER)
 
 
-def _counts_until(m: Reader, start: Number, limit: Number) -> Number:
-    """Counts (at least 1) until the counter becomes `limit`, which is not 0."""
+def _counts_until(m: RuleBuilder, start: Number, limit: Number) -> Number:
+    """Return the number of counts (at least 1) until the counter becomes `limit`, which is not 0."""
     behind = m.select(start < limit, limit - start, limit + 1)
     return m.select(start > limit, 0x10000 - start + limit, behind)

@@ -1,7 +1,7 @@
 """Timers 1-5 (§7): timer, gated and counter modes, 32-bit pairs. TMR is computed on read, never ticked.
 
-`counter.py` has the count, `timerrules.py` what instructions do to a timer that runs plainly; here is everything else
-that changes its course, and the match. A match posts one event, whose due date is the cycle the interrupt flag first
+`counter.py` computes the count; `rules.py` has the rules of the common cases. This module handles all other register
+writes, the clock sources and the match. A match posts one event, due in the cycle in which the interrupt flag first
 reads 1: one Tcy after TMR became equal to PR (§7 rule 2).
 """
 
@@ -18,64 +18,64 @@ from emu.peripherals.timers.rules import (
     PIN,
     STOPPED,
     TCY,
-    WAVE,
+    WAVEFORM,
     ClockPin,
     MatchOperands,
     TimerOperands,
     fire_match,
     next_edges,
     read_count,
-    switch,
     write_count,
     write_period,
+    write_ton,
 )
 from emu.system.device import Register
 from emu.system.events import NEVER
-from emu.system.rules import Rule, place_of, slot_of
+from emu.system.rules import Rule, cell_of, event_slot
 
 
 class Timer(Counter):
-    """One 16-bit timer, or, with T32 set, a 32-bit timer that owns its partner's registers too."""
+    """A 16-bit timer or, with T32 set, a 32-bit timer that also owns its partner's registers."""
 
     def __init__(self, site: TimerSite, context: ChipContext) -> None:
         super().__init__(site, context)
         self.line: Final = self.irq(site.irq)
         self.low: Timer | None = None
-        """For a type C timer: the type B timer that takes it over with T32."""
+        """For a type C timer: the type B timer that owns it while T32 is set."""
         self.high: Timer | None = None
         self._hold: Register | None = None
         self.period: Final = self.cell("period", "Q")
-        """Tcy from one match to the next; 0 if the event is not simply periodic."""
-        self.clear_from: Final = self.moment("clear_from")
-        self.clear_until: Final = self.moment("clear_until")
-        self.clear_due: Final = self.moment("clear_due", NEVER)
-        """On a described clock: when the match comes if TMR is cleared in clear_from <= cycle < clear_until."""
-        self.closed: Final = self.moment("closed", NEVER)
-        """When the flag of the gate's last falling edge is due."""
+        """Tcy from one match to the next; 0 if the event is not periodic."""
+        self.clear_from: Final = self.timestamp("clear_from")
+        self.clear_until: Final = self.timestamp("clear_until")
+        self.clear_due: Final = self.timestamp("clear_due", NEVER)
+        """On a waveform clock: due cycle of the match if TMR is cleared in clear_from <= cycle < clear_until."""
+        self.closed: Final = self.timestamp("closed", NEVER)
+        """Due cycle of the flag for the gate's last falling edge."""
         self._match: Final = self.slot("match", self._fire)
         self._on_match: Final[list[Callable[[int], None]]] = []
         self._on_change: Final[list[Callable[[], None]]] = []
         self._listeners: Final = self.cell("listeners", "B")
-        """Those in both."""
-        places = self._registers()
-        self.tmr.ruled(Rule(places, read_count, write_count))
-        self.pr.ruled(Rule(places, None, write_period))
+        """Number of listeners in both lists."""
+        places = self._rule_operands()
+        self.tmr.set_rule(Rule(places, read_count, write_count))
+        self.pr.set_rule(Rule(places, None, write_period))
         self._places: Final = self._match_places(places)
-        self.con.ruled(Rule(self._places, None, switch))
-        self.ruled(self._match, Rule(self._places, fires=fire_match))
+        self.con.set_rule(Rule(self._places, None, write_ton))
+        self.set_event_rule(self._match, Rule(self._places, fires=fire_match))
         self.tmr.computed(self.read)
         self.tmr.written_by(self._tmr_written)
-        self.pr.written_by(self._course_written)
+        self.pr.written_by(self._period_written)
         self.con.written_by(self._con_written)
         if site.clock_pin:
             context.pins.watch(site.clock_pin, self._edge)
         context.pins.on_waveform_change(self._waveform_changes, self._waveform_changed)
 
-    def _registers(self) -> TimerOperands:
+    def _rule_operands(self) -> TimerOperands:
         cells = ("base", "tick", "period", "before", "phase", "clear_from", "clear_until", "clear_due", "listeners",
                  "frozen")  # fmt: skip
-        places = {name: place_of(self.record, f"{self.name}.{name}") for name in cells}
-        match, line = slot_of(self.record, self._match), self.line.line
+        places = {name: cell_of(self.record, f"{self.name}.{name}") for name in cells}
+        match, line = event_slot(self.record, self._match), self.line.line
         pair = self.con if self.site.kind != "C" else self.register(f"T{self.site.partner}CON")
         return TimerOperands(
             tmr=self.tmr.place,
@@ -109,10 +109,10 @@ class Timer(Counter):
         self._hold = self.register(f"TMR{high.site.number}HLD")
         self.tmr.read_by(self._read_and_latch)
 
-    # -- changes of course -------------------------------------------------------------------------------------------
+    # -- register writes ---------------------------------------------------------------------------------------------
 
     def _plan(self, rewritten: bool = False) -> None:
-        """Publish tick and period, and post the next match behind the current cycle."""
+        """Store tick and period for the rules, and post the next match after the current cycle."""
         self.clear_until.value = 0
         source = self._source.value
         simple = source == TCY and not self.is_taken
@@ -122,27 +122,27 @@ class Timer(Counter):
         self.tick.value = self._prescale if narrow else 0
         periodic = narrow and self.limit != 0 and not self._is_gated and not self._on_match
         self.period.value = (self.limit + 1) * self._prescale if periodic else 0
-        if self._match_stands(rewritten):
-            self.period.value = 0  # the one behind it is not a period away: let Python plan it
+        if self._is_match_fixed(rewritten):
+            self.period.value = 0  # the match after it is not a period away: Python schedules it
         else:
             self._post(self.now)
-        self._tell()
+        self._notify_change()
 
     def _empty_prescaler(self) -> None:
-        """What is in it counts as Tcy since an earlier base: rules compute the count from base and tick alone."""
+        """Account the prescaler's content as an earlier base: rules compute the count from base and tick alone."""
         self.base.value -= self._phase.value
         self._phase.value = 0
 
-    def _tell(self) -> None:
+    def _notify_change(self) -> None:
         for listener in self._on_change:
             listener()
 
-    def _match_stands(self, rewritten: bool) -> bool:
-        """Whether the posted match happens in the current cycle, or in the next whatever was just written."""
+    def _is_match_fixed(self, rewritten: bool) -> bool:
+        """Whether the current write cannot change the posted match: its count has already been reached."""
         due = self.events.due(self._match)
         if due in (self.now + 1, self.closed.value) and due != NEVER:
             return True
-        running = self._source.value in (TCY, WAVE)
+        running = self._source.value in (TCY, WAVEFORM)
         return due == self.now + 2 and running and not rewritten and self.count(self.now + 1) == self.limit
 
     def _post(self, after: int) -> None:
@@ -160,13 +160,13 @@ class Timer(Counter):
         if self.is_taken or not self.con["TON"]:
             return STOPPED
         if self.con["TCS"]:
-            return WAVE if self.context.pins.waveform(self._port, self._pin) is not None else PIN
+            return WAVEFORM if self.context.pins.waveform(self._port, self._pin) is not None else PIN
         if self.con["TGATE"] and not self.context.pins.level[self._port] & self._pin:
             return STOPPED
         return TCY
 
     def _tmr_written(self, _old: int, new: int, lanes: int) -> None:
-        """The written count stands from the next cycle; the prescaler restarts (§7 rules 6, 8)."""
+        """Handle a write to TMR: the count holds from the next cycle; the prescaler restarts (§7 rules 6, 8)."""
         if self.is_taken:
             assert self.low is not None
             self.low.high_written(new, lanes)
@@ -184,7 +184,7 @@ class Timer(Counter):
         self._plan(rewritten=True)
 
     def _post_edges(self, due: int) -> None:
-        """After a match on a described clock that not every engine can read."""
+        """Post the next match on a waveform clock, and store the prediction for clearing TMR."""
         self.clear_until.value = 0
         waveform, pin = self.context.pins.waveform(self._port, self._pin), self._pin
         if waveform is None or self.is_wide or not self.limit or self._on_change:
@@ -197,14 +197,14 @@ class Timer(Counter):
             cell.value = value
 
     def high_written(self, new: int, lanes: int) -> None:
-        """A direct write to the upper half of a 32-bit timer, which the manual does not use (§7)."""
+        """Handle a direct write to the upper half of a 32-bit timer, which the manual does not use (§7)."""
         assert self.high is not None
         self._fold(self.now + 1, self._prescale, self.limit)
         self.high.tmr.value = self.high.tmr.value & ~lanes | new & lanes
         self._plan()
 
-    def _course_written(self, old: int, new: int, _lanes: int) -> None:
-        """PR changed: what was counted until the next cycle was counted with the old PR."""
+    def _period_written(self, old: int, new: int, _lanes: int) -> None:
+        """Handle a write to PR: counts up to the next cycle use the old PR."""
         owner = self.low if self.is_taken and self.low is not None else self
         shift = 0 if owner is self else 16
         previous = owner.limit & ~(0xFFFF << shift) | old << shift
@@ -212,7 +212,7 @@ class Timer(Counter):
             owner.replan(previous)
 
     def replan(self, previous_limit: int) -> None:
-        """Count up to the next cycle with `previous_limit`, then plan with the present registers."""
+        """Count up to the next cycle with `previous_limit`, then schedule with the current registers."""
         self._fold(self.now + 1, self._prescale, previous_limit)
         self._plan()
 
@@ -222,14 +222,14 @@ class Timer(Counter):
         if self.high is not None and (old ^ new) & self._t32:
             self._join_changed(old, new)
             return
-        self._switch(old)
+        self._control_changed(old)
 
     @property
     def _t32(self) -> int:
         return 1 << self.context.chip.sfrs[self.con.name].fields["T32"][0] if self.high is not None else 0
 
     def _join_changed(self, old: int, new: int) -> None:
-        """T32 was set or cleared: both halves freeze their counts under the old arrangement, then start anew."""
+        """Handle a change of T32: both halves keep the counts of the old configuration, then restart."""
         assert self.high is not None
         cycle = self.now + 1
         self.con.value = old
@@ -245,8 +245,8 @@ class Timer(Counter):
         for half in halves:
             half._plan()
 
-    def _switch(self, old_con: int) -> None:
-        """TxCON changed. The prescaler empties when TON falls or the clock is chosen anew (§7 rule 6).
+    def _control_changed(self, old_con: int) -> None:
+        """Handle a change of TxCON. The prescaler empties when TON falls or the clock source changes (§7 rule 6).
 
         UNVERIFIED: the data sheet lists any write to TxCON as clearing it; here only those that change the clock.
         """
@@ -264,7 +264,7 @@ class Timer(Counter):
     def _field(self, name: str) -> tuple[int, int]:
         return self.context.chip.sfrs[self.con.name].fields[name]
 
-    # -- outside clock and gate --------------------------------------------------------------------------------------
+    # -- external clock and gate -------------------------------------------------------------------------------------
 
     def _edge(self, cycle: int, _changed: int, levels: int) -> None:
         if self.is_frozen or self.is_taken or not self.con["TON"]:
@@ -277,7 +277,7 @@ class Timer(Counter):
             self._gate(cycle, rising)
 
     def _count_edge(self, cycle: int) -> None:
-        """One rising edge in `cycle` is counted in the cycle behind it (§7 rule 9)."""
+        """Count a rising edge of `cycle`, which takes effect in the next cycle (§7 rule 9)."""
         self._before.value = self.count(cycle)
         self.base.value = cycle + 1
         phase = self._phase.value + 1
@@ -289,10 +289,10 @@ class Timer(Counter):
         self._start = count = advance(start, 1, self.limit, self.top)
         if count == self.limit and count != 0:
             self.events.set(self._match, cycle + 2)
-        self._tell()
+        self._notify_change()
 
     def _gate(self, cycle: int, opened: bool) -> None:
-        """The gate is synchronised for one Tcy; its falling edge raises the flag (§7)."""
+        """Handle an edge of the gate: synchronised for one Tcy; the falling edge raises the flag (§7)."""
         self._fold(cycle + 1, self._prescale, self.limit)
         self._source.value = TCY if opened else STOPPED
         self._plan()
@@ -301,25 +301,25 @@ class Timer(Counter):
             self.events.set(self._match, cycle + 2)
 
     def _waveform_changes(self, cycle: int) -> None:
-        """A described clock is about to change: count what came before, then look at the pins again."""
-        if self._source.value in (WAVE, PIN) and not self.is_frozen:
+        """Count up to `cycle` before the clock waveform changes."""
+        if self._source.value in (WAVEFORM, PIN) and not self.is_frozen:
             self._fold(cycle, self._prescale, self.limit)
 
     def _waveform_changed(self) -> None:
-        """A described clock has changed its future."""
-        if self._source.value in (WAVE, PIN):
+        """Select the source again and reschedule after the clock waveform has changed."""
+        if self._source.value in (WAVEFORM, PIN):
             self._source.value = self._choose_source()
             self._plan()
 
     def listen(self, on_match: Callable[[int], None], wanted: bool) -> None:
-        """Call `on_match(due)` at each match from now on, or no longer (ADC trigger, §13)."""
+        """Add or remove (`wanted`) a listener on_match(due), called at each match (ADC trigger, §13)."""
         if wanted != (on_match in self._on_match):
             self._on_match.append(on_match) if wanted else self._on_match.remove(on_match)
             self._listeners.value = len(self._on_change) + len(self._on_match)
             self._plan()
 
     def listen_to_changes(self, on_change: Callable[[], None], wanted: bool) -> None:
-        """Call `on_change()` whenever the course of the count has changed, or no longer (output compare, §9)."""
+        """Add or remove (`wanted`) a listener called when future counts have changed (output compare, §9)."""
         if wanted != (on_change in self._on_change):
             self._on_change.append(on_change) if wanted else self._on_change.remove(on_change)
             self._listeners.value = len(self._on_change) + len(self._on_match)
@@ -333,7 +333,7 @@ class Timer(Counter):
         source = self._source.value
         if source == TCY:
             self._post(due - 1)
-        elif source == WAVE:
+        elif source == WAVEFORM:
             self._post_edges(due)
         if self.tick.value and self.limit and not self._is_gated and not self._on_match:
             self.period.value = (self.limit + 1) * self.tick.value
@@ -341,28 +341,30 @@ class Timer(Counter):
     # -- power and reset ---------------------------------------------------------------------------------------------
 
     def reset(self, power_on: bool) -> None:
-        """Stopped; the count survives every reset but power-on in silicon, and reads 0 here."""
+        """Reset to stopped. In silicon the count survives every reset but power-on; here it reads 0."""
         for cell in (self.base, self.tick, self.period, self._source, self._phase, self._before):
             cell.value = 0
         self.closed.value = NEVER
 
     def stops_in(self, mode: int) -> bool:
-        """Only timer 1 as asynchronous counter runs in Sleep (§7)."""
+        """Whether the clock stops: only timer 1 as asynchronous counter runs in Sleep (§7)."""
         if mode == SLEEP:
             return not (self.site.kind == "A" and self.con["TCS"] and not self.con["TSYNC"])
         owner = self.low if self.is_taken and self.low is not None else self
         return mode == IDLE and bool(owner.con["TSIDL"])
 
     def freeze(self, cycle: int, mode: int) -> None:
-        """Count what came before, so that only the remainder waits."""
+        """Count up to `cycle`, then stop the clock."""
         self.clear_until.value = 0
         self._fold(max(cycle, self.base.value), self._prescale, self.limit)
         super().freeze(cycle, mode)
-        self._tell()
+        self._notify_change()
 
     def thaw(self, cycle: int) -> None:
-        """Gate and described clocks did not wait: what they are now decides how it goes on. A match that had been
-        counted when the clock stopped still raises its flag."""
+        """Resume the clock. Gate and waveform clocks have continued, so their current state selects the source.
+
+        A match already counted when the clock stopped still raises its flag.
+        """
         waiting = self.remaining_delay(self._match)
         super().thaw(cycle)
         if not self.is_taken and self.con["TON"] and (self.con["TCS"] or self.con["TGATE"]):
@@ -372,22 +374,22 @@ class Timer(Counter):
                 self._post(self.now)
         if self._source.value == TCY:
             self._empty_prescaler()
-        self._tell()
+        self._notify_change()
 
     def before_disable(self) -> None:
-        """The upper half of a pair is a timer of its own without the lower one."""
+        """Split a 32-bit pair before its lower half is disabled."""
         if self.is_wide:
             joined = self.con.value
             self.con.value = joined & ~self._t32
             self._join_changed(joined, self.con.value)
 
     def restart(self) -> None:
-        """Nobody can plan by a timer that is off."""
+        """Reset, then notify the listeners: a disabled timer has no matches."""
         super().restart()
-        self._tell()
+        self._notify_change()
 
     def _read_and_latch(self) -> int:
-        """Reading the lower half latches the upper half, in 32-bit mode (§7)."""
+        """Read the lower half; in 32-bit mode this latches the upper half (§7)."""
         count = self.count(self.clock)
         if self._hold is not None and self.is_wide:
             self._hold.value = count >> 16
@@ -395,7 +397,7 @@ class Timer(Counter):
 
 
 def timers(context: ChipContext) -> dict[int, Timer]:
-    """The timers of a chip by number, paired."""
+    """Construct the timers of a chip, with pairs joined; return them by number."""
     by_number = {site.number: Timer(site, context) for site in context.chip.timers}
     for site in context.chip.timers:
         if site.kind == "B":

@@ -1,7 +1,7 @@
-"""Characters as levels on a wire: start bit, data, parity, stop bits, and what a sampling receiver sees (§10).
+"""UART frames as bit patterns: start bit, data, parity, stop bits, and their sampling by a receiver (§10).
 
-Text for every engine (emu/system/rules.py) that needs operators only; `mode` is UxMODE, whose bits
-2:0 are PDSEL and STSEL.
+The functions are rules (emu/system/rules.py) that use operators only. `mode` is UxMODE, whose bits 2:0 are PDSEL and
+STSEL.
 """
 
 from __future__ import annotations
@@ -16,50 +16,50 @@ FRAMING_MARK: Final = 0x200
 
 
 def is_nine(mode: Number) -> Number:
-    """PDSEL = 3: nine data bits, no parity."""
+    """Whether a frame has nine data bits and no parity (PDSEL = 3)."""
     return (mode & 6) == 6
 
 
 def has_parity(mode: Number) -> Number:
-    """PDSEL = 1 (even) or 2 (odd)."""
+    """Whether a frame has a parity bit: PDSEL = 1 (even) or 2 (odd)."""
     return ((mode & 6) == 2) | ((mode & 6) == 4)
 
 
 def data_of(mode: Number, word: Number) -> Number:
-    """The 8 or 9 data bits of a word."""
+    """Return the 8 or 9 data bits of a word."""
     return word & (0xFF | is_nine(mode) << 8)
 
 
 def first_stop(mode: Number) -> Number:
-    """Index of the first stop bit in a frame."""
+    """Return the index of the first stop bit in a frame."""
     return ((mode & 6) != 0) + 9
 
 
 def stops(mode: Number) -> Number:
-    """1 or 2 (STSEL)."""
+    """Return the number of stop bits, 1 or 2 (STSEL)."""
     return (mode & 1) + 1
 
 
 def length(mode: Number) -> Number:
-    """Bits of a frame."""
+    """Return the number of bits in a frame."""
     return first_stop(mode) + stops(mode)
 
 
 def parity(mode: Number, data: Number) -> Number:
-    """Parity bit of a character, 0 where there is none."""
+    """Return the parity bit of a character, 0 without parity."""
     nibbles = (data ^ data >> 4) & 0xF
     pairs = nibbles ^ nibbles >> 2
     return (((mode & 6) == 4) ^ (pairs ^ pairs >> 1) & 1) & has_parity(mode)
 
 
 def pack(mode: Number, word: Number) -> Number:
-    """Levels of a frame, start bit in bit 0."""
+    """Return the levels of a frame, start bit in bit 0."""
     data = data_of(mode, word)
     return data << 1 | parity(mode, data) << 9 | (1 | (mode & 1) << 1) << first_stop(mode)
 
 
 def judge(mode: Number, sampled: Number) -> Number:
-    """Data and error marks of a sampled frame. UNVERIFIED: with two stop bits the first one decides."""
+    """Return data and error marks of a sampled frame. UNVERIFIED: with two stop bits the first one decides."""
     data = data_of(mode, sampled >> 1)
     broken = (sampled >> first_stop(mode) & 1) ^ 1
     wrong = (parity(mode, data) ^ sampled >> 9 & 1) & has_parity(mode)
@@ -67,10 +67,10 @@ def judge(mode: Number, sampled: Number) -> Number:
 
 
 def sample(wave: int, bits: int, offset: int, tick: int, bit_q8: int) -> int:
-    """What a receiver with 16 clocks of `tick` Tcy per bit sees of a frame of `bits`: the majority of clocks 7, 8 and 9
-    (§10.2).
+    """Return the bits that a receiver samples: the majority of clocks 7, 8 and 9 of the 16 per bit (§10.2).
 
-    `offset`: Tcy from the start edge to the clock that detects it; `bit_q8`: the sender's bit time in Tcy/256.
+    `bits`: length of the frame; `tick`: Tcy per receiver clock; `offset`: Tcy from the start edge to the receiver clock
+    that detects it; `bit_q8`: the sender's bit time in Tcy/256.
     """
     sampled = 0
     for index in range(bits):

@@ -1,7 +1,7 @@
-"""What a UART does (§10): text for every engine.
+"""Rules of a UART (§10).
 
-The rules at the end are its common case; around the same text `uart.py` adds what needs Python: listeners that must
-hear at once, loopback, autobaud, senders at another rate, a log of edges.
+The rules at the end handle the common cases. `uart.py` uses the same functions and adds the cases that need Python:
+eager listeners, loopback, autobaud, senders at a different baud rate, and the log of edges.
 """
 
 from __future__ import annotations
@@ -14,72 +14,72 @@ from typing import Final
 from emu.peripherals.uart.frame import FRAMING_MARK, PARITY_MARK, data_of, first_stop, is_nine, judge, length, pack
 from emu.peripherals.uart.rx_line import CAPACITY, ERRORS, RxQueueOperands
 from emu.system.events import NEVER
-from emu.system.rules import Line, Number, Place, Reader, Slot, request
+from emu.system.rules import Cell, EventSlot, InterruptLine, Number, RuleBuilder, request
 
 FIFO: Final = 4
 """Depth of the transmit and receive FIFOs (§10.1, §10.2)."""
 SENT: Final = 64
-"""Characters that have left and need not be told at once."""
+"""Capacity of the buffer for sent characters whose listeners are called later."""
 QUIET, COMING, SAMPLING = range(3)
 """Receiver states: no frame, start bit posted (loopback), inside a frame."""
 _FILL: Final = (0, 0, 3, 4)
-"""By URXISEL: characters in the FIFO that request an interrupt; 0: each does."""
+"""FIFO level that requests an interrupt, by URXISEL; 0: every character does."""
 CHARACTER: Final = 0x1FF
 """Data bits of an element of the receive FIFO."""
 
 
 @dataclass(frozen=True, slots=True)
 class UartOperands:
-    """Registers and cells of one UART."""
+    """Operands of the rules: registers and cells of one UART."""
 
-    mode: Place
-    sta: Place
-    brg: Place
-    txreg: Place
+    mode: Cell
+    sta: Cell
+    brg: Cell
+    txreg: Cell
     bit: Mapping[str, int]
     """Masks of the fields of UxMODE and UxSTA, which have different names."""
     urxisel: int
-    """Its lowest bit."""
+    """Lowest bit of URXISEL."""
     writable: int
-    """Bits of UxTXREG."""
-    clock: Place
-    tx: Place
-    tx_count: Place
-    shifting: Place
-    frame: Place
-    wave: Place
-    start: Place
-    end: Place
-    bit_began: Place
-    rx: Place
-    rx_count: Place
-    held: Place
-    receiving: Place
-    incoming: Place
-    done: Place
-    rx_wave: Place
-    rx_start: Place
-    rx_bit: Place
-    line_free: Place
-    frozen: Place
-    at_once: Place
-    """Whether somebody must hear of a character in the cycle in which it has left."""
-    sent: Place
-    sent_count: Place
-    watched: Place
-    """Pins of TX's port whose edges somebody wants to see, TX among them while edges are logged."""
+    """Writable bits of UxTXREG."""
+    clock: Cell
+    tx: Cell
+    tx_count: Cell
+    shifting: Cell
+    frame: Cell
+    wave: Cell
+    start: Cell
+    end: Cell
+    bit_began: Cell
+    rx: Cell
+    rx_count: Cell
+    held: Cell
+    receiving: Cell
+    incoming: Cell
+    done: Cell
+    rx_wave: Cell
+    rx_start: Cell
+    rx_bit: Cell
+    line_free: Cell
+    frozen: Cell
+    at_once: Cell
+    """Whether an eager listener must be called in the cycle in which a character has been sent."""
+    sent: Cell
+    sent_count: Cell
+    watched: Cell
+    """Pins with eager watchers on the port of TX; TX is among them while edges are logged."""
     tx_pin: int
     line: RxQueueOperands
-    send_slot: Slot
-    receive_slot: Slot
-    line_slot: Slot
-    send_line: Line
-    receive_line: Line
+    send_slot: EventSlot
+    receive_slot: EventSlot
+    line_slot: EventSlot
+    send_line: InterruptLine
+    receive_line: InterruptLine
 
 
 # -- transmit --------------------------------------------------------------------------------------------------------
-def push(m: Reader, u: UartOperands, value: Number, lanes: int) -> bool:
-    """TXREG written: the low byte pushes; a full FIFO drops the character (§10.1)."""
+def push(m: RuleBuilder, u: UartOperands, value: Number, lanes: int) -> bool:
+    """Write TXREG: a write to the low byte pushes the character; a full FIFO drops it (§10.1)."""
     mode, status, count, due = m.get(u.mode), m.get(u.sta), m.get(u.tx_count), m.get(u.send_slot.due)
     free = u.writable & lanes
     word = (m.get(u.txreg) & (0xFFFF & ~free)) | (value & free)
@@ -95,19 +95,19 @@ def push(m: Reader, u: UartOperands, value: Number, lanes: int) -> bool:
     return True
 
 
-def bit_time(m: Reader, u: UartOperands) -> Number:
-    """Length of a bit in Tcy: 16 (BRG + 1)."""
+def bit_time(m: RuleBuilder, u: UartOperands) -> Number:
+    """Return the bit time in Tcy: 16 (BRG + 1)."""
     return (m.get(u.brg) + 1) << 4
 
 
-def edge(m: Reader, u: UartOperands, cycle: Number, step: Number) -> Number:
-    """The first edge of the free-running baud clock, divided to `step` Tcy, that is not before `cycle`."""
+def edge(m: RuleBuilder, u: UartOperands, cycle: Number, step: Number) -> Number:
+    """Return the first edge of the baud clock with period `step` Tcy at or after `cycle`."""
     clock = m.get(u.clock)
     return clock + m.div(cycle - clock + step - 1, step) * step
 
 
-def send_next(m: Reader, u: UartOperands, cycle: Number) -> None:
-    """FIFO to TSR: the start bit begins at the next edge of the bit clock (§10.1). An empty FIFO: TRMT rises."""
+def send_next(m: RuleBuilder, u: UartOperands, cycle: Number) -> None:
+    """Move the next FIFO entry to TSR: its start bit begins at the next bit clock edge (§10.1). Set TRMT if empty."""
     mode, status, count, ended = m.get(u.mode), m.get(u.sta), m.get(u.tx_count), m.get(u.end)
     waits, data, bit = count != 0, m.get(u.tx), bit_time(m, u)
     free = m.select(ended == cycle, cycle, edge(m, u, cycle, bit))
@@ -128,27 +128,31 @@ def send_next(m: Reader, u: UartOperands, cycle: Number) -> None:
 
 
 # -- receive ---------------------------------------------------------------------------------------------------------
-def arrive(m: Reader, u: UartOperands, start: Number, wave: Number, sampled: Number, bit_q8: Number) -> None:
-    """A frame's start bit falls in cycle `start`; `wave` is what is on the line, `sampled` what will be seen of it,
-    `bit_q8` the sender's bit time in Tcy/256."""
+def schedule_frame(
+    m: RuleBuilder, u: UartOperands, start: Number, wave: Number, sampled: Number, bit_q8: Number
+) -> None:
+    """Schedule the reception of a frame whose start bit begins in cycle `start`.
+
+    `wave`: levels on the line; `sampled`: bits the receiver will sample; `bit_q8`: the sender's bit time in Tcy/256.
+    """
     mode, tick = m.get(u.mode), m.get(u.brg) + 1
-    middle = edge(m, u, start, tick) + ((first_stop(mode) << 4) + 8) * tick  # of the first stop bit (§10.2)
+    middle = edge(m, u, start, tick) + ((first_stop(mode) << 4) + 8) * tick  # middle of the first stop bit (§10.2)
     m.put(u.incoming, judge(mode, sampled))
     m.put(u.rx_bit, bit_q8)
     m.put(u.done, middle)
-    m.put(u.rx_wave, (wave | 0xFFFF << length(mode)) & 0xFFFF)  # behind the frame the line is high
+    m.put(u.rx_wave, (wave | 0xFFFF << length(mode)) & 0xFFFF)  # after the frame the line is high
     m.put(u.rx_start, start)
 
 
-def begin(m: Reader, u: UartOperands) -> None:
-    """The start bit has begun."""
+def begin(m: RuleBuilder, u: UartOperands) -> None:
+    """Handle the beginning of the start bit."""
     m.put(u.receiving, SAMPLING)
     m.put(u.sta, m.get(u.sta) & (0xFFFF & ~u.bit["RIDLE"]))
     m.post(u.receive_slot, m.get(u.done))
 
 
 def shown(u: UartOperands, status: Number, count: Number, top: Number) -> Number:
-    """`status` with URXDA, PERR and FERR, which belong to the character at the top of the FIFO (§10.2)."""
+    """Return `status` with URXDA, PERR and FERR of the character at the top of the FIFO (§10.2)."""
     bit, some = u.bit, count != 0
     others = status & (0xFFFF & ~(bit["URXDA"] | bit["PERR"] | bit["FERR"]))
     wrong = some & ((top & PARITY_MARK) != 0)
@@ -156,8 +160,8 @@ def shown(u: UartOperands, status: Number, count: Number, top: Number) -> Number
     return others | some * bit["URXDA"] | wrong * bit["PERR"] | broken * bit["FERR"]
 
 
-def receive(m: Reader, u: UartOperands) -> None:
-    """A character is complete: FIFO, or the shift register when the FIFO is full (§10.2)."""
+def receive(m: RuleBuilder, u: UartOperands) -> None:
+    """Store a complete character in the FIFO, or in the shift register if the FIFO is full (§10.2)."""
     bit, mode, count, character = u.bit, m.get(u.mode), m.get(u.rx_count), m.get(u.incoming)
     status = m.get(u.sta) | bit["RIDLE"]
     unaddressed = ((status & bit["ADDEN"]) != 0) & is_nine(mode) & ((character & 0x100) == 0)
@@ -176,8 +180,8 @@ def receive(m: Reader, u: UartOperands) -> None:
     request(m, u.receive_line, m.now, taken & ((wanted == 0) | (wanted == after)))
 
 
-def pop(m: Reader, u: UartOperands) -> Number:
-    """RXREG read: the top of the FIFO, which goes; an empty one shows the last character again."""
+def pop(m: RuleBuilder, u: UartOperands) -> Number:
+    """Read RXREG: remove and return the top of the FIFO; an empty FIFO returns the last character again."""
     count, data, before = m.get(u.rx_count), m.get(u.rx), m.get(u.sta)
     left = m.select(count == 0, 0, count - 1)
     elements = [m.get(u.rx, place) for place in range(FIFO)]
@@ -190,38 +194,40 @@ def pop(m: Reader, u: UartOperands) -> Number:
 
 
 # -- rules -----------------------------------------------------------------------------------------------------------
-def fire_send(m: Reader, u: UartOperands) -> None:
-    """A frame has ended, or a character waits for the idle shift register."""
-    mode, count, told = m.get(u.mode), m.get(u.tx_count), m.get(u.sent_count)
+def fire_send(m: RuleBuilder, u: UartOperands) -> None:
+    """Handle the end of a sent frame, or start sending a waiting character."""
+    mode, count, stored = m.get(u.mode), m.get(u.tx_count), m.get(u.sent_count)
     sent = m.get(u.shifting) != 0
-    m.need((sent == 0) | ((m.get(u.end) <= m.now) & (m.get(u.at_once) == 0) & (told < SENT)))
-    m.need((((mode & u.bit["LPBACK"]) == 0) & ((m.get(u.watched) & u.tx_pin) == 0)) | (count == 0))
-    place = m.select(sent, told, 0)
+    m.require((sent == 0) | ((m.get(u.end) <= m.now) & (m.get(u.at_once) == 0) & (stored < SENT)))
+    m.require((((mode & u.bit["LPBACK"]) == 0) & ((m.get(u.watched) & u.tx_pin) == 0)) | (count == 0))
+    place = m.select(sent, stored, 0)
     character = m.select((m.get(u.sta) & u.bit["UTXBRK"]) == 0, m.get(u.frame), 0)
     m.put(u.sent, m.select(sent, m.get(u.start) << 16 | character, m.get(u.sent, place)), place)
-    m.put(u.sent_count, m.select(sent, told + 1, told))
+    m.put(u.sent_count, m.select(sent, stored + 1, stored))
     send_next(m, u, m.now)
 
 
-def fire_receive(m: Reader, u: UartOperands) -> None:
-    """The middle of the stop bit."""
-    m.need(m.get(u.receiving) == SAMPLING)
+def fire_receive(m: RuleBuilder, u: UartOperands) -> None:
+    """Complete a reception in the middle of the stop bit."""
+    m.require(m.get(u.receiving) == SAMPLING)
     receive(m, u)
 
 
-def fire_line(m: Reader, u: UartOperands) -> None:
-    """A start bit falls on RX: a frame without errors, at the receiver's own rate."""
+def fire_line(m: RuleBuilder, u: UartOperands) -> None:
+    """Start a reception: a queued frame without errors, at the receiver's own baud rate."""
     line, mode, count, head = u.line, m.get(u.mode), m.get(u.line.count), m.get(u.line.head)
     data, following = m.get(line.data, head), m.select(head + 1 == CAPACITY, 0, head + 1)
     plain = (mode & (u.bit["UARTEN"] | u.bit["LPBACK"] | u.bit["ABAUD"])) == u.bit["UARTEN"]
-    m.need(plain & (m.get(u.frozen) == NEVER) & (m.get(u.receiving) == QUIET) & (count != 0))
-    m.need((m.get(line.bit, head) == 0) & ((data & ERRORS) == 0) & ((m.get(line.more) == 0) | (count > CAPACITY // 2)))
+    m.require(plain & (m.get(u.frozen) == NEVER) & (m.get(u.receiving) == QUIET) & (count != 0))
+    m.require(
+        (m.get(line.bit, head) == 0) & ((data & ERRORS) == 0) & ((m.get(line.more) == 0) | (count > CAPACITY // 2))
+    )
     bits, bit = length(mode), bit_time(m, u)
     wave, free = pack(mode, data), m.now + bits * bit
     earliest = m.get(line.earliest, following)
     m.put(line.head, following)
     m.put(line.count, count - 1)
     m.put(u.line_free, free)
-    arrive(m, u, m.now, wave, wave, bit << 8)
+    schedule_frame(m, u, m.now, wave, wave, bit << 8)
     begin(m, u)
     m.post(u.line_slot, m.select(count == 1, NEVER, m.select(m.below(earliest, free), free, earliest)))

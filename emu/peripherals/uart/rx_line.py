@@ -1,7 +1,7 @@
-"""The wire in front of a UART's RX pin: frames that wait for their turn, each with its earliest cycle.
+"""Queue of frames for a UART's RX pin, each with its earliest start cycle.
 
-The next `CAPACITY` frames live in the record; what is fed beyond that waits outside it, so only a snapshot taken
-while more than `CAPACITY` frames wait misses the rest.
+The next `CAPACITY` frames are in the record. Further frames wait in a host-side backlog, which snapshots do not
+contain.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from dataclasses import dataclass, fields
 from typing import Final
 
 from emu.system.record import Record
-from emu.system.rules import Place, place_of
+from emu.system.rules import Cell, cell_of
 
 CAPACITY: Final = 1024
 FRAMING_ERROR: Final = 0x200
@@ -22,13 +22,13 @@ PARITY_ERROR: Final = 0x400
 BREAK: Final = 0x800
 """The line is low for the whole frame."""
 WAIT_FOR_RECEIVER: Final = 0x1000
-"""The frame is not sent before the receiver is enabled."""
+"""The frame waits until the receiver is enabled."""
 ERRORS: Final = FRAMING_ERROR | PARITY_ERROR | BREAK
 
 
 @dataclass(frozen=True, slots=True)
 class QueuedFrame:
-    """One frame: earliest cycle of its start bit, data with error marks, bit time in Tcy/256 (0 = the receiver's)."""
+    """A queued frame: earliest start cycle, data with error marks, bit time in Tcy/256 (0 = the receiver's)."""
 
     earliest: int
     data: int
@@ -37,18 +37,18 @@ class QueuedFrame:
 
 @dataclass(frozen=True, slots=True)
 class RxQueueOperands:
-    """A ring of `CAPACITY` frames, and whether more of them wait outside."""
+    """Operands of the rules: a ring of `CAPACITY` frames, and whether the backlog holds more."""
 
-    earliest: Place
-    bit: Place
-    data: Place
-    head: Place
-    count: Place
-    more: Place
+    earliest: Cell
+    bit: Cell
+    data: Cell
+    head: Cell
+    count: Cell
+    more: Cell
 
 
 class RxQueue:
-    """First in, first out."""
+    """First-in, first-out queue of frames towards RX."""
 
     def __init__(self, record: Record, name: str) -> None:
         def reserve(purpose: str, kind: str, count: int = 1) -> int:
@@ -65,11 +65,11 @@ class RxQueue:
         self._more: Final = reserve("line.more", "B")
         self._u16: Final = record.u16
         self._u8: Final = record.u8
-        places = (place_of(record, f"{name}.line.{one.name}") for one in fields(RxQueueOperands))
+        places = (cell_of(record, f"{name}.line.{one.name}") for one in fields(RxQueueOperands))
         self.places: Final = RxQueueOperands(*places)
-        """For rules."""
+        """Operands for rules."""
         self.backlog: Final[deque[QueuedFrame]] = deque()
-        """What does not fit into the record yet."""
+        """Frames that do not fit into the record yet."""
 
     def __len__(self) -> int:
         return self._u16[self._count] + len(self.backlog)
@@ -80,7 +80,7 @@ class RxQueue:
         self._top_up()
 
     def head(self) -> QueuedFrame | None:
-        """The next frame, left in place."""
+        """Return the next frame without removing it."""
         if not self._u16[self._count]:
             return None
         index = self._u16[self._head]

@@ -1,4 +1,4 @@
-"""A UART's transmit pin: its level as a function of the cycle, its edges for a log."""
+"""A UART's transmit pin: its level as a function of the cycle, and its edges for a log."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from emu.system.events import NEVER
 
 
 class TxPin:
-    """A `Waveform` over the one pin; `level(cycle)` is the transmitter's."""
+    """A `Waveform` for the TX pin; `level(cycle)` returns the transmitter's level."""
 
     def __init__(self, pins: Pins, port: int, mask: int, level: Callable[[int], int]) -> None:
         self._pins: Final = pins
@@ -19,23 +19,23 @@ class TxPin:
         self._level: Final = level
 
     def bits(self, cycle: int) -> int:
-        """The pin in `cycle`."""
+        """Return the pin's level in `cycle`."""
         return self._mask if self._level(cycle) else 0
 
     def rises(self, mask: int, after: int, until: int) -> int:
-        """Edges of TX clock nothing inside the chip."""
+        """No device of the chip is clocked by TX."""
         return 0
 
     def nth_rise(self, mask: int, after: int, count: int) -> int:
-        """Edges of TX clock nothing inside the chip."""
+        """No device of the chip is clocked by TX."""
         return NEVER
 
     def constant_until(self, cycle: int) -> int:
-        """Firmware does not read its own TX pin often: nothing is promised."""
+        """No guarantee: firmware rarely reads its own TX pin."""
         return cycle
 
     def log_frame(self, start: int, bits: int, length: int, bit: int) -> None:
-        """Write a frame's edges to the log of the pins, if one is kept: `length` levels of `bit` Tcy from `start`."""
+        """Write a frame to the log of pin changes, if there is one: `length` levels of `bit` Tcy from `start`."""
         if self._pins.frames is not None:
             self._pins.frames.append((start, self._port, self._mask, bits, length, bit))
             return

@@ -1,8 +1,8 @@
 """UART1/2 (§10): FIFOs, bit-exact line timing, error flags, interrupt modes, loopback, break, autobaud.
 
-The outside is bytes with cycles: `on_byte(byte, start_cycle)` when a frame has left the pin, `feed(bytes)` for frames
-that arrive at line rate. The level of the TX pin is a function of the cycle. What happens inside is the text of
-`uartrules.py`; here is what surrounds it.
+The environment exchanges bytes with cycles: `on_byte(byte, start_cycle)` is called when a frame has left the pin,
+`feed(bytes)` queues frames that arrive at line rate. The level of the TX pin is a function of the cycle. `rules.py` has
+the common cases; this module handles all others.
 """
 
 from __future__ import annotations
@@ -25,7 +25,6 @@ from emu.peripherals.uart.rules import (
     QUIET,
     SENT,
     UartOperands,
-    arrive,
     begin,
     bit_time,
     edge,
@@ -35,6 +34,7 @@ from emu.peripherals.uart.rules import (
     pop,
     push,
     receive,
+    schedule_frame,
     send_next,
     shown,
 )
@@ -43,7 +43,7 @@ from emu.peripherals.uart.tx_pin import TxPin
 from emu.peripherals.wait import OutputMatcher, Pattern
 from emu.system.events import NEVER
 from emu.system.observers import Listeners
-from emu.system.rules import Rule, place_of, slot_of
+from emu.system.rules import Rule, cell_of, event_slot
 
 _NO_SENT: Final = memoryview(bytes(8 * SENT)).cast("Q")
 
@@ -67,13 +67,13 @@ class Uart(Peripheral):
         self.txreg.computed(lambda: 0)
         self.rxreg.computed(lambda: self._rx[0] & CHARACTER)
         self.brg.written_by(self._brg_written)
-        self._ear: OutputMatcher | None = None
+        self._matcher: OutputMatcher | None = None
         self._at_once: Final = self.cell("at_once", "B")
-        """Whether somebody must hear of a character in the cycle in which it has left."""
+        """Whether an eager listener must be called in the cycle in which a character has been sent."""
         self._sent: Final = self.array("sent", "Q", SENT)
-        """Characters that nobody has been told of: first cycle of the start bit << 16 | character."""
+        """Sent characters not yet delivered to listeners: first cycle of the start bit << 16 | character."""
         self._sent_count: Final = self.cell("sent_count", "B")
-        self._sent_to: Final[Listeners[[int, int]]] = Listeners(self.events, self._at_once.set)
+        self._listeners: Final[Listeners[[int, int]]] = Listeners(self.events, self._at_once.set)
         self._capture: Capture | None = None
         self._uarten: Final = 1 << context.chip.sfrs[prefix + "MODE"].fields["UARTEN"][0]
         tx_port, self._tx_pin = parse_pin(site.tx_pin)
@@ -81,32 +81,32 @@ class Uart(Peripheral):
         self._tx_port: Final = ports[tx_port]
         self._rx_port: Final = ports[rx_port]
 
-        self._clock: Final = self.moment("clock")
-        """Cycle the baud generator last started from 0."""
+        self._clock: Final = self.timestamp("clock")
+        """Cycle in which the baud generator last started from 0."""
         self._tx: Final = self.array("tx", "H", FIFO)
         self._tx_count: Final = self.cell("tx_count", "B")
         self._shifting: Final = self.cell("shifting", "B")
         self._frame: Final = self.cell("frame", "H")
         self._wave: Final = self.cell("wave", "H")
-        self._start: Final = self.moment("start", NEVER)
-        """Cycle the start bit in TSR began or begins."""
-        self._end: Final = self.moment("end", NEVER)
-        self._bit_began: Final = self.moment("bit_began", NEVER)
-        """Cycle the bit in bit 0 of the wave begins in: the start bit, or the one in which BRG was written."""
+        self._start: Final = self.timestamp("start", NEVER)
+        """Cycle in which the start bit of the frame in TSR begins."""
+        self._end: Final = self.timestamp("end", NEVER)
+        self._bit_began: Final = self.timestamp("bit_began", NEVER)
+        """Cycle in which bit 0 of `wave` begins: the start bit, or the bit in which BRG was written."""
         self._tx_event: Final = self.slot("tx", self._tx_due)
         self._pin: Final = TxPin(context.pins, tx_port, self._tx_pin, self._tx_level)
 
         self._rx: Final = self.array("rx", "H", FIFO + 1)
-        """FIFO; data in bits 8:0, errors above. The last element is the character in the shift register."""
+        """Receive FIFO: data in bits 8:0, errors above. The last element is the character in the shift register."""
         self._rx_count: Final = self.cell("rx_count", "B")
         self._held: Final = self.cell("held", "B")
-        """The shift register holds a character that found the FIFO full."""
+        """Whether the shift register holds a character because the FIFO is full."""
         self._receiving: Final = self.cell("receiving", "B")
         self._incoming: Final = self.cell("incoming", "H")
-        self._done: Final = self.moment("done", NEVER)
+        self._done: Final = self.timestamp("done", NEVER)
         self._rx_event: Final = self.slot("rx", self._rx_due)
         self._rx_wave: Final = self.cell("rx_wave", "H")
-        self._rx_start: Final = self.moment("rx_start", NEVER)
+        self._rx_start: Final = self.timestamp("rx_start", NEVER)
         self._rx_bit: Final = self.cell("rx_bit", "I")
         """Bit time of the sender in Tcy/256."""
         self._edge_bit: Final = self.cell("edge_bit", "B")
@@ -114,12 +114,12 @@ class Uart(Peripheral):
 
         self.line: Final = RxQueue(self.record, self.name)
         self._line_free: Final = self.cell("line_free", "Q")
-        """First cycle the line is free for the next frame."""
+        """First cycle in which the line is free for the next frame."""
         self._line_event: Final = self.events.slot(f"{self.name}.line", self._line_due)
-        self._places: Final = self._registers()
-        self._ruled(self._places)
+        self._places: Final = self._rule_operands()
+        self._set_rules(self._places)
 
-    def _registers(self) -> UartOperands:
+    def _rule_operands(self) -> UartOperands:
         sfrs = self.context.chip.sfrs
         cells = ("clock", "tx", "tx_count", "shifting", "frame", "wave", "start", "end", "bit_began", "rx", "rx_count",
                  "held", "receiving", "incoming", "done", "rx_wave", "rx_start", "rx_bit", "line_free", "frozen",
@@ -133,90 +133,95 @@ class Uart(Peripheral):
             bit={name: ((1 << width) - 1) << lsb for name, (lsb, width) in fields.items()},
             urxisel=fields["URXISEL"][0],
             writable=sfrs[self.txreg.name].writable,
-            watched=place_of(self.record, "pins.eager", self._tx_port.index),
+            watched=cell_of(self.record, "pins.eager", self._tx_port.index),
             tx_pin=self._tx_pin,
             line=self.line.places,
-            send_slot=slot_of(self.record, self._tx_event),
-            receive_slot=slot_of(self.record, self._rx_event),
-            line_slot=slot_of(self.record, self._line_event),
+            send_slot=event_slot(self.record, self._tx_event),
+            receive_slot=event_slot(self.record, self._rx_event),
+            line_slot=event_slot(self.record, self._line_event),
             send_line=self._interrupts.line(self.site.tx_irq).line,
             receive_line=self._interrupts.line(self.site.rx_irq).line,
-            **{name: place_of(self.record, f"{self.name}.{name}") for name in cells},
+            **{name: cell_of(self.record, f"{self.name}.{name}") for name in cells},
         )
 
-    def _ruled(self, places: UartOperands) -> None:
-        """What has rules; hooks for who has taken the rules off the bus run the same text."""
+    def _set_rules(self, places: UartOperands) -> None:
+        """Set the rules of registers and events. The register hooks run the same functions without rules on the bus."""
         integers = self.bus.integers
-        self.txreg.ruled(Rule(places, writes=push))
+        self.txreg.set_rule(Rule(places, writes=push))
         self.txreg.written_by(lambda _old, new, lanes: self._push(new, lanes))
-        self.rxreg.ruled(Rule(places, takes=pop))
+        self.rxreg.set_rule(Rule(places, reads_with_effect=pop))
         self.rxreg.read_by(lambda: pop(integers, places))
-        self.ruled(self._tx_event, Rule(places, fires=fire_send))
-        self.ruled(self._rx_event, Rule(places, fires=fire_receive))
-        self.ruled(self._line_event, Rule(places, fires=fire_line))
+        self.set_event_rule(self._tx_event, Rule(places, fires=fire_send))
+        self.set_event_rule(self._rx_event, Rule(places, fires=fire_receive))
+        self.set_event_rule(self._line_event, Rule(places, fires=fire_line))
 
     def listen(
         self, listener: Callable[[int, int], object], *, part: bool = False, lazy: bool = False
     ) -> Callable[[], None]:
-        """Call listener(byte, start_cycle) for every frame that has left TX; its start bit began in start_cycle. Any
-        number may listen. Returns how to remove this one. `part`: a part of the board, whose state depends on it.
-        `lazy`: it need not hear in that very cycle, but before the run ends; a machine runs faster if all are."""
-        return self._sent_to.add(listener, part=part, lazy=lazy)
+        """Call listener(byte, start_cycle) for every frame sent on TX; its start bit began in start_cycle.
 
-    def tell(self) -> None:
-        """Tell who listens what has been sent. The record keeps no trace of it."""
+        Return a function that removes the listener. `part`: the listener is a part of the board, whose state depends
+        on the bytes. `lazy`: the call may come later than the frame's end, but before the run ends. A machine runs
+        faster if all listeners are lazy.
+        """
+        return self._listeners.add(listener, part=part, lazy=lazy)
+
+    def deliver_sent(self) -> None:
+        """Call the listeners for the sent characters stored in the record, and clear the store."""
         count = self._sent_count.value
         if count:
             entries = self._sent[:count].tolist()
             self._sent_count.value = 0
             self._sent[:count] = _NO_SENT[:count]
             for entry in entries:
-                self._sent_to(entry & 0xFFFF, entry >> 16)
+                self._listeners(entry & 0xFFFF, entry >> 16)
 
     @property
     def on_byte(self) -> Callable[[int, int], object] | None:
-        """One listener that an assignment replaces; those of `listen` hear as well."""
-        return self._sent_to.assigned
+        """A single listener, replaced by assignment, in addition to those added by `listen`."""
+        return self._listeners.assigned
 
     @on_byte.setter
     def on_byte(self, listener: Callable[[int, int], object] | None) -> None:
-        self._sent_to.assigned = listener
+        self._listeners.assigned = listener
 
     def expect(self, pattern: Pattern, *, within: float) -> Match[bytes]:
         """Run the machine until `pattern` has been sent, for at most `within` ms of simulated time.
 
-        A text or bytes mean themselves, a compiled pattern of bytes is searched. The search goes on behind the last
-        match; the first use begins to listen. The machine stops at the cycle the match's last byte has left the pin in.
-        Raises ExpectError (an AssertionError) with what was said instead, and with the fault if there was one.
+        Text and bytes match literally, a compiled bytes pattern is searched. The search starts behind the last match;
+        the first call starts collecting. The machine stops in the cycle in which the match's last byte has left the
+        pin. Raises ExpectError (an AssertionError) with the output received instead, and with the fault if any.
         """
-        if self._ear is None:
-            self._ear = OutputMatcher(self.name.upper().replace("U", "UART", 1), self.context.cpu_signals, self.context.fcy, lambda: self.now)
-            self.listen(self._ear.hear, lazy=True)
-        no_longer = self.listen(lambda _byte, _start: None)  # what ends a run must be heard at once
+        if self._matcher is None:
+            self._matcher = OutputMatcher(
+                self.name.upper().replace("U", "UART", 1), self.context.cpu_signals, self.context.fcy, lambda: self.now
+            )
+            self.listen(self._matcher.on_byte, lazy=True)
+        remove = self.listen(lambda _byte, _start: None)  # an eager listener: a match must end the run at once
         try:
-            return self._ear.expect(pattern, within, self.drain)
+            return self._matcher.expect(pattern, within, self.drain)
         finally:
-            no_longer()
+            remove()
 
     def connect_capture(self, capture: Capture) -> None:
-        """The capture channel that ABAUD connects to the receive pin."""
+        """Set the capture channel that ABAUD connects to the receive pin."""
         self._capture = capture
 
     # -- settings ----------------------------------------------------------------------------------------------------
 
     @property
     def bit_time(self) -> int:
-        """Length of a bit in Tcy: 16 (BRG + 1)."""
+        """Bit time in Tcy: 16 (BRG + 1)."""
         return int(bit_time(self.bus.integers, self._places))
 
     @property
     def is_enabled(self) -> bool:
-        """UARTEN."""
+        """Whether UARTEN is set."""
         return bool(self.mode.value & self._uarten)
 
     @property
     def is_sending_enabled(self) -> bool:
-        """UARTEN and UTXEN."""
+        """Whether UARTEN and UTXEN are set."""
         return self.is_enabled and bool(self.sta["UTXEN"])
 
     # -- transmit ----------------------------------------------------------------------------------------------------
@@ -225,23 +230,23 @@ class Uart(Peripheral):
         push(self.bus.integers, self._places, value, lanes)
 
     def _tx_due(self, due: int) -> None:
-        """A frame has ended, or a character waits for the idle shift register."""
+        """Handle the end of a sent frame, or start sending a waiting character."""
         if self._shifting.value and due < self._end.value:
             return
         if self._shifting.value:
             self._shifting.value = 0
-            self.tell()  # loopback cuts off the receive pin only: the frame has left TX (§10)
-            self._sent_to(0 if self.sta["UTXBRK"] else self._frame.value, self._start.value)
+            self.deliver_sent()  # loopback disconnects the receive pin only: the frame is sent on TX (§10)
+            self._listeners(0 if self.sta["UTXBRK"] else self._frame.value, self._start.value)
         waits = self._tx_count.value > 0
         send_next(self.bus.integers, self._places, due)
         if waits:
             start, mode = self._start.value, self.mode.value
             self._pin.log_frame(start, self._wave.value, length(mode), self.bit_time)
             if self.mode["LPBACK"]:
-                self._arrive(start, self._frame.value | (BREAK if self.sta["UTXBRK"] else 0), 0)
+                self._receive_frame(start, self._frame.value | (BREAK if self.sta["UTXBRK"] else 0), 0)
 
     def _tx_level(self, cycle: int) -> int:
-        """Level of TX in `cycle`, 1 = idle."""
+        """Return the level of TX in `cycle`, 1 = idle."""
         if self.sta["UTXBRK"]:
             return 0
         if not self._shifting.value or cycle < self._start.value:
@@ -249,8 +254,8 @@ class Uart(Peripheral):
         return self._wave.value >> (cycle - self._bit_began.value) // self.bit_time & 1
 
     def drain(self) -> None:
-        """Deliver what is still in the transmitter as a robot would: the pins outlive a stopped program."""
-        self.tell()
+        """Send all characters left in the transmitter: a real UART keeps running after the program has stopped."""
+        self.deliver_sent()
         while self._shifting.value or (self._tx_count.value and self.is_sending_enabled):
             self.events.cancel(self._tx_event)
             self._tx_due(self._end.value if self._shifting.value else self.now + 1)
@@ -258,9 +263,9 @@ class Uart(Peripheral):
     # -- receive -----------------------------------------------------------------------------------------------------
 
     def feed(self, data: bytes | Iterable[int], cycle: int | None = None, *, errors: int = 0, baud: float = 0) -> None:
-        """Let frames arrive back to back on RX, at this UART's own bit time or at `baud` bits per second.
+        """Queue frames that arrive back to back on RX, at this UART's own bit time or at `baud` bits per second.
 
-        With `cycle` the first start bit is not before that cycle and a closed receiver loses the frames; without it
+        With `cycle` the first start bit is not before that cycle, and a disabled receiver loses the frames. Without it
         the sender waits until the receiver is enabled. `errors` may combine FRAMING_ERROR, PARITY_ERROR and BREAK.
         """
         bit = round(self.context.fcy() * 256 / baud) if baud else 0
@@ -269,7 +274,7 @@ class Uart(Peripheral):
         self._plan_line()
 
     def _plan_line(self) -> None:
-        """Post the start bit of the frame at the head of the line."""
+        """Post the start bit of the frame at the head of the queue."""
         frame = self.line.head()
         if frame is None or (frame.data & WAIT_FOR_RECEIVER and not self._is_listening):
             self.events.cancel(self._line_event)
@@ -281,7 +286,7 @@ class Uart(Peripheral):
         return self.is_enabled and (not self.is_frozen or bool(self.mode["WAKE"]))
 
     def drop_next_frame(self) -> bool:
-        """The next frame that is on its way to RX never comes; whether there was one."""
+        """Remove the next queued frame. Return whether there was one."""
         if self.line.head() is None:
             return False
         self.line.drop()
@@ -289,7 +294,7 @@ class Uart(Peripheral):
         return True
 
     def _line_due(self, due: int) -> None:
-        """A start bit falls on the RX pin."""
+        """Handle a start bit on the RX pin."""
         frame = self.line.head()
         if frame is None:
             return
@@ -300,20 +305,20 @@ class Uart(Peripheral):
             self._interrupts.line(self.site.rx_irq).request()
             self.mode["WAKE"] = 0
         elif self.is_enabled and not self.is_frozen and not self.mode["LPBACK"] and self._receiving.value == QUIET:
-            self._arrive(due, frame.data, frame.bit)
+            self._receive_frame(due, frame.data, frame.bit)
         self._plan_line()
 
-    def _arrive(self, start: int, data: int, bit_q8: int) -> None:
-        """Sample a frame whose start bit falls in cycle `start`; `bit_q8` is the sender's bit time in Tcy/256."""
-        mode, text, places = self.mode.value, self.bus.integers, self._places
+    def _receive_frame(self, start: int, data: int, bit_q8: int) -> None:
+        """Sample a frame whose start bit begins in cycle `start`; `bit_q8` is the sender's bit time in Tcy/256."""
+        mode, rules, places = self.mode.value, self.bus.integers, self._places
         wave, bits, stop = pack(mode, data), length(mode), first_stop(mode)
         if data & PARITY_ERROR and has_parity(mode):
             wave ^= 1 << stop - 1
         if data & (FRAMING_ERROR | BREAK):
             wave &= 0 if data & BREAK else (1 << stop) - 1
         tick = self.brg.value + 1
-        sampled = wave if not bit_q8 else sample(wave, bits, edge(text, places, start, tick) - start, tick, bit_q8)
-        arrive(text, places, start, wave, sampled, bit_q8 or self.bit_time << 8)
+        sampled = wave if not bit_q8 else sample(wave, bits, edge(rules, places, start, tick) - start, tick, bit_q8)
+        schedule_frame(rules, places, start, wave, sampled, bit_q8 or self.bit_time << 8)
         self._receiving.value = COMING
         if start > self.now:
             self.events.set(self._rx_event, start)
@@ -321,21 +326,21 @@ class Uart(Peripheral):
             self._rx_due(start)
 
     def _rx_due(self, due: int) -> None:
-        text = self.bus.integers
+        rules = self.bus.integers
         if self._receiving.value != COMING:
-            receive(text, self._places)
+            receive(rules, self._places)
             return
-        begin(text, self._places)
+        begin(rules, self._places)
         if self.mode["ABAUD"]:
             self._edge_bit.value = 0
             self.events.set(self._edge_event, due)
 
     def _show_top(self) -> None:
-        """URXDA, PERR and FERR belong to the character at the top of the FIFO (§10.2)."""
+        """Set URXDA, PERR and FERR for the character at the top of the FIFO (§10.2)."""
         self.sta.value = int(shown(self._places, self.sta.value, self._rx_count.value, self._rx[0]))
 
     def _edge_due(self, due: int) -> None:
-        """Autobaud: pass the edges of the RX pin to the capture module, starting with the start bit."""
+        """Pass the edges of the RX pin to the capture module (autobaud), starting with the start bit."""
         bit = self._edge_bit.value
         wave = self._rx_wave.value
         if self._capture is not None:
@@ -355,11 +360,11 @@ class Uart(Peripheral):
             if new & enable:
                 self._clock.value = self.now + 1
                 self._rx_port.own(self._rx_pin, drive=False, level=0)
-                self._sender_switched(self.is_sending_enabled)
+                self._transmitter_switched(self.is_sending_enabled)
             else:
                 self._abort()
         if "ALTIO" in self.context.chip.sfrs[self.mode.name].fields and self.mode["ALTIO"]:
-            self.bus.lacks(f"{self.mode.name}.ALTIO, the UART keeps the pins it has")  # UNVERIFIED (§10)
+            self.bus.lacks(f"{self.mode.name}.ALTIO: the UART keeps its standard pins")  # UNVERIFIED (§10)
         self.restored()
         self._plan_line()
 
@@ -367,14 +372,14 @@ class Uart(Peripheral):
         fields = self.context.chip.sfrs[self.sta.name].fields
         utxen, oerr = (1 << fields[name][0] for name in ("UTXEN", "OERR"))
         if (old ^ new) & utxen and self.is_enabled:
-            self._sender_switched(bool(new & utxen))
-        if old & oerr and not new & oerr:  # only 1 -> 0 flushes (§10.2)
+            self._transmitter_switched(bool(new & utxen))
+        if old & oerr and not new & oerr:  # only a change 1 -> 0 flushes the FIFO (§10.2)
             self._rx_count.value = 0
             self._held.value = 0
             self._show_top()
 
-    def _sender_switched(self, on: bool) -> None:
-        """UTXEN and UARTEN became both 1, or no longer are (§10.1)."""
+    def _transmitter_switched(self, on: bool) -> None:
+        """Handle the transmitter being enabled or disabled: UARTEN and UTXEN both 1 (§10.1)."""
         self.restored()
         if on:
             self._tx_port.own(self._tx_pin, drive=True, level=1)
@@ -392,8 +397,8 @@ class Uart(Peripheral):
         self.sta["TRMT"] = 1
 
     def _abort(self) -> None:
-        """UARTEN fell: FIFOs, flags and the baud counter are cleared, MODE and BRG are kept (§10.1)."""
-        self._sender_switched(False)
+        """Handle UARTEN = 0: clear FIFOs, flags and the baud counter; keep MODE and BRG (§10.1)."""
+        self._transmitter_switched(False)
         self._rx_port.disown(self._rx_pin)
         self._rx_count.value = 0
         self._held.value = 0
@@ -402,27 +407,27 @@ class Uart(Peripheral):
             self.sta[flag] = 0
 
     def _stop_receiving(self) -> None:
-        """A character on its way is lost."""
+        """Abort a reception; its character is lost."""
         self._receiving.value = QUIET
         for slot in (self._rx_event, self._edge_event):
             self.events.cancel(slot)
         self.sta["RIDLE"] = 1
 
     def release_pins(self) -> None:
-        """TX and RX."""
+        """Return TX and RX to LAT and TRIS."""
         self._tx_port.disown(self._tx_pin)
         self._rx_port.disown(self._rx_pin)
 
     def _brg_written(self, old: int, _new: int, _lanes: int) -> None:
-        """Writing BRG restarts the baud counter (§10), so the bit on the line lasts one bit time more.
+        """Handle a write to BRG: the baud counter restarts (§10), so the current bit lasts one more bit time.
 
-        UNVERIFIED: a character that arrives goes on at the rate it began with.
+        UNVERIFIED: a character being received keeps the rate it began with.
         """
         following, before, bit = self.now + 1, 16 * (old + 1), self.bit_time
         self._clock.value = following
         if not self._shifting.value or following >= self._end.value:
             return
-        heard = bool(self.mode["LPBACK"]) and self._receiving.value and self._rx_start.value == self._start.value
+        in_loopback = bool(self.mode["LPBACK"]) and self._receiving.value and self._rx_start.value == self._start.value
         began = self._bit_began.value
         passed = max(following - began, 0) // before
         bits = (self._end.value - began) // before - passed
@@ -433,7 +438,7 @@ class Uart(Peripheral):
             self._start.value = self._bit_began.value = following + bit
         self._end.value = self._bit_began.value + bits * bit
         self.events.set(self._tx_event, self._end.value)
-        if heard:  # in loopback the receiver follows
+        if in_loopback:  # the receiver follows
             self._rx_start.value = self._start.value
             self._done.value = self._end.value - stops(self.mode.value) * bit + bit // 2
             is_coming = self._receiving.value == COMING
@@ -442,7 +447,7 @@ class Uart(Peripheral):
     # -- power and reset ---------------------------------------------------------------------------------------------
 
     def reset(self, power_on: bool) -> None:
-        """Disabled and empty. Frames on the line are the outside's affair and stay."""
+        """Reset: disabled and empty. Queued frames belong to the environment and stay."""
         self.restored()
         self._tx_count.value = self._shifting.value = 0
         self._rx_count.value = self._held.value = self._receiving.value = 0
@@ -451,8 +456,10 @@ class Uart(Peripheral):
         self._plan_line()
 
     def freeze(self, cycle: int, mode: int) -> None:
-        """In Idle with USIDL everything waits; Sleep cuts off what is under way, TX rests high. UNVERIFIED: §10 does
-        not say what becomes of a reception."""
+        """Stop the clock. Idle with USIDL suspends transfers; Sleep aborts them, and TX idles high.
+
+        UNVERIFIED: §10 does not say what happens to a reception.
+        """
         if mode == SLEEP and (self._shifting.value or self._tx_count.value):
             self.events.cancel(self._tx_event)
             self._tx_count.value = self._shifting.value = 0
@@ -464,16 +471,16 @@ class Uart(Peripheral):
         super().freeze(cycle, mode)
 
     def restored(self) -> None:
-        """The TX pin carries the waveform while the sender is enabled."""
+        """Attach the waveform to the TX pin while the transmitter is enabled."""
         if self.is_sending_enabled:
             self.context.pins.attach(self._tx_port.index, self._tx_pin, self._pin)
         else:
             self.context.pins.detach(self._tx_port.index, self._pin)
-        self._at_once.set(self._sent_to.urgent)
+        self._at_once.set(self._listeners.urgent)
         if self._capture is not None:
             self._capture.autobaud = bool(self.mode["ABAUD"])
 
     def thaw(self, cycle: int) -> None:
-        """Frames that waited for the receiver may come."""
+        """Resume the clock; frames that waited for the receiver may arrive."""
         super().thaw(cycle)
         self._plan_line()

@@ -27,12 +27,12 @@ def rendered(robot: Robot, camera: Camera, cycle: int, pixels: np.ndarray) -> tu
     python = record.snapshot()
     record.restore(before)
     code = line_code()
-    row = code["asked"](addressof(camera.native), camera.native.setting, cycle, addressof(href))
+    row = code["row_on_bus"](addressof(camera.native), camera.native.setting, cycle, addressof(href))
     if row < 0:
         record.restore(python)
         return by_python, False
     seen = np.ascontiguousarray(pixels[row][camera._readout._columns])
-    code["send"](addressof(camera.native), href.value, seen.ctypes.data)
+    code["write_line"](addressof(camera.native), href.value, seen.ctypes.data)
     assert record.snapshot() == python
     return by_python, True
 
@@ -105,7 +105,7 @@ def test_python_is_asked_first_in_every_new_setting() -> None:
     camera, href = robot.board.camera, c_int64()
 
     def painted_by_code(cycle: int) -> int:
-        return line_code()["asked"](addressof(camera.native), camera.native.setting, cycle, addressof(href))
+        return line_code()["row_on_bus"](addressof(camera.native), camera.native.setting, cycle, addressof(href))
 
     def asked() -> bool:
         cycle = camera.scan.href(3, 2)
@@ -136,6 +136,7 @@ def test_python_is_asked_first_in_every_new_setting() -> None:
     assert asked()
     setting = camera.native.setting
     assert painted_by_code(camera.scan.href(3, 2)) >= 0
-    assert line_code()["asked"](addressof(camera.native), setting + 1, camera.scan.href(3, 2), addressof(href)) == -1
+    row_on_bus = line_code()["row_on_bus"]
+    assert row_on_bus(addressof(camera.native), setting + 1, camera.scan.href(3, 2), addressof(href)) == -1
     camera.unplug()
     assert painted_by_code(camera.scan.href(3, 2)) == -1

@@ -6,7 +6,7 @@ import pytest
 
 from emu.boards import BOARDS, board_named
 from emu.boards.epuck.board import Epuck
-from emu.boards.part import Part
+from emu.boards.part import BoardPart
 from emu.chips import chip_named
 from emu.image.loader import parse_image
 from emu.image.model import Image
@@ -60,7 +60,7 @@ def test_bare_pins_have_the_watchdog_off_and_nothing_of_a_robot() -> None:
 
 def test_an_epuck_refuses_a_chip_it_does_not_carry() -> None:
     """Its parts are soldered to pins the other does not have."""
-    with pytest.raises(ValueError, match="an e-puck carries a dsPIC30F6014A, not a dsPIC30F4013"):
+    with pytest.raises(ValueError, match="an e-puck has a dsPIC30F6014A, not a dsPIC30F4013"):
         Machine(chip_named("30F4013"), engine="plain", board=Epuck)
 
 

@@ -86,8 +86,10 @@ def test_handler_reads_the_bus_16_to_18_tcy_behind_href_and_frames_come_every_16
 )
 @pytest.mark.parametrize("noise", [0.0, 1.0])
 def test_engines_agree_to_the_bit_on_a_busy_robot(program, sources, cycles, noise):
-    """engines.md §4.3: same inputs, same record, same cycle; noise, remote control and radio included. Without noise the
-    analog inputs are numbers, which native code converts by itself."""
+    """engines.md §4.3: same inputs, same record, same cycle; noise, remote control and radio included.
+
+    Without noise the analog inputs are numbers, which native code converts by itself.
+    """
     states = []
     for engine in ("plain", "auto"):
         machine = start(program(*sources), engine, seed=7)

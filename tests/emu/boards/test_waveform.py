@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from emu.boards.epuck.stimulus import StimulusError, waveform
+from emu.boards.epuck.stimulus import StimulusError, load_waveform
 from emu.cli import main
 from tests.vcd_reader import VCDVCD
 from toolchain.driver.driver import main as compile_program
@@ -71,12 +71,12 @@ def test_csv_sets_pins_and_says_bytes(tmp_path, capsys):
 @pytest.mark.parametrize(
     ("name", "text", "line", "expected"),
     [
-        ("a.csv", "when,RB8\n", 1, "expected names of columns"),
+        ("a.csv", "when,RB8\n", 1, "expected column names"),
         ("a.csv", "time,RB8,RX9\n", 1, "RX9"),
         ("a.csv", "time,RB8\n0.1,1\n0.2,2\n", 3, "RB8: a level is 0 or 1, not '2'"),
         ("a.csv", "time,RB8\nsoon,1\n", 2, "expected a time in s, not 'soon'"),
         ("a.csv", "time,RB8\n1e999999999,1\n", 2, "expected a time in s, not '1e999999999'"),
-        ("a.csv", "time,RB8\n1e12,1\n", 2, "later than 10^18 cycles"),
+        ("a.csv", "time,RB8\n1e12,1\n", 2, "at most 10^18 cycles"),
         ("a.csv", 'time,RB8\n0,"' + "1" * 140_000, 2, "field"),
         ("a.csv", "time,RB8\n0.1,1,1\n", 2, "expected 2 cells, found 3"),
         ("a.csv", "time,uart1\n0.1,256\n", 2, "uart1: expected a byte"),
@@ -88,7 +88,7 @@ def test_mistakes_are_told_with_their_line(tmp_path, name, text, line, expected)
     path = tmp_path / name
     path.write_text(text)
     with pytest.raises(StimulusError) as told:
-        waveform(BOARD, path)
+        load_waveform(BOARD, path)
     assert str(told.value).startswith(f"{path}:{line}: ")
     assert expected in str(told.value)
 

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import pytest
 
 from emu.chips.dspic30f6014a import DSPIC30F6014A
-from emu.peripherals import Peripherals, CpuSignals, build
+from emu.peripherals import CpuSignals, Peripherals, build
 from emu.system.bus import Bus
 from emu.system.events import Events
 from emu.system.program import ProgramMemory

@@ -6,7 +6,7 @@ import random
 
 import pytest
 
-from emu.system.rules import Integers, Place, Rule
+from emu.system.rules import RuleInterpreter, Cell, Rule
 
 from .conftest import Rig
 from .test_fuzz import WORDS, act
@@ -52,11 +52,11 @@ def test_a_need_that_does_not_hold_leaves_everything_as_it_was(rig: Rig) -> None
     """And the register's hooks are asked."""
 
     def writes(m, place, value, lanes):
-        m.need(value < 10)
+        m.require(value < 10)
         m.put(place, value)
         return lanes == 0xFFFF
 
-    integers, place = Integers(rig.record, rig.events), Place(rig.address("PR1"), 16)
+    integers, place = RuleInterpreter(rig.record, rig.events), Cell(rig.address("PR1"), 16)
     rule = Rule(place, None, writes)
     assert integers.write(rule, 7, 0xFFFF)
     assert not integers.write(rule, 70, 0xFFFF)

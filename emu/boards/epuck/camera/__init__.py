@@ -1,1 +1,1 @@
-"""The e-puck's camera: sensor registers, exposure, line timing and the bytes of its pixels."""
+"""The e-puck's camera: sensor registers, exposure, line timing and pixel bytes."""

@@ -1,8 +1,8 @@
 """The camera: register file on I2C, sync lines and pixel bus as functions of the cycle (epuck.md §7).
 
-Nothing ticks. HREF, VSYNC and PCLK are closed forms of the cycle (`scan.py`), so the timers that count them post one
-event per match. Pixels of a line are rendered when the first of them is read, and lie in the record until the line is
-over. The port reads a line that is on the bus from the record.
+The camera posts no events. HREF, VSYNC and PCLK are closed forms of the cycle (`scan.py`), so timers that count them
+post one event per match. The first read of a line renders its pixels into the record, where they stay until the line
+ends. Rules of the port read them from there.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ from emu.boards.epuck.camera.sensors import SENSORS, ImageSettings, SensorTiming
 from emu.boards.part import BoardPart
 from emu.peripherals import Peripherals
 from emu.peripherals.i2c.bus import I2cDevice
-from emu.peripherals.ports.rules import Stretch
+from emu.peripherals.ports.rules import ByteStream
 from emu.system.events import NEVER
-from emu.system.rules import place_of
+from emu.system.rules import cell_of
 
-if TYPE_CHECKING:  # loaded when the first picture is: most runs start faster without
+if TYPE_CHECKING:  # imported with the first picture: most runs start faster without
     import numpy as np
     from numpy.typing import NDArray
 
@@ -37,11 +37,11 @@ SYNC_PORT: Final = 2
 RESET_PIN: Final = "RC13"
 
 RowSource = Callable[[int, int], "Pixels"]
-"""rows(y, cycle): line y (0 = top) of the upright scene, 640 x 3 values, as seen in `cycle`."""
+"""rows(y, cycle): returns line y (0 = top) of the upright scene in `cycle`, 640 x 3 values."""
 
 
 class Camera(BoardPart, I2cDevice):
-    """One image sensor on its connector. Raises ValueError for a sensor that is not in SENSORS."""
+    """An image sensor and its connector. Raises ValueError for a sensor that is not in SENSORS."""
 
     def __init__(self, chip: Peripherals, sensor: str = "PO6030K", plugged: bool = True) -> None:
         super().__init__("camera", chip)
@@ -57,39 +57,39 @@ class Camera(BoardPart, I2cDevice):
         self._plugged: Final = self.cell("plugged", "B")
         self.pins.describe(SYNC_PORT, HREF | VSYNC | PCLK, self.scan, self._plugged.place)
         self._line: Final = self.array("line", "B", 2 * LINE_PIXELS)
-        self._line_at: Final = self.record.address + self.record.fields["camera.line"].offset
+        self._line_address: Final = self.record.address + self.record.fields["camera.line"].offset
         self._u64: Final = self.record.u64
         self._line_from: Final = self.cell("line_from", "Q")
         self._line_to: Final = self.cell("line_to", "Q")
         self._byte: Final = self.cell("line_byte_tcy", "Q", 1)
-        places = (place_of(self.record, f"camera.{name}") for name in ("line_from", "line_to", "line", "line_byte_tcy"))
-        chip.ports[DATA_PORT].show(Stretch(DATA_MASK, 8, *places), self._refresh)
+        places = (cell_of(self.record, f"camera.{name}") for name in ("line_from", "line_to", "line", "line_byte_tcy"))
+        chip.ports[DATA_PORT].attach_byte_stream(ByteStream(DATA_MASK, 8, *places), self._refresh)
         self.native: Final = NativeCamera.of(self.record)
-        """For compiled code that paints what `sample` was given."""
+        """State for native code that renders the scene given to `sample`."""
         self._native_address: Final = ctypes.addressof(self.native)
         self._has_native_source, self._settings = False, 0
         self._pixels: PixelSource | None = None
         self._still: StillImage | None = None
         self._href: Final = ctypes.c_int64()
         self._href_at: Final = ctypes.addressof(self._href)
-        self._timing: Timing
+        self._timing: SensorTiming
         self._picture: ImageSettings
         self._readout: Readout | None
         self._load_defaults()
-        self._interpret()
+        self._decode_registers()
         self.scan.begin(frame_timing(self._timing), self.now, running=True)
-        self.pins.set(RESET_PIN, 1)  # UNVERIFIED: pulled up while nobody drives it
-        self.pins.watch(RESET_PIN, self._reset_moved)
+        self.pins.set(RESET_PIN, 1)  # UNVERIFIED: pulled up while not driven
+        self.pins.watch(RESET_PIN, self._reset_pin_changed)
         if plugged:
             self.plug()
 
     # -- scene -------------------------------------------------------------------------------------------------------
 
     def show(self, image: NDArray[np.uint8], turned: int = 0) -> None:
-        """Let the camera see a still picture: grey or RGB, any size (scaled to 640 x 480 by nearest pixel).
+        """Show a still picture to the camera: grey or RGB, any size (scaled to 640 x 480 by nearest pixel).
 
-        `turned` = 90, 180 or 270 turns it counter-clockwise before a sensor that is mounted turned (§7.1).
-        Raises ValueError for something that is no picture.
+        `turned` = 90, 180 or 270 rotates it counter-clockwise, for a sensor that is mounted rotated (§7.1). Raises
+        ValueError for an array that is not a picture.
         """
         from emu.boards.epuck.camera.pixels import StillImage, as_vga
 
@@ -98,14 +98,14 @@ class Camera(BoardPart, I2cDevice):
         self._still = still
 
     def look(self, rows: RowSource) -> None:
-        """Let the camera see what `rows(y, cycle)` returns for each line when it is read out."""
+        """Show a scene by rows: `rows(y, cycle)` is called for each line when it is read out."""
         self.sample(lambda y, columns, cycle: rows(y, cycle)[columns])
 
     def sample(self, pixels: PixelSource, has_native_source: bool = False) -> None:
-        """Let the camera see what `pixels(y, columns, cycle)` returns for each line when it is read out.
+        """Show a scene by pixels: `pixels(y, columns, cycle)` is called for each line when it is read out.
 
-        It is called with the cycle in which the line's HREF rises, only for lines that somebody reads, once per line.
-        `has_native_source`: there is compiled code that paints the same, by `lent`, whoever of the two is asked.
+        `cycle` is the one in which the line's HREF rises. The call is made once per line, only for lines that are read.
+        `has_native_source`: native code that uses `native` may render the same scene instead.
         """
         self._pixels, self._has_native_source, self._still = pixels, has_native_source, None
         self.native.setting = 0
@@ -113,12 +113,12 @@ class Camera(BoardPart, I2cDevice):
 
     @property
     def sampled(self) -> PixelSource | None:
-        """What `sample` was given last."""
+        """The current pixel source."""
         return self._pixels
 
     @property
     def lamp(self) -> float:
-        """Brightness of the scene's light, 1 = as the picture says; automatic exposure follows a change."""
+        """Brightness of the scene's light, 1 = as in the picture; automatic exposure follows a change."""
         return self._exposure.lamp
 
     @lamp.setter
@@ -127,8 +127,10 @@ class Camera(BoardPart, I2cDevice):
         self._line_to.value = 0
 
     def frame(self, cycle: int | None = None) -> Pixels:
-        """The picture the sensor would send of the scene in `cycle` (default: now): lines x pixels x 3, through its
-        present window, format and exposure."""
+        """Return the picture the sensor would send in `cycle` (default: now): lines x pixels x 3.
+
+        The sensor's current window, format and exposure apply.
+        """
         import numpy as np
 
         from emu.boards.epuck.camera.pixels import decode_line
@@ -137,19 +139,19 @@ class Camera(BoardPart, I2cDevice):
         room = (ctypes.c_uint8 * (2 * LINE_PIXELS))()
         lines = []
         for line in range(self.scan.timing.lines):
-            count = self._sent(line, at, ctypes.addressof(room))
+            count = self._encode_line(line, at, ctypes.addressof(room))
             lines.append(decode_line(bytes(room[:count]), self._picture.form))
         return np.stack(lines) if lines else np.zeros((0, 0, 3), np.uint8)
 
-    def _sent(self, line: int, cycle: int, address: int) -> int:
-        """Put the bytes of a line read out in `cycle` to an address of the host; how many there are."""
+    def _encode_line(self, line: int, cycle: int, address: int) -> int:
+        """Write the bytes of a line read out in `cycle` to a host address. Return their number."""
         if self._readout is None:
             from emu.boards.epuck.camera.pixels import Readout
 
             self._readout = Readout(self._timing, self._picture, self.scan.timing.lines)
         if self._has_native_source and not self.native.setting:
             self._settings += 1
-            self._readout.tell(self.native, self._settings, self._picture)
+            self._readout.publish(self.native, self._settings, self._picture)
         brightness = self._exposure.brightness(self._picture.exposure, cycle, self.scan.timing.frame_tcy)
         return self._readout.put(self._pixels, line, cycle, brightness, address)
 
@@ -157,15 +159,15 @@ class Camera(BoardPart, I2cDevice):
 
     @property
     def is_plugged(self) -> bool:
-        """Whether the camera is on its connector."""
+        """Whether the camera is plugged in."""
         return bool(self._plugged.value)
 
     def plug(self) -> None:
-        """Connect the camera."""
+        """Plug the camera in."""
         self._set_plugged(True)
 
     def unplug(self) -> None:
-        """Take the camera off its connector: no answers, no edges."""
+        """Unplug the camera: no I2C answers, no edges."""
         self._set_plugged(False)
 
     def _set_plugged(self, plugged: bool) -> None:
@@ -174,7 +176,7 @@ class Camera(BoardPart, I2cDevice):
         self.pins.change_waveform(self.now, self._connect)
 
     def _connect(self) -> None:
-        """Pins and I2C address follow the connector."""
+        """Attach or detach the waveforms and the I2C address, as the connector state says."""
         for port, mask, wave in ((DATA_PORT, DATA_MASK, self), (SYNC_PORT, HREF | VSYNC | PCLK, self.scan)):
             if self.is_plugged:
                 self.pins.attach(port, mask, wave)
@@ -188,12 +190,14 @@ class Camera(BoardPart, I2cDevice):
 
     @property
     def frames_per_second(self) -> float:
-        """Frame rate at the present clock and setting."""
+        """Frame rate at the current clock and sensor settings."""
         return self.chip.fcy / self.scan.timing.frame_tcy
 
     def align(self, cycle: int, line: int = 0) -> None:
-        """Shift the sensor's phase so that HREF of a line (0 = first of the frame) rises in `cycle`, which is to come:
-        for tests that put an edge on a chosen instruction. On a robot the phase is chance."""
+        """Shift the sensor's phase so that HREF of a line (0 = first of the frame) rises in the future `cycle`.
+
+        Tests use this to place an edge on a chosen instruction. On a robot the phase is arbitrary.
+        """
         timing = self.scan.timing
         start = cycle - timing.first_href - line * timing.line_tcy
         start -= max(-(-(start - self.now) // timing.frame_tcy), 0) * timing.frame_tcy
@@ -203,50 +207,55 @@ class Camera(BoardPart, I2cDevice):
     # -- pixel bus ---------------------------------------------------------------------------------------------------
 
     def bits(self, cycle: int) -> int:
-        """The byte on RD8..RD15 in `cycle`, 0 between lines."""
+        """Return the byte on RD8..RD15 in `cycle`, 0 between lines."""
         u64, first = self._u64, self._line_from.index
         if not u64[first] <= cycle < u64[self._line_to.index] and not self._render(cycle):
             return 0
         return self._line[(cycle - u64[first]) // u64[self._byte.index]] << 8
 
     def constant_until(self, cycle: int) -> int:
-        """Between lines the next one; the bytes of a line are in the record."""
+        """Between lines: the start of the next line. Within a line: no guarantee."""
         u64 = self._u64
-        is_on = u64[self._line_from.index] <= cycle < u64[self._line_to.index]
-        return cycle if is_on else self.scan.next_line(cycle)
+        in_line = u64[self._line_from.index] <= cycle < u64[self._line_to.index]
+        return cycle if in_line else self.scan.next_line(cycle)
 
     def rises(self, mask: int, after: int, until: int) -> int:
-        """The data lines clock nothing inside the chip."""
+        """No device of the chip is clocked by the data lines."""
         return 0
 
     def nth_rise(self, mask: int, after: int, count: int) -> int:
-        """The data lines clock nothing inside the chip."""
+        """No device of the chip is clocked by the data lines."""
         return NEVER
 
     def _refresh(self, cycle: int) -> bool:
-        """What `bits` does with a new line, for native code that reads its bytes from the record."""
+        """Render the line on the bus into the record, for native code that reads its bytes there.
+
+        Return whether it did.
+        """
         u64 = self._u64
         if not self._plugged.value or u64[self._line_from.index] <= cycle < u64[self._line_to.index]:
             return False
-        return (self._still is not None and self._sent_at_once(self._still, cycle)) or self._render(cycle)
+        return (self._still is not None and self._render_natively(self._still, cycle)) or self._render(cycle)
 
-    def _sent_at_once(self, still: StillImage, cycle: int) -> bool:
-        """A line of a still picture put into the record by compiled code, if that would do what `_render` does and the
-        row has been looked at before."""
-        row = still.asked(self._native_address, self.native.setting, cycle, self._href_at)
-        pixels = still.place(row)
+    def _render_natively(self, still: StillImage, cycle: int) -> bool:
+        """Render a line of a still picture by native code. Return False if only `_render` can do it.
+
+        Native code needs a row that `_render` has cut before.
+        """
+        row = still.row_on_bus(self._native_address, self.native.setting, cycle, self._href_at)
+        pixels = still.row_address(row)
         if pixels:
-            still.send(self._native_address, self._href.value, pixels)
+            still.write_line(self._native_address, self._href.value, pixels)
         return bool(pixels)
 
     def _render(self, cycle: int) -> bool:
-        """Put the line that is on the bus in `cycle` into the record. False between lines."""
+        """Render the line that is on the bus in `cycle` into the record. Return False between lines."""
         found = self.scan.line_at(cycle)
         if found is None:
             return False
         line, href = found
         tcy = self.scan.timing.byte_tcy
-        count = self._sent(line, href, self._line_at)
+        count = self._encode_line(line, href, self._line_address)
         self._line_from.value = begin = href - tcy // 2
         self._line_to.value = begin + count * tcy
         self._byte.value = tcy
@@ -255,16 +264,16 @@ class Camera(BoardPart, I2cDevice):
     # -- registers on I2C --------------------------------------------------------------------------------------------
 
     def register(self, bank: int, number: int) -> int:
-        """A register, 0..255."""
+        """Return the value of a register, 0..255."""
         return self._registers[256 * bank + number]
 
     def start(self, read: bool, cycle: int) -> bool:
-        """In reset the sensor does not answer."""
+        """Handle being addressed; in reset the sensor does not acknowledge."""
         self._pointer_next.value = not read
         return self.scan.running
 
     def write(self, byte: int, cycle: int) -> bool:
-        """First the register number, then its value."""
+        """Handle a byte: first the register number, then its value."""
         if self._pointer_next.value:
             self._pointer.value = byte
             self._pointer_next.value = 0
@@ -272,11 +281,11 @@ class Camera(BoardPart, I2cDevice):
             self._bank.value = byte % self.sensor.banks
         else:
             self._registers[256 * self._bank.value + self._pointer.value] = byte
-            self._reconsider(cycle)
+            self._register_changed(cycle)
         return True
 
     def read(self, cycle: int) -> int:
-        """Registers 0 and 1 tell the type; the bank register reads back."""
+        """Return the selected register: 0 and 1 hold the sensor type; the bank register reads back."""
         number = self._pointer.value
         if number < len(self.sensor.identity):
             return self.sensor.identity[number]
@@ -284,10 +293,10 @@ class Camera(BoardPart, I2cDevice):
             return self._bank.value
         return self.register(self._bank.value, number)
 
-    def _reconsider(self, cycle: int) -> None:
-        """A register changed. UNVERIFIED: a new timing begins with a new frame at once."""
+    def _register_changed(self, cycle: int) -> None:
+        """Apply a register change. UNVERIFIED: a new timing starts a new frame at once."""
         before = self._picture.exposure
-        self._interpret()
+        self._decode_registers()
         if (before is None) != (self._picture.exposure is None):
             self._exposure.hold(cycle, self.scan.timing.frame_tcy)
         timing = frame_timing(self._timing)
@@ -295,8 +304,8 @@ class Camera(BoardPart, I2cDevice):
             self._exposure.hold(cycle, self.scan.timing.frame_tcy)
             self.pins.change_waveform(cycle, partial(self.scan.begin, timing, cycle, self.scan.running))
 
-    def _interpret(self) -> None:
-        """What the registers mean; a line already rendered is out of date."""
+    def _decode_registers(self) -> None:
+        """Decode the registers and discard a rendered line."""
         self._timing = self.sensor.timing(self.register)
         self._picture = self.sensor.picture(self.register)
         self._readout = None
@@ -305,13 +314,13 @@ class Camera(BoardPart, I2cDevice):
 
     # -- reset -------------------------------------------------------------------------------------------------------
 
-    def _reset_moved(self, cycle: int, changed: int, levels: int) -> None:
-        """RC13 low holds the sensor in reset (§2)."""
+    def _reset_pin_changed(self, cycle: int, changed: int, levels: int) -> None:
+        """Handle an edge of RC13, which holds the sensor in reset while low (§2)."""
         self.pins.change_waveform(cycle, partial(self._set_running, bool(changed & levels), cycle))
 
     def _set_running(self, running: bool, cycle: int) -> None:
         self._load_defaults()
-        self._interpret()
+        self._decode_registers()
         self._exposure.restart(cycle)
         self.scan.begin(frame_timing(self._timing), cycle, running)
 
@@ -323,9 +332,9 @@ class Camera(BoardPart, I2cDevice):
             self._registers[256 * bank + number] = value
 
     def restored(self) -> None:
-        """The record was replaced: take over what follows from it. A rendered line stays valid."""
+        """Rebuild derived state after a snapshot replaced the record. A rendered line stays valid."""
         line_to = self._line_to.value
-        self._interpret()
+        self._decode_registers()
         self._line_to.value = line_to
         self.scan.restored()
         self._connect()

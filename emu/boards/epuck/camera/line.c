@@ -1,4 +1,4 @@
-// The bytes a sensor sends for a line of pixels: gains and colour formats (epuck.md §7.4).
+// Bytes of a line of pixels as a sensor sends them: gains and colour formats (epuck.md §7.4).
 
 #include <stdint.h>
 
@@ -45,30 +45,30 @@ void encode(const uint8_t *pixels, i64 count, i64 form, const f64 *gains, uint8_
     }
 }
 
-// One frame in the machine's record, as scan.py has it (`FrameTiming`, `Scan`). Cycles.
+// Timing of a frame in the machine's record, in cycles; twin of `FrameTiming` and `Scan` in scan.py.
 struct scan {
     i64 frame_tcy, first_href, line_tcy, lines, line_bytes, byte_tcy, vsync_rise, vsync_fall, start;
     uint8_t running;
 };
 
-// A camera for compiled code that paints its lines instead of Python. The second half is what `Readout` knows.
+// Camera state for native code that renders lines instead of Python. `Readout.publish` sets the members from `setting`.
 struct camera {
     const struct scan *scan;
     const uint8_t *plugged;
     const u64 *lamp, *exposure; // in 1 / `one`
     u64 *from, *to, *byte_tcy;  // when the bytes of the line in the record are on the bus
     uint8_t *line;
-    i64 setting;    // another number whenever what is below, or who paints, has changed; 0: Python is to be asked
-    const i64 *row; // of the upright scene, of each line
+    i64 setting;    // changes with the members below and with the pixel source; 0: only Python can render
+    const i64 *row; // scene row of each line
     i64 count, form;
     f64 gains[3], manual; // manual exposure, less than 0 for an automatic one
     u64 one;
 };
 
-// The row of the scene of the line whose byte is on the bus in a cycle and that is not in the record yet, as in
-// `Scan.line_at`, and when its HREF rises. -1: there is none, the setting is not this one, or automatic exposure is on
-// its way: then Python answers.
-i64 asked(const struct camera *c, i64 setting, i64 cycle, i64 *href)
+// Return the scene row of the line on the bus in a cycle, and set `href` to the cycle in which its HREF rises; as
+// `Scan.line_at`. Return -1 if there is no such line, the line is in the record already, `setting` is out of date, or
+// automatic exposure is still adapting; Python then renders.
+i64 row_on_bus(const struct camera *c, i64 setting, i64 cycle, i64 *href)
 {
     const struct scan *s = c->scan;
     i64 since = cycle + s->byte_tcy / 2 - s->start;
@@ -88,8 +88,8 @@ i64 asked(const struct camera *c, i64 setting, i64 cycle, i64 *href)
     return c->row[line];
 }
 
-// Put a line whose HREF rises in a cycle into the record, as `Camera._render` does.
-void send(const struct camera *c, i64 href, const uint8_t *pixels)
+// Render a line whose HREF rises in cycle `href` into the record, as `Camera._render` does.
+void write_line(const struct camera *c, i64 href, const uint8_t *pixels)
 {
     f64 brightness = c->manual < 0 ? 1 : (f64)*c->lamp / (f64)c->one * c->manual;
     f64 gains[3] = {c->gains[0] * brightness, c->gains[1] * brightness, c->gains[2] * brightness};

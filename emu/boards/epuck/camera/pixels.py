@@ -1,4 +1,4 @@
-"""From the scene to the bytes of a line: mirrors, gains and colour formats (epuck.md §7.2, §7.4)."""
+"""Conversion of the scene to the bytes of a line: mirroring, gains and colour formats (epuck.md §7.2, §7.4)."""
 
 from __future__ import annotations
 
@@ -19,54 +19,54 @@ from emu.native_library import ADDRESS, INT, functions
 Pixels = NDArray[np.uint8]
 """n x 3 values, red, green, blue."""
 PixelSource = Callable[[int, NDArray[np.intp], int], Pixels]
-"""pixels(y, columns, cycle): only these columns (0..639) of line y, len(columns) x 3 values."""
+"""pixels(y, columns, cycle): returns the given columns (0..639) of line y, len(columns) x 3 values."""
 
 
 def scene_columns(timing: SensorTiming, picture: ImageSettings) -> NDArray[np.intp]:
-    """Scene column (0 = left, 0..639) of every pixel of a line. Beside the array its edge is seen."""
+    """Return the scene column (0 = left, 0..639) of every pixel of a line, clamped to the scene's edges."""
     pixels = frame_timing(timing).line_bytes // timing.bytes_per_pixel
     columns = timing.first_column + timing.scale_x * np.arange(pixels) - picture.origin_x
     return np.clip(WIDTH - 1 - columns if picture.flip_x else columns, 0, WIDTH - 1)
 
 
 def scene_row(timing: SensorTiming, picture: ImageSettings, line: int) -> int:
-    """Scene row (0 = top, 0..479) of a line of the frame."""
+    """Return the scene row (0 = top, 0..479) of a line of the frame."""
     row = timing.first_row + line * timing.scale_y - picture.origin_y
     return min(max(HEIGHT - 1 - row if picture.flip_y else row, 0), HEIGHT - 1)
 
 
 def darkness(_y: int, columns: NDArray[np.intp], _cycle: int) -> Pixels:
-    """A scene without light."""
+    """Pixel source of a scene without light."""
     return np.zeros((len(columns), 3), dtype=np.uint8)
 
 
 class StillImage:
-    """A picture that stays as it is (480 x 640 x 3): a row cut to the same columns is the same array each time."""
+    """Pixel source of a still picture (480 x 640 x 3). It returns the same array for the same row and columns."""
 
     def __init__(self, scene: Pixels) -> None:
         self._scene: Final = scene
         self._columns: NDArray[np.intp] | None = None
         self._cut: Final[dict[int, Pixels]] = {}
-        self._places: Final[dict[int, int]] = {}
+        self._addresses: Final[dict[int, int]] = {}
         code = line_code()
-        self.asked: Final = code["asked"]
-        self.send: Final = code["send"]
+        self.row_on_bus: Final = code["row_on_bus"]
+        self.write_line: Final = code["write_line"]
 
     def __call__(self, y: int, columns: NDArray[np.intp], _cycle: int) -> Pixels:
-        """A row's pixels in these columns."""
+        """Return a row's pixels in the given columns."""
         if columns is not self._columns:
             self._columns = columns
             self._cut.clear()
-            self._places.clear()
+            self._addresses.clear()
         found = self._cut.get(y)
         if found is None:
             found = self._cut[y] = np.ascontiguousarray(self._scene[y, columns])
-            self._places[y] = found.ctypes.data
+            self._addresses[y] = found.ctypes.data
         return found
 
-    def place(self, y: int) -> int:
-        """Where a row lies that was asked for in the present columns; 0 if it was not."""
-        return self._places.get(y, 0)
+    def row_address(self, y: int) -> int:
+        """Return the host address of a row already cut to the current columns, 0 if it was not."""
+        return self._addresses.get(y, 0)
 
 
 Gains = ctypes.c_double * 3
@@ -74,14 +74,13 @@ Gains = ctypes.c_double * 3
 
 
 def encode(pixels: int, count: int, form: str, gains: ctypes.Array[ctypes.c_double], address: int) -> int:
-    """Write the bytes a sensor sends for a line of `count` pixels after its gains to an address of the host, from
-    another (`line.c`); how many they are."""
+    """Encode a line of `count` pixels from one host address to another (`line.c`). Return the number of bytes."""
     line_code()["encode"](pixels, count, _FORMS.index(form), gains, address)
     return count * _SIZES[form]
 
 
 class Readout:
-    """Lines of the frame as one setting of a sensor sends them."""
+    """Encoder of the frame's lines for one set of sensor settings."""
 
     def __init__(self, timing: SensorTiming, picture: ImageSettings, lines: int) -> None:
         self._columns: Final = scene_columns(timing, picture)
@@ -93,25 +92,29 @@ class Readout:
         self._brightness = 1.0
         self._held: Final[dict[int, tuple[Pixels, int]]] = {}
 
-    def tell(self, camera: NativeCamera, setting: int, picture: ImageSettings) -> None:
-        """Let compiled code know this setting, by a number of its own. It must live as long as it is in force."""
+    def publish(self, camera: NativeCamera, setting: int, picture: ImageSettings) -> None:
+        """Publish the settings to native code under the unique number `setting`. Keep this object alive meanwhile."""
         camera.row, camera.count = ctypes.addressof(self._row_numbers), len(self._columns)
         camera.form, camera.gains[:] = _FORMS.index(self._form), self._gains
         camera.manual = -1.0 if picture.exposure is None else picture.exposure
         camera.setting = setting
 
     def put(self, source: PixelSource | None, line: int, cycle: int, brightness: float, address: int) -> int:
-        """Write the bytes of a line in which a source's pixels come `brightness` times as bright to an address of the
-        host; how many bytes that were. Raises ValueError if the source has not as many pixels as it was asked for."""
+        """Encode a line to a host address, its pixels scaled by `brightness`. Return the number of bytes.
+
+        Raises ValueError if the source returns another number of pixels than requested.
+        """
         seen = (source or darkness)(self._rows[line], self._columns, cycle)
         count = len(self._columns)
         if brightness != self._brightness:
             self._brightness = brightness
             self._factors[:] = [gain * brightness for gain in self._gains]
         held, at = self._held.get(line, (None, 0))
-        if seen is not held:  # who paints every line of a frame into the same array is not asked for its address again
+        if seen is not held:  # a source that reuses one array saves the address look-up
             if seen.shape != (count, 3):
-                raise ValueError(f"a line of {count} pixels was asked for, not an array of shape {seen.shape}")
+                raise ValueError(
+                    f"the pixel source returned shape {seen.shape}; expected {count} pixels, shape ({count}, 3)"
+                )
             whole = np.ascontiguousarray(seen, dtype=np.uint8)
             at = whole.ctypes.data
             self._held[line] = whole, at
@@ -120,16 +123,16 @@ class Readout:
 
 @cache
 def line_code() -> dict[str, Callable[..., int]]:
-    """The functions of line.c."""
+    """Return the functions of line.c."""
     return functions(Path(__file__).with_name("line.c"), {
         "encode": (None, (ADDRESS, INT, INT, ADDRESS, ADDRESS)),
-        "asked": (INT, (ADDRESS, INT, INT, ADDRESS)),
-        "send": (None, (ADDRESS, INT, ADDRESS)),
+        "row_on_bus": (INT, (ADDRESS, INT, INT, ADDRESS)),
+        "write_line": (None, (ADDRESS, INT, ADDRESS)),
     })  # fmt: skip
 
 
 def decode(data: bytes, form: str) -> Pixels:
-    """The pixels in a buffer that a driver filled: the inverse of `encode` as far as the format keeps them.
+    """Decode the pixels in a buffer filled by a driver: the inverse of `encode`, up to the format's precision.
 
     Raises ValueError for an unknown format or a buffer that ends in the middle of a pixel.
     """
@@ -137,20 +140,25 @@ def decode(data: bytes, form: str) -> Pixels:
         raise ValueError(f"unknown pixel format {form!r}; expected one of {', '.join(_DECODERS)}")
     size = 1 if form == GREY else 4 if form == YUV else 2
     if len(data) % size:
-        raise ValueError(f"{len(data)} bytes are no whole number of {form} pixels")
+        raise ValueError(f"{len(data)} bytes are not a whole number of {form} pixels")
     return _DECODERS[form](np.frombuffer(data, dtype=np.uint8))
 
 
 def decode_line(data: bytes, form: str) -> Pixels:
-    """The pixels of a whole line. In YUV it may end with the first of two that share a colour: that is sent without its
-    red, which is then taken as grey."""
+    """Decode the pixels of a whole line.
+
+    A YUV line may end with the first of two pixels that share chroma; its missing red difference is taken as 0.
+    """
     is_alone = form == YUV and len(data) % 4 == _SIZES[YUV]
     return decode(data + bytes((128, data[-1])), form)[:-1] if is_alone else decode(data, form)
 
 
 def as_vga(image: NDArray[np.uint8], turned: int = 0) -> NDArray[np.uint8]:
-    """Any grey, RGB or RGBA picture as 480 x 640 x 3 by nearest pixel, `turned` by 0, 90, 180 or 270 degrees counter-
-    clockwise first (sensors mounted turned, epuck.md §7.1). Raises ValueError for other shapes and angles."""
+    """Scale a grey, RGB or RGBA picture to 480 x 640 x 3 by nearest pixel.
+
+    It is first rotated counter-clockwise by `turned` = 0, 90, 180 or 270 degrees, for sensors mounted rotated (epuck.md
+    §7.1). Raises ValueError for other shapes and angles.
+    """
     if image.ndim == 2:
         image = np.repeat(image[:, :, None], 3, axis=2)
     if image.ndim != 3 or image.shape[2] not in (3, 4) or not image.size:
@@ -164,7 +172,7 @@ def as_vga(image: NDArray[np.uint8], turned: int = 0) -> NDArray[np.uint8]:
 
 
 _FORMS: Final = (RGB565, GREY, YUV)
-"""In the order of the numbers in `line.c`."""
+"""Formats in the order of `enum form` in line.c."""
 _SIZES: Final = {RGB565: 2, GREY: 1, YUV: 2}
 """Bytes of a pixel."""
 

@@ -1,7 +1,7 @@
-"""When the sensor's lines and bytes come: HREF, VSYNC, PCLK and byte numbers in closed form (epuck.md §7.4).
+"""Timing of the sensor's lines and bytes: HREF, VSYNC, PCLK and byte numbers in closed form (epuck.md §7.4).
 
-Every number is a record cell `camera.<name>`, so that a snapshot has it. Sensors
-know columns and rows; here everything is Tcy.
+Every number is a record cell `camera.<name>`, so snapshots contain it. `sensors.py` uses columns and rows; this module
+uses Tcy.
 """
 
 from __future__ import annotations
@@ -10,10 +10,10 @@ from dataclasses import astuple, dataclass, fields
 from typing import Final
 
 from emu.boards.epuck.camera.sensors import SensorTiming
-from emu.peripherals.base import Cell
+from emu.peripherals.base import StateCell
 from emu.system.events import NEVER
 from emu.system.record import Record
-from emu.system.rules import NUMBERS, Number, Reader
+from emu.system.rules import INTEGER_OPERATIONS, Number, RuleBuilder
 
 HREF, VSYNC, PCLK = 1 << 3, 1 << 4, 1 << 14
 """RC3, RC4, RC14 (epuck.md §2)."""
@@ -21,18 +21,18 @@ HREF, VSYNC, PCLK = 1 << 3, 1 << 4, 1 << 14
 _SIGN: Final = 1 << 63
 
 LINE_PIXELS: Final = 1024
-"""Longest line: no sensor has more columns, but registers can ask for them."""
+"""Longest line in pixels: no sensor has more columns, but registers can request them."""
 
 
 @dataclass(frozen=True, slots=True)
 class FrameTiming:
-    """One frame in Tcy; it repeats for ever. A line's bytes and its HREF begin together."""
+    """Timing of one frame in Tcy; frames repeat without end. A line's bytes and its HREF begin together."""
 
     frame_tcy: int
     first_href: int
     """From the start of the frame to the rise of its first HREF."""
     line_tcy: int
-    """From one HREF to the next: skipped rows have none (§7.4)."""
+    """From one HREF to the next; skipped rows have none (§7.4)."""
     lines: int
     line_bytes: int
     byte_tcy: int
@@ -42,7 +42,7 @@ class FrameTiming:
 
 
 def frame_timing(timing: SensorTiming) -> FrameTiming:
-    """Columns and rows to Tcy."""
+    """Convert a sensor timing from columns and rows to Tcy."""
     row = timing.columns * timing.column_tcy
     visible = min(timing.end_row, timing.rows) - timing.first_row
     width = min(min(timing.end_column, timing.columns) - timing.first_column, timing.columns - 1)
@@ -61,18 +61,20 @@ def frame_timing(timing: SensorTiming) -> FrameTiming:
 
 
 class Scan:
-    """The timing in force and the cycle its first frame began. `running` is 0 in reset."""
+    """The current frame timing and the cycle in which its first frame began. `running` is False in reset."""
 
     def __init__(self, record: Record) -> None:
-        self._cells: Final = {part.name: Cell(record, f"camera.{part.name}", "Q", 1) for part in fields(FrameTiming)}
-        self._start: Final = Cell(record, "camera.frame_start", "q")
-        self._running: Final = Cell(record, "camera.running", "B")
+        self._cells: Final = {
+            part.name: StateCell(record, f"camera.{part.name}", "Q", 1) for part in fields(FrameTiming)
+        }
+        self._start: Final = StateCell(record, "camera.frame_start", "q")
+        self._running: Final = StateCell(record, "camera.running", "B")
         self.timing = FrameTiming(*(1 for _ in self._cells))
         self.start = 0
         self.running = False
 
     def begin(self, timing: FrameTiming, cycle: int, running: bool) -> None:
-        """The first frame of `timing` starts in `cycle`."""
+        """Start the first frame of `timing` in `cycle`."""
         for cell, number in zip(self._cells.values(), astuple(timing), strict=True):
             cell.value = number
         self._start.value = cycle
@@ -80,19 +82,19 @@ class Scan:
         self.restored()
 
     def restored(self) -> None:
-        """Take over what the record says."""
+        """Reload the state from the record."""
         self.timing = FrameTiming(*(cell.value for cell in self._cells.values()))
         self.start = self._start.value
         self.running = bool(self._running.value)
 
     def place(self, cycle: int) -> tuple[int, int]:
-        """(frame, Tcy since its start); the frame is negative before the sensor started."""
+        """Return (frame, Tcy since its start); the frame is negative before the sensor started."""
         return divmod(cycle - self.start, self.timing.frame_tcy)
 
     def line_at(self, cycle: int) -> tuple[int, int] | None:
-        """(line, cycle of its HREF) whose byte is on the bus in `cycle`, None between lines.
+        """Return (line, cycle of its HREF) for the line whose byte is on the bus in `cycle`, None between lines.
 
-        Byte k is there from HREF + (k - 1/2) to HREF + (k + 1/2) byte times (§7.5).
+        Byte k is on the bus from HREF + (k - 1/2) to HREF + (k + 1/2) byte times (§7.5).
         """
         timing = self.timing
         frame, offset = self.place(cycle + timing.byte_tcy // 2)
@@ -102,12 +104,12 @@ class Scan:
         return (line, self.href(line, frame)) if behind < timing.line_bytes * timing.byte_tcy else None
 
     def href(self, line: int, frame: int = 0) -> int:
-        """Cycle in which HREF rises for a line (0 = first of the frame) of a frame since the last restart."""
+        """Return the cycle in which HREF rises for a line (0 = first) of a frame since the last restart."""
         timing = self.timing
         return self.start + frame * timing.frame_tcy + timing.first_href + line * timing.line_tcy
 
     def bits(self, cycle: int) -> int:
-        """Levels of HREF, VSYNC and PCLK in `cycle`."""
+        """Return the levels of HREF, VSYNC and PCLK in `cycle`."""
         timing = self.timing
         frame, offset = self.place(cycle)
         if not self.running or frame < 0:
@@ -121,15 +123,15 @@ class Scan:
         return levels
 
     def rises(self, mask: int, after: int, until: int) -> int:
-        """Rising edges of one line in after < c <= until."""
+        """Return the rising edges of one sync line in after < c <= until."""
         return self.edges(mask, until) - self.edges(mask, after)
 
     def nth_rise(self, mask: int, after: int, count: int) -> int:
-        """Cycle of the `count`-th rising edge behind `after`, or NEVER."""
+        """Return the cycle of the `count`-th rising edge after `after`, or NEVER."""
         return self.edge_cycle(mask, self.edges(mask, after) + count)
 
     def constant_until(self, cycle: int) -> int:
-        """The next edge of a sync line; nothing is promised while PCLK runs."""
+        """Return the next edge of a sync line; no guarantee while PCLK runs."""
         timing = self.timing
         frame, offset = self.place(cycle)
         if not self.running:
@@ -143,13 +145,13 @@ class Scan:
         return cycle + min(edge for edge in edges if edge > offset) - offset
 
     def _next_line(self, offset: int) -> int:
-        """Offset in the frame of the first HREF behind `offset`, or the end of the frame."""
+        """Return the offset in the frame of the first HREF after `offset`, or the end of the frame."""
         timing = self.timing
         line = max((offset - timing.first_href) // timing.line_tcy + 1, 0)
         return timing.first_href + line * timing.line_tcy if line < timing.lines else timing.frame_tcy
 
     def next_line(self, cycle: int) -> int:
-        """Cycle from which `line_at` may name a line again, for a `cycle` between lines; NEVER in reset."""
+        """Return the first cycle in which `line_at` may return a line, for a `cycle` between lines; NEVER in reset."""
         timing = self.timing
         half = timing.byte_tcy // 2
         frame, offset = self.place(cycle + half)
@@ -158,23 +160,26 @@ class Scan:
         return self.start - half if frame < 0 else cycle + self._next_line(offset) - offset
 
     def edges(self, mask: int, cycle: int) -> int:
-        """Rising edges of one sync line since the start, up to and with `cycle`."""
-        return int(edges(NUMBERS, mask, self.timing, (self.start, self.running), cycle))
+        """Return the rising edges of one sync line since the start, `cycle` included."""
+        return int(edges(INTEGER_OPERATIONS, mask, self.timing, (self.start, self.running), cycle))
 
     def edge_cycle(self, mask: int, number: int) -> int:
-        """Cycle of the `number`-th (1 = first) rising edge since the start, or NEVER."""
-        return int(edge_cycle(NUMBERS, mask, self.timing, (self.start, self.running), number))
+        """Return the cycle of the `number`-th (1 = first) rising edge since the start, or NEVER."""
+        return int(edge_cycle(INTEGER_OPERATIONS, mask, self.timing, (self.start, self.running), number))
 
-    def nth_rise_rule(self, m: Reader, mask: int, after: Number, count: Number) -> Number:
-        """`nth_rise` for every engine."""
+    def nth_rise_rule(self, m: RuleBuilder, mask: int, after: Number, count: Number) -> Number:
+        """Return `nth_rise` as a rule expression."""
         timing = FrameTiming(*(m.get(cell.place) for cell in self._cells.values()))
         start = (m.get(self._start.place) ^ _SIGN) - _SIGN
         begun = (start, m.get(self._running.place))
         return edge_cycle(m, mask, timing, begun, edges(m, mask, timing, begun, after) + count)
 
 
-def edges(m: Reader, mask: int, timing: FrameTiming, begun: tuple[Number, Number], cycle: Number) -> Number:
-    """Text of `Scan.edges`. `begun`: the cycle the first frame began, and whether it did."""
+def edges(m: RuleBuilder, mask: int, timing: FrameTiming, begun: tuple[Number, Number], cycle: Number) -> Number:
+    """Return `Scan.edges` as a rule expression.
+
+    `begun`: cycle of the first frame's start, and whether the sensor runs.
+    """
     start, running = begun
     counts = (cycle >= start) & (running != 0)
     passed = m.select(counts, cycle - start, 0)
@@ -193,8 +198,8 @@ def edges(m: Reader, mask: int, timing: FrameTiming, begun: tuple[Number, Number
     return m.select(counts, frame * per_frame(mask, timing) + found, 0)
 
 
-def edge_cycle(m: Reader, mask: int, timing: FrameTiming, begun: tuple[Number, Number], number: Number) -> Number:
-    """Text of `Scan.edge_cycle`."""
+def edge_cycle(m: RuleBuilder, mask: int, timing: FrameTiming, begun: tuple[Number, Number], number: Number) -> Number:
+    """Return `Scan.edge_cycle` as a rule expression."""
     start, running = begun
     rate = per_frame(mask, timing)
     none = (running == 0) | (rate == 0)
@@ -210,7 +215,7 @@ def edge_cycle(m: Reader, mask: int, timing: FrameTiming, begun: tuple[Number, N
 
 
 def per_frame(mask: int, timing: FrameTiming) -> Number:
-    """Rising edges of a sync line in a frame."""
+    """Return the number of rising edges of a sync line per frame."""
     if mask == VSYNC:
         return timing.vsync_rise < timing.vsync_fall
     return timing.lines * timing.line_bytes if mask == PCLK else timing.lines

@@ -1,4 +1,4 @@
-"""The image sensors fitted to e-pucks: what their registers mean (epuck.md §7; openswarm-original.md §5.5).
+"""Image sensors of e-pucks: the meaning of their registers (epuck.md §7; openswarm-original.md §5.5).
 
 Positions are sensor columns and rows. A column lasts `column_tcy` Tcy, a row is `columns` of them, a frame `rows` rows.
 """
@@ -15,12 +15,12 @@ WIDTH, HEIGHT = 640, 480
 RGB565, YUV, GREY = "rgb565", "yuv", "grey"
 
 ReadRegister = Callable[[int, int], int]
-"""read(bank, register) -> 0..255."""
+"""read(bank, register): returns the register's value, 0..255."""
 
 
 @dataclass(frozen=True, slots=True)
 class SensorTiming:
-    """When lines and bytes come."""
+    """Timing settings, in columns and rows."""
 
     columns: int
     rows: int
@@ -29,20 +29,20 @@ class SensorTiming:
     scale_y: int
     bytes_per_pixel: int
     first_column: int
-    """HREF rises here."""
+    """Column in which HREF rises."""
     end_column: int
-    """HREF is low from here on."""
+    """Column from which HREF is low."""
     first_row: int
     end_row: int
     vsync_row: int
     vsync_column: int
     vsync_end_row: int
-    """VSYNC is low from this row on."""
+    """Row from which VSYNC is low."""
 
 
 @dataclass(frozen=True, slots=True)
 class ImageSettings:
-    """What the bytes mean."""
+    """Image settings: pixel format, orientation, gains and exposure."""
 
     form: str
     origin_x: int
@@ -52,7 +52,7 @@ class ImageSettings:
     gains: tuple[float, float, float]
     """Factors on red, green and blue."""
     exposure: float | None
-    """Factor of the exposure registers, 1 = as lit; None while the sensor chooses by itself."""
+    """Factor of the exposure registers, 1 = nominal; None with automatic exposure."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,7 +73,7 @@ def _word(read: ReadRegister, bank: int, high: int) -> int:
 
 
 def _defaults(text: str) -> dict[tuple[int, int], int]:
-    """`bank:register=value value ...` groups, all hexadecimal; the values go to consecutive registers."""
+    """Parse groups `bank:register=value value ...`, all hexadecimal; values are for consecutive registers."""
     table = {}
     for group in text.split(";"):
         place, values = group.split("=")
@@ -134,7 +134,7 @@ def _po3030k_picture(read: ReadRegister) -> ImageSettings:
 
 
 def _gains(registers: tuple[float, float, float], balanced: bool) -> tuple[float, float, float]:
-    """Gain registers are 1.0 at 0x40; automatic white balance is taken as converged."""
+    """Return the gains: registers are 1.0 at 0x40; automatic white balance is taken as converged."""
     red, green, blue = (1.0 if balanced else value / 0x40 for value in registers)
     return red, green, blue
 
@@ -144,7 +144,7 @@ def _gains(registers: tuple[float, float, float], balanced: bool) -> tuple[float
 
 @dataclass(frozen=True, slots=True)
 class _Banked:
-    """Where the two banked sensors keep the same things. Pairs are (bank, register)."""
+    """Register locations in which the two banked sensors differ. Pairs are (bank, register)."""
 
     columns: int
     rows: int
@@ -162,14 +162,15 @@ class _Banked:
     vsync: tuple[int, int]
     mirror: tuple[int, int]
     upright: int
-    """Mirror bits (0x40 sideways, 0x80 up and down) with which the sensor sends the picture as it is mounted."""
+    """Mirror bits (0x40 horizontal, 0x80 vertical) with which the sensor sends an unmirrored picture."""
     control: tuple[int, int]
     exposure: tuple[int, int]
     gains: tuple[int, int]
 
 
 _NOMINAL_EXPOSURE: Final = 0x0008_0000
-"""Exposure registers at which the picture comes out as lit. UNVERIFIED: "8.0 units" in a public driver (§7.6)."""
+"""Value of the exposure registers at which the exposure factor is 1. UNVERIFIED: "8.0 units" in a public driver
+(§7.6)."""
 
 
 def _banked_timing(chip: _Banked, read: ReadRegister) -> SensorTiming:
@@ -287,4 +288,4 @@ SENSORS: Final[Mapping[str, Sensor]] = MappingProxyType(
         )
     }
 )
-"""By name. Defaults not in the library's tables are UNVERIFIED; drivers write all of them."""
+"""Sensors by name. Defaults not in the library's tables are UNVERIFIED; drivers write all of them."""
