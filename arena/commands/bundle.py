@@ -15,14 +15,14 @@ DIFFERENT = 1
 
 def parser() -> argparse.ArgumentParser:
     """Return the parser of the options of `bundle`."""
-    made = argparse.ArgumentParser(
+    command = argparse.ArgumentParser(
         description="pack runs with their firmware, experiments and manifests into one file, and print its hash",
         epilog="example: arena bundle study.zip results/openswarm-A results/bare-A",
     )
-    made.add_argument("bundle", type=Path, metavar="FILE", help="zip archive to write")
-    made.add_argument("--light", action="store_true", help="store hashes instead of records: can be verified only")
-    made.add_argument("runs", nargs="+", type=Path, metavar="FOLDER", help="folder of a run")
-    return made
+    command.add_argument("bundle", type=Path, metavar="FILE", help="zip archive to write")
+    command.add_argument("--light", action="store_true", help="store hashes instead of records: can be verified only")
+    command.add_argument("runs", nargs="+", type=Path, metavar="FOLDER", help="folder of a run")
+    return command
 
 
 def run(options: argparse.Namespace) -> int:
@@ -35,25 +35,25 @@ def run(options: argparse.Namespace) -> int:
 
 def verify_parser() -> argparse.ArgumentParser:
     """Return the parser of the options of `verify`."""
-    made = argparse.ArgumentParser(
+    command = argparse.ArgumentParser(
         description="check the files of a bundle and run some of its trials again; exit status 1 if a result differs",
         epilog="example: arena verify study.zip --trials 1",
     )
-    made.add_argument("bundle", type=Path, metavar="FILE", help="bundle to verify")
-    made.add_argument(
+    command.add_argument("bundle", type=Path, metavar="FILE", help="bundle to verify")
+    command.add_argument(
         "--trials",
         type=count_or_none,
         default=1,
         metavar="N",
         help="run the first N trials of each run again (default 1)",
     )
-    made.add_argument(
+    command.add_argument(
         "--number", type=count, action="append", metavar="N", help="run trial N of each run again; repeatable"
     )
-    made.add_argument("--strict", action="store_true", help="require equal bytes, and so equal versions")
-    made.add_argument("--processes", type=removed_processes, help=argparse.SUPPRESS)
-    made.add_argument("--json", action="store_true", help="print JSON")
-    return made
+    command.add_argument("--strict", action="store_true", help="require equal bytes, and so equal versions")
+    command.add_argument("--processes", type=removed_processes, help=argparse.SUPPRESS)
+    command.add_argument("--json", action="store_true", help="print JSON")
+    return command
 
 
 def verify(options: argparse.Namespace) -> int:

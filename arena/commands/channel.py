@@ -28,19 +28,19 @@ NEAR_CM: Final = 10.0
 
 def parser() -> argparse.ArgumentParser:
     """Return the parser of the command's options."""
-    made = argparse.ArgumentParser(
+    command = argparse.ArgumentParser(
         description="print the infrared amplitude between two robots beside the published values, and draw it",
         epilog="example: arena channel --figure docs/figures/infrared-channel.png",
     )
-    made.add_argument(
+    command.add_argument(
         "scene", nargs="?", default="clustering", help="scene with the [infrared] section (default %(default)s)"
     )
-    made.add_argument("--set", action="append", default=[], metavar="SECTION.KEY=VALUE", help="change a scene value")
-    made.add_argument(
+    command.add_argument("--set", action="append", default=[], metavar="SECTION.KEY=VALUE", help="change a scene value")
+    command.add_argument(
         "--figure", type=Path, metavar="FILE", help="draw amplitude and range into this PNG, SVG or PDF file"
     )
-    made.add_argument("--json", action="store_true", help="print JSON")
-    return made
+    command.add_argument("--json", action="store_true", help="print JSON")
+    return command
 
 
 def received_counts(optics: Optics, distance_cm: float, sender_deg: float, receiver_deg: float) -> float:

@@ -13,17 +13,17 @@ from arena.trial.record import trials_in
 
 def parser() -> argparse.ArgumentParser:
     """Return the parser of the command's options."""
-    made = argparse.ArgumentParser(
+    command = argparse.ArgumentParser(
         description="compare two runs by equivalence tests",
         epilog="example: arena compare results/clustering-openswarm-A results/clustering-bare-A",
     )
-    made.add_argument("first", type=Path, metavar="X", help="folder of a run")
-    made.add_argument("second", type=Path, metavar="Y", help="folder of another run")
-    made.add_argument(
+    command.add_argument("first", type=Path, metavar="X", help="folder of a run")
+    command.add_argument("second", type=Path, metavar="Y", help="folder of another run")
+    command.add_argument(
         "--at", type=duration, default=600.0, metavar="S", help="simulated time of the measures (default 600 s)"
     )
-    made.add_argument("--json", action="store_true", help="print JSON")
-    return made
+    command.add_argument("--json", action="store_true", help="print JSON")
+    return command
 
 
 def run(options: argparse.Namespace) -> int:

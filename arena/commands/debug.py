@@ -36,13 +36,13 @@ EXAMPLE: Final = "example: arena debug clustering --robot 2 --port 4711    or   
 
 def parser() -> argparse.ArgumentParser:
     """Return the parser of the command's options."""
-    made = argparse.ArgumentParser(description=DESCRIPTION, epilog=EXAMPLE)
-    add_plan(made)
-    made.add_argument("--robot", type=count_or_none, required=True, metavar="N", help="number of the robot, from 0")
-    made.add_argument("--port", type=port, metavar="N", help="serve one client on 127.0.0.1:N (0: any free port)")
-    made.add_argument("--tui", action="store_true", help="debug at a prompt, or with a script on standard input")
-    made.add_argument("--out", type=Path, metavar="FOLDER", help="record the trial in this folder")
-    return made
+    command = argparse.ArgumentParser(description=DESCRIPTION, epilog=EXAMPLE)
+    add_plan(command)
+    command.add_argument("--robot", type=count_or_none, required=True, metavar="N", help="number of the robot, from 0")
+    command.add_argument("--port", type=port, metavar="N", help="serve one client on 127.0.0.1:N (0: any free port)")
+    command.add_argument("--tui", action="store_true", help="debug at a prompt, or with a script on standard input")
+    command.add_argument("--out", type=Path, metavar="FOLDER", help="record the trial in this folder")
+    return command
 
 
 def run(options: argparse.Namespace) -> int:

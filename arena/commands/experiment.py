@@ -16,45 +16,45 @@ EXAMPLE = "example: arena experiment clustering --document docs/experiment.md --
 
 def parser() -> argparse.ArgumentParser:
     """Return the parser of the command's options."""
-    made = argparse.ArgumentParser(
+    command = argparse.ArgumentParser(
         description="run all combinations of brains and controllers, then write the report; finished trials are kept",
         epilog=EXAMPLE,
     )
-    made.add_argument("scene", metavar="SCENE", help="name of a scene (see `arena scenes`) or TOML file")
-    made.add_argument(
+    command.add_argument("scene", metavar="SCENE", help="name of a scene (see `arena scenes`) or TOML file")
+    command.add_argument(
         "--brains", default="openswarm,bare", metavar="B1,B2", help="firmware to compare (default openswarm,bare)"
     )
-    made.add_argument("--controllers", default="AB", help="speed tables to compare (default AB)")
-    made.add_argument(
+    command.add_argument("--controllers", default="AB", help="speed tables to compare (default AB)")
+    command.add_argument(
         "--trials", type=count, default=10, metavar="N", help="trials per brain and controller (default 10)"
     )
-    made.add_argument(
+    command.add_argument(
         "--minutes", type=duration, default=15.0, metavar="M", help="simulated minutes per trial (default 15)"
     )
-    made.add_argument(
+    command.add_argument(
         "--twins", type=count_or_none, default=100, metavar="N", help="scripted trials per controller (default 100)"
     )
-    made.add_argument(
+    command.add_argument(
         "--twin-minutes",
         type=duration,
         default=10.0,
         metavar="M",
         help="simulated minutes per scripted trial (default 10)",
     )
-    made.add_argument(
+    command.add_argument(
         "--at", type=duration, default=600.0, metavar="S", help="simulated time of the measures (default 600 s)"
     )
-    made.add_argument("--seed", type=count_or_none, default=1, help="seed of the first trial (default 1)")
-    made.add_argument(
+    command.add_argument("--seed", type=count_or_none, default=1, help="seed of the first trial (default 1)")
+    command.add_argument(
         "--jobs", type=count, default=os.cpu_count() or 1, metavar="N", help="worker processes (default: all cores)"
     )
-    made.add_argument("--scheduler", metavar="ADDRESS", help="run on a Dask cluster instead")
-    made.add_argument("--out", type=Path, default=Path("results"), metavar="FOLDER", help="default results")
-    made.add_argument(
+    command.add_argument("--scheduler", metavar="ADDRESS", help="run on a Dask cluster instead")
+    command.add_argument("--out", type=Path, default=Path("results"), metavar="FOLDER", help="default results")
+    command.add_argument(
         "--document", type=Path, metavar="FILE", help="replace the results in this document; default: standard output"
     )
-    made.add_argument("--figures", type=Path, metavar="FOLDER", help="draw the figures into this folder")
-    return made
+    command.add_argument("--figures", type=Path, metavar="FOLDER", help="draw the figures into this folder")
+    return command
 
 
 def run(options: argparse.Namespace) -> int:

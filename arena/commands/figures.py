@@ -20,16 +20,18 @@ FILM_ROBOT: Final = 4
 
 def parser() -> argparse.ArgumentParser:
     """Return the parser of the command's options."""
-    made = argparse.ArgumentParser(
+    command = argparse.ArgumentParser(
         description="draw all figures of a study: one set per controller, and the filmstrip of one robot",
         epilog="example: arena figures results --out docs/figures",
     )
-    made.add_argument(
+    command.add_argument(
         "results", type=Path, metavar="RESULTS", help="folder of `arena experiment` with one folder per run"
     )
-    made.add_argument("--out", type=Path, default=Path("docs/figures"), metavar="FOLDER", help="default docs/figures")
-    made.add_argument("--no-film", action="store_true", help="omit the filmstrip, whose trial is run if missing")
-    return made
+    command.add_argument(
+        "--out", type=Path, default=Path("docs/figures"), metavar="FOLDER", help="default docs/figures"
+    )
+    command.add_argument("--no-film", action="store_true", help="omit the filmstrip, whose trial is run if missing")
+    return command
 
 
 def run(options: argparse.Namespace) -> int:

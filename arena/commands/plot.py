@@ -13,16 +13,16 @@ from arena.trial.record import Trial, trials_in
 
 def parser() -> argparse.ArgumentParser:
     """Return the parser of the command's options."""
-    made = argparse.ArgumentParser(
+    command = argparse.ArgumentParser(
         description="draw snapshots, clustering over time, trajectories and CPU load",
         epilog="example: arena plot results/clustering-openswarm-A results/clustering-bare-A --out figures",
     )
-    made.add_argument("runs", nargs="+", type=Path, metavar="FOLDER", help="folder of a run")
-    made.add_argument("--out", type=Path, default=Path("figures"), metavar="FOLDER", help="default figures")
-    made.add_argument("--film", type=count_or_none, metavar="ROBOT",
+    command.add_argument("runs", nargs="+", type=Path, metavar="FOLDER", help="folder of a run")
+    command.add_argument("--out", type=Path, default=Path("figures"), metavar="FOLDER", help="default figures")
+    command.add_argument("--film", type=count_or_none, metavar="ROBOT",
                       help="draw the filmstrip of one robot of the first trial, and print its log")  # fmt: skip
-    made.add_argument("--format", default="png", choices=("png", "svg", "pdf"), help="default png")
-    return made
+    command.add_argument("--format", default="png", choices=("png", "svg", "pdf"), help="default png")
+    return command
 
 
 def run(options: argparse.Namespace) -> int:

@@ -37,19 +37,19 @@ _ROWS: Final = 480
 
 def parser() -> argparse.ArgumentParser:
     """Return the parser of the command's options."""
-    made = argparse.ArgumentParser(
+    command = argparse.ArgumentParser(
         description="measure the time from the last line of a frame to the new wheel speed, and missed frames",
         epilog="example: arena reaction --brain openswarm --brain bare --frames 300",
     )
-    made.add_argument(
+    command.add_argument(
         "--brain", action="append", help="openswarm, bare, or an ELF file; repeatable (default: openswarm and bare)"
     )
-    made.add_argument("--word", metavar="SYMBOL", help="word that holds the left wheel's speed, for other firmware")
-    made.add_argument("--controller", default="A", choices=sorted(SPEED_TABLES), help="table of speeds (default A)")
-    made.add_argument("--frames", type=count, default=300, metavar="N", help="frames to measure (default 300)")
-    made.add_argument("--seed", type=count_or_none, default=1, help="seed of the pictures (default 1)")
-    made.add_argument("--json", action="store_true", help="print JSON")
-    return made
+    command.add_argument("--word", metavar="SYMBOL", help="word that holds the left wheel's speed, for other firmware")
+    command.add_argument("--controller", default="A", choices=sorted(SPEED_TABLES), help="table of speeds (default A)")
+    command.add_argument("--frames", type=count, default=300, metavar="N", help="frames to measure (default 300)")
+    command.add_argument("--seed", type=count_or_none, default=1, help="seed of the pictures (default 1)")
+    command.add_argument("--json", action="store_true", help="print JSON")
+    return command
 
 
 class AlternatingPicture:

@@ -20,35 +20,37 @@ from emu.host.files import is_standard
 
 def parser() -> argparse.ArgumentParser:
     """Return the parser of the command's options."""
-    made = argparse.ArgumentParser(
+    command = argparse.ArgumentParser(
         description="write an HTML page or a video of a trial, or serve a page that follows a running trial",
         epilog="examples: arena replay results/clustering-scripted-A/trial-0001.parquet --out trial.html\n"
         "          arena replay results/clustering-scripted-A/trial-0001.parquet --export trial.gif --speed 60\n"
         "          arena replay results/clustering-openswarm-A --live",
     )
-    made.add_argument(
+    command.add_argument(
         "trial", type=Path, metavar="TRIAL", help="file trial-NNNN.parquet; with --live the folder of the run"
     )
-    made.add_argument("--out", type=Path, metavar="FILE", help="page to write (default: name of the trial with .html)")
-    made.add_argument("--export", type=Path, metavar="FILE", help="write a video instead: .gif, or .mp4 with ffmpeg")
-    made.add_argument(
+    command.add_argument(
+        "--out", type=Path, metavar="FILE", help="page to write (default: name of the trial with .html)"
+    )
+    command.add_argument("--export", type=Path, metavar="FILE", help="write a video instead: .gif, or .mp4 with ffmpeg")
+    command.add_argument(
         "--speed",
         type=duration,
         default=30.0,
         metavar="X",
         help="speed of the video as a multiple of real time (default 30)",
     )
-    made.add_argument(
+    command.add_argument(
         "--seconds", type=float, metavar="S", help="simulated time that the video shows (default: the whole trial)"
     )
-    made.add_argument("--live", action="store_true", help="serve a page that follows a running trial")
-    made.add_argument(
+    command.add_argument("--live", action="store_true", help="serve a page that follows a running trial")
+    command.add_argument(
         "--number", type=count, metavar="N", help="with --live: number of the trial (default: the newest)"
     )
-    made.add_argument(
+    command.add_argument(
         "--port", type=port, default=8765, metavar="P", help="with --live: TCP port (default 8765, 0: any free port)"
     )
-    return made
+    return command
 
 
 def run(options: argparse.Namespace) -> int:

@@ -17,22 +17,22 @@ from arena.trial.record import trials_in, write_text
 
 def parser() -> argparse.ArgumentParser:
     """Return the parser of the command's options."""
-    made = argparse.ArgumentParser(
+    command = argparse.ArgumentParser(
         description="write tables and figures of runs as Markdown, grouped by controller",
         epilog="example: arena report results/openswarm-A results/bare-A results/openswarm-B results/bare-B "
         "--document docs/experiment.md --figures docs/figures",
     )
-    made.add_argument("runs", nargs="+", type=Path, metavar="FOLDER", help="folder of a run")
-    made.add_argument(
+    command.add_argument("runs", nargs="+", type=Path, metavar="FOLDER", help="folder of a run")
+    command.add_argument(
         "--document", type=Path, metavar="FILE", help="replace the results in this document; default: standard output"
     )
-    made.add_argument(
+    command.add_argument(
         "--at", type=duration, default=600.0, metavar="S", help="simulated time of the measures (default 600 s)"
     )
-    made.add_argument(
+    command.add_argument(
         "--figures", type=Path, metavar="FOLDER", help="draw snapshots, curves and CPU load into this folder"
     )
-    return made
+    return command
 
 
 def run(options: argparse.Namespace) -> int:

@@ -27,53 +27,57 @@ EXAMPLE = "example: arena run clustering --brain openswarm --controller A --tria
 
 def parser() -> argparse.ArgumentParser:
     """Return the parser of the command's options."""
-    made = argparse.ArgumentParser(description="run trials; finished ones are kept and skipped", epilog=EXAMPLE)
-    made.add_argument("--trials", type=count, default=10, metavar="N", help="number of trials (default 10)")
-    add_plan(made)
-    made.add_argument(
+    command = argparse.ArgumentParser(description="run trials; finished ones are kept and skipped", epilog=EXAMPLE)
+    command.add_argument("--trials", type=count, default=10, metavar="N", help="number of trials (default 10)")
+    add_plan(command)
+    command.add_argument(
         "--jobs",
         type=count,
         default=os.cpu_count() or 1,
         metavar="N",
         help="cores to use (default: all): concurrent trials, or threads of one trial if there are fewer trials",
     )
-    made.add_argument(
+    command.add_argument(
         "--processes",
         type=removed_processes,
         help=argparse.SUPPRESS,
     )
-    made.add_argument(
+    command.add_argument(
         "--scheduler", metavar="ADDRESS", help="run on a Dask cluster instead, for example tcp://host:8786"
     )
-    made.add_argument("--out", type=Path, metavar="FOLDER", help="default results/SCENE-BRAIN-CONTROLLER")
-    made.add_argument("--json", action="store_true", help="print the results as JSON")
-    return made
+    command.add_argument("--out", type=Path, metavar="FOLDER", help="default results/SCENE-BRAIN-CONTROLLER")
+    command.add_argument("--json", action="store_true", help="print the results as JSON")
+    return command
 
 
-def add_plan(made: argparse.ArgumentParser) -> None:
+def add_plan(command: argparse.ArgumentParser) -> None:
     """Add the options that define a trial."""
-    made.add_argument("scene", metavar="SCENE", help="name of a scene (see `arena scenes`) or TOML file")
-    made.add_argument("--brain", default="openswarm", help="openswarm (default), bare, scripted, or an ELF or HEX file")
-    made.add_argument("--controller", default="A", choices=sorted(SPEED_TABLES), help="table of speeds (default A)")
-    made.add_argument(
+    command.add_argument("scene", metavar="SCENE", help="name of a scene (see `arena scenes`) or TOML file")
+    command.add_argument(
+        "--brain", default="openswarm", help="openswarm (default), bare, scripted, or an ELF or HEX file"
+    )
+    command.add_argument("--controller", default="A", choices=sorted(SPEED_TABLES), help="table of speeds (default A)")
+    command.add_argument(
         "--minutes", type=duration, default=15.0, metavar="M", help="simulated minutes per trial (default 15)"
     )
-    made.add_argument("--robots", type=count_or_none, metavar="N", help="number of robots, instead of the scene's")
-    made.add_argument("--objects", type=count_or_none, metavar="N", help="number of objects, instead of the scene's")
-    made.add_argument(
+    command.add_argument("--robots", type=count_or_none, metavar="N", help="number of robots, instead of the scene's")
+    command.add_argument("--objects", type=count_or_none, metavar="N", help="number of objects, instead of the scene's")
+    command.add_argument(
         "--set",
         action="append",
         default=[],
         metavar="SECTION.KEY=VALUE",
         help="change a value of the scene; repeatable",
     )
-    made.add_argument(
+    command.add_argument(
         "--seed",
         type=count_or_none,
         default=1,
         help="seed of the first trial; each next trial has the next seed (default 1)",
     )
-    made.add_argument("--cache", type=use_cache, metavar="DIR", help="folder of the cache for firmware and native code")
+    command.add_argument(
+        "--cache", type=use_cache, metavar="DIR", help="folder of the cache for firmware and native code"
+    )
 
 
 def with_overrides(scene: Scene, settings: list[str], robots: int | None = None, objects: int | None = None) -> Scene:
@@ -140,12 +144,12 @@ def run(options: argparse.Namespace) -> int:
     """Run the missing trials and print the results; exit status 1 if a robot had a fault.
 
     Raises SceneError, RecordError, LoadError, ValueError."""
-    made = run_missing_trials(options)
+    result = run_missing_trials(options)
     if options.json:
-        print(json_text({"folder": str(made.folder), "trials": list(map(summary, made.trials)), "new": made.new}))
+        print(json_text({"folder": str(result.folder), "trials": list(map(summary, result.trials)), "new": result.new}))
     else:
-        print_result(made)
-    return 1 if made.faults else 0
+        print_result(result)
+    return 1 if result.faults else 0
 
 
 class RunResult(NamedTuple):
@@ -157,10 +161,10 @@ class RunResult(NamedTuple):
     faults: bool
 
 
-def print_result(made: RunResult) -> None:
+def print_result(result: RunResult) -> None:
     """Print a line per trial and the number of trials."""
-    print("\n".join(map(result_line, made.trials)))
-    print(f"{len(made.trials)} trials in {made.folder}")
+    print("\n".join(map(result_line, result.trials)))
+    print(f"{len(result.trials)} trials in {result.folder}")
 
 
 def run_missing_trials(options: argparse.Namespace) -> RunResult:
@@ -178,37 +182,37 @@ def run_missing_trials(options: argparse.Namespace) -> RunResult:
 
 def summary(trial: Trial) -> dict[str, Any]:
     """Return the last value of every curve and every measure of one trial."""
-    done, end = trial.series, float(trial.times[-1])
-    curves = {one.name: done.last(one.name) for one in trial.experiment.curves}
-    measures = {one.name: one.of(done, end) for one in trial.experiment.measures}
+    series, end = trial.series, float(trial.times[-1])
+    curves = {one.name: series.last(one.name) for one in trial.experiment.curves}
+    measures = {one.name: one.of(series, end) for one in trial.experiment.measures}
     about = {"trial": trial.path.stem, "seed": trial.about["seed"], "seconds": end, "faults": trial.about["faults"]}
     return curves | measures | about
 
 
 def result_line(trial: Trial) -> str:
     """Return the last value of every curve of one trial as a line of text."""
-    done, curves = trial.series, trial.experiment.curves
-    values = ", ".join(f"{one.label} {one.shown(done.last(one.name))}" for one in curves)
+    series, curves = trial.series, trial.experiment.curves
+    values = ", ".join(f"{one.label} {one.shown(series.last(one.name))}" for one in curves)
     return f"{trial.path.stem}: seed {trial.about['seed']}, after {trial.times[-1]:g} s: {values}"
 
 
 def run_with_progress(plan: Plan, folder: Path, missing: list[int], jobs: int, scheduler: str | None = None) -> bool:
     """Run trials on local workers or on a Dask cluster; return whether a robot had a fault."""
-    stopped = False
+    has_fault = False
     with ProgressDisplay(len(missing), plan.seconds) as display:
 
-        def done(one: FinishedTrial) -> None:
-            nonlocal stopped
+        def on_finished(one: FinishedTrial) -> None:
+            nonlocal has_fault
             display.complete(one.trial, one.host_s)
             note_host_time(folder, one.trial, one.host_s, one.faults)
             for robot, seconds, why in one.faults:
-                stopped = True
+                has_fault = True
                 display.print(f"trial {one.trial}, {seconds:.1f} s: robot {robot} {why}")
 
         if scheduler is not None and missing:
             from arena.campaign.cluster import run_on
 
-            run_on(scheduler, plan, folder, missing, display.update, done)
+            run_on(scheduler, plan, folder, missing, display.update, on_finished)
         else:
-            run_all(plan, folder, missing, jobs, display.update, done)
-    return stopped
+            run_all(plan, folder, missing, jobs, display.update, on_finished)
+    return has_fault

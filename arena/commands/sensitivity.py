@@ -47,29 +47,29 @@ second row of the window then shows robots up to 135 cm away."""
 
 def parser() -> argparse.ArgumentParser:
     """Return the parser of the command's options."""
-    made = argparse.ArgumentParser(
+    command = argparse.ArgumentParser(
         description="vary one scene value at a time with scripted robots and print the experiment's first metric",
         epilog="example: arena sensitivity clustering --trials 10 --minutes 10 --save results/sensitivity.md",
     )
-    made.add_argument("scene", metavar="SCENE", help="name of a scene (see `arena scenes`) or TOML file")
-    made.add_argument("--controllers", default="AB", help="speed tables to vary (default AB)")
-    made.add_argument("--trials", type=count, default=10, metavar="N", help="trials per variant (default 10)")
-    made.add_argument(
+    command.add_argument("scene", metavar="SCENE", help="name of a scene (see `arena scenes`) or TOML file")
+    command.add_argument("--controllers", default="AB", help="speed tables to vary (default AB)")
+    command.add_argument("--trials", type=count, default=10, metavar="N", help="trials per variant (default 10)")
+    command.add_argument(
         "--minutes", type=duration, default=10.0, metavar="M", help="simulated minutes per trial (default 10)"
     )
-    made.add_argument("--seed", type=count_or_none, default=1, help="seed of the first trial (default 1)")
-    made.add_argument(
+    command.add_argument("--seed", type=count_or_none, default=1, help="seed of the first trial (default 1)")
+    command.add_argument(
         "--only", action="append", metavar="TEXT", help="run only variants whose names contain TEXT; repeatable"
     )
-    made.add_argument(
+    command.add_argument(
         "--jobs", type=count, default=os.cpu_count() or 1, metavar="N", help="cores to use (default: all)"
     )
-    made.add_argument(
+    command.add_argument(
         "--out", type=Path, default=Path("results/sensitivity"), metavar="FOLDER", help="default results/sensitivity"
     )
-    made.add_argument("--save", type=Path, metavar="FILE", help="also write the table to a Markdown file")
-    made.add_argument("--json", action="store_true", help="print JSON")
-    return made
+    command.add_argument("--save", type=Path, metavar="FILE", help="also write the table to a Markdown file")
+    command.add_argument("--json", action="store_true", help="print JSON")
+    return command
 
 
 def run(options: argparse.Namespace) -> int:

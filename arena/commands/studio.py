@@ -39,14 +39,16 @@ COMMANDS: Final[dict[str, dict[str, type]]] = {
 
 def parser() -> argparse.ArgumentParser:
     """Return the parser of the command's options."""
-    made = argparse.ArgumentParser(
+    command = argparse.ArgumentParser(
         description="run one trial in a browser page: pause, step, rewind, move robots and objects, inspect firmware",
         epilog=EXAMPLE,
     )
-    add_plan(made)
-    made.add_argument("--port", type=port, default=8766, metavar="P", help="TCP port (default 8766, 0: any free port)")
-    made.add_argument("--open", action="store_true", help="open the page in the default browser")
-    return made
+    add_plan(command)
+    command.add_argument(
+        "--port", type=port, default=8766, metavar="P", help="TCP port (default 8766, 0: any free port)"
+    )
+    command.add_argument("--open", action="store_true", help="open the page in the default browser")
+    return command
 
 
 def run(options: argparse.Namespace) -> int:

@@ -19,11 +19,11 @@ EXAMPLE = "example: arena sweep clustering --brain scripted --vary camera.range_
 
 def parser() -> argparse.ArgumentParser:
     """Return the parser of the options of `run` and the grid of values."""
-    made = single.parser()
-    made.description, made.epilog = "run every combination of the given scene values and print a table", EXAMPLE
-    made.add_argument("--vary", action="append", default=[], required=True, metavar="SECTION.KEY=V1,V2,...",
+    command = single.parser()
+    command.description, command.epilog = "run every combination of the given scene values and print a table", EXAMPLE
+    command.add_argument("--vary", action="append", default=[], required=True, metavar="SECTION.KEY=V1,V2,...",
                       help="scene value and its alternatives; repeatable")  # fmt: skip
-    return made
+    return command
 
 
 def run(options: argparse.Namespace) -> int:
@@ -41,10 +41,10 @@ def run(options: argparse.Namespace) -> int:
     for settings in itertools.product(*axes):
         quiet.set = [*options.set, *settings]
         quiet.out = base / "-".join(map(single.folder_name, settings))
-        made = single.run_missing_trials(quiet)
-        status, trials = max(status, int(made.faults)), trials_in(quiet.out)
+        result = single.run_missing_trials(quiet)
+        status, trials = max(status, int(result.faults)), trials_in(quiet.out)
         if not options.json:
-            single.print_result(made)
+            single.print_result(result)
         done = [one for _, one in series_by_seed(trials).values()]
         curves = trials[0].experiment.curves
         ends = {one.name: [series.last(one.name) for series in done] for one in curves}
