@@ -4,8 +4,8 @@
 as many threads, events, subscriptions, messages and holes as there were at most while its longest was under way (--json
 tells them). Measured is from the first instruction to behind the return, as bounds are; a call that was interrupted, or
 in which threads were switched, is not counted; a thread that ends itself goes on into the scheduler, so of its end
-`bury` has a row and `Sys_Kill_Process` is that of others. "Plain" leaves out the ways on which memory is short, the
-reserve is exchanged, a handler has left something to join, or the call is refused; they count in the other column.
+`end_thread` has a row and `Sys_Kill_Process` is that of others. "Plain" leaves out the ways on which memory is short,
+the reserve is exchanged, a handler has left something to join, or the call is refused; they count in the other column.
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ sys.path.insert(0, str(ROOT))
 
 import emu  # noqa: E402
 from bench.structures import Structures  # noqa: E402
-from toolchain.bounds.annotations.notes import read_notes  # noqa: E402
+from toolchain.bounds.annotations.reader import read_annotation_section  # noqa: E402
 from toolchain.bounds.program import Program  # noqa: E402
-from toolchain.bounds.report import Analyst  # noqa: E402
+from toolchain.bounds.report import BoundAnalysis  # noqa: E402
 from toolchain.elf.read import read_executable  # noqa: E402
 from toolchain.stack.annotations import Annotations, add_symbols  # noqa: E402
 
@@ -36,11 +36,11 @@ PLAIN = {"x": 0, "j": 0}
 """Limits of plain ways beside those seen: no hole outgrows the reserve, nothing given back waits to be joined."""
 ITSELF = "os_thread_returned"
 """Where a thread ends itself: on into the scheduler, a row of its own."""
-TREE = ("find_hole", "pull_hole", "put_hole")
+TREE = ("find_hole", "remove_hole", "insert_hole")
 """What works on the heap's tree: in front of each it is whole."""
-EXCHANGE = "renew_reserve"
+EXCHANGE = "swap_reserve"
 """Pulls a hole only where it is larger than the reserve."""
-ALSO = ("_bury",)
+ALSO = ("_end_thread",)
 """Timed beside the calls."""
 SWITCHES = ("hal_yield", "hal_block", "hal_abandon")
 TARGET = "../tests/firmware/target"
@@ -193,7 +193,7 @@ def measure(path: Path, program: Program, names: list[str], seconds: float) -> M
     for name in TREE:
         address = program.address(name)
         if address in program.calls.entries:
-            machine.hook_pc(address, meter.tree(exchange if name == "pull_hole" else range(0)))
+            machine.hook_pc(address, meter.tree(exchange if name == "remove_hole" else range(0)))
     for name in names:
         address = program.address(name)
         assert address is not None
@@ -215,7 +215,7 @@ def rows_of(app: str, path: Path, values: dict[str, int], seconds: float) -> lis
     image = read_executable(path.read_bytes(), str(path))
     annotations = Annotations()
     add_symbols(annotations, image.symbols)
-    bare = Program(image, annotations, read_notes(image, values))
+    bare = Program(image, annotations, read_annotation_section(image, values))
     names = [*bare.interesting("_Sys_"), *(name for name in ALSO if bare.address(name) in bare.calls.entries)]
     meter = measure(path, bare, names, seconds)
     seen = meter.worst
@@ -223,10 +223,10 @@ def rows_of(app: str, path: Path, values: dict[str, int], seconds: float) -> lis
     itself = [name for name in there if name == ITSELF]
 
     def bound(name: str, limits: dict[str, int], left_out: list[str]) -> int | None:
-        program = Program(image, annotations, read_notes(image, values | limits), left_out)
+        program = Program(image, annotations, read_annotation_section(image, values | limits), left_out)
         at = program.address(name)
         assert at is not None
-        return Analyst(program).bound(name, at, "call").cycles
+        return BoundAnalysis(program).bound(name, at, "call").cycles
 
     rows = []
     for name in names:

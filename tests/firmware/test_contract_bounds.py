@@ -12,15 +12,15 @@ import emu
 from bench.bounds import IMAGES, rows_of
 from tests.firmware.conftest import TARGET_APPS, Build
 from tests.firmware.contracts import HEADERS
-from toolchain.bounds.annotations.notes import read_notes
+from toolchain.bounds.annotations.reader import read_annotation_section
 from toolchain.bounds.program import Program
-from toolchain.bounds.report import Analyst
+from toolchain.bounds.report import BoundAnalysis
 from toolchain.cli import main
 from toolchain.elf.read import read_executable
 from toolchain.stack.annotations import Annotations
 
 LOAD = {"n": 4, "m": 4, "b": 1, "s": 1, "q": 1, "i": 0, "u": 100, "d": 2, "k": 224}
-SHORT = ("renew_reserve", "refuse_message", "first_waiter")
+SHORT = ("swap_reserve", "refuse_message", "first_waiter")
 """Not called while memory is not short, the event is known and somebody has subscribed to it."""
 SWITCH = ("os_schedule", "save_dsp", "resume_dsp")
 """Not called while nothing is pending, between threads without SYS_DSP."""
@@ -44,7 +44,7 @@ LINK = ("Sys_Send_Neighbours", "Sys_Get_Neighbours", "Sys_Get_RobotNumber", "Sys
         "Sys_Set_InfraredThreshold", "Sys_Estimate_Range")  # fmt: skip
 """Calls of openswarm_infrared.h; those that start something are made once."""
 RETURN_ADDRESS = 4
-CLOSE = ("Sys_Kill_Process", "bury", "Sys_Register_Event", "Sys_Unregister_Event", "Sys_Subscribe_to_Event",
+CLOSE = ("Sys_Kill_Process", "end_thread", "Sys_Register_Event", "Sys_Unregister_Event", "Sys_Subscribe_to_Event",
          "Sys_Unsubscribe_Handler", "Sys_Send_Event", "Sys_Send_IntEvent", "Sys_Start_ProcessWith",
          "Sys_Get_ProcessState", "Sys_Start_CriticalSection", "Sys_End_CriticalSection")  # fmt: skip
 """Calls whose worst case the image `crowded` builds: bounds are within 1.3 x of it."""
@@ -68,9 +68,9 @@ def test_a_call_takes_no_longer_than_its_contract(calls, call: str) -> None:
     lines = header[: re.search(rf"\b{call}\(", header).start()]
     assert f"| {text} |" in lines[lines.rindex("| no |") :] or f"| {text}." in lines[lines.rindex("| no |") :]
     _, executable = calls
-    program = Program(executable, Annotations(), read_notes(executable, LOAD), left_out)
-    bound = Analyst(program).bound(call, program.address(call), "call")
-    assert not bound.open
+    program = Program(executable, Annotations(), read_annotation_section(executable, LOAD), left_out)
+    bound = BoundAnalysis(program).bound(call, program.address(call), "call")
+    assert not bound.unbounded
     assert bound.cycles <= slack * cycles
     assert cycles <= 1.6 * bound.cycles
 
@@ -80,8 +80,8 @@ def test_a_call_of_the_link_takes_no_longer_than_its_contract(image: Build, call
     """Of most by its bound; of a send, whose copy the bound cannot tell from a longer one, on the emulator."""
     path = image("infrared-calls", TARGET_APPS, "OPTIMISE=-Os -fno-lto")
     executable = read_executable(path.read_bytes(), str(path))
-    program = Program(executable, Annotations(), read_notes(executable, LOAD))
-    bound = Analyst(program).bound(call, program.address(call), "call")
+    program = Program(executable, Annotations(), read_annotation_section(executable, LOAD))
+    bound = BoundAnalysis(program).bound(call, program.address(call), "call")
     line = (HEADERS / "openswarm_infrared.h").read_text().partition(f" {call}(")[0].rpartition("| no | ")[2]
     cycles, stack = (int(word) for word in line.split(" | ")[:2])
     assert stack == max(bound.stack.values()) + RETURN_ADDRESS
@@ -125,8 +125,8 @@ def test_a_longer_memory_has_longer_paths(crowded: Path) -> None:
     executable = read_executable(crowded.read_bytes(), str(crowded))
     cycles = []
     for holes in ({"h": 10}, {"h": 11}, {}):
-        program = Program(executable, Annotations(), read_notes(executable, LOAD | holes))
-        cycles.append(Analyst(program).bound("heap_give", program.address("heap_give"), "call").cycles)
+        program = Program(executable, Annotations(), read_annotation_section(executable, LOAD | holes))
+        cycles.append(BoundAnalysis(program).bound("heap_free", program.address("heap_free"), "call").cycles)
     assert cycles[0] < cycles[1] == cycles[2]
 
 

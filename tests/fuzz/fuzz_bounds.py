@@ -3,9 +3,9 @@
 `python tests/fuzz/fuzz_bounds.py [--programs N] [--seed S] [--seconds T]`; exits 1 with the first program that exceeds
 a bound. The programs are those of `c_shapes.py`: interrupts, escapes, volatile, large frames, loops of fixed counts;
 every second one has what `c_features.py` has, which often leaves no bound, and every third is one of `c_notes.py`,
-which only its notes bound. Every sixth is one of `c_interrupts.py`: there it is the responses of interrupts, and the
-stack with all that interrupts it, that nothing may exceed, at many phases. Prints how tight the bounds of `main` are; a
-campaign that is long enough fails if `c_interrupts.py` never made something it is for.
+which only its annotations bound. Every sixth is one of `c_interrupts.py`: there the responses of interrupts, and the
+stack under nested interrupts, are compared at many phases. Prints how tight the bounds of `main` are; a campaign that
+is long enough fails if `c_interrupts.py` never made a shape that it exists for.
 """
 
 from __future__ import annotations
@@ -26,10 +26,10 @@ from tests.fuzz.fuzz_compiler import NO_ROOM  # noqa: E402
 from tests.fuzz.seeds import Course, parser  # noqa: E402
 from tests.toolchain.bounds.responses import Watched, watched  # noqa: E402
 from tests.toolchain.c_programs import build  # noqa: E402
-from toolchain.bounds.annotations.notes import read_notes  # noqa: E402
+from toolchain.bounds.annotations.reader import read_annotation_section  # noqa: E402
 from toolchain.bounds.interference import report_of  # noqa: E402
 from toolchain.bounds.program import Program  # noqa: E402
-from toolchain.bounds.report import Analyst, Bound  # noqa: E402
+from toolchain.bounds.report import Bound, BoundAnalysis  # noqa: E402
 from toolchain.elf.read import read_executable  # noqa: E402
 from toolchain.stack.annotations import Annotations  # noqa: E402
 
@@ -38,7 +38,7 @@ CYCLES = 400_000
 """Longest run that is measured."""
 HANDLER = "__T1Interrupt"
 NOTED = 1
-"""Of three seeds, the one that makes a program with notes."""
+"""Of three seeds, the one that makes a program with annotations."""
 INTERRUPTED = 3
 """Of six seeds, the one that makes a program about interrupts."""
 PHASES, WATCHED = 24, 4_000
@@ -119,14 +119,14 @@ def examine(seed: int, folder: Path) -> tuple[str, dict[str, tuple[Seen, Bound]]
     if isinstance(seen, str):
         return seen, {}
     executable = read_executable(image.read_bytes(), str(image))
-    program = Program(executable, Annotations(), read_notes(executable, {}))
-    analyst = Analyst(program)
+    program = Program(executable, Annotations(), read_annotation_section(executable, {}))
+    analyst = BoundAnalysis(program)
     pairs = {}
     for name, what in seen.items():
         address = program.address(name)
         if what.cycles and address is not None:
             pairs[name] = what, analyst.bound(name, address, *(("call", 0) if name == "_main" else ("interrupt", 4)))
-    open_ends = {reason for _, bound in pairs.values() for reason in bound.open.values()}
+    open_ends = {reason for _, bound in pairs.values() for reason in bound.unbounded.values()}
     for name, (what, bound) in pairs.items():
         if bound.cycles is not None:
             assert what.cycles <= bound.cycles, f"{level} {name}: {what.cycles} cycles, bound {bound.cycles}"
@@ -154,7 +154,7 @@ class Held:
         names = [f"{timer}Interrupt" for timer in c_interrupts.TIMERS]
         seen = watched(image, names, program.phases(PHASES), WATCHED)
         executable = read_executable(image.read_bytes(), str(image))
-        report = report_of(Program(executable, Annotations(), read_notes(executable, {})), ["main"])
+        report = report_of(Program(executable, Annotations(), read_annotation_section(executable, {})), ["main"])
         said = {one.name.removeprefix("_"): one.cycles for one in report.responses} | {"stack": report.stacks["main"]}
         for name, most in _worst(seen).items():
             limit = said[name]

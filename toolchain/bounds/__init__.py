@@ -1,1 +1,1 @@
-"""Worst-case time, stack and masking of a linked image, by running it on sets of values."""
+"""Bounds of execution time, stack use and interrupt masking of a linked image, by abstract execution."""

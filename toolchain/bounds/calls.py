@@ -1,4 +1,4 @@
-"""Calls and returns: which functions a run goes on into, and what it finds behind them."""
+"""TransferFunctions execution of calls, jumps between functions, and returns."""
 
 from __future__ import annotations
 
@@ -6,118 +6,123 @@ from abc import abstractmethod
 from typing import Final
 
 from emu.dspic30f.isa.flow import Branch, Skip
-from toolchain.bounds.abstract.state import INHERITED, NOWHERE, State
-from toolchain.bounds.abstract.values import Value, ends
-from toolchain.bounds.annotations.rules import DEEP, ELSEWHERE, JUMP, TABLE
-from toolchain.bounds.builder import TRAP, exact, levels_in
-from toolchain.bounds.graph import Block, Step
-from toolchain.bounds.result import Outcome
-from toolchain.bounds.steps import Steps
+from toolchain.bounds.abstract.state import INHERITED, NO_ADDRESS, AbstractState
+from toolchain.bounds.abstract.values import Value, extremes
+from toolchain.bounds.annotations.flow_facts import CALLS_TOO_DEEP, JUMP_PAST_TABLE, JUMP_WITHOUT_TABLE, UNKNOWN_RETURN
+from toolchain.bounds.graph import Block, Instruction
+from toolchain.bounds.result import FunctionResult
+from toolchain.bounds.steps import InstructionExecution
+from toolchain.bounds.transfer import TRAP, is_constant, priority_range
 
-MAX_DEPTH: Final = 60
-MOST_CALLS: Final = 8 * MAX_DEPTH
-"""Calls under way at once, of all functions (DEEP)."""
+MAX_RECURSION: Final = 60
+MAX_CALL_DEPTH: Final = 8 * MAX_RECURSION
+"""Greatest depth of the abstract call stack."""
 RESULTS: Final = frozenset((0, 1))
-"""Results by which the ways through a function are told apart."""
-CHOICE: Final = 6
-"""Most instructions of a block that tells them apart."""
+"""Values of W0 at a return for which separate return states are kept."""
+MAX_TEST_BLOCK: Final = 6
+"""Greatest length of a block after a call that tests such a result."""
 
 
-class Calls(Steps):
-    """One function, once: where control leaves it, and comes back."""
-
-    @abstractmethod
-    def _arrive(self, target: int, state: State) -> None:
-        """Go on at a block with that state."""
+class CallExecution(InstructionExecution):
+    """One abstract execution of a function: calls and returns."""
 
     @abstractmethod
-    def _block(self, block: Block, state: State) -> None:
-        """Run a block and hand its state on."""
+    def _arrive(self, target: int, state: AbstractState) -> None:
+        """Continue at a block with a state."""
 
-    def _goto(self, last: Step, target: Value, state: State) -> None:
+    @abstractmethod
+    def _block(self, block: Block, state: AbstractState) -> None:
+        """Execute a block and pass the resulting states to its successors."""
+
+    def _goto(self, last: Instruction, target: Value, state: AbstractState) -> None:
         inside = self.code.blocks
-        if exact(target) and target in inside and last.pc not in self.code.tails:
+        if is_constant(target) and target in inside and last.pc not in self.code.tail_calls:
             self._arrive(target, state)
             return
-        if last.insn.row.mnemonic == "BRA" and not exact(target):
+        if last.insn.row.mnemonic == "BRA" and not is_constant(target):
             table = self.code.blocks[self._head(last)].following
             if not table:
-                self.outcome.open[last.pc] = JUMP
-            least, most = ends(target)
+                self.result.unbounded[last.pc] = JUMP_WITHOUT_TABLE
+            least, most = extremes(target)
             for place in table:
                 if least <= place <= most:
                     self._arrive(place, state.copy())
             if table and not table[0] <= least <= most <= table[-1]:
-                self.outcome.open[last.pc] = TABLE
+                self.result.unbounded[last.pc] = JUMP_PAST_TABLE
             return
-        targets = [target] if exact(target) else self._unknown(last.pc, state)
+        targets = [target] if is_constant(target) else self._pointer_targets(last.pc, state)
         for place in targets:
             self._enter(last, place, state.copy(), tail=True)
 
-    def _head(self, last: Step) -> int:
+    def _head(self, last: Instruction) -> int:
         return next(head for head, block in self.code.blocks.items() if block.steps[-1] is last)
 
-    def _call(self, last: Step, target: Value, state: State) -> None:
-        targets = [target] if exact(target) else self._unknown(last.pc, state)
+    def _call(self, last: Instruction, target: Value, state: AbstractState) -> None:
+        targets = [target] if is_constant(target) else self._pointer_targets(last.pc, state)
         if not targets:
             returned = state.copy()
-            self._lose_registers(returned)
+            self._forget_registers(returned)
             returned.w[15] = state.w[15] - 4 & 0xFFFF
             self._arrive(last.after, returned)
         for place in targets:
             self._enter(last, place, state.copy(), tail=False, many=len(targets) > 1)
 
-    def _unknown(self, pc: int, state: State) -> list[int]:
-        if not exact(state.w[15]):
-            self._leave(state)
-            return [entry for entry in self.explorer.rules.resumed() if entry not in self.explorer.active]
-        found = self.explorer.rules.calls(pc, state)
+    def _pointer_targets(self, pc: int, state: AbstractState) -> list[int]:
+        if not is_constant(state.w[15]):
+            self._record_stack_switch(state)
+            return [
+                entry for entry in self.explorer.flow_facts.resume_points() if entry not in self.explorer.call_stack
+            ]
+        found = self.explorer.flow_facts.call_targets(pc, state)
         if found is None:
-            self.outcome.open[pc] = "the targets of this call through a pointer are not known"
+            self.result.unbounded[pc] = "the targets of this call through a pointer are not known"
             return []
         return found
 
-    def _enter(self, last: Step, target: int, state: State, tail: bool, many: bool = False) -> None:
-        """Call a function, or jump to it, and go on behind it."""
+    def _enter(self, last: Instruction, target: int, state: AbstractState, tail: bool, many: bool = False) -> None:
+        """Execute a call or tail call and continue after it."""
         explorer = self.explorer
-        if target in explorer.rules.without or explorer.rules.never(last.pc, target):
+        if target in explorer.flow_facts.excluded or explorer.flow_facts.is_never_called(last.pc, target):
             return
         if target == 0:  # a weak function that is not linked
             if not tail:
                 state.w[15] = state.w[15] - 4 & 0xFFFF
                 self._arrive(last.after, state)
             return
-        depth = explorer.active.count(target)
-        allowed = explorer.rules.recursion(target)
-        if len(explorer.active) > MOST_CALLS:
-            self.outcome.open[last.pc] = DEEP
+        depth = explorer.call_stack.count(target)
+        allowed = explorer.flow_facts.recursion_depth(target)
+        if len(explorer.call_stack) > MAX_CALL_DEPTH:
+            self.result.unbounded[last.pc] = CALLS_TOO_DEEP
             return
-        if depth >= (MAX_DEPTH if allowed is None else allowed):
+        if depth >= (MAX_RECURSION if allowed is None else allowed):
             if allowed is None:
-                self.outcome.open[last.pc] = "recursion"
+                self.result.unbounded[last.pc] = "recursion"
             return
-        start, since, stack, waits = state.time, state.since.copy(), state.w[15], state.waits
+        start, since, stack, waits = state.time, state.masked_since.copy(), state.w[15], state.waits
         if not tail:
-            state.flags = State().flags
+            state.flags = AbstractState().flags
         before = state.copy()
         found, general = explorer.call(target, state, many)
-        self.outcome.take(found, start, since, (self.code.entry,))
-        if found.left is not None:
-            self.outcome.waits |= found.waits | waits
-        self.outcome.arguments |= tail and found.arguments
-        level = explorer.rules.back(target)
-        if level is not None and found.left is not None:
+        self.result.merge_call(found, start, since, (self.code.entry,))
+        if found.switch_time is not None:
+            self.result.waits |= found.waits | waits
+        self.result.reads_caller_stack |= tail and found.reads_caller_stack
+        level = explorer.flow_facts.return_level(target)
+        if level is not None and found.switch_time is not None:
             back = state.copy()
-            self._lose_registers(back)
-            back.time, back.ipl, back.waits = found.left, (level, level), frozenset(found.waits)
+            self._forget_registers(back)
+            back.time, back.ipl, back.waits = found.switch_time, (level, level), frozenset(found.waits)
             back.w[15] = stack - 4 & 0xFFFF
             ends = [back]
         else:
-            ends = [self._behind(before, end, found) if general else end.copy() for end in found.ends.values()]
-        rare = explorer.rare(last.pc, target)
-        if rare is not None and ends:
+            ends = [
+                self._after_general_call(before, end, found) if general else end.copy()
+                for end in found.return_states.values()
+            ]
+        share = explorer.call_share(last.pc, target)
+        if share is not None and ends:
             cycles = min(end.time for end in ends)
-            self.outcome.share(*rare, cycles)
+            self.result.exclude_iteration(*share, cycles)
             for end in ends:
                 end.shift(-cycles)
         for end in ends:  # W8-W14 are preserved (abi-elf.md §2.1)
@@ -125,74 +130,76 @@ class Calls(Steps):
                 end.w[8:15] = before.w[8:15]
             end.shift(start)
             end.waits |= waits
-            end.since = [since[k] if s == INHERITED else s for k, s in enumerate(end.since)]
-            self._levels(end, last.pc)
+            end.masked_since = [since[k] if s == INHERITED else s for k, s in enumerate(end.masked_since)]
+            self._update_masking(end, last.pc)
             if tail:
-                self._finish(end)
-            elif len(ends) > 1 and self._decides(last.after):
+                self._record_return(end)
+            elif len(ends) > 1 and self._tests_result(last.after):
                 self._block(self.code.blocks[last.after], end)
             else:
                 self._arrive(last.after, end)
 
-    def _behind(self, before: State, end: State, found: Outcome) -> State:
-        """The caller's state behind a call that was run for all its calls."""
-        private = self.explorer.world.private
+    def _after_general_call(self, before: AbstractState, end: AbstractState, found: FunctionResult) -> AbstractState:
+        """Return the caller's state after a call that was analysed in the general context."""
+        private = self.explorer.model.tracked_words
         new = end.copy()
         new.w = [*end.w[:15], before.w[15] - 4 & 0xFFFF]
         kept = {a: v for a, v in before.mem.items() if (a if a >= 0 else ~a) & ~1 not in private}
-        handed = [*before.w[:8], *(before.mem.values() if found.arguments else ())]
-        shown = min((ends(value)[0] for value in handed if self.area.inside(value)), default=NOWHERE)
-        if found.wild and min(before.leaked, shown) < NOWHERE:
+        handed = [*before.w[:8], *(before.mem.values() if found.reads_caller_stack else ())]
+        shown = min((extremes(value)[0] for value in handed if self.area.points_into(value)), default=NO_ADDRESS)
+        if found.unknown_store and min(before.lowest_leak, shown) < NO_ADDRESS:
             kept = {}
         new.mem = kept | {a: v for a, v in end.mem.items() if (a if a >= 0 else ~a) & ~1 in private}
-        new.leaked = min(before.leaked, shown)
+        new.lowest_leak = min(before.lowest_leak, shown)
         return new
 
-    def _decides(self, head: int) -> bool:
-        """Whether a block does nothing but choose a way: results of a call are kept apart until then."""
+    def _tests_result(self, head: int) -> bool:
+        """Whether a block only tests a result: the return states of a call are kept separate until then."""
         block = self.code.blocks[head]
-        short = len(block.steps) <= CHOICE and block.steps[-1].flow in (Branch, Skip)
+        short = len(block.steps) <= MAX_TEST_BLOCK and block.steps[-1].flow in (Branch, Skip)
         return short and head not in self.code.heads
 
     @staticmethod
-    def _lose_registers(state: State) -> None:
-        """What a call may change (abi-elf.md §2.1)."""
-        fresh = State()
+    def _forget_registers(state: AbstractState) -> None:
+        """Make the caller-saved registers unknown (abi-elf.md §2.1)."""
+        fresh = AbstractState()
         state.w[:8] = fresh.w[:8]
         state.flags = fresh.flags
 
-    def _leave(self, state: State) -> None:
-        """Control goes to another stack."""
-        self.outcome.left = max(self.outcome.left or 0, state.time)
-        self.outcome.waits |= state.waits
+    def _record_stack_switch(self, state: AbstractState) -> None:
+        """Record that control passes to another stack."""
+        self.result.switch_time = max(self.result.switch_time or 0, state.time)
+        self.result.waits |= state.waits
 
     @staticmethod
-    def _restored(state: State, srl: Value, ipl3: Value) -> None:
-        """RETFIE brings the level back that was stacked (isa.md §7.4)."""
-        (low, high), trap = levels_in(srl), ends(ipl3)
+    def _restore_priority(state: AbstractState, srl: Value, ipl3: Value) -> None:
+        """Restore the CPU priority that RETFIE pops from the stack (isa.md §7.4)."""
+        (low, high), trap = priority_range(srl), extremes(ipl3)
         state.ipl = low | (TRAP if trap[0] else 0), high | (TRAP if trap[1] else 0)
 
-    def _return(self, target: Value, state: State) -> None:
-        if not exact(state.w[15]):
-            if not self.explorer.rules.switches(self.code.entry):
-                self.outcome.open[self.code.entry] = ELSEWHERE
-            self._leave(state)
-            state.ipl, state.disi = (0, 0), 0  # whatever level it is, this stack is done with it
-            self._levels(state, self.code.entry)
+    def _return(self, target: Value, state: AbstractState) -> None:
+        if not is_constant(state.w[15]):
+            if not self.explorer.flow_facts.switches_stack(self.code.entry):
+                self.result.unbounded[self.code.entry] = UNKNOWN_RETURN
+            self._record_stack_switch(state)
+            state.ipl, state.disi_end = (0, 0), 0  # masking ends for this stack, whatever the new priority is
+            self._update_masking(state, self.code.entry)
             return
-        self._finish(state)
+        self._record_return(state)
 
-    def _finish(self, state: State) -> None:
+    def _record_return(self, state: AbstractState) -> None:
         top = state.w[15]
         above = (
-            {k for k in state.mem if (at := k if k >= 0 else ~k) >= top and self.area.holds(at)} if exact(top) else ()
+            {k for k in state.mem if (at := k if k >= 0 else ~k) >= top and self.area.contains(at)}
+            if is_constant(top)
+            else ()
         )
         for key in above:
             del state.mem[key]
-        state.w[4:8], state.flags = State().w[4:8], State().flags  # not preserved (abi-elf.md §2.1)
-        if exact(top) and state.leaked >= top:
-            state.leaked = NOWHERE  # what has leaked is gone
+        state.w[4:8], state.flags = AbstractState().w[4:8], AbstractState().flags  # not preserved (abi-elf.md §2.1)
+        if is_constant(top) and state.lowest_leak >= top:
+            state.lowest_leak = NO_ADDRESS  # the frame that leaked no longer exists
         result = state.w[0]
-        shown = result if exact(result) and result in RESULTS else None
-        end = self.outcome.ends.get(shown)
-        self.outcome.ends[shown] = state if end is None else self.area.join(end, state)
+        shown = result if is_constant(result) and result in RESULTS else None
+        end = self.result.return_states.get(shown)
+        self.result.return_states[shown] = state if end is None else self.area.join(end, state)

@@ -1,5 +1,7 @@
-"""Functions of an image as blocks, and the order in which to visit them: Bourdoncle's weak topological order (1993), in
-which every loop, reducible or not, is a component with a head."""
+"""Control-flow graphs of functions, and the order of their analysis: Bourdoncle's weak topological order (1993).
+
+In this order every loop, reducible or not, is a component with a head.
+"""
 
 from __future__ import annotations
 
@@ -13,99 +15,101 @@ from toolchain.elf.disassemble import Item
 
 
 @dataclass(frozen=True, slots=True)
-class Step:
-    """One instruction, with what stays the same however often it runs."""
+class Instruction:
+    """One instruction with its static facts."""
 
     pc: int
     insn: Insn
     after: int
     cycles: int
     pointers: int
-    """Registers it forms source addresses from (emu.dspic30f.isa.facts)."""
+    """Bit mask of registers used as source addresses (emu.dspic30f.isa.facts)."""
     writes: int
     window: int
-    """Cycles a read of the PSV window adds (isa.md §13.3)."""
+    """Additional cycles of a PSV window read (isa.md §13.3)."""
     flow: type | None
 
 
 @dataclass(slots=True)
 class Block:
-    """Instructions that run one after the other; `following` are the blocks of the same function behind it."""
+    """A basic block; `following` are the heads of its successors within the function."""
 
-    steps: list[Step]
+    steps: list[Instruction]
     following: list[int]
-    tested: int | None = None
-    """Which step left the result that the branch at the end asks about (compare.tested)."""
+    flag_setter: int | None = None
+    """Index of the instruction whose result the branch at the end tests (conditions.flag_setter_index)."""
 
 
 @dataclass(slots=True)
 class Loop:
-    """A component: its head, and everything else of it in order."""
+    """A component of the weak topological order: its head, and its other elements in order."""
 
     head: int
-    body: list[Order]
+    body: list[OrderElement]
     members: set[int]
     heads: set[int] = field(default_factory=set)
-    """Where its rounds begin: its head, and those of loops within that are the same loop of the source."""
+    """Where iterations begin: the head, and the heads of inner loops merged with this one."""
 
 
-Order = int | Loop
+OrderElement = int | Loop
 
 
 @dataclass(slots=True)
-class Code:
-    """One function."""
+class FunctionGraph:
+    """The control-flow graph of one function."""
 
     entry: int
     blocks: dict[int, Block] = field(default_factory=dict)
-    order: list[Order] = field(default_factory=list)
+    order: list[OrderElement] = field(default_factory=list)
     heads: set[int] = field(default_factory=set)
     """Heads of loops."""
-    lost: list[int] = field(default_factory=list)
-    """Addresses it leads to where no instruction is."""
-    tails: dict[int, int] = field(default_factory=dict)
-    """Jumps to other functions: place -> target."""
-    ends: set[int] = field(default_factory=set)
+    missing_instructions: list[int] = field(default_factory=list)
+    """Reachable addresses without an instruction."""
+    tail_calls: dict[int, int] = field(default_factory=dict)
+    """Jumps to other functions: address of the jump -> target."""
+    do_ends: set[int] = field(default_factory=set)
     """Last instructions of DO loops."""
-    framed: bool = False
-    """It has a frame of its own (LNK), in which alloca takes room."""
+    has_frame: bool = False
+    """Whether the function has a frame (LNK) that alloca can extend."""
 
 
-def step_at(item: Item) -> Step:
-    """What the explorer needs of an instruction."""
+def instruction_at(item: Item) -> Instruction:
+    """Return an instruction with its static facts."""
     assert item.insn is not None
     facts = facts_of(item.insn)
     row = item.insn.row
     window = 1 if row.psv_class == "mov" else 2
     after = item.address + 2 * len(item.words)
-    return Step(item.address, item.insn, after, row.cycles, facts.source_pointers, facts.writes, window, facts.flow)
+    return Instruction(
+        item.address, item.insn, after, row.cycles, facts.source_pointers, facts.writes, window, facts.flow
+    )
 
 
-class Builder:
-    """Makes `Code` of what starts at an address."""
+class GraphBuilder:
+    """Builds the control-flow graphs of functions."""
 
     def __init__(self, items: Mapping[int, Item], entries: set[int]) -> None:
         self.items, self.entries = items, entries
-        self.steps: dict[int, Step] = {}
+        self.steps: dict[int, Instruction] = {}
 
-    def code(self, entry: int) -> Code:
-        """The function at `entry`."""
-        result = Code(entry)
+    def code(self, entry: int) -> FunctionGraph:
+        """Return the graph of the function at `entry`."""
+        result = FunctionGraph(entry)
         following, heads = self._walk(result)
         for head in sorted(heads):
             steps = [self.steps[head]]
             while (next_pc := self._falls(steps[-1], following)) is not None and next_pc not in heads:
                 steps.append(self.steps[next_pc])
             result.blocks[head] = Block(steps, following[steps[-1].pc])
-        result.order = ordered(entry, {head: block.following for head, block in result.blocks.items()})
-        result.heads = {loop.head for loop in loops_in(result.order)}
+        result.order = weak_topological_order(entry, {head: block.following for head, block in result.blocks.items()})
+        result.heads = {loop.head for loop in all_loops(result.order)}
         return result
 
-    def _falls(self, step: Step, following: dict[int, list[int]]) -> int | None:
+    def _falls(self, step: Instruction, following: dict[int, list[int]]) -> int | None:
         return step.after if following[step.pc] == [step.after] and step.flow not in (Call, Goto) else None
 
-    def _walk(self, result: Code) -> tuple[dict[int, list[int]], set[int]]:
-        """Successors of every instruction, and the first instructions of blocks."""
+    def _walk(self, result: FunctionGraph) -> tuple[dict[int, list[int]], set[int]]:
+        """Return the successors of every instruction, and the first instructions of blocks."""
         following: dict[int, list[int]] = {}
         heads = {result.entry}
         ends: dict[int, int] = {}
@@ -116,30 +120,30 @@ class Builder:
                 continue
             item = self.items.get(pc)
             if item is None or item.insn is None:
-                result.lost.append(pc)
+                result.missing_instructions.append(pc)
                 following[pc] = []
                 heads.discard(pc)
                 continue
             step = self.steps.get(pc)
             if step is None:
-                step = self.steps[pc] = step_at(item)
+                step = self.steps[pc] = instruction_at(item)
             targets = self._targets(result, step, flow_of(step.insn, pc), ends)
             following[pc] = targets
             if targets != [step.after] or step.flow in (Call, Goto):
                 heads.update(targets)
             work += targets
-        result.ends = set(ends)
+        result.do_ends = set(ends)
         for end, start in ends.items():
             if end in following:
                 following[end] = [*following[end], start]
                 heads.update(following[end])
-        for pc in result.lost:
+        for pc in result.missing_instructions:
             del following[pc]
         for pc in following:
             following[pc] = [t for t in following[pc] if t in following]
         return following, {h for h in heads if h in following}
 
-    def _targets(self, result: Code, step: Step, flow: Flow, ends: dict[int, int]) -> list[int]:
+    def _targets(self, result: FunctionGraph, step: Instruction, flow: Flow, ends: dict[int, int]) -> list[int]:
         match flow:
             case Branch(_, target):
                 return [step.after, target]
@@ -148,7 +152,7 @@ class Builder:
                 return [step.after, step.after + 2 * (len(skipped.words) if skipped else 1)]
             case Goto(target) if isinstance(target, int):
                 if target in self.entries and target != result.entry:
-                    result.tails[step.pc] = target
+                    result.tail_calls[step.pc] = target
                     return []
                 return [target]
             case Goto():
@@ -160,7 +164,7 @@ class Builder:
         return [step.after]
 
     def table(self, address: int) -> list[int]:
-        """Entries of a jump table behind BRA Wn: a run of BRA and RETLW (abi-elf.md §8.1)."""
+        """Return the entries of a jump table after BRA Wn: a sequence of BRA and RETLW (abi-elf.md §8.1)."""
         targets: list[int] = []
         while (item := self.items.get(address)) is not None and item.insn is not None:
             name = item.insn.row.mnemonic
@@ -171,13 +175,13 @@ class Builder:
         return targets
 
 
-def ordered(entry: int, graph: Mapping[int, list[int]]) -> list[Order]:
-    """The weak topological order of what can be reached from `entry`."""
+def weak_topological_order(entry: int, graph: Mapping[int, list[int]]) -> list[OrderElement]:
+    """Return the weak topological order of the nodes reachable from `entry`."""
     number = dict.fromkeys(graph, 0)
     stack: list[int] = []
     count = 0
 
-    def visit(node: int, order: list[Order]) -> int:
+    def visit(node: int, order: list[OrderElement]) -> int:
         nonlocal count
         stack.append(node)
         count += 1
@@ -200,7 +204,7 @@ def ordered(entry: int, graph: Mapping[int, list[int]]) -> list[Order]:
         return head
 
     def component(node: int) -> Loop:
-        body: list[Order] = []
+        body: list[OrderElement] = []
         for child in graph[node]:
             if number[child] == 0:
                 visit(child, body)
@@ -209,28 +213,28 @@ def ordered(entry: int, graph: Mapping[int, list[int]]) -> list[Order]:
             members |= part.members if isinstance(part, Loop) else {part}
         return Loop(node, body, members, {node})
 
-    order: list[Order] = []
+    order: list[OrderElement] = []
     if entry in graph:
         visit(entry, order)
     return order
 
 
-def loops_in(order: list[Order]) -> list[Loop]:
-    """All loops, outer ones first."""
+def all_loops(order: list[OrderElement]) -> list[Loop]:
+    """Return all loops, outer ones first."""
     found: list[Loop] = []
     for part in order:
         if isinstance(part, Loop):
-            found += [part, *loops_in(part.body)]
+            found += [part, *all_loops(part.body)]
     return found
 
 
-def joined(order: list[Order], same: set[int]) -> list[Order]:
-    """The order with each loop whose head is in `same` made one with the loop around it."""
-    result: list[Order] = []
+def merge_loops(order: list[OrderElement], same: set[int]) -> list[OrderElement]:
+    """Return the order with each loop whose head is in `same` merged with the enclosing loop."""
+    result: list[OrderElement] = []
     for part in order:
         if isinstance(part, Loop):
-            body: list[Order] = []
-            for inner in joined(part.body, same):
+            body: list[OrderElement] = []
+            for inner in merge_loops(part.body, same):
                 if isinstance(inner, Loop) and inner.head in same:
                     part.heads |= inner.heads
                     body += [inner.head, *inner.body]
@@ -239,6 +243,3 @@ def joined(order: list[Order], same: set[int]) -> list[Order]:
             part.body = body
         result.append(part)
     return result
-
-
-__all__ = ["Block", "Builder", "Code", "Loop", "Order", "Step", "joined", "loops_in", "ordered", "step_at"]

@@ -1,7 +1,7 @@
-"""Entries of an image together: what holds an interrupt back, and stacks with all that interrupts them, by priority.
+"""Interference between entries: response times of interrupts, and stacks under nested interrupts.
 
-What enters: the bound of each entry alone (report.py).  What leaves: responses and stacks.  Both are for interrupts
-that do not come again before their handler has returned.
+In: the bound of each entry in isolation (report.py).  Out: response times and stack depths.  Both assume that an
+interrupt is not requested again before its handler has returned.
 """
 
 from __future__ import annotations
@@ -10,27 +10,29 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import partial
 
-from toolchain.bounds.annotations.rules import SLEEPS, WAITS
+from toolchain.bounds.annotations.flow_facts import CLOCK_STOPPED, WAITS_FOR_INTERRUPT
 from toolchain.bounds.program import Program
-from toolchain.bounds.report import Analyst, Bound
+from toolchain.bounds.report import Bound, BoundAnalysis
 from toolchain.errors import ToolError
 from toolchain.stack.effects import CALL_BYTES
 
 TRAP_LEVEL = 8
 LATENCY = 5
-"""Cycles counted from a request to the handler's first instruction, at least: 4, and one more behind an instruction of
-three (isa.md §14.3)."""
+"""Least cycles from a request to the handler's first instruction: 4, and one more after an instruction of three cycles
+(isa.md §14.3)."""
 ENTRY = 2
-"""Cycles of entry beyond the instruction that a request falls into the first cycle of."""
+"""Cycles of interrupt entry in addition to the instruction in whose first cycle the request occurs."""
 MOST_ORDERS = 12
-"""Interrupts whose nesting is looked at in every order; of more, all are taken to nest."""
+"""Greatest number of interrupts whose nesting orders are enumerated; above it, all are assumed to nest."""
 START = "_main"
 
 
 @dataclass(slots=True)
 class Response:
-    """An interrupt: cycles from the request to its handler's first instruction if every other interrupt comes once
-    meanwhile, and every trap whose handler returns."""
+    """Response of an interrupt: cycles from the request to its handler's first instruction.
+
+    Every other interrupt, and every trap whose handler returns, occurs once in this time.
+    """
 
     name: str
     level: int
@@ -41,124 +43,131 @@ class Response:
 
 @dataclass(slots=True)
 class Report:
-    """Everything about one image."""
+    """Bounds of one image."""
 
     calls: list[Bound]
     threads: list[Bound]
     interrupts: list[Bound]
-    nested: list[Bound]
-    """The same interrupts, entered on the other stack."""
+    on_second_stack: list[Bound]
+    """The same interrupts, entered on the second stack (STACK_AREA)."""
     main: Bound | None = None
-    """What runs in front of threads, or instead of them, whatever was asked for."""
+    """Bound of main, which runs before threads or without them; present whatever functions were requested."""
     responses: list[Response] = field(default_factory=list)
     stacks: dict[str, int | None] = field(default_factory=dict)
-    """Bytes by stack: of main and of each thread with everything that interrupts it, and of the other stack."""
-    open: dict[str, str] = field(default_factory=dict)
-    """Why no response and no stack of several entries is known: source line -> what contradicts the levels told."""
+    """Bytes by stack: main and each thread under nested interrupts, and the second stack."""
+    contradictions: dict[str, str] = field(default_factory=dict)
+    """Why no response and no stack under interrupts is known: source line -> contradiction to an annotated level."""
 
     @property
-    def late(self) -> dict[str, str]:
-        """Why responses have no bound: source line -> what holds interrupts back there for ever, or stops the clock."""
-        rows = [row for row in self.rows if row.held and row.level < TRAP_LEVEL]
+    def unbounded_responses(self) -> dict[str, str]:
+        """Why responses have no bound: source line -> endless masking, or a stopped clock."""
+        rows = [row for row in self.rows if row.masked_for_ever and row.level < TRAP_LEVEL]
         highest: dict[str, int] = {}
         for row in rows:
-            for level, place in row.held.items():
+            for level, place in row.masked_for_ever.items():
                 highest[place] = max(level, highest.get(place, 0))
-        stopped = {row.asleep: SLEEPS for row in self.rows if row.asleep}
+        stopped = {row.clock_stopped_at: CLOCK_STOPPED for row in self.rows if row.clock_stopped_at}
         return stopped | {
             place: f"an endless loop in which levels up to {level} are held back" for place, level in highest.items()
         }
 
     @property
     def rows(self) -> list[Bound]:
-        """Everything looked at on the stack it is entered on, each once."""
+        """All bounds of entries on their own stack, each once."""
         rows = [*self.calls, *self.threads, *self.interrupts]
         return rows if self.main is None or any(row is self.main for row in rows) else [self.main, *rows]
 
 
 def report_of(program: Program, functions: Iterable[str]) -> Report:
-    """Bounds of the named functions, of main, of all threads and interrupts, and what follows for stacks and responses.
+    """Return the bounds of the named functions, main, all threads and interrupts, with response times and stacks.
 
     Raises `ToolError` for a name that is no function.
     """
-    analyst = Analyst(program)
+    analysis = BoundAnalysis(program)
     calls, threads, interrupts, nested = [], [], [], []
     asked: dict[int, Bound] = {}
     for name in functions:
         address = program.address(name)
         if address is None or address not in program.calls.entries:
             raise ToolError(f"no function is called {name}")
-        asked[address] = analyst.bound(name, address, "call")
+        asked[address] = analysis.bound(name, address, "call")
         calls.append(asked[address])
     for entry in program.threads():
-        threads.append(analyst.bound(program.calls.name(entry), entry, "thread"))
+        threads.append(analysis.bound(program.calls.name(entry), entry, "thread"))
     for entry, name, level in program.interrupts():
-        interrupts.append(analyst.bound(name, entry, "interrupt", level))
-        if analyst.other is not None:
-            nested.append(analyst.bound(name, entry, "interrupt", level, on_other=True))
+        interrupts.append(analysis.bound(name, entry, "interrupt", level))
+        if analysis.second_stack is not None:
+            nested.append(analysis.bound(name, entry, "interrupt", level, on_second_stack=True))
     start = program.address(START)
     main = None
     if start is not None and start in program.calls.entries:
-        main = asked.get(start) or analyst.bound(START, start, "main")
+        main = asked.get(start) or analysis.bound(START, start, "main")
     report = Report(calls, threads, interrupts, nested, main)
     for row in (*report.rows, *nested):
-        for place, which in row.levels.items():
-            report.open[place] = f"gives an interrupt another priority than is told (INTERRUPT_LEVEL): {which}"
+        for place, which in row.priority_changes.items():
+            report.contradictions[place] = f"sets an interrupt priority that contradicts INTERRUPT_LEVEL: {which}"
     report.responses = [_response(report, one) for one in interrupts if one.level < TRAP_LEVEL]
-    _stacks(report, analyst)
+    _stacks(report, analysis)
     return report
 
 
 def _response(report: Report, one: Bound) -> Response:
-    """Held back by the longest stretch of anything of a lower level, then by every interrupt of a higher level once, by
-    those of its own level that come first, by traps, and by what DISI in a handler holds back behind its end.
+    """Return the response of an interrupt, the sum of the delays that other entries cause.
 
-    Without nesting (NSTDIS) a handler of a lower level holds back for as long as it runs.
+    - the longest time for which code of a lower level masks the interrupt
+    - one run of every interrupt of the same or a higher level, and of every trap that returns
+    - DISI that continues after the end of a handler
+
+    Without nesting (NSTDIS), a handler of a lower level masks the interrupt as long as it runs.
     """
     level = one.level
-    longest, where, more = 0, "", one.behind
-    known = not report.open and not any(row.asleep for row in report.rows)
-    unnested = any(row.unnested for row in report.rows)
-    latency = max(LATENCY, ENTRY + max(row.slowest for row in report.rows))
+    longest, where, more = 0, "", one.disi_after_return
+    known = not report.contradictions and not any(row.clock_stopped_at for row in report.rows)
+    unnested = any(row.nesting_disabled_at for row in report.rows)
+    latency = max(LATENCY, ENTRY + max(row.longest_instruction for row in report.rows))
     for other in report.rows:
         if other is one or (other.level >= TRAP_LEVEL and not other.returns):
             continue
         if other.level >= level:
             known &= other.cycles is not None
-            more += (other.cycles or 0) + other.behind + latency
+            more += (other.cycles or 0) + other.disi_after_return + latency
             continue
         cycles, place = other.masked.get(level, (0, ""))
         if unnested and other.kind == "interrupt":
             known &= other.cycles is not None
-            cycles, place = max(cycles, other.cycles or 0), place or other.unnested
-        if other.kind == "interrupt" and other.behind:
+            cycles, place = max(cycles, other.cycles or 0), place or other.nesting_disabled_at
+        if other.kind == "interrupt" and other.disi_after_return:
             more += cycles
         elif cycles > longest:
             longest, where = cycles, f"{place} in {other.name}"
-        known &= level not in other.held and all(why == WAITS for why in other.open.values())
+        known &= level not in other.masked_for_ever and all(
+            why == WAITS_FOR_INTERRUPT for why in other.unbounded.values()
+        )
     return Response(one.name, level, longest if known else None, where, longest + more + latency if known else None)
 
 
-def _stacks(report: Report, analyst: Analyst) -> None:
-    """Each stack with the deepest chain of interrupts on top."""
+def _stacks(report: Report, analysis: BoundAnalysis) -> None:
+    """Compute the depth of each stack under the deepest chain of nested interrupts."""
 
     def known(*parts: Bound) -> bool:
-        return not report.open and all(part.stack_is_known for part in parts)
+        return not report.contradictions and all(part.stack_is_known for part in parts)
 
     on_thread = partial(_on_top, report.interrupts)
-    on_other = partial(_on_top, report.nested)
+    on_second_stack = partial(_on_top, report.on_second_stack)
     users = report.threads if report.main is None else [report.main, *report.threads]
     for user in users:
         total = max((depth + on_thread(level) for level, depth in user.stack.items()), default=0)
         report.stacks[user.name] = CALL_BYTES + total if known(user, *report.interrupts) else None
-    if analyst.other is not None:
-        depths = [depth + on_other(level) for row in report.rows for level, depth in row.other.items()]
-        report.stacks["kernel stack"] = max(depths, default=0) if known(*report.rows, *report.nested) else None
+    if analysis.second_stack is not None:
+        depths = [depth + on_second_stack(level) for row in report.rows for level, depth in row.second_stack.items()]
+        report.stacks["kernel stack"] = max(depths, default=0) if known(*report.rows, *report.on_second_stack) else None
 
 
 def _on_top(interrupts: list[Bound], level: int) -> int:
-    """Bytes that interrupts above a level can put on a stack, one within the other, each once: of rising priority, or
-    within one that lowers the priority it came with."""
+    """Return the greatest bytes that nested interrupts above a level use, each at most once.
+
+    An interrupt nests in one of lower priority, or in one that has lowered its own priority.
+    """
     able = [one for one in interrupts if one.level < TRAP_LEVEL and one.stack]
     if len(able) > MOST_ORDERS and any(at < one.level for one in able for at in one.stack):
         return sum(CALL_BYTES + one.bytes for one in able)

@@ -1,97 +1,101 @@
-"""What a run of one function found: its ends, stacks, masked times, and what has no bound."""
+"""Result of the abstract execution of one function."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
-from toolchain.bounds.abstract.state import INHERITED, State
+from toolchain.bounds.abstract.state import INHERITED, AbstractState
 
 Scope = tuple[int | None, str]
-"""Rounds that are counted together: those in one call of the function at an address (None: in all), and which."""
+"""Scope of shared iterations: function whose calls they are counted in (None: whole analysis), and annotation text."""
 
 
 @dataclass(slots=True)
-class Outcome:
-    """What a run of one function found.  Addresses are program addresses, times cycles."""
+class FunctionResult:
+    """Result of the abstract execution of one function.  Addresses are program addresses, times are cycles."""
 
-    ends: dict[int | None, State] = field(default_factory=dict)
-    """At its return, by the number in W0 where it is small and known; without any it never returns."""
+    return_states: dict[int | None, AbstractState] = field(default_factory=dict)
+    """States at the return, by the value of W0 if known and small; empty if the function never returns."""
     peak: dict[tuple[int, int], tuple[int, tuple[int, ...]]] = field(default_factory=dict)
-    """By stack and CPU priority: the highest address used, and the functions on the way there."""
+    """By stack and CPU priority: the highest address used, and the call chain that reaches it."""
     masked: dict[int, tuple[int, int]] = field(default_factory=dict)
-    """By level: longest time it was held back, and where it ended; complete stretches only."""
-    prefix: dict[int, tuple[int, int]] = field(default_factory=dict)
-    """The same for stretches that began before the call, from the call on."""
-    open: dict[int, str] = field(default_factory=dict)
-    """What has no bound: address -> why."""
-    forever: set[int] = field(default_factory=set)
-    """Heads of loops without a way out."""
-    left: int | None = None
-    """Longest time to a change to another stack, from which it does not return by itself."""
-    wild: bool = False
-    """It stores where the address says nothing."""
-    arguments: bool = False
-    """It reads its caller's part of the stack."""
+    """By level: longest masked time that began within the call, and where it ended."""
+    masked_prefix: dict[int, tuple[int, int]] = field(default_factory=dict)
+    """By level: longest masked time, counted from the call, that began before it, and where it ended."""
+    unbounded: dict[int, str] = field(default_factory=dict)
+    """FunctionGraph without a bound: address -> reason."""
+    endless_loops: set[int] = field(default_factory=set)
+    """Heads of endless loops."""
+    switch_time: int | None = None
+    """Longest time to a switch to another stack, None without one."""
+    unknown_store: bool = False
+    """Whether it stores through an unknown address."""
+    reads_caller_stack: bool = False
+    """Whether it reads its caller's part of the stack."""
     visited: set[int] = field(default_factory=set)
-    """Functions run."""
+    """Functions executed."""
     waits: set[int] = field(default_factory=set)
-    """PWRSAV on the ways to another stack; those on the ways to its return are in `ends`."""
-    asleep: set[int] = field(default_factory=set)
-    """PWRSAV #0 on any way: it stops the clock."""
-    held: dict[int, int] = field(default_factory=dict)
-    """Levels held back for ever: level -> head of the endless loop."""
-    slowest: int = 0
-    """Most cycles from one instruction boundary to the next."""
-    unnested: set[int] = field(default_factory=set)
-    """Where it turns the nesting of interrupts off (INTCON1.NSTDIS)."""
-    levels: dict[int, str] = field(default_factory=dict)
-    """Where it gives an interrupt another priority than is told: place -> which."""
-    shared: dict[Scope, tuple[int, int]] = field(default_factory=dict)
-    """Rounds of loops that its times leave out (`Explorer.sharing`): the longest of them, and how many in all."""
+    """PWRSAV on paths to a stack switch; PWRSAV on paths to a return is in the return states."""
+    clock_stops: set[int] = field(default_factory=set)
+    """PWRSAV #0 on any path: it stops the clock."""
+    masked_for_ever: dict[int, int] = field(default_factory=dict)
+    """Levels masked for ever: level -> head of the endless loop."""
+    longest_instruction: int = 0
+    """Greatest number of cycles between two instruction boundaries."""
+    nesting_disabled: set[int] = field(default_factory=set)
+    """Where interrupt nesting is disabled (INTCON1.NSTDIS)."""
+    priority_changes: dict[int, str] = field(default_factory=dict)
+    """Where a priority is set that contradicts an annotation: address -> interrupt."""
+    shared_iterations: dict[Scope, tuple[int, int]] = field(default_factory=dict)
+    """Shared iterations that its times exclude, by scope: cost of the longest, and their number."""
 
-    def share(self, scope: Scope, total: int, cycles: int) -> None:
-        """Leave out a round of a loop, of so many in all."""
-        most = self.shared.get(scope, (0, 0))
-        self.shared[scope] = max(most[0], cycles), max(most[1], total)
+    def exclude_iteration(self, scope: Scope, total: int, cycles: int) -> None:
+        """Exclude one iteration from the times and record it in its scope.
 
-    def rounds_of(self, entry: int | None) -> int:
-        """Cycles of the rounds left out that belong to the calls of a function, or to no call."""
-        return sum(cycles * total for (of, _), (cycles, total) in self.shared.items() if of == entry)
+        total   number of iterations in the scope
+        cycles  cost of this one
+        """
+        most = self.shared_iterations.get(scope, (0, 0))
+        self.shared_iterations[scope] = max(most[0], cycles), max(most[1], total)
 
-    def take(self, other: Outcome, start: int, since: list[int | None], caller: tuple[int, ...]) -> None:
-        """Add what a call, made at time `start`, found."""
+    def excluded_cycles(self, entry: int | None) -> int:
+        """Return the cycles of the excluded iterations in scopes of a function, None for the whole analysis."""
+        return sum(cycles * total for (of, _), (cycles, total) in self.shared_iterations.items() if of == entry)
+
+    def merge_call(self, other: FunctionResult, start: int, since: list[int | None], caller: tuple[int, ...]) -> None:
+        """Merge the result of a call made at time `start`."""
         for stack, (top, chain) in other.peak.items():
             if top > self.peak.get(stack, (-1,))[0]:
                 self.peak[stack] = top, caller + chain
         for level, (cycles, where) in other.masked.items():
-            self.longer(self.masked, level, cycles, where)
-        for level, (cycles, where) in other.prefix.items():
+            self.keep_longest(self.masked, level, cycles, where)
+        for level, (cycles, where) in other.masked_prefix.items():
             began = since[level]
             if began == INHERITED:
-                self.longer(self.prefix, level, start + cycles, where)
+                self.keep_longest(self.masked_prefix, level, start + cycles, where)
             elif began is not None:
-                self.longer(self.masked, level, start + cycles - began, where)
-        self.open.update(other.open)
-        self.forever |= other.forever
+                self.keep_longest(self.masked, level, start + cycles - began, where)
+        self.unbounded.update(other.unbounded)
+        self.endless_loops |= other.endless_loops
         self.visited |= other.visited
-        self.wild |= other.wild
-        self.asleep |= other.asleep
-        self.held = other.held | self.held
-        self.slowest = max(self.slowest, other.slowest)
-        self.unnested |= other.unnested
-        self.levels |= other.levels
-        for scope, (cycles, total) in other.shared.items():
-            self.share(scope, total, cycles)
-        if other.left is not None:
-            self.left = max(self.left or 0, start + other.left)
+        self.unknown_store |= other.unknown_store
+        self.clock_stops |= other.clock_stops
+        self.masked_for_ever = other.masked_for_ever | self.masked_for_ever
+        self.longest_instruction = max(self.longest_instruction, other.longest_instruction)
+        self.nesting_disabled |= other.nesting_disabled
+        self.priority_changes |= other.priority_changes
+        for scope, (cycles, total) in other.shared_iterations.items():
+            self.exclude_iteration(scope, total, cycles)
+        if other.switch_time is not None:
+            self.switch_time = max(self.switch_time or 0, start + other.switch_time)
 
-    def moved(self, stack: int, distance: int) -> Outcome:
-        """The same, entered that many bytes further up a stack."""
+    def relocated(self, stack: int, distance: int) -> FunctionResult:
+        """Return the same result for an entry `distance` bytes higher on a stack."""
         peak = {k: (top + distance if k[0] == stack else top, chain) for k, (top, chain) in self.peak.items()}
         return replace(self, peak=peak)
 
     @staticmethod
-    def longer(table: dict[int, tuple[int, int]], level: int, cycles: int, where: int) -> None:
-        """Keep the longest."""
+    def keep_longest(table: dict[int, tuple[int, int]], level: int, cycles: int, where: int) -> None:
+        """Record a masked time if it is the longest of its level."""
         if cycles > table.get(level, (-1, 0))[0]:
             table[level] = cycles, where

@@ -1,4 +1,4 @@
-"""Which functions a pointer of a type can call: those of the same signature, from the debug information."""
+"""Signatures of functions and function types, from the debug information: possible targets of typed pointers."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class Signatures:
 
 
 def _target(die: Any) -> Any:
-    """What a type or an object is of, behind its qualifiers and other names; None for void."""
+    """Return the type of a DIE without qualifiers and typedefs, None for void."""
     while die is not None and "DW_AT_type" in die.attributes:
         die = die.get_DIE_from_attribute("DW_AT_type")
         if die.tag not in _STRIPPED:
@@ -52,7 +52,7 @@ def _target(die: Any) -> Any:
 
 
 def _kind(die: Any) -> str:
-    """What matters of a type in a call: pointers are alike, integers differ by size."""
+    """Return the calling-convention class of a type: all pointers are equal, integers differ by size."""
     if die is None:
         return "void"
     if die.tag == "DW_TAG_pointer_type":

@@ -1,164 +1,171 @@
-"""Instructions on sets of values: what each does to a state, its time, the stack's peak and the levels held back."""
+"""TransferFunctions execution of single instructions: state, cycles, stack depth and masked levels."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from emu.dspic30f.isa.flow import Branch, Disi, Do, Flow, Repeat, Return, Skip, Sleep
-from toolchain.bounds.abstract.state import INHERITED, LEVELS, State, widened
-from toolchain.bounds.abstract.values import ends
-from toolchain.bounds.annotations.rules import MOVED, NESTED
-from toolchain.bounds.builder import exact
-from toolchain.bounds.graph import Code, Step
-from toolchain.bounds.result import Outcome
+from toolchain.bounds.abstract.state import INHERITED, LEVELS, AbstractState, widen
+from toolchain.bounds.abstract.values import extremes
+from toolchain.bounds.annotations.flow_facts import DO_LOOPS_TOO_DEEP, VARIABLE_FRAME
+from toolchain.bounds.contexts import CallContexts
+from toolchain.bounds.graph import FunctionGraph, Instruction
+from toolchain.bounds.result import FunctionResult
+from toolchain.bounds.transfer import is_constant
 
-if TYPE_CHECKING:
-    from toolchain.bounds.explore import Explorer
-
-TAKEN: Final[dict[type, int]] = {Branch: 1, Skip: 2, Return: -1}
-"""What a branch or a skip adds at most to the cycles of its row, and what a return is shorter by if an interrupt waits
+BRANCH_CYCLES: Final[dict[type, int]] = {Branch: 1, Skip: 2, Return: -1}
+"""Greatest additional cycles of a branch or skip; a return is one cycle shorter if an interrupt is pending
 (isa.md §14.3)."""
 DO_LEVELS: Final = 2
-"""Open DO loops that the core keeps (isa.md §7.6)."""
+"""Nesting depth of DO loops that the core supports (isa.md §7.6)."""
 REPEATED_WINDOW: Final = 4
-"""Cycles that a read of the PSV window adds to all iterations of a REPEAT (isa.md §13.3)."""
+"""Additional cycles of PSV window reads over all iterations of a REPEAT (isa.md §13.3)."""
 REPEATS: Final = 600
-"""Iterations of REPEAT run one by one; behind that only their number counts."""
+"""Iterations of REPEAT that are executed one by one; of further ones only the number counts."""
 
 
-class Steps:
-    """One function, once: its instructions one by one."""
+class InstructionExecution:
+    """One abstract execution of a function: its instructions."""
 
-    def __init__(self, explorer: Explorer, code: Code) -> None:
+    def __init__(self, explorer: CallContexts, code: FunctionGraph) -> None:
         self.explorer, self.code = explorer, code
-        self.area: Final = explorer.world.area
-        self.outcome: Final = Outcome(visited={code.entry})
+        self.area: Final = explorer.model.stack_areas
+        self.result: Final = FunctionResult(visited={code.entry})
         self.floor = 0
-        """Where its own part of the stack begins."""
+        """Lowest stack address of the function's own frame."""
 
-    def _step(self, step: Step, state: State) -> Flow:
+    def _step(self, step: Instruction, state: AbstractState) -> Flow:
         if state.repeat is not None:
             return self._repeated(step, state)
-        abstract = self.explorer.abstract
-        level, top, start, blocked = state.ipl, state.w[15], state.time, state.disi
+        transfer = self.explorer.transfer
+        level, top, start, blocked = state.ipl, state.w[15], state.time, state.disi_end
         state.time += step.cycles + (state.stall & step.pointers != 0)
-        abstract.begin(step.pc, state)
-        flow: Flow = step.insn.row.does(abstract, step.insn.x)
-        abstract.commit()
+        transfer.begin(step.pc, state)
+        flow: Flow = step.insn.row.does(transfer, step.insn.x)
+        transfer.commit()
         state.stall = step.writes
-        if abstract.window:
+        if transfer.reads_window:
             state.time += step.window
-        if abstract.wild:
-            self.outcome.wild, abstract.wild = True, False
-        self._notice(step)
-        if self.code.framed and exact(top) and not exact(state.w[15]):
-            self.outcome.open[step.pc] = MOVED  # what changes stacks has no frame
-        self._peak(state)
+        if transfer.unknown_store:
+            self.result.unknown_store, transfer.unknown_store = True, False
+        self._record_effects(step)
+        if self.code.has_frame and is_constant(top) and not is_constant(state.w[15]):
+            self.result.unbounded[step.pc] = VARIABLE_FRAME  # functions that switch stacks have no frame
+        self._record_stack_depth(state)
         match flow:
             case Repeat(count):
                 state.repeat = count
             case Do(count, end):
-                if len(state.loops) >= DO_LEVELS:
-                    self.outcome.open[step.pc] = NESTED
-                state.loops = (*state.loops, (step.after, end, count))
+                if len(state.do_loops) >= DO_LEVELS:
+                    self.result.unbounded[step.pc] = DO_LOOPS_TOO_DEEP
+                state.do_loops = (*state.do_loops, (step.after, end, count))
             case Sleep(mode):
                 state.waits |= {step.pc}
                 if mode == "sleep":
-                    self.outcome.asleep.add(step.pc)
+                    self.result.clock_stops.add(step.pc)
             case Disi(count):
-                state.disi = max(state.disi, state.time + count + 1)
-        taken = TAKEN.get(step.flow, 0) if step.flow is not None else 0
-        self.outcome.slowest = max(self.outcome.slowest, state.time - start + taken)
-        if level != state.ipl or blocked or state.disi:
-            self._levels(state, step.pc)
+                state.disi_end = max(state.disi_end, state.time + count + 1)
+        taken = BRANCH_CYCLES.get(step.flow, 0) if step.flow is not None else 0
+        self.result.longest_instruction = max(self.result.longest_instruction, state.time - start + taken)
+        if level != state.ipl or blocked or state.disi_end:
+            self._update_masking(state, step.pc)
         return flow
 
-    def _repeated(self, step: Step, state: State) -> Flow:
-        """The target of REPEAT (isa.md §7.5, §13.3): an access to the window costs in its first and last iteration."""
-        abstract, count = self.explorer.abstract, state.repeat
+    def _repeated(self, step: Instruction, state: AbstractState) -> Flow:
+        """Execute the target of REPEAT; PSV window reads cost in its first and last iteration (isa.md §7.5, §13.3)."""
+        transfer, count = self.explorer.transfer, state.repeat
         state.repeat = None
-        least, most = ends(count)
+        least, most = extremes(count)
         again = int(step.writes & step.pointers != 0)
         state.time += step.cycles + (state.stall & step.pointers != 0) + most * (step.cycles + again)
         window = False
-        result: State | None = None
+        result: AbstractState | None = None
         current, level = state, state.ipl
         for turn in range(min(most, REPEATS) + 1):
-            abstract.begin(step.pc, current)
-            step.insn.row.does(abstract, step.insn.x)
-            abstract.commit()
-            window |= abstract.window
-            self.outcome.wild |= abstract.wild
-            self._notice(step)
-            self._peak(current)
+            transfer.begin(step.pc, current)
+            step.insn.row.does(transfer, step.insn.x)
+            transfer.commit()
+            window |= transfer.reads_window
+            self.result.unknown_store |= transfer.unknown_store
+            self._record_effects(step)
+            self._record_stack_depth(current)
             if turn >= least and turn < most:
                 result = current.copy() if result is None else self.area.join(result, current)
         if most > REPEATS:
-            current = self._many(step, current, most)
+            current = self._long_repeat(step, current, most)
         final = current if result is None else self.area.join(result, current)
         state.w, state.flags, state.mem = final.w, final.flags, final.mem
-        state.regs, state.leaked, state.ipl, state.loops = final.regs, final.leaked, final.ipl, final.loops
+        state.regs, state.lowest_leak, state.ipl, state.do_loops = (
+            final.regs,
+            final.lowest_leak,
+            final.ipl,
+            final.do_loops,
+        )
         state.stall = step.writes
-        self.outcome.slowest = max(self.outcome.slowest, step.cycles + 1 + (REPEATED_WINDOW if window else 0))
+        self.result.longest_instruction = max(
+            self.result.longest_instruction, step.cycles + 1 + (REPEATED_WINDOW if window else 0)
+        )
         if window:
             state.time += step.window if not most else max(step.window if not least else 0, REPEATED_WINDOW)
-        if level != state.ipl or state.disi:
-            self._levels(state, step.pc)
+        if level != state.ipl or state.disi_end:
+            self._update_masking(state, step.pc)
         return None
 
-    def _many(self, step: Step, state: State, most: int) -> State:
-        """Registers a long REPEAT has changed, and what it may have stored."""
+    def _long_repeat(self, step: Instruction, state: AbstractState, most: int) -> AbstractState:
+        """Return the state after a REPEAT of more than REPEATS iterations: what it changes becomes unknown."""
         before = state.copy()
-        abstract = self.explorer.abstract
+        transfer = self.explorer.transfer
         for _ in range(2):
-            abstract.begin(step.pc, state)
-            step.insn.row.does(abstract, step.insn.x)
-            abstract.commit()
-        wide = widened(before, state)
-        if not exact(wide.w[15]):
-            self.outcome.open[step.pc] = "pushes an unknown number of times"
-        wide.mem = {a: v for a, v in wide.mem.items() if (a if a >= 0 else ~a) & ~1 in self.explorer.world.private}
-        wide.leaked = 0
+            transfer.begin(step.pc, state)
+            step.insn.row.does(transfer, step.insn.x)
+            transfer.commit()
+        wide = widen(before, state)
+        if not is_constant(wide.w[15]):
+            self.result.unbounded[step.pc] = "pushes an unknown number of times"
+        wide.mem = {
+            a: v for a, v in wide.mem.items() if (a if a >= 0 else ~a) & ~1 in self.explorer.model.tracked_words
+        }
+        wide.lowest_leak = 0
         return wide
 
-    def _notice(self, step: Step) -> None:
-        """What the instruction did that concerns the whole function."""
-        abstract = self.explorer.abstract
-        if abstract.refused is not None:
-            self.outcome.open[step.pc] = abstract.refused
-        self.outcome.arguments |= abstract.lowest < self.floor
-        if abstract.unnested:
-            self.outcome.unnested.add(step.pc)
-            abstract.unnested = False
-        if abstract.level is not None:
-            self.outcome.levels[step.pc] = abstract.level
-            abstract.level = None
+    def _record_effects(self, step: Instruction) -> None:
+        """Record effects of an instruction that concern the whole function."""
+        transfer = self.explorer.transfer
+        if transfer.unbounded_reason is not None:
+            self.result.unbounded[step.pc] = transfer.unbounded_reason
+        self.result.reads_caller_stack |= transfer.lowest_stack_read < self.floor
+        if transfer.disabled_nesting:
+            self.result.nesting_disabled.add(step.pc)
+            transfer.disabled_nesting = False
+        if transfer.priority_change is not None:
+            self.result.priority_changes[step.pc] = transfer.priority_change
+            transfer.priority_change = None
 
     # -- what is measured ----------------------------------------------------------------------------------------
 
-    def _peak(self, state: State) -> None:
+    def _record_stack_depth(self, state: AbstractState) -> None:
         top = state.w[15]
-        if exact(top):
+        if is_constant(top):
             for number, (lo, hi) in enumerate(self.area.ranges):
                 key = number, state.ipl[0]
-                if lo <= top <= hi and top > self.outcome.peak.get(key, (-1,))[0]:
-                    self.outcome.peak[key] = top, (self.code.entry,)
-        elif self.code.framed and self.area.inside(top):
-            self.outcome.open.setdefault(self.code.entry, MOVED)
+                if lo <= top <= hi and top > self.result.peak.get(key, (-1,))[0]:
+                    self.result.peak[key] = top, (self.code.entry,)
+        elif self.code.has_frame and self.area.points_into(top):
+            self.result.unbounded.setdefault(self.code.entry, VARIABLE_FRAME)
 
-    def _levels(self, state: State, pc: int) -> None:
-        """Begin and end the stretches in which levels are held back."""
-        blocked = state.disi > state.time
+    def _update_masking(self, state: AbstractState, pc: int) -> None:
+        """Begin or end masked times of levels."""
+        blocked = state.disi_end > state.time
         if not blocked:
-            state.disi = 0
+            state.disi_end = 0
         for level in range(1, LEVELS):
-            since = state.since[level]
+            since = state.masked_since[level]
             if state.ipl[1] >= level or (blocked and level < LEVELS - 1):
                 if since is None:
-                    state.since[level] = state.time
+                    state.masked_since[level] = state.time
             elif since is not None:
                 if since == INHERITED:
-                    Outcome.longer(self.outcome.prefix, level, state.time, pc)
+                    FunctionResult.keep_longest(self.result.masked_prefix, level, state.time, pc)
                 else:
-                    Outcome.longer(self.outcome.masked, level, state.time - since, pc)
-                state.since[level] = None
+                    FunctionResult.keep_longest(self.result.masked, level, state.time - since, pc)
+                state.masked_since[level] = None

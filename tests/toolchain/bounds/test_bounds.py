@@ -10,9 +10,9 @@ import pytest
 from emu.image.loader import load_image
 from tests.fuzz.fuzz_bounds import examine, measure
 from tests.toolchain.c_programs import build
-from toolchain.bounds.annotations.notes import read_notes
+from toolchain.bounds.annotations.reader import read_annotation_section
 from toolchain.bounds.program import Program
-from toolchain.bounds.report import Analyst
+from toolchain.bounds.report import BoundAnalysis
 from toolchain.cli import main
 from toolchain.elf.read import read_executable
 from toolchain.stack.annotations import Annotations
@@ -157,7 +157,7 @@ def test_a_loop_over_a_list_is_named_with_its_line(tmp_path, capsys) -> None:
 
 
 def test_an_annotated_loop_is_bounded_by_its_note(tmp_path, capsys) -> None:
-    """Eight rounds here; each round more that the note allows costs the same."""
+    """Eight rounds here; each round more that the annotation allows costs the same."""
     image = built(tmp_path, LIST.replace("NOTE", "LOOP_BOUND(n + 1);"))
     seen = measure(image)
     assert isinstance(seen, dict)
@@ -165,7 +165,7 @@ def test_an_annotated_loop_is_bounded_by_its_note(tmp_path, capsys) -> None:
     seven, eight, nine = (report(capsys, image, "--let", f"n={n}")["cycles"] for n in (7, 8, 9))
     assert seen["_main"].cycles <= seven
     assert nine - eight == eight - seven > 0
-    assert report(capsys, image, "--let", "n=2")["cycles"] < seen["_main"].cycles  # the note is what counts
+    assert report(capsys, image, "--let", "n=2")["cycles"] < seen["_main"].cycles  # the annotation is what counts
 
 
 @pytest.mark.parametrize("level", ["-Os", "-O1", "-O2"])
@@ -317,18 +317,21 @@ def test_room_of_unknown_length_is_no_other_stack(level: str, called: str, tmp_p
     seen = measure(tmp_path / "a.elf")
     assert not isinstance(seen, str), seen
     executable = read_executable((tmp_path / "a.elf").read_bytes(), "a.elf")
-    program = Program(executable, Annotations(), read_notes(executable, {}))
+    program = Program(executable, Annotations(), read_annotation_section(executable, {}))
     address = program.address("_main")
     assert address is not None
-    bound = Analyst(program).bound("_main", address, "call", 0)
+    bound = BoundAnalysis(program).bound("_main", address, "call", 0)
     assert bound.cycles is None or bound.cycles >= seen["_main"].cycles
     assert not bound.stack_is_known or bound.bytes >= seen["_main"].stack
-    assert any("room of a length" in why for why in bound.open.values()) or bound.cycles is not None
+    assert (
+        any("allocates an unknown number of bytes" in why for why in bound.unbounded.values())
+        or bound.cycles is not None
+    )
 
 
 @pytest.mark.parametrize("level", ["-O0", "-Os"])
 def test_notes_are_no_variables_of_the_program(tmp_path: Path, level: str) -> None:
-    """What DWARF knows stands in data memory: a note's place in its section is no address there."""
+    """What DWARF knows stands in data memory: an annotation's place in its section is no address there."""
     image = load_image(str(built(tmp_path, LIST.replace("NOTE", "LOOP_BOUND(8);"), level)))
     assert set(image.lines.files) <= {symbol.address for symbol in image.symbols.all if symbol.space == "data"}
     head = image.symbols.find("_head")

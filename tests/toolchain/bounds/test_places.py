@@ -1,4 +1,4 @@
-"""Notes are of one place: the line, the function and the file they stand in, the call and the loop they speak of."""
+"""Annotations apply to one line, function and file, and to one call or loop."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ volatile int wanted = 2;
 __attribute__((noinline)) void work(void)
 {{
     for (int i = 0; i < 10; i++) {{
-        if (wanted == i) {{ {note} mend();
+        if (wanted == i) {{ {annotation} mend();
         }}
         mend();
     }}
@@ -32,7 +32,7 @@ struct item {{ struct item *next; }} items_{name}[{count}], *volatile head_{name
 __attribute__((noinline)) static int length(struct item *p)
 {{
     int c = 0;
-    {note}
+    {annotation}
     for (; p; p = p->next) c++;
     return c;
 }}
@@ -50,7 +50,7 @@ volatile int odd;
 __attribute__((noinline)) struct item *after(struct item *p) {{ return p->next; }}
 __attribute__((noinline)) int visit(struct item *p, int key)
 {{
-    {note}
+    {annotation}
     while ((p = after(p)) != 0) {{
         if (p->key != key)
             continue;
@@ -94,7 +94,7 @@ def cycles(image: Path) -> int:
 @pytest.mark.parametrize("level", ["-Os", "-O2"])
 def test_a_note_of_one_call_says_nothing_about_the_next_line(tmp_path: Path, capsys, level: str) -> None:
     """Both lines call mend(); it is only the first that is made once."""
-    text = TWICE.format(slow=SLOW.format("", 999), note="CALL_SHARE(mend, work, 1);")
+    text = TWICE.format(slow=SLOW.format("", 999), annotation="CALL_SHARE(mend, work, 1);")
     image = built(tmp_path, text, level)
     assert cycles(image) <= report(capsys, image)["cycles"] <= 1.1 * cycles(image)
     image = built(tmp_path, text.replace("CALL_SHARE(mend, work, 1)", "CALL_IF(mend, 0)"), level)
@@ -102,16 +102,16 @@ def test_a_note_of_one_call_says_nothing_about_the_next_line(tmp_path: Path, cap
 
 
 @pytest.mark.parametrize(
-    ("note", "message"),
+    ("annotation", "message"),
     [
         ("CALL_SHARE(work, work, 1);", "program.c:9: no call of work stands in line 9"),
         ("CALL_IF(other, 0);", "program.c:9: no call of other stands in line 9"),
         ("CALL_SHARE(mend, work, );", "program.c:9: expected 3 arguments, got 'mend work'"),
     ],
 )
-def test_a_note_of_no_call_is_refused(tmp_path: Path, capsys, note: str, message: str) -> None:
+def test_a_note_of_no_call_is_refused(tmp_path: Path, capsys, annotation: str, message: str) -> None:
     """With its place."""
-    image = built(tmp_path, TWICE.format(slow=SLOW.format("", 9), note=note))
+    image = built(tmp_path, TWICE.format(slow=SLOW.format("", 9), annotation=annotation))
     assert main(["bounds", str(image)]) == 2
     assert message in capsys.readouterr().err
 
@@ -120,17 +120,17 @@ def test_a_note_behind_all_code_is_refused(tmp_path: Path, capsys) -> None:
     """Nothing could come of it."""
     text = "#include <bounds.h>\nvolatile int a;\nint main(void)\n{\n    a = 2;\n    return 0;\n    LOOP_BOUND(3);\n}\n"
     assert main(["bounds", str(built(tmp_path, text))]) == 2
-    assert "program.c:7: no code of main stands behind this note" in capsys.readouterr().err
+    assert "program.c:7: main has no code after this annotation" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("lto", [[], ["-fno-lto"]])
 def test_static_functions_of_one_name_are_told_apart(tmp_path: Path, capsys, lto: list[str]) -> None:
-    """In files and folders of one name, with notes of the same line: 40 items in one list, 5 in the other."""
+    """In files and folders of one name, with annotations of the same line: 40 items in one list, 5 in the other."""
     sources = []
-    for name, count, note in (("one", 40, "LOOP_BOUND(40);"), ("two", 5, "LOOP_BOUND(5);")):
+    for name, count, annotation in (("one", 40, "LOOP_BOUND(40);"), ("two", 5, "LOOP_BOUND(5);")):
         (tmp_path / name / "part").mkdir(parents=True)
         sources.append(tmp_path / name / "part" / "list.c")
-        sources[-1].write_text(PART.format(name=name, count=count, note=note))
+        sources[-1].write_text(PART.format(name=name, count=count, annotation=annotation))
     (tmp_path / "main.c").write_text(
         "int walk_one(void), walk_two(void); int main(void) { return walk_one() + walk_two(); }"
     )
@@ -153,7 +153,7 @@ def test_static_functions_of_one_name_are_told_apart(tmp_path: Path, capsys, lto
 
 def test_a_static_function_of_another_file_is_named_with_it(tmp_path: Path, capsys) -> None:
     """`list.c/length` from main.c, however it is spaced; without its file it is none that main.c can see."""
-    (tmp_path / "list.c").write_text(PART.format(name="one", count=8, note=""))
+    (tmp_path / "list.c").write_text(PART.format(name="one", count=8, annotation=""))
     for name in ("list.c/length", "list.c / length", "length"):
         (tmp_path / "main.c").write_text(
             f"#include <bounds.h>\nLOOPS_OF({name}, 8);\nint walk_one(void); int main(void) {{ return walk_one(); }}"
@@ -168,11 +168,11 @@ def test_a_static_function_of_another_file_is_named_with_it(tmp_path: Path, caps
 
 def test_several_ways_back_are_one_loop_only_where_a_note_says_so(tmp_path: Path, capsys) -> None:
     """What `continue` leads back to could as well be the condition of a loop within."""
-    image = built(tmp_path, WAYS_BACK.format(note="LOOP_BOUND(8);"), "-Os")
+    image = built(tmp_path, WAYS_BACK.format(annotation="LOOP_BOUND(8);"), "-Os")
     row = report(capsys, image)
     assert row["cycles"] is None
-    assert any("several ways lead back" in why for why in row["open"].values())
-    image = built(tmp_path, WAYS_BACK.format(note="LOOP_BOUND(8); ONE_LOOP();"), "-Os")
+    assert any("several back edges" in why for why in row["open"].values())
+    image = built(tmp_path, WAYS_BACK.format(annotation="LOOP_BOUND(8); ONE_LOOP();"), "-Os")
     assert cycles(image) <= report(capsys, image)["cycles"] <= 1.3 * cycles(image)
 
 
@@ -180,7 +180,7 @@ def test_the_note_of_an_unrolled_loop_says_nothing_about_the_one_around_it(tmp_p
     """At -O2 nothing is left of the inner loop but its line."""
     row = report(capsys, built(tmp_path, UNROLLED, "-O2"))
     assert row["cycles"] is None
-    assert "no bound of this loop is known" in row["open"].values()
+    assert "this loop has no known bound" in row["open"].values()
 
 
 def test_a_loop_that_is_followed_no_further_is_told_so(tmp_path: Path, capsys) -> None:
@@ -188,7 +188,7 @@ def test_a_loop_that_is_followed_no_further_is_told_so(tmp_path: Path, capsys) -
     text = "volatile unsigned n; int main(void) { for (unsigned i = 0; i < 6000; i++) n = i; return 0; }"
     row = report(capsys, built(tmp_path, text, "-Os"))
     assert row["cycles"] is None
-    assert any("followed for 5,000 rounds" in why for why in row["open"].values())
+    assert any("more than 5,000 iterations" in why for why in row["open"].values())
 
 
 @pytest.mark.parametrize("seed", [4, 7, 10])

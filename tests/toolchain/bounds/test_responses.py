@@ -11,7 +11,7 @@ from tests.fuzz import c_interrupts
 from tests.fuzz.fuzz_bounds import ENOUGH, INTERRUPTED, Held
 from tests.toolchain.bounds.responses import Watched, watched
 from tests.toolchain.c_programs import build
-from toolchain.bounds.annotations.notes import read_notes
+from toolchain.bounds.annotations.reader import read_annotation_section
 from toolchain.bounds.interference import Report, report_of
 from toolchain.bounds.program import Program
 from toolchain.cli import main
@@ -93,7 +93,7 @@ def images(folder: Path, text: str, told: tuple[int, int], given: tuple[int, int
 def said_of(image: Path, function: str = "main") -> Report:
     """Everything about an image."""
     executable = read_executable(image.read_bytes(), str(image))
-    return report_of(Program(executable, Annotations(), read_notes(executable, {})), [function])
+    return report_of(Program(executable, Annotations(), read_annotation_section(executable, {})), [function])
 
 
 def compare(seen: Watched, report: Report) -> None:
@@ -158,7 +158,7 @@ def test_a_level_other_than_told_is_named(tmp_path: Path) -> None:
     seen = watched(image, ["T1Interrupt"], PHASES, CYCLES)
     assert seen.handlers["T1Interrupt"].late > 200
     report = said_of(image)
-    ((place, why),) = report.open.items()
+    ((place, why),) = report.contradictions.items()
     assert "c.c:9 " in place
     assert why.endswith("T2: 5")
     assert [one.cycles for one in report.responses] == [None, None]

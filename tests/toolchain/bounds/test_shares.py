@@ -104,8 +104,9 @@ def measured(image: Path) -> int:
 
 
 def test_rounds_of_two_calls_are_shared_in_the_function_that_makes_them(tmp_path: Path, capsys) -> None:
-    """Eight rounds in each of two calls of walk(), three of them in the first call of down(); without the note the
-    second may go round eight times."""
+    """Each of two calls of walk() has eight iterations, three of them in the first call of down().
+
+    Without the annotation the second call of down() may have eight."""
     image = built(tmp_path, SHARED.replace("NOTE", "LOOP_SHARE(walk, 8);"))
     assert measured(image) <= report(capsys, image)["cycles"] <= 1.1 * measured(image)
     apart = built(tmp_path, SHARED.replace("NOTE", ""))

@@ -8,20 +8,20 @@ import pytest
 
 import emu
 from tests.toolchain.c_programs import build
-from toolchain.bounds.annotations.notes import read_notes
-from toolchain.bounds.annotations.rules import (
-    ADDRESSING,
-    JUMP,
-    LAST,
-    LOOP_REGISTER,
-    NESTED,
-    STACK_POINTER,
-    TABLE,
-    WAITS,
-    WAYS_IN,
+from toolchain.bounds.annotations.flow_facts import (
+    DO_LOOP_ENDS_WITH_JUMP,
+    DO_LOOPS_TOO_DEEP,
+    DO_REGISTER_WRITTEN,
+    IRREGULAR_DO_LOOP,
+    JUMP_PAST_TABLE,
+    JUMP_WITHOUT_TABLE,
+    SPECIAL_ADDRESSING,
+    STACK_POINTER_OVERWRITTEN,
+    WAITS_FOR_INTERRUPT,
 )
+from toolchain.bounds.annotations.reader import read_annotation_section
 from toolchain.bounds.program import Program
-from toolchain.bounds.report import Analyst, Bound
+from toolchain.bounds.report import Bound, BoundAnalysis
 from toolchain.elf.read import read_executable
 from toolchain.stack.annotations import Annotations
 
@@ -31,12 +31,13 @@ WAIT = "1:  repeat #99\n    nop\n    dec w1,w1\n    bra gtu,1b\n    return\n"
 CYCLES = 20_000
 PROGRAMS = {
     "a branch past DO": (
-        "clr w1\n btss w0,#0\n do #9,1f\n nop\n repeat #50\n nop\n nop\n1: inc w1,w1\n return\n", 8, (WAYS_IN, 8)),
+        "clr w1\n btss w0,#0\n do #9,1f\n nop\n repeat #50\n nop\n nop\n1: inc w1,w1\n return\n",
+        8, (IRREGULAR_DO_LOOP, 8)),
     "a branch out of the inner of two DO loops": (
         "clr w1\n mov #30,w4\n do #4,3f\n do #4,1f\n dec w4,w4\n cp w0,w4\n bra z,2f\n nop\n1: inc w1,w1\n2: nop\n"
-        " nop\n3: nop\n mov w4,w1\n" + WAIT, 32, (WAYS_IN, 14)),
+        " nop\n3: nop\n mov w4,w1\n" + WAIT, 32, (IRREGULAR_DO_LOOP, 14)),
     "a call at the end of DO": (
-        "do #3,1f\n nop\n nop\n1: rcall s1\n return\ns1: repeat #90\n nop\n return\n", 1, (LAST, 8)),
+        "do #3,1f\n nop\n nop\n1: rcall s1\n return\ns1: repeat #90\n nop\n return\n", 1, (DO_LOOP_ENDS_WITH_JUMP, 8)),
     "EDT": (
         "mov #10,w1\n do #9,1f\n dec w1,w1\n cpsne w0,w1\n bset.b 0x45,#3\n nop\n1: nop\n" + WAIT, 12, None),
     "the upper byte of a register": ("mov #1,w1\n bset.b 0x03,#0\n1: dec w1,w1\n bra gtu,1b\n return\n", 1, None),
@@ -46,9 +47,10 @@ PROGRAMS = {
         "lnk #8\n mov.b #1,w0\n add w14,#3,w1\n mov.b w0,[w1]\n mov _in,w2\n and w2,#2,w2\n add w14,w2,w3\n"
         " mov #0x1400,w0\n mov w0,[w3]\n ze [w1],w4\n1: dec w4,w4\n bra gtu,1b\n ulnk\n return\n", 4, None),
     "a jump into what is no table": (
-        "cp w0,#3\n bra gtu,2f\n bra w0\n repeat #200\n nop\n nop\n nop\n2: return\n", 5, (JUMP, 7)),
+        "cp w0,#3\n bra gtu,2f\n bra w0\n repeat #200\n nop\n nop\n nop\n2: return\n", 5, (JUMP_WITHOUT_TABLE, 7)),
     "a jump past the end of its table": (
-        "cp w0,#3\n bra gtu,2f\n bra w0\n bra 2f\n bra 2f\n repeat #200\n nop\n nop\n2: return\n", 4, (TABLE, 7)),
+        "cp w0,#3\n bra gtu,2f\n bra w0\n bra 2f\n bra 2f\n repeat #200\n nop\n nop\n2: return\n",
+        4, (JUMP_PAST_TABLE, 7)),
     "a jump into its table": (
         "and w0,#1,w0\n bra w0\n bra 1f\n bra 2f\n bra 3f\n1: repeat #20\n nop\n2: return\n3: repeat #200\n nop\n"
         " return\n", 4, None),
@@ -63,17 +65,17 @@ PROGRAMS = {
         " nop\n nop\n1: nop\n return\n", 1, None),
     "DOEND moved": (
         "do #3,1f\n mov 0x3e,w1\n add w1,#8,w1\n mov w1,0x3e\n nop\n nop\n1: nop\n nop\n nop\n nop\n repeat #90\n"
-        " nop\n return\n", 1, (LOOP_REGISTER, 8)),
+        " nop\n return\n", 1, (DO_REGISTER_WRITTEN, 8)),
     "a third DO within two": (
         "clr w1\n do #1,3f\n do #1,2f\n do #1,1f\n nop\n inc w1,w1\n1: nop\n nop\n2: nop\n nop\n3: nop\n"
         " mov #8,w2\n sub w2,w1,w1\n bra z,5f\n4: repeat #90\n nop\n dec w1,w1\n bra nz,4b\n5: return\n", 1,
-        (NESTED, 8)),
+        (DO_LOOPS_TOO_DEEP, 8)),
     "Idle": (
         "mov #500,w1\n mov w1,0x102\n bset 0x8c,#3\n bset 0x104,#15\n bset 0x42,#7\n pwrsav #1\n nop\n return\n", 1,
-        (WAITS, 10)),
+        (WAITS_FOR_INTERRUPT, 10)),
     "registers, or what lies behind them all": (
         "mov #0xffe,w1\n and w0,w1,w0\n mov #100,w5\n mov #1,w3\n mov w5,[w0]\n1: dec w3,w3\n bra gtu,1b\n return\n",
-        8, (STACK_POINTER, 9)),
+        8, (STACK_POINTER_OVERWRITTEN, 9)),
     "SR, or what lies behind the registers": (
         "and w0,#1,w0\n sl w0,#11,w0\n mov #0x42,w1\n add w0,w1,w0\n mov #2,w5\n mov w5,[w0]\n bra z,1f\n return\n"
         "1: repeat #90\n nop\n return\n", 2, None),
@@ -89,7 +91,7 @@ PROGRAMS = {
     "modulo addressing": (
         "mov #0x900,w0\n mov w0,0x48\n mov #0x91f,w0\n mov w0,0x4a\n mov #0x8ff1,w0\n mov w0,0x46\n nop\n"
         " mov #0x910,w1\n mov #100,w3\n1: mov [w1++],w2\n mov #0x920,w4\n dec w3,w3\n bra z,2f\n cp w1,w4\n bra nz,1b\n"
-        "2: clr 0x46\n nop\n return\n", 1, (ADDRESSING, 10)),
+        "2: clr 0x46\n nop\n return\n", 1, (SPECIAL_ADDRESSING, 10)),
 }  # fmt: skip
 """What gets past -> the code behind `mov _in,w0`, how many inputs there are, and the reason and line of what is
 refused (None: it is bounded)."""
@@ -115,10 +117,10 @@ int main(void)
 def bound_of(image: Path) -> Bound:
     """What is said of main."""
     executable = read_executable(image.read_bytes(), str(image))
-    program = Program(executable, Annotations(), read_notes(executable, {}))
+    program = Program(executable, Annotations(), read_annotation_section(executable, {}))
     address = program.address("_main")
     assert address is not None
-    return Analyst(program).bound("_main", address, "call")
+    return BoundAnalysis(program).bound("_main", address, "call")
 
 
 def worst(image: Path, inputs: int) -> int:
@@ -149,7 +151,9 @@ def test_assembly_stays_within_its_bound_or_is_refused_by_its_line(tmp_path: Pat
     if refused is not None:
         reason, line = refused
         assert bound.cycles is None
-        assert [where for where, why in bound.open.items() if why == reason and f"p.s:{line} " in where], bound.open
+        assert [where for where, why in bound.unbounded.items() if why == reason and f"p.s:{line} " in where], (
+            bound.unbounded
+        )
     else:
         seen = worst(tmp_path / "p.elf", inputs)
         assert bound.cycles is not None

@@ -1,1 +1,1 @@
-"""Abstract values and states: sets of integers, and what a condition says about them."""
+"""TransferFunctions domain: sets of integers, abstract states, and refinement by branch conditions."""

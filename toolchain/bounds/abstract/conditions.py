@@ -1,21 +1,21 @@
-"""What a conditional branch says about the registers compared in front of it."""
+"""Refinement of register values by the condition of a branch."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-from toolchain.bounds.abstract.state import State
-from toolchain.bounds.abstract.values import Span, Value, ends, span
-from toolchain.bounds.graph import Step
+from toolchain.bounds.abstract.state import AbstractState
+from toolchain.bounds.abstract.values import Interval, Value, extremes, interval
+from toolchain.bounds.graph import Instruction
 
 _SIGN = 0x8000
 _OPPOSITE = {"LTU": "GEU", "LEU": "GTU", "LT": "GE", "LE": "GT", "Z": "NZ", "N": "NN"}
 _OPPOSITE |= {b: a for a, b in _OPPOSITE.items()}
-_NAMES = {"C": "GEU", "NC": "LTU"}
+_ALIASES = {"C": "GEU", "NC": "LTU"}
 
 
 _WIDTH = 0x10000
-_WAYS = {
+_DIFFERENCES = {
     "Z": [(0, 0)],
     "NZ": [(-_WIDTH, -1), (1, _WIDTH)],
     "N": [(-_SIGN, -1), (_SIGN, _WIDTH - 1)],
@@ -25,14 +25,14 @@ _WAYS = {
     "LTU": [(-_WIDTH, -1)],
     "LEU": [(-_WIDTH, 0)],
 }
-"""Where a difference lies for a condition; those that take OV are left alone."""
+"""Intervals of the difference for which a condition holds.  Conditions that read OV are not refine."""
 
 
 @dataclass(frozen=True, slots=True)
-class Result:
-    """What an instruction has written to a register and its flags tell of: one of lo..hi, modulo 2**16.
+class FlagResult:
+    """The result that set the flags and that is in a register: a member of lo..hi, modulo 2**16.
 
-    borrows  whether it is a difference, below zero where C is clear
+    borrows  whether the result is a difference, so that it is negative where C is clear
     """
 
     register: int
@@ -41,46 +41,49 @@ class Result:
     borrows: bool
 
     @classmethod
-    def of(cls, step: Step, before: list[Value], after: list[Value]) -> Result:
-        """The result of a step that `tested` found, from the registers on both sides of it."""
+    def of(cls, step: Instruction, before: list[Value], after: list[Value]) -> FlagResult:
+        """Return the result of the instruction that set the flags, from the registers before and after it."""
         row, x = step.insn.row, step.insn.x
-        less = _LESS.get(row.mnemonic)
+        less = _DECREMENTS.get(row.mnemonic)
         source = x.s if less is not None else 0
         if row.mnemonic == "SUB" and "k" in row.fields:
             less, source = x.k, x.w if "w" in row.fields else x.d
         if less is None or ("p" in row.fields and x.p):
-            return cls(x.d, *ends(after[x.d]), False)
-        lo, hi = ends(before[source])
+            return cls(x.d, *extremes(after[x.d]), False)
+        lo, hi = extremes(before[source])
         return cls(x.d, lo - less, hi - less, True)
 
-    def where(self, condition: str, now: Value) -> Value | None:
-        """The members of `now`, the register, for which a condition can hold; None: there are none."""
-        if condition not in _WAYS or (condition.endswith("U") and not self.borrows):
+    def restrict(self, condition: str, now: Value) -> Value | None:
+        """Return the members of the register value `now` for which `condition` can hold, None if there are none."""
+        if condition not in _DIFFERENCES or (condition.endswith("U") and not self.borrows):
             return now
-        parts = [(max(self.lo, a), min(self.hi, b)) for a, b in _WAYS[condition]]
+        parts = [(max(self.lo, a), min(self.hi, b)) for a, b in _DIFFERENCES[condition]]
         parts = [(a, b) for a, b in parts if a <= b]
         if not parts:
             return None
         if any(a // _WIDTH != b // _WIDTH for a, b in parts):
-            return now  # on both sides of zero
-        low, high = ends(now)
+            return now  # the interval wraps around zero
+        low, high = extremes(now)
         least = max(low, min(a % _WIDTH for a, _ in parts))
         most = min(high, max(b % _WIDTH for _, b in parts))
-        return _cut(now, least, most) if least <= most else now
+        return _clamp(now, least, most) if least <= most else now
 
 
-_RESULTS = {"ADD", "SUB", "INC", "INC2", "DEC", "DEC2", "AND", "IOR", "XOR", "LSR", "ASR", "SL", "NEG", "COM"}
-"""Instructions whose Z and N tell of what they write."""
-_LESS = {"DEC": 1, "DEC2": 2}
+_FLAG_SETTERS = {"ADD", "SUB", "INC", "INC2", "DEC", "DEC2", "AND", "IOR", "XOR", "LSR", "ASR", "SL", "NEG", "COM"}
+"""Mnemonics of instructions that set Z and N from the value they write."""
+_DECREMENTS = {"DEC": 1, "DEC2": 2}
 
 
-def tested(steps: list[Step]) -> int | None:
-    """Which of the steps leaves in a register, until the end, the result that its flags tell of."""
+def flag_setter_index(steps: list[Instruction]) -> int | None:
+    """Return the index of the instruction that set the flags, if its result is still in its register at the end.
+
+    None if there is no such instruction.
+    """
     written = 0
     for index in range(len(steps) - 1, -1, -1):
         row, x = steps[index].insn.row, steps[index].insn.x
         if row.flags:
-            if row.mnemonic not in _RESULTS or "d" not in row.fields:
+            if row.mnemonic not in _FLAG_SETTERS or "d" not in row.fields:
                 return None
             if ("B" in row.fields and x.B) or ("q" in row.fields and x.q):
                 return None
@@ -89,29 +92,30 @@ def tested(steps: list[Step]) -> int | None:
     return None
 
 
-def refined(steps: list[Step], state: State, taken: bool, result: Result | None = None) -> bool:
-    """Narrow registers in `state`, which went one way behind the branch that ends `steps`; False: none can go there.
+def refine(steps: list[Instruction], state: AbstractState, taken: bool, result: FlagResult | None = None) -> bool:
+    """Narrow registers of `state` by the branch that ends `steps`; return False if that outcome is impossible.
 
-    result  what the instruction that set the flags wrote, where that still stands
+    taken   whether the branch is taken
+    result  the result that set the flags, None if its register has been overwritten
     """
     condition = steps[-1].insn.row.syntax.partition(" ")[2].partition(",")[0]
-    condition = _NAMES.get(condition, condition)
+    condition = _ALIASES.get(condition, condition)
     if condition not in _OPPOSITE:
         return True
     if not taken:
         condition = _OPPOSITE[condition]
     if result is not None:
-        left_over = result.where(condition, state.w[result.register])
+        left_over = result.restrict(condition, state.w[result.register])
         if left_over is None:
             return False
         state.w[result.register] = left_over
-    compared = _compared(steps)
+    compared = _compared_operands(steps)
     if compared is None:
         return True
     left, right = compared
     a = state.w[left]
     b: Value = state.w[right[1]] if isinstance(right, tuple) else right
-    narrow = _narrowed(condition, a, b)
+    narrow = _narrow(condition, a, b)
     if narrow is None:
         return False
     state.w[left] = narrow[0]
@@ -120,15 +124,18 @@ def refined(steps: list[Step], state: State, taken: bool, result: Result | None 
     return True
 
 
-def _compared(steps: list[Step]) -> tuple[int, tuple[str, int] | int] | None:
-    """Left register, and right register or number, of a word comparison whose operands still stand."""
+def _compared_operands(steps: list[Instruction]) -> tuple[int, tuple[str, int] | int] | None:
+    """Return left register, and right register or literal, of the word comparison before the branch.
+
+    None if there is none, or if an operand has been overwritten.
+    """
     written = 0
     for index in range(len(steps) - 2, -1, -1):
         step = steps[index]
         row, x = step.insn.row, step.insn.x
         if row.flags:
             if row.mnemonic == "SUB" and "k" in row.fields and not x.B:
-                return _subtracted(steps, index, written)
+                return _subtraction_operands(steps, index, written)
             if row.mnemonic not in ("CP", "CP0") or ("B" in row.fields and x.B) or "f" in row.fields:
                 return None
             if "p" in row.fields and x.p:
@@ -143,8 +150,8 @@ def _compared(steps: list[Step]) -> tuple[int, tuple[str, int] | int] | None:
     return None
 
 
-def _subtracted(steps: list[Step], index: int, written: int) -> tuple[int, int] | None:
-    """The register a literal was subtracted from, where its value still stands, or its copy made just before."""
+def _subtraction_operands(steps: list[Instruction], index: int, written: int) -> tuple[int, int] | None:
+    """Return (register, literal) of a subtraction whose minuend is still in that register or in a copy of it."""
     insn = steps[index].insn
     x, fields = insn.x, insn.row.fields
     if "w" in fields:  # Wd <- Wb - lit5
@@ -159,16 +166,16 @@ def _subtracted(steps: list[Step], index: int, written: int) -> tuple[int, int] 
     return (other, x.k) if other != x.d and not written >> other & 1 else None
 
 
-def _narrowed(condition: str, a: Value, b: Value) -> tuple[Value, Value] | None:
-    """The members of a and b for which the condition can hold, None if there are none."""
+def _narrow(condition: str, a: Value, b: Value) -> tuple[Value, Value] | None:
+    """Return the members of a and b for which the condition can hold, None if there are none."""
     if condition in ("LT", "LE", "GT", "GE", "N", "NN"):
-        low, high = ends(a), ends(b)
+        low, high = extremes(a), extremes(b)
         if any(lo < _SIGN <= hi for lo, hi in (low, high)) or (low[0] < _SIGN) != (high[0] < _SIGN):
-            return a, b  # signs differ, or are not known
+            return a, b  # the signs differ or are unknown
         if condition in ("N", "NN"):
             condition = "LT" if condition == "N" else "GE"
         condition += "U"
-    (al, ah), (bl, bh) = ends(a), ends(b)
+    (al, ah), (bl, bh) = extremes(a), extremes(b)
     match condition:
         case "Z":
             al, ah = max(al, bl), min(ah, bh)
@@ -188,8 +195,8 @@ def _narrowed(condition: str, a: Value, b: Value) -> tuple[Value, Value] | None:
             al, bh = max(al, bl), min(bh, ah)
     if al > ah or bl > bh:
         return None
-    return _cut(a, al, ah), _cut(b, bl, bh)
+    return _clamp(a, al, ah), _clamp(b, bl, bh)
 
 
-def _cut(value: Value, lo: int, hi: int) -> Value:
-    return span(lo, hi, value.mask, value.bits, value.ram) if isinstance(value, Span) else value
+def _clamp(value: Value, lo: int, hi: int) -> Value:
+    return interval(lo, hi, value.mask, value.bits, value.ram) if isinstance(value, Interval) else value

@@ -1,62 +1,73 @@
-"""What is known at one point of a program: registers, stack, level, and the longest way here in cycles."""
+"""TransferFunctions state at one program point: registers, stack contents, CPU priority and elapsed cycles."""
 
 from __future__ import annotations
 
 from typing import Any
 
-from toolchain.bounds.abstract.values import EITHER, LINK, WORD, Span, Value, ends, is_ram, key_of, union
+from toolchain.bounds.abstract.values import (
+    BIT,
+    RAM_POINTER,
+    WORD,
+    Interval,
+    Value,
+    extremes,
+    is_ram_address,
+    key_of,
+    union,
+)
 
 FLAGS = ("C", "Z", "OV", "N", "DC", "OA", "OB", "SA", "SB")
 LEVELS = 8
-NOWHERE = 1 << 16
+NO_ADDRESS = 1 << 16
 INHERITED = -(1 << 60)
-"""In `since`: masked since before this function was called."""
+"""Value in `masked_since`: the level has been masked since before the function was called."""
 
 
-class State:
-    """One abstract state.  `time` is the greatest number of cycles of any path that leads here.
+class AbstractState:
+    """One abstract state.  `time` is the greatest number of cycles of any path to this point.
 
-    mem      tracked data: word address -> word, ~byte address -> byte; what is missing may be anything
-    ipl      least and greatest CPU priority; 8 more while a trap is served (IPL3)
-    since    by level, the time from which an interrupt of that level has been held back; None: it has not been
-    disi     time up to which DISI blocks: an instruction boundary before it lets nothing in (isa.md §12)
-    loops    open DO loops, outermost first: (start, end, remaining)
-    repeat   count of the REPEAT in front of the next instruction, None without one
-    stall    registers whose use as a source address costs a cycle now
-    leaked   the lowest address of the stack that is kept where it is not tracked, NOWHERE without one
-    waits    where the CPU has stood still since the function was entered: PWRSAV
+    mem           tracked data: word address -> word, ~byte address -> byte; any other location has an unknown value
+    ipl           least and greatest CPU priority; 8 is added while a trap is served (IPL3)
+    masked_since  by level, the time since which interrupts of that level are masked; None if they are not
+    disi_end      time until which DISI blocks interrupts at instruction boundaries (isa.md §12)
+    do_loops      active DO loops, outermost first: (start, end, remaining iterations)
+    repeat        count of a REPEAT directly before the next instruction, None without one
+    stall         bit mask of registers whose use as a source address costs one stall cycle in the next instruction
+    lowest_leak   lowest stack address stored in an untracked location, NO_ADDRESS without one
+    waits         addresses of PWRSAV instructions executed since the function was entered
     """
 
     __slots__ = (
-        "disi", "flags", "ipl", "leaked", "loops", "mem", "regs", "repeat", "since", "stall", "time", "w", "waits",
+        "disi_end", "do_loops", "flags", "ipl", "lowest_leak", "masked_since", "mem", "regs", "repeat", "stall", "time",
+        "w", "waits",
     )  # fmt: skip
 
     def __init__(self) -> None:
         self.w: list[Value] = [WORD] * 16
-        self.flags: dict[str, Value] = dict.fromkeys(FLAGS, EITHER)
+        self.flags: dict[str, Value] = dict.fromkeys(FLAGS, BIT)
         self.regs: dict[str, Value] = {}
         self.mem: dict[int, Value] = {}
         self.time = 0
         self.stall = 0
         self.ipl = (0, 0)
-        self.disi = 0
-        self.since: list[int | None] = [None] * LEVELS
-        self.loops: tuple[tuple[int, int, Value], ...] = ()
+        self.disi_end = 0
+        self.masked_since: list[int | None] = [None] * LEVELS
+        self.do_loops: tuple[tuple[int, int, Value], ...] = ()
         self.repeat: Value | None = None
-        self.leaked = NOWHERE
+        self.lowest_leak = NO_ADDRESS
         self.waits: frozenset[int] = frozenset()
 
-    def copy(self) -> State:
-        """An independent state."""
-        new = State.__new__(State)
+    def copy(self) -> AbstractState:
+        """Return an independent copy."""
+        new = AbstractState.__new__(AbstractState)
         new.w, new.flags, new.mem = self.w.copy(), self.flags.copy(), self.mem.copy()
-        new.regs, new.since = self.regs.copy(), self.since.copy()
-        new.time, new.stall, new.ipl, new.disi = self.time, self.stall, self.ipl, self.disi
-        new.loops, new.repeat, new.leaked, new.waits = self.loops, self.repeat, self.leaked, self.waits
+        new.regs, new.masked_since = self.regs.copy(), self.masked_since.copy()
+        new.time, new.stall, new.ipl, new.disi_end = self.time, self.stall, self.ipl, self.disi_end
+        new.do_loops, new.repeat, new.lowest_leak, new.waits = self.do_loops, self.repeat, self.lowest_leak, self.waits
         return new
 
     def key(self) -> tuple[Any, ...]:
-        """Equal for states between which nothing but time and the beginnings of masked stretches differs."""
+        """Return a key that is equal for states that differ only in time and in when masking began."""
         return (
             tuple(map(key_of, self.w)),
             tuple(key_of(v) for v in self.flags.values()),
@@ -64,46 +75,49 @@ class State:
             frozenset((address, key_of(v)) for address, v in self.mem.items()),
             self.stall,
             self.ipl,
-            self.blocked,
-            tuple(s is None for s in self.since),
-            tuple((start, end, key_of(n)) for start, end, n in self.loops),
+            self.disi_remaining,
+            tuple(s is None for s in self.masked_since),
+            tuple((start, end, key_of(n)) for start, end, n in self.do_loops),
             None if self.repeat is None else key_of(self.repeat),
-            self.leaked,
+            self.lowest_leak,
             self.waits,
         )
 
     @property
-    def blocked(self) -> int:
-        """Cycles for which DISI still blocks, that of the boundary among them."""
-        return max(0, self.disi - self.time)
+    def disi_remaining(self) -> int:
+        """Cycles for which DISI still blocks, including the cycle of the current instruction boundary."""
+        return max(0, self.disi_end - self.time)
 
     def shift(self, cycles: int) -> None:
-        """Move its clock."""
+        """Add `cycles` to all times of the state."""
         self.time += cycles
-        if self.disi:
-            self.disi += cycles
-        self.since = [s if s is None or s == INHERITED else s + cycles for s in self.since]
+        if self.disi_end:
+            self.disi_end += cycles
+        self.masked_since = [s if s is None or s == INHERITED else s + cycles for s in self.masked_since]
 
 
-class Area:
-    """The addresses of stacks: what a value may point to them for, and when such a value gets out of sight."""
+class StackAreas:
+    """The address ranges of stacks, and the join of states, which detects stack addresses that become untracked."""
 
     def __init__(self, ranges: list[tuple[int, int]]) -> None:
         self.ranges = ranges
 
-    def holds(self, address: int) -> bool:
-        """Whether an address is on a stack."""
+    def contains(self, address: int) -> bool:
+        """Whether an address lies on a stack."""
         return any(lo <= address < hi for lo, hi in self.ranges)
 
-    def inside(self, value: Value) -> bool:
-        """Whether every member points to one stack; its first address, where no object lies, stands for the array."""
-        a, b = ends(value)
+    def points_into(self, value: Value) -> bool:
+        """Whether every member points into one stack.
+
+        The first address of a stack is excluded: no object lies there, and it is the address of the array itself.
+        """
+        a, b = extremes(value)
         return any(lo < a and b < hi for lo, hi in self.ranges)
 
-    def join(self, a: State, b: State) -> State:
-        """What is known where two paths meet; the slower one's time."""
+    def join(self, a: AbstractState, b: AbstractState) -> AbstractState:
+        """Return the join of two states; its time is the greater of both."""
         new = a.copy()
-        new.leaked = min(a.leaked, b.leaked)
+        new.lowest_leak = min(a.lowest_leak, b.lowest_leak)
         for n in range(16):
             new.w[n] = self._union(new, a.w[n], b.w[n])
         for name, value in b.flags.items():
@@ -114,59 +128,67 @@ class Area:
             other = b.mem.get(address)
             if other is not None:
                 new.mem[address] = self._union(new, value, other)
-            elif self.inside(value):
-                new.leaked = min(new.leaked, ends(value)[0])
+            elif self.points_into(value):
+                new.lowest_leak = min(new.lowest_leak, extremes(value)[0])
         for address, value in b.mem.items():
-            if address not in a.mem and self.inside(value):
-                new.leaked = min(new.leaked, ends(value)[0])
+            if address not in a.mem and self.points_into(value):
+                new.lowest_leak = min(new.lowest_leak, extremes(value)[0])
         new.time = max(a.time, b.time)
         new.stall = a.stall | b.stall
         new.ipl = min(a.ipl[0], b.ipl[0]), max(a.ipl[1], b.ipl[1])
-        blocked = max(a.blocked, b.blocked)
-        new.disi = new.time + blocked if blocked else 0
+        blocked = max(a.disi_remaining, b.disi_remaining)
+        new.disi_end = new.time + blocked if blocked else 0
         new.waits = a.waits | b.waits
-        if a.since != b.since or a.time != b.time:
-            new.since = [longest(new.time, (x, a.time), (y, b.time)) for x, y in zip(a.since, b.since, strict=True)]
-        new.loops = tuple((s, e, union(n, m)) for (s, e, n), (_, _, m) in zip(a.loops, b.loops, strict=False))
+        if a.masked_since != b.masked_since or a.time != b.time:
+            new.masked_since = [
+                earliest_masking(new.time, (x, a.time), (y, b.time))
+                for x, y in zip(a.masked_since, b.masked_since, strict=True)
+            ]
+        new.do_loops = tuple((s, e, union(n, m)) for (s, e, n), (_, _, m) in zip(a.do_loops, b.do_loops, strict=False))
         if a.repeat is not None or b.repeat is not None:
             new.repeat = union(0 if a.repeat is None else a.repeat, 0 if b.repeat is None else b.repeat)
         return new
 
-    def _union(self, state: State, a: Value, b: Value) -> Value:
+    def _union(self, state: AbstractState, a: Value, b: Value) -> Value:
         result = union(a, b)
-        if hides(result):
-            state.leaked = min(state.leaked, *(ends(v)[0] if self.inside(v) else NOWHERE for v in (a, b)))
+        if is_unknown_address(result):
+            state.lowest_leak = min(
+                state.lowest_leak, *(extremes(v)[0] if self.points_into(v) else NO_ADDRESS for v in (a, b))
+            )
         return result
 
 
-def hides(value: Value) -> bool:
-    """Whether a set is so wide that, as an address, it says nothing: whoever stores there spares the stack."""
-    lo, hi = ends(value)
+def is_unknown_address(value: Value) -> bool:
+    """Whether a set is too wide to serve as an address; stores to such an address are assumed to spare the stack."""
+    lo, hi = extremes(value)
     return hi - lo >= 0x8000
 
 
-def longest(time: int, *ways: tuple[int | None, int]) -> int | None:
-    """Since when a level has been held back at `time`, if it has for as long as on the worst of the ways there."""
-    if any(since == INHERITED for since, _ in ways):
+def earliest_masking(time: int, *paths: tuple[int | None, int]) -> int | None:
+    """Return when masking began if, at `time`, it has lasted as long as on the worst of the paths.
+
+    paths  begin of masking (None: not masked) and time at the end of each path
+    """
+    if any(since == INHERITED for since, _ in paths):
         return INHERITED
-    lengths = [now - since for since, now in ways if since is not None]
+    lengths = [now - since for since, now in paths if since is not None]
     return time - max(lengths) if lengths else None
 
 
-def widened(before: State, after: State) -> State:
-    """`after` with every value that differs from `before` given up: two rounds of a loop at most reach an end."""
+def widen(before: AbstractState, after: AbstractState) -> AbstractState:
+    """Return `after` with every value that differs from `before` made unknown, so that loops reach a fixpoint."""
     new = after.copy()
-    new.w = [_given_up(a, b) for a, b in zip(before.w, after.w, strict=True)]
+    new.w = [_widen_value(a, b) for a, b in zip(before.w, after.w, strict=True)]
     new.mem = {k: v for k, v in after.mem.items() if k in before.mem and key_of(before.mem[k]) == key_of(v)}
     new.regs = {k: v for k, v in after.regs.items() if k in before.regs and key_of(before.regs[k]) == key_of(v)}
-    new.flags = {k: v if key_of(before.flags[k]) == key_of(v) else EITHER for k, v in after.flags.items()}
+    new.flags = {k: v if key_of(before.flags[k]) == key_of(v) else BIT for k, v in after.flags.items()}
     return new
 
 
-def _given_up(before: Value, after: Value) -> Value:
+def _widen_value(before: Value, after: Value) -> Value:
     if key_of(before) == key_of(after):
         return after
-    return LINK if is_ram(before) and is_ram(after) else WORD
+    return RAM_POINTER if is_ram_address(before) and is_ram_address(after) else WORD
 
 
-__all__ = ["INHERITED", "LEVELS", "Area", "Span", "State", "widened"]
+__all__ = ["INHERITED", "LEVELS", "AbstractState", "Interval", "StackAreas", "widen"]

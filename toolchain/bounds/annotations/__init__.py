@@ -1,1 +1,1 @@
-"""Annotations of an image: loop bounds and targets from notes, names and debug information."""
+"""Source annotations of an image: parsing, and binding to loops and calls through the debug information."""

@@ -1,4 +1,4 @@
-"""Which loop and which call each note is of: those of its line, and no other."""
+"""Binding of annotations to the loops and calls of their source line."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from typing import Final
 
 from emu.dspic30f.isa.facts import flow_of
 from emu.dspic30f.isa.flow import Call, Goto
-from toolchain.bounds.annotations.names import Names
-from toolchain.bounds.annotations.notes import Note, Notes
-from toolchain.bounds.annotations.sources import Line, Sources
-from toolchain.bounds.graph import Code, Loop, loops_in
+from toolchain.bounds.annotations.names import NameResolver
+from toolchain.bounds.annotations.reader import Annotation, AnnotationSet
+from toolchain.bounds.annotations.source_map import SourceLine, SourceMap
+from toolchain.bounds.graph import FunctionGraph, Loop, all_loops
 from toolchain.elf.disassemble import Item
 from toolchain.errors import ToolError
 
@@ -18,141 +18,159 @@ LOOPS = ("loop", "total", "share", "same", "one")
 CALLS = ("often", "if")
 
 
-class Bindings:
-    """What notes of lines say: of loops (asked by function and loop) and of calls (asked by address and callee).
+class AnnotationBindings:
+    """Annotations by loop and by call.
 
-    Raises `ToolError` for a note that is of no code of its function, or of no call of the function it names.
+    Raises `ToolError` for an annotation after all code of its function, or one without a call of the function it names.
     """
 
-    def __init__(self, notes: Notes, sources: Sources, names: Names, code: dict[int, Item]) -> None:
-        self.notes, self.sources, self.names, self.items = notes, sources, names, code
-        self._lines: Final[dict[tuple[str, Line], list[Note]]] = {}
+    def __init__(
+        self, annotations: AnnotationSet, sources: SourceMap, names: NameResolver, code: dict[int, Item]
+    ) -> None:
+        self.annotations, self.sources, self.names, self.items = annotations, sources, names, code
+        self._lines: Final[dict[tuple[str, SourceLine], list[Annotation]]] = {}
         for kind in (*LOOPS, "calls"):
-            for note in notes.of(kind):
-                line = sources.target(note)
+            for annotation in annotations.of(kind):
+                line = sources.target_line(annotation)
                 if line is not None:
-                    self._lines.setdefault((kind, line), []).append(note)
-        self._loops: Final[dict[tuple[str, int], dict[int, set[Note]]]] = {}
-        self._calls: Final[dict[str, dict[tuple[int, int], list[Note]]]] = {kind: {} for kind in CALLS}
-        """By kind: place of a call and callee -> notes."""
+                    self._lines.setdefault((kind, line), []).append(annotation)
+        self._loops: Final[dict[tuple[str, int], dict[int, set[Annotation]]]] = {}
+        self._calls: Final[dict[str, dict[tuple[int, int], list[Annotation]]]] = {kind: {} for kind in CALLS}
+        """By kind: (address of a call, callee) -> annotations."""
         for kind in CALLS:
-            for note in notes.of(kind):
-                self._bind_call(kind, note)
+            for annotation in annotations.of(kind):
+                self._bind_call(kind, annotation)
 
     # -- loops -------------------------------------------------------------------------------------------------------
 
-    def rounds(self, code: Code, loop: Loop) -> int | None:
-        """Rounds of a loop by its LOOP_BOUND, the line in front of its condition."""
+    def loop_bound(self, code: FunctionGraph, loop: Loop) -> int | None:
+        """Return the iterations of a loop per entry, by its LOOP_BOUND or the function's LOOPS_OF."""
         numbers = self._numbers(code, loop, "loop")
-        numbers += [self.notes.number(_words(note, 2)[1], note) for note in self._loops_of(code)]
+        numbers += [
+            self.annotations.number(_words(annotation, 2)[1], annotation)
+            for annotation in self._function_annotations(code)
+        ]
         return None if None in numbers else max((n for n in numbers if n is not None), default=None)
 
-    def total(self, code: Code, loop: Loop) -> int | None:
-        """Rounds of a loop in all, by its LOOP_TOTAL."""
+    def total_iterations(self, code: FunctionGraph, loop: Loop) -> int | None:
+        """Return the iterations of a loop over all its entries, by its LOOP_TOTAL."""
         numbers = self._numbers(code, loop, "total")
         return None if None in numbers else max((n for n in numbers if n is not None), default=None)
 
-    def together(self, code: Code, loop: Loop) -> dict[int, tuple[str, int]]:
-        """Rounds of a loop and all others of one LOOP_SHARE in one call of a function: what it says, the number."""
-        notes = [note for head in loop.heads for note in self._bound(code, "share", head)]
-        return {address: (text, number) for address, text, number in self._of_functions(notes)}
+    def shared_iterations(self, code: FunctionGraph, loop: Loop) -> dict[int, tuple[str, int]]:
+        """Return the LOOP_SHAREs of a loop, by function: text, and iterations shared in one call of the function."""
+        annotations = [annotation for head in loop.heads for annotation in self._annotations_at(code, "share", head)]
+        return {address: (text, number) for address, text, number in self._function_values(annotations)}
 
-    def same(self, code: Code) -> set[int]:
-        """Heads of loops that are one with the loop around them, by SAME_LOOP."""
-        return {loop.head for loop in loops_in(code.order) if self._bound(code, "same", loop.head)}
+    def merged_loops(self, code: FunctionGraph) -> set[int]:
+        """Return the heads of loops that SAME_LOOP merges with the enclosing loop."""
+        return {loop.head for loop in all_loops(code.order) if self._annotations_at(code, "same", loop.head)}
 
-    def one(self, code: Code, loop: Loop) -> bool:
-        """Whether a loop of the machine code is one of the source: one way leads back, or ONE_LOOP says so.
+    def is_single_loop(self, code: FunctionGraph, loop: Loop) -> bool:
+        """Whether a loop of the machine code is a single loop of the source: it has one back edge, or ONE_LOOP is set.
 
-        Ways that end in one line are copies of its condition; LOOPS_OF speaks of machine code.
+        Back edges in one source line are copies of its condition.  LOOPS_OF refers to loops of the machine code.
         """
-        if len(loop.heads) > 1 or self._bound(code, "one", loop.head) or self._loops_of(code):
+        if len(loop.heads) > 1 or self._annotations_at(code, "one", loop.head) or self._function_annotations(code):
             return True
         back = [head for head in loop.members if loop.head in code.blocks[head].following]
-        lines = {self.sources.at(code.blocks[head].steps[-1].pc) for head in back}
+        lines = {self.sources.line_of(code.blocks[head].steps[-1].pc) for head in back}
         return len(back) == 1 or (len(lines) == 1 and ("", 0) not in lines)
 
-    def scopes(self) -> frozenset[int]:
-        """Functions that LOOP_SHARE and CALL_SHARE count rounds and calls in."""
-        said = [(note.text.split()[0], note) for note in self.notes.of("share")]
-        said += [(_words(note, 3)[1], note) for note in self.notes.of("often")]
-        return frozenset(address for name, note in said if (address := self.names.find(name, note)) is not None)
+    def sharing_scopes(self) -> frozenset[int]:
+        """Return the functions whose calls LOOP_SHARE and CALL_SHARE refer to."""
+        named = [(annotation.text.split()[0], annotation) for annotation in self.annotations.of("share")]
+        named += [(_words(annotation, 3)[1], annotation) for annotation in self.annotations.of("often")]
+        return frozenset(
+            address for name, annotation in named if (address := self.names.find(name, annotation)) is not None
+        )
 
-    def _loops_of(self, code: Code) -> list[Note]:
-        """LOOPS_OF that name a function."""
-        return [note for note in self.notes.of("loops") if self.names.find(note.text.split()[0], note) == code.entry]
+    def _function_annotations(self, code: FunctionGraph) -> list[Annotation]:
+        """Return the LOOPS_OF annotations of a function."""
+        return [
+            annotation
+            for annotation in self.annotations.of("loops")
+            if self.names.find(annotation.text.split()[0], annotation) == code.entry
+        ]
 
-    def _numbers(self, code: Code, loop: Loop, kind: str) -> list[int | None]:
-        return [self.notes.number(note.text, note) for head in loop.heads for note in self._bound(code, kind, head)]
+    def _numbers(self, code: FunctionGraph, loop: Loop, kind: str) -> list[int | None]:
+        return [
+            self.annotations.number(annotation.text, annotation)
+            for head in loop.heads
+            for annotation in self._annotations_at(code, kind, head)
+        ]
 
-    def _bound(self, code: Code, kind: str, head: int) -> set[Note]:
+    def _annotations_at(self, code: FunctionGraph, kind: str, head: int) -> set[Annotation]:
         if (kind, code.entry) not in self._loops:
             self._loops[kind, code.entry] = self._bind_loops(code, kind)
         return self._loops[kind, code.entry].get(head, set())
 
-    def _bind_loops(self, code: Code, kind: str) -> dict[int, set[Note]]:
-        """Notes by the head of their loop: the innermost one with code of their line, and no loop around that."""
-        bound: dict[int, set[Note]] = {}
-        for loop in reversed(loops_in(code.order)) if self.notes.of(kind) else ():
-            inner = loops_in(loop.body)
+    def _bind_loops(self, code: FunctionGraph, kind: str) -> dict[int, set[Annotation]]:
+        """Return annotations by loop head; an annotation belongs to the innermost loop with code of its line."""
+        bound: dict[int, set[Annotation]] = {}
+        for loop in reversed(all_loops(code.order)) if self.annotations.of(kind) else ():
+            inner = all_loops(loop.body)
             own = loop.members - {m for part in inner for m in part.members}
-            below = {note for part in inner for note in bound[part.head]}
-            lines = {self.sources.at(step.pc) for head in own for step in code.blocks[head].steps}
-            found = {(line, note) for line in lines for note in self._lines.get((kind, line), ())}
+            below = {annotation for part in inner for annotation in bound[part.head]}
+            lines = {self.sources.line_of(step.pc) for head in own for step in code.blocks[head].steps}
+            found = {(line, annotation) for line in lines for annotation in self._lines.get((kind, line), ())}
             bound[loop.head] = {
-                note for line, note in found if note not in below and (kind == "same" or self._is_of(code, loop, line))
+                annotation
+                for line, annotation in found
+                if annotation not in below and (kind == "same" or self._is_loop_line(code, loop, line))
             }
         return bound
 
-    def _is_of(self, code: Code, loop: Loop, line: Line) -> bool:
-        """Whether a line can be that of a loop: code of the same function within it stands on one side only, or a way
-        out begins there. A loop that was unrolled leaves its line to the one around it, of which its notes say
-        nothing."""
-        first, end = self.sources.extent(line)
-        places = [self.sources.at(step.pc) for head in loop.members for step in code.blocks[head].steps]
+    def _is_loop_line(self, code: FunctionGraph, loop: Loop, line: SourceLine) -> bool:
+        """Whether a line can be the line of a loop.
+
+        It can if all code of the function within the loop is on one side of the line, or if an exit of the loop is in
+        the line.  The line of an unrolled loop is part of the enclosing loop, to which its annotations do not apply.
+        """
+        first, end = self.sources.function_extent(line)
+        places = [self.sources.line_of(step.pc) for head in loop.members for step in code.blocks[head].steps]
         around = [number for file, number in places if file == line[0] and first <= number < end]
         if min(around) >= line[1] or max(around) <= line[1]:
             return True
         leaving = [b for m in loop.members if not loop.members.issuperset((b := code.blocks[m]).following)]
-        return any(self.sources.at(block.steps[-1].pc) == line for block in leaving)
+        return any(self.sources.line_of(block.steps[-1].pc) == line for block in leaving)
 
     # -- calls -------------------------------------------------------------------------------------------------------
 
-    def times(self, pc: int, target: int) -> dict[int, tuple[str, int]]:
-        """By function, which call of the source the one there is, and how often it is made in one call of the function,
-        by CALL_SHARE."""
+    def call_counts(self, pc: int, target: int) -> dict[int, tuple[str, int]]:
+        """Return the CALL_SHAREs of a call, by function: source call, and its number in one call of the function."""
         found = {}
-        for note in self._calls["often"].get((pc, target), ()):
-            for address, _, number in self._of_functions([note], skip=1):
-                found[address] = f"{note.place} {note.text}", number
+        for annotation in self._calls["often"].get((pc, target), ()):
+            for address, _, number in self._function_values([annotation], skip=1):
+                found[address] = f"{annotation.place} {annotation.text}", number
         return found
 
-    def never(self, pc: int, target: int) -> bool:
-        """Whether the call there is not made, by CALL_IF."""
-        notes = self._calls["if"].get((pc, target), ())
-        return any(self.notes.number(_words(note, 2)[1], note) == 0 for note in notes)
+    def is_never_called(self, pc: int, target: int) -> bool:
+        """Whether a CALL_IF with limit 0 excludes the call."""
+        annotations = self._calls["if"].get((pc, target), ())
+        return any(self.annotations.number(_words(annotation, 2)[1], annotation) == 0 for annotation in annotations)
 
-    def pointed(self, pc: int) -> list[Note]:
-        """CALL_TARGETS in front of the call there."""
-        return self._lines.get(("calls", self.sources.at(pc)), [])
+    def call_target_annotations(self, pc: int) -> list[Annotation]:
+        """Return the CALL_TARGETS annotations of the call at an address."""
+        return self._lines.get(("calls", self.sources.line_of(pc)), [])
 
-    def _bind_call(self, kind: str, note: Note) -> None:
-        line = self.sources.target(note)
-        name = note.text.partition(" ")[0]
-        callee = self.names.find(name, note)
+    def _bind_call(self, kind: str, annotation: Annotation) -> None:
+        line = self.sources.target_line(annotation)
+        name = annotation.text.partition(" ")[0]
+        callee = self.names.find(name, annotation)
         if line is None:
             return
         calls = list(self._calls_of(line))
         sites = [pc for pc, target in calls if callee is not None and target in (callee, None)]
         if not sites and (calls or callee is not None):
-            raise ToolError(f"{note.place}: no call of {name} stands in line {line[1]}")
+            raise ToolError(f"{annotation.place}: line {line[1]} contains no call of {name}")
         for pc in sites:
             assert callee is not None
-            self._calls[kind].setdefault((pc, callee), []).append(note)
+            self._calls[kind].setdefault((pc, callee), []).append(annotation)
 
-    def _calls_of(self, line: Line) -> Iterator[tuple[int, int | None]]:
-        """Calls of a line and what they call; None: through a pointer."""
-        for start, end in self.sources.instructions(line):
+    def _calls_of(self, line: SourceLine) -> Iterator[tuple[int, int | None]]:
+        """Yield the calls in a line: address and callee, None for a call through a pointer."""
+        for start, end in self.sources.address_ranges(line):
             for pc in range(start, end, 2):
                 item = self.items.get(pc)
                 flow = flow_of(item.insn, pc) if item is not None and item.insn is not None else None
@@ -162,18 +180,18 @@ class Bindings:
                     case Goto(target) if isinstance(target, int) and target in self.names.entries:
                         yield pc, target
 
-    def _of_functions(self, notes: Iterable[Note], skip: int = 0) -> Iterator[tuple[int, str, int]]:
-        """Function, rest and value of notes that have a function and a number behind `skip` other words."""
-        for note in notes:
-            name, text = _words(note, skip + 2)[skip:]
-            address, number = self.names.find(name, note), self.notes.number(text, note)
+    def _function_values(self, annotations: Iterable[Annotation], skip: int = 0) -> Iterator[tuple[int, str, int]]:
+        """Yield function, text and number of annotations that have a function and a number after `skip` other words."""
+        for annotation in annotations:
+            name, text = _words(annotation, skip + 2)[skip:]
+            address, number = self.names.find(name, annotation), self.annotations.number(text, annotation)
             if address is not None and number is not None:
                 yield address, text, number
 
 
-def _words(note: Note, count: int) -> list[str]:
-    """The text of a note as words, the last of them its rest; raises `ToolError` where there are less."""
-    words = note.text.split(None, count - 1)
+def _words(annotation: Annotation, count: int) -> list[str]:
+    """Split the text of an annotation into `count` words, the last with the rest; raises `ToolError` for fewer."""
+    words = annotation.text.split(None, count - 1)
     if len(words) < count:
-        raise ToolError(f"{note.place}: expected {count} arguments, got {note.text!r}")
+        raise ToolError(f"{annotation.place}: expected {count} arguments, got {annotation.text!r}")
     return words

@@ -1,4 +1,4 @@
-"""Annotations: lines of the section .note.bounds (include/bounds.h), and values for the names in them."""
+"""Annotations in the section .note.bounds (include/bounds.h), and values for the names in their expressions."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from toolchain.errors import ToolError
 SECTION = ".note.bounds"
 _LINE = re.compile(r"(\w+) (.*)@(.+):(\d+)")
 _FUNCTION = re.compile(r"in (\w+)")
-"""Behind a note the compiler tells its function (lower/data.py)."""
+"""The compiler writes the enclosing function after an annotation (toolchain/emit)."""
 _OF_A_FILE = re.compile(r"(\.\w+) ?/ ?(?=\w)")
-"""`file.c/name`, which formatters of C take for a division."""
+"""`file.c/name`; C formatters insert blanks because they read it as a division."""
 _OPERATORS: dict[type[ast.operator], Callable[[int, int], int]] = {
     ast.Add: operator.add,
     ast.Sub: operator.sub,
@@ -27,44 +27,44 @@ _OPERATORS: dict[type[ast.operator], Callable[[int, int], int]] = {
 
 
 @dataclass(frozen=True, slots=True)
-class Note:
-    """One annotation: loop, calls, argument, back, private or ram; what it says and where it stands."""
+class Annotation:
+    """One annotation: kind (loop, calls, argument, back, private, ram ...), text and source position."""
 
     kind: str
     text: str
     file: str
     line: int
     function: str = ""
-    """The function it stands in, where the compiler says so."""
+    """The enclosing function, "" if the compiler recorded none."""
 
     @property
     def place(self) -> str:
-        """File and line, for messages."""
+        """Return file and line, for messages."""
         return f"{self.file}:{self.line}"
 
 
 @dataclass(slots=True)
-class Notes:
-    """All annotations of an image, and the values of names."""
+class AnnotationSet:
+    """All annotations of an image, and the values of the names in them."""
 
-    all: list[Note] = field(default_factory=list)
+    all: list[Annotation] = field(default_factory=list)
     values: Mapping[str, int] = field(default_factory=dict)
     missing: set[str] = field(default_factory=set)
-    """Names that were needed and have no value."""
+    """Names that an evaluated expression contains and that have no value."""
 
-    def of(self, kind: str) -> list[Note]:
-        """Those of one kind."""
-        return [note for note in self.all if note.kind == kind]
+    def of(self, kind: str) -> list[Annotation]:
+        """Return the annotations of one kind."""
+        return [annotation for annotation in self.all if annotation.kind == kind]
 
-    def number(self, text: str, where: Note) -> int | None:
-        """Value of an expression; None if a name in it has none. Raises `ToolError` for what is no expression."""
+    def number(self, text: str, where: Annotation) -> int | None:
+        """Return the value of an expression, None if a name has no value; raises `ToolError` if it cannot be parsed."""
         try:
             tree = ast.parse(text.strip(), mode="eval").body
         except SyntaxError:
             raise ToolError(f"{where.place}: expected a number or an expression, got {text!r}") from None
         return self._value(tree, where)
 
-    def _value(self, tree: ast.expr, where: Note) -> int | None:
+    def _value(self, tree: ast.expr, where: Annotation) -> int | None:
         match tree:
             case ast.Constant(value=int(value)):
                 return value
@@ -84,9 +84,9 @@ class Notes:
         raise ToolError(f"{where.place}: expected integers, names, + - * / min, got {ast.unparse(tree)!r}")
 
 
-def read_notes(image: Executable, values: Mapping[str, int]) -> Notes:
-    """The notes of an image; raises `ToolError` for a line that is none."""
-    result = Notes(values=values)
+def read_annotation_section(image: Executable, values: Mapping[str, int]) -> AnnotationSet:
+    """Return the annotations of an image; raises `ToolError` for a line that cannot be parsed."""
+    result = AnnotationSet(values=values)
     for section in image.sections:
         if section.name == SECTION:
             for line in bytes(section.data[::2]).replace(b"\0", b"").decode("utf-8", "replace").splitlines():
@@ -97,5 +97,7 @@ def read_notes(image: Executable, values: Mapping[str, int]) -> Notes:
                 match = _LINE.fullmatch(line)
                 if match is None:
                     raise ToolError(f"section {SECTION}: expected `kind text@file:line`, got {line!r}")
-                result.all.append(Note(match[1], _OF_A_FILE.sub(r"\1/", match[2].strip()), match[3], int(match[4])))
+                result.all.append(
+                    Annotation(match[1], _OF_A_FILE.sub(r"\1/", match[2].strip()), match[3], int(match[4]))
+                )
     return result
