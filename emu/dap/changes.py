@@ -11,7 +11,7 @@ from emu.debug.dwarf.types import Type
 from emu.debug.inspector import Frame, Inspector, Value
 
 
-class Change(Protocol):
+class StateChange(Protocol):
     """A change as plain values, so that it can be sent to another process."""
 
     def apply(self, inspector: Inspector) -> None:
@@ -30,7 +30,7 @@ class Assignment:
     number: Any
 
     def apply(self, inspector: Inspector) -> None:
-        """Apply the change as `Change.apply` specifies."""
+        """Apply the change as `StateChange.apply` specifies."""
         Value(self.type, self.pieces, inspector.view(self.frame), self.name, self.bits).set(self.number)
 
 
@@ -42,7 +42,7 @@ class MemoryWrite:
     data: bytes
 
     def apply(self, inspector: Inspector) -> None:
-        """Apply the change as `Change.apply` specifies."""
+        """Apply the change as `StateChange.apply` specifies."""
         inspector.machine.poke(self.address, int.from_bytes(self.data, "little"), len(self.data))
 
 

@@ -18,7 +18,7 @@ from emu.debug.threads import Thread, Threads
 from emu.dspic30f.isa.codec import decode_for_execution
 from emu.dspic30f.isa.facts import facts_of
 from emu.dspic30f.isa.flow import Call
-from emu.image.lines import Line
+from emu.image.lines import SourceLine
 
 if TYPE_CHECKING:
     from emu.machine.machine import Machine
@@ -303,7 +303,7 @@ class Debuggee:
             self.history.advance(min(before + SLICE_CYCLES, cycle))
         return machine.cycle >= cycle
 
-    def _line(self) -> Line | None:
+    def _line(self) -> SourceLine | None:
         return self.inspector.image.lines.find(self.machine.pc)
 
     # Back
@@ -317,7 +317,7 @@ class Debuggee:
         start = self.inspector.function_start(self.machine.pc)
         line = self._line()
         if line is not None and line.start != self.machine.pc:  # from inside a line, the start of that line comes first
-            line = Line(-1, -1, line.file, -line.line)
+            line = SourceLine(-1, -1, line.file, -line.line)
         for positions in self.history.earlier_steps():
             for at, (cycle, pc) in reversed(list(enumerate(positions))):
                 here = self.inspector.image.lines.find(pc)

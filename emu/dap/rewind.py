@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 from emu.dap.breakpoint_requests import BreakpointRequests
 from emu.dap.breakpoints import Breakpoint
-from emu.dap.changes import Change
+from emu.dap.changes import StateChange
 from emu.dap.debuggee import Debuggee, StopEvent
 from emu.dap.state_requests import RequestRefusedError
 from emu.debug.history import History
@@ -34,7 +34,7 @@ class SessionState(NamedTuple):
     """Cycle to which the checkpoint runs."""
     event: StopEvent
     """Event that the checkpoint reports at that cycle."""
-    changes: list[tuple[int, Change]]
+    changes: list[tuple[int, StateChange]]
     breakpoints: dict[str, list[Breakpoint]]
     stops_at_faults: bool
     last_id: int
@@ -54,7 +54,7 @@ class RewindingSession(BreakpointRequests):
     _output: dict[int, bytearray]
 
     def __init__(self) -> None:
-        self._changes: list[tuple[int, Change]] = []
+        self._changes: list[tuple[int, StateChange]] = []
         """Changes made by the client, each with its cycle."""
         self._is_muted = False
         """Whether output is discarded, because the client has already received it in the original run."""
@@ -132,7 +132,9 @@ class RewindingSession(BreakpointRequests):
         if not self._is_over:
             self._report_stop(session_state.event if is_there else INTERRUPTED)
 
-    def _replay_changes(self, cycle: int, done: list[tuple[int, Change]], changes: list[tuple[int, Change]]) -> bool:
+    def _replay_changes(
+        self, cycle: int, done: list[tuple[int, StateChange]], changes: list[tuple[int, StateChange]]
+    ) -> bool:
         """Run to a cycle past all breakpoints and repeat `changes`, of which `done` are already made.
 
         Return whether the machine got there before a pause was requested.
@@ -155,7 +157,7 @@ class RewindingSession(BreakpointRequests):
             return target.run_to_cycle(cycle, lambda: environment.offer_checkpoint(cycle))
         return target.run_to_cycle(cycle)
 
-    def _apply(self, change: Change) -> None:
+    def _apply(self, change: StateChange) -> None:
         """Apply a change as `StateRequests` specifies."""
         read_only_reason = self._debuggee.history.read_only_reason
         if read_only_reason:

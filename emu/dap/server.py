@@ -16,7 +16,7 @@ from emu.dap.debuggee import Debuggee, StopEvent
 from emu.dap.launch import validated
 from emu.dap.rewind import RewindingSession
 from emu.dap.state_requests import RequestRefusedError
-from emu.dap.variables import ReferenceTable, Row, Sources
+from emu.dap.variables import ReferenceTable, Row, SourceFiles
 from emu.dap.wire import Channel, Message
 from emu.debug.dwarf.location import Unavailable
 from emu.debug.environment import CheckpointResumedError
@@ -71,7 +71,7 @@ class Server(RewindingSession):
         self.terminate_debuggee = False
         """Whether the client has requested that the debuggee ends, and not only the session."""
         self._target: Debuggee | None = None
-        self._views: tuple[ReferenceTable, Sources] | None = None
+        self._views: tuple[ReferenceTable, SourceFiles] | None = None
         self._launch: Row = {}
         self._client: Row = {}
         """Capabilities and identity that the client has sent."""
@@ -169,7 +169,7 @@ class Server(RewindingSession):
         program = Path(machine.image.path).resolve()
         roots = [Path(root) for root in arguments.get("sourceRoots", [])] + [Path.cwd(), *program.parents]
         self._target = Debuggee(machine, self._is_stop_requested, self._write_output, self._record(machine))
-        sources = Sources(self._target.inspector, roots)
+        sources = SourceFiles(self._target.inspector, roots)
         world = self._environment_state if self._target.history.environment is not None else None
         self._views = ReferenceTable(self._target.inspector, sources, world), sources
         self._attach_output(machine)
@@ -246,10 +246,10 @@ class Server(RewindingSession):
         self._pause = True
         return {}
 
-    def _run_action(self, act: Callable[[], StopEvent]) -> None:
+    def _run_action(self, action: Callable[[], StopEvent]) -> None:
         self._references.clear()
         self._pause = False
-        event = self._rewind_if_followed(act())
+        event = self._rewind_if_followed(action())
         if not self._is_over:
             self._report_stop(event)
 
@@ -264,11 +264,11 @@ class Server(RewindingSession):
             body["hitBreakpointIds"] = list(event.breakpoints)
         self._event("stopped", body)
 
-    def _resuming(self, act: Callable[[], StopEvent]) -> Any:
+    def _resuming(self, action: Callable[[], StopEvent]) -> Any:
         target = self._debuggee
         if not self._configured:
             raise RequestRefusedError(f"{target.machine.pc:#x}: the configuration is not done")
-        return {"allThreadsContinued": True}, lambda: self._run_action(act)
+        return {"allThreadsContinued": True}, lambda: self._run_action(action)
 
     def _do_continue(self, _arguments: Row) -> Any:
         return self._resuming(self._debuggee.resume)

@@ -7,12 +7,12 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from typing import Any, Final
 
-from emu.dap.changes import Change, MemoryWrite, assignment
+from emu.dap.changes import MemoryWrite, StateChange, assignment
 from emu.dap.completions import completions
 from emu.dap.console import console_command
 from emu.dap.debuggee import Debuggee, StopEvent
 from emu.dap.sfrs import sfr_groups
-from emu.dap.variables import ReferenceTable, Row, Sources, disassembled
+from emu.dap.variables import ReferenceTable, Row, SourceFiles, disassembled
 from emu.debug.expressions.expression import evaluate
 from emu.debug.inspector import Value
 
@@ -31,10 +31,10 @@ class StateRequests(ABC):
     """
 
     _target: Debuggee | None
-    _views: tuple[ReferenceTable, Sources] | None
+    _views: tuple[ReferenceTable, SourceFiles] | None
 
     @abstractmethod
-    def _run_action(self, act: Callable[[], StopEvent]) -> None:
+    def _run_action(self, action: Callable[[], StopEvent]) -> None:
         """Execute a function that moves the machine, and report where it stops."""
 
     @abstractmethod
@@ -42,7 +42,7 @@ class StateRequests(ABC):
         """Rewind the environment to the time of the machine. Raises RequestRefusedError if that is interrupted."""
 
     @abstractmethod
-    def _apply(self, change: Change) -> None:
+    def _apply(self, change: StateChange) -> None:
         """Apply a change now, and again whenever the session returns to this time. Raises RequestRefusedError."""
 
     def _environment_state(self) -> list[tuple[str, str]]:
@@ -66,7 +66,7 @@ class StateRequests(ABC):
         return self._views[0]
 
     @property
-    def _sources(self) -> Sources:
+    def _sources(self) -> SourceFiles:
         if self._views is None:
             raise RequestRefusedError("no program has been launched")
         return self._views[1]
@@ -87,10 +87,10 @@ class StateRequests(ABC):
                     "result": "\n".join(": ".join(one) for one in self._environment_state()),
                     "variablesReference": 0,
                 }
-            said = console_command(self._debuggee, text[1:])
-            if isinstance(said, str):
-                return {"result": said, "variablesReference": 0}
-            return {"result": "", "variablesReference": 0}, lambda: self._run_action(said)
+            result = console_command(self._debuggee, text[1:])
+            if isinstance(result, str):
+                return {"result": result, "variablesReference": 0}
+            return {"result": "", "variablesReference": 0}, lambda: self._run_action(result)
         name, equals, value = text.partition("=")
         if arguments.get("context") == "repl" and equals and not value.startswith("=") and name[-1:] not in "!<>=":
             return self._assign(name.strip(), value.strip(), arguments)

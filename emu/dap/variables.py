@@ -14,7 +14,7 @@ from urllib.parse import unquote
 from emu.debug.dwarf.location import Piece, Unavailable
 from emu.debug.dwarf.types import UNSIGNED, parts_of
 from emu.debug.inspector import Frame, Inspector, Value
-from emu.image.lines import Line
+from emu.image.lines import SourceLine
 from emu.instruments.disassembly import instruction
 
 REGISTERS: Final = 16
@@ -29,7 +29,7 @@ class ReferenceTable:
     one."""
 
     def __init__(
-        self, inspector: Inspector, sources: Sources, world: Callable[[], list[tuple[str, str]]] | None = None
+        self, inspector: Inspector, sources: SourceFiles, world: Callable[[], list[tuple[str, str]]] | None = None
     ) -> None:
         self.inspector = inspector
         """Inspector of the debugged machine. References remain valid for another machine in the same state."""
@@ -86,9 +86,9 @@ class ReferenceTable:
 
             return rows
 
-        mine = of_variables(self.inspector.variables(frame))
+        local_rows = of_variables(self.inspector.variables(frame))
         statics = of_variables(list(self.inspector.debug.statics.get(unit, {}).values()))
-        everything = [("Locals", mine, "locals", False), ("Statics", statics, "", False),
+        everything = [("Locals", local_rows, "locals", False), ("Statics", statics, "", False),
                       ("Registers", lambda: self._registers(frame), "registers", False),
                       ("SFRs", self._sfrs, "registers", True)]  # fmt: skip
         if self._world is not None:
@@ -193,7 +193,7 @@ class ReferenceTable:
         row["indexedVariables" if bare.kind == "array" else "namedVariables"] = len(members) or 1
 
 
-class Sources:
+class SourceFiles:
     """Source files of the line table and their paths on this computer."""
 
     def __init__(self, inspector: Inspector, roots: list[Path]) -> None:
@@ -217,15 +217,15 @@ class Sources:
         """Return all source files of the program."""
         return [self.row(file) for file in sorted({row.file for row in self._inspector.image.lines.rows})]
 
-    def lines(self, path: str) -> list[Line]:
+    def lines(self, path: str) -> list[SourceLine]:
         """Return the rows of the line table for the file that a client calls `path`."""
         _, is_uri, rest = path.partition("://")
         requested = Path("/" + unquote(rest.partition("/")[2]) if is_uri else path)
         requested = requested.resolve() if requested.exists() else requested
         files = {row.file for row in self._inspector.image.lines.rows}
-        mine = {file for file in files if self.path(file) == requested}
-        mine = mine or {file for file in files if Path(file).name == requested.name}
-        return [row for row in self._inspector.image.lines.rows if row.file in mine]
+        own_files = {file for file in files if self.path(file) == requested}
+        own_files = own_files or {file for file in files if Path(file).name == requested.name}
+        return [row for row in self._inspector.image.lines.rows if row.file in own_files]
 
     def addresses(self, path: str, line: int) -> tuple[int, tuple[int, ...]]:
         """Return the first line at or after `line` with code, and its address in each function; 0 if there is none."""
@@ -242,7 +242,7 @@ class Sources:
         return behind[0], tuple(sorted(found.values()))
 
 
-def disassembled(inspector: Inspector, sources: Sources, address: int, count: int, symbols: bool) -> list[Row]:
+def disassembled(inspector: Inspector, sources: SourceFiles, address: int, count: int, symbols: bool) -> list[Row]:
     """Return exactly `count` rows of one program word each from `address`, with source lines at their starts."""
     rows: list[Row] = []
     program, end = inspector.machine.program, inspector.image.chip.program["flash"].end

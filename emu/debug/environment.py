@@ -13,7 +13,7 @@ class CheckpointResumedError(Exception):
     `session_state`."""
 
     def __init__(self, session_state: Any) -> None:
-        super().__init__("woken")
+        super().__init__("checkpoint resumed")
         self.session_state = session_state
 
 

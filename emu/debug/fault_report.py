@@ -1,7 +1,8 @@
 """Diagnosis of firmware faults: cause, place, variables, thread, call stack and the branches that led there.
 
-Inputs: a stopped machine and its checkpoints (`emu.machine.stops.RunCheckpoints`). Output: the `Stop` with a `Fault`,
-or the unchanged stop if the firmware simply ended. A handled trap is no fault, unless the firmware never returns from
+Inputs: a stopped machine and its checkpoints (`emu.machine.stops.RunCheckpoints`). Output: the `Stop` with a
+`FaultReport`, or the unchanged stop if the firmware simply ended. A handled trap is no fault, unless the firmware never
+returns from
 its handler. A kernel that stops the system is one. An unhandled exception is recognised by a debugger word at the
 vector's target: the linkers of XC16 and of this project put one there (abi-elf.md §3.3).
 
@@ -27,7 +28,7 @@ from emu.dspic30f.isa.codec import decode_for_execution
 from emu.dspic30f.isa.debug import FAILED_CHECK, PLAIN_TRAP
 from emu.dspic30f.state.state import IPL3, STACK_POINTER
 from emu.image.model import ERASED
-from emu.machine.fault import Branch, Fault, StackEntry
+from emu.machine.fault import FaultReport, StackEntry, TakenBranch
 
 if TYPE_CHECKING:
     from emu.machine.machine import Machine
@@ -102,7 +103,7 @@ def attach(machine: Machine) -> None:
 
 
 def explain(machine: Machine, stop: Stop) -> Stop:
-    """Return `stop` with reason "fault" and a `Fault` if the firmware failed, else `stop` itself."""
+    """Return `stop` with reason "fault" and a `FaultReport` if the firmware failed, else `stop` itself."""
     inspector = Inspector(machine)
     case = _case_of_stop(machine, inspector, stop)
     return stop if case is None else replace(stop, reason="fault", fault=_diagnosed(machine, inspector, case))
@@ -116,8 +117,8 @@ def never_started(machine: Machine, stop: Stop, refused: int) -> Stop:
     return replace(stop, reason="fault", fault=_diagnosed(machine, Inspector(machine), case))
 
 
-def state_report(machine: Machine, cause: str) -> Fault:
-    """Return thread, call stack and last branches of a machine without a fault, in the form of a `Fault`."""
+def state_report(machine: Machine, cause: str) -> FaultReport:
+    """Return thread, call stack and last branches of a machine without a fault, in the form of a `FaultReport`."""
     case = _Case(cause, machine.pc, machine.cycle, None, machine.checkpoints.start)
     return _diagnosed(machine, Inspector(machine), case)
 
@@ -182,7 +183,7 @@ def _case_of_trap(machine: Machine, trap: tuple[Vector, bytes, bytes | None]) ->
 # Diagnosis
 
 
-def _diagnosed(machine: Machine, inspector: Inspector, case: _Case) -> Fault:
+def _diagnosed(machine: Machine, inspector: Inspector, case: _Case) -> FaultReport:
     """Find the faulty instruction of `case`, replay the run up to it and describe the state there."""
     trace = _trace(machine, case)
     replay_cycle = _locate(machine, inspector, case, trace)
@@ -196,7 +197,7 @@ def _diagnosed(machine: Machine, inspector: Inspector, case: _Case) -> Fault:
     branches = trace.branches if trace is not None else ()
     symbol = inspector.image.symbols.text(case.pc) if inspector.is_code(case.pc) else None
     line = inspector.image.lines.find(case.pc)
-    return Fault(
+    return FaultReport(
         case.cause, case.pc, case.cycle, inspector.where(case.pc), symbol, str(line) if line else None, thread or None,
         entries, branches, tuple(_branch_text(inspector, one) for one in branches),
     )  # fmt: skip
@@ -249,7 +250,7 @@ def _frames_of_culprit(inspector: Inspector, case: _Case) -> list[Frame]:
     return frames
 
 
-def _wild_jump(inspector: Inspector, case: _Case, trace: ExecutionTrace | None) -> Branch | None:
+def _wild_jump(inspector: Inspector, case: _Case, trace: ExecutionTrace | None) -> TakenBranch | None:
     """Return the branch by which control left the program for good, if there is one."""
     if trace is None:
         return None
@@ -260,7 +261,7 @@ def _wild_jump(inspector: Inspector, case: _Case, trace: ExecutionTrace | None) 
     return next((one for one in reversed(trace.branches) if inspector.is_code(one.source)), None)
 
 
-def _jump_text(machine: Machine, jump: Branch, cause: str) -> str:
+def _jump_text(machine: Machine, jump: TakenBranch, cause: str) -> str:
     """Return the cause of a fault after a wild jump."""
     word = machine.program.word(jump.source)
     insn = decode_for_execution(word, machine.program.word(jump.source + 2))
@@ -322,7 +323,7 @@ def _entry(inspector: Inspector, frame: Frame, with_values: bool) -> StackEntry:
     return StackEntry(frame.pc, frame.function, str(frame.line) if frame.line else None, frame.kind, tuple(values))
 
 
-def _branch_text(inspector: Inspector, one: Branch) -> str:
+def _branch_text(inspector: Inspector, one: TakenBranch) -> str:
     arrow = "=>" if one.kind == "exception" else "->"
     return f"cycle {one.cycle:,}: {inspector.where(one.source)} {arrow} {inspector.where(one.target)}"
 

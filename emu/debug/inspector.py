@@ -15,7 +15,7 @@ from emu.debug.dwarf import location
 from emu.debug.dwarf.types import UNSIGNED, Type, decode, decode_member, encode, parts_of, text_of
 from emu.debug.dwarf.units import DebugInfo, Scope, Variable, debug_of
 from emu.debug.unwind import CodeAnalysis, RawFrame, Unwinder
-from emu.image.lines import Line
+from emu.image.lines import SourceLine
 from emu.image.model import Image
 
 if TYPE_CHECKING:
@@ -37,7 +37,7 @@ class Frame:
     """Next instruction of the frame; for a caller, the return address."""
     function: str
     """Name of the function in C or assembly; its address if it has no name."""
-    line: Line | None
+    line: SourceLine | None
     kind: str
     """"call", "interrupt" (entered by an exception) or "inlined"."""
     scopes: tuple[Scope, ...]
@@ -172,7 +172,7 @@ class Inspector:
             yield Frame(raw.pc, name, line, "inlined" if inlined else kind, tuple(scopes[first:]), raw, at)
             if not inlined:
                 return
-            line = Line(at, at + 2, own.call_file, own.call_line) if own.call_line else line
+            line = SourceLine(at, at + 2, own.call_file, own.call_line) if own.call_line else line
             scopes = scopes[:first]
 
     # Variables

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Final
 
 from emu.dspic30f.isa.codec import decode_for_execution
 from emu.dspic30f.state.state import STACK_POINTER
-from emu.machine.fault import Branch
+from emu.machine.fault import TakenBranch
 
 if TYPE_CHECKING:
     from emu.machine.machine import Machine
@@ -30,7 +30,7 @@ WINDOWS: Final = (4_000, 64_000, 400_000)
 class ExecutionTrace:
     """How a machine came to its state."""
 
-    branches: tuple[Branch, ...]
+    branches: tuple[TakenBranch, ...]
     """The last branches, oldest first."""
     last: int | None
     """Address of the instruction that ran last."""
@@ -80,7 +80,7 @@ def retrace(machine: Machine, state: bytes, end: int, until: Callable[[], bool] 
 
 def _stepped(machine: Machine, end: int, until: Callable[[], bool] | None) -> ExecutionTrace | None:
     """Single-step the machine as `retrace` does and return the trace."""
-    branches: deque[Branch] = deque(maxlen=MAX_BRANCHES)
+    branches: deque[TakenBranch] = deque(maxlen=MAX_BRANCHES)
     stop: Stop | None = None
     last: int | None = None
     began = machine.cycle
@@ -91,7 +91,7 @@ def _stepped(machine: Machine, end: int, until: Callable[[], bool] | None) -> Ex
             if stop is not None or machine.cycle > end:
                 break
             if machine.pc != before and last is not None:
-                branches.append(Branch(before, machine.pc, machine.cycle, "exception"))
+                branches.append(TakenBranch(before, machine.pc, machine.cycle, "exception"))
             began, pc = machine.cycle, machine.pc
             errors.clear()
             stop = machine.step()
@@ -99,7 +99,7 @@ def _stepped(machine: Machine, end: int, until: Callable[[], bool] | None) -> Ex
             if stop is not None:
                 break
             if machine.pc not in _sequential_targets(machine, pc):
-                branches.append(Branch(pc, machine.pc, began, "branch"))
+                branches.append(TakenBranch(pc, machine.pc, began, "branch"))
     if stop is None if until is None else not until():
         return None
     return ExecutionTrace(tuple(branches), last, began, machine.w[STACK_POINTER], errors[0] if errors else None)

@@ -12,7 +12,7 @@ MAX_FRAMES_SHOWN: Final = 12
 
 
 @dataclass(frozen=True, slots=True)
-class Branch:
+class TakenBranch:
     """A taken branch or exception entry: control passed from the instruction at `source` to `target`."""
 
     source: int
@@ -36,7 +36,7 @@ class StackEntry:
 
 
 @dataclass(frozen=True, slots=True)
-class Fault:
+class FaultReport:
     """What went wrong and where. `pc` is the faulty instruction, or the best estimate of it."""
 
     cause: str
@@ -50,7 +50,7 @@ class Fault:
     """`thread 1 (worker)` of an OpenSwarm firmware."""
     frames: tuple[StackEntry, ...] = ()
     """The call stack at `pc`, innermost first, through interrupts."""
-    branches: tuple[Branch, ...] = ()
+    branches: tuple[TakenBranch, ...] = ()
     """The last branches before the fault, oldest first. Empty unless `run`, `advance` or the command line ran the
     machine."""
     branch_texts: tuple[str, ...] = ()

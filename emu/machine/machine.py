@@ -18,7 +18,7 @@ from emu.dspic30f.engines import make_engine
 from emu.dspic30f.exceptions.faults import RESTART, Breakpoint, DeviceReset, Violation
 from emu.dspic30f.state.state import PC_MASK, RUN, W15_INITIALISED
 from emu.image.model import Image
-from emu.machine.state_access import Location, MemoryObserver, StateAccess
+from emu.machine.state_access import MemoryObserver, NameOrAddress, StateAccess
 from emu.machine.stops import CHECKPOINT_CYCLES, RESET_LOOP, RESETS_KEPT, LastReset, RunCheckpoints, Stop, next_reset
 from emu.peripherals import CpuSignals, Peripherals, build
 from emu.system.bus import Bus
@@ -250,7 +250,7 @@ class Machine(StateAccess):
     def run(
         self,
         cycles: int | None = None,
-        until: Callable[[], bool] | Location | None = None,
+        until: Callable[[], bool] | NameOrAddress | None = None,
         *,
         seconds: float | Fraction | None = None,
     ) -> Stop:
@@ -504,7 +504,7 @@ class Machine(StateAccess):
 
     # Hooks
 
-    def hook_pc(self, place: Location, hook: PcHook) -> Callable[[], None]:
+    def hook_pc(self, place: NameOrAddress, hook: PcHook) -> Callable[[], None]:
         """Call `hook` before the instruction at `place`: a function, a label or a program address.
 
         A true result stops the run. Returns a function that removes the hook. Raises KeyError for an unknown name,

@@ -18,7 +18,7 @@ from emu.dspic30f.state.state import PC_MASK
 from emu.image.model import Image
 from emu.system.bus import Tap, tap
 
-Location = str | int
+NameOrAddress = str | int
 """A name of the loaded image or chip, or an address."""
 SfrHook = Callable[[bool, int], object]
 
@@ -52,7 +52,7 @@ class StateAccess:
         self.memory_observer: MemoryObserver | None = None
         self._sfr_hooks: Final[dict[int, Tap]] = {}
 
-    def program_address(self, place: Location) -> int:
+    def program_address(self, place: NameOrAddress) -> int:
         """Return the program address of a function or label of the loaded image, or check an address.
 
         Raises KeyError for an unknown name, ValueError for an address at which no instruction can start.
@@ -66,7 +66,7 @@ class StateAccess:
             raise ValueError(f"{place:#x} is no program address: expected an even number, 0 to {PC_MASK:#x}")
         return place
 
-    def address_of(self, place: Location) -> int:
+    def address_of(self, place: NameOrAddress) -> int:
         """Return the data address of a register (`U1STA`, `W3`) or variable by name. An address is returned unchanged.
 
         Raises KeyError for an unknown name.
@@ -81,27 +81,27 @@ class StateAccess:
             raise KeyError(f"there is no register or variable {place!r}")
         return symbol.address
 
-    def read(self, place: Location, size: int = 2) -> int:
+    def read(self, place: NameOrAddress, size: int = 2) -> int:
         """Read a byte or an aligned word of data space as an instruction does, with side effects.
 
         Raises ValueError for another size or an odd word address, KeyError for an unknown name.
         """
         return self.core.data.read(self._accessed(place, size), size)
 
-    def write(self, place: Location, value: int, size: int = 2) -> None:
+    def write(self, place: NameOrAddress, value: int, size: int = 2) -> None:
         """Write a byte or an aligned word of data space as an instruction does, with side effects.
 
         Raises as `read`.
         """
         self.core.data.write(self._accessed(place, size), value, size)
 
-    def _accessed(self, place: Location, size: int) -> int:
+    def _accessed(self, place: NameOrAddress, size: int) -> int:
         address = self.address_of(place)
         if size not in (1, 2) or address & (size - 1):
             raise ValueError(f"an instruction accesses a byte or an aligned word, not {size} bytes at {address:#06x}")
         return address
 
-    def peek(self, place: Location, size: int = 2) -> int:
+    def peek(self, place: NameOrAddress, size: int = 2) -> int:
         """Return the unsigned little-endian number in `size` bytes of data space, without side effects.
 
         `place` is a register (`U1STA`, `W3`), a variable, or any address; from 0x8000 on it lies in the PSV window.
@@ -112,7 +112,7 @@ class StateAccess:
             return self.bus.peek(address) if address < self.bus.end else self.record.u16[address >> 1]
         return int.from_bytes(self.peek_bytes(address, size), "little")
 
-    def peek_bytes(self, place: Location, size: int) -> bytes:
+    def peek_bytes(self, place: NameOrAddress, size: int) -> bytes:
         """Return `size` bytes of data space from `place`, without side effects. Raises as `peek`."""
         address = self.address_of(place)
         end = address + size
@@ -131,7 +131,7 @@ class StateAccess:
             return self.record.u16[address >> 1]
         return self.program.word(self.record.u16[self.core.state.at["PSVPAG"]] << 15 | address & 0x7FFE) & 0xFFFF
 
-    def poke(self, place: Location, value: int, size: int = 2) -> None:
+    def poke(self, place: NameOrAddress, value: int, size: int = 2) -> None:
         """Store the low `size` bytes of `value` at `place` in data space, without side effects and hooks.
 
         Raises as `peek`. Constants in program memory cannot be changed.
@@ -143,7 +143,7 @@ class StateAccess:
             self.memory_observer.on_external_write(address, size)
         self.record.bytes[address : address + size] = (value & (1 << 8 * size) - 1).to_bytes(size, "little")
 
-    def hook_sfr(self, place: Location, hook: SfrHook) -> Callable[[], None]:
+    def hook_sfr(self, place: NameOrAddress, hook: SfrHook) -> Callable[[], None]:
         """Call hook(is_write, word) after every access of an instruction to a register.
 
         Returns a function that removes the hook. Raises KeyError for an unknown name, ValueError for an address that

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Final, NamedTuple
 
 from emu.chips.chip import Vector
-from emu.machine.fault import Fault
+from emu.machine.fault import FaultReport
 
 REASONS: Final = ("limit", "breakpoint", "halt", "fault", "until", "interrupted")
 CHECKPOINT_CYCLES: Final = 1 << 23
@@ -68,5 +68,5 @@ class Stop:
     cycle: int
     detail: str = ""
     """Cause of a fault, or the text of a debugger word."""
-    fault: Fault | None = None
+    fault: FaultReport | None = None
     """The diagnosis of a fault (`emu.debug.fault_report`), if one is attached to the machine and an image is loaded."""

@@ -14,7 +14,7 @@ REQUESTS: Final = {
 
 
 @dataclass(eq=False, slots=True)
-class Breakpoint:
+class PromptBreakpoint:
     """One breakpoint of the user."""
 
     number: int
@@ -45,14 +45,14 @@ class BreakpointList:
     """All breakpoints of a session."""
 
     def __init__(self, client: Client) -> None:
-        self.all: Final[list[Breakpoint]] = []
+        self.all: Final[list[PromptBreakpoint]] = []
         self._client: Final = client
         self._last = 0
 
-    def add(self, kind: str, row: Row, text: str, is_temporary: bool = False) -> Breakpoint:
+    def add(self, kind: str, row: Row, text: str, is_temporary: bool = False) -> PromptBreakpoint:
         """Set a breakpoint. Raises CommandRefusedError if the server refuses it."""
         self._last += 1
-        made = Breakpoint(self._last, kind, row, text, is_temporary)
+        made = PromptBreakpoint(self._last, kind, row, text, is_temporary)
         self.all.append(made)
         self.send([made.list])
         if not made.facts["verified"]:
@@ -65,27 +65,27 @@ class BreakpointList:
     def send(self, kinds: Iterable[str]) -> None:
         """Send the lists of the given kinds to the server."""
         for kind in set(kinds):
-            mine = [one for one in self.all if one.list == kind and one.is_enabled]
+            selected = [one for one in self.all if one.list == kind and one.is_enabled]
             more = {} if kind in REQUESTS else {"source": {"path": kind}}
             request = REQUESTS.get(kind, "setBreakpoints")
-            told = self._client.ask(request, breakpoints=[one.row for one in mine], **more)["breakpoints"]
-            for one, facts in zip(mine, told, strict=True):
+            reported = self._client.ask(request, breakpoints=[one.row for one in selected], **more)["breakpoints"]
+            for one, facts in zip(selected, reported, strict=True):
                 one.facts = facts
 
-    def find(self, text: str) -> Breakpoint:
+    def find(self, text: str) -> PromptBreakpoint:
         """Return the breakpoint with a number. Raises CommandRefusedError."""
         found = next((one for one in self.all if text == str(one.number)), None)
         if found is None:
             raise CommandRefusedError(f"there is no breakpoint {text or 'without a number'}")
         return found
 
-    def delete(self, breakpoints: list[Breakpoint]) -> None:
+    def delete(self, breakpoints: list[PromptBreakpoint]) -> None:
         """Delete breakpoints."""
         for one in breakpoints:
             self.all.remove(one)
         self.send(one.list for one in breakpoints)
 
-    def take_hit(self, ids: list[int]) -> list[Breakpoint]:
+    def take_hit(self, ids: list[int]) -> list[PromptBreakpoint]:
         """Return the breakpoints that ended a run, and delete the temporary ones among them."""
         hit = [one for one in self.all if one.is_enabled and one.facts.get("id") in ids]
         self.delete([one for one in hit if one.is_temporary])

@@ -53,16 +53,16 @@ def number(text: str, form: str) -> str:
         raise CommandRefusedError(f"{text} is no whole number")
     value = int(match[0], 0)
     bits = next(bits for bits in (16, 32, 64, 4096) if -(1 << bits - 1) <= value < 1 << bits)
-    plain = value & (1 << bits) - 1
+    unsigned = value & (1 << bits) - 1
     match form:
         case "x" | "a":
-            return f"{plain:#x}"
+            return f"{unsigned:#x}"
         case "t":
-            return f"{plain:#b}"
+            return f"{unsigned:#b}"
         case "c":
-            return repr(chr(plain & 0xFF))
+            return repr(chr(unsigned & 0xFF))
         case "u":
-            return str(plain)
+            return str(unsigned)
     return str(value)
 
 
@@ -75,14 +75,14 @@ def registers(rows: Sequence[Row]) -> str:
                       *(f"{name} {value}" for name, value in texts if not name.startswith("W"))])  # fmt: skip
 
 
-def sfrs(groups: Sequence[Row], wanted: str) -> str:
-    """Return the registers whose name or peripheral matches the pattern `wanted`, with their fields.
+def sfrs(groups: Sequence[Row], requested: str) -> str:
+    """Return the registers whose name or peripheral matches the pattern `requested`, with their fields.
 
     Without a pattern, list the peripherals. Raises CommandRefusedError if nothing matches.
     """
-    if not wanted:
+    if not requested:
         return "\n".join(f"{group['name']}: {' '.join(one['name'] for one in group['parts'])}" for group in groups)
-    pattern = wanted.upper()
+    pattern = requested.upper()
     found = [
         f"{one['name']:<9} {one['address']}  {one['value']}  "
         + " ".join(f"{part['name']}={part['value']}" for part in one.get("parts", []))
@@ -91,7 +91,7 @@ def sfrs(groups: Sequence[Row], wanted: str) -> str:
         if fnmatchcase(one["name"].upper(), pattern) or fnmatchcase(group["name"].upper(), pattern)
     ]
     if not found:
-        raise CommandRefusedError(f"no register and no peripheral is called {wanted}")
+        raise CommandRefusedError(f"no register and no peripheral is called {requested}")
     return "\n".join(line.rstrip() for line in found)
 
 

@@ -10,7 +10,7 @@ from emu.host.exit_status import BAD_INPUT, DONE, FAULT
 from emu.host.paths import history
 from emu.prompt import breakpoint_commands, run_commands, state_commands  # noqa: F401  they fill the table
 from emu.prompt.client import Client, CommandRefusedError, DebugServer, Row
-from emu.prompt.session import Session
+from emu.prompt.session import DebugSession
 from emu.prompt.state_commands import TOPICS
 from emu.prompt.table import TABLE, Command, find_command
 
@@ -32,7 +32,7 @@ class Prompt:
         self._program: Final = program
         self._column = 0
         self.client: Final = Client(make_server, self._print_output)
-        self.session: Final = Session(self.client, self._write)
+        self.session: Final = DebugSession(self.client, self._write)
 
     def serve(self, launch: Row, source: TextIO) -> int:
         """Execute commands to the end and return the exit status.
@@ -95,7 +95,7 @@ class Prompt:
         self._column = 0
 
 
-def execute(session: Session, line: str) -> Command:
+def execute(session: DebugSession, line: str) -> Command:
     """Execute one line and return its command. Raises CommandRefusedError."""
     word, rest = split(line)
     found = find_command(word)
@@ -111,7 +111,7 @@ def split(line: str) -> tuple[str, str]:
     return (name, f"/{form} {rest}".strip()) if slash and name else (word, rest)
 
 
-def candidates(session: Session, text: str) -> Iterator[tuple[str, int, str]]:
+def candidates(session: DebugSession, text: str) -> Iterator[tuple[str, int, str]]:
     """Yield completions of a line: the name, the number of last characters that it replaces, and its kind."""
     word, space, rest = text.lstrip().partition(" ")
     if not space:
@@ -135,7 +135,7 @@ def candidates(session: Session, text: str) -> Iterator[tuple[str, int, str]]:
                 yield row["label"], row["length"], row["type"]
 
 
-def _editor(session: Session) -> PromptSession[str]:
+def _editor(session: DebugSession) -> PromptSession[str]:
     """Return a line editor with completion by Tab. It keeps its history in a file if that can be written."""
     from prompt_toolkit import PromptSession
     from prompt_toolkit.completion import Completer, Completion
@@ -152,7 +152,7 @@ def _editor(session: Session) -> PromptSession[str]:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         path.open("a").close()
-        kept: Any = FileHistory(str(path))
+        past_commands: Any = FileHistory(str(path))
     except OSError:
-        kept = InMemoryHistory()
-    return PromptSession(history=kept, completer=Names(), complete_while_typing=False)
+        past_commands = InMemoryHistory()
+    return PromptSession(history=past_commands, completer=Names(), complete_while_typing=False)

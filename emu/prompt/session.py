@@ -14,7 +14,7 @@ LISTING_LINES: Final = 10
 """Lines of a listing, and instructions of a disassembly."""
 
 
-class Session:
+class DebugSession:
     """The state that commands act on. `write(text)` prints a line."""
 
     def __init__(self, client: Client, write: Callable[[str], None]) -> None:
@@ -117,8 +117,8 @@ class Session:
         if self.frame is None:
             raise CommandRefusedError("there is no frame")
         scopes = self.client.ask("scopes", frameId=self.frame["id"])["scopes"]
-        wanted = next(one["variablesReference"] for one in scopes if one["name"] == name)
-        rows: list[Row] = self.client.ask("variables", variablesReference=wanted)["variables"]
+        requested = next(one["variablesReference"] for one in scopes if one["name"] == name)
+        rows: list[Row] = self.client.ask("variables", variablesReference=requested)["variables"]
         return rows
 
     # Locations

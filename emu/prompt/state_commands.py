@@ -7,7 +7,7 @@ from typing import Final
 
 from emu.prompt import formatting
 from emu.prompt.client import CommandRefusedError
-from emu.prompt.session import LISTING_LINES, Session
+from emu.prompt.session import LISTING_LINES, DebugSession
 from emu.prompt.table import TABLE, command, find_command
 
 FORMAT: Final = re.compile(r"/(\d*)([a-z]*)(?:\s+|$)(.*)", re.DOTALL)
@@ -31,12 +31,12 @@ def _formatted(text: str) -> tuple[int, str, str]:
 
 
 @command("backtrace", "show the call stack, through interrupts", "bt", "where")
-def backtrace_(session: Session, _text: str) -> None:
+def backtrace_(session: DebugSession, _text: str) -> None:
     session.write(formatting.backtrace(session.frames, session.at))
 
 
 @command("frame [N]", "select the Nth frame of the call stack", "f")
-def frame_(session: Session, text: str) -> None:
+def frame_(session: DebugSession, text: str) -> None:
     if text:
         if not text.isdecimal() or int(text) >= len(session.frames):
             raise CommandRefusedError(f"the frames are 0 to {len(session.frames) - 1}, not {text}")
@@ -45,24 +45,24 @@ def frame_(session: Session, text: str) -> None:
 
 
 @command("up", "select the caller", repeats=True)
-def up_(session: Session, _text: str) -> None:
+def up_(session: DebugSession, _text: str) -> None:
     frame_(session, str(session.at + 1))
 
 
 @command("down", "select the called function", repeats=True)
-def down_(session: Session, _text: str) -> None:
+def down_(session: DebugSession, _text: str) -> None:
     if not session.at:
         raise CommandRefusedError("this is the innermost frame")
     frame_(session, str(session.at - 1))
 
 
 @command("threads", "show the threads of OpenSwarm with stack use")
-def threads_(session: Session, _text: str) -> None:
+def threads_(session: DebugSession, _text: str) -> None:
     session.run_console_command("/threads")
 
 
 @command("thread PID", "select another thread and show its call stack")
-def thread_(session: Session, text: str) -> None:
+def thread_(session: DebugSession, text: str) -> None:
     threads = {one["name"].partition(" ")[0]: one["id"] for one in session.client.ask("threads")["threads"]}
     if text not in threads:
         raise CommandRefusedError(f"there is no thread {text or 'without a PID'}: {', '.join(threads)}")
@@ -71,7 +71,7 @@ def thread_(session: Session, text: str) -> None:
 
 
 @command("print[/x|d|u|t|c] EXPRESSION", "show the value of a C expression", "p")
-def print_(session: Session, text: str) -> None:
+def print_(session: DebugSession, text: str) -> None:
     _, form, expression = _formatted(text)
     if form and (len(form) > 1 or form not in formatting.FORMATS):
         raise CommandRefusedError(f"the formats are /{' /'.join(formatting.FORMATS)}, not /{form}")
@@ -80,7 +80,7 @@ def print_(session: Session, text: str) -> None:
 
 
 @command("set PLACE = EXPRESSION", "assign to a variable, a register, an SFR or its field")
-def set_(session: Session, text: str) -> None:
+def set_(session: DebugSession, text: str) -> None:
     text = text.removeprefix("var ")
     if not re.search(r"[^=!<>]=[^=]", text):
         raise CommandRefusedError("expected PLACE = EXPRESSION")
@@ -91,7 +91,7 @@ def set_(session: Session, text: str) -> None:
 
 @command("x[/COUNT FORMAT SIZE] ADDRESS", "show memory: x/8xb &buffer; sizes b h w, formats x d u t c a s, i for code",
          repeats=True)  # fmt: skip
-def x_(session: Session, text: str) -> None:
+def x_(session: DebugSession, text: str) -> None:
     count, letters, expression = _formatted(text)
     forms, sizes = letters.strip("bhw"), [one for one in letters if one in SIZES]
     if len(forms) > 1 or (forms and forms not in f"{formatting.FORMATS}si") or len(sizes) > 1:
@@ -101,12 +101,12 @@ def x_(session: Session, text: str) -> None:
         return
     size = SIZES[sizes[0]] if sizes else 1 if forms in ("c", "s") and forms else 2
     address = session.number(expression)
-    wanted = STRING_BYTES if forms == "s" else count * size
-    found = session.client.ask("readMemory", memoryReference=f"{address:#06x}", count=wanted)
+    requested = STRING_BYTES if forms == "s" else count * size
+    found = session.client.ask("readMemory", memoryReference=f"{address:#06x}", count=requested)
     session.write(formatting.memory(found, size, forms or "x"))
 
 
-def _instructions(session: Session, address: int, count: int) -> None:
+def _instructions(session: DebugSession, address: int, count: int) -> None:
     rows = session.client.ask(
         "disassemble", memoryReference=f"{address:#08x}", instructionCount=count, resolveSymbols=True
     )["instructions"]
@@ -114,14 +114,14 @@ def _instructions(session: Session, address: int, count: int) -> None:
 
 
 @command("disassemble [FUNCTION|ADDRESS [COUNT]]", "show instructions with their source lines", "dis")
-def disassemble_(session: Session, text: str) -> None:
+def disassemble_(session: DebugSession, text: str) -> None:
     words = text.rsplit(maxsplit=1)
     count = int(words.pop()) if len(words) == 2 and words[1].isdecimal() else LISTING_LINES
     _instructions(session, session.number(words[0].removeprefix("*") if words else "PC"), count)
 
 
 @command("info TOPIC", "show one of " + ", ".join(TOPICS), "i")
-def info_(session: Session, text: str) -> None:
+def info_(session: DebugSession, text: str) -> None:
     word, _, rest = text.partition(" ")
     found = [one for one in TOPICS if word and one.startswith(word)]
     if len(found) != 1:
@@ -144,7 +144,7 @@ def info_(session: Session, text: str) -> None:
 
 
 @command("list [LOCATION]", "show source around LOCATION, or continue the last listing", "l", repeats=True)
-def list_(session: Session, text: str) -> None:
+def list_(session: DebugSession, text: str) -> None:
     path, first = session.list_position
     if text:
         path, line = session.source_location(text)
@@ -158,20 +158,20 @@ def list_(session: Session, text: str) -> None:
 
 
 @command("time", "show cycle, seconds, and the distance to the present")
-def time_(session: Session, _text: str) -> None:
+def time_(session: DebugSession, _text: str) -> None:
     session.write(session.time())
 
 
 @command("world", "show the state of the trial around the robot")
-def world_(session: Session, _text: str) -> None:
+def world_(session: DebugSession, _text: str) -> None:
     session.run_console_command("/world")
 
 
 @command("help [COMMAND]", "show commands", "h", "?")
-def help_(session: Session, text: str) -> None:
-    wanted = [find_command(text)] if text else sorted(TABLE, key=lambda one: one.name)
+def help_(session: DebugSession, text: str) -> None:
+    requested = [find_command(text)] if text else sorted(TABLE, key=lambda one: one.name)
     width = max(len(one.usage) for one in TABLE)
-    for one in wanted:
+    for one in requested:
         also = f" ({', '.join(one.aliases)})" if one.aliases else ""
         session.write(f"{one.usage:<{width}}  {one.help}{also}")
     if not text:

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from typing import Final
 
 from emu.prompt.client import CommandRefusedError
-from emu.prompt.session import Session
+from emu.prompt.session import DebugSession
 
-Handler = Callable[[Session, str], None]
+Handler = Callable[[DebugSession, str], None]
 
 
 @dataclass(frozen=True, slots=True)

@@ -40,7 +40,7 @@ BASE_SELECTION: Final = 0xFFFFFFFF
 
 
 @dataclass(frozen=True, slots=True)
-class Location:
+class VariableLocation:
     """Location of a variable: DWARF expressions, each for a range of program addresses or for all."""
 
     entries: tuple[tuple[int | None, int, bytes], ...]
@@ -57,7 +57,7 @@ class Variable:
 
     name: str
     type: Type
-    location: Location | None
+    location: VariableLocation | None
     constant: int | bytes | None = None
     is_parameter: bool = False
     file: str = ""
@@ -74,7 +74,7 @@ class Scope:
     ranges: Ranges
     variables: list[Variable] = field(default_factory=list)
     inner: list[Scope] = field(default_factory=list)
-    frame_base: Location | None = None
+    frame_base: VariableLocation | None = None
     file: str = ""
     line: int = 0
     call_file: str = ""
@@ -243,13 +243,13 @@ class _Reader:
         number = _number(die, attribute)
         return self.files[number] if number is not None and 0 <= number < len(self.files) else ""
 
-    def _location(self, die: Any, attribute: str) -> Location | None:
+    def _location(self, die: Any, attribute: str) -> VariableLocation | None:
         found = die.attributes.get(attribute)
         if found is None:
             return None
         if isinstance(found.value, list):
-            return Location(((None, 0, bytes(found.value)),))
-        return Location(tuple(self._location_list(found.value)))
+            return VariableLocation(((None, 0, bytes(found.value)),))
+        return VariableLocation(tuple(self._location_list(found.value)))
 
     def _location_list(self, offset: int) -> Iterator[tuple[int, int, bytes]]:
         """Yield start, end and expression of each entry of a location list (DWARF 2 §2.4.6)."""

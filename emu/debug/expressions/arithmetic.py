@@ -26,7 +26,7 @@ memory."""
 
 
 @dataclass(frozen=True, slots=True)
-class Number:
+class TypedNumber:
     """A value with a type and without a place in memory."""
 
     value: int | float
@@ -38,41 +38,43 @@ class Number:
         return isinstance(self.value, int)
 
 
-def integer_constant(value: int, *, unsigned: bool = False, size: int = INT, may_be_unsigned: bool = False) -> Number:
+def integer_constant(
+    value: int, *, unsigned: bool = False, size: int = INT, may_be_unsigned: bool = False
+) -> TypedNumber:
     """Return a constant in the first type of at least `size` bytes that can represent it.
 
     Raises ValueError if no type can.
     """
     for bytes_ in (one for one in (2, 4, 8) if one >= size):
         if not unsigned and -(1 << 8 * bytes_ - 1) <= value < 1 << 8 * bytes_ - 1:
-            return Number(value, SIGNED[bytes_])
+            return TypedNumber(value, SIGNED[bytes_])
         if (unsigned or may_be_unsigned) and 0 <= value < 1 << 8 * bytes_:
-            return Number(value, UNSIGNED[bytes_])
+            return TypedNumber(value, UNSIGNED[bytes_])
     raise ValueError(f"no type holds {value:#x}")
 
 
-def promote(value: Any, kind: Type, bits: int = 0) -> Number:
+def promote(value: Any, kind: Type, bits: int = 0) -> TypedNumber:
     """Return a value read from an object of type `kind` after integer promotion. `bits` is the width of a bit field."""
     bare = kind.bare
     if isinstance(value, float):
-        return Number(value, bare)
+        return TypedNumber(value, bare)
     width = bits or 8 * bare.size
     if width < 8 * INT or bare.kind == "bool":
-        return Number(int(value))
+        return TypedNumber(int(value))
     size = max(bare.size, INT)
-    return Number(int(value), SIGNED[size] if bare.is_signed else UNSIGNED.get(size, UNSIGNED[8]))
+    return TypedNumber(int(value), SIGNED[size] if bare.is_signed else UNSIGNED.get(size, UNSIGNED[8]))
 
 
-def wrap_result(value: int | float, kind: Type) -> Number:
+def wrap_result(value: int | float, kind: Type) -> TypedNumber:
     """Return a result of type `kind`: unsigned modulo its width, signed in the first type that can represent it."""
     if isinstance(value, float):
-        return Number(_round_to(value, kind), kind)
+        return TypedNumber(_round_to(value, kind), kind)
     if kind.kind == "unsigned":
-        return Number(value & (1 << 8 * kind.size) - 1, kind)
+        return TypedNumber(value & (1 << 8 * kind.size) - 1, kind)
     for size in (2, 4, 8):
         if size >= kind.size and -(1 << 8 * size - 1) <= value < 1 << 8 * size - 1:
-            return Number(value, SIGNED[size])
-    return Number((value + (1 << 63)) % (1 << 64) - (1 << 63), SIGNED[8])
+            return TypedNumber(value, SIGNED[size])
+    return TypedNumber((value + (1 << 63)) % (1 << 64) - (1 << 63), SIGNED[8])
 
 
 def _round_to(value: float, kind: Type) -> float:
@@ -153,13 +155,13 @@ INTEGER_ONLY: Final = ("|", "^", "&", "<<", ">>", "%")
 """Operators for integers only."""
 
 
-def apply_binary(sign: str, one: Number, other: Number) -> Number:
+def apply_binary(sign: str, one: TypedNumber, other: TypedNumber) -> TypedNumber:
     """Return the result of a binary operator. Raises ValueError or ArithmeticError for an undefined result."""
     compute = BINARY[sign][1]
     if sign in INTEGER_ONLY and not (one.is_integer and other.is_integer):
         raise ValueError(f"{sign} needs whole numbers")
     if sign in LOGIC:
-        return Number(int(compute(one.value, other.value)))
+        return TypedNumber(int(compute(one.value, other.value)))
     if sign in SHIFTS:
         return wrap_result(compute(one.value, other.value), one.kind)
     kind = common_type(one.kind, other.kind)
@@ -168,15 +170,15 @@ def apply_binary(sign: str, one: Number, other: Number) -> Number:
     else:
         left, right = wrap_result(one.value, kind).value, wrap_result(other.value, kind).value
     result = compute(left, right)
-    return Number(int(result)) if sign in COMPARISONS else wrap_result(result, kind)
+    return TypedNumber(int(result)) if sign in COMPARISONS else wrap_result(result, kind)
 
 
-def negate(one: Number) -> Number:
+def negate(one: TypedNumber) -> TypedNumber:
     """Return `-one`."""
     return wrap_result(-one.value, one.kind)
 
 
-def complement(one: Number) -> Number:
+def complement(one: TypedNumber) -> TypedNumber:
     """Return `~one`. Raises ValueError for a floating-point number."""
     if not isinstance(one.value, int):
         raise ValueError("~ needs whole numbers")

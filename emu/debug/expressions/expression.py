@@ -22,7 +22,7 @@ from emu.debug.expressions.arithmetic import (
     FLOAT,
     FLOATING,
     INT,
-    Number,
+    TypedNumber,
     apply_binary,
     common_type,
     complement,
@@ -46,7 +46,7 @@ MAX_NESTING: Final = 50
 ESCAPES: Final = dict(zip("abfnrtv\\'\"?", (7, 8, 12, 10, 13, 9, 11, 92, 39, 34, 63), strict=True))
 
 
-UNEVALUATED: Final = Number(0)
+UNEVALUATED: Final = TypedNumber(0)
 """Result of an expression that is not evaluated."""
 
 
@@ -76,7 +76,7 @@ def evaluate(inspector: Inspector, text: str, frame: Frame | None = None) -> Val
     result = parser.expression(0)
     if parser.at < len(parser.tokens):
         raise ExpressionError(f"{text!r}: {parser.tokens[parser.at][1]!r} is too much")
-    found: Value | int | float = result.value if isinstance(result, Number) else result
+    found: Value | int | float = result.value if isinstance(result, TypedNumber) else result
     return found
 
 
@@ -141,10 +141,10 @@ class _Parser:
         number = self._number(taken)
         with self._unevaluated():
             kind = common_type(number.kind, self._number(other).kind)
-        return Number(convert(number.value, kind), kind)
+        return TypedNumber(convert(number.value, kind), kind)
 
     def _is_arithmetic(self, value: Any) -> bool:
-        return isinstance(value, Number) or (value.type.is_number and not _is_pointer(value))
+        return isinstance(value, TypedNumber) or (value.type.is_number and not _is_pointer(value))
 
     @contextmanager
     def _nested(self) -> Iterator[None]:
@@ -174,7 +174,7 @@ class _Parser:
         with self._unevaluated(is_lenient=True):
             return self.expression(lowest)
 
-    def _error(self, why: object) -> Number:
+    def _error(self, why: object) -> TypedNumber:
         """Raise ExpressionError, or return 0 where errors are permitted."""
         if self.is_lenient:
             return UNEVALUATED
@@ -200,7 +200,7 @@ class _Parser:
                     address = self._read(one) + (distance if sign == "+" else -distance)
                     return _constant(one.type, address & 0xFFFF, self.inspector)
                 if sign == "-":
-                    return apply_binary("/", Number(self._read(one) - self._read(other)), Number(step))
+                    return apply_binary("/", TypedNumber(self._read(one) - self._read(other)), TypedNumber(step))
             return apply_binary(sign, self._number(one), self._number(other))
         except (ArithmeticError, TypeError, ValueError) as error:
             return self._error(error)
@@ -215,16 +215,16 @@ class _Parser:
                 return _constant(pointer, value.address, self.inspector)
         return value
 
-    def _number(self, value: Any) -> Number:
+    def _number(self, value: Any) -> TypedNumber:
         value = self._decay(value)
         if isinstance(value, Value):
             if not value.type.is_number:
                 return self._error(f"a {value.type} is no number")
             return promote(self._read(value), value.type, value.bits[0] if value.bits is not None else 0)
-        assert isinstance(value, Number)
-        return value if self.evaluates else Number(type(value.value)(1), value.kind)
+        assert isinstance(value, TypedNumber)
+        return value if self.evaluates else TypedNumber(type(value.value)(1), value.kind)
 
-    def _integer(self, sign: str, number: Number) -> int:
+    def _integer(self, sign: str, number: TypedNumber) -> int:
         if not isinstance(number.value, int):
             return int(self._error(f"{sign} needs whole numbers").value)
         return number.value
@@ -247,7 +247,7 @@ class _Parser:
             number = self._number(self.unary())
             return complement(number) if number.is_integer else self._error("~ needs whole numbers")
         if self._accept("!"):
-            return Number(int(not self._number(self.unary()).value))
+            return TypedNumber(int(not self._number(self.unary()).value))
         if self._accept("*"):
             return self._part(self.unary(), 0)
         if self._accept("&"):
@@ -273,7 +273,7 @@ class _Parser:
         unit = self.frame.scopes[0].unit if self.frame is not None and self.frame.scopes else -1
         return None if self.inspector.variable(name, self.frame) is not None else self.inspector.debug.type(name, unit)
 
-    def _sizeof(self) -> Number:
+    def _sizeof(self) -> TypedNumber:
         """Return the size of the operand of `sizeof`, which is not evaluated."""
         kind = self._parenthesised_type()
         if kind is None:
@@ -281,7 +281,7 @@ class _Parser:
                 value = self.unary()
             if isinstance(value, Value) and value.bits is not None:
                 return self._error("a bit field has no size")
-            kind = value.kind if isinstance(value, Number) else value.type
+            kind = value.kind if isinstance(value, TypedNumber) else value.type
         if not kind.bytes:
             return self._error(f"the size of {kind} is not known")
         return integer_constant(kind.bytes, unsigned=True)
@@ -293,12 +293,12 @@ class _Parser:
         if not kind.is_number or (isinstance(one, Value) and not one.type.is_number):
             return self._error(f"what is {one.type if isinstance(one, Value) else 'a number'} is no {kind}")
         try:
-            plain = self._read(one) if isinstance(one, Value) else one.value
-            return _constant(kind, convert(plain, kind), self.inspector)
+            number = self._read(one) if isinstance(one, Value) else one.value
+            return _constant(kind, convert(number, kind), self.inspector)
         except ValueError as error:
             return self._error(error)
 
-    def _address(self, value: Any) -> Value | Number:
+    def _address(self, value: Any) -> Value | TypedNumber:
         if isinstance(value, Value) and value.bits is None and not self.evaluates:
             return self._placeholder(Type("pointer", size=2, target=value.type))
         if not isinstance(value, Value) or value.address is None or value.bits is not None:
@@ -311,7 +311,7 @@ class _Parser:
             if self._accept("["):
                 index = self.expression(0)
                 self._expect("]")
-                if isinstance(value, Number) and _is_pointer(self._decay(index)):
+                if isinstance(value, TypedNumber) and _is_pointer(self._decay(index)):
                     value, index = index, value
                 value = self._part(value, self._integer("[]", self._number(index)))
             elif self._accept("->"):
@@ -321,8 +321,8 @@ class _Parser:
             else:
                 return value
 
-    def _part(self, value: Any, part: str | int) -> Value | Number:
-        if isinstance(value, Number) and isinstance(value.value, int) and part == 0:
+    def _part(self, value: Any, part: str | int) -> Value | TypedNumber:
+        if isinstance(value, TypedNumber) and isinstance(value.value, int) and part == 0:
             return Value(UNSIGNED[2], (Piece("memory", value.value & 0xFFFF),), self.inspector.view(self.frame), "")
         if not isinstance(value, Value):
             return self._error("a number has no parts")
@@ -365,12 +365,12 @@ class _Parser:
             return self.identifier(text)
         raise ExpressionError(f"{self.text!r}: {text!r} is not expected there")
 
-    def _fraction(self, text: str) -> Number:
+    def _fraction(self, text: str) -> TypedNumber:
         """Return a floating-point constant of the program's own `double`: some compilers make it as short as float."""
         kind = FLOAT if text[-1] in "fF" else self.inspector.debug.type("double") or FLOATING
-        return Number(float(convert(float(text.rstrip("fFlL")), kind)), kind)
+        return TypedNumber(float(convert(float(text.rstrip("fFlL")), kind)), kind)
 
-    def _literal(self, text: str) -> Number:
+    def _literal(self, text: str) -> TypedNumber:
         digits = text.rstrip("uUlL")
         suffix = text[len(digits) :].lower()
         is_decimal = not digits.startswith("0")
@@ -383,7 +383,7 @@ class _Parser:
         except ValueError:
             raise ExpressionError(f"{text[:40]!r} is no number of C, or too large for any type") from None
 
-    def _letter(self, text: str) -> Number:
+    def _letter(self, text: str) -> TypedNumber:
         if text[:1] != "\\":
             code = ord(text)
         elif text[1] in "x01234567":
@@ -392,7 +392,7 @@ class _Parser:
             code = ESCAPES.get(text[1], -1)
         if not 0 <= code < 256:
             raise ExpressionError(f"{self.text!r}: '{text}' is no char")
-        return Number(code - 256 if code >= 128 else code)
+        return TypedNumber(code - 256 if code >= 128 else code)
 
     def identifier(self, name: str) -> Any:
         inspector = self.inspector
@@ -413,12 +413,12 @@ class _Parser:
             place = (Piece("memory", sfr.address),)
             return Value(UNSIGNED[sfr.size], place, inspector.view(self.frame), bare.removesuffix("bits"))
         if bare.lower() == "pc":
-            return Number(self.frame.pc if self.frame is not None else inspector.machine.pc, UNSIGNED[4])
+            return TypedNumber(self.frame.pc if self.frame is not None else inspector.machine.pc, UNSIGNED[4])
         if bare == "cycle":
-            return Number(inspector.machine.cycle, UNSIGNED[8])
+            return TypedNumber(inspector.machine.cycle, UNSIGNED[8])
         function = inspector.image.symbols.find(name)
         if function is not None:
-            return Number(function.address, UNSIGNED[4])
+            return TypedNumber(function.address, UNSIGNED[4])
         if self.is_lenient:
             return UNEVALUATED
         raise ExpressionError(f"there is nothing called {name!r} here")

@@ -113,8 +113,8 @@ class _Reader:
             raise TypeNameError(f"{text!r} is no type")
         size = _INTEGER_SIZES[rest]
         if size == 1:
-            plain = self.find("char") if not is_unsigned + is_signed else None
-            return plain or Type("char", text, size, is_signed=not is_unsigned)
+            char = self.find("char") if not is_unsigned + is_signed else None
+            return char or Type("char", text, size, is_signed=not is_unsigned)
         return Type("unsigned" if is_unsigned else "signed", text, size, is_signed=not is_unsigned)
 
     def declarator(self, kind: Type) -> Type:
