@@ -46,7 +46,7 @@ class Structures:
             "s": max(map(len, subscriptions), default=0),
             "o": max(owners.values(), default=0),
             "t": owners.total(),
-            "q": sum(1 for name in ("_event_queue", "_undelivered") for _ in self._list(self._at(name), 0)),
+            "q": sum(1 for name in ("_event_queue", "_delivery_batch") for _ in self._list(self._at(name), 0)),
             "h": self._depth(self.machine.peek("_holes")),
         }
 

@@ -14,7 +14,7 @@ from typing import Final
 
 from emu.image.footprint import pieces
 from emu.image.model import Image
-from emu.kernel_metrics.shares import DEVICES, KERNEL, sizes_by_owner
+from emu.kernel_metrics.owners import DEVICES, KERNEL, sizes_by_owner
 from emu.kernel_metrics.target import WORD, MeasureError, Target
 
 APPLICATION: Final = "footprint_wanted"

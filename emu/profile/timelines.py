@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator
 from json import dumps
 from typing import Any, Final
 
-from emu.profile.cycle_shares import Place
+from emu.profile.cycle_shares import CodeLocation
 from emu.profile.tracks import MAIN, Track, Tracks
 
 SENDS: Final = ("Sys_Send_Event", "Sys_Send_IntEvent")
@@ -24,7 +24,9 @@ LEVEL_TRACKS: Final = 10
 """Thread number of level 0; the threads' come behind the levels'."""
 
 
-def speedscope(tracks: Tracks, place_of: Callable[[int], Place], name: str, start: int, end: int) -> Iterator[str]:
+def speedscope(
+    tracks: Tracks, place_of: Callable[[int], CodeLocation], name: str, start: int, end: int
+) -> Iterator[str]:
     """A speedscope file, in pieces."""
     frames: list[dict[str, Any]] = []
     known: dict[int, int] = {}
@@ -63,7 +65,7 @@ def _thread_number(track: Track) -> int:
 
 def perfetto(
     tracks: Tracks,
-    place_of: Callable[[int], Place],
+    place_of: Callable[[int], CodeLocation],
     name: str,
     hz: float,
     inside: Callable[[int], frozenset[str]],
@@ -86,7 +88,7 @@ def perfetto(
 
 
 def _events(
-    tracks: Tracks, place_of: Callable[[int], Place], hz: float, inside: Callable[[int], frozenset[str]],
+    tracks: Tracks, place_of: Callable[[int], CodeLocation], hz: float, inside: Callable[[int], frozenset[str]],
     seen: set[Track],
 ) -> Iterator[str]:  # fmt: skip
     """Events as text: there are tens of thousands in a second. `seen` gets their tracks."""

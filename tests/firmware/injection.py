@@ -227,7 +227,7 @@ def fail_every_allocation(path: Path) -> Iterator[tuple[int, int]]:
         return calls == wanted
 
     machine.hook_pc(stage.end, lambda: True)
-    for allocator in ("heap_take", "heap_keep"):
+    for allocator in ("heap_alloc", "heap_alloc_lasting"):
         machine.hook_pc(place(machine, allocator), take)
     for scene, base in enumerate(stage.bases):
         wanted = 0
@@ -335,7 +335,8 @@ def _queued(machine: Machine) -> Counter[int]:
 def _free_bytes(machine: Machine) -> int:
     """Heap that is not handed out, seen from outside (kernel/memory.c)."""
     assert machine.image is not None
-    free = machine.peek("high") - machine.peek("low") + machine.peek("run_end") - machine.peek("run")
+    free = machine.peek("reserve_end") - machine.peek("reserve_begin")
+    free += machine.peek("free_run_end") - machine.peek("free_run")
     holes = [machine.peek("holes")]
     while holes:
         hole = holes.pop()

@@ -4,11 +4,11 @@
 
 #include "kernel.h"
 
-/* A thread loses OS_DRIVES with its life; so a later thread with the same PID is not taken for it. */
+/* A thread loses OS_USES_BUS with its life; so a later thread with the same PID is not taken for it. */
 static bool is_used(const bus *b)
 {
     const sys_pcb *owner = b->block != NULL ? process_find(b->owner) : NULL;
-    return owner != NULL && (owner->status & OS_DRIVES);
+    return owner != NULL && (owner->status & OS_USES_BUS);
 }
 
 void *bus_take(bus *wanted, uint16 size, void (*silence)(void))
@@ -21,15 +21,15 @@ void *bus_take(bus *wanted, uint16 size, void (*silence)(void))
     if (!is_used(wanted)) {
         silence();
         if (wanted->block != NULL) {
-            heap_give(wanted->block, wanted->size);
+            heap_free(wanted->block, wanted->size);
         }
-        block = heap_take(size);
+        block = heap_alloc(size);
         wanted->block = block;
         wanted->size = size;
         wanted->owner = os_running->pid;
         error = SYS_ERROR_MEMORY;
         if (block != NULL) {
-            os_running->status |= OS_DRIVES;
+            os_running->status |= OS_USES_BUS;
             error = SYS_OK;
         }
     }
@@ -41,8 +41,8 @@ void bus_give(bus *used, void (*silence)(void))
 {
     Sys_Start_CriticalSection();
     silence();
-    heap_give(used->block, used->size);
+    heap_free(used->block, used->size);
     used->block = NULL;
-    os_running->status &= (uint8)~OS_DRIVES;
+    os_running->status &= (uint8)~OS_USES_BUS;
     Sys_End_CriticalSection();
 }

@@ -64,7 +64,7 @@ static void discard(void)
     while (building.first != NULL) {
         message *block = building.first;
         building.first = block->queued.next;
-        heap_give(block, size_of(block));
+        heap_free(block, size_of(block));
     }
 }
 
@@ -72,7 +72,7 @@ static HAL_OUTLINE bool begin_block(void)
 {
     uint16 room = building.expected > LARGEST ? LARGEST : building.expected != 0 ? building.expected | 1u : GROWTH;
     uint16 taken = (uint16)(building.taken + sizeof(message) + 1 + room);
-    message *block = taken <= building.limit ? heap_take((uint16)(taken - building.taken)) : NULL;
+    message *block = taken <= building.limit ? heap_alloc((uint16)(taken - building.taken)) : NULL;
     if (block == NULL) {
         if (taken <= SYS_UART_TX) {
             building.error = SYS_ERROR_BUSY; /* there will be room */

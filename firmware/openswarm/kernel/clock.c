@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
-/* System time, the 1 ms event and everything that waits for a moment.
+/* System time, the 1 ms event and time-outs.
  *
- * os_clock_tick compares one alarm per tick; the threads behind it are looked at only when it rings, on the kernel
- * stack. Moments are low words of the system time, ordered by their distance from base, the time of the last look. An
- * alarm that is not behind base rings a whole wrap later, in vain. */
+ * os_clock_tick() compares the time with one alarm per tick. Only when the alarm expires does the kernel stack scan the
+ * blocked threads. Times are low words of the system time, ordered by their distance from base, the time of the last
+ * scan. An alarm that is not later than base expires one wrap later and wakes no thread. */
 #include "kernel.h"
 
 LINKS_IN_RAM();
@@ -42,6 +42,7 @@ void os_clock_tick(void)
     board_tick();
 }
 
+/* Moves the alarm to `moment` if that is earlier than the alarm in force. */
 static HAL_OUTLINE void set_alarm(uint16 moment)
 {
     uint16 distance = (uint16)(moment - base); /* at least 1 */
@@ -55,7 +56,7 @@ static HAL_OUTLINE void set_alarm(uint16 moment)
     hal_unlock(lock);
 }
 
-/* Slice locked. Wakes what is due and sets the alarm to the next moment. */
+/* Wakes the threads whose time-out has expired and sets the alarm to the next one. Slice locked. */
 void clock_wake_due(void)
 {
     uint16 now = clock_now();
@@ -68,18 +69,18 @@ void clock_wake_due(void)
         if (!(p->status & OS_TIMED)) {
             continue;
         }
-        if ((uint16)(p->own.wake - now + elapsed) <= elapsed) {
+        if ((uint16)(p->time_or_error.wake - now + elapsed) <= elapsed) {
             process_wake(p, NULL);
         } else {
-            set_alarm(p->own.wake);
+            set_alarm(p->time_or_error.wake);
         }
     }
 }
 
 void clock_set_wake(sys_pcb *process, uint16 ms)
 {
-    clock_wake_due(); /* base becomes the present, so that 65,535 ms fit behind it */
-    process->own.wake = (uint16)(base + ms);
+    clock_wake_due(); /* sets base to the present time, so that a time-out may be 65,535 ms long */
+    process->time_or_error.wake = (uint16)(base + ms);
     process->status |= OS_TIMED;
-    set_alarm(process->own.wake);
+    set_alarm(process->time_or_error.wake);
 }

@@ -1,23 +1,23 @@
 /* SPDX-License-Identifier: MIT */
-/* What went wrong, and how often: the last error, saturating counters, and losses per event. */
+/* Errors: the last error of each caller, saturating counters, and lost messages per event. */
 #include "kernel.h"
 
 sys_statistics os_statistics;
 
 static volatile uint8 error_of_handlers, error_of_isrs;
 
-/* Losses of the first SYS_LOSS_COUNTERS events that lost something; entry 0 counts those of all others. */
+/* Lost messages of the first SYS_LOSS_COUNTERS events that lost one; entry 0 counts those of all other events. */
 typedef struct {
     uint16 event, count;
 } loss;
 
 static loss losses[SYS_LOSS_COUNTERS + 1];
 
-/* The last error of whoever calls. A thread keeps its own, so that nobody overwrites it between its call and its question;
- * handlers, which interrupt each other never, have one together, and so have ISRs. */
+/* Returns the last error of the caller. Each thread has its own, so that no other context overwrites it before the
+ * thread reads it. All handlers share one, because no handler interrupts another; all ISRs share one. */
 static HAL_OUTLINE volatile uint8 *last_error(void)
 {
-    return hal_in_isr() ? &error_of_isrs : os_in_kernel ? &error_of_handlers : &os_running->own.error;
+    return hal_in_isr() ? &error_of_isrs : os_in_kernel ? &error_of_handlers : &os_running->time_or_error.error;
 }
 
 bool os_fail(sys_error error)
@@ -43,7 +43,7 @@ sys_error os_refuse(void)
     return SYS_ERROR_CONTEXT;
 }
 
-/* A free entry is taken by the first who comes, and kept. */
+/* Whether an entry counts the losses of event id. The first event that reaches a free entry claims it for good. */
 static bool belongs_to(loss *entry, uint16 id)
 {
     hal_lock_state lock = hal_lock_devices();
@@ -81,6 +81,6 @@ uint16 Sys_Get_LastError(void)
 
 const sys_statistics *Sys_Get_Statistics(void)
 {
-    heap_note_use();
+    heap_update_peak();
     return &os_statistics;
 }

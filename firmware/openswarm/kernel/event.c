@@ -1,9 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* Events: registration, subscription, sending, delivery and waiting.
  *
- * A message is copied once, when it is sent, and handed to whoever listens when it is delivered: first the handlers in
- * order of subscription, then the waiting threads in order of waiting. Readers share the block; it is freed with the
- * last of them. */
+ * The sender's payload is copied once, into a message. Delivery passes the message first to the handlers in order of
+ * subscription, then to the waiting threads in order of waiting. Readers share the block; the last one frees it. */
 #include "kernel.h"
 
 LINKS_IN_RAM();
@@ -13,13 +12,13 @@ LINKS_IN_RAM();
 #define PAYLOAD(m) ((uint8 *)(m) + sizeof(message))
 
 enum { BUCKETS = 8 };                        /* a power of two */
-static event *events[BUCKETS];               /* by the low bits of the identifier */
+static event *events[BUCKETS];               /* hash table indexed by the low bits of the identifier */
 message *event_queue;                        /* devices locked */
-message **queue_end;                         /* the same */
-static message *undelivered;                 /* the rest of the batch in delivery */
-event *(*os_at_sending)(uint16 id, const void *data, uint16 size);
-static subscription *const nobody;
-static subscription *const *place;           /* where the delivery stands among the subscribers, moved with them */
+message **queue_end;                         /* devices locked */
+static message *delivery_batch;              /* messages of the current delivery round not yet delivered */
+event *(*os_send_hook)(uint16 id, const void *data, uint16 size);
+static subscription *const no_subscription;  /* an empty list */
+static subscription *const *delivery_cursor; /* link to the next subscriber; adjusted when subscriptions change */
 
 void event_init(void)
 {
@@ -28,11 +27,11 @@ void event_init(void)
 
 /* ---- Registration ------------------------------------------------------------------------------------------- */
 
-/* What points to the event, or to nothing. */
+/* Returns the link that points to the event, or the NULL link at the end of its bucket. */
+LOOPS_OF(link_of, b);
 static HAL_OUTLINE event **link_of(uint16 id)
 {
     event **link = &events[id % BUCKETS];
-    LOOP_BOUND(b);
     while (*link != NULL && (*link)->id != id) {
         link = &(*link)->next;
     }
@@ -44,21 +43,21 @@ event *event_find(uint16 id)
     return *link_of(id);
 }
 
-/* The same for senders: the event that was registered last in its bucket is found without a call. */
+/* Finds the event of a sender. The most recently registered event of a bucket is found without a call. */
 static HAL_INLINE event *find(uint16 id, const void *data, uint16 size)
 {
     event *first = events[id % BUCKETS];
     if (first != NULL && first->id == id) {
         return first;
     }
-    return os_at_sending == NULL ? event_find(id) : os_at_sending(id, data, size);
+    return os_send_hook == NULL ? event_find(id) : os_send_hook(id, data, size);
 }
 
+LOOPS_OF(first_waiter, n);
 static HAL_OUTLINE const sys_pcb *first_waiter(const event *e)
 {
     const sys_pcb *p = os_blocked;
-    LOOP_BOUND(n);
-    while (p != NULL && p->on.awaited != e) {
+    while (p != NULL && p->event_or_slice.awaited != e) {
         p = p->next;
     }
     return p;
@@ -77,7 +76,7 @@ event **event_bucket(uint16 id)
     return &events[id % BUCKETS];
 }
 
-void event_put_first(event *e, uint16 id)
+void event_insert(event *e, uint16 id)
 {
     event **first = &events[id % BUCKETS];
     e->next = *first;
@@ -93,10 +92,10 @@ bool Sys_Register_Event(uint16 id)
         return false;
     }
     if (event_find(id) == NULL) {
-        event *e = heap_keep(sizeof *e);
+        event *e = heap_alloc_lasting(sizeof *e);
         if (e != NULL) {
             e->id = id;
-            event_put_first(e, id); /* the application's events are found before the system's */
+            event_insert(e, id); /* at the head: lookups reach the application's events before the system's */
         } else {
             error = SYS_ERROR_MEMORY;
         }
@@ -107,31 +106,32 @@ bool Sys_Register_Event(uint16 id)
 static HAL_OUTLINE void unlink_subscription(subscription **link)
 {
     subscription *s = *link;
-    if (place == &s->next) {
-        place = link;
+    if (delivery_cursor == &s->next) {
+        delivery_cursor = link;
     }
     HAL_STORE(*link, s->next);
-    heap_give(s, sizeof *s);
+    heap_free(s, sizeof *s);
 }
 
-/* Those that wait for e without condition; with m = NULL all, because e goes. */
+/* Wakes the threads that wait for e without a condition. m = NULL: wakes all, because e is being unregistered. */
+LOOPS_OF(wake_waiters, n);
 static HAL_OUTLINE bool wake_waiters(const event *e, message *m)
 {
     bool any = false;
     sys_pcb *next;
-    LOOP_BOUND(n); ONE_LOOP();
     for (sys_pcb *p = os_blocked; p != NULL; p = next) {
         next = p->next;
-        if (p->on.awaited == e && (m == NULL || p->wait.condition == NULL)) {
+        if (p->event_or_slice.awaited == e && (m == NULL || p->wait.condition == NULL)) {
             process_wake(p, m);
-            p->own.error = m != NULL ? SYS_OK : SYS_ERROR_EVENT;
+            p->time_or_error.error = m != NULL ? SYS_OK : SYS_ERROR_EVENT;
             any = true;
         }
     }
     return any;
 }
 
-static HAL_OUTLINE void disown_messages(message *m, const event *e)
+/* Clears the event of every message of e from m on, so that delivery drops the message. */
+static HAL_OUTLINE void detach_messages(message *m, const event *e)
 {
     LOOP_BOUND(q); LOOP_TOTAL(q);
     for (; m != NULL; m = HAL_LOAD(m->queued.next)) {
@@ -151,24 +151,24 @@ bool Sys_Unregister_Event(uint16 id)
     if (e == NULL) {
         return os_leave(SYS_ERROR_EVENT);
     }
-    HAL_STORE(*link, e->next); /* from here on ISRs queue nothing for it */
+    HAL_STORE(*link, e->next); /* from here on ISRs queue no message for it */
     LOOP_BOUND(s);
     while (e->subscribers != NULL) {
         unlink_subscription(&e->subscribers);
     }
-    if (place == &e->subscribers) {
-        place = &nobody;
+    if (delivery_cursor == &e->subscribers) {
+        delivery_cursor = &no_subscription;
     }
     (void)wake_waiters(e, NULL);
-    disown_messages(HAL_LOAD(event_queue), e);
-    disown_messages(undelivered, e);
-    heap_give(e, sizeof *e);
+    detach_messages(HAL_LOAD(event_queue), e);
+    detach_messages(delivery_batch, e);
+    heap_free(e, sizeof *e);
     return os_leave(SYS_OK);
 }
 
 /* ---- Subscription ------------------------------------------------------------------------------------------- */
 
-/* Slice locked. Finds or adds the subscription. */
+/* Updates the subscription or adds it. Slice locked. */
 static sys_error subscribe(event *e, uint16 pid, sys_handler handler, sys_condition condition)
 {
     subscription *s = e->subscribers, **link = &e->subscribers;
@@ -177,16 +177,16 @@ static sys_error subscribe(event *e, uint16 pid, sys_handler handler, sys_condit
         s = s->next;
     }
     if (s == NULL) {
-        s = heap_keep(sizeof *s);
+        s = heap_alloc_lasting(sizeof *s);
         if (s == NULL) {
             return SYS_ERROR_MEMORY;
         }
         LOOP_BOUND(s);
-        while (*link != NULL && link != place) { /* in front of a delivery it would be heard this time already */
+        while (*link != NULL && link != delivery_cursor) { /* behind the cursor it would get the current message too */
             link = &(*link)->next;
         }
-        if (link == place) {
-            place = &s->next;
+        if (link == delivery_cursor) {
+            delivery_cursor = &s->next;
         }
         s->next = *link;
         s->handler = handler;
@@ -213,7 +213,7 @@ bool Sys_Subscribe_to_Event(uint16 id, uint16 pid, sys_handler handler, sys_cond
     return os_leave(error);
 }
 
-/* Slice locked. handler NULL = every handler of the thread. */
+/* Removes subscriptions of a thread; handler NULL = all of them. Slice locked. */
 static bool unsubscribe(event *e, uint16 pid, sys_handler handler)
 {
     bool found = false;
@@ -221,9 +221,9 @@ static bool unsubscribe(event *e, uint16 pid, sys_handler handler)
     LOOP_BOUND(s); LOOP_TOTAL(min(t, m * s)); LOOP_SHARE(Sys_Unsubscribe_Handler, s); ONE_LOOP();
     while (*link != NULL) {
         if ((*link)->pid == pid && (handler == NULL || (*link)->handler == handler)) {
-            /* Those of one thread, each once. */
+            /* A thread has o subscriptions; each is removed once. */
             CALL_SHARE(unlink_subscription, Sys_Unsubscribe_Handler, min(s, o));
-            CALL_SHARE(unlink_subscription, process.c / bury, min(t, m * s, o));
+            CALL_SHARE(unlink_subscription, process.c / end_thread, min(t, m * s, o));
             unlink_subscription(link);
             found = true;
         } else {
@@ -288,7 +288,7 @@ typedef uint16 __attribute__((may_alias)) any_word;
 
 static HAL_INLINE void copy(void *to, const void *from, uint16 size)
 {
-    if (HAL_WORD_IS_ONE_ACT && size == sizeof(any_word) && ((uintptr_t)from & 1u) == 0) { /* most events */
+    if (HAL_WORD_IS_ONE_ACT && size == sizeof(any_word) && ((uintptr_t)from & 1u) == 0) { /* the common case */
         *(any_word *)to = *(const any_word *)from;
     } else if (size != 0) {
         memcpy(to, from, size);
@@ -309,7 +309,7 @@ bool Sys_Send_Event(uint16 id, const void *data, uint16 size)
     if (e == NULL) {
         error = SYS_ERROR_EVENT;
     } else if (e->subscribers != NULL || first_waiter(e) != NULL) {
-        message *m = heap_take((uint16)(sizeof *m + size));
+        message *m = heap_alloc((uint16)(sizeof *m + size));
         if (m != NULL) {
             m->queued.event = e;
             m->queued.size = size;
@@ -336,16 +336,16 @@ static uint16 value_of(const message *m, uint16 size)
     return size >= sizeof(any_word) ? *(const any_word *)payload : size != 0 ? *(const uint8 *)payload : 0;
 }
 
-/* A condition or handler may end any subscription and any thread, its own as well. */
+/* Calls the handlers of e. A handler or condition may end any subscription and any thread, including its own. */
 static void run_handlers(const event *e, sys_event_data *data)
 {
     uint16 id = e->id;
     const subscription *s;
-    place = &e->subscribers;
+    delivery_cursor = &e->subscribers;
     LOOP_BOUND(s);
-    while ((s = *place) != NULL) {
+    while ((s = *delivery_cursor) != NULL) {
         CALL_TARGETS(sys_condition);
-        if ((s->condition == NULL || s->condition(data)) && *place == s) {
+        if ((s->condition == NULL || s->condition(data)) && *delivery_cursor == s) {
             sys_handler handler = s->handler;
             uint16 pid = s->pid;
             CALL_TARGETS(sys_handler);
@@ -354,24 +354,24 @@ static void run_handlers(const event *e, sys_event_data *data)
             }
         }
         SAME_LOOP();
-        if (*place == s) {
-            place = &s->next;
+        if (*delivery_cursor == s) {
+            delivery_cursor = &s->next;
         }
     }
 }
 
-/* Takes the condition off every waiter for which it holds. None is woken before all are asked: a condition may kill a
- * thread, and with it the message that this thread was just given. */
-static void ask_waiters(const event *e, sys_event_data *data)
+/* Clears the condition of every waiter whose condition holds for the data. wake_waiters() wakes them afterwards: a
+ * condition may kill a thread, which would free the message that the thread had just received. */
+static void evaluate_conditions(const event *e, sys_event_data *data)
 {
     sys_pcb *p;
     process_scan = &os_blocked;
     LOOP_BOUND(n);
     while ((p = *process_scan) != NULL) {
         CALL_TARGETS(sys_condition);
-        bool holds = p->on.awaited == e && p->wait.condition != NULL && p->wait.condition(data);
+        bool holds = p->event_or_slice.awaited == e && p->wait.condition != NULL && p->wait.condition(data);
         SAME_LOOP();
-        if (*process_scan == p) { /* else the condition ended its own wait */
+        if (*process_scan == p) { /* else the condition ended the wait of its own thread */
             if (holds) {
                 p->wait.condition = NULL;
             }
@@ -390,36 +390,37 @@ static void deliver(message *m)
         m->data.value = value_of(m, size);
         m->data.payload = PAYLOAD(m);
         run_handlers(e, &m->data);
-        ask_waiters(e, &m->data);
+        evaluate_conditions(e, &m->data);
         kept = wake_waiters(e, m);
     }
     if (!kept) {
-        heap_give_later(m, (uint16)(sizeof *m + size));
+        heap_free_deferred(m, (uint16)(sizeof *m + size));
     }
 }
 
 void event_deliver_queued(void)
 {
     hal_lock_state lock = hal_lock_devices();
-    undelivered = event_queue;
+    delivery_batch = event_queue;
     event_queue = NULL;
     queue_end = &event_queue;
     os_pending &= (uint16)~OS_MESSAGES;
     hal_unlock(lock);
     LOOP_BOUND(q); ONE_LOOP();
-    while (undelivered != NULL) {
-        message *m = undelivered;
-        undelivered = m->queued.next;
+    while (delivery_batch != NULL) {
+        message *m = delivery_batch;
+        delivery_batch = m->queued.next;
         deliver(m);
     }
-    heap_settle();
+    heap_coalesce();
 }
 
 /* ---- Waiting ------------------------------------------------------------------------------------------------ */
 
-static bool holds(const sys_pcb *p, const message *m)
+/* Whether thread p still holds m as its wait result. */
+static bool holds_result(const sys_pcb *p, const message *m)
 {
-    return p->wait.result == m && (!(p->status & OS_OFF_RING) || p->on.awaited == NULL);
+    return p->wait.result == m && (!(p->status & OS_OFF_RING) || p->event_or_slice.awaited == NULL);
 }
 
 void event_release_result(sys_pcb *process)
@@ -432,11 +433,11 @@ void event_release_result(sys_pcb *process)
     }
     LOOP_BOUND(n); ONE_LOOP();
     while ((p = process_next(p)) != NULL) {
-        if (holds(p, m)) {
+        if (holds_result(p, m)) {
             return;
         }
     }
-    heap_give(m, (uint16)(sizeof *m + m->data.size));
+    heap_free(m, (uint16)(sizeof *m + m->data.size));
 }
 
 sys_event_data *Sys_Wait_for_ConditionTimeout(uint16 id, sys_condition condition, uint16 ms)
@@ -453,7 +454,7 @@ sys_event_data *Sys_Wait_for_ConditionTimeout(uint16 id, sys_condition condition
     }
     self->wait.condition = condition;
     process_block(e, ms);
-    return (sys_event_data *)self->wait.result; /* the first member of the union, or NULL */
+    return (sys_event_data *)self->wait.result; /* data is a union member, at offset 0; or NULL */
 }
 
 sys_event_data *Sys_Wait_for_Condition(uint16 id, sys_condition condition)

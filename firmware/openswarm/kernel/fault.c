@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: MIT */
-/* What stops a thread or the system: stack overflow, traps, failed assertions. The motors stop first. */
+/* Fault reports: stack overflow, traps and failed assertions. The motors stop before anything is reported. */
 #include "kernel.h"
 
-enum { DIGITS = 6 }; /* of a 16-bit number, and room for the end mark */
+enum { DIGITS = 6 }; /* buffer size: digits of a 16-bit number and the terminating NUL */
 
-/* Writes a number in front of end; returns its begin. */
+/* Writes the digits of a number in front of end; returns the first one. */
 static HAL_OUTLINE char *put_number(char *end, uint16 number, uint16 radix)
 {
     do {
@@ -34,8 +34,8 @@ static HAL_NORETURN void stop(void)
     hal_stop();
 }
 
-/* "address trap at 0x0:1234 in thread 1"; "stack" is that of the kernel, or of main (at 0x0:0). Called by the port, on a
- * stack of its own choice, with everything masked. */
+/* Reports "address trap at 0x0:1234 in thread 1" and stops. Cause "stack": the stack of the kernel or of main, at
+ * 0x0:0. The port calls it on a stack of its own choice, with all interrupts masked. */
 void os_trap(uint16 cause, uint16 pc, uint16 pc_high)
 {
     static const char names[] = "oscillator\0address\0math\0interrupt\0stack";
@@ -47,7 +47,7 @@ void os_trap(uint16 cause, uint16 pc, uint16 pc_high)
     stop();
 }
 
-/* "file.c:123 in thread 1" */
+/* Reports "file.c:123 in thread 1" and stops. */
 void Sys_Assertion_Failed(const char *file, uint16 line)
 {
     (void)hal_lock_devices();
@@ -57,7 +57,8 @@ void Sys_Assertion_Failed(const char *file, uint16 line)
     stop();
 }
 
-/* The thread is gone after this; a listener hears its PID, and UART1 says so once it is free. */
+/* Ends the running thread. Subscribers of SYS_EVENT_TERMINATION get its PID, and UART1 sends a report once it is
+ * free. */
 sys_pcb *os_overflow(void)
 {
     static const char text[] = "stack overflow: thread ";

@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: MIT */
-/* Start-up: a list of what becomes ready, in order. Once per reset: variables begin as zeros. */
+/* Start-up: initialises the parts of the kernel in order. Runs once per reset: variables start as zeros. */
 #include "kernel.h"
 
 void Sys_Init_Kernel(void)
 {
     heap_init();
     event_init();
-    process_init(); /* the caller becomes PID 0; no interrupt is enabled */
+    process_init(); /* the caller becomes PID 0; interrupts stay disabled */
     (void)Sys_Register_Event(SYS_EVENT_TERMINATION);
     (void)Sys_Register_Event(SYS_1ms_TIMER);
     if (SYS_1PXSENSOR) {

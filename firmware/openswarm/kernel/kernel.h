@@ -1,11 +1,12 @@
 /* SPDX-License-Identifier: MIT */
-/* Private to the kernel, its ports and its schedulers.
+/* Private interface of the kernel, its ports and its schedulers.
  *
- * Who may touch what:
+ * Lock required for each data structure:
  *   slice locked     ring, blocked list, events, subscriptions, holes in the heap   (threads and kernel stack)
- *   devices locked   the heap's reserve, message queue, os_pending, alarm            (ISRs as well)
- * ISRs walk events, subscriptions and the blocked list without a lock: links are changed by single stores (HAL_STORE), in
- * an order (hal_barrier) that leaves every list well-formed at each instruction. The ring is closed to ISRs.
+ *   devices locked   heap reserve, message queue, os_pending, alarm                  (ISRs as well)
+ * ISRs walk events, subscriptions and the blocked list without a lock. Links are therefore changed by single stores
+ * (HAL_STORE), in an order (hal_barrier) that keeps every list well-formed at each instruction. ISRs never use the
+ * ring.
  */
 #ifndef OS_KERNEL_H
 #define OS_KERNEL_H
@@ -19,49 +20,67 @@ typedef struct event event;
 typedef struct subscription subscription;
 typedef union message message;
 
-struct event { /* C of the memory equation: 6 B */
+struct event { /* term C of the memory equation: 6 B */
     uint16 id;
     event *next;
     subscription *subscribers;
 };
 
-struct subscription { /* D: 8 B */
+struct subscription { /* term D: 8 B */
     subscription *next;
     sys_handler handler;
     sys_condition condition; /* NULL = always */
     uint16 pid;
 };
 
-/* E: 6 B in front of the payload. While queued it is a list element, once delivered the data its readers see. */
+/* Term E: 6 B in front of the payload. A list element while queued; the readers' event data once delivered. */
 union message {
     struct {
         message *next;
-        event *event; /* NULL: unregistered meanwhile */
+        event *event; /* NULL: the event was unregistered after the message was sent */
         uint16 size;
     } queued;
     sys_event_data data;
 };
 
-/* B: 18 B above the thread's stack. The port knows the offsets of sp, limit and status. A stack overflow spills into
- * the first 8 bytes at most (port/dspic30f/README.md); what is needed to bury the thread comes after them. */
+/* Three words of a control block have one meaning while the thread is ready (on the ring) and another while it is
+ * blocked (on the blocked list). The thread's state in `status` selects the member:
+ *
+ *   record                ready (SYS_NEW, SYS_READY)       blocked (SYS_BLOCKED)
+ *   event_or_slice        spent                            awaited
+ *   time_or_error         error                            wake, with OS_TIMED
+ *   wait                  result                           condition; result if no event is awaited */
+
+/* Cause of a wait, or progress within the slice. */
+typedef union {
+    event *awaited; /* blocked: NULL if the thread waits for time only */
+    uint16 spent;   /* ready: part of the slice used before the thread was preempted, in the port's units */
+} event_or_slice;
+
+/* Time-out of a wait, or the outcome of the thread's calls. */
+typedef union {
+    uint16 wake;          /* blocked with OS_TIMED: low word of the system time at which the wait ends */
+    volatile uint8 error; /* ready: the thread's last error */
+} time_or_error;
+
+/* Filter of a wait, or its result. */
+typedef union {
+    sys_condition condition; /* blocked on an event; NULL: every message ends the wait */
+    message *result;         /* otherwise: the wait result, until the thread clears it */
+} condition_or_result;
+
+/* Control block of a thread (term B): 18 B above its stack. The port depends on the offsets of sp, limit and status.
+ * A stack overflow overwrites at most the first 8 bytes (port/dspic30f/README.md); the fields needed to end the thread
+ * follow them. */
 struct sys_pcb {
     void *sp;
     hal_limit limit;
-    union {
-        event *awaited; /* while blocked: NULL if it waits for time only */
-        uint16 spent;   /* while ready: of the slice in which it was preempted, in the port's units */
-    } on;
-    union {
-        uint16 wake;          /* while blocked with OS_TIMED: low word of the system time */
-        volatile uint8 error; /* while ready: the thread's last error */
-    } own;
+    event_or_slice event_or_slice;
+    time_or_error time_or_error;
     uint8 status;   /* OS_* bits */
     uint8 priority;
     uint8 *block; /* start of the heap block; NULL for the system thread */
-    union {
-        sys_condition condition; /* while blocked on an event */
-        message *result;         /* otherwise: uncleared wait result */
-    } wait;
+    condition_or_result wait;
     sys_pcb *next; /* ring of ready threads, or blocked list */
     uint16 pid;
 };
@@ -70,115 +89,116 @@ enum {
     OS_STATE = 0x03, /* SYS_NEW..SYS_ZOMBIE; OS_OFF_RING is set in the last two */
     OS_OFF_RING = 0x02,
     OS_TIMED = 0x04, /* while blocked */
-    OS_WOKEN = 0x04, /* while ready: it has not run since; for sys_woken_first, which clears it */
-    OS_MISSED = 0x20, /* this period's miss is reported */
-    OS_DRIVES = 0x40, /* it uses a bus (io/bus.h) */
-    OS_JOINABLE = 0x80 /* its control block stays until somebody has waited for its end (option/join.c) */
+    OS_WOKEN = 0x04, /* while ready: woken and not run since; read and cleared by sys_woken_first */
+    OS_MISSED = 0x20, /* the deadline miss of this period is reported */
+    OS_USES_BUS = 0x40, /* the thread owns a bus (io/bus.h) */
+    OS_JOINABLE = 0x80 /* the control block stays after the end until a thread joins it (option/join.c) */
     /* 0x08 SYS_PERIODIC, 0x10 SYS_DSP */
 };
 
-/* In front of the stack of a SYS_PERIODIC thread. Times are low words of the system time. */
+/* Timing of a SYS_PERIODIC thread, stored in front of its stack. Times are low words of the system time. */
 typedef struct {
     uint16 period, deadline, release, due;
 } periodic;
 
-static inline periodic *process_periodic(const sys_pcb *process) /* of a SYS_PERIODIC thread */
+static inline periodic *process_periodic(const sys_pcb *process) /* SYS_PERIODIC threads only */
 {
     return (periodic *)(void *)process->block;
 }
 
-/* os_pending: why the next thread of the ring cannot simply run. The low byte, OS_WORK, must be worked off and keeps
- * the kernel from idling; the high byte says that a scheduler chooses. One word, so that a slice end tests it once. */
+/* Bits of os_pending: why the next thread of the ring cannot run at once. The low byte, OS_WORK, is pending kernel work
+ * and prevents idling; the high byte is set while a scheduler chooses. One word, so that a slice end tests it once. */
 enum { OS_MESSAGES = 0x01, OS_ALARM = 0x02, OS_WORK = 0xFF, OS_CHOICE = 0x100 };
 
 extern volatile uint16 os_pending;
 #define OS_HAS_WORK (*(const volatile uint8 *)&os_pending != 0) /* the low byte, which comes first */
 extern sys_pcb *os_running;   /* &os_system while idle */
-extern sys_pcb os_system;     /* PID 0 */
+extern sys_pcb os_system;     /* system thread, PID 0 */
 extern sys_pcb *os_ring;      /* ring member before the running one (or before the next, if it blocked); NULL = empty */
-extern sys_pcb *os_blocked;   /* in order of blocking */
-extern volatile uint16 critical_depth; /* of the running thread; while os_in_kernel, of the handler that runs */
-extern bool os_eager;         /* what becomes due preempts the running thread */
-extern volatile bool os_in_kernel; /* handlers, conditions, wake-ups and schedulers are at work on the kernel stack */
+extern sys_pcb *os_blocked;   /* blocked threads in order of blocking */
+extern volatile uint16 critical_depth; /* nesting in the running thread; while os_in_kernel, in the running handler */
+extern bool os_eager;         /* a wake-up or message preempts the running thread */
+extern volatile bool os_in_kernel; /* a handler, condition, wake-up or scheduler runs on the kernel stack */
 extern sys_statistics os_statistics;
 extern HAL_ZEROS sys_process_config os_plain; /* all defaults */
 
-/* memory.c: one array, so that the kernel stack lies below the heap and with it below every thread stack */
+/* memory.c: one array, so that the kernel stack lies below the heap and therefore below every thread stack */
 typedef union {
     void *align;
     uint8 bytes[SYS_KERNEL_STACK + SYS_HEAP];
 } os_memory_space;
 extern os_memory_space os_memory;
 void heap_init(void);
-/* Sizes are at least three pointers. NULL: none left. */
-void *heap_take(uint16 size);             /* any context */
-void *heap_keep(uint16 size);             /* for what is small and stays: as low as possible; not in an ISR */
-void heap_give(void *block, uint16 size); /* the size it was taken with; not in an ISR */
-void heap_give_later(void *block, uint16 size); /* quick for one piece behind the other; to be had after heap_settle() */
-void heap_settle(void);                         /* and ISRs find some room again, if there is any */
-void heap_note_use(void);
+/* Sizes are at least three pointers. NULL: out of memory. */
+void *heap_alloc(uint16 size);            /* any context */
+void *heap_alloc_lasting(uint16 size);    /* small, long-lived blocks: at the lowest address; not in an ISR */
+void heap_free(void *block, uint16 size); /* with the size of the allocation; not in an ISR */
+void heap_free_deferred(void *block, uint16 size); /* fast for adjacent blocks; allocatable after heap_coalesce() */
+void heap_coalesce(void); /* joins the blocks freed last with their neighbours and refills the reserve of the ISRs */
+void heap_update_peak(void);
 
 /* stack.c */
 void stack_paint(void *begin, const void *end); /* whole words */
-bool kernel_stack_is_intact(void); /* its last byte was never written; asked where the CPU does not trap */
+bool kernel_stack_is_intact(void); /* its last byte was never written; for CPUs without a stack limit trap */
 
-/* What an application uses of option/ puts itself here; NULL otherwise. Chains: who comes later calls who was there. */
-typedef bool (*os_burial)(sys_pcb *p);
-extern os_burial os_at_burial; /* slice locked; p is on no list any more. True: its block has been seen to */
-extern event *(*os_at_sending)(uint16 id, const void *data, uint16 size); /* to whom a sender sends, instead of event_find() */
+/* Hooks of option/: set by the options an application uses, else NULL. A later hook calls the one installed before
+ * it. */
+typedef bool (*os_thread_end_function)(sys_pcb *p);
+extern os_thread_end_function os_thread_end_hook; /* slice locked; p is on no list. True: the hook freed the block */
+extern event *(*os_send_hook)(uint16 id, const void *data, uint16 size); /* a sender's event, instead of event_find() */
 
 /* event.c */
 void event_init(void);
-event **event_bucket(uint16 id);           /* the first link of those that share a bucket with it; slice locked */
-void event_put_first(event *e, uint16 id); /* into the bucket of id */
-void event_deliver_queued(void);           /* kernel stack: all messages queued when it began */
+event **event_bucket(uint16 id);        /* first link of the bucket of id; slice locked */
+void event_insert(event *e, uint16 id); /* at the head of the bucket of id */
+void event_deliver_queued(void);        /* kernel stack: all messages queued before the call */
 void event_drop_subscriptions(uint16 pid);
-void event_release_result(sys_pcb *process); /* it gives up its wait result; the last holder frees it */
+void event_release_result(sys_pcb *process); /* releases the wait result; the last holder frees the message */
 event *event_find(uint16 id);                /* any context */
-/* The link behind the last queued message; devices locked, and OS_MESSAGES follows. A device may hang a block of its own
- * there, with event NULL and its size: the kernel stack frees it with the next messages. */
+/* Link behind the last queued message; devices locked; set OS_MESSAGES after an insertion. A device may append a
+ * block of its own with event NULL and its size: the kernel frees the block with the next messages. */
 extern message **queue_end;
-extern message *event_queue; /* what is not yet being delivered */
+extern message *event_queue; /* messages outside the delivery batch */
 
 /* process.c */
 void process_init(void);
 sys_pcb *process_find(uint16 pid);               /* any live thread; slice locked */
-sys_pcb *process_next(const sys_pcb *process);   /* a walk over all live threads, NULL to NULL; slice locked */
-void process_wake(sys_pcb *process, message *m); /* from the blocked list to the end of the ring; m, if it waits for one */
-void process_block(event *awaited, uint16 ms);   /* the running thread, after os_enter_blocking() */
-sys_pcb *process_end_running(void);              /* kernel stack: buries the running thread, picks the next */
+sys_pcb *process_next(const sys_pcb *process);   /* iterates over live threads, from NULL to NULL; slice locked */
+void process_wake(sys_pcb *process, message *m); /* blocked list to the end of the ring; m: result of an event wait */
+void process_block(event *awaited, uint16 ms);   /* blocks the running thread; after os_enter_blocking() */
+sys_pcb *process_end_running(void);              /* kernel stack: ends the running thread, picks the next */
 HAL_NORETURN HAL_USED void os_thread_returned(void);
 
-/* The link at which a walk over the blocked list stands, during which threads may be woken and killed; one at a time. */
+/* Cursor of the walk over the blocked list during which threads may be woken and killed; one walk at a time. */
 extern sys_pcb **process_scan;
 
-/* Most calls begin with one of these, and unless they are refused end with os_leave(): the slice is locked in between,
- * as in a critical section. */
-HAL_OUTLINE sys_error os_enter(void);          /* not from ISRs */
-HAL_OUTLINE sys_error os_enter_blocking(void); /* from threads only; process_block() unlocks as well */
-HAL_OUTLINE bool os_leave(sys_error error);    /* true, or false and the last error */
-void os_call_in_section(void (*run)(void *), void *arg); /* whatever sections it begins or ends */
+/* Most kernel calls begin with os_enter() or os_enter_blocking() and, unless refused, end with os_leave(). The slice is
+ * locked in between, as in a critical section. */
+HAL_OUTLINE sys_error os_enter(void);          /* refused in ISRs */
+HAL_OUTLINE sys_error os_enter_blocking(void); /* refused outside threads; process_block() unlocks as well */
+HAL_OUTLINE bool os_leave(sys_error error);    /* returns true, or false and sets the last error */
+void os_call_in_section(void (*run)(void *), void *arg); /* run cannot end the section, whatever it starts or ends */
 
-/* scheduler.c: the ways into the kernel stack; all pick the next thread */
-HAL_USED sys_pcb *os_yield(sys_pcb *running);     /* the running thread stays ready, others come first */
-HAL_USED sys_pcb *os_slice_end(sys_pcb *running); /* the same; or it was preempted and keeps turn and rest of its slice */
-HAL_USED sys_pcb *os_schedule(void);              /* it is not ready any more */
-void os_preempt(void); /* if the scheduler is eager, it has something to decide as soon as the level allows; any context */
+/* scheduler.c: entry points on the kernel stack; all return the next thread */
+HAL_USED sys_pcb *os_yield(sys_pcb *running);     /* running stays ready and moves to the end of the ring */
+HAL_USED sys_pcb *os_slice_end(sys_pcb *running); /* as os_yield(); a preempted thread keeps its turn and its rest */
+HAL_USED sys_pcb *os_schedule(void);              /* the running thread is no longer ready */
+void os_preempt(void); /* requests a decision of an eager scheduler as soon as the level allows; any context */
 
 /* clock.c */
-void clock_set_wake(sys_pcb *process, uint16 ms); /* process is on the blocked list; slice locked */
+void clock_set_wake(sys_pcb *process, uint16 ms); /* starts the time-out of a blocked process; slice locked */
 void clock_wake_due(void);
 uint16 clock_now(void);  /* low word; any context */
 HAL_USED void os_clock_tick(void); /* ISR, every 1 ms */
 
 /* error.c */
-HAL_OUTLINE bool os_fail(sys_error error); /* sets the last error of whoever calls, returns false */
+HAL_OUTLINE bool os_fail(sys_error error); /* sets the caller's last error and returns false */
 sys_error os_refuse(void);     /* sets, counts and returns SYS_ERROR_CONTEXT */
 void os_count(uint16 *counter); /* saturating */
 void event_lost(uint16 id);
 
 /* fault.c */
-HAL_USED sys_pcb *os_overflow(void); /* kernel stack: the running thread hit its stack limit; picks the next */
+HAL_USED sys_pcb *os_overflow(void); /* kernel stack: ends the thread that hit its stack limit; picks the next */
 enum { OS_STACK = 4 };
 HAL_NORETURN HAL_USED void os_trap(uint16 cause, uint16 pc, uint16 pc_high);
 

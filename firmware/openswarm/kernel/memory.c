@@ -1,28 +1,28 @@
 /* SPDX-License-Identifier: MIT */
-/* All dynamic memory: without headers, because the kernel knows the size of what it frees, and in bounded time.
+/* Heap allocator. Blocks have no header, because the kernel knows the size of what it frees; every call is bounded.
  *
- *      os_memory       low            high                          end
+ *      os_memory       reserve_begin   reserve_end
  *      | kernel stack | blocks, holes | the reserve | blocks, holes |
  *
- * The reserve is one free piece that ISRs may cut from as well: messages from its lower end. Every other free piece is a
- * hole, in a tree that only code with the slice locked touches. Neighbouring free pieces are always one; none is smaller
- * than a tree node, so no byte is ever lost.
+ * The reserve is one free block. ISRs allocate messages from its lower end. Every other free block is a hole in a tree,
+ * which requires the slice lock. Adjacent free blocks are always merged, and no hole is smaller than a tree node, so no
+ * byte is lost.
  *
- * The tree is a trie on addresses and a heap on sizes at once: a node of level n is the largest hole of an address range
- * of SPAN / 2^n bytes, its sides lead into the halves of that range. Two holes lie at least two smallest blocks apart, so
- * paths are short and every search, insertion and removal is bounded, whatever happened before. README.md has the
- * reason for this and the figures. */
+ * The tree is a radix priority search tree: a trie on addresses and a heap on sizes. A node of level n is the
+ * largest hole of an address range of SPAN / 2^n bytes; its children lie in the halves of that range. Two holes are
+ * at least two smallest blocks apart. Paths are therefore short, and every search, insertion and removal is bounded
+ * for any history. docs/design/allocator.md has the reasons and the figures. */
 #include "kernel.h"
 
 LINKS_IN_RAM();
 
 typedef struct hole hole;
-struct hole { /* the beginning of a free piece; its size stands in its last HEAP_STEP bytes once more */
+struct hole { /* start of a free block; the block's last HEAP_STEP bytes repeat its size */
     hole *side[2];
     uint16 size;
 };
 
-enum { /* the bit by which the halves of the whole memory differ */
+enum { /* address bit that distinguishes the halves of the whole memory */
     TOP_BIT = sizeof os_memory > 0x8000 ? 0x8000 : sizeof os_memory > 0x4000 ? 0x4000
             : sizeof os_memory > 0x2000 ? 0x2000 : sizeof os_memory > 0x1000 ? 0x1000
             : sizeof os_memory > 0x0800 ? 0x0800 : sizeof os_memory > 0x0400 ? 0x0400 : 0x0200
@@ -35,16 +35,16 @@ typedef char kernel_stack_is_whole_steps[SYS_KERNEL_STACK % HEAP_STEP == 0 ? 1 :
 
 os_memory_space os_memory;
 
-static uint8 *low, *high; /* the reserve; devices locked */
-static hole *holes;       /* slice locked; every path ends at no_hole */
-static hole no_hole;      /* of size 0 */
-static uint8 *run, *run_end; /* slice locked; given back last, piece after piece, and not yet joined */
+static uint8 *reserve_begin, *reserve_end; /* devices locked */
+static hole *holes;       /* root of the tree; slice locked; every path ends at no_hole */
+static hole no_hole;      /* sentinel of size 0 */
+static uint8 *free_run, *free_run_end; /* adjacent blocks freed last, not yet in the tree; slice locked */
 
 void heap_init(void)
 {
     stack_paint(os_memory.bytes, BEGIN);
-    low = BEGIN;
-    high = END;
+    reserve_begin = BEGIN;
+    reserve_end = END;
     holes = no_hole.side[0] = no_hole.side[1] = &no_hole;
 }
 
@@ -53,8 +53,8 @@ static uint16 round_up(uint16 size)
     return (uint16)((size + (HEAP_STEP - 1u)) & ~(HEAP_STEP - 1u));
 }
 
-/* How much is in use, and the most of it: noted before it becomes less and when somebody asks, not on each taking. */
-HAL_OUTLINE void heap_note_use(void)
+/* Updates the peak use. Called before the use decreases and when the statistics are read, not on each allocation. */
+HAL_OUTLINE void heap_update_peak(void)
 {
     uint16 used = HAL_LOAD(os_statistics.heap_used);
     if (used > os_statistics.heap_peak) {
@@ -62,8 +62,9 @@ HAL_OUTLINE void heap_note_use(void)
     }
 }
 
-/* For bounds: nodes of a path, of which a memory twice as large has one more (README.md); runs joined when a piece is given
- * back, itself and perhaps what came before; paths searched and pulled meanwhile, one more where the reserve is exchanged. */
+/* Terms of loop bounds. PATH: nodes of a path; a memory twice as large has one more (docs/design/allocator.md).
+ * RUNS: runs merged when a block is freed: its own and perhaps the run before it. PATHS: nodes searched and removed
+ * meanwhile, with one more path if the reserve is swapped. */
 #if SYS_KERNEL_STACK + SYS_HEAP > 0x1000
 #define PATH min(11, h)
 #else
@@ -79,52 +80,55 @@ static HAL_INLINE uint16 offset_of(const void *at)
     return (uint16)((const uint8 *)at - os_memory.bytes);
 }
 
-static HAL_INLINE uint16 *last_step(uint8 *end)
+/* Where a hole that ends at `end` stores its size. */
+static HAL_INLINE uint16 *trailing_size(uint8 *end)
 {
     return (uint16 *)(void *)(end - HEAP_STEP);
 }
 
-/* The link to the hole that begins there, or to nothing. */
+/* Returns the link to the hole that begins at an address, or a link to no_hole. */
 static HAL_OUTLINE hole **find_hole(uintptr_t at)
 {
     hole **link = &holes;
     uint16 offset = (uint16)(at - (uintptr_t)os_memory.bytes);
-    LOOP_BOUND(PATH); LOOP_SHARE(join_run, 2 * PATH); LOOP_SHARE(heap_give, PATHS);
+    LOOP_BOUND(PATH); LOOP_SHARE(coalesce_free_run, 2 * PATH); LOOP_SHARE(heap_free, PATHS);
     for (uint16 bit = TOP_BIT; *link != &no_hole && (uintptr_t)*link != at; bit >>= 1) {
         link = offset & bit ? &(*link)->side[1] : &(*link)->side[0];
     }
     return link;
 }
 
-/* From the top downwards whoever is larger stays, the other goes on into its half. */
-static HAL_OUTLINE void put_hole(void *at, uint16 size)
+/* Inserts a hole from the root downwards: on each level the larger hole is kept, the smaller one descends into its
+ * half. */
+LOOPS_OF(insert_hole, PATH - 1);
+static HAL_OUTLINE void insert_hole(void *at, uint16 size)
 {
     hole *h = at, **link = &holes;
     uint16 bit = TOP_BIT;
     h->size = size;
-    *last_step((uint8 *)at + size) = size;
+    *trailing_size((uint8 *)at + size) = size;
     do {
-        hole *stays = *link;
-        if (stays->size < h->size) {
+        hole *larger = *link;
+        if (larger->size < h->size) {
             *link = h;
-            h->side[0] = stays->side[0];
-            h->side[1] = stays->side[1];
-            h = stays;
-            stays = *link;
+            h->side[0] = larger->side[0];
+            h->side[1] = larger->side[1];
+            h = larger;
+            larger = *link;
         }
-        link = offset_of(h) & bit ? &stays->side[1] : &stays->side[0];
+        link = offset_of(h) & bit ? &larger->side[1] : &larger->side[0];
         bit >>= 1;
-        LOOP_BOUND(PATH - 1);
     } while (h != &no_hole);
 }
 
-/* Out of the tree: the larger of the two below fills the gap, and so on downwards. */
-static HAL_OUTLINE hole *pull_hole(hole **link)
+/* Removes a hole from the tree: the larger of its two children moves up, and so on downwards. */
+static HAL_OUTLINE hole *remove_hole(hole **link)
 {
-    hole *gone = *link, *left = gone->side[0], *right = gone->side[1];
-    /* What was searched lies above what is pulled, on one path. */
-    LOOP_BOUND(PATH - 1); LOOP_SHARE(heap_keep, PATH); LOOP_SHARE(join_run, 2 * PATH); LOOP_SHARE(heap_give, PATHS);
-    while (left != right) { /* not both nothing */
+    hole *removed = *link, *left = removed->side[0], *right = removed->side[1];
+    /* The nodes searched and the nodes moved lie on one path. */
+    LOOP_BOUND(PATH - 1); LOOP_SHARE(heap_alloc_lasting, PATH); LOOP_SHARE(coalesce_free_run, 2 * PATH);
+    LOOP_SHARE(heap_free, PATHS);
+    while (left != right) { /* until both are no_hole */
         hole *next;
         if (left->size >= right->size) {
             *link = left;
@@ -143,80 +147,80 @@ static HAL_OUTLINE hole *pull_hole(hole **link)
         }
     }
     *link = &no_hole;
-    return gone;
+    return removed;
 }
 
 /* ---- The reserve ------------------------------------------------------------------------------------------------ */
 
-static HAL_INLINE uint16 reserve(void)
+static HAL_INLINE uint16 reserve_size(void)
 {
-    return (uint16)(high - HAL_LOAD(low));
+    return (uint16)(reserve_end - HAL_LOAD(reserve_begin));
 }
 
-/* Slice locked. */
-static HAL_OUTLINE void join_run(void)
+/* Merges the free run with the holes on both sides or with the reserve. Slice locked. */
+static HAL_OUTLINE void coalesce_free_run(void)
 {
-    uint8 *begin = run, *end = run_end;
-    bool apart = false;
+    uint8 *begin = free_run, *end = free_run_end;
+    bool is_hole = false;
     if (begin == end) {
         return;
     }
-    run = run_end;
-    /* The size of a hole, if one ends here; if not, no hole begins so far below that ends here. Who starts a thread gives
-     * nothing back (but where hal_stack_init() may fail): it joins what waits. */
-    CALL_SHARE(find_hole, heap_give, RUNS); CALL_SHARE(find_hole, process.c / start, min(1, j));
-    hole **link = find_hole((uintptr_t)begin - *last_step(begin));
+    free_run = free_run_end;
+    /* The word in front of the run is the size of a hole only if the tree has a hole of that size there. Starting a
+     * thread frees no block (unless hal_stack_init() may fail): it merges only a run that is already pending. */
+    CALL_SHARE(find_hole, heap_free, RUNS); CALL_SHARE(find_hole, process.c / start, min(1, j));
+    hole **link = find_hole((uintptr_t)begin - *trailing_size(begin));
     if ((uint8 *)*link + (*link)->size == begin) {
-        CALL_SHARE(pull_hole, heap_give, RUNS); CALL_SHARE(pull_hole, process.c / start, min(1, j));
-        begin = (uint8 *)pull_hole(link);
+        CALL_SHARE(remove_hole, heap_free, RUNS); CALL_SHARE(remove_hole, process.c / start, min(1, j));
+        begin = (uint8 *)remove_hole(link);
     }
-    CALL_SHARE(find_hole, heap_give, RUNS); CALL_SHARE(pull_hole, heap_give, RUNS);
-    CALL_SHARE(find_hole, process.c / start, min(1, j)); CALL_SHARE(pull_hole, process.c / start, min(1, j));
-    end += pull_hole(find_hole((uintptr_t)end))->size; /* of nothing: 0 */
+    CALL_SHARE(find_hole, heap_free, RUNS); CALL_SHARE(remove_hole, heap_free, RUNS);
+    CALL_SHARE(find_hole, process.c / start, min(1, j)); CALL_SHARE(remove_hole, process.c / start, min(1, j));
+    end += remove_hole(find_hole((uintptr_t)end))->size; /* no_hole: 0 */
     hal_lock_state lock = hal_lock_devices();
-    if (end == low) {
-        low = begin;
-    } else if (begin == high) {
-        high = end;
+    if (end == reserve_begin) {
+        reserve_begin = begin;
+    } else if (begin == reserve_end) {
+        reserve_end = end;
     } else {
-        apart = true;
+        is_hole = true;
     }
     hal_unlock(lock);
-    if (apart) {
-        CALL_SHARE(put_hole, heap_give, RUNS); CALL_SHARE(put_hole, process.c / start, min(1, j));
-        put_hole(begin, (uint16)(end - begin));
+    if (is_hole) {
+        CALL_SHARE(insert_hole, heap_free, RUNS); CALL_SHARE(insert_hole, process.c / start, min(1, j));
+        insert_hole(begin, (uint16)(end - begin));
     }
 }
 
-/* Slice locked. A hole that is larger than the reserve changes places with it. */
-static HAL_OUTLINE uint16 renew_reserve(void)
+/* Swaps the reserve with the largest hole if the hole is larger; returns whether it did. Slice locked. */
+static HAL_OUTLINE uint16 swap_reserve(void)
 {
-    if (holes->size <= reserve()) {
+    if (holes->size <= reserve_size()) {
         return 0;
     }
-    CALL_IF(pull_hole, min(1, x));
-    hole *h = pull_hole(&holes);
+    CALL_IF(remove_hole, min(1, x));
+    hole *h = remove_hole(&holes);
     hal_lock_state lock = hal_lock_devices();
-    uint8 *from = low, *to = high;
-    low = (uint8 *)h;
-    high = (uint8 *)h + h->size;
+    uint8 *from = reserve_begin, *to = reserve_end;
+    reserve_begin = (uint8 *)h;
+    reserve_end = (uint8 *)h + h->size;
     hal_unlock(lock);
     if (from != to) {
-        put_hole(from, (uint16)(to - from));
+        insert_hole(from, (uint16)(to - from));
     }
     return 1;
 }
 
-void heap_settle(void)
+void heap_coalesce(void)
 {
-    join_run();
-    renew_reserve();
+    coalesce_free_run();
+    swap_reserve();
 }
 
-/* ---- Taking and giving ------------------------------------------------------------------------------------------ */
+/* ---- Allocation ------------------------------------------------------------------------------------------------- */
 
-/* What remains of a piece is nothing, or enough for a hole. */
-void *heap_take(uint16 size)
+/* Allocates from the reserve. The rest of the reserve stays empty or large enough for a hole. */
+void *heap_alloc(uint16 size)
 {
     if (HAL_ALLOCATION_FAILS()) {
         return NULL;
@@ -224,55 +228,55 @@ void *heap_take(uint16 size)
     size = round_up(size);
     do {
         hal_lock_state lock = hal_lock_devices();
-        uint8 *block = low, *rest = block + size;
-        if (HAL_LIKELY(high - rest >= (ptrdiff_t)sizeof(hole)) || rest == high) {
-            low = rest;
+        uint8 *block = reserve_begin, *rest = block + size;
+        if (HAL_LIKELY(reserve_end - rest >= (ptrdiff_t)sizeof(hole)) || rest == reserve_end) {
+            reserve_begin = rest;
             os_statistics.heap_used += size;
             hal_unlock(lock);
             return block;
         }
         hal_unlock(lock);
-        LOOP_BOUND(1); /* the reserve is the largest piece then */
-    } while (!hal_in_isr() && renew_reserve());
+        LOOP_BOUND(1); /* after one swap the reserve is the largest free block */
+    } while (!hal_in_isr() && swap_reserve());
     return NULL;
 }
 
-/* Down the left side, as far as there is room. */
-void *heap_keep(uint16 size)
+/* Allocates from the lowest sufficient hole on the leftmost path of the tree, else from the reserve. */
+void *heap_alloc_lasting(uint16 size)
 {
     hole **link = NULL, **next = &holes;
-    LOOP_BOUND(PATH); LOOP_SHARE(heap_keep, PATH);
+    LOOP_BOUND(PATH); LOOP_SHARE(heap_alloc_lasting, PATH);
     while ((*next)->size >= size + sizeof(hole)) {
         link = next;
         next = &(*link)->side[0];
     }
     if (link == NULL) {
-        return heap_take(size);
+        return heap_alloc(size);
     }
     if (HAL_ALLOCATION_FAILS()) {
         return NULL;
     }
     HAL_ADD(os_statistics, heap_used, size);
-    hole *h = pull_hole(link);
+    hole *h = remove_hole(link);
     uint16 rest = (uint16)(h->size - size);
-    put_hole(h, rest);
+    insert_hole(h, rest);
     return (uint8 *)h + rest;
 }
 
-void heap_give_later(void *freed, uint16 size)
+void heap_free_deferred(void *freed, uint16 size)
 {
     size = round_up(size);
-    heap_note_use();
+    heap_update_peak();
     HAL_ADD(os_statistics, heap_used, -size);
-    if (freed != run_end) {
-        join_run();
-        run = freed;
+    if (freed != free_run_end) {
+        coalesce_free_run();
+        free_run = freed;
     }
-    run_end = (uint8 *)freed + size;
+    free_run_end = (uint8 *)freed + size;
 }
 
-void heap_give(void *freed, uint16 size)
+void heap_free(void *freed, uint16 size)
 {
-    heap_give_later(freed, size);
-    heap_settle();
+    heap_free_deferred(freed, size);
+    heap_coalesce();
 }

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* Threads: creation, the ring of ready threads, the blocked list, the end.
  *
- * The ring is circular and singly linked; os_ring is the member before the running one. Turning it by one member ends a
- * slice, and a thread that becomes ready enters behind everyone else, all in O(1). */
+ * The ring is circular and singly linked; os_ring is the member before the running one. A slice ends by moving os_ring
+ * by one member, and a thread that becomes ready enters at the end of the ring; both take constant time. */
 #include "kernel.h"
 
 LINKS_IN_RAM();
@@ -14,7 +14,7 @@ sys_pcb *os_blocked;
 HAL_ZEROS sys_process_config os_plain;
 
 sys_pcb **process_scan;
-os_burial os_at_burial;
+os_thread_end_function os_thread_end_hook;
 
 static uint16 newest_pid;
 volatile uint16 critical_depth;
@@ -36,10 +36,10 @@ static HAL_OUTLINE void ring_append(sys_pcb *p)
     os_preempt();
 }
 
+LOOPS_OF(ring_remove, n);
 static HAL_OUTLINE void ring_remove(const sys_pcb *p)
 {
     sys_pcb *before = os_ring;
-    LOOP_BOUND(n);
     while (before->next != p) {
         before = before->next;
     }
@@ -50,18 +50,18 @@ static HAL_OUTLINE void ring_remove(const sys_pcb *p)
     hal_barrier();
 }
 
-/* The link of the blocked list that points to p. */
+/* Returns the link of the blocked list that points to p. */
 static HAL_OUTLINE sys_pcb **link_to(const sys_pcb *p)
 {
     sys_pcb **link = &os_blocked;
-    LOOP_BOUND(n); LOOP_SHARE(event.c / wake_waiters, n * n / 4); /* those in front that stay, for each that is woken */
+    LOOP_BOUND(n); LOOP_SHARE(event.c / wake_waiters, n * n / 4); /* per woken thread: those that stay in front of it */
     while (*link != p) {
         link = &(*link)->next;
     }
     return link;
 }
 
-/* m becomes the wait result of a thread that waits for one. */
+/* Takes p off the blocked list. m becomes its wait result if it waits for an event. */
 static HAL_OUTLINE void unlink_blocked(sys_pcb *p, message *m)
 {
     sys_pcb **link = link_to(p);
@@ -69,8 +69,8 @@ static HAL_OUTLINE void unlink_blocked(sys_pcb *p, message *m)
     if (process_scan == &p->next) {
         process_scan = link;
     }
-    if (p->on.awaited != NULL) {
-        p->wait.result = m; /* it was the condition */
+    if (p->event_or_slice.awaited != NULL) {
+        p->wait.result = m; /* overwrites the condition */
     }
 }
 
@@ -79,13 +79,13 @@ static void set_state(sys_pcb *p, uint8 state)
     p->status = (uint8)((p->status & ~(OS_STATE | OS_TIMED)) | state);
 }
 
-/* The running thread, from the ring to the end of the blocked list. */
-static HAL_OUTLINE sys_pcb *leave_ring(event *awaited)
+/* Moves the running thread from the ring to the end of the blocked list. */
+static HAL_OUTLINE sys_pcb *ring_to_blocked(event *awaited)
 {
     sys_pcb *self = os_running;
     critical_depth = 0;
     ring_remove(self);
-    self->on.awaited = awaited;
+    self->event_or_slice.awaited = awaited;
     set_state(self, SYS_BLOCKED);
     self->next = NULL;
     sys_pcb **end = link_to(NULL);
@@ -98,8 +98,8 @@ void process_wake(sys_pcb *p, message *m)
 {
     unlink_blocked(p, m);
     set_state(p, SYS_READY | OS_WOKEN);
-    p->on.awaited = NULL;
-    p->own.error = SYS_OK;
+    p->event_or_slice.awaited = NULL;
+    p->time_or_error.error = SYS_OK;
     ring_append(p);
 }
 
@@ -120,7 +120,7 @@ sys_pcb *process_find(uint16 pid)
     sys_pcb *p = NULL;
     do {
         p = process_next(p);
-        LOOP_BOUND(n); LOOP_SHARE(start, n * (n + 1) / 2); /* each that is taken is found at another place */
+        LOOP_BOUND(n); LOOP_SHARE(start, n * (n + 1) / 2); /* each PID in use is found at another position */
     } while (p != NULL && p->pid != pid);
     return p;
 }
@@ -140,7 +140,7 @@ static uint16 unused_pid(void)
     do {
         newest_pid++;
         LOOP_BOUND(n);
-    } while (process_find(newest_pid) != NULL); /* 0 is always there */
+    } while (process_find(newest_pid) != NULL); /* PID 0 is always in use */
     return newest_pid;
 }
 
@@ -172,8 +172,8 @@ static HAL_OUTLINE uint16 start(const sys_process_config *config, void (*entry)(
         return 0;
     }
     if (entry != NULL && is_valid(config, stack)) {
-        uint8 *block = heap_take(size);
-        heap_settle();
+        uint8 *block = heap_alloc(size);
+        heap_coalesce();
         error = SYS_ERROR_MEMORY;
         if (block != NULL) {
             sys_pcb *p = (sys_pcb *)(void *)(block + extra + stack);
@@ -182,18 +182,18 @@ static HAL_OUTLINE uint16 start(const sys_process_config *config, void (*entry)(
                 error = SYS_OK;
                 pid = unused_pid();
                 p->pid = pid;
-                p->status = (uint8)config->flags; /* and SYS_NEW */
+                p->status = (uint8)config->flags; /* with state SYS_NEW, which is 0 */
                 p->priority = config->priority;
                 p->block = block;
-                p->own.error = SYS_OK;
+                p->time_or_error.error = SYS_OK;
                 p->wait.result = NULL;
-                p->on.awaited = NULL;
+                p->event_or_slice.awaited = NULL;
                 if (extra != 0) {
                     set_period(process_periodic(p), config);
                 }
                 ring_append(p);
             } else {
-                heap_give(block, size);
+                heap_free(block, size);
             }
         }
     }
@@ -201,7 +201,7 @@ static HAL_OUTLINE uint16 start(const sys_process_config *config, void (*entry)(
     return pid;
 }
 
-union callable { /* a thread function without argument, in the place of one with */
+union callable { /* calls a thread function without argument as one with an argument */
     sys_function plain;
     void (*with_argument)(void *);
 };
@@ -220,7 +220,7 @@ uint16 Sys_Start_ProcessWith(const sys_process_config *config)
 
 void process_block(event *awaited, uint16 ms)
 {
-    sys_pcb *self = leave_ring(awaited);
+    sys_pcb *self = ring_to_blocked(awaited);
     if (ms != 0) {
         clock_set_wake(self, ms);
     }
@@ -238,7 +238,7 @@ void Sys_Sleep(uint16 ms)
 
 static sys_pcb *retire_running(void)
 {
-    (void)leave_ring(NULL);
+    (void)ring_to_blocked(NULL);
     return os_schedule();
 }
 
@@ -257,7 +257,7 @@ void Sys_Start_CriticalSection(void)
 {
     hal_lock_state before = hal_lock_slice();
     uint16 depth = critical_depth;
-    HAL_STORE(critical_depth, (uint16)(depth + 1u)); /* an ISR before or behind it leaves the depth as it was */
+    HAL_STORE(critical_depth, (uint16)(depth + 1u)); /* an ISR in between restores the depth before it returns */
     if (depth == 0) {
         critical_before = before;
     }
@@ -265,7 +265,7 @@ void Sys_Start_CriticalSection(void)
 
 void Sys_End_CriticalSection(void)
 {
-    hal_lock_state before = critical_before; /* first: at depth 0 the section of an ISR stores its own */
+    hal_lock_state before = critical_before; /* read first: at depth 0 an ISR's section stores its own */
     uint16 depth = critical_depth;
     if (depth != 0) {
         HAL_STORE(critical_depth, (uint16)(depth - 1u));
@@ -277,10 +277,10 @@ void Sys_End_CriticalSection(void)
 
 void os_call_in_section(void (*run)(void *), void *arg)
 {
-    enum { FAR = 0x4000 };
+    enum { NESTING_OFFSET = 0x4000 }; /* more sections than run can end */
     Sys_Start_CriticalSection();
     uint16 depth = critical_depth;
-    HAL_STORE(critical_depth, (uint16)(depth + FAR));
+    HAL_STORE(critical_depth, (uint16)(depth + NESTING_OFFSET));
     run(arg);
     HAL_STORE(critical_depth, depth);
     Sys_End_CriticalSection();
@@ -308,8 +308,8 @@ bool os_leave(sys_error error)
 
 /* ---- End -------------------------------------------------------------------------------------------------------- */
 
-/* Slice locked; nothing runs on p's stack. */
-static HAL_OUTLINE void bury(sys_pcb *p)
+/* Ends thread p and frees its memory. Slice locked; no code runs on p's stack. */
+static HAL_OUTLINE void end_thread(sys_pcb *p)
 {
     if (p->status & OS_OFF_RING) {
         unlink_blocked(p, NULL);
@@ -323,9 +323,9 @@ static HAL_OUTLINE void bury(sys_pcb *p)
         HAL_STORE(os_running, &os_system);
     }
     uint16 pid = p->pid;
-    if (os_at_burial == NULL || !os_at_burial(p)) {
+    if (os_thread_end_hook == NULL || !os_thread_end_hook(p)) {
         hal_stack_release(p);
-        heap_give(p->block, (uint16)((uint8 *)(p + 1) - p->block));
+        heap_free(p->block, (uint16)((uint8 *)(p + 1) - p->block));
     }
     (void)Sys_Send_IntEvent(SYS_EVENT_TERMINATION, pid);
 }
@@ -333,7 +333,7 @@ static HAL_OUTLINE void bury(sys_pcb *p)
 sys_pcb *process_end_running(void)
 {
     critical_depth = 0;
-    bury(os_running); /* perhaps blocked: it may have overflown its stack on the way to sleep */
+    end_thread(os_running); /* perhaps already blocked: its stack may overflow while it blocks */
     return os_schedule();
 }
 
@@ -355,7 +355,7 @@ bool Sys_Kill_Process(uint16 pid)
             if (p == os_running && !os_in_kernel) {
                 os_thread_returned();
             }
-            bury(p);
+            end_thread(p);
             error = SYS_OK;
         }
     }

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The ways into the kernel stack, and the schedulers. */
+/* Entry points on the kernel stack, and the schedulers. */
 #include "kernel.h"
 
 LINKS_IN_RAM();
@@ -13,10 +13,11 @@ static sys_pick pick_thread; /* NULL = round robin */
 
 /* ---- Dispatch: kernel stack, slice level ------------------------------------------------------------------------ */
 
+/* Delivers messages and expires time-outs. */
 static HAL_OUTLINE void work(void)
 {
     event_deliver_queued();
-    HAL_STORE(critical_depth, 0); /* a section that a handler left open ends with the handlers */
+    HAL_STORE(critical_depth, 0); /* ends a section that a handler left open */
     if (os_pending & OS_ALARM) {
         HAL_CLEAR_BIT(os_pending, 1);
         clock_wake_due();
@@ -31,7 +32,7 @@ static HAL_OUTLINE void work(void)
 static HAL_INLINE sys_pcb *dispatch(sys_pcb *next, uint16 spent)
 {
     HAL_STORE(os_running, next);
-    hal_slice_restart(spent); /* handlers are over: the slice belongs to next */
+    hal_slice_restart(spent); /* after the handlers: the whole slice belongs to next */
     return next;
 }
 
@@ -40,11 +41,11 @@ sys_pcb *os_schedule(void)
     hal_guard_kernel_stack();
     os_in_kernel = true;
     for (;;) {
-        hal_slice_unforce(); /* what comes from here on calls the kernel back */
+        hal_slice_unforce(); /* a request from here on enters the kernel again */
         if (OS_HAS_WORK) {
             work();
         }
-        LOOP_BOUND(i); /* idle; with i = 0 there is a thread to run */
+        LOOP_BOUND(i); /* i times idle; 0: a thread is ready */
         if (os_ring != NULL) {
             break;
         }
@@ -62,14 +63,14 @@ sys_pcb *os_schedule(void)
     }
     os_in_kernel = false;
     sys_pcb *next = os_ring->next;
-    uint16 spent = next->on.spent;
-    next->on.spent = 0;
+    uint16 spent = next->event_or_slice.spent;
+    next->event_or_slice.spent = 0;
     return dispatch(next, spent);
 }
 
 sys_pcb *os_yield(sys_pcb *running)
 {
-    os_ring = running; /* it was os_ring->next: the ring turns by one */
+    os_ring = running; /* running was os_ring->next: advances the ring by one */
     if (HAL_LIKELY(os_pending == 0)) {
         return dispatch(running->next, 0);
     }
@@ -83,14 +84,14 @@ sys_pcb *os_slice_end(sys_pcb *running)
         return dispatch(running->next, 0);
     }
     uint16 spent = hal_slice_spent();
-    if (hal_slice_is_over()) { /* asked second: the slice may end in between */
+    if (hal_slice_is_over()) { /* re-check after reading `spent`: the slice may have expired in between */
         return os_yield(running);
     }
-    running->on.spent = spent; /* and the ring stays, so that its turn comes again when no better thread is ready */
+    running->event_or_slice.spent = spent; /* os_ring is unchanged: running continues once no better thread is ready */
     return os_schedule();
 }
 
-/* What handlers send waits for the next tick: one that resends for ever shall not keep threads from running. */
+/* Messages sent by handlers wait for the next tick: a handler that always resends must not starve the threads. */
 void os_preempt(void)
 {
     if (os_eager && (!os_in_kernel || hal_in_isr())) {
@@ -159,8 +160,8 @@ static void report_miss(sys_pcb *p)
     (void)Sys_Send_IntEvent(SYS_DEADLINE_MISSED, p->pid);
 }
 
-/* A job that is late has no deadline to meet any more: it takes turns with the threads without a period, which run when
- * no job is on time. So whatever it does, it starves nobody. */
+/* Picks the job on time with the earliest deadline. If there is none, late jobs and threads without a period share the
+ * CPU by round robin, so that a late job cannot starve them. */
 static sys_pcb *earliest_deadline(sys_pcb *first)
 {
     uint16 now = clock_now();
@@ -174,7 +175,7 @@ static sys_pcb *earliest_deadline(sys_pcb *first)
             } else if (left < least) {
                 least = left;
                 best = p;
-                hal_barrier(); /* a branch is shorter than two conditional moves */
+                hal_barrier(); /* makes the compiler emit a branch, which is shorter than two conditional moves */
             }
         }
         p = p->next;

@@ -1,20 +1,21 @@
 /* SPDX-License-Identifier: MIT */
-/* How much of a stack was never used: stacks are painted before their first use and looked at from the far end.
+/* Unused stack: stacks are painted before their first use; the paint left at the far end was never used.
  *
  * Stacks grow upwards, away from the start of their block, unless the port defines HAL_STACK_GROWS_DOWN. */
 #include "kernel.h"
 
 enum { PAINT = 0xA5 };
 
+LOOPS_OF(stack_paint, k / 2 - 1);
 HAL_OUTLINE void stack_paint(void *begin, const void *end)
 {
-    volatile uint16 *word = begin; /* volatile: as a call of memset it takes more room */
+    volatile uint16 *word = begin; /* volatile: else the compiler calls memset, which is larger */
     do {
         *word++ = PAINT * 0x101u;
-        LOOP_BOUND(k / 2 - 1);
     } while (word != end);
 }
 
+/* Returns the painted bytes at the far end of a stack. */
 static uint16 unused(const uint8 *stack, uint16 bytes)
 {
 #ifdef HAL_STACK_GROWS_DOWN
@@ -33,7 +34,7 @@ static uint16 unused(const uint8 *stack, uint16 bytes)
 #endif
 }
 
-/* The guard at the end of a thread's stack is not the thread's to use. */
+/* The guard at the end of a thread's stack does not count: it belongs to the port. */
 uint16 Sys_Get_UnusedStack(uint16 pid)
 {
     uint16 bytes = 0;

@@ -1,14 +1,14 @@
 /* SPDX-License-Identifier: MIT */
-/* What is to be done when a thread ends, whatever ends it (openswarm_cleanup.h). */
+/* Cleanup functions that run when their thread ends, for whatever reason (openswarm_cleanup.h). */
 #include "kernel.h"
 #include "openswarm_cleanup.h"
 
 static sys_cleanup *cleanups; /* of all threads, newest first; slice locked */
-static os_burial before;
-static bool buries;
-static const sys_pcb *dying; /* its cleanups run */
+static os_thread_end_function previous_hook;
+static bool hook_installed;
+static const sys_pcb *dying; /* the thread whose cleanups run */
 
-/* The link behind which the newest of a thread hangs; NULL: it has none. */
+/* Returns the link to the newest cleanup of a thread, or NULL if it has none. */
 static sys_cleanup **newest_of(uint16 pid)
 {
     for (sys_cleanup **link = &cleanups; *link != NULL; link = &(*link)->next) {
@@ -19,10 +19,10 @@ static sys_cleanup **newest_of(uint16 pid)
     return NULL;
 }
 
-static bool on_burial(sys_pcb *p)
+static bool on_thread_end(sys_pcb *p)
 {
     sys_cleanup **link;
-    const sys_pcb *outer = dying; /* a cleanup may end other threads */
+    const sys_pcb *outer = dying; /* nested: a cleanup may end other threads */
     dying = p;
     while ((link = newest_of(p->pid)) != NULL) {
         const sys_cleanup *c = *link;
@@ -30,7 +30,7 @@ static bool on_burial(sys_pcb *p)
         os_call_in_section(c->run, c->arg);
     }
     dying = outer;
-    return before != NULL && before(p);
+    return previous_hook != NULL && previous_hook(p);
 }
 
 bool Sys_Push_Cleanup(sys_cleanup *c, void (*run)(void *), void *arg)
@@ -46,10 +46,10 @@ bool Sys_Push_Cleanup(sys_cleanup *c, void (*run)(void *), void *arg)
             return os_leave(SYS_ERROR_ARGUMENT);
         }
     }
-    if (!buries) {
-        buries = true;
-        before = os_at_burial;
-        os_at_burial = on_burial;
+    if (!hook_installed) {
+        hook_installed = true;
+        previous_hook = os_thread_end_hook;
+        os_thread_end_hook = on_thread_end;
     }
     *c = (sys_cleanup){cleanups, run, arg, os_running->pid};
     cleanups = c;

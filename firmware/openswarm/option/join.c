@@ -1,21 +1,21 @@
 /* SPDX-License-Identifier: MIT */
-/* Waiting for the end of a thread, and threads that stay as zombies until somebody does (openswarm_join.h). */
+/* Joining threads, and joinable threads that stay as zombies until another thread joins them (openswarm_join.h). */
 #include "kernel.h"
 #include "openswarm_join.h"
 
 typedef struct joiner joiner;
-struct joiner { /* on the stack of who waits */
+struct joiner { /* on the waiting thread's stack */
     joiner *next;
     sys_pcb *thread;
     uint16 pid;
 };
 
 static joiner *joiners; /* slice locked */
-static os_burial before;
-static bool buries;
+static os_thread_end_function previous_hook;
+static bool hook_installed;
 
-/* Wakes who waited for it; true if there was anybody. Who waits himself waits no more. */
-static bool tell_joiners(const sys_pcb *gone)
+/* Wakes the threads that join an ended thread; returns whether there was one. Also drops the ended thread's own join. */
+static bool wake_joiners(const sys_pcb *gone)
 {
     bool any = false;
     for (joiner **link = &joiners; *link != NULL;) {
@@ -33,22 +33,22 @@ static bool tell_joiners(const sys_pcb *gone)
     return any;
 }
 
-/* A zombie keeps its control block, behind all that are blocked. Whoever kills it again sets that free. */
-static bool on_burial(sys_pcb *p)
+/* Keeps the control block of a joinable thread at the end of the blocked list. Killing the zombie frees the block. */
+static bool on_thread_end(sys_pcb *p)
 {
-    bool stays = before != NULL && before(p);
+    bool stays = previous_hook != NULL && previous_hook(p);
     bool is_zombie = p->block == NULL;
     if (is_zombie) {
-        heap_give(p, sizeof *p);
+        heap_free(p, sizeof *p);
         return true;
     }
-    if (tell_joiners(p) || !(p->status & OS_JOINABLE) || stays) {
+    if (wake_joiners(p) || !(p->status & OS_JOINABLE) || stays) {
         return stays;
     }
     hal_stack_release(p);
-    heap_give(p->block, (uint16)((uint8 *)p - p->block));
+    heap_free(p->block, (uint16)((uint8 *)p - p->block));
     p->block = NULL;
-    p->on.awaited = NULL;
+    p->event_or_slice.awaited = NULL;
     p->next = NULL;
     sys_pcb **end = &os_blocked;
     while (*end != NULL) {
@@ -59,13 +59,14 @@ static bool on_burial(sys_pcb *p)
     return true;
 }
 
-static void begin(void)
+/* Installs the hook at the first use of joins. */
+static void install_hook(void)
 {
     Sys_Start_CriticalSection();
-    if (!buries) {
-        buries = true;
-        before = os_at_burial;
-        os_at_burial = on_burial;
+    if (!hook_installed) {
+        hook_installed = true;
+        previous_hook = os_thread_end_hook;
+        os_thread_end_hook = on_thread_end;
     }
     Sys_End_CriticalSection();
 }
@@ -73,7 +74,7 @@ static void begin(void)
 uint16 Sys_Start_Joinable(const sys_process_config *config)
 {
     sys_process_config joinable = *config;
-    begin();
+    install_hook();
     joinable.flags |= OS_JOINABLE;
     return Sys_Start_ProcessWith(&joinable);
 }
@@ -93,11 +94,11 @@ bool Sys_Join(uint16 pid)
             link = &(*link)->next;
         }
         HAL_STORE(*link, p->next);
-        event_drop_subscriptions(pid); /* it may have been given some since its end */
-        heap_give((void *)(uintptr_t)p, sizeof *p);
+        event_drop_subscriptions(pid); /* other threads may have subscribed it after its end */
+        heap_free((void *)(uintptr_t)p, sizeof *p);
         return os_leave(SYS_OK);
     }
-    begin();
+    install_hook();
     joiner waiting = {joiners, os_running, pid};
     joiners = &waiting;
     process_block(NULL, 0);

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Mutexes with immediate priority ceiling (openswarm_mutex.h).
  *
- * A mutex without owner is on no list and knows no waiters. Waiters are nodes on the stacks of who waits. */
+ * A mutex without an owner is on no list and has no waiters. Wait nodes are on the stacks of the waiting threads. */
 #include "kernel.h"
 #include "openswarm_mutex.h"
 
@@ -11,9 +11,9 @@ struct sys_mutex_waiter {
     sys_pcb *thread;
 };
 
-static sys_mutex *held; /* all that have an owner; slice locked */
-static os_burial before;
-static bool buries;
+static sys_mutex *held; /* all mutexes with an owner; slice locked */
+static os_thread_end_function previous_hook;
+static bool hook_installed;
 
 static uint8 base_priority(const sys_pcb *thread)
 {
@@ -25,7 +25,7 @@ static uint8 base_priority(const sys_pcb *thread)
     return thread->priority;
 }
 
-static void own(sys_mutex *m, sys_pcb *thread)
+static void acquire(sys_mutex *m, sys_pcb *thread)
 {
     m->base = base_priority(thread);
     m->owner = thread;
@@ -36,7 +36,7 @@ static void own(sys_mutex *m, sys_pcb *thread)
     }
 }
 
-static void forget_waiter(sys_mutex *m, const sys_pcb *thread)
+static void remove_waiter(sys_mutex *m, const sys_pcb *thread)
 {
     for (waiter **link = &m->waiters; *link != NULL; link = &(*link)->next) {
         if ((*link)->thread == thread) {
@@ -46,7 +46,8 @@ static void forget_waiter(sys_mutex *m, const sys_pcb *thread)
     }
 }
 
-/* To the best waiter, of equal ones to the first. One whose time is up, but which has not run since, is no longer blocked. */
+/* Passes a free mutex to the waiter of the highest priority, the first of equals. A waiter whose time-out expired but
+ * which has not run since is no longer blocked. */
 static void hand_over(sys_mutex *m)
 {
     sys_pcb *best = NULL;
@@ -56,8 +57,8 @@ static void hand_over(sys_mutex *m)
         }
     }
     if (best != NULL) {
-        forget_waiter(m, best);
-        own(m, best);
+        remove_waiter(m, best);
+        acquire(m, best);
         if (best->status & OS_OFF_RING) {
             process_wake(best, NULL);
         }
@@ -82,11 +83,11 @@ static void release(sys_mutex *m)
     hand_over(m);
 }
 
-static bool on_burial(sys_pcb *thread)
+static bool on_thread_end(sys_pcb *thread)
 {
     sys_mutex *m;
     for (m = held; m != NULL; m = m->next) {
-        forget_waiter(m, thread);
+        remove_waiter(m, thread);
     }
     for (m = held; m != NULL;) {
         if (m->owner == thread) {
@@ -96,7 +97,7 @@ static bool on_burial(sys_pcb *thread)
             m = m->next;
         }
     }
-    return before != NULL && before(thread);
+    return previous_hook != NULL && previous_hook(thread);
 }
 
 bool Sys_Lock_MutexTimeout(sys_mutex *m, uint16 ms)
@@ -112,13 +113,13 @@ bool Sys_Lock_MutexTimeout(sys_mutex *m, uint16 ms)
     if (base_priority(self) > m->ceiling) {
         return os_leave(SYS_ERROR_ARGUMENT);
     }
-    if (!buries) {
-        buries = true;
-        before = os_at_burial;
-        os_at_burial = on_burial;
+    if (!hook_installed) {
+        hook_installed = true;
+        previous_hook = os_thread_end_hook;
+        os_thread_end_hook = on_thread_end;
     }
     if (m->owner == NULL) {
-        own(m, self);
+        acquire(m, self);
         return os_leave(SYS_OK);
     }
     waiter **end = &m->waiters;
@@ -128,9 +129,9 @@ bool Sys_Lock_MutexTimeout(sys_mutex *m, uint16 ms)
     *end = &own_node;
     process_block(NULL, ms);
     Sys_Start_CriticalSection();
-    bool mine = m->owner == self; /* it was handed over */
+    bool mine = m->owner == self; /* the previous owner handed it over */
     if (!mine) {
-        forget_waiter(m, self);
+        remove_waiter(m, self);
     }
     Sys_End_CriticalSection();
     return mine;
@@ -155,7 +156,7 @@ bool Sys_Unlock_Mutex(sys_mutex *m)
     uint8 raised = os_running->priority;
     release(m);
     if (os_running->priority < raised) {
-        os_preempt(); /* somebody between both may be ready */
+        os_preempt(); /* a thread of a priority in between may be ready */
     }
     return os_leave(SYS_OK);
 }

@@ -1,17 +1,18 @@
 /* SPDX-License-Identifier: MIT */
-/* Bounds of what may wait for delivery (openswarm_quota.h).
+/* Limits of queued messages per event (openswarm_quota.h).
  *
- * Senders find the newest event of a bucket without a call. A gate in front of an event with a quota, an event without number
- * of the bucket, makes them call; only they pay. What waits is counted in the queue itself. */
+ * Senders find the newest event of a bucket without a call. A quota puts a gate in front of its event: an event whose
+ * number does not belong to the bucket. Senders of that bucket then miss the fast path and call apply_quota(); all others
+ * pay nothing. Queued messages are counted in the queue itself. */
 #include "kernel.h"
 #include "openswarm_quota.h"
 
 #include <string.h>
 
 static sys_quota *quotas;
-static event nobody; /* has no listeners: what is sent to it is not stored */
+static event null_event; /* has no subscribers: a message sent to it is not stored */
 
-/* The newest undelivered message of e, and how many there are. Messages are only appended meanwhile. */
+/* Returns the newest queued message of e and adds their number to *count. ISRs may append messages meanwhile. */
 static message *newest_of(const event *e, uint16 *count)
 {
     message *newest = NULL;
@@ -24,10 +25,10 @@ static message *newest_of(const event *e, uint16 *count)
     return newest;
 }
 
-static event *admit(uint16 id, const void *data, uint16 size)
+static event *apply_quota(uint16 id, const void *data, uint16 size)
 {
     event *e = *event_bucket(id);
-    bool limited = false; /* not without the gate in front: a quota ends with its event, which may be registered anew */
+    bool limited = false; /* true behind a gate: a quota ends with its event, which may be registered again without one */
     while (e != NULL && e->id != id) {
         limited |= e->id == (uint16)(id + 1u);
         e = e->next;
@@ -51,11 +52,11 @@ static event *admit(uint16 id, const void *data, uint16 size)
     } else {
         os_count(&q->dropped);
     }
-    return &nobody;
+    return &null_event;
 }
 
-/* Slice locked. A quota holds for one event, an event has one quota and one gate. */
-static void forget(const sys_quota *again, uint16 id)
+/* Removes a quota, and the quota and gate of an event: an event has at most one of each. Slice locked. */
+static void remove_quota(const sys_quota *again, uint16 id)
 {
     for (sys_quota **link = &quotas; *link != NULL;) {
         if (*link == again || (*link)->event == id) {
@@ -68,7 +69,7 @@ static void forget(const sys_quota *again, uint16 id)
         event *gate = *link;
         if (gate->id == (uint16)(id + 1u)) {
             HAL_STORE(*link, gate->next);
-            heap_give(gate, sizeof *gate);
+            heap_free(gate, sizeof *gate);
             return;
         }
     }
@@ -81,17 +82,17 @@ static bool add(sys_quota *q, uint16 id, uint16 most)
         return false;
     }
     if (event_find(id) != NULL) {
-        forget(q, id);
-        event *gate = heap_keep(sizeof *gate);
+        remove_quota(q, id);
+        event *gate = heap_alloc_lasting(sizeof *gate);
         error = SYS_ERROR_MEMORY;
         if (gate != NULL) {
             error = SYS_OK;
             *q = (sys_quota){quotas, id, most, 0};
             hal_barrier();
             HAL_STORE(quotas, q);
-            HAL_STORE(os_at_sending, admit);
+            HAL_STORE(os_send_hook, apply_quota);
             gate->id = (uint16)(id + 1u);
-            event_put_first(gate, id);
+            event_insert(gate, id);
         }
     }
     return os_leave(error);

@@ -1,20 +1,20 @@
 /* SPDX-License-Identifier: MIT */
-/* Threads that are watched and started anew (openswarm_service.h). */
+/* Services: threads with a watchdog and automatic restart (openswarm_service.h). */
 #include "kernel.h"
 #include "openswarm_service.h"
 
 static sys_service *services; /* slice locked */
-static os_burial before;
-static bool buries;
+static os_thread_end_function previous_hook;
+static bool hook_installed;
 
-static bool on_burial(sys_pcb *p)
+static bool on_thread_end(sys_pcb *p)
 {
     for (sys_service *s = services; s != NULL; s = s->next) {
         if (s->pid == p->pid) {
             s->pid = 0;
         }
     }
-    return before != NULL && before(p);
+    return previous_hook != NULL && previous_hook(p);
 }
 
 static void start(sys_service *s)
@@ -23,7 +23,7 @@ static void start(sys_service *s)
     s->fed = clock_now();
 }
 
-static bool look_after(uint16 unused, uint16 event, sys_event_data *tick)
+static bool supervise(uint16 unused, uint16 event, sys_event_data *tick)
 {
     (void)unused, (void)event;
     for (sys_service *s = services; s != NULL; s = s->next) {
@@ -54,13 +54,13 @@ bool Sys_Start_Service(sys_service *s)
     if (known != NULL && s->pid != 0) {
         return os_leave(SYS_ERROR_PROCESS);
     }
-    if (!buries) {
-        buries = true;
-        before = os_at_burial;
-        os_at_burial = on_burial;
+    if (!hook_installed) {
+        hook_installed = true;
+        previous_hook = os_thread_end_hook;
+        os_thread_end_hook = on_thread_end;
     }
     s->pid = 0;
-    if (Sys_Subscribe_to_Event(SYS_1ms_TIMER, 0, look_after, NULL)) {
+    if (Sys_Subscribe_to_Event(SYS_1ms_TIMER, 0, supervise, NULL)) {
         start(s);
     }
     if (s->pid == 0) {

@@ -1,7 +1,9 @@
 /* SPDX-License-Identifier: MIT */
-/* Round robin, but who has waited runs before all who have not. A file of its own: linked where it is used. */
+/* The scheduler sys_woken_first: round robin, but woken threads run before the others. In a file of its own, so that it
+ * is linked only where it is used. */
 #include "kernel.h"
 
+/* Returns the first thread of the ring that was woken and has not run since, else the first thread. */
 static sys_pcb *first_woken(sys_pcb *first)
 {
     sys_pcb *p = first;

@@ -2,7 +2,7 @@
 #include "test.h"
 
 enum {
-    SMALLEST = 3 * sizeof(void *), /* what heap_take() may be asked for */
+    SMALLEST = 3 * sizeof(void *), /* what heap_alloc() may be asked for */
     BLOCKS = 200,
     HISTORY = 120000
 };
@@ -52,9 +52,9 @@ static void release(held_block *b)
     mark(b, 0);
     unsettled = rand() % 4 == 0; /* as within a round of handlers */
     if (unsettled) {
-        heap_give_later(b->at, b->asked);
+        heap_free_deferred(b->at, b->asked);
     } else {
-        heap_give(b->at, b->asked);
+        heap_free(b->at, b->asked);
     }
     b->at = NULL;
 }
@@ -65,7 +65,7 @@ static void obtain(held_block *b, uint16 asked, bool stays, uint8 fill)
     uint16 gap = largest_gap();
     b->asked = asked;
     b->size = (uint16)(steps(asked) * HEAP_STEP);
-    b->at = stays ? heap_keep(b->size) : heap_take(asked);
+    b->at = stays ? heap_alloc_lasting(b->size) : heap_alloc(asked);
     CHECK(b->at != NULL || unsettled || (gap < b->size + SMALLEST && gap != b->size));
     if (b->at != NULL) {
         b->filled = fill;
@@ -108,7 +108,7 @@ TEST(random_histories_agree_with_a_model, "memory.c: no overlap, nothing lost, f
             }
         }
         CHECK_EQ(heap_now(), 0);
-        heap_settle();
+        heap_coalesce();
         unsettled = false;
         held_block all;
         obtain(&all, SYS_HEAP, false, 0); /* every piece has grown together again */
@@ -119,7 +119,7 @@ TEST(random_histories_agree_with_a_model, "memory.c: no overlap, nothing lost, f
     exit(0); /* there is no kernel whose lists could be looked at */
 }
 
-TEST(exhaustion_is_an_error_and_everything_can_be_had_again, "design.md §6: bounded, deterministic allocator")
+TEST(exhaustion_is_an_error_and_everything_can_be_had_again, "engines.md §6: bounded, deterministic allocator")
 {
     static void *blocks[4096];
     boot();
@@ -127,18 +127,18 @@ TEST(exhaustion_is_an_error_and_everything_can_be_had_again, "design.md §6: bou
     for (int round = 0; round < 3; round++) {
         for (uint16 size = SMALLEST; size <= 40 * HEAP_STEP; size = (uint16)(size + 3 * HEAP_STEP)) {
             uint16 n = 0;
-            while ((blocks[n] = heap_take(size)) != NULL) {
+            while ((blocks[n] = heap_alloc(size)) != NULL) {
                 memset(blocks[n++], 0x5A, size);
             }
             CHECK(n >= (SYS_HEAP - empty) * 9 / 10 / size);
             for (uint16 i = 0; i < n; i++) { /* every second first: the other half joins pieces on both sides */
-                heap_give_later(blocks[i * 2 < n ? i * 2 : (i * 2 - n) | 1], size);
+                heap_free_deferred(blocks[i * 2 < n ? i * 2 : (i * 2 - n) | 1], size);
             }
-            heap_settle();
+            heap_coalesce();
             CHECK_EQ(heap_now(), empty);
-            void *all = heap_take((uint16)(SYS_HEAP - empty));
+            void *all = heap_alloc((uint16)(SYS_HEAP - empty));
             CHECK(all != NULL);
-            heap_give(all, (uint16)(SYS_HEAP - empty));
+            heap_free(all, (uint16)(SYS_HEAP - empty));
         }
     }
 }
@@ -183,7 +183,7 @@ static void release_all(held_block blocks[], int n)
     }
 }
 
-TEST(what_stays_gathers_low, "memory.c, heap_keep: else events strewn over the heap leave no room for threads")
+TEST(what_stays_gathers_low, "memory.c, heap_alloc_lasting: else events strewn over the heap leave no room for threads")
 {
     static held_block lasting[LASTING], queued[QUEUED], running[RUNNING];
     long room = 0, threads = 0;

@@ -1,4 +1,4 @@
-/* Devices: processors, bounded buffers, back-pressure (design.md §6, kernel.md §2, the paper). */
+/* Devices: processors, bounded buffers, back-pressure (engines.md §6, kernel.md §2, the paper). */
 #include "test.h"
 
 static uint8 line[2][4 * SYS_UART_TX];
@@ -117,7 +117,7 @@ TEST(ready_also_follows_when_the_heap_was_exhausted, "openswarm_io.h: BUSY")
     static uint16 sizes[SYS_HEAP / 8];
     size_t blocks = 0;
     for (uint16 size = 160; size != 0; size -= 8) {
-        while ((all[blocks] = heap_take(size)) != NULL) {
+        while ((all[blocks] = heap_alloc(size)) != NULL) {
             sizes[blocks++] = size;
         }
     }
@@ -125,7 +125,7 @@ TEST(ready_also_follows_when_the_heap_was_exhausted, "openswarm_io.h: BUSY")
     CHECK_EQ(Sys_Get_LastError(), SYS_ERROR_BUSY);
     host_tick(); /* without memory for the event itself */
     while (blocks-- != 0) {
-        heap_give(all[blocks], sizes[blocks]);
+        heap_free(all[blocks], sizes[blocks]);
     }
     Sys_Yield();
     CHECK_EQ(ready_events, 0);

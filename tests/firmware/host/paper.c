@@ -1,5 +1,5 @@
 /* The behaviour the paper (Trenkwalder et al., IROS 2016) describes, in our words as collected in
- * openswarm-original.md §2-§6 and design.md §6; one statement, one test. */
+ * openswarm-original.md §2-§6 and engines.md §6; one statement, one test. */
 #include "test.h"
 
 static char handler_trace[64];

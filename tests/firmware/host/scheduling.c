@@ -122,7 +122,7 @@ static void spin(void *which)
     }
 }
 
-TEST(a_signal_preempts_threads_that_never_call_the_kernel, "port/posix/README.md: real time; design.md §6: 10 ms slices")
+TEST(a_signal_preempts_threads_that_never_call_the_kernel, "port/posix/README.md: real time; engines.md §6: 10 ms slices")
 {
     sys_process_config a = {spin, (void *)&spins[0], 0, 0, 0, 0, 0}, b = {spin, (void *)&spins[1], 0, 0, 0, 0, 0};
     Sys_Init_Kernel();
@@ -172,8 +172,8 @@ TEST(a_preempted_thread_goes_on_with_the_rest_of_its_slice, "hal_cpu.h: hal_slic
     CHECK(waiter != 0 && a != 0 && b != 0);
     Sys_Sleep(6);
     CHECK(strcmp(trace, "a.a.a.a.a.a") == 0); /* then PID 0 is the better one */
-    CHECK_EQ(process_find(a)->on.spent, 6);
-    CHECK_EQ(process_find(b)->on.spent, 0);
+    CHECK_EQ(process_find(a)->event_or_slice.spent, 6);
+    CHECK_EQ(process_find(b)->event_or_slice.spent, 0);
 }
 
 static void yield_between_ticks(void *c)

@@ -126,7 +126,7 @@ __attribute__((noinline, used)) static void numbers_are_round(void)
 
 static void take(uint16 size, bool is_hole)
 {
-    uint16 *at = heap_take(size);
+    uint16 *at = heap_alloc(size);
     expect(at != NULL);
     at[size / 2 - 1] = NEAR; /* read as the size of a hole that ends here, it leads a little below */
     taken[pieces].at = at;
@@ -138,16 +138,16 @@ static void give(bool holes)
 {
     for (uint16 k = 0; k < pieces; k++) {
         if (taken[k].is_hole == holes) {
-            heap_give(taken[k].at, taken[k].size);
+            heap_free(taken[k].at, taken[k].size);
         }
     }
 }
 
 static void build(const layout *l, void (*subscribe_kth)(uint16 k))
 {
-    pad = heap_take(2);
+    pad = heap_alloc(2);
     padding = (uint16)(os_memory.bytes + l->begin - pad);
-    expect(pad != NULL && padding < 0x1000 && heap_take(padding - 2u) == pad + 2);
+    expect(pad != NULL && padding < 0x1000 && heap_alloc(padding - 2u) == pad + 2);
     pieces = 0;
     for (const signed char *piece = l->pieces; *piece != END; piece++) {
         if (*piece == EVENT) {
@@ -203,7 +203,7 @@ static void clear(uint16 events)
     expect(Sys_Unregister_Event(LATE) && Sys_Unregister_Event(TOKEN));
     (void)Sys_Unregister_Event(GATHERING);
     give(false);
-    heap_give(pad, padding);
+    heap_free(pad, padding);
     Sys_Yield();
     scenes++;
 }
