@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
+class SourceLocation:
     """Where a message belongs: a file and, when known, a line (1-based)."""
 
     file: str
@@ -19,7 +19,7 @@ class Place:
 class ToolError(Exception):
     """Bad input to a tool.  Carries every finding; the command line prints them and exits with status 2."""
 
-    def __init__(self, message: str, place: Place | None = None) -> None:
+    def __init__(self, message: str, place: SourceLocation | None = None) -> None:
         super().__init__(message)
         self.findings: list[str] = [f"{place}: error: {message}" if place else f"error: {message}"]
 

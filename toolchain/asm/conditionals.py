@@ -9,7 +9,7 @@ from typing import Protocol
 from toolchain.asm.expr import ExprError
 from toolchain.asm.macro import split_arguments
 from toolchain.asm.symbols import AsmSymbol
-from toolchain.errors import Place
+from toolchain.errors import SourceLocation
 
 _COMPARISONS = (".if", ".ifne", ".ifeq", ".ifgt", ".ifge", ".iflt", ".ifle")
 _TESTS = (".ifdef", ".ifndef", ".ifnotdef", ".ifdecl", ".ifndecl", ".ifc", ".ifnc", ".ifeqs", ".ifnes")
@@ -25,12 +25,12 @@ class Context(Protocol):
     registers: dict[str, str]
 
     def constant(self, text: str, what: str = "expression") -> int:
-        """Value of `text`, which must be a number now."""
+        """SymbolicValue of `text`, which must be a number now."""
 
 
 @dataclass(slots=True)
 class _Level:
-    place: Place
+    place: SourceLocation
     active: bool
     taken: bool  # a branch of this .if has been assembled, or the whole .if lies in skipped text
     had_else: bool = False
@@ -53,7 +53,7 @@ class Conditionals:
     def depth(self) -> int:
         return len(self._levels)
 
-    def innermost(self) -> Place | None:
+    def innermost(self) -> SourceLocation | None:
         """Where the innermost open .if stands."""
         return self._levels[-1].place if self._levels else None
 
@@ -65,7 +65,7 @@ class Conditionals:
     def _update(self) -> None:
         self.active = all(level.active for level in self._levels[-1:])
 
-    def obey(self, word: str, operands: str, place: Place, context: Context) -> None:
+    def obey(self, word: str, operands: str, place: SourceLocation, context: Context) -> None:
         """Process one conditional directive."""
         if word in (".else", ".elsec"):
             level = self._top(word)

@@ -11,12 +11,12 @@ from itertools import groupby
 
 from emu.image.elf_facts import RELOCATION_BY_NAME
 from toolchain.asm.directives.data import leb128
-from toolchain.asm.sections import AsmSection
+from toolchain.asm.sections import AsmSection, Piece
 from toolchain.asm.state import Assembler
-from toolchain.asm.symbols import Label
+from toolchain.asm.symbols import Label, LabelledSection
 from toolchain.elf import constants as c
 from toolchain.elf.model import Home, Reloc, Section, Symbol
-from toolchain.errors import Place
+from toolchain.errors import SourceLocation
 
 LINE_BASE, LINE_RANGE, OPCODE_BASE = -5, 14, 10  # assembler units, abi-elf.md §6.7
 ADDRESS_SIZE = 4
@@ -54,7 +54,7 @@ class _Bytes:
         return Section(name, 0, c.SHT_NOTE, doubled, align=1, relocs=relocs)
 
 
-def debug_sections(asm: Assembler, sections: dict[AsmSection, Section]) -> tuple[list[Section], list[Symbol]]:
+def debug_sections(asm: Assembler, sections: dict[LabelledSection, Section]) -> tuple[list[Section], list[Symbol]]:
     """Return .debug_line, .debug_info, .debug_abbrev and their symbols; nothing when there is nothing to say."""
     if not asm.line_rows or any(name.startswith(".debug_") for name in asm.sections):
         return [], []
@@ -88,7 +88,7 @@ def _info(asm: Assembler, line: Symbol, abbrev: Symbol) -> _Bytes:
     return body
 
 
-def _line_program(asm: Assembler, sections: dict[AsmSection, Section], starts: dict[Section, Symbol]) -> _Bytes:
+def _line_program(asm: Assembler, sections: dict[LabelledSection, Section], starts: dict[Section, Symbol]) -> _Bytes:
     files = list(dict.fromkeys(place.file for _, place in asm.line_rows))
     out = _Bytes()
     out.word(0)
@@ -108,11 +108,12 @@ def _line_program(asm: Assembler, sections: dict[AsmSection, Section], starts: d
 
 
 def _owner(label: Label) -> AsmSection:
+    assert isinstance(label.frag, Piece)
     return label.frag.section
 
 
 def _sequence(
-    out: _Bytes, rows: list[tuple[Label, Place]], source: AsmSection, start: Symbol, files: dict[str, int]
+    out: _Bytes, rows: list[tuple[Label, SourceLocation]], source: AsmSection, start: Symbol, files: dict[str, int]
 ) -> None:
     """One run of instructions in one section: set address, a row per change of line, end behind the last one."""
     addresses = [label.frag.start + label.offset for label, _ in rows]

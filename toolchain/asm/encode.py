@@ -12,9 +12,10 @@ from emu.dspic30f.isa.text import Parsed, Slot, StatementError, parse
 from emu.image.elf_facts import RELOCATION_BY_NAME, RelocationType
 from toolchain.asm import expr
 from toolchain.asm.directives.data import operator_of
-from toolchain.asm.expr import ExprError, Known, Value, combine
+from toolchain.asm.expr import ExprError, combine
 from toolchain.asm.sections import Fixup, Relaxable
 from toolchain.asm.state import Assembler
+from toolchain.asm.symbols import ExprValue, SymbolicValue
 from toolchain.elf.model import Bind
 
 CACHE_LIMIT = 100_000  # statements; a bound for long-lived processes
@@ -89,7 +90,7 @@ def _read(asm: Assembler, statement: str) -> _Known:
 
 def _put(asm: Assembler, parsed: Parsed) -> None:
     values: dict[int, int | None] = {}
-    open_slots: list[tuple[Slot, Known]] = []
+    open_slots: list[tuple[Slot, ExprValue]] = []
     for index, slot in enumerate(parsed.slots):
         value = asm.value_of(slot.expression.tree)
         if isinstance(value, int) and slot.relocation not in _TARGETS:
@@ -116,7 +117,7 @@ def _put(asm: Assembler, parsed: Parsed) -> None:
         )
 
 
-def _kind(slot: Slot, value: Known) -> tuple[RelocationType, int]:
+def _kind(slot: Slot, value: ExprValue) -> tuple[RelocationType, int]:
     """Return the relocation of an operand and the octet offset of its word within the instruction."""
     name = slot.relocation
     if not name:
@@ -133,9 +134,9 @@ def _kind(slot: Slot, value: Known) -> tuple[RelocationType, int]:
     return RELOCATION_BY_NAME[name], 4 if name == "PCREL_DO" else 0
 
 
-def _put_relaxable(asm: Assembler, parsed: Parsed, words: tuple[int, ...], value: Known) -> bool:
+def _put_relaxable(asm: Assembler, parsed: Parsed, words: tuple[int, ...], value: ExprValue) -> bool:
     """Emit CALL or GOTO in a piece of its own, ready to become RCALL or BRA; False when the target forbids it."""
-    if not isinstance(value, Value) or value.add is None or value.offset or value.sub or value.op:
+    if not isinstance(value, SymbolicValue) or value.add is None or value.offset or value.sub or value.op:
         return False
     if value.add.bind is Bind.WEAK:
         return False

@@ -1,7 +1,4 @@
-"""Assembler expressions: text -> tree -> value.
-
-A value is an `int`, a `Value` (symbol ± symbol + offset under an optional operator such as tbloffset()) or a
-`Pending` tree of such values, for what can only be known once all labels have their place.
+"""Assembler expressions: parsing of text to a tree, and evaluation of the tree to a value of `symbols`.
 
 Operators and ranks are those of GNU as 2.14, on which pic30-as is based (abi-elf.md §4): `* / % << >>` bind
 tightest, then `| & ^ !` (or-not), then `+ -`, then comparisons (true is -1), then `&&`, then `||`.
@@ -14,7 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 
-from toolchain.asm.symbols import AsmSymbol, Label
+from toolchain.asm.symbols import AsmSymbol, ExprValue, Label, PendingOperation, SymbolicValue
 
 MASK64 = 0xFFFF_FFFF_FFFF_FFFF
 MAX_DEPTH = 64  # parentheses and prefixes; a limit, so that hostile input ends in a message
@@ -72,27 +69,6 @@ class Apply:
 
 Tree = int | Name | Here | Unary | Binary | Apply
 
-
-@dataclass(frozen=True, slots=True)
-class Value:
-    """op(add - sub + offset); `op` is "" for a plain address."""
-
-    add: AsmSymbol | None = None
-    sub: AsmSymbol | None = None
-    offset: int = 0
-    op: str = ""
-
-
-@dataclass(frozen=True, slots=True)
-class Pending:
-    """An operation on values that are not numbers yet; `op` "u-" etc. are prefixes with `right` None."""
-
-    op: str
-    left: Known
-    right: Known | None
-
-
-Known = int | Value | Pending
 
 _TOKEN = re.compile(
     r"""\s*(?:
@@ -315,48 +291,53 @@ def distance(a: AsmSymbol, b: AsmSymbol, final: bool) -> int | None:
     return None
 
 
-def combine(op: str, a: Known, b: Known, final: bool = False) -> Known:
+def combine(op: str, a: ExprValue, b: ExprValue, final: bool = False) -> ExprValue:
     """Return `a op b` as simply as it can be known; raise `ExprError` for what can never have a value."""
     if isinstance(a, int) and isinstance(b, int):
         return wrap(_BINARY[op](a, b))
     if op in "+-":
         if isinstance(b, int) and isinstance(
-            a, Value
+            a, SymbolicValue
         ):  # also op(x)+n: a relocation has one addend, inside the operator
-            return Value(a.add, a.sub, wrap(a.offset + b if op == "+" else a.offset - b), a.op)
-        if op == "+" and isinstance(a, int) and isinstance(b, Value):
-            return Value(b.add, b.sub, wrap(a + b.offset), b.op)
-    if isinstance(a, Value) and isinstance(b, Value) and op in _COMPARABLE and not (a.op or b.op or a.sub or b.sub):
+            return SymbolicValue(a.add, a.sub, wrap(a.offset + b if op == "+" else a.offset - b), a.op)
+        if op == "+" and isinstance(a, int) and isinstance(b, SymbolicValue):
+            return SymbolicValue(b.add, b.sub, wrap(a + b.offset), b.op)
+    if (
+        isinstance(a, SymbolicValue)
+        and isinstance(b, SymbolicValue)
+        and op in _COMPARABLE
+        and not (a.op or b.op or a.sub or b.sub)
+    ):
         if a.add is b.add:
             return wrap(_BINARY[op](a.offset, b.offset))
         gap = distance(a.add, b.add, final) if a.add and b.add else None
         if gap is not None:
             return wrap(_BINARY[op](gap + a.offset, b.offset))
-    return Pending(op, a, b)
+    return PendingOperation(op, a, b)
 
 
 _COMPARABLE = frozenset(("-", "==", "!=", "<", ">", "<=", ">="))
 
 
-def prefix(op: str, a: Known) -> Known:
+def prefix(op: str, a: ExprValue) -> ExprValue:
     """Return `op a` for a prefix - ~ !."""
-    return wrap(_UNARY[op](a)) if isinstance(a, int) else Pending("u" + op, a, None)
+    return wrap(_UNARY[op](a)) if isinstance(a, int) else PendingOperation("u" + op, a, None)
 
 
-def apply(op: str, a: Known) -> Known:
+def apply(op: str, a: ExprValue) -> ExprValue:
     """Return tbloffset(a) and its kin."""
     if isinstance(a, int):
         if op not in CONSTANT_OPERATORS:
             raise ExprError(f"{op}() needs a symbol, not a number")
         return CONSTANT_OPERATORS[op](a)
-    if isinstance(a, Value):
+    if isinstance(a, SymbolicValue):
         if a.op:
             raise ExprError(f"{op}() of {a.op}() has no meaning")
-        return Value(a.add, a.sub, a.offset, op)
-    return Pending("f" + op, a, None)
+        return SymbolicValue(a.add, a.sub, a.offset, op)
+    return PendingOperation("f" + op, a, None)
 
 
-def evaluate(tree: Tree, name: Callable[[str], Known], here: Callable[[], Known]) -> Known:
+def evaluate(tree: Tree, name: Callable[[str], ExprValue], here: Callable[[], ExprValue]) -> ExprValue:
     """Return the value of `tree` now; `name` and `here` answer for symbols and the location counter."""
     if isinstance(tree, int):
         return tree
@@ -371,27 +352,27 @@ def evaluate(tree: Tree, name: Callable[[str], Known], here: Callable[[], Known]
     return combine(tree.op, evaluate(tree.left, name, here), evaluate(tree.right, name, here))
 
 
-def settle(value: Known, final: bool, seen: tuple[AsmSymbol, ...] = ()) -> Known:
+def resolve(value: ExprValue, final: bool, seen: tuple[AsmSymbol, ...] = ()) -> ExprValue:
     """Return `value` with equated symbols replaced and, when `final`, label distances known."""
     if isinstance(value, int):
         return value
-    if isinstance(value, Pending):
-        left = settle(value.left, final, seen)
+    if isinstance(value, PendingOperation):
+        left = resolve(value.left, final, seen)
         if value.right is None:
             return prefix(value.op[1:], left) if value.op[0] == "u" else apply(value.op[1:], left)
-        return combine(value.op, left, settle(value.right, final, seen), final)
-    result: Known = 0
+        return combine(value.op, left, resolve(value.right, final, seen), final)
+    result: ExprValue = 0
     if value.add is not None:
-        result = _settle_symbol(value.add, final, seen)
+        result = _resolve_symbol(value.add, final, seen)
     if value.sub is not None:
-        result = combine("-", result, _settle_symbol(value.sub, final, seen), final)
+        result = combine("-", result, _resolve_symbol(value.sub, final, seen), final)
     result = combine("+", result, value.offset, final)
     return apply(value.op, result) if value.op else result
 
 
-def _settle_symbol(symbol: AsmSymbol, final: bool, seen: tuple[AsmSymbol, ...]) -> Known:
+def _resolve_symbol(symbol: AsmSymbol, final: bool, seen: tuple[AsmSymbol, ...]) -> ExprValue:
     if symbol in seen:
         raise ExprError(f"symbol {symbol.name} is defined in terms of itself")
     if symbol.place is None or isinstance(symbol.place, Label):
-        return Value(symbol)
-    return settle(symbol.place, final, (*seen, symbol))
+        return SymbolicValue(symbol)
+    return resolve(symbol.place, final, (*seen, symbol))

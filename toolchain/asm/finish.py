@@ -8,11 +8,11 @@ from __future__ import annotations
 
 from emu.image.elf_facts import RELOCATION_BY_NAME, Formula, RelocationType
 from toolchain.asm.debug import debug_sections
-from toolchain.asm.expr import ExprError, Known, Pending, Value, settle
+from toolchain.asm.expr import ExprError, resolve
 from toolchain.asm.relax import relax
 from toolchain.asm.sections import AsmSection, Fixup, Piece
 from toolchain.asm.state import Assembler
-from toolchain.asm.symbols import AsmSymbol, Label
+from toolchain.asm.symbols import AsmSymbol, ExprValue, Label, LabelledSection, PendingOperation, SymbolicValue
 from toolchain.elf import constants as c
 from toolchain.elf import fields
 from toolchain.elf.model import Bind, Home, ObjectFile, Reloc, Section, Symbol
@@ -34,7 +34,7 @@ def finish(asm: Assembler) -> ObjectFile:
 class _Finisher:
     def __init__(self, asm: Assembler) -> None:
         self.asm = asm
-        self.sections: dict[AsmSection, Section] = {}
+        self.sections: dict[LabelledSection, Section] = {}
         self.symbols: dict[AsmSymbol, Symbol] = {}
         self.absolutes: dict[int, Symbol] = {}
         self.sums: dict[tuple[AsmSymbol, int], AsmSymbol] = {}
@@ -71,8 +71,8 @@ class _Finisher:
         assert isinstance(fixup.frag, Piece)
         section, kind = self.sections[source], fixup.kind
         offset = source.octets(fixup.frag, fixup.offset)
-        value = settle(fixup.value, final=True)
-        if isinstance(value, Pending) or (isinstance(value, Value) and value.sub is not None):
+        value = resolve(fixup.value, final=True)
+        if isinstance(value, PendingOperation) or (isinstance(value, SymbolicValue) and value.sub is not None):
             raise ExprError(f"{_describe(value)} is neither a constant nor a symbol plus a constant")
         branch = kind.formula in (Formula.BRANCH, Formula.DO_END)
         if isinstance(value, int):
@@ -129,7 +129,7 @@ class _Finisher:
         number = RELOCATION_BY_NAME[_ABSOLUTE[kind.name.removeprefix("R_PIC30_")]].number
         section.relocs.append(Reloc(offset, number, symbol))
 
-    def _check_target(self, source: AsmSection, value: Value, kind: RelocationType) -> None:
+    def _check_target(self, source: AsmSection, value: SymbolicValue, kind: RelocationType) -> None:
         """Refuse what the section of a known target makes meaningless (abi-elf.md §4.2)."""
         assert value.add is not None
         place = value.add.place
@@ -202,7 +202,7 @@ class _Finisher:
         else:
             self._emit_equate(symbol, result)
         if symbol.size is not None:
-            size = settle(symbol.size, final=True)
+            size = resolve(symbol.size, final=True)
             if isinstance(size, int) and 0 <= size <= 0xFFFFFFFF:
                 result.size = size
             else:
@@ -212,11 +212,11 @@ class _Finisher:
     def _emit_equate(self, symbol: AsmSymbol, result: Symbol) -> None:
         assert symbol.place is not None
         assert not isinstance(symbol.place, Label)
-        value = settle(symbol.place, final=True)
+        value = resolve(symbol.place, final=True)
         if isinstance(value, int):
             result.home, result.value = Home.ABSOLUTE, value
         elif (
-            isinstance(value, Value)
+            isinstance(value, SymbolicValue)
             and value.add
             and isinstance(value.add.place, Label)
             and not (value.op or value.sub)
@@ -279,10 +279,10 @@ def _check_do(distance: int) -> None:
         raise ExprError("DO loop shorter than two instructions")
 
 
-def _describe(value: Known) -> str:
+def _describe(value: ExprValue) -> str:
     if isinstance(value, int):
         return str(value)
-    if isinstance(value, Pending):
+    if isinstance(value, PendingOperation):
         inner = f"{_describe(value.left)} {value.op} {_describe(value.right)}" if value.right is not None else value.op
         return f"({inner})"
     text = value.add.name if value.add else "0"

@@ -9,10 +9,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from emu.image.elf_facts import OCTETS_PER_WORD, ExtendedAttribute, RelocationType, SectionFlag
-from toolchain.asm.expr import ExprError, Known
-from toolchain.asm.symbols import AsmSymbol, Frag, Label
+from toolchain.asm.expr import ExprError
+from toolchain.asm.symbols import AsmSymbol, ExprValue, Frag, Label, LabelledSection
 from toolchain.elf import constants as c
-from toolchain.errors import Place
+from toolchain.errors import SourceLocation
 
 CODE_LIMIT = 1 << 24  # PC units: no program address is longer than 24 bits (isa.md §1.1)
 DATA_LIMIT = 1 << 16  # data space is 64 KB (isa.md §1.2)
@@ -26,15 +26,16 @@ class Fixup:
     frag: Frag
     offset: int  # octets (code) or bytes (elsewhere) from the frag start
     kind: RelocationType
-    value: Known
-    place: Place
+    value: ExprValue
+    place: SourceLocation
     next_word: bool = False  # CALL/GOTO: the high part goes into the following word
 
 
 @dataclass(slots=True, eq=False)
 class Piece(Frag):
-    """A frag with its content: octets in code, plain bytes elsewhere."""
+    """A fragment with its content: octets in code, plain bytes elsewhere."""
 
+    section: AsmSection
     data: bytearray = field(default_factory=bytearray)
 
 
@@ -62,10 +63,10 @@ def _spread(data: bytes, per_word: int, fill_upper: int) -> bytearray:
     return octets
 
 
-class AsmSection:
+class AsmSection(LabelledSection):
     """One section of the object being assembled."""
 
-    def __init__(self, name: str, flags: int, kind: int, place: Place) -> None:
+    def __init__(self, name: str, flags: int, kind: int, place: SourceLocation) -> None:
         self.name, self.place = name, place
         self.extended = ExtendedAttribute(0)
         self.load: int | None = None
@@ -217,7 +218,7 @@ class AsmSection:
         self.align = max(self.align, units)
         self.skip(-self.location() % units, fill, packed)
 
-    def add_fixup(self, offset: int, kind: RelocationType, value: Known, place: Place) -> Fixup:
+    def add_fixup(self, offset: int, kind: RelocationType, value: ExprValue, place: SourceLocation) -> Fixup:
         """Remember that the field at `offset` of the current piece is to be filled with `value`."""
         fixup = Fixup(self.piece, offset, kind, value, place)
         self.fixups.append(fixup)

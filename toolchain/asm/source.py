@@ -6,7 +6,7 @@ import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from toolchain.errors import Place
+from toolchain.errors import SourceLocation
 
 MAX_DEPTH = 64  # nested includes and expansions
 MAX_EXPANDED = 1_000_000  # lines that macros and repeats may produce in one assembly
@@ -59,7 +59,7 @@ class Source:
     def __init__(self, text: str, file: str, counted: bool = True) -> None:
         self.frames = [Frame(strip_comments(text), file, 0, counted=counted)]
         self.expanded = 0
-        self.place = Place(file, 0)
+        self.place = SourceLocation(file, 0)
         self.on_end: Callable[[Frame], None] = lambda frame: None
 
     def next(self) -> str | None:
@@ -78,9 +78,9 @@ class Source:
                 if "#" in text and (marker := _LINE_MARKER.match(text)):
                     frame.line, frame.file = int(marker[1]) - frame.counted, marker[2]
                     continue
-                self.place = Place(frame.file, frame.line)
+                self.place = SourceLocation(frame.file, frame.line)
             else:
-                self.place = Place(frame.file, frame.line)
+                self.place = SourceLocation(frame.file, frame.line)
             return text
         return None
 

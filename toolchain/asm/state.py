@@ -14,13 +14,13 @@ from emu.chips.chip import Chip
 from emu.image.elf_facts import SectionFlag
 from toolchain.asm import expr
 from toolchain.asm.conditionals import Conditionals
-from toolchain.asm.expr import ExprError, Known, Value
+from toolchain.asm.expr import ExprError
 from toolchain.asm.macro import Macro
 from toolchain.asm.sections import AsmSection
 from toolchain.asm.source import Frame, Source
-from toolchain.asm.symbols import AsmSymbol, Label
+from toolchain.asm.symbols import AsmSymbol, ExprValue, Label, SymbolicValue
 from toolchain.elf import constants as c
-from toolchain.errors import Place, ToolError
+from toolchain.errors import SourceLocation, ToolError
 
 MAX_ERRORS = 50
 DEVICE_SYMBOLS = (
@@ -86,9 +86,9 @@ class Assembler:
         self.after_repeat = ""  # mnemonic REPEAT when the previous instruction was one
         self.file_name = ""
         self.label = ""  # the last one defined, for messages
-        self.line_rows: list[tuple[Label, Place]] = []
+        self.line_rows: list[tuple[Label, SourceLocation]] = []
         self.ended = False
-        place = Place(file, 0)
+        place = SourceLocation(file, 0)
         code = int(SectionFlag.ALLOC | SectionFlag.EXECINSTR)
         data = int(SectionFlag.ALLOC | SectionFlag.WRITE)
         for name, flags, kind in (
@@ -105,7 +105,7 @@ class Assembler:
 
     # -- errors ------------------------------------------------------------------------------------------------
 
-    def error(self, message: str, place: Place | None = None) -> None:
+    def error(self, message: str, place: SourceLocation | None = None) -> None:
         """Record a finding at `place`, by default the current line; stop when there are too many."""
         self.findings.append(f"{place or self.source.place}: error: {message}")
         if len(self.findings) >= MAX_ERRORS:
@@ -125,8 +125,8 @@ class Assembler:
             found = self.symbols[name] = AsmSymbol(name)
         return found
 
-    def lookup(self, name: str) -> Known:
-        """Value of a name as of now; numeric local labels become their unique name."""
+    def lookup(self, name: str) -> ExprValue:
+        """SymbolicValue of a name as of now; numeric local labels become their unique name."""
         if name[0].isdigit():
             match = _NUMERIC_LABEL.fullmatch(name)
             if match is None:
@@ -140,26 +140,26 @@ class Assembler:
             symbol.used = True
             if symbol.first_use is None:
                 symbol.first_use = self.source.place
-            return Value(symbol)
+            return SymbolicValue(symbol)
         return symbol.place
 
-    def here(self) -> Known:
+    def here(self) -> ExprValue:
         """A label for the current location."""
         self.anonymous += 1
-        return Value(AsmSymbol(f".LH{self.anonymous}", self.section.dot()))
+        return SymbolicValue(AsmSymbol(f".LH{self.anonymous}", self.section.dot()))
 
-    def evaluate(self, text: str) -> Known:
-        """Value of expression `text` as far as it is known now; a `#` before it means nothing."""
+    def evaluate(self, text: str) -> ExprValue:
+        """SymbolicValue of expression `text` as far as it is known now; a `#` before it means nothing."""
         return self.value_of(expr.parse(text.strip().removeprefix("#")))
 
-    def value_of(self, tree: expr.Tree) -> Known:
-        """Value of a parsed expression as far as it is known now."""
+    def value_of(self, tree: expr.Tree) -> ExprValue:
+        """SymbolicValue of a parsed expression as far as it is known now."""
         if isinstance(tree, int):
             return tree
-        return expr.settle(expr.evaluate(tree, self.lookup, self.here), final=False)
+        return expr.resolve(expr.evaluate(tree, self.lookup, self.here), final=False)
 
     def constant(self, text: str, what: str = "expression") -> int:
-        """Value of `text`, which must be a number already on this line."""
+        """SymbolicValue of `text`, which must be a number already on this line."""
         value = self.evaluate(text)
         if not isinstance(value, int):
             raise ExprError(f"{what} {text.strip()!r} must be a constant at this point")
@@ -170,14 +170,16 @@ class Assembler:
         value = self.evaluate(text)
         if isinstance(value, int):
             return value
-        place = value.add.place if isinstance(value, Value) and value.add and not (value.sub or value.op) else None
+        place = (
+            value.add.place if isinstance(value, SymbolicValue) and value.add and not (value.sub or value.op) else None
+        )
         if not isinstance(place, Label) or place.frag.section is not self.section:
             raise ExprError(f"location {text.strip()!r} must be a number, or a place in this section plus a number")
-        assert isinstance(value, Value)
+        assert isinstance(value, SymbolicValue)
         return place.frag.start + place.offset + value.offset
 
     def define_label(self, name: str) -> None:
-        """Place label `name` at the current location."""
+        """SourceLocation label `name` at the current location."""
         if name.isdigit():
             self.numeric[name] = self.numeric.get(name, 0) + 1
             name = f".LN{name}.{self.numeric[name]}"
@@ -202,7 +204,7 @@ class Assembler:
         self.registers.pop(name, None)
         symbol = self.symbol(name)
         value = self.evaluate(text)
-        if isinstance(value, Value) and value.add is symbol:
+        if isinstance(value, SymbolicValue) and value.add is symbol:
             raise ExprError(f"symbol {name} is defined in terms of itself")
         symbol.place = value
 

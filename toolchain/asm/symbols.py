@@ -1,24 +1,31 @@
-"""Symbols while a file is being assembled, and the pieces of sections that labels point into."""
+"""Symbols, locations and values of expressions while a file is being assembled.
+
+The value of an expression is an `int`, a `SymbolicValue` (symbol - symbol + offset under an optional operator), or a
+`PendingOperation` whose operands become numbers only when all labels have their location.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 from toolchain.elf import constants as c
 from toolchain.elf.model import Bind
+from toolchain.errors import SourceLocation
 
-if TYPE_CHECKING:
-    from toolchain.asm.expr import Known
-    from toolchain.asm.sections import AsmSection
-    from toolchain.errors import Place
+
+class LabelledSection:
+    """What a label needs to know about its section; `sections.AsmSection` holds the content."""
+
+    name: str
+    flags: int
+    is_code: bool
 
 
 @dataclass(slots=True, eq=False)
 class Frag:
-    """A run of content whose inner distances never change; a call that may be relaxed ends it."""
+    """A fragment of a section with fixed inner distances; a call that --relax may shorten ends it."""
 
-    section: AsmSection
+    section: LabelledSection
     start: int = 0  # address units from the section start; final once relaxation has ended
 
 
@@ -32,14 +39,39 @@ class Label:
 
 @dataclass(slots=True, eq=False)
 class AsmSymbol:
-    """A symbol.  `place` is None while undefined, a `Label`, or the value an equate gave it."""
+    """A symbol.  `place` is None while it is undefined, else a `Label` or the value of an equate."""
 
     name: str
-    place: Label | Known | None = None
+    place: Label | ExprValue | None = None
     bind: Bind | None = None
     type: int = c.STT_NOTYPE
-    size: Known | None = None
+    size: ExprValue | None = None
     visibility: int = c.STV_DEFAULT
     common: tuple[int, int] | None = None
     used: bool = False
-    first_use: Place | None = field(default=None)
+    first_use: SourceLocation | None = field(default=None)
+
+
+@dataclass(frozen=True, slots=True)
+class SymbolicValue:
+    """op(add - sub + offset); `op` is "" for a plain address."""
+
+    add: AsmSymbol | None = None
+    sub: AsmSymbol | None = None
+    offset: int = 0
+    op: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class PendingOperation:
+    """An operation on values that are not numbers yet.
+
+    op  a binary operator; "u" and a prefix operator, or "f" and an operator such as tbloffset, with `right` None
+    """
+
+    op: str
+    left: ExprValue
+    right: ExprValue | None
+
+
+ExprValue = int | SymbolicValue | PendingOperation

@@ -18,7 +18,7 @@ from toolchain.errors import ToolError
 from toolchain.link.hexfile import hex_text
 from toolchain.link.link import Linked, link
 from toolchain.link.mapfile import map_text, memory_summary
-from toolchain.link.options import MINIMUM_STACK, STACK_GUARD, LinkOptions, Part
+from toolchain.link.options import MINIMUM_STACK, STACK_GUARD, LinkOptions, PartRegions
 
 IGNORED_WORDS = (
     "--start-group", "--end-group", "-(", "-)",  # all libraries are one group anyway
@@ -99,7 +99,7 @@ def link_options(options: argparse.Namespace) -> LinkOptions:
     )
 
 
-def _part(text: str, chip: Chip) -> Part:
+def _part(text: str, chip: Chip) -> PartRegions:
     number = r"(0x[0-9a-fA-F]+|\d+)"
     found = re.fullmatch(f"{number}-{number},{number}-{number}", text)
     if found is None:
@@ -114,7 +114,7 @@ def _part(text: str, chip: Chip) -> Part:
                 f"--part {text}: {region.start:#x}-{region.end - 1:#x} are no whole words of {whole.name} memory,"
                 f" {whole.start:#x}-{whole.end - 1:#x}"
             )
-    return Part(*regions)
+    return PartRegions(*regions)
 
 
 class _Words(argparse.ArgumentParser):

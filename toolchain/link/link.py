@@ -1,4 +1,4 @@
-"""The linker: objects and libraries -> an image.  `link` lists the steps in order."""
+"""The linker: objects and libraries -> an image.  `_link` lists the steps in order."""
 
 from __future__ import annotations
 
@@ -52,75 +52,137 @@ def link(objects: list[ObjectFile], archives: list[Archive], options: LinkOption
     GOTO slots for function pointers take flash only in images where a function lies beyond the reach of a pointer.
     """
     linked = _link(objects, archives, options, False) or _link(objects, archives, options, True)
-    assert linked is not None, "with slots nothing is out of reach"
+    assert linked is not None, "with slots every function is within reach"
     return linked
 
 
 def _link(objects: list[ObjectFile], archives: list[Archive], options: LinkOptions, with_slots: bool) -> Linked | None:
-    """One attempt; None when function pointers turn out to need slots."""
+    """Link once; None when function pointers turn out to need GOTO slots that `with_slots` did not reserve."""
+    inputs = _gather_inputs(objects, archives, options)
+    handles = _handles(inputs, options, with_slots)
+    memory = Memory(options.chip, options.part)
+    absolute = memory.script_symbols() | options.define | dict.fromkeys(_LINKER_SYMBOLS, 0)
+    _check_inputs(inputs, set(absolute), options)
+    placement = _place_sections(inputs, memory, options)
+    if not with_slots and any(_beyond_pointers(placement.layout, target) for target in handles.slots):
+        return None
+    stack = (0, 0) if options.part is not None else _stack(inputs.resolution, placement, options)
+    absolute |= _linker_symbols(inputs.resolution, placement, stack, options)
+    absolute |= _section_limits(inputs.resolution, placement.layout)
+    relocator = Relocator(inputs.resolution, placement.layout, absolute, handles.slots, handles.section)
+    outputs = build_outputs(
+        placement.layout, _relocate(relocator, placement, options), options.fill_upper, options.debug_phantoms
+    )
+    entry = relocator.target(synthesize.wanted(options.entry)).address
+    image = build_executable(inputs.resolution, outputs, relocator, entry, options.chip.processors[0])
+    messages = _foreign_processors(objects, options.chip)
+    return Linked(image, inputs.resolution, placement.layout, outputs, placement.records, inputs.live, stack, messages)
+
+
+@dataclass(slots=True)
+class _Inputs:
+    """The input sections of a link: resolved symbols, the linker's own object, and the live sections."""
+
+    resolution: Resolution
+    generated: ObjectFile
+    live: set[Section]
+
+    def adopt(self) -> None:
+        """Enter the sections and symbols of the linker's own object into the resolution."""
+        for section in self.generated.sections:
+            self.resolution.owner[section] = self.generated
+        for symbol in self.generated.symbols:
+            self.resolution.globals.setdefault(symbol.name, symbol)
+            self.resolution.defined_in.setdefault(symbol.name, self.generated)
+
+
+@dataclass(slots=True)
+class _Handles:
+    """The `.handle` section, and the offset of each function's GOTO slot in it."""
+
+    section: Section
+    slots: dict[Symbol, int]
+
+
+@dataclass(slots=True)
+class _Placement:
+    """Sections with addresses: all of them in input order, the `.dinit` table (None without one) and its records."""
+
+    layout: Layout
+    order: list[Section]
+    table: Section | None
+    records: list[dinit.Record]
+
+
+def _gather_inputs(objects: list[ObjectFile], archives: list[Archive], options: LinkOptions) -> _Inputs:
+    """Resolve symbols, select the live sections, and generate the sections that the program does not bring."""
     roots = [options.entry, *options.undefined]
     resolution = resolve(objects, archives, roots)
-    own = ObjectFile(LINKER_OBJECT)
     if options.part is not None:
         part.adapt(resolution)
-    resolution.objects.append(own)
+    inputs = _Inputs(resolution, ObjectFile(LINKER_OBJECT), set())
+    resolution.objects.append(inputs.generated)
     if options.isr and options.part is None and "__DefaultInterrupt" not in resolution.globals:
-        synthesize.default_interrupt(own)
-    _adopt(resolution, own)
-    live = live_sections(resolution, roots + sorted(vector_names()), options.gc_sections)
-    _common_sections(resolution, own)
+        synthesize.default_interrupt(inputs.generated)
+    inputs.adopt()
+    inputs.live = live_sections(resolution, roots + sorted(vector_names()), options.gc_sections)
+    _common_sections(resolution, inputs.generated)
     if options.part is None:
-        _fixed_sections(resolution, own, live, options)
-    handle, slots = synthesize.handle_section(resolution, live | set(own.sections))
-    if not with_slots:
-        handle.type, handle.flags = c.SHT_NOTE, SectionFlag(0)  # only tells tools whose address is taken
-    if options.handles:
-        own.sections.append(handle)
-    else:
-        slots = {}
-    _adopt(resolution, own)
-    live |= set(own.sections)
-    memory = Memory(options.chip, options.part)
-    absolute = memory.script_symbols() | options.define
-    absolute |= dict.fromkeys(_LINKER_SYMBOLS, 0)
-    provided = set(absolute) | {n for n in resolution.wanted if SECTION_LIMIT.fullmatch(n)}
-    check(resolution, provided, live)
-    if options.part is None:
-        _check_handlers(resolution, live)
-    else:
-        part.check(resolution, live)
-    messages = _foreign_processors(objects, options.chip)
+        _fixed_sections(resolution, inputs.generated, inputs.live, options)
+    return inputs
 
-    order = [s for obj in resolution.objects for s in obj.sections if s in live and s.name != c.SIGNATURE_SECTION]
-    placer = Placer(resolution, order, memory)
+
+def _handles(inputs: _Inputs, options: LinkOptions, with_slots: bool) -> _Handles:
+    """Generate `.handle`; without slots it is an info section that lists the functions whose address is taken."""
+    section, slots = synthesize.handle_section(inputs.resolution, inputs.live | set(inputs.generated.sections))
+    if not with_slots:
+        section.type, section.flags = c.SHT_NOTE, SectionFlag(0)
+    if options.handles:
+        inputs.generated.sections.append(section)
+    inputs.adopt()
+    inputs.live |= set(inputs.generated.sections)
+    return _Handles(section, slots if options.handles else {})
+
+
+def _check_inputs(inputs: _Inputs, absolute: set[str], options: LinkOptions) -> None:
+    """Raise `ToolError` for undefined and duplicate symbols, and for handlers that no vector takes."""
+    limits = {name for name in inputs.resolution.wanted if SECTION_LIMIT.fullmatch(name)}
+    check(inputs.resolution, absolute | limits, inputs.live)
+    if options.part is None:
+        _check_handlers(inputs.resolution, inputs.live)
+    else:
+        part.check(inputs.resolution, inputs.live)
+
+
+def _place_sections(inputs: _Inputs, memory: Memory, options: LinkOptions) -> _Placement:
+    """Give every live section its address; data first, because the `.dinit` table depends on its placement."""
+    sections = [section for obj in inputs.resolution.objects for section in obj.sections]
+    order = [s for s in sections if s in inputs.live and s.name != c.SIGNATURE_SECTION]
+    placer = Placer(inputs.resolution, order, memory)
     placer.place_data()
-    records = dinit.plan(placer.layout, options.pack_data) if options.data_init else []
-    table = dinit.empty_section(records)
+    records: list[dinit.Record] = []
+    table: Section | None = None
     if options.data_init:
-        own.sections.append(table)
-        resolution.owner[table] = own
+        records = dinit.plan(placer.layout, options.pack_data)
+        table = dinit.empty_section(records)
+        inputs.generated.sections.append(table)
+        inputs.resolution.owner[table] = inputs.generated
         placer.by_space.setdefault("program", []).append(table)
     placer.place_fixed_program()
     placer.place_program()
     placer.place_eeprom()
     placer.place_info()
-    layout = placer.layout
-    if not with_slots and any(_beyond_pointers(layout, target) for target in slots):
-        return None
+    return _Placement(placer.layout, order, table, records)
 
-    stack = (0, 0) if options.part is not None else _stack(resolution, layout, order, options)
-    absolute |= _linker_symbols(resolution, layout, table if options.data_init else None, stack, options)
-    absolute |= _section_limits(resolution, layout)
-    relocator = Relocator(resolution, layout, absolute, slots, handle)
-    contents = {s: relocator.apply(s) for s in layout.placed}
+
+def _relocate(relocator: Relocator, placement: _Placement, options: LinkOptions) -> dict[Section, bytearray]:
+    """Return the relocated contents of all sections, including the `.dinit` table; raises `ToolError`."""
+    contents = {section: relocator.apply(section) for section in placement.layout.placed}
     relocator.check()
-    if options.data_init:
-        dinit.fill(table, records, contents, options.fill_upper)
-        contents[table] = table.data
-    outputs = build_outputs(layout, contents, options.fill_upper, options.debug_phantoms)
-    entry = relocator.target(synthesize.wanted(options.entry)).address
-    image = build_executable(resolution, outputs, relocator, entry, options.chip.processors[0])
-    return Linked(image, resolution, layout, outputs, records, live, stack, messages)
+    if placement.table is not None:
+        dinit.fill(placement.table, placement.records, contents, options.fill_upper)
+        contents[placement.table] = placement.table.data
+    return contents
 
 
 def _beyond_pointers(layout: Layout, target: Symbol) -> bool:
@@ -128,15 +190,6 @@ def _beyond_pointers(layout: Layout, target: Symbol) -> bool:
     if target.section is None or target.section not in layout.placed:
         return target.home is Home.ABSOLUTE and target.value >= HANDLE_LIMIT
     return layout.placed[target.section].load + target.value >= HANDLE_LIMIT
-
-
-def _adopt(resolution: Resolution, own: ObjectFile) -> None:
-    """Enter what the linker made itself into the tables."""
-    for section in own.sections:
-        resolution.owner[section] = own
-    for symbol in own.symbols:
-        resolution.globals.setdefault(symbol.name, symbol)
-        resolution.defined_in.setdefault(symbol.name, own)
 
 
 def _common_sections(resolution: Resolution, own: ObjectFile) -> None:
@@ -153,7 +206,7 @@ def _common_sections(resolution: Resolution, own: ObjectFile) -> None:
 
 
 def _fixed_sections(resolution: Resolution, own: ObjectFile, live: set[Section], options: LinkOptions) -> None:
-    """Reset, vector tables, heap, the end of .user_init: unless the program brings its own."""
+    """Generate reset, vector tables, heap and the end of .user_init, unless the program has its own."""
     present = {s.name for s in live if s.units}
     if ".reset" not in present:
         own.sections.append(synthesize.reset_section(options.entry))
@@ -177,8 +230,10 @@ _LINKER_SYMBOLS = (
 
 
 def _linker_symbols(
-    resolution: Resolution, layout: Layout, table: Section | None, stack: tuple[int, int], options: LinkOptions
+    resolution: Resolution, placement: _Placement, stack: tuple[int, int], options: LinkOptions
 ) -> dict[str, int]:
+    """Return the values of `_LINKER_SYMBOLS`, without those that the program defines itself."""
+    layout, table = placement.layout, placement.table
     values = dict.fromkeys(_LINKER_SYMBOLS, 0)
     values["__SP_init"], values["__SPLIM_init"] = stack
     values["__MIN_STACK_SIZE"], values["__STACKGUARD_SIZE"] = options.stack, options.stack_guard
@@ -198,7 +253,7 @@ def _linker_symbols(
     if calls:
         gaps = [a for (a, size), (b, _) in pairwise(calls) if a + size != b]
         if gaps:
-            raise ToolError(f".user_init is torn apart at {gaps[0]:#x} by a section with a fixed address")
+            raise ToolError(f".user_init is split at {gaps[0]:#x} by a section with a fixed address")
         values["__user_init"], values["__has_user_init"] = calls[0][0], 1
     return {name: value for name, value in values.items() if name not in resolution.globals}
 
@@ -217,8 +272,9 @@ def _section_limits(resolution: Resolution, layout: Layout) -> dict[str, int]:
     return result
 
 
-def _stack(resolution: Resolution, layout: Layout, order: list[Section], options: LinkOptions) -> tuple[int, int]:
+def _stack(resolution: Resolution, placement: _Placement, options: LinkOptions) -> tuple[int, int]:
     """Return (first address, limit): a stack section of the program, else the largest free block (abi-elf.md §3.3)."""
+    layout, order = placement.layout, placement.order
     given = [s for s in order if s.extended & ExtendedAttribute.STACK and s.units]
     if given:
         size = even(sum(s.units for s in given))
@@ -241,7 +297,7 @@ _HANDLER = re.compile(r"__(?:Alt)?[A-Z]\w*(?:Interrupt|Fail|Error)")
 
 
 def _check_handlers(resolution: Resolution, live: set[Section]) -> None:
-    """Refuse a function that is spelled like an interrupt handler but that no vector of the chip takes."""
+    """Raise `ToolError` for a function that is named like an interrupt handler but belongs to no vector of the chip."""
     vectors = vector_names()
     called = {r.symbol.name for s in resolution.owner if s in live for r in s.relocs}
     findings: list[str] = []

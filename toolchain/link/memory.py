@@ -12,7 +12,7 @@ from emu.chips import NAMES, chip_named
 from emu.chips.chip import Chip, Region
 from emu.chips.family import UNIT_ID
 from emu.image.elf_facts import UNITS_PER_WORD
-from toolchain.link.options import Part
+from toolchain.link.options import PartRegions
 
 HANDLE_LIMIT = 0x10000  # abi-elf.md §1.5: a function pointer is 16 bits
 UNIT_ID_WORDS = 4  # FUID0..3, abi-elf.md §3.3
@@ -21,7 +21,7 @@ UNIT_ID_WORDS = 4  # FUID0..3, abi-elf.md §3.3
 class Memory:
     """One chip, or a part of it, as a linker sees it."""
 
-    def __init__(self, chip: Chip, part: Part | None = None) -> None:
+    def __init__(self, chip: Chip, part: PartRegions | None = None) -> None:
         self.chip: Final = chip
         program, data = chip.program, chip.data
         self.flash, self.program, self.eeprom = program["flash"], program["program"], program["eedata"]

@@ -12,7 +12,7 @@ MINIMUM_STACK = 16  # --stack default
 
 
 @dataclass(frozen=True, slots=True)
-class Part:
+class PartRegions:
     """What a program may use that another image calls: a range of program memory and one of RAM. It has no vectors, no
     reset and no stack, and its constants lie in its RAM, since the PSV window shows those of the other image."""
 
@@ -38,4 +38,4 @@ class LinkOptions:
     undefined: list[str] = field(default_factory=list)
     define: dict[str, int] = field(default_factory=dict)
     chip: Chip = field(default_factory=chip_named)
-    part: Part | None = None
+    part: PartRegions | None = None

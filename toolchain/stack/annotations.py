@@ -20,7 +20,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 from toolchain.elf.model import Home, Symbol
-from toolchain.errors import Place, ToolError
+from toolchain.errors import SourceLocation, ToolError
 
 _LINE = re.compile(r"(calls|depth|recursion|thread)\s+([\w.$]+)\s*:?\s*(.*)")
 _SYMBOL = re.compile(r"__stack_(depth_of|recursion_of|thread)_(.+)")
@@ -47,7 +47,7 @@ def read_annotations(text: str, file: str) -> Annotations:
         match = _LINE.fullmatch(line)
         if match is None:
             raise ToolError(
-                f"expected calls, depth, recursion or thread and a function, got {line!r}", Place(file, number)
+                f"expected calls, depth, recursion or thread and a function, got {line!r}", SourceLocation(file, number)
             )
         kind, name, rest = match.groups()
         if kind == "calls":
@@ -58,7 +58,7 @@ def read_annotations(text: str, file: str) -> Annotations:
             try:
                 value = int(rest, 0)
             except ValueError:
-                raise ToolError(f"{kind} {name} needs a number, got {rest!r}", Place(file, number)) from None
+                raise ToolError(f"{kind} {name} needs a number, got {rest!r}", SourceLocation(file, number)) from None
             (result.depth if kind == "depth" else result.recursion)[name] = value
     return result
 

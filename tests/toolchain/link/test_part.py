@@ -7,9 +7,9 @@ import pytest
 from emu.chips.chip import Region
 from toolchain.errors import ToolError
 from toolchain.link.command import link_options, parse_link_words
-from toolchain.link.options import Part
+from toolchain.link.options import PartRegions
 
-PART = Part(Region("program", 0xF800, 0x10000), Region("data", 0x0800, 0x0900))
+PART = PartRegions(Region("program", 0xF800, 0x10000), Region("data", 0x0800, 0x0900))
 START = ".section .text,code\n.global __reset\n__reset: return\n"
 
 

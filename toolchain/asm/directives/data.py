@@ -7,9 +7,10 @@ import struct
 from collections.abc import Callable
 
 from emu.image.elf_facts import RELOCATION_BY_NAME, RelocationType
-from toolchain.asm.expr import ExprError, Known, Pending, Value, unescape
+from toolchain.asm.expr import ExprError, unescape
 from toolchain.asm.macro import split_arguments
 from toolchain.asm.state import Assembler
+from toolchain.asm.symbols import ExprValue, PendingOperation, SymbolicValue
 from toolchain.elf import constants as c
 from toolchain.files import read_bytes
 
@@ -35,11 +36,11 @@ _PACKED_KINDS: dict[int, dict[str, str]] = {
 }  # fmt: skip
 
 
-def operator_of(value: Known) -> str:
+def operator_of(value: ExprValue) -> str:
     """Return the operator a value stands under, "" for none."""
-    if isinstance(value, Value):
+    if isinstance(value, SymbolicValue):
         return value.op
-    if isinstance(value, Pending) and value.op[0] == "f":
+    if isinstance(value, PendingOperation) and value.op[0] == "f":
         return value.op[1:]
     return ""
 
