@@ -2,7 +2,7 @@
 
 What enters: facts, parts of a program, bytes. What leaves: the same in the other form; nothing for what is damaged. The
 other end is firmware/openswarm/io/update/spread.c, and io/framing.c for frames: COBS with a CRC-16/CCITT-FALSE, here
-between zeros. tests/firmware/test_update.py compares both.
+between zeros. tests/firmware/update/test_update.py compares both.
 """
 
 from __future__ import annotations

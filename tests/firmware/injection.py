@@ -1,8 +1,8 @@
 """Interrupts at every instruction of every kernel call, and every allocation failing, on the emulated robot.
 
 What enters: the firmware of target/calls, whose scenes leave everything as they found it. What leaves: nothing, or an
-AssertionError with scene, boundary and way of injection, which reproduce it. tests/firmware/test_every_instruction.py
-takes a sample, tests/fuzz/fuzz_kernel.py all.
+AssertionError with scene, boundary and way of injection, which reproduce it. tests/firmware/kernel/test_every_instruction.py
+takes a sample, tests/fuzz/kernel/fuzz_kernel.py all.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from pathlib import Path
 
 from emu import Machine
 from emu.system.events import NEVER
-from tests.firmware.test_on_target import load, place, run_to, thread_list, words
+from tests.firmware.kernel.test_kernel_on_target import load, place, run_to, thread_list, words
 
 T1IF, T2IF, T3IF, INT1IF, INT2IF = 1 << 3, 1 << 6, 1 << 7, 1 << 0, 1 << 7
 CLOCK_PERIOD = 14746

@@ -3,7 +3,7 @@
 What enters: the firmware of target/kills, whose victim makes one scene of driver calls after the other. What leaves:
 nothing, or an AssertionError with scene, boundary and pause, which reproduce it. From the kill on, the memory the
 victim had is watched: no interrupt may write there. Then the keeper uses every bus and line itself, and the heap must
-be as it was. tests/firmware/test_kills_on_target.py takes a sample, tests/fuzz/fuzz_kills.py all.
+be as it was. tests/firmware/kernel/test_kills_on_target.py takes a sample, tests/fuzz/kernel/fuzz_kills.py all.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from pathlib import Path
 from emu import Machine
 from emu.boards.epuck.board import Epuck
 from emu.image.loader import load_image
-from tests.firmware.test_on_target import place, thread_list
+from tests.firmware.kernel.test_kernel_on_target import place, thread_list
 
 INT1IF, T2IF = 1 << 0, 1 << 6
 PATIENCE = 3_000_000

@@ -1,5 +1,5 @@
 """`openswarm flash` against a boot loader in Python, whose line loses, damages and delays what the test says, on a
-clock of its own; the loader in C is met in tests/firmware/test_boot_on_target.py."""
+clock of its own; the loader in C is met in tests/firmware/update/test_boot_on_target.py."""
 
 from __future__ import annotations
 

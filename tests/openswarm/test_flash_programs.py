@@ -1,5 +1,5 @@
 """`openswarm flash` of programs against robots in Python, on a clock of their own: such as echo, stand still, begin
-anew, answer late, or vanish. The robot in C is met in tests/firmware/test_spreading_on_target.py."""
+anew, answer late, or vanish. The robot in C is met in tests/firmware/update/test_spreading_on_target.py."""
 
 from __future__ import annotations
 

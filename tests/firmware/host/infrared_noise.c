@@ -1,5 +1,5 @@
 /* Anything a robot may see and be asked, at random: whole frames, damaged ones, cut ones, two at once, light of the room and
- * noise, while its program calls all of openswarm_infrared.h and openswarm_remote.h. tests/fuzz/fuzz_infrared.py gives
+ * noise, while its program calls all of openswarm_infrared.h and openswarm_remote.h. tests/fuzz/kernel/fuzz_infrared.py gives
  * seeds. */
 #include "infrared_air.h"
 

@@ -1,5 +1,5 @@
 /* Every processor of every device, put in and taken out again while the devices run; what arrives is left in variables
- * (tests/firmware/test_processors_on_target.py). */
+ * (tests/firmware/drivers/test_processors_on_target.py). */
 #include <analog.h>
 #include <bluetooth.h>
 #include <camera.h>

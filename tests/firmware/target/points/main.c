@@ -1,5 +1,5 @@
 /* A scenario that uses every structural kernel call, run again and again beside a thread that checks its registers. The
- * test interrupts it at every instruction (tests/firmware/test_on_target.py). */
+ * test interrupts it at every instruction (tests/firmware/kernel/test_kernel_on_target.py). */
 #include <openswarm.h>
 #include <p30F6014A.h>
 

@@ -1,4 +1,4 @@
-/* Register patterns under preemption and an interrupt storm; tests/firmware/test_on_target.py reads the counters. */
+/* Register patterns under preemption and an interrupt storm; tests/firmware/kernel/test_kernel_on_target.py reads the counters. */
 #include <openswarm.h>
 #include <p30F6014A.h>
 

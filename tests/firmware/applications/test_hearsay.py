@@ -1,0 +1,28 @@
+"""What robots of apps/average tell each other of a third: by the application's own functions, on a host."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+HERE = Path(__file__).parent
+FIRMWARE = HERE.parents[2] / "firmware"
+
+
+def test_who_is_gone_is_forgotten_and_who_is_hidden_is_not(tmp_path):
+    """Under sanitizers: word of a robot reaches who has not met it, as late as six seconds after, and however often it
+    is told on, with messages that wait for a second, it is forgotten in time and does not come back."""
+    if shutil.which("gcc") is None:
+        pytest.skip("the host test is built with gcc, which is not installed (Debian package gcc)")
+    folders = [FIRMWARE, *(FIRMWARE / "openswarm" / one for one in ("include", "hal", "kernel", "io", "port/posix"))]
+    folders += [FIRMWARE / "openswarm" / "board" / "host", FIRMWARE / "apps" / "clocks"]
+    command = ["gcc", "-std=gnu99", "-O1", "-g", "-Wall", "-Wextra", "-Werror", "-fsanitize=address,undefined"]
+    command += ["-fno-sanitize-recover=undefined", "-ffunction-sections", "-Wl,--gc-sections"]  # the kernel is not here
+    command += [f"-I{folder}" for folder in folders]
+    subprocess.run([*command, HERE / "hearsay.c", "-o", tmp_path / "hearsay"], check=True)
+    done = subprocess.run([tmp_path / "hearsay"], capture_output=True, text=True, check=False, timeout=60)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert done.stdout == "it was known and forgotten\n"

@@ -1,0 +1,53 @@
+"""The named bugs of the original on the emulated robot: host/original_bugs.c, one test per reset."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from tests.firmware.conftest import TARGET_APPS, Build
+from tests.firmware.drivers.test_drivers_on_target import START, robot
+from tests.firmware.kernel.test_kernel_on_target import FCY, load, place, run_to
+
+HOST = Path(__file__).parents[1] / "host"
+# Needs the host's unlock hook, or its UART sink: test_interrupts_at_every_instruction and the processors test do these.
+HOST_ONLY = {"bug_13_events_from_threads_and_interrupts_mix_at_every_point", "bug_24b_each_uart_sends_its_own_bytes"}
+TESTS = [
+    name for name in re.findall(r"^TEST\((\w+),", (HOST / "original_bugs.c").read_text(), re.M) if name not in HOST_ONLY
+]
+
+
+@pytest.mark.parametrize("name", TESTS)
+def test_the_kernel_on_the_robot(image: Build, name: str) -> None:
+    """openswarm-original.md §7; issue 4, Must show 2: on posix and on emu."""
+    defines = f"DEFINES=-DTESTS={','.join(TESTS)} -DSYS_DEFAULT_STACK=192"
+    machine = load(image("bugs", TARGET_APPS, defines))
+    said = bytearray()
+    machine.uart[1].on_byte = lambda byte, _: said.append(byte)
+    run_to(machine, "begin")
+    machine.poke("chosen", TESTS.index(name))
+    stop = machine.run(cycles=4 * FCY, until=place(machine, "passed"))
+    assert stop.reason == "until", (stop, bytes(said))
+
+
+@pytest.mark.parametrize("level", ["-O0", "-O1", "-O2"])
+def test_bug_22_the_kernel_works_at_every_optimisation_level(image: Build, level: str) -> None:
+    """openswarm-original.md §7, 22: only -O0 worked. Every kernel call, beside a thread that checks its registers."""
+    machine = load(image("calls", TARGET_APPS, f"OPTIMISE={level}", "DEFINES=-DSYS_DEFAULT_STACK=256"))
+    for _ in range(18):  # scenes: two rounds
+        run_to(machine, "scene_end")
+        machine.step()
+    assert machine.peek("failures") == 0
+    assert machine.peek("broken") == 0
+    assert machine.peek("heard") == machine.peek("sent") > 8
+    assert machine.peek("checked") > 10
+
+
+def test_bug_16_images_are_not_classified_in_an_interrupt(image: Build) -> None:
+    """openswarm-original.md §7, 16: classification stopped stepping, clock and scheduling for milliseconds."""
+    machine = robot(image("clustering"), engine="auto", selector=START)
+    stop = machine.run(cycles=FCY, until=place(machine, "on_frame"))
+    assert stop.reason == "until"
+    assert machine.peek("SR") >> 5 & 7 <= 1, "in a handler, which every device interrupts"

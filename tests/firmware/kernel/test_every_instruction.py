@@ -1,0 +1,56 @@
+"""Preemption at every instruction of every kernel call, and every allocation failing: samples of the whole campaign."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+
+from tests.firmware.conftest import TARGET_APPS, Build
+from tests.firmware.contracts import legal_in_interrupts, refused_in_interrupts
+from tests.firmware.injection import LEFT, MASKED, WAYS, fail_every_allocation, sweep
+from tests.firmware.kernel.test_kernel_on_target import load, place
+from tests.fuzz.seeds import base_seed
+
+STRIDE = 211
+
+
+@pytest.mark.parametrize("ipl_slip", [0, 1])
+@pytest.mark.parametrize("way", WAYS)
+def test_interrupts_at_every_instruction_change_nothing(image: Build, way: str, ipl_slip: int) -> None:
+    """Inject tick, UART, a 100 us device that makes every call, stepper and an IPL 6 interrupt into every kernel call.
+
+    Samples every 211th boundary from an offset that the commit determines; tests/fuzz/kernel/fuzz_kernel.py tries all.
+    kernel.md §4 `--ipl-slip`; bugs 7, 12, 13 of openswarm-original.md §7.
+    """
+    phase = (base_seed() + 53 * (2 * WAYS.index(way) + ipl_slip)) % STRIDE  # a failure names its boundary
+    *_, (scenes, seen) = sweep(image("calls", TARGET_APPS), ipl_slip, way, STRIDE, phase)
+    assert scenes == 9
+    assert seen.boundaries > 60
+    assert seen.compared > seen.boundaries
+    assert seen.stack_left >= LEFT
+    assert seen.stepper_late <= MASKED + 20
+
+
+def test_the_interrupt_makes_every_call_of_the_headers() -> None:
+    """target/calls/isr_calls.c against the contract lines: a call that is added to a header must be added there."""
+    source = (TARGET_APPS / "calls" / "isr_calls.c").read_text()
+    legal, refused = source.split("/* ---- Must be refused")
+    assert set(re.findall(r"\bSys_\w+(?=\()", legal)) == legal_in_interrupts()
+    assert set(re.findall(r"\bSys_\w+(?=\()", refused)) >= refused_in_interrupts()
+
+
+def test_every_allocation_may_fail(image: Build) -> None:
+    """Issue 4, Must show 3: in every scene the k-th allocation finds no memory, for every k. Calls fail, no more."""
+    *_, (scenes, failures) = fail_every_allocation(image("calls", TARGET_APPS))
+    assert scenes == 9
+    assert failures >= 25
+
+
+def test_a_register_lost_in_a_switch_is_seen(image: Build) -> None:
+    """The sweep can fail: with W10 and W11 saved twice instead of W12 and W13 it does."""
+    path = image("calls", TARGET_APPS)
+    save = place(load(path), "_T2Interrupt") + 14  # PUSH.D W12
+    with pytest.raises(AssertionError, match="register"):
+        for _ in sweep(path, 0, "together", STRIDE, patch={save: 0xBE9F8A}):
+            pass

@@ -1,0 +1,19 @@
+"""The portable kernel on the POSIX port, under address and undefined-behaviour sanitizers: every TEST of host/*.c."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+from pathlib import Path
+
+import pytest
+
+HOST = Path(__file__).parents[1] / "host"
+TESTS = [name for file in sorted(HOST.glob("*.c")) for name in re.findall(r"^TEST\((\w+),", file.read_text(), re.M)]
+
+
+@pytest.mark.parametrize("name", TESTS)
+def test_the_kernel_on_posix(host_program: Path, name: str) -> None:
+    """kernel.md §2; openswarm-original.md §7; the statement beside each TEST."""
+    done = subprocess.run([host_program, name], capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == 0, done.stderr

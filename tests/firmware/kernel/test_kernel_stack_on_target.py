@@ -1,0 +1,74 @@
+"""The kernel stack has a limit of its own: whoever overflows it is caught there, before the heap is harmed."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+
+from emu.machine.machine import Machine
+from tests.firmware.conftest import TARGET_APPS, Build
+from tests.firmware.kernel.test_kernel_on_target import FCY, load, place, run_to
+
+KERNEL_STACK = 224
+"""Bytes (port/dspic30f/hal_limits.h); the heap follows."""
+FIRST = 0x41
+"""kind of the first of KINDS (target/handlers)."""
+KINDS = {
+    "formats": ("snprintf", "vsnprintf", "format", "formats"),
+    "recursion": ("chain",),
+    "large frame": ("large_frame",),
+    "kernel call without room": ("Sys_Send_IntEvent", "Sys_Send_Event"),
+    "condition": ("chain",),
+    "interrupt": ("chain",),
+    "scheduler": ("chain",),
+}
+"""What overflows, and the functions that may be at work then; of the first any of the library."""
+
+
+def heap(machine: Machine) -> list[int]:
+    """The first words behind the kernel stack: the first small block of the heap and what follows."""
+    first = machine.address_of("os_memory") + KERNEL_STACK
+    return [machine.peek(address) for address in range(first, first + 64, 2)]
+
+
+def culprit(machine: Machine, said: bytes) -> str:
+    """The function that the report names by its address."""
+    assert machine.image is not None
+    found = re.search(rb"stack trap at 0x([0-9a-f]+):([0-9a-f]+) in thread \d+\r\n", said)
+    assert found, said
+    inside = machine.image.symbols.code(int(found[1], 16) << 16 | int(found[2], 16))
+    assert inside is not None
+    return inside[0].name.lstrip("_")
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("ipl_slip", [0, 1])
+def test_an_overflow_of_the_kernel_stack_is_caught_at_the_culprit(image: Build, kind: str, ipl_slip: int) -> None:
+    """A handler with snprintf("%f") needs more than the kernel stack has."""
+    machine = load(image("handlers", TARGET_APPS), ipl_slip)
+    run_to(machine, "begin")
+    machine.poke("kind", FIRST + list(KINDS).index(kind))
+    said = bytearray()
+    machine.uart[1].on_byte = lambda byte, _: said.append(byte)
+    before: list[list[int]] = []
+    for name in ("snprintf", "deep_handler", "deep_condition", "deep_isr", "deep_pick"):
+        machine.hook_pc(place(machine, name), lambda: before.append(heap(machine)) is not None)
+    harmed: list[bool] = []
+    machine.hook_pc(place(machine, "_StackError"), lambda: harmed.append(heap(machine) != before[-1]) is not None)
+    stop = machine.run(cycles=FCY // 4, until=place(machine, "hal_stop"))
+    assert stop.reason == "until", stop
+    assert harmed == [False]
+    assert machine.peek("LATD") & 0xFF == 0, "the motors stop"
+    name = culprit(machine, bytes(said))
+    library = kind == "formats" and name not in ("chain", "fill", "large_frame")
+    assert name in KINDS[kind] or library, name
+
+
+def test_half_a_kernel_stack_is_free_beside_an_ordinary_handler(image: Build) -> None:
+    """The limit leaves room: without an overflow the same program runs on."""
+    machine = load(image("handlers", TARGET_APPS))
+    run_to(machine, "begin")
+    machine.poke("kind", 0)
+    assert machine.run(cycles=FCY // 4).reason == "limit"
+    assert machine.peek("rounds") > 100

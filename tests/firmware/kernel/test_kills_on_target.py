@@ -1,0 +1,59 @@
+"""Threads killed inside driver calls: samples of the whole campaign (tests/fuzz/kernel/fuzz_kills.py)."""
+
+from __future__ import annotations
+
+import pytest
+
+from emu import Machine
+from tests.firmware.conftest import TARGET_APPS, Build
+from tests.firmware.kills import PAUSES, SCENES, Stage, run_to_begin, sweep
+
+STRIDE = 331
+
+
+@pytest.mark.parametrize("ipl_slip", [0, 1])
+@pytest.mark.parametrize("scene", range(len(SCENES)), ids=SCENES)
+def test_a_thread_killed_inside_a_driver_call_leaves_the_device_to_others(
+    image: Build, scene: int, ipl_slip: int
+) -> None:
+    """Buses go on, messages are whole, memory is as before, and no interrupt writes into memory of the dead."""
+    *_, seen = sweep(image("kills", TARGET_APPS), ipl_slip, scene, STRIDE, 17 + 23 * ipl_slip)
+    assert seen.boundaries >= len(PAUSES)
+    assert seen.kills
+
+
+def test_a_write_into_a_dead_threads_memory_is_seen(image: Build) -> None:
+    """The campaign can fail: here the bus goes on into the dead thread's block."""
+
+    def spoil(machine: Machine, block: int) -> None:
+        job = machine.peek("transfer")
+        machine.poke(job + 6, block + 100)  # i2c_transfer.in
+
+    stage = Stage(image("kills", TARGET_APPS))
+    stage.run_to("checked")
+    while stage.machine.peek("scene") != len(SCENES) - 1:
+        stage.run_to("checked")
+    run_to_begin(stage.machine)
+    memory = stage.victim()
+    stage.after_kill = spoil
+    stage.machine.run(cycles=3_000)  # the bus has begun
+    with pytest.raises(AssertionError, match="memory of the dead thread was written"):
+        stage.kill(*memory, 4)
+
+
+def test_the_bus_is_busy_while_its_thread_lives(image: Build) -> None:
+    """What frees the bus is the thread's death, not its time: a living thread is never robbed."""
+    stage = Stage(image("kills", TARGET_APPS))
+    machine = stage.machine
+    while machine.peek("scene") != len(SCENES) - 1:
+        stage.run_to("checked")
+    run_to_begin(machine)
+    machine.run(cycles=3_000)
+    owner, size = machine.peek("i2c"), machine.peek(machine.address_of("i2c") + 2)
+    assert owner
+    assert size == 8 + 1 + 2
+    for heard in stage.said.values():
+        heard.clear()
+    stage.run_to("checked")
+    stage.check()
+    assert machine.peek("i2c") == 0

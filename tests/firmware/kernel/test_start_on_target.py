@@ -1,0 +1,78 @@
+"""What happens around Sys_Start_Kernel on the emulated robot."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from emu.cli import main
+from tests.firmware.conftest import TARGET_APPS, Build
+from tests.firmware.kernel.test_kernel_on_target import FCY, load, run_to, words
+
+SCHEDULERS = ["round robin", "fixed priority", "earliest deadline", "woken first"]
+MOMENTS = ["never", "before the threads", "before the start", "after the start"]
+
+
+@pytest.mark.parametrize("moment", range(len(MOMENTS)), ids=MOMENTS)
+@pytest.mark.parametrize("scheduler", range(len(SCHEDULERS)), ids=SCHEDULERS)
+@pytest.mark.parametrize("ipl_slip", [0, 1])
+def test_the_start_completes_under_every_scheduler(image: Build, scheduler: int, moment: int, ipl_slip: int) -> None:
+    """An end of the slice that was forced before the start must not come before both timers run: beside a thread that
+    never yields nothing would ever switch them on."""
+    machine = load(image("starts", TARGET_APPS), ipl_slip)
+    run_to(machine, "begin")
+    machine.poke("scheduler", scheduler)
+    machine.poke("moment", moment)
+    assert machine.run(cycles=FCY // 10).reason == "limit"
+    rounds, periods = words(machine, "rounds", 2), machine.peek("periods")
+    assert 98 <= machine.peek("now_ms") <= 100
+    assert machine.peek("spins") > 0
+    if SCHEDULERS[scheduler] == "fixed priority" and moment != 0:
+        assert rounds[0] >= 45
+        assert rounds[1] <= 1, "its priority is below the busy thread's"
+        assert 18 <= periods <= 21, "every 5 ms in 100"
+    elif moment != 0 and SCHEDULERS[scheduler] == "earliest deadline":
+        assert 18 <= periods <= 21
+        assert min(rounds) >= 4, "round robin beside it"
+    else:
+        assert min(*rounds, periods) >= 4
+    assert machine.peek("T1CON") == 0x8000
+    assert machine.peek("T2CON") == 0x8010
+
+
+NEVER_STARTED = """
+#include <openswarm.h>
+int main(void)
+{
+    Sys_Init_Kernel();
+    START
+    do {
+        Sys_Sleep(100);
+        sys_event_data *data = Sys_Wait_for_Event(SYS_1ms_TIMER);
+        Sys_Clear_EventData(&data);
+        Sys_Yield();
+    } while (AGAIN);
+    Sys_Run_SystemThread();
+    return 0;
+}
+"""
+
+
+@pytest.mark.parametrize(
+    ("start", "again", "refused"),
+    [("", "false", "4 calls"), ("", "true", "65,535 calls"), ("Sys_Start_Kernel();", "true", "")],
+    ids=["and main returns", "for ever", "but started"],
+)
+def test_calls_that_need_a_running_kernel_do_not_look_like_success(
+    image: Build, tmp_path: Path, capfd: pytest.CaptureFixture[str], start: str, again: str, refused: str
+) -> None:
+    """Blocking calls without Sys_Start_Kernel are refused; whoever runs such a program is told, by status 1 as well."""
+    (tmp_path / "early").mkdir()
+    (tmp_path / "early" / "main.c").write_text(NEVER_STARTED.replace("START", start).replace("AGAIN", again))
+    path = image("early", tmp_path, f"DEFINES=-DCASE={len(start) + len(again)}")
+    assert main(["run", str(path), "--seconds", "0.5"]) == (1 if refused else 0)
+    said = capfd.readouterr().err
+    if refused:
+        assert f"firmware fault: the kernel was never started (Sys_Start_Kernel) and refused {refused}" in said
+    assert main(["run", str(path), "--seconds", "0.5", "--exit-code"]) == (125 if refused else 124)

@@ -1,0 +1,74 @@
+"""Slices of preempted threads, and how soon a woken one runs, on the emulated robot."""
+
+from __future__ import annotations
+
+import emu
+from emu import Machine
+from tests.firmware.conftest import TARGET_APPS, Build
+from tests.firmware.kernel.test_kernel_on_target import FCY, place, run_to
+from tests.firmware.kernel.test_time_on_target import SLICE
+
+SLICES, WOKEN_FIRST, ROUND_ROBIN = 9, 10, 11
+"""Scenes (target/turns/main.c)."""
+SAVING = 40
+"""Cycles that a preemption costs the thread's slice: its registers are saved, and the timer counts by 8."""
+CLOCK = 300
+"""Cycles of a clock interrupt, which may hold the end of a slice back."""
+
+
+def scene(image: Build, number: int) -> Machine:
+    machine = emu.load(image("turns", TARGET_APPS), engine="jit")
+    run_to(machine, "begin")
+    machine.poke("scene", number)
+    return machine
+
+
+def test_a_preempted_thread_gets_the_rest_of_its_slice(image: Build) -> None:
+    """hal_cpu.h, hal_slice_restart(): beside a better thread that waits for every tick, equal threads still change
+    every 10 ms of their own time. Once they changed with every tick."""
+    machine = scene(image, SLICES)
+    resumed = turn = 0
+    own: dict[int, int] = {}
+    whole: list[int] = []
+
+    def restarted(write: bool, _: int) -> None:
+        nonlocal resumed
+        resumed = machine.cycle if write else resumed
+
+    def interrupted() -> bool:
+        """The better thread runs too briefly to be interrupted; so another one means that the turn has passed on."""
+        nonlocal turn
+        thread = machine.peek("os_running")
+        if thread != turn and turn:
+            whole.append(own.pop(turn))
+        turn = thread
+        own[thread] = own.get(thread, 0) + machine.cycle - resumed
+        return False
+
+    machine.hook_sfr("TMR2", restarted)
+    machine.hook_pc(place(machine, "_T2Interrupt"), interrupted)
+    machine.run(cycles=FCY)
+    assert machine.peek("rounds") >= 998, "ticks"
+    assert 92 <= machine.peek("turns") <= 101
+    assert len(whole) >= 90
+    preemptions = 11
+    settled = whole[1:]  # the system thread's turn at the start is none
+    assert all(-preemptions * SAVING <= length - SLICE <= CLOCK for length in settled), settled
+
+
+def test_a_woken_thread_runs_first(image: Build) -> None:
+    """openswarm.h, Sys_Set_Scheduler: Sys_Sleep(1) beside eight busy threads."""
+    machine = scene(image, WOKEN_FIRST)
+    machine.run(cycles=FCY)
+    assert machine.peek("slept_most") == 1
+    assert machine.peek("rounds") >= 998
+    spins = [machine.peek(machine.address_of("spins") + 2 * i) for i in range(8)]
+    assert min(spins) > 0
+    assert 92 <= machine.peek("turns") <= 101, "the others keep their slices"
+
+
+def test_round_robin_lets_a_woken_thread_wait_for_all(image: Build) -> None:
+    """The bound that openswarm.h states for the default scheduler."""
+    machine = scene(image, ROUND_ROBIN)
+    machine.run(cycles=FCY)
+    assert 89 <= machine.peek("slept_most") <= 91

@@ -1,0 +1,158 @@
+"""Interrupts at every instruction of every kernel call, on the ports: target/boundaries.
+
+Takes a sample. `python -m tests.firmware.ports.test_port_boundaries` visits all boundaries of the Kilobot, or with
+--robot epuck2 those of the e-puck2. In simavr a boundary is an instruction of the round, and the harness sets the interrupt's
+flag. In QEMU it is an instruction's address, the first or a later time it is come to: the CPU stops there at a
+breakpoint, executes one store to the NVIC or the SCB with interrupts held back and the clock standing, and goes on.
+"""
+
+from __future__ import annotations
+
+import argparse
+import re
+import subprocess
+import sys
+import tempfile
+from contextlib import closing
+from pathlib import Path
+
+import pytest
+
+from firmware.tools.simulated.epuck2 import Epuck2
+from firmware.tools.simulated.kilobot import Kilobot
+from firmware.tools.simulated.machine import Machine, NotInstalled, Stopped, peek
+from tests.firmware.conftest import TARGET_APPS
+from tests.firmware.ports.test_kernel_ports import kilobot, make
+
+EXTI0, PENDSV = (0xE000E200, 1 << 6), (0xE000ED04, 1 << 28)
+"""What is stored where to request them: NVIC_ISPR0, SCB_ICSR (ARMv7-M architecture reference manual, B3)."""
+KERNEL_CODE = re.compile(r"/openswarm/(kernel|option|port)/")
+INT0, SLICE = 1, 14
+"""Vectors: the device's, T0's compare A."""
+WAYS = ("device", "slice", "nested")
+"""The device; the end of the slice; the end of the slice and up to 44 instructions later the device."""
+PRIME = 97
+"""Boundaries between two of the sample."""
+
+
+def check(machine: Machine, where: str) -> None:
+    failures = peek(machine, "failures")
+    assert failures == 0, f"{where}: {failures} failures, the first in line {peek(machine, 'first_failure')} of main.c"
+
+
+def round_length(machine: Kilobot) -> int:
+    """Instructions of a round that nothing disturbs."""
+    begin = 0
+    for _ in range(2):  # the first one starts threads for the first time
+        machine.run_to("round_begin")
+        begin = machine.instructions
+        machine.run_to("round_end")
+    return machine.instructions - begin
+
+
+def sweep(machine: Kilobot, way: str, stride: int) -> int:
+    """One interrupt in each round, `stride` instructions later than in the last; how many rounds."""
+    length = round_length(machine)
+    rounds = 0
+    for boundary in range(1, length, stride):
+        machine.run_to("round_begin")
+        machine.steps(boundary)
+        before = peek(machine, "interrupts")
+        if way != "device":
+            machine.interrupt(SLICE)
+        if way == "nested":
+            machine.steps(boundary * 7 % 45)
+        if way != "slice":
+            machine.interrupt(INT0)
+        machine.run_to("round_begin")
+        rounds += 1
+        where = f"{way}, boundary {boundary} of {length}"
+        check(machine, where)
+        assert peek(machine, "interrupts") - before == (way != "slice"), f"{where}: the interrupt was lost"
+    return rounds
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_the_kilobot_is_interrupted_everywhere(way: str, tmp_path: Path) -> None:
+    """Every 97th boundary; another phase in each way, for the rounds shift against the clock."""
+    machine = kilobot(make("kilobot", "boundaries", tmp_path, apps=TARGET_APPS))
+    assert sweep(machine, way, PRIME) > 50
+
+
+def kernel_instructions(image: Path) -> list[int]:
+    """Addresses of all instructions of kernel, options and port."""
+    symbols = subprocess.run(["arm-none-eabi-nm", "-l", "-S", image], capture_output=True, text=True, check=True).stdout
+    rows = (line.split() for line in symbols.splitlines() if KERNEL_CODE.search(line))
+    spans = [(int(row[0], 16), int(row[1], 16)) for row in rows if len(row) == 5 and row[2] in "tT"]
+    code = subprocess.run(["arm-none-eabi-objdump", "-d", image], capture_output=True, text=True, check=True).stdout
+    places = (int(match[1], 16) for match in re.finditer(r"^ *([0-9a-f]+):\t(?!.*\t\.(?:word|short|byte))", code, re.M))
+    return sorted(at for at in places if any(start <= at < start + size for start, size in spans))
+
+
+def sweep_epuck2(image: Path, way: str, stride: int, phase: int, times: int) -> int:
+    """One interrupt in each round, at every stride-th instruction of the kernel, the times-th time that the round comes
+    there, if it does; how many were."""
+    places = kernel_instructions(image)[phase::stride]
+    tried = 0
+    with closing(Epuck2(image)) as machine:
+        end, idle = machine.symbols["round_end"], machine.symbols.span("hal_idle")
+        for number, place in enumerate(places):
+            machine.run_to("round_begin")
+            come = 0
+            while come < times and machine.run_to(place, end) == place:
+                come += 1
+            if come < times:
+                continue
+            before = peek(machine, "interrupts")
+            if way != "device":
+                machine.store(*PENDSV)
+            for _ in range(number * 7 % 45 if way == "nested" else 0):
+                if machine.pc not in idle:  # WFI would not end while the clock stands
+                    machine.step()
+            if way != "slice":
+                machine.store(*EXTI0)
+            where = f"{way}, {place:#x} the {times}. time"
+            try:
+                machine.run_to("round_begin")
+            except Stopped as stopped:
+                raise AssertionError(f"{where}: {stopped}") from None
+            tried += 1
+            check(machine, where)
+            assert peek(machine, "interrupts") - before == (way != "slice"), f"{where}: the interrupt was lost"
+    return tried
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_the_epuck2_is_interrupted_everywhere(way: str, tmp_path: Path) -> None:
+    """Every 97th instruction of the kernel; interrupts inside IT blocks and under every mask among them."""
+    image = make("epuck2", "boundaries", tmp_path, apps=TARGET_APPS)
+    try:
+        assert sweep_epuck2(image, way, PRIME, 13 * WAYS.index(way), 1) > 10
+    except NotInstalled as missing:
+        pytest.skip(str(missing))
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(prog="python -m tests.firmware.ports.test_port_boundaries", description=__doc__)
+    parser.add_argument("--robot", choices=("kilobot", "epuck2"), default="kilobot")
+    parser.add_argument("--stride", type=int, default=1, help="boundaries from one to the next (default 1: all)")
+    parser.add_argument("--phase", type=int, default=0, help="of the e-puck2: the first of them (default 0)")
+    parser.add_argument("--times", type=int, default=1, help="of the e-puck2: which time an instruction is come to")
+    options = parser.parse_args()
+    with tempfile.TemporaryDirectory() as folder:
+        try:
+            image = make(options.robot, "boundaries", Path(folder), apps=TARGET_APPS)
+        except pytest.skip.Exception as missing:
+            print(missing, file=sys.stderr)
+            return 2
+        for way in WAYS:
+            if options.robot == "kilobot":
+                tried = sweep(Kilobot(image), way, options.stride)
+            else:
+                tried = sweep_epuck2(image, way, options.stride, options.phase, options.times)
+            print(f"{way}: {tried:,} boundaries, nothing lost", flush=True)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,83 @@
+"""An image depends on the commit alone, not on where the checkout lies: otherwise one clone could not continue what
+another has begun, and a result could not be traced to its firmware."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from emu.cli import main
+from toolchain.driver import driver
+
+ROOT = Path(__file__).resolve().parents[3]
+PARTS = ("emu", "toolchain", "firmware")
+
+
+@pytest.fixture(scope="module")
+def checkouts(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
+    """The project twice, in folders whose names differ in length and depth."""
+    folder = tmp_path_factory.mktemp("checkouts")
+    roots = [folder / "a", folder / "another" / "and deeper".replace(" ", "-")]
+    for root in roots:
+        for part in PARTS:
+            shutil.copytree(ROOT / part, root / part, ignore=shutil.ignore_patterns("__pycache__", "build"))
+    return roots
+
+
+def built(root: Path, app: str, *words: str) -> Path:
+    """An application of a checkout, with a run-time library of its own: the shared cache would hide a difference."""
+    out = root / "out" / app
+    command = ["make", "-C", str(root / "firmware"), f"APP={app}", f"OUT={out}", f"PYTHON={sys.executable}", *words]
+    environment = os.environ | {"XDG_CACHE_HOME": str(root / "cache")}
+    done = subprocess.run(command, capture_output=True, text=True, timeout=600, env=environment, check=False)
+    assert done.returncode == 0, done.stderr
+    return out / "firmware.elf"
+
+
+@pytest.mark.parametrize("app", ["clustering", "clustering-bare"])
+def test_two_checkouts_of_one_commit_build_the_same_bytes(checkouts: list[Path], app: str) -> None:
+    """C, assembly, inline functions of headers and the run-time library, all with -g."""
+    one, other = (built(root, app).read_bytes() for root in checkouts)
+    assert one == other
+    plain = one.replace(b"\0", b"")  # debug information is stored with a phantom after every byte
+    for root in (*checkouts, ROOT):
+        assert str(root).encode() not in plain
+
+
+def test_an_application_of_another_folder_does_not_bring_that_folder_along(checkouts: list[Path]) -> None:
+    """Somebody's own application, named by its absolute path as `APPS=` may be."""
+    images = []
+    for root in checkouts:
+        source = root / "mine" / "tiny" / "main.c"
+        source.parent.mkdir(parents=True, exist_ok=True)
+        source.write_text("#include <openswarm.h>\nint main(void) { Sys_Init_Kernel(); SYS_ASSERT(0); return 0; }\n")
+        images.append(built(root, "tiny", f"APPS={root / 'mine'}").read_bytes())
+    assert images[0] == images[1]
+
+
+def test_source_lines_are_still_found(
+    checkouts: list[Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Names begin at the project's folder; the listing with sources finds them from anywhere, beside the image."""
+    image = built(checkouts[0], "clustering")
+    monkeypatch.chdir(tmp_path)
+    assert main(["disasm", str(image), "--source"]) == 0
+    listing = capsys.readouterr().out
+    assert re.search(r"^firmware/apps/clustering/main\.c:\d+: \S", listing, re.MULTILINE)
+
+
+def test_the_assembler_records_the_path_it_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """`cc -g -ffile-prefix-map=` of an assembly file named by its absolute path."""
+    monkeypatch.chdir(tmp_path)
+    source = tmp_path / "one.s"
+    source.write_text("\t.text\n\t.global _main\n_main: return\n")
+    assert driver.main(["-g", "-c", f"-ffile-prefix-map={tmp_path}=here", str(source), "-o", "one.o"]) == 0
+    plain = (tmp_path / "one.o").read_bytes().replace(b"\0", b"")
+    assert b"here/one.s" in plain
+    assert str(tmp_path).encode() not in plain
