@@ -23,7 +23,7 @@ The `clustering` firmware reads the picture region to its end (16.4 ms) before i
 FIRST_FRAME_TCY: Final = 853_232
 """Time from power-on to the first middle of the sensor window.
 
-tests/arena/robots/test_emulated.py measures this value and LATENCY_TCY on the `clustering` firmware. The published
+tests/arena/robots/test_firmware_controller.py measures this value and LATENCY_TCY on the `clustering` firmware. The published
 trials used them, so they stay. The firmware is 0.15 ms later, at 855,484 Tcy: the camera model includes the last bit
 of a register's value.
 """

@@ -1,6 +1,6 @@
 """Random programs for robots of a swarm: they look, sense, talk, turn, sleep, are interrupted, trapped and reset.
 
-In: a source of chance, the sensor of the camera. Out: assembly. `tests/fuzz/fuzz_swarm.py` runs them in every way a
+In: a source of chance, the sensor of the camera. Out: assembly. `tests/fuzz/swarm/fuzz_swarm.py` runs them in every way a
 swarm can be run.
 """
 

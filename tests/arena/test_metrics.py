@@ -1,4 +1,4 @@
-"""Metrics on arrangements made by hand, and the statistics against known values."""
+"""Metrics of hand-made arrangements, and statistics against known values."""
 
 import itertools
 import subprocess
@@ -8,7 +8,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from arena.analysis.statistics import _typical, bootstrap_band, equivalence, exact, pairs_needed, remark, signed_rank_p
+from arena.analysis.statistics import (
+    _typical_interval,
+    bootstrap_band,
+    equivalence,
+    pairs_needed,
+    remark,
+    sign_flip_test,
+    signed_rank_p,
+)
 from arena.experiments import TrialSamples, experiment_of
 from arena.metrics import (
     SMALL,
@@ -35,7 +43,7 @@ def test_compactness_is_equation_2() -> None:
 
 
 def test_clusters_are_connected_by_less_than_four_radii() -> None:
-    """epuck.md §8: a chain holds together, a gap of exactly 4 r does not."""
+    """A chain of objects is one cluster; a gap of exactly 4 radii separates clusters (epuck.md §8)."""
     places = np.array([(0, 0), (19, 0), (38, 0), (58, 0), (200, 0), (210, 0)], float)
     assert clusters(places, reach_of("4r", R)) == [0, 0, 0, 1, 2, 2]
     assert clusters(places, reach_of("12cm", R)) == [0, 1, 2, 3, 4, 4]
@@ -43,14 +51,14 @@ def test_clusters_are_connected_by_less_than_four_radii() -> None:
 
 
 def test_all_alone_is_one_of_n_and_nothing_is_nothing() -> None:
-    """Limits of the share."""
+    """Single objects have the share 1/n; without objects the share is 0."""
     places = np.array([(100 * k, 0) for k in range(20)], float)
     assert largest_share(places, 20.0) == 0.05
     assert largest_share(np.zeros((0, 2)), 20.0) == 0.0
 
 
 def test_time_to_a_share_is_the_first_sample_that_has_it() -> None:
-    """docs/experiment.md §1."""
+    """The time to a share is that of the first sample with it (docs/experiment.md §1)."""
     times, shares = np.array([0.0, 1.0, 2.0, 3.0]), np.array([0.1, 0.5, 0.4, 0.8])
     assert time_to(times, shares, 0.5) == 1.0
     assert time_to(times, shares, 0.8) == 3.0
@@ -60,8 +68,8 @@ def test_time_to_a_share_is_the_first_sample_that_has_it() -> None:
 MEETING = np.array([[(0, 0), (100, 0)], [(0, 0), (60, 0)], [(0, 0), (10, 0)]], float)
 
 
-def course_of(places: np.ndarray, times: list[float]) -> MetricSeries:
-    """As the clustering experiment measures it."""
+def series_of(places: np.ndarray, times: list[float]) -> MetricSeries:
+    """Return the metrics of the clustering experiment for some positions."""
     robots = np.zeros((len(times), 0, 3))
     return experiment_of("clustering").series(
         TrialSamples(np.array(times), robots, places, load_scene("clustering"), {})
@@ -69,8 +77,8 @@ def course_of(places: np.ndarray, times: list[float]) -> MetricSeries:
 
 
 def test_a_course_follows_objects_that_meet() -> None:
-    """Share, compactness, and the area as a mean over time."""
-    done = course_of(MEETING, [0.0, 1.0, 2.0])
+    """Share, compactness and mean over time follow objects that meet."""
+    done = series_of(MEETING, [0.0, 1.0, 2.0])
     assert done.curves["share"].tolist() == [0.5, 0.5, 1.0]
     assert done.curves["compactness"].tolist() == [50.0, 18.0, 0.5]
     assert done.mean("compactness") == pytest.approx((34 + 9.25) / 2)
@@ -78,7 +86,7 @@ def test_a_course_follows_objects_that_meet() -> None:
 
 
 def test_equal_runs_are_equivalent_and_different_ones_are_not() -> None:
-    """experiment-contract.md §5: 90 % interval within the margin."""
+    """Runs are equivalent if the 90 % interval is within the margin (experiment-contract.md §5)."""
     rng = np.random.default_rng(0)
     base = rng.normal(0.9, 0.05, 10)
     near, far = base + rng.normal(0, 0.02, 10), base - 0.15
@@ -86,20 +94,20 @@ def test_equal_runs_are_equivalent_and_different_ones_are_not() -> None:
     result = equivalence(base, far + rng.normal(0, 0.02, 10), 0.1)
     assert not result.equivalent
     assert result.low > 0.1
-    assert not equivalence(base, base + rng.normal(0, 0.4, 10), 0.1).equivalent  # few and scattered: not shown
+    assert not equivalence(base, base + rng.normal(0, 0.4, 10), 0.1).equivalent  # few pairs with a large variance
     with pytest.raises(ValueError, match="two or more pairs"):
         equivalence(base[:1], base[:1], 0.1)
 
 
 def test_signed_ranks_are_exact_for_few_pairs() -> None:
-    """Five pairs that all differ one way: p = 2 / 2^5."""
+    """Five pairs that differ in the same direction have p = 2 / 2^5."""
     ones = np.arange(5) + np.array([0.1, 0.2, 0.3, 0.4, 0.5])
     assert signed_rank_p(ones, np.arange(5).astype(float)) == pytest.approx(2 / 32)
     assert signed_rank_p(ones, ones) == 1.0
 
 
 def test_bootstrap_bands_hold_the_mean() -> None:
-    """And are the same every time."""
+    """The band contains the mean and is reproducible."""
     values = np.random.default_rng(1).normal(0, 1, (10, 3)) + np.array([0, 5, 9])
     low, high = bootstrap_band(values)
     assert (low < values.mean(axis=0)).all()
@@ -108,7 +116,7 @@ def test_bootstrap_bands_hold_the_mean() -> None:
 
 
 def test_shares_of_all_samples_at_once_are_those_one_by_one() -> None:
-    """Chains of up to all objects, scattered ones, one, none."""
+    """Shares of all samples at once equal those of single samples, for chains, scattered objects, one and none."""
     rng = np.random.default_rng(3)
     scattered = rng.uniform(0, 150, (200, 20, 2))
     chain = np.stack([np.column_stack([19.0 * rng.permutation(20), np.zeros(20)]) for _ in range(5)])
@@ -119,15 +127,15 @@ def test_shares_of_all_samples_at_once_are_those_one_by_one() -> None:
 
 
 def test_the_pairs_needed_are_those_of_the_plan() -> None:
-    """experiment-contract.md §5: standard deviation 0.25 needs about 107 trials per arm, 0.06 seven (independent arms)."""
+    """experiment-contract.md §5: sd 0.25 needs about 107 trials per arm, sd 0.06 seven (independent arms)."""
     assert pairs_needed(0.25 * 2**0.5, 0.1) == pytest.approx(107, abs=1)
     assert pairs_needed(0.06 * 2**0.5, 0.1) == 7
     assert pairs_needed(0.0, 0.1) == 2
 
 
 def test_a_course_can_be_cut() -> None:
-    """Runs of unequal length are compared over the time they have in common."""
-    done = course_of(MEETING, [0.0, 1.001, 2.0])
+    """`until` cuts a series, so that runs of unequal length can be compared."""
+    done = series_of(MEETING, [0.0, 1.001, 2.0])
     assert done.until(1.0).times.tolist() == [0.0, 1.001]
     assert done.until(1.0).curves["share"].tolist() == [0.5, 0.5]
     assert done.until(9.0).mean("compactness") == done.mean("compactness")
@@ -135,7 +143,7 @@ def test_a_course_can_be_cut() -> None:
 
 @pytest.mark.parametrize("count", [SMALL, SMALL + 1, 90])
 def test_few_and_many_objects_are_counted_alike(count: int) -> None:
-    """Matrices of all pairs and sparse graphs: the same shares; clusters are numbered by their first object."""
+    """Dense matrices and sparse graphs give equal shares; clusters are numbered by their first object."""
     rng = np.random.default_rng(count)
     places = rng.uniform(0, 25 * count**0.5, (30, count, 2))
     assert largest_shares(places, 20.0).tolist() == _largest_shares(places, 20.0).tolist()
@@ -148,7 +156,7 @@ def test_few_and_many_objects_are_counted_alike(count: int) -> None:
 
 
 def _parts(near: np.ndarray) -> int:
-    """Connected parts, by joining sets."""
+    """Return the connected components, by merging sets."""
     parts = [{i} for i in range(len(near))]
     for i, j in zip(*np.nonzero(near), strict=True):
         one, other = (next(part for part in parts if k in part) for k in (i, j))
@@ -159,7 +167,7 @@ def _parts(near: np.ndarray) -> int:
 
 
 def test_the_distance_of_the_rule_itself_is_not_near() -> None:
-    """Nearer than 4 radii, not as near."""
+    """Objects at exactly the distance of the rule are not adjacent."""
     touching = np.array([(0.0, 0.0), (20.0, 0.0), (39.9, 0.0)])
     assert clusters(touching, 20.0) == [0, 1, 1]
 
@@ -182,17 +190,17 @@ print((resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) // 1024)
 
 @pytest.mark.skipif(sys.platform != "linux", reason="the peak of memory has other units, or none, elsewhere")
 def test_metrics_of_many_objects_need_little_memory() -> None:
-    """400 objects for 15 minutes: before, 11 GB; 100 for 15 minutes: before, 0.7 GB."""
+    """Shares of 400 and of 100 objects over 15 minutes need less than 200 MB."""
     for objects in (100, 400):
-        said = subprocess.run([sys.executable, "-c", METER, str(objects), "1801"], capture_output=True, text=True,
+        measured = subprocess.run([sys.executable, "-c", METER, str(objects), "1801"], capture_output=True, text=True,
                               check=True, timeout=300, cwd=Path(__file__).parents[2])  # fmt: skip
-        assert int(said.stdout) < 200  # MB
+        assert int(measured.stdout) < 200  # MB
 
 
-# -- what was added to the registered statistics -----------------------------------------------------------------------
+# -- statistics added to the registered ones ------------------------------------------------------------------------
 
 TWO_SETS = [(-0.40, 0.05), (-0.30, -0.25, 0.05, 0.05, 0.05, 0.05)]
-"""Both give all that docs/experiment.md printed of controller B's ten differences: it could not tell them apart."""
+"""Two sets of ten differences with the same printed values as those of controller B in docs/experiment.md."""
 
 
 def padded(differences: tuple[float, ...]) -> np.ndarray:
@@ -201,53 +209,53 @@ def padded(differences: tuple[float, ...]) -> np.ndarray:
 
 @pytest.mark.parametrize(("differences", "least"), list(zip(TWO_SETS, (0.5, 2 / 64), strict=True)))
 def test_a_p_that_cannot_be_small_is_named(differences: tuple[float, ...], least: float) -> None:
-    """With eight ties of ten, Wilcoxon's p is 0.5 at best: 1.00 said nothing."""
+    """With eight ties in ten pairs, the smallest possible p of Wilcoxon's test is 0.5."""
     x, y = padded(differences) + 0.9, np.full(10, 0.9)
     result = equivalence(x, y, 0.1)
     printed = f"{result.mean:+.3f} {result.low:+.3f} {result.high:+.3f} {signed_rank_p(x, y):.2f}"
     assert printed == "-0.035 -0.110 +0.040 1.00"
-    found = exact(x, y)
+    found = sign_flip_test(x, y)
     assert (found.differ, found.least_p) == (len(differences), pytest.approx(least))
     assert ("cannot fall below 0.5" in remark(x, y, 1.0)) == (least == 0.5)
 
 
 def test_the_sign_flip_test_is_that_of_all_signs() -> None:
-    """Against every one of 2^n assignments, written out."""
+    """The test equals an enumeration of all 2^n sign assignments."""
     rng = np.random.default_rng(4)
     for count in (2, 3, 7, 10):
         d = rng.normal(0.3, 1, count)
         signs = np.array(list(itertools.product((1, -1), repeat=count)))
         means = (signs * d).mean(axis=1)
         by_hand = min(2 * min((means >= d.mean() - 1e-12).mean(), (means <= d.mean() + 1e-12).mean()), 1.0)
-        assert exact(d, np.zeros(count)).p == pytest.approx(by_hand)
+        assert sign_flip_test(d, np.zeros(count)).p == pytest.approx(by_hand)
 
 
 def test_the_exact_interval_is_what_the_test_does_not_reject() -> None:
-    """A shift just inside has p above 10 %, one just outside not; with few pairs nothing is excluded."""
+    """A shift just inside the interval has p above 10 %, one just outside has not; few pairs exclude nothing."""
     d = np.random.default_rng(5).normal(1, 1, 9)
-    found = exact(d, np.zeros(9))
+    found = sign_flip_test(d, np.zeros(9))
     for inside, outside in ((found.low + 1e-6, found.low - 1e-6), (found.high - 1e-6, found.high + 1e-6)):
-        assert exact(d - inside, np.zeros(9)).p > 0.1 - 1e-9
-        assert exact(d - outside, np.zeros(9)).p < 0.1 + 1e-9
-    few = exact(d[:3], np.zeros(3))
+        assert sign_flip_test(d - inside, np.zeros(9)).p > 0.1 - 1e-9
+        assert sign_flip_test(d - outside, np.zeros(9)).p < 0.1 + 1e-9
+    few = sign_flip_test(d[:3], np.zeros(3))
     assert (few.low, few.high) == (-np.inf, np.inf)
 
 
 def test_the_exact_interval_covers_what_it_says() -> None:
-    """90 % of 400 drawn sets of ten, also for differences that are mostly nothing; more than 16 pairs are sampled."""
+    """The interval covers the mean in 90 % of 400 random sets of ten pairs, with many ties too."""
     rng = np.random.default_rng(6)
     for count, draw in ((10, lambda n: rng.normal(0, 1, n)), (10, lambda n: rng.laplace(0, 1, n)),
                         (20, lambda n: rng.normal(0, 1, n))):  # fmt: skip
         tries = 400 if count == 10 else 40
         hits = 0
         for _ in range(tries):
-            low, high = _typical(draw(count), 0)
+            low, high = _typical_interval(draw(count), 0)
             hits += low <= 0 <= high
         assert hits / tries == pytest.approx(0.9, abs=0.05 if count == 10 else 0.12)
 
 
 def test_ceilings_and_runs_without_spread_are_named() -> None:
-    """Equal to the digit is no evidence of equality where nothing could differ."""
+    """Ceilings, and runs without variance, have a remark."""
     x = np.array([1.0] * 9 + [0.6])
     assert (
         remark(x, x, 1.0)

@@ -20,7 +20,7 @@ from arena.scene.loader import Scene, load_scene
 from arena.trial.record import read_trial
 from arena.world.physics import Poses
 from tests.arena.reference_camera import ReferenceCamera
-from tests.arena.test_emulated import AT_ONCE
+from tests.arena.robots.test_firmware_controller import AT_ONCE
 
 BLINKER = """
         .include "p30F6014A.inc"

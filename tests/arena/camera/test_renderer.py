@@ -1,4 +1,4 @@
-"""The camera's view and the line-of-renderer sensor (epuck.md §7.6; openswarm-original.md §8)."""
+"""The camera's view and the line-of-sight sensor (epuck.md §7.6; openswarm-original.md §8)."""
 
 import math
 from itertools import pairwise

@@ -26,7 +26,7 @@ from emu.dap.wire import Message
 from emu.prompt.client import Client
 from tests.emu.dap.node import mocha, node_modules
 from tests.firmware.conftest import built_once
-from tests.fuzz.fuzz_rewind import SWARMS, Swarm, plan_of, walk
+from tests.fuzz.swarm.fuzz_rewind import SWARMS, Swarm, plan_of, walk
 
 FEW = Swarm("clustering", 1.0, (), (), {"robots__count": 2, "objects__count": 2, "start__selector": 8})
 needs_fork = pytest.mark.skipif(not checkpoints.CAN_COPY, reason="checkpoints exist on Linux only")

@@ -12,7 +12,7 @@ from arena.camera.appearance import COLOURS
 from arena.camera.renderer import WINDOW_ROWS
 from arena.campaign.campaign import SELECTOR
 from arena.cli import main
-from arena.commands.reaction import OK_AT_TCY, SPEED_WORDS, Show, reaction
+from arena.commands.reaction import OK_AT_TCY, SPEED_WORDS, AlternatingPicture, reaction
 from arena.robots.controller import FIRST_FRAME_TCY, LATENCY_TCY, OK_DECODED_TCY, ScriptedController, power_on_cycle
 from arena.robots.firmware_controller import FirmwareController
 from arena.scene.loader import FCY, Scene, load_scene
@@ -206,13 +206,13 @@ def test_the_scenes_light_reaches_the_camera(talking_image: Path, alone: Scene) 
 
 
 def test_reaction_finds_the_latency_and_no_missed_frame(clustering_image: Path) -> None:
-    """experiment-contract.md §4: reaction times equal those of polling the wheel's word, within the polling period of 5 us."""
+    """experiment-contract.md §4: reaction times equal those of polling the wheel, within the polling period of 5 us."""
     found = reaction(clustering_image, SPEED_WORDS["openswarm"], 0, 10, 1)
     assert found["frames_missed"] == 0
     assert found["changes"] in (9, 10)
     assert 50 < found["min_us"] <= found["median_us"] <= found["p99_us"] <= found["max_us"] < 1000
 
-    show = Show(1)
+    show = AlternatingPicture(1)
     machine = emu.load(clustering_image, board=partial(Epuck, camera="PO6030K", selector=0, seed=1))
     machine.board.remote.press("ok", cycle=OK_AT_TCY)
     machine.board.camera.sample(show.pixels)

@@ -17,7 +17,7 @@ from arena.trial.record import Trial, read_trial
 from arena.world.physics import World
 from tests.arena.images import BEGIN, ECHO
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 Assembled = Callable[[str], Path]
 
 

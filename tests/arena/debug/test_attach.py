@@ -17,7 +17,7 @@ from arena.studio.process import Studio
 from arena.studio.session import CommandRefusedError
 from arena.trial.trial import run_trial
 from tests.arena.browser import needs_browser
-from tests.arena.test_studio import browsed, do, scene_of, scripted_plan, serving, settled, studio_of
+from tests.arena.studio.test_studio import browsed, do, scene_of, scripted_plan, serving, settled, studio_of
 from tests.emu.dap.client import Client
 
 SECONDS = 2.0

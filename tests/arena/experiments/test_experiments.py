@@ -20,7 +20,7 @@ from arena.trial.record import read_trial
 from arena.trial.trial import run_trial
 from arena.world.physics import World
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 SCENE = """name = "mine"
 experiment = "mine.py"
 [arena]

@@ -79,7 +79,7 @@ def test_a_trial_says_what_it_was_made_from(tmp_path: Path) -> None:
         (["run", "clustering", "--brain", __file__], "test_campaign.py"),
         (["run", "clustering", *SHORT, "--set", "range=3"], "expected SECTION.KEY=VALUE"),
         (["run", "clustering", *SHORT, "--set", "camera.range_cm=far"], "camera.range_cm is 'far'; expected float"),
-        (["run", "clustering", *SHORT, "--trials", "0"], "must be a whole number, 1 or more"),
+        (["run", "clustering", *SHORT, "--trials", "0"], "expected a whole number of 1 or more"),
         (["compare", "nowhere", "elsewhere"], "no finished trials"),
         (["replay", "nowhere.parquet"], "no such file"),
         (["replay", __file__], "is no recorded trial"),
@@ -226,7 +226,7 @@ def test_one_command_draws_all_figures_of_a_study(tmp_path: Path, capsys: pytest
         "scripted-curves.png",
     }
     assert main(["figures", str(tmp_path / "none"), "--no-film"]) == 2
-    assert "no run's folder" in capsys.readouterr().err
+    assert "no folder of a run" in capsys.readouterr().err
 
 
 def test_figures_show_what_is_there(tmp_path: Path) -> None:
@@ -290,7 +290,7 @@ def test_an_interrupted_run_keeps_finished_trials_and_leaves_no_half_ones(tmp_pa
     command = ["run", "clustering", "--brain", "scripted", "--trials", "8", "--minutes", "1"]
     arguments = [*command, "--jobs", "1", "--out", str(tmp_path / "a")]
     code = f"import sys; from arena.cli import main; sys.exit(main({arguments!r}))"
-    root = Path(__file__).resolve().parents[2]
+    root = Path(__file__).resolve().parents[3]
     with subprocess.Popen([sys.executable, "-c", code], stderr=subprocess.PIPE, cwd=root) as process:
         assert process.stderr is not None
         deadline = time.monotonic() + 60

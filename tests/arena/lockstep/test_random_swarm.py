@@ -1,4 +1,4 @@
-"""A sample of tests/fuzz/fuzz_swarm.py: a swarm of random robots is the same however it is run."""
+"""A sample of tests/fuzz/swarm/fuzz_swarm.py: a swarm of random robots is the same however it is run."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pytest
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 
-from tests.fuzz import fuzz_swarm
-from tests.fuzz.fuzz_swarm import EXPECTED, Trial, check
+from tests.fuzz.swarm import fuzz_swarm
+from tests.fuzz.swarm.fuzz_swarm import EXPECTED, Trial, check
 
 
 def test_swarms_of_random_robots_are_the_same_in_every_way(tmp_path: Path) -> None:

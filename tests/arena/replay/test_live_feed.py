@@ -157,7 +157,7 @@ def test_the_command_serves_until_it_is_interrupted(
     live = LiveFile(live_path(tmp_path, 1), about)
     live.write(rows[0])
     command = [sys.executable, "-m", "arena", "replay", str(tmp_path), "--live", "--port", "0"]
-    root = Path(__file__).resolve().parents[2]
+    root = Path(__file__).resolve().parents[3]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=root) as process:
         assert process.stdout is not None
         assert process.stderr is not None

@@ -19,7 +19,7 @@ import pytest
 from arena.cli import main
 from arena.infrared.channel import OpticalChannel, light_code
 from arena.infrared.propagation import PUBLISHED, Optics, amplitude, beam, brightest, distance_of
-from arena.infrared.ring import Ring, ambient
+from arena.infrared.ring import InfraredRing, ambient
 from arena.robots.firmware_controller import FirmwareController, volts_after
 from arena.scene import dimensions, geometry
 from arena.scene.loader import FCY, Scene, SceneError, load_scene
@@ -30,9 +30,9 @@ from emu.boards.noise import Noise
 from emu.chips.dspic30f6014a import DSPIC30F6014A
 from emu.machine.machine import Machine
 from emu.system.record import Record
-from tests.arena import plain_light
+from tests.arena import reference_light
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 UP = math.pi / 2
 
 LISTENER = """
@@ -398,7 +398,7 @@ def lit_of_frames(scene: Scene, seed: int, share: float) -> list[list[int]]:
     """Of a frame that another robot sends 30 times, 100 ms apart: scans of 0.25 ms in which a sensor sees it. A flash
     for proximity ends 2 ms before; darkness in the frame lasts up to 20 bits, with a one of 0.73 ms between."""
     scene, channel = scene.with_values(infrared__lost_share=share), OpticalChannel.of(scene)
-    ring = Ring(scene, seed, (board := Machine(DSPIC30F6014A, board=Epuck).board), channel, 0, 0)
+    ring = InfraredRing(scene, seed, (board := Machine(DSPIC30F6014A, board=Epuck).board), channel, 0, 0)
     poses = Poses([(100.0, 150.0, UP), (100 + 7.4 + 12.5, 150.0, -UP)], [(300.0, 20.0)])
     scan, frame = FCY // 4096, "111111" + "".join("0" * dark + "1" for dark in (1, 4, 9, 15, 20, 4, 5, 12))
     found = []
@@ -410,7 +410,7 @@ def lit_of_frames(scene: Scene, seed: int, share: float) -> list[list[int]]:
             if bit != before:
                 channel.switch(1, start + 3 * scan * place, 2, bit == "1")
         board.ir.events.now = now = start + channel.delay
-        ring.move(poses)
+        ring.begin_quantum(poses)
         board.ir._level(0, now)
         times = range(now, now + 3 * scan * len(frame), scan)
         seen = [light_code()["light"](addressof(ring._light), 2, cycle + scan // 2) > 10 for cycle in times]
@@ -460,7 +460,7 @@ def test_the_compiled_light_is_the_plain_one_to_the_bit(scene: Scene) -> None:
     scene = scene.with_values(robots__count=4, infrared__lost_share=0.3, infrared__noise_counts=2.0)
     for trial in range(6):
         channel = OpticalChannel.of(scene)
-        ring = Ring(scene, trial, (board := Machine(DSPIC30F6014A, board=Epuck).board), channel, 0, 5000)
+        ring = InfraredRing(scene, trial, (board := Machine(DSPIC30F6014A, board=Epuck).board), channel, 0, 5000)
         poses = Poses([(100 + 12 * i, 150 + 9 * (i % 2), rng.uniform(-3, 3)) for i in range(4)], [(20.0, 20.0)])
         tracks: dict[int, tuple[list[int], list[int]]] = {}
         for robot in (1, 2, 3):
@@ -475,7 +475,7 @@ def test_the_compiled_light_is_the_plain_one_to_the_bit(scene: Scene) -> None:
         last = max(cycles[-1] for cycles, _ in tracks.values())
         channel.slowest = last - 200_000
         board.ir.events.now = now = last - 100_000
-        ring.move(poses)
+        ring.begin_quantum(poses)
         board.ir._level(0, now - 4000)
         seen, light = {one.robot: one for one in Optics(scene).signals(poses, 0, [1, 2, 3])}, light_code()["light"]
         setting = ring._light
@@ -485,9 +485,9 @@ def test_the_compiled_light_is_the_plain_one_to_the_bit(scene: Scene) -> None:
                      for robot, track in tracks.items() if robot in seen and seen[robot].shares[sensor]]  # fmt: skip
             receivers = channel.tau, channel.receivers.settled
             loss = setting.lost_share, setting.lost_seen, setting.lost_period
-            plain = plain_light.light(heard, cycle + 5000, setting.seed, channel.delay, receivers, loss)
+            plain = reference_light.light(heard, cycle + 5000, setting.seed, channel.delay, receivers, loss)
             checked += plain != 0
-            plain += 2.0 * plain_light.gaussian(setting.seed, sensor, cycle + 5000)
+            plain += 2.0 * reference_light.gaussian(setting.seed, sensor, cycle + 5000)
             assert light(addressof(setting), sensor, cycle) == plain, f"trial {trial}"
     assert checked > 200
 
@@ -557,7 +557,7 @@ def test_native_code_converts_as_python_does(scene: Scene, tmp_path: Path, monke
 
 def test_noise_is_gaussian_with_its_tails() -> None:
     """300,000 draws: shares beyond 1, 3 and 4 deviations."""
-    draws = [plain_light.gaussian(7, cycle % 8, cycle) for cycle in range(300_000)]
+    draws = [reference_light.gaussian(7, cycle % 8, cycle) for cycle in range(300_000)]
     assert statistics.fmean(draws) == pytest.approx(0, abs=0.005)
     for limit, share in ((1, 0.31731), (3, 0.0027), (4, 6.3e-5)):
         found = sum(abs(one) > limit for one in draws) / len(draws)

@@ -32,7 +32,7 @@ from arena.trial.trial import run_trial
 from tests.arena.browser import BROWSER, needs_browser
 from tests.arena.images import ECHO
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 SECONDS = 6.0
 
 

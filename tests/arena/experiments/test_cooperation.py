@@ -71,7 +71,7 @@ def test_clocks_are_compared_with_the_arenas_time() -> None:
 
 def trial(tmp_path: Path, scene: str, seconds: float, *words: str) -> Trial:
     """Run a short trial of few robots near each other, none of which is switched off."""
-    text = (Path(__file__).parents[2] / "arena" / "scenes" / f"{scene}.toml").read_text()
+    text = (Path(__file__).parents[3] / "arena" / "scenes" / f"{scene}.toml").read_text()
     lines = [line for line in text.splitlines() if not line.startswith("off =")]
     path = tmp_path / f"{scene}.toml"
     few = re.sub(r"count = (\d)", lambda found: f"count = {int(found[1]) - 2}", "\n".join(lines))

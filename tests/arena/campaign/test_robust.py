@@ -24,7 +24,7 @@ from arena.trial import versions
 from arena.trial.json_numbers import misfit
 from arena.trial.record import RecordError, read_trial
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 SHORT = ["run", "clustering", "--brain", "scripted", "--minutes", "0.05", "--trials", "1", "--jobs", "1"]
 
 
