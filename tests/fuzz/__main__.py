@@ -28,8 +28,7 @@ PATIENCE = 600.0
 
 def campaigns() -> dict[str, Path]:
     """Scripts by name."""
-    scripts = [*sorted(HERE.glob("fuzz_*.py")), HERE / "csmith_campaign.py"]
-    return {script.stem.removeprefix("fuzz_").removesuffix("_campaign"): script for script in scripts}
+    return {script.stem.removeprefix("fuzz_"): script for script in sorted(HERE.glob("*/fuzz_*.py"))}
 
 
 def run(script: Path, seed: int, seconds: float | None, output: IO[bytes] | None = None) -> str:

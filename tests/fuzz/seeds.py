@@ -35,7 +35,7 @@ def base_seed() -> int:
     return int(told.stdout[:7], 16)
 
 
-class Course:
+class Campaign:
     """The seeds of one run of a campaign, from the command line.
 
     Iterate over it; the loop ends when as many seeds are done as the campaign wants or its time is over. With

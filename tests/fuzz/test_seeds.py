@@ -8,7 +8,7 @@ import sys
 import pytest
 
 from tests.fuzz.__main__ import campaigns
-from tests.fuzz.seeds import ROOT, Course, base_seed, parser
+from tests.fuzz.seeds import ROOT, Campaign, base_seed, parser
 
 
 def test_the_first_seed_follows_from_the_commit() -> None:
@@ -17,9 +17,9 @@ def test_the_first_seed_follows_from_the_commit() -> None:
     assert 0 < base_seed() < 1 << 28
 
 
-def course(*words: str) -> Course:
+def course(*words: str) -> Campaign:
     """A course of at most three tries if nothing else is said."""
-    made = Course(parser("text"), "tries", 3, "tries")
+    made = Campaign(parser("text"), "tries", 3, "tries")
     made.parse(list(words))
     return made
 

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from tests.fuzz import verdicts
-from tests.fuzz.seeds import ROOT, Course, parser
+from tests.fuzz.seeds import ROOT, Campaign, parser
 from tests.fuzz.verdicts import Book, LogError, Verdict, run_all
 
 OTHER = """
@@ -30,13 +30,13 @@ SLOW = """
 import sys, time
 from functools import partial
 from pathlib import Path
-from tests.fuzz.seeds import Course, parser
+from tests.fuzz.seeds import Campaign, parser
 from tests.fuzz.verdicts import Book, Verdict, run_all
 def examine(seed):
     Path(sys.argv[1] + ".begun").touch()
     time.sleep(0.5)
     return Verdict(seed, "agreed", "", ("-O0",))
-course = Course(parser("text"), "programs", 1000, "programs")
+course = Campaign(parser("text"), "programs", 1000, "programs")
 course.parse(["--seed", "1"])
 sys.exit(run_all(course, examine, Book(Path(sys.argv[1]), "made up"), 1))
 """
@@ -47,9 +47,9 @@ def judge(differing: set[int], seed: int) -> Verdict:
     return Verdict(seed, "failed", "it differs") if seed in differing else Verdict(seed, "agreed", "", ("-O0", "-Os"))
 
 
-def course(count: int) -> Course:
+def course(count: int) -> Campaign:
     """Seeds from 1 on."""
-    made = Course(parser("text"), "programs", count, "programs")
+    made = Campaign(parser("text"), "programs", count, "programs")
     made.parse(["--seed", "1"])
     return made
 

@@ -24,7 +24,7 @@ from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from tests.fuzz.seeds import ROOT, Course
+from tests.fuzz.seeds import ROOT, Campaign
 
 INTERRUPTED = 130
 """Exit status of a campaign that was ended by SIGINT or SIGTERM, and failed in nothing until then."""
@@ -161,7 +161,7 @@ class Book:
             raise LogError(f"{self.path}: its verdicts are about another compiler or emulator; begin another file")
 
 
-def run_all(course: Course, examine: Callable[[int], Verdict], book: Book, jobs: int) -> int:
+def run_all(course: Campaign, examine: Callable[[int], Verdict], book: Book, jobs: int) -> int:
     """Examine the seeds of `course` in `jobs` processes; the exit status.
 
     It goes on behind failures. After SIGINT or SIGTERM the programs being examined are ended and written down; a second
@@ -223,7 +223,7 @@ def _leave_with(campaign: int) -> None:
     os._exit(1)
 
 
-def _noted(running: set[Future[Verdict]], book: Book, done: dict[int, Verdict], course: Course) -> set[Future[Verdict]]:
+def _noted(running: set[Future[Verdict]], book: Book, done: dict[int, Verdict], course: Campaign) -> set[Future[Verdict]]:
     """Wait for a verdict, write down what there is; what is left."""
     finished, left = wait(running, LOOK_AGAIN, FIRST_COMPLETED)
     for future in finished:

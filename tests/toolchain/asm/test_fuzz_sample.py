@@ -1,9 +1,9 @@
-"""A sample of the mutation campaign of `tests/fuzz/fuzz_asm.py`, which `make campaigns` runs at full length."""
+"""A sample of the mutation campaign of `tests/fuzz/compiler/fuzz_asm.py`, which `make campaigns` runs at full length."""
 
 import importlib.util
 from pathlib import Path
 
-SCRIPT = Path(__file__).resolve().parents[2] / "fuzz" / "fuzz_asm.py"
+SCRIPT = Path(__file__).resolve().parents[2] / "fuzz" / "compiler" / "fuzz_asm.py"
 
 
 def test_mutated_sources_and_objects_give_images_or_clean_errors():

@@ -1,6 +1,6 @@
-"""Steps back against steps forward: `python tests/fuzz/fuzz_reverse.py [--walks N] [--seed N] [--seconds S] [--json]`.
+"""Steps back against steps forward: `python tests/fuzz/emulator/fuzz_reverse.py [--walks N] [--seed N] [--seconds S] [--json]`.
 
-The campaign behind tests/firmware/test_time_travel.py, which samples. A walk runs the clustering firmware or Listing 1
+The campaign behind tests/firmware/debugging/test_time_travel.py, which samples. A walk runs the clustering firmware or Listing 1
 to a random time, with bytes for UART1 now and then, steps forward some hundred times and notes a hash of the whole
 state before every step; then it steps back all the way, and every state must be the one that was there. It tells how
 many of the steps entered an interrupt, saw an I2C register change, ran the camera's code, or began with input.
@@ -20,7 +20,7 @@ from pathlib import Path
 
 import numpy as np
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 sys.path.insert(0, str(ROOT))
 
 import emu  # noqa: E402
@@ -28,7 +28,7 @@ from emu.boards.epuck.board import Epuck  # noqa: E402
 from emu.debug.history import History  # noqa: E402
 from emu.image.loader import load_image  # noqa: E402
 from emu.image.model import Image  # noqa: E402
-from tests.fuzz.seeds import Course, parser  # noqa: E402
+from tests.fuzz.seeds import Campaign, parser  # noqa: E402
 
 APPS = {"clustering": 8, "listing1": 0}
 """Applications and the position of the selector at which they start."""
@@ -114,7 +114,7 @@ def walk(image: Path, selector: int, seed: int, tally: Counter[str]) -> None:
 
 
 def main() -> int:
-    course = Course(parser(__doc__), "walks", 40, "walks")
+    course = Campaign(parser(__doc__), "walks", 40, "walks")
     course.parser.add_argument("--json", action="store_true", help="print the tally as one JSON object")
     options = course.parse()
     tally: Counter[str] = Counter()

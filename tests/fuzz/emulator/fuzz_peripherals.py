@@ -1,7 +1,7 @@
 """Random register accesses, pin changes, resets and naps on the peripherals alone; snapshots must continue identically,
 the converter do what a plain one does, and no two devices contradict each other (who owns a pin, when a timer matches).
 
-`python tests/fuzz/fuzz_peripherals.py [--rounds N] [--seed S] [--seconds T]`; exits 1 at the first failure.
+`python tests/fuzz/emulator/fuzz_peripherals.py [--rounds N] [--seed S] [--seconds T]`; exits 1 at the first failure.
 """
 
 from __future__ import annotations
@@ -11,14 +11,14 @@ import sys
 import traceback
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "emu")]
 
 from peripherals.conftest import Rig  # noqa: E402
 from peripherals.plain_adc import difference  # noqa: E402
 from peripherals.test_fuzz import WORDS, act, contradictions  # noqa: E402
 
-from tests.fuzz.seeds import Course, parser  # noqa: E402
+from tests.fuzz.seeds import Campaign, parser  # noqa: E402
 
 ACTIONS = 8000
 """Accesses per round."""
@@ -52,7 +52,7 @@ def check(seed: int) -> None:
 
 
 def main() -> int:
-    course = Course(parser(__doc__), "rounds", 200, f"rounds of {ACTIONS} accesses")
+    course = Campaign(parser(__doc__), "rounds", 200, f"rounds of {ACTIONS} accesses")
     course.parse()
     for seed in course:
         try:

@@ -6,8 +6,8 @@ odd seeds on a made-up chip) and
 `long` (loops for millions of instructions, block code beside exact code, a share of it also beside the plain
 interpreter). Odd seeds run with ipl_slip 1. With --seconds the targets are out of reach: it ends in time.
 
-    python tests/fuzz/fuzz_jit.py                                           # a few minutes
-    python tests/fuzz/fuzz_jit.py --pairs 1000000 --interrupts 100000 --instructions 1000000000 --wild 2000 \
+    python tests/fuzz/emulator/fuzz_jit.py                                           # a few minutes
+    python tests/fuzz/emulator/fuzz_jit.py --pairs 1000000 --interrupts 100000 --instructions 1000000000 --wild 2000 \
         --state jit.npz                                                     # all of it; may be stopped and run again
 
 Exits 1 at the first difference, naming campaign and seed; 130 after Ctrl-C, with what was done until then.
@@ -28,7 +28,7 @@ import numpy as np
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "emu" / "jit"), str(ROOT / "tests" / "emu" / "chips")]
 
 from long_runs import check_long  # noqa: E402
@@ -86,7 +86,7 @@ class Campaign:
         try:
             found = check(seed)
         except Difference as difference:
-            again = f"python tests/fuzz/fuzz_jit.py --kind {kind} --seed {seed}"
+            again = f"python tests/fuzz/emulator/fuzz_jit.py --kind {kind} --seed {seed}"
             raise Difference(f"{kind} seed {seed}: {difference}\nagain: {again}") from difference
         self.tally.add(found)
         self.seeds[kind] = seed + 1

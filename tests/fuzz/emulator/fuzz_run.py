@@ -1,6 +1,6 @@
 """Damaged and random firmware, executed: a run always ends with a reason, never with an exception of the emulator.
 
-`python tests/fuzz/fuzz_run.py [--images N] [--seed S] [--seconds T]`; exits 1 with the first image that made something
+`python tests/fuzz/emulator/fuzz_run.py [--images N] [--seed S] [--seconds T]`; exits 1 with the first image that made something
 else happen.
 """
 
@@ -14,7 +14,7 @@ from collections import Counter
 from collections.abc import Iterable
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "emu" / "loader"), str(ROOT / "tests" / "emu" / "cli")]
 
 from elf_samples import ElfSample, Part, words  # noqa: E402
@@ -23,7 +23,7 @@ from programs import ECHO, HELLO, SPIN, assembled  # noqa: E402
 from emu.api import Machine  # noqa: E402
 from emu.image.loader import parse_image  # noqa: E402
 from emu.machine.stops import REASONS  # noqa: E402
-from tests.fuzz.seeds import Course, parser  # noqa: E402
+from tests.fuzz.seeds import Campaign, parser  # noqa: E402
 
 CYCLES = 3_000
 CODE_WORDS = 300
@@ -74,7 +74,7 @@ def campaign(seeds: Iterable[int], engines: tuple[str, ...]) -> Counter[str]:
 
 
 def main() -> int:
-    course = Course(parser(__doc__), "images", 5_000, "images to run")
+    course = Campaign(parser(__doc__), "images", 5_000, "images to run")
     course.parse()
     try:
         outcomes = campaign(course, ("plain", "jit"))

@@ -1,6 +1,6 @@
 """Engines against each other: random (instruction, context) pairs and random programs, the whole state compared.
 
-`python tests/fuzz/fuzz_engines.py [--batches N] [--seed S] [--seconds T] [--engine NAME]
+`python tests/fuzz/emulator/fuzz_engines.py [--batches N] [--seed S] [--seconds T] [--engine NAME]
 [--chip NAME]`. A batch takes every row of
 the instruction table through 20 contexts and runs 20 programs. Exits 1 at the first difference.
 """
@@ -10,14 +10,14 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "emu" / "cpu"), str(ROOT / "tests" / "emu" / "chips")]
 
 from engine_fuzz import Difference, check_pairs, check_programs  # noqa: E402
 from made_up import CHIPS  # noqa: E402
 
 from emu.dspic30f.isa.table import ROWS  # noqa: E402
-from tests.fuzz.seeds import Course, parser  # noqa: E402
+from tests.fuzz.seeds import Campaign, parser  # noqa: E402
 
 CONTEXTS = 20
 """Contexts per instruction."""
@@ -26,7 +26,7 @@ PROGRAMS = 20
 
 
 def main() -> int:
-    course = Course(parser(__doc__), "batches", 220, f"batches of {len(ROWS) * CONTEXTS} pairs, {PROGRAMS} programs")
+    course = Campaign(parser(__doc__), "batches", 220, f"batches of {len(ROWS) * CONTEXTS} pairs, {PROGRAMS} programs")
     course.parser.add_argument("--engine", default="jit", help="compared with the plain one (default %(default)s)")
     course.parser.add_argument("--chip", choices=CHIPS, default="dsPIC30F6014A", help="(default %(default)s)")
     options = course.parse()

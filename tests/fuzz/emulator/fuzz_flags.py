@@ -1,6 +1,6 @@
 """Flags: short programs of instructions that write them and instructions that read them, on all engines.
 
-`python tests/fuzz/fuzz_flags.py [--images N] [--seed S] [--seconds T]`. An image is 24 programs, each run from 16
+`python tests/fuzz/emulator/fuzz_flags.py [--images N] [--seed S] [--seconds T]`. An image is 24 programs, each run from 16
 states and cut behind every number of cycles. Exits 1 at the first difference. At the end it tells how many pairs there
 were of an instruction that writes a flag and one that reads it, of all in the table, which some 460 images go through.
 """
@@ -10,16 +10,16 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "emu"), str(ROOT / "tests" / "emu" / "jit")]
 
 from flag_drills import Tally, all_pairs, check  # noqa: E402
 
-from tests.fuzz.seeds import Course, parser  # noqa: E402
+from tests.fuzz.seeds import Campaign, parser  # noqa: E402
 
 
 def main() -> int:
-    course = Course(parser(__doc__), "images", 60, "images of 24 drills, each run 16 times")
+    course = Campaign(parser(__doc__), "images", 60, "images of 24 drills, each run 16 times")
     course.parse()
     tally = Tally()
     for seed in course:

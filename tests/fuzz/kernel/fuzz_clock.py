@@ -1,4 +1,4 @@
-"""An hour of clock events on the emulated robot: `python tests/fuzz/fuzz_clock.py [--hours N] [--seconds T]`.
+"""An hour of clock events on the emulated robot: `python tests/fuzz/kernel/fuzz_clock.py [--hours N] [--seconds T]`.
 
 3,600,000 events of 1 ms must take exactly 53,084,160,000 Tcy (kernel.md §3) while threads never yield, a device sends
 every 100 us and a handler resends for ever. Prints the worst jitter of the clock's interrupt too. With --seconds, as
@@ -11,18 +11,18 @@ import sys
 import tempfile
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 sys.path.insert(0, str(ROOT))
 
-from tests.firmware.test_time_on_target import count_clock  # noqa: E402
-from tests.fuzz.fuzz_kernel import build  # noqa: E402
-from tests.fuzz.seeds import Course, parser  # noqa: E402
+from tests.firmware.kernel.test_time_on_target import count_clock  # noqa: E402
+from tests.fuzz.kernel.fuzz_kernel import build  # noqa: E402
+from tests.fuzz.seeds import Campaign, parser  # noqa: E402
 
 HOUR = 3_600_000
 
 
 def main() -> int:
-    course = Course(parser(__doc__), "hours", 1, "hours of clock events")
+    course = Campaign(parser(__doc__), "hours", 1, "hours of clock events")
     options = course.parse()
     with tempfile.TemporaryDirectory() as folder:
         image = build("slices", Path(folder))

@@ -1,6 +1,6 @@
-"""Every wheel speed for a minute: `python tests/fuzz/fuzz_wheels.py [--speeds N] [--duration D] [--seconds T]`.
+"""Every wheel speed for a minute: `python tests/fuzz/kernel/fuzz_wheels.py [--speeds N] [--duration D] [--seconds T]`.
 
-The campaign behind tests/firmware/test_wheels_on_target.py: -129..129 mm/s on both wheels, unrelated to each other,
+The campaign behind tests/firmware/drivers/test_wheels_on_target.py: -129..129 mm/s on both wheels, unrelated to each other,
 beginning at the one the seed says; the steps of D simulated seconds (default 60) are within 1 of exact.
 """
 
@@ -11,17 +11,17 @@ import sys
 import tempfile
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 sys.path.insert(0, str(ROOT))
 
 from tests.firmware.wheels import FASTEST, measure, partner, start  # noqa: E402
-from tests.fuzz.seeds import Course, parser  # noqa: E402
+from tests.fuzz.seeds import Campaign, parser  # noqa: E402
 
 SPEEDS = 2 * FASTEST + 1
 
 
 def main() -> int:
-    course = Course(parser(__doc__), "speeds", SPEEDS, "speeds")
+    course = Campaign(parser(__doc__), "speeds", SPEEDS, "speeds")
     course.parser.add_argument("--duration", type=float, default=60.0, help="simulated seconds (default %(default)g)")
     options = course.parse()
     worst = 0.0

@@ -1,6 +1,6 @@
 """Random C at every level: nothing runs longer, uses more stack or masks longer than `toolchain.bounds` says.
 
-`python tests/fuzz/fuzz_bounds.py [--programs N] [--seed S] [--seconds T]`; exits 1 with the first program that exceeds
+`python tests/fuzz/compiler/fuzz_bounds.py [--programs N] [--seed S] [--seconds T]`; exits 1 with the first program that exceeds
 a bound. The programs are those of `c_shapes.py`: interrupts, escapes, volatile, large frames, loops of fixed counts;
 every second one has what `c_features.py` has, which often leaves no bound, and every third is one of `c_notes.py`,
 which only its annotations bound. Every sixth is one of `c_interrupts.py`: there the responses of interrupts, and the
@@ -16,14 +16,14 @@ from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 sys.path.insert(0, str(ROOT))
 
 import emu  # noqa: E402
 from emu.system.events import NEVER  # noqa: E402
-from tests.fuzz import c_interrupts, c_notes, c_shapes  # noqa: E402
-from tests.fuzz.fuzz_compiler import NO_ROOM  # noqa: E402
-from tests.fuzz.seeds import Course, parser  # noqa: E402
+from tests.fuzz.compiler.fuzz_compiler import NO_ROOM  # noqa: E402
+from tests.fuzz.programs import c_interrupts, c_notes, c_shapes  # noqa: E402
+from tests.fuzz.seeds import Campaign, parser  # noqa: E402
 from tests.toolchain.bounds.responses import Watched, watched  # noqa: E402
 from tests.toolchain.c_programs import build  # noqa: E402
 from toolchain.bounds.annotations.reader import read_annotation_section  # noqa: E402
@@ -179,7 +179,7 @@ def _worst(seen: Watched) -> dict[str, int]:
 
 def main() -> int:
     """Command line."""
-    course = Course(parser(__doc__), "programs", 300, "programs")
+    course = Campaign(parser(__doc__), "programs", 300, "programs")
     course.parse()
     outcomes: Counter[str] = Counter()
     ratios: list[float] = []

@@ -1,6 +1,6 @@
-"""The kernel under interrupts and without memory: `python tests/fuzz/fuzz_kernel.py [--rounds N] [--stride N]`.
+"""The kernel under interrupts and without memory: `python tests/fuzz/kernel/fuzz_kernel.py [--rounds N] [--stride N]`.
 
-The campaign behind tests/firmware/test_every_instruction.py, which samples: every kernel call is interrupted at every
+The campaign behind tests/firmware/kernel/test_every_instruction.py, which samples: every kernel call is interrupted at every
 instruction boundary by all interrupts together or by them one after the other, without or with IPL slip (kernel.md
 §4): four rounds, in turn by seed. An interrupt itself makes every call of the public headers, those it may not make
 too. With --stride a round tries every N-th boundary, beginning at one that its seed says.
@@ -15,12 +15,12 @@ import sys
 import tempfile
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 sys.path.insert(0, str(ROOT))
 
 from tests.firmware.injection import WAYS, fail_every_allocation, sweep  # noqa: E402
-from tests.firmware.test_on_target import load, place  # noqa: E402
-from tests.fuzz.seeds import Course, parser  # noqa: E402
+from tests.firmware.kernel.test_kernel_on_target import load, place  # noqa: E402
+from tests.fuzz.seeds import Campaign, parser  # noqa: E402
 
 SPARSE = 499
 """Stride of a run that was given a time."""
@@ -52,7 +52,7 @@ def preempt_patterns(path: Path, wanted: int) -> None:
 
 
 def main() -> int:
-    course = Course(parser(__doc__), "rounds", 4, "rounds of calls")
+    course = Campaign(parser(__doc__), "rounds", 4, "rounds of calls")
     add = course.parser.add_argument
     add("--stride", type=int, help=f"every N-th boundary (default 1: 5 minutes a round; {SPARSE} with --seconds)")
     add("--scene", type=int, default=0, help="begin with this scene of target/calls")

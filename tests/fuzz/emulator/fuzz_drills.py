@@ -1,6 +1,6 @@
 """Engines against each other on very short programs, hundreds to an image, that access registers in every way there is.
 
-`python tests/fuzz/fuzz_drills.py [--images N] [--seed S] [--seconds T] [--chip NAME] [--jobs N] [--table]`.
+`python tests/fuzz/emulator/fuzz_drills.py [--images N] [--seed S] [--seconds T] [--chip NAME] [--jobs N] [--table]`.
 Exits 1 at the first difference. Every fourth seed runs on a made-up chip unless --chip names one for all. At the end it
 tells how many combinations of register, read or write, byte or word and way were never made; --table which ones.
 """
@@ -13,7 +13,7 @@ from concurrent.futures import ProcessPoolExecutor
 from itertools import islice
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "emu")]
 
 from peripherals.access_census import WAYS, ways_of  # noqa: E402
@@ -21,7 +21,7 @@ from peripherals.device_drills import registers_of  # noqa: E402
 from peripherals.device_programs import CHIPS  # noqa: E402
 from peripherals.drill_runs import Tally, check  # noqa: E402
 
-from tests.fuzz.seeds import Course, parser  # noqa: E402
+from tests.fuzz.seeds import Campaign, parser  # noqa: E402
 
 
 def one(seed: int, chip: str) -> tuple[str | None, Tally]:
@@ -30,7 +30,7 @@ def one(seed: int, chip: str) -> tuple[str | None, Tally]:
     return check(seed, CHIPS[chip], tally), tally
 
 
-def results(course: Course, chip: str | None, jobs: int) -> Iterator[tuple[str | None, Tally]]:
+def results(course: Campaign, chip: str | None, jobs: int) -> Iterator[tuple[str | None, Tally]]:
     """The seeds of a course, `jobs` at a time, each told of in order."""
     real, made_up = CHIPS
 
@@ -64,7 +64,7 @@ def never(tally: Tally, chip: str) -> dict[tuple[str, int, str], list[str]]:
 
 
 def main() -> int:
-    course = Course(parser(__doc__), "images", 60, "images of 40 drills, each run 30 times")
+    course = Campaign(parser(__doc__), "images", 60, "images of 40 drills, each run 30 times")
     course.parser.add_argument("--chip", choices=CHIPS, help="(default: by seed)")
     course.parser.add_argument("--jobs", type=int, default=1, metavar="N", help="processes (default 1)")
     course.parser.add_argument("--table", action="store_true", help="print what accesses were never made")

@@ -1,6 +1,6 @@
-"""The camera's HREF on every cycle: `python tests/fuzz/fuzz_camera.py [--rounds N] [--stride N] [--seconds T]`.
+"""The camera's HREF on every cycle: `python tests/fuzz/kernel/fuzz_camera.py [--rounds N] [--stride N] [--seconds T]`.
 
-The campaign behind tests/firmware/test_camera_on_target.py, which samples: a round of every kernel and device call with
+The campaign behind tests/firmware/camera/test_camera_on_target.py, which samples: a round of every kernel and device call with
 all interrupts running, without (even seeds) and with IPL slip; every line must be right to the byte. Some 25,000 lines
 each. With --stride a round tries every N-th cycle, beginning at one that its seed says.
 """
@@ -14,18 +14,18 @@ from pathlib import Path
 
 import numpy as np
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 sys.path.insert(0, str(ROOT))
 
 from tests.firmware.sights import start, sweep  # noqa: E402
-from tests.fuzz.seeds import Course, parser  # noqa: E402
+from tests.fuzz.seeds import Campaign, parser  # noqa: E402
 
 SPARSE = 499
 """Stride of a run that was given a time."""
 
 
 def main() -> int:
-    course = Course(parser(__doc__), "rounds", 2, "rounds of calls")
+    course = Campaign(parser(__doc__), "rounds", 2, "rounds of calls")
     course.parser.add_argument("--stride", type=int, help=f"every N-th cycle (default 1; {SPARSE} with --seconds)")
     options = course.parse()
     stride = options.stride or (1 if options.seconds is None else SPARSE)

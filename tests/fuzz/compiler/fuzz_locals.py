@@ -1,4 +1,4 @@
-"""Locals and parameters as a debugger shows them: `python tests/fuzz/fuzz_locals.py [--files N] [--seed N]`.
+"""Locals and parameters as a debugger shows them: `python tests/fuzz/compiler/fuzz_locals.py [--files N] [--seed N]`.
 
 Random functions, ten to a file, with a model of what every variable holds before every line. At -O0 each variable that
 has been set is right wherever a line begins. At -Os lines move, so a shown value counts as right if the variable has it
@@ -15,12 +15,12 @@ from collections import Counter
 from functools import partial
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 sys.path.insert(0, str(ROOT))
 
 import emu  # noqa: E402
 from emu.debug.dwarf.location import Unavailable  # noqa: E402
-from tests.fuzz.seeds import Course, parser  # noqa: E402
+from tests.fuzz.seeds import Campaign, parser  # noqa: E402
 
 FUNCTIONS = 10
 OPERATORS = ("+", "-", "^", "&", "|", "*")
@@ -176,7 +176,7 @@ def tried(seed: int, folder: Path, tally: dict[str, Counter[str]]) -> None:
 
 
 def main() -> int:
-    course = Course(parser(__doc__), "files", 20, "files of ten functions")
+    course = Campaign(parser(__doc__), "files", 20, "files of ten functions")
     course.parse()
     tally: dict[str, Counter[str]] = {"-O0": Counter(), "-Os": Counter()}
     with tempfile.TemporaryDirectory() as folder:

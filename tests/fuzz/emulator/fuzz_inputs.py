@@ -1,6 +1,6 @@
 """Damaged files of every other kind the commands read: each command ends with a status it documents and a sentence.
 
-`python tests/fuzz/fuzz_inputs.py [--inputs N] [--seed S] [--seconds T] [--format NAME]`; exits 1 with the first input
+`python tests/fuzz/emulator/fuzz_inputs.py [--inputs N] [--seed S] [--seconds T] [--format NAME]`; exits 1 with the first input
 that made something else happen. Scenes, stimuli, recorded input, pictures, baselines, counts, records, manifests,
 bundles, annotations, archives, C sources, option files, states of fault campaigns, and messages of the debug
 protocol; ELF, HEX and assembly have `fuzz_loader.py` and `fuzz_asm.py`.
@@ -26,7 +26,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 sys.path[:0] = [str(ROOT)]
 
 import pyarrow  # noqa: E402
@@ -40,8 +40,8 @@ from emu.commands.debug import machine_of  # noqa: E402
 from emu.dap.server import Server  # noqa: E402
 from emu.dap.wire import Wire  # noqa: E402
 from emu.host.exit_status import BAD_INPUT, MEANING  # noqa: E402
-from tests.fuzz.fuzz_loader import mutate  # noqa: E402
-from tests.fuzz.seeds import Course, parser  # noqa: E402
+from tests.fuzz.emulator.fuzz_loader import mutate  # noqa: E402
+from tests.fuzz.seeds import Campaign, parser  # noqa: E402
 
 PROGRAM = """
 #include <p30F6014A.h>
@@ -410,7 +410,7 @@ def campaign(seeds: Iterable[int], only: str | None = None) -> Counter[str]:
 def main() -> int:
     made = parser(__doc__)
     made.add_argument("--format", metavar="NAME", help="this kind of file only")
-    course = Course(made, "inputs", 15_000, "files")
+    course = Campaign(made, "inputs", 15_000, "files")
     options = course.parse()
     resource.setrlimit(resource.RLIMIT_AS, (MOST_MEMORY, resource.getrlimit(resource.RLIMIT_AS)[1]))
     try:

@@ -1,4 +1,4 @@
-"""Random firmware-like C (`c_shapes.py`), proved: `python tests/fuzz/fuzz_prove.py [--files N] [--functions N]`.
+"""Random firmware-like C (`c_shapes.py`), proved: `python tests/fuzz/compiler/fuzz_prove.py [--files N] [--functions N]`.
 
 One file of a program at one level, a few of its functions (`--functions 0`: all). A refutation is a fault of the
 compiler, or of the proof; `toolchain prove` shows its input. No emulator and no test inputs take part, so this sees
@@ -14,11 +14,11 @@ from collections import Counter
 from importlib.util import find_spec
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 sys.path.insert(0, str(ROOT))
 
-from tests.fuzz.c_shapes import Program  # noqa: E402
-from tests.fuzz.seeds import SKIPPED, Course, parser  # noqa: E402
+from tests.fuzz.programs.c_shapes import Program  # noqa: E402
+from tests.fuzz.seeds import SKIPPED, Campaign, parser  # noqa: E402
 
 LEVELS = ("-O0", "-O1", "-Os", "-O2")
 FILES = ("one.c", "two.c", "three.c")
@@ -44,7 +44,7 @@ def examine(seed: int, most: int, counts: Counter[str]) -> None:
 
 
 def main() -> int:
-    course = Course(parser(__doc__), "files", 30, "files")
+    course = Campaign(parser(__doc__), "files", 30, "files")
     course.parser.add_argument("--functions", type=int, default=4, metavar="N", help="of each (default 4; 0: all)")
     options = course.parse()
     if find_spec("z3") is None:

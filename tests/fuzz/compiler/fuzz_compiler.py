@@ -1,7 +1,7 @@
 """Random firmware-like C (`c_shapes.py`) at every level, with and without -fno-lto, on the emulator: one checksum and
 one sequence of accesses to volatile registers, those of the host's model where gcc is installed.
 
-`python tests/fuzz/fuzz_compiler.py [--programs N] [--seed S] [--seconds T] [--jobs J] [--log FILE] [--keep DIR]`;
+`python tests/fuzz/compiler/fuzz_compiler.py [--programs N] [--seed S] [--seconds T] [--jobs J] [--log FILE] [--keep DIR]`;
 exits 1 if a program differs; DIR gets its sources. With FILE a campaign can be interrupted and gone on with, and
 several processes can share it (`verdicts.py`). The compiler verifies its machine code after every pass meanwhile.
 Shapes whose images are equal to the byte are run once.
@@ -19,13 +19,13 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 sys.path.insert(0, str(ROOT))
 
 import emu  # noqa: E402
 from emu.host.exit_status import BAD_INPUT  # noqa: E402
-from tests.fuzz.c_shapes import Program  # noqa: E402
-from tests.fuzz.seeds import Course, parser  # noqa: E402
+from tests.fuzz.programs.c_shapes import Program  # noqa: E402
+from tests.fuzz.seeds import Campaign, parser  # noqa: E402
 from tests.fuzz.verdicts import Book, LogError, Verdict, run_all  # noqa: E402
 from tests.toolchain.c_programs import FrontEndOnce, build  # noqa: E402
 
@@ -141,7 +141,7 @@ def main() -> int:
     options.add_argument("--jobs", type=int, default=2)
     options.add_argument("--log", type=Path, help="file of verdicts, read and continued")
     options.add_argument("--keep", type=Path, help="folder for the sources of failures")
-    course = Course(options, "programs", 200, "programs")
+    course = Campaign(options, "programs", 200, "programs")
     given = course.parse()
     try:
         return run_all(course, partial(examine, keep=given.keep), Book(given.log, "compiler"), given.jobs)

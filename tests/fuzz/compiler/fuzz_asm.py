@@ -1,6 +1,6 @@
 """Mutated sources and objects: assembler and linker give an image or clear errors, nothing else.
 
-`python tests/fuzz/fuzz_asm.py [--inputs N] [--seed S] [--seconds T]`; exits 1 with the first input that made something
+`python tests/fuzz/compiler/fuzz_asm.py [--inputs N] [--seed S] [--seconds T]`; exits 1 with the first input that made something
 else happen.
 """
 
@@ -13,10 +13,10 @@ from collections import Counter
 from collections.abc import Iterable
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 sys.path.insert(0, str(ROOT))
 
-from tests.fuzz.seeds import Course, parser  # noqa: E402
+from tests.fuzz.seeds import Campaign, parser  # noqa: E402
 from toolchain.asm.assemble import assemble  # noqa: E402
 from toolchain.asm.directives.table import DIRECTIVES  # noqa: E402
 from toolchain.asm.state import Options  # noqa: E402
@@ -194,7 +194,7 @@ def campaign(seeds: Iterable[int]) -> Counter[str]:
 
 
 def main() -> int:
-    course = Course(parser(__doc__), "inputs", 20_000, "sources and objects")
+    course = Campaign(parser(__doc__), "inputs", 20_000, "sources and objects")
     course.parse()
     try:
         outcomes = campaign(course)

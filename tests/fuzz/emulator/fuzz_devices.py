@@ -1,6 +1,6 @@
 """Engines against each other on random programs that live on device registers: state, UART bytes, rendered lines.
 
-`python tests/fuzz/fuzz_devices.py [--programs N] [--seed S] [--seconds T] [--engine NAME] [--chip NAME] [--show]`.
+`python tests/fuzz/emulator/fuzz_devices.py [--programs N] [--seed S] [--seconds T] [--engine NAME] [--chip NAME] [--show]`.
 Exits 1 at the first difference. Every fourth seed runs on a made-up chip unless --chip names one for all. What was
 touched how often is printed at the end; --show prints the program of a seed instead.
 """
@@ -11,17 +11,17 @@ import sys
 from collections import Counter
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "emu")]
 
 from peripherals.device_programs import CHIPS, difference, program, words_of  # noqa: E402
 
 from emu.chips.chip import Chip  # noqa: E402
-from tests.fuzz.seeds import Course, parser  # noqa: E402
+from tests.fuzz.seeds import Campaign, parser  # noqa: E402
 
 
 def main() -> int:
-    course = Course(parser(__doc__), "programs", 150, "random programs")
+    course = Campaign(parser(__doc__), "programs", 150, "random programs")
     course.parser.add_argument("--engine", choices=("jit",), help="compared with the plain one")
     course.parser.add_argument("--chip", choices=CHIPS, help="(default: by seed)")
     course.parser.add_argument("--show", action="store_true", help="print the first program and end")

@@ -1,7 +1,7 @@
 """Random C programs: every level, with and without -fno-lto, must give one checksum on the emulator, and avr-gcc with
 simavr the same one.
 
-`python tests/fuzz/csmith_campaign.py [--count N] [--seed S] [--seconds T] [--jobs J] [--log FILE] [--keep DIR]`.
+`python tests/fuzz/compiler/fuzz_csmith.py [--count N] [--seed S] [--seconds T] [--jobs J] [--log FILE] [--keep DIR]`.
 Needs Debian's `csmith`; the AVR, another machine with 16-bit int, joins in when `gcc-avr avr-libc simavr` are there.
 Programs that run too long at -O0 or do not fit into 8 kB of RAM are skipped. With FILE a campaign can be interrupted
 and gone on with, and several processes can share it (`verdicts.py`). Exit status 0 when all checksums agree; DIR keeps
@@ -28,15 +28,15 @@ import tempfile
 from functools import partial
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 sys.path.insert(0, str(ROOT))
 
 from emu.host.exit_status import BAD_INPUT  # noqa: E402
-from tests.fuzz.seeds import SKIPPED, Course, parser  # noqa: E402
+from tests.fuzz.seeds import SKIPPED, Campaign, parser  # noqa: E402
 from tests.fuzz.verdicts import Book, LogError, Verdict, run_all  # noqa: E402
 from tests.toolchain.c_programs import FrontEndOnce, build, run  # noqa: E402
 
-RUNTIME = Path(__file__).parent / "csmith_runtime"
+RUNTIME = Path(__file__).parents[1] / "programs" / "csmith_runtime"
 HEADERS = Path("/usr/include/csmith")
 Shape = tuple[str, str]
 LEVELS = ("-O0", "-O1", "-Os", "-O2")
@@ -183,7 +183,7 @@ def main() -> int:
     options.add_argument("--jobs", type=int, default=2)
     options.add_argument("--log", type=Path, help="file of verdicts, read and continued")
     options.add_argument("--keep", type=Path, help="folder for the sources of failures")
-    course = Course(options, "count", 1000, "programs")
+    course = Campaign(options, "count", 1000, "programs")
     given = course.parse()
     if not available():
         print("csmith is not installed (Debian package csmith): nothing to do", file=sys.stderr)

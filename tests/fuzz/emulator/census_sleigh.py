@@ -1,6 +1,6 @@
 """Compare all 2**24 first words with SLEIGH and print the classes of disagreement, as in docs/census.md.
 
-Run from the repository's top folder: ``python tests/fuzz/census_sleigh.py``. About five minutes on one core.
+Run from the repository's top folder: ``python tests/fuzz/emulator/census_sleigh.py``. About five minutes on one core.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from pathlib import Path
 
 from emu.dspic30f.isa import codec
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "emu" / "isa"))
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "emu" / "isa"))
 
 
 def main() -> int:

@@ -1,6 +1,6 @@
 """Mutated ELF and HEX files: the loader gives a valid image or a clear refusal, nothing else.
 
-`python tests/fuzz/fuzz_loader.py [--inputs N] [--seed S] [--seconds T]`; exits 1 with the first input that made
+`python tests/fuzz/emulator/fuzz_loader.py [--inputs N] [--seed S] [--seconds T]`; exits 1 with the first input that made
 something else happen.
 """
 
@@ -13,7 +13,7 @@ from collections import Counter
 from collections.abc import Iterable
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "emu" / "loader")]
 
 from dwarf_samples import debug_sections  # noqa: E402
@@ -24,7 +24,7 @@ from emu.image.footprint import pieces  # noqa: E402
 from emu.image.loader import parse_image  # noqa: E402
 from emu.image.model import LoadError  # noqa: E402
 from emu.instruments.disassembly import items  # noqa: E402
-from tests.fuzz.seeds import Course, parser  # noqa: E402
+from tests.fuzz.seeds import Campaign, parser  # noqa: E402
 
 INTERESTING = (0, 1, 2, 3, 4, 7, 8, 0x7F, 0x80, 0xFF, 0x100, 0x7FFF, 0x8000, 0xFFFF, 0x17FFE, 0x18000, 0x7FF000)
 WIDE = (*INTERESTING, 0xF80000, 0x7FFFFFFF, 0x80000000, 0xFFFFFFFE, 0xFFFFFFFF)
@@ -104,7 +104,7 @@ def campaign(seeds: Iterable[int]) -> Counter[str]:
 
 
 def main() -> int:
-    course = Course(parser(__doc__), "inputs", 20_000, "files")
+    course = Campaign(parser(__doc__), "inputs", 20_000, "files")
     course.parse()
     try:
         outcomes = campaign(course)

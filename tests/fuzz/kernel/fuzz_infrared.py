@@ -1,4 +1,4 @@
-"""Infra-red messages and shared events under any light: `python tests/fuzz/fuzz_infrared.py [--tries N] [--seconds S]`.
+"""Infra-red messages and shared events under any light: `python tests/fuzz/kernel/fuzz_infrared.py [--tries N] [--seconds S]`.
 
 Each seed is RUNS runs of the test `anything_seen_and_asked_is_survived` (tests/firmware/host/infrared_noise.c) under
 address and undefined-behaviour sanitizers: frames that are whole, damaged, cut or two at once, noise and light of the
@@ -13,10 +13,10 @@ import sys
 import tempfile
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 sys.path.insert(0, str(ROOT))
 
-from tests.fuzz.seeds import SKIPPED, Course, parser  # noqa: E402
+from tests.fuzz.seeds import SKIPPED, Campaign, parser  # noqa: E402
 
 HOST = ROOT / "tests/firmware/host"
 RUNS = 50
@@ -37,7 +37,7 @@ def build(sizes: str, out: Path) -> Path:
 
 
 def main() -> int:
-    course = Course(parser(__doc__), "tries", 30, f"times {RUNS} runs")
+    course = Campaign(parser(__doc__), "tries", 30, f"times {RUNS} runs")
     course.parse()
     if shutil.which("gcc") is None:
         print("skipped: gcc is not installed")

@@ -11,7 +11,7 @@ from __future__ import annotations
 import random
 from dataclasses import dataclass, field
 
-from tests.fuzz import c_features
+from tests.fuzz.programs import c_features
 
 UNSIGNED = ("u8", "u16", "u32")
 SIGNED = ("i8", "i16", "i32")

@@ -1,4 +1,4 @@
-"""Random histories of the heap, a million allocations: `python tests/fuzz/fuzz_heap.py [--histories N] [--seconds S]`.
+"""Random histories of the heap, a million allocations: `python tests/fuzz/kernel/fuzz_heap.py [--histories N] [--seconds S]`.
 
 The emulated robot sends, starts and kills threads, registers and subscribes at random and times each call by a timer of
 its own. Prints the worst Tcy of each kind; fails when Sys_Send_Event or Sys_Start_Process took longer than the contract
@@ -11,18 +11,18 @@ import sys
 import tempfile
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 sys.path.insert(0, str(ROOT))
 
-from tests.firmware.test_heap_on_target import Histories  # noqa: E402
-from tests.fuzz.fuzz_kernel import build  # noqa: E402
-from tests.fuzz.seeds import Course, parser  # noqa: E402
+from tests.firmware.kernel.test_heap_on_target import Histories  # noqa: E402
+from tests.fuzz.kernel.fuzz_kernel import build  # noqa: E402
+from tests.fuzz.seeds import Campaign, parser  # noqa: E402
 
 STEPS = 20_000
 
 
 def main() -> int:
-    course = Course(parser(__doc__), "histories", 80, f"histories of {STEPS:,} steps, about 14,000 measured calls each")
+    course = Campaign(parser(__doc__), "histories", 80, f"histories of {STEPS:,} steps, about 14,000 measured calls each")
     course.parse()
     with tempfile.TemporaryDirectory() as folder:
         histories = Histories(build("heap", Path(folder)))

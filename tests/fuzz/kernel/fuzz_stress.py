@@ -1,4 +1,4 @@
-"""The stress program for a simulated day: `python tests/fuzz/fuzz_stress.py [--runs N] [--seconds S]`.
+"""The stress program for a simulated day: `python tests/fuzz/kernel/fuzz_stress.py [--runs N] [--seconds S]`.
 
 firmware/apps/stress on the emulated robot, in runs of an hour, each with another seed of its random numbers: threads
 started and killed, events registered, sent and waited for. Fails when the firmware stops (it asserts that the heap is
@@ -12,13 +12,13 @@ import sys
 import tempfile
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 sys.path.insert(0, str(ROOT))
 
 import emu  # noqa: E402
-from tests.firmware.test_on_target import FCY, run_to  # noqa: E402
-from tests.fuzz.fuzz_kernel import build  # noqa: E402
-from tests.fuzz.seeds import Course, parser  # noqa: E402
+from tests.firmware.kernel.test_kernel_on_target import FCY, run_to  # noqa: E402
+from tests.fuzz.kernel.fuzz_kernel import build  # noqa: E402
+from tests.fuzz.seeds import Campaign, parser  # noqa: E402
 
 HOUR = 3600
 MINUTE = 60
@@ -53,7 +53,7 @@ def stress(path: Path, seed: int, seconds: int) -> int:
 
 
 def main() -> int:
-    course = Course(parser(__doc__), "runs", 24, "runs of a simulated hour, or of half a minute with --seconds")
+    course = Campaign(parser(__doc__), "runs", 24, "runs of a simulated hour, or of half a minute with --seconds")
     options = course.parse()
     handled = 0
     with tempfile.TemporaryDirectory() as folder:

@@ -1,6 +1,6 @@
-"""Threads killed inside driver calls: `python tests/fuzz/fuzz_kills.py [--rounds N] [--stride N]`.
+"""Threads killed inside driver calls: `python tests/fuzz/kernel/fuzz_kills.py [--rounds N] [--stride N]`.
 
-The campaign behind tests/firmware/test_kills_on_target.py, which samples: in each round one scene of driver calls,
+The campaign behind tests/firmware/kernel/test_kills_on_target.py, which samples: in each round one scene of driver calls,
 without or with IPL slip (kernel.md §4), both in turn by seed, is killed at every boundary of the scene, and the devices
 are used again at once and after a while. With --stride a round tries every N-th boundary, beginning at one that its
 seed says.
@@ -12,19 +12,19 @@ import sys
 import tempfile
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 sys.path.insert(0, str(ROOT))
 
 from tests.firmware.kills import SCENES, Seen, sweep  # noqa: E402
-from tests.fuzz.fuzz_kernel import build  # noqa: E402
-from tests.fuzz.seeds import Course, parser  # noqa: E402
+from tests.fuzz.kernel.fuzz_kernel import build  # noqa: E402
+from tests.fuzz.seeds import Campaign, parser  # noqa: E402
 
 SPARSE = 97
 """Stride of a run that was given a time."""
 
 
 def main() -> int:
-    course = Course(parser(__doc__), "rounds", 2 * len(SCENES), "scenes")
+    course = Campaign(parser(__doc__), "rounds", 2 * len(SCENES), "scenes")
     course.parser.add_argument(
         "--stride", type=int, help=f"every N-th boundary (default 1: an hour; {SPARSE} with --seconds)"
     )

@@ -1,4 +1,4 @@
-"""Swarms of random robots, run in every way there is: `python tests/fuzz/fuzz_swarm.py [--trials N] [--seconds S]`.
+"""Swarms of random robots, run in every way there is: `python tests/fuzz/swarm/fuzz_swarm.py [--trials N] [--seconds S]`.
 
 A trial is a scene of two or three robots with up to two random programs (`tests/arena/random_robots.py`), while
 somebody talks to the robots and moves them about. Quantum after quantum, in lock-step by Python, and in compiled code
@@ -18,7 +18,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 sys.path.insert(0, str(ROOT))
 
 from arena.infrared.channel import OpticalChannel  # noqa: E402
@@ -28,7 +28,7 @@ from arena.scene.loader import Scene, load_scene  # noqa: E402
 from arena.world.physics import World  # noqa: E402
 from emu.dspic30f.jit.engine import JitEngine  # noqa: E402
 from tests.arena.random_robots import program  # noqa: E402
-from tests.fuzz.seeds import Course, parser  # noqa: E402
+from tests.fuzz.seeds import Campaign, parser  # noqa: E402
 
 STEPWISE: Final = "quantum after quantum"
 QUANTA: Final = 150
@@ -180,7 +180,7 @@ def check(trial: Trial, tally: Counter[str]) -> str | None:
 
 
 def main() -> int:
-    course = Course(parser(__doc__), "trials", 30, "trials")
+    course = Campaign(parser(__doc__), "trials", 30, "trials")
     course.parse()
     tally = Counter[str]()
     with tempfile.TemporaryDirectory() as folder:
