@@ -1,10 +1,10 @@
-"""A few programs of the csmith campaign (`tests/fuzz/csmith_campaign.py`); each commit tries new ones there."""
+"""A few programs of the csmith campaign (`tests/fuzz/compiler/fuzz_csmith.py`); each commit tries new ones there."""
 
 from __future__ import annotations
 
 import pytest
 
-from tests.fuzz.csmith_campaign import SHAPES, available, examine
+from tests.fuzz.compiler.fuzz_csmith import SHAPES, available, examine
 
 SEEDS = [seed for seed in range(9000, 9014) if seed not in (9001, 9012)]
 """Without two whose programs run on for more than 15,000,000 cycles at -O0."""

@@ -1,4 +1,4 @@
-"""A sample of the compiler campaign (tests/fuzz/fuzz_compiler.py), and that its programs mean one thing."""
+"""A sample of the compiler campaign (tests/fuzz/compiler/fuzz_compiler.py), and that its programs mean one thing."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.fuzz.c_shapes import Program
-from tests.fuzz.fuzz_compiler import SOURCES, examine
+from tests.fuzz.programs.c_shapes import Program
+from tests.fuzz.compiler.fuzz_compiler import SOURCES, examine
 
 
 @pytest.mark.parametrize("seed", range(1, 3))

@@ -110,12 +110,12 @@ def test_a_chip_whose_memory_does_not_fit_together_is_refused() -> None:
 
 
 def test_a_sample_of_the_instruction_campaign() -> None:
-    """tests/fuzz/fuzz_engines.py --chip."""
+    """tests/fuzz/emulator/fuzz_engines.py --chip."""
     assert check_pairs(7, len(ROWS), 2, "jit", MADE_UP)
     assert check_programs(7, 4, "jit", MADE_UP)
 
 
 @pytest.mark.parametrize("seed", [1, 3, 5])
 def test_a_sample_of_the_native_campaign(seed: int) -> None:
-    """tests/fuzz/fuzz_jit.py."""
+    """tests/fuzz/emulator/fuzz_jit.py."""
     assert check_wild(seed, stops=8, chip=MADE_UP).stops == 8

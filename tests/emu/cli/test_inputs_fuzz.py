@@ -1,4 +1,4 @@
-"""A sample of the fuzz campaign `tests/fuzz/fuzz_inputs.py`, with the inputs that made it fail before."""
+"""A sample of the fuzz campaign `tests/fuzz/emulator/fuzz_inputs.py`, with the inputs that made it fail before."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import pytest
 from arena.trial.record import Columns, RecordError
 from emu.image.loader import load_image
 from emu.instruments.coverage import Counts
-from tests.fuzz.fuzz_inputs import call, campaign, converse
+from tests.fuzz.emulator.fuzz_inputs import call, campaign, converse
 
 HELLO = Path(__file__).with_name("hello.hex")
 
@@ -60,7 +60,7 @@ def test_a_request_for_more_than_there_is_is_refused(command: str, key: str) -> 
     code = (
         "import resource, sys\n"
         "resource.setrlimit(resource.RLIMIT_AS, (4 << 30, 4 << 30))\n"
-        "from tests.fuzz.fuzz_inputs import converse\n"
+        "from tests.fuzz.emulator.fuzz_inputs import converse\n"
         "print(converse(sys.stdin.buffer.read()))"
     )
     ended = subprocess.run([sys.executable, "-c", code], input=asked, capture_output=True, check=False, timeout=60)

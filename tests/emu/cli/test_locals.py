@@ -1,10 +1,10 @@
-"""A sample of tests/fuzz/fuzz_locals.py: locals and parameters of random functions at every line."""
+"""A sample of tests/fuzz/compiler/fuzz_locals.py: locals and parameters of random functions at every line."""
 
 from __future__ import annotations
 
 from collections import Counter
 
-from tests.fuzz.fuzz_locals import tried
+from tests.fuzz.compiler.fuzz_locals import tried
 
 
 def test_locals_and_parameters_are_correct_at_every_line(tmp_path):

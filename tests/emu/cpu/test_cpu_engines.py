@@ -1,4 +1,4 @@
-"""Engines agree on random code; `make campaigns` runs the long version (tests/fuzz/fuzz_engines.py)."""
+"""Engines agree on random code; `make campaigns` runs the long version (tests/fuzz/emulator/fuzz_engines.py)."""
 
 from __future__ import annotations
 

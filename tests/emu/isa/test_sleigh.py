@@ -27,7 +27,7 @@ def explained() -> set[str]:
 
 
 def test_random_words_disagree_only_as_the_page_explains() -> None:
-    """All 2**24 words were compared once (tests/fuzz/census_sleigh.py); this is a sample."""
+    """All 2**24 words were compared once (tests/fuzz/emulator/census_sleigh.py); this is a sample."""
     generator = random.Random(30)
     known = explained()
     for word in (generator.getrandbits(24) for _ in range(RANDOM_WORDS)):

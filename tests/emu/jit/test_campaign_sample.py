@@ -1,4 +1,4 @@
-"""A sample of tests/fuzz/fuzz_jit.py: straight, wild and long programs; its counts and comparisons are true."""
+"""A sample of tests/fuzz/emulator/fuzz_jit.py: straight, wild and long programs; its counts and comparisons are true."""
 
 from __future__ import annotations
 

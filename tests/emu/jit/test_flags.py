@@ -1,4 +1,4 @@
-"""Flags in native code: a sample of tests/fuzz/fuzz_flags.py, and writes to SR by instructions that set flags."""
+"""Flags in native code: a sample of tests/fuzz/emulator/fuzz_flags.py, and writes to SR by instructions that set flags."""
 
 from __future__ import annotations
 

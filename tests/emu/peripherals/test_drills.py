@@ -1,4 +1,4 @@
-"""A sample of tests/fuzz/fuzz_drills.py: engines agree, every kind of access is made, differences show."""
+"""A sample of tests/fuzz/emulator/fuzz_drills.py: engines agree, every kind of access is made, differences show."""
 
 from __future__ import annotations
 

@@ -450,5 +450,5 @@ def test_i2c_polled_write_takes_the_bus_time(engine):
 @pytest.mark.parametrize(("seed", "chip"), [*((seed, "dsPIC30F6014A") for seed in range(6)), (100, "dsPIC30F0000")])
 @pytest.mark.parametrize("other", ENGINES[1:])
 def test_engines_agree_on_programs_that_live_on_device_registers(seed, chip, other):
-    """engines.md §4: same seed, same bytes, same cycle in every engine; `tests/fuzz/fuzz_devices.py` runs more."""
+    """engines.md §4: same seed, same bytes, same cycle in every engine; `tests/fuzz/emulator/fuzz_devices.py` runs more."""
     assert difference(seed, other, chip=CHIPS[chip]) is None

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from emu.image.loader import load_image
-from tests.fuzz.fuzz_bounds import examine, measure
+from tests.fuzz.compiler.fuzz_bounds import examine, measure
 from tests.toolchain.c_programs import build
 from toolchain.bounds.annotations.reader import read_annotation_section
 from toolchain.bounds.program import Program
@@ -137,7 +137,7 @@ def test_counted_loops_recursion_and_division_are_bounded_closely(tmp_path, caps
 
 @pytest.mark.parametrize("seed", [2])
 def test_random_programs_stay_within_their_bounds(tmp_path: Path, seed: int) -> None:
-    """A sample of tests/fuzz/fuzz_bounds.py."""
+    """A sample of tests/fuzz/compiler/fuzz_bounds.py."""
     outcome, pairs = examine(seed, tmp_path)
     assert outcome == "bounded"
     seen, bound = pairs["_main"]

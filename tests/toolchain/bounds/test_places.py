@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.fuzz.fuzz_bounds import examine, measure
+from tests.fuzz.compiler.fuzz_bounds import examine, measure
 from tests.toolchain.bounds.test_bounds import built, report
 from tests.toolchain.c_programs import build
 from toolchain.cli import main
@@ -193,6 +193,6 @@ def test_a_loop_that_is_followed_no_further_is_told_so(tmp_path: Path, capsys) -
 
 @pytest.mark.parametrize("seed", [4, 7, 10])
 def test_programs_with_true_notes_of_every_kind_stay_within_their_bounds(tmp_path: Path, seed: int) -> None:
-    """A sample of the third of tests/fuzz/fuzz_bounds.py that tests/fuzz/c_notes.py makes."""
+    """A sample of the third of tests/fuzz/compiler/fuzz_bounds.py that tests/fuzz/programs/c_notes.py makes."""
     outcome, _ = examine(seed, tmp_path)
     assert outcome == "bounded"

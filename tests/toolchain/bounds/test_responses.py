@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.fuzz import c_interrupts
-from tests.fuzz.fuzz_bounds import ENOUGH, INTERRUPTED, Held
+from tests.fuzz.programs import c_interrupts
+from tests.fuzz.compiler.fuzz_bounds import ENOUGH, INTERRUPTED, Held
 from tests.toolchain.bounds.responses import Watched, watched
 from tests.toolchain.c_programs import build
 from toolchain.bounds.annotations.reader import read_annotation_section
@@ -174,7 +174,7 @@ def test_main_counts_whatever_is_asked_for(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("seed", [3, 15])
 def test_random_programs_answer_within_their_bounds(tmp_path: Path, seed: int) -> None:
-    """A sample of the sixth of tests/fuzz/fuzz_bounds.py that tests/fuzz/c_interrupts.py makes."""
+    """A sample of the sixth of tests/fuzz/compiler/fuzz_bounds.py that tests/fuzz/programs/c_interrupts.py makes."""
     held = Held(Counter())
     assert held.examine(seed, tmp_path) == "responses"
     assert held.nested > 1

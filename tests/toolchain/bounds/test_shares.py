@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.fuzz.fuzz_bounds import measure
+from tests.fuzz.compiler.fuzz_bounds import measure
 from tests.toolchain.bounds.test_bounds import built, report
 
 SHARED = """
