@@ -57,8 +57,8 @@ def test_the_same_runs_give_the_same_file(study: Path, packed: Path, tmp_path: P
 def test_a_bundle_is_computed_again_to_the_byte(packed: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """`verify` reproduces all trials, with firmware and scripted."""
     assert main(["verify", str(packed), "--trials", "9", "--strict"]) == 0
-    said = capsys.readouterr().out.splitlines()
-    assert said[:3] == [
+    output = capsys.readouterr().out.splitlines()
+    assert output[:3] == [
         f"{name}: equal to the byte" for name in ("script, trial 1", "script, trial 2", "talk, trial 1")
     ]
     assert main(["verify", str(packed), "--number", "2", "--json"]) == 0
@@ -172,13 +172,13 @@ def test_only_runs_can_be_packed(study: Path, tmp_path: Path, capsys: pytest.Cap
     assert main(["verify", str(tmp_path / "none.zip")]) == 2
 
 
-@pytest.mark.parametrize(("change", "said"), [
+@pytest.mark.parametrize(("change", "message"), [
     ({"seconds": "6"}, "seconds is '6'; expected float"), ({"seconds": -1.0}, "seconds: invalid value -1.0"),
     ({"seed": "x"}, "seed is 'x'; expected int"), ({"controller": "Z"}, "controller: invalid value 'Z'"),
     ({"controller": ["A"]}, "manifest.json: "), ({"brain": None}, "brain is None; expected str"),
 ])  # fmt: skip
 def test_a_manifest_that_is_no_plan_is_refused(
-    change: dict[str, object], said: str, packed: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    change: dict[str, object], message: str, packed: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """A manifest with invalid values is refused with one line and status 2, although all hashes match."""
     with zipfile.ZipFile(packed) as archive:
@@ -187,9 +187,9 @@ def test_a_manifest_that_is_no_plan_is_refused(
     changed = listed(packed, {"script/manifest.json": json.dumps(manifest).encode()})
     path = rewritten(packed, tmp_path / "x.zip", changed)
     assert main(["verify", str(path)]) == 2
-    told = capsys.readouterr().err
-    assert said in told
-    assert told.count("\n") == 1
+    error = capsys.readouterr().err
+    assert message in error
+    assert error.count("\n") == 1
 
 
 DEEP = b"[" * 100_000 + b"]" * 100_000

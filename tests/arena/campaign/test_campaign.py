@@ -298,9 +298,9 @@ def test_an_interrupted_run_keeps_finished_trials_and_leaves_no_half_ones(tmp_pa
             assert time.monotonic() < deadline
             time.sleep(0.01)
         process.send_signal(signal.SIGINT)
-        said = process.stderr.read().decode()
+        output = process.stderr.read().decode()
     assert process.returncode == 130
-    assert "finished trials are kept" in said
+    assert "finished trials are kept" in output
     assert 1 <= len(contents(tmp_path / "a")) < 8
     stamp = (tmp_path / "a" / "trial-0001.parquet").stat().st_mtime_ns
     for name in "ab":

@@ -1,4 +1,4 @@
-"""What goes wrong around a run: numbers that are none, killed processes, two runs in one folder, versions that mix."""
+"""Robustness of runs: invalid numbers, killed processes, two runs in one folder, mixed versions."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ SHORT = ["run", "clustering", "--brain", "scripted", "--minutes", "0.05", "--tri
 
 
 def started(*arguments: object) -> subprocess.Popen[str]:
-    """`arena` in a process of its own."""
+    """Start `arena` in another process."""
     command = [sys.executable, "-m", "arena", *map(str, arguments)]
     return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=ROOT)
 
@@ -37,7 +37,7 @@ def started(*arguments: object) -> subprocess.Popen[str]:
 def wait_for(path: Path, seconds: float = 60) -> None:
     end = time.monotonic() + seconds
     while not path.exists():
-        assert time.monotonic() < end, f"{path} never came"
+        assert time.monotonic() < end, f"{path} did not appear"
         time.sleep(0.02)
 
 
@@ -50,15 +50,15 @@ def wait_for(path: Path, seconds: float = 60) -> None:
     ],
 )  # fmt: skip
 def test_numbers_that_are_none(words: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Each is named, with status 2, and no folder is begun."""
+    """An invalid number is named with status 2, and no folder is created."""
     assert main([*SHORT, *words, "--out", str(tmp_path / "out")]) == 2
-    said = capsys.readouterr().err
-    assert f"argument {words[0]}: {words[1]!r} must be" in said
+    output = capsys.readouterr().err
+    assert f"argument {words[0]}: {words[1]!r}: expected" in output
     assert not (tmp_path / "out").exists()
 
 
 def test_an_arena_without_robots_and_things_is_a_trial_like_any_other(tmp_path: Path) -> None:
-    """Run, drawn, told and shown."""
+    """A trial of an empty arena can be run, drawn and exported as a video."""
     path, out = tmp_path / "empty.toml", tmp_path / "out"
     path.write_text('name = "empty"\n[robots]\ncount = 0\n[objects]\ncount = 0\n')
     assert main(["run", str(path), "--brain", "scripted", "--trials", "1", "--minutes", "0.02", "--out", str(out)]) == 0
@@ -67,7 +67,7 @@ def test_an_arena_without_robots_and_things_is_a_trial_like_any_other(tmp_path: 
 
 
 def test_json_knows_no_nan(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """A metric that is no number is null, in results and in the page."""
+    """A metric that is nan is null in JSON results and in the page."""
     experiment = """from arena.experiments import Curve
 CURVES = [Curve("share", "share")]
 def metrics(sample): return {"share": float("nan")}
@@ -81,8 +81,8 @@ def metrics(sample): return {"share": float("nan")}
     def refuse(name: str) -> None:
         raise AssertionError(name)
 
-    told = json.loads(capsys.readouterr().out, parse_constant=refuse)
-    assert told["trials"][0]["share"] is None
+    results = json.loads(capsys.readouterr().out, parse_constant=refuse)
+    assert results["trials"][0]["share"] is None
     text = page(read_trial(out / "trial-0001.parquet"))
     data = text.split('id="trial">')[1].split("</script>")[0]
     assert set(json.loads(data, parse_constant=refuse)["curves"]["share"]) == {None}
@@ -92,7 +92,7 @@ def metrics(sample): return {"share": float("nan")}
 def test_a_scene_cannot_choose_a_folder_by_its_name(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The default folder is made of the scene's name."""
+    """The name of a scene, which is part of the default folder, cannot contain a path."""
     inner = tmp_path / "a" / "b"
     inner.mkdir(parents=True)
     monkeypatch.chdir(inner)
@@ -103,7 +103,7 @@ def test_a_scene_cannot_choose_a_folder_by_its_name(
 
 
 def test_a_sweep_cannot_choose_a_folder_by_its_values(tmp_path: Path) -> None:
-    """Values become parts of folder names without anything that means something there."""
+    """Values become parts of folder names without characters that are special to a file system."""
     command = ["sweep", "clustering", *SHORT[2:], "--vary", "camera.sensor=PO6030K,../../../evil"]
     assert main([*command, "--out", str(tmp_path / "deep" / "deeper")]) == 0
     made = [path.parent for path in tmp_path.rglob("manifest.json")]
@@ -112,17 +112,17 @@ def test_a_sweep_cannot_choose_a_folder_by_its_values(tmp_path: Path) -> None:
 
 
 def test_two_runs_do_not_share_a_folder(tmp_path: Path) -> None:
-    """The second is told so with status 3 and changes nothing; the first ends as if it had been alone."""
+    """The second run ends with status 3 and changes nothing; the first run is unaffected."""
     long = ["run", "clustering", "--brain", "scripted", "--minutes", "2", "--trials", "3", "--jobs", "1"]
     first = started(*long, "--out", tmp_path)
     wait_for(tmp_path / "manifest.json")
-    first.send_signal(signal.SIGSTOP)  # or it is through before the second has begun
+    first.send_signal(signal.SIGSTOP)  # so that it is still running when the second one starts
     second = started(*SHORT, "--seed", 99, "--out", tmp_path)
-    said = second.communicate(timeout=120)[1]
+    output = second.communicate(timeout=120)[1]
     first.send_signal(signal.SIGCONT)
     assert second.returncode == 3
-    assert said.count("\n") == 1
-    assert "another run is writing here" in said
+    assert output.count("\n") == 1
+    assert "another run is writing here" in output
     assert first.wait(120) == 0
     manifest = json.loads((tmp_path / "manifest.json").read_text())
     assert manifest["key"]["seed"] == 1
@@ -130,20 +130,20 @@ def test_two_runs_do_not_share_a_folder(tmp_path: Path) -> None:
 
 
 def test_a_killed_run_leaves_the_folder_free(tmp_path: Path) -> None:
-    """The lock goes with the process."""
+    """The lock is released with its process."""
     long = ["run", "clustering", "--brain", "scripted", "--minutes", "60", "--trials", "1", "--jobs", "1"]
     first = started(*long, "--out", tmp_path / "run")
     wait_for(tmp_path / "run" / "manifest.json")
     first.kill()
     first.wait()
     again = [*long[:5], "0.02", *long[6:], "--out", str(tmp_path / "run")]
-    assert main(again) == 2  # another duration is another run; but nobody holds the folder
+    assert main(again) == 2  # refused for another duration, not because of a lock
     (tmp_path / "run" / "manifest.json").unlink()
     assert main(again) == 0
 
 
 def test_a_file_where_the_folder_should_be(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """One line, status 2."""
+    """A file in place of the folder is one line and status 2."""
     (tmp_path / "out").write_text("mine")
     assert main([*SHORT, "--out", str(tmp_path / "out")]) == 2
     assert "is not a folder" in capsys.readouterr().err
@@ -163,7 +163,7 @@ time.sleep(600)
 
 
 def test_a_page_that_follows_a_killed_run_says_that_it_is_gone(tmp_path: Path) -> None:
-    """SIGKILL leaves the file of the running trial behind; the page must not wait for ever."""
+    """SIGKILL leaves the live file; the reader reports that the trial was aborted."""
     path = live_path(tmp_path, 1)
     with subprocess.Popen([sys.executable, "-c", WRITER, str(path)], stdout=subprocess.PIPE, cwd=ROOT) as writer:
         assert writer.stdout is not None
@@ -179,25 +179,25 @@ def test_a_page_that_follows_a_killed_run_says_that_it_is_gone(tmp_path: Path) -
 
 
 def test_a_trial_that_ends_takes_its_lock_away(tmp_path: Path) -> None:
-    """Nothing is left in the folder."""
+    """A finished trial leaves neither live file nor lock."""
     live = LiveFile(live_path(tmp_path, 1), {})
     live.close()
     assert list(tmp_path.iterdir()) == []
 
 
 def test_progress_without_a_terminal_is_plain_lines(tmp_path: Path) -> None:
-    """As in a log file of a batch system."""
+    """Without a terminal, progress is plain lines."""
     run = started(*SHORT[:-4], "--trials", 3, "--jobs", 1, "--out", tmp_path)
-    out, said = run.communicate(timeout=120)
+    out, output = run.communicate(timeout=120)
     assert run.returncode == 0
-    lines = said.splitlines()
+    lines = output.splitlines()
     assert [line.split(" done in ")[0] for line in lines] == ["trial 1", "trial 2", "trial 3"]
     assert lines[-1].endswith("3 of 3 (100% of all)")
     assert "done in" not in out
 
 
 def test_a_record_names_what_it_depends_on(tmp_path: Path) -> None:
-    """Emulator, arena and libraries, in the file itself; where it was made only in the manifest."""
+    """A record names the versions of emulator, arena and libraries; the manifest also names the host."""
     assert main([*SHORT, "--out", str(tmp_path)]) == 0
     about = read_trial(tmp_path / "trial-0001.parquet").about
     assert set(about["versions"]) == {"emulator", "arena", "machine", "pymunk", "numpy", "pyarrow", "llvmlite"}
@@ -212,7 +212,7 @@ def test_a_record_names_what_it_depends_on(tmp_path: Path) -> None:
 def test_versions_do_not_mix_in_a_folder(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Going on with another emulator would make one result of two experiments."""
+    """A run with another version of the emulator cannot continue in the same folder."""
     assert main([*SHORT, "--out", str(tmp_path)]) == 0
     changed = versions.versions() | {name: "another"}
     monkeypatch.setattr(campaign, "versions", lambda: changed)
@@ -221,7 +221,7 @@ def test_versions_do_not_mix_in_a_folder(
 
 
 def test_the_hash_of_sources_sees_code_and_not_where_it_lies(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """One byte of code is another version; a page's looks are not."""
+    """The version hash depends on every byte of code, and not on the page."""
 
     def hashed(root: Path) -> str:
         monkeypatch.setattr(versions, "ROOT", root)
@@ -243,14 +243,14 @@ def test_the_hash_of_sources_sees_code_and_not_where_it_lies(tmp_path: Path, mon
 
 
 def test_a_worker_of_another_version_is_refused() -> None:
-    """It says which, instead of sending a record that differs."""
+    """A worker of another version is refused, and the message names the versions."""
     plan = Plan(scripted(load_scene("clustering")), "scripted", "A", None, 1, 1.0, 1)
     with pytest.raises(ValueError, match=r"worker on .* has pymunk .* instead of 0\.1"):
         cluster.run_remote_trial(plan, cluster.Files(None, None, []), 1, versions.versions() | {"pymunk": "0.1"})
 
 
 def test_a_scheduler_that_dies_is_one_line_and_what_is_finished_stays(tmp_path: Path) -> None:
-    """Status 3; the same command without the cluster goes on."""
+    """A lost scheduler is status 3; the same command without the cluster continues."""
     pytest.importorskip("distributed", reason="Dask is not installed (extra: cluster)")
     port = 18786
     dask = [sys.executable, "-m", "distributed.cli.dask_scheduler", "--port", str(port), "--no-dashboard"]
@@ -270,10 +270,10 @@ def test_a_scheduler_that_dies_is_one_line_and_what_is_finished_stays(tmp_path: 
         assert run is not None
         wait_for(tmp_path / "trial-0001.parquet", 120)
         scheduler.kill()
-        said = run.communicate(timeout=120)[1]
-        assert run.returncode == 3, said
-        lines = [line for line in said.splitlines() if not line.startswith("trial ")]
-        assert len(lines) == 1, said
+        output = run.communicate(timeout=120)[1]
+        assert run.returncode == 3, output
+        lines = [line for line in output.splitlines() if not line.startswith("trial ")]
+        assert len(lines) == 1, output
         assert "lost while trials ran" in lines[0]
         assert read_trial(tmp_path / "trial-0001.parquet").about["seed"] == 1
     finally:
@@ -297,7 +297,7 @@ def test_a_scheduler_that_dies_is_one_line_and_what_is_finished_stays(tmp_path: 
     ],
 )
 def test_the_first_thing_that_is_wrong_with_a_json_text(value: object, wrong: str) -> None:
-    """Of a record's metadata, a manifest."""
+    """The first wrong value in the metadata of a record is named."""
     assert misfit(value, {"seed": int, "faults": [(int, float, str)], "note?": str}) == wrong
 
 
@@ -314,7 +314,7 @@ def test_the_first_thing_that_is_wrong_with_a_json_text(value: object, wrong: st
 )
 def test_a_record_with_a_damaged_column_is_refused(column: str, values: list[object], message: str,
                                                    tmp_path: Path) -> None:  # fmt: skip
-    """With the file and the column."""
+    """A damaged column is reported with file and column."""
     assert main([*SHORT, "--robots", "1", "--objects", "0", "--out", str(tmp_path)]) == 0
     path = tmp_path / "trial-0001.parquet"
     table = parquet.read_table(path).slice(0, 2)

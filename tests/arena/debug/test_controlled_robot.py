@@ -31,9 +31,9 @@ def move(client: Client, request: str, **arguments: object) -> str:
 
 def world(client: Client) -> str:
     """Return the state of all robots and objects, with a hash of the whole state."""
-    told = str(client.ask("evaluate", expression="/world", context="repl")["result"])
-    assert told.splitlines()[-1].startswith("state: ")
-    return told
+    output = str(client.ask("evaluate", expression="/world", context="repl")["result"])
+    assert output.splitlines()[-1].startswith("state: ")
+    return output
 
 
 @pytest.mark.parametrize(
@@ -158,10 +158,10 @@ def test_the_prompt_executes_a_script(
     out = ("--out", str(tmp_path / "debugged"))
     session = ("break react", "continue", "next 2", "reverse-stepi", "info locals", "threads", "detach")
     assert play(*session, more=out) == 0
-    told = capsys.readouterr().out
-    assert "react at " in told
-    assert "thread 0 (main): " in told
-    assert "None" not in told
+    output = capsys.readouterr().out
+    assert "react at " in output
+    assert "thread 0 (main): " in output
+    assert "None" not in output
     assert main(["run", "clustering", *trial, "--trials", "1", "--jobs", "1", "--out", str(tmp_path / "alone")]) == 0
     records = [(tmp_path / name / "trial-0001.parquet").read_bytes() for name in ("debugged", "alone")]
     assert records[0] == records[1]
@@ -182,10 +182,10 @@ def test_a_rewind_from_a_fault_and_from_the_end(
     monkeypatch.setattr("sys.stdin", io.StringIO("\n".join(lines)))
     words = ["--set", "robots.count=2", "--set", "objects.count=1", "--minutes", "0.005", "--brain", str(image)]
     assert main(["debug", "clustering", "--robot", "1", "--tui", *words]) == 0
-    told = capsys.readouterr().out
-    assert told.count("firmware fault: address error trap") == 2
-    assert "the trial is over" in told
-    worlds = [part.partition("state: ")[2][:64] for part in told.split("world: t = ")[1:]]
+    output = capsys.readouterr().out
+    assert output.count("firmware fault: address error trap") == 2
+    assert "the trial is over" in output
+    worlds = [part.partition("state: ")[2][:64] for part in output.split("world: t = ")[1:]]
     assert len(worlds) == 3
     assert len(set(worlds)) == 1
 

@@ -108,8 +108,8 @@ def test_an_editor_client_moves_the_whole_world(
     launcher.write_text(
         f"import sys\nfrom arena.cli import main\nif __name__ == '__main__':\n    sys.exit(main({words}))\n"
     )
-    told = mocha(modules, Path(__file__).with_name("rewinding.js"), EMU_LAUNCHER=str(launcher))
-    assert "1 passing" in told
+    output = mocha(modules, Path(__file__).with_name("rewinding.js"), EMU_LAUNCHER=str(launcher))
+    assert "1 passing" in output
     assert main(["run", *trial, "--trials", "1", "--jobs", "1", "--out", str(tmp_path / "alone")]) == 0
     assert trial_path(debugged, 1).read_bytes() == trial_path(tmp_path / "alone", 1).read_bytes()
 

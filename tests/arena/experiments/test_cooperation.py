@@ -27,7 +27,7 @@ def samples(scene: str, seconds: list[float], lines: list[UartLine]) -> TrialSam
     return TrialSamples(np.array(seconds), places, places[:, :0, :2], load_scene(scene), {}, lines)
 
 
-def test_what_robots_said_last_is_known_at_every_sample() -> None:
+def test_the_last_value_is_known_at_every_sample() -> None:
     """A value holds from the next sample on; other words, and lines without a number, are ignored."""
     lines = [
         UartLine(1, 0.2, "clock 7"),

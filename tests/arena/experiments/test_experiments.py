@@ -171,7 +171,7 @@ def test_a_supervisor_moves_things_notes_numbers_and_ends_the_trial(tmp_path: Pa
         (METRIC + "\ndef step(stage): raise SystemExit(5)\n", "step: SystemExit: 5"),
     ],
 )
-def test_what_is_wrong_with_an_experiment_is_said_in_one_line(
+def test_a_wrong_experiment_is_reported_in_one_line(
     metric: str, words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """A wrong experiment is status 2 and a message of one line."""
@@ -213,7 +213,7 @@ class Listener:
     def __init__(self) -> None:
         self.heard: list[bytes] = []
 
-    def tell(self, data: bytes) -> None:
+    def feed_uart(self, data: bytes) -> None:
         self.heard.append(data)
 
 
