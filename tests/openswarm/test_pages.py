@@ -14,7 +14,7 @@ from arena.scene.loader import load_scene
 from emu.host import exit_status as status
 
 ROOT = Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(ROOT / "docs"))
+sys.path.insert(0, str(ROOT / "docs" / "tools"))
 import exit_status  # noqa: E402
 
 PAGES = sorted(

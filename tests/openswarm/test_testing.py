@@ -16,8 +16,8 @@ import yaml
 from tests.vcd_reader import VCDVCD
 
 ROOT = Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(ROOT / "docs"))
-import newcomer  # noqa: E402
+sys.path.insert(0, str(ROOT / "docs" / "tools"))
+import first_steps  # noqa: E402
 
 FAULTY = """
 #include <p30F6014A.h>
@@ -122,7 +122,7 @@ def test_the_action_s_steps_as_they_are_from_the_wheel(tmp_path):
     """In an environment with nothing but the wheel: a new project passes; with a mistake in its C source, the summary
     names thread and line, and there is a waveform."""
     action = yaml.safe_load((ROOT / "action.yml").read_text())
-    environment = newcomer.installed(newcomer.built_wheel(tmp_path), tmp_path / "venv")
+    environment = first_steps.installed(newcomer.built_wheel(tmp_path), tmp_path / "venv")
     subprocess.run(["openswarm", "new", "robot"], cwd=tmp_path, env=environment, check=True, capture_output=True)
     source = tmp_path / "robot" / "src" / "main.c"
 

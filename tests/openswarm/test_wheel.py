@@ -12,8 +12,8 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(ROOT / "docs"))
-import newcomer  # noqa: E402
+sys.path.insert(0, str(ROOT / "docs" / "tools"))
+import first_steps  # noqa: E402
 
 pytestmark = [
     pytest.mark.skipif(shutil.which("git") is None, reason="no git here (Debian package git)"),
@@ -26,7 +26,7 @@ def test_the_wheel_holds_everything_and_repeats(tmp_path):
     wheels = []
     for name in ("one", "another"):
         (tmp_path / name).mkdir()
-        wheels.append(newcomer.built_wheel(tmp_path / name))
+        wheels.append(first_steps.built_wheel(tmp_path / name))
     first, second = (hashlib.sha256(wheel.read_bytes()).hexdigest() for wheel in wheels)
     assert first == second
     with zipfile.ZipFile(wheels[0]) as wheel:
@@ -55,6 +55,6 @@ def test_the_wheel_holds_everything_and_repeats(tmp_path):
 
 def test_the_first_steps_say_what_happens(tmp_path):
     """docs/first-steps.md, played from the wheel in an empty folder with an empty HOME; nothing lands beside them."""
-    words = [sys.executable, str(ROOT / "docs" / "newcomer.py"), "--check", "--keep", str(tmp_path / "newcomer")]
+    words = [sys.executable, str(ROOT / "docs" / "tools" / "first_steps.py"), "--check", "--keep", str(tmp_path / "first-steps")]
     done = subprocess.run(words, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stdout) == (0, ""), done.stderr
