@@ -2,9 +2,8 @@
 
 Inputs: a stopped machine and its checkpoints (`emu.machine.stops.RunCheckpoints`). Output: the `Stop` with a
 `FaultReport`, or the unchanged stop if the firmware simply ended. A handled trap is no fault, unless the firmware never
-returns from
-its handler. A kernel that stops the system is one. An unhandled exception is recognised by a debugger word at the
-vector's target: the linkers of XC16 and of this project put one there (abi-elf.md §3.3).
+returns from its handler. A kernel that stops the system is one. An unhandled exception is recognised by a debugger word
+at the vector's target: the linkers of XC16 and of this project put one there (abi-elf.md §3.3).
 
 The fault is often much earlier than the stop. The diagnosis therefore replays the run in a sandbox
 (`emu.debug.replay`) up to the faulty instruction, and reads variables and call stack there.
