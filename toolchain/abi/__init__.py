@@ -1,1 +1,1 @@
-"""ABI facts: registers, argument placement, assembler names, interrupt names, struct alignment."""
+"""ABI facts: registers, locations of arguments, assembler names, interrupt names, struct alignment."""

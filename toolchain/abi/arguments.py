@@ -1,4 +1,4 @@
-"""Argument placement, abi-elf.md §2.2. Pure arithmetic on sizes; used by callers and by function entry."""
+"""Locations of arguments in registers and on the stack (abi-elf.md §2.2), computed from their sizes."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from toolchain.ir.model import Type, align_of, size_of
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
-    """Where one argument travels: first register, or bytes below the entry W15 of its low end (`stack` > 0)."""
+class ArgumentLocation:
+    """Location of an argument: first register, or distance of its low end below W15 at entry (`stack` > 0)."""
 
     register: int | None
     words: int
@@ -18,48 +18,49 @@ class Place:
 
 
 @dataclass(frozen=True, slots=True)
-class Shape:
-    """What placement needs to know of an argument."""
+class ArgumentShape:
+    """Size and alignment of an argument."""
 
     words: int
     aligned: bool  # takes a register run aligned to its size (rules 2 and 3)
 
 
-def scalar_shape(t: Type) -> Shape:
+def scalar_shape(t: Type) -> ArgumentShape:
     """Shape of an integer, pointer or floating value (legal type)."""
     words = max(1, (t.bits + 15) // 16)
-    return Shape(words, words in (1, 2, 4))
+    return ArgumentShape(words, words in (1, 2, 4))
 
 
-def struct_shape(t: Type, align: int = 0, loose: bool = False) -> Shape:
-    """Shape of a struct or union passed by value (rule 3). `align` is C's (0: that of the type); `loose` says that it
-    holds an aggregate of 3, 5, 6 or 7 bytes (`record_shapes`)."""
+def struct_shape(t: Type, align: int = 0, unaligned: bool = False) -> ArgumentShape:
+    """Shape of a struct or union passed by value (rule 3).
+
+    `align` is its alignment in C (0: that of the type); `unaligned` is the fact that `struct_alignment` marks."""
     size = size_of(t)
-    return Shape((size + 1) // 2, (align or align_of(t)) >= 2 and size in (2, 4, 8) and not loose)
+    return ArgumentShape((size + 1) // 2, (align or align_of(t)) >= 2 and size in (2, 4, 8) and not unaligned)
 
 
-def place_arguments(shapes: list[Shape], named: int | None = None) -> list[Place]:
-    """Rules 1-5: lowest fitting run of W0..W7, back-fill allowed; the rest on the stack in order.
+def argument_locations(shapes: list[ArgumentShape], named: int | None = None) -> list[ArgumentLocation]:
+    """Locations of all arguments by rules 1-5: the lowest fitting run of W0..W7, with back-fill, else the stack.
 
-    `named` is the number of named arguments of a variadic function, a hidden result pointer included: the last of them
-    and what follows is on the stack."""
+    `named` is the number of named arguments of a variadic function, including a hidden result pointer. The last named
+    argument and all behind it are on the stack."""
     free = [True] * ARGUMENT_REGISTERS
     stack = RETURN_ADDRESS_BYTES
-    places = []
+    locations = []
     for k, shape in enumerate(shapes):
         if named is not None and k == named - 1:
             free = [False] * ARGUMENT_REGISTERS
         n = shape.words
         if n == 0:
-            places.append(Place(None, 0))
+            locations.append(ArgumentLocation(None, 0))
             continue
         step = n if shape.aligned else 1
         for first in range(0, ARGUMENT_REGISTERS - n + 1, step):
             if all(free[first : first + n]):
                 free[first : first + n] = [False] * n
-                places.append(Place(first, n))
+                locations.append(ArgumentLocation(first, n))
                 break
         else:
             stack += 2 * n
-            places.append(Place(None, n, stack))
-    return places
+            locations.append(ArgumentLocation(None, n, stack))
+    return locations

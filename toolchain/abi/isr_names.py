@@ -1,6 +1,6 @@
-"""Refuses misuse of interrupt handler names: the linker binds them to vectors by name alone (abi-elf.md §2.7).
+"""Names of interrupt handlers. The linker binds handlers to vectors by name alone (abi-elf.md §2.7).
 
-Enters: IR text. A function with a vector's name must be an interrupt function, and an interrupt function must bear one.
+`check` refuses functions with a vector's name that are not interrupt functions, and interrupt functions without one.
 """
 
 from __future__ import annotations
@@ -14,15 +14,15 @@ from toolchain.errors import ToolError
 VECTOR_FUNCTIONS = frozenset(
     ["_DefaultInterrupt", *(prefix + vector.name for vector in SLOTS for prefix in ("_", "_Alt"))]
 )
-"""C names that the linker puts into the vector tables."""
+"""C names of handlers that the linker enters into the vector tables."""
 
 IRQ_PREFIX = {"irq": "", "altirq": "Alt"}
-"""What `interrupt(irq(N))` says -> prefix of the handler's name."""
-FIRST_INTERRUPT = 8  # vectors before are traps (abi-elf.md §2.7)
+"""Keyword of `interrupt(irq(N))` -> prefix of the handler's name."""
+FIRST_INTERRUPT = 8  # lower vector numbers are traps (abi-elf.md §2.7)
 
 
 def irq_name(number: int) -> str:
-    """Name of the vector of an interrupt number. Raises IndexError for one that the chip has no vector for."""
+    """Name of the vector of an interrupt number. Raises IndexError if the chip has no such vector."""
     if number < 0:
         raise IndexError(number)
     return SLOTS[number + FIRST_INTERRUPT].name
@@ -35,8 +35,8 @@ _STRING = re.compile(r'^(@[\w$.]+) = [^\n]*c"interrupt\\00"', re.MULTILINE)
 _NUMBERED = re.compile(r'^(@[\w$.]+) = [^\n]*c"(irq|altirq):([^"]*)\\00"', re.MULTILINE)
 
 
-def check(ir_text: str, place: Callable[[str], str]) -> None:
-    """Raise `ToolError` listing every handler whose name and kind disagree; `place` gives "file:line" of metadata."""
+def check(ir_text: str, locate: Callable[[str], str]) -> None:
+    """Raise ToolError that lists every handler whose name and kind disagree; `locate` gives "file:line" of metadata."""
     marks = set(_STRING.findall(ir_text))
     annotations = _ANNOTATIONS.search(ir_text)
     pairs = _ANNOTATED.findall(annotations[0]) if annotations else []
@@ -47,7 +47,7 @@ def check(ir_text: str, place: Callable[[str], str]) -> None:
     defined = set(defined_at)
 
     def error(name: str) -> str:
-        return f"{place(defined_at[name])}: error" if defined_at.get(name) else "error"
+        return f"{locate(defined_at[name])}: error" if defined_at.get(name) else "error"
 
     findings = [
         f"{error(name)}: function '{name}' has the name of an interrupt vector but is not an interrupt function "
@@ -55,7 +55,7 @@ def check(ir_text: str, place: Callable[[str], str]) -> None:
         for name in sorted((defined & VECTOR_FUNCTIONS) - handlers)
     ]
     findings += [
-        f"{error(name)}: interrupt function '{name}' does not have a vector's name, so nothing would call it "
+        f"{error(name)}: interrupt function '{name}' does not have a vector's name, so it is never called "
         f"(names look like {_nearest(name)})"
         for name in sorted((defined & handlers) - VECTOR_FUNCTIONS - set(numbered))
     ]
@@ -77,6 +77,7 @@ def _is_irq(text: str) -> bool:
 
 
 def _nearest(name: str) -> str:
+    """The vector function with the most similar name."""
     import difflib
 
     close = difflib.get_close_matches(name, sorted(VECTOR_FUNCTIONS), 1)

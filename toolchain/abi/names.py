@@ -6,7 +6,7 @@ from toolchain.ir.model import Module
 
 
 def symbol(module: Module, name: str) -> str:
-    """x -> _x; names given by asm("...") verbatim; private globals become local labels."""
+    """Assembler name of a global: x -> _x, names given by asm("...") unchanged, private globals as local labels."""
     if name.startswith("\x01"):
         return name[1:]
     var = module.globals.get(name)
@@ -16,5 +16,5 @@ def symbol(module: Module, name: str) -> str:
 
 
 def block_label(function: str, block: str) -> str:
-    """Assembler label of a block whose address is taken."""
+    """Assembler label of a basic block whose address is taken."""
     return f".LA.{function}.{block}"

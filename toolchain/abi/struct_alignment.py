@@ -1,9 +1,9 @@
-"""Which structs and unions travel in unaligned register runs although their size is 2, 4 or 8 (abi-elf.md §2.2 rule 3).
+"""Structs and unions of 2, 4 or 8 bytes that are passed in unaligned register runs (abi-elf.md §2.2 rule 3).
 
-A record that holds, at any depth, an array, struct or union of 3, 5, 6 or 7 bytes is placed like one of odd size. IR
-types do not tell: unions keep one member, bit-fields become arrays. The front end's record layouts do
-(`-fdump-record-layouts`, on its standard output); from there the fact goes to the `byval` parameters as an attribute.
-An array whose elements are of a typedef'd array type is taken for scalars.
+A record with an array, struct or union of 3, 5, 6 or 7 bytes at any depth is passed like one of odd size. IR types do
+not contain this fact: a union has one member there, and bit-fields are arrays. The record layouts of the front end
+(`-fdump-record-layouts`, on its standard output) do. `mark` adds it to `byval` parameters as an attribute.
+Limitation: an array with elements of a typedef'd array type is treated as an array of scalars.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import re
 from toolchain.ir.lex import UNALIGNED_RUN
 
 LAYOUT_FLAGS = ["-Xclang", "-fdump-record-layouts"]
-ODD = {3, 5, 6, 7}
+ODD_SIZES = {3, 5, 6, 7}
 
 SIZE = re.compile(r"\[sizeof=(\d+),")
 HEAD = re.compile(r"^\s*0 \| (.+)$", re.MULTILINE)
@@ -21,19 +21,19 @@ RECORD = re.compile(r"^Record: \w+ \S+ (?:prev \S+ )?<([^,>]+)")
 FIELD = re.compile(r"^[|`]-FieldDecl .*?'([^']*)'(?::'([^']*)')?[^']*$", re.MULTILINE)
 LLVM_TYPE = re.compile(r"LLVMType:%(\S+) = type")
 TAGGED = re.compile(r"\b(?:struct|union) (\w+) definition$", re.MULTILINE)
-PLACE = re.compile(r"\((?:unnamed|anonymous)[^)]* at ([^)]*)\)")
+POSITION = re.compile(r"\((?:unnamed|anonymous)[^)]* at ([^)]*)\)")
 ARRAY = re.compile(r"^(.*[^)*])((?:\[\d+\])+)$")
 BYVAL = re.compile(rb"byval\(%([\w.$-]+)\)")
 
 
 def mark(ir: bytes, dump: str) -> bytes:
-    """IR text in which `byval` of every such record is followed by UNALIGNED_RUN; `dump` is what clang printed."""
+    """IR text with UNALIGNED_RUN after `byval` of every such record; `dump` are the record layouts."""
     loose = unaligned_types(dump) if b"byval(" in ir else set()
     return BYVAL.sub(lambda m: m[0] + b" " + UNALIGNED_RUN.encode() if m[1].decode() in loose else m[0], ir)
 
 
 def unaligned_types(dump: str) -> set[str]:
-    """Names of LLVM types, such as `struct.s`, whose records hold an odd-sized aggregate."""
+    """Names of LLVM types, such as `struct.s`, whose records contain an odd-sized aggregate."""
     sizes: dict[str, int] = {}
     fields: dict[str, list[str]] = {}
     names: dict[str, str] = {}
@@ -52,18 +52,19 @@ def unaligned_types(dump: str) -> set[str]:
         for key in {tag[1] if tag is not None else llvm[1].partition(".")[2], where[1]}:
             fields[key] = types
             names[llvm[1]] = key
-    return {llvm for llvm, key in names.items() if _holds_odd(key, sizes, fields)}
+    return {llvm for llvm, key in names.items() if _contains_odd(key, sizes, fields)}
 
 
 def _key(type_name: str) -> str:
-    """One name for a record however clang words it: its tag or typedef, or where it stands when it has neither."""
-    place = PLACE.search(type_name)
-    if place is not None:
-        return place[1]
+    """Unique name of a record in clang's spellings: tag, typedef or source position."""
+    position = POSITION.search(type_name)
+    if position is not None:
+        return position[1]
     return re.sub(r"\b(const|volatile|struct|union|class)\b|\(empty\)", "", type_name).strip()
 
 
-def _holds_odd(key: str, sizes: dict[str, int], fields: dict[str, list[str]]) -> bool:
+def _contains_odd(key: str, sizes: dict[str, int], fields: dict[str, list[str]]) -> bool:
+    """Whether a record contains an odd-sized aggregate at any depth."""
     for text in fields.get(key, []):
         array = ARRAY.match(text)
         element = text
@@ -71,11 +72,11 @@ def _holds_odd(key: str, sizes: dict[str, int], fields: dict[str, list[str]]) ->
             element, count = array[1], 1
             for dimension in re.findall(r"\d+", array[2]):
                 count *= int(dimension)
-            if count in ODD:  # of bytes or, three of them, of words: 8 bytes hold nothing else
+            if count in ODD_SIZES:  # bytes, or three words: larger elements do not fit in 8 bytes
                 return True
             if not count:
                 continue
         inner = _key(element)
-        if inner in sizes and (sizes[inner] in ODD or _holds_odd(inner, sizes, fields)):
+        if inner in sizes and (sizes[inner] in ODD_SIZES or _contains_odd(inner, sizes, fields)):
             return True
     return False

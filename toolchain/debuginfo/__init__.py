@@ -1,1 +1,1 @@
-"""DWARF output: scopes, variables, locations, types and call frames."""
+"""DWARF debug information: scopes, variables, locations, types, line table and call frames."""

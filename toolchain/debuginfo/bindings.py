@@ -1,7 +1,7 @@
-"""Which debug record holds for each source variable at each instruction: forward data flow over a function's records.
+"""The debug record that is valid for each source variable at each instruction, by forward data flow.
 
-Needs: IR as read. Ensures: the `line` of every instruction that has one is a `Position`, which passes hand on as they
-hand on lines. Where two ways into a block disagree, nothing is known of the variable.
+Needs: IR as read. Ensures: the `line` of every instruction with one is a `BoundLine`, which passes copy like any other
+line. If two paths into a block disagree, the variable has no record there.
 """
 
 from __future__ import annotations
@@ -10,36 +10,36 @@ from toolchain.debuginfo.metadata import DebugInfo
 from toolchain.ir.cfg import predecessors
 from toolchain.ir.model import Arg, Block, ConstInt, DbgRecord, Function, Instr, Type, size_of
 
-Known = dict[str, int]
-"""Variable (with the place it was inlined at) -> index of its record."""
+ValidRecords = dict[str, int]
+"""Variable (`name_of`) -> index of its record."""
 
-MOST_ROUNDS = 50  # of the data flow; a function that needs more has no locations
+MAX_ROUNDS = 50  # of the data flow; a function that needs more gets no locations
 
 
-class Position(str):
-    """A !dbg reference that knows the records holding where it stands."""
+class BoundLine(str):
+    """A !dbg reference with the debug records that are valid at its instruction."""
 
     records: tuple[int, ...] = ()
 
 
 def bind(f: Function, info: DebugInfo) -> None:
-    """Give every line of `f` its records. Assignments become values, or memory where that holds the value."""
+    """Bind the lines of `f` to records. Assignment records become values, or memory if that contains the value."""
     for k, home in in_memory(f, info).items():
         f.dbg_records[k].kind, f.dbg_records[k].value = "memory", home
     for record in f.dbg_records:
-        if record.kind == "dbg_declare" and isinstance(record.value, Arg):  # a struct, perhaps in registers
+        if record.kind == "dbg_declare" and isinstance(record.value, Arg):  # a struct, possibly in registers
             record.kind = "parameter"
         if record.kind == "dbg_assign":
             record.kind = "dbg_value"
-            if isinstance(record.address, Instr):  # on its way to memory, which others may change from then on
+            if isinstance(record.address, Instr):  # stored to memory that other code may change
                 record.value = None
         record.variable = name_of(record, info)
     if not any(record.kind != "dbg_declare" for record in f.dbg_records):
         return
-    records = _Records(f)
+    records = _RecordFlow(f)
     preds = predecessors(f)
-    after: dict[str, Known] = {}
-    for _ in range(MOST_ROUNDS):
+    after: dict[str, ValidRecords] = {}
+    for _ in range(MAX_ROUNDS):
         changed = False
         for b in f.blocks:
             known = _meet([after[p] for p in preds[b.name] if p in after]) if b is not f.blocks[0] else {}
@@ -56,8 +56,8 @@ def bind(f: Function, info: DebugInfo) -> None:
         records.mark(b, _meet([after[p] for p in preds[b.name]]) if b is not f.blocks[0] else {})
 
 
-class _Records:
-    """The records of a function by block, and what each does to what is known."""
+class _RecordFlow:
+    """Records of a function by block, and the effect of each on the valid records."""
 
     def __init__(self, f: Function) -> None:
         self.records = f.dbg_records
@@ -68,10 +68,10 @@ class _Records:
         self.sunk = self._sunk()
 
     def _sunk(self) -> dict[int, set[int]]:
-        """Record -> those that it continues, of values that the middle end has moved down.
+        """Record of a value that the middle end has moved down -> the records that it replaces.
 
-        It takes the record along, also past a later assignment to the same variable, and leaves one in the old place
-        that computes the value from its operands. Only where that one still holds does the moved one hold.
+        The middle end moves the record with the value, even past a later assignment to the variable, and leaves a
+        record that computes the value from its operands. The moved record is valid only where that record is.
         """
         by_variable: dict[str, list[int]] = {}
         for k, record in enumerate(self.records):
@@ -87,19 +87,19 @@ class _Records:
                     found[k] = origins
         return found
 
-    def apply(self, k: int, known: Known) -> None:
-        """What is known behind record `k`."""
+    def apply(self, k: int, known: ValidRecords) -> None:
+        """Change the valid records to those behind record `k`."""
         name = self.records[k].variable
         if k in self.sunk and known.get(name) not in {k, *self.sunk[k]}:
             known.pop(name, None)
         else:
             known[name] = k
 
-    def mark(self, b: Block, known: Known) -> None:
-        """Give the lines of a block their records."""
+    def mark(self, b: Block, known: ValidRecords) -> None:
+        """Bind the lines of a block to their records."""
         at = 0
         mine = self.of.get(b.name, [])
-        made: dict[tuple[str, tuple[int, ...]], Position] = {}
+        made: dict[tuple[str, tuple[int, ...]], BoundLine] = {}
         for n, i in enumerate(b.instrs):
             while at < len(mine) and self.records[mine[at]].index <= n:
                 self.apply(mine[at], known)
@@ -107,29 +107,30 @@ class _Records:
             if i.line is not None:
                 key = (str(i.line), tuple(sorted(known.values())))
                 if key not in made:
-                    made[key] = Position(i.line)
+                    made[key] = BoundLine(i.line)
                     made[key].records = key[1]
                 i.line = made[key]
 
 
 def name_of(record: DbgRecord, info: DebugInfo) -> str:
-    """Reference of the variable, and behind it that of the call where its function was inlined."""
+    """Reference of the variable, followed by that of the call at which its function was inlined."""
     call = info.node(record.location).get("inlinedAt", "") if record.location else ""
     return f"{record.variable}{call}"
 
 
-def _meet(ways: list[Known]) -> Known:
-    if not ways:
+def _meet(incoming: list[ValidRecords]) -> ValidRecords:
+    """Records that are valid on all incoming paths."""
+    if not incoming:
         return {}
-    first = ways[0]
-    return {name: k for name, k in first.items() if all(way.get(name) == k for way in ways[1:])}
+    first = incoming[0]
+    return {name: k for name, k in first.items() if all(other.get(name) == k for other in incoming[1:])}
 
 
 def in_memory(f: Function, info: DebugInfo) -> dict[int, Instr]:
-    """Indices of assignments behind which the variable lies whole in memory -> its alloca.
+    """Index of every assignment record behind which the whole variable is in memory -> its alloca.
 
-    The store that the record is linked to stands before it, or the object has not been written yet. A variable of which
-    some part has gone into registers lies nowhere whole.
+    The store linked to the record precedes it, or the object has not been written yet. Variables with a part in
+    registers are excluded.
     """
     found: dict[int, Instr] = {}
     split: set[str] = set()
@@ -145,21 +146,21 @@ def in_memory(f: Function, info: DebugInfo) -> dict[int, Instr]:
         )
         home = root(record.address) if isinstance(record.address, Instr) else None
         plain = not record.expression or "LLVM_fragment" in record.expression
-        if done and plain and home is not None and home.op == "alloca" and _holds(home, record, info):
+        if done and plain and home is not None and home.op == "alloca" and _is_whole(home, record, info):
             found[k] = home
         elif record.expression:
             split.add(name_of(record, info))
     return {k: home for k, home in found.items() if name_of(f.dbg_records[k], info) not in split}
 
 
-def _holds(home: Instr, record: DbgRecord, info: DebugInfo) -> bool:
-    """Whether the object is as large as the variable: a part of one that was taken apart is not."""
+def _is_whole(home: Instr, record: DbgRecord, info: DebugInfo) -> bool:
+    """Whether an object has the size of the variable, so that it is not a part of a split one."""
     t = home.extra.get("type")
     return isinstance(t, Type) and 8 * size_of(t) == info.bits(info.node(record.variable).get("type", ""))
 
 
 def constants(f: Function) -> dict[str, bytes]:
-    """Variables (`name_of`) that are one number wherever they are anything."""
+    """Variables (`name_of`) with the same constant value in all their records."""
     found: dict[str, set[bytes | None]] = {}
     for record in f.dbg_records:
         v = record.value
@@ -169,12 +170,12 @@ def constants(f: Function) -> dict[str, bytes]:
 
 
 def bytes_of(v: ConstInt) -> bytes:
-    """The number as memory holds it."""
+    """Bytes of a constant in memory."""
     return v.value.to_bytes((v.type.bits + 7) // 8, "little")
 
 
 def root(address: Instr) -> Instr:
-    """The object an address lies in, as far as it is computed from one."""
+    """The instruction that an address is computed from by getelementptr."""
     while address.op == "getelementptr" and isinstance(address.args[0], Instr):
         address = address.args[0]
     return address

@@ -1,7 +1,8 @@
-"""Call frame information of one function: where its caller's registers are, at each instruction (DWARF 2 §6.4).
+"""Call frame information: locations of the caller's registers at each instruction of a function (DWARF 2 §6.4).
 
-The canonical frame address is W15 as the caller had it before the call: W15-4 at entry, as the stack grows upwards
-(abi-elf.md §6.7). It is followed through the finished code: pushes and pops, LNK and ULNK, arguments, inline assembly.
+The canonical frame address (CFA) is the caller's W15 before the call, which is W15-4 at entry because the stack grows
+upwards (abi-elf.md §6.7). `follow` tracks it through the finished code: pushes and pops, LNK and ULNK, arguments,
+inline assembly.
 """
 
 from __future__ import annotations
@@ -17,65 +18,65 @@ from toolchain.verify.stack import stack_change
 RETURN_BYTES = 4
 RCOUNT, RETURN_ADDRESS = 16, 37  # DWARF register numbers beside W0-W15 (abi-elf.md §6.7)
 DATA_ALIGN = 2
-SCRATCH = range(8)  # W0-W7, which a function need not hand back (abi-elf.md §2.1)
+SCRATCH = range(8)  # W0-W7, which a function need not preserve (abi-elf.md §2.1)
 SHADOWED = range(4)  # PUSH.S
 ADVANCE_LOC4, UNDEFINED, DEF_CFA, DEF_CFA_REGISTER = "0x04", "0x07", "0x0c", "0x0d"  # DWARF 2 §7.23
 DEF_CFA_EXPRESSION, DEF_CFA_OFFSET_SF, VAL_EXPRESSION = "0x0f", "0x13", "0x16"  # DWARF 3 §7.23
 OFFSET, RESTORE = 0x80, 0xC0
 OP_DEREF, OP_CONST4U, OP_DUP, OP_AND, OP_PLUS = "0x06", "0x0c", "0x12", "0x1a", "0x22"
 OP_BREG_SP, OP_BREG_RCOUNT = str(0x70 + SP), str(0x70 + RCOUNT)
-STACKED_PC = ("0xfe", "0xff", "0x7f", "0")  # the rest of the upper word is SRL and IPL3 (isa.md §14.2)
+STACKED_PC = ("0xfe", "0xff", "0x7f", "0")  # mask; the other bits of the upper word are SRL and IPL3 (isa.md §14.2)
 CIE_ID = "0xffffffff"
 NAMED = re.compile(r"(push|pop)(?:\.d)?\s+w(\d+)$")
 ASM_STACK = re.compile(r"(?:(push|pop)|mov)(\.d)? (?:([^,\[]+)|([^,\[]+),\[w15\+\+\]|\[--w15\],([^,]+))")
 
 
 @dataclass(frozen=True, slots=True)
-class State:
-    """What holds in front of an instruction. All numbers are bytes above the canonical frame address."""
+class FrameState:
+    """State of the frame in front of an instruction. All numbers are bytes above the CFA."""
 
     depth: int = RETURN_BYTES
-    """W15; where it moves by unknown amounts, as it was in front of that."""
+    """Offset of W15; before a change by an unknown amount, if there is one."""
     frame: int | None = None
-    """W14, when LNK has made it the frame pointer."""
+    """Offset of W14 between LNK and ULNK."""
     repeats: int = 0
-    """In front of a push under REPEAT #n: n. RCOUNT says how many are still to come."""
+    """n in front of a push under REPEAT #n; RCOUNT is the number of remaining repetitions."""
     saved: tuple[tuple[int, int | None], ...] = ()
-    """Register -> where the caller's value is; None: nowhere."""
+    """Register -> offset of the caller's value; None if it is not in memory."""
 
-    def with_saved(self, changes: dict[int, int | None]) -> State:
-        """More registers on the stack. The first place of a register is the one that counts."""
+    def with_saved(self, changes: dict[int, int | None]) -> FrameState:
+        """The state with more registers saved; an earlier location of a register has precedence."""
         return replace(self, saved=tuple(sorted((changes | dict(self.saved)).items())))
 
-    def without(self, gone: set[int]) -> State:
-        """Registers that hold the caller's values again."""
+    def without(self, gone: set[int]) -> FrameState:
+        """The state in which the registers `gone` contain the caller's values again."""
         return replace(self, saved=tuple(one for one in self.saved if one[0] not in gone))
 
 
 @dataclass
 class CallFrames:
-    """States of a function, and the labels where they change while its text is written."""
+    """Frame states of a function, and the labels at which they change, collected while its text is written."""
 
     prefix: str
     interrupt: bool
-    states: dict[int, State]  # id of an instruction -> what holds in front of it
-    rows: list[tuple[str, State]] = field(default_factory=list)  # label, what holds from there on
-    now: State = State()
+    states: dict[int, FrameState]  # id(instruction) -> state in front of it
+    rows: list[tuple[str, FrameState]] = field(default_factory=list)  # label, state from there on
+    now: FrameState = FrameState()
 
     def at(self, mi: MI) -> str:
-        """Label line to write in front of an instruction where something has changed, or ""."""
+        """Label line to write in front of an instruction if the state changes, else ""."""
         return self._change(self.states.get(id(mi), self.now))
 
     def inside(self, line: str) -> str:
-        """The same behind a line of inline assembly."""
+        """Label line to write behind a line of inline assembly if the state changes, else ""."""
         state = _asm_after(self.now, line, self.interrupt)
         return self._change(state)
 
     def repeated(self, count: int) -> str:
-        """The same between REPEAT #count and its push of a word."""
+        """Label line to write between REPEAT #count and its push of a word, or ""."""
         return self._change(replace(self.now, repeats=count)) if self.now.frame is None else ""
 
-    def _change(self, state: State) -> str:
+    def _change(self, state: FrameState) -> str:
         if state == self.now:
             return ""
         self.now = state
@@ -85,11 +86,11 @@ class CallFrames:
 
 
 def follow(m: MFunction, prefix: str) -> CallFrames:
-    """Needs: the finished function."""
+    """Frame states of a finished function, by data flow over its blocks."""
     interrupt = bool(m.interrupt)
     blocks = m.block_map()
-    at_start = {m.blocks[0].name: State()}
-    found: dict[int, State] = {}
+    at_start = {m.blocks[0].name: FrameState()}
+    found: dict[int, FrameState] = {}
     work = [m.blocks[0].name]
     while work:
         b = blocks[work.pop()]
@@ -104,7 +105,7 @@ def follow(m: MFunction, prefix: str) -> CallFrames:
     return CallFrames(prefix, interrupt, found)
 
 
-def _after(state: State, mi: MI, interrupt: bool) -> State:
+def _after(state: FrameState, mi: MI, interrupt: bool) -> FrameState:
     text = str(mi.args[0]) if mi.op == "text" else ""
     if text.startswith("lnk "):
         below = state.depth + 2
@@ -129,13 +130,14 @@ def _after(state: State, mi: MI, interrupt: bool) -> State:
 
 
 def _by(mi: MI) -> int:
+    """Bytes that an instruction adds to the stack."""
     if mi.op == "asm":
         return sum(_asm_change(line)[0] for line in mi.text.split("\n"))
     return stack_change(mi)
 
 
-def _asm_after(state: State, line: str, interrupt: bool) -> State:
-    """Behind a line of inline assembly; what it pushes is saved, what it takes off is back."""
+def _asm_after(state: FrameState, line: str, interrupt: bool) -> FrameState:
+    """State behind a line of inline assembly, which may push and pop registers."""
     change, registers = _asm_change(line)
     if change > 0:
         kept = {r: state.depth + 2 * k for k, r in enumerate(registers) if interrupt or r not in SCRATCH}
@@ -145,7 +147,7 @@ def _asm_after(state: State, line: str, interrupt: bool) -> State:
 
 
 def _asm_change(line: str) -> tuple[int, list[int]]:
-    """Bytes a line of inline assembly adds to the stack, and the registers it pushes or pops."""
+    """Bytes that a line of inline assembly adds to the stack, and the registers that it pushes or pops."""
     found = ASM_STACK.fullmatch(re.sub(r"\s+", " ", line.strip().lower()).replace(", ", ","))
     if found is None:
         return 0, []
@@ -157,11 +159,11 @@ def _asm_change(line: str) -> tuple[int, list[int]]:
 
 
 def _pushes_saved(mi: MI) -> bool:
-    """Whether it is one of the pushes that save registers, which the frame pass gives no source line."""
+    """Whether an instruction is a push of the prologue, which has no source line."""
     return mi.line is None and _by(mi) > 0
 
 
-def _pushed(state: State, mi: MI, interrupt: bool) -> State:
+def _pushed(state: FrameState, mi: MI, interrupt: bool) -> FrameState:
     registers = _registers(mi, "push", 0)
     kept = {r: state.depth + 2 * k for k, r in enumerate(registers) if interrupt or r not in SCRATCH}
     return replace(state.with_saved(dict(kept)), depth=state.depth + _by(mi))
@@ -172,7 +174,7 @@ def _popped(mi: MI) -> list[int]:
 
 
 def _registers(mi: MI, name: str, operand: int) -> list[int]:
-    """Those that a push or pop names, in the order of their addresses."""
+    """Registers of a push or pop (`name`), in the order of their addresses."""
     if mi.op == "text":
         text = str(mi.args[0])
         found = NAMED.match(text)
@@ -186,17 +188,17 @@ def _registers(mi: MI, name: str, operand: int) -> list[int]:
 
 
 class FrameSection:
-    """Text of .debug_frame of one module."""
+    """Section .debug_frame of one module."""
 
     def __init__(self) -> None:
         self.functions: list[tuple[str, str, CallFrames]] = []
 
     def add(self, name: str, end: str, frames: CallFrames) -> None:
-        """A function between two labels."""
+        """Add a function between two labels."""
         self.functions.append((name, end, frames))
 
     def text(self) -> list[str]:
-        """All lines; none without functions."""
+        """All lines of the section; none without functions."""
         if not self.functions:
             return []
         out = ["\t.section .debug_frame,info"]
@@ -207,7 +209,7 @@ class FrameSection:
         return out
 
     def _common(self, interrupt: bool) -> list[str]:
-        """What holds at entry. An exception stacks a part of SR with the PC, and the handler keeps all registers."""
+        """Common information entry (CIE). Handlers mask the return address and preserve all registers."""
         data = [DEF_CFA, str(SP), "0", DEF_CFA_OFFSET_SF, *sleb(-RETURN_BYTES // DATA_ALIGN)]
         if interrupt:
             expression = [OP_DEREF, OP_CONST4U, *STACKED_PC, OP_AND]
@@ -223,7 +225,7 @@ class FrameSection:
     def _entry(self, name: str, end: str, frames: CallFrames) -> list[str]:
         lines = [f"\t.4byte .Ldbg_cie{int(frames.interrupt)}", f"\t.4byte {name},{end}-{name}"]
         size = 12
-        before, place = State(), name
+        before, place = FrameState(), name
         for label, state in frames.rows:
             data = _difference(before, state)
             if data:
@@ -234,8 +236,8 @@ class FrameSection:
         return _record(f".Ldbg_fde_{name}", lines, size)
 
 
-def _difference(before: State, after: State) -> list[str]:
-    """Instructions from one row of the table to the next."""
+def _difference(before: FrameState, after: FrameState) -> list[str]:
+    """Call frame instructions from one state to the next."""
     data: list[str] = []
     (register, offset), (old_register, old_offset) = _base(after), _base(before)
     if after.repeats:
@@ -258,7 +260,7 @@ def _difference(before: State, after: State) -> list[str]:
     return data
 
 
-def _base(state: State) -> tuple[int, int]:
+def _base(state: FrameState) -> tuple[int, int]:
     return (SP, state.depth) if state.frame is None else (FP, state.frame)
 
 
@@ -267,7 +269,7 @@ def _bytes(data: list[str]) -> str:
 
 
 def _record(label: str, lines: list[str], size: int) -> list[str]:
-    """Length, content of `size` bytes and NOPs up to a multiple of an address."""
+    """An entry: length, content of `size` bytes, and NOPs up to a multiple of 4 bytes."""
     padding = -size % 4
     out = [f"{label}:", f"\t.4byte {size + padding}", *lines]
     return [*out, _bytes(["0"] * padding)] if padding else out

@@ -1,6 +1,6 @@
-"""DWARF 2 as assembler data directives (abi-elf.md §6.7): units with their entries, lines, locations and call frames.
+"""DWARF 2 sections as assembler directives (abi-elf.md §6.7): entries, line table, location lists and call frames.
 
-Code addresses are PC units, variables data addresses, both 4 bytes.
+Addresses have 4 bytes: program counter values for code, data addresses for variables.
 """
 
 from __future__ import annotations
@@ -10,10 +10,10 @@ from collections.abc import Iterator
 
 from toolchain.abi.names import symbol
 from toolchain.debuginfo.call_frames import CallFrames, FrameSection
-from toolchain.debuginfo.entries import Unit
+from toolchain.debuginfo.entries import CompileUnit
 from toolchain.debuginfo.leb128 import sleb, uleb
 from toolchain.debuginfo.metadata import DebugInfo
-from toolchain.debuginfo.scopes import Die, FunctionInfo
+from toolchain.debuginfo.scopes import DebugEntry, FunctionInfo
 from toolchain.ir.model import Module
 
 ADDRESS_BYTES = 4
@@ -45,30 +45,30 @@ def _string(text: str) -> str:
 
 
 class DwarfWriter:
-    """Text of all debug sections of one module."""
+    """Writes all debug sections of one module."""
 
     def __init__(self, module: Module) -> None:
         self.module = module
         self.info = DebugInfo(module)
-        self.units: dict[str, Unit] = {}
+        self.units: dict[str, CompileUnit] = {}
         self.abbreviations: dict[tuple[object, ...], int] = {}
         self.frames = FrameSection()
         self.out: list[str] = []
 
-    def unit(self, ref: str) -> Unit:
-        """The unit for a DICompileUnit."""
+    def unit(self, ref: str) -> CompileUnit:
+        """The compile unit of a DICompileUnit node."""
         if ref not in self.units:
-            self.units[ref] = Unit(self.info, self.module, ref, len(self.units))
+            self.units[ref] = CompileUnit(self.info, self.module, ref, len(self.units))
         return self.units[ref]
 
     def add_function(self, f: FunctionInfo) -> None:
-        """Record one compiled function."""
+        """Add a compiled function to its unit."""
         unit = self.info.node(f.subprogram).get("unit", "")
         if unit.startswith("!"):
             self.unit(unit).functions.append(f)
 
     def add_frames(self, name: str, end: str, frames: CallFrames) -> None:
-        """Record the call frames of one compiled function, which need not be one of the source."""
+        """Add the call frames of a compiled function, which may have no DISubprogram."""
         self.frames.add(name, end, frames)
 
     def _collect_globals(self) -> None:
@@ -92,7 +92,7 @@ class DwarfWriter:
         return {self.info.node(expression).get("var", ""): cu for cu, expression in self._expressions()}
 
     def _expressions(self) -> Iterator[tuple[str, str]]:
-        """Compile units with their DIGlobalVariableExpressions."""
+        """Pairs of compile unit and DIGlobalVariableExpression."""
         for cu in REFERENCE.findall(self.module.named_metadata.get("llvm.dbg.cu", "")):
             for expression in self.info.items(self.info.node(cu).get("globals", "")):
                 yield cu, expression
@@ -121,14 +121,14 @@ class DwarfWriter:
 
     # -- .debug_info --------------------------------------------------------------------------------------------------
 
-    def _info(self, unit: Unit, tree: Die) -> None:
+    def _info(self, unit: CompileUnit, tree: DebugEntry) -> None:
         n = unit.number
         self.out += [f".Ldbg_info{n}:", f"\t.4byte .Ldbg_info_end{n}-.Ldbg_info_start{n}", f".Ldbg_info_start{n}:",
                      "\t.2byte 2", "\t.4byte .Ldbg_abbrev", f"\t.byte {ADDRESS_BYTES}"]  # fmt: skip
         self._die(tree, f".Ldbg_info{n}")
         self.out.append(f".Ldbg_info_end{n}:")
 
-    def _die(self, die: Die, base: str) -> None:
+    def _die(self, die: DebugEntry, base: str) -> None:
         key = (die.tag, bool(die.children), tuple((a, f) for a, f, _ in die.attributes))
         code = self.abbreviations.setdefault(key, len(self.abbreviations) + 1)
         if die.label:
@@ -174,8 +174,8 @@ class DwarfWriter:
 
     # -- .debug_loc ---------------------------------------------------------------------------------------------------
 
-    def _locations(self, unit: Unit) -> None:
-        """Start, end, expression; the unit's base address is 0. A pair of zeros ends a list."""
+    def _locations(self, unit: CompileUnit) -> None:
+        """Location lists: start, end, expression; the base address is 0, a pair of zeros ends a list."""
         for k, ranges in enumerate(unit.lists):
             self.out.append(f".Ldbg_loc{unit.number}_{k}:")
             for start, end, data in ranges:
@@ -184,7 +184,7 @@ class DwarfWriter:
 
     # -- .debug_line --------------------------------------------------------------------------------------------------
 
-    def _lines(self, unit: Unit) -> None:
+    def _lines(self, unit: CompileUnit) -> None:
         n = unit.number
         for f in unit.functions:
             for _, node, _ in f.rows:
@@ -203,8 +203,8 @@ class DwarfWriter:
             self._sequence(unit, f)
         self.out.append(f".Ldbg_line_end{n}:")
 
-    def _sequence(self, unit: Unit, f: FunctionInfo) -> None:
-        """Rows of one function: every row sets its address, so that no distance needs to be known here."""
+    def _sequence(self, unit: CompileUnit, f: FunctionInfo) -> None:
+        """Rows of one function. Every row sets its address, because the compiler does not know distances."""
         line = file = 1
         for label, node, row_line in f.rows:
             self.out += [f"\t.byte 0,{1 + ADDRESS_BYTES},2", f"\t.4byte {label}"]

@@ -1,16 +1,16 @@
-"""Debug entries of a compile unit, as a tree: functions, variables, types, scopes (DWARF 2 §3-5).
+"""Debugging information entries of a compile unit: functions, variables, types, scopes (DWARF 2 §3-5).
 
-Frame variables are relative to W15 at entry, which the frame base expresses through W15 or W14. Variables in registers
-have location lists; where neither applies, debuggers report them as optimised out.
+Frame variables are relative to W15 at entry, which the frame base expresses by W15 or W14. Variables in registers have
+location lists. A variable without a location is reported as optimised out by debuggers.
 """
 
 from __future__ import annotations
 
 from toolchain.debuginfo.leb128 import sleb, uleb
 from toolchain.debuginfo.metadata import DebugInfo
-from toolchain.debuginfo.scopes import Die, FunctionInfo, Scope, Scopes, split_name
+from toolchain.debuginfo.scopes import DebugEntry, FunctionInfo, LexicalScope, ScopeTree, split_name
 from toolchain.ir.model import Module
-from toolchain.mir.mir import CONSTANT, GONE
+from toolchain.mir.mir import CONSTANT_WORD, OPTIMISED_OUT
 
 PRODUCER = "toolchain for dsPIC30F, clang front end"
 ENCODINGS = {"address": 1, "boolean": 2, "float": 4, "signed": 5, "signed_char": 6, "unsigned": 7, "unsigned_char": 8}
@@ -25,14 +25,15 @@ COMPOSITES = {"DW_TAG_structure_type": "structure_type", "DW_TAG_union_type": "u
 
 
 def _expression(f: FunctionInfo, where: tuple[int, ...]) -> list[str]:
-    """Location of a variable: in the frame, in registers, or a value without a place (`mir.Located`)."""
+    """DWARF expression of a `mir.VariableLocation`: in the frame, in registers, or an implicit value."""
     if where[0] < 0:
         return [str(OP_FBREG), *sleb(f.objects[-1 - where[0]])]
-    if all(w >= CONSTANT for w in where):
-        return [str(OP_IMPLICIT_VALUE), str(2 * len(where)), *(str(b) for w in where for b in _octets(w - CONSTANT))]
+    if all(w >= CONSTANT_WORD for w in where):
+        content = [str(b) for w in where for b in _octets(w - CONSTANT_WORD)]
+        return [str(OP_IMPLICIT_VALUE), str(len(content)), *content]
     data: list[str] = []
     for w in where:
-        if w != GONE:
+        if w != OPTIMISED_OUT:
             data.append(str(OP_REG0 + w))
         if len(where) > 1:
             data += [str(OP_PIECE), "2"]
@@ -40,55 +41,56 @@ def _expression(f: FunctionInfo, where: tuple[int, ...]) -> list[str]:
 
 
 def _octets(word: int) -> bytes:
+    """Bytes of a word, low byte first."""
     return word.to_bytes(2, "little")
 
 
 def _constant(value: bytes) -> tuple[str, str, str | int | list[str]]:
-    """DW_AT_const_value."""
+    """Attribute DW_AT_const_value."""
     if len(value) in (1, 2, 4):
         return ("const_value", f"data{len(value)}", int.from_bytes(value, "little"))
     return ("const_value", "block1", [str(b) for b in value])
 
 
-class Unit:
-    """Debug entries of one compile unit."""
+class CompileUnit:
+    """Builds the entries of one compile unit."""
 
     def __init__(self, info: DebugInfo, module: Module, ref: str, number: int) -> None:
         self.info = info
         self.module = module
         self.ref = ref
         self.number = number
-        self.types: dict[str, Die] = {}
+        self.types: dict[str, DebugEntry] = {}
         self.files: list[tuple[str, str]] = []
         self.functions: list[FunctionInfo] = []
         self.globals: list[tuple[str, str | bytes]] = []  # DIGlobalVariable, assembler symbol or value
         self.lists: list[list[tuple[str, str, list[str]]]] = []  # location lists, for .debug_loc
         self.ranges: list[list[tuple[str, str]]] = []  # addresses of units and scopes, for .debug_ranges
-        self.abstract: dict[str, Die] = {}  # functions that were inlined somewhere
+        self.abstract: dict[str, DebugEntry] = {}  # abstract instances of inlined functions
 
     def file_number(self, ref: str) -> int:
-        """1-based number of the file of a node."""
+        """Number of the file of a node in the unit's file table, from 1."""
         name = self.info.file(ref)
         if name not in self.files:
             self.files.append(name)
         return self.files.index(name) + 1
 
-    def tree(self) -> Die:
-        """The unit's entry with everything below it."""
+    def tree(self) -> DebugEntry:
+        """The entry of the unit with all its children."""
         directory, name = self.info.file(self.ref)
-        top = Die("compile_unit", [
+        top = DebugEntry("compile_unit", [
             ("producer", "string", PRODUCER), ("language", "data1", LANGUAGE_C89), ("name", "string", name),
             ("comp_dir", "string", directory), ("low_pc", "addr", 0), ("stmt_list", "data4",
             f".Ldbg_line{self.number}"),
         ])  # fmt: skip
         if self.functions:
             top.attributes.append(self._addresses([(f.name, f.end_label) for f in self.functions]))
-        body = [self._variable(ref, place) for ref, place in self.globals] + [self._function(f) for f in self.functions]
+        body = [self._variable(ref, value) for ref, value in self.globals] + [self._function(f) for f in self.functions]
         top.children = [*self.types.values(), *self.abstract.values(), *body]
         return top
 
     def _addresses(self, pieces: list[tuple[str, str]]) -> tuple[str, str, str]:
-        """Attribute that leads to a list of ranges."""
+        """Attribute DW_AT_ranges for pairs of labels."""
         self.ranges.append(pieces)
         return ("ranges", "data4", f".Ldbg_ranges{self.number}_{len(self.ranges) - 1}")
 
@@ -106,14 +108,14 @@ class Unit:
         die = self.type(ref)
         return [("type", "ref4", die.label)] if die is not None else []
 
-    def _variable(self, ref: str, place: str | bytes) -> Die:
+    def _variable(self, ref: str, value: str | bytes) -> DebugEntry:
         node = self.info.node(ref)
         attributes = self._declared(ref) + self._type_attribute(node.get("type"))
         attributes.append(("external", "flag", int(node.get("isLocal") != "true")))
-        attributes.append(_constant(place) if isinstance(place, bytes) else ("location", "block1", ["addr", place]))
-        return Die("variable", attributes)
+        attributes.append(_constant(value) if isinstance(value, bytes) else ("location", "block1", ["addr", value]))
+        return DebugEntry("variable", attributes)
 
-    def _function(self, f: FunctionInfo) -> Die:
+    def _function(self, f: FunctionInfo) -> DebugEntry:
         node = self.info.node(f.subprogram)
         returns = self.info.items(self.info.node(node.get("type", "")).get("types", "")) if "type" in node else []
         register, offset = f.frame_base
@@ -127,22 +129,22 @@ class Unit:
             ("high_pc", "addr", f.end_label),
             ("frame_base", "block1", [str(OP_BREG0 + register), *sleb(offset)]),
         ]
-        die = Die("subprogram", attributes)
-        scopes = Scopes(self.info, f)
+        die = DebugEntry("subprogram", attributes)
+        scopes = ScopeTree(self.info, f)
         located = dict(f.variables)
         for name in dict.fromkeys([*self._parameters(node), *f.known]):
             ref, call = split_name(name)
-            scopes.place(ref, call, self._local(f, name, located.get(name)))
+            scopes.add_variable(ref, call, self._local(f, name, located.get(name)))
         self._fill(die, scopes.top)
         return die
 
-    def _fill(self, die: Die, scope: Scope) -> None:
-        """Variables of a scope, and the scopes inside that have code or variables."""
+    def _fill(self, die: DebugEntry, scope: LexicalScope) -> None:
+        """Add the variables of a scope and the inner scopes with code to the scope's entry."""
         die.children += scope.variables
         for inner in scope.inside.values():
             if not inner.pieces:
                 continue
-            child = Die("lexical_block", [self._addresses(inner.pieces)])
+            child = DebugEntry("lexical_block", [self._addresses(inner.pieces)])
             if inner.call:
                 child.tag = "inlined_subroutine"
                 child.attributes += [
@@ -153,19 +155,19 @@ class Unit:
             self._fill(child, inner)
             die.children.append(child)
 
-    def _abstract(self, subprogram: str) -> Die:
-        """The entry that copies of an inlined function refer to."""
+    def _abstract(self, subprogram: str) -> DebugEntry:
+        """The abstract instance of an inlined function, to which its inlined copies refer."""
         if subprogram not in self.abstract:
             attributes = [*self._declared(subprogram), ("prototyped", "flag", 1), ("inline", "data1", INLINED)]
             label = f".Ldbg_a{self.number}_{len(self.abstract)}"
-            self.abstract[subprogram] = Die("subprogram", attributes, [], label)
+            self.abstract[subprogram] = DebugEntry("subprogram", attributes, [], label)
         return self.abstract[subprogram]
 
     def _parameters(self, subprogram: dict[str, str]) -> list[str]:
         retained = self.info.items(subprogram.get("retainedNodes", ""))
         return [r for r in retained if self.info.number(r, "arg")]
 
-    def _local(self, f: FunctionInfo, name: str, offset: int | None) -> Die:
+    def _local(self, f: FunctionInfo, name: str, offset: int | None) -> DebugEntry:
         ref, ranges = split_name(name)[0], f.ranges.get(name)
         attributes = self._declared(ref) + self._type_attribute(self.info.node(ref).get("type"))
         if offset is not None:
@@ -175,19 +177,19 @@ class Unit:
         elif ranges:
             attributes.append(("location", "data4", f".Ldbg_loc{self.number}_{len(self.lists)}"))
             self.lists.append([(start, end, _expression(f, where)) for start, end, where in ranges])
-        return Die("formal_parameter" if self.info.number(ref, "arg") else "variable", attributes)
+        return DebugEntry("formal_parameter" if self.info.number(ref, "arg") else "variable", attributes)
 
     # -- types --------------------------------------------------------------------------------------------------------
 
-    def type(self, ref: str | None) -> Die | None:
-        """Entry of a type node; None for void."""
+    def type(self, ref: str | None) -> DebugEntry | None:
+        """The entry of a type node; None for void."""
         if ref is None or not ref.startswith("!"):
             return None
         found = self.types.get(ref)
         if found is not None:
             return found
         node = self.info.node(ref)
-        die = Die("base_type", [], [], f".Ldbg_t{self.number}_{len(self.types)}")
+        die = DebugEntry("base_type", [], [], f".Ldbg_t{self.number}_{len(self.types)}")
         self.types[ref] = die
         tag = node.get("tag", "")
         if node["kind"] == "DIBasicType":
@@ -206,12 +208,12 @@ class Unit:
     def _bytes(self, ref: str) -> int:
         return (self.info.number(ref, "size") + 7) // 8
 
-    def _base(self, die: Die, ref: str, node: dict[str, str]) -> None:
+    def _base(self, die: DebugEntry, ref: str, node: dict[str, str]) -> None:
         encoding = ENCODINGS.get(node.get("encoding", "").removeprefix("DW_ATE_"), ENCODINGS["unsigned"])
         die.attributes = [("name", "string", node.get("name", "?")), ("byte_size", "data2", self._bytes(ref)),
                           ("encoding", "data1", encoding)]  # fmt: skip
 
-    def _specifier(self, die: Die, ref: str, node: dict[str, str], tag: str) -> None:
+    def _specifier(self, die: DebugEntry, ref: str, node: dict[str, str], tag: str) -> None:
         die.tag = tag
         if tag == "typedef":
             die.attributes = self._declared(ref)
@@ -219,7 +221,7 @@ class Unit:
             die.attributes = [("byte_size", "data2", self._bytes(ref))]
         die.attributes = die.attributes + self._type_attribute(node.get("baseType"))
 
-    def _composite(self, die: Die, ref: str, node: dict[str, str], tag: str) -> None:
+    def _composite(self, die: DebugEntry, ref: str, node: dict[str, str], tag: str) -> None:
         die.tag = tag
         elements = self.info.items(node.get("elements", ""))
         if tag == "array_type":
@@ -233,18 +235,18 @@ class Unit:
         die.attributes.append(("byte_size", "data2", self._bytes(ref)))
         if tag == "enumeration_type":
             die.children = [
-                Die("enumerator", [("name", "string", self.info.node(e).get("name", "?")),
+                DebugEntry("enumerator", [("name", "string", self.info.node(e).get("name", "?")),
                                    ("const_value", "sdata", self.info.number(e, "value"))])
                 for e in elements
             ]  # fmt: skip
         else:
             die.children = [self._member(e, tag) for e in elements]
 
-    def _subrange(self, ref: str) -> Die:
+    def _subrange(self, ref: str) -> DebugEntry:
         count = self.info.number(ref, "count", -1)
-        return Die("subrange_type", [("upper_bound", "data2", count - 1)] if count > 0 else [])
+        return DebugEntry("subrange_type", [("upper_bound", "data2", count - 1)] if count > 0 else [])
 
-    def _member(self, ref: str, parent: str) -> Die:
+    def _member(self, ref: str, parent: str) -> DebugEntry:
         node = self.info.node(ref)
         attributes = self._declared(ref) + self._type_attribute(node.get("baseType"))
         bit = self.info.number(ref, "offset")
@@ -257,10 +259,10 @@ class Unit:
                            ("bit_offset", "data1", max(0, 8 * storage - size - (bit - 8 * at)))]  # fmt: skip
         if parent == "structure_type":
             attributes.append(("data_member_location", "block1", [str(OP_PLUS_UCONST), *uleb(at)]))
-        return Die("member", attributes)
+        return DebugEntry("member", attributes)
 
     def _storage(self, ref: str | None) -> int:
-        """Bytes of a bit-field's declared type."""
+        """Size in bytes of the declared type of a bit-field."""
         for _ in range(16):
             if ref is None or not ref.startswith("!"):
                 return 2
@@ -269,7 +271,7 @@ class Unit:
             ref = self.info.node(ref).get("baseType")
         return 2
 
-    def _subroutine(self, die: Die, node: dict[str, str]) -> None:
+    def _subroutine(self, die: DebugEntry, node: dict[str, str]) -> None:
         die.tag = "subroutine_type"
         types = self.info.items(node.get("types", ""))
         die.attributes = [("prototyped", "flag", 1)]
@@ -277,6 +279,6 @@ class Unit:
             die.attributes += self._type_attribute(types[0])
         for t in types[1:]:
             if t == "null":
-                die.children.append(Die("unspecified_parameters", []))
+                die.children.append(DebugEntry("unspecified_parameters", []))
             else:
-                die.children.append(Die("formal_parameter", self._type_attribute(t)))
+                die.children.append(DebugEntry("formal_parameter", self._type_attribute(t)))

@@ -1,10 +1,10 @@
-"""LEB128 numbers of DWARF (DWARF 2 §7.6) as assembler operands."""
+"""LEB128 numbers (DWARF 2 §7.6) as assembler operands, one per byte."""
 
 from __future__ import annotations
 
 
 def uleb(value: int) -> list[str]:
-    """Unsigned."""
+    """Unsigned LEB128."""
     out = []
     while True:
         byte, value = value & 0x7F, value >> 7
@@ -14,7 +14,7 @@ def uleb(value: int) -> list[str]:
 
 
 def sleb(value: int) -> list[str]:
-    """Signed."""
+    """Signed LEB128."""
     out = []
     while True:
         byte, value = value & 0x7F, value >> 7

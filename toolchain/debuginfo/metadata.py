@@ -1,4 +1,4 @@
-"""Readable view of !DI metadata: fields of nodes and source positions."""
+"""Reader of !DI metadata: fields of nodes and source positions."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ MAX_DEPTH = 64
 
 
 class DebugInfo:
-    """Parsed metadata nodes of one module, each read once."""
+    """Metadata nodes of one module, each parsed once."""
 
     def __init__(self, module: Module) -> None:
         self.module = module
@@ -21,7 +21,7 @@ class DebugInfo:
         self._files: dict[str, tuple[str, str]] = {}
 
     def node(self, ref: str) -> dict[str, str]:
-        """Fields of node "!n"; "kind" is the class name, such as DISubprogram."""
+        """Fields of node "!n"; field "kind" is its class, such as DISubprogram."""
         found = self._nodes.get(ref)
         if found is None:
             body = self.module.metadata.get(ref[1:], "")
@@ -36,12 +36,12 @@ class DebugInfo:
         return LIST.findall(self.module.metadata.get(ref[1:], "")) if ref.startswith("!") else []
 
     def number(self, ref: str, key: str, default: int = 0) -> int:
-        """Integer field."""
+        """Integer field of a node, or `default`."""
         text = self.node(ref).get(key, "").strip()
         return int(text) if re.fullmatch(r"-?\d+", text) else default
 
     def bits(self, ref: str) -> int:
-        """Size of a type in bits, through typedefs and qualifiers; 0 when it has none."""
+        """Size of a type in bits, through typedefs and qualifiers; 0 if it has none."""
         for _ in range(MAX_DEPTH):
             if not ref.startswith("!"):
                 return 0
@@ -51,7 +51,7 @@ class DebugInfo:
         return 0
 
     def file(self, ref: str) -> tuple[str, str]:
-        """(directory, name) of the DIFile a node or one of its scopes names."""
+        """(directory, name) of the DIFile of a node or of its closest scope with one."""
         if ref not in self._files:
             at = ref
             for _ in range(MAX_DEPTH):
@@ -66,8 +66,9 @@ class DebugInfo:
         return self._files[ref]
 
     def position(self, ref: str | None) -> tuple[str, int] | None:
-        """(file name, line) of a DILocation or DISubprogram; None without one. The name leads there from the present
-        folder: clang takes what a file's path shares with that folder's off the name."""
+        """(file name, line) of a DILocation or DISubprogram; None without a line.
+
+        The name is relative to the current folder, as far as clang has removed that folder from it."""
         if ref is None or not (line := self.number(ref, "line")):
             return None
         directory, name = self.file(ref)
@@ -75,16 +76,16 @@ class DebugInfo:
         return (os.path.join(directory, name) if elsewhere else name), line
 
     def declared(self, ref: str | None) -> tuple[str, int] | None:
-        """(file name, line) of a DISubprogram, or of the variable a DIGlobalVariableExpression is of."""
+        """(file name, line) of a DISubprogram, or of the variable of a DIGlobalVariableExpression."""
         return self.position(self.node(ref).get("var", ref) if ref is not None else None)
 
     def marker(self, ref: str | None) -> list[str]:
-        """Assembly that says of what follows where in the source it is from: of a DISubprogram or of a variable."""
-        place = self.declared(ref)
-        return [f'# {place[1]} "{place[0]}"'] if place is not None else []
+        """Line marker in assembly for the code of a DISubprogram or the data of a variable."""
+        position = self.declared(ref)
+        return [f'# {position[1]} "{position[0]}"'] if position is not None else []
 
     def subprogram(self, ref: str) -> str:
-        """The DISubprogram a scope lies in."""
+        """The DISubprogram that contains a scope."""
         for _ in range(MAX_DEPTH):
             node = self.node(ref)
             if node["kind"] == "DISubprogram" or "scope" not in node:

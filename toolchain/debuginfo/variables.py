@@ -1,8 +1,9 @@
-"""Source variables in registers and in the frame, for debug information: where they are, as address ranges.
+"""Locations of source variables in registers and in the frame, as address ranges.
 
-Allocation claims: a variable is in the registers that its value was given, as long as that value is live. Later passes
-move, merge and replace instructions, so every claim is checked on the finished code: along every way, the last write of
-the register must be one of that value. What cannot be shown is left out, and a debugger says "optimised out".
+Register allocation claims that a variable is in the registers of its value as long as that value is live. Later passes
+move, merge and replace instructions, so every claim is verified on the finished code: on every path, the last write of
+the register must write that value. A claim that cannot be verified is omitted, and a debugger reports the variable as
+optimised out.
 """
 
 from __future__ import annotations
@@ -10,89 +11,94 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from toolchain.debuginfo.bindings import Position
+from toolchain.debuginfo.bindings import BoundLine
 from toolchain.mir.liveness import live_out
-from toolchain.mir.mir import GONE, MI, Located, MFunction
+from toolchain.mir.mir import MI, OPTIMISED_OUT, MFunction, VariableLocation
 
-Values = dict[int, int]
-"""Register -> number of the value it holds."""
+RegisterValues = dict[int, int]
+"""Register -> number of the value that it contains."""
 
 
 def claim(m: MFunction, rename: Mapping[int, int], group: Mapping[int, int]) -> None:
-    """Note on every instruction what its position says of variables. Registers are still virtual.
+    """Attach claims about variables to every instruction, before virtual registers are renamed.
 
-    `rename` gives their real ones, `group` one number to registers that are the same value under two names.
+    `rename` maps them to real registers, `group` maps coalesced registers to one number.
     """
     known: dict[int, tuple[str, tuple[int, ...], tuple[int, ...], tuple[int, ...]]] = {}
     for k, (variable, words) in m.bindings.items():
-        virtual = tuple(w if w >= GONE or w < 0 or (w in rename and w not in m.pairs) else GONE for w in words)
+        virtual = tuple(
+            w if w >= OPTIMISED_OUT or w < 0 or (w in rename and w not in m.pairs) else OPTIMISED_OUT for w in words
+        )
         known[k] = variable, virtual, tuple(rename.get(w, w) for w in virtual), tuple(group.get(w, 0) for w in virtual)
     out = live_out(m)
     for b in m.blocks:
         live = out[b.name]
         for mi in reversed(b.insts):
-            mi.holds = {rename[r]: group[r] for r in mi.defs() if r in rename and r not in m.pairs}
+            mi.written_values = {rename[r]: group[r] for r in mi.defs() if r in rename and r not in m.pairs}
             used, written = mi.register_sets()
             live = live & ~written | used
-            if isinstance(mi.line, Position):
+            if isinstance(mi.line, BoundLine):
                 here = [known[k] for k in mi.line.records if k in known]
-                claims = [(v, tuple(r if w < 0 or w >= GONE or live >> w & 1 else GONE
+                claims = [(v, tuple(r if w < 0 or w >= OPTIMISED_OUT or live >> w & 1 else OPTIMISED_OUT
                                     for w, r in zip(virtual, real, strict=True)), values)
                           for v, virtual, real, values in here]  # fmt: skip
-                mi.variables = tuple(claim for claim in claims if _anywhere(claim[1]))
+                mi.claims = tuple(claim for claim in claims if _has_location(claim[1]))
 
 
-def proved(m: MFunction) -> dict[int, tuple[Located, ...]]:
-    """id of an instruction of the finished function -> where variables are in front of it."""
+def verified_locations(m: MFunction) -> dict[int, tuple[VariableLocation, ...]]:
+    """id(instruction) of the finished function -> verified locations of variables in front of it."""
     at_start = _values_at_start(m)
-    found: dict[int, tuple[Located, ...]] = {}
+    found: dict[int, tuple[VariableLocation, ...]] = {}
     for b in m.blocks:
         values = dict(at_start[b.name])
         for mi in b.insts:
-            values.update(mi.holds_before)
-            true = [(v, _true(values, real, wanted)) for v, real, wanted in mi.variables]
-            found[id(mi)] = tuple(sorted((v, words) for v, words in true if _anywhere(words)))
+            values.update(mi.values_before)
+            verified = [(v, _verified(values, real, wanted)) for v, real, wanted in mi.claims]
+            found[id(mi)] = tuple(sorted((v, words) for v, words in verified if _has_location(words)))
             _step(values, mi)
     return found
 
 
-def _true(values: Values, words: tuple[int, ...], wanted: tuple[int, ...]) -> tuple[int, ...]:
-    """The words, those in registers as far as these hold what they should."""
+def _verified(values: RegisterValues, words: tuple[int, ...], wanted: tuple[int, ...]) -> tuple[int, ...]:
+    """The words of a claim; OPTIMISED_OUT for registers that do not contain the wanted values."""
     return tuple(
-        w if w < 0 or w >= GONE or values.get(w) == value else GONE for w, value in zip(words, wanted, strict=True)
+        w if w < 0 or w >= OPTIMISED_OUT or values.get(w) == value else OPTIMISED_OUT
+        for w, value in zip(words, wanted, strict=True)
     )
 
 
-def _anywhere(words: tuple[int, ...]) -> bool:
-    return any(w != GONE for w in words)
+def _has_location(words: tuple[int, ...]) -> bool:
+    """Whether any word has a location."""
+    return any(w != OPTIMISED_OUT for w in words)
 
 
-def _step(values: Values, mi: MI) -> None:
+def _step(values: RegisterValues, mi: MI) -> None:
+    """Change the values to those behind an instruction."""
     for r in mi.defs():
-        if r in mi.holds:
-            values[r] = mi.holds[r]
+        if r in mi.written_values:
+            values[r] = mi.written_values[r]
         else:
             values.pop(r, None)
 
 
-def _values_at_start(m: MFunction) -> dict[str, Values]:
-    """Forward data flow: what every register holds on all ways into a block."""
+def _values_at_start(m: MFunction) -> dict[str, RegisterValues]:
+    """Forward data flow: values that registers contain on all paths into a block."""
     preds: dict[str, list[str]] = {b.name: [] for b in m.blocks}
     for b in m.blocks:
         for s in b.succs:
             preds[s].append(b.name)
-    start: dict[str, Values] = {m.blocks[0].name: {}}
-    end: dict[str, Values] = {}
+    start: dict[str, RegisterValues] = {m.blocks[0].name: {}}
+    end: dict[str, RegisterValues] = {}
     changed = True
     while changed:
         changed = False
         for b in m.blocks:
-            ways = [end[p] for p in preds[b.name] if p in end]
+            incoming = [end[p] for p in preds[b.name] if p in end]
             if b is not m.blocks[0]:
-                start[b.name] = _meet(ways)
+                start[b.name] = _meet(incoming)
             values = dict(start[b.name])
             for mi in b.insts:
-                values.update(mi.holds_before)
+                values.update(mi.values_before)
                 _step(values, mi)
             if end.get(b.name) != values:
                 end[b.name] = values
@@ -100,24 +106,25 @@ def _values_at_start(m: MFunction) -> dict[str, Values]:
     return start
 
 
-def _meet(ways: list[Values]) -> Values:
-    if not ways:
+def _meet(incoming: list[RegisterValues]) -> RegisterValues:
+    """Facts that all incoming paths share."""
+    if not incoming:
         return {}
-    return {r: value for r, value in ways[0].items() if all(way.get(r) == value for way in ways[1:])}
+    return {r: value for r, value in incoming[0].items() if all(other.get(r) == value for other in incoming[1:])}
 
 
 @dataclass
-class Ranges:
-    """Collects (start label, end label, registers) of every variable while text is written."""
+class LocationLists:
+    """Collects (start label, end label, words) of every variable while the text of a function is written."""
 
     prefix: str
     found: dict[str, list[tuple[str, str, tuple[int, ...]]]] = field(default_factory=dict)
     _open: dict[str, tuple[str, tuple[int, ...]]] = field(default_factory=dict)
-    _state: tuple[Located, ...] = ()
+    _state: tuple[VariableLocation, ...] = ()
     _serial: int = 0
 
-    def at(self, state: tuple[Located, ...]) -> str:
-        """Label line to write where the state changes, or ""."""
+    def at(self, state: tuple[VariableLocation, ...]) -> str:
+        """Label line to write if the locations change to `state`, else ""."""
         if state == self._state:
             return ""
         self._serial += 1
@@ -126,10 +133,10 @@ class Ranges:
         return f"{label}:"
 
     def close(self, end: str) -> None:
-        """All ranges end here."""
+        """End all open ranges at a label."""
         self._change((), end)
 
-    def _change(self, state: tuple[Located, ...], label: str) -> None:
+    def _change(self, state: tuple[VariableLocation, ...], label: str) -> None:
         new = dict(state)
         for variable, (start, registers) in list(self._open.items()):
             if new.get(variable) != registers:

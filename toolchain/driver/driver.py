@@ -167,7 +167,7 @@ def _to_assembly(options: CcOptions, ir_text: str) -> str:
     from toolchain.driver import pipeline
     from toolchain.ir.model import UnsupportedError
 
-    check(ir_text, lambda ref: pipeline.place_in(ir_text, ref))
+    check(ir_text, lambda ref: pipeline.position_in(ir_text, ref))
     try:
         return pipeline.compile_module(ir_text, options)
     except UnsupportedError as error:

@@ -1,7 +1,7 @@
-"""Optimised LLVM IR text -> pic30-as assembly text: the ordered list of passes.
+"""The pass pipeline: optimised LLVM IR text to pic30-as assembly text.
 
-Each pass sits in its own file and states what it needs and ensures. FUNCTION_PASSES is the order; `check_order`
-verifies the constraints at import, so a pass cannot be moved to where its needs do not hold.
+FUNCTION_PASSES lists the passes in order, with the optimisation levels at which each runs and the properties that it
+requires and establishes. `check_order` verifies the requirements at import.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from toolchain.debuginfo import bindings, call_frames
 from toolchain.debuginfo.dwarf import DwarfWriter
 from toolchain.debuginfo.metadata import DebugInfo
 from toolchain.debuginfo.scopes import FunctionInfo
-from toolchain.debuginfo.variables import Ranges
+from toolchain.debuginfo.variables import LocationLists
 from toolchain.emit import atomic_sections, constructors, data, isr, used
 from toolchain.emit import function as emit
 from toolchain.ir import cfg
@@ -45,19 +45,19 @@ METADATA = re.compile(r"^!(\d+) = (.*)$", re.MULTILINE)
 
 
 class CompileOptions(Protocol):
-    """What the back end needs to know of the command line."""
+    """Command line options that the back end uses."""
 
     level: str  # "0" "1" "2" "s"
     debug: bool
     stack_check: bool
     large_code: bool
     large_data: bool
-    verify: bool  # the machine form, after every pass
+    verify: bool  # check the machine form after every pass
 
 
 @dataclass(frozen=True)
-class Options:
-    """Stand-alone CompileOptions."""
+class BackendOptions:
+    """CompileOptions without a command line."""
 
     level: str = "s"
     debug: bool = False
@@ -68,46 +68,58 @@ class Options:
 
 
 @dataclass
-class Context:
-    """One function on its way through the passes."""
+class FunctionContext:
+    """One function in the pipeline: its IR, its machine form and the facts that passes need."""
 
     module: Module
     info: DebugInfo
     function: Function
     options: CompileOptions
     interrupt: str
-    taken: set[str]  # blocks whose address somebody in the module takes
+    taken: set[str]  # blocks whose address the module takes
     probe: bool  # check the stack limit at entry
     notes: set[str]  # its annotations
     machine: MFunction | None = None
 
     @property
     def m(self) -> MFunction:
-        """The machine form; exists after selection."""
+        """The machine form, which exists after selection."""
         assert self.machine is not None
         return self.machine
 
     @property
     def for_size(self) -> bool:
-        """-Os, and -O0 where nobody measures speed."""
+        """Whether small code is preferred: at -Os and -O0."""
         return self.options.level in ("0", "s")
+
+    @property
+    def for_speed(self) -> bool:
+        """Whether fast code is preferred even if it is larger: at -O2."""
+        return self.options.level == "2"
+
+
+ALL_LEVELS = frozenset("012s")
+UNOPTIMISED = frozenset("0")
+OPTIMISED = frozenset("12s")
+SIZE = frozenset("s")
 
 
 @dataclass(frozen=True)
 class Pass:
-    """One step. `needs` and `gives` name properties of the function; order constraints follow from them."""
+    """One pass: the levels at which it runs, and the properties of the function that it requires and establishes."""
 
     name: str
-    run: Callable[[Context], None]
+    run: Callable[[FunctionContext], None]
+    levels: frozenset[str] = ALL_LEVELS
     needs: tuple[str, ...] = ()
     gives: tuple[str, ...] = ()
 
 
-def _legalize(c: Context) -> None:
-    legalize.legalize(c.module, c.function, lambda line: where(c.info, c.function, line))
+def _legalize(c: FunctionContext) -> None:
+    legalize.legalize(c.module, c.function, lambda line: source_position(c.info, c.function, line))
 
 
-def _select(c: Context) -> None:
+def _select(c: FunctionContext) -> None:
     c.machine = select.Selector(c.module, c.function, c.for_size, c.taken).run()
     c.machine.interrupt = c.interrupt
     c.machine.preserved, c.machine.preprologue = isr.preserved(c.notes), isr.preprologue(c.notes)
@@ -116,100 +128,70 @@ def _select(c: Context) -> None:
     c.machine.uses_fp = frame.wants_frame_pointer(c.machine)
 
 
-def _constants(c: Context) -> None:
-    if c.options.level != "0":
-        constants.run(c.m)
-
-
-def _repeats(c: Context) -> None:
-    if c.options.level != "0":
-        local_cse.run(c.m)
-
-
-def _schedule(c: Context) -> None:
-    if c.options.level != "0":
-        schedule.run(c.m)
-
-
-def _by_value(c: Context) -> None:
-    if c.options.level != "0":
-        by_value.run(c.function)
-
-
-def _combine(c: Context) -> None:
-    if c.options.level != "0":
-        combine.combine(c.function, c.for_size, c.options.level == "2")
-
-
-def _single_bits(c: Context) -> None:
-    if c.options.level != "0":
-        single_bits.run(c.function, lambda name: sections.is_near(c.module, name))
-    else:
-        single_bits.one_operation(c.function)
-
-
-def _returns(c: Context) -> None:
-    if c.options.level != "0":
-        returns.run(c.m)
-
-
-def _tails(c: Context) -> None:
-    if c.options.level == "s":
-        tail_merging.run(c.m)
-
-
-def _allocate(c: Context) -> None:
+def _allocate(c: FunctionContext) -> None:
     c.machine = colouring.allocate(c.m, c.for_size, c.options.verify)
 
 
+def _single_bits(c: FunctionContext) -> None:
+    single_bits.run(c.function, lambda name: sections.is_near(c.module, name))
+
+
 FUNCTION_PASSES = [
-    Pass("unreachable", lambda c: cfg.remove_unreachable(c.function), ("ssa",), ("reachable",)),
-    Pass("legalize", _legalize, ("ssa", "reachable"), ("legal",)),
-    Pass("unreachable-again", lambda c: cfg.remove_unreachable(c.function), ("legal",)),
-    Pass("dead-code", lambda c: cfg.dead_code(c.function), ("legal",)),
-    Pass("by-value", _by_value, ("legal",)),
-    Pass("combine", _combine, ("legal",)),
-    Pass("dead-code-again", lambda c: cfg.dead_code(c.function), ("legal",)),
-    Pass("split-logical", lambda c: cfg.split_logical_branches(c.function), ("legal",), ("no-logical-branches",)),
-    Pass("sink-compares", lambda c: cfg.sink_compares(c.function), ("legal",)),
-    Pass("switch", lambda c: switch.lower_switches(c.function, c.for_size), ("legal",), ("no-switch",)),
-    Pass("critical-edges", lambda c: cfg.split_critical_edges(c.function), ("no-switch",), ("no-critical-edges",)),
-    Pass("single-bits", _single_bits, ("legal", "no-critical-edges")),
-    Pass("select", _select, ("legal", "reachable", "no-switch", "no-critical-edges"), ("machine",)),
-    Pass("repeats", _repeats, ("machine",)),
-    Pass("constants", _constants, ("machine",)),
-    Pass("allocate", _allocate, ("machine",), ("real-registers",)),
-    Pass("frame", lambda c: frame.build_frame(c.m, c.probe), ("real-registers",), ("framed",)),
-    Pass("peephole", lambda c: peephole.run(c.m), ("framed",)),
-    Pass("schedule", _schedule, ("framed",)),
-    Pass("tail-calls", lambda c: branches.tail_calls(c.m), ("framed",)),
-    Pass("tails", _tails, ("framed",)),
-    Pass("branches", lambda c: branches.run(c.m, c.options.level != "0"), ("framed",), ("laid-out",)),
-    Pass("returns", _returns, ("laid-out",)),
-    Pass("holds", lambda c: atomic_sections.run(c.m), ("laid-out",)),
-]
+    # LLVM IR -> legal IR
+    Pass("unreachable", lambda c: cfg.remove_unreachable(c.function), ALL_LEVELS, ("ssa",), ("reachable",)),
+    Pass("legalize", _legalize, ALL_LEVELS, ("ssa", "reachable"), ("legal",)),
+    Pass("unreachable-again", lambda c: cfg.remove_unreachable(c.function), ALL_LEVELS, ("legal",)),
+    Pass("dead-code", lambda c: cfg.dead_code(c.function), ALL_LEVELS, ("legal",)),
+    Pass("by-value", lambda c: by_value.run(c.function), OPTIMISED, ("legal",)),
+    Pass("combine", lambda c: combine.combine(c.function, c.for_size, c.for_speed), OPTIMISED, ("legal",)),
+    Pass("dead-code-again", lambda c: cfg.dead_code(c.function), ALL_LEVELS, ("legal",)),
+    Pass("split-logical", lambda c: cfg.split_logical_branches(c.function), ALL_LEVELS, ("legal",)),
+    Pass("sink-compares", lambda c: cfg.sink_compares(c.function), ALL_LEVELS, ("legal",)),
+    Pass("switch", lambda c: switch.lower_switches(c.function, c.for_size), ALL_LEVELS, ("legal",), ("no-switch",)),
+    Pass("critical-edges", lambda c: cfg.split_critical_edges(c.function), ALL_LEVELS, ("no-switch",),
+         ("no-critical-edges",)),
+    Pass("single-bits", _single_bits, OPTIMISED, ("legal", "no-critical-edges")),
+    Pass("one-bit-operations", lambda c: single_bits.one_operation(c.function), UNOPTIMISED, ("legal",)),
+    # legal IR -> machine form over virtual registers
+    Pass("select", _select, ALL_LEVELS, ("legal", "reachable", "no-switch", "no-critical-edges"), ("machine",)),
+    Pass("local-cse", lambda c: local_cse.run(c.m), OPTIMISED, ("machine",)),
+    Pass("constants", lambda c: constants.run(c.m), OPTIMISED, ("machine",)),
+    # machine form over W0-W15
+    Pass("allocate", _allocate, ALL_LEVELS, ("machine",), ("real-registers",)),
+    Pass("frame", lambda c: frame.build_frame(c.m, c.probe), ALL_LEVELS, ("real-registers",), ("framed",)),
+    Pass("peephole", lambda c: peephole.run(c.m), ALL_LEVELS, ("framed",)),
+    Pass("schedule", lambda c: schedule.run(c.m), OPTIMISED, ("framed",)),
+    Pass("tail-calls", lambda c: branches.tail_calls(c.m), ALL_LEVELS, ("framed",)),
+    Pass("tail-merging", lambda c: tail_merging.run(c.m), SIZE, ("framed",)),
+    Pass("thread-jumps", lambda c: branches.thread_jumps(c.m), ALL_LEVELS, ("framed",)),
+    Pass("block-layout", lambda c: branches.reorder(c.m), OPTIMISED, ("framed",)),
+    Pass("branches", lambda c: branches.run(c.m), ALL_LEVELS, ("framed",), ("laid-out",)),
+    Pass("returns", lambda c: returns.run(c.m), OPTIMISED, ("laid-out",)),
+    Pass("atomic-sections", lambda c: atomic_sections.run(c.m), ALL_LEVELS, ("laid-out",)),
+]  # fmt: skip
 
 
 def check_order(passes: list[Pass]) -> None:
-    """Every need is given by an earlier pass. Raises AssertionError naming the pass otherwise."""
+    """Raise AssertionError if a pass needs a property that no earlier pass of all levels gives."""
     have = {"ssa"}
     for p in passes:
         missing = set(p.needs) - have
         assert not missing, f"pass {p.name} needs {missing}"
-        have |= set(p.gives)
+        if p.levels == ALL_LEVELS:
+            have |= set(p.gives)
 
 
 check_order(FUNCTION_PASSES)
 
 
-def where(info: DebugInfo, f: Function, line: str | None) -> str:
-    """ "file:line" of a !dbg reference, or the function's name."""
+def source_position(info: DebugInfo, f: Function, line: str | None) -> str:
+    """ "file:line" of a !dbg reference or of the function; the function's name without debug information."""
     found = info.position(line) or info.position(f.dbg)
     return f"{found[0]}:{found[1]}" if found is not None else f"in function '{f.name}'"
 
 
-def taken_blocks(module: Module) -> dict[str, set[str]]:
-    """Function name -> blocks whose address code or data takes."""
+def address_taken_blocks(module: Module) -> dict[str, set[str]]:
+    """Function name -> blocks whose address code or data of the module takes."""
     out: dict[str, set[str]] = {}
     work: list[Value] = [v.init for v in module.globals.values() if v.init is not None]
     work += [a for f in module.functions.values() for b in f.blocks for i in b.instrs for a in i.args]
@@ -224,8 +206,8 @@ def taken_blocks(module: Module) -> dict[str, set[str]]:
     return out
 
 
-class LineRows:
-    """Line-table rows of one function, collected while its text is written."""
+class LineTableRows:
+    """Line table rows of one function, collected while its text is written."""
 
     def __init__(self, info: DebugInfo, f: Function, name: str) -> None:
         self.info = info
@@ -237,27 +219,27 @@ class LineRows:
         self.rows.append((name, f.dbg, line))
 
     def mark(self, ref: str | None) -> str:
-        """Label line to put before an instruction that starts a new row, or ""."""
+        """Label line for an instruction that starts a new row of the line table; "" for any other."""
         position = self.info.position(ref)
         if position is None or ref is None:
             return ""
         node = self.info.node(ref)
-        place = (*position, node.get("scope", ""), node.get("inlinedAt", ""))
-        if place == self.last:
+        location = (*position, node.get("scope", ""), node.get("inlinedAt", ""))
+        if location == self.last:
             return ""
-        self.last = place
+        self.last = location
         label = f".Lrow{self.name}_{len(self.rows)}"
         self.rows.append((label, ref, position[1]))
         return f"{label}:"
 
 
 def no_rows(ref: str | None) -> str:
-    """Line marks without debug information."""
+    """`LineTableRows.mark` of a function without debug information: no label."""
     return ""
 
 
 def frame_variables(f: Function, m: MFunction) -> list[tuple[str, int]]:
-    """(DILocalVariable, offset from W15 at entry) of variables declared to live in the frame."""
+    """(DILocalVariable, offset from W15 at entry) of the variables that debug records declare in the frame."""
     out = []
     for record in f.dbg_records:
         slot = m.slot_of.get(id(record.value))
@@ -266,38 +248,37 @@ def frame_variables(f: Function, m: MFunction) -> list[tuple[str, int]]:
     return out
 
 
-def named_places(f: Function, m: MFunction) -> dict[str, int]:
-    """Offsets from W15 at entry of the variables and struct parameters that lie in the frame, by their IR names."""
+def frame_offsets(f: Function, m: MFunction) -> dict[str, int]:
+    """IR name of every variable and struct parameter in the frame -> its offset from W15 at entry."""
     slots = [(i.extra["source"], i) for i in f.blocks[0].instrs if i.op == "slot" and "source" in i.extra]
     named = [*slots, *((a.name, a) for a in f.args)]
     return {name: offset_of(m, m.slot_of[id(value)]) for name, value in named if id(value) in m.slot_of}
 
 
 def offset_of(m: MFunction, index: int) -> int:
-    """Bytes from W15 at entry to an object of the frame."""
+    """Offset in bytes of a frame object from W15 at entry."""
     o = m.frame[index]
     return o.fixed if o.fixed is not None else o.offset + m.locals_base
 
 
 class ModuleCompiler:
-    """State of one module: text so far and label numbers."""
+    """Compiles one module: assembly text so far, and the counter that makes local labels unique."""
 
     def __init__(self, module: Module, options: CompileOptions) -> None:
         self.module = module
         self.options = options
         self.notes = isr.annotations_of(module)
-        self.used = used.kept(module)
+        self.used = used.retained_names(module)
         module.large_data = options.large_data
         self.lines: list[str] = []
         self.serial = 0
-        self.taken = taken_blocks(module)
+        self.taken = address_taken_blocks(module)
         self.dwarf = DwarfWriter(module)
-        module.far = data.beyond_near(self.notes, self.declared)
-        self.placed: dict[str, dict[str, int]] = {}
-        """By function: bytes from W15 at entry to its variables that have addresses, by their names in the IR."""
+        module.far = data.far_objects(self.notes, self.declared)
+        self.frame_offsets: dict[str, dict[str, int]] = {}  # by function: `frame_offsets` of its variables
 
     def run(self) -> str:
-        """All functions, then all data, then aliases."""
+        """Return the assembly text: functions, data, aliases, debug sections."""
         for text in self.module.module_asm:
             self.lines.append(text)
         for f in self.module.functions.values():
@@ -313,15 +294,24 @@ class ModuleCompiler:
         return "\n".join(self.lines) + "\n"
 
     def declared(self, name: str) -> str:
-        """ "file:line" of a function or variable, or its name."""
+        """ "file:line" of the declaration of a function or variable; its name without debug information."""
         found = self.module.functions.get(name) or self.module.globals.get(name)
-        place = self.dwarf.info.declared(found.dbg) if found is not None else None
+        position = self.dwarf.info.declared(found.dbg) if found is not None else None
         kind = "function" if name in self.module.functions else "variable"
-        return f"{place[0]}:{place[1]}" if place is not None else f"in {kind} '{name}'"
+        return f"{position[0]}:{position[1]}" if position is not None else f"in {kind} '{name}'"
 
     def function(self, f: Function) -> None:
-        """Compile one definition."""
+        """Compile one function definition."""
         self.serial += 1
+        c = self._context(f)
+        self._run_passes(c)
+        self.frame_offsets[f.name] = frame_offsets(f, c.m)
+        self.lines += self.dwarf.info.marker(f.dbg)
+        self.header(f, c.interrupt)
+        self._emit(c)
+
+    def _context(self, f: Function) -> FunctionContext:
+        """Prepare a function for the passes. Raises UnsupportedError for an interrupt function with a signature."""
         notes = self.notes.get(f.name, set())
         interrupt = isr.interrupt_kind(notes, self.declared(f.name))
         probe = isr.wants_probe(notes, self.options.stack_check and not interrupt)
@@ -331,28 +321,34 @@ class ModuleCompiler:
             f.dbg_records = []
         bindings.bind(f, self.dwarf.info)
         taken = self.taken.get(f.name, set())
-        c = Context(self.module, self.dwarf.info, f, self.options, interrupt, taken, probe, notes)
+        return FunctionContext(self.module, self.dwarf.info, f, self.options, interrupt, taken, probe, notes)
+
+    def _run_passes(self, c: FunctionContext) -> None:
+        """Run the passes of the level; with `verify`, check the machine form after each."""
+        verifier: Verifier | None = None
         try:
-            verifier: Verifier | None = None
             for p in FUNCTION_PASSES:
+                if self.options.level not in p.levels:
+                    continue
                 if "machine" in p.gives and self.options.verify:
-                    verifier = Verifier(f)
+                    verifier = Verifier(c.function)
                 p.run(c)
                 if verifier is not None:
                     verifier.check(p.name, c.m)
         except UnsupportedError as e:
-            raise UnsupportedError(e.what, e.where or where(self.dwarf.info, f, e.line)) from e
-        self.placed[f.name] = named_places(f, c.m)
-        self.lines += self.dwarf.info.marker(f.dbg)
-        self.header(f, interrupt)
+            raise UnsupportedError(e.what, e.where or source_position(c.info, c.function, e.line)) from e
+
+    def _emit(self, c: FunctionContext) -> None:
+        """Append the instructions of a compiled function, and add its debug information to the module's."""
+        f = c.function
         name = symbol(self.module, f.name)
-        rows = LineRows(self.dwarf.info, f, name) if self.options.debug and f.dbg is not None else None
-        ranges = Ranges(str(self.serial))
+        rows = LineTableRows(self.dwarf.info, f, name) if self.options.debug and f.dbg is not None else None
+        ranges = LocationLists(str(self.serial))
         emitter = emit.Emitter(c.m, str(self.serial), self.options.large_code, self.dwarf.info.position)
         frames = call_frames.follow(c.m, str(self.serial)) if self.options.debug else None
         self.lines += emitter.text(rows.mark if rows is not None else no_rows, ranges, frames)
-        gone = c.taken - {b.name for b in c.m.blocks}  # nothing jumps there, but their addresses are still values
-        self.lines += [f"{block_label(f.name, block)}:" for block in sorted(gone)]
+        removed = c.taken - {b.name for b in c.m.blocks}  # no code jumps to them, but their addresses are still values
+        self.lines += [f"{block_label(f.name, block)}:" for block in sorted(removed)]
         self.lines.append(f"\t.size {name},.-{name}")
         end = f".Lend{self.serial}"
         if frames is not None:
@@ -370,9 +366,10 @@ class ModuleCompiler:
             self.dwarf.add_function(info)
 
     def header(self, f: Function, interrupt: str) -> None:
-        """Section, symbol and type. Each function has a section of its own for --gc-sections."""
+        """Append section, symbol and type. Each function has its own section for --gc-sections."""
         name = symbol(self.module, f.name)
-        own = "" if sections.place_of(f.section) else f.section  # near, far: how to call, which -mlarge-code decides
+        # near and far are attributes of the call, which -mlarge-code decides
+        own = "" if sections.attribute_section(f.section) else f.section
         section = own or (".isr.text." if interrupt else ".text.") + name
         modifiers = isr.section_modifiers(f.name, self.notes.get(f.name, set()))
         keep = used.KEEP if f.name in self.used else ""
@@ -388,10 +385,10 @@ class ModuleCompiler:
             self.lines += [f"\t.global {vector}", f"{vector}:"]
 
     def aliases(self) -> None:
-        """alias = target."""
+        """Append the definitions of aliases."""
         for name, target in self.module.aliases.items():
             s = symbol(self.module, name)
-            image = data.Image(self.module)
+            image = data.InitialiserImage(self.module)
             text = image.expression(target)
             if text.startswith("handle("):
                 text = text[len("handle(") : -1]
@@ -400,15 +397,15 @@ class ModuleCompiler:
 
 
 def compile_module(ll_text: str, options: CompileOptions) -> str:
-    """Translate one module. Raises UnsupportedError naming the construct and its source line."""
+    """Translate the IR text of one module. Raises UnsupportedError naming the construct and its source line."""
     try:
         module = read_module(ll_text)
     except UnsupportedError as e:
-        raise UnsupportedError(e.what, place_in(ll_text, e.line) or e.where) from None
+        raise UnsupportedError(e.what, position_in(ll_text, e.line) or e.where) from None
     return ModuleCompiler(module, options).run()
 
 
-def place_in(ll_text: str, ref: str | None) -> str:
-    """ "file:line" of a !dbg reference of a module that is not read, or ""."""
+def position_in(ll_text: str, ref: str | None) -> str:
+    """ "file:line" of a !dbg reference in IR text that has not been parsed, or ""."""
     found = DebugInfo(Module(metadata=dict(METADATA.findall(ll_text)))).position(ref)
     return f"{found[0]}:{found[1]}" if found is not None else ""

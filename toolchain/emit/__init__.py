@@ -1,1 +1,1 @@
-"""Machine form and data to assembly text."""
+"""Emission of assembly text: functions in machine form, variables, interrupt functions, constructors."""

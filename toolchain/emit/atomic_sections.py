@@ -1,19 +1,20 @@
-"""Lengths of the stretches in which an atomic access holds interrupts off.
+"""Atomic sections: cycles for which DISI must delay interrupts.
 
-`hold` becomes `DISI #n` unless as much is left of a DISI stretch of the source, which it must not shorten (isa.md §12);
-`release` marks the end and is no instruction. Needs: final instructions and blocks. Ensures: every `hold` has its n.
+`begin_atomic` becomes `DISI #n`, unless a DISI of the source is active for at least n more cycles, which it must not
+shorten (isa.md §12). `end_atomic` marks the end and emits no code. Needs: final instructions and blocks. Ensures: every
+`begin_atomic` has its n.
 """
 
 from __future__ import annotations
 
 from toolchain.mir.mir import MI, SKIPS, Imm, MFunction
 
-LIMIT = 0x3FFF
-FLOW = 3  # cycles of a taken branch and a stall
+LIMIT = 0x3FFF  # DISI #lit14
+BRANCH_CYCLES = 3  # a taken branch and a stall
 
 
 def run(m: MFunction) -> None:
-    """Fill in every `hold`. Raises AssertionError when a `release` is missing or too far."""
+    """Compute n of every `begin_atomic`. Raises AssertionError if the section does not end within LIMIT cycles."""
     for number, b in enumerate(m.blocks):
         for k, mi in enumerate(b.insts):
             if mi.op == "begin_atomic":
@@ -21,8 +22,9 @@ def run(m: MFunction) -> None:
 
 
 def _cycles(m: MFunction, number: int, at: int) -> int:
-    """At least the cycles from instruction `at` to the next release; an atomic sequence has no branches of its own, but
-    its end may be shared."""
+    """Upper bound of the cycles from instruction `at` to the end of its section.
+
+    A section contains no branches of the source, but tail merging may have moved its end to another block."""
     total, blocks = 0, m.block_map()
     b = m.blocks[number]
     while total <= LIMIT:
@@ -34,12 +36,12 @@ def _cycles(m: MFunction, number: int, at: int) -> int:
             assert mi.op not in ends, f"{m.name}: {mi!r} in an atomic section"
             if mi.op == "jump":
                 following = str(mi.args[0])
-            total += FLOW if mi.op == "jump" or mi.op in SKIPS else _at_most(mi)
+            total += BRANCH_CYCLES if mi.op == "jump" or mi.op in SKIPS else _max_cycles(mi)
         order = m.blocks.index(b) + 1
         b, at = blocks[following] if following else m.blocks[order], 0
-    raise AssertionError(f"{m.name}: an atomic sequence does not end")
+    raise AssertionError(f"{m.name}: an atomic section does not end")
 
 
-def _at_most(mi: MI) -> int:
-    """Cycles of an instruction, a stall included (isa.md §13)."""
+def _max_cycles(mi: MI) -> int:
+    """Upper bound of the cycles of an instruction with a stall (isa.md §13)."""
     return (2 if mi.op == "movd" else max(1, mi.info.words)) + 1

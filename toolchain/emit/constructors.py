@@ -1,6 +1,7 @@
-"""Functions that run before main: `constructor` and XC16's `user_init` are calls in .user_init (abi-elf.md §1.4, §3.1).
+"""Functions that run before main: calls in section .user_init (abi-elf.md §1.4, §3.1).
 
-The start-up code calls that section when the program has one; the linker ends it with RETURN.
+The attributes `constructor` and XC16's `user_init` mark them. The start-up code calls the section if the program has
+one; the linker ends it with RETURN.
 """
 
 from __future__ import annotations
@@ -10,9 +11,9 @@ from toolchain.ir.model import ConstAgg, ConstInt, GlobalRef, Module, Unsupporte
 
 
 def emit_constructors(module: Module, large_code: bool) -> list[str]:
-    """Lines of one call each, in order of priority, equal ones in order of the source."""
+    """One call per function, in order of priority, then in order of the source. Raises UnsupportedError."""
     if _rows(module, "llvm.global_dtors"):
-        raise UnsupportedError("destructor functions: nothing runs after main", "attribute destructor")
+        raise UnsupportedError("destructor functions: no code runs after main", "attribute destructor")
     rows = sorted(_rows(module, "llvm.global_ctors"), key=lambda row: row[0])
     if not rows:
         return []
@@ -21,7 +22,7 @@ def emit_constructors(module: Module, large_code: bool) -> list[str]:
 
 
 def _rows(module: Module, table: str) -> list[tuple[int, str]]:
-    """(priority, function) of one of LLVM's tables."""
+    """(priority, function) rows of a table such as llvm.global_ctors."""
     var = module.globals.get(table)
     if var is None or not isinstance(var.init, ConstAgg):
         return []

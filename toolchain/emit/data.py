@@ -1,4 +1,4 @@
-"""Global variables -> data sections (abi-elf.md §1.4, §4.3): near and far RAM, constants in the PSV window."""
+"""Global variables as data sections (abi-elf.md §1.4, §4.3): near and far RAM, constants in the PSV window."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import re
 from collections.abc import Callable
 
 from toolchain.abi.names import block_label, symbol
-from toolchain.abi.sections import PLACES, is_near, place_of
+from toolchain.abi.sections import SECTION_ATTRIBUTES, attribute_section, is_near
 from toolchain.abi.target import NEAR_END
 from toolchain.debuginfo.metadata import DebugInfo
 from toolchain.emit.isr import numbers, section_modifiers
@@ -41,17 +41,17 @@ SECTION_TYPES = {".const": "psv,page", ".nbss": "bss,near", ".ndata": "data,near
 CONFIG_SECTION = re.compile(r"__\w+\.sec")  # configuration words are program words (abi-elf.md §6.6)
 
 
-def beyond_near(notes: dict[str, set[str]], place: Callable[[str], str]) -> frozenset[str]:
-    """Objects whose `address(N)` lies where file-register instructions do not reach; `place` is for errors."""
+def far_objects(notes: dict[str, set[str]], locate: Callable[[str], str]) -> frozenset[str]:
+    """Objects whose `address(N)` lies beyond near memory; `locate` gives the position of an object for errors."""
     return frozenset(
         name
         for name, texts in notes.items()
-        if any(what == "address" and number >= NEAR_END for what, number in numbers(place(name), texts))
+        if any(what == "address" and number >= NEAR_END for what, number in numbers(locate(name), texts))
     )
 
 
 class DataEmitter:
-    """Text of all variables of a module."""
+    """Writes all variables of a module."""
 
     def __init__(self, module: Module, notes: dict[str, set[str]], used: frozenset[str], info: DebugInfo) -> None:
         self.module = module
@@ -61,7 +61,7 @@ class DataEmitter:
         self.lines: list[str] = []
 
     def run(self) -> list[str]:
-        """Every definition, each in its own section so that unused ones can be dropped by the linker."""
+        """Lines of every definition, each in its own section so that the linker can drop unused ones."""
         for var in self.module.globals.values():
             if var.init is None:
                 if var.linkage == "extern_weak":
@@ -73,7 +73,7 @@ class DataEmitter:
         return self.lines
 
     def variable(self, var: GlobalVar) -> None:
-        """One definition."""
+        """Append the lines of one definition."""
         name, size = symbol(self.module, var.name), size_of(var.type)
         zero = isinstance(var.init, ConstZero | Undef) or (isinstance(var.init, ConstInt) and var.init.value == 0)
         modifiers = section_modifiers(var.name, self.notes.get(var.name, set()))
@@ -95,29 +95,30 @@ class DataEmitter:
             self.lines.append(f"\t.space {max(size, 1)}")
             return
         self.lines += self._content(var, size)
-        if var.section == NOTES and "._" in var.name:  # of a function: notes are of one place
+        if var.section == NOTES and "._" in var.name:  # static in a function: name the function
             self.lines.append(f'\t.ascii "in {var.name.partition(".")[0]}\\n"')
 
     def _content(self, var: GlobalVar, size: int) -> list[str]:
         """Directives of the initialiser."""
         assert var.init is not None
-        data = Image(self.module)
+        data = InitialiserImage(self.module)
         try:
             data.value(var.init, var.type)
             data.pad_to(max(size, 1))
             return data.text()
         except UnsupportedError as e:
-            place = self.info.declared(var.dbg)
-            where = f"{place[0]}:{place[1]}" if place is not None else f"in variable '{var.name}'"
+            position = self.info.declared(var.dbg)
+            where = f"{position[0]}:{position[1]}" if position is not None else f"in variable '{var.name}'"
             raise UnsupportedError(e.what, where) from e
 
     def _section(self, var: GlobalVar, name: str, zero: bool, modifiers: str) -> str:
+        """Name and attributes of the section of a variable."""
         suffix = name.removeprefix(".L")
         kind = "bss" if zero else "data"
-        place = place_of(var.section)
-        if place:
-            return f"{place}.{suffix},{kind}{PLACES[place]}"
-        if "," in var.section:  # the section's attributes beside its name, as in assembly
+        stem = attribute_section(var.section)
+        if stem:
+            return f"{stem}.{suffix},{kind}{SECTION_ATTRIBUTES[stem]}"
+        if "," in var.section:  # name and attributes, as in assembly
             return var.section
         if CONFIG_SECTION.fullmatch(var.section):
             return f"{var.section},code"
@@ -127,13 +128,13 @@ class DataEmitter:
                 return f"{var.section},{SECTION_TYPES[base]}"
             return f"{var.section}," + ("psv,page" if var.constant else "bss" if zero else "data")
         if var.constant:
-            return ".const,psv,page"  # one section, as Microchip's linker wants it (abi-elf.md §1.4)
+            return ".const,psv,page"  # one section, as Microchip's linker requires (abi-elf.md §1.4)
         near = is_near(self.module, var.name) and "address" not in modifiers
         return f".n{kind}.{suffix},{kind},near" if near else f".{kind}.{suffix},{kind}"
 
 
-class Image:
-    """Bytes and relocatable words of one initialiser, in order."""
+class InitialiserImage:
+    """Bytes and relocatable words of one initialiser, in order of their addresses."""
 
     def __init__(self, module: Module) -> None:
         self.module = module
@@ -141,12 +142,12 @@ class Image:
         self.size = 0
 
     def pad_to(self, size: int) -> None:
-        """Zero bytes up to an offset."""
+        """Append zero bytes up to an offset."""
         self.items += [0] * (size - self.size)
         self.size = max(size, self.size)
 
     def value(self, v: Value, t: Type) -> None:
-        """Append a constant of the type at the present offset."""
+        """Append a constant of type `t` at the present offset."""
         start = self.size
         match v:
             case ConstInt():
@@ -188,7 +189,7 @@ class Image:
             case ConstInt():
                 return str(v.value)
             case ConstExpr(op="sub", args=args) if any(_is_label(a) for a in args):
-                # a handle may be that of a jump to the label: the distance of two says nothing
+                # a handle may be the address of a jump to the label, so the difference of two has no meaning
                 raise UnsupportedError("a difference of labels in an initialiser: keep the labels themselves (&&label)")
             case ConstExpr(op="add" | "sub", args=[a, b]):
                 return f"({self.expression(a)}{'+' if v.op == 'add' else '-'}{self.expression(b)})"
@@ -197,7 +198,7 @@ class Image:
         raise UnsupportedError(f"initialiser expression {getattr(v, 'op', v)}")
 
     def text(self) -> list[str]:
-        """Directives: words where two plain bytes or an expression start at an even offset, bytes else."""
+        """Data directives: words at even offsets where possible, bytes otherwise."""
         lines: list[str] = []
         run: list[str] = []
         kind = ".word"
@@ -240,7 +241,7 @@ class Image:
         return lines
 
     def _zero_run(self, k: int) -> int:
-        """Even number of zero bytes that start here."""
+        """Number of zero bytes from item `k` on, rounded down to an even number."""
         n = 0
         while k + n < len(self.items) and self.items[k + n] == 0:
             n += 1
@@ -248,11 +249,12 @@ class Image:
 
 
 def _is_label(v: Value) -> bool:
+    """Whether a constant is a block address, possibly cast."""
     while isinstance(v, ConstExpr) and v.op in ("ptrtoint", "inttoptr", "bitcast", "zext", "trunc"):
         v = v.args[0]
     return isinstance(v, BlockAddress)
 
 
 def emit_data(module: Module, notes: dict[str, set[str]], used: frozenset[str], info: DebugInfo) -> list[str]:
-    """Assembly lines of all variables; `notes` are their annotations, `used` those that collection must keep."""
+    """Assembly lines of all variables; `notes` are their annotations, `used` those that the linker must keep."""
     return DataEmitter(module, notes, used, info).run()

@@ -1,4 +1,4 @@
-"""Machine form -> assembly text of one function (pic30-as syntax, abi-elf.md §4)."""
+"""Assembly text of one function in machine form (pic30-as syntax, abi-elf.md §4)."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from emu.dspic30f.isa.rows.multiply import DIVIDE_COUNT
 from toolchain.abi.names import block_label
 from toolchain.abi.target import SP
 from toolchain.debuginfo.call_frames import CallFrames
-from toolchain.debuginfo.variables import Ranges, proved
-from toolchain.mir.mir import MI, File, Imm, MBlock, Mem, MFunction, Operand
+from toolchain.debuginfo.variables import LocationLists, verified_locations
+from toolchain.mir.mir import MI, FileRegister, Imm, MBlock, Mem, MFunction, Operand
 
 MEM_TEXT = {"ind": "[w{}]", "++": "[w{}++]", "--": "[w{}--]", "+": "[++w{}]", "-": "[--w{}]"}
 RENAMED = {
@@ -31,7 +31,7 @@ BIT_OPS = {"bset", "bclr", "btg", "btst", "btsc", "btss"}
 WREG_OPS = {n + "w": n for n in ("and", "ior", "xor")}
 CONDITION_TEXT = {"c": "geu", "nc": "ltu"}
 ASM_OPERAND = re.compile("\x00(\\d+):(\\w?)\x00|\x00uid\x00")
-HOLD_CYCLES = 4  # from the comparison with DISICNT to the first instruction of the sequence
+ENTRY_CYCLES = 4  # from the comparison with DISICNT to the first instruction of the section
 SHIFT_FIRST = {"shl": "sl", "lshr": "lsr", "ashr": "asr"}
 
 
@@ -48,14 +48,14 @@ def operand_text(a: Operand) -> str:
             return f"[w{a.base}+w{a.off}]"
         case Mem():
             return MEM_TEXT[a.mode].format(a.base)
-        case File():
+        case FileRegister():
             return a.expr
         case _:
             return str(a)
 
 
 class Emitter:
-    """Text of one function."""
+    """Writes one function."""
 
     def __init__(
         self, m: MFunction, prefix: str, large_code: bool, position: Callable[[str | None], tuple[str, int] | None]
@@ -75,24 +75,26 @@ class Emitter:
         return f".L{self.prefix}_{self.numbers[block]}"
 
     def fresh(self) -> str:
-        """Local label inside a block."""
+        """A new local label inside a block."""
         self.serial += 1
         return f".L{self.prefix}_i{self.serial}"
 
-    def text(self, location: Callable[[str | None], str], ranges: Ranges, frames: CallFrames | None) -> list[str]:
-        """All lines. `location` gives the line-table label text for a !dbg reference, or ""."""
+    def text(
+        self, location: Callable[[str | None], str], ranges: LocationLists, frames: CallFrames | None
+    ) -> list[str]:
+        """All lines of the function; `location` gives the label of the line table for a !dbg reference, or ""."""
         self.frames = frames
-        self.variables = proved(self.m) if self.m.bindings else {}
+        self.variables = verified_locations(self.m) if self.m.bindings else {}
         for block in self.m.blocks:
             self._block(block, location, ranges)
         return self.lines
 
-    def _block(self, block: MBlock, location: Callable[[str | None], str], ranges: Ranges) -> None:
+    def _block(self, block: MBlock, location: Callable[[str | None], str], ranges: LocationLists) -> None:
         if block.name in self.targets:
             self.lines.append(f"{self.label(block.name)}:")
         if block.address_taken:
             self.lines.append(f"{block_label(self.m.name, block.name)}:")
-        label = ""  # behind what a skip covers
+        label = ""  # label behind the instructions that a skip covers
         for mi in block.insts:
             frame = self.frames.at(mi) if self.frames is not None else ""
             marks = (ranges.at(self.variables.get(id(mi), ())), location(mi.line), frame)
@@ -132,9 +134,9 @@ class Emitter:
         self._out(f"{op} {','.join(args)}")
 
     def _byte_move(self, mi: MI, args: list[str]) -> list[str]:
-        if isinstance(mi.args[0], File):
+        if isinstance(mi.args[0], FileRegister):
             return [args[0], "WREG"]
-        if isinstance(mi.args[1], File):
+        if isinstance(mi.args[1], FileRegister):
             return ["WREG", args[1]]
         return args
 
@@ -187,7 +189,7 @@ class Emitter:
             self._out(f"mov{suffix} w{mi.args[2]},[w{mi.args[1]}++]")
 
     def _shiftloop(self, mi: MI) -> None:
-        """DEC count; leave when negative; shift by one through the carry; again (abi-elf.md §8.1)."""
+        """Loop: decrement the count, leave if it is negative, shift by one through the carry (abi-elf.md §8.1)."""
         kind, count, *words = mi.args
         top, end = self.fresh(), self.fresh()
         self.lines.append(f"{top}:")
@@ -215,37 +217,35 @@ class Emitter:
                 return str(-int(a.value)) if modifier == "n" else str(a.value)
             return operand_text(a)
 
-        place = self.position(mi.line)
-        if place is not None:  # what the assembler has to say is about the source
-            self.lines.append(f'# {place[1]} "{place[0]}"')
+        position = self.position(mi.line)
+        if position is not None:  # the assembler reports errors at the source line
+            self.lines.append(f'# {position[1]} "{position[0]}"')
         for line in ASM_OPERAND.sub(replace, mi.text).split("\n"):
             if line.strip():
                 self._out(line.strip())
                 if self.frames is not None and (mark := self.frames.inside(line)):
                     self.lines.append(mark)
-        if place is not None:  # no more
-            self.lines.append(f'# 0 "{place[0]}"')
+        if position is not None:
+            self.lines.append(f'# 0 "{position[0]}"')  # end of the lines of the source
 
     def _begin_atomic(self, mi: MI) -> None:
-        """DISI for the sequence behind it, unless a longer one is under way (`holds`)."""
-        cycles, end = mi.args[0], self.fresh()
-        assert isinstance(cycles, Imm)
-        assert isinstance(cycles.value, int)
-        self._out(f"mov #{cycles.value + HOLD_CYCLES},w0")
+        """DISI for the section (`atomic_sections`), unless DISICNT is larger already."""
+        cycles, end = mi.number(0), self.fresh()
+        self._out(f"mov #{cycles + ENTRY_CYCLES},w0")
         self._out("cp _DISICNT")
         self._out(f"bra geu,{end}")
-        self._out(f"disi #{cycles.value}")
+        self._out(f"disi #{cycles}")
         self.lines.append(f"{end}:")
 
     def _end_atomic(self, mi: MI) -> None:
-        """Nothing."""
+        """No code: DISI counts the cycles itself."""
 
     def _clear_pair(self, mi: MI) -> None:
-        """The product of anything and 0; no flags change (isa.md §6.5)."""
+        """Clear a register pair by a multiplication with 0, which changes no flags (isa.md §6.5)."""
         self._out(f"mul.uu w{mi.args[0]},#0,w{mi.args[0]}")
 
     def _borrow(self, mi: MI) -> None:
-        """-1 after a borrow, else 0."""
+        """Set a register to -1 after a borrow, else to 0."""
         r = operand_text(mi.args[0])
         self._out(f"subb {r},{r},{r}")
 

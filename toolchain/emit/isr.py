@@ -1,4 +1,4 @@
-"""Interrupt functions, addresses and other roles given by __attribute__((annotate("...")))."""
+"""Annotations of functions and variables, __attribute__((annotate("..."))): interrupt functions, addresses, probes."""
 
 from __future__ import annotations
 
@@ -33,6 +33,7 @@ def annotations_of(module: Module) -> dict[str, set[str]]:
 
 
 def _text(module: Module, v: Value) -> str:
+    """String constant that a value points to."""
     if not isinstance(v, GlobalRef):
         return ""
     init = module.globals[v.name].init
@@ -41,22 +42,22 @@ def _text(module: Module, v: Value) -> str:
     return init.data.rstrip(b"\0").decode() if isinstance(init, ConstBytes) else ""
 
 
-def interrupt_kind(notes: set[str], place: str) -> str:
+def interrupt_kind(notes: set[str], position: str) -> str:
     """ "" for ordinary functions, else "no_auto_psv" or "auto_psv", with ",shadow" appended (abi-elf.md §2.5).
 
-    Raises UnsupportedError at `place` for both at once.
+    Raises UnsupportedError at `position` for both at once.
     """
     words = {w for n in notes for w in n.removeprefix(PREFIX).split(",")} & WORDS
     if not any(n.startswith(PREFIX) for n in notes) and "interrupt" not in words:
         return ""
     if {"auto_psv", "no_auto_psv"} <= words:
-        raise UnsupportedError("both auto_psv and no_auto_psv", place)
+        raise UnsupportedError("both auto_psv and no_auto_psv", position)
     kind = "no_auto_psv" if "no_auto_psv" in words else "auto_psv"
     return kind + (",shadow" if "shadow" in words else "")
 
 
 def preserved(notes: set[str]) -> tuple[str, ...]:
-    """Assembler names of the variables that `save(...)` lists: pushed at entry, popped at the end."""
+    """Assembler names of the variables in `save(...)`: pushed at entry, popped before RETFIE."""
     lists = [note.removeprefix("save:") for note in sorted(notes) if note.startswith("save:")]
     return tuple("_" + name.strip() for names in lists for name in names.split(",") if name.strip())
 
@@ -68,14 +69,14 @@ _ACCUMULATOR = re.compile(
 
 
 def accumulators(f: Function) -> tuple[str, ...]:
-    """Registers of the accumulators that inline assembly of an interrupt function names: saved like `save(...)`."""
+    """Registers of the accumulators in inline assembly of an interrupt function, which are saved like `save(...)`."""
     texts = [i.extra["asm"].text for b in f.blocks for i in b.instrs if "asm" in i.extra]
     named = sorted({found.upper() for text in texts for found in _ACCUMULATOR.findall(text)})
     return tuple(f"_ACC{name}{part}" for name in named for part in "LHU")
 
 
 def preprologue(notes: set[str]) -> tuple[str, ...]:
-    """Lines of assembly that run before anything is saved."""
+    """Lines of assembly that run before any register is saved."""
     texts = [note.removeprefix("preprologue:") for note in sorted(notes) if note.startswith("preprologue:")]
     return tuple(line.strip() for text in texts for line in re.split(r"[\n;]", text) if line.strip())
 
@@ -88,7 +89,7 @@ def vector_symbols(notes: set[str]) -> tuple[str, ...]:
 
 
 def wants_probe(notes: set[str], default: bool) -> bool:
-    """Whether a function's frame is probed against SPLIM: -fstack-check, overruled by "os_probe" or "os_no_probe"."""
+    """Whether the frame is probed against SPLIM: -fstack-check, unless "os_probe" or "os_no_probe" overrides it."""
     if "os_no_probe" in notes:
         return False
     return default or "os_probe" in notes
@@ -100,9 +101,10 @@ def section_modifiers(name: str, notes: set[str]) -> str:
     return out + "".join(f",{what}(0x{number:X})" for what, number in numbers(name, notes))
 
 
-def numbers(place: str, notes: set[str]) -> list[tuple[str, int]]:
-    """("address" or "reverse", N) of the notes of one object, which `place` names in the UnsupportedError that is
-    raised for what is no number."""
+def numbers(position: str, notes: set[str]) -> list[tuple[str, int]]:
+    """("address" or "reverse", N) of the annotations of one object.
+
+    Raises UnsupportedError at `position` if N is not a number."""
     out = []
     for note in sorted(notes):
         found = re.fullmatch(r"(address|reverse)\((.*)\)", note)
@@ -111,5 +113,5 @@ def numbers(place: str, notes: set[str]) -> list[tuple[str, int]]:
         try:
             out.append((found[1], int(found[2].strip("() ").rstrip("uUlL"), 0)))
         except ValueError:
-            raise UnsupportedError(f"attribute {note}: the argument must be a number", place) from None
+            raise UnsupportedError(f"attribute {note}: the argument must be a number", position) from None
     return out

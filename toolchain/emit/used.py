@@ -1,7 +1,7 @@
-"""`used` and `retain`: definitions that --gc-sections keeps although nothing refers to them.
+"""`used` and `retain`: definitions that --gc-sections keeps without a reference.
 
-GCC's `used` keeps them in the object and `retain` in the image; XC16 has one word for both, `keep`. Here either keeps
-both, because nobody marks a function for an object's sake.
+In GCC, `used` keeps a definition in the object and `retain` keeps it in the image; XC16's `keep` does both. Here every
+one of them does both.
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ KEEP = ",keep"
 TABLES = ("llvm.used", "llvm.compiler.used")
 
 
-def kept(module: Module) -> frozenset[str]:
-    """Names of the functions and variables so marked; of an alias, those it stands for."""
+def retained_names(module: Module) -> frozenset[str]:
+    """Names of the functions and variables with these attributes, and of the targets of such aliases."""
     work: list[Value] = []
     for table in TABLES:
         var = module.globals.get(table)

@@ -1,8 +1,9 @@
-"""Function -> text. Raw IR comes out as LLVM IR that `read` accepts again; legal IR with its own operations."""
+"""Functions as text: unlegalised IR as LLVM IR that `read` accepts, legal IR with its additional operations."""
 
 from __future__ import annotations
 
 import struct
+from collections.abc import Callable
 
 from .model import (
     Arg,
@@ -23,13 +24,13 @@ from .model import (
 
 
 def quoted(name: str) -> str:
-    """Identifier after % or @, in quotes where it needs them."""
+    """Identifier after % or @, quoted if it contains other characters than a plain identifier."""
     plain = all(ch.isalnum() or ch in "-._$" for ch in name)
     return name if plain and name else '"' + name.replace("\\", "\\5C").replace('"', "\\22") + '"'
 
 
 class Dumper:
-    """Text of one function; unnamed values get numbers of their own."""
+    """Writes one function; values without a name are numbered."""
 
     def __init__(self, f: Function) -> None:
         self.f = f
@@ -44,7 +45,7 @@ class Dumper:
                     serial += 1
 
     def text(self) -> str:
-        """The whole definition."""
+        """Text of the whole definition."""
         f = self.f
         params = ", ".join(f"{a.type} {self.names[id(a)]}" for a in f.args)
         dots = ", ..." if f.vararg and f.args else "..." if f.vararg else ""
@@ -99,75 +100,76 @@ class Dumper:
         return f"{v.type} {self.value(v)}"
 
     def instruction(self, i: Instr) -> str:
-        """One line."""
+        """Text of one instruction, without indentation."""
         left = f"{self.names[id(i)]} = " if id(i) in self.names else ""
         return left + self._body(i)
 
     def _body(self, i: Instr) -> str:
-        volatile = "volatile " if i.volatile else ""
-        align = f", align {i.extra['align']}" if "align" in i.extra else ""
+        """The line without the name of the result."""
+        formatter = FORMATTERS.get(i.op)
+        if formatter is not None:
+            return formatter(self, i)
         args = i.args
-        match i.op:
-            case "ret":
-                return f"ret {self.typed(args[0])}" if args else "ret void"
-            case "br" if not args:
-                return f"br label %{quoted(i.blocks[0])}"
-            case "br":
-                return f"br {self.typed(args[0])}, label %{quoted(i.blocks[0])}, label %{quoted(i.blocks[1])}"
-            case "switch":
-                return self._switch(i)
-            case "indirectbr":
-                return f"indirectbr {self.typed(args[0])}, [{', '.join(f'label %{quoted(b)}' for b in i.blocks)}]"
-            case "phi":
-                pairs = zip(args, i.blocks, strict=True)
-                return f"phi {i.type} " + ", ".join(f"[ {self.value(a)}, %{quoted(b)} ]" for a, b in pairs)
-            case "icmp" | "fcmp":
-                return f"{i.op} {i.pred} {self.typed(args[0])}, {self.value(args[1])}"
-            case "load":
-                return f"load {volatile}{i.type}, {self.typed(args[0])}{align}"
-            case "store":
-                return f"store {volatile}{self.typed(args[0])}, {self.typed(args[1])}{align}"
-            case "alloca":
-                count = f", {self.typed(args[0])}" if args else ""
-                return f"alloca {i.extra['type']}{count}{align}"
-            case "getelementptr":
-                return f"getelementptr {i.extra['type']}, " + ", ".join(self.typed(a) for a in args)
-            case "call":
-                return self._call(i)
-            case "extractvalue" | "insertvalue":
-                indices = i.extra["indices"]
-                return f"{i.op} " + ", ".join([*(self.typed(a) for a in args), *map(str, indices)])
-            case (
-                "zext"
-                | "sext"
-                | "trunc"
-                | "bitcast"
-                | "ptrtoint"
-                | "inttoptr"
-                | "fptosi"
-                | "fptoui"
-                | "sitofp"
-                | "uitofp"
-            ):
-                return f"{i.op} {self.typed(args[0])} to {i.type}"
-            case "fpext" | "fptrunc":
-                return f"{i.op} {self.typed(args[0])} to {i.type}"
-            case "freeze" | "fneg":
-                return f"{i.op} {self.typed(args[0])}"
-            case "select":
-                return "select " + ", ".join(self.typed(a) for a in args)
-            case "va_arg":
-                return f"va_arg {self.typed(args[0])}, {i.type}"
-            case "atomicrmw":
-                return f"atomicrmw {volatile}{i.extra['kind']} {self.typed(args[0])}, {self.typed(args[1])} seq_cst"
-            case "cmpxchg":
-                return f"cmpxchg {volatile}" + ", ".join(self.typed(a) for a in args) + " seq_cst seq_cst"
-            case "unreachable" | "fence":
-                return i.op + (f" {i.extra['ordering']}" if "ordering" in i.extra else "")
         if len(args) == 2 and args[0].type == i.type:
             return f"{i.op} {self.typed(args[0])}, {self.value(args[1])}"
         extras = ", ".join(f"{k}={v}" for k, v in i.extra.items())
         return f"{i.op} {i.type} " + ", ".join(self.typed(a) for a in args) + (f" ; {extras}" if extras else "")
+
+    def _operands(self, i: Instr) -> str:
+        """All operands with their types."""
+        return ", ".join(self.typed(a) for a in i.args)
+
+    def _plain(self, i: Instr) -> str:
+        return f"{i.op} {self._operands(i)}"
+
+    def _ret(self, i: Instr) -> str:
+        return f"ret {self.typed(i.args[0])}" if i.args else "ret void"
+
+    def _br(self, i: Instr) -> str:
+        if not i.args:
+            return f"br label %{quoted(i.blocks[0])}"
+        return f"br {self.typed(i.args[0])}, label %{quoted(i.blocks[0])}, label %{quoted(i.blocks[1])}"
+
+    def _indirectbr(self, i: Instr) -> str:
+        return f"indirectbr {self.typed(i.args[0])}, [{', '.join(f'label %{quoted(b)}' for b in i.blocks)}]"
+
+    def _phi(self, i: Instr) -> str:
+        pairs = zip(i.args, i.blocks, strict=True)
+        return f"phi {i.type} " + ", ".join(f"[ {self.value(a)}, %{quoted(b)} ]" for a, b in pairs)
+
+    def _comparison(self, i: Instr) -> str:
+        return f"{i.op} {i.pred} {self.typed(i.args[0])}, {self.value(i.args[1])}"
+
+    def _load(self, i: Instr) -> str:
+        return f"load {_volatile(i)}{i.type}, {self.typed(i.args[0])}{_align(i)}"
+
+    def _store(self, i: Instr) -> str:
+        return f"store {_volatile(i)}{self._operands(i)}{_align(i)}"
+
+    def _alloca(self, i: Instr) -> str:
+        count = f", {self.typed(i.args[0])}" if i.args else ""
+        return f"alloca {i.extra['type']}{count}{_align(i)}"
+
+    def _gep(self, i: Instr) -> str:
+        return f"getelementptr {i.extra['type']}, {self._operands(i)}"
+
+    def _member(self, i: Instr) -> str:
+        return f"{i.op} " + ", ".join([*(self.typed(a) for a in i.args), *map(str, i.extra["indices"])])
+
+    def _conversion(self, i: Instr) -> str:
+        return f"{i.op} {self.typed(i.args[0])} to {i.type}"
+
+    def _va_arg(self, i: Instr) -> str:
+        return f"va_arg {self.typed(i.args[0])}, {i.type}"
+
+    def _atomicrmw(self, i: Instr) -> str:
+        return f"atomicrmw {_volatile(i)}{i.extra['kind']} {self._operands(i)} seq_cst"
+
+    def _cmpxchg(self, i: Instr) -> str:
+        return f"cmpxchg {_volatile(i)}{self._operands(i)} seq_cst seq_cst"
+
+    def _no_operands(self, i: Instr) -> str:
+        return i.op + (f" {i.extra['ordering']}" if "ordering" in i.extra else "")
 
     def _switch(self, i: Instr) -> str:
         cases = i.extra["cases"]
@@ -185,6 +187,41 @@ class Dumper:
             words.append(f"{a.type}{text} {self.value(a)}")
         dots = f" ({', '.join(str(a.type) for a in i.args[:-1])}, ...)" if i.extra.get("vararg") else ""
         return f"call {i.type}{dots} {self.value(i.args[-1])}({', '.join(words)})"
+
+
+FORMATTERS: dict[str, Callable[[Dumper, Instr], str]] = {
+    "ret": Dumper._ret,
+    "br": Dumper._br,
+    "switch": Dumper._switch,
+    "indirectbr": Dumper._indirectbr,
+    "phi": Dumper._phi,
+    **dict.fromkeys(("icmp", "fcmp"), Dumper._comparison),
+    "load": Dumper._load,
+    "store": Dumper._store,
+    "alloca": Dumper._alloca,
+    "getelementptr": Dumper._gep,
+    "call": Dumper._call,
+    **dict.fromkeys(("extractvalue", "insertvalue"), Dumper._member),
+    **dict.fromkeys(
+        ("zext", "sext", "trunc", "bitcast", "ptrtoint", "inttoptr", "fptosi", "fptoui", "sitofp", "uitofp", "fpext",
+         "fptrunc"),
+        Dumper._conversion,
+    ),
+    **dict.fromkeys(("freeze", "fneg", "select"), Dumper._plain),
+    "va_arg": Dumper._va_arg,
+    "atomicrmw": Dumper._atomicrmw,
+    "cmpxchg": Dumper._cmpxchg,
+    **dict.fromkeys(("unreachable", "fence"), Dumper._no_operands),
+}  # fmt: skip
+"""Text of an instruction by its opcode. All others are binary operations or operations of legal IR."""
+
+
+def _volatile(i: Instr) -> str:
+    return "volatile " if i.volatile else ""
+
+
+def _align(i: Instr) -> str:
+    return f", align {i.extra['align']}" if "align" in i.extra else ""
 
 
 def _escaped(text: str) -> str:

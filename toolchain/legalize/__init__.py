@@ -1,1 +1,1 @@
-"""Legalisation: LLVM IR to operations and widths that the machine has."""
+"""Legalisation: LLVM IR to the operations and widths of the CPU."""

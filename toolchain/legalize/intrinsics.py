@@ -1,4 +1,4 @@
-"""Expansion of llvm.* intrinsics into legal IR. One function per family; the table at the end names them all."""
+"""Legalisation of llvm.* intrinsics: one handler per family, in the table FAMILIES."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from toolchain.legalize import mathlib, softfloat
 from toolchain.legalize.context import LegalResult
 from toolchain.legalize.memory import MemoryLegalizer
 
-INLINE_COPY_UNITS = 0x4000  # REPEAT counts 14 bits (isa.md §5.7)
+MAX_INLINE_UNITS = 0x4000  # REPEAT has a count of 14 bits (isa.md §5.7)
 
 
 def expand(lz: MemoryLegalizer, i: Instr, name: str) -> LegalResult:
@@ -24,12 +24,12 @@ def expand(lz: MemoryLegalizer, i: Instr, name: str) -> LegalResult:
 
 
 def _nothing(lz: MemoryLegalizer, i: Instr, name: str) -> LegalResult:
-    """Hints: lifetime, assume, prefetch. No code."""
+    """No code: hints such as lifetime, assume and prefetch."""
     return None
 
 
 def _first(lz: MemoryLegalizer, i: Instr, name: str) -> LegalResult:
-    """Intrinsics whose value is their first operand."""
+    """The first operand, for intrinsics that return it."""
     return lz.legal(i.args[0])
 
 
@@ -42,7 +42,7 @@ def _minmax(lz: MemoryLegalizer, i: Instr, name: str) -> LegalResult:
 
 
 def _compare3(lz: MemoryLegalizer, i: Instr, name: str) -> LegalResult:
-    """scmp / ucmp: -1, 0 or 1."""
+    """scmp and ucmp: -1, 0 or 1."""
     signed = name[0] == "s"
     extend = lz.sign_extended if signed else lz.zero_extended
     a, b = extend(i.args[0]), extend(i.args[1])
@@ -59,7 +59,7 @@ def _abs(lz: MemoryLegalizer, i: Instr, name: str) -> LegalResult:
 
 
 def _overflow(lz: MemoryLegalizer, i: Instr, name: str) -> LegalResult:
-    """{s,u}{add,sub,mul}.with.overflow -> [result, flag]."""
+    """{s,u}{add,sub,mul}.with.overflow: result and overflow flag."""
     signed, op, bits = name[0] == "s", name[1:4], i.args[0].type.bits
     extend = lz.sign_extended if signed else lz.zero_extended
     a, b = extend(i.args[0]), extend(i.args[1])
@@ -67,7 +67,7 @@ def _overflow(lz: MemoryLegalizer, i: Instr, name: str) -> LegalResult:
 
 
 def _checked(lz: MemoryLegalizer, op: str, signed: bool, bits: int, a: Value, b: Value) -> tuple[Value, Value]:
-    """Result and overflow flag of an operation on operands extended from `bits`."""
+    """Result and overflow flag of an operation on values extended from `bits` bits."""
     t = a.type
     if op == "mul" or bits != t.bits:
         wide = legal_type(int_type(bits * 2 if op == "mul" else bits + 1))
@@ -86,7 +86,7 @@ def _checked(lz: MemoryLegalizer, op: str, signed: bool, bits: int, a: Value, b:
         return result, lz.b.icmp("ult", result, a) if op == "add" else lz.b.icmp("ult", a, b)
     changed = lz.b.binary("xor", a, result)
     other = lz.b.binary("xor", b, result) if op == "add" else lz.b.binary("xor", a, b)
-    both = lz.b.binary("and", changed, other)  # negative when the sign is not the one of the exact result
+    both = lz.b.binary("and", changed, other)  # negative if the sign differs from that of the exact result
     return result, lz.b.icmp("slt", both, const(t, 0))
 
 
@@ -105,7 +105,7 @@ def _saturating(lz: MemoryLegalizer, i: Instr, name: str) -> LegalResult:
 
 
 def _funnel(lz: MemoryLegalizer, i: Instr, name: str) -> LegalResult:
-    """fshl / fshr: the double-width value a:b shifted by n modulo the width."""
+    """fshl and fshr: the double-width value a:b shifted by n modulo the width."""
     bits = i.type.bits
     a, b, n = lz.zero_extended(i.args[0]), lz.zero_extended(i.args[1]), lz.zero_extended(i.args[2])
     t = a.type
@@ -128,7 +128,7 @@ def _funnel(lz: MemoryLegalizer, i: Instr, name: str) -> LegalResult:
 
 
 def _count_zeros(lz: MemoryLegalizer, i: Instr, name: str) -> LegalResult:
-    """ctlz / cttz word by word with FF1L / FF1R (isa.md §6.4), which give 1-based positions and 0 for none."""
+    """ctlz and cttz by words: FF1L and FF1R return positions from 1, and 0 for a zero word (isa.md §6.4)."""
     bits = i.type.bits
     leading = name.startswith("ctlz")
     v = lz.zero_extended(i.args[0])
@@ -148,7 +148,7 @@ def _count_zeros(lz: MemoryLegalizer, i: Instr, name: str) -> LegalResult:
 
 
 def _popcount(lz: MemoryLegalizer, i: Instr, name: str) -> LegalResult:
-    """Sum over the words; each by the run-time function (abi-elf.md §2.8)."""
+    """ctpop: sum of the counts of the words, each by a library function (abi-elf.md §2.8)."""
     v = lz.zero_extended(i.args[0])
     t = v.type
     if t.bits < 16:
@@ -177,7 +177,7 @@ def _bswap(lz: MemoryLegalizer, i: Instr, name: str) -> LegalResult:
 
 
 def _bitreverse(lz: MemoryLegalizer, i: Instr, name: str) -> LegalResult:
-    """Swap ever larger groups of bits."""
+    """Swap groups of 1, 2, 4, ... bits."""
     bits = i.type.bits
     if bits & (bits - 1):
         raise UnsupportedError(f"bit reversal of i{bits}")
@@ -192,7 +192,7 @@ def _bitreverse(lz: MemoryLegalizer, i: Instr, name: str) -> LegalResult:
 
 
 def _memory(lz: MemoryLegalizer, i: Instr, name: str) -> LegalResult:
-    """memcpy memmove memset: REPEAT forms for constant sizes, library calls otherwise."""
+    """memcpy, memmove, memset: block operations for constant sizes, library calls otherwise."""
     dst, src, size = (lz.legal(a) for a in i.args[:3])
     if size.type.bits != 16:
         size = lz.b.cast("trunc" if size.type.bits > 16 else "zext", size, I16)
@@ -204,7 +204,7 @@ def _memory(lz: MemoryLegalizer, i: Instr, name: str) -> LegalResult:
     if kind != "memset":
         even = even and lz.even(src, attrs[1].get("align", 1))
     unit = 2 if even and isinstance(size, ConstInt) and not size.value & 1 else 1
-    inline = isinstance(size, ConstInt) and size.value // unit <= INLINE_COPY_UNITS
+    inline = isinstance(size, ConstInt) and size.value // unit <= MAX_INLINE_UNITS
     if kind == "memset":
         value = lz.b.cast("trunc", src, I8)
         if inline and isinstance(size, ConstInt):
@@ -248,7 +248,7 @@ def _stackrestore(lz: MemoryLegalizer, i: Instr, name: str) -> LegalResult:
 
 
 def _entry_word(lz: MemoryLegalizer, i: Instr, name: str) -> LegalResult:
-    """__builtin_return_address / frame_address of this function; outer levels are unknown: 0, as GCC allows."""
+    """__builtin_return_address and __builtin_frame_address; 0 for outer functions, which GCC allows."""
     level = i.args[0]
     if not isinstance(level, ConstInt) or level.value:
         return const(I16, 0)
@@ -256,7 +256,7 @@ def _entry_word(lz: MemoryLegalizer, i: Instr, name: str) -> LegalResult:
 
 
 def _fmuladd(lz: MemoryLegalizer, i: Instr, name: str) -> LegalResult:
-    """Not fused: two roundings, as XC16 does."""
+    """Multiplication and addition with two roundings, as in XC16."""
     a, b, c = (lz.legal(x) for x in i.args[:3])
     mode = "sf" if a.type.bits == 32 else "df"
     return lz.b.call(f"__add{mode}3", a.type, [lz.b.call(f"__mul{mode}3", a.type, [a, b]), c])
@@ -279,7 +279,7 @@ def _round_to_int(lz: MemoryLegalizer, i: Instr, name: str) -> LegalResult:
 
 
 def _fpclass(lz: MemoryLegalizer, i: Instr, name: str) -> LegalResult:
-    """llvm.is.fpclass: the mask bits in LangRef order, decided on the raw bits."""
+    """llvm.is.fpclass: the classes of the mask (order of LangRef), decided on the bits of the value."""
     a, mask = lz.legal(i.args[0]), i.args[1]
     assert isinstance(mask, ConstInt)
     t, bits = a.type, a.type.bits
@@ -308,7 +308,7 @@ def _fpclass(lz: MemoryLegalizer, i: Instr, name: str) -> LegalResult:
 
 
 def _fptoint_sat(lz: MemoryLegalizer, i: Instr, name: str) -> LegalResult:
-    """The run-time conversions already saturate at 32 and 64 bits (abi-elf.md §2.8); narrower results are clamped."""
+    """Saturating conversion: library conversions saturate at 32 and 64 bits (abi-elf.md §2.8), others are clamped."""
     signed = name.startswith("fptosi")
     bits = i.type.bits
     wide = int_type(64 if bits > 32 else 32)
@@ -323,9 +323,9 @@ def _fptoint_sat(lz: MemoryLegalizer, i: Instr, name: str) -> LegalResult:
 
 
 def _trap(lz: MemoryLegalizer, i: Instr, name: str) -> LegalResult:
-    """Stop: the software breakpoint word, then a reset (abi-elf.md §3.3, as the default interrupt handler).
+    """Software breakpoint, then reset, as in the default interrupt handler (abi-elf.md §3.3).
 
-    Behind them, where nothing runs, the number of the check that failed tells a debugger that this is no ordinary end.
+    The number of the failed check follows as data, which a debugger reads.
     """
     if name == "debugtrap":
         lz.b.emit("builtin", VOID, [], name="__builtin_software_breakpoint")

@@ -1,4 +1,4 @@
-"""Lanes of vector values as operands."""
+"""Lanes of vectors as operands of scalar instructions."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from toolchain.ir.model import Value
 
 
 class Lane(Value):
-    """One lane of a vector value, resolved when its legal value is asked for."""
+    """One lane of a vector; `LegalizationContext.legal` returns its legal value."""
 
     __slots__ = ("index", "source")
 

@@ -1,8 +1,8 @@
-"""IR -> legal IR: only i1, i8, i16 and multiples of 16 bits; pointers are i16, floats are their bits.
+"""Legalisation of a function: only i1, i8, i16 and multiples of 16 bits; pointers are i16, floats are their bits.
 
-Needs: a function as read. Ensures: no getelementptr, aggregate, float or wide-divide operation is left; those became
-address arithmetic, several values, or calls of the run-time library (abi-elf.md §2.8). An iN of odd width lives in
-the next legal container with undefined upper bits, which are cleared or sign-filled where an operation looks at them.
+Needs: a function as read. Ensures: no getelementptr, aggregate, float or wide division remains. They become address
+arithmetic, several values, or calls of the run-time library (abi-elf.md §2.8). An integer of another width is stored in
+the next legal container with undefined upper bits; operations that read these bits clear or sign-extend them first.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ LIBGCC_MODE = {32: "si", 64: "di", 128: "ti"}
 
 
 class Legalizer(MemoryLegalizer):
-    """Arithmetic, control flow and calls; the table of handlers."""
+    """Legalises one function; handlers of arithmetic, control flow and calls."""
 
     result_address: Arg | None = None  # parameter with the address of a result that registers cannot hold
 
@@ -113,7 +113,7 @@ class Legalizer(MemoryLegalizer):
             phi.blocks = [self.last_block[n] for n in phi.blocks]
 
     def argument(self, old: Arg) -> Value:
-        """i1 and odd widths arrive with undefined upper bits (abi-elf.md §2.2): make i1 clean."""
+        """Legal value of a parameter; callers leave the upper bits of i1 undefined (abi-elf.md §2.2)."""
         new = self.values[id(old)]
         if old.type is I1 or old.type.bits == 1:
             clean = self.b.emit("and", I16, [self.b.emit("bits", I16, [new]), const(I16, 1)])
@@ -153,7 +153,7 @@ class Legalizer(MemoryLegalizer):
         return self.multiply(a, b) if op == "mul" else self.b.binary(op, a, b)
 
     def divide(self, op: str, a: Value, b: Value) -> Value:
-        """8 and 16 bits use the DIV instruction, wider ones the run-time library."""
+        """Build a division: DIV for 8 and 16 bits, a run-time library call for wider operands."""
         bits = a.type.bits
         signed = op in SIGNED_OPS
         if bits <= 16:
@@ -256,7 +256,7 @@ class Legalizer(MemoryLegalizer):
             self.jump("br", [c], i.blocks)
 
     def drop_edge(self, i: Instr, target: str) -> None:
-        """Remove this block from the phis of a successor it no longer reaches."""
+        """Remove the block of branch `i` from the phis of a successor that it no longer reaches."""
         here = next(b.name for b in self.function.blocks if b.instrs and b.instrs[-1] is i)
         for block in self.function.blocks:
             if block.name == target:
@@ -297,7 +297,7 @@ class Legalizer(MemoryLegalizer):
         self.jump("unreachable", [], [])
 
     def fence(self, i: Instr) -> None:
-        """One core, in-order: a fence only orders the compiler, which keeps memory operations in order anyway."""
+        """No code: the CPU is in-order, and the compiler does not reorder memory operations."""
 
     # -- calls --------------------------------------------------------------------------------------------------------
 
@@ -334,13 +334,13 @@ class Legalizer(MemoryLegalizer):
         return self.clean_result(i.type, new)
 
     def passed(self, a: Value) -> list[Value]:
-        """The values an argument or result travels as."""
+        """Legal values that an argument or result is passed as."""
         if a.type.kind == "vector" and not vectors.is_wide(a.type):
             return [self.packed(a)]
         return self.legal_leaves(a) if a.type.kind in AGGREGATES else [self.legal(a)]
 
     def clean_result(self, t: Type, new: Value) -> Value | None:
-        """i1 results come with undefined upper bits (abi-elf.md §2.3)."""
+        """Legal value of a call's result; callees leave the upper bits of i1 undefined (abi-elf.md §2.3)."""
         if t.bits == 1:
             low = self.b.emit("and", I16, [self.b.emit("bits", I16, [new]), const(I16, 1)])
             return self.b.emit("trunc", I1, [low])

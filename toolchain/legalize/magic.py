@@ -1,8 +1,8 @@
 """Division by constants as multiplication: x / d is the high word of x * m, shifted (Granlund, Montgomery 1994).
 
-MUL takes a cycle where REPEAT DIV takes 19 (isa.md §6.7). Signed division by 2^k is a shift of x, made 2^k - 1 larger
-where it is negative. Needs: legal IR. For size only where this takes no more words than DIV. 32 bits, which
-otherwise call the run-time library, only for speed: 17 words and cycles where the call takes 3 words and 50 cycles.
+MUL takes one cycle, REPEAT DIV takes 19 (isa.md §6.7). Signed division by 2^k is a shift of x, plus 2^k - 1 if x is
+negative. For size, the rewrite applies only if it takes no more words than DIV. Divisions of 32 bits are rewritten for
+speed only: 17 words and cycles instead of a library call of 3 words and 50 cycles. Needs: legal IR.
 """
 
 from __future__ import annotations
@@ -15,14 +15,14 @@ REMAINDER = {"udiv": "urem", "sdiv": "srem"}
 
 
 def run(f: Function, for_size: bool, for_speed: bool = False) -> None:
-    """Rewrite quotients and remainders of every block; those of the same operands share the quotient."""
+    """Rewrite quotients and remainders in every block; those of the same operands share the quotient."""
     for b in f.blocks:
         if for_speed:
             for i in b.instrs:
                 _inline(i)
-        wanted = [i for i in b.instrs if _wanted(i)]
+        wanted = [i for i in b.instrs if _is_candidate(i)]
         if for_size:
-            wanted = [i for i in wanted if _short(i, wanted)]
+            wanted = [i for i in wanted if _saves_words(i, wanted)]
         scratch = Block(b.name)
         quotients: dict[tuple[str, int, int], Value] = {}
         for i in b.instrs:
@@ -33,20 +33,21 @@ def run(f: Function, for_size: bool, for_speed: bool = False) -> None:
 
 
 def _inline(i: Instr) -> None:
-    """A call that legalisation made of a division by a constant becomes the operation itself, for `_rewrite`."""
+    """Turn a call that legalisation made of a 32-bit division by a constant into the division again."""
     op = i.extra.get("divides")
-    if isinstance(op, str) and i.type is I32 and _divides(op, i.args[0], i.args[1]):
+    if isinstance(op, str) and i.type is I32 and _is_divisor(op, i.args[0], i.args[1]):
         i.op, i.args, i.extra = op, i.args[:2], {}
 
 
-def _wanted(i: Instr) -> bool:
+def _is_candidate(i: Instr) -> bool:
+    """Whether an instruction is a division that can be rewritten."""
     if i.op not in OPERATIONS or (i.type is not I16 and i.type is not I32) or "other" in i.extra:
         return False
-    return _divides(i.op, i.args[0], i.args[1])
+    return _is_divisor(i.op, i.args[0], i.args[1])
 
 
-def _divides(op: str, x: Value, d: Value) -> bool:
-    """Whether there is a product for this quotient or remainder."""
+def _is_divisor(op: str, x: Value, d: Value) -> bool:
+    """Whether a quotient or remainder by `d` can be computed by a multiplication."""
     if not isinstance(d, ConstInt) or isinstance(x, ConstInt) or d.type.bits not in (16, 32):
         return False
     least = 1 << d.type.bits - 1
@@ -55,8 +56,8 @@ def _divides(op: str, x: Value, d: Value) -> bool:
     return d.value > 2 and d.value & (d.value - 1) != 0 and d.value < least
 
 
-def _short(i: Instr, others: list[Instr]) -> bool:
-    """MOV, MUL, LSR or LSR, ADD, ASR instead of MOV, REPEAT, DIV, unless that DIV gives a remainder too."""
+def _saves_words(i: Instr, others: list[Instr]) -> bool:
+    """Whether the rewrite takes no more words than MOV, REPEAT, DIV, and no remainder shares that DIV."""
     d = i.args[1]
     assert isinstance(d, ConstInt)
     halved = i.op == "sdiv" and d.value == 2
@@ -67,7 +68,7 @@ def _short(i: Instr, others: list[Instr]) -> bool:
 
 
 def _rewrite(block: Block, i: Instr, quotients: dict[tuple[str, int, int], Value]) -> None:
-    """Put what comes before `i` into the block and make `i` the last step."""
+    """Append the first steps of the computation to the block, and turn `i` into the last step."""
     x, d = i.args
     assert isinstance(d, ConstInt)
     b = Builder(block)
@@ -104,7 +105,7 @@ def signed_factor(d: int, bits: int = 16) -> tuple[int, int]:
 
 
 def _high(b: Builder, x: Value, m: int, extend: str) -> Value:
-    """Upper half of x * m, x signed (sext) or not (zext) and 0 <= m < 2^bits."""
+    """Upper half of x * m for 0 <= m < 2^bits, x extended by `extend`."""
     if x.type is I32:
         return b.emit("mulhigh", I32, [x, const(I32, m)], signed=extend == "sext")
     product = b.binary("mul", b.cast(extend, x, I32), b.cast(extend, const(I16, m), I32))

@@ -1,4 +1,4 @@
-"""Legalisation of addresses, loads, stores, locals and atomics. Odd addresses are accessed byte by byte (isa.md §3)."""
+"""Legalisation of addresses, loads, stores, locals and atomics; odd addresses are accessed by bytes (isa.md §3)."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ class MemoryLegalizer(LegalizationContext):
         return self.b.binary("add", address, const(I16, offset)) if offset & 0xFFFF else address
 
     def alloca(self, i: Instr) -> Value:
-        """Fixed-size objects become frame slots, others move the stack pointer."""
+        """Objects of constant size in the entry block become frame slots, others are allocated at run time."""
         t = i.extra["type"]
         size = size_of(t)
         count = self.legal(i.args[0]) if i.args else const(I16, 1)
@@ -72,18 +72,18 @@ class MemoryLegalizer(LegalizationContext):
         return self.aligned(self.b.emit("dynalloca", I16, [total]), slack)
 
     def frame_slot(self, size: int) -> Instr:
-        """Address of fresh bytes in the frame, wherever the code stands."""
+        """Add an object to the frame, from any block; returns its address."""
         slot = Instr("slot", I16, [])
         slot.extra["size"] = size
         self.blocks[0].instrs.insert(0, slot)
         return slot
 
     def aligned(self, p: Value, align: int) -> Value:
-        """The next multiple of `align` (0: as is); the stack itself is aligned to 2 only."""
+        """The next multiple of `align` (0: p itself); the stack is aligned to 2 bytes only."""
         return self.b.binary("and", self.b.add(p, align - 1), const(I16, -align)) if align else p
 
     def even(self, p: Value, align: int) -> bool:
-        """Whether a pointer is known to be even, so that word accesses do not trap (isa.md §3)."""
+        """Whether a pointer is known to be even, so that word accesses cause no address error (isa.md §3)."""
         if align >= 2:
             return True
         offset = 0
@@ -105,14 +105,14 @@ class MemoryLegalizer(LegalizationContext):
             return self.load_aggregate(i.type, p, align, i.volatile)
         t, size, even = legal_type(i.type), store_size(i.type), self.even(p, align)
         value = (
-            self.load_at_once(t, size, p, even)
+            self.load_atomic(t, size, p, even)
             if "ordering" in i.extra
             else self.load_bits(t, size, p, even, i.volatile)
         )
         return self.to_bool(value) if i.type.bits == 1 else value
 
-    def load_at_once(self, t: Type, size: int, p: Value, even: bool) -> Value:
-        """Atomic load: one instruction, or with interrupts held off."""
+    def load_atomic(self, t: Type, size: int, p: Value, even: bool) -> Value:
+        """Atomic load: one instruction, or an atomic section."""
         if size == 1 or (even and size == 2):
             return self.load_bits(t, size, p, even, True)
         if even and size == 4:
@@ -149,12 +149,12 @@ class MemoryLegalizer(LegalizationContext):
         value = self.b.cast("zext", self.legal(v), I8) if v.type.bits == 1 else self.zero_extended(v)
         size, even = store_size(v.type), self.even(p, align)
         if "ordering" in i.extra:
-            self.store_at_once(value, size, p, even)
+            self.store_atomic(value, size, p, even)
         else:
             self.store_bits(value, size, p, even, i.volatile)
 
-    def store_at_once(self, value: Value, size: int, p: Value, even: bool) -> None:
-        """Atomic store: one instruction, or with interrupts held off."""
+    def store_atomic(self, value: Value, size: int, p: Value, even: bool) -> None:
+        """Atomic store: one instruction, or an atomic section."""
         if size == 1 or (even and size == 2):
             self.store_bits(value, size, p, even, True)
         elif even and size == 4:
@@ -198,7 +198,7 @@ class MemoryLegalizer(LegalizationContext):
             self.store_bits(part, store_size(t), q, self.even(q, 1 if at & 1 else align), volatile)
 
     def va_arg(self, i: Instr) -> Value:
-        """Step the pointer down by the rounded size, then read (abi-elf.md §2.4)."""
+        """Decrement the argument pointer by the rounded size, then load (abi-elf.md §2.4)."""
         if i.type.kind not in ("int", "float", "ptr"):
             raise UnsupportedError(f"va_arg of type {i.type}")
         pp = self.legal(i.args[0])
@@ -211,7 +211,7 @@ class MemoryLegalizer(LegalizationContext):
     # -- atomics ------------------------------------------------------------------------------------------------------
 
     def atomicrmw(self, i: Instr) -> Value:
-        """Read, modify, write with interrupts of priority 1-6 held off for the length of the sequence."""
+        """Read, modify and write in an atomic section."""
         kind = str(i.extra["kind"])
         p, v = self.legal(i.args[0]), self.legal(i.args[1])
         t = legal_type(i.type)
@@ -223,7 +223,7 @@ class MemoryLegalizer(LegalizationContext):
         return old
 
     def modified(self, kind: str, t: Type, old: Value, v: Value) -> Value:
-        """What atomicrmw writes."""
+        """Value that atomicrmw writes."""
         if kind in ("add", "sub", "and", "or", "xor"):
             return self.b.binary(kind, old, v)
         if kind == "xchg":
@@ -246,20 +246,20 @@ class MemoryLegalizer(LegalizationContext):
         return [old, same]
 
     def atomic_call(self, i: Instr, name: str) -> Value | None:
-        """Calls of GCC's generic atomic functions, which the front end makes for objects declared _Atomic."""
+        """Calls of GCC's generic atomic functions, which the front end emits for _Atomic objects."""
         size, p, *operands = (self.legal(a) for a in i.args[:-2])
         assert isinstance(size, ConstInt)
         n = size.value
         t = I8 if n == 1 else int_type(8 * n)
         even = self.even(p, 1)
         if name == "__atomic_load":
-            value = self.load_at_once(t, n, p, even)
+            value = self.load_atomic(t, n, p, even)
             self.store_bits(value, n, operands[0], self.even(operands[0], 1), False)
             return None
         given = operands[1] if name == "__atomic_compare_exchange" else operands[0]
         new = self.load_bits(t, n, given, self.even(given, 1), False)
         if name == "__atomic_store":
-            self.store_at_once(new, n, p, even)
+            self.store_atomic(new, n, p, even)
             return None
         if name == "__atomic_exchange":
             self.begin_atomic()
@@ -275,12 +275,12 @@ class MemoryLegalizer(LegalizationContext):
         same = self.b.icmp("eq", old, expected)
         self.store_bits(self.b.select(same, new, old), n, p, even, True)
         self.end_atomic()
-        self.store_bits(old, n, where, self.even(where, 1), False)  # when they were equal, what is there already
+        self.store_bits(old, n, where, self.even(where, 1), False)  # no change if they were equal
         return same
 
 
 def _pieces(size: int, even: bool) -> list[tuple[int, int]]:
-    """(offset, bytes) of the accesses that cover `size` bytes."""
+    """(offset, bytes) of the accesses to `size` bytes."""
     if not even:
         return [(k, 1) for k in range(size)]
     return [(k, 2) for k in range(0, size - 1, 2)] + ([(size - 1, 1)] if size & 1 else [])

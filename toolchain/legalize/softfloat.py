@@ -1,4 +1,4 @@
-"""Floating-point operations as calls of XC16's run-time names (abi-elf.md §2.8). Values are raw bits: i32 or i64."""
+"""Floating-point operations as calls of the run-time library (abi-elf.md §2.8); values are their bits, i32 or i64."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from toolchain.ir.model import I16, I32, I64, Type, UnsupportedError, Value, int
 MODE = {32: "sf", 64: "df"}
 INT_MODE = {32: "si", 64: "di"}
 ARITHMETIC = {"fadd": "__add{}3", "fsub": "__sub{}3", "fmul": "__mul{}3", "fdiv": "__div{}3"}
-# predicate -> (helper, comparison of its result with 0); an unordered predicate asks the ordered opposite, because the
-# helpers answer NaN in the direction that makes the ordered test fail (abi-elf.md §2.8).
+# Predicate -> (library function, comparison of its result with 0). An unordered predicate negates the opposite ordered
+# one, because the functions return for NaN a value that makes the ordered comparison false (abi-elf.md §2.8).
 COMPARISONS = {
     "oeq": ("eq", "eq"), "une": ("ne", "ne"), "olt": ("lt", "slt"), "ole": ("le", "sle"), "ogt": ("gt", "sgt"),
     "oge": ("ge", "sge"), "ult": ("ge", "slt"), "ule": ("gt", "sle"), "ugt": ("le", "sgt"), "uge": ("lt", "sge"),
@@ -18,7 +18,7 @@ COMPARISONS = {
 
 
 def binary(b: Builder, op: str, bits: int, x: Value, y: Value) -> Value:
-    """fadd fsub fmul fdiv frem."""
+    """Build fadd, fsub, fmul, fdiv or frem."""
     t = int_type(bits)
     if op == "frem":
         return b.call("fmodf" if bits == 32 else "fmod", t, [x, y])
@@ -26,7 +26,7 @@ def binary(b: Builder, op: str, bits: int, x: Value, y: Value) -> Value:
 
 
 def compare(b: Builder, pred: str, bits: int, x: Value, y: Value) -> Value:
-    """fcmp -> i1."""
+    """Build fcmp, as an i1."""
     from toolchain.ir.model import I1
 
     if pred in ("true", "false"):
@@ -42,7 +42,7 @@ def compare(b: Builder, pred: str, bits: int, x: Value, y: Value) -> Value:
 
 
 def from_int(b: Builder, x: Value, signed: bool, bits: int) -> Value:
-    """Integer of a legal width -> float."""
+    """Build the conversion of an integer of legal width to floating point."""
     width = 32 if x.type.bits < 32 or (x.type.bits == 32) else 64
     if x.type.bits > 64:
         raise UnsupportedError(f"conversion of a {x.type.bits}-bit integer to floating point")
@@ -52,7 +52,7 @@ def from_int(b: Builder, x: Value, signed: bool, bits: int) -> Value:
 
 
 def to_int(b: Builder, x: Value, signed: bool, t: Type) -> Value:
-    """Float -> integer; narrow results are the low bits of the 32-bit conversion (abi-elf.md §2.8 `(int)f`)."""
+    """Build the conversion to an integer; narrow ones are the low bits of a 32-bit one (abi-elf.md §2.8 `(int)f`)."""
     wide = I32 if t.bits <= 32 else I64
     if t.bits > 64:
         raise UnsupportedError(f"conversion of floating point to a {t.bits}-bit integer")

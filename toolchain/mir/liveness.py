@@ -1,4 +1,4 @@
-"""Live registers at block borders, by backward data flow. A set of registers is one int, bit n for register n."""
+"""Liveness analysis: live registers at block boundaries. A set of registers is an int, bit n for register n."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ SP_BIT = 1 << 15
 
 
 def bits(registers: list[int]) -> int:
-    """Set of the given registers."""
+    """The set of the given registers."""
     out = 0
     for r in registers:
         out |= 1 << r
@@ -16,7 +16,7 @@ def bits(registers: list[int]) -> int:
 
 
 def members(mask: int) -> list[int]:
-    """Registers in a set."""
+    """The registers in a set, in ascending order."""
     out = []
     while mask:
         low = mask & -mask
@@ -26,7 +26,7 @@ def members(mask: int) -> list[int]:
 
 
 def live_out(m: MFunction, at_return: int = 0) -> dict[str, int]:
-    """Block name -> registers live at its end. `at_return` is live after ret (callee-saved ones, after allocation)."""
+    """Block name -> registers live at its end. `at_return` are those live after RETURN (callee-saved registers)."""
     gen: dict[str, int] = {}
     kill: dict[str, int] = {}
     for b in m.blocks:
@@ -35,7 +35,7 @@ def live_out(m: MFunction, at_return: int = 0) -> dict[str, int]:
 
 
 def summary(b: MBlock) -> tuple[int, int]:
-    """Registers a block reads before it writes them, and registers it writes."""
+    """Registers that a block reads before it writes them, and registers that it writes."""
     g = k = 0
     for mi in reversed(b.insts):
         u, d = mi.register_sets()
@@ -45,7 +45,7 @@ def summary(b: MBlock) -> tuple[int, int]:
 
 
 def solve(m: MFunction, gen: dict[str, int], kill: dict[str, int], at_return: int = 0) -> dict[str, int]:
-    """`live_out` from the summaries of all blocks."""
+    """`live_out` computed from the summaries of all blocks, by backward data flow."""
     live_in: dict[str, int] = dict.fromkeys(gen, 0)
     out: dict[str, int] = dict.fromkeys(gen, 0)
     preds: dict[str, list[str]] = {b.name: [] for b in m.blocks}
@@ -73,12 +73,12 @@ def solve(m: MFunction, gen: dict[str, int], kill: dict[str, int], at_return: in
 
 
 def remove_dead(m: MFunction) -> None:
-    """Drop instructions whose results and flags nobody reads. Repeats until nothing changes."""
+    """Remove instructions whose results and flags are not read, until nothing changes."""
     gen: dict[str, int] = {}
     kill: dict[str, int] = {}
     for b in m.blocks:
         gen[b.name], kill[b.name] = summary(b)
-    known: dict[str, int] = {}  # what was live behind a block when its dead code was dropped
+    known: dict[str, int] = {}  # registers that were live behind a block when its dead code was removed
     changed = True
     while changed:
         out = solve(m, gen, kill)
@@ -93,9 +93,9 @@ def remove_dead(m: MFunction) -> None:
 
 
 def drop_dead(b: MBlock, live: int) -> bool:
-    """The same in one block, `live` being the registers live at its end; flags never live across blocks.
+    """Remove dead code from one block and return whether there was any; `live` are the registers live at its end.
 
-    Once more with the same `live` it finds nothing.
+    Flags are never live across blocks. A second call with the same `live` removes nothing.
     """
     kept: list[MI] = []
     flags: set[str] = set()

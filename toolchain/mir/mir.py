@@ -1,16 +1,17 @@
-"""Machine form: dsPIC30F instructions over virtual registers.
+"""Machine form (MIR): dsPIC30F instructions over virtual registers.
 
 Registers are ints: 0..15 are W0..W15, larger ones are virtual. A virtual register is one word, or an even-aligned pair
-when it is in `MFunction.pairs` (result of MUL, dividend of DIV.SD). OPS says of every operation which operands it reads
-and writes, what it does to the flags and to memory; every pass asks `uses`, `defs`, `reads_memory`, `writes_memory` and
-`effect` and nothing else.
+if `MFunction.pairs` contains it (result of MUL, dividend of DIV.SD).
 
-Skips. A skip instruction covers the conditional instructions (`pred`) right behind it, up to the first that is not;
-there is no second record of how many. Whatever replaces a conditional instruction is conditional as a whole
+OPS describes every operation: the operands that it reads and writes, and its effect on flags and memory. Passes use
+`uses`, `defs`, `reads_memory`, `writes_memory` and `effect` instead of the name of the operation.
+
+Skips. A skip instruction covers the conditional instructions (`pred`) that follow it directly, up to the first other
+one. The number of covered instructions is not stored. All replacements of a conditional instruction are conditional
 (`replaced`).
 
-Volatile. A memory operand carries the number of the volatile access of the source it belongs to, 0 for plain memory. An
-access of several words has one number; two accesses never share one.
+Volatile accesses. A memory operand carries the number of the volatile access of the source that it belongs to, 0 for
+plain memory. All words of one access have one number; two accesses never share a number.
 """
 
 from __future__ import annotations
@@ -35,7 +36,7 @@ class Imm:
 class Mem:
     """Register-indirect operand.
 
-    mode   "ind" [W]   "++" [W++]   "--" [W--]   "+" [++W]   "-" [--W]   "off" [W+off]   "idx" [W+Wi], off is a register
+    Modes: "ind" [W], "++" [W++], "--" [W--], "+" [++W], "-" [--W], "off" [W+off], "idx" [W+Wi] (`off` is register i).
     """
 
     mode: str
@@ -46,7 +47,7 @@ class Mem:
 
 @dataclass(frozen=True, slots=True)
 class Slot:
-    """Memory of the frame: object number and byte offset in it."""
+    """Operand in the stack frame: number of the frame object and byte offset in it."""
 
     index: int
     off: int = 0
@@ -54,25 +55,31 @@ class Slot:
 
 
 @dataclass(frozen=True, slots=True)
-class File:
-    """Directly addressed memory: assembler expression of the address. `near` when known to lie below 0x2000."""
+class FileRegister:
+    """Directly addressed memory: assembler expression of the address; `near` if it is known to lie below 0x2000."""
 
     expr: str
     near: bool
     volatile: int = 0
 
 
-Operand = int | Imm | Mem | Slot | File | str
-MEMORY = (Mem, Slot, File)
+Operand = int | Imm | Mem | Slot | FileRegister | str
+MEMORY = (Mem, Slot, FileRegister)
 STEPPING = ("++", "--", "+", "-")
 
 
 class OpInfo:
-    """Operand roles, one letter each: s read, d written, b both, n neither, capital S D for even-aligned pairs (the low
-    register stands for both once registers are real); flags written and read; words; memory read ("r") and written
-    ("w") other than by operands; `fixed`: does more than write registers, flags and memory, so it stays where it is."""
+    """Description of an operation.
 
-    __slots__ = ("fixed", "flags", "memory", "reads", "roles", "ways", "words", "writes")
+    roles           one letter per operand: s read, d written, b both, n neither; capital S D B for even-aligned pairs,
+                    which the low register represents after allocation
+    writes, reads   flags
+    words           program words
+    memory          "r" and "w" if it reads or writes memory other than by its operands
+    fixed           whether it has other effects than on registers, flags and memory, so that it cannot be moved
+    """
+
+    __slots__ = ("access", "fixed", "flags", "memory", "reads", "roles", "words", "writes")
 
     def __init__(
         self, roles: str, writes: str = "", reads: str = "", words: int = 1, memory: str = "", fixed: bool = False
@@ -84,11 +91,11 @@ class OpInfo:
         self.memory = memory
         self.fixed = fixed
         self.flags = frozenset(writes)
-        self.ways = tuple(WAYS[role] for role in roles)
+        self.access = tuple(ROLE_ACCESS[role] for role in roles)
 
 
-# Role -> whether a register operand is read, written, whether a conditional write also reads, and real registers of it.
-WAYS = {
+# Role -> whether a register operand is read, is written, is also read by a conditional write; mask of real registers.
+ROLE_ACCESS = {
     "n": (False, False, False, 1),
     "s": (True, False, False, 1),
     "d": (False, True, True, 1),
@@ -100,15 +107,15 @@ WAYS = {
 
 
 def opaque(roles: str, writes: str = "", words: int = 1) -> OpInfo:
-    """An instruction nobody may look through: any memory, and it stays where it is."""
+    """An instruction with unknown effects: it may access any memory and cannot be moved."""
     return OpInfo(roles, writes, words=words, memory="rw", fixed=True)
 
 
 ARITH, LOGIC, SHIFT1 = "cznv", "zn", "czn"
 OPS: dict[str, OpInfo] = {
     "mov": OpInfo("sd"),
-    "movlow": OpInfo("sb"),  # byte into the low byte of a register, whose upper byte stays
-    **{n: OpInfo("bs", LOGIC) for n in ("iorlow", "xorlow")},  # the same of a result
+    "movlow": OpInfo("sb"),  # replaces the low byte of a register
+    **{n: OpInfo("bs", LOGIC) for n in ("iorlow", "xorlow")},  # byte operations on the low byte of a register
     "lea": OpInfo("nd", ARITH, words=2),
     **{n: OpInfo("ssd", ARITH) for n in ("add", "sub", "subr")},
     **{n: OpInfo("ssd", ARITH, "cz") for n in ("addc", "subb", "subbr")},
@@ -146,7 +153,7 @@ OPS: dict[str, OpInfo] = {
     "splitlo": OpInfo("dS", words=0),
     "join": OpInfo("Dss", words=0),
     "movd": OpInfo("SD"),
-    # file-register forms: address, and W0 (WREG) where named
+    # file-register forms: address, then W0 (WREG) if it is an operand
     **{n: OpInfo("b", ARITH) for n in ("incf", "decf", "inc2f", "dec2f", "negf")},
     "cp0f": OpInfo("s", ARITH),
     "comf": OpInfo("b", LOGIC),
@@ -162,7 +169,7 @@ OPS: dict[str, OpInfo] = {
     "repmov": OpInfo("nbb", words=2, memory="rw"),
     "repfill": OpInfo("nbs", words=2, memory="w"),
     "repclr": OpInfo("nb", words=2, memory="w"),
-    # skips: over the conditional instructions behind them, or over one (isa.md §7.3)
+    # skip covers the conditional instructions behind it, the skip instructions cover one (isa.md §7.3)
     "skip": OpInfo("n", fixed=True),
     **{n: OpInfo("ss", fixed=True) for n in ("cpseq", "cpsne", "cpslt", "cpsgt")},
     **{n: OpInfo("sn", fixed=True) for n in ("btsc", "btss", "btscf", "btssf")},
@@ -205,9 +212,15 @@ class MI:
 
     byte    byte-sized form
     cc      condition of bra and skip
-    pred    conditional: executed only when the skip before it is not taken, so its results are also inputs
+    pred    conditional: executed only if the skip before it is not taken, so its results are also inputs
     also_uses, also_defs   implicit registers (calls, DIV, inline assembly)
-    late    indices into args of registers that must survive past the definition (DIV divisor)
+    late    indices of the operands that are read after the results are written (DIV divisor)
+    tail    of a call: the callee does not access this frame, and only the epilogue follows
+    epilogue        inserted before RETURN by the frame pass
+    claims          locations of source variables in front of the instruction
+    written_values  register that it writes -> number of the value that the register then contains
+    values_before   the same for copies in front of it that allocation removed
+    text    template of inline assembly; \\0n:m\\0 represents operand n with modifier m
     """
 
     __slots__ = (
@@ -216,9 +229,8 @@ class MI:
         "args",
         "byte",
         "cc",
+        "claims",
         "epilogue",
-        "holds",
-        "holds_before",
         "info",
         "late",
         "line",
@@ -226,8 +238,9 @@ class MI:
         "pred",
         "tail",
         "text",
-        "variables",
-    )  # fmt: skip
+        "values_before",
+        "written_values",
+    )
 
     def __init__(self, op: str, *args: Operand, byte: bool = False, cc: str = "", line: str | None = None) -> None:
         self.op = op
@@ -240,12 +253,36 @@ class MI:
         self.also_defs: tuple[int, ...] = ()
         self.late: tuple[int, ...] = ()
         self.line = line
-        self.tail = False  # call: the callee does not look at our frame, and nothing follows but the epilogue
-        self.epilogue = False  # put before RETURN by the frame pass
-        self.variables: tuple[Claim, ...] = ()  # where source variables are in front of it
-        self.holds: dict[int, int] = {}  # register it writes -> the value, by number, that it holds then
-        self.holds_before: dict[int, int] = {}  # the same of moves in front of it that allocation made superfluous
-        self.text = ""  # asm: template; \0n:m\0 stands for operand n with modifier m
+        self.tail = False
+        self.epilogue = False
+        self.claims: tuple[VariableClaim, ...] = ()
+        self.written_values: dict[int, int] = {}
+        self.values_before: dict[int, int] = {}
+        self.text = ""
+
+    def register(self, k: int) -> int:
+        """Operand `k`, which is a register."""
+        a = self.args[k]
+        assert isinstance(a, int)
+        return a
+
+    def number(self, k: int) -> int:
+        """Value of operand `k`, which is a literal number."""
+        a = self.args[k]
+        assert isinstance(a, Imm)
+        assert isinstance(a.value, int)
+        return a.value
+
+    def slot(self, k: int) -> Slot:
+        """Operand `k`, which lies in the frame."""
+        a = self.args[k]
+        assert isinstance(a, Slot)
+        return a
+
+    @property
+    def target(self) -> str:
+        """Name of the block that bra or jump branches to."""
+        return str(self.args[0])
 
     def uses(self) -> list[int]:
         """Registers read."""
@@ -276,7 +313,7 @@ class MI:
         return out
 
     def register_sets(self) -> tuple[int, int]:
-        """Registers read and registers written, each a set as `liveness` has them (bit n for register n)."""
+        """Registers read and registers written, as bit sets of `liveness` (bit n for register n)."""
         used = defined = 0
         if self.also_uses:
             for r in self.also_uses:
@@ -284,7 +321,7 @@ class MI:
         if self.also_defs:
             for r in self.also_defs:
                 defined |= 1 << r
-        for a, (reads, writes, partly, real) in zip(self.args, self.info.ways, strict=False):
+        for a, (reads, writes, partly, real) in zip(self.args, self.info.access, strict=False):
             if a.__class__ is int:
                 bit = (real if a < FIRST_VIRTUAL else 1) << a
                 if reads or (partly and self.pred):
@@ -300,7 +337,7 @@ class MI:
         return used, defined
 
     def map_registers(self, rename: dict[int, int]) -> None:
-        """Replace registers, in place."""
+        """Rename registers in place."""
         for k, a in enumerate(self.args):
             if a.__class__ is int:
                 self.args[k] = rename.get(a, a)
@@ -316,17 +353,17 @@ class MI:
 
     def clone(self) -> MI:
         """An independent copy."""
-        new = MI.__new__(MI)  # copy.copy() takes ten times as long, and allocation copies functions up to three times
+        new = MI.__new__(MI)  # ten times as fast as copy.copy(); allocation clones functions up to three times
         new.op, new.info, new.args = self.op, self.info, list(self.args)
         new.byte, new.cc, new.pred, new.late, new.line = self.byte, self.cc, self.pred, self.late, self.line
         new.also_uses, new.also_defs = self.also_uses, self.also_defs
         new.tail, new.epilogue, new.text = self.tail, self.epilogue, self.text
-        new.variables, new.holds, new.holds_before = self.variables, self.holds, self.holds_before
+        new.claims, new.written_values, new.values_before = self.claims, self.written_values, self.values_before
         return new
 
     @property
     def volatile(self) -> int:
-        """Number of the volatile access it makes, 0 for none."""
+        """Number of its volatile access, 0 if it has none."""
         for a in self.args:
             if isinstance(a, MEMORY) and a.volatile:
                 return a.volatile
@@ -336,7 +373,7 @@ class MI:
         return any(role in roles and isinstance(a, MEMORY) for role, a in zip(self.info.roles, self.args, strict=False))
 
     def reads_memory(self) -> bool:
-        """Whether it reads memory that something else may write."""
+        """Whether it reads memory."""
         return "r" in self.info.memory or self._memory("sSbB")
 
     def writes_memory(self) -> bool:
@@ -344,19 +381,19 @@ class MI:
         return "w" in self.info.memory or self._memory("dDbB")
 
     def effect(self) -> bool:
-        """Whether it does more than write registers and flags. Stepping a pointer counts: it is not worth a half."""
+        """Whether it has other effects than on registers and flags. A modified pointer counts as an effect."""
         if self.info.fixed or self.info.memory or self.volatile or self._memory("dDbB"):
             return True
         return any(a.__class__ is Mem and a.mode in STEPPING for a in self.args)
 
     def replaced(self, made: list[MI]) -> list[MI]:
-        """The instructions that take its place: conditional when it is."""
+        """Return its replacement `made`, conditional if the instruction is conditional."""
         for mi in made:
             mi.pred = self.pred
         return made
 
     def is_copy(self) -> bool:
-        """A plain word move between registers."""
+        """Whether it is an unconditional word move between registers."""
         return (
             self.op == "mov"
             and self.args[0].__class__ is int
@@ -366,18 +403,18 @@ class MI:
         )
 
     def flags_read(self) -> str:
-        """Flags this instruction looks at."""
+        """Flags that the instruction reads."""
         return CC_FLAGS.get(self.cc, "") if self.op in READS_FLAGS else self.info.reads
 
     def flags_written(self) -> str:
-        """Flags this instruction changes; a byte move from a near address sets N and Z (isa.md §6.2)."""
-        if self.op == "mov" and self.byte and isinstance(self.args[0], File):
+        """Flags that the instruction writes; a byte move from a near address sets N and Z (isa.md §6.2)."""
+        if self.op == "mov" and self.byte and isinstance(self.args[0], FileRegister):
             return "zn"
         return self.info.writes
 
     def flags_written_set(self) -> frozenset[str]:
-        """The same as a set."""
-        return NZ if self.op == "mov" and self.byte and isinstance(self.args[0], File) else self.info.flags
+        """`flags_written` as a set."""
+        return NZ if self.op == "mov" and self.byte and isinstance(self.args[0], FileRegister) else self.info.flags
 
     def __repr__(self) -> str:
         cc = f".{self.cc}" if self.cc else ""
@@ -387,8 +424,29 @@ class MI:
         return ("? " if self.pred else "") + text
 
 
-def covered(insts: list[MI], at: int) -> int:
-    """How many instructions the skip at position `at` covers."""
+@dataclass(frozen=True, slots=True)
+class PairMove:
+    """The operands of split, splitlo and join: words copied out of a pair, or into it."""
+
+    pair: int
+    words: tuple[int, ...]  # low word first
+    into_pair: bool
+
+
+def pair_move(mi: MI) -> PairMove | None:
+    """The operands of split, splitlo or join; None for other operations."""
+    match mi.op:
+        case "split":
+            return PairMove(mi.register(2), (mi.register(0), mi.register(1)), False)
+        case "splitlo":
+            return PairMove(mi.register(1), (mi.register(0),), False)
+        case "join":
+            return PairMove(mi.register(0), (mi.register(1), mi.register(2)), True)
+    return None
+
+
+def covered_count(insts: list[MI], at: int) -> int:
+    """Number of instructions that the skip at position `at` covers."""
     end = at + 1
     while end < len(insts) and insts[end].pred:
         end += 1
@@ -401,15 +459,16 @@ def _show(a: Operand) -> str:
     return str(a)
 
 
-Claim = tuple[str, tuple[int, ...], tuple[int, ...]]  # DILocalVariable, registers, what they hold if it is true
-Located = tuple[str, tuple[int, ...]]
-"""DILocalVariable and its words: in registers, GONE, or CONSTANT + the word; -1 - k: all of it in frame object k."""
-GONE, CONSTANT = 1 << 20, 1 << 21
+VariableClaim = tuple[str, tuple[int, ...], tuple[int, ...]]
+"""DILocalVariable, the registers of its words, and the values that these must contain for the claim to hold."""
+VariableLocation = tuple[str, tuple[int, ...]]
+"""DILocalVariable and its words: register, OPTIMISED_OUT or CONSTANT_WORD + value. A single -1 - k: frame object k."""
+OPTIMISED_OUT, CONSTANT_WORD = 1 << 20, 1 << 21
 
 
 @dataclass(slots=True)
 class MBlock:
-    """Straight-line code; ends in branches. Successors by name."""
+    """Basic block: straight-line code that ends in branches. Successors are named in `succs`."""
 
     name: str
     insts: list[MI] = field(default_factory=list)
@@ -420,7 +479,7 @@ class MBlock:
 
 @dataclass(slots=True)
 class FrameObject:
-    """One piece of the frame. `fixed`: offset of an incoming stack argument from W15 at entry (negative)."""
+    """Object in the frame. `fixed` is the (negative) offset of an incoming stack argument from W15 at entry."""
 
     size: int
     fixed: int | None = None
@@ -438,18 +497,18 @@ class MFunction:
     pairs: set[int] = field(default_factory=set)
     next_register: int = FIRST_VIRTUAL
     pair_hints: dict[int, int] = field(default_factory=dict)  # low word register -> high word register
-    dynamic_stack: bool = False  # W15 moves by amounts unknown here
+    dynamic_stack: bool = False  # W15 changes by amounts that are known only at run time
     uses_fp: bool = False  # W14 is the frame pointer
     interrupt: str = ""  # "", "no_auto_psv", "auto_psv"; "shadow" may be appended after a comma
-    preserved: tuple[str, ...] = ()  # variables an interrupt function saves beside the registers it uses
-    preprologue: tuple[str, ...] = ()  # lines of assembly before all else
+    preserved: tuple[str, ...] = ()  # variables that an interrupt function saves in addition to registers
+    preprologue: tuple[str, ...] = ()  # lines of assembly before the prologue
     tables: list[tuple[str, list[str]]] = field(default_factory=list)
     slot_of: dict[int, int] = field(default_factory=dict)  # id(IR value) -> frame object, for debug information
-    bindings: dict[int, Located] = field(default_factory=dict)  # debug record -> its variable and where it is
+    bindings: dict[int, VariableLocation] = field(default_factory=dict)  # debug record -> its variable, located
     locals_base: int = 0  # offset of the locals from W15 at entry
-    frame_base: tuple[int, int] = (15, 0)  # register, and W15 at entry relative to it, in the body
+    frame_base: tuple[int, int] = (15, 0)  # register in the body, and offset of W15 at entry from it
     frame_bytes: int = 0  # locals and saved registers, known after the frame pass
-    temps: set[int] = field(default_factory=set)  # registers that must not be spilled again
+    temps: set[int] = field(default_factory=set)  # registers of spill code, which must not be spilled again
 
     def new_register(self) -> int:
         """A fresh one-word virtual register."""

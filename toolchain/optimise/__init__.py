@@ -1,1 +1,1 @@
-"""Optimisation passes over legal IR and machine form."""
+"""Optimisation passes over legal IR and the machine form."""

@@ -1,7 +1,7 @@
 """Block order: chains of fall-through edges, hottest first (Pettis and Hansen 1990).
 
-An unconditional jump that falls through saves a word and two cycles, so those edges come before conditional ones of the
-same loop depth. A loop whose test stands at its top thereby gets its test at the bottom.
+Removing an unconditional jump saves a word and two cycles, so these edges come before conditional ones of the same loop
+depth. As a consequence, a loop with the test at the top is laid out with the test at the bottom.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from toolchain.mir.mir import MBlock, MFunction
 
 
 def run(m: MFunction) -> None:
-    """Reorder m.blocks; the entry stays first. Every block must end in explicit branches."""
+    """Reorder the blocks; the entry remains first. Needs: explicit branches at the end of every block."""
     order = {b.name: k for k, b in enumerate(m.blocks)}
     depth = {b.name: b.depth for b in m.blocks}
     edges: list[tuple[int, int, int, str, str]] = []
@@ -24,7 +24,7 @@ def run(m: MFunction) -> None:
     edges.sort(key=lambda e: (e[0], e[1], e[2], order[e[3]], order[e[4]]))
     after: dict[str, str] = {}
     before: dict[str, str] = {}
-    head = {n: n for n in order}  # chain of every block, by its first block; exact for chain ends only
+    head = {n: n for n in order}  # first block of the chain of every block; exact for ends of chains only
     tail = {n: n for n in order}
     entry = m.blocks[0].name
     for _, _, _, a, b_name in edges:

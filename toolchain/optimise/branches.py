@@ -1,23 +1,25 @@
-"""Layout and branches: chains, fall-through, skips, tail calls."""
+"""Branch optimisation: jump threading, fall-through, skip instructions, tail calls."""
 
 from __future__ import annotations
 
 import copy
 
 from toolchain.mir.liveness import bits, live_out, summary
-from toolchain.mir.mir import CC_INVERSE, MI, File, Imm, MBlock, Mem, MFunction, covered
+from toolchain.mir.mir import CC_INVERSE, MI, FileRegister, Imm, MBlock, Mem, MFunction, covered_count
 from toolchain.optimise import block_layout
 from toolchain.optimise.peephole import ALL, AT_RETURN
 
 
-def run(m: MFunction, reorder: bool) -> None:
-    """Needs: frame built. Removes redundant branches, and changes the order of blocks if allowed; keeps behaviour."""
+def reorder(m: MFunction) -> None:
+    """Bypass branches with a known outcome, empty edge blocks and order the blocks. Needs: explicit branches."""
+    thread_constants(m)
+    hoist_edge_moves(m)
     thread_jumps(m)
-    if reorder:
-        thread_constants(m)
-        hoist_edge_moves(m)
-        thread_jumps(m)
-        block_layout.run(m)
+    block_layout.run(m)
+
+
+def run(m: MFunction) -> None:
+    """Remove redundant branches and use skip instructions. Needs: the final order of blocks, explicit branches."""
     fall_through(m)
     thread_jumps(m)
     for b in m.blocks:
@@ -25,7 +27,7 @@ def run(m: MFunction, reorder: bool) -> None:
 
 
 def thread_jumps(m: MFunction) -> None:
-    """A branch to a block that only jumps goes to the final target; blocks nobody reaches go away."""
+    """Redirect branches to blocks that only jump to their final targets; remove unreachable blocks."""
     forward: dict[str, str] = {}
     for b, following in zip(m.blocks, [*m.blocks[1:], None], strict=True):
         if b.address_taken:
@@ -45,14 +47,14 @@ def thread_jumps(m: MFunction) -> None:
     for b in m.blocks:
         for mi in b.insts:
             if mi.op in ("bra", "jump"):
-                mi.args[0] = final(str(mi.args[0]))
+                mi.args[0] = final(mi.target)
         b.succs = list(dict.fromkeys(final(s) for s in b.succs))
     m.tables = [(name, [final(t) for t in targets]) for name, targets in m.tables]
     remove_unreached(m)
 
 
 def remove_unreached(m: MFunction) -> None:
-    """Drop blocks control cannot reach from the entry or through an address."""
+    """Remove blocks that cannot be reached from the entry or by a block address."""
     blocks = m.block_map()
     work = [m.blocks[0].name, *(b.name for b in m.blocks if b.address_taken)]
     reached = set(work)
@@ -65,7 +67,7 @@ def remove_unreached(m: MFunction) -> None:
 
 
 def fall_through(m: MFunction) -> None:
-    """No branch to what follows anyway; a conditional branch over a jump is inverted."""
+    """Remove branches to the following block; invert a conditional branch over a jump."""
     depth = {b.name: b.depth for b in m.blocks}
     for k, b in enumerate(m.blocks):
         following = m.blocks[k + 1].name if k + 1 < len(m.blocks) else ""
@@ -87,9 +89,9 @@ NEUTRAL = {"clr", "clrd", "setm", "mov"}
 
 
 def hoist_edge_moves(m: MFunction) -> None:
-    """Moves on one edge of a conditional branch go before it, when the other edge does not see them.
+    """Move register moves on one edge of a conditional branch before the branch, if they do not affect the other edge.
 
-    The edge's block then only jumps, and the branch can go straight to its target. Moves leave the flags alone.
+    The block of the edge then only jumps, so the branch can be redirected to its target. Moves change no flags.
     """
     blocks = m.block_map()
     out = live_out(m, ALL if m.interrupt else AT_RETURN)
@@ -119,19 +121,20 @@ MAX_HOISTED = 3
 
 
 def _is_neutral(mi: MI) -> bool:
-    """A register move or constant load that touches neither flags nor memory."""
+    """Whether an instruction is a register move or constant load, which changes neither flags nor memory."""
     return mi.op in NEUTRAL and not mi.byte and not mi.pred and all(isinstance(a, int | Imm) for a in mi.args)
 
 
 def live_in(block: MBlock, live: int) -> int:
-    """Registers live at the start of a block, from those live at its end. Moving copies up an edge leaves them as they
-    are for every block but the emptied one, so one analysis serves the whole pass."""
+    """Registers live at the start of a block, computed from those live at its end.
+
+    Hoisting moves from an edge changes them for the emptied block only, so the pass needs one analysis."""
     reads, kill = summary(block)
     return reads | live & ~kill
 
 
 def thread_constants(m: MFunction) -> None:
-    """A jump to a block that only compares a register with a constant, from where the register is known."""
+    """Bypass a block that only compares a register with a constant, if the jumping block leaves a constant in it."""
     blocks = m.block_map()
     for b in m.blocks:
         if not b.insts or b.insts[-1].op != "jump":
@@ -144,11 +147,11 @@ def thread_constants(m: MFunction) -> None:
             continue
         goal = str(target.insts[1].args[0] if taken else target.insts[2].args[0])
         b.insts[-1] = MI("jump", goal, line=b.insts[-1].line)
-        b.succs = list(dict.fromkeys(str(mi.args[0]) for mi in b.insts if mi.op in ("bra", "jump")))
+        b.succs = list(dict.fromkeys(mi.target for mi in b.insts if mi.op in ("bra", "jump")))
 
 
 def _decide(b: MBlock, test: MI, cc: str) -> bool | None:
-    """Outcome of `test; bra cc` with the constants the block leaves in registers, or None."""
+    """Outcome of `test; bra cc` with the constants that the block leaves in registers; None if it is unknown."""
     if test.op not in ("cp", "cp0") or not isinstance(test.args[0], int):
         return None
     right = test.args[1] if test.op == "cp" else Imm(0)
@@ -158,10 +161,11 @@ def _decide(b: MBlock, test: MI, cc: str) -> bool | None:
     if value is None:
         return None
     mask = 0xFF if test.byte else 0xFFFF
-    return _holds(cc, value & mask, right.value & mask, mask)
+    return _evaluate(cc, value & mask, right.value & mask, mask)
 
 
 def _known_value(b: MBlock, r: int) -> int | None:
+    """Constant that the block leaves in register r; None if it is unknown."""
     for mi in reversed(b.insts):
         if r in mi.defs():
             if mi.pred or mi.byte:
@@ -175,8 +179,8 @@ def _known_value(b: MBlock, r: int) -> int | None:
     return None
 
 
-def _holds(cc: str, a: int, b: int, mask: int) -> bool | None:
-    """Condition after comparing a with b, for the conditions that follow CP."""
+def _evaluate(cc: str, a: int, b: int, mask: int) -> bool | None:
+    """Value of a condition after CP a, b; None for conditions that CP does not define."""
     sign = (mask >> 1) + 1
     x, y = a - 2 * (a & sign), b - 2 * (b & sign)
     answers = {"z": a == b, "nz": a != b, "c": a >= b, "nc": a < b, "gtu": a > b, "leu": a <= b, "lt": x < y,
@@ -195,11 +199,11 @@ TWO_WORDS = {"call", "tailcall", "jumpr", "repmov", "repclr", "repfill", "div.s"
 
 
 def use_skips(b: MBlock) -> None:
-    """A comparison and a skip over one instruction become CPSxx or BTSx (isa.md §7.3)."""
+    """Replace a comparison and a skip over one instruction by CPSxx or BTSx (isa.md §7.3)."""
     k = 1
     while k < len(b.insts):
         skip = b.insts[k]
-        if skip.op == "skip" and covered(b.insts, k) == 1 and b.insts[k + 1].op not in TWO_WORDS:
+        if skip.op == "skip" and covered_count(b.insts, k) == 1 and b.insts[k + 1].op not in TWO_WORDS:
             short = _short_skip(b.insts[k - 1], skip)
             if short is not None and not _flags_needed(b, k):
                 b.insts[k - 1 : k + 1] = [short]
@@ -208,19 +212,19 @@ def use_skips(b: MBlock) -> None:
 
 
 def _short_skip(test: MI, skip: MI) -> MI | None:
-    """The instruction that does what `test` and `skip` do."""
+    """The skip instruction with the effect of `test` and `skip`; None if there is none."""
     if test.op == "cp" and skip.cc in SKIP_WHEN and all(isinstance(a, int) for a in test.args):
         return MI(SKIP_WHEN[skip.cc], *test.args, byte=test.byte, line=skip.line)
     if test.op in ("btst", "btstf") and skip.cc in ("z", "nz"):
         operand = test.args[0]
-        if isinstance(operand, int | File) or (isinstance(operand, Mem) and operand.mode == "ind"):
+        if isinstance(operand, int | FileRegister) or (isinstance(operand, Mem) and operand.mode == "ind"):
             name = ("btsc" if skip.cc == "z" else "btss") + test.op.removeprefix("btst")
             return MI(name, *test.args, byte=test.byte, line=skip.line)
     return None
 
 
 def _flags_needed(b: MBlock, skip_at: int) -> bool:
-    """Whether flags of the comparison are read after the guarded instruction."""
+    """Whether flags of the comparison are read after the covered instruction."""
     for mi in b.insts[skip_at + 1 :]:
         if mi.flags_read():
             return True
@@ -234,9 +238,9 @@ def _flags_needed(b: MBlock, skip_at: int) -> bool:
 
 
 def tail_calls(m: MFunction) -> None:
-    """CALL, epilogue, RETURN -> epilogue, BRA: the callee returns to our caller. `MI.tail` says when that is sound.
+    """Replace CALL, epilogue, RETURN by epilogue, BRA: the callee returns to this function's caller.
 
-    A branch to a bare RETURN counts as one.
+    `MI.tail` or an empty frame make that correct. A branch to a block that only returns counts as RETURN.
     """
     if m.interrupt:
         return
@@ -265,7 +269,7 @@ def tail_calls(m: MFunction) -> None:
 
 
 def _is_epilogue(mi: MI) -> bool:
-    """Instructions `frame` puts before RETURN, which leave W0-W7 alone."""
+    """Whether an instruction belongs to an epilogue, which does not change W0-W7."""
     if mi.op in ("mov", "movd") and isinstance(mi.args[0], Mem) and isinstance(mi.args[1], int):
         return mi.args[1] >= 8 and mi.args[0].base == 15 and mi.args[0].mode == "-"
     return mi.epilogue

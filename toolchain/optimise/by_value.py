@@ -1,28 +1,28 @@
-"""Struct parameters in registers: words that are only read stay where they came.
+"""Scalar replacement of struct parameters: structs in registers that the function only reads need no copy in memory.
 
-The front end hands a struct passed by value over as a pointer to a copy. When that copy travels in registers
-(abi-elf.md §2.2) and the function does nothing but load parts of it, every load becomes the word that holds it, and
-the frame has no copy. Needs: legal IR. Ensures: what `argword` reads has no address.
+For the front end, a struct passed by value is a pointer to a copy. If registers carry the struct (abi-elf.md §2.2) and
+the function only loads from the copy, this pass replaces every load by the register of its word (`argword`).
+Needs: legal IR.
 """
 
 from __future__ import annotations
 
 from toolchain.ir.build import Builder
 from toolchain.ir.model import I8, I16, Arg, ConstInt, Function, Instr, Value, int_type
-from toolchain.select.calls import is_struct, parameter_places
+from toolchain.select.calls import is_struct, parameter_locations
 
 
 def run(f: Function) -> None:
-    """Rewrite the loads of every struct parameter that allows it."""
-    for a, place in zip(f.args, parameter_places(f), strict=True):
-        if is_struct(a) and place.register is not None:
-            loads = _loads(f, a, place.words)
+    """Replace the loads of every struct parameter in registers that is only loaded from."""
+    for a, location in zip(f.args, parameter_locations(f), strict=True):
+        if is_struct(a) and location.register is not None:
+            loads = _loads(f, a, location.words)
             if loads:
                 _read_words(f, a, loads)
 
 
 def _loads(f: Function, a: Arg, words: int) -> list[tuple[Instr, int]] | None:
-    """Loads from the copy with their byte offsets; None when its address goes elsewhere or a load is not of words."""
+    """Loads from the copy with their byte offsets; None if its address has other uses or a load is not of words."""
     offsets: dict[int, int] = {id(a): 0}
     found: list[tuple[Instr, int]] = []
     pending: list[Value] = [a]
@@ -45,27 +45,27 @@ def _loads(f: Function, a: Arg, words: int) -> list[tuple[Instr, int]] | None:
 
 
 def _inside(at: int, bits: int, words: int) -> bool:
-    """Whether a load takes one byte or whole words of the copy."""
+    """Whether a load reads one byte or whole words of the copy."""
     return at >= 0 and at + bits // 8 <= 2 * words and (bits == 8 or (at % 2 == 0 and bits in (16, 32, 64)))
 
 
 def _read_words(f: Function, a: Arg, loads: list[tuple[Instr, int]]) -> None:
-    """Put the words at the entry, their combinations where the loads were."""
+    """Add the words to the entry block, and replace the loads by combinations of words."""
     words: dict[int, Instr] = {}
     for load, at in loads:
         for k in range(at // 2, (at + load.type.bits // 8 + 1) // 2):
             if k not in words:
                 words[k] = Instr("argword", I16, [])
                 words[k].extra = {"argument": a, "word": k}
-    gone = {id(load): at for load, at in loads}
+    offset_of = {id(load): at for load, at in loads}
     values: dict[int, Value] = {}
     for b in f.blocks:
         old, b.instrs = b.instrs, []
         build = Builder(b)
         for i in old:
-            if id(i) in gone:
+            if id(i) in offset_of:
                 build.line = i.line
-                values[id(i)] = _value(build, words, gone[id(i)], i.type.bits)
+                values[id(i)] = _value(build, words, offset_of[id(i)], i.type.bits)
             else:
                 b.instrs.append(i)
     for b in f.blocks:
@@ -80,7 +80,7 @@ def _read_words(f: Function, a: Arg, loads: list[tuple[Instr, int]]) -> None:
 
 
 def _value(b: Builder, words: dict[int, Instr], at: int, bits: int) -> Value:
-    """What a load of `bits` at byte `at` of the copy reads."""
+    """Build the value that a load of `bits` bits at byte offset `at` reads."""
     if bits == 8:
         return b.cast("trunc", b.shift("lshr", words[at // 2], 8) if at % 2 else words[at // 2], I8)
     t = int_type(bits)

@@ -1,12 +1,13 @@
-"""Small rewrites of legal IR that the middle end cannot know are good here.
+"""Target-specific rewrites of legal IR, which the middle end does not make.
 
-quotients    x < c with x / c at hand is x / c == 0, so that x need not outlive the division
-remainders   x - x/c*c back to x % c, and quotient and remainder of one division from one DIV (isa.md §6.7)
-conditional  x op (c ? y : 0) is c ? x op y : x, where the operation stands under a skip
-selects      those on one condition stand together and share the test
-increments   pointer and counter steps next to the last use of the old value, so both share a register and the step can
-             become a post-increment; those by the size of a block stand before its copy, which makes them
-countdowns   `n-- != 0`: the decrement moves to the test, whose carry answers it
+quotients    x < c becomes x / c == 0 if x / c is computed anyway, so that x need not be live behind the division
+remainders   x - x/c*c becomes x % c again; quotient and remainder of one division share one DIV (isa.md §6.7)
+conditional  x op (c ? y : 0) becomes c ? x op y : x, whose operation is covered by a skip
+selects      selects on one condition are adjacent and share the test
+increments   steps of pointers and counters move behind the last use of the old value, so that both share a register and
+             the step can become a post-increment
+block_steps  steps by the size of a block move before its copy, which advances the pointer
+countdowns   the decrement of `n-- != 0` moves to the test, which its carry decides
 """
 
 from __future__ import annotations
@@ -16,11 +17,11 @@ from toolchain.ir.model import Block, ConstInt, Function, GlobalRef, Instr, Valu
 from toolchain.legalize import magic
 from toolchain.legalize.magic import REMAINDER
 from toolchain.optimise import induction
-from toolchain.select.compare import COUNTED
+from toolchain.select.compare import COUNTDOWN_CONDITION
 
 
 def users_of(f: Function) -> dict[int, list[Instr]]:
-    """id(value) -> instructions that use it."""
+    """id(instruction) -> instructions that use its value."""
     out: dict[int, list[Instr]] = {}
     for b in f.blocks:
         for i in b.instrs:
@@ -31,7 +32,7 @@ def users_of(f: Function) -> dict[int, list[Instr]]:
 
 
 def combine(f: Function, for_size: bool, for_speed: bool = False) -> None:
-    """Needs: legal IR. Ensures: the rewrites above, where they apply."""
+    """Apply all rewrites. Needs: legal IR."""
     quotients(f)
     conditional(f)
     selects(f)
@@ -45,7 +46,7 @@ def combine(f: Function, for_size: bool, for_speed: bool = False) -> None:
 
 
 def quotients(f: Function) -> None:
-    """icmp x, c -> icmp x udiv c, 0 in the block of that division, when the division is needed anyway."""
+    """Replace icmp x, c by icmp (x udiv c), 0 in blocks that contain the division."""
     for b in f.blocks:
         divided: dict[tuple[int, int], Instr] = {}
         for i in b.instrs:
@@ -53,7 +54,7 @@ def quotients(f: Function) -> None:
                 divided[id(i.args[0]), i.args[1].value] = i
             if i.op != "icmp" or not isinstance(i.args[1], ConstInt) or i.pred not in ("ult", "ugt", "ule", "uge"):
                 continue
-            below = i.args[1].value + (i.pred in ("ugt", "ule"))  # x < below, or not
+            below = i.args[1].value + (i.pred in ("ugt", "ule"))  # the comparison decides x < below
             quotient = divided.get((id(i.args[0]), below))
             if quotient is not None:
                 i.args = [quotient, ConstInt(quotient.type, 0)]
@@ -64,7 +65,7 @@ NEUTRAL_RIGHT = ("add", "sub", "or", "xor")  # x op 0 is x
 
 
 def conditional(f: Function) -> None:
-    """x op select(c, y, 0) -> select(c, x op y, x) and its mirror image, for a select nobody else wants."""
+    """Replace x op select(c, y, 0) by select(c, x op y, x), and its mirror image, if the select has no other use."""
     counts = use_counts(f)
     for b in f.blocks:
         made: list[Instr] = []
@@ -80,7 +81,7 @@ def conditional(f: Function) -> None:
 
 
 def _conditional(i: Instr, counts: dict[int, int], here: set[int]) -> Instr | None:
-    """Make `i` the select; returns the operation in front of it."""
+    """Turn `i` into the select; returns the operation to insert before it, or None if the rewrite does not apply."""
     a, b = i.args
     for x, chosen in ((a, b), (b, a)) if i.op != "sub" else ((a, b),):
         if not isinstance(chosen, Instr) or chosen.op != "select" or counts[id(chosen)] != 1 or id(chosen) not in here:
@@ -98,7 +99,7 @@ def _conditional(i: Instr, counts: dict[int, int], here: set[int]) -> Instr | No
 
 
 def selects(f: Function) -> None:
-    """Move a select down to the next one of its block on the same condition, when nothing in between wants it."""
+    """Move a select down to the next one on the same condition, if no instruction in between uses it."""
     for b in f.blocks:
         last: dict[int, Instr] = {}
         for i in [x for x in b.instrs if x.op == "select"]:
@@ -112,8 +113,9 @@ def selects(f: Function) -> None:
 
 
 def remainders(f: Function, for_size: bool) -> None:
-    """sub x, (mul (div x, c), c) -> rem x, c. For c = 2^k the product is a shift, and DIV, which has both results, is
-    there for size only."""
+    """Replace sub x, (mul (div x, c), c) by rem x, c.
+
+    For c = 2^k the product is a shift; there the remainder saves words only, because DIV computes both results."""
     for b in f.blocks:
         for i in b.instrs:
             if i.op == "sub" and i.type.bits == 16:
@@ -123,7 +125,7 @@ def remainders(f: Function, for_size: bool) -> None:
 
 
 def _division_of(x: Value, product: Value, sign: int, shifts: bool) -> tuple[Instr, Value] | None:
-    """The division q = x / c behind product = q * (sign*c), or with `shifts` q << k for c = 2^k."""
+    """The division q = x / c of product = q * (sign*c), with `shifts` also of q << k for c = 2^k; None otherwise."""
     if not isinstance(product, Instr) or product.op not in ("mul", "shl"):
         return None
     q, c = product.args
@@ -147,7 +149,7 @@ def _recover_remainder(i: Instr, for_size: bool) -> None:
 
 
 def _recover_negative(i: Instr) -> None:
-    """x + q * -c, the form the middle end prefers for constants."""
+    """Replace x + q * -c, the middle end's form for constants c, by a remainder."""
     for x, product in ((i.args[0], i.args[1]), (i.args[1], i.args[0])):
         found = _division_of(x, product, -1, False)
         if found is not None:
@@ -157,7 +159,7 @@ def _recover_negative(i: Instr) -> None:
 
 
 def pair_divisions(f: Function) -> None:
-    """A quotient and a remainder of the same operands in one block share one DIV."""
+    """Let a quotient and a remainder of the same operands in one block share one DIV."""
     for b in f.blocks:
         seen: dict[tuple[str, int, object], Instr] = {}
         for i in b.instrs:
@@ -173,7 +175,7 @@ def pair_divisions(f: Function) -> None:
 
 
 def _share(first: Instr, second: Instr) -> None:
-    """Make `second` the other result of `first`'s DIV."""
+    """Turn `second` into the other result of `first`'s DIV."""
     if "other" in first.extra:
         return
     second.op = "divother"
@@ -182,7 +184,7 @@ def _share(first: Instr, second: Instr) -> None:
 
 
 def increments(f: Function) -> None:
-    """Move p + constant behind the last use of the phi p, when it feeds the phi again."""
+    """Move the step p + constant of a phi p behind the last use of p."""
     users = users_of(f)
     depths = loop_depths(f)
     dominators = immediate_dominators(f)
@@ -196,8 +198,8 @@ def increments(f: Function) -> None:
                 _to_last_use(b, i, users)
                 continue
             others = [u for u in users[id(p)] if u is not i]
-            places = {id(home[id(u)]): home[id(u)] for u in others}
-            behind = _last_place(_places(p, others, home, f), b, users[id(i)], dominators)
+            using = {id(home[id(u)]): home[id(u)] for u in others}
+            behind = _last_using_block(_using_blocks(p, others, home, f), b, users[id(i)], dominators)
             if behind is not None and depths[behind.name] == depths[b.name]:
                 b.instrs.remove(i)
                 behind.instrs.insert(len(behind.instrs) - 1, i)
@@ -206,8 +208,8 @@ def increments(f: Function) -> None:
                 continue
             if any(u.op == "phi" for u in others):
                 continue
-            if len(places) == 1 and all(u.op in ("load", "store", "add") for u in others):
-                target = next(iter(places.values()))
+            if len(using) == 1 and all(u.op in ("load", "store", "add") for u in others):
+                target = next(iter(using.values()))
                 if target is not b and depths[target.name] <= depths[b.name] and _dominates(dominators, target, b):
                     b.instrs.remove(i)
                     target.instrs.insert(len(target.instrs) - 1, i)
@@ -218,7 +220,7 @@ def increments(f: Function) -> None:
 
 
 def block_steps(f: Function) -> None:
-    """Move p + size in front of the operation on a block of that size at p, whose pointer ends there (`blocks`)."""
+    """Move p + size before the copy or fill of a block of that size at p, which leaves its pointer there."""
     for b in f.blocks:
         for block in [i for i in b.instrs if i.op in ("blockcopy", "blockfill")]:
             count, unit = block.extra["count"], block.extra["unit"]
@@ -229,8 +231,8 @@ def block_steps(f: Function) -> None:
                     b.instrs.insert(at, step)
 
 
-def _places(p: Instr, users: list[Instr], home: dict[int, Block], f: Function) -> list[Block]:
-    """Blocks that want `p`; a phi wants it at the end of the block it comes from."""
+def _using_blocks(p: Instr, users: list[Instr], home: dict[int, Block], f: Function) -> list[Block]:
+    """Blocks that use `p`; a phi uses it at the end of the incoming block."""
     blocks = {b.name: b for b in f.blocks}
     found: dict[str, Block] = {}
     for u in users:
@@ -239,9 +241,9 @@ def _places(p: Instr, users: list[Instr], home: dict[int, Block], f: Function) -
     return list(found.values())
 
 
-def _last_place(places: list[Block], b: Block, phis: list[Instr], idom: dict[str, str]) -> Block | None:
-    """The block behind `b` that all others of `places` come before, on every way to the phis that take the step."""
-    last = next((t for t in places if all(_dominates(idom, other, t) for other in places)), None)
+def _last_using_block(using: list[Block], b: Block, phis: list[Instr], idom: dict[str, str]) -> Block | None:
+    """The block behind `b` that all others of `using` dominate, if it dominates the edge to the phi of the step."""
+    last = next((t for t in using if all(_dominates(idom, other, t) for other in using)), None)
     if last is None or last is b or not _dominates(idom, b, last):
         return None
     step = {name for phi in phis for v, name in zip(phi.args, phi.blocks, strict=True)
@@ -250,7 +252,7 @@ def _last_place(places: list[Block], b: Block, phis: list[Instr], idom: dict[str
 
 
 def _to_last_use(b: Block, i: Instr, users: dict[int, list[Instr]]) -> None:
-    """Place `i` as late as its own uses allow: before the first in the block, else before the terminator."""
+    """Move `i` before its first use in the block, or before the terminator if it has none."""
     position = {id(x): k for k, x in enumerate(b.instrs)}
     uses = [position[id(u)] for u in users.get(id(i), ()) if u.op != "phi" and id(u) in position]
     target = min(uses, default=len(b.instrs) - 1)
@@ -261,7 +263,7 @@ def _to_last_use(b: Block, i: Instr, users: dict[int, list[Instr]]) -> None:
 
 
 def immediate_dominators(f: Function) -> dict[str, str]:
-    """Cooper, Harvey, Kennedy: A Simple, Fast Dominance Algorithm."""
+    """Block name -> name of its immediate dominator (Cooper, Harvey, Kennedy: A Simple, Fast Dominance Algorithm)."""
     order = [b.name for b in reverse_postorder(f)]
     number = {n: k for k, n in enumerate(order)}
     preds = predecessors(f)
@@ -303,7 +305,7 @@ def _named_dominates(idom: dict[str, str], a: str, b: str) -> bool:
 
 
 def countdowns(f: Function) -> None:
-    """For a branch on x == 0 or x == 1, bring y = x - 1 of the block or of its only-reached successor to the branch."""
+    """Move y = x - 1 to a branch on x == 0 or x == 1, from its block or a successor that only it reaches."""
     preds = predecessors(f)
     blocks = {b.name: b for b in f.blocks}
     users = users_of(f)
@@ -317,7 +319,7 @@ def countdowns(f: Function) -> None:
             continue
         if not zero.value and x.op == "add" and x in b.instrs:
             _to_test(b, x, c, users)
-        if zero.value > 1 or c.pred not in COUNTED[zero.value]:
+        if zero.value > 1 or c.pred not in COUNTDOWN_CONDITION[zero.value]:
             continue
         for source in [b, *(blocks[s] for s in br.blocks if preds[s] == [b.name])]:
             step = next((i for i in source.instrs if _is_decrement(i, x)), None)
@@ -329,7 +331,7 @@ def countdowns(f: Function) -> None:
 
 
 def _to_test(b: Block, step: Instr, c: Instr, users: dict[int, list[Instr]]) -> None:
-    """Place a step and the test of its result against 0 right before the branch, where the step's flags answer it."""
+    """Move a step and the test of its result directly before the branch, which the flags of the step decide there."""
     alone = all(u is c or u.op == "phi" or u not in b.instrs for u in users.get(id(step), ()))
     if alone and users.get(id(c)) == [b.instrs[-1]]:
         b.instrs = [*(i for i in b.instrs[:-1] if i is not step and i is not c), step, c, b.instrs[-1]]

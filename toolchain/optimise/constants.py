@@ -1,7 +1,6 @@
-"""Constants in registers: loaded once per block stretch and once per loop instead of at every use.
+"""Sharing of constants in registers: loaded once for several uses in a block, and once before a loop.
 
-Needs: virtual registers. A moved constant keeps a single definition, so the allocator can still load it again at its
-uses when registers run out (see `spill`).
+Needs: virtual registers. A shared constant has a single definition, so the allocator can rematerialise it (`spill`).
 """
 
 from __future__ import annotations
@@ -10,13 +9,13 @@ from toolchain.ir.cfg import natural_loops
 from toolchain.mir.liveness import live_out
 from toolchain.mir.mir import MI, Imm, MBlock, MFunction
 
-REACH = 12  # instructions over which a repeated constant is kept
-LOOP_REGISTERS = 9  # registers a loop may hold with its constants: W0-W7 and one spare
-Key = tuple[str, object]
+REACH = 12  # most instructions between two uses of a shared constant
+LOOP_REGISTERS = 9  # most registers live in a loop with its constants: W0-W7 and one more
+LoadKey = tuple[str, object]
 
 
 def run(m: MFunction) -> None:
-    """Both rewrites."""
+    """Share constants in blocks, then hoist them from loops."""
     counts = _definition_counts(m)
     out = live_out(m)
     for b in m.blocks:
@@ -33,8 +32,8 @@ def _definition_counts(m: MFunction) -> dict[int, int]:
     return counts
 
 
-def _key(mi: MI, counts: dict[int, int]) -> Key | None:
-    """What a constant load loads; None for anything else, or when the register has other definitions."""
+def _key(mi: MI, counts: dict[int, int]) -> LoadKey | None:
+    """Operation and value of a constant load; None for others, and if the register has another definition."""
     if mi.pred or mi.byte or not mi.args or not isinstance(mi.args[-1], int):
         return None
     if mi.args[-1] < 16 or counts.get(mi.args[-1]) != 1:
@@ -53,8 +52,8 @@ def _is_call(mi: MI) -> bool:
 
 
 def _share_in_block(b: MBlock, counts: dict[int, int], live: int) -> None:
-    """Reuse the register of an equal constant loaded a few instructions earlier; those live at the end stay."""
-    known: dict[Key, tuple[int, int]] = {}
+    """Reuse the register of an equal constant loaded shortly before; constants live at the end of the block remain."""
+    known: dict[LoadKey, tuple[int, int]] = {}
     rename: dict[int, int] = {}
     out: list[MI] = []
     for at, mi in enumerate(b.insts):
@@ -62,8 +61,7 @@ def _share_in_block(b: MBlock, counts: dict[int, int], live: int) -> None:
             known.clear()
         key = _key(mi, counts)
         if key is not None:
-            r = mi.args[-1]
-            assert isinstance(r, int)
+            r = mi.register(-1)
             found = known.get(key)
             if found is not None and at - found[1] <= REACH and not live >> r & 1:
                 rename[r] = found[0]
@@ -77,7 +75,7 @@ def _share_in_block(b: MBlock, counts: dict[int, int], live: int) -> None:
 
 
 def _hoist_from_loops(m: MFunction, counts: dict[int, int]) -> None:
-    """Innermost loops without calls: constants move to the block before the loop."""
+    """Move the constants of innermost loops without calls to the block before the loop."""
     succs = {b.name: b.succs for b in m.blocks}
     loops = natural_loops(succs, m.blocks[0].name)
     blocks = m.block_map()
@@ -96,7 +94,7 @@ def _hoist_from_loops(m: MFunction, counts: dict[int, int]) -> None:
 
 
 def _entry(blocks: dict[str, MBlock], succs: dict[str, list[str]], header: str, body: set[str]) -> MBlock | None:
-    """The only block that enters the loop, if it goes nowhere else."""
+    """The only predecessor of a loop outside it, if the loop is its only successor."""
     outside = [n for n, s in succs.items() if header in s and n not in body]
     if len(outside) != 1 or succs[outside[0]] != [header]:
         return None
@@ -104,7 +102,7 @@ def _entry(blocks: dict[str, MBlock], succs: dict[str, list[str]], header: str, 
 
 
 def _hoist(m: MFunction, entry: MBlock, body: list[MBlock], counts: dict[int, int], room: int) -> None:
-    found: dict[Key, int] = {}
+    found: dict[LoadKey, int] = {}
     rename: dict[int, int] = {}
     for b in body:
         kept: list[MI] = []
@@ -113,8 +111,7 @@ def _hoist(m: MFunction, entry: MBlock, body: list[MBlock], counts: dict[int, in
             if key is None or (key not in found and len(found) >= room) or _used_outside(m, mi, body):
                 kept.append(mi)
                 continue
-            r = mi.args[-1]
-            assert isinstance(r, int)
+            r = mi.register(-1)
             if key in found:
                 rename[r] = found[key]
             else:
@@ -128,7 +125,7 @@ def _hoist(m: MFunction, entry: MBlock, body: list[MBlock], counts: dict[int, in
 
 
 def _used_outside(m: MFunction, mi: MI, body: list[MBlock]) -> bool:
-    """Constants are used in their own block only, unless an earlier pass says otherwise."""
+    """Whether the register of a constant is used outside the loop."""
     r = mi.args[-1]
     names = {b.name for b in body}
     return any(r in x.uses() for b in m.blocks if b.name not in names for x in b.insts)

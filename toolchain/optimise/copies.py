@@ -1,23 +1,23 @@
-"""Copies and constants in registers: loads of what a register holds already go, copies give way to their originals.
+"""Copy and constant propagation: remove loads of values that the register contains, replace copies by their originals.
 
-Facts travel along all edges of the function (what holds at a block's start holds at the end of every predecessor).
-Needs: real registers, frames built. The caller drops what became dead, with liveness computed anew.
+Forward data flow over the whole function: a fact holds at the start of a block if it holds at the end of every
+predecessor. Needs: real registers, frames built. The caller removes dead code with a new liveness analysis.
 """
 
 from __future__ import annotations
 
 from toolchain.abi.target import SP
-from toolchain.mir.mir import MI, File, Imm, MBlock, Mem, MFunction
+from toolchain.mir.mir import MI, FileRegister, Imm, MBlock, Mem, MFunction
 
-Known = tuple[str, object]
-Facts = dict[int, int | Known]
-"""Register -> the register it is a copy of, or the constant it holds."""
-Effect = tuple[int, int, Known | None, int]
-"""Registers an instruction writes, the one it copies (-1: none), the constant it loads, and the one for either (-1)."""
+KnownConstant = tuple[str, object]
+RegisterFacts = dict[int, int | KnownConstant]
+"""Register -> the register that it is a copy of, or the constant that it contains."""
+Transfer = tuple[int, int, KnownConstant | None, int]
+"""Registers that an instruction writes; source of a copy (-1: none), loaded constant, destination of either (-1)."""
 
 
 def run(m: MFunction) -> bool:
-    """Rewrite every block; whether anything changed."""
+    """Rewrite every block and return whether anything changed."""
     starts = _solve(m)
     changed = False
     for b in m.blocks:
@@ -25,19 +25,19 @@ def run(m: MFunction) -> bool:
     return changed
 
 
-def _solve(m: MFunction) -> dict[str, Facts]:
-    """Facts at the start of every block. Blocks not reached yet know everything, so loops keep what they preserve."""
+def _solve(m: MFunction) -> dict[str, RegisterFacts]:
+    """RegisterFacts at the start of every block. Optimistic: unvisited predecessors of a loop do not remove facts."""
     entry = m.blocks[0].name
-    starts: dict[str, Facts] = {entry: {}}
+    starts: dict[str, RegisterFacts] = {entry: {}}
     starts |= {b.name: {} for b in m.blocks if b.address_taken}
     blocks = m.block_map()
-    effects = {b.name: [_effect(mi) for mi in b.insts] for b in m.blocks}
+    transfers = {b.name: [_transfer(mi) for mi in b.insts] for b in m.blocks}
     work = list(starts)
     while work:
         name = work.pop()
         facts = dict(starts[name])
-        for effect in effects[name]:
-            _follow(effect, facts)
+        for transfer in transfers[name]:
+            _apply_transfer(transfer, facts)
         for s in dict.fromkeys(blocks[name].succs):
             old = starts.get(s)
             new = facts if old is None else {r: v for r, v in old.items() if facts.get(r) == v}
@@ -47,25 +47,26 @@ def _solve(m: MFunction) -> dict[str, Facts]:
     return {b.name: starts.get(b.name, {}) for b in m.blocks}
 
 
-def _effect(mi: MI) -> Effect:
-    """What one instruction does to facts."""
+def _transfer(mi: MI) -> Transfer:
+    """Effect of one instruction on the facts."""
     copied = mi.args[0] if mi.is_copy() else None
     source = copied if isinstance(copied, int) and copied < SP else -1
     dest = mi.args[-1] if mi.args else None
     return mi.register_sets()[1], source, _constant(mi), dest if isinstance(dest, int) and dest < SP else -1
 
 
-def _follow(effect: Effect, facts: Facts) -> None:
-    """Facts after one instruction."""
-    written, source, value, dest = effect
-    result: int | Known | None = value if source < 0 else facts.get(source, source)
+def _apply_transfer(transfer: Transfer, facts: RegisterFacts) -> None:
+    """Change the facts to those after one instruction."""
+    written, source, value, dest = transfer
+    result: int | KnownConstant | None = value if source < 0 else facts.get(source, source)
     if facts:
         _forget(written, facts)
     if dest >= 0 and result is not None and result != dest:
         facts[dest] = result
 
 
-def _forget(written: int, facts: Facts) -> None:
+def _forget(written: int, facts: RegisterFacts) -> None:
+    """Remove the facts about registers that are written."""
     moved = written >> SP & 1  # addresses in the frame are relative to it
     gone = [
         r for r, v in facts.items()
@@ -75,8 +76,8 @@ def _forget(written: int, facts: Facts) -> None:
         del facts[r]
 
 
-def _constant(mi: MI) -> Known | None:
-    """What a load of a constant, or of an address in the frame, puts into its register."""
+def _constant(mi: MI) -> KnownConstant | None:
+    """Constant or frame address that an instruction loads into its register; None for other instructions."""
     if mi.pred or mi.byte or not mi.args or not isinstance(mi.args[-1], int):
         return None
     if mi.op == "clr":
@@ -90,41 +91,41 @@ def _constant(mi: MI) -> Known | None:
     return None
 
 
-def _rewrite(b: MBlock, facts: Facts) -> bool:
+def _rewrite(b: MBlock, facts: RegisterFacts) -> bool:
+    """Rewrite one block with the facts at its start; returns whether it changed."""
     out: list[MI] = []
-    made: Facts = {}  # in this block: longer lives of originals would cost more than they give
+    made: RegisterFacts = {}  # facts of this block only: longer live ranges of originals cost more than they save
     changed = False
     for mi in b.insts:
-        if _restates(mi, facts):
+        if _is_redundant(mi, facts):
             changed = True
             continue
         changed |= _use_originals(mi, made)
-        effect = _effect(mi)
-        _follow(effect, facts)
-        _follow(effect, made)
+        transfer = _transfer(mi)
+        _apply_transfer(transfer, facts)
+        _apply_transfer(transfer, made)
         out.append(mi)
     b.insts = out
     return changed
 
 
-def _restates(mi: MI, facts: Facts) -> bool:
-    """Whether the register it writes holds that value already."""
+def _is_redundant(mi: MI, facts: RegisterFacts) -> bool:
+    """Whether the destination of a copy or load already contains its value."""
     dest = mi.args[-1] if mi.args else None
     if not isinstance(dest, int) or dest >= SP:
         return False
     if mi.is_copy():
-        source = mi.args[0]
-        assert isinstance(source, int)
+        source = mi.register(0)
         return facts.get(dest, dest) == facts.get(source, source)
     known = _constant(mi)
     return known is not None and facts.get(dest) == known
 
 
-def _use_originals(mi: MI, facts: Facts) -> bool:
-    """Replace read-only register operands by what they are copies of."""
+def _use_originals(mi: MI, facts: RegisterFacts) -> bool:
+    """Replace copies in read-only operands by their originals; returns whether there were any."""
     if not facts or mi.pred or mi.op in ("asm", "split", "join", "movd"):
         return False
-    if mi.byte and any(isinstance(a, File) for a in mi.args):
+    if mi.byte and any(isinstance(a, FileRegister) for a in mi.args):
         return False  # near bytes move through W0 only (isa.md §3.3)
     changed = False
     for k, (role, a) in enumerate(zip(mi.info.roles, mi.args, strict=False)):

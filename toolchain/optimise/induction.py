@@ -1,10 +1,10 @@
-"""Induction variables: array walks become pointer walks, and counters that only count run down to zero.
+"""Induction variables: strength reduction of array indices, and loop counters that count down to zero.
 
-    a[i] with i += c    ->  a pointer stepped by c elements, which addressing turns into [Wn++]
-    i == n as the exit  ->  n - i == 0, which the decrement's own flags answer
+    a[i] with i += c    ->  a pointer stepped by c elements, which becomes [Wn++]
+    i == n as the exit  ->  n - i == 0, which the flags of the decrement decide
     i == max(n, start)  ->  i >= n: the middle end's trip count of `i < n`
 
-Needs: legal IR. Touches loops with one entry. The middle end leaves this to us (engines.md §5: it runs no LSR).
+Needs: legal IR. Changes loops with one entry only. The middle end runs no loop strength reduction (engines.md §5).
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ from toolchain.ir.cfg import dead_code, natural_loops, predecessors
 from toolchain.ir.model import I16, Block, ConstInt, Function, Instr, Value
 
 MAX_POINTERS = 3
-MAX_HEADER_PHIS = 6  # with more values around the loop, another register would be spilled
+MAX_HEADER_PHIS = 6  # with more loop-carried values, another register would be spilled
 CALLS = frozenset(("call", "asm", "builtin"))
 
 
 @dataclass
-class Loop:
-    """An innermost loop with one entry block."""
+class CountedLoop:
+    """A loop with one entry block."""
 
     f: Function
     header: Block
@@ -36,8 +36,8 @@ class Loop:
 
 
 @dataclass
-class Counter:
-    """A phi that grows by a constant: `phi` in the header, `step` = phi + amount in the body."""
+class InductionVariable:
+    """A phi in the header that grows by a constant: `step` = `phi` + amount in the body."""
 
     phi: Instr
     step: Instr
@@ -46,7 +46,7 @@ class Counter:
 
 
 def run(f: Function) -> None:
-    """Rewrite all loops of the function: pointers in innermost ones without calls, counters in all."""
+    """Rewrite the loops of the function: pointers in innermost loops without calls, counters in all loops."""
     for loop, innermost in _loops(f):
         if innermost and not any(i.op in CALLS for b in loop.body for i in b.instrs):
             for counter in _counters(loop):
@@ -59,8 +59,8 @@ def run(f: Function) -> None:
     dead_code(f)
 
 
-def _loops(f: Function) -> list[tuple[Loop, bool]]:
-    """Loops with one entry block, and whether no other loop lies inside."""
+def _loops(f: Function) -> list[tuple[CountedLoop, bool]]:
+    """Loops with one entry block, each with whether it is innermost."""
     blocks = {b.name: b for b in f.blocks}
     preds = predecessors(f)
     loops = natural_loops({b.name: b.succs for b in f.blocks}, f.blocks[0].name)
@@ -72,16 +72,16 @@ def _loops(f: Function) -> list[tuple[Loop, bool]]:
         body = [b for b in f.blocks if b.name in names]
         inside = {id(i) for b in body for i in b.instrs}
         innermost = not any(other != header and other in names for other in loops)
-        found.append((Loop(f, blocks[header], blocks[outside[0]], body, inside), innermost))
+        found.append((CountedLoop(f, blocks[header], blocks[outside[0]], body, inside), innermost))
     return found
 
 
-def _counters(loop: Loop) -> list[Counter]:
+def _counters(loop: CountedLoop) -> list[InductionVariable]:
     return [c for phi in loop.header.phis() if (c := _counter(loop, phi)) is not None]
 
 
-def _counter(loop: Loop, phi: Instr) -> Counter | None:
-    """The counter behind a phi, or None."""
+def _counter(loop: CountedLoop, phi: Instr) -> InductionVariable | None:
+    """The induction variable of a phi; None for other phis."""
     if phi.type is not I16:
         return None
     start: Value | None = None
@@ -98,10 +98,11 @@ def _counter(loop: Loop, phi: Instr) -> Counter | None:
     amount = step.args[1]
     if not isinstance(amount, ConstInt) or loop.invariant(step):
         return None
-    return Counter(phi, step, start, amount.signed)
+    return InductionVariable(phi, step, start, amount.signed)
 
 
 def _users(f: Function, v: Value) -> list[Instr]:
+    """Instructions that use a value, once per operand."""
     return [i for b in f.blocks for i in b.instrs for a in i.args if a is v]
 
 
@@ -109,8 +110,8 @@ def _users(f: Function, v: Value) -> list[Instr]:
 # pointers
 
 
-def _make_pointers(loop: Loop, counter: Counter) -> None:
-    """Give every (base, bytes per count) a pointer of its own."""
+def _make_pointers(loop: CountedLoop, counter: InductionVariable) -> None:
+    """Give every pair of base and scale a pointer."""
     groups: dict[tuple[str, int], list[tuple[Instr, Value, int]]] = {}
     for b in loop.body:
         for i in b.instrs:
@@ -127,8 +128,8 @@ def _identity(base: Value) -> str:
     return repr(base) if not isinstance(base, Instr) else f"instr {id(base)}"
 
 
-def _scaled_sum(loop: Loop, counter: Counter, i: Instr) -> tuple[Value, int, int] | None:
-    """(base, bytes per count, bytes ahead) of base + (+-counter + n) * scale."""
+def _scaled_sum(loop: CountedLoop, counter: InductionVariable, i: Instr) -> tuple[Value, int, int] | None:
+    """(base, scale of the counter, constant offset) of an address base + (+-counter + n) * scale; else None."""
     if i.op != "add" or i.type is not I16:
         return None
     for base, scaled in ((i.args[0], i.args[1]), (i.args[1], i.args[0])):
@@ -144,8 +145,8 @@ def _scaled_sum(loop: Loop, counter: Counter, i: Instr) -> tuple[Value, int, int
     return None
 
 
-def _linear(counter: Counter, index: Value) -> tuple[int, int] | None:
-    """(1 or -1, n) when an index is counter + n or n - counter."""
+def _linear(counter: InductionVariable, index: Value) -> tuple[int, int] | None:
+    """(1, n) for an index counter + n, (-1, n) for n - counter, None for any other."""
     if index is counter.phi:
         return 1, 0
     if not isinstance(index, Instr) or index.op not in ("add", "sub", "xor"):
@@ -158,7 +159,10 @@ def _linear(counter: Counter, index: Value) -> tuple[int, int] | None:
     return (-1, -1) if a is counter.phi and isinstance(b, ConstInt) and b.signed == -1 and index.op == "xor" else None
 
 
-def _make_pointer(loop: Loop, counter: Counter, scale: int, sums: list[tuple[Instr, Value, int]]) -> None:
+def _make_pointer(
+    loop: CountedLoop, counter: InductionVariable, scale: int, sums: list[tuple[Instr, Value, int]]
+) -> None:
+    """Add a pointer phi to the loop, and replace the addresses `sums` by it."""
     base = sums[0][1]
     last = loop.entry.instrs.pop()
     b = Builder(loop.entry)
@@ -176,8 +180,8 @@ def _make_pointer(loop: Loop, counter: Counter, scale: int, sums: list[tuple[Ins
     stride = counter.amount * scale
     early = next((i for i, _, ahead in sums if stride < 0 and ahead == stride and i in home.instrs), None)
     if early is not None and any(i is not early and _follows(loop, home, early, i) for i, _, _ in sums):
-        early = None  # the pointer before the step is still wanted behind it, which would cost a copy
-    if early is not None:  # walking down, the stepped pointer is the one wanted: addressing gets [--Wn]
+        early = None  # the pointer before the step is still used behind it, which would cost a copy
+    if early is not None:  # downwards, the stepped pointer is the address: [--Wn]
         home.instrs.insert(home.instrs.index(early), step)
     else:
         home.instrs.insert(home.instrs.index(counter.step) + 1, step)
@@ -191,8 +195,8 @@ def _make_pointer(loop: Loop, counter: Counter, scale: int, sums: list[tuple[Ins
             _replace(loop.f, i, pointer)
 
 
-def _follows(loop: Loop, home: Block, early: Instr, i: Instr) -> bool:
-    """Whether an address is wanted behind another one of block `home`."""
+def _follows(loop: CountedLoop, home: Block, early: Instr, i: Instr) -> bool:
+    """Whether an address is used behind address `early` of block `home`."""
     behind = home.instrs[home.instrs.index(early) :]
     return any(u in behind for u in _users(loop.f, i)) or any(
         u in b.instrs for u in _users(loop.f, i) for b in loop.body if b is not home
@@ -200,6 +204,7 @@ def _follows(loop: Loop, home: Block, early: Instr, i: Instr) -> bool:
 
 
 def _replace(f: Function, old: Instr, new: Instr) -> None:
+    """Replace all uses of a value."""
     for user in _users(f, old):
         user.args = [new if a is old else a for a in user.args]
 
@@ -208,8 +213,8 @@ def _replace(f: Function, old: Instr, new: Instr) -> None:
 # counting down
 
 
-def _leaves_at(loop: Loop, test: Instr) -> bool:
-    """Whether every turn begins with the test and ends the loop there, so that the counter never passes 0."""
+def _leaves_at(loop: CountedLoop, test: Instr) -> bool:
+    """Whether the header tests the counter and leaves the loop there, so that the counter never passes 0."""
     br = loop.header.instrs[-1]
     if br.op != "br" or not br.args or br.args[0] is not test:
         return False
@@ -217,7 +222,7 @@ def _leaves_at(loop: Loop, test: Instr) -> bool:
 
 
 def _unclamped(v: Value, start: Value) -> Value | None:
-    """n when a value is max(n, start), signed, for a constant start."""
+    """n if a value is the signed max(n, start) for a constant start, else None."""
     if not isinstance(v, Instr) or v.op != "select" or not isinstance(v.args[0], Instr) or v.args[0].op != "icmp":
         return None
     test, a, b = v.args
@@ -232,8 +237,8 @@ def _equal(a: Value, b: Value) -> bool:
     return isinstance(a, ConstInt) and isinstance(b, ConstInt) and a.value == b.value
 
 
-def _unclamp(loop: Loop, counter: Counter) -> None:
-    """From start on in steps of one, i is max(n, start) when it is n or more for the first time."""
+def _unclamp(loop: CountedLoop, counter: InductionVariable) -> None:
+    """Replace the exit test i == max(n, start) of a loop in steps of one from `start` by i >= n."""
     test = _exit_test(loop)
     if counter.amount != 1 or test is None or test.args[0] is not counter.phi or not _leaves_at(loop, test):
         return
@@ -243,8 +248,8 @@ def _unclamp(loop: Loop, counter: Counter) -> None:
         test.extra["pred"] = "sge" if test.pred == "eq" else "slt"
 
 
-def _exit_test(loop: Loop) -> Instr | None:
-    """The comparison for equality at the end of the header that nobody else wants."""
+def _exit_test(loop: CountedLoop) -> Instr | None:
+    """The comparison for equality that only the branch at the end of the header uses, or None."""
     br = loop.header.instrs[-1]
     test = br.args[0] if br.op == "br" and br.args else None
     if not isinstance(test, Instr) or test.op != "icmp" or test.pred not in ("eq", "ne"):
@@ -252,8 +257,8 @@ def _exit_test(loop: Loop) -> Instr | None:
     return test if len(_users(loop.f, test)) == 1 else None
 
 
-def _count_down(loop: Loop, counter: Counter) -> None:
-    """Turn a counter with no use but the exit test into one that reaches zero there."""
+def _count_down(loop: CountedLoop, counter: InductionVariable) -> None:
+    """Let a counter that only the exit test uses count down to zero."""
     if counter.amount != 1:
         return
     tests = {id(u): u for v in (counter.phi, counter.step) for u in _users(loop.f, v)}
@@ -281,8 +286,8 @@ def _count_down(loop: Loop, counter: Counter) -> None:
     test.args = [test.args[0], const(I16, 0)]
 
 
-def _count_down_signed(loop: Loop, counter: Counter, test: Instr) -> None:
-    """i >= n for i from 0 or 1 on: from n down to there. The difference of n and i might not fit into a word."""
+def _count_down_signed(loop: CountedLoop, counter: InductionVariable, test: Instr) -> None:
+    """Let a counter from 0 or 1 with the exit test i >= n count down from n; n - i might overflow."""
     n, start = test.args[1], counter.start
     if test.args[0] is not counter.phi or not _leaves_at(loop, test) or not loop.invariant(n):
         return
@@ -292,11 +297,11 @@ def _count_down_signed(loop: Loop, counter: Counter, test: Instr) -> None:
         test.extra["pred"] = "sle" if test.pred == "sge" else "sgt"
 
 
-def _start_at(loop: Loop, counter: Counter, start: Value) -> None:
-    """Let the counter begin there and go down."""
+def _start_at(loop: CountedLoop, counter: InductionVariable, start: Value) -> None:
+    """Let the counter start at a value and count down."""
     counter.phi.args = [start if n == loop.entry.name else v
                         for v, n in zip(counter.phi.args, counter.phi.blocks, strict=True)]  # fmt: skip
     counter.step.args = [counter.phi, const(I16, -1)]
     for record in loop.f.dbg_records:
         if record.value is counter.phi or record.value is counter.step:
-            record.value = None  # the source variable counts the other way
+            record.value = None  # the source variable counts up

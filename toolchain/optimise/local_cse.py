@@ -1,7 +1,7 @@
-"""Computations that a block makes twice: the second one gives way to the register of the first.
+"""Local common subexpression elimination: replace a repeated computation in a block by the register of the first one.
 
-The front end's addresses, such as a[i] and b[i], share their scaled index only in the machine form.
-Needs: virtual registers. A register that takes over has a single definition, so it still holds the value at every use.
+Addresses such as a[i] and b[i] share their scaled index only in the machine form. Needs: virtual registers. Both
+registers have a single definition, so the first one contains the value at every use of the second.
 """
 
 from __future__ import annotations
@@ -9,16 +9,16 @@ from __future__ import annotations
 from toolchain.mir.mir import FIRST_VIRTUAL, MI, Imm, MBlock, MFunction
 from toolchain.optimise.peephole import flags_unused
 
-REACH = 12  # instructions over which a result is kept: longer lives cost registers
+REACH = 12  # most instructions between the computations; longer live ranges cost registers
 PURE = frozenset((
     "add", "sub", "subr", "and", "ior", "xor", "inc", "inc2", "dec", "dec2", "neg", "com", "sl", "lsr", "asr", "sl1",
     "lsr1", "asr1", "se", "ze", "rlnc", "rrnc",
 ))  # fmt: skip
-Key = tuple[object, ...]
+Expression = tuple[object, ...]
 
 
 def run(m: MFunction) -> None:
-    """Every block on its own."""
+    """Rewrite every block, then rename the registers of the removed computations."""
     counts: dict[int, int] = {}
     for b in m.blocks:
         for mi in b.insts:
@@ -27,7 +27,7 @@ def run(m: MFunction) -> None:
     rename: dict[int, int] = {}
     hinted = {*m.pair_hints, *m.pair_hints.values()}
     for b in m.blocks:
-        _block(b, counts, hinted, rename)
+        _eliminate(b, counts, hinted, rename)
     if rename:
         for b in m.blocks:
             for mi in b.insts:
@@ -36,8 +36,8 @@ def run(m: MFunction) -> None:
             m.bindings[record] = (variable, tuple(rename.get(r, r) for r in words))
 
 
-def _block(b: MBlock, counts: dict[int, int], hinted: set[int], rename: dict[int, int]) -> None:
-    known: dict[Key, tuple[int, int]] = {}
+def _eliminate(b: MBlock, counts: dict[int, int], hinted: set[int], rename: dict[int, int]) -> None:
+    known: dict[Expression, tuple[int, int]] = {}
     out: list[MI] = []
     for at, mi in enumerate(b.insts):
         if mi.op in ("call", "callr", "asm"):
@@ -60,8 +60,8 @@ def _block(b: MBlock, counts: dict[int, int], hinted: set[int], rename: dict[int
     b.insts = out
 
 
-def _key(mi: MI, counts: dict[int, int]) -> Key | None:
-    """Operation and operands of a computation whose result nothing changes; None for all else."""
+def _key(mi: MI, counts: dict[int, int]) -> Expression | None:
+    """Operation and operands of a computation with a single-definition result; None for other instructions."""
     if mi.op not in PURE or mi.pred:
         return None
     *sources, dest = mi.args

@@ -1,7 +1,7 @@
-"""Local rewrites over real registers, after frames are built.
+"""Peephole optimisation: local rewrites over real registers.
 
-Each rewrite looks at neighbouring instructions of one block and the registers and flags live behind them; `local` runs
-them until nothing changes. Needs: real registers. Keeps behaviour; only removes or shortens.
+Each rewrite examines neighbouring instructions of one block and the registers and flags that are live behind them.
+Needs: frames built. No rewrite adds an instruction.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from toolchain.optimise import copies
 
 AT_RETURN = bits([*CALLEE_SAVED, 15])
 ALL = 0xFFFF
-# Single-register results whose N and Z describe the word or byte written.
+# Operations with one result, whose N and Z describe the word or byte that they write.
 SETS_NZ = {"add", "sub", "subr", "addc", "subb", "and", "ior", "xor", "addl", "subl", "andl", "iorl", "xorl",
            "inc", "dec",
            "inc2", "dec2", "neg", "com", "sl", "lsr", "asr", "sl1", "lsr1", "asr1", "se", "ze", "rlc",
@@ -22,7 +22,7 @@ STICKY_Z = {"addc", "subb", "subbr", "cpb"}
 
 
 def run(m: MFunction) -> None:
-    """All local rewrites, to a fixed point."""
+    """Apply all rewrites until nothing changes, at most four times."""
     at_return = ALL if m.interrupt else AT_RETURN
     for _ in range(4):
         changed = copies.run(m)
@@ -36,7 +36,7 @@ def run(m: MFunction) -> None:
 
 
 def clear_pairs(b: MBlock) -> None:
-    """Two CLR of the registers of a pair become one instruction."""
+    """Merge two CLR of the registers of a pair into one instruction."""
     k = 0
     while k + 1 < len(b.insts):
         one, two = b.insts[k : k + 2]
@@ -44,14 +44,15 @@ def clear_pairs(b: MBlock) -> None:
             r, q = one.args[0], two.args[0]
             if isinstance(r, int) and isinstance(q, int) and r ^ q == 1 and min(r, q) < FP:
                 pair = MI("clrd", min(r, q), line=one.line)
-                pair.variables = two.variables
-                pair.holds, pair.holds_before = one.holds | two.holds, one.holds_before | two.holds_before
+                pair.claims = two.claims
+                pair.written_values = one.written_values | two.written_values
+                pair.values_before = one.values_before | two.values_before
                 b.insts[k : k + 2] = [pair]
         k += 1
 
 
 def local(b: MBlock, live: int) -> bool:
-    """One round over one block. `live` is the registers live at its end."""
+    """Apply every rewrite once to one block; `live` are the registers live at its end. Return whether it changed."""
     before = len(b.insts)
     touched = drop_dead(b, live)
     touched |= drop_compares(b)
@@ -63,7 +64,7 @@ def local(b: MBlock, live: int) -> bool:
 
 
 def flags_read_after(b: MBlock, at: int) -> set[str] | None:
-    """Condition codes that read the flags as left by instruction `at`; None when something unknown does."""
+    """Conditions that read the flags written by instruction `at`; None if another kind of instruction reads them."""
     found: set[str] = set()
     for mi in b.insts[at + 1 :]:
         if mi.op in ("bra", "skip"):
@@ -78,7 +79,7 @@ def flags_read_after(b: MBlock, at: int) -> set[str] | None:
 
 
 def drop_compares(b: MBlock) -> bool:
-    """CP0 of a register whose last writer left the same Z and N."""
+    """Remove repeated comparisons, and CP0 of a register whose last write set the same Z and N."""
     changed = False
     k = 0
     while k < len(b.insts):
@@ -101,7 +102,7 @@ def drop_compares(b: MBlock) -> bool:
 
 
 def _repeated(b: MBlock, at: int) -> bool:
-    """Whether the same registers were compared before and neither they nor the flags changed since."""
+    """Whether an earlier comparison of the same operands has left the same flags."""
     mi = b.insts[at]
     if not all(isinstance(a, int | Imm) for a in mi.args):
         return False
@@ -116,7 +117,7 @@ def _repeated(b: MBlock, at: int) -> bool:
 
 
 def compare_while_copying(b: MBlock) -> bool:
-    """MOV Wa,Wb beside CP0 of either is SUB Wa,#0,Wb: the same flags (isa.md §6.2)."""
+    """Replace MOV Wa,Wb beside CP0 of either register by SUB Wa,#0,Wb, which sets the same flags (isa.md §6.2)."""
     k, before = 0, len(b.insts)
     while k + 1 < len(b.insts):
         one, two = b.insts[k : k + 2]
@@ -128,13 +129,13 @@ def compare_while_copying(b: MBlock) -> bool:
         tested = test.args[0] == source or (test.args[0] == dest and copy is one)
         if tested and isinstance(source, int) and isinstance(dest, int) and max(source, dest) < SP:
             new = MI("sub", source, Imm(0), dest, line=copy.line)
-            new.variables = one.variables
+            new.claims = one.claims
             b.insts[k - 1 : k + 1] = [new]
     return len(b.insts) != before
 
 
 def compare_in_place(b: MBlock, live: int) -> bool:
-    """MOV #k,Wt; CP Wn,Wt with both dead afterwards is SUB #k,Wn (same flags)."""
+    """Replace MOV #k,Wt; CP Wn,Wt by SUB #k,Wn, which sets the same flags, if both registers are dead behind it."""
     changed = False
     for k in range(len(b.insts) - 1, 0, -1):
         mi, load = b.insts[k], b.insts[k - 1]
@@ -155,7 +156,7 @@ def compare_in_place(b: MBlock, live: int) -> bool:
 
 
 def _flag_source(b: MBlock, at: int, r: int, byte: bool) -> MI | None:
-    """The instruction before `at` that wrote r and the flags, with only moves between."""
+    """The instruction before `at` that wrote register r and set the flags; None if another one changed either."""
     for k in range(at - 1, -1, -1):
         mi = b.insts[k]
         if mi.pred or mi.op in SKIPS:
@@ -171,7 +172,7 @@ def _flag_source(b: MBlock, at: int, r: int, byte: bool) -> MI | None:
 
 
 def _fits_a_byte(mi: MI) -> bool:
-    """Whether a word operation masks all but bits 0-6, so that the word and its low byte have the same Z and N."""
+    """Whether a word operation clears bits 7-15, so that the word and its low byte have the same Z and N."""
     masks = [a.value for a in mi.args if isinstance(a, Imm)] if mi.op in ("and", "andl") else []
     return any(isinstance(mask, int) and 0 <= mask <= 0x7F for mask in masks)
 
@@ -184,15 +185,14 @@ STEPS = {"inc": 1, "inc2": 2, "dec": -1, "dec2": -2}
 
 
 def auto_increment(b: MBlock) -> bool:
-    """[Wn] and a step of Wn by the access size become [Wn++] or [Wn--]; a step before [Wn] becomes [++Wn] or [--Wn]."""
+    """Merge an access through [Wn] with the step of Wn by the access size: [Wn++] and [Wn--], or [++Wn] and [--Wn]."""
     changed = False
     k = 0
     while k < len(b.insts):
         step = b.insts[k]
         amount = _step_amount(step)
         if amount is not None and flags_unused(b, k):
-            r = step.args[-1]
-            assert isinstance(r, int)
+            r = step.register(-1)
             if _fold_after(b, k, r, amount) or _fold_before(b, k, r, amount):
                 del b.insts[k]
                 changed = True
@@ -202,7 +202,7 @@ def auto_increment(b: MBlock) -> bool:
 
 
 def _step_amount(mi: MI) -> int | None:
-    """Signed step of `op Wn, Wn`."""
+    """Signed step of an instruction that increments or decrements a register; None for any other."""
     if mi.pred or mi.byte:
         return None
     if mi.op in STEPS and isinstance(mi.args[0], int) and mi.args[0] == mi.args[1]:
@@ -213,13 +213,13 @@ def _step_amount(mi: MI) -> int | None:
 
 
 def flags_unused(b: MBlock, at: int) -> bool:
-    """Whether nobody reads the flags instruction `at` leaves. Flags never live across blocks."""
+    """Whether no instruction reads the flags that instruction `at` sets. Flags are never live across blocks."""
     readers = flags_read_after(b, at)
     return readers is not None and not readers
 
 
 def _fold_after(b: MBlock, at: int, r: int, amount: int) -> bool:
-    """Find the last access through [r] before the step."""
+    """Merge the step with the last access through [r] before it. Return whether that was possible."""
     for k in range(at - 1, -1, -1):
         mi = b.insts[k]
         if r in mi.uses() or r in mi.defs():
@@ -230,7 +230,7 @@ def _fold_after(b: MBlock, at: int, r: int, amount: int) -> bool:
 
 
 def _fold_before(b: MBlock, at: int, r: int, amount: int) -> bool:
-    """Find the first access through [r] after the step."""
+    """Merge the step with the first access through [r] after it. Return whether that was possible."""
     for k in range(at + 1, len(b.insts)):
         mi = b.insts[k]
         if r in mi.uses() or r in mi.defs():
@@ -241,7 +241,7 @@ def _fold_before(b: MBlock, at: int, r: int, amount: int) -> bool:
 
 
 def _modify(mi: MI, r: int, amount: int, mode: str) -> bool:
-    """Turn the only [r] of an instruction into the modifying form, if r has no other part in it (isa.md §3.4)."""
+    """Make the only [r] of an instruction modify r, if the instruction does not use r otherwise (isa.md §3.4)."""
     size = 1 if mi.byte or mi.op in ("se", "ze") else 4 if mi.op == "movd" else 2
     if abs(amount) != size or mi.pred or mi.info.fixed or mi.info.memory:
         return False
@@ -256,7 +256,7 @@ def _modify(mi: MI, r: int, amount: int, mode: str) -> bool:
 
 
 def merge_pairs(b: MBlock) -> bool:
-    """Two word moves of neighbouring words and registers become MOV.D (isa.md §5.5)."""
+    """Merge two moves of adjacent words and registers into MOV.D (isa.md §5.5). Return whether any were merged."""
     changed = False
     k = 0
     while k + 1 < len(b.insts):
@@ -269,6 +269,7 @@ def merge_pairs(b: MBlock) -> bool:
 
 
 def _merged(first: MI, second: MI) -> MI | None:
+    """The MOV.D with the effect of two moves; None if there is none."""
     if first.op != "mov" or second.op != "mov" or first.byte or second.byte or first.pred or second.pred:
         return None
     a, b = first.args
@@ -280,7 +281,7 @@ def _merged(first: MI, second: MI) -> MI | None:
             return MI("movd", a, b, line=first.line)
         return None
     if isinstance(b, int) and isinstance(d, int) and isinstance(a, Mem) and isinstance(c, Mem):
-        if b == c.base:  # the first load must not move the second
+        if b == c.base:  # the first load must not change the address of the second
             return None
         low = _pair_of(a, b, c, d)
         return MI("movd", a if low == b else c, low, line=first.line) if low is not None else None
@@ -291,8 +292,9 @@ def _merged(first: MI, second: MI) -> MI | None:
 
 
 def _pair_of(x: Mem, r: int, y: Mem, q: int) -> int | None:
-    """Even register of a pair when r and q with their places x and y, in this order, can travel in one MOV.D, which
-    goes low word first. Volatile words must belong to one access and keep their order."""
+    """Low register of the pair (r, q), in either order, if one MOV.D can move it to or from the addresses x and y.
+
+    MOV.D accesses the low word first. Volatile words must belong to one access and keep their order."""
     if x.base != y.base or x.volatile != y.volatile:
         return None
     if _offset(x) == 0 and _offset(y) == 2:

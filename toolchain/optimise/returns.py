@@ -1,7 +1,7 @@
-"""Returns: RETURN instead of a branch to it, and RETLW for constant results.
+"""Returns: RETURN instead of a branch to RETURN, and RETLW for constant results.
 
-RETLW #lit10, W0 loads the result while returning (isa.md §5.7): a word less than MOV and RETURN, the same three cycles.
-Needs: the final order of blocks. Changes nothing else.
+RETLW #lit10, W0 returns and loads the result (isa.md §5.7). It takes a word less than MOV and RETURN and the same three
+cycles. Needs: the final order of blocks.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ RESULT = 0  # W0
 
 
 def run(m: MFunction) -> None:
-    """Both rewrites."""
+    """Replace branches to RETURN, then constant results."""
     _return_early(m)
     if not m.interrupt:
         for b in list(m.blocks):
@@ -25,7 +25,7 @@ def run(m: MFunction) -> None:
 
 
 def _return_early(m: MFunction) -> None:
-    """A branch to a block that only returns is as long as the return itself."""
+    """Replace a branch to a block that only returns by the return, which has the same size."""
     bare = {b.name: b.insts[0] for b in m.blocks if len(b.insts) == 1 and b.insts[0].op == "ret"}
     for b in m.blocks:
         if b.insts and b.insts[-1].op == "jump" and str(b.insts[-1].args[0]) in bare:
@@ -37,7 +37,7 @@ def _return_early(m: MFunction) -> None:
 
 
 def _return_either(m: MFunction, b: MBlock) -> None:
-    """MOV #k,W0; skip; MOV #j,W0; RETURN -> BRA to a RETLW #k,W0; RETLW #j,W0."""
+    """Replace MOV #k,W0; skip; MOV #j,W0; RETURN by a branch to RETLW #k,W0 and RETLW #j,W0."""
     if len(b.insts) < 4 or b.insts[-1].op != "ret" or b.insts[-1].text:
         return
     first, skip, second, end = b.insts[-4:]
@@ -58,13 +58,13 @@ def _return_either(m: MFunction, b: MBlock) -> None:
 
 
 def _load(ret: MI, value: int) -> None:
-    """Make a return load the result."""
+    """Turn RETURN into RETLW."""
     ret.text = f"retlw #{value},w{RESULT}"
     ret.also_uses = tuple(r for r in ret.also_uses if r != RESULT)
 
 
 def _load_while_returning(b: MBlock) -> None:
-    """MOV #k,W0; epilogue; RETURN -> epilogue; RETLW #k,W0."""
+    """Replace MOV #k,W0; epilogue; RETURN by epilogue; RETLW #k,W0."""
     if not b.insts or b.insts[-1].op != "ret" or b.insts[-1].text:
         return
     for k in range(len(b.insts) - 2, -1, -1):
@@ -79,7 +79,7 @@ def _load_while_returning(b: MBlock) -> None:
 
 
 def _constant(mi: MI) -> int | None:
-    """What a constant load puts into the result register, if RETLW can."""
+    """Constant that an instruction loads into the result register, if RETLW can load it; else None."""
     if mi.pred or mi.byte or not mi.args or mi.args[-1] != RESULT:
         return None
     if mi.op == "clr":

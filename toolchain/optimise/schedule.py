@@ -1,7 +1,7 @@
-"""Fill RAW stalls: an instruction that uses Wn as a source address right after one that writes Wn waits a cycle
-(isa.md §13.2). Another instruction is moved between the two when nothing else changes by it.
+"""Instruction scheduling: fill read-after-write stalls.
 
-Needs: final instructions of each block, before branches are laid out. Keeps behaviour and size.
+An instruction that uses Wn as a source address stalls for a cycle directly after one that writes Wn (isa.md §13.2). The
+pass moves an independent instruction between the two. Needs: final instructions of each block. The size is unchanged.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ WINDOW = 4
 
 
 def run(m: MFunction) -> None:
-    """One pass over every block."""
+    """Fill the stalls of every block, from its start to its end."""
     for b in m.blocks:
         k = 0
         while k + 1 < len(b.insts):
@@ -24,13 +24,13 @@ def run(m: MFunction) -> None:
 
 
 def stalls(first: MI, second: MI) -> bool:
-    """Whether `second` waits for a register `first` writes."""
+    """Whether `second` stalls for a register that `first` writes."""
     written = bits(_destination_writes(first))
     return bool(written & bits(_source_addresses(second)))
 
 
 def _destination_writes(mi: MI) -> list[int]:
-    """Registers written directly or by modification of the destination pointer; source pointers are early."""
+    """Registers written as destination, or modified as destination pointer; modified source pointers do not stall."""
     out = list(mi.also_defs) if mi.op not in ("call", "callr") else []
     for role, a in zip(mi.info.roles, mi.args, strict=False):
         if isinstance(a, int):
@@ -42,6 +42,7 @@ def _destination_writes(mi: MI) -> list[int]:
 
 
 def _source_addresses(mi: MI) -> list[int]:
+    """Registers that an instruction uses as source addresses."""
     out = []
     for role, a in zip(mi.info.roles, mi.args, strict=False):
         if isinstance(a, Mem) and role in "sbS":
@@ -52,14 +53,14 @@ def _source_addresses(mi: MI) -> list[int]:
 
 
 def _movable(mi: MI) -> bool:
-    """Register work and plain loads: no effect, not part of a skip, nothing with the stack pointer."""
+    """Whether an instruction may be moved: no effects, not covered by a skip, no use of the stack pointer."""
     if mi.pred or mi.effect() or mi.also_defs or mi.also_uses:
         return False
     return all(a != SP and not (isinstance(a, Mem) and a.base == SP) for a in mi.args)
 
 
 def _independent(a: MI, b: MI) -> bool:
-    """Whether two neighbours may change places."""
+    """Whether two adjacent instructions may be exchanged."""
     if a.info.fixed or b.info.fixed:
         return False
     if (a.writes_memory() and (b.reads_memory() or b.writes_memory())) or (b.writes_memory() and a.reads_memory()):
@@ -72,7 +73,7 @@ def _independent(a: MI, b: MI) -> bool:
 
 
 def _fill_from_below(insts: list[MI], k: int) -> bool:
-    """Bring a later instruction up between insts[k] and insts[k+1]."""
+    """Move a later instruction up between insts[k] and insts[k+1]; returns whether there was one."""
     for j in range(k + 2, min(k + 2 + WINDOW, len(insts))):
         mover = insts[j]
         if insts[j - 1].op in SKIPS or insts[j - 1].pred or mover.info.fixed:
@@ -85,7 +86,7 @@ def _fill_from_below(insts: list[MI], k: int) -> bool:
 
 
 def _flags_reach_end(insts: list[MI], j: int, mover: MI) -> bool:
-    """Whether somebody after position j reads flags the mover writes: then it stays in place."""
+    """Whether an instruction after position j reads flags that the moved instruction writes."""
     live = set(mover.flags_written())
     for mi in insts[j + 1 :]:
         if live & set(mi.flags_read()) or mi.op in ("asm", "text"):
@@ -96,7 +97,7 @@ def _flags_reach_end(insts: list[MI], j: int, mover: MI) -> bool:
 
 
 def _fill_from_above(insts: list[MI], k: int) -> None:
-    """Move insts[k-1] down behind insts[k]."""
+    """Move insts[k-1] down behind insts[k] if they are independent and no new stall results."""
     if k == 0 or insts[k - 1].op in SKIPS or insts[k].pred or insts[k + 1].pred:
         return
     mover = insts[k - 1]

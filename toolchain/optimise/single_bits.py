@@ -1,15 +1,16 @@
-"""Writes of one bit of a volatile object in near memory, back where the source has them.
+"""Single-bit writes: one BSET, BCLR or BTG for every write of one bit of a volatile object in near memory.
 
-BSET, BCLR and BTG change one bit in one instruction (isa.md §5.4), so an interrupt in between loses no other bit; what
-programs do to flags of the hardware counts on that. The front end clears a bit-field before it sets it; here both are
-one operation. The middle end knows no such instruction. Of branches, or of a switch, that each write a bit it makes
+These instructions change one bit (isa.md §5.4), so an interrupt cannot lose the change of another bit. Programs rely on
+that for the flags of peripherals. The front end clears a bit-field before it sets it; `one_operation` merges the two.
+The middle end merges the writes of several branches; this pass reverses that. It recognises four shapes:
 
-    one store behind them, of a phi        the store moves back into the branches
-    one load in front of them              the load moves back into the branches
-    a choice of the value that is stored   the choice becomes branches again
-    a bit that is put into the old value   the same, on that bit
+    shape                                                       result
+    one store behind the branches, of a phi                     a store in each branch
+    one load before the branches                                a load in each branch
+    a store of a select between two values                      two branches with a load and a store each
+    a store of the old value with one bit inserted              the same, selected by that bit
 
-Needs: legal IR without critical edges. Every way makes the same accesses in the same order as before.
+Needs: legal IR without critical edges. The order of volatile accesses on every path is unchanged.
 """
 
 from __future__ import annotations
@@ -23,37 +24,38 @@ from toolchain.ir.model import I1, VOID, Block, ConstInt, Function, GlobalRef, I
 from toolchain.optimise.combine import users_of
 from toolchain.select.state import MEMORY_BARRIERS
 
-Near = Callable[[str], bool]
-Change = tuple[Instr, str, int]
-"""The load, and what one operation with one constant makes of it."""
+IsNear = Callable[[str], bool]
+"""Whether the variable of that name lies in near memory."""
+BitChange = tuple[Instr, str, int]
+"""A load, and the operation with a constant that changes one bit of its value."""
 
 
 @dataclass(frozen=True)
-class Choice:
-    """A value that is one change of a load where `asked` has a bit of `mask`, and another change of it elsewhere."""
+class BitChoice:
+    """A value that is one change of a load if `condition` has a bit of `mask`, and another change of it otherwise."""
 
-    asked: Value
+    condition: Value
     mask: int
-    first: Change
-    second: Change
-    own: frozenset[int]  # identities of the instructions that make it from the load, which is one of them
+    first: BitChange
+    second: BitChange
+    own: frozenset[int]  # identities of the load and of the instructions that compute the value from it
 
 
-def run(f: Function, near: Near) -> None:
-    """Undo the four for every store of the function; `near` tells whether a variable is in near memory."""
+def run(f: Function, is_near: IsNear) -> None:
+    """Separate the single-bit writes of the function."""
     one_operation(f)
     for b in f.blocks:
-        _store_in_branches(f, b, near)
-    written = _bits_written(f, near)
-    for b in f.blocks if written else ():
-        _load_in_branches(f, b, near, written)
+        _store_in_branches(f, b, is_near)
+    addresses = _single_bit_addresses(f, is_near)
+    for b in f.blocks if addresses else ():
+        _load_in_branches(f, b, is_near, addresses)
     for b in list(f.blocks):
-        _branches_for_choice(f, b, near)
+        _branches_for_choice(f, b, is_near)
     dead_code(f)
 
 
 def one_operation(f: Function) -> None:
-    """Several operations that change one bit of a volatile object become one, wherever the object is."""
+    """Merge consecutive operations that together change one bit of a volatile object, in any memory."""
     users = users_of(f)
     for b in f.blocks:
         for store in [i for i in b.instrs if i.op == "store" and i.volatile]:
@@ -67,14 +69,14 @@ def one_operation(f: Function) -> None:
     dead_code(f)
 
 
-def _bits_written(f: Function, near: Near) -> list[Value]:
-    """Places to which a store of the function writes one bit."""
-    stores = [(i, _place(i, near)) for b in f.blocks for i in b.instrs if i.op == "store"]
-    return [p for i, p in stores if p is not None and _writes(i.args[0], p)]
+def _single_bit_addresses(f: Function, is_near: IsNear) -> list[Value]:
+    """Addresses of the single-bit writes of the function."""
+    stores = [(i, _near_address(i, is_near)) for b in f.blocks for i in b.instrs if i.op == "store"]
+    return [p for i, p in stores if p is not None and _writes_single_bit(i.args[0], p)]
 
 
-def _place(i: Instr, near: Near) -> Value | None:
-    """Where a volatile access of a byte or word goes, if that is a fixed place in near memory."""
+def _near_address(i: Instr, is_near: IsNear) -> Value | None:
+    """Address of a volatile access of a byte or word, if it is a constant in near memory."""
     if i.op not in ("load", "store") or not i.volatile:
         return None
     t, p = (i.type if i.op == "load" else i.args[0].type), i.args[-1]
@@ -82,10 +84,11 @@ def _place(i: Instr, near: Near) -> Value | None:
         return None
     if isinstance(p, ConstInt):
         return p if p.value < NEAR_END else None
-    return p if isinstance(p, GlobalRef) and near(p.name) else None
+    return p if isinstance(p, GlobalRef) and is_near(p.name) else None
 
 
 def _same(p: Value, q: Value) -> bool:
+    """Whether two constant addresses are equal."""
     if p is q:
         return True
     if isinstance(p, GlobalRef) and isinstance(q, GlobalRef):
@@ -94,7 +97,7 @@ def _same(p: Value, q: Value) -> bool:
 
 
 def _chain(v: Value) -> tuple[Value, list[Instr]]:
-    """What operations with constants start from, and these in order."""
+    """The first operand of a chain of logical operations with constants, and the operations in order."""
     steps: list[Instr] = []
     while isinstance(v, Instr) and v.op in ("and", "or", "xor") and isinstance(v.args[1], ConstInt):
         steps.insert(0, v)
@@ -102,21 +105,19 @@ def _chain(v: Value) -> tuple[Value, list[Instr]]:
     return v, steps
 
 
-def _change(v: Value, p: Value) -> Change | None:
-    """How a value is the volatile object at `p` with one bit changed; None if it is not."""
+def _change(v: Value, p: Value) -> BitChange | None:
+    """The change of one bit that makes `v` of the volatile object at `p`; None for any other value."""
     load, steps = _chain(v)
     if not isinstance(load, Instr) or load.op != "load" or not load.volatile or load.type is not v.type:
         return None
     return _one_bit(load, (1 << v.type.bits) - 1, 0, steps) if _same(load.args[0], p) else None
 
 
-def _one_bit(load: Instr, kept: int, flipped: int, steps: list[Instr]) -> Change | None:
-    """What operations make of load & kept ^ flipped; None if that is not one bit changed."""
+def _one_bit(load: Instr, kept: int, flipped: int, steps: list[Instr]) -> BitChange | None:
+    """The change of one bit that `steps` make of load & kept ^ flipped; None if they change another number of bits."""
     ones = (1 << load.type.bits) - 1
     for step in steps:
-        constant = step.args[1]
-        assert isinstance(constant, ConstInt)
-        k = constant.value
+        k = _constant(step)
         if step.op == "and":
             kept, flipped = kept & k, flipped & k
         elif step.op == "or":
@@ -131,35 +132,42 @@ def _one_bit(load: Instr, kept: int, flipped: int, steps: list[Instr]) -> Change
     return (load, "or", bit) if flipped else (load, "and", kept)
 
 
-def _choice(v: Value, p: Value) -> Choice | None:
-    """How a value is one of two changes of one bit of the volatile object at `p`; None if it is not."""
+def _constant(step: Instr) -> int:
+    """The constant operand of a step of `_chain`."""
+    k = step.args[1]
+    assert isinstance(k, ConstInt)
+    return k.value
+
+
+def _choice(v: Value, p: Value) -> BitChoice | None:
+    """The two changes of one bit of the volatile object at `p` between which `v` selects; None if there are none."""
     root, steps = _chain(v)
     if not isinstance(root, Instr) or len(root.args) < 2:
         return None
     if root.op == "select" and not steps:
-        asked, one, other = root.args
+        condition, one, other = root.args
         first, second = _change(one, p), _change(other, p)
         inner, mask = [*_chain(one)[1], *_chain(other)[1]], 1
     elif root.op == "or":
-        kept, asked = root.args if _change(root.args[0], p) is not None else reversed(root.args)
+        kept, condition = root.args if _change(root.args[0], p) is not None else reversed(root.args)
         cleared = _change(kept, p)
         if cleared is None or cleared[1] != "and":
             return None
         load, _, rest = cleared
         mask = ~rest & (1 << v.type.bits) - 1
-        if _possible(asked) != mask:
+        if _possible_bits(condition) != mask:
             return None
         first, second = _one_bit(load, rest, mask, steps), _one_bit(load, rest, 0, steps)
         inner = [*_chain(kept)[1], *steps]
     else:
         return None
-    if first is None or second is None or first[0] is not second[0] or asked is first[0]:
+    if first is None or second is None or first[0] is not second[0] or condition is first[0]:
         return None
-    return Choice(asked, mask, first, second, frozenset(id(i) for i in (first[0], root, *inner)))
+    return BitChoice(condition, mask, first, second, frozenset(id(i) for i in (first[0], root, *inner)))
 
 
-def _possible(v: Value) -> int:
-    """The bits of a value that may be 1."""
+def _possible_bits(v: Value) -> int:
+    """Mask of the bits of a value that may be 1."""
     ones = (1 << v.type.bits) - 1
     if isinstance(v, ConstInt):
         return v.value & ones
@@ -167,18 +175,18 @@ def _possible(v: Value) -> int:
         return ones
     by = v.args[1].value if len(v.args) == 2 and isinstance(v.args[1], ConstInt) else None
     if v.op == "and":
-        return _possible(v.args[0]) & _possible(v.args[1])
+        return _possible_bits(v.args[0]) & _possible_bits(v.args[1])
     if v.op == "shl" and by is not None:
-        return _possible(v.args[0]) << by & ones
+        return _possible_bits(v.args[0]) << by & ones
     if v.op == "lshr" and by is not None:
-        return _possible(v.args[0]) >> by
+        return _possible_bits(v.args[0]) >> by
     if v.op in ("zext", "trunc"):
-        return _possible(v.args[0]) & ones
+        return _possible_bits(v.args[0]) & ones
     return ones
 
 
 def _truth(v: Value, mask: int, made: list[Instr]) -> Value:
-    """Whether a value has a bit of `mask`, as an i1; what must be computed for it goes behind `made`."""
+    """Whether a value has a bit of `mask`, as an i1; appends the instructions that compute it to `made`."""
     if v.type is I1:
         return v
     if isinstance(v, Instr) and v.op in ("zext", "trunc"):
@@ -194,13 +202,13 @@ def _truth(v: Value, mask: int, made: list[Instr]) -> Value:
     return there
 
 
-def _writes(v: Value, p: Value) -> bool:
-    """Whether a store of the value to `p` is to be the write of one bit, or a choice of two."""
+def _writes_single_bit(v: Value, p: Value) -> bool:
+    """Whether a store of the value to `p` changes one bit, or one of two bits."""
     return _change(v, p) is not None or _choice(v, p) is not None
 
 
-def _written(p: Value, change: Change, line: str | None) -> list[Instr]:
-    """Load, operation and store."""
+def _read_modify_write(p: Value, change: BitChange, line: str | None) -> list[Instr]:
+    """Load, operation and store of a change at `p`."""
     old, op, k = change
     load = Instr("load", old.type, [p])
     new = Instr(op, old.type, [load, ConstInt(old.type, k)])
@@ -210,11 +218,13 @@ def _written(p: Value, change: Change, line: str | None) -> list[Instr]:
     return [load, new, store]
 
 
-def _store_in_branches(f: Function, b: Block, near: Near) -> None:
-    """store phi(...) at the start of a block, all ways into which lead nowhere else: a store at the end of each."""
+def _store_in_branches(f: Function, b: Block, is_near: IsNear) -> None:
+    """Replace a store of a phi at the start of a block by a store at the end of each predecessor.
+
+    The predecessors must have no other successor, and all but one of the values must be single-bit changes."""
     phis = list(b.phis())
     store = b.instrs[len(phis)]
-    p, v = _place(store, near), store.args[0] if store.args else None
+    p, v = _near_address(store, is_near), store.args[0] if store.args else None
     phi = next((i for i in phis if i is v), None)
     if p is None or phi is None or store.op != "store" or len(users_of(f)[id(phi)]) != 1:
         return
@@ -224,7 +234,7 @@ def _store_in_branches(f: Function, b: Block, near: Near) -> None:
         return
     if any(s.instrs[-1].op != "br" or s.instrs[-1].args for s in sources):
         return
-    whole = sum(1 for x in phi.args if not _writes(x, p))
+    whole = sum(1 for x in phi.args if not _writes_single_bit(x, p))
     if whole > 1 or whole == len(phi.args):
         return
     for s, x in zip(sources, phi.args, strict=True):
@@ -237,48 +247,48 @@ def _store_in_branches(f: Function, b: Block, near: Near) -> None:
         if record.value is phi:
             record.value = None
     for s in sources:
-        _store_in_branches(f, s, near)
+        _store_in_branches(f, s, is_near)
 
 
-def _load_in_branches(f: Function, b: Block, near: Near, written: list[Value]) -> None:
-    """The last access of a block that goes on to two others, which alone want its value: a load in each of them.
+def _load_in_branches(f: Function, b: Block, is_near: IsNear, addresses: list[Value]) -> None:
+    """Replace a load before a two-way branch by a load in each branch.
 
-    Blocks without an access are passed; a switch is a tree of such blocks by now.
+    The load must be the last memory access of its block, and only code that both branches alone lead to may use it.
+    Branches without an access are searched through, because a switch is a tree of such blocks.
     """
-    at = next((k for k in range(len(b.instrs) - 1, -1, -1) if _accesses(b.instrs[k])), None)
-    ways = b.instrs[-1]
-    if at is None or ways.op != "br" or not ways.args or len(set(ways.blocks)) != 2:
+    load = _last_access_before_branch(b)
+    p = _near_address(load, is_near) if load is not None and load.op == "load" else None
+    if load is None or p is None or not any(_same(p, q) for q in addresses):
         return
-    load = b.instrs[at]
-    p = _place(load, near)
-    if p is None or load.op != "load" or not any(_same(p, q) for q in written):
-        return
-    targets = [x for x in f.blocks if x.name in ways.blocks]
+    targets = [x for x in f.blocks if x.name in b.instrs[-1].blocks]
     preds = predecessors(f)
     if any(preds[t.name] != [b.name] for t in targets):
         return
-    behind = [_behind(f, t, preds) for t in targets]
-    inside = {id(i) for blocks in behind for x in blocks for i in x.instrs}
-    if any(u.op == "phi" or id(u) not in inside for u in users_of(f).get(id(load), [])):
+    regions = [_region_without_access(f, t, preds) for t in targets]
+    if not _used_only_inside(f, load, regions):
         return
-    if not any(_writes_bit(i, load, p, near) for blocks in behind for x in blocks for i in x.instrs):
+    if not any(_changes_loaded_bit(i, load, p, is_near) for region in regions for x in region for i in x.instrs):
         return
     b.instrs.remove(load)
-    for t, blocks in zip(targets, behind, strict=True):
-        again = Instr("load", load.type, [p])
-        again.volatile, again.line = True, load.line
-        for i in (i for x in blocks for i in x.instrs):
-            i.args = [again if a is load else a for a in i.args]
-        t.instrs.insert(len(list(t.phis())), again)
+    for t, region in zip(targets, regions, strict=True):
+        _insert_copy(load, p, t, region)
     for record in f.dbg_records:
         if record.value is load:
             record.value = None
     for t in targets:
-        _load_in_branches(f, t, near, written)
+        _load_in_branches(f, t, is_near, addresses)
 
 
-def _behind(f: Function, t: Block, preds: dict[str, list[str]]) -> list[Block]:
-    """The block, and those that only blocks without an access lie between it and, with no other way to them."""
+def _last_access_before_branch(b: Block) -> Instr | None:
+    """The last memory access of a block that ends in a branch to two different blocks."""
+    branch = b.instrs[-1]
+    if branch.op != "br" or not branch.args or len(set(branch.blocks)) != 2:
+        return None
+    return next((i for i in reversed(b.instrs) if _accesses(i)), None)
+
+
+def _region_without_access(f: Function, t: Block, preds: dict[str, list[str]]) -> list[Block]:
+    """`t`, and the blocks that only paths from `t` without a memory access lead to."""
     found = [t]
     for x in found:
         if not any(_accesses(i) for i in x.instrs):
@@ -286,60 +296,76 @@ def _behind(f: Function, t: Block, preds: dict[str, list[str]]) -> list[Block]:
     return found
 
 
+def _used_only_inside(f: Function, load: Instr, regions: list[list[Block]]) -> bool:
+    """Whether all users of a load lie in the regions and none is a phi."""
+    inside = {id(i) for region in regions for x in region for i in x.instrs}
+    return all(u.op != "phi" and id(u) in inside for u in users_of(f).get(id(load), []))
+
+
+def _insert_copy(load: Instr, p: Value, t: Block, region: list[Block]) -> None:
+    """Insert a copy of a load at the start of `t`, and use it in the region."""
+    copy = Instr("load", load.type, [p])
+    copy.volatile, copy.line = True, load.line
+    for i in (i for x in region for i in x.instrs):
+        i.args = [copy if a is load else a for a in i.args]
+    t.instrs.insert(len(list(t.phis())), copy)
+
+
 def _accesses(i: Instr) -> bool:
+    """Whether an instruction may access memory, other than a plain load."""
     return i.volatile or i.op in MEMORY_BARRIERS
 
 
-def _writes_bit(i: Instr, load: Instr, p: Value, near: Near) -> bool:
-    """Whether a store changes one bit of what was loaded."""
-    to = _place(i, near)
-    if i.op != "store" or to is None or not _same(to, p):
+def _changes_loaded_bit(i: Instr, load: Instr, p: Value, is_near: IsNear) -> bool:
+    """Whether an instruction stores the value of `load` to `p` with one bit changed."""
+    target = _near_address(i, is_near)
+    if i.op != "store" or target is None or not _same(target, p):
         return False
     change, choice = _change(i.args[0], p), _choice(i.args[0], p)
     return (change or (choice.first if choice is not None else (None,)))[0] is load
 
 
-def _branches_for_choice(f: Function, b: Block, near: Near) -> None:
-    """store of a choice of two changes of the load: a branch for each, until the block has no such store."""
+def _branches_for_choice(f: Function, b: Block, is_near: IsNear) -> None:
+    """Replace every store of a choice between two changes by two branches, each with a load and a store."""
     for store in [i for i in b.instrs if i.op == "store"]:
-        p = _place(store, near)
+        p = _near_address(store, is_near)
         choice = _choice(store.args[0], p) if p is not None else None
         if p is None or choice is None:
             continue
         load, value = choice.first[0], store.args[0]
-        if load not in b.instrs or value not in b.instrs or not _alone(f, choice.own, store):
+        if load not in b.instrs or value not in b.instrs or not _used_only_by(f, choice.own, store):
             continue
         between = b.instrs[b.instrs.index(load) + 1 : b.instrs.index(store)]
         if any(_accesses(i) for i in between):
             continue
-        b = _split(f, b, store, choice, [_written(p, x, store.line) for x in (choice.first, choice.second)])
+        b = _split(f, b, store, choice, [_read_modify_write(p, x, store.line) for x in (choice.first, choice.second)])
 
 
-def _alone(f: Function, own: frozenset[int], store: Instr) -> bool:
-    """Whether only these and the store use the values of these."""
+def _used_only_by(f: Function, own: frozenset[int], store: Instr) -> bool:
+    """Whether the instructions `own` have no users but each other and the store."""
     users = users_of(f)
     return all(u is store or id(u) in own for i in own for u in users.get(i, ()))
 
 
-def _split(f: Function, b: Block, store: Instr, choice: Choice, bodies: list[list[Instr]]) -> Block:
-    """Cut `b` at the store, which two blocks take the place of; returns the block behind them."""
+def _split(f: Function, b: Block, store: Instr, choice: BitChoice, bodies: list[list[Instr]]) -> Block:
+    """Replace a store by a branch to one of two blocks with `bodies`; returns the block behind them."""
     at = b.instrs.index(store)
     end = Block(f"{b.name}.written", b.instrs[at + 1 :])
     b.instrs = [i for i in b.instrs[:at] if id(i) not in choice.own]
-    asking: list[Instr] = []
+    test: list[Instr] = []
     branch = new_branch("")
-    branch.args, branch.line, branch.blocks = [_truth(choice.asked, choice.mask, asking)], store.line, []
+    branch.args, branch.line, branch.blocks = [_truth(choice.condition, choice.mask, test)], store.line, []
     made: list[Block] = []
     for k, body in enumerate(bodies):
         made.append(Block(f"{b.name}.bit{k}", [*body, new_branch(end.name)]))
         branch.blocks.append(made[-1].name)
-    b.instrs += [*asking, branch]
+    b.instrs += [*test, branch]
     for x in f.blocks:
         if x.name in end.succs:
             for phi in x.phis():
                 phi.blocks = [end.name if name == b.name else name for name in phi.blocks]
-    place = f.blocks.index(b) + 1
-    f.blocks[place:place] = [*made, end]
+    at = f.blocks.index(b) + 1
+    f.blocks[at:at] = [*made, end]
     for record in f.dbg_records:
         if id(record.value) in choice.own:
             record.value = None

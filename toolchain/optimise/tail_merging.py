@@ -1,7 +1,7 @@
-"""Tail merging for size: equal endings of blocks that go on to the same place are kept once.
+"""Tail merging: one copy of the common ending of blocks with the same successor.
 
-Needs: final instructions (after the frame), explicit branches. The shared ending gets a block of its own, to which the
-others branch instead of branching to the common successor, so nothing grows.
+The common ending becomes a block, to which the others branch instead of branching to the successor. Needs: frames
+built, explicit branches.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ ENDS = {"ret", "tailcall"}
 
 
 def run(m: MFunction) -> None:
-    """Merge until no two blocks share an ending worth it."""
+    """Merge endings until no merge saves a word."""
     serial = 0
     while True:
         group = _best_group(m)
@@ -26,13 +26,13 @@ def run(m: MFunction) -> None:
 
 
 def _signature(mi: MI) -> tuple[object, ...]:
-    """Equal for instructions that do the same; of volatile accesses only that they are."""
+    """Key that is equal for instructions with the same effect; numbers of volatile accesses do not count."""
     args = tuple(replace(a, volatile=1) if isinstance(a, MEMORY) and a.volatile else a for a in mi.args)
     return (mi.op, args, mi.byte, mi.cc, mi.pred, mi.text, mi.also_uses, mi.also_defs)
 
 
 def _ending(b: MBlock) -> tuple[object, ...] | None:
-    """What the block does last: where it jumps, or how it returns."""
+    """Key of the last instruction: target of a jump, or kind of return; None for other blocks."""
     if not b.insts or (b.address_taken and len(b.insts) < 2):
         return None
     last = b.insts[-1]
@@ -42,7 +42,7 @@ def _ending(b: MBlock) -> tuple[object, ...] | None:
 
 
 def _best_group(m: MFunction) -> tuple[list[MBlock], int, bool] | None:
-    """Blocks with the longest common ending, its length without a closing jump, and whether it returns."""
+    """The merge that saves most words: blocks, length of the common ending without a jump, whether it returns."""
     endings: dict[tuple[object, ...], list[MBlock]] = {}
     for b in m.blocks:
         key = _ending(b)
@@ -59,7 +59,7 @@ def _best_group(m: MFunction) -> tuple[list[MBlock], int, bool] | None:
 
 
 def _groups(blocks: list[MBlock], closed: bool) -> list[tuple[list[MBlock], int]]:
-    """Sets of blocks that agree in their last instruction, with the length of their common ending."""
+    """Groups of blocks with the same last instruction, with the length of their common ending."""
     skip = 0 if closed else 1
     by_last: dict[tuple[object, ...], list[MBlock]] = {}
     for b in blocks:
@@ -76,7 +76,7 @@ def _groups(blocks: list[MBlock], closed: bool) -> list[tuple[list[MBlock], int]
 
 
 def _common(group: list[MBlock], skip: int) -> int:
-    """Instructions all blocks share before the closing jump; a skip stays with what it guards and what it tests."""
+    """Length of the common ending before the jump; a skip is not separated from its instructions and its test."""
     length = 0
     shortest = min(len(b.insts) for b in group) - skip
     while length < shortest:
@@ -85,13 +85,13 @@ def _common(group: list[MBlock], skip: int) -> int:
             break
         length += 1
     end = len(group[0].insts) - skip
-    while length and _joined(group[0].insts[end - length : end]):
+    while length and _depends_on_predecessor(group[0].insts[end - length : end]):
         length -= 1
     return length
 
 
-def _joined(insts: list[MI]) -> bool:
-    """Whether these instructions cannot be a block: they start under a skip or read flags set before them."""
+def _depends_on_predecessor(insts: list[MI]) -> bool:
+    """Whether instructions cannot start a block: they begin under a skip, or read flags set before them."""
     if insts[0].pred or insts[0].op in ("bra", "jump"):
         return True
     written: set[str] = set()
@@ -103,6 +103,7 @@ def _joined(insts: list[MI]) -> bool:
 
 
 def _merge(m: MFunction, blocks: list[MBlock], length: int, closed: bool, name: str) -> None:
+    """Move the common ending of `blocks` to a new block."""
     skip = 0 if closed else 1
     keeper = blocks[0]
     cut = len(keeper.insts) - skip - length

@@ -1,12 +1,16 @@
 """Register allocation: graph colouring with conservative coalescing, pairs and rematerialisation.
 
-Terms. Nodes are registers; W0-W14 are nodes with their own colour. Two nodes interfere when one is written while the
-other is live. A word node may take any of W0-W14, a pair node an even register below W14 and the one after it.
-Method. Build the graph; merge copies when the merged node stays colourable (Briggs for two virtual registers, on trial
-George, too, who is asked against a real one); remove nodes in order of colourability, spilling candidates
-optimistically (Briggs, Cooper, Torczon 1994; the weights for pairs follow Smith, Ramsey, Holloway 2004); colour in
-reverse, preferring the register of a copy partner. What finds no colour is rematerialised when it is a constant, else
-kept in a frame slot, and all is repeated.
+Terms. Nodes are registers; W0-W14 are nodes with their own colour. Two nodes interfere if one is written while the
+other is live. A word node may take any of W0-W14, a pair node an even register below W14 and the next register.
+
+Method.
+1. Build the interference graph.
+2. Coalesce copies if the merged node stays colourable: Briggs' test for two virtual registers, George's test for a
+   precoloured node. One of the trials uses George's test for virtual registers, too.
+3. Simplify: remove nodes in order of colourability, and spill candidates optimistically (Briggs, Cooper, Torczon 1994;
+   the weights of pairs follow Smith, Ramsey, Holloway 2004).
+4. Colour in reverse order, preferring the register of a copy partner.
+5. Rematerialise constants without a colour, spill other nodes without a colour to frame slots, and repeat from 1.
 """
 
 from __future__ import annotations
@@ -17,7 +21,7 @@ from toolchain.abi.target import ALLOCATABLE, CALLEE_SAVED, CALLER_SAVED, FP
 from toolchain.debuginfo import variables
 from toolchain.ir.model import UnsupportedError
 from toolchain.mir.liveness import bits, live_out, members, remove_dead
-from toolchain.mir.mir import FIRST_VIRTUAL, MI, MFunction
+from toolchain.mir.mir import FIRST_VIRTUAL, MI, MFunction, PairMove, pair_move
 from toolchain.regalloc.spill import rewrite_spills
 from toolchain.verify import allocation
 
@@ -25,12 +29,12 @@ WORD_COLOURS = bits(list(ALLOCATABLE))
 PAIR_COLOURS = bits([r for r in ALLOCATABLE if r % 2 == 0 and r < 14])
 REAL = (1 << FIRST_VIRTUAL) - 1
 LOOP_WEIGHT = 8
-EXACT_SPILL_NODES = 300  # up to this many, the best victim is looked for anew at every step
+EXACT_SPILL_NODES = 300  # up to this many nodes, the best spill candidate is computed again at every step
 TRIAL_LIMIT = 400  # instructions; larger functions are allocated once
 
 
-class Graph:
-    """Interference graph of one round."""
+class InterferenceGraph:
+    """Interference graph of one round of allocation."""
 
     def __init__(self, m: MFunction) -> None:
         self.m = m
@@ -42,8 +46,8 @@ class Graph:
         self.pair_mask = bits(sorted(m.pairs))
         self._build()
 
-    def of_copy(self, m: MFunction) -> Graph:
-        """The graph of an independent copy of the function, independent as well."""
+    def of_copy(self, m: MFunction) -> InterferenceGraph:
+        """An independent copy of the graph, for a clone of its function."""
         new = copy.copy(self)
         new.m = m
         new.adjacent, new.alias, new.moves, new.cost = {**self.adjacent}, {**self.alias}, [*self.moves], {**self.cost}
@@ -82,53 +86,35 @@ class Graph:
         for r in uses:
             adjacent.setdefault(r, 0)
             cost[r] = cost.get(r, 0) + weight
-        if mi.op == "split":
-            low, high, pair = mi.args
-            assert isinstance(low, int)
-            assert isinstance(high, int)
-            assert isinstance(pair, int)
-            self._pair_hints(pair, low, high)
-        elif mi.op == "splitlo":
-            low, pair = mi.args
-            assert isinstance(low, int)
-            assert isinstance(pair, int)
-            self.hints.setdefault(low, []).append((pair, 0))
-            self.hints.setdefault(pair, []).append((low, 0))
-        elif mi.op == "join":
-            pair, low, high = mi.args
-            assert isinstance(low, int)
-            assert isinstance(high, int)
-            assert isinstance(pair, int)
-            self._pair_hints(pair, low, high)
+        move = pair_move(mi)
+        if move is not None:
+            for offset, word in enumerate(move.words):
+                self.hints.setdefault(word, []).append((move.pair, offset))
+                self.hints.setdefault(move.pair, []).append((word, -offset))
         return live & ~d | bits(uses)
 
-    def _pair_hints(self, pair: int, low: int, high: int) -> None:
-        for part, offset in ((low, 0), (high, 1)):
-            self.hints.setdefault(part, []).append((pair, offset))
-            self.hints.setdefault(pair, []).append((part, -offset))
-
     def find(self, n: int) -> int:
-        """Representative of a node."""
+        """The node that a coalesced node was merged into."""
         while n in self.alias:
             n = self.alias[n]
         return n
 
     def pressure(self, n: int, mask: int) -> int:
-        """How many colours of n's class the nodes in `mask` can take away at most."""
+        """Number of colours of n's class that the nodes in `mask` can occupy at most."""
         if n in self.m.pairs:
             return mask.bit_count()
         return mask.bit_count() + (mask & self.pair_mask).bit_count()
 
     def limit(self, n: int) -> int:
-        """Colours in n's class; W14 is none where it is the frame pointer."""
+        """Number of colours in n's class, without W14 if it is the frame pointer."""
         return 7 if n in self.m.pairs else 15 - self.m.uses_fp
 
     # -- coalescing ---------------------------------------------------------------------------------------------------
 
     def coalesce(self, eager: bool, thorough: bool) -> None:
-        """Merge copies, most frequent first, while that is safe; `eager` merges with real registers too.
+        """Merge copies, most frequent first, if that is safe; with `eager` also copies from and to real registers.
 
-        `thorough` takes George's test for virtual registers, too: fewer moves, but what is spilled later is more."""
+        `thorough` uses George's test for virtual registers, too, which removes more moves but may cause more spills."""
         pending = sorted(self.moves, key=lambda m: -m[0])
         changed = True
         while changed and pending:
@@ -157,7 +143,7 @@ class Graph:
             return False
         if b < FIRST_VIRTUAL:
             a, b = b, a
-        if a < FIRST_VIRTUAL:  # George: every neighbour of b already lives with a, or cannot cause trouble
+        if a < FIRST_VIRTUAL:  # George's test
             return self._harmless(a, b)
         both = self.adjacent[a] | self.adjacent[b]
         if self.pressure(a, both) < self.limit(a):
@@ -173,7 +159,7 @@ class Graph:
         return significant < self.limit(a)
 
     def _harmless(self, a: int, b: int) -> bool:
-        """Whether every neighbour of b already lives with a, or finds a register in any case."""
+        """George's test: whether every neighbour of b interferes with a, too, or always finds a colour."""
         trouble = self.adjacent[b] & ~self.adjacent[a]
         if a >= FIRST_VIRTUAL and trouble & REAL:
             return False
@@ -197,7 +183,7 @@ class Graph:
     # -- simplification -----------------------------------------------------------------------------------------------
 
     def simplify(self) -> list[int]:
-        """Order of removal; colour in reverse."""
+        """Remove all virtual nodes; returns them in the order of removal."""
         remaining = {n for n in self.adjacent if n >= FIRST_VIRTUAL}
         active = bits(sorted(remaining)) | REAL
         stack: list[int] = []
@@ -234,7 +220,7 @@ class Graph:
 class Colouring:
     """Assignment of real registers to the nodes of a simplified graph."""
 
-    def __init__(self, g: Graph) -> None:
+    def __init__(self, g: InterferenceGraph) -> None:
         self.g = g
         self.m = g.m
         self.colour: dict[int, int] = {r: r for r in range(FIRST_VIRTUAL)}
@@ -247,7 +233,7 @@ class Colouring:
             self.partner.setdefault(b, []).append((a, 1))
 
     def run(self, order: list[int]) -> None:
-        """Colour nodes last removed first."""
+        """Colour nodes in the reverse of the order of their removal."""
         for n in reversed(order):
             allowed = self._allowed(n)
             if not allowed:
@@ -286,11 +272,11 @@ class Colouring:
         return self._best(n, allowed)
 
     def _fresh(self, c: int) -> int:
-        """1 when the register would have to be saved only for this node."""
+        """1 if the function would have to save the register for this node only, else 0."""
         return int(c in CALLEE_SAVED and not self.used_saved >> c & 1)
 
     def _best(self, n: int, allowed: int) -> int:
-        """The register that costs least: one that needs no saving, of the half its pair wants, in a fixed order."""
+        """The cheapest register: preferably one that need not be saved, and of the parity that the pair needs."""
         registers = members(allowed)
         if self.m.interrupt:
             return registers[0]
@@ -307,10 +293,10 @@ class Colouring:
 
 
 def allocate(m: MFunction, for_size: bool, verify: bool = False) -> MFunction:
-    """Replace virtual registers by W0-W14. Ensures: pairs are even-aligned, split and join are moves or gone.
+    """Replace virtual registers by W0-W14 and return the function. Ensures: pairs are even-aligned, no pair moves.
 
-    Merging a value with an argument or result register is usually right and sometimes crowds others out, so small
-    functions are allocated both ways, and with more merging among values, and the cheapest result is kept.
+    Coalescing with argument and result registers usually helps, but may leave too few registers for other values. Small
+    functions are therefore allocated with, without, and with thorough coalescing; the cheapest result is returned.
     """
     remove_dead(m)
     size = sum(len(b.insts) for b in m.blocks)
@@ -318,7 +304,7 @@ def allocate(m: MFunction, for_size: bool, verify: bool = False) -> MFunction:
         _allocate(m, True, False, verify)
         return m
     trials = []
-    untouched = Graph(m)
+    untouched = InterferenceGraph(m)
     for number, (eager, thorough) in enumerate(((True, False), (False, False), (True, True))):
         trial = m.clone()
         _allocate(trial, eager, thorough, verify, untouched.of_copy(trial))
@@ -328,11 +314,12 @@ def allocate(m: MFunction, for_size: bool, verify: bool = False) -> MFunction:
     return min(trials, key=lambda t: t[:2])[2]
 
 
-def _allocate(m: MFunction, eager: bool, thorough: bool, verify: bool, first: Graph | None = None) -> None:
-    """`first` is the graph of the first round where it is known. Every round that finds no colour for something of the
-    program keeps one register less of it, so there is a last one."""
+def _allocate(m: MFunction, eager: bool, thorough: bool, verify: bool, first: InterferenceGraph | None = None) -> None:
+    """Allocate in place. `first` is the graph of the first round, if it is known.
+
+    Every round spills at least one register of the program and none of the spill code, so the loop ends."""
     while True:
-        g, first = first or Graph(m), None
+        g, first = first or InterferenceGraph(m), None
         g.coalesce(eager, thorough)
         colouring = Colouring(g)
         colouring.run(g.simplify())
@@ -341,30 +328,30 @@ def _allocate(m: MFunction, eager: bool, thorough: bool, verify: bool, first: Gr
                 allocation.check(m, {r: colouring.colour[g.find(r)] for r in [*g.adjacent, *g.alias]})
             _apply(m, g, colouring.colour)
             return
-        groups = {n: list(g_members(g, n)) for n in colouring.spilled}
+        groups = {n: list(members_of(g, n)) for n in colouring.spilled}
         if m.temps.issuperset(r for group in groups.values() for r in group):
             raise _no_room(m, {r for group in groups.values() for r in group})
         rewrite_spills(m, groups)
 
 
 def _no_room(m: MFunction, registers: set[int]) -> UnsupportedError:
-    """What to say where values of one instruction find no registers: only inline assembly can want that many."""
+    """Error for an instruction whose operands need too many registers; only inline assembly can have so many."""
     wanting = [mi for b in m.blocks for mi in b.insts if registers & {*mi.uses(), *mi.defs()}]
     crowded = next((mi for mi in wanting if mi.op == "asm"), None)
     if crowded is None:
         return UnsupportedError("register allocation does not converge")
-    error = UnsupportedError("inline assembly: its operands and clobbers want more registers than there are")
+    error = UnsupportedError("inline assembly: its operands and clobbers need more registers than the CPU has")
     error.line = crowded.line
     return error
 
 
 def _crowded(m: MFunction) -> bool:
-    """Whether the result has moves or callee-saved registers that another choice might avoid."""
+    """Whether the result contains moves or callee-saved registers, which another trial may avoid."""
     return any(mi.is_copy() or any(r in CALLEE_SAVED for r in mi.defs()) for b in m.blocks for mi in b.insts)
 
 
 def _cost(m: MFunction, for_size: bool) -> int:
-    """Words, or words weighted by loop depth, with the saves of callee-saved registers."""
+    """Cost of a result: words, weighted by loop depth unless `for_size`, with the saves of registers."""
     saved: set[int] = set()
     total = 0
     for b in m.blocks:
@@ -375,58 +362,51 @@ def _cost(m: MFunction, for_size: bool) -> int:
     return total + 2 * len({r // 2 for r in saved})
 
 
-def g_members(g: Graph, n: int) -> list[int]:
+def members_of(g: InterferenceGraph, n: int) -> list[int]:
     """Virtual registers merged into node n."""
     return [r for r in [n, *g.alias] if r >= FIRST_VIRTUAL and g.find(r) == n]
 
 
-PAIR_OPS = ("split", "splitlo", "join")
-
-
-def _apply(m: MFunction, g: Graph, colour: dict[int, int]) -> None:
+def _apply(m: MFunction, g: InterferenceGraph, colour: dict[int, int]) -> None:
+    """Rename registers to their colours, expand pair moves and drop copies of a register to itself."""
     rename = {r: colour[g.find(r)] for r in [*g.adjacent, *g.alias] if g.find(r) in colour}
     if m.bindings:
         variables.claim(m, rename, {r: g.find(r) for r in rename})
     for b in m.blocks:
         out: list[MI] = []
-        held: dict[int, int] = {}  # what copies to themselves would have written
+        dropped: dict[int, int] = {}  # values that the dropped copies would have written
         for mi in b.insts:
             mi.map_registers(rename)
             start = len(out)
-            if mi.op == "split":
-                out += _pair_moves(mi, ((mi.args[2], mi.args[0], 0), (mi.args[2], mi.args[1], 1)), False)
-            elif mi.op == "splitlo":
-                out += _pair_moves(mi, ((mi.args[1], mi.args[0], 0),), False)
-            elif mi.op == "join":
-                out += _pair_moves(mi, ((mi.args[0], mi.args[1], 0), (mi.args[0], mi.args[2], 1)), True)
+            move = pair_move(mi)
+            if move is not None:
+                out += _word_moves(move, mi.line)
             elif mi.is_copy() and mi.args[0] == mi.args[1]:
-                held.update(mi.holds)
+                dropped.update(mi.written_values)
                 continue
             else:
                 out.append(mi)
-            if mi.holds and mi.op in PAIR_OPS:
-                moved = {d: made for made in out[start:] for d in made.defs()}
-                for r, value in mi.holds.items():
-                    (moved[r].holds if r in moved else held)[r] = value
-            elif held and len(out) > start:
-                out[start].holds_before, held = held, {}
+            if mi.written_values and move is not None:
+                writer = {d: made for made in out[start:] for d in made.defs()}
+                for r, value in mi.written_values.items():
+                    (writer[r].written_values if r in writer else dropped)[r] = value
+            elif dropped and len(out) > start:
+                out[start].values_before, dropped = dropped, {}
         b.insts = out
     m.pairs = set()
 
 
-def _pair_moves(mi: MI, parts: tuple[tuple[object, object, int], ...], into_pair: bool) -> list[MI]:
-    """Two moves as if at once; EXCH for a swap."""
+def _word_moves(move: PairMove, line: str | None) -> list[MI]:
+    """Word moves with the effect of a pair move, in an order that overwrites no source; EXCH for a swap."""
     moves = []
-    for pair, word, offset in parts:
-        assert isinstance(pair, int)
-        assert isinstance(word, int)
-        source, dest = (word, pair + offset) if into_pair else (pair + offset, word)
+    for offset, word in enumerate(move.words):
+        source, dest = (word, move.pair + offset) if move.into_pair else (move.pair + offset, word)
         if source != dest:
             moves.append((source, dest))
     if len(moves) == 2:
         (s0, d0), (s1, d1) = moves
         if d0 == s1 and d1 == s0:
-            return [MI("exch", s0, s1, line=mi.line)]
+            return [MI("exch", s0, s1, line=line)]
         if d0 == s1:
             moves.reverse()
-    return [MI("mov", s, d, line=mi.line) for s, d in moves]
+    return [MI("mov", s, d, line=line) for s, d in moves]

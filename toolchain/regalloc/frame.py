@@ -1,11 +1,11 @@
-"""Frames: slot operands become addresses; prologues and epilogues are added.
+"""Stack frames: replace slot operands by addresses, and add prologues and epilogues.
 
-Without frame pointer (addresses relative to W15, which also moves while arguments are pushed):
+Without frame pointer (addresses are relative to W15, which pushed arguments change):
     entry W15 ->  saved registers | locals, spill slots nearest the top | pushed arguments  <- W15
 With it (dynamic stack, or locals beyond the reach of ADD #lit10), as in abi-elf.md §2.4:
     entry W15 ->  caller's W14 | locals, spill slots first | saved registers | dynamic blocks
                   ^ W14
-Interrupt functions save everything they change, in the order of abi-elf.md §2.5.
+Interrupt functions save all registers that they change, in the order of abi-elf.md §2.5.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ REPEATS = {"repmov", "repfill", "repclr", "div.s", "div.u", "div.sd", "div.ud"}
 
 
 def wants_frame_pointer(m: MFunction) -> bool:
-    """Decided before register allocation, because W14 is then not free."""
+    """Whether the function needs a frame pointer; register allocation must not use W14 then."""
     return m.dynamic_stack or sum(o.size for o in m.frame if o.fixed is None) > FRAME_POINTER_BYTES
 
 
 class FrameBuilder:
-    """Layout and rewriting of one function."""
+    """Lays out the frame of one function and rewrites the function."""
 
     def __init__(self, m: MFunction, stack_check: bool) -> None:
         self.m = m
@@ -50,7 +50,7 @@ class FrameBuilder:
         return [r for r in range(shadow, 15) if r in written and not (r == FP and self.m.uses_fp)]
 
     def _layout(self) -> int:
-        """Assign offsets; returns the bytes of locals. Dead slots take no room."""
+        """Assign offsets to the objects in use; returns the bytes of locals."""
         used = {a.index for b in self.m.blocks for mi in b.insts for a in mi.args if isinstance(a, Slot)}
         free = [(k, o) for k, o in enumerate(self.m.frame) if o.fixed is None and k in used]
         free.sort(key=lambda e: (e[1].spill, -e[1].size), reverse=self.m.uses_fp)
@@ -64,7 +64,7 @@ class FrameBuilder:
 
     # -- addresses ----------------------------------------------------------------------------------------------------
 
-    def _place(self, slot: Slot, pushed: int) -> tuple[int, int]:
+    def _locate(self, slot: Slot, pushed: int) -> tuple[int, int]:
         """(base register, offset) of a slot while `pushed` bytes lie above the frame."""
         o = self.m.frame[slot.index]
         if self.m.uses_fp:
@@ -76,7 +76,7 @@ class FrameBuilder:
         return SP, o.fixed + slot.off - saved - self.locals - pushed
 
     def interrupt_bytes(self) -> int:
-        """Bytes an interrupt function pushes before its frame."""
+        """Bytes that an interrupt function pushes before its frame."""
         extra = (2 if self._saves_rcount() else 0) + (2 if "no_auto_psv" not in self.m.interrupt else 0)
         return 2 * len(self.saved) + 2 * len(self.m.preserved) + extra
 
@@ -103,7 +103,7 @@ class FrameBuilder:
         self._describe()
 
     def _describe(self) -> None:
-        """Facts for debug information: where locals lie relative to W15 at entry."""
+        """Record the offsets of locals from W15 at entry, for debug information."""
         m = self.m
         m.frame_bytes = self.locals + 2 * len(self.saved)
         before = self.interrupt_bytes() if m.interrupt else 0
@@ -116,30 +116,21 @@ class FrameBuilder:
 
     def _instruction(self, mi: MI, pushed: int) -> list[MI]:
         if mi.op == "lea":
-            slot, r = mi.args
-            assert isinstance(slot, Slot)
-            assert isinstance(r, int)
-            base, offset = self._place(slot, pushed)
-            return _address_into(r, base, offset, mi)
+            base, offset = self._locate(mi.slot(0), pushed)
+            return _address_into(mi.register(1), base, offset, mi)
         if mi.op == "setsp":
-            source = mi.args[0]
-            assert isinstance(source, int)
-            return [MI("mov", source, SP, line=mi.line)]
+            return [MI("mov", mi.register(0), SP, line=mi.line)]
         if mi.op == "spadd":
-            amount = mi.args[0]
-            assert isinstance(amount, Imm)
-            assert isinstance(amount.value, int)
-            return _adjust(amount.value, mi.line)
+            return _adjust(mi.number(0), mi.line)
         if not any(isinstance(a, Slot) for a in mi.args):
             return [mi]
         return self._slot_operand(mi, pushed)
 
     def _slot_operand(self, mi: MI, pushed: int) -> list[MI]:
-        """mov with a frame operand. Out of reach, a load computes the address in its own destination."""
+        """MOV with a frame operand. A load beyond the offset range computes the address in its destination."""
         k = next(n for n, a in enumerate(mi.args) if isinstance(a, Slot))
-        slot = mi.args[k]
-        assert isinstance(slot, Slot)
-        base, offset = self._place(slot, pushed)
+        slot = mi.slot(k)
+        base, offset = self._locate(slot, pushed)
         low, high = (-512, 511) if mi.byte else WORD_OFFSET
         if low <= offset <= high:
             args: list[Operand] = list(mi.args)
@@ -153,7 +144,7 @@ class FrameBuilder:
         return self._far_store(mi, base, offset, slot.volatile)
 
     def _far_store(self, mi: MI, base: int, offset: int, volatile: int) -> list[MI]:
-        """Borrow a register for the offset: PUSH, MOV #offset, MOV [base+Wt], POP. No flags change."""
+        """Store beyond the offset range: PUSH Wt, MOV #offset,Wt, MOV [base+Wt], POP Wt. No flags change."""
         source = mi.args[0]
         t = next(r for r in range(8) if r != source)
         if base == SP:
@@ -181,7 +172,7 @@ class FrameBuilder:
             if not m.interrupt:
                 out += _push_registers(self.saved)
             out += _adjust(self.locals, None)
-        if self.stack_check and self.locals > PROBE_BYTES:  # pushes are accesses and need no probe
+        if self.stack_check and self.locals > PROBE_BYTES:  # pushes access the stack themselves
             out[0:0] = _probe(self.locals + 2 * len(self.saved))
         m.blocks[0].insts[0:0] = out
 
@@ -231,31 +222,26 @@ class FrameBuilder:
 
 
 def _pushes(mi: MI) -> int:
-    """Bytes an instruction adds to the stack for the rest of its block."""
+    """Bytes that an instruction adds to the stack for the rest of its block."""
     if mi.op == "spadd":
-        amount = mi.args[0]
-        assert isinstance(amount, Imm)
-        assert isinstance(amount.value, int)
-        return amount.value
+        return mi.number(0)
     if mi.op == "repmov" and mi.args[2] == SP:
-        count = mi.args[0]
-        assert isinstance(count, Imm)
-        assert isinstance(count.value, int)
-        return 2 * (count.value + 1)
+        return 2 * (mi.number(0) + 1)
     return sum(2 for a in mi.args if isinstance(a, Mem) and a.mode == "++" and a.base == SP)
 
 
 def _probe(depth: int) -> list[MI]:
-    """Read `depth` bytes above W15, so that a stack that is too short traps here, with W15 still inside it: the trap's
-    own frame (isa.md §14.2) would otherwise land in the neighbour. Two instructions may follow the read (§14.4, soft
-    traps); they are harmless. W7 may hold an argument."""
+    """Read `depth` bytes above W15, so that a stack that is too short traps while W15 is still inside it.
+
+    Otherwise the frame of the trap (isa.md §14.2) would overwrite the neighbouring memory. The CPU may execute two more
+    instructions after the read (§14.4, soft traps); they are harmless. W7 may contain an argument."""
     if depth + 2 > PROBE_REACH:
         return [*_adjust(depth, None), MI("cp0", Mem("ind", SP)), *_adjust(-depth, None), MI("text", "nop")]
     return [MI("text", line) for line in ("push w7", f"mov [w15+{depth}],w7", "pop w7", "nop")]
 
 
 def _adjust(amount: int, line: str | None) -> list[MI]:
-    """W15 += amount."""
+    """Instructions that add `amount` to W15."""
     if amount == 0:
         return []
     op, k = ("add", amount) if amount > 0 else ("sub", -amount)
@@ -268,7 +254,7 @@ def _adjust(amount: int, line: str | None) -> list[MI]:
 
 
 def _address_into(r: int, base: int, offset: int, mi: MI) -> list[MI]:
-    """r = base + offset."""
+    """Instructions that compute r = base + offset."""
     if offset == 0:
         return [MI("mov", base, r, line=mi.line)]
     if abs(offset) <= LIT5_MAX:
@@ -279,21 +265,21 @@ def _address_into(r: int, base: int, offset: int, mi: MI) -> list[MI]:
 
 
 def _load_far(r: int, offset: int, line: str | None) -> list[MI]:
-    """r = word at W14 + offset."""
+    """Instructions that load r from W14 + offset."""
     if offset <= WORD_OFFSET[1]:
         return [MI("mov", Mem("off", FP, offset) if offset else Mem("ind", FP), r, line=line)]
     return [MI("mov", Imm(offset), r, line=line), MI("mov", Mem("idx", FP, r), r, line=line)]
 
 
 def _text(text: str, uses: tuple[int, ...] = (), defs: tuple[int, ...] = ()) -> MI:
-    """An instruction given as text, with the registers later passes must know about."""
+    """An instruction given as text, with the registers that it uses and defines."""
     mi = MI("text", text)
     mi.also_uses, mi.also_defs = uses, defs
     return mi
 
 
 def _push_registers(registers: list[int]) -> list[MI]:
-    """PUSH, two at a time where an even register and the next are both saved."""
+    """Instructions that push registers, two at a time if an even register and the next one are both saved."""
     out = []
     k = 0
     while k < len(registers):
@@ -315,5 +301,5 @@ def _pop_registers(registers: list[int], line: str | None) -> list[MI]:
 
 
 def build_frame(m: MFunction, stack_check: bool) -> None:
-    """Needs: real registers, uses_fp decided. Ensures: no Slot, lea, spadd or setsp is left."""
+    """Build the frame. Needs: real registers, `uses_fp` set. Ensures: no Slot, lea, spadd or setsp remains."""
     FrameBuilder(m, stack_check).run()

@@ -1,34 +1,35 @@
-"""Spill code: registers that found no colour move to frame slots, or are computed again at every use."""
+"""Spill code: registers without a colour move to frame slots or are rematerialised at every use."""
 
 from __future__ import annotations
 
 from collections.abc import Set
 
-from toolchain.mir.mir import MI, FrameObject, Imm, MFunction, Slot, covered
+from toolchain.mir.mir import MI, FrameObject, Imm, MFunction, Slot, covered_count
 
 REMATERIALISABLE = {"clr", "setm", "lea"}
-UNIT_REGISTERS = 12  # what a skip covers may name so many at once: there are 15, some of them live across it
+UNIT_REGISTERS = 12  # most registers that the instructions under one skip may use; others are live across the skip
 
 
 def rewrite_spills(m: MFunction, groups: dict[int, list[int]]) -> None:
-    """Rewrite every use and definition of the given groups of registers (each group shares one slot)."""
+    """Spill groups of coalesced registers: each group gets one frame slot or is rematerialised."""
     slot_of: dict[int, int] = {}
-    again: dict[int, MI] = {}
+    rematerialised: dict[int, MI] = {}
     definitions = _single_definitions(m, {r for g in groups.values() for r in g})
     for group in groups.values():
         source = definitions.get(group[0]) if len(group) == 1 else None
         if source is not None and _cheap(m, source):
-            again[group[0]] = source
+            rematerialised[group[0]] = source
             continue
         m.frame.append(FrameObject(4 if group[0] in m.pairs else 2, None, True))
         for r in group:
             slot_of[r] = len(m.frame) - 1
     for b in m.blocks:
-        b.insts = _rewrite_block(m, _narrow_skips(b.insts, slot_of.keys() | again.keys()), slot_of, again)
+        insts = _narrow_skips(b.insts, slot_of.keys() | rematerialised.keys())
+        b.insts = _rewrite_block(m, insts, slot_of, rematerialised)
 
 
 def _single_definitions(m: MFunction, wanted: set[int]) -> dict[int, MI]:
-    """The only instruction that writes a register, for registers with exactly one."""
+    """Register -> the instruction that writes it, for registers with exactly one unconditional definition."""
     found: dict[int, MI] = {}
     many: set[int] = set()
     for b in m.blocks:
@@ -42,7 +43,7 @@ def _single_definitions(m: MFunction, wanted: set[int]) -> dict[int, MI]:
 
 
 def _cheap(m: MFunction, mi: MI) -> bool:
-    """Whether repeating the instruction is as good as a load from the frame."""
+    """Whether repeating the instruction costs no more than a load from the frame."""
     if mi.op in REMATERIALISABLE:
         return True
     if mi.op != "mov" or mi.byte:
@@ -62,13 +63,13 @@ def _slot_written(m: MFunction, index: int) -> bool:
     return False
 
 
-def _rewrite_block(m: MFunction, insts: list[MI], slot_of: dict[int, int], again: dict[int, MI]) -> list[MI]:
-    """Loads go before an instruction, stores after it; a skip and what it guards are one unit."""
+def _rewrite_block(m: MFunction, insts: list[MI], slot_of: dict[int, int], rematerialised: dict[int, MI]) -> list[MI]:
+    """Insert loads before and stores after the instructions of a block; a skip and what it covers are one unit."""
     out: list[MI] = []
-    chain = 0  # where `out` was before the last instruction that started to compute flags
+    chain = 0  # length of `out` before the last instruction that started a computation of flags
     k = 0
     while k < len(insts):
-        size = 1 + covered(insts, k)
+        size = 1 + covered_count(insts, k)
         unit = insts[k : k + size]
         k += size
         before: list[MI] = []
@@ -76,13 +77,13 @@ def _rewrite_block(m: MFunction, insts: list[MI], slot_of: dict[int, int], again
         renames: dict[int, int] = {}
         kept: list[MI] = []
         for mi in unit:
-            if _is_remat_definition(mi, again):
+            if _is_rematerialised_definition(mi, rematerialised):
                 continue
-            direct = _direct_move(mi, slot_of, again) if size == 1 else None
+            direct = _direct_move(mi, slot_of, rematerialised) if size == 1 else None
             if direct is not None:
                 kept.append(direct)
                 continue
-            _rewrite_one(m, mi, slot_of, again, renames, before, after)
+            _rewrite_one(m, mi, slot_of, rematerialised, renames, before, after)
             kept.append(mi)
         if any(mi.flags_read() for mi in unit) and any(mi.info.writes for mi in before):
             out[chain:chain] = before
@@ -96,15 +97,15 @@ def _rewrite_block(m: MFunction, insts: list[MI], slot_of: dict[int, int], again
 
 
 def _narrow_skips(insts: list[MI], spilled: Set[int]) -> list[MI]:
-    """A skip that covers more than there are registers for is made again in front of the rest: flags are as they were.
+    """Repeat a skip before the rest of its instructions if they use too many registers; the flags are unchanged.
 
-    Loads for what is covered come before the skip, and stores behind it, so all of it is in registers at once."""
+    Loads of covered instructions come before the skip and stores behind it, so their registers are live at once."""
     out: list[MI] = []
     skip = None
     named: set[int] = set()
     for k, mi in enumerate(insts):
         if mi.op == "skip":
-            unit = insts[k + 1 : k + 1 + covered(insts, k)]
+            unit = insts[k + 1 : k + 1 + covered_count(insts, k)]
             wide = any(r in spilled for one in unit for r in (*one.uses(), *one.defs()))
             skip, named = (mi if wide and not any(one.info.writes for one in unit) else None), set()
         elif mi.pred and skip is not None:
@@ -117,17 +118,15 @@ def _narrow_skips(insts: list[MI], spilled: Set[int]) -> list[MI]:
     return out
 
 
-def _is_remat_definition(mi: MI, again: dict[int, MI]) -> bool:
-    return any(mi is source for source in again.values())
+def _is_rematerialised_definition(mi: MI, rematerialised: dict[int, MI]) -> bool:
+    return any(mi is source for source in rematerialised.values())
 
 
-def _direct_move(mi: MI, slot_of: dict[int, int], again: dict[int, MI]) -> MI | None:
-    """A copy from or to a spilled register is itself the load or store, unless a constant must be loaded for it."""
-    if not mi.is_copy() or mi.args[0] in again:
+def _direct_move(mi: MI, slot_of: dict[int, int], rematerialised: dict[int, MI]) -> MI | None:
+    """The load or store that replaces a copy from or to a spilled register; None if it needs another register."""
+    if not mi.is_copy() or mi.args[0] in rematerialised:
         return None
-    source, dest = mi.args
-    assert isinstance(source, int)
-    assert isinstance(dest, int)
+    source, dest = mi.register(0), mi.register(1)
     if source in slot_of and dest not in slot_of:
         return MI("mov", Slot(slot_of[source]), dest, line=mi.line)
     if dest in slot_of and source not in slot_of:
@@ -139,21 +138,21 @@ def _rewrite_one(
     m: MFunction,
     mi: MI,
     slot_of: dict[int, int],
-    again: dict[int, MI],
+    rematerialised: dict[int, MI],
     renames: dict[int, int],
     before: list[MI],
     after: list[MI],
 ) -> None:
     uses, defs = set(mi.uses()), set(mi.defs())
     for r in uses | defs:
-        if r not in slot_of and r not in again:
+        if r not in slot_of and r not in rematerialised:
             continue
         t = renames.get(r)
         if t is None:
             t = renames[r] = m.new_pair() if r in m.pairs else m.new_register()
             m.temps.add(t)
-            if r in again:
-                source = again[r]
+            if r in rematerialised:
+                source = rematerialised[r]
                 before.append(MI(source.op, *[t if a == r else a for a in source.args], line=mi.line))
             elif r in uses:
                 before += _transfer(m, r, slot_of[r], t, True, mi.line)
@@ -163,7 +162,7 @@ def _rewrite_one(
 
 
 def _transfer(m: MFunction, r: int, slot: int, t: int, load: bool, line: str | None) -> list[MI]:
-    """Load or store one register; pairs go word by word."""
+    """Load or store of one register; pairs are transferred word by word."""
     if r not in m.pairs:
         return [MI("mov", Slot(slot), t, line=line) if load else MI("mov", t, Slot(slot), line=line)]
     low, high = m.new_register(), m.new_register()

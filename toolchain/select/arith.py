@@ -5,13 +5,13 @@ from __future__ import annotations
 from toolchain.ir.model import I1, ConstInt, Instr, Value
 from toolchain.mir.mir import Imm, Mem
 from toolchain.select.context import Handler, SelectionContext
-from toolchain.select.rules import CARRY_OP, COMMUTES, REGISTER_OP, ImmRule, immediate_rule
+from toolchain.select.rules import CARRY_OP, COMMUTES, REGISTER_OP, ImmediateRule, immediate_rule
 from toolchain.select.shifts import fill
 from toolchain.select.state import words_of
 
 
 def select_binary(s: SelectionContext, i: Instr) -> None:
-    """One word: rule table, then register form with a folded load. Several words: a carry chain."""
+    """Addition, subtraction, logic: by the rules of immediates, with a folded load, or as a chain of words."""
     if _into_low_byte(s, i):
         return
     if words_of(i) > 1:
@@ -46,7 +46,7 @@ def select_binary(s: SelectionContext, i: Instr) -> None:
 
 
 def _into_low_byte(s: SelectionContext, i: Instr) -> bool:
-    """a | b and a ^ b for a byte b: only the low byte changes, so b is not extended."""
+    """Select a | b and a ^ b for an extended byte b as a byte operation, which needs no extension."""
     if i.op not in ("or", "xor") or i.type.bits < 16:
         return False
     for a, b in (i.args, i.args[::-1]):
@@ -66,7 +66,7 @@ def _into_low_byte(s: SelectionContext, i: Instr) -> bool:
 
 
 def _file_logic(s: SelectionContext, i: Instr, a: Value, b: ConstInt, d: int, byte: bool) -> bool:
-    """near object op constant, through W0: one word less than loading both (abi-elf.md §8.1, bit-field writes)."""
+    """Select near object op constant through W0, a word less than loading both (abi-elf.md §8.1, bit-fields)."""
     if i.op not in ("and", "or", "xor") or immediate_rule(i.op, b.value, i.type.bits) is not None:
         return False
     near = s.near_operand(a, i)
@@ -79,7 +79,7 @@ def _file_logic(s: SelectionContext, i: Instr, a: Value, b: ConstInt, d: int, by
 
 
 def _reverse_subtract(s: SelectionContext, i: Instr, a: ConstInt, d: int, byte: bool) -> None:
-    """constant - b."""
+    """Select constant - b."""
     right = s.source(i.args[1], i)
     if a.value == 0:
         s.emit("neg", right, d, byte=byte)
@@ -92,7 +92,7 @@ def _reverse_subtract(s: SelectionContext, i: Instr, a: ConstInt, d: int, byte: 
 
 
 def apply_immediate(s: SelectionContext, op: str, a: Value, k: int, d: int, byte: bool, user: Instr | None) -> None:
-    """d = a op k by the first fitting rule; the constant goes to a register otherwise."""
+    """d = a op k by the first matching rule, else with the constant in a register."""
     rule = immediate_rule(op, k, 8 if byte else 16)
     if rule is not None and rule.form == "unary" and user is not None and rule.op != "ze":
         s.emit(rule.op, s.source(a, user), d, byte=byte)
@@ -100,8 +100,8 @@ def apply_immediate(s: SelectionContext, op: str, a: Value, k: int, d: int, byte
     apply_rule(s, rule, op, s.reg(a), k, d, byte)
 
 
-def apply_rule(s: SelectionContext, rule: ImmRule | None, op: str, a: int, k: int, d: int, byte: bool) -> None:
-    """d = a op k for a register a."""
+def apply_rule(s: SelectionContext, rule: ImmediateRule | None, op: str, a: int, k: int, d: int, byte: bool) -> None:
+    """d = a op k for a register a; without a rule, the constant is loaded into a register."""
     if rule is None:
         t = s.temp()
         s.load_imm(k, t)
@@ -121,7 +121,7 @@ def apply_rule(s: SelectionContext, rule: ImmRule | None, op: str, a: int, k: in
 
 
 def _wide_binary(s: SelectionContext, i: Instr) -> None:
-    """Word by word; add and sub carry. Constant words use literals; words that change nothing are copies."""
+    """Select an operation on several words; words known to be zero become copies."""
     a, b = i.args
     d = s.value_regs(i)
     if isinstance(a, ConstInt) and i.op == "sub":
@@ -148,7 +148,7 @@ def _wide_binary(s: SelectionContext, i: Instr) -> None:
 
 
 def _known_zero_words(v: Value) -> set[int]:
-    """Words of a value that are certainly 0: the upper part of a zext, the lower part of a shift by whole words."""
+    """Words of a value that are known to be 0: upper words of a zext, lower words of a shift by whole words."""
     if isinstance(v, Instr):
         if v.op == "zext":
             return set(range(words_of(v.args[0]), words_of(v)))
@@ -161,6 +161,7 @@ def _known_zero_words(v: Value) -> set[int]:
 
 
 def _wide_reverse(s: SelectionContext, i: Instr, a: ConstInt) -> None:
+    """Select constant - b on several words."""
     right, d = s.regs(i.args[1]), s.value_regs(i)
     for k, (y, r) in enumerate(zip(right, d, strict=True)):
         word = a.value >> 16 * k & 0xFFFF
@@ -174,7 +175,7 @@ def _wide_reverse(s: SelectionContext, i: Instr, a: ConstInt) -> None:
 
 
 def _wide_immediate(s: SelectionContext, op: str, a: tuple[int, ...], value: int, d: tuple[int, ...]) -> None:
-    """Wide operation with a constant."""
+    """Select an operation of several words with a constant; words that change nothing become copies."""
     words = [value >> 16 * k & 0xFFFF for k in range(len(a))]
     if op in ("add", "sub"):
         _wide_add_immediate(s, op, a, words, d)
@@ -191,7 +192,7 @@ def _wide_immediate(s: SelectionContext, op: str, a: tuple[int, ...], value: int
 
 
 def _wide_add_immediate(s: SelectionContext, op: str, a: tuple[int, ...], words: list[int], d: tuple[int, ...]) -> None:
-    """Add or subtract a constant, choosing the direction with more short literals; leading zero words are copies."""
+    """Add or subtract a constant, whichever needs more short literals; leading zero words become copies."""
     value = sum(w << 16 * k for k, w in enumerate(words))
     bits = 16 * len(words)
     negated = -value & ((1 << bits) - 1)
@@ -217,7 +218,7 @@ def _wide_add_immediate(s: SelectionContext, op: str, a: tuple[int, ...], words:
 
 
 def select_extend(s: SelectionContext, i: Instr) -> None:
-    """zext and sext. Words of the source are shared, not copied."""
+    """zext and sext. The result shares the registers of its source words."""
     v, signed = i.args[0], i.op == "sext"
     d = s.value_regs(i)
     if s.is_leaf(v):
@@ -258,7 +259,7 @@ def _byte_source(s: SelectionContext, v: Value, i: Instr) -> int | Mem:
 
 
 def select_unary(s: SelectionContext, i: Instr) -> None:
-    """ff1l, ff1r."""
+    """FF1L and FF1R."""
     s.emit(i.op, s.source(i.args[0], i), s.result(i))
 
 

@@ -1,4 +1,4 @@
-"""Inline assembly: GCC-style operands as clang hands them over (`$0`, constraint list)."""
+"""Selection of inline assembly: GCC-style operands in clang's form (`$0`, constraint list)."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from toolchain.ir.model import ConstInt, GlobalRef, Instr, Type, UnsupportedErro
 from toolchain.mir.mir import FIRST_VIRTUAL, MI, Imm, Mem, Operand, opaque
 from toolchain.select.context import SelectionContext
 
-# The front end knows MSP430 register names only; r0-r3 have other names there.
+# Register names of the front end, which are those of the MSP430; r0-r3 have other names there.
 REGISTER_NAMES = {"pc": 0, "sp": 1, "sr": 2, "cg": 3, "fp": 4, **{f"r{n}": n for n in range(16)}}
 REFERENCE = re.compile(r"\$(?:(\d+)|\{(\d+)(?::(\w))?\}|\{:uid\}|\$)")
 REFUSED_LETTERS = frozenset("abcdetwABxyz")
 
 
 @dataclass
-class Constraint:
+class AsmConstraint:
     """One operand of the constraint string."""
 
     output: bool
@@ -29,12 +29,12 @@ class Constraint:
 
     @property
     def either(self) -> bool:
-        """`rm` and `g`: a register, as GCC for this chip gives, whose instructions mostly take nothing else."""
+        """Whether register and memory are allowed (`rm`, `g`): the operand becomes a register, as in XC16."""
         return "r" in self.text and "m" in self.text
 
 
-def _parse(text: str) -> tuple[list[Constraint], list[int]]:
-    """Operands and clobbered registers."""
+def _parse(text: str) -> tuple[list[AsmConstraint], list[int]]:
+    """Operands and clobbered registers of a constraint string. Raises UnsupportedError."""
     operands, clobbers = [], []
     for part in _split(text):
         if part.startswith("~"):
@@ -56,13 +56,14 @@ def _parse(text: str) -> tuple[list[Constraint], list[int]]:
                 raise UnsupportedError(f"inline assembly register '{name}'")
             fixed = REGISTER_NAMES[name]
         tied = int(body) if body.isdigit() else None
-        operands.append(Constraint(output, early, indirect, body, tied, fixed))
+        operands.append(AsmConstraint(output, early, indirect, body, tied, fixed))
     return operands, clobbers
 
 
-def _place(constraints: list[Constraint], clobbers: list[int], text: str) -> None:
-    """Give operands that asked for a class of registers one of it. An input may share an output's register unless that
-    is written early. Raises UnsupportedError when a class has too few."""
+def _assign_classes(constraints: list[AsmConstraint], clobbers: list[int], text: str) -> None:
+    """Assign registers to operands with a register class. Raises UnsupportedError if a class has too few registers.
+
+    An input may share the register of an output, unless that is written early."""
     mark = MARK.match(text)
     if mark is None:
         return
@@ -87,7 +88,7 @@ def _split(text: str) -> list[str]:
 
 
 class AsmBuilder:
-    """Collects operands of one statement. Registers get a role each; memory and immediates are text in place."""
+    """Builds the machine instruction of one statement: operands, their roles, copies before and after."""
 
     def __init__(self, s: SelectionContext, i: Instr) -> None:
         self.s = s
@@ -97,22 +98,23 @@ class AsmBuilder:
         self.roles: list[str] = []
         self.late: list[int] = []
         self.after: list[tuple[int, tuple[int, ...]]] = []
-        self.stores: list[tuple[int, int, bool]] = []  # pointer, register, byte: "=rm" objects in memory
+        self.stores: list[tuple[int, int, bool]] = []  # pointer, register, byte: outputs in memory
         self.fixed_uses: list[int] = []
         self.fixed_defs: list[int] = []
         self.blocks = [0, 4]  # free register runs for 64-bit operands
         self.reference: list[int] = []  # operand number in the text -> index in `operands`
 
     def run(self) -> None:
+        """Emit the statement."""
         constraints, clobbers = _parse(self.asm.constraints)
-        _place(constraints, clobbers, self.asm.text)
+        _assign_classes(constraints, clobbers, self.asm.text)
         results = self.i.extra["results"]
         inputs = list(self.i.args)
         result_at = 0
         early = False
         for c in constraints:
             if c.output and c.indirect and c.either:
-                self.output_by_way_of_register(c, inputs.pop(0), element(self.i, len(self.i.args) - len(inputs) - 1))
+                self.memory_output_in_register(c, inputs.pop(0), element(self.i, len(self.i.args) - len(inputs) - 1))
             elif c.output and not c.indirect:
                 self.output(c, results[result_at], result_at)
                 result_at += 1
@@ -121,7 +123,7 @@ class AsmBuilder:
                 self.tied(c, inputs.pop(0))
             else:
                 self.input(c, inputs.pop(0))
-        if early or clobbers:  # a clobbered register may be written before the inputs have been read
+        if early or clobbers:  # a clobbered register may be written before the inputs are read
             self.late = [k for k, r in enumerate(self.roles) if r in "sS"]
         mi = MI("asm", *self.operands, line=self.s.line)
         mi.info = opaque("".join(self.roles), "cznv", words=max(1, self.asm.text.count("\n") + 1))
@@ -141,7 +143,8 @@ class AsmBuilder:
             else:
                 self.s.emit("split", dest[0], dest[1], source)
 
-    def _check(self, c: Constraint, t: Type) -> int:
+    def _check(self, c: AsmConstraint, t: Type) -> int:
+        """Words of an operand. Raises UnsupportedError for unsupported sizes and constraints."""
         words = max(1, t.bits // 16)
         if words == 4 and c.fixed is None and self.blocks and "r" in c.text:
             c.fixed = self.blocks.pop()  # 64 bits travel in W4-W7 or W0-W3, as in calls
@@ -157,7 +160,7 @@ class AsmBuilder:
         self.roles.append(role)
         return len(self.operands) - 1
 
-    def output(self, c: Constraint, t: Type, index: int) -> None:
+    def output(self, c: AsmConstraint, t: Type, index: int) -> None:
         words = self._check(c, t)
         dest = self.s.value_regs(self.i) if index == 0 else result_registers(self.s, self.i, index, words)
         if c.fixed is not None:
@@ -170,8 +173,8 @@ class AsmBuilder:
         self.reference.append(self.add(r, "d" if words == 1 else "D"))
         self.after.append((r, dest))
 
-    def output_by_way_of_register(self, c: Constraint, p: Value, t: Type) -> None:
-        """An object in memory that may as well be a register while the statement runs: it is stored behind it."""
+    def memory_output_in_register(self, c: AsmConstraint, p: Value, t: Type) -> None:
+        """An output in memory for which a register is allowed: the register is stored behind the statement."""
         size = size_of(t)
         if size > 2:
             raise UnsupportedError(f"inline assembly operand '{c.text}' of {size} bytes (use r or m)")
@@ -179,12 +182,12 @@ class AsmBuilder:
         self.reference.append(self.add(r, "d"))
         self.stores.append((self.s.reg(p), r, size == 1))
 
-    def tied(self, c: Constraint, v: Value) -> None:
-        """An input in the register of an output: the output becomes read and written."""
+    def tied(self, c: AsmConstraint, v: Value) -> None:
+        """An input in the register of an output, which becomes read and written."""
         assert c.tied is not None
         at = self.reference[c.tied]
         r = self.operands[at]
-        if not isinstance(r, int):  # "+m": the object holds the value when the statement starts
+        if not isinstance(r, int):  # "+m": the object contains the value before the statement
             self.s.emit("mov", self.s.reg(v), r, byte=v.type.bits == 8)
             self.reference.append(at)
             return
@@ -205,7 +208,7 @@ class AsmBuilder:
         else:
             self.s.copy(registers[0], r)
 
-    def input(self, c: Constraint, v: Value) -> None:
+    def input(self, c: AsmConstraint, v: Value) -> None:
         if c.indirect or c.text == "m":
             if not c.indirect:
                 raise UnsupportedError("inline assembly memory operand without an address")
@@ -237,11 +240,11 @@ class AsmBuilder:
             self.reference.append(self.add(self.s.reg(v), "s"))
 
     def memory(self, p: Value) -> Operand:
-        """[Wn] of an address."""
+        """Operand [Wn] for an address."""
         return Mem("ind", self.s.reg(p))
 
     def template(self) -> str:
-        """The text with operand numbers rewritten to indices into `args`, as {n} or {n:modifier}."""
+        """The text with operand numbers replaced by indices into `args` (`MI.text`)."""
 
         def replace(m: re.Match[str]) -> str:
             number = m[1] or m[2]
@@ -254,12 +257,12 @@ class AsmBuilder:
 
 
 def element(asm: Instr, k: int) -> Type:
-    """Type of the object that argument `k`, an address, stands for."""
+    """Type of the object whose address is argument `k`."""
     return asm.extra["attrs"][k]["elementtype"]
 
 
 def result_registers(s: SelectionContext, asm: Instr, index: int, words: int) -> tuple[int, ...]:
-    """Registers of the second and later results of a statement."""
+    """Registers of result `index`; new ones if it has no user."""
     for user in s.users.get(id(asm), ()):
         if user.op == "asmresult" and user.extra["index"] == index:
             return s.value_regs(user)
@@ -267,9 +270,9 @@ def result_registers(s: SelectionContext, asm: Instr, index: int, words: int) ->
 
 
 def select_asm(s: SelectionContext, i: Instr) -> None:
-    """Emit one statement with its operand copies."""
+    """Select one statement with the copies of its operands."""
     AsmBuilder(s, i).run()
 
 
 def select_asmresult(s: SelectionContext, i: Instr) -> None:
-    """Nothing: the statement writes its results itself."""
+    """No code: the statement writes its results."""

@@ -6,12 +6,14 @@ from toolchain.ir.model import ConstInt, Instr, Value
 from toolchain.mir.mir import Imm, Mem
 from toolchain.select.context import Handler, SelectionContext
 
-INLINE_WORDS = 3  # copies and fills of up to this many units are written out
+MAX_UNROLLED_UNITS = 3  # larger copies and fills use REPEAT
 
 
 def _pointer(s: SelectionContext, p: Value, size: int, block: Instr) -> tuple[int, int | None]:
-    """A private copy of a pointer, to be advanced, and the register of p + size that it goes to in the end, if somebody
-    wants that behind the operation on a block. Until then that register has no value, which a debugger should know."""
+    """(copy of a pointer to be advanced, register of p + size or None).
+
+    The register receives the advanced pointer if code behind the operation uses p + size. It has no value before, so
+    the copy is a separate register for the debugger."""
     r = s.temp()
     if s.is_leaf(p):
         s.load_leaf(p, 0, r)
@@ -25,7 +27,7 @@ def _pointer(s: SelectionContext, p: Value, size: int, block: Instr) -> tuple[in
 
 
 def _step_behind(s: SelectionContext, p: Value, size: int, block: Instr) -> Instr | None:
-    """p + size of this block, not emitted yet, whose register is read behind `block` only."""
+    """The addition p + size of this block whose register is read behind `block` only; None if there is none."""
     _, at = s.position[id(block)]
     for step in s.users.get(id(p), ()):
         k = step.args[1] if step.op == "add" and step.args[0] is p else None
@@ -39,18 +41,18 @@ def _step_behind(s: SelectionContext, p: Value, size: int, block: Instr) -> Inst
 
 
 def _modes(count: int, behind: int | None) -> list[str]:
-    """How a pointer is used `count` times in a row; it is advanced the last time only if the end is wanted."""
+    """Addressing modes of `count` accesses; the last one advances the pointer only if its end is used."""
     return ["++"] * (count - 1) + ["ind" if behind is None else "++"]
 
 
 def select_blockcopy(s: SelectionContext, i: Instr) -> None:
-    """MOV [Ws++],[Wd++], under REPEAT when long (isa.md §15)."""
+    """MOV [Ws++],[Wd++], under REPEAT for more than a few units (isa.md §15)."""
     count, unit = i.extra["count"], i.extra["unit"]
     (dest, dest_end), (source, source_end) = (_pointer(s, p, count * unit, i) for p in i.args[:2])
     byte = unit == 1
-    if count <= INLINE_WORDS:
-        for taken, put in zip(_modes(count, source_end), _modes(count, dest_end), strict=True):
-            s.emit("mov", Mem(taken, source), Mem(put, dest), byte=byte)
+    if count <= MAX_UNROLLED_UNITS:
+        for source_mode, dest_mode in zip(_modes(count, source_end), _modes(count, dest_end), strict=True):
+            s.emit("mov", Mem(source_mode, source), Mem(dest_mode, dest), byte=byte)
     else:
         s.emit("repmov", Imm(count - 1), source, dest, byte=byte)
     for r, end in ((dest, dest_end), (source, source_end)):
@@ -59,13 +61,13 @@ def select_blockcopy(s: SelectionContext, i: Instr) -> None:
 
 
 def select_blockfill(s: SelectionContext, i: Instr) -> None:
-    """CLR [Wd++] or MOV Ws,[Wd++], under REPEAT when long."""
+    """CLR [Wd++] or MOV Ws,[Wd++], under REPEAT for more than a few units."""
     count, unit = i.extra["count"], i.extra["unit"]
     value, byte = i.args[1], unit == 1
     zero = isinstance(value, ConstInt) and value.value == 0
     source = None if zero else s.reg(value)
     dest, end = _pointer(s, i.args[0], count * unit, i)
-    if count <= INLINE_WORDS:
+    if count <= MAX_UNROLLED_UNITS:
         for mode in _modes(count, end):
             if source is None:
                 s.emit("clr", Mem(mode, dest), byte=byte)

@@ -1,4 +1,4 @@
-"""XC16's machine builtins (abi-elf.md §2.9). They arrive as calls of external functions of these names."""
+"""Selection of XC16's builtins (abi-elf.md §2.9), which are calls of external functions in the IR."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from toolchain.select.context import Handler, SelectionContext
 
 
 def _constant(i: Instr, k: int, limit: int) -> int:
+    """Constant argument `k`. Raises UnsupportedError unless it is a constant from 0 to `limit`."""
     v = i.args[k]
     if not isinstance(v, ConstInt) or v.value > limit:
         raise UnsupportedError(f"{i.extra['name']}: argument {k + 1} must be a constant from 0 to {limit}")
@@ -41,7 +42,7 @@ def _pwrsav(s: SelectionContext, i: Instr) -> None:
 
 
 def _osccon(byte: str, keys: tuple[int, int]) -> Handler:
-    """Key, key, value as three consecutive byte writes through a register, so that no instruction comes between."""
+    """Write two keys and the value by three consecutive byte moves through a register."""
 
     def expand(s: SelectionContext, i: Instr) -> None:
         value = s.reg(i.args[0])
@@ -57,7 +58,7 @@ def _osccon(byte: str, keys: tuple[int, int]) -> Handler:
 
 
 def _write_nvm(s: SelectionContext, i: Instr) -> None:
-    """NVMKEY = 0x55, 0xAA, then WR; two NOPs follow (abi-elf.md §2.9)."""
+    """Write 0x55 and 0xAA to NVMKEY and set WR, followed by two NOPs (abi-elf.md §2.9)."""
     for key in (0x55, 0xAA):
         r = s.temp()
         s.load_imm(key, r)
@@ -105,7 +106,7 @@ def _multiply(kind: str) -> Handler:
 
 
 def _divide(op: str, result: int) -> Handler:
-    """32 by 16 bits: REPEAT #17, DIV.SD or DIV.UD."""
+    """Divide 32 by 16 bits: REPEAT #17, DIV.SD or DIV.UD; the result is in W0 or W1."""
 
     def expand(s: SelectionContext, i: Instr) -> None:
         low, high = s.regs(i.args[0])
@@ -125,7 +126,7 @@ def _bit_toggle(s: SelectionContext, i: Instr) -> None:
 
 
 def _get_isr_state(s: SelectionContext, i: Instr) -> None:
-    """SR.IPL, bits 7-5."""
+    """Return SR.IPL, bits 7-5."""
     r, t = s.temp(), s.temp()
     mi = s.emit("asm", r)
     mi.info = opaque("d")
@@ -135,7 +136,7 @@ def _get_isr_state(s: SelectionContext, i: Instr) -> None:
 
 
 def _set_isr_state(s: SelectionContext, i: Instr) -> None:
-    """SR.IPL = argument; flags in the low bits are scratch."""
+    """Set SR.IPL; the flags in the low bits of SR are overwritten."""
     r = s.temp()
     s.emit("sl", s.reg(i.args[0]), Imm(5), r)
     s.copy(r, 0)
@@ -189,7 +190,7 @@ BUILTINS: dict[str, Handler] = {
 
 
 def select_builtin(s: SelectionContext, i: Instr) -> None:
-    """Expand one builtin in place. Raises UnsupportedError for unknown names."""
+    """Select one builtin. Raises UnsupportedError for unknown names."""
     name = i.extra["name"].removeprefix("__builtin_")
     handler = BUILTINS.get(name)
     if handler is None:

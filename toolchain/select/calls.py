@@ -1,8 +1,8 @@
-"""Selection of calls, returns and function entry by abi-elf.md §2.2-2.4, and of builtins and inline assembly."""
+"""Selection of calls, returns and function entry (abi-elf.md §2.2-2.4)."""
 
 from __future__ import annotations
 
-from toolchain.abi.arguments import Place, Shape, place_arguments, scalar_shape, struct_shape
+from toolchain.abi.arguments import ArgumentLocation, ArgumentShape, argument_locations, scalar_shape, struct_shape
 from toolchain.abi.names import symbol
 from toolchain.abi.target import CALLER_SAVED, RETURN_ADDRESS_BYTES, SP
 from toolchain.ir.model import (
@@ -22,10 +22,10 @@ from toolchain.mir.mir import Imm, Mem, Slot
 from toolchain.select import asm_inline, builtins
 from toolchain.select.context import Handler, SelectionContext
 
-BLOCK_PUSH_WORDS = 5
+BLOCK_PUSH_WORDS = 5  # structs of this size and more are pushed under REPEAT
 
 
-def shape_of(v: Value, attrs: ParameterAttributes) -> Shape:
+def shape_of(v: Value, attrs: ParameterAttributes) -> ArgumentShape:
     """Shape of an argument or parameter with these attributes."""
     t = attrs.get("byval")
     if t is None:
@@ -38,53 +38,53 @@ def shape_of(v: Value, attrs: ParameterAttributes) -> Shape:
 
 
 def is_struct(a: Arg) -> bool:
-    """Whether a parameter is the address of a copy the caller makes."""
+    """Whether a parameter is a struct passed by value, which the IR represents by the address of a copy."""
     return "byval" in a.attrs
 
 
-def parameter_places(f: Function) -> list[Place]:
-    """Where every parameter travels."""
-    return place_arguments([shape_of(a, a.attrs) for a in f.args], len(f.args) if f.vararg else None)
+def parameter_locations(f: Function) -> list[ArgumentLocation]:
+    """Locations of the parameters of a function."""
+    return argument_locations([shape_of(a, a.attrs) for a in f.args], len(f.args) if f.vararg else None)
 
 
 def incoming(s: SelectionContext) -> None:
-    """Decide where every parameter lives before any code is selected."""
+    """Choose frame slots for parameters on the stack and for structs, before any code is selected."""
     f = s.f
-    s.places = parameter_places(f)
+    s.parameters = parameter_locations(f)
     read = [i.extra["argument"] for i in f.blocks[0].instrs if i.op == "argword"]
     low = RETURN_ADDRESS_BYTES
-    for a, place in zip(f.args, s.places, strict=True):
+    for a, location in zip(f.args, s.parameters, strict=True):
         t = a.attrs.get("byval")
-        if place.stack:
-            low = max(low, place.stack)
-            slot = s.new_slot(2 * place.words, -place.stack)
+        if location.stack:
+            low = max(low, location.stack)
+            slot = s.new_slot(2 * location.words, -location.stack)
             s.arg_slots[id(a)] = slot
             if t is not None:
                 s.slots[id(a)] = slot
         elif t is not None and a not in read:
-            s.slots[id(a)] = s.new_slot(max(2 * place.words, 1))
+            s.slots[id(a)] = s.new_slot(max(2 * location.words, 1))
     s.variadic_anchor = s.new_slot(2, -low) if f.vararg else 0
 
 
 def receive(s: SelectionContext) -> None:
-    """Entry code: parameters from registers and stack to virtual registers or their slots."""
-    late: list[tuple[Arg, Place]] = []
-    for a, place in zip(s.f.args, s.places, strict=True):
-        if place.register is None:
-            late.append((a, place))
+    """Entry code: move parameters from registers and stack to virtual registers or slots."""
+    late: list[tuple[Arg, ArgumentLocation]] = []
+    for a, location in zip(s.f.args, s.parameters, strict=True):
+        if location.register is None:
+            late.append((a, location))
             continue
         if id(a) in s.slots:
-            for k in range(place.words):
-                s.emit("mov", place.register + k, Slot(s.slots[id(a)], 2 * k))
+            for k in range(location.words):
+                s.emit("mov", location.register + k, Slot(s.slots[id(a)], 2 * k))
         elif is_struct(a):
             for word in s.f.blocks[0].instrs:
                 if word.op == "argword" and word.extra["argument"] is a and id(word) in s.needed:
-                    s.copy(place.register + word.extra["word"], s.value_regs(word)[0])
+                    s.copy(location.register + word.extra["word"], s.value_regs(word)[0])
         elif id(a) in s.needed:
             for k, r in enumerate(s.value_regs(a)):
-                s.copy(place.register + k, r)
-    for a, place in late:
-        if place.stack and id(a) not in s.slots and id(a) in s.needed:
+                s.copy(location.register + k, r)
+    for a, location in late:
+        if location.stack and id(a) not in s.slots and id(a) in s.needed:
             for k, r in enumerate(s.value_regs(a)):
                 s.emit("mov", Slot(s.arg_slots[id(a)], 2 * k), r)
 
@@ -94,16 +94,16 @@ def receive(s: SelectionContext) -> None:
 
 
 def select_call(s: SelectionContext, i: Instr) -> None:
-    """Stack arguments last to first, then register arguments, the call, the result."""
+    """Push stack arguments from last to first, load register arguments, call, take the result."""
     callee = i.args[-1]
     args = i.args[:-1]
     attrs = i.extra["attrs"]
     named = i.extra["fixed"] if i.extra.get("vararg") else None
-    places = place_arguments([shape_of(a, k) for a, k in zip(args, attrs, strict=True)], named)
+    locations = argument_locations([shape_of(a, k) for a, k in zip(args, attrs, strict=True)], named)
     target: int | str
     target = symbol(s.module, callee.name) if isinstance(callee, GlobalRef) else s.reg(callee)
-    pushed = _push_stack_arguments(s, args, attrs, places)
-    used = _load_register_arguments(s, args, attrs, places)
+    pushed = _push_stack_arguments(s, args, attrs, locations)
+    used = _load_register_arguments(s, args, attrs, locations)
     mi = s.emit("callr", target) if isinstance(target, int) else s.emit("call", target)
     mi.also_uses = tuple(used)
     mi.also_defs = CALLER_SAVED
@@ -114,7 +114,7 @@ def select_call(s: SelectionContext, i: Instr) -> None:
 
 
 def _take_results(s: SelectionContext, i: Instr) -> None:
-    """Copy the result registers; the parts of an aggregate follow one another from W0."""
+    """Copy the result from its registers; the members of an aggregate occupy consecutive registers from W0."""
     results = i.extra.get("results")
     if not results:
         if id(i) in s.needed:
@@ -133,17 +133,17 @@ def _take_results(s: SelectionContext, i: Instr) -> None:
 
 
 def _push_stack_arguments(
-    s: SelectionContext, args: list[Value], attrs: list[ParameterAttributes], places: list[Place]
+    s: SelectionContext, args: list[Value], attrs: list[ParameterAttributes], locations: list[ArgumentLocation]
 ) -> int:
-    """Push in descending distance; returns the bytes pushed."""
+    """Push stack arguments in descending distance; returns the bytes pushed."""
     pushed = 0
-    for k in sorted((k for k in range(len(args)) if places[k].stack), key=lambda k: -places[k].stack):
+    for k in sorted((k for k in range(len(args)) if locations[k].stack), key=lambda k: -locations[k].stack):
         v = args[k]
         t = attrs[k].get("byval")
         if t is not None:
             _push_struct(s, v, t)
         elif s.is_leaf(v):
-            for word in range(places[k].words):
+            for word in range(locations[k].words):
                 if isinstance(v, ConstInt) and not v.value >> 16 * word & 0xFFFF:
                     s.emit("clr", Mem("++", SP))
                 else:
@@ -151,18 +151,19 @@ def _push_stack_arguments(
         else:
             for r in s.regs(v):
                 s.emit("mov", r, Mem("++", SP))
-        pushed += 2 * places[k].words
+        pushed += 2 * locations[k].words
     return pushed
 
 
 def _push_struct(s: SelectionContext, v: Value, t: Type) -> None:
+    """Push a copy of a struct in memory."""
     words = (size_of(t) + 1) // 2
     if align_of(t) == 2 and words >= BLOCK_PUSH_WORDS:
         source = s.temp()
         s.copy(s.reg(v), source)
         s.emit("repmov", Imm(words - 1), source, SP)
         return
-    if words >= BLOCK_PUSH_WORDS:  # bytes: W15 itself must stay even
+    if words >= BLOCK_PUSH_WORDS:  # copied by bytes; W15 itself must remain even
         source, dest = s.temp(), s.temp()
         s.copy(s.reg(v), source)
         s.emit("mov", SP, dest)
@@ -174,7 +175,7 @@ def _push_struct(s: SelectionContext, v: Value, t: Type) -> None:
 
 
 def _struct_words(s: SelectionContext, v: Value, t: Type) -> list[int]:
-    """Registers with the words of a struct in memory; the padding byte of an odd size is not read."""
+    """Load the words of a struct in memory; the padding byte of an odd size is not read."""
     base, size = s.reg(v), size_of(t)
     out = []
     for at in range(0, size, 2):
@@ -196,25 +197,25 @@ def _struct_words(s: SelectionContext, v: Value, t: Type) -> list[int]:
 
 
 def _load_register_arguments(
-    s: SelectionContext, args: list[Value], attrs: list[ParameterAttributes], places: list[Place]
+    s: SelectionContext, args: list[Value], attrs: list[ParameterAttributes], locations: list[ArgumentLocation]
 ) -> list[int]:
-    """Copies into W0-W7; everything that needs work is computed before the first copy."""
+    """Copy arguments into W0-W7; returns these registers. All values are computed before the first copy."""
     moves: list[tuple[int, int]] = []
     leaves: list[tuple[Value, int, int]] = []
     used: list[int] = []
-    for v, a, place in zip(args, attrs, places, strict=True):
-        if place.register is None:
+    for v, a, location in zip(args, attrs, locations, strict=True):
+        if location.register is None:
             continue
         if isinstance(v, Undef):
             continue
-        used += range(place.register, place.register + place.words)
+        used += range(location.register, location.register + location.words)
         t = a.get("byval")
         if t is not None:
-            moves += [(r, place.register + k) for k, r in enumerate(_struct_words(s, v, t))]
+            moves += [(r, location.register + k) for k, r in enumerate(_struct_words(s, v, t))]
         elif s.is_leaf(v):
-            leaves += [(v, k, place.register + k) for k in range(place.words)]
+            leaves += [(v, k, location.register + k) for k in range(location.words)]
         else:
-            moves += [(r, place.register + k) for k, r in enumerate(s.regs(v))]
+            moves += [(r, location.register + k) for k, r in enumerate(s.regs(v))]
     for source, dest in moves:
         s.copy(source, dest)
     for leaf, word, dest in leaves:
@@ -223,7 +224,7 @@ def _load_register_arguments(
 
 
 def select_ret(s: SelectionContext, i: Instr) -> None:
-    """Result in W0.. (abi-elf.md §2.3)."""
+    """Copy the result to W0 and the following registers (abi-elf.md §2.3), then return."""
     at = 0
     used: list[int] = []
     leaves: list[tuple[Value, int, int]] = []
@@ -243,17 +244,17 @@ def select_ret(s: SelectionContext, i: Instr) -> None:
 
 
 def select_entryword(s: SelectionContext, i: Instr) -> None:
-    """Return address (first word) or frame address of this function."""
+    """Load the first word of the return address, or the frame address, of this function."""
     slot = s.new_slot(2, -RETURN_ADDRESS_BYTES)
     s.emit("lea" if i.extra["address"] else "mov", Slot(slot), s.value_regs(i)[0])
 
 
 def select_argword(s: SelectionContext, i: Instr) -> None:
-    """Nothing: the entry code puts the word into its register."""
+    """No code: `receive` copies the word into its register."""
 
 
 def select_callresult(s: SelectionContext, i: Instr) -> None:
-    """Nothing: the call copies all parts of its result."""
+    """No code: the call copies all members of its result."""
 
 
 HANDLERS: dict[str, Handler] = {

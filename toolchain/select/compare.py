@@ -1,28 +1,28 @@
-"""Selection of comparisons and truth values."""
+"""Selection of comparisons, for branch conditions and as truth values."""
 
 from __future__ import annotations
 
-from toolchain.abi.target import LIT10_BYTE_MAX, LIT10_MAX
+from toolchain.abi.target import LIT5_MAX, LIT10_BYTE_MAX, LIT10_MAX
 from toolchain.ir.build import SWAPPED
 from toolchain.ir.model import I1, ConstInt, Instr, Undef, Value
 from toolchain.mir.mir import CC_INVERSE, MI, Imm
 from toolchain.select.context import Handler, SelectionContext
 from toolchain.select.rules import CONDITION
 
-# Comparisons with 0 that CP0 answers, N being the sign because CP0 clears OV (isa.md §6.1).
+# Predicate of a comparison with 0 -> condition after CP0. N is the sign, because CP0 clears OV (isa.md §6.1).
 ZERO_CONDITION = {"eq": "z", "ne": "nz", "slt": "n", "sge": "nn", "sgt": "gt", "sle": "le", "ugt": "nz", "ule": "z"}
 
 
-# Tests of x against 0 by the flags of x - 1: DEC borrows exactly for 0, and N^OV is the sign of the true difference.
-# Against 1 they say what they say of the result.
-COUNTED = (
+# Comparisons of x with 0 and 1 -> condition after DEC of x. DEC borrows exactly for 0, and N^OV is the sign of the
+# exact difference. A comparison with 1 is one of the result with 0.
+COUNTDOWN_CONDITION = (
     {"eq": "nc", "ne": "c", "sle": "lt", "sgt": "ge"},
     {"eq": "z", "ne": "nz", "sle": "le", "sgt": "gt", "ule": "leu", "ugt": "gtu"},
 )
 
 
 def condition(s: SelectionContext, c: Value, user: Instr) -> str:
-    """Emit a comparison for the truth of `c` and return the branch condition."""
+    """Emit a comparison that decides `c` and return the branch condition."""
     if isinstance(c, Instr) and c.op == "icmp" and s.same_block(c):
         step = _countdown(s, c) if user.op == "br" else None
         if step is not None:
@@ -30,7 +30,7 @@ def condition(s: SelectionContext, c: Value, user: Instr) -> str:
             s.emit("dec", s.reg(step.args[0]), s.value_regs(step)[0], byte=step.type.bits == 8)
             against = c.args[1]
             assert isinstance(against, ConstInt)
-            return COUNTED[against.value][c.pred]
+            return COUNTDOWN_CONDITION[against.value][c.pred]
         return compare(s, c, user)
     if isinstance(c, Instr) and c.op == "xor" and c.type is I1 and isinstance(c.args[1], ConstInt):
         inner = condition(s, c.args[0], user)
@@ -40,9 +40,9 @@ def condition(s: SelectionContext, c: Value, user: Instr) -> str:
 
 
 def _countdown(s: SelectionContext, c: Instr) -> Instr | None:
-    """y = x - 1 of this block, wanted only after it, for a test of x against 0 or 1."""
+    """The decrement x - 1 of this block that is used behind it only, for a comparison of x with 0 or 1; or None."""
     x, against = c.args
-    if not isinstance(against, ConstInt) or against.value > 1 or c.pred not in COUNTED[against.value]:
+    if not isinstance(against, ConstInt) or against.value > 1 or c.pred not in COUNTDOWN_CONDITION[against.value]:
         return None
     if x.type.bits not in (8, 16) or c.type is not I1:
         return None
@@ -55,9 +55,9 @@ def _countdown(s: SelectionContext, c: Instr) -> Instr | None:
 
 
 def compare(s: SelectionContext, c: Instr, at: Instr) -> str:
-    """CP or a relative of it, emitted at `at`; returns the condition under which the icmp holds.
+    """Emit a comparison for icmp `c` at its user `at`; returns the condition under which it is true.
 
-    A comparison may be repeated at several users, so loads fold into it only when it has one.
+    The comparison is repeated for every user, so loads fold into it only if it has one.
     """
     a, b = c.args
     pred = c.pred
@@ -80,39 +80,48 @@ def compare(s: SelectionContext, c: Instr, at: Instr) -> str:
 
 
 def _compare_constant(s: SelectionContext, a: Value, b: ConstInt, pred: str, byte: bool, fold: Instr | None) -> str:
-    k, bits = b.value, max(b.type.bits, 8)
+    """Compare with a constant; returns the condition. Loads fold into the user `fold`, if there is one."""
+    bits = max(b.type.bits, 8)
     ones = (1 << bits) - 1
-    if pred in ("slt", "sge") and k == 1:
-        pred, k = ("sle" if pred == "slt" else "sgt"), 0
-    elif pred in ("sgt", "sle") and k == ones:
-        pred, k = ("sge" if pred == "sgt" else "slt"), 0
-    elif pred in ("ult", "uge") and k == 1:
-        pred, k = ("eq" if pred == "ult" else "ne"), 0
-    elif pred in ("ugt", "ule") and k < 31 and k + 1 <= ones:
-        pred, k = ("uge" if pred == "ugt" else "ult"), k + 1
-    elif pred in ("sgt", "sle") and k < 31:
-        pred, k = ("sge" if pred == "sgt" else "slt"), k + 1
+    pred, k = _canonical(pred, b.value, ones)
     if k == 0 and pred in ZERO_CONDITION:
         return _compare_zero(s, a, pred, byte, fold)
-    if k <= 31:
+    if k <= LIT5_MAX:
         s.emit("cp", s.reg(a), Imm(k), byte=byte)
-    elif -k & ones <= 31:  # a + (-k) leaves the flags of a - k, but for 0 and the least number
+        return CONDITION[pred]
+    if -k & ones <= LIT5_MAX:  # a + (-k) leaves the flags of a - k, except for k = 0 and the least number
         s.emit("add", s.reg(a), Imm(-k & ones), s.temp(), byte=byte)
-    else:
-        t = s.temp()
-        right = s.source(a, fold) if fold is not None else s.reg(a)
-        if not isinstance(right, int):
-            s.load_imm(k, t)
-            s.emit("cp", t, right, byte=byte)
-            pred = SWAPPED[pred]
-        elif fold is None or fold.op != "br" or not s.single_use(a) or not _subtract(s, right, k, bits, t):
-            s.load_imm(k, t)
-            s.emit("cp", right, t, byte=byte)
+        return CONDITION[pred]
+    t = s.temp()
+    right = s.source(a, fold) if fold is not None else s.reg(a)
+    if not isinstance(right, int):
+        s.load_imm(k, t)
+        s.emit("cp", t, right, byte=byte)
+        return CONDITION[SWAPPED[pred]]
+    last_use = fold is not None and fold.op == "br" and s.single_use(a)
+    if not (last_use and _subtract(s, right, k, bits, t)):
+        s.load_imm(k, t)
+        s.emit("cp", right, t, byte=byte)
     return CONDITION[pred]
 
 
+def _canonical(pred: str, k: int, ones: int) -> tuple[str, int]:
+    """An equivalent comparison with a constant: with 0 if possible, and `<` or `>=` instead of `<=` and `>`."""
+    if pred in ("slt", "sge") and k == 1:
+        return ("sle" if pred == "slt" else "sgt"), 0
+    if pred in ("sgt", "sle") and k == ones:
+        return ("sge" if pred == "sgt" else "slt"), 0
+    if pred in ("ult", "uge") and k == 1:
+        return ("eq" if pred == "ult" else "ne"), 0
+    if pred in ("ugt", "ule") and k < LIT5_MAX and k + 1 <= ones:
+        return ("uge" if pred == "ugt" else "ult"), k + 1
+    if pred in ("sgt", "sle") and k < LIT5_MAX:
+        return ("sge" if pred == "sgt" else "slt"), k + 1
+    return pred, k
+
+
 def _subtract(s: SelectionContext, a: int, k: int, bits: int, t: int) -> bool:
-    """The flags of a - k by a two-address instruction, which spoils t, a copy of a, and needs no register for k."""
+    """Set the flags of a - k by SUB #k on a copy t of a, without a register for k; False if k is too large."""
     negative = -k & ((1 << bits) - 1)
     most = LIT10_BYTE_MAX if bits == 8 else LIT10_MAX
     if min(k, negative) > most:
@@ -123,7 +132,7 @@ def _subtract(s: SelectionContext, a: int, k: int, bits: int, t: int) -> bool:
 
 
 def _compare_zero(s: SelectionContext, a: Value, pred: str, byte: bool, fold: Instr | None) -> str:
-    """Against 0: bit tests, near objects, CP0."""
+    """Compare with 0 by a bit test, on a near object, or by CP0; returns the condition."""
     if fold is None:
         s.emit("cp0", s.reg(a), byte=byte)
         return ZERO_CONDITION[pred]
@@ -138,12 +147,12 @@ def _compare_zero(s: SelectionContext, a: Value, pred: str, byte: bool, fold: In
 
 
 def _is_mask(s: SelectionContext, a: Value) -> bool:
-    """x & constant, with no other user."""
+    """Whether a value is x & constant without another user."""
     return isinstance(a, Instr) and a.op == "and" and s.single_use(a) and isinstance(a.args[1], ConstInt)
 
 
 def _test_bits(s: SelectionContext, a: Instr, at: Instr) -> bool:
-    """BTST for one bit of a register or near object."""
+    """Emit BTST if the mask of `a` has one bit; returns whether it has."""
     mask = a.args[1]
     assert isinstance(mask, ConstInt)
     if mask.value and mask.value & (mask.value - 1) == 0:
@@ -158,7 +167,7 @@ def _test_bits(s: SelectionContext, a: Instr, at: Instr) -> bool:
 
 
 def _compare_wide(s: SelectionContext, a: Value, b: Value, pred: str) -> str:
-    """Several words: CP, then CPB; Z is sticky (isa.md §6.1)."""
+    """Compare several words by CP and CPB, which has a sticky Z (isa.md §6.1); returns the condition."""
     left = s.regs(a)
     if isinstance(b, ConstInt):
         if b.value == 0 and pred in ("eq", "ne"):
@@ -184,7 +193,7 @@ def _compare_wide(s: SelectionContext, a: Value, b: Value, pred: str) -> str:
 
 
 def _or_words(s: SelectionContext, words: tuple[int, ...]) -> None:
-    """Z says whether all words are 0."""
+    """Set Z if all words are 0."""
     total = words[0]
     for x in words[1:]:
         t = s.temp()
@@ -193,7 +202,7 @@ def _or_words(s: SelectionContext, words: tuple[int, ...]) -> None:
 
 
 def select_icmp(s: SelectionContext, i: Instr) -> None:
-    """A truth value: by the carry where it answers, else 1 unless the condition fails."""
+    """Select icmp as a value: from the carry if that decides it, else 1, cleared under a skip."""
     d = s.result(i)
     a, b = i.args
     if i.pred == "slt" and isinstance(b, ConstInt) and b.value == 0:
@@ -217,7 +226,7 @@ def select_icmp(s: SelectionContext, i: Instr) -> None:
 
 
 def _from_carry(s: SelectionContext, cc: str, d: int) -> None:
-    """d = C, or d = !C as the negated borrow of d - d."""
+    """d = C, or d = !C as the negated result of d - d with borrow."""
     if cc == "c":
         zero = s.temp()
         s.emit("clr", zero)
@@ -229,14 +238,14 @@ def _from_carry(s: SelectionContext, cc: str, d: int) -> None:
 
 
 def _skippable(mi: MI, cc: str) -> bool:
-    """Whether the comparison can become a skip instruction, which must stand next to what it guards."""
+    """Whether a comparison can become a skip instruction, which must directly precede the covered instruction."""
     if mi.op in ("btst", "btstf"):
         return True
     return mi.op == "cp" and cc in ("z", "nz", "lt", "gt") and all(isinstance(a, int) for a in mi.args)
 
 
 def _sign_bit(s: SelectionContext, a: Value, d: int) -> None:
-    """a < 0 as 0 or 1."""
+    """d = 1 if a < 0, else 0."""
     top = s.regs(a)[-1]
     if a.type.bits == 8:
         wide = s.temp()

@@ -1,7 +1,7 @@
-"""Selection of `select`: a value that hangs on a condition.
+"""Selection of `select`: conditional values.
 
-All selects of one condition that stand together share one test and one skip. Each starts from one of its two values;
-what makes it the other stands under the skip: a move, a constant, or the operation that makes one from the other.
+Adjacent selects on one condition share a test and a skip. Each starts with one of its two values; the covered
+instruction replaces it by the other: a move, a constant load, or the operation that computes one value from the other.
 """
 
 from __future__ import annotations
@@ -14,12 +14,12 @@ from toolchain.select.context import Handler, SelectionContext
 from toolchain.select.rules import CARRY_OP, REGISTER_OP, immediate_rule
 
 CONDITIONAL = frozenset(("add", "sub", "and", "or", "xor"))
-# Operation on the first word, operation on those behind it, order of the words.
+# Operation on the first word, operation on the other words, order of the words.
 SHIFT_BY_ONE = {"shl": ("sl1", "rlc", 1), "lshr": ("lsr1", "rrc", -1), "ashr": ("asr1", "rrc", -1)}
 
 
 def select_select(s: SelectionContext, i: Instr) -> None:
-    """`i`, and those right before it that hang on the same condition."""
+    """Select `i` and the selects directly before it on the same condition."""
     if _undefined(s, i):
         return
     group = _group(s, i)
@@ -41,7 +41,7 @@ def select_select(s: SelectionContext, i: Instr) -> None:
 
 
 def _undefined(s: SelectionContext, i: Instr) -> bool:
-    """A select with a value nobody defined is its other value."""
+    """Select the other value if one value is undefined; returns whether one is."""
     _, a, b = i.args
     if not isinstance(a, Undef) and not isinstance(b, Undef):
         return False
@@ -60,7 +60,7 @@ def _assign(s: SelectionContext, v: Value, d: tuple[int, ...]) -> None:
 
 
 def _group(s: SelectionContext, i: Instr) -> list[Instr]:
-    """`i` and the wanted selects right before it with its condition and none of its values; they are taken along."""
+    """`i` and the needed selects directly before it that share its condition and do not depend on each other."""
     group = [i]
     for j in reversed(s.block.instrs[: s.block.instrs.index(i)]):
         same = j.op == "select" and j.args[0] is i.args[0] and not any(isinstance(a, Undef) for a in j.args)
@@ -74,17 +74,17 @@ def _group(s: SelectionContext, i: Instr) -> list[Instr]:
 
 
 def _starts_from(i: Instr, when: bool) -> tuple[Value, Value]:
-    """(value to start from, value under the skip, which is executed when the condition is `when`)."""
+    """(initial value, value under the skip), where the covered instructions run if the condition is `when`."""
     return (i.args[2], i.args[1]) if when else (i.args[1], i.args[2])
 
 
 def _cost(s: SelectionContext, i: Instr, when: bool) -> int:
-    """In quarter words, to compare both ways to make a select."""
+    """Cost of a select in quarter words, to choose between its two forms."""
     base, other = _starts_from(i, when)
     cost = 1 if when else 0
     if _operation(s, i, base, other) is not None:
         cost -= 16
-    if isinstance(base, Instr) and base.op == "phi" and i in base.args:  # stays in the register of the loop
+    if isinstance(base, Instr) and base.op == "phi" and i in base.args:  # remains in the register of the loop
         cost -= 12
     if s.is_leaf(base) and not s.is_leaf(other):
         cost += 8
@@ -94,9 +94,9 @@ def _cost(s: SelectionContext, i: Instr, when: bool) -> int:
 
 
 def _strict(i: Instr, skip: str) -> str:
-    """Of a minimum or maximum the case of equality does not matter; CPSLT and CPSGT know the strict orders only.
+    """The strict condition for a minimum or maximum, where equality does not matter; CPSLT and CPSGT are strict.
 
-    A comparison with a constant may have become one with its neighbour."""
+    Comparisons with a constant are excluded: the constant may have been replaced by its neighbour."""
     c = i.args[0]
     if not isinstance(c, Instr) or c.op != "icmp" or any(isinstance(v, ConstInt) for v in c.args):
         return skip
@@ -106,7 +106,7 @@ def _strict(i: Instr, skip: str) -> str:
 
 
 def _alternative(s: SelectionContext, i: Instr, when: bool, shifted: bool) -> list[MI]:
-    """Emit the start of a select; returns what makes it the other value."""
+    """Emit the initial value of a select; returns the instructions that replace it by the other value."""
     base, other = _starts_from(i, when)
     d = s.value_regs(i)
     operation = _operation(s, i, base, other)
@@ -126,7 +126,7 @@ def _alternative(s: SelectionContext, i: Instr, when: bool, shifted: bool) -> li
 
 
 def _operation(s: SelectionContext, i: Instr, base: Value, other: Value) -> Instr | None:
-    """`other` if it is base op x or 0 - base and nobody else wants it, so that it can stand under the skip."""
+    """`other` if it is base op x or 0 - base without another user, so that a skip can cover it; else None."""
     if not isinstance(other, Instr) or other.op not in CONDITIONAL or not s.single_use(other):
         return None
     if not s.same_block(other) or s.is_leaf(base) or id(other) in s.wanted or i.type.bits not in (8, 16, 32):
@@ -138,7 +138,7 @@ def _operation(s: SelectionContext, i: Instr, base: Value, other: Value) -> Inst
 
 
 def _operate(s: SelectionContext, operation: Instr, base: Value, d: tuple[int, ...], shifted: bool) -> list[MI]:
-    """Emit d = base; returns d = d op x. Constants without an immediate form are loaded in front."""
+    """Emit d = base; returns the instructions of d = d op x. Constants without an immediate form are loaded first."""
     byte = base.type.bits == 8
     s.folded.add(id(operation))
     negated = operation.args[0] is not base
@@ -164,19 +164,19 @@ def _operate(s: SelectionContext, operation: Instr, base: Value, d: tuple[int, .
 
 
 def _operand(s: SelectionContext, op: str, x: Value, k: int, byte: bool) -> int | ConstInt:
-    """Word k of the second operand: a register, or a constant that `_apply` needs no register for."""
+    """Word k of the second operand: a register, or a constant with an immediate form."""
     if not isinstance(x, ConstInt):
         return s.leaf_word(x, k) if s.is_leaf(x) else s.value_regs(x)[k]
     ones = 0xFF if byte else 0xFFFF
     word = ConstInt(x.type, x.value >> 16 * k & ones)
-    if x.type.bits > 16 and op in ("add", "sub"):  # the carry wants every word
+    if x.type.bits > 16 and op in ("add", "sub"):  # every word has a carry
         return word if word.value <= 31 else s.leaf_word(x, k)
     name, value = ("add", -word.value & ones) if op == "sub" else (op, word.value)
     return word if _changes_nothing(op, word) or immediate_rule(name, value, 8 if byte else 16) else s.leaf_word(x, k)
 
 
 def _changes_nothing(op: str, word: ConstInt) -> bool:
-    """A word of a long constant that leaves the other operand as it is."""
+    """Whether a word of a constant is neutral for an operation on several words."""
     return word.type.bits > 16 and op in ("and", "or", "xor") and word.value == (0xFFFF if op == "and" else 0)
 
 
@@ -195,11 +195,13 @@ def _apply(s: SelectionContext, op: str, operand: int | ConstInt, r: int, k: int
 
 
 # ---------------------------------------------------------------------------------------------------------------------
-# the bit that a shift loses
+# selects on the bit that a shift moves out
 
 
 def _shifted_out(s: SelectionContext, i: Instr, when: bool) -> str | None:
-    """The condition by the carry, when a select starts from x shifted by one and asks for the bit that leaves x."""
+    """Condition on the carry for a select whose initial value is x shifted by one and whose test is the bit moved out.
+
+    None for other selects."""
     base, other = _starts_from(i, when)
     operation, c = _operation(s, i, base, other), i.args[0]
     if operation is None or operation.args[0] is not base or base.type.bits not in (16, 32):
@@ -212,14 +214,14 @@ def _shifted_out(s: SelectionContext, i: Instr, when: bool) -> str | None:
         return None
     if base.op == "shl" and tested is x and (c.pred, zero.signed) in (("slt", 0), ("sgt", -1)):
         return "c" if c.pred == "slt" else "nc"
-    lost = base.type.bits - 1 if base.op == "shl" else 0
-    if c.pred in ("eq", "ne") and not zero.value and _only_bit(tested, x, lost):
+    moved_out = base.type.bits - 1 if base.op == "shl" else 0
+    if c.pred in ("eq", "ne") and not zero.value and _only_bit(tested, x, moved_out):
         return "c" if c.pred == "ne" else "nc"
     return None
 
 
 def _only_bit(masked: Value, x: Value, bit: int) -> bool:
-    """x & 1 << bit, perhaps of the low word of x."""
+    """Whether a value is x & 1 << bit, or that of the low word of x."""
     if not isinstance(masked, Instr) or masked.op != "and":
         return False
     a, mask = masked.args
@@ -228,7 +230,7 @@ def _only_bit(masked: Value, x: Value, bit: int) -> bool:
 
 
 def _shift_out(s: SelectionContext, base: Instr, d: tuple[int, ...]) -> None:
-    """d = x shifted by one, the lost bit in the carry."""
+    """d = x shifted by one, with the bit moved out in the carry."""
     first, rest, order = SHIFT_BY_ONE[base.op]
     for k, (source, r) in enumerate(list(zip(s.value_regs(base.args[0]), d, strict=True))[::order]):
         s.emit(rest if k else first, source, r)

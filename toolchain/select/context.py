@@ -1,4 +1,4 @@
-"""Addressing: operands for memory accesses, and which loads may fold into their users."""
+"""Operands in memory: addressing modes, and loads that fold into their users."""
 
 from __future__ import annotations
 
@@ -7,17 +7,17 @@ from collections.abc import Callable
 from toolchain.abi.sections import is_near
 from toolchain.abi.target import BYTE_OFFSET, WORD_OFFSET
 from toolchain.ir.model import ConstInt, GlobalRef, Instr, Value
-from toolchain.mir.mir import File, Imm, Mem, Operand, Slot
+from toolchain.mir.mir import FileRegister, Imm, Mem, Operand, Slot
 from toolchain.select.state import SelectionState
 
 
 class SelectionContext(SelectionState):
-    """Selection state with operands in memory: what the handlers of instructions work with."""
+    """State of one function with operands in memory; the argument of all handlers of instructions."""
 
     # -- addresses ----------------------------------------------------------------------------------------------------
 
     def decompose(self, p: Value) -> tuple[Value, int]:
-        """Pointer = base + constant, looking through additions that exist only for addressing."""
+        """(base, constant) of a pointer, looking through additions that only compute addresses."""
         offset = 0
         while (
             isinstance(p, Instr)
@@ -30,7 +30,7 @@ class SelectionContext(SelectionState):
         return p, offset
 
     def address_only(self, p: Instr) -> bool:
-        """Whether a sum is used by loads and stores (as their address) only."""
+        """Whether only loads and stores use a sum, as their address."""
         for user in self.users.get(id(p), ()):
             if user.op == "load":
                 continue
@@ -47,9 +47,9 @@ class SelectionContext(SelectionState):
         return True
 
     def address(self, p: Value, byte: bool, extra: int = 0, count: int = 1, volatile: int = 0) -> Operand:
-        """Operand for a MOV at p + extra, usable for `count` words by `step`. File only for words and near bytes.
+        """Operand of MOV for the first of `count` words, or for a byte, at p + extra.
 
-        `volatile` is the number of the access (`mir`)."""
+        It is a FileRegister for words and near bytes only. `volatile` is the number of the access (`mir`)."""
         base, offset = self.decompose(p)
         offset += extra
         if isinstance(base, GlobalRef):
@@ -57,16 +57,16 @@ class SelectionContext(SelectionState):
             if base.name not in self.module.functions:
                 near = is_near(self.module, base.name)
                 constant = self._constant_global(base.name)
-                odd = not byte and offset & 1  # a trap when it runs, but not an instruction that exists
+                odd = not byte and offset & 1  # an address error at run time, but no instruction has such an operand
                 if (near and not odd) or (not byte and not constant and not odd):
-                    return File(self.address_expr(ref), near, volatile)
+                    return FileRegister(self.address_expr(ref), near, volatile)
             r = self.temp()
             self.emit("mov", Imm(self.address_expr(ref)), r)
             return Mem("ind", r, 0, volatile)
         if isinstance(base, ConstInt):
             at = base.value + offset & 0xFFFF
             if (byte and at < 0x2000) or (not byte and not at & 1):
-                return File(f"0x{at:04X}", at < 0x2000, volatile)
+                return FileRegister(f"0x{at:04X}", at < 0x2000, volatile)
             r = self.temp()
             self.load_imm(at, r)
             return Mem("ind", r, 0, volatile)
@@ -81,7 +81,7 @@ class SelectionContext(SelectionState):
         return self.offset_operand(self.reg(base), offset, byte, volatile)
 
     def _is_index_sum(self, base: Instr) -> bool:
-        """base + index, wanted only as an address."""
+        """Whether a sum base + index is used as an address only."""
         return base.op == "add" and not isinstance(base.args[1], ConstInt) and self.address_only(base)
 
     def _constant_global(self, name: str) -> bool:
@@ -89,7 +89,7 @@ class SelectionContext(SelectionState):
         return var is not None and var.constant
 
     def offset_operand(self, base: int, offset: int, byte: bool, volatile: int = 0) -> Mem:
-        """[base+offset], computing the sum when the offset is out of reach."""
+        """Operand [base+offset]; the sum is computed if the offset is out of range."""
         if offset == 0:
             return Mem("ind", base, 0, volatile)
         low, high = BYTE_OFFSET if byte else WORD_OFFSET
@@ -101,10 +101,10 @@ class SelectionContext(SelectionState):
         return Mem("ind", r, 0, volatile)
 
     def foldable_load(self, v: Value, user: Instr) -> Instr | None:
-        """The load that defines `v`, when it may move down to its only user.
+        """The load that defines `v`, if it may move down to its only user; else None.
 
-        The user may be selected twice, as a sum folded into an address and for its own sake; then the register that
-        was asked for first decides.
+        The user may be selected twice, folded into an address and for its own value. A load that already has a register
+        is not folded.
         """
         if not isinstance(v, Instr) or v.op != "load" or not self.single_use(v) or not self.same_block(v):
             return None
@@ -116,7 +116,7 @@ class SelectionContext(SelectionState):
         return v if start == self.epoch[id(user)] else None
 
     def source(self, v: Value, user: Instr) -> Operand:
-        """Operand for the Ws position of an ALU instruction: a register, or [Wn] when a load folds."""
+        """Operand Ws of an ALU instruction: a register, or [Wn] if a load folds."""
         load = self.foldable_load(v, user)
         if load is not None and load.type.bits in (8, 16) and not load.volatile:
             base, offset = self.decompose(load.args[0])
@@ -127,9 +127,9 @@ class SelectionContext(SelectionState):
         return self.reg(v)
 
     def _stepping(self, p: Value, load: Instr, user: Instr) -> Mem | None:
-        """[Wn++] for a comparison at a branch, where p + size goes on from here and p does not.
+        """[Wn++] for a comparison at a branch, if p + size is live behind it and p is not; else None.
 
-        Elsewhere the step finds its place later (`peephole`); here it would stand between comparison and branch."""
+        In other cases the peephole pass merges the step; here the step would separate comparison and branch."""
         if user.op != "br" or not isinstance(p, Instr):
             return None
         others = [u for u in self.users[id(p)] if u is not load]
@@ -145,8 +145,8 @@ class SelectionContext(SelectionState):
         self.copy(self.reg(p), d)
         return Mem("++", d)
 
-    def near_operand(self, v: Value, user: Instr) -> File | None:
-        """Near address of a load that may fold into `user` as a file-register operand."""
+    def near_operand(self, v: Value, user: Instr) -> FileRegister | None:
+        """File-register operand for a load from near memory that may fold into `user`, or None."""
         load = self.foldable_load(v, user)
         if load is None or load.type.bits not in (8, 16):
             return None
@@ -155,7 +155,7 @@ class SelectionContext(SelectionState):
             return None
         mark = len(self.out)
         operand = self.address(load.args[0], load.type.bits == 8, volatile=self.access_number(load))
-        if isinstance(operand, File) and operand.near:
+        if isinstance(operand, FileRegister) and operand.near:
             self.folded.add(id(load))
             return operand
         del self.out[mark:]

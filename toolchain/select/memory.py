@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from toolchain.ir.model import ConstInt, Instr, Value
-from toolchain.mir.mir import File, Imm, Mem, Operand, Slot
+from toolchain.mir.mir import FileRegister, Imm, Mem, Operand, Slot
 from toolchain.select.context import Handler, SelectionContext
 from toolchain.select.rules import COMMUTES, FILE_BINARY, FILE_CARRY, FILE_UNARY, REGISTER_OP, immediate_rule
 from toolchain.select.state import words_of
 
 
 def move_in(s: SelectionContext, source: Operand, d: int, byte: bool) -> None:
-    """d = memory operand. Near bytes pass through W0 (isa.md §3.3)."""
-    if byte and isinstance(source, File):
+    """Load d from memory. Near bytes are moved through W0 (isa.md §3.3)."""
+    if byte and isinstance(source, FileRegister):
         s.emit("mov", source, 0, byte=True)
         s.emit("mov", 0, d)
     else:
@@ -19,8 +19,8 @@ def move_in(s: SelectionContext, source: Operand, d: int, byte: bool) -> None:
 
 
 def move_out(s: SelectionContext, r: int, dest: Operand, byte: bool) -> None:
-    """memory operand = r."""
-    if byte and isinstance(dest, File):
+    """Store r to memory. Near bytes are moved through W0 (isa.md §3.3)."""
+    if byte and isinstance(dest, FileRegister):
         s.emit("mov", r, 0)
         s.emit("mov", 0, dest, byte=True)
     else:
@@ -28,7 +28,7 @@ def move_out(s: SelectionContext, r: int, dest: Operand, byte: bool) -> None:
 
 
 def select_load(s: SelectionContext, i: Instr) -> None:
-    """One MOV a word, low word first. A dead volatile load still reads."""
+    """One MOV per word, low word first. A volatile load without users still reads."""
     d = s.value_regs(i)
     p, byte, number = i.args[0], i.type.bits == 8, s.access_number(i)
     if len(d) == 1:
@@ -39,7 +39,7 @@ def select_load(s: SelectionContext, i: Instr) -> None:
 
 
 def select_loadpair(s: SelectionContext, i: Instr) -> None:
-    """Two words in one instruction, which no interrupt divides."""
+    """Load two words by MOV.D, which an interrupt cannot divide."""
     low, high = s.value_regs(i)
     pair = s.m.new_pair()
     s.emit("movd", Mem("ind", s.reg(i.args[0]), 0, s.access_number(i)), pair)
@@ -47,7 +47,7 @@ def select_loadpair(s: SelectionContext, i: Instr) -> None:
 
 
 def select_storepair(s: SelectionContext, i: Instr) -> None:
-    """The same for a store."""
+    """Store two words by MOV.D, which an interrupt cannot divide."""
     low, high = s.regs(i.args[0])
     pair = s.m.new_pair()
     s.emit("join", pair, low, high)
@@ -60,17 +60,17 @@ def _run(s: SelectionContext, p: Value, count: int, number: int) -> list[Operand
     if isinstance(first, Mem):
         start = first.off if first.mode == "off" else 0
         if first.mode in ("ind", "off") and start + 2 * count <= 1024:
-            places = [start + 2 * k for k in range(count)]
-            return [Mem("off" if at else "ind", first.base, at, number) for at in places]
+            offsets = [start + 2 * k for k in range(count)]
+            return [Mem("off" if at else "ind", first.base, at, number) for at in offsets]
         return [first, *(s.offset_operand(first.base, start + 2 * k, False, number) for k in range(1, count))]
     if isinstance(first, Slot):
         return [Slot(first.index, first.off + 2 * k, number) for k in range(count)]
-    assert isinstance(first, File)
+    assert isinstance(first, FileRegister)
     return [first, *(s.address(p, False, 2 * k, count, number) for k in range(1, count))]
 
 
 def select_store(s: SelectionContext, i: Instr) -> None:
-    """Read-modify-write forms first, then constants with CLR and SETM, then plain moves, low word first."""
+    """Store by a read-modify-write form, else by CLR and SETM for constants, else by moves, low word first."""
     v, p = i.args
     if _store_modified(s, i):
         return
@@ -95,11 +95,11 @@ def _store_word(s: SelectionContext, v: Value, operand: Operand, byte: bool) -> 
 
 
 def _store_constant(s: SelectionContext, k: int, operand: Operand, byte: bool) -> None:
-    """CLR and SETM reach memory directly where the form exists (isa.md §5.1)."""
+    """Store a constant word or byte, by CLR or SETM on memory if that form exists (isa.md §5.1)."""
     ones = 0xFF if byte else 0xFFFF
     if k in (0, ones):
         op = "clr" if k == 0 else "setm"
-        if isinstance(operand, File) and operand.near:
+        if isinstance(operand, FileRegister) and operand.near:
             s.emit(op + "f", operand, byte=byte)
             return
         if isinstance(operand, Mem) and operand.mode == "ind":
@@ -115,7 +115,7 @@ def _store_constant(s: SelectionContext, k: int, operand: Operand, byte: bool) -
 
 
 def _store_modified(s: SelectionContext, i: Instr) -> bool:
-    """store (load p op x), p as one instruction on memory, when nothing else needs the values."""
+    """Select store (load p op x), p as a read-modify-write form if the values have no other use."""
     op, p = i.args
     if isinstance(op, Instr) and op.type.bits > 16:
         return _modify_wide(s, i, op, p)
@@ -139,7 +139,7 @@ def _store_modified(s: SelectionContext, i: Instr) -> bool:
 
 
 def _load_of(s: SelectionContext, v: Value, p: Value, store: Instr) -> Instr | None:
-    """The load behind `v` when it reads where the store writes and may move to it."""
+    """The load `v` if it reads the address of the store and may move down to it; else None."""
     load = s.foldable_load(v, store)
     if load is None or load.volatile != store.volatile:
         return None
@@ -155,9 +155,10 @@ def _load_of(s: SelectionContext, v: Value, p: Value, store: Instr) -> Instr | N
     return None
 
 
-def _target(s: SelectionContext, p: Value, byte: bool, load: Instr) -> File | Mem | None:
-    """Near address or [Wn] for a read-modify-write; None when only MOV reaches it. A volatile one has the number of its
-    load; its store has the next."""
+def _target(s: SelectionContext, p: Value, byte: bool, load: Instr) -> FileRegister | Mem | None:
+    """Operand of a read-modify-write form: near address or [Wn]; None if only MOV can access the address.
+
+    A volatile operand has the number of the load."""
     number = s.access_number(load)
     base, offset = s.decompose(p)
     if id(base) in s.slots:
@@ -165,7 +166,7 @@ def _target(s: SelectionContext, p: Value, byte: bool, load: Instr) -> File | Me
     if s.is_leaf(base):
         mark = len(s.out)
         operand = s.address(p, byte, volatile=number)
-        if isinstance(operand, File) and operand.near:
+        if isinstance(operand, FileRegister) and operand.near:
             return operand
         del s.out[mark:]
         return None
@@ -175,6 +176,7 @@ def _target(s: SelectionContext, p: Value, byte: bool, load: Instr) -> File | Me
 
 
 def _modify_constant(s: SelectionContext, op: Instr, b: ConstInt, load: Instr, p: Value, byte: bool) -> bool:
+    """Select memory op= constant; returns whether there is a form."""
     name, k, bits = op.op, b.value, op.type.bits
     if name == "sub":
         name, k = "add", -k & ((1 << bits) - 1)
@@ -187,7 +189,7 @@ def _modify_constant(s: SelectionContext, op: Instr, b: ConstInt, load: Instr, p
     target = _target(s, p, byte, load)
     if target is None:
         return False
-    if isinstance(target, File):
+    if isinstance(target, FileRegister):
         s.folded.add(id(load))
         if unary is not None:
             s.emit(unary, target, byte=byte)
@@ -214,7 +216,7 @@ def _modify_constant(s: SelectionContext, op: Instr, b: ConstInt, load: Instr, p
 
 
 def _single_bit(name: str, k: int, bits: int) -> tuple[str, int] | None:
-    """("bset" | "bclr" | "btg", bit number) for operations on one bit."""
+    """("bset", "bclr" or "btg", bit number) of an operation that changes one bit; None for others."""
     inverse = ~k & ((1 << bits) - 1)
     if name == "and" and inverse and inverse & (inverse - 1) == 0:
         return "bclr", inverse.bit_length() - 1
@@ -224,12 +226,13 @@ def _single_bit(name: str, k: int, bits: int) -> tuple[str, int] | None:
 
 
 def _modify_register(s: SelectionContext, op: Instr, b: Value, load: Instr, p: Value, byte: bool) -> bool:
+    """Select memory op= register; returns whether there is a form."""
     target = _target(s, p, byte, load)
     if target is None:
         return False
     value = s.reg(b)
     s.folded.add(id(load))
-    if isinstance(target, File):
+    if isinstance(target, FileRegister):
         s.copy(value, 0)
         s.emit(FILE_BINARY[op.op], target, 0, byte=byte)
     else:
@@ -239,9 +242,9 @@ def _modify_register(s: SelectionContext, op: Instr, b: Value, load: Instr, p: V
 
 
 def _modify_wide(s: SelectionContext, store: Instr, op: Instr, p: Value) -> bool:
-    """Several words in near memory: word by word through W0, the carry running along. CLR and MOV keep the carry.
+    """Modify several words in near memory one after the other through W0. CLR and MOV preserve the carry between them.
 
-    Volatile words are all read before the first is written, as the source says."""
+    Volatile objects are excluded: the source reads all their words before it writes the first."""
     if store.volatile or not s.single_use(op) or not s.same_block(op) or id(op) in s.needed or op.op not in FILE_BINARY:
         return False
     a, b = op.args
@@ -249,30 +252,44 @@ def _modify_wide(s: SelectionContext, store: Instr, op: Instr, p: Value) -> bool
     if load is None and op.op in COMMUTES:
         a, b = b, a
         load = _load_of(s, a, p, store)
-    if load is None or not s.is_leaf(s.decompose(p)[0]) or id(s.decompose(p)[0]) in s.slots:
+    base = s.decompose(p)[0]
+    if load is None or not s.is_leaf(base) or id(base) in s.slots:
         return False
     targets = [s.address(p, False, 2 * k, words_of(op)) for k in range(words_of(op))]
-    if not all(isinstance(t, File) and t.near for t in targets) or (s.is_leaf(b) and not isinstance(b, ConstInt)):
+    if not all(isinstance(t, FileRegister) and t.near for t in targets):
         return False
-    s.folded.add(id(load))
-    registers = None if isinstance(b, ConstInt) else s.regs(b)
+    if isinstance(b, ConstInt):
+        s.folded.add(id(load))
+        _modify_words_constant(s, op.op, targets, b.value)
+    elif s.is_leaf(b):
+        return False
+    else:
+        s.folded.add(id(load))
+        _modify_words_register(s, op.op, targets, s.regs(b))
+    return True
+
+
+def _modify_words_register(s: SelectionContext, op: str, targets: list[Operand], registers: tuple[int, ...]) -> None:
+    """Words in near memory op= words in registers."""
+    for k, (target, r) in enumerate(zip(targets, registers, strict=True)):
+        s.copy(r, 0)
+        s.emit(FILE_CARRY[op] if k else FILE_BINARY[op], target, 0)
+
+
+def _modify_words_constant(s: SelectionContext, op: str, targets: list[Operand], value: int) -> None:
+    """Words in near memory op= constant; words that change nothing are skipped until there is a carry."""
+    neutral = 0xFFFF if op == "and" else 0
     carry = False
     for k, target in enumerate(targets):
-        if registers is not None:
-            s.copy(registers[k], 0)
+        word = value >> 16 * k & 0xFFFF
+        if not carry and word == neutral:
+            continue
+        if not carry and op == "add" and word == 1:
+            s.emit("incf", target)
         else:
-            assert isinstance(b, ConstInt)
-            word = b.value >> 16 * k & 0xFFFF
-            if not carry and word == (0xFFFF if op.op == "and" else 0):
-                continue
-            if not carry and op.op == "add" and word == 1:
-                s.emit("incf", target)
-                carry = True
-                continue
             s.load_imm(word, 0)
-        s.emit(FILE_CARRY[op.op] if carry else FILE_BINARY[op.op], target, 0)
-        carry = op.op in ("add", "sub")
-    return True
+            s.emit(FILE_CARRY[op] if carry else FILE_BINARY[op], target, 0)
+        carry = op in ("add", "sub")
 
 
 # ---------------------------------------------------------------------------------------------------------------------
@@ -280,7 +297,7 @@ def _modify_wide(s: SelectionContext, store: Instr, op: Instr, p: Value) -> bool
 
 
 def select_dynalloca(s: SelectionContext, i: Instr) -> None:
-    """The block starts at W15, which moves up by the rounded size (abi-elf.md §2.4)."""
+    """Allocate a block at W15 and increase W15 by the rounded size (abi-elf.md §2.4)."""
     s.m.dynamic_stack = True
     d, t, u = s.value_regs(i)[0], s.temp(), s.temp()
     s.emit("inc", s.reg(i.args[0]), t)

@@ -9,14 +9,14 @@ from toolchain.select.state import words_of
 
 
 def _extension_kind(v: Value) -> tuple[str, Value] | None:
-    """("s" or "u", narrow value) when a wide value is an extension of at most 16 bits, or a small constant."""
+    """("s" or "u", narrow value) of an extension of at most 16 bits; None for other values."""
     if isinstance(v, Instr) and v.op in ("zext", "sext") and v.args[0].type.bits in (8, 16):
         return ("s" if v.op == "sext" else "u"), v.args[0]
     return None
 
 
 def select_mul(s: SelectionContext, i: Instr) -> None:
-    """One word: low half of a product. 32 bits of two extended words: one MUL. Else sums of partial products."""
+    """Product: one MUL for words and for extended words of 32 bits, else a sum of partial products."""
     if words_of(i) == 1:
         _mul_word(s, i)
         return
@@ -32,7 +32,7 @@ def select_mul(s: SelectionContext, i: Instr) -> None:
 
 
 def _signed_word(s: SelectionContext, i: Instr) -> tuple[Value, int] | None:
-    """(factor of two words, register of the other) of a product with a signed word or a small negative constant."""
+    """(factor of two words, register of the other) if that is a signed word or a small negative constant; else None."""
     for a, b in (i.args, i.args[::-1]):
         kind = _extension_kind(b)
         if kind is not None and kind[0] == "s":
@@ -45,7 +45,7 @@ def _signed_word(s: SelectionContext, i: Instr) -> tuple[Value, int] | None:
 
 
 def _mul_signed(s: SelectionContext, i: Instr, a: Value, b: int) -> None:
-    """(h * 2^16 + l) * b is l * b in full, unsigned by signed, with the low word of h * b added to its upper word."""
+    """(h * 2^16 + l) * b: the full unsigned-by-signed product l * b, plus the low word of h * b in the upper word."""
     d = s.value_regs(i)
     words = s.regs(a)
     upper = s.m.new_pair()
@@ -58,11 +58,12 @@ def _mul_signed(s: SelectionContext, i: Instr, a: Value, b: int) -> None:
 
 
 def _fits(b: Value, kind: str) -> bool:
+    """Whether a value is a constant of 16 bits, unsigned or signed according to `kind`."""
     return isinstance(b, ConstInt) and (b.value <= 0xFFFF or (kind == "s" and -0x8000 <= b.signed < 0))
 
 
 def _pair(s: SelectionContext, kind: str, a: int, b: int | Imm | Mem) -> tuple[int, int]:
-    """MUL.kind a, b -> fresh (low, high) registers."""
+    """Emit MUL.kind a, b; returns new registers (low, high)."""
     p = s.m.new_pair()
     s.emit(f"mul.{kind}", a, b, p)
     low, high = s.temp(), s.temp()
@@ -72,6 +73,7 @@ def _pair(s: SelectionContext, kind: str, a: int, b: int | Imm | Mem) -> tuple[i
 
 
 def _product(s: SelectionContext, kind: str, a: int, b: int | Imm | Mem, low: int, high: int) -> None:
+    """Emit MUL.kind a, b with the result in (low, high)."""
     p = s.m.new_pair()
     s.emit(f"mul.{kind}", a, b, p)
     s.emit("split", low, high, p)
@@ -96,7 +98,7 @@ def _mul_word(s: SelectionContext, i: Instr) -> None:
 
 
 def _narrow_reg(s: SelectionContext, kind: str, v: Value) -> int:
-    """The 16-bit register of an extended value; bytes are extended first."""
+    """Register with the narrow value of an extension; bytes are extended to words."""
     if v.type.bits == 16:
         return s.reg(v)
     r = s.temp()
@@ -105,7 +107,7 @@ def _narrow_reg(s: SelectionContext, kind: str, v: Value) -> int:
 
 
 def _extended_load(s: SelectionContext, v: Value, i: Instr) -> Instr | None:
-    """The load of a word behind an extension that nobody else wants, if it may move to the product."""
+    """The load of an extended word without another user that may fold into the product; else None."""
     if not isinstance(v, Instr) or not s.single_use(v) or id(v) in s.wanted or v.args[0].type.bits != 16:
         return None
     return s.foldable_load(v.args[0], i)
@@ -133,13 +135,13 @@ def _mul_extended(s: SelectionContext, i: Instr, ka: tuple[str, Value], kb: tupl
 
 
 def _mul_wide(s: SelectionContext, i: Instr, ka: tuple[str, Value] | None, kb: tuple[str, Value] | None) -> None:
-    """Schoolbook product modulo 2^bits. Words known to be zero are skipped."""
+    """Schoolbook product modulo 2^bits; words known to be zero are skipped."""
     n = words_of(i)
     a, b = s.regs(i.args[0]), s.regs(i.args[1])
     d = s.value_regs(i)
     zero_a, zero_b = _zero_words(i.args[0], ka), _zero_words(i.args[1], kb)
     total: list[int | None] = [None] * n
-    # Of two words the upper comes first: the last product is then the one that stays in its registers.
+    # Two words start with the upper one, so that the last product can remain in its registers.
     for k in range(n) if n > 2 else (1, 0):
         for j in range(k + 1):
             if j in zero_a or k - j in zero_b:
@@ -168,7 +170,7 @@ def _zero_words(v: Value, kind: tuple[str, Value] | None) -> set[int]:
 
 
 def _accumulate(s: SelectionContext, total: list[int | None], k: int, low: int, high: int | None) -> None:
-    """total += (high:low) << 16k, with the carry running to the top."""
+    """total += (high:low) << 16k; the carry propagates to the top word."""
     parts = [low] if high is None else [low, high]
     carry = False
     for j, part in enumerate(parts):
@@ -201,9 +203,9 @@ def _accumulate(s: SelectionContext, total: list[int | None], k: int, low: int, 
 
 
 def select_mulhigh(s: SelectionContext, i: Instr) -> None:
-    """Upper two words of a product of two words by a constant of two words without sign.
+    """Upper two words of the product of two words and an unsigned constant of two words.
 
-    x * y + z fits into two words for words x, y, z, so the first carry ends one word up. MUL leaves the flags alone."""
+    x * y + z fits in two words for words x, y, z, so the first carry propagates one word only. MUL changes no flags."""
     (low, high), d = s.regs(i.args[0]), s.value_regs(i)
     m, kind = i.args[1], "su" if i.extra["signed"] else "uu"
     assert isinstance(m, ConstInt)
@@ -229,7 +231,7 @@ def select_mulhigh(s: SelectionContext, i: Instr) -> None:
 
 
 def select_divide(s: SelectionContext, i: Instr) -> None:
-    """16-bit DIV under REPEAT #17: quotient in W0, remainder in W1 (isa.md §6.7). The divisor must survive them."""
+    """16-bit DIV under REPEAT #17: quotient in W0, remainder in W1 (isa.md §6.7), which must not hold the divisor."""
     signed = i.op in ("sdiv", "srem")
     m, n = s.reg(i.args[0]), s.reg(i.args[1])
     mi = s.emit("div.s" if signed else "div.u", m, n)
@@ -244,7 +246,7 @@ def select_divide(s: SelectionContext, i: Instr) -> None:
 
 
 def select_divother(s: SelectionContext, i: Instr) -> None:
-    """The second result of a division: the division itself copies it out."""
+    """The second result of a division, which the division copies to its register."""
     s.value_regs(i)
     s.needed.add(id(i.args[0]))
 

@@ -1,12 +1,12 @@
-"""Selection rules as data: how an operation with a constant operand is best said on this machine.
+"""Selection rules of operations with a constant operand.
 
-A rule is (condition on the constant, operation, form). Rules are tried from the top; the first whose condition holds
-wins. Forms:
+A rule consists of a condition on the constant, an operation and a form. The first rule whose condition is true applies.
+Every form is one word:
     unary     op Ws, Wd                    (Ws may be memory)
     lit5      op Wb, #k, Wd                k transformed by `literal`
-    tied      op #k, Wn                    two-address: Wd starts as a copy of the source
+    tied      op #k, Wn                    two-address: Wn starts as a copy of the source
     bit       op Wn, #log2(k)              two-address, bit number
-Sources: isa.md §3.2 (literal ranges), §5.1 and §5.4 (forms). Words: every form is one word.
+Sources: isa.md §3.2 (literal ranges), §5.1 and §5.4 (forms).
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ from toolchain.abi.target import LIT5_MAX, LIT10_BYTE_MAX, LIT10_MAX
 
 
 @dataclass(frozen=True, slots=True)
-class ImmRule:
-    """One way to apply a constant. `when(k, bits)` sees k as an unsigned value of that many bits."""
+class ImmediateRule:
+    """One form of an operation with a constant; `when` and `literal` get k as an unsigned value of `bits` bits."""
 
     when: Callable[[int, int], bool]
     op: str
@@ -71,33 +71,33 @@ def _all_but_one_bit(k: int, bits: int) -> bool:
     return _one_bit(~k & ((1 << bits) - 1), bits)
 
 
-IMMEDIATE: dict[str, list[ImmRule]] = {
+IMMEDIATE: dict[str, list[ImmediateRule]] = {
     "add": [
-        ImmRule(_is(1), "inc", "unary", _same),
-        ImmRule(_is(2), "inc2", "unary", _same),
-        ImmRule(_is(-1), "dec", "unary", _same),
-        ImmRule(_is(-2), "dec2", "unary", _same),
-        ImmRule(_lit5, "add", "lit5", _same),
-        ImmRule(_negative_lit5, "sub", "lit5", _negated),
-        ImmRule(_lit10, "addl", "tied", _same),
-        ImmRule(_negative_lit10, "subl", "tied", _negated),
+        ImmediateRule(_is(1), "inc", "unary", _same),
+        ImmediateRule(_is(2), "inc2", "unary", _same),
+        ImmediateRule(_is(-1), "dec", "unary", _same),
+        ImmediateRule(_is(-2), "dec2", "unary", _same),
+        ImmediateRule(_lit5, "add", "lit5", _same),
+        ImmediateRule(_negative_lit5, "sub", "lit5", _negated),
+        ImmediateRule(_lit10, "addl", "tied", _same),
+        ImmediateRule(_negative_lit10, "subl", "tied", _negated),
     ],
     "and": [
-        ImmRule(_lit5, "and", "lit5", _same),
-        ImmRule(lambda k, bits: bits == 16 and k == 0xFF, "ze", "unary", _same),
-        ImmRule(_all_but_one_bit, "bclr", "bit", _zero_bit),
-        ImmRule(_lit10, "andl", "tied", _same),
+        ImmediateRule(_lit5, "and", "lit5", _same),
+        ImmediateRule(lambda k, bits: bits == 16 and k == 0xFF, "ze", "unary", _same),
+        ImmediateRule(_all_but_one_bit, "bclr", "bit", _zero_bit),
+        ImmediateRule(_lit10, "andl", "tied", _same),
     ],
     "or": [
-        ImmRule(_lit5, "ior", "lit5", _same),
-        ImmRule(_one_bit, "bset", "bit", _bit),
-        ImmRule(_lit10, "iorl", "tied", _same),
+        ImmediateRule(_lit5, "ior", "lit5", _same),
+        ImmediateRule(_one_bit, "bset", "bit", _bit),
+        ImmediateRule(_lit10, "iorl", "tied", _same),
     ],
     "xor": [
-        ImmRule(_is(-1), "com", "unary", _same),
-        ImmRule(_lit5, "xor", "lit5", _same),
-        ImmRule(_one_bit, "btg", "bit", _bit),
-        ImmRule(_lit10, "xorl", "tied", _same),
+        ImmediateRule(_is(-1), "com", "unary", _same),
+        ImmediateRule(_lit5, "xor", "lit5", _same),
+        ImmediateRule(_one_bit, "btg", "bit", _bit),
+        ImmediateRule(_lit10, "xorl", "tied", _same),
     ],
 }
 
@@ -119,8 +119,8 @@ FILE_BINARY = {"add": "addf", "sub": "subf", "and": "andf", "or": "iorf", "xor":
 FILE_CARRY = FILE_BINARY | {"add": "addcf", "sub": "subbf"}
 
 
-def immediate_rule(op: str, k: int, bits: int) -> ImmRule | None:
-    """The first rule for `op` with constant `k`, or None when the constant needs a register."""
+def immediate_rule(op: str, k: int, bits: int) -> ImmediateRule | None:
+    """The first rule for `op` with constant `k`; None if the constant needs a register."""
     for rule in IMMEDIATE.get(op, ()):
         if rule.when(k, bits):
             return rule

@@ -1,9 +1,9 @@
-"""Instruction selection: legal IR -> machine form over virtual registers.
+"""Instruction selection: legal IR to machine form over virtual registers.
 
-Every block is walked from its end. An instruction emits code only when it has an effect or somebody asked for its
-registers; whoever asks may instead fold it (a load into an ALU operand, an addition into an address, a comparison into
-a branch). Code of one IR instruction is collected in order in `out` and put before what is already there.
-Needs: legal IR, critical edges split, no switch. Ensures: machine form with virtual registers, phis turned into copies.
+The selector visits the instructions of a block from the last to the first. An instruction emits code if it has an
+effect or a later instruction has requested its registers. A later instruction may fold it instead: a load into an ALU
+operand, an addition into an address, a comparison into a branch.
+Needs: legal IR, critical edges split, no switch. Ensures: virtual registers, copies instead of phis.
 """
 
 from __future__ import annotations
@@ -12,18 +12,18 @@ from collections.abc import Callable
 
 from toolchain.ir.cfg import loop_depths, predecessors
 from toolchain.ir.model import ConstInt, DbgRecord, Instr, Undef, UnsupportedError, Value
-from toolchain.mir.mir import CONSTANT, GONE, MI, MBlock, MFunction
+from toolchain.mir.mir import CONSTANT_WORD, MI, OPTIMISED_OUT, MBlock, MFunction
 from toolchain.select import arith, block_copies, calls, compare, conditional, memory, multiply, shifts
 from toolchain.select.context import SelectionContext
 
 
 class Selector(SelectionContext):
-    """Drives the walk over blocks; terminators and phis."""
+    """Selects one function; handles terminators and phis."""
 
     # -- function -----------------------------------------------------------------------------------------------------
 
     def run(self) -> MFunction:
-        """Select the whole function."""
+        """Return the machine form of the function."""
         f = self.f
         depths = loop_depths(f)
         preds = predecessors(f)
@@ -73,18 +73,18 @@ class Selector(SelectionContext):
         return self.m
 
     def _words_of(self, record: DbgRecord) -> tuple[int, ...]:
-        """Where a variable's words are (`mir.Located`); none where that is not known."""
+        """Words of a variable (`mir.VariableLocation`); empty if its location is unknown."""
         if record.kind == "parameter":
-            return tuple(self.registers.get(id(word), (GONE,))[0] for word in record.words)
+            return tuple(self.registers.get(id(word), (OPTIMISED_OUT,))[0] for word in record.words)
         if record.kind != "dbg_value" or record.expression:
             return ()
         if isinstance(record.value, ConstInt):
             words = max(1, record.value.type.bits // 16)
-            return tuple(CONSTANT + (record.value.value >> 16 * k & 0xFFFF) for k in range(words))
+            return tuple(CONSTANT_WORD + (record.value.value >> 16 * k & 0xFFFF) for k in range(words))
         return tuple(self.registers.get(id(record.value), ()))
 
     def phi_input(self, phi: Instr) -> tuple[int, ...]:
-        """Registers predecessors write for a phi: its own, or separate ones below an indirectbr."""
+        """Registers that predecessors write for a phi: its own, or separate ones behind an indirectbr."""
         if self.position[id(phi)][0] not in self.two_stage:
             return self.value_regs(phi)
         if id(phi) not in self.phi_inputs:
@@ -92,7 +92,7 @@ class Selector(SelectionContext):
         return self.phi_inputs[id(phi)]
 
     def instruction(self, i: Instr) -> None:
-        """Emit one instruction if its effect or its value is wanted."""
+        """Select one instruction if it has an effect or its value is used."""
         if id(i) in self.folded:
             return
         if i.op in SIDE_EFFECTS or i.volatile or id(i) in self.needed:
@@ -101,7 +101,7 @@ class Selector(SelectionContext):
     # -- terminators --------------------------------------------------------------------------------------------------
 
     def phi_copies(self, targets: list[str]) -> list[tuple[int, int | tuple[Value, int]]]:
-        """Moves (destination, source register or leaf word) for the edges to `targets`."""
+        """Moves (destination, source register or word of a leaf) of phis on the edges to `targets`."""
         moves: list[tuple[int, int | tuple[Value, int]]] = []
         for target in targets:
             for phi in self.by_name[target].phis():
@@ -118,7 +118,7 @@ class Selector(SelectionContext):
         return moves
 
     def parallel_copy(self, moves: list[tuple[int, int | tuple[Value, int]]]) -> None:
-        """Perform moves as if at once: registers first, cycles through a temporary, constants last."""
+        """Perform parallel moves: registers first, cycles through a temporary, constants last."""
         pending = {d: s for d, s in moves if isinstance(s, int)}
         while pending:
             sources = set(pending.values())
@@ -137,7 +137,7 @@ class Selector(SelectionContext):
 
 
 def select_br(s: Selector, i: Instr) -> None:
-    """Branches; a comparison used here becomes CP and a condition."""
+    """Unconditional branch, or comparison and conditional branch."""
     if not i.args:
         s.parallel_copy(s.phi_copies(i.blocks))
         s.emit("jump", i.blocks[0])
@@ -154,28 +154,28 @@ def select_brtable(s: Selector, i: Instr) -> None:
 
 
 def select_indirectbr(s: Selector, i: Instr) -> None:
-    """GNU computed goto through a handle."""
+    """GNU computed goto, through a handle."""
     r = s.reg(i.args[0])
     s.parallel_copy(s.phi_copies(list(dict.fromkeys(i.blocks))))
     s.emit("jumpr", r)
 
 
 def select_unreachable(s: Selector, i: Instr) -> None:
-    """Nothing: control never comes here. An empty function still needs a word, so a reset stands for it."""
+    """RESET: the block is never executed, but an empty function needs an instruction."""
     s.emit("text", "reset")
 
 
 def select_phi(s: Selector, i: Instr) -> None:
-    """Phis emit nothing here; predecessors copy into their registers."""
+    """No code: predecessors copy into the registers of phis."""
     s.value_regs(i)
 
 
 def select_nothing(s: Selector, i: Instr) -> None:
-    """slot, and aliases whose registers are those of their operand."""
+    """No code: slots are addressed by their users."""
 
 
 def select_cast_alias(s: Selector, i: Instr) -> None:
-    """trunc and bits: alias of the low words, or a leaf loaded into fresh registers."""
+    """trunc and bits: the registers of the operand's low words, or a leaf loaded into new registers."""
     if s.is_leaf(i.args[0]):
         for k, r in enumerate(s.value_regs(i)):
             s.load_leaf(i.args[0], k, r)

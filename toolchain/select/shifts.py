@@ -7,11 +7,11 @@ from toolchain.mir.mir import MI, Imm, OpInfo
 from toolchain.select.context import Handler, SelectionContext
 from toolchain.select.state import words_of
 
-MULTIPLIED = 4  # MUL has literals below 32
+MAX_MULTIPLIED_SHIFT = 4  # MUL has literals below 32
 
 
 def select_shift(s: SelectionContext, i: Instr) -> None:
-    """shl lshr ashr by constants or variables, any width."""
+    """shl, lshr and ashr by constants or variables, of any width."""
     a, n = i.args
     if isinstance(n, ConstInt):
         if words_of(i) == 1:
@@ -30,7 +30,7 @@ SHIFT_OP = {"shl": "sl", "lshr": "lsr", "ashr": "asr"}
 
 
 def _extended_byte(s: SelectionContext, v: Value, signed: bool, user: Instr) -> int:
-    """A byte value extended to a word."""
+    """Register with a byte value extended to a word."""
     r = s.temp()
     s.emit("se" if signed else "ze", s.source(v, user), r)
     return r
@@ -55,21 +55,21 @@ def _shift_word(s: SelectionContext, i: Instr, n: int) -> None:
 
 
 def _shift_word_variable(s: SelectionContext, i: Instr) -> None:
-    """Native for words; the count uses its low 5 bits, counts of 16 and more are undefined in the IR."""
+    """Shift of a word by a variable; counts of 16 and more are undefined in the IR."""
     d, byte = s.result(i), i.type.bits == 8
     a = _extended_byte(s, i.args[0], i.op == "ashr", i) if byte and i.op != "shl" else s.reg(i.args[0])
     s.emit(SHIFT_OP[i.op], a, s.reg(i.args[1]), d)
 
 
 def _low_word_suffices(s: SelectionContext, i: Instr) -> bool:
-    """Whether two words go left and only the lower is read: SL gives 0 for the counts of 16 to 31 (isa.md §6.3)."""
+    """Whether only the low word of a left shift of two words is used; SL yields 0 for counts 16-31 (isa.md §6.3)."""
     if i.op != "shl" or words_of(i) != 2:
         return False
     return all(user.op == "trunc" and words_of(user) == 1 for user in s.users[id(i)])
 
 
 def _shift_wide_constant(s: SelectionContext, op: str, a: tuple[int, ...], n: int, d: tuple[int, ...]) -> None:
-    """Whole words move; the rest is shifted with neighbours' bits brought in."""
+    """Shift several words by a constant: move whole words, then shift with the bits of the neighbouring words."""
     count = len(a)
     jump, bits = n // 16, n % 16
     if jump >= count:
@@ -80,7 +80,7 @@ def _shift_wide_constant(s: SelectionContext, op: str, a: tuple[int, ...], n: in
         _move_words(s, op, a, jump, d)
     elif bits == 1 and jump == 0:
         _shift_by_one(s, op, a, d)
-    elif count == 2 and op == "shl" and bits <= MULTIPLIED and jump == 0:
+    elif count == 2 and op == "shl" and bits <= MAX_MULTIPLIED_SHIFT and jump == 0:
         _shift_by_product(s, a, bits, d)
     elif count == 2 and op != "shl" and n == 8:
         _shift_by_byte(s, op, a, d)
@@ -104,7 +104,7 @@ def _shift_wide_constant(s: SelectionContext, op: str, a: tuple[int, ...], n: in
 
 
 def _shift_by_product(s: SelectionContext, a: tuple[int, ...], bits: int, d: tuple[int, ...]) -> None:
-    """The product of the low word and 2^bits has the bits that cross over in its upper word."""
+    """Shift two words left: the upper word of the product low * 2^bits contains the bits that cross over."""
     upper, crossing, p = s.temp(), s.temp(), s.m.new_pair()
     s.emit("sl", a[1], Imm(bits), upper)
     s.emit("mul.uu", a[0], Imm(1 << bits), p)
@@ -113,7 +113,7 @@ def _shift_by_product(s: SelectionContext, a: tuple[int, ...], bits: int, d: tup
 
 
 def _shift_by_byte(s: SelectionContext, op: str, a: tuple[int, ...], d: tuple[int, ...]) -> None:
-    """The low byte of the upper word takes the place of the low byte of the lower, then both bytes change places."""
+    """Shift two words right by 8: replace the low byte of the low word by that of the high word, then swap bytes."""
     s.copy(a[0], d[0])
     s.emit("movlow", a[1], d[0], byte=True)
     s.emit("swap", d[0])
@@ -121,7 +121,7 @@ def _shift_by_byte(s: SelectionContext, op: str, a: tuple[int, ...], d: tuple[in
 
 
 def _combine(s: SelectionContext, op: str, main: int, bits: int, other_op: str, other: int, d: int) -> None:
-    """d = main shifted by bits | neighbour shifted the other way."""
+    """d = main shifted by `bits`, combined with the neighbour shifted the other way."""
     x, y = s.temp(), s.temp()
     s.emit(op, main, Imm(bits), x)
     s.emit(other_op, other, Imm(16 - bits), y)
@@ -129,7 +129,7 @@ def _combine(s: SelectionContext, op: str, main: int, bits: int, other_op: str, 
 
 
 def fill(s: SelectionContext, op: str, top: int, d: int) -> None:
-    """Word above the value: zero or sign."""
+    """Set a word above a value to zero, or for ashr to the sign of its top word."""
     if op == "ashr":
         s.emit("asr", top, Imm(15), d)
     else:
@@ -149,7 +149,7 @@ def _move_words(s: SelectionContext, op: str, a: tuple[int, ...], jump: int, d: 
 
 
 def _shift_by_one(s: SelectionContext, op: str, a: tuple[int, ...], d: tuple[int, ...]) -> None:
-    """Through the carry: SL/RLC upward, LSR or ASR/RRC downward (abi-elf.md §8.1)."""
+    """Shift by one through the carry: SL and RLC upwards, LSR or ASR and RRC downwards (abi-elf.md §8.1)."""
     if op == "shl":
         for k in range(len(a)):
             s.emit("sl1" if k == 0 else "rlc", a[k], d[k])
@@ -160,7 +160,7 @@ def _shift_by_one(s: SelectionContext, op: str, a: tuple[int, ...], d: tuple[int
 
 
 def _shift_wide_variable(s: SelectionContext, i: Instr) -> None:
-    """A loop of one-bit shifts on copies (abi-elf.md §8.1: 5 words for 32 bits)."""
+    """Shift several words by a variable in a loop of one-bit shifts (abi-elf.md §8.1: 5 words for 32 bits)."""
     d = s.value_regs(i)
     a = s.regs(i.args[0])
     n = s.regs(i.args[1])[0]

@@ -1,8 +1,8 @@
-"""Selection state: positions and users of values, registers of values, emission of instructions."""
+"""State of the selection of one function: uses of values, registers of values, emission of instructions."""
 
 from __future__ import annotations
 
-from toolchain.abi.arguments import Place
+from toolchain.abi.arguments import ArgumentLocation
 from toolchain.abi.names import block_label, symbol
 from toolchain.ir.model import (
     I1,
@@ -20,11 +20,11 @@ from toolchain.ir.model import (
 )
 from toolchain.mir.mir import MI, FrameObject, Imm, MFunction, Operand, Slot
 
-FAR_FRAME_BYTES = 380  # above this, locals are reached through computed addresses (offset limits, isa.md §3.2)
+FAR_FRAME_BYTES = 380  # with more bytes of locals, their addresses are computed (offset limits, isa.md §3.2)
 
 
 def words_of(v: Value) -> int:
-    """Machine words a legal value occupies."""
+    """Number of machine words of a legal value."""
     return max(1, v.type.bits // 16)
 
 
@@ -34,7 +34,7 @@ MEMORY_BARRIERS = frozenset(
 
 
 class SelectionState:
-    """State of one function's selection."""
+    """Values and registers of one function, and the machine instructions selected so far."""
 
     def __init__(self, module: Module, f: Function, for_size: bool, taken: set[str]) -> None:
         self.module = module
@@ -45,18 +45,18 @@ class SelectionState:
         self.out: list[MI] = []
         self.line: str | None = None
         self.registers: dict[int, tuple[int, ...]] = {}
-        self.needed: set[int] = set()  # instructions that must emit code
-        self.wanted: set[int] = set()  # values whose own registers somebody reads
+        self.needed: set[int] = set()  # instructions whose value is used, so that they emit code
+        self.wanted: set[int] = set()  # values that are read from their registers
         self.users: dict[int, list[Instr]] = {}
         self.position: dict[int, tuple[str, int]] = {}
         self.epoch: dict[int, int] = {}
-        self.access: dict[int, int] = {}  # volatile loads and stores, numbered in their order
+        self.access: dict[int, int] = {}  # numbers of the volatile loads and stores
         self.folded: set[int] = set()
         self.slots: dict[int, int] = {}
         self.block: Block = f.blocks[0]
         self.by_name = {b.name: b for b in f.blocks}
         self.variadic_anchor = 0
-        self.places: list[Place] = []
+        self.parameters: list[ArgumentLocation] = []
         self.arg_slots: dict[int, int] = {}
         self.phi_inputs: dict[int, tuple[int, ...]] = {}
         self.two_stage: set[str] = set()
@@ -65,7 +65,7 @@ class SelectionState:
     # -- analysis -----------------------------------------------------------------------------------------------------
 
     def _index(self) -> None:
-        """Positions, users, memory epochs, frame slots, values used outside their block."""
+        """Compute positions, users, memory epochs, frame slots, and values used outside their block."""
         total = 0
         for block in self.f.blocks:
             epoch = 0
@@ -94,12 +94,12 @@ class SelectionState:
                             self.wanted.add(id(a))
 
     def new_slot(self, size: int, fixed: int | None = None) -> int:
-        """Add an object to the frame."""
+        """Add an object to the frame and return its number."""
         self.m.frame.append(FrameObject(max(size, 1), fixed))
         return len(self.m.frame) - 1
 
     def access_number(self, i: Instr | None) -> int:
-        """Number of a volatile load or store, 0 for a plain one."""
+        """Number of a volatile load or store; 0 for other instructions and None."""
         return self.access.get(id(i), 0)
 
     def single_use(self, v: Value) -> bool:
@@ -107,37 +107,37 @@ class SelectionState:
         return len(self.users.get(id(v), ())) == 1
 
     def same_block(self, v: Instr) -> bool:
-        """Whether an instruction sits in the block being selected."""
+        """Whether an instruction belongs to the block that is being selected."""
         found = self.position.get(id(v))
         return found is not None and found[0] == self.block.name
 
     # -- emission -----------------------------------------------------------------------------------------------------
 
     def emit(self, op: str, *args: Operand, byte: bool = False, cc: str = "") -> MI:
-        """Append one machine instruction to the current chunk."""
+        """Append a machine instruction to the code of the current IR instruction."""
         mi = MI(op, *args, byte=byte, cc=cc, line=self.line)
         self.out.append(mi)
         return mi
 
     def copy(self, source: int, dest: int) -> None:
-        """Register move; coalescing removes most of them."""
+        """Append a register move; coalescing removes most of them."""
         if source != dest:
             self.emit("mov", source, dest)
 
     def temp(self) -> int:
-        """A fresh one-word register."""
+        """A new one-word register."""
         return self.m.new_register()
 
     # -- values to registers ------------------------------------------------------------------------------------------
 
     def regs(self, v: Value) -> tuple[int, ...]:
-        """Registers that hold the words of a value, low word first; constants are loaded here and now."""
+        """Registers with the words of a value, low word first; constants are loaded at the current position."""
         if (isinstance(v, Instr) and v.op != "slot") or (isinstance(v, Arg) and id(v) not in self.slots):
             return self.value_regs(v)
         return tuple(self.leaf_word(v, k) for k in range(words_of(v)))
 
     def value_regs(self, v: Value) -> tuple[int, ...]:
-        """Registers of a non-constant value, marking it as needed."""
+        """Registers of a value that is not a leaf; marks the value as needed."""
         found = self.registers.get(id(v))
         if found is None:
             found = self._assign(v)
@@ -150,7 +150,7 @@ class SelectionState:
         return found
 
     def _assign(self, v: Value) -> tuple[int, ...]:
-        """Choose registers: aliases for truncations and clean booleans, fresh ones otherwise."""
+        """Choose registers: those of the operand for truncations and extended booleans, new ones otherwise."""
         if isinstance(v, Instr):
             source = v.args[0] if v.args else None
             if v.op in ("trunc", "bits") and isinstance(source, Instr | Arg) and id(source) not in self.slots:
@@ -181,13 +181,13 @@ class SelectionState:
         return self.value_regs(i)[0]
 
     def leaf_word(self, v: Value, k: int) -> int:
-        """Load word k of a constant, symbol or frame address into a fresh register."""
+        """Load word k of a leaf into a new register and return the register."""
         r = self.temp()
         self.load_leaf(v, k, r)
         return r
 
     def load_leaf(self, v: Value, k: int, r: int) -> None:
-        """Load word k of a constant, symbol or frame address into a register. Leaves the flags alone except for lea."""
+        """Load word k of a constant, symbol or frame address into a register. Only `lea` changes flags."""
         if isinstance(v, ConstInt):
             self.load_imm(v.value >> 16 * k & 0xFFFF, r, v.type.bits == 8)
         elif isinstance(v, Undef):
@@ -200,7 +200,7 @@ class SelectionState:
             raise UnsupportedError(f"constant {v!r}")
 
     def load_imm(self, k: int, r: int, byte: bool = False) -> None:
-        """Load a 16-bit number. Bytes leave the upper half undefined, so the shortest word form serves."""
+        """Load a 16-bit number. The upper byte of byte values is undefined, so word forms load bytes, too."""
         if k == 0:
             self.emit("clr", r)
         elif k == 0xFFFF:
@@ -220,5 +220,5 @@ class SelectionState:
         return f"{name}{offset:+d}" if offset else name
 
     def is_leaf(self, v: Value) -> bool:
-        """Values without a register of their own: loaded at every use."""
+        """Whether a value is a constant, symbol or frame address, which is loaded at every use."""
         return not isinstance(v, Instr | Arg) or id(v) in self.slots

@@ -1,6 +1,6 @@
-"""switch -> compare chains, binary search or branch tables, chosen by size.
+"""Lowering of switches to compare chains, binary search or branch tables, chosen by size.
 
-A chain costs 2 words a case (CP #lit5, BRA; 3 with a large constant). A table costs a range check, BRA Wn and one BRA
+A chain costs 2 words per case (CP #lit5, BRA; 3 with a large constant). A table costs a range check, BRA Wn and one BRA
 per value of its range (abi-elf.md §8.1).
 """
 
@@ -12,11 +12,11 @@ from toolchain.ir.model import I16, VOID, Block, Function, Instr, Value
 
 TABLE_OVERHEAD_WORDS = 5
 CHAIN_WORDS = 2
-Run = tuple[int, int, str]  # first value, last value, target
+CaseRange = tuple[int, int, str]  # first value, last value, target
 
 
 class SwitchLowering:
-    """Replaces one switch; collects the new blocks and who branches where."""
+    """Replaces one switch; collects the new blocks and the predecessors of the targets."""
 
     def __init__(self, blocks: dict[str, Block], block: Block, for_size: bool) -> None:
         self.blocks = blocks
@@ -30,19 +30,19 @@ class SwitchLowering:
         self.edges: dict[str, list[str]] = {}
 
     def run(self) -> list[Block]:
-        """Rewrite; returns the added blocks in layout order."""
+        """Replace the switch; returns the added blocks in layout order."""
         cases = self.switch.extra["cases"]
         pairs = sorted(zip(cases, self.switch.blocks[1:], strict=True))
         pairs = [(k, t) for k, t in pairs if t != self.default]
         if self.value.type.bits > 16 and pairs:
             pairs = self._narrow(pairs)
-        self._search(self.start, _runs(pairs), 0, (1 << self.value.type.bits) - 1)
+        self._search(self.start, _case_ranges(pairs), 0, (1 << self.value.type.bits) - 1)
         for target in dict.fromkeys(self.switch.blocks):
             retarget_phis(self.blocks[target], self.block.name, self.edges.get(target, []))
         return self.new_blocks
 
     def _narrow(self, pairs: list[tuple[int, str]]) -> list[tuple[int, str]]:
-        """Switch on a wide value: when all cases fit a word, check the upper part once; else compare wide."""
+        """For a wide value whose cases span at most a word, check the range once and continue with the low word."""
         base, top = pairs[0][0], pairs[-1][0]
         if top - base > 0xFFFF or len(pairs) < 3:
             return pairs
@@ -81,32 +81,32 @@ class SwitchLowering:
         block.instrs.append(i)
         self._edge(block.name, target)
 
-    def _search(self, block: Block, runs: list[Run], low: int, high: int) -> None:
-        """Code for the cases in `runs`, when the value is known to lie in low..high."""
-        if not runs:
+    def _search(self, block: Block, ranges: list[CaseRange], low: int, high: int) -> None:
+        """Code for the cases `ranges`; the value is known to lie in low..high."""
+        if not ranges:
             self._jump(block, self.default)
-        elif self._wants_table(runs):
-            self._table(block, runs, low, high)
-        elif len(runs) <= self.longest_chain:
-            self._chain(block, runs, low, high)
+        elif self._wants_table(ranges):
+            self._table(block, ranges, low, high)
+        elif len(ranges) <= self.longest_chain:
+            self._chain(block, ranges, low, high)
         else:
-            middle = len(runs) // 2
-            pivot = runs[middle][0]
+            middle = len(ranges) // 2
+            pivot = ranges[middle][0]
             left, right = self._block(), self._block()
             b = Builder(block)
             b.line = self.switch.line
             self._branch(block, b.icmp("ult", self.value, const(self.value.type, pivot)), left.name, right.name)
-            self._search(left, runs[:middle], low, pivot - 1)
-            self._search(right, runs[middle:], pivot, high)
+            self._search(left, ranges[:middle], low, pivot - 1)
+            self._search(right, ranges[middle:], pivot, high)
 
-    def _wants_table(self, runs: list[Run]) -> bool:
-        span = runs[-1][1] - runs[0][0] + 1
-        chain = sum(CHAIN_WORDS + (first > 31) + (2 if last > first else 0) for first, last, _ in runs)
-        return len(runs) > 3 and span + TABLE_OVERHEAD_WORDS <= chain and self.value.type.bits <= 16
+    def _wants_table(self, ranges: list[CaseRange]) -> bool:
+        span = ranges[-1][1] - ranges[0][0] + 1
+        chain = sum(CHAIN_WORDS + (first > 31) + (2 if last > first else 0) for first, last, _ in ranges)
+        return len(ranges) > 3 and span + TABLE_OVERHEAD_WORDS <= chain and self.value.type.bits <= 16
 
-    def _chain(self, block: Block, runs: list[Run], low: int, high: int) -> None:
+    def _chain(self, block: Block, ranges: list[CaseRange], low: int, high: int) -> None:
         t = self.value.type
-        for k, (first, last, target) in enumerate(runs):
+        for k, (first, last, target) in enumerate(ranges):
             b = Builder(block)
             b.line = self.switch.line
             if first <= low and last >= high:
@@ -118,14 +118,14 @@ class SwitchLowering:
                 test = b.icmp("ule", self.value, const(t, last))
             else:
                 test = b.icmp("ule", b.binary("sub", self.value, const(t, first)), const(t, last - first))
-            final = k == len(runs) - 1
+            final = k == len(ranges) - 1
             next_block = self.default if final else self._block().name
             self._branch(block, test, target, next_block)
             if not final:
                 block = self.new_blocks[-1]
 
-    def _table(self, block: Block, runs: list[Run], low: int, high: int) -> None:
-        base, top = runs[0][0], runs[-1][1]
+    def _table(self, block: Block, ranges: list[CaseRange], low: int, high: int) -> None:
+        base, top = ranges[0][0], ranges[-1][1]
         b = Builder(block)
         b.line = self.switch.line
         index = b.cast("zext", self.value, I16) if self.value.type.bits < 16 else self.value
@@ -139,7 +139,7 @@ class SwitchLowering:
             self._branch(block, inside, table.name, self.default)
             block = table
         targets = [self.default] * (top - base + 1)
-        for first, last, target in runs:
+        for first, last, target in ranges:
             for k in range(first, last + 1):
                 targets[k - base] = target
         i = Instr("brtable", VOID, [index])
@@ -150,19 +150,19 @@ class SwitchLowering:
             self._edge(block.name, target)
 
 
-def _runs(pairs: list[tuple[int, str]]) -> list[Run]:
-    """Merge neighbouring values with one target."""
-    runs: list[Run] = []
+def _case_ranges(pairs: list[tuple[int, str]]) -> list[CaseRange]:
+    """Merge adjacent values with one target."""
+    ranges: list[CaseRange] = []
     for k, target in pairs:
-        if runs and runs[-1][1] == k - 1 and runs[-1][2] == target:
-            runs[-1] = (runs[-1][0], k, target)
+        if ranges and ranges[-1][1] == k - 1 and ranges[-1][2] == target:
+            ranges[-1] = (ranges[-1][0], k, target)
         else:
-            runs.append((k, k, target))
-    return runs
+            ranges.append((k, k, target))
+    return ranges
 
 
 def lower_switches(f: Function, for_size: bool) -> None:
-    """Replace every switch of the function. Ensures: terminators are br, brtable, indirectbr, ret, unreachable."""
+    """Replace every switch of the function. Ensures: terminators are br, brtable, indirectbr, ret and unreachable."""
     out: list[Block] = []
     blocks = {b.name: b for b in f.blocks}
     for block in list(f.blocks):

@@ -1,19 +1,20 @@
-"""The machine verifier: what every function must satisfy after every pass, and what no pass may change.
+"""Machine verifier: rules that the machine form must satisfy after every pass, and facts that no pass may change.
 
-`Verifier(f)` takes down the volatile accesses of legal IR; `check(name, m)` compares after a pass, raises MachineError,
-and takes the new facts down. Off by default, on in all tests (`-fverify-machine`, or DSPIC_VERIFY_MACHINE=1).
+`Verifier(f)` records the volatile accesses of legal IR. `check(name, m)` compares the machine form after a pass with
+the recorded facts, raises MachineError, and records the new facts. The verifier is off by default and on in all tests
+(`-fverify-machine`, or DSPIC_VERIFY_MACHINE=1).
 
-rule                                                                                     file
-blocks end where they say; branches have targets                                         form.py
-a skip covers what is conditional, and nothing conditional stands without one            form.py
+rule                                                                                     module
+blocks end in their successors; branches have targets                                    form.py
+a skip covers conditional instructions, and every conditional instruction has a skip     form.py
 pairs are even, words are words, near bytes move through W0                              form.py
-flags are read where the same kind of instruction left them                              flags.py
-no register is read that the pass left undefined; saved registers are saved              registers.py
-the value an instruction wants is in the register it reads (allocation)                  allocation.py
+every reader of a flag gets it from the same kind of instruction as before               flags.py
+no register is read that the pass left undefined; callee-saved registers are saved       registers.py
+every instruction reads the value that it read before allocation                         allocation.py
 pushes and pops balance on every path                                                    stack.py
 volatile accesses, calls and assembly: number, order and width on every path             traces.py
 
-A pass leaves most blocks alone: what the rules need of a block is found again only when it has changed (`facts.py`).
+Most passes change few blocks; facts of unchanged blocks are reused (`facts.py`).
 """
 
 from __future__ import annotations
@@ -25,37 +26,44 @@ from toolchain.ir.model import Function
 from toolchain.mir.mir import MFunction
 from toolchain.verify import flags, form, registers, stack, traces
 from toolchain.verify.error import MachineError
-from toolchain.verify.facts import Facts, key_of, taken_down
+from toolchain.verify.facts import BlockFacts, collect_facts, key_of
 
 __all__ = ["MachineError", "Verifier"]
 
-RESHAPES = {"tails", "tail-calls", "branches", "returns"}  # passes that join, drop or move blocks
-EXCHANGES_FLAGS = {"peephole"}  # passes that let one instruction's flags stand for another's
+CHANGES_BLOCKS = {
+    "tail-merging",
+    "tail-calls",
+    "thread-jumps",
+    "block-layout",
+    "branches",
+    "returns",
+}  # passes that join, drop or move blocks
+REPLACES_FLAGS = {"peephole"}  # passes that let one instruction's flags stand for another's
 
 
 Layout = tuple[object, ...]
 
 
 def layout_of(m: MFunction) -> Layout:
-    """What the rules look at beside the blocks."""
+    """Properties of a function besides its instructions that the rules use."""
     tables = tuple((name, tuple(blocks)) for name, blocks in m.tables)
     return ([b.name for b in m.blocks], tables, frozenset(m.pairs), m.uses_fp, m.dynamic_stack, m.interrupt)
 
 
 class Verifier:
-    """Facts of one function, from pass to pass."""
+    """Checks one function after every pass; remembers its facts from pass to pass."""
 
     def __init__(self, f: Function) -> None:
         self.allocated = self.framed = self.selected = False
-        self.source = traces.Traces.of_ir(f)
-        self.facts: dict[str, Facts] = {}
+        self.source = traces.TraceAutomaton.of_ir(f)
+        self.facts: dict[str, BlockFacts] = {}
         self.layout: Layout | None = None
         self.traces = self.source
-        self.flags: set[flags.Source] = set()
+        self.flags: set[flags.FlagUse] = set()
         self.undefined = 0
 
     def check(self, name: str, m: MFunction) -> None:
-        """Compare with the facts before pass `name`. Raises MachineError that names the pass."""
+        """Check the function after pass `name`. Raises MachineError that names the pass."""
         renamed = name == "allocate"
         self.allocated |= renamed
         self.framed |= name == "frame"
@@ -65,7 +73,7 @@ class Verifier:
             raise MachineError(f"{m.name}: after pass {name}: {e}\n{m.dump()}") from None
 
     def _check(self, name: str, m: MFunction, new_rules: bool) -> None:
-        """`new_rules`: more is asked of the machine form than before the pass, or it has other registers."""
+        """Check all rules; `new_rules` if more rules apply than before the pass, or the registers have new names."""
         keys = {b.name: key_of(b) for b in m.blocks}
         layout, before = layout_of(m), self.facts
         same_layout = layout == self.layout and not new_rules
@@ -73,22 +81,23 @@ class Verifier:
         if same_layout and len(known) == len(m.blocks):
             return
         form.check(m, self.allocated, known, same_layout)
-        facts = taken_down(m, keys, before)
+        facts = collect_facts(m, keys, before)
         stack.check(m, self.framed, {n: f.stack for n, f in facts.items()})
         if self.framed:
             pushed = reduce(or_, (f.pushed for f in facts.values()))
             registers.check_saved(m, pushed, reduce(or_, (f.written for f in facts.values())))
-        made = traces.Traces.of(m, {n: (f.word, f.numbers) for n, f in facts.items()})
-        sources = {s for f in facts.values() for s in f.sources}
+        automaton = traces.TraceAutomaton.of(m, {n: (f.events, f.numbers) for n, f in facts.items()})
+        flag_uses = {use for f in facts.values() for use in f.flag_uses}
         undefined = registers.undefined_at_entry(
             m, {n: f.reads for n, f in facts.items()}, {n: f.kill for n, f in facts.items()}
         )
         if not self.selected:
-            self.source.includes(made.accesses_only())
+            self.source.includes(automaton.accesses_only())
             self.selected = True
         else:
-            self.traces.check(made, name not in RESHAPES)
-            flags.compare(self.flags, sources, name in EXCHANGES_FLAGS)
+            self.traces.check(automaton, name not in CHANGES_BLOCKS)
+            flags.compare(self.flags, flag_uses, name in REPLACES_FLAGS)
             if self.allocated and not new_rules:
                 registers.compare(self.undefined, undefined)
-        self.traces, self.flags, self.undefined, self.facts, self.layout = made, sources, undefined, facts, layout
+        self.traces, self.flags, self.undefined = automaton, flag_uses, undefined
+        self.facts, self.layout = facts, layout

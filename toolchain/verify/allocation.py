@@ -1,7 +1,7 @@
-"""Allocation, checked by following values: at every use the register chosen holds the value wanted.
+"""Check of register allocation: at every use, the chosen register contains the value of the virtual register.
 
-For each real register the set of virtual registers whose value it holds travels along all edges; a copy makes two names
-for one value. What was never written may be anywhere. Sets are bit masks over virtual registers.
+Forward data flow: for each real register, the set of virtual registers whose value it contains. A copy gives a value a
+second name. A virtual register that has not been written may be in any register. Sets are bit masks.
 """
 
 from __future__ import annotations
@@ -9,11 +9,11 @@ from __future__ import annotations
 from toolchain.mir.mir import FIRST_VIRTUAL, MI, MFunction
 from toolchain.verify.error import fail
 
-State = tuple[list[int], int]  # contents of W0-W15, registers possibly written
+Contents = tuple[list[int], int]  # sets of W0-W15; virtual registers that may have been written
 
 
-class Step:
-    """One instruction as it moves values between registers."""
+class ValueTransfer:
+    """Effect of one instruction on the contents of registers."""
 
     __slots__ = ("kept", "mi", "names", "source", "uses", "wiped", "written")
 
@@ -24,26 +24,28 @@ class Step:
         self.source = -1  # the real register it copies
         if isinstance(source, int):
             self.source = colour[source] if source >= FIRST_VIRTUAL else source
-        self.wiped: list[int] = []
-        self.written: list[tuple[int, int]] = []  # real register, and the name it gets
-        self.names = 0  # virtual registers whose old values are no longer meant
+        self.wiped: list[int] = []  # real registers that lose their contents
+        self.written: list[tuple[int, int]] = []  # real register, and its new set
+        self.names = 0  # virtual registers that get new values
         for r in mi.defs():
             if r < FIRST_VIRTUAL:
                 self.wiped.append(r)
                 self.written.append((r, 0))
                 continue
             self.names |= 1 << r
-            places = [colour[r], colour[r] + 1] if r in m.pairs else [colour[r]]
-            self.wiped += places
-            self.written += [(k, 1 << r) for k in places]
+            real = [colour[r], colour[r] + 1] if r in m.pairs else [colour[r]]
+            self.wiped += real
+            self.written += [(k, 1 << r) for k in real]
         self.kept = ~self.names
 
 
 def check(m: MFunction, colour: dict[int, int]) -> None:
-    """`m` still has virtual registers; `colour` is the real register of each (of a pair, the lower one)."""
-    steps = {b.name: [Step(m, mi, colour) for mi in b.insts] for b in m.blocks}
+    """Check an allocation that has not been applied; raises MachineError.
+
+    `colour` is the real register of each virtual register, the lower one of a pair."""
+    steps = {b.name: [ValueTransfer(m, mi, colour) for mi in b.insts] for b in m.blocks}
     succs = {b.name: b.succs for b in m.blocks}
-    starts: dict[str, State] = {m.blocks[0].name: ([0] * 16, 0)}
+    starts: dict[str, Contents] = {m.blocks[0].name: ([0] * 16, 0)}
     for b in m.blocks:
         if b.address_taken:
             starts.setdefault(b.name, ([0] * 16, 0))
@@ -61,26 +63,27 @@ def check(m: MFunction, colour: dict[int, int]) -> None:
         _through(steps[name], state, name)
 
 
-def _meet(a: State, b: State) -> State:
+def _meet(a: Contents, b: Contents) -> Contents:
+    """Contents at a block with two predecessors."""
     anywhere, here, written = ~a[1], ~b[1], a[1] | b[1]
     return [(x | anywhere) & (y | here) & written for x, y in zip(a[0], b[0], strict=True)], written
 
 
-def _through(steps: list[Step], state: State, checked: str) -> State:
-    """The state behind a block; `checked` is its name when its uses are checked."""
-    held, written = list(state[0]), state[1]
+def _through(steps: list[ValueTransfer], state: Contents, checked: str) -> Contents:
+    """Contents behind a block; `checked` is its name if its uses are to be checked, else ""."""
+    contents, written = list(state[0]), state[1]
     for step in steps:
         if checked:
             for r, k in step.uses:
-                if written >> r & 1 and not held[k] >> r & 1:
-                    fail(f"W{k} does not hold v{r}", checked, step.mi)
-        value = held[step.source] if step.source >= 0 else 0
+                if written >> r & 1 and not contents[k] >> r & 1:
+                    fail(f"W{k} does not contain v{r}", checked, step.mi)
+        value = contents[step.source] if step.source >= 0 else 0
         for k in step.wiped:
-            held[k] = 0
+            contents[k] = 0
         if step.names:
             kept = step.kept
-            held = [x & kept for x in held]
+            contents = [x & kept for x in contents]
             written |= step.names
         for k, name in step.written:
-            held[k] = value | name
-    return held, written
+            contents[k] = value | name
+    return contents, written

@@ -1,4 +1,4 @@
-"""What the verifier says."""
+"""Error of the machine verifier."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from toolchain.mir.mir import MI
 
 
 class MachineError(AssertionError):
-    """A rule is broken: the fault is the compiler's."""
+    """A rule of the verifier is violated, which is a bug of the compiler."""
 
 
 def fail(rule: str, block: str, mi: MI | None = None) -> NoReturn:
-    """Raise MachineError for an instruction of a block."""
+    """Raise MachineError: `rule` is violated in a block, at `mi` if given."""
     raise MachineError(f"{rule}: block {block}" + (f": {mi!r}" if mi is not None else ""))

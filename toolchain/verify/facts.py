@@ -1,4 +1,4 @@
-"""What the rules need to know of one block, found once for as long as no pass changes the block."""
+"""Facts of one block that the rules of the verifier use, computed once for as long as no pass changes the block."""
 
 from __future__ import annotations
 
@@ -10,33 +10,35 @@ from toolchain.verify import flags, registers, stack, traces
 Key = tuple[object, ...]
 
 
-def written_down(mi: MI) -> Key:
-    """All of an instruction that any rule looks at."""
+def instruction_key(mi: MI) -> Key:
+    """All parts of an instruction that any rule uses."""
     return (mi.op, mi.info, mi.byte, mi.cc, mi.pred, mi.epilogue, mi.also_uses, mi.also_defs, *mi.args)
 
 
-class Facts:
-    """One block's part in the rules that hold for the whole function."""
+class BlockFacts:
+    """Contribution of one block to the rules of the whole function."""
 
-    __slots__ = ("key", "kill", "numbers", "pushed", "reads", "sources", "stack", "word", "written")
+    __slots__ = ("events", "flag_uses", "key", "kill", "numbers", "pushed", "reads", "stack", "written")
 
     def __init__(self, b: MBlock, key: list[Key]) -> None:
         self.key = key
-        self.sources = flags.walk(b)
+        self.flag_uses = flags.flag_uses(b)
         self.reads, self.kill, self.pushed, self.written = registers.summary(b)
         self.stack = stack.plain_change(b)
-        self.word, self.numbers = traces.seen_outside(b)
+        self.events, self.numbers = traces.observable_events(b)
 
 
 def key_of(b: MBlock) -> list[Key]:
-    """The block as it is now, to compare with later."""
-    return [tuple(b.succs), *map(written_down, b.insts)]
+    """The present content of a block, for a later comparison."""
+    return [tuple(b.succs), *map(instruction_key, b.insts)]
 
 
-def taken_down(m: MFunction, keys: Mapping[str, list[Key]], before: Mapping[str, Facts]) -> dict[str, Facts]:
-    """Facts of every block by name, those of `before` where its key is the same. Raises MachineError for lost flags."""
+def collect_facts(
+    m: MFunction, keys: Mapping[str, list[Key]], before: Mapping[str, BlockFacts]
+) -> dict[str, BlockFacts]:
+    """Facts of every block by name, reusing those of `before` with the same key. Raises MachineError for lost flags."""
     found = {}
     for b in m.blocks:
         old, key = before.get(b.name), keys[b.name]
-        found[b.name] = old if old is not None and old.key == key else Facts(b, key)
+        found[b.name] = old if old is not None and old.key == key else BlockFacts(b, key)
     return found

@@ -1,25 +1,27 @@
-"""Form: where blocks end, what skips cover, which registers and operands an instruction may have."""
+"""Rules of form: ends of blocks, skips, and the registers and operands that an instruction may have."""
 
 from __future__ import annotations
 
 import itertools
 from collections.abc import Collection
 
-from toolchain.mir.mir import FIRST_VIRTUAL, MI, SKIPS, File, MBlock, Mem, MFunction, covered
+from toolchain.mir.mir import FIRST_VIRTUAL, MI, SKIPS, FileRegister, MBlock, Mem, MFunction, covered_count
 from toolchain.verify.error import fail
 
-LEAVE = {"bra", "jump", "jumpr", "brtable", "ret", "tailcall"}
-LAST = LEAVE - {"bra"}
-LONG = {"call", "tailcall", "jumpr", "repmov", "repclr", "repfill", "div.s", "div.u", "div.sd", "div.ud", "asm",
+TRANSFERS = {"bra", "jump", "jumpr", "brtable", "ret", "tailcall"}
+BLOCK_ENDS = TRANSFERS - {"bra"}
+TWO_WORDS = {"call", "tailcall", "jumpr", "repmov", "repclr", "repfill", "div.s", "div.u", "div.sd", "div.ud", "asm",
         "text", "shiftloop", "brtable", "lea", "begin_atomic"}  # fmt: skip
 
 
 def check(m: MFunction, allocated: bool, known: Collection[str] = (), same_layout: bool = False) -> None:
-    """All rules of form. `allocated`: registers are real. The instructions of the blocks `known` were checked before,
-    and with `same_layout` stood among the same neighbours and tables."""
+    """Check all rules of form. Raises MachineError.
+
+    `allocated` says that registers are real. The instructions of the blocks `known` have been checked before; with
+    `same_layout` their neighbours and branch tables are the same, too."""
     names = [b.name for b in m.blocks]
     if len(set(names)) != len(names):
-        fail("two blocks of one name", names[0])
+        fail("two blocks have the same name", names[0])
     following = dict(itertools.pairwise(names))
     present = set(names)
     for b in m.blocks:
@@ -42,13 +44,13 @@ def _ends(b: MBlock, names: set[str], following: str, m: MFunction) -> None:
             targets.add(str(mi.args[0]))
         elif mi.op == "brtable":
             targets |= set(m.tables[int(str(mi.args[1]))][1])
-        if mi.op in LAST and k != len(b.insts) - 1:
+        if mi.op in BLOCK_ENDS and k != len(b.insts) - 1:
             fail("code behind the end of a block", b.name, mi)
-        if mi.op == "bra" and any(x.op not in LEAVE for x in b.insts[k + 1 :]):
+        if mi.op == "bra" and any(x.op not in TRANSFERS for x in b.insts[k + 1 :]):
             fail("code behind a branch", b.name, mi)
     if not targets <= names:
-        fail(f"branch to a block that is not there ({sorted(targets - names)})", b.name)
-    falls = not b.insts or b.insts[-1].op not in LAST
+        fail(f"branch to a block that does not exist ({sorted(targets - names)})", b.name)
+    falls = not b.insts or b.insts[-1].op not in BLOCK_ENDS
     if not targets <= set(b.succs):
         fail(f"successors {b.succs} miss a target of {sorted(targets)}", b.name)
     ended = bool(b.insts) and b.insts[-1].op == "text"  # unreachable
@@ -57,10 +59,10 @@ def _ends(b: MBlock, names: set[str], following: str, m: MFunction) -> None:
 
 
 def _skip(b: MBlock, k: int) -> None:
-    count, mi = covered(b.insts, k), b.insts[k]
+    count, mi = covered_count(b.insts, k), b.insts[k]
     if not count:
         fail("a skip covers nothing", b.name, mi)
-    if mi.op != "skip" and (count != 1 or b.insts[k + 1].op in LONG):
+    if mi.op != "skip" and (count != 1 or b.insts[k + 1].op in TWO_WORDS):
         fail("a skip instruction covers one word", b.name, mi)
 
 
@@ -77,6 +79,6 @@ def _registers(m: MFunction, b: MBlock, mi: MI, allocated: bool) -> None:
         elif role != "n" and (role in "SDB") != (a in m.pairs):
             wide = role in "SDB"
             fail("a pair where a word belongs" if not wide else "a word where a pair belongs", b.name, mi)
-    near_byte = mi.op == "mov" and mi.byte and any(isinstance(a, File) for a in mi.args)
+    near_byte = mi.op == "mov" and mi.byte and any(isinstance(a, FileRegister) for a in mi.args)
     if near_byte and any(isinstance(a, int) and a != 0 for a in mi.args):
         fail("near bytes move through W0 only", b.name, mi)

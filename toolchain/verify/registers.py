@@ -1,4 +1,4 @@
-"""Registers: none becomes undefined, and those a caller keeps are kept."""
+"""Rules of registers: no pass makes one undefined, and the function preserves those of its caller."""
 
 from __future__ import annotations
 
@@ -11,24 +11,23 @@ KEPT = bits(list(CALLEE_SAVED))
 
 
 def undefined_at_entry(m: MFunction, reads: dict[str, int], kill: dict[str, int]) -> int:
-    """Registers somebody may read before the function has written them: arguments, and values C leaves undefined.
+    """Registers that may be read before the function writes them: arguments, and variables that C leaves undefined.
 
-    `reads` and `kill` are the blocks' (`summary`).
+    `reads` and `kill` are those of `summary` for every block.
     """
     first = m.blocks[0].name
     return (reads[first] | solve(m, reads, kill)[first] & ~kill[first]) & ~(1 << SP)
 
 
 def compare(before: int, after: int) -> None:
-    """A pass may not read more at the entry than was read there before it."""
+    """Raise MachineError if more registers are read before they are written than before the pass."""
     if after & ~before & ~KEPT:
         names = ", ".join(f"W{r}" for r in members(after & ~before & ~KEPT))
         raise MachineError(f"{names} is read before it is written")
 
 
 def summary(b: MBlock) -> tuple[int, int, int, int]:
-    """`liveness.summary`: registers read before they are written, and written; those it pushes, and those it writes
-    outside of an epilogue."""
+    """Registers of a block: read before they are written, written, pushed, and written outside of an epilogue."""
     reads = kill = pushed = written = 0
     for mi in reversed(b.insts):
         u, d = mi.register_sets()
@@ -41,21 +40,23 @@ def summary(b: MBlock) -> tuple[int, int, int, int]:
 
 
 def check_saved(m: MFunction, pushed: int, written: int) -> None:
-    """Registers that must survive are pushed before they are written. Interrupt functions save what they write.
+    """Raise MachineError if a register is written that must be preserved and is not pushed.
 
-    `pushed` and `written` are of all blocks together (`summary`).
+    Interrupt functions preserve all registers. `pushed` and `written` are those of all blocks (`summary`).
     """
     saved = pushed | (bits([0, 1, 2, 3]) if "shadow" in m.interrupt else 0)
     if m.uses_fp:
         saved |= 1 << 14
     lost = written & ~saved & ~(1 << SP) & (KEPT if not m.interrupt else 0xFFFF)
     if m.interrupt and m.blocks[0].insts and any(mi.args and mi.args[0] == "pop w0" for mi in m.blocks[0].insts):
-        lost &= ~1  # saved around the prologue's own use of it
+        lost &= ~1  # the prologue saves W0 around its own use
     if lost:
-        raise MachineError(f"{', '.join(f'W{r}' for r in members(lost))} must survive, but is written and not saved")
+        names = ", ".join(f"W{r}" for r in members(lost))
+        raise MachineError(f"{names} must be preserved, but is written and not saved")
 
 
 def _pushed(mi: MI) -> int:
+    """Registers that an instruction pushes."""
     if mi.op in ("mov", "movd") and len(mi.args) == 2 and isinstance(mi.args[0], int):
         to = mi.args[1]
         if isinstance(to, Mem) and to.mode == "++" and to.base == SP:

@@ -1,18 +1,18 @@
-"""The stack pointer: the same depth wherever paths meet, 0 at every return."""
+"""Rule of the stack: the same depth on all paths into a block, 0 at every return."""
 
 from __future__ import annotations
 
 from toolchain.abi.target import SP
-from toolchain.mir.mir import MI, Imm, MBlock, Mem, MFunction
+from toolchain.mir.mir import MI, MBlock, Mem, MFunction
 from toolchain.verify.error import fail
 
-LINK = 1 << 20  # depth counted from the frame pointer, whatever the dynamic part of the stack does
+LINK = 1 << 20  # added to the depth between LNK and ULNK, where the depth of the dynamic part is not followed
 
 
 def check(m: MFunction, framed: bool, changes: dict[str, int | None]) -> None:
-    """Follow every path. Before frames are built, what a block pushes it takes off again.
+    """Check the depth along every path; before frames are built, that every block pops what it pushes.
 
-    `changes` is `plain_change` of every block.
+    `changes` is `plain_change` of every block. Raises MachineError.
     """
     first = m.blocks[0].name
     depth = {first: 0} | {b.name: 0 for b in m.blocks if not framed}
@@ -38,7 +38,7 @@ def check(m: MFunction, framed: bool, changes: dict[str, int | None]) -> None:
 
 
 def plain_change(b: MBlock) -> int | None:
-    """Bytes the block adds, None when that depends on the frame pointer or it ends the function."""
+    """Bytes that the block adds to the stack; None if it uses the frame pointer or ends the function."""
     if any(mi.op in ("ret", "tailcall") or (mi.op == "text" and _is_link(str(mi.args[0]))) for mi in b.insts):
         return None
     return sum(map(stack_change, b.insts))
@@ -49,6 +49,7 @@ def _is_link(text: str) -> bool:
 
 
 def _through(b: MBlock, at: int, m: MFunction) -> int:
+    """Depth behind a block that starts at depth `at`."""
     for mi in b.insts:
         if mi.op in ("ret", "tailcall") and at and not m.dynamic_stack:
             fail(f"{at} bytes are left on the stack", b.name, mi)
@@ -65,14 +66,14 @@ def _through(b: MBlock, at: int, m: MFunction) -> int:
 
 
 def stack_change(mi: MI) -> int:
-    """Bytes an instruction adds."""
+    """Bytes that an instruction adds to the stack."""
     if mi.op == "spadd" or (mi.op in ("addl", "subl") and mi.args[1] == SP):
-        k = _number(mi.args[0])
+        k = mi.number(0)
         return -k if mi.op == "subl" else k
     if mi.op in ("add", "sub") and mi.args[0] == SP and mi.args[2] == SP:
-        return _number(mi.args[1]) * (1 if mi.op == "add" else -1)
+        return mi.number(1) * (1 if mi.op == "add" else -1)
     if mi.op == "repmov" and mi.args[2] == SP:
-        return 2 * (_number(mi.args[0]) + 1)
+        return 2 * (mi.number(0) + 1)
     if mi.op == "text":
         word = str(mi.args[0]).split()[0]
         return {"push": 2, "pop": -2}.get(word, 0)
@@ -82,9 +83,3 @@ def stack_change(mi: MI) -> int:
         if isinstance(a, Mem) and a.base == SP:
             total += size if a.mode == "++" else -size if a.mode == "-" else 0
     return total
-
-
-def _number(a: object) -> int:
-    assert isinstance(a, Imm)
-    assert isinstance(a.value, int)
-    return a.value

@@ -7,7 +7,7 @@ import subprocess
 import tempfile
 from pathlib import Path
 
-from toolchain.driver.pipeline import Options, compile_module
+from toolchain.driver.pipeline import BackendOptions, compile_module
 from toolchain.frontend.clang import clang_program, front_end_flags
 from toolchain.frontend.options import CcOptions
 
@@ -33,7 +33,7 @@ def llvm(source: str, level: str = "s", *flags: str) -> str:
 def assembly(source: str, level: str = "s", **options: bool) -> str:
     """Assembly of a C text. Options: debug, stack_check."""
     flags = ["-g"] if options.get("debug") else []
-    return compile_module(llvm(source, level, *flags), Options(level=level, **options))
+    return compile_module(llvm(source, level, *flags), BackendOptions(level=level, **options))
 
 
 def body(text: str, function: str) -> list[str]:

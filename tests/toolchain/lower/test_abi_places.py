@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import pytest
 
-from toolchain.abi.arguments import Shape, place_arguments, scalar_shape, struct_shape
+from toolchain.abi.arguments import ArgumentShape, argument_locations, scalar_shape, struct_shape
 from toolchain.ir.model import I8, I16, I32, I64, Type
 
 
-def scalar(bits: int) -> Shape:
+def scalar(bits: int) -> ArgumentShape:
     return scalar_shape({8: I8, 16: I16, 32: I32, 64: I64}[bits])
 
 
-def struct(*members: Type) -> Shape:
+def struct(*members: Type) -> ArgumentShape:
     return struct_shape(Type("struct", 0, members))
 
 
@@ -21,7 +21,7 @@ def array(count: int, of: Type) -> Type:
 
 
 INT, LONG, LLONG = scalar(16), scalar(32), scalar(64)
-ROWS: list[tuple[str, list[Shape], list[object]]] = [
+ROWS: list[tuple[str, list[ArgumentShape], list[object]]] = [
     ("ten ints", [INT] * 10, [0, 1, 2, 3, 4, 5, 6, 7, "stack 6", "stack 8"]),
     ("int long int long int int int", [INT, LONG, INT, LONG, INT, INT, INT], [0, 2, 1, 4, 6, 7, "stack 6"]),
     ("int llong int int", [INT, LLONG, INT, INT], [0, 4, 1, 2]),
@@ -40,21 +40,21 @@ ROWS: list[tuple[str, list[Shape], list[object]]] = [
 
 
 @pytest.mark.parametrize(("name", "shapes", "expected"), ROWS, ids=[r[0] for r in ROWS])
-def test_arguments_travel_where_xc16_puts_them(name: str, shapes: list[Shape], expected: list[object]) -> None:
+def test_arguments_travel_where_xc16_puts_them(name: str, shapes: list[ArgumentShape], expected: list[object]) -> None:
     """abi-elf.md §2.2, rules 1-4 and the table. "stack n": the low end lies n bytes below W15 at entry."""
-    places = place_arguments(shapes, False)
+    places = argument_locations(shapes, False)
     assert [p.register if p.register is not None else f"stack {p.stack}" for p in places] == expected
 
 
 def test_all_arguments_of_a_variadic_function_with_one_named_are_on_the_stack() -> None:
     """abi-elf.md §2.2, rule 5: the first ends right below the return address."""
-    places = place_arguments([INT, LONG, scalar(8)], named=1)
+    places = argument_locations([INT, LONG, scalar(8)], named=1)
     assert [p.register for p in places] == [None] * 3
     assert [p.stack for p in places] == [6, 10, 12]
 
 
 def test_named_arguments_before_the_last_of_a_variadic_function_are_in_registers() -> None:
     """abi-elf.md §2.2, rule 5, row `g(int a,long b,int n,...)`."""
-    places = place_arguments([INT, LONG, INT, LONG], named=3)
+    places = argument_locations([INT, LONG, INT, LONG], named=3)
     assert [p.register for p in places] == [0, 2, None, None]
     assert [p.stack for p in places[2:]] == [6, 10]

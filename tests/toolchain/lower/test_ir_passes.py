@@ -70,7 +70,7 @@ PASSES: dict[str, Callable[[Function], None]] = {
     "switches for size": lambda f: switch.lower_switches(f, True),
     "switches for speed": lambda f: switch.lower_switches(f, False),
     "critical edges": cfg.split_critical_edges,
-    "single bits": partial(single_bits.run, near=lambda name: True),
+    "single bits": partial(single_bits.run, is_near=lambda name: True),
 }
 TEXTS: dict[str, str] = {}
 

@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import pytest
 
-from toolchain.mir.mir import MI, SKIPS, File, Imm, MBlock, Mem, MFunction, Operand
+from toolchain.mir.mir import MI, SKIPS, FileRegister, Imm, MBlock, Mem, MFunction, Operand
 from toolchain.optimise import block_layout, branches, peephole, returns, schedule, tail_merging
 
 WORD = 0xFFFF
@@ -30,14 +30,14 @@ class Machine:
         if isinstance(a, Imm):
             assert isinstance(a.value, int)
             return a.value & WORD
-        if isinstance(a, Mem | File):
+        if isinstance(a, Mem | FileRegister):
             at = self.address(a, byte)
             return self.memory.get(at, at * 7 & WORD)
         assert isinstance(a, int)
         return self.w[a]
 
-    def address(self, a: Mem | File, byte: bool) -> int:
-        if isinstance(a, File):
+    def address(self, a: Mem | FileRegister, byte: bool) -> int:
+        if isinstance(a, FileRegister):
             return int(a.expr, 16)
         size = 1 if byte else 2
         before = {"+": size, "-": -size}.get(a.mode, 0)
@@ -47,7 +47,7 @@ class Machine:
         return at
 
     def write(self, a: Operand, value: int, byte: bool) -> None:
-        if isinstance(a, Mem | File):
+        if isinstance(a, Mem | FileRegister):
             self.memory[self.address(a, byte)] = value & WORD
         else:
             assert isinstance(a, int)
@@ -170,9 +170,9 @@ class Machine:
                 self.w[dest], self.w[dest + 1] = low, high
 
 
-def near(rng: random.Random) -> File:
+def near(rng: random.Random) -> FileRegister:
     """A near object among those the pointers reach."""
-    return File(f"0x{DATA + 2 * rng.randrange(9):04X}", True)
+    return FileRegister(f"0x{DATA + 2 * rng.randrange(9):04X}", True)
 
 
 def instruction(rng: random.Random) -> list[MI]:
@@ -251,9 +251,11 @@ def generate(seed: int) -> MFunction:
 PASSES: dict[str, Callable[[MFunction], None]] = {
     "peephole": peephole.run,
     "schedule": schedule.run,
-    "tails": tail_merging.run,
+    "tail-merging": tail_merging.run,
     "layout": block_layout.run,
-    "branches": lambda m: branches.run(m, True),
+    "jumps": branches.thread_jumps,
+    "reorder": branches.reorder,
+    "branches": branches.run,
     "returns": returns.run,
 }
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from tests.toolchain.lower.compiled import llvm
-from toolchain.driver.pipeline import FUNCTION_PASSES, Options, Pass, check_order, compile_module
+from toolchain.driver.pipeline import FUNCTION_PASSES, BackendOptions, Pass, check_order, compile_module
 from toolchain.ir import cfg
 from toolchain.ir.read import read_module
 from toolchain.ir.spec import check
@@ -53,14 +53,14 @@ def test_every_ir_pass_leaves_well_formed_legal_functions(level: str) -> None:
 def test_output_is_the_same_every_time(level: str) -> None:
     """Same input, same bytes."""
     text = llvm(SOURCE, level)
-    assert compile_module(text, Options(level)) == compile_module(text, Options(level))
+    assert compile_module(text, BackendOptions(level)) == compile_module(text, BackendOptions(level))
 
 
 def test_no_virtual_register_reaches_the_assembly() -> None:
     """Every register in the text is W0-W15."""
     import re
 
-    text = compile_module(llvm(SOURCE), Options())
+    text = compile_module(llvm(SOURCE), BackendOptions())
     assert all(int(n) <= 15 for n in re.findall(r"\bw(\d+)\b", text))
 
 
@@ -70,4 +70,4 @@ def test_a_pass_before_what_it_needs_is_refused() -> None:
     with pytest.raises(AssertionError, match="single-bits"):
         check_order([p for p in FUNCTION_PASSES if p.name != "critical-edges"])
     with pytest.raises(AssertionError, match="odd"):
-        check_order([Pass("odd", lambda c: None, ("nothing gives this",))])
+        check_order([Pass("odd", lambda c: None, needs=("nothing gives this",))])

@@ -7,7 +7,7 @@ import random
 import pytest
 
 from toolchain.abi.target import ALLOCATABLE, CALLER_SAVED
-from toolchain.mir.mir import FIRST_VIRTUAL, MI, File, Imm, MBlock, MFunction, Slot
+from toolchain.mir.mir import FIRST_VIRTUAL, MI, FileRegister, Imm, MBlock, MFunction, Slot
 from toolchain.regalloc.colouring import allocate
 
 WORD = 0xFFFF
@@ -59,7 +59,7 @@ class Machine:
 
     def step(self, mi: MI) -> None:
         match mi.op, mi.args:
-            case "mov", [source, File()]:
+            case "mov", [source, FileRegister()]:
                 self.stored.append(self.value(source))
             case "mov", [source, Slot() as slot]:
                 self.slots[slot.index, slot.off] = self.value(source)
@@ -105,7 +105,7 @@ def generate(seed: int, pressure: int, calls: bool) -> MFunction:
     left = MBlock("left", [*body(rng, m, live, calls), MI("cp0", tested)], ["right", "end"])
     left.insts += [MI("bra", "end", cc="z"), MI("jump", "right")]
     right = MBlock("right", [*body(rng, m, live, calls), MI("jump", "end")], ["end"])
-    end = MBlock("end", [MI("mov", r, File("out", True)) for r in live] + [MI("ret")])
+    end = MBlock("end", [MI("mov", r, FileRegister("out", True)) for r in live] + [MI("ret")])
     m.blocks = [entry, loop, left, right, end]
     return m
 
@@ -166,7 +166,7 @@ def test_values_live_across_calls_avoid_scratch_registers() -> None:
     kept = [m.new_register() for _ in range(3)]
     call = MI("call", "_f")
     call.also_defs = CALLER_SAVED
-    insts = [*(MI("mov", File("in", True), r) for r in kept), call, *(MI("mov", r, File("out", True)) for r in kept)]
+    insts = [*(MI("mov", FileRegister("in", True), r) for r in kept), call, *(MI("mov", r, FileRegister("out", True)) for r in kept)]
     m.blocks = [MBlock("entry", [*insts, MI("ret")])]
     used = {mi.args[0] for mi in allocate(m, True).blocks[0].insts[4:7]}
     assert all(isinstance(r, int) and r >= 8 for r in used)

@@ -5,12 +5,12 @@ from __future__ import annotations
 import pytest
 
 from toolchain.abi.target import LIT5_MAX, LIT10_BYTE_MAX, LIT10_MAX
-from toolchain.select.rules import IMMEDIATE, ImmRule, immediate_rule
+from toolchain.select.rules import IMMEDIATE, ImmediateRule, immediate_rule
 
 MEANING = {"add": lambda a, k: a + k, "and": lambda a, k: a & k, "or": lambda a, k: a | k, "xor": lambda a, k: a ^ k}
 
 
-def machine(rule: ImmRule, a: int, literal: int, bits: int) -> int:
+def machine(rule: ImmediateRule, a: int, literal: int, bits: int) -> int:
     """What the instruction of a rule computes (isa.md §6)."""
     mask = (1 << bits) - 1
     unary = {"inc": a + 1, "inc2": a + 2, "dec": a - 1, "dec2": a - 2, "com": ~a, "ze": a & 0xFF}

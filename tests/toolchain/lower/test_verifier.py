@@ -11,7 +11,7 @@ from tests.toolchain.lower.compiled import llvm
 from toolchain.driver import pipeline
 from toolchain.ir.read import read_module
 from toolchain.mir.liveness import summary
-from toolchain.mir.mir import MI, File, Imm, MBlock, Mem, MFunction
+from toolchain.mir.mir import MI, FileRegister, Imm, MBlock, Mem, MFunction
 from toolchain.regalloc import colouring
 from toolchain.verify import MachineError
 from toolchain.verify.registers import undefined_at_entry
@@ -65,7 +65,7 @@ def _swapped_stores(m: MFunction) -> bool:
 
 def _dropped_read(m: MFunction) -> bool:
     for b, k, mi in _each(m):
-        if mi.volatile and mi.op == "mov" and isinstance(mi.args[0], Mem | File):
+        if mi.volatile and mi.op == "mov" and isinstance(mi.args[0], Mem | FileRegister):
             del b.insts[k]
             return True
     return False
@@ -73,7 +73,7 @@ def _dropped_read(m: MFunction) -> bool:
 
 def _doubled_write(m: MFunction) -> bool:
     for b, k, mi in _each(m):
-        if mi.volatile and mi.op == "mov" and isinstance(mi.args[1], Mem | File):
+        if mi.volatile and mi.op == "mov" and isinstance(mi.args[1], Mem | FileRegister):
             b.insts.insert(k, mi.clone())
             return True
     return False
@@ -171,7 +171,7 @@ def _virtual_left(m: MFunction) -> bool:
 
 
 def _near_byte(m: MFunction) -> bool:
-    m.blocks[0].insts.insert(0, MI("mov", File("_near", True), 5, byte=True))
+    m.blocks[0].insts.insert(0, MI("mov", FileRegister("_near", True), 5, byte=True))
     return True
 
 
@@ -184,7 +184,7 @@ CLASSES: list[tuple[str, str, Plant]] = [
     ("a volatile access narrowed", "select", _narrowed),
     ("a volatile access moved over a call", "schedule", _moved_over_call),
     ("volatile accesses exchanged while branches are laid out", "branches", _swapped_stores),
-    ("a volatile read dropped while tails are merged", "tails", _dropped_read),
+    ("a volatile read dropped while tails are merged", "tail-merging", _dropped_read),
     ("flags clobbered before a branch", "schedule", _clobbered_flags),
     ("the comparison before a branch lost", "schedule", _lost_flags),
     ("a register read that nothing wrote", "schedule", _undefined),
@@ -198,7 +198,9 @@ CLASSES: list[tuple[str, str, Plant]] = [
 ]
 
 
-def damaged(run: Callable[[pipeline.Context], None], plant: Plant, planted: list[bool], c: pipeline.Context) -> None:
+def damaged(
+    run: Callable[[pipeline.FunctionContext], None], plant: Plant, planted: list[bool], c: pipeline.FunctionContext
+) -> None:
     """A pass with a bug."""
     run(c)
     planted.append(plant(c.m))
@@ -212,10 +214,10 @@ def compile_with(plant: Plant | None, after: str, monkeypatch: pytest.MonkeyPatc
         run = p.run
         if p.name == after and plant is not None:
             run = functools.partial(damaged, p.run, plant, planted)
-        passes.append(pipeline.Pass(p.name, run, p.needs, p.gives))
+        passes.append(pipeline.Pass(p.name, run, p.levels, p.needs, p.gives))
     monkeypatch.setattr(pipeline, "FUNCTION_PASSES", passes)
     module = read_module(llvm(SOURCE, level))
-    pipeline.ModuleCompiler(module, pipeline.Options(level=level)).run()
+    pipeline.ModuleCompiler(module, pipeline.BackendOptions(level=level)).run()
     return any(planted)
 
 
