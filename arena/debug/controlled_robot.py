@@ -21,7 +21,7 @@ from greenlet import getcurrent, greenlet
 from arena.debug.input_log import InputLog
 from arena.robots.controller import Controller
 from arena.robots.firmware_controller import FirmwareController
-from arena.trial.snapshot import seen
+from arena.trial.snapshot import state_view
 from arena.world.physics import World
 from emu.debug.history import History, position
 from emu.machine.machine import Machine
@@ -167,7 +167,7 @@ class ControlledRobot:
 
     def describe(self) -> list[tuple[str, str]]:
         """Return names and values that describe the world and its robots."""
-        return seen(self._world, self._controllers, self._robot)
+        return state_view(self._world, self._controllers, self._robot)
 
     # Called in the trial's greenlets
 

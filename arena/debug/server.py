@@ -30,7 +30,7 @@ from typing import Any, Final
 from arena.campaign.campaign import Plan, run_one
 from arena.debug.controlled_robot import ControlledRobot, ReplayRequired
 from arena.scene.loader import FCY
-from arena.trial.checkpoints import CAN_COPY, PipeClosedError, PipeEnd, ProcessForker
+from arena.trial.checkpoints import CAN_FORK, PipeClosedError, PipeEnd, ProcessForker
 from emu.dap.server import Server
 from emu.dap.wire import Message
 from emu.debug.environment import CheckpointResumedError
@@ -117,7 +117,7 @@ class CheckpointedRobot(ControlledRobot):
     @property
     def has_checkpoints(self) -> bool:
         """As `Environment.has_checkpoints`."""
-        return CAN_COPY
+        return CAN_FORK
 
     def offer_checkpoint(self, near: int | None = None) -> None:
         """As `Environment.offer_checkpoint`. After the end of the trial the last checkpoint is near enough."""
@@ -125,7 +125,7 @@ class CheckpointedRobot(ControlledRobot):
         is_due = last is None or cycle - last >= self._interval
         if near is not None and last is not None and not is_due:
             is_due = near - cycle <= NEAR < (cycle - last) // 2
-        if is_due and CAN_COPY and not self.is_over:
+        if is_due and CAN_FORK and not self.is_over:
             self._checkpoint_cycle = cycle
             self._checkpoint()
 
@@ -178,7 +178,7 @@ class CheckpointedRobot(ControlledRobot):
 
     def _fork(self) -> tuple[PipeEnd | None, bool]:
         try:
-            return self._forker.make()
+            return self._forker.fork()
         except OSError:
             return None, False
 

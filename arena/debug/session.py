@@ -111,7 +111,7 @@ class DebugSession:
 
     def close(self) -> None:
         """End the trial and its process."""
-        self._checkpoints.forget(-1)
+        self._checkpoints.discard_after(-1)
         self._pipe.close()
         self._process.join(PATIENCE_S)
 
@@ -136,9 +136,9 @@ class DebugSession:
 
     def _rewind(self, cycle: int, count: int) -> None:
         """Continue from the latest checkpoint before `cycle`; the server has received `count` messages."""
-        self._checkpoints.forget(cycle)
-        while (checkpoint := self._checkpoints.before(cycle)) is not None:
-            self._checkpoints.pop(checkpoint)
+        self._checkpoints.discard_after(cycle)
+        while (checkpoint := self._checkpoints.latest_before(cycle)) is not None:
+            self._checkpoints.remove(checkpoint)
             with suppress(PipeClosedError):
                 checkpoint.pipe.send(("fork",))
                 fork = checkpoint.pipe.receive()[1]

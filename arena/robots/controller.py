@@ -23,9 +23,9 @@ The `clustering` firmware reads the picture region to its end (16.4 ms) before i
 FIRST_FRAME_TCY: Final = 853_232
 """Time from power-on to the first middle of the sensor window.
 
-tests/arena/robots/test_firmware_controller.py measures this value and LATENCY_TCY on the `clustering` firmware. The published
-trials used them, so they stay. The firmware is 0.15 ms later, at 855,484 Tcy: the camera model includes the last bit
-of a register's value.
+tests/arena/robots/test_firmware_controller.py measures this value and LATENCY_TCY on the `clustering` firmware.
+The published trials used them, so they stay. The firmware is 0.15 ms later, at 855,484 Tcy, because the camera model
+includes the last bit of a register's value.
 """
 OK_DECODED_TCY: Final = 354_275
 """Time from the remote control's key until the `clustering` firmware has decoded it, 24.0 ms (bare: 345,804)."""
@@ -37,7 +37,7 @@ STRIP_PIXELS: Final = 20
 pixels (openswarm-original.md §8)."""
 
 
-class UartLine(NamedTuple):
+class SerialLine(NamedTuple):
     """A line that a robot sent on UART1; `cycle` of the trial is that of its first byte."""
 
     cycle: int
@@ -79,7 +79,7 @@ class Controller(Protocol):
     def reading(self) -> Reading:
         """Return the values to record, and begin the next period of `load`."""
 
-    def take_lines(self) -> list[UartLine]:
+    def take_lines(self) -> list[SerialLine]:
         """Return the lines sent on UART1 since the last call."""
 
     def take_led_changes(self) -> list[LedChange]:
@@ -166,7 +166,7 @@ class ScriptedController:
         """As `Controller.reading`."""
         return self._reading
 
-    def take_lines(self) -> list[UartLine]:
+    def take_lines(self) -> list[SerialLine]:
         """Return no lines: a scripted controller has no UART."""
         return []
 

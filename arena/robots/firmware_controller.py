@@ -27,7 +27,7 @@ from arena.robots.controller import (
     STRIP_PIXELS,
     LedChange,
     Reading,
-    UartLine,
+    SerialLine,
     power_on_cycle,
     remote_key_cycle,
 )
@@ -146,7 +146,7 @@ class FirmwareController:
         for bit, pin in enumerate(LED_PINS.values()):
             self.machine.peripherals.pins.watch(pin, partial(self._on_led, bit), lazy=not self._sees_leds)
         self._strip: tuple[NDArray[np.intp], NDArray[np.uint8]] | None = None
-        self._lines: list[UartLine] = []
+        self._lines: list[SerialLine] = []
         self._line_bytes = bytearray()
         self._uart_output: bytearray | None = None
         self._line_cycle = 0
@@ -372,7 +372,7 @@ class FirmwareController:
             self._uart_output.append(byte)
         if byte in b"\r\n" or len(self._line_bytes) >= LINE_LIMIT:
             if self._line_bytes:
-                self._lines.append(UartLine(self._line_cycle, self._line_bytes.decode("ascii", "backslashreplace")))
+                self._lines.append(SerialLine(self._line_cycle, self._line_bytes.decode("ascii", "backslashreplace")))
             self._line_bytes.clear()
         if byte not in b"\r\n":
             if not self._line_bytes:
@@ -410,7 +410,7 @@ class FirmwareController:
         if (rays := self.native.take_strip_rays()) is not None and rays.columns is not None:
             self._strip = rays.columns, rays.pixels
 
-    def take_lines(self) -> list[UartLine]:
+    def take_lines(self) -> list[SerialLine]:
         """As `Controller.take_lines`."""
         lines, self._lines = self._lines, []
         return lines

@@ -7,21 +7,21 @@ from itertools import combinations
 
 Point = Sequence[float]
 Side = tuple[float, float, float, float]
-"""x, y of both ends."""
+"""x and y of both ends."""
 
 
 def sides(points: Sequence[Point]) -> list[Side]:
-    """The closed outline."""
+    """Return the sides of the closed outline."""
     return [(a[0], a[1], b[0], b[1]) for a, b in zip(points, [*points[1:], points[0]], strict=True)]
 
 
 def area(points: Sequence[Point]) -> float:
-    """Positive if the corners go round counter-clockwise."""
+    """Return the signed area, positive if the corners are in counter-clockwise order."""
     return sum(x1 * y2 - x2 * y1 for x1, y1, x2, y2 in sides(points)) / 2
 
 
 def is_simple(points: Sequence[Point]) -> bool:
-    """Whether a polygon has area and no two of its sides meet but neighbours at their corner."""
+    """Whether a polygon has an area and its sides meet only at common corners."""
     outline = sides(points)
     if abs(area(points)) < 1e-9 or len({tuple(point) for point in points}) < len(points):
         return False
@@ -33,11 +33,12 @@ def is_simple(points: Sequence[Point]) -> bool:
 
 
 def _turn(ax: float, ay: float, bx: float, by: float, cx: float, cy: float) -> float:
+    """Return twice the signed area of a triangle: positive for a left turn."""
     return (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
 
 
 def _cross(one: Side, other: Side) -> bool:
-    """Whether two sides have a point in common."""
+    """Whether two sides have a common point."""
     a, b = _turn(*one, other[0], other[1]), _turn(*one, other[2], other[3])
     c, d = _turn(*other, one[0], one[1]), _turn(*other, one[2], one[3])
     if (a > 0) != (b > 0) and (c > 0) != (d > 0):
@@ -48,7 +49,7 @@ def _cross(one: Side, other: Side) -> bool:
 
 
 def contains(points: Sequence[Point], x: float, y: float) -> bool:
-    """Whether a point lies in a polygon: an odd number of its sides lie to the right of it."""
+    """Whether a point is in a polygon: a ray to the right crosses an odd number of sides."""
     inside = False
     for x1, y1, x2, y2 in sides(points):
         if (y1 > y) != (y2 > y) and x < x1 + (y - y1) / (y2 - y1) * (x2 - x1):
@@ -57,7 +58,7 @@ def contains(points: Sequence[Point], x: float, y: float) -> bool:
 
 
 def distance_to(x: float, y: float, side: Side) -> float:
-    """From a point to the nearest point of a side."""
+    """Return the distance from a point to the nearest point of a side."""
     x1, y1, x2, y2 = side
     dx, dy = x2 - x1, y2 - y1
     length2 = dx * dx + dy * dy

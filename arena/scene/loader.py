@@ -1,7 +1,6 @@
-"""Scenes: TOML files to checked values. What enters: a name or a path. What leaves: a `Scene`, which knows no physics.
+"""Load scenes: from a name or the path of a TOML file to a validated `Scene`.
 
-A new scene is a new TOML file; keys that are left out take the values of `clustering.toml`'s comments, unknown keys are
-errors. `scenery.py` has the tables and what each value can be.
+Omitted keys have the defaults of `schema.py`, which also has the limits of all values. Unknown keys are errors.
 """
 
 from __future__ import annotations
@@ -51,17 +50,17 @@ COLOUR: Final = re.compile(r"#[0-9a-fA-F]{6}")
 
 
 class SceneError(ValueError):
-    """A scene cannot be read or built; the text names file and key, and the line if there is one."""
+    """A scene cannot be read or built; the message names the file, the key, and the line if there is one."""
 
 
 @dataclass(frozen=True, slots=True)
 class Scene:
-    """Everything about a world that is not chance."""
+    """All values of a world that are not random."""
 
     name: str
     description: str = ""
     experiment: str = "plain"
-    """What is measured: an experiment's name, or the path of a Python file, from the scene's file on."""
+    """Name of an experiment, or path of its Python file, relative to the scene file."""
     arena: Arena = field(default_factory=Arena)
     marks: Marks = field(default_factory=Marks)
     robots: Robots = field(default_factory=Robots)
@@ -74,24 +73,24 @@ class Scene:
     bluetooth: Bluetooth = field(default_factory=Bluetooth)
     clock: Clock = field(default_factory=Clock)
     groups: tuple[RobotGroup, ...] = ()
-    """Empty: `robots.count` robots of one kind on marks."""
+    """Groups of robots; empty: `robots.count` robots of one kind on marks."""
     kinds: tuple[ObjectKind, ...] = ()
-    """Empty: `objects.count` objects of one kind on marks."""
+    """Kinds of objects; empty: `objects.count` objects of one kind on marks."""
     obstacles: tuple[Obstacle, ...] = ()
     patches: tuple[Patch, ...] = ()
     lamps: tuple[Lamp, ...] = ()
 
     @property
     def is_furnished(self) -> bool:
-        """Whether there is more to see or to bump into than four walls and objects of one kind."""
+        """Whether the scene has more than four walls and objects of one kind."""
         return bool(self.kinds or self.obstacles or self.patches or self.arena.polygon)
 
     def group_of(self, robot: int) -> RobotGroup:
-        """What kind of robot one is."""
+        """Return the group of a robot."""
         return _nth(self.groups, robot) if self.groups else RobotGroup()
 
     def id_of(self, robot: int) -> int:
-        """A robot's number within the swarm: its place in its group, counted from the group's first."""
+        """Return the number that replaces `{id}` in a robot's stimulus: its index in its group plus `id_first`."""
         first = 0
         for group in self.groups:
             if robot < first + group.count:
@@ -100,7 +99,7 @@ class Scene:
         return robot
 
     def start_of(self, robot: int) -> Start:
-        """How a robot comes to life."""
+        """Return power-on and inputs of a robot, with the values of its group."""
         group = self.group_of(robot)
         stimulus = self.start.stimulus if group.stimulus == INHERIT else group.stimulus
         return replace(
@@ -111,14 +110,14 @@ class Scene:
         )
 
     def off_tick(self, robot: int) -> int:
-        """Quanta after which a robot's battery is taken out; beyond every trial if it is not."""
+        """Return the tick at which a robot's battery is removed; after every trial if it never is."""
         for one, seconds in self.start.off:
             if one == robot:
                 return round(seconds * FCY / self.clock.quantum_tcy)
         return 1 << 62
 
     def kind_of(self, number: int) -> ObjectKind:
-        """What kind of object one is."""
+        """Return the kind of an object."""
         if self.kinds:
             return _nth(self.kinds, number)
         one = self.objects
@@ -126,7 +125,7 @@ class Scene:
                           share=self.infrared.object_share)  # fmt: skip
 
     def with_values(self, **values: Any) -> Scene:
-        """A copy with `section__key=value` replaced, checked. Raises SceneError."""
+        """Return a validated copy with `section__key=value` replaced. Raises SceneError."""
         scene = self
         for place, value in values.items():
             section, _, key = place.partition("__")
@@ -153,17 +152,17 @@ def _nth(kinds: tuple[K, ...], number: int) -> K:
 
 
 def scripted(scene: Scene) -> Scene:
-    """The scene as scripted controllers live in it: with their own, longer quantum."""
+    """Return the scene with the longer quantum of scripted controllers."""
     return scene.with_values(clock__quantum_ms=scene.clock.scripted_quantum_ms)
 
 
 def scenes() -> list[str]:
-    """Names of the scenes that come along."""
+    """Return the names of the included scenes."""
     return sorted(path.stem for path in FOLDER.glob("*.toml"))
 
 
 def load_scene(name: str) -> Scene:
-    """A scene by name, or from the TOML file at a path. Raises SceneError."""
+    """Load a scene by name, or from the TOML file at a path. Raises SceneError."""
     path = Path(name) if name.endswith(".toml") or is_standard(name) else FOLDER / f"{name}.toml"
     try:
         text = read_file(path).decode()
@@ -171,7 +170,7 @@ def load_scene(name: str) -> Scene:
     except FileNotFoundError:
         raise SceneError(f"there is no scene {name!r}; known: {', '.join(scenes())}, or a path to a .toml") from None
     except UnicodeDecodeError as error:
-        raise SceneError(f"{path}:{error.object[: error.start].count(10) + 1}: is no UTF-8 text") from None
+        raise SceneError(f"{path}:{error.object[: error.start].count(10) + 1}: is not UTF-8 text") from None
     except tomllib.TOMLDecodeError as error:
         line = re.search(r"at line (\d+)", str(error))
         at = int(line[1]) if line else text.count("\n") + 1
@@ -183,20 +182,20 @@ def load_scene(name: str) -> Scene:
 
 
 def scene_of(values: dict[str, Any]) -> Scene:
-    """The scene a record was made in, from its metadata. Raises SceneError for one this version cannot build."""
+    """Return the scene of a record from its metadata. Raises SceneError if this version cannot build it."""
     errors = _Errors("the record")
     return _checked(_scene(errors, values), errors)
 
 
 class _Errors:
-    """Makes errors that name the file's line, found again by table and key: the parser does not tell it."""
+    """Creates errors with the line in the file. The TOML parser reports no lines, so it searches table and key."""
 
     def __init__(self, path: str, text: str = "") -> None:
         self._path = path
         self._lines = text.splitlines()
 
     def at(self, table: str, key: str, words: str, number: int | None = None) -> SceneError:
-        """About a key of a table, of the `number`th table of that name, or (key empty) the table itself."""
+        """Return an error about a key of the `number`th table of a name, or (empty key) about the table itself."""
         line = self._find(table, key, number) if self._lines else None
         return SceneError(f"{self._path}{f':{line}' if line else ''}: {words}")
 
@@ -229,7 +228,7 @@ def _scene(errors: _Errors, data: dict[str, Any]) -> Scene:
             values[key] = value
         elif key == "chassis" and isinstance(value, dict):
             if "count" in value:
-                raise errors.at("chassis", "count", "chassis.count: robots are counted by their groups")
+                raise errors.at("chassis", "count", "chassis.count: the groups determine the number of robots")
             values["robots"] = _table(errors, "chassis", Robots, value, values.get("robots", Robots()))
         elif key in TABLES and isinstance(value, dict):
             values[key] = _table(errors, key, TABLES[key], value, TABLES[key]())
@@ -244,7 +243,7 @@ def _scene(errors: _Errors, data: dict[str, Any]) -> Scene:
     if "name" not in values:
         raise errors.at("", "name", "a scene needs a name")
     if values.get("groups") and "objects" not in values and "kinds" not in values:
-        values["objects"] = Objects(count=0)  # who writes down every kind of robot does so with objects
+        values["objects"] = Objects(count=0)  # a scene with groups of robots has only the objects it lists
     return _counted(Scene(**values))
 
 
@@ -253,7 +252,7 @@ def _numbered(one: K) -> K:
 
 
 def _counted(scene: Scene) -> Scene:
-    """Numbers of robots and objects as the sums of their kinds; places of robots that are all written down."""
+    """Return the scene with the counts of robots and objects as sums of their kinds, and the size of a polygon."""
     groups, kinds = tuple(map(_numbered, scene.groups)), tuple(map(_numbered, scene.kinds))
     scene = replace(scene, groups=groups, kinds=kinds)
     if groups:
@@ -291,17 +290,17 @@ def _table(errors: _Errors, name: str, kind: type[T], values: dict[str, Any], ba
 
 
 def _wrong_points(value: Any) -> str:
-    """What is wrong with a list of points; empty if nothing is."""
+    """Return what is wrong with a list of points, or an empty text."""
     if not isinstance(value, (list, tuple)) or not all(isinstance(one, (list, tuple)) for one in value):
         return "expected a list of points, [[x, y], ...]"
     for one in value:
         if len(one) not in (2, 3) or not all(type(number) in (int, float) and abs(number) < 1e6 for number in one):
-            return f"{list(one)} is no point [x, y] in cm, or pose [x, y, degrees]"
+            return f"{list(one)}: expected a point [x, y] in cm or a pose [x, y, degrees]"
     return ""
 
 
 def _checked(scene: Scene, errors: _Errors) -> Scene:
-    """Raises SceneError for values no world can have."""
+    """Validate all values of a scene. Raises SceneError."""
     if not NAME.fullmatch(scene.name):
         raise errors.at("", "name", f"name is {scene.name!r}; expected up to 64 letters, digits, blanks and -_., "
                         "a letter or digit first: results go into a folder of this name")  # fmt: skip
@@ -333,7 +332,7 @@ def _check_links(errors: _Errors, scene: Scene) -> None:
         if len(link) != 2 or len(ends) != 2 or not all(end in range(scene.robots.count) for end in ends):
             words = f"expected two different robots of 0 to {scene.robots.count - 1}"
         elif ends in taken:
-            words = "is there twice"
+            words = "is listed twice"
         if words:
             raise errors.at("bluetooth", "links", f"bluetooth.links: {[f'{end:g}' for end in link]}: {words}")
         taken.add(ends)

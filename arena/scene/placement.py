@@ -1,5 +1,4 @@
-"""Start positions: robots and objects on marks of a grid, where the scene says, or drawn by the trial's generator
-(epuck.md §8, experiment)."""
+"""Start positions: on marks of a grid, as listed in the scene, or random (epuck.md §8)."""
 
 from __future__ import annotations
 
@@ -16,11 +15,11 @@ from arena.scene.schema import Placed, RobotGroup
 
 Place = tuple[float, float]
 TRIES: Final = 2000
-"""Of a random place, before the scene counts as full."""
+"""Random positions to try before the scene counts as full."""
 
 
 def marks_of(scene: Scene) -> list[Place]:
-    """Marks in cm from the lower left corner, row by row; those outside the walls are left out."""
+    """Return the marks within the walls in cm from the lower left corner, row by row."""
     grid, arena = scene.marks, scene.arena
     left = (arena.width_cm - (grid.columns - 1) * grid.spacing_cm) / 2
     low = (arena.height_cm - (grid.rows - 1) * grid.spacing_cm) / 2
@@ -30,12 +29,12 @@ def marks_of(scene: Scene) -> list[Place]:
 
 
 def place_all(scene: Scene, rng: np.random.Generator) -> tuple[list[tuple[float, float, float]], list[Place]]:
-    """Poses of the robots (x, y in cm, heading in rad) and places of the objects, no two touching.
+    """Return the poses of the robots (x, y in cm, heading in rad) and the positions of the objects, without contacts.
 
     Raises SceneError if there is no room: too few marks, or marks too near each other or to a wall.
     """
     if scene.groups or scene.kinds or scene.is_furnished:
-        return _Floor(scene, rng).filled()
+        return _Placer(scene, rng).place()
     radii = [dimensions.ROBOT_RADIUS] * scene.robots.count + [scene.objects.radius_cm] * scene.objects.count
     marks = marks_of(scene)
     if len(radii) > len(marks):
@@ -54,8 +53,8 @@ def place_all(scene: Scene, rng: np.random.Generator) -> tuple[list[tuple[float,
     return robots, chosen[scene.robots.count :]
 
 
-class _Floor:
-    """Places given away one after the other: first those written down, then the others, group by group."""
+class _Placer:
+    """Places bodies one after the other: first those with listed poses, then the others, group by group."""
 
     def __init__(self, scene: Scene, rng: np.random.Generator) -> None:
         self._scene = scene
@@ -66,8 +65,8 @@ class _Floor:
         self._sides = [side for shape in (*room, *(one.polygon for one in scene.obstacles)) if shape
                        for side in geometry.sides(shape)]  # fmt: skip
 
-    def filled(self) -> tuple[list[tuple[float, float, float]], list[Place]]:
-        """Everything of the scene at its place."""
+    def place(self) -> tuple[list[tuple[float, float, float]], list[Place]]:
+        """Return the poses of all robots and the positions of all objects."""
         scene = self._scene
         groups = scene.groups or (RobotGroup(count=scene.robots.count),)
         kinds = scene.kinds or (replace(scene.kind_of(0), count=scene.objects.count),)
@@ -77,7 +76,7 @@ class _Floor:
         wanted += [(one, "object", one.radius_cm) for one in kinds]
         found: dict[int, list[tuple[float, ...]]] = {}
         for number in sorted(range(len(wanted)), key=lambda number: wanted[number][0].place != "poses"):
-            found[number] = [self._put(*wanted[number], index) for index in range(wanted[number][0].count)]
+            found[number] = [self._place_one(*wanted[number], index) for index in range(wanted[number][0].count)]
         robots: list[tuple[float, float, float]] = []
         for number, group in enumerate(groups):
             for place in found[number]:
@@ -86,10 +85,11 @@ class _Floor:
                 robots.append((place[0], place[1], drawn if math.isnan(heading) else math.radians(heading)))
         return robots, [(x, y) for number in range(len(groups), len(wanted)) for x, y in found[number]]
 
-    def _put(self, one: Placed, what: str, radius: float, index: int) -> tuple[float, ...]:
+    def _place_one(self, one: Placed, what: str, radius: float, index: int) -> tuple[float, ...]:
+        """Return the pose of body `index` of a group and mark it as taken. Raises SceneError without room."""
         if one.place == "poses":
             pose = one.poses[index]
-            why = self._obstructed(pose[0], pose[1], radius)
+            why = self._obstruction(pose[0], pose[1], radius)
             if why:
                 raise SceneError(f"{self._scene.name}: no room: {what} {one.name or index} at "
                                  f"({pose[0]:g}, {pose[1]:g}) cm {why}")  # fmt: skip
@@ -97,7 +97,7 @@ class _Floor:
             return pose
         why = ""
         for x, y in self._candidates(one, index):
-            why = self._obstructed(x, y, radius)
+            why = self._obstruction(x, y, radius)
             if not why:
                 self._taken.append((x, y, radius))
                 return x, y
@@ -106,6 +106,7 @@ class _Floor:
                          f"{f'; the last one {why}' if why else ''}")  # fmt: skip
 
     def _candidates(self, one: Placed, index: int) -> Iterator[Place]:
+        """Yield candidate positions for body `index` of a group."""
         arena = self._scene.arena
         x = arena.width_cm / 2 if math.isnan(one.x_cm) else one.x_cm
         y = arena.height_cm / 2 if math.isnan(one.y_cm) else one.y_cm
@@ -124,8 +125,8 @@ class _Floor:
                 dx, dy = (self._rng.uniform(-0.5, 0.5, 2) * (wide, deep)).tolist()
             yield x + dx, y + dy
 
-    def _obstructed(self, x: float, y: float, radius: float) -> str:
-        """What is in the way of a disc at a place; empty if nothing is."""
+    def _obstruction(self, x: float, y: float, radius: float) -> str:
+        """Return what obstructs a disc at a position, or an empty text."""
         arena = self._scene.arena
         if min(x, y, arena.width_cm - x, arena.height_cm - y) < radius:
             return "is in a wall"

@@ -70,7 +70,7 @@ class Studio:
     def close(self) -> None:
         """End the trial and its process."""
         with self._lock:
-            self._checkpoints.forget(-1)
+            self._checkpoints.discard_after(-1)
             self._pipe.close()
             self._process.join(PATIENCE_S)
 
@@ -102,9 +102,9 @@ class Studio:
         (state,) = self._send(self._pipe, [Call("rewind_state", (target,))]).results
         if state is None:
             return None
-        self._checkpoints.forget(target)
-        while (checkpoint := self._checkpoints.before(target)) is not None:
-            self._checkpoints.pop(checkpoint)
+        self._checkpoints.discard_after(target)
+        while (checkpoint := self._checkpoints.latest_before(target)) is not None:
+            self._checkpoints.remove(checkpoint)
             with suppress(PipeClosedError):
                 reply = self._send(checkpoint.pipe, [Call("checkpoint", (state,))])
                 break

@@ -22,9 +22,9 @@ from arena.debug.attach import AttachedRobot
 from arena.replay.page import sample_data
 from arena.robots.firmware_controller import FirmwareController
 from arena.scene.loader import SceneError
-from arena.trial.checkpoints import CAN_COPY, PipeClosedError, PipeEnd, ProcessForker
+from arena.trial.checkpoints import CAN_FORK, PipeClosedError, PipeEnd, ProcessForker
 from arena.trial.record import Trial
-from arena.trial.snapshot import digest, place_of
+from arena.trial.snapshot import function_at, state_digest
 from arena.trial.trial import RunningTrial
 
 POLL_S: Final = 0.05
@@ -151,7 +151,7 @@ class TrialSession:
         """
         while True:
             try:
-                pipe, is_fork = self._forker.make()
+                pipe, is_fork = self._forker.fork()
             except OSError:
                 pipe, is_fork = None, False
             if not is_fork:
@@ -267,7 +267,7 @@ class TrialSession:
             return {"robot": robot, "script": True}
         machine = controller.machine
         return {
-            "robot": robot, "pc": machine.pc, "place": place_of(machine), "cycle": machine.cycle,
+            "robot": robot, "pc": machine.pc, "place": function_at(machine), "cycle": machine.cycle,
             "sr": machine.peek("SR"),
             "asleep": machine.is_asleep, "w": [machine.peek(f"W{n}") for n in range(16)],
             "frames": [str(frame) for frame in machine.backtrace()[:MAX_FRAMES]],
@@ -277,7 +277,7 @@ class TrialSession:
 
     def digest(self) -> str:
         """Return the SHA-256 of the whole state: all bodies with their speeds, and all machines."""
-        return digest(self._running.world, self._running.controllers)
+        return state_digest(self._running.world, self._running.controllers)
 
     # -- main loop ---------------------------------------------------------------------------------------------------
 
@@ -352,7 +352,7 @@ class TrialSession:
         end = results[0] if results and isinstance(results[0], PipeEnd) else None
         world = self._running.world
         is_plain = not (self._hit or self._attached or self._failure or self._is_modified)
-        self._pipe.send((None, [] if end else results, (world.ticks, world.seconds, CAN_COPY and is_plain)), end)
+        self._pipe.send((None, [] if end else results, (world.ticks, world.seconds, CAN_FORK and is_plain)), end)
         if end is not None:
             end.drop()
 

@@ -1,7 +1,7 @@
-"""Moments of a process that are kept, to go on from: copies of it, each at the other end of a line, asleep.
+"""Checkpoints of a trial process: forked copies, each blocked on a pipe until it is resumed.
 
-A copy made by `fork` is the process at that instant, to the byte, with what libraries keep where nobody else can reach
-it. It costs the memory in which it differs from those that went on. A line that is closed ends whoever is at its end.
+A copy made by `fork` is the process at that instant, to the byte, with the hidden state of its libraries. It costs the
+memory in which it differs from the processes that continue. Closing a pipe ends the process at its other end.
 """
 
 from __future__ import annotations
@@ -17,29 +17,30 @@ from contextlib import suppress
 from multiprocessing.context import ForkServerContext, SpawnContext
 from typing import Any, Final, NamedTuple
 
-CAN_COPY: Final = sys.platform == "linux"
-"""Elsewhere the system's own libraries do not all survive a fork."""
-KEPT: Final = 10
-"""Moments that are kept at most."""
+CAN_FORK: Final = sys.platform == "linux"
+"""Whether processes can be forked. On other systems some libraries of the system do not survive a fork."""
+MAX_CHECKPOINTS: Final = 10
+"""Greatest number of checkpoints."""
 EVERY_S: Final = 10.0
-"""Simulated seconds from one moment to the next, while they are new."""
+"""Simulated seconds between two checkpoints, while they are new."""
 PATIENCE_S: Final = 5.0
-"""For which a process is waited for that is to end."""
+"""Seconds to wait for a process to end."""
 _HEAD: Final = struct.Struct("<Q")
+"""Length of a message."""
 
 
 class PipeClosedError(ConnectionError):
-    """The other end of a line was closed."""
+    """The other end of a pipe was closed."""
 
 
 class PipeEnd:
-    """One end of a line between two processes, along which go objects, and ends of other lines."""
+    """One end of a pipe between two processes. It transports objects, and ends of other pipes."""
 
     def __init__(self, end: socket.socket) -> None:
         self.end: Final = end
 
     def send(self, what: Any, end: PipeEnd | None = None) -> None:
-        """Raises PipeClosedError."""
+        """Send an object, and optionally an end of another pipe. Raises PipeClosedError."""
         body = pickle.dumps(what)
         head = _HEAD.pack(len(body))
         try:
@@ -52,7 +53,7 @@ class PipeEnd:
             raise PipeClosedError(str(error)) from None
 
     def receive(self) -> tuple[Any, PipeEnd | None]:
-        """The next object, and the end that came with it. Raises PipeClosedError."""
+        """Return the next object and the end that came with it. Raises PipeClosedError."""
         try:
             head, ends, _, _ = socket.recv_fds(self.end, _HEAD.size, 1)
             end = socket.socket(fileno=ends[0]) if ends else None
@@ -65,6 +66,7 @@ class PipeEnd:
         return pickle.loads(body), PipeEnd(end) if end is not None else None
 
     def _exactly(self, count: int) -> bytes:
+        """Read `count` bytes. Raises PipeClosedError."""
         parts = []
         while count:
             parts.append(self.end.recv(min(count, 1 << 20)))
@@ -74,14 +76,15 @@ class PipeEnd:
         return b"".join(parts)
 
     def is_ready(self, wait: float) -> bool:
-        """Whether something has come, or comes within so many seconds; also that it was closed."""
+        """Whether data, or the end of data, is available within `wait` seconds."""
         return bool(select.select([self.end], [], [], wait)[0])
 
     def fileno(self) -> int:
+        """Return the file descriptor."""
         return self.end.fileno()
 
     def close(self) -> bool:
-        """End whoever is at the other end; whether it has ended."""
+        """Close the pipe and wait for the process at the other end. Return whether it has ended."""
         with self.end as end, suppress(TimeoutError):
             with suppress(ConnectionError):
                 end.shutdown(socket.SHUT_WR)
@@ -92,19 +95,19 @@ class PipeEnd:
         return False
 
     def drop(self) -> None:
-        """Close it here; another process has it too."""
+        """Close this process's descriptor; another process has the same end."""
         self.end.close()
 
 
 def pipe() -> tuple[PipeEnd, PipeEnd]:
-    """Both ends of a new line."""
+    """Return both ends of a new pipe."""
     one, other = socket.socketpair()
     return PipeEnd(one), PipeEnd(other)
 
 
 def context() -> SpawnContext | ForkServerContext:
-    """How a process is begun that can be copied: it must have no other threads."""
-    if not CAN_COPY:
+    """Return the multiprocessing context for a process that can be forked: it starts without other threads."""
+    if not CAN_FORK:
         return multiprocessing.get_context("spawn")
     made = multiprocessing.get_context("forkserver")
     made.set_forkserver_preload(["arena.studio.session", "arena.robots.firmware_controller"])
@@ -112,14 +115,13 @@ def context() -> SpawnContext | ForkServerContext:
 
 
 class ProcessForker:
-    """In the process that is copied: the copies that are its children."""
+    """Forks the process it is in, and reaps the copies that have ended."""
 
     def __init__(self) -> None:
         self._children: list[int] = []
 
-    def make(self) -> tuple[PipeEnd, bool]:
-        """Copy this process. Comes back twice: in this one with the line to the copy and false, in the copy with its
-        own end and true. Raises OSError."""
+    def fork(self) -> tuple[PipeEnd, bool]:
+        """Fork this process and return an end of a pipe between both, and whether this is the copy. Raises OSError."""
         self._children = [one for one in self._children if os.waitpid(one, os.WNOHANG)[0] == 0]
         here, there = pipe()
         child = os.fork()
@@ -133,7 +135,7 @@ class ProcessForker:
 
 
 class Checkpoint(NamedTuple):
-    """A copy that sleeps."""
+    """A blocked copy of the trial process."""
 
     tick: int
     seconds: float
@@ -141,37 +143,37 @@ class Checkpoint(NamedTuple):
 
 
 class CheckpointPool:
-    """The moments of one trial, the oldest first."""
+    """The checkpoints of one trial, the oldest first."""
 
     def __init__(self) -> None:
-        self._moments: Final[list[Checkpoint]] = []
+        self._checkpoints: Final[list[Checkpoint]] = []
 
     def __len__(self) -> int:
-        return len(self._moments)
+        return len(self._checkpoints)
 
     def is_due(self, seconds: float) -> bool:
-        """Whether that time is far enough from the newest moment, or the beginning."""
-        return seconds - (self._moments[-1].seconds if self._moments else 0.0) >= EVERY_S
+        """Whether EVERY_S has passed since the newest checkpoint, or since the start."""
+        return seconds - (self._checkpoints[-1].seconds if self._checkpoints else 0.0) >= EVERY_S
 
-    def add(self, moment: Checkpoint) -> None:
-        """Keep it. If there are too many then, the one goes that leaves the smallest gap, for its age: what is long ago
-        is kept more coarsely."""
-        self._moments.append(moment)
-        if len(self._moments) > KEPT:
-            times = [0.0, *(one.seconds for one in self._moments)]
+    def add(self, checkpoint: Checkpoint) -> None:
+        """Add a checkpoint. If there are too many, end the one whose gap is smallest for its age, so that older
+        checkpoints are further apart."""
+        self._checkpoints.append(checkpoint)
+        if len(self._checkpoints) > MAX_CHECKPOINTS:
+            times = [0.0, *(one.seconds for one in self._checkpoints)]
             now = times[-1]
             gaps = [(times[i + 1] - times[i - 1]) / (now - times[i]) for i in range(1, len(times) - 1)]
-            self._moments.pop(gaps.index(min(gaps))).pipe.close()
+            self._checkpoints.pop(gaps.index(min(gaps))).pipe.close()
 
-    def before(self, tick: int) -> Checkpoint | None:
-        """The latest that is not after `tick`."""
-        return next((one for one in reversed(self._moments) if one.tick <= tick), None)
+    def latest_before(self, tick: int) -> Checkpoint | None:
+        """Return the latest checkpoint that is not after `tick`."""
+        return next((one for one in reversed(self._checkpoints) if one.tick <= tick), None)
 
-    def pop(self, moment: Checkpoint) -> None:
-        """It is awake now."""
-        self._moments.remove(moment)
+    def remove(self, checkpoint: Checkpoint) -> None:
+        """Remove a checkpoint whose process was resumed."""
+        self._checkpoints.remove(checkpoint)
 
-    def forget(self, tick: int) -> None:
-        """What was after `tick` will never be."""
-        while self._moments and self._moments[-1].tick > tick:
-            self._moments.pop().pipe.close()
+    def discard_after(self, tick: int) -> None:
+        """End the checkpoints after `tick`."""
+        while self._checkpoints and self._checkpoints[-1].tick > tick:
+            self._checkpoints.pop().pipe.close()

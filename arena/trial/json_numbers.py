@@ -1,4 +1,4 @@
-"""Numbers as JSON that every reader takes: what is no number, or beyond all bounds, is null."""
+"""JSON that every reader accepts: nan and infinities become null. Validation of JSON values against a shape."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 
 
 def finite(value: Any) -> Any:
-    """The same value of dictionaries, lists and numbers, with None for nan and both infinities."""
+    """Return a copy of nested dictionaries and lists with None for nan and both infinities."""
     if isinstance(value, dict):
         return {key: finite(one) for key, one in value.items()}
     if isinstance(value, (list, tuple)):
@@ -17,15 +17,19 @@ def finite(value: Any) -> Any:
 
 
 def json_text(value: Any, **options: Any) -> str:
-    """`value` as `json.dumps` writes it with `options`."""
+    """Return `value` as JSON; `options` are those of `json.dumps`."""
     return json.dumps(finite(value), allow_nan=False, **options)
 
 
 def misfit(value: Any, shape: Any, name: str = "it") -> str:
-    """What is first wrong with `value` of a JSON text; empty if it is of `shape`.
+    """Return the first mismatch between the JSON value and `shape`, or an empty text.
 
-    A shape is a type, `[shape]` for a list of such, `(shape, ...)` for a list of just those, or `{key: shape}` for a
-    table that has these keys among others; a key with `?` behind it may be missing or null.
+    A shape is one of:
+
+    - a type
+    - `[shape]`: a list of any length
+    - `(shape, ...)`: a list of exactly these
+    - `{key: shape}`: a table with at least these keys; a key that ends in `?` may be missing or null
     """
     if isinstance(shape, dict):
         if not isinstance(value, dict):

@@ -1,4 +1,4 @@
-"""The manifest beside the trials of a run: what the run depends on, who made it, and what each trial took."""
+"""The manifest of a run: what its trials depend on, the host it ran on, and the host time of each trial."""
 
 from __future__ import annotations
 
@@ -18,24 +18,27 @@ _SHAPE: Final = {
 
 
 def read_manifest(folder: Path) -> dict[str, Any]:
-    """The manifest of a run. Raises RecordError if there is none, or something in it is missing or of another kind."""
+    """Read the manifest of a run. Raises RecordError if it is missing or invalid."""
     path = folder / MANIFEST
     try:
         value: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError) as error:
         raise RecordError(f"{path}: {error}") from None
     if wrong := misfit(value, _SHAPE):
-        raise RecordError(f"{path}: is no manifest of a run: {wrong}")
+        raise RecordError(f"{path}: is not the manifest of a run: {wrong}")
     return value
 
 
 def write_manifest(folder: Path, value: dict[str, Any]) -> None:
-    """Write it whole or not at all. Raises RecordError."""
+    """Write the manifest atomically. Raises RecordError."""
     write_json(folder / MANIFEST, value)
 
 
 def note_host_time(folder: Path, trial: int, host_s: float, faults: object) -> None:
-    """Keep how long a trial took, and its faults: a trial's bytes must not depend on host time. Raises RecordError."""
+    """Add the host time and the faults of a trial. They are not in the record, whose bytes must not depend on the host.
+
+    Raises RecordError.
+    """
     value = read_manifest(folder)
     value["host"].append({"trial": trial, "host_s": round(host_s, 2), "faults": faults})
     write_manifest(folder, value)

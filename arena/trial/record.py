@@ -1,6 +1,6 @@
-"""Trials on disk: one Parquet file each, with what it was made from in its metadata, beside a manifest in JSON.
+"""Records of trials: one Parquet file each, with its inputs in the metadata.
 
-A file appears whole or not at all (written beside its place, then renamed), and the same trial gives the same bytes.
+Files are written atomically (to a temporary file, which is then renamed). The same trial gives the same bytes.
 """
 
 from __future__ import annotations
@@ -23,24 +23,22 @@ from arena.trial.json_numbers import misfit
 from arena.trial.trial import Rows
 from emu.host.files import atomic_file, is_standard, read_file
 
-if TYPE_CHECKING:  # pyarrow is 30 MB in every process that loads it; those that only carry robots need none
+if TYPE_CHECKING:  # pyarrow takes 30 MB in every process that loads it, and running a trial does not need it
     import pyarrow as pa
 
 EXPERIMENT: Final = "experiment.py"
-"""The experiment's file as it was when the run began, if it is one's own."""
-
-
+"""Copy of the user's experiment file in the folder of a run, made when the run began."""
 FAULT: Final = (int, float, str)
-"""A robot, s, why."""
-MOST: Final = 1e7
-"""No place in cm, time in s, speed or share of a trial comes near; what does not hold for nan, either."""
+"""JSON shape of a fault: robot, seconds, description."""
+MAX_VALUE: Final = 1e7
+"""Bound of all numbers of a record: positions in cm, times in s, speeds, shares. nan is not below it."""
 _HEAD: Final = {"scene": dict, "brain": str, "controller": str, "seed": int, "faults": [FAULT], "image_sha256?": str,
                 "images_sha256?": dict, "versions?": dict}  # fmt: skip
-"""What a record says of itself, at least."""
+"""JSON shape of the metadata."""
 
 
 class RecordError(Exception):
-    """A record cannot be written or read; the text names the file."""
+    """A record cannot be written or read; the message names the file."""
 
 
 class FolderInUseError(RecordError):
@@ -48,19 +46,19 @@ class FolderInUseError(RecordError):
 
 
 class Columns(dict[str, Any]):
-    """Columns of a trial by name. One that is not there raises RecordError: the file is damaged."""
+    """Columns of a trial by name. A missing one raises RecordError."""
 
     def __init__(self, path: Path) -> None:
         super().__init__()
         self._path: Final = path
 
     def __missing__(self, name: str) -> Any:
-        raise RecordError(f"{self._path}: is no whole trial: there is no column {name}")
+        raise RecordError(f"{self._path}: is not a complete trial: column {name} is missing")
 
 
 @dataclass(frozen=True)
 class Trial:
-    """One recorded trial. `columns` as in docs/experiment.md; `about` is its metadata."""
+    """One recorded trial. docs/experiment.md explains `columns`; `about` is the metadata."""
 
     path: Path
     columns: dict[str, Any]
@@ -68,32 +66,32 @@ class Trial:
 
     @property
     def times(self) -> NDArray[np.float64]:
-        """s."""
+        """Times of the samples, s."""
         return np.array(self.columns["t"])
 
     @property
     def objects(self) -> NDArray[np.float64]:
-        """samples x objects x 2, cm."""
+        """Positions of the objects: samples x objects x 2, cm."""
         return self._places("o", self.scene.objects.count)
 
     @property
     def robots(self) -> NDArray[np.float64]:
-        """samples x robots x 2, cm."""
+        """Positions of the robots: samples x robots x 2, cm."""
         return self._places("r", self.scene.robots.count)
 
     @property
     def is_scripted(self) -> bool:
-        """Whether no robot had firmware."""
+        """Whether all robots had scripted controllers."""
         return not any((self.about.get("image_sha256"), *(self.about.get("images_sha256") or {}).values()))
 
     @cached_property
     def scene(self) -> Scene:
-        """What it was made in. Raises SceneError for a scene this version cannot build."""
+        """Scene of the trial. Raises SceneError if this version cannot build it."""
         return scene_of(self.about["scene"])
 
     @cached_property
     def experiment(self) -> Experiment:
-        """What it is measured by. Records of before scenes named their experiment are of clustering."""
+        """Experiment of the trial; `clustering` if the scene in the record names none."""
         name = str(self.about["scene"].get("experiment", "clustering"))
         beside = self.path.parent / EXPERIMENT
         return experiment_of(str(beside.resolve()) if name.endswith(".py") and beside.exists() else name)
@@ -110,10 +108,10 @@ class Trial:
         turned = np.stack(headings, axis=1)[:, :, None] if headings else np.zeros((len(self.times), 0, 1))
         noted = {name[2:]: np.asarray(values) for name, values in self.columns.items() if name.startswith("n_")}
         lines = [line for sample in self.columns.get("log", []) for line in sample or ()]
-        said = [UartLine(line["robot"], line["cycle"] / FCY, line["text"]) for line in lines]
-        said.sort(key=lambda one: one.seconds)
+        heard = [UartLine(line["robot"], line["cycle"] / FCY, line["text"]) for line in lines]
+        heard.sort(key=lambda one: one.seconds)
         robots = np.concatenate([self.robots, turned], axis=2)
-        return TrialSamples(self.times, robots, self.objects, self.scene, noted, said)
+        return TrialSamples(self.times, robots, self.objects, self.scene, noted, heard)
 
     def _places(self, letter: str, count: int) -> NDArray[np.float64]:
         if not count:
@@ -124,7 +122,7 @@ class Trial:
 
 
 def write_trial(path: Path, rows: Rows, about: dict[str, Any]) -> None:
-    """Write a trial. Raises RecordError, for example on a full disk; then no file is left."""
+    """Write a trial. Raises RecordError, for example on a full disk, and then leaves no file."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
@@ -140,12 +138,12 @@ def write_trial(path: Path, rows: Rows, about: dict[str, Any]) -> None:
 
 
 def reason_of(error: OSError) -> str:
-    """The system's words; libraries add theirs."""
+    """Return the operating system's text of an error, without additions of libraries."""
     return os.strerror(error.errno) if error.errno else str(error)
 
 
 def kind_of(column: str) -> pa.DataType:
-    """Type of a column: numbers by sample, but what robots said and showed as lists of events."""
+    """Return the type of a column: a number per sample, or a list of events for log, messages and lights."""
     import pyarrow as pa
 
     said = pa.list_(pa.struct([("robot", pa.int16()), ("cycle", pa.int64()), ("text", pa.string())]))
@@ -155,12 +153,12 @@ def kind_of(column: str) -> pa.DataType:
     )
     kinds = {"log": said, "messages": sent, "lights": shown, "seen": pa.int16(), "leds": pa.int16(),
              "strip": pa.binary(), "infrared": pa.list_(pa.int16())}  # fmt: skip
-    is_noted = column.startswith("n_")  # a supervisor's numbers have the names it likes
+    is_noted = column.startswith("n_")  # the supervisor chooses these names, so they can end like any other
     return pa.float64() if is_noted else kinds.get(column.rsplit("_", 1)[-1], pa.float64())
 
 
 def read_trial(path: Path) -> Trial:
-    """Read a trial. Raises RecordError for what is none."""
+    """Read a trial. Raises RecordError if the file is not one."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
@@ -168,38 +166,38 @@ def read_trial(path: Path) -> Trial:
         table = pq.read_table(pa.BufferReader(read_file(path)) if is_standard(path) else path)
         about = json.loads((table.schema.metadata or {})[b"arena"])
     except (OSError, pa.ArrowException, KeyError, ValueError, RecursionError) as error:
-        raise RecordError(f"{path}: is no recorded trial: {error}") from None
+        raise RecordError(f"{path}: is not a recorded trial: {error}") from None
     columns = Columns(path)
     columns.update({name: _values(path, name, table[name]) for name in table.column_names})
     return Trial(path, columns, checked(path, about))
 
 
 def checked(path: Path, about: Any) -> dict[str, Any]:
-    """What a record says of itself. Raises RecordError if something is missing or of another kind."""
+    """Return the metadata of a record. Raises RecordError if a value is missing or of the wrong type."""
     if wrong := misfit(about, _HEAD):
-        raise RecordError(f"{path}: is no whole trial: {wrong}")
+        raise RecordError(f"{path}: is not a complete trial: {wrong}")
     return dict(about)
 
 
 def _values(path: Path, name: str, column: Any) -> Any:
-    """Numbers as an array, anything else as a list. Raises RecordError for a column of another kind."""
+    """Return a column: numbers as an array, others as a list. Raises RecordError for a wrong type or value."""
     import pyarrow as pa
 
-    filled = column.drop_null() if name.endswith("_infrared") else column  # no round of conversions since the last
+    filled = column.drop_null() if name.endswith("_infrared") else column  # null: no conversions since the last sample
     if column.type != kind_of(name) or _has_gaps(filled):
-        raise RecordError(f"{path}: is no whole trial: column {name} is not whole or not of {kind_of(name)}")
+        raise RecordError(f"{path}: is not a complete trial: column {name} has gaps or is not of type {kind_of(name)}")
     if not pa.types.is_integer(column.type) and not pa.types.is_floating(column.type):
         return column.to_pylist()
     values = column.to_numpy()
     if name.endswith("_seen") and not np.isin(values, (-1, NOTHING, OBJECT, ROBOT)).all():
-        raise RecordError(f"{path}: is no whole trial: column {name} is not of -1 to {ROBOT}")
-    if not name.startswith("n_") and not (np.abs(values) < MOST).all():
-        raise RecordError(f"{path}: is no whole trial: column {name} is not of numbers below {MOST:g}")
+        raise RecordError(f"{path}: is not a complete trial: column {name}: expected -1 to {ROBOT}")
+    if not name.startswith("n_") and not (np.abs(values) < MAX_VALUE).all():
+        raise RecordError(f"{path}: is not a complete trial: column {name}: expected numbers below {MAX_VALUE:g}")
     return values
 
 
 def _has_gaps(column: Any) -> bool:
-    """Whether a value is missing, in whatever depth."""
+    """Whether a value is missing at any depth of a nested column."""
     import pyarrow as pa
 
     return any(
@@ -211,7 +209,7 @@ def _has_gaps(column: Any) -> bool:
 
 
 def trials_in(folder: Path) -> list[Trial]:
-    """All finished trials of a run, or the one if `folder` is a file. Raises RecordError if there is none."""
+    """Return all finished trials of a run, or the one in the file. Raises RecordError if there is none."""
     if folder.is_file():
         return [read_trial(folder)]
     paths = sorted(folder.glob("trial-*.parquet"))
@@ -221,17 +219,17 @@ def trials_in(folder: Path) -> list[Trial]:
 
 
 def write_json(path: Path, value: Any) -> None:
-    """Write JSON whole or not at all. Raises RecordError."""
+    """Write JSON atomically. Raises RecordError."""
     write_text(path, json.dumps(value, indent=2, sort_keys=True, default=str) + "\n")
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write a text file whole or not at all. Raises RecordError."""
+    """Write a text file atomically. Raises RecordError."""
     write_bytes(path, text.encode())
 
 
 def write_bytes(path: Path, data: bytes) -> None:
-    """Write a file whole or not at all; a device or pipe as it is. Raises RecordError."""
+    """Write a file atomically; devices and pipes are written directly. Raises RecordError."""
     try:
         with atomic_file(path) as part:
             part.write_bytes(data)

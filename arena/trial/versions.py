@@ -1,6 +1,7 @@
-"""What a result depends on beside scene, firmware and seed: the emulator, this package, the libraries, the machine.
+"""Versions that a result depends on beside scene, firmware and seed: emulator, arena, libraries, machine.
 
-The project's version number stands still between releases, so emulator and arena are named by a hash of their sources.
+The project's version number does not change between releases. So emulator and arena are identified by a hash of their
+sources.
 """
 
 from __future__ import annotations
@@ -16,16 +17,16 @@ from typing import Final
 
 ROOT: Final = Path(__file__).resolve().parents[2]
 LIBRARIES: Final = ("pymunk", "numpy", "pyarrow", "llvmlite")
-"""Physics, noise, the file's bytes, native code."""
+"""Libraries for physics, noise, the bytes of a record, and native code."""
 SHOWING: Final = ("commands/", "cli.py", "analysis/", "replay/", "studio/process.py", "campaign/bundle.py", "env.py",
                   "README.md", "scenes/")  # fmt: skip
-"""Of the arena: what only looks at records. A scene is in the key by its values."""
+"""Parts of the arena that only read records; their sources are not hashed. A scene is in the key by its values."""
 _KINDS: Final = {".py", ".c", ".csv", ".toml"}
 
 
 @cache
 def sources_hash(package: str) -> str:
-    """SHA-256 of a package's sources with their names, the first 16 digits. Line ends and folders do not count."""
+    """Return the first 16 digits of the SHA-256 of a package's sources and their names, independent of line ends."""
     digest = hashlib.sha256()
     folder = ROOT / package
     for path in sorted(folder.rglob("*")):
@@ -37,7 +38,7 @@ def sources_hash(package: str) -> str:
 
 
 def versions() -> dict[str, str]:
-    """Of everything the bytes of a record can depend on."""
+    """Return the versions of everything the bytes of a record can depend on."""
     found = {"emulator": sources_hash("emu"), "arena": sources_hash("arena"), "machine": platform.machine()}
     for name in LIBRARIES:
         try:
@@ -48,7 +49,7 @@ def versions() -> dict[str, str]:
 
 
 def host() -> dict[str, str]:
-    """Where a run was made, for people: nothing of it shows in a record."""
+    """Return a description of the host for people; the record does not depend on it."""
     found = {"python": platform.python_version(), "system": sys.platform, "openswarm": version("openswarm")}
     try:
         said = subprocess.run(["git", "-C", str(ROOT), "describe", "--always", "--dirty", "--abbrev=40"],

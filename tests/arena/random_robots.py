@@ -1,7 +1,7 @@
-"""Random programs for robots of a swarm: they look, sense, talk, turn, sleep, are interrupted, trapped and reset.
+"""Random programs for robots of a swarm: camera, infrared, UART, motors, sleep, interrupts, traps and resets.
 
-In: a source of chance, the sensor of the camera. Out: assembly. `tests/fuzz/swarm/fuzz_swarm.py` runs them in every way a
-swarm can be run.
+Input: a random generator, the sensor of the camera. Output: assembly. `tests/fuzz/swarm/fuzz_swarm.py` runs them in all
+modes of a swarm.
 """
 
 from __future__ import annotations

@@ -138,10 +138,10 @@ def test_firmware_turns_to_another_robot_whose_red_led_is_lit(
         assert lit == pytest.approx((1.0, 0.1) if sees else (0.1, 0.1), abs=0.05)
 
 
-def test_records_are_the_same_for_two_processes(
+def test_records_are_the_same_for_two_threads(
     clustering_image: Path, assembled: Callable[[str], Path], tmp_path: Path
 ) -> None:
-    """Switches of LEDs travel between processes as those of emitters do."""
+    """LED changes reach other robots' cameras independently of the thread that runs a robot."""
     blinker = assembled(BLINKER)
     text = f"""name = "leds"
 [camera]
@@ -161,9 +161,9 @@ poses = [[221, 150, 180]]
     path = tmp_path / "leds.toml"
     path.write_text(text)
     records = []
-    for processes in ("1", "2"):
-        out = tmp_path / processes
-        command = ["run", str(path), "--trials", "1", "--minutes", "0.02", "--processes", processes, "--out", str(out)]
+    for jobs in ("1", "2"):
+        out = tmp_path / jobs
+        command = ["run", str(path), "--trials", "1", "--minutes", "0.02", "--jobs", jobs, "--out", str(out)]
         assert main(command) == 0
         records.append(out / "trial-0001.parquet")
     assert records[0].read_bytes() == records[1].read_bytes()

@@ -82,7 +82,7 @@ def test_a_trial_says_what_it_was_made_from(tmp_path: Path) -> None:
         (["run", "clustering", *SHORT, "--trials", "0"], "expected a whole number of 1 or more"),
         (["compare", "nowhere", "elsewhere"], "no finished trials"),
         (["replay", "nowhere.parquet"], "no such file"),
-        (["replay", __file__], "is no recorded trial"),
+        (["replay", __file__], "is not a recorded trial"),
         (["sweep", "clustering", *SHORT, "--vary", "camera"], "expected SECTION.KEY=V1,V2"),
     ],
 )

@@ -29,7 +29,7 @@ from tests.firmware.conftest import built_once
 from tests.fuzz.swarm.fuzz_rewind import SWARMS, Swarm, plan_of, walk
 
 FEW = Swarm("clustering", 1.0, (), (), {"robots__count": 2, "objects__count": 2, "start__selector": 8})
-needs_fork = pytest.mark.skipif(not checkpoints.CAN_COPY, reason="checkpoints exist on Linux only")
+needs_fork = pytest.mark.skipif(not checkpoints.CAN_FORK, reason="checkpoints exist on Linux only")
 
 
 @pytest.fixture
@@ -119,7 +119,7 @@ def test_without_checkpoints_a_trial_runs_again(tmp_path: Path, image_of: Callab
     """The number of checkpoints is limited; without them the trial runs again from its seed to equal worlds."""
     with session_of(plan_of(FEW, 7, image_of), tmp_path, every_s=0.03) as (session, debugger):
         seen = {cycle: debugger.to(cycle) for cycle in (3_000_000, 6_000_000, 9_000_000)}
-        assert session.checkpoint_count == checkpoints.KEPT
+        assert session.checkpoint_count == checkpoints.MAX_CHECKPOINTS
         assert debugger.to(6_000_000) == seen[6_000_000]
         assert not [text for kind, text in debugger.events if kind == "said" and "run again" in text]
         session._checkpoints.forget(-1)
@@ -182,7 +182,7 @@ def test_without_fork_the_world_goes_back_on_inspection(
     tmp_path: Path, image_of: Callable[[str], Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The robot goes back alone; the trial runs again when the world is inspected or the past changed."""
-    monkeypatch.setattr(server, "CAN_COPY", False)
+    monkeypatch.setattr(server, "CAN_FORK", False)
     monkeypatch.setattr(debugsession, "context", partial(multiprocessing.get_context, "fork"))
     with session_of(plan_of(FEW, 7, image_of), tmp_path) as (session, debugger):
         first = debugger.to(3_000_000)

@@ -15,7 +15,7 @@ import pytest
 import arena
 from arena.infrared.channel import OpticalChannel
 from arena.lockstep.scheduler import LockStep
-from arena.robots.controller import Controller, LedChange, Reading, UartLine
+from arena.robots.controller import Controller, LedChange, Reading, SerialLine
 from arena.robots.firmware_controller import FirmwareController
 from arena.scene.loader import Scene, load_scene
 from arena.trial.trial import run_trial
@@ -37,7 +37,7 @@ class Stepwise:
     def reading(self) -> Reading:
         return self._controller.reading()
 
-    def take_lines(self) -> list[UartLine]:
+    def take_lines(self) -> list[SerialLine]:
         return self._controller.take_lines()
 
     def take_led_changes(self) -> list[LedChange]:

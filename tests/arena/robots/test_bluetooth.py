@@ -52,8 +52,8 @@ def test_words_pass_from_robot_to_robot(assembled: Callable[[str], Path], tmp_pa
     assert sample_data(trial)["messages"] == trial.columns["messages"]
 
 
-def test_the_number_of_processes_does_not_show(assembled: Callable[[str], Path], tmp_path: Path) -> None:
-    """Robots in two processes, the same bytes."""
+def test_the_record_is_the_same_for_two_threads(assembled: Callable[[str], Path], tmp_path: Path) -> None:
+    """Equal to the byte."""
     image = assembled(ECHO)
     for name in ("one", "two"):
         (tmp_path / name).mkdir()
@@ -75,7 +75,7 @@ def test_without_links_there_is_no_column_of_messages(assembled: Callable[[str],
         ([[0, 5]], "two different robots of 0 to 4"),
         ([[0, 0.5]], "two different robots of 0 to 4"),
         ([[0, 1, 2]], "two different robots of 0 to 4"),
-        ([[0, 1], [1, 0]], "is there twice"),
+        ([[0, 1], [1, 0]], "is listed twice"),
         ([0, 1], "expected a list of points"),
     ],
 )

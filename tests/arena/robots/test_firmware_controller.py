@@ -199,7 +199,7 @@ def test_the_scenes_light_reaches_the_camera(talking_image: Path, alone: Scene) 
     for brightness in (1.0, 0.5):
         firmware = FirmwareController(alone.with_values(light__brightness=brightness), 1, 0, talking_image)
         poses = World.of(alone, 1, [(200, 150, 0.0)], []).poses
-        firmware._see(0, poses, poses)
+        firmware._begin_quantum(0, poses, poses)
         pictures.append(firmware.machine.board.camera.frame(cycle=0).astype(int))
     lit, dim = (picture[:, :, 0].mean() for picture in pictures)
     assert dim == pytest.approx(lit / 2, rel=0.1)
@@ -244,4 +244,4 @@ def test_moments_of_probes_are_those_the_generator_would_draw(clustering_image: 
     firmware = FirmwareController(alone, 1, 0, clustering_image)
     twin = np.random.default_rng()
     twin.bit_generator.state = firmware._rng.bit_generator.state
-    assert [firmware._below(end) for _ in range(2000)] == [int(twin.integers(end)) for _ in range(2000)]
+    assert [firmware._random_below(end) for _ in range(2000)] == [int(twin.integers(end)) for _ in range(2000)]

@@ -176,11 +176,11 @@ def test_colours_and_heights_are_seen(yard: Scene) -> None:
     yellow, blue = colours.index(NAMED["yellow"]), colours.index(NAMED["blue"])
     camera = ReferenceCamera(yard, Poses([(100.0, 35.0, 0.0)] * 4, [(300.0, 300.0)] * 6), 0)
     assert camera.column(320, (240, 250, 200)) == [yellow, yellow, WALL]
-    look = appearance_of(yard)
-    assert look.floor_at(240, 60) == colours.index((0x20, 0x40, 0x60))
-    assert look.floor_at(20, 20) == colours.index(NAMED["white"])
-    assert look.floor_at(100, 100) == FLOOR
-    assert look.sensed[blue] == 0  # the clustering sensor knows red and green only
+    appearance = appearance_of(yard)
+    assert appearance.floor_at(240, 60) == colours.index((0x20, 0x40, 0x60))
+    assert appearance.floor_at(20, 20) == colours.index(NAMED["white"])
+    assert appearance.floor_at(100, 100) == FLOOR
+    assert appearance.sensor_classes[blue] == 0  # the clustering sensor knows red and green only
 
 
 def test_what_stands_fast_stops_a_robot(yard: Scene) -> None:
@@ -222,14 +222,14 @@ def test_infrared_feels_what_stands_fast_and_all_lamps(yard: Scene) -> None:
         (('place = "normal"', 'place = "gauss"'), 30, "objects.place is 'gauss'; expected marks, uniform"),
         (('colour = "black"', 'colour = "pink"'), 55, "obstacles.colour is 'pink'; expected red,"),
         (("[170, 50], [150, 50]]", "[150, 50], [170, 50]]"), 46, "obstacles.polygon: its sides cross"),
-        (("[50, 50], [0, 50]]", "[50]]"), 60, "patches.polygon: [50] is no point [x, y]"),
+        (("[50, 50], [0, 50]]", "[50]]"), 60, "patches.polygon: [50]: expected a point [x, y]"),
         (("poses = [[40, 200, 90]]", ""), 23, 'robots.poses goes with place = "poses"'),
         (("counts = 2000", "counts = 2000\n[start]\noff = [[1, 2], [4, 1]]"), 75, "start.off: ['4', '1']: expected a"),
         (("counts = 2000", "counts = 2000\n[start]\noff = [[1, 2], [1, 1]]"), 75, "start.off: ['1', '1']: expected a"),
         (("counts = 2000", "counts = 2000\n[infrared]\nlost_share = 2"), 75, "infrared.lost_share is 2.0; expected"),
         (("counts = 2000", "counts = true"), 73, "lamps.counts is True; expected float"),
         (('name = "yard"', 'name = "../yard"'), 1, "name is '../yard'"),
-        (("[chassis]\n", "[chassis]\ncount = 3\n"), 8, "chassis.count: robots are counted by their groups"),
+        (("[chassis]\n", "[chassis]\ncount = 3\n"), 8, "chassis.count: the groups determine the number of robots"),
         (("[[lamps]]", "[[lumps]]"), 70, "unexpected 'lumps'; expected name,"),
         (('controller = "B"', "controller = B"), 19, "Invalid value"),
         (('controller = "B"', 'controller = "C"'), 19, "robots.controller is 'C'; expected A or B"),
@@ -333,7 +333,7 @@ def _refusal(path: Path) -> str:
 def test_groups_have_their_own_firmware_switch_and_number(
     assembled: Callable[[str], Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Two images and a script in one trial; any number of processes writes the same bytes."""
+    """A trial of two images and a scripted robot is the same to the byte for one and two jobs."""
     one = assembled(SPEAKER.format(letter="P"))
     two = assembled(SPEAKER.format(letter="Q"))
     (tmp_path / "p.elf").write_bytes(one.read_bytes())
@@ -351,9 +351,9 @@ selector = 9
 [[robots]]
 image = "scripted"
 """)
-    for processes in (1, 2):
-        assert main(["run", str(path), "--trials", "1", "--minutes", "0.01", "--processes", str(processes), "--out",
-                     str(tmp_path / str(processes))]) == 0  # fmt: skip
+    for jobs in ("1", "2"):
+        assert main(["run", str(path), "--trials", "1", "--minutes", "0.01", "--jobs", jobs, "--out",
+                     str(tmp_path / jobs)]) == 0  # fmt: skip
     trial = read_trial(tmp_path / "1" / "trial-0001.parquet")
     said = sorted((line["robot"], line["text"]) for row in trial.columns["log"] for line in row)
     assert said == [(0, "41"), (0, "PD"), (1, "42"), (1, "PD"), (2, "QJ")]

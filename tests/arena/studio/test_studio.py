@@ -145,7 +145,7 @@ def test_commands_during_a_rewind_discard_later_actions() -> None:
         assert studio.ask("digest") == last, "later actions are discarded"
 
 
-@pytest.mark.skipif(not checkpoints.CAN_COPY, reason="checkpoints exist on Linux only")
+@pytest.mark.skipif(not checkpoints.CAN_FORK, reason="checkpoints exist on Linux only")
 def test_a_checkpoint_restores_the_state_to_the_byte(
     clustering_image: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -195,8 +195,8 @@ def test_older_checkpoints_have_larger_distances() -> None:
         there.drop()
         ends.append(here)
         pool.add(checkpoints.Checkpoint(ten * 1000, 10.0 * ten, here))
-    assert len(pool) == checkpoints.KEPT
-    assert sum(end.fileno() >= 0 for end in ends) == checkpoints.KEPT
+    assert len(pool) == checkpoints.MAX_CHECKPOINTS
+    assert sum(end.fileno() >= 0 for end in ends) == checkpoints.MAX_CHECKPOINTS
     times = [moment.seconds for moment in (pool.before(tick) for tick in range(0, 60001, 500)) if moment is not None]
     ages = sorted({600.0 - one for one in times})
     assert ages[:3] == [0.0, 10.0, 20.0]

@@ -129,11 +129,11 @@ def test_objects_whose_joints_are_out_of_the_solver_are_where_they_were_to_the_b
             plain._world.steps = 0  # it never looks for what may rest
             plain.step(wheels)
             assert quick.poses.values.tobytes() == plain.poses.values.tobytes()
-            now = [disc.rests for disc in quick._discs]
+            now = [disc.is_resting for disc in quick._discs]
             roused += sum(one and not other for one, other in zip(before, now, strict=True))
             before = now
         resting.append(sum(before))
-    assert not any(disc.rests for disc in plain._discs)
+    assert not any(disc.is_resting for disc in plain._discs)
     assert max(resting) > 7
     assert roused > 10
     assert max(abs(x - a) for (x, _), (a, _) in zip(quick.poses.objects, objects, strict=True)) > 5
@@ -227,13 +227,13 @@ def test_speeds_are_those_of_the_last_quanta_together() -> None:
         for _ in range(rng.randrange(1, 9)):
             made = made[0] + rng.choice((-1, 0, 0, 1)), made[1] + rng.choice((0, 1))
             new.append(made)
-        wheels.turned(tick, array("q", [count for pair in new for count in pair]))
+        wheels.add_steps(tick, array("q", [count for pair in new for count in pair]))
         for left, right in new:
             counts.append((left, right))
             rate = dimensions.CM_PER_STEP * 14_745_600 / (quantum * (len(counts) - 1))
             assert wheels.speed(tick) == ((left - counts[0][0]) * rate, (right - counts[0][1]) * rate)
             tick += 1
-    wheels.rested(tick)
+    wheels.set_stopped(tick)
     assert wheels.speed(tick) == (0.0, 0.0)
 
 
@@ -249,9 +249,9 @@ def test_copied_poses_are_where_their_numbers_are(again) -> None:
 @pytest.mark.parametrize(("robots", "objects"), [(3, 0), (0, 3), (3, 3)])
 def test_a_camera_has_room_for_its_scene_alone(robots: int, objects: int) -> None:
     """Each of both is counted: the light of a robot's LEDs is found by its number."""
-    sight = Renderer(load_scene("clustering").with_values(robots__count=2, objects__count=2), 0)
+    renderer = Renderer(load_scene("clustering").with_values(robots__count=2, objects__count=2), 0)
     with pytest.raises(ValueError, match=f"{robots} robots and {objects} objects are more than the scene has"):
-        sight.look(Poses([(9.0 * n, 9.0, 0.0) for n in range(robots)], [(50.0, 50.0)] * objects))
+        renderer.set_viewpoint(Poses([(9.0 * n, 9.0, 0.0) for n in range(robots)], [(50.0, 50.0)] * objects))
 
 
 def test_quanta_in_a_row_are_quanta_one_by_one() -> None:
@@ -260,13 +260,13 @@ def test_quanta_in_a_row_are_quanta_one_by_one() -> None:
     rows, one = World(scene, 3), World(scene, 3)
     wheels = [Wheels(scene.clock.quantum_tcy) for _ in range(2)]
     for robot, speeds in enumerate(wheels):
-        speeds.turned(0, array("q", [count for tick in range(900) for count in (tick // 3, tick // (2 + robot))]))
+        speeds.add_steps(0, array("q", [count for tick in range(900) for count in (tick // 3, tick // (2 + robot))]))
     addresses = (c_void_p * 2)(*(speeds.address for speeds in wheels))
     for count in (1, 7, 300, 592):
-        for stretch in rows.go(addressof(addresses), ROOM, count):
-            for tick in range(stretch.first, stretch.last + 1):
+        for block in rows.run_quanta(addressof(addresses), ROOM, count):
+            for tick in range(block.first, block.last + 1):
                 one.step([speeds.speed(one.ticks) for speeds in wheels])
-                poses = rows.at(stretch, tick)
+                poses = rows.poses_in(block, tick)
                 assert poses.values.tolist() == one.poses.values.tolist()
                 assert poses.address == poses.values.ctypes.data
     assert (rows.ticks, rows.poses.counts) == (900, (2, 5))

@@ -78,7 +78,7 @@ def test_a_bad_file_of_options_is_named(text: str, words: str, tmp_path: Path) -
 
 
 def test_a_record_without_a_column_is_named(tmp_path: Path) -> None:
-    with pytest.raises(RecordError, match="there is no column r0_x"):
+    with pytest.raises(RecordError, match="column r0_x is missing"):
         Columns(tmp_path)["r0_x"]
 
 

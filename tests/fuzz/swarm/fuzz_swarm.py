@@ -131,7 +131,7 @@ class Trial:
                 width, height = scene.arena.width_cm, scene.arena.height_cm
                 world.move(world.robots[who], 10 + where * (width - 20), height / 2, 6 * where)
             if lockstep is not None:
-                lockstep.moved()
+                lockstep.refresh_poses()
         tally["interpreted"] += sum(robot.machine.runner.counts.interpreted for robot in robots)
         tally["Tcy"] += sum(robot.machine.cycle for robot in robots)
         tally["resets"] += sum(cycle > 0 for robot in robots for cycle, _ in robot.machine.resets)
