@@ -51,13 +51,13 @@ def look(level: str, work: tuple[str, Path]) -> tuple[str, str, list[dict[str, A
     """Part, file and verdicts of one file; none where it cannot be compiled by itself."""
     from toolchain.errors import ToolError
     from toolchain.frontend.clang import CompileError
-    from toolchain.proof.problem import subject
+    from toolchain.proof.problem import compile_file
     from toolchain.proof.prove import verdicts
 
     part, file = work
     name = file.relative_to(ROOT).as_posix()
     try:
-        return part, name, [asdict(v) for v in verdicts(subject([str(file), *options_of(part, level)]))]
+        return part, name, [asdict(v) for v in verdicts(compile_file([str(file), *options_of(part, level)]))]
     except (ToolError, CompileError) as error:
         print(f"{name}: {error}", file=sys.stderr)
         return part, name, []

@@ -9,7 +9,7 @@ from toolchain.commands.names import letter
 from toolchain.commands.parser import parser
 from toolchain.elf import constants as c
 from toolchain.elf.disassemble import Item, Names, items, text_of
-from toolchain.elf.dwarf import Lines, SourceText, lines_of
+from toolchain.elf.dwarf import LineTable, SourceText, lines_of
 from toolchain.elf.model import Executable, Home, ObjectFile, Section
 from toolchain.elf.read import is_object, read_executable, read_object
 from toolchain.errors import ToolError
@@ -103,7 +103,7 @@ def _relocations(sections: list[Section]) -> None:
 def _disassembly(
     image: ObjectFile | Executable, sections: list[Section], source: bool, relocs: bool, start: str | None
 ) -> None:
-    lines = lines_of(image) if source and isinstance(image, Executable) else Lines({})
+    lines = lines_of(image) if source and isinstance(image, Executable) else LineTable({})
     if source and isinstance(image, Executable) and not len(lines):
         print("(no line information in this file)")
     text = SourceText()
@@ -132,7 +132,7 @@ def _range(image: ObjectFile | Executable, start: str | None) -> tuple[int, int]
 
 
 def _print_item(
-    section: Section, item: Item, names: Names, lines: Lines, text: SourceText, previous: str, relocs: bool
+    section: Section, item: Item, names: Names, lines: LineTable, text: SourceText, previous: str, relocs: bool
 ) -> str:
     """Print one item with label, source and relocations; return the source line it belongs to."""
     symbol = names.at["code"].get(item.address)

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from emu.image.lines import Line, Lines
+from emu.image.lines import LineTable, SourceLine
 from toolchain.elf.model import Executable
 
-__all__ = ["Line", "Lines", "SourceText", "lines_of"]
+__all__ = ["LineTable", "SourceLine", "SourceText", "lines_of"]
 
 
-def lines_of(image: Executable) -> Lines:
+def lines_of(image: Executable) -> LineTable:
     """Return the line table of `image`; empty when it carries no DWARF."""
-    return Lines({s.name: bytes(s.data) for s in image.sections if s.name.startswith(".debug_")})
+    return LineTable({s.name: bytes(s.data) for s in image.sections if s.name.startswith(".debug_")})
 
 
 class SourceText:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from emu.image.elf_facts import OCTETS_PER_WORD, Formula, Place, RelocationType
+from emu.image.elf_facts import OCTETS_PER_WORD, Formula, RelocatedField, RelocationType
 
 
 class FieldError(Exception):
@@ -14,7 +14,7 @@ def positions(kind: RelocationType, offset: int, code: bool) -> list[int]:
     count = (kind.width + 7) // 8
     if not code:
         return [offset + 2 * i for i in range(count)]
-    used = 2 if kind.place is Place.DATA else 3
+    used = 2 if kind.place is RelocatedField.DATA else 3
     result = []
     for _ in range(count):
         if offset % OCTETS_PER_WORD >= used:
@@ -27,7 +27,7 @@ def positions(kind: RelocationType, offset: int, code: bool) -> list[int]:
 def load(data: bytearray, offset: int, kind: RelocationType, code: bool) -> int:
     """Return the raw, unsigned content of the field."""
     try:
-        if kind.place is Place.WORD:
+        if kind.place is RelocatedField.WORD:
             word = data[offset] | data[offset + 1] << 8 | data[offset + 2] << 16
             return word >> kind.lsb & (1 << kind.width) - 1
         return int.from_bytes(bytes(data[p] for p in positions(kind, offset, code)), "little")
@@ -38,7 +38,7 @@ def load(data: bytearray, offset: int, kind: RelocationType, code: bool) -> int:
 def store(data: bytearray, offset: int, kind: RelocationType, code: bool, raw: int) -> None:
     """Replace the field by the low bits of `raw`."""
     try:
-        if kind.place is Place.WORD:
+        if kind.place is RelocatedField.WORD:
             mask = (1 << kind.width) - 1 << kind.lsb
             word = data[offset] | data[offset + 1] << 8 | data[offset + 2] << 16
             word = word & ~mask | raw << kind.lsb & mask

@@ -1,1 +1,1 @@
-"""Proofs by an SMT solver that machine code does what the optimised LLVM IR says."""
+"""Translation validation: proofs by an SMT solver that machine code implements the optimised LLVM IR."""

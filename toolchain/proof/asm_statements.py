@@ -1,8 +1,8 @@
-"""Assembly statements: where the code may have one, and in which registers its operands are.
+"""Inline assembly statements: their possible positions in the code, and the registers of their operands.
 
-A statement is its text: the same instructions on operands that hold what they should are the statement, whoever wrote
-them. So each stretch of the assembly text that reads like a template of the IR is marked with labels; where the source
-comes to a statement, the code must come to one of its stretches. What the instructions do is nobody's business.
+A statement is identified by its text.  Each sequence of assembly lines that matches a template of the IR is marked with
+labels.  Where the source reaches a statement, the code must reach a matching sequence whose operands hold the same
+values.  The meaning of the instructions is not examined.
 """
 
 from __future__ import annotations
@@ -19,26 +19,31 @@ from toolchain.select.asm_inline import REGISTER_NAMES
 
 LABEL: Final = "__statement_"
 REFERENCE: Final = re.compile(r"\$(?:(\d+)|\{(\d+)(?::(\w))?\}|\{:uid\}|(\$))")
-"""What a template has of operands (GCC's %0, %d1, %=, and a dollar sign), as clang hands it over."""
+"""Operand references in a template as clang spells them (GCC's %0, %d1, %=, and a dollar sign)."""
 PART: Final = re.compile(r"[^,{]*\{[^}]*\}[^,]*|[^,]+")
 REGISTER: Final = re.compile(r"w(\d+)")
 
 
 @dataclass(frozen=True)
 class Operand:
-    """One of the constraints. `tied`: number of the output it shares registers with; `fixed`: the first of them."""
+    """One operand constraint.
+
+    early  whether an output is written before all inputs are read
+    tied   number of the output that the operand shares registers with, None without one
+    fixed  its first register, where the constraint names one
+    """
 
     output: bool
     early: bool
     tied: int | None
     fixed: int | None
     allowed: tuple[int, ...] | None
-    """Registers of its class, where it names one."""
+    """Registers of the operand's class, where the constraint names a class."""
 
 
 @dataclass(frozen=True)
 class Shape:
-    """What the constraints say: operands by number, registers that are overwritten, whether memory may be."""
+    """The constraints of a statement: operands by number, clobbered registers, whether memory is clobbered."""
 
     operands: tuple[Operand, ...]
     clobbered: frozenset[int]
@@ -47,15 +52,17 @@ class Shape:
 
 @dataclass(frozen=True)
 class Statement:
-    """A stretch of code, up to the address `end`, that reads like a template. `texts`: what stands for an operand, by
-    number and modifier."""
+    """A code sequence, up to the address `end`, that matches a template.
+
+    texts  text of each operand reference, by operand number and modifier
+    """
 
     template: str
     end: int
     texts: Mapping[tuple[int, str], str]
 
     def register(self, number: int, operand: Operand) -> int | None:
-        """The first register of an operand that is not tied, None if it has none."""
+        """Return the first register of an operand that is not tied, None if it has none."""
         if operand.fixed is not None:
             return operand.fixed
         found = REGISTER.fullmatch(self.texts.get((number, ""), ""))
@@ -63,7 +70,7 @@ class Statement:
 
 
 def shape_of(code: InlineAsm) -> Shape:
-    """Raises Undecided."""
+    """Return the constraints of a statement; raises Undecided for operands in memory."""
     operands: list[Operand] = []
     clobbered: set[int] = set()
     memory = False
@@ -88,19 +95,21 @@ def shape_of(code: InlineAsm) -> Shape:
 
 
 def plain(text: str) -> str:
-    """A template without the front end's mark."""
+    """Return a template without the front end's mark."""
     return MARK.sub("", text)
 
 
 def templates(module: Module) -> set[str]:
-    """Of all statements that have text."""
+    """Return the templates of all statements with text."""
     codes = [i.args[-1] for f in module.functions.values() for b in f.blocks for i in b.instrs if i.op == "call"]
     return {plain(code.text) for code in codes if isinstance(code, InlineAsm) and code.text.strip()}
 
 
 def marked(text: str, wanted: Iterable[str]) -> tuple[str, list[tuple[str, str, dict[tuple[int, str], str], str]]]:
-    """Assembly text with labels around each stretch that reads like one of the templates; of each the label it begins
-    with, its template, what stands for operands, and the label behind it."""
+    """Return assembly text with labels around each sequence that matches a template, and a list of the sequences.
+
+    A sequence is (label at its start, template, operand texts, label after it).
+    """
     found = []
     for template in sorted(wanted):
         pattern = _pattern(template)

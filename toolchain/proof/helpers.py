@@ -1,7 +1,7 @@
-"""Functions of the run-time library that stand for an operation of the IR, as what they are documented to give back
-(abi-elf.md §2.8): on integers what the operation means, of floating point a number that depends on the operands only.
+"""Models of the run-time library functions that implement operations of the IR (abi-elf.md §2.8).
 
-That the library's code does so is not assumed by the proof of a caller to be right: it has proofs and tests of its own.
+Integer functions are modelled by the operation.  Floating-point functions are uninterpreted: their result depends only
+on the operands.  A caller's proof relies on these models; the library's code has proofs and tests of its own.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from typing import Final
 
 import z3
 
-from toolchain.abi.arguments import Shape, place_arguments
+from toolchain.abi.arguments import ArgumentShape, argument_locations
 from toolchain.proof.terms import Term
 
 Meaning = Callable[..., Term]
@@ -20,7 +20,7 @@ Meaning = Callable[..., Term]
 
 @dataclass(frozen=True)
 class Helper:
-    """Widths of its operands in bits, and of the result; the meaning on vectors of those widths."""
+    """Model of a library function: widths of operands and result in bits, and its meaning on such vectors."""
 
     operands: tuple[int, ...]
     result: int
@@ -28,14 +28,14 @@ class Helper:
 
     @property
     def gives(self) -> range:
-        """Registers of the result."""
+        """Return the registers of the result."""
         return range(self.result // 16)
 
     def call(self, registers: Sequence[Term]) -> list[Term]:
-        """What the result registers hold behind it, W0 first."""
-        shapes = [Shape(bits // 16, True) for bits in self.operands]
+        """Return the result registers after a call, W0 first."""
+        shapes = [ArgumentShape(bits // 16, True) for bits in self.operands]
         values = []
-        for place in place_arguments(shapes):
+        for place in argument_locations(shapes):
             assert place.register is not None
             words = [registers[place.register + k] for k in range(place.words)]
             values.append(words[0] if len(words) == 1 else z3.Concat(*reversed(words)))
@@ -44,7 +44,7 @@ class Helper:
 
 
 def opaque(name: str, result: int) -> Meaning:
-    """A function nothing is known of but that equal operands give equal results."""
+    """Return an uninterpreted function: equal operands give equal results."""
 
     def meaning(*operands: Term) -> Term:
         sorts = [z3.BitVecSort(one.size()) for one in operands]
@@ -54,7 +54,7 @@ def opaque(name: str, result: int) -> Meaning:
 
 
 def bits_set(a: Term) -> Term:
-    """How many bits of a vector are 1."""
+    """Return the number of bits of a vector that are 1."""
     total = z3.BitVecVal(0, a.size())
     for k in range(a.size()):
         total = total + z3.ZeroExt(a.size() - 1, z3.Extract(k, k, a))
@@ -87,4 +87,4 @@ def _all() -> dict[str, Helper]:
 
 
 HELPERS: Final = _all()
-"""By assembler name."""
+"""Models by assembler name."""

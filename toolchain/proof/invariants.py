@@ -1,7 +1,7 @@
-"""What the machine may hold at a loop's first block: guesses from numbers, to be proved.
+"""Candidate loop invariants: relations between machine locations and source values at a loop head.
 
-In: for each time a few inputs come there, what a register or a word of the frame holds and what the source's values
-are. Out: claims that are true of all of them.
+In: for each visit of the loop head in sample runs, the contents of a register or frame word and the values of the
+source.  Out: relations that hold in all of these visits, to be proved by induction.
 """
 
 from __future__ import annotations
@@ -16,21 +16,21 @@ from toolchain.proof.ir.operands import either
 from toolchain.proof.terms import WORD, Term, vector
 
 FACTORS: Final = (1, -1, 2, -2, 4, -4)
-"""What a value is multiplied by in a sum: steps of pointers, and counts that go down."""
-FEWEST: Final = 4
-"""Times the machine must have been there before a sum is guessed, which chance could make."""
+"""Factors of a value in a sum: steps of pointers, and decreasing counts."""
+MIN_VISITS: Final = 4
+"""Least number of visits for a candidate with a sum, which could hold by coincidence."""
 
 
 @dataclass(frozen=True)
-class Part:
-    """A word of a value: its key on a path, its number, and whether above a short value stands its sign."""
+class ValueWord:
+    """A 16-bit word of a source value: key of the value on a path, index of the word, sign or zero extension."""
 
     key: Any
     number: int = 0
     signed: bool = False
 
     def term(self, values: Mapping[Any, Any]) -> Term:
-        """16 bits."""
+        """Return the word as a term."""
         whole = values[self.key][0]
         bits = WORD * (self.number + 1)
         if whole.size() < bits:
@@ -40,17 +40,19 @@ class Part:
 
 
 @dataclass(frozen=True)
-class Claim:
-    """A register (0-14) or a word of the frame (its address) holds a sum of parts, by factors, and a number; of that
-    its low `bits` are told."""
+class Invariant:
+    """Invariant: the low `bits` of a location equal a sum of value words, each with a factor, and a number.
+
+    place  a register (0-14), or the address of a frame word
+    """
 
     place: int
-    parts: tuple[tuple[int, Part], ...] = ()
+    parts: tuple[tuple[int, ValueWord], ...] = ()
     number: int = 0
     bits: int = WORD
 
     def term(self, values: Mapping[Any, Any]) -> Term:
-        """What it holds."""
+        """Return the sum as a term."""
         terms = [part.term(values) * vector(factor, WORD) if factor != 1 else part.term(values)
                  for factor, part in self.parts]  # fmt: skip
         if self.number or not terms:
@@ -58,29 +60,29 @@ class Claim:
         return z3.simplify(sum(terms[1:], terms[0]))
 
     def poison(self, values: Mapping[Any, Any]) -> Term | None:
-        """When it says nothing."""
+        """Return the condition under which the sum is poison, None if never."""
         found = None
         for _, part in self.parts:
             found = either(found, values[part.key][1])
         return found
 
     def holds(self, held: Term, values: Mapping[Any, Any]) -> Term:
-        """That it is true of what the place holds."""
+        """Return the condition that the invariant holds, for the contents of its location."""
         poison = self.poison(values)
         same = z3.Extract(self.bits - 1, 0, held) == z3.Extract(self.bits - 1, 0, self.term(values))
         return same if poison is None else z3.Or(poison, same)
 
 
 @dataclass(frozen=True)
-class Order:
-    """Among the source's own values, by words, and numbers: that one is not above another, signed or not."""
+class OrderInvariant:
+    """Invariant: a word of a source value, or a number, is not greater than another."""
 
-    low: Part | int
-    high: Part | int
+    low: ValueWord | int
+    high: ValueWord | int
     signed: bool = False
 
     def holds(self, values: Mapping[Any, Any]) -> Term:
-        """It, or one of them is poison."""
+        """Return the condition that the order holds or that a value is poison."""
         sides = (self.low, self.high)
         a, b = (vector(one, WORD) if isinstance(one, int) else one.term(values) for one in sides)
         poison = None
@@ -90,14 +92,14 @@ class Order:
         return same if poison is None else z3.Or(poison, same)
 
 
-def orders(rows: list[dict[Part, int]], sizes: Mapping[Part, int]) -> Iterator[Order]:
-    """Which values were always the same, as branches on the way are, and which were never above others."""
+def candidate_orders(rows: list[dict[ValueWord, int]], sizes: Mapping[ValueWord, int]) -> Iterator[OrderInvariant]:
+    """Yield orders that held in all visits: constant words, and words that were never greater than others."""
     moving = [part for part in rows[0] if len({row[part] for row in rows}) > 1]
     for part, number in rows[0].items():
         if part not in moving:
-            yield from (Order(part, number), Order(number, part))
+            yield from (OrderInvariant(part, number), OrderInvariant(number, part))
     whole = [part for part in rows[0] if sizes[part] == WORD]
-    others: list[Part | int] = [0, *whole]
+    others: list[ValueWord | int] = [0, *whole]
     for a in (part for part in moving if part in whole):
         for b in others:
             for low, high in ((a, b), (b, a)):
@@ -105,60 +107,67 @@ def orders(rows: list[dict[Part, int]], sizes: Mapping[Part, int]) -> Iterator[O
                     flip = 0x8000 if signed else 0
                     pairs = [(_number(low, row) ^ flip, _number(high, row) ^ flip) for row in rows]
                     if a != b and (low != 0 or signed) and all(x <= y for x, y in pairs):
-                        yield Order(low, high, signed)
+                        yield OrderInvariant(low, high, signed)
 
 
-def _number(one: Part | int, row: dict[Part, int]) -> int:
+def _number(one: ValueWord | int, row: dict[ValueWord, int]) -> int:
     return one if isinstance(one, int) else row[one]
 
 
-def parts_of(key: Any, value: tuple[Term, Term | None]) -> Iterator[tuple[Part, int]]:
-    """The words of a value, and how many bits of each are its own."""
+def words_of(key: Any, value: tuple[Term, Term | None]) -> Iterator[tuple[ValueWord, int]]:
+    """Yield the words of a value with the number of bits of each that belong to the value."""
     whole, rest = divmod(value[0].size(), WORD)
-    yield from ((Part(key, n), WORD) for n in range(whole))
+    yield from ((ValueWord(key, n), WORD) for n in range(whole))
     if rest:
-        yield from ((Part(key, whole, signed), rest) for signed in (False, True))
+        yield from ((ValueWord(key, whole, signed), rest) for signed in (False, True))
 
 
-def guessed(place: int, held: list[int], rows: list[dict[Part, int]], sizes: Mapping[Part, int]) -> Iterator[Claim]:
-    """Claims about one place. `rows` are the parts' numbers each time, `sizes` how many bits of a part are its own."""
+def candidate_invariants(
+    place: int, held: list[int], rows: list[dict[ValueWord, int]], sizes: Mapping[ValueWord, int]
+) -> Iterator[Invariant]:
+    """Yield candidate invariants of one location.
+
+    held   contents of the location at each visit
+    rows   numbers of the value words at each visit
+    sizes  by word, the number of bits that belong to the value
+    """
     exact = False
     for part in rows[0]:
         if all(row[part] == number for row, number in zip(rows, held, strict=True)):
             exact = True
-            yield Claim(place, ((1, part),))
+            yield Invariant(place, ((1, part),))
         elif not part.signed and sizes[part] < WORD:
             mask = (1 << sizes[part]) - 1
             if all((row[part] ^ number) & mask == 0 for row, number in zip(rows, held, strict=True)):
-                yield Claim(place, ((1, part),), 0, sizes[part])
+                yield Invariant(place, ((1, part),), 0, sizes[part])
     if len(set(held)) == 1:
-        yield Claim(place, (), held[0])
-    elif not exact and len(rows) >= FEWEST:
+        yield Invariant(place, (), held[0])
+    elif not exact and len(rows) >= MIN_VISITS:
         yield from _sums(place, held, rows)
 
 
-def _sums(place: int, held: list[int], rows: list[dict[Part, int]]) -> Iterator[Claim]:
-    """A value and a number; or two and a number, of which one is multiplied."""
+def _sums(place: int, held: list[int], rows: list[dict[ValueWord, int]]) -> Iterator[Invariant]:
+    """Yield candidates of one value and a number, or of two values, one with a factor, and a number."""
     moving = [part for part in rows[0] if len({row[part] for row in rows}) > 1]
     for a in moving:
         number = _rest(held, [row[a] for row in rows])
         if number is not None:
-            yield Claim(place, ((1, a),), number)
+            yield Invariant(place, ((1, a),), number)
     for n, a in enumerate(moving):
         for k, b in enumerate(moving):
             for factor in FACTORS:
                 if n < k or (n > k and factor != 1):
                     number = _rest(held, [row[a] + factor * row[b] for row in rows])
                     if number is not None:
-                        yield Claim(place, ((1, a), (factor, b)), number)
+                        yield Invariant(place, ((1, a), (factor, b)), number)
     for a in moving:
         for factor in FACTORS[1:]:
             number = _rest(held, [factor * row[a] for row in rows])
             if number is not None:
-                yield Claim(place, ((factor, a),), number)
+                yield Invariant(place, ((factor, a),), number)
 
 
 def _rest(held: list[int], sums: list[int]) -> int | None:
-    """What is missing everywhere, if that is one number."""
+    """Return the difference between contents and sums if it is the same at all visits, else None."""
     rests = {(number - total) & 0xFFFF for number, total in zip(held, sums, strict=True)}
     return rests.pop() if len(rests) == 1 else None

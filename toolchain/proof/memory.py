@@ -1,7 +1,7 @@
-"""Memory of both sides: bytes that everybody shares, and of the machine those of its own frame.
+"""Memory model: shared bytes of source and machine, and the machine's private stack frame.
 
-W15 at entry is a number (`STACK`), so places in a frame are numbers, too. What lies at or above the return address is
-private: no pointer leads there but to the variables that the source has there (`Frame.objects`).
+W15 at entry is a number (`STACK`), so frame addresses are numbers.  The stack from the return address up is private:
+pointers reach only the variables that the source has there (`Frame.objects`).
 """
 
 from __future__ import annotations
@@ -14,34 +14,38 @@ from toolchain.abi.target import RAM_END, RETURN_ADDRESS_BYTES
 from toolchain.proof.terms import Term, known, vector
 
 STACK = 0x1A00
-"""W15 behind the return address, at a function's first instruction."""
+"""W15 at a function's first instruction, above the return address."""
 BYTE = 8
 
 
 @dataclass
 class Frame:
-    """Where the private part of the stack begins, and what of it the source knows: address and bytes of each variable,
-    `escaped` those whose addresses others may have."""
+    """The private part of the stack.
+
+    lowest   its lowest address
+    objects  address and size of each source variable in it
+    escaped  variables whose addresses escape
+    """
 
     lowest: int = STACK - RETURN_ADDRESS_BYTES
     objects: dict[str, tuple[int, int]] = field(default_factory=dict)
     escaped: set[str] = field(default_factory=set)
 
     def is_private(self, address: int) -> bool:
-        """Whether only the machine knows the byte."""
+        """Whether a byte is private to the machine."""
         return self.lowest <= address < RAM_END and not self.is_object(address)
 
     def is_object(self, address: int) -> bool:
-        """Whether the byte is of a variable of the source."""
+        """Whether a byte belongs to a source variable."""
         return any(start <= address < start + size for start, size in self.objects.values())
 
-    def kept(self) -> list[int]:
-        """Bytes of variables whose addresses nobody else has."""
+    def unescaped_bytes(self) -> list[int]:
+        """Return the byte addresses of variables whose addresses do not escape."""
         places = [place for name, place in self.objects.items() if name not in self.escaped]
         return [start + k for start, size in places for k in range(size)]
 
-    def spared(self, address: Term, size: int) -> Term:
-        """That `size` bytes at an address (16 bits) touch nothing private."""
+    def avoids_private_bytes(self, address: Term, size: int) -> Term:
+        """Return the condition that `size` bytes at a 16-bit address overlap no private byte."""
         last = address + (size - 1)
         below = z3.And(z3.ULT(address, self.lowest), z3.ULT(last, self.lowest))
         above = z3.And(z3.UGE(address, RAM_END), z3.UGE(last, RAM_END))
@@ -54,64 +58,64 @@ class Frame:
 
 
 class Memory:
-    """Bytes by address: a z3 array, and over it those that were written at addresses that are numbers."""
+    """Bytes by address: a z3 array, overlaid with the bytes written at known addresses."""
 
     def __init__(self, array: Term, written: dict[int, Term] | None = None) -> None:
         self.array = array
         self.written = written if written is not None else {}
 
     def copy(self) -> Memory:
-        """An independent memory."""
+        """Return an independent copy."""
         return Memory(self.array, dict(self.written))
 
     def whole(self) -> Term:
-        """All of it as one array."""
+        """Return the whole memory as one array."""
         for address, byte in self.written.items():
             self.array = z3.Store(self.array, vector(address, 16), byte)
         self.written.clear()
         return self.array
 
     def byte(self, address: int) -> Term:
-        """The byte at a known address."""
+        """Return the byte at a known address."""
         found = self.written.get(address)
         if found is None:
             found = z3.Select(self.array, vector(address, 16))
         return found
 
     def read(self, address: Term | int, size: int) -> Term:
-        """`size` bytes, the lowest first, as one vector."""
+        """Return `size` bytes, the lowest first, as one vector."""
         place = address if isinstance(address, int) else known(address)
         if place is not None:
             parts = [self.byte((place + k) & 0xFFFF) for k in range(size)]
         else:
             array = self.whole()
             parts = [z3.Select(array, address + k) for k in range(size)]
-        return joined(parts)
+        return concat(parts)
 
     def write(self, address: Term | int, value: Term) -> None:
-        """The bytes of a vector, the lowest first."""
+        """Write the bytes of a vector, the lowest first."""
         place = address if isinstance(address, int) else known(address)
-        for k, part in enumerate(split(value)):
+        for k, part in enumerate(bytes_of(value)):
             if place is not None:
                 self.written[(place + k) & 0xFFFF] = part
             else:
                 self.array = z3.Store(self.whole(), address + k, part)
 
-    def become(self, array: Term, kept: list[int]) -> None:
-        """Others have run: everything may have changed but the bytes at the addresses `kept`."""
+    def havoc(self, array: Term, kept: list[int]) -> None:
+        """Replace the contents by an unknown array, except for the bytes at the addresses `kept`."""
         same = {address: self.byte(address) for address in kept}
         self.array, self.written = array, same
 
 
-def joined(parts: list[Term]) -> Term:
-    """Bytes, the lowest first, as one vector; parts of one vector become that vector again."""
+def concat(parts: list[Term]) -> Term:
+    """Concatenate bytes, the lowest first; the bytes of one vector give that vector again."""
     if len(parts) == 1:
         return parts[0]
     return z3.simplify(z3.Concat(*reversed(parts)))
 
 
-def split(value: Term) -> list[Term]:
-    """The bytes of a vector, the lowest first; the last is filled up with zeros."""
+def bytes_of(value: Term) -> list[Term]:
+    """Return the bytes of a vector, the lowest first; the last is zero-extended."""
     missing = -value.size() % BYTE
     if missing:
         value = z3.ZeroExt(missing, value)

@@ -1,4 +1,4 @@
-"""What one way through a function shows the world, and what must hold on it."""
+"""One path of a function: its observable events, and its conditions."""
 
 from __future__ import annotations
 
@@ -13,87 +13,95 @@ from toolchain.proof.terms import Term
 
 @dataclass
 class Event:
-    """What the world sees: a volatile access, a call, an assembly statement.
+    """An observable event: a volatile access, a call, or an assembly statement.
 
-    `kind` read, write, call or asm. `value` is what was read or written, of a call what it gives back, by words.
+    kind   read, write, call or asm
+    value  the value read or written; for a call its result; for assembly its outputs
     """
 
     kind: str
     address: Any = None
-    """Of an access or a call through a pointer a 16-bit term; of another call its name; of assembly its text."""
+    """16-bit term of an access or a call through a pointer; name of a direct call; text of an assembly statement."""
     size: int = 0
     value: Any = None
     arguments: list[tuple[Value, Any, ParameterAttributes]] = field(default_factory=list)
-    named: int | None = None
+    named_arguments: int | None = None
     memory: Memory | None = None
-    """What must have been written before: of a call, and next to a barrier of the compiler."""
-    loose: tuple[tuple[Term, Term], ...] = ()
-    """Stores, by address and value, that may stand before or behind it."""
-    even: bool = False
-    """Of an access: words of it lie at even addresses."""
+    """Memory at the event, None if stores may be moved over it: calls and compiler barriers fix it."""
+    movable_stores: tuple[tuple[Term, Term], ...] = ()
+    """Stores, by address and value, that may be executed before or after the event."""
+    aligned: bool = False
+    """Whether the words of an access are at even addresses."""
     shape: Shape | None = None
-    """Of an assembly statement: its constraints. Its arguments are the inputs."""
-    tail: bool = False
-    """Of a call: it does not use the caller's variables."""
-    after: Any = None
-    """The array behind it, where others may have written."""
+    """Constraints of an assembly statement, whose inputs are in `arguments`."""
+    is_tail_call: bool = False
+    """Whether a call does not access the caller's variables."""
+    memory_after: Any = None
+    """Array of the memory after the event, where other code may have written."""
 
 
 @dataclass
 class Path:
-    """One way through the function, up to now."""
+    """A path of the source up to the current instruction."""
 
     memory: Memory
     values: dict[int, Any] = field(default_factory=dict)
-    taken: list[Term] = field(default_factory=list)
-    """Conditions of its branches."""
-    assumed: list[Term] = field(default_factory=list)
-    """What must hold for it to mean anything."""
-    preferred: list[Term] = field(default_factory=list)
-    """What would be usual for it: pointers lead into RAM. An example of an input shows more so."""
+    branch_conditions: list[Term] = field(default_factory=list)
+    """Conditions of the branches taken."""
+    assumptions: list[Term] = field(default_factory=list)
+    """Assumptions that exclude undefined behaviour."""
+    preferences: list[Term] = field(default_factory=list)
+    """Preferences for readable counterexamples, such as pointers into RAM."""
     events: list[Event] = field(default_factory=list)
     visits: dict[str, int] = field(default_factory=dict)
     forks: dict[str, int] = field(default_factory=dict)
     behind_barrier: bool = False
-    """Whether a barrier of the compiler was the last that stores may not be moved over,"""
-    stored: list[tuple[Term, Term]] = field(default_factory=list)
-    """the stores since,"""
-    passed: list[tuple[int, Memory]] = field(default_factory=list)
-    """and the events since, by number, with memory then."""
+    """Whether the last point that stores may not be moved over was a compiler barrier."""
+    pending_stores: list[tuple[Term, Term]] = field(default_factory=list)
+    """Stores since that point."""
+    movable_events: list[tuple[int, Memory]] = field(default_factory=list)
+    """Events since that point, by number, with the memory at each."""
     result: Any = None
-    ended: str = ""
-    """ret, unreachable, or loop: at the first block of one,"""
+    end_kind: str = ""
+    """How the path ends: ret, unreachable, or loop (at a loop head)."""
     head: str = ""
-    """which is this."""
-    heads: list[tuple[str, dict[int, Any], int]] = field(default_factory=list)
-    """First blocks of loops that it came through, with all values and the number of events then."""
+    """Loop head at which the path ends."""
+    loop_visits: list[tuple[str, dict[int, Any], int]] = field(default_factory=list)
+    """Visits of watched blocks: block, all values, and number of preceding events."""
 
     def copy(self) -> Path:
-        """An independent path."""
-        return Path(self.memory.copy(), dict(self.values), [*self.taken], [*self.assumed], [*self.preferred],
-                    [*self.events], dict(self.visits), dict(self.forks),
-                    self.behind_barrier, [*self.stored], [*self.passed], heads=[*self.heads])  # fmt: skip
+        """Return an independent copy."""
+        return Path(
+            self.memory.copy(), dict(self.values), [*self.branch_conditions], [*self.assumptions], [*self.preferences],
+            [*self.events], dict(self.visits), dict(self.forks), self.behind_barrier, [*self.pending_stores],
+            [*self.movable_events], loop_visits=[*self.loop_visits],
+        )  # fmt: skip
 
     def write(self, address: Term, value: Term) -> None:
-        """A store that may be moved as far as the next barrier."""
+        """Execute a store, which may be moved up to the next barrier."""
         self.memory.write(address, value)
-        self.stored.append((address, value))
+        self.pending_stores.append((address, value))
 
-    def show(self, event: Event) -> None:
-        """An event that stores may be moved over."""
-        self.passed.append((len(self.events), self.memory.copy()))
+    def record_event(self, event: Event) -> None:
+        """Record an event that stores may be moved over."""
+        self.movable_events.append((len(self.events), self.memory.copy()))
         self.events.append(event)
 
-    def part(self, barrier: bool) -> None:
-        """No store is moved over this place. Between two of them of which one is a barrier, what stands beyond must
-        have been written at every event, or must not."""
+    def fix_store_order(self, barrier: bool) -> None:
+        """Record a point that no store may be moved over.
+
+        If this point or the previous one is a compiler barrier, the events between them fix memory: stores before the
+        previous point are executed, stores after this one are not.
+        """
         if barrier or self.behind_barrier:
-            for number, memory in self.passed:
-                self.events[number] = replace(self.events[number], memory=memory, loose=tuple(self.stored))
+            for number, memory in self.movable_events:
+                self.events[number] = replace(
+                    self.events[number], memory=memory, movable_stores=tuple(self.pending_stores)
+                )
         self.behind_barrier = barrier
-        self.stored, self.passed = [], []
+        self.pending_stores, self.movable_events = [], []
 
     @property
-    def known(self) -> list[Term]:
-        """All that holds on it."""
-        return self.taken + self.assumed
+    def conditions(self) -> list[Term]:
+        """All conditions of the path."""
+        return self.branch_conditions + self.assumptions

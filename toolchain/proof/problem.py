@@ -1,7 +1,7 @@
-"""What a proof is about: the optimised IR of one C file, and the machine code the back end makes of it.
+"""The proof problem: the optimised IR of one C file, and the machine code that the back end generates from it.
 
-The file is compiled and linked by itself. What it only declares gets made-up addresses: variables in RAM that the file
-does not use, functions behind its code. Special function registers have their own.
+The file is compiled and linked alone.  Symbols that it only declares get artificial addresses: variables in unused RAM,
+functions above its code.  Special function registers have their real addresses.
 """
 
 from __future__ import annotations
@@ -36,38 +36,38 @@ from toolchain.proof.memory import STACK
 
 PRIVATE = re.compile(r"^(@\S+ = )private ", re.MULTILINE)
 DATA, DATA_END = 0x1000, STACK - 0x100
-"""Where variables lie that are only declared."""
-MOST_BYTES = 0x200
-"""Of one variable: of a larger one what lies behind is that of the next."""
+"""Address range of variables that are only declared."""
+MAX_BYTES = 0x200
+"""Bytes reserved for a declared variable; larger variables overlap the next one."""
 CODE, CODE_STEP = 0x6000, 0x10
-"""Where functions lie that are only declared, and how far apart."""
+"""First address and distance of functions that are only declared."""
 WORD_UNITS = 2
 PAGE = "__const_psvpage"
-"""What PSVPAG is for constants: the linker's (abi-elf.md §1.4)."""
+"""Linker symbol with the value of PSVPAG for constants (abi-elf.md §1.4)."""
 ENTRY = "__entry"
-"""What the reset vector leads to: nothing."""
+"""Target of the reset vector; it has no code."""
 
 
 @dataclass
-class Subject:
-    """One C file, compiled."""
+class CompiledFile:
+    """A compiled and linked C file with its IR."""
 
     module: Module
     symbols: dict[str, int]
     """Addresses by assembler name, of code in PC units."""
     ends: dict[str, int]
-    """By assembler name, where a function's code ends."""
+    """End address of each function's code, by assembler name."""
     code: dict[int, int]
     """24-bit words by address in PC units."""
-    placed: dict[str, dict[str, int]]
-    """By function, where its variables lie in the frame (`ModuleCompiler.placed`)."""
+    frame_offsets: dict[str, dict[str, int]]
+    """By function, frame offsets of its variables (`ModuleCompiler.frame_offsets`)."""
     handlers: dict[str, str]
-    """Functions that serve interrupts, and of what kind (`interrupt_kind`)."""
-    saving: set[str]
-    """Those that also save variables."""
+    """Interrupt functions and their kind (`interrupt_kind`)."""
+    handlers_saving_variables: set[str]
+    """Interrupt functions that also save variables."""
     statements: dict[int, list[Statement]]
-    """Stretches of code that read like assembly statements, by where they begin."""
-    made: ObjectFile
+    """Code sequences that match assembly statements, by start address."""
+    object_file: ObjectFile
     options: LinkOptions
 
     @cached_property
@@ -80,24 +80,24 @@ class Subject:
         return {symbol(self.module, name) for name in self.module.globals}
 
     def address(self, name: str) -> int:
-        """Of a variable or function of the IR. Raises KeyError."""
+        """Return the address of a variable or function of the IR; raises KeyError."""
         return self.symbols[symbol(self.module, name)]
 
-    def with_start(self, text: str) -> bytes:
-        """The file as an ELF image that begins with some assembly, which defines ENTRY. Raises ToolError."""
+    def image_with_start(self, text: str) -> bytes:
+        """Return the file as an ELF image with start-up assembly that defines ENTRY; raises ToolError."""
         start, _ = assemble(text, "<start>", AssemblerOptions(chip=self.options.chip))
-        return executable_bytes(link([self.made, start], [], self.options).image)
+        return executable_bytes(link([self.object_file, start], [], self.options).image)
 
     def insn(self, pc: int) -> Insn | None:
-        """The instruction at an address."""
+        """Return the instruction at an address, None without one."""
         first = self.code.get(pc)
         return None if first is None else codec.decode(first, self.code.get(pc + WORD_UNITS, 0))
 
 
-def subject(arguments: list[str], edit: Callable[[str], str] = str) -> Subject:
+def compile_file(arguments: list[str], edit: Callable[[str], str] = str) -> CompiledFile:
     """Compile one file with the driver's options. Raises ToolError, CompileError.
 
-    `edit` gets the assembly text and gives back what is assembled.
+    `edit` maps the compiler's assembly text to the text that is assembled.
     """
     options = parse(["-c", "-fno-lto", *arguments])
     if len(options.inputs) != 1 or options.inputs[0].language not in ("c", "c++", "cpp-output", "ir"):
@@ -111,20 +111,20 @@ def subject(arguments: list[str], edit: Callable[[str], str] = str) -> Subject:
     module = read_module(ir)
     text, stretches = marked(text, templates(module))
     made, _ = assemble(text, options.inputs[0].path.name, assembler_options(options, compiled=True))
-    found = linked(module, made, compiler.placed, options.chip)
+    found = link_alone(module, made, compiler.frame_offsets, options.chip)
     places = {name: found.symbols.pop(name) for name in [*found.symbols] if name.startswith(LABEL)}
     for start, template, texts, end in stretches:
         found.statements.setdefault(places[start], []).append(Statement(template, places[end], texts))
     return found
 
 
-def linked(module: Module, made: ObjectFile, placed: dict[str, dict[str, int]], chip: Chip) -> Subject:
-    """The object by itself, with addresses for what it only declares, and none of its statements."""
+def link_alone(module: Module, made: ObjectFile, frame_offsets: dict[str, dict[str, int]], chip: Chip) -> CompiledFile:
+    """Link an object alone, with artificial addresses for declared symbols; `statements` is empty."""
     options = LinkOptions(entry=ENTRY, data_init=False, isr=False, chip=chip)
-    invented = _invented(module, made.symbols, options)
-    options.define.update(invented)
+    artificial = _artificial_addresses(module, made.symbols, options)
+    options.define.update(artificial)
     image = link([made], [], replace(options, define=options.define | {ENTRY: CODE - CODE_STEP})).image
-    symbols = {s.name: s.value for s in image.symbols if s.name and s.name not in invented} | invented
+    symbols = {s.name: s.value for s in image.symbols if s.name and s.name not in artificial} | artificial
     symbols |= {f"_{name}": register.address for name, register in options.chip.sfrs.items()}
     ends = {s.name: s.value + s.size for s in image.symbols if s.size}
     code: dict[int, int] = {}
@@ -138,10 +138,10 @@ def linked(module: Module, made: ObjectFile, placed: dict[str, dict[str, int]], 
     saving = {name for name, found in notes.items() if preserved(found)}
     kinds = {name: interrupt_kind(notes.get(name, set()), name) for name in module.functions}
     handlers = {name: kind.partition(",")[0] for name, kind in kinds.items() if kind}
-    return Subject(module, symbols, ends, code, placed, handlers, saving, {}, made, options)
+    return CompiledFile(module, symbols, ends, code, frame_offsets, handlers, saving, {}, made, options)
 
 
-def _invented(module: Module, symbols: list[Symbol], options: LinkOptions) -> dict[str, int]:
+def _artificial_addresses(module: Module, symbols: list[Symbol], options: LinkOptions) -> dict[str, int]:
     sizes = {symbol(module, name): size_of(v.type) for name, v in module.globals.items()}
     declared = [symbol(module, name) for name, v in module.globals.items() if v.init is None]
     declared += [symbol(module, name) for name, f in module.functions.items() if not f.blocks]
@@ -153,10 +153,10 @@ def _invented(module: Module, symbols: list[Symbol], options: LinkOptions) -> di
             continue
         if name in sizes:
             found[name] = data
-            data += (min(sizes[name], MOST_BYTES) + 3) // 2 * 2
+            data += (min(sizes[name], MAX_BYTES) + 3) // 2 * 2
         else:
             found[name] = code
             code += CODE_STEP
     if data > DATA_END:
-        raise ToolError("more variables are declared than have room beside the stack of the proof")
+        raise ToolError("the declared variables do not fit beside the stack of the proof")
     return found

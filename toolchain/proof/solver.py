@@ -1,4 +1,4 @@
-"""Questions to z3: whether something can be, and whether something must be."""
+"""Queries to the z3 solver: satisfiability and validity of conditions."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ import z3
 from toolchain.proof.terms import Term
 
 WORK: Final = 12_000_000
-"""z3's units of work for one question, some seconds: the same question has the same answer on every machine."""
+"""Resource limit (rlimit) of one query, some seconds; it gives the same answer on every machine."""
 ALL_WORK: Final = 10 * WORK
-"""For all that is asked about one function."""
+"""Resource limit of all queries about one function."""
 
 
 class Undecided(Exception):
-    """There is no proof and no counterexample; says why."""
+    """There is neither a proof nor a counterexample; the message gives the reason."""
 
 
 class Refuted(Exception):
-    """Code and IR differ for every input that meets `conditions`; None: for what the path in question holds."""
+    """Code and IR differ for every input that satisfies `conditions`; None stands for the conditions of the path."""
 
     def __init__(self, what: str, conditions: Sequence[Term] | None = None) -> None:
         super().__init__(what)
@@ -29,7 +29,7 @@ class Refuted(Exception):
 
 
 class _Budget:
-    """Work that is left for the function that is looked at."""
+    """Remaining solver budget of the current function."""
 
     def __init__(self) -> None:
         self.left = ALL_WORK
@@ -37,13 +37,13 @@ class _Budget:
         self._count = 0
 
     def begin(self, share: int = 1) -> None:
-        """A new function, or a part of one that gets so much less."""
+        """Reset the budget for a function, or to 1/`share` of it for a part of one."""
         self.left = ALL_WORK // share
 
-    def spend(self, told: z3.Statistics) -> None:
-        """What z3 tells after a question: the count of all questions so far."""
-        names = told.keys()
-        count = int(told.get_key_value("rlimit count")) if "rlimit count" in names else self._count
+    def spend(self, statistics: z3.Statistics) -> None:
+        """Charge the work since the last query; z3's counter is cumulative."""
+        names = statistics.keys()
+        count = int(statistics.get_key_value("rlimit count")) if "rlimit count" in names else self._count
         self.left -= max(0, count - self._count)
         self._count = count
 
@@ -51,10 +51,10 @@ class _Budget:
 budget: Final = _Budget()
 
 
-def answer(conditions: Sequence[Term]) -> tuple[z3.CheckSatResult, z3.Solver]:
-    """Whether some input meets all of them, and the solver that knows. Raises Undecided when too much was asked."""
+def check(conditions: Sequence[Term]) -> tuple[z3.CheckSatResult, z3.Solver]:
+    """Return whether the conditions are satisfiable, and the solver; raises Undecided if the budget is exhausted."""
     if budget.left <= 0:
-        raise Undecided("more work for the solver than a function gets")
+        raise Undecided("the solver budget of the function is exhausted")
     solver = z3.SolverFor("QF_AUFBV")
     solver.set("rlimit", WORK)
     solver.add(*conditions)
@@ -64,32 +64,32 @@ def answer(conditions: Sequence[Term]) -> tuple[z3.CheckSatResult, z3.Solver]:
 
 
 def feasible(conditions: Sequence[Term]) -> bool:
-    """Whether some input meets all of them; True where the solver does not know."""
-    return bool(answer(conditions)[0] != z3.unsat)
+    """Whether the conditions are satisfiable; True if the solver gives up."""
+    return bool(check(conditions)[0] != z3.unsat)
 
 
-def demand(claim: Term, given: Sequence[Term], what: str) -> None:
-    """Raises Refuted where some input makes `claim` false, Undecided where the solver gives up."""
+def require(claim: Term, given: Sequence[Term], what: str) -> None:
+    """Check that `claim` follows from `given`; raises Refuted if it does not, Undecided if the solver gives up."""
     if z3.is_true(z3.simplify(claim)):
         return
     conditions = [*given, z3.Not(claim)]
-    found, _ = answer(conditions)
+    found, _ = check(conditions)
     if found == z3.sat:
         raise Refuted(what, conditions)
     if found != z3.unsat:
         raise Undecided(f"the solver gave up: {what}")
 
 
-def example(conditions: Sequence[Term], preferred: Sequence[Term]) -> z3.ModelRef | None:
-    """An input that meets all conditions and as many of the preferences as come, one after the other."""
+def find_model(conditions: Sequence[Term], preferred: Sequence[Term]) -> z3.ModelRef | None:
+    """Return a model of the conditions that satisfies the preferences greedily in order, None without one."""
     kept = list(conditions)
-    found, solver = answer(kept)
+    found, solver = check(kept)
     model = solver.model() if found == z3.sat else None
-    for wish in preferred:
+    for preference in preferred:
         if model is None:
             return None
-        found, solver = answer([*kept, wish])
+        found, solver = check([*kept, preference])
         if found == z3.sat:
-            kept.append(wish)
+            kept.append(preference)
             model = solver.model()
     return model

@@ -1,7 +1,7 @@
-"""Numbers the instruction table computes with, as z3 terms: plain ints where they are known.
+"""Integers of the instruction table as z3 terms, or plain ints where they are known.
 
-A table value is an exact integer; `Number` has it in 48 bits, which hold products of two words and a 40-bit
-accumulator, and beside that its low word by itself, so that what the source computes in 16 bits is the same term here.
+A table value is an exact integer.  `Number` represents it in 48 bits, enough for products of two words and a 40-bit
+accumulator.  Its low word is a separate term, so that 16-bit computations give the same terms as in the source.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ Term: TypeAlias = Any
 
 
 def known(term: Term) -> int | None:
-    """The number a bit vector is, if that is plain to see."""
+    """Return the value of a constant bit vector, None if it does not simplify to a constant."""
     if z3.is_bv_value(term):
         return int(term.as_long())
     small = z3.simplify(term)
@@ -29,25 +29,29 @@ def known(term: Term) -> int | None:
 
 
 def vector(value: int, bits: int) -> Term:
-    """A constant of so many bits."""
+    """Return a constant bit vector."""
     return z3.BitVecVal(value, bits)
 
 
 def truth(bit: Term) -> Term:
-    """Whether a vector of one bit is 1."""
+    """Return the condition that a one-bit vector is 1."""
     return bit == vector(1, 1)
 
 
 def one_bit(condition: Term) -> Term:
-    """A vector of one bit that says whether a condition holds."""
+    """Return a condition as a one-bit vector."""
     return z3.If(condition, vector(1, 1), vector(0, 1))
 
 
 class Number:
-    """What is not known: `wide` in 48 bits, `word` its low 16, `truth` its condition where it is 0 or 1.
+    """A symbolic integer.
 
-    `narrow` says that it is its word, from 0 to 65535, `signed` that it is its word as two's complement; `flipped` is
-    the word of which it has the top bit the other way round, on the way to that.
+    wide     the integer in 48 bits
+    word     its low 16 bits
+    truth    the condition that it is 1, if it is known to be 0 or 1
+    narrow   whether it equals its zero-extended word
+    signed   whether it equals its sign-extended word
+    flipped  the word whose inverted top bit gives it, an intermediate step of sign extension
     """
 
     __slots__ = ("flipped", "narrow", "signed", "truth", "wide", "word")
@@ -184,29 +188,29 @@ def _unequal(a: Term, b: Term) -> Term:
 
 
 def wide(value: Any) -> Term:
-    """A table value in 48 bits."""
+    """Return a table value in 48 bits."""
     return value.wide if isinstance(value, Number) else vector(int(value), BITS)
 
 
 def word(value: Any) -> Term:
-    """Its low word."""
+    """Return the low word of a table value."""
     return value.word if isinstance(value, Number) else vector(int(value), WORD)
 
 
 def condition(value: Any) -> Term | None:
-    """Its truth, if it is known to be 0 or 1."""
+    """Return the condition that a table value is 1 if it is known to be 0 or 1, else None."""
     return value.truth if isinstance(value, Number) else None
 
 
 def holds(value: Any) -> Term:
-    """Whether a table value is not 0."""
+    """Return the condition that a table value is not 0."""
     if isinstance(value, Number):
         return value.truth if value.truth is not None else value.wide != 0
     return z3.BoolVal(bool(value))
 
 
 def narrow(term: Term) -> Number | int:
-    """A term of at most 16 bits, zero-extended; the number it is, where that is plain to see."""
+    """Return a term of at most 16 bits, zero-extended, as a table value; an int if it is constant."""
     if z3.is_bv_value(term):
         return int(term.as_long())
     if term.size() < WORD:
@@ -215,36 +219,36 @@ def narrow(term: Term) -> Number | int:
 
 
 def truth_number(term: Term) -> Number:
-    """0 or 1."""
+    """Return a condition as the table value 0 or 1."""
     return Number(
         z3.If(term, vector(1, BITS), vector(0, BITS)), z3.If(term, vector(1, WORD), vector(0, WORD)), term, True
     )
 
 
 def signed_number(term: Term) -> Number:
-    """A word as two's complement."""
+    """Return a word as a signed table value."""
     found = Number(z3.SignExt(BITS - WORD, term), term)
     found.signed = True
     return found
 
 
 def is_signed(value: Any) -> bool:
-    """Whether it may be below zero."""
+    """Whether a table value may be negative."""
     return value < 0 if isinstance(value, int) else value.signed
 
 
 def is_narrow(value: Any) -> bool:
-    """Whether it is from 0 to 65535."""
+    """Whether a table value is in 0..65535."""
     return 0 <= value < 1 << WORD if isinstance(value, int) else value.narrow
 
 
 def is_short(value: Any) -> bool:
-    """Whether it is from -32768 to 32767."""
+    """Whether a table value is in -32768..32767."""
     return -HALF <= value < HALF if isinstance(value, int) else value.signed
 
 
 def factor(value: Any) -> Term | None:
-    """In 32 bits, which hold the product of any two that have such a form."""
+    """Return a table value in 32 bits if products of two such values fit 32 bits, else None."""
     if isinstance(value, int):
         return vector(value, 2 * WORD) if -HALF <= value < 2 * HALF else None
     if value.signed:
@@ -253,8 +257,10 @@ def factor(value: Any) -> Term | None:
 
 
 def product(a: Term, b: Term) -> Term:
-    """a * b of equal sizes. 32 bits as the machine does them: the product of the low words, and above it those of a low
-    and a high one; that both are equal is arithmetic, which solvers find hard."""
+    """Return a * b of equal sizes; 32 bits as the machine's sum of three 16-bit products.
+
+    The equality of both forms is hard to prove for solvers.
+    """
     if a.size() != 2 * WORD or any(_is_extended(one) for one in (a, b)):
         return a * b
     (a_low, a_high), (b_low, b_high) = halves(a), halves(b)
@@ -267,12 +273,12 @@ def _is_extended(term: Term) -> bool:
 
 
 def halves(term: Term) -> tuple[Term, Term]:
-    """Low and high word of 32 bits."""
+    """Return low and high word of 32 bits."""
     return z3.simplify(z3.Extract(WORD - 1, 0, term)), z3.simplify(z3.Extract(2 * WORD - 1, WORD, term))
 
 
 def lowest_bit(value: Any) -> Any:
-    """The number's lowest bit as a flag."""
+    """Return the lowest bit of a table value as a flag."""
     if isinstance(value, int):
         return value & 1
     return value if value.truth is not None else truth_number(z3.Extract(0, 0, value.word) == 1)

@@ -1,4 +1,4 @@
-"""Random firmware-like C (`c_shapes.py`), proved: `python tests/fuzz/compiler/fuzz_prove.py [--files N] [--functions N]`.
+"""Prove random firmware-like C (`c_shapes.py`): `python tests/fuzz/compiler/fuzz_prove.py [--files N] [--functions N]`.
 
 One file of a program at one level, a few of its functions (`--functions 0`: all). A refutation is a fault of the
 compiler, or of the proof; `toolchain prove` shows its input. No emulator and no test inputs take part, so this sees
@@ -26,7 +26,7 @@ FILES = ("one.c", "two.c", "three.c")
 
 def examine(seed: int, most: int, counts: Counter[str]) -> None:
     """Raises AssertionError naming file, level and function of a refutation."""
-    from toolchain.proof.problem import subject
+    from toolchain.proof.problem import compile_file
     from toolchain.proof.prove import verdicts
 
     chance = random.Random(seed)
@@ -34,13 +34,13 @@ def examine(seed: int, most: int, counts: Counter[str]) -> None:
     with tempfile.TemporaryDirectory(prefix="prove-") as name:
         for each, text in Program(seed).files.items():
             (Path(name) / each).write_text(text)
-        made = subject([str(Path(name) / file), level, "-w", "-std=gnu11"])
+        made = compile_file([str(Path(name) / file), level, "-w", "-std=gnu11"])
         defined = [f.name for f in made.module.functions.values() if f.blocks]
         chosen = chance.sample(defined, min(most, len(defined))) if most else defined
         for function in chosen:
             for verdict in verdicts(made, function):
                 counts[verdict.kind] += 1
-                assert verdict.kind != "refuted", f"{file} {level} {function}: {verdict.why}; {verdict.witness}"
+                assert verdict.kind != "refuted", f"{file} {level} {function}: {verdict.why}; {verdict.counterexample}"
 
 
 def main() -> int:

@@ -12,7 +12,7 @@ from typing import Any
 import z3
 
 from emu.dspic30f.isa import codec, flow
-from toolchain.proof.code.machine import Machine, State
+from toolchain.proof.code.machine import MachineState, SymbolicMachine
 from toolchain.proof.memory import STACK, Frame, Memory
 from toolchain.proof.solver import feasible
 from toolchain.proof.terms import BITS, Number, holds, narrow, vector, wide
@@ -56,7 +56,7 @@ def times(a: Any, b: Any) -> Any:
     return bounds[key][0]
 
 
-class Free(Machine):
+class Free(SymbolicMachine):
     """Every pointer leads to memory, and words to even addresses: nobody says what the function may rely on."""
 
     def load(self, ea: Any, size: int, side: str = "src", ptr: int | None = None) -> Any:
@@ -65,13 +65,13 @@ class Free(Machine):
         return narrow(self.state.memory.read(ea.word, size))
 
 
-def start() -> State:
+def start() -> MachineState:
     """Every register, flag and byte is free."""
     w = [z3.BitVec(f"w{n}", 16) for n in range(15)]
-    return State([*w, STACK], Memory(z3.Array("memory", z3.BitVecSort(16), z3.BitVecSort(8))), 0)
+    return MachineState([*w, STACK], Memory(z3.Array("memory", z3.BitVecSort(16), z3.BitVecSort(8))), 0)
 
 
-def results(words: list[int]) -> Iterator[State]:
+def results(words: list[int]) -> Iterator[MachineState]:
     """States at RETURN on every path that some input takes. AssertionError for code that is not loop-free."""
     page = vector(0, 16)
     machine = Free(Frame(), [], [], page, page)

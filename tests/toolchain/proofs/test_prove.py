@@ -15,7 +15,7 @@ from toolchain.cli import main
 pytest.importorskip("z3", reason="the solver is not installed (extra: test)")
 
 from toolchain.proof.counterexample import image
-from toolchain.proof.problem import subject
+from toolchain.proof.problem import compile_file
 from toolchain.proof.prove import Verdict, verdicts
 
 SAMPLE = Path(__file__).with_name("prove_sample.c")
@@ -142,14 +142,14 @@ def planted(kind: str) -> Verdict:
         assert count, f"{right!r} is not in the code:{text[start:end]}"
         return text[:start] + body + text[end:]
 
-    made = subject([str(SAMPLE), "-Os", "-w"], edit)
+    made = compile_file([str(SAMPLE), "-Os", "-w"], edit)
     (verdict,) = verdicts(made, function)
     return verdict
 
 
 @pytest.mark.parametrize("level", ["-O1", "-Os", "-O2"])
 def test_right_code_is_proved(level: str) -> None:
-    found = {v.function: v.kind for v in verdicts(subject([str(SAMPLE), level, "-w"]))}
+    found = {v.function: v.kind for v in verdicts(compile_file([str(SAMPLE), level, "-w"]))}
     assert set(found.values()) == {"proved"}, found
 
 
@@ -167,36 +167,36 @@ def test_a_fault_of_many_rounds_is_not_proved(kind: str) -> None:
 
 def test_the_input_of_a_refutation_shows_it_on_the_emulator(tmp_path: Path) -> None:
     """The larger of two, which gives the smaller: the emulator runs it on what the solver found."""
-    made = subject([str(SAMPLE), "-Os", "-w"], lambda text: text.replace("cpsgt w0,w1", "cpslt w0,w1"))
+    made = compile_file([str(SAMPLE), "-Os", "-w"], lambda text: text.replace("cpsgt w0,w1", "cpslt w0,w1"))
     (verdict,) = verdicts(made, "larger")
-    assert verdict.witness is not None
+    assert verdict.counterexample is not None
     file = tmp_path / "larger.elf"
-    file.write_bytes(image(made, verdict.witness))
+    file.write_bytes(image(made, verdict.counterexample))
     machine = emu.load(file, engine="auto")
     assert machine.run(until="__returned", cycles=1000).reason == "until"
-    a, b = (((verdict.witness.registers.get(n, 0) ^ 0x8000) - 0x8000) for n in (0, 1))
+    a, b = (((verdict.counterexample.registers.get(n, 0) ^ 0x8000) - 0x8000) for n in (0, 1))
     assert machine.w[0] == min(a, b) & 0xFFFF != max(a, b) & 0xFFFF
 
 
 def test_memory_of_a_refutation_is_in_the_image(tmp_path: Path) -> None:
     """A byte of a table is read from the wrong place."""
-    made = subject(
+    made = compile_file(
         [str(SAMPLE), "-Os", "-w"], lambda text: text.replace("mov.b [w0+1],w7\n\tse", "mov.b [w0+2],w7\n\tse")
     )
     (verdict,) = verdicts(made, "widened")
-    assert verdict.witness is not None
+    assert verdict.counterexample is not None
     file = tmp_path / "widened.elf"
-    file.write_bytes(image(made, verdict.witness))
+    file.write_bytes(image(made, verdict.counterexample))
     machine = emu.load(file, engine="auto")
     assert machine.run(until="__returned", cycles=10_000).reason == "until"
-    first, second = (machine.peek(verdict.witness.registers[0] + k & 0xFFFF, 1) for k in (1, 2))
+    first, second = (machine.peek(verdict.counterexample.registers[0] + k & 0xFFFF, 1) for k in (1, 2))
     assert machine.w[0] == ((second ^ 0x80) - 0x80) & 0xFFFF != ((first ^ 0x80) - 0x80) & 0xFFFF
 
 
 @pytest.mark.parametrize("file", ["clock.c", "error.c", "fault.c", "init.c"])
 def test_nothing_of_the_kernel_is_refuted(file: str) -> None:
     """And what has no loop is proved."""
-    made = subject([str(KERNEL / file), "-Os", "-w", "-std=gnu99", *(f"-I{SYSTEM / name}" for name in FOLDERS)])
+    made = compile_file([str(KERNEL / file), "-Os", "-w", "-std=gnu99", *(f"-I{SYSTEM / name}" for name in FOLDERS)])
     found = list(verdicts(made))
     assert not [v for v in found if v.kind == "refuted"]
     assert not [v for v in found if v.kind != "proved" and not v.loops]

@@ -7,7 +7,7 @@ from bisect import bisect_right
 from collections.abc import Iterable, Mapping
 from typing import Any, Final
 
-from emu.image.lines import Lines, dwarf_of, file_names
+from emu.image.lines import LineTable, dwarf_of, file_names
 from toolchain.bounds.annotations.reader import Annotation
 from toolchain.errors import ToolError
 
@@ -21,7 +21,7 @@ class SourceMap:
     """
 
     def __init__(self, debug: Mapping[str, bytes]) -> None:
-        self.lines: Final = Lines(debug)
+        self.lines: Final = LineTable(debug)
         self.functions: Final[dict[int, tuple[str, str]]] = {}
         """File and name of each function, by address."""
         self._first_lines: Final[dict[str, dict[int, str]]] = {}

@@ -1,1 +1,1 @@
-"""Machine code on symbolic inputs."""
+"""Symbolic execution of machine code."""

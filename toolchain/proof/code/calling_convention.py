@@ -1,6 +1,6 @@
-"""Where code meets what others rely on: calls, returns, and memory as the source has it (abi-elf.md §2.1, §2.2).
+"""Checks of the calling convention: calls, returns, and memory contents at them (abi-elf.md §2.1, §2.2).
 
-In: a state of the machine and what one path of the source says of that moment. Out: nothing, or Refuted.
+In: a machine state and the corresponding event of one path of the source.  Out: nothing, or Refuted.
 """
 
 from __future__ import annotations
@@ -11,75 +11,79 @@ from typing import Any, Final
 
 import z3
 
-from toolchain.abi.arguments import place_arguments
+from toolchain.abi.arguments import argument_locations
 from toolchain.abi.target import CALLEE_SAVED, CALLER_SAVED, RAM_END, RETURN_ADDRESS_BYTES, SP
 from toolchain.proof.asm_statements import Statement
-from toolchain.proof.code.machine import ACCUMULATORS, CORE, PSVPAG, Machine, State
+from toolchain.proof.code.machine import ACCUMULATORS, CORE, PSVPAG, MachineState, SymbolicMachine
 from toolchain.proof.helpers import HELPERS, Helper
-from toolchain.proof.memory import STACK, Frame, Memory, joined, split
+from toolchain.proof.memory import STACK, Frame, Memory, bytes_of, concat
 from toolchain.proof.path import Event, Path
-from toolchain.proof.problem import Subject
-from toolchain.proof.solver import Refuted, Undecided, answer, demand
+from toolchain.proof.problem import CompiledFile
+from toolchain.proof.solver import Refuted, Undecided, check, require
 from toolchain.proof.terms import Term, known, narrow, vector, wide, word
 from toolchain.select.calls import shape_of
 
 NUMBER: Final = re.compile(r"(?P<name>_\w+)?(?P<plus>[+-]?\d+)?")
 
 
-class Contract:
-    """What holds on one path of the source, for a machine whose registers had certain values at entry."""
+class ConventionChecker:
+    """Checks of one path of the source against a machine with given registers at entry."""
 
-    def __init__(self, subject: Subject, frame: Frame, registers: list[Term], path: Path, machine: Machine) -> None:
-        self.subject: Final = subject
+    def __init__(
+        self, compiled: CompiledFile, frame: Frame, registers: list[Term], path: Path, machine: SymbolicMachine
+    ) -> None:
+        self.compiled: Final = compiled
         self.frame: Final = frame
         self.registers: Final = registers
         self.path: Final = path
         self.machine: Final = machine
-        machine.settle = self.settle
+        machine.check_memory = self.check_memory
 
-    def settle(self, e: Event) -> None:
-        """What was written before is in memory."""
+    def check_memory(self, e: Event) -> None:
+        """Check that all stores before an event are in memory."""
         if e.memory is not None:
-            self.same_memory(
-                self.machine.state, e.memory, self.frame.escaped, f"memory differs at: {_said(e)}", e.loose
+            self.check_equal_memory(
+                self.machine.state, e.memory, self.frame.escaped, f"memory differs at: {_describe(e)}", e.movable_stores
             )
 
-    def call(self, state: State, target: Any) -> None:
-        """The next event is this call, with these arguments; behind it is what calls leave."""
+    def call(self, state: MachineState, target: Any) -> None:
+        """Check that the next event is this call with equal arguments, and apply the effects of a call."""
         e = self.machine.expected()
-        name = self.subject.functions.get(target) if isinstance(target, int) else None
+        name = self.compiled.functions.get(target) if isinstance(target, int) else None
         helper = HELPERS.get(name or "")
         if helper is not None and (e is None or e.kind != "call" or self.target(e) != target):
-            self._by_model(state, helper)
+            self._apply_model(state, helper)
             return
         if e is None or e.kind != "call":
-            raise Refuted(f"calls {name or 'a pointer'}, which the source does not here")
+            raise Refuted(f"calls {name or 'a pointer'}, where the source makes no call")
         wanted = self.target(e)
         if isinstance(wanted, int) and isinstance(target, int):
             if wanted != target:
-                raise Refuted(f"calls {name}, the source {e.address}")
+                raise Refuted(f"calls {name}, where the source calls {e.address}")
         else:
-            demand(vector(wanted, 16) == word(target) if isinstance(wanted, int) else wanted == word(target),
-                   self.machine.given, "calls another function than the source")  # fmt: skip
+            require(vector(wanted, 16) == word(target) if isinstance(wanted, int) else wanted == word(target),
+                   self.machine.conditions, "calls another function than the source")  # fmt: skip
         self._constants("a call")
         pushed = self._arguments(state, e)
         assert e.memory is not None
-        self.same_memory(
+        self.check_equal_memory(
             state,
             e.memory,
-            set() if e.tail else self.frame.escaped,
+            set() if e.is_tail_call else self.frame.escaped,
             f"memory differs at the call of {name or 'a pointer'}",
         )
-        state.memory.become(e.after, self.frame.kept())
+        state.memory.havoc(e.memory_after, self.frame.unescaped_bytes())
         self._forget(state, pushed)
-        self.machine.passed()
+        self.machine.advance()
         if e.value is not None:
             for n, term in enumerate(_words_of(e.value)):
                 self._put(state, n, term)
 
-    def stated(self, state: State, statement: Statement, e: Event) -> bool:
-        """Whether the operands of this stretch hold what they should at the source's next event, a statement that reads
-        the same. If so it is done: what it does to outputs, flags and memory is what the source says, or unknown."""
+    def execute_statement(self, state: MachineState, statement: Statement, e: Event) -> bool:
+        """Execute a code sequence as the assembly statement that is the source's next event, if its operands are equal.
+
+        Return whether they are.  Outputs get the values of the source; flags and clobbered memory become unknown.
+        """
         assert e.shape is not None
         leaves, inputs = iter(_leaves(e.value or [])), iter(e.arguments)
         registers: list[list[int]] = []
@@ -105,66 +109,66 @@ class Contract:
             else:
                 return False
             if operand.allowed is not None and first not in operand.allowed:
-                raise Refuted(f"{_said(e)}: W{first} is not of the class that operand {n} asks for")
+                raise Refuted(f"{_describe(e)}: W{first} is not in the register class of operand {n}")
         if any(m and (m != "d" or text != f"w{registers[n][0] + 1}") for (n, m), text in statement.texts.items()):
             return False
-        self._apart(e, registers, read)
-        self.settle(e)
-        if e.after is not None:
-            state.memory.become(e.after, self.frame.kept())
+        self._check_operand_registers(e, registers, read)
+        self.check_memory(e)
+        if e.memory_after is not None:
+            state.memory.havoc(e.memory_after, self.frame.unescaped_bytes())
         for n in e.shape.clobbered:
             state.w[n] = z3.FreshConst(z3.BitVecSort(16), f"W{n}")
         state.forget_flags()
         for n, term in results:
             self._put(state, n, term)
-        self.machine.passed()
+        self.machine.advance()
         return True
 
-    def _apart(self, e: Event, registers: list[list[int]], read: set[int]) -> None:
-        """Outputs and what is overwritten share no register, nor do inputs with what is overwritten early."""
+    def _check_operand_registers(self, e: Event, registers: list[list[int]], read: set[int]) -> None:
+        """Check that outputs and clobbers are disjoint, and inputs disjoint from clobbers and early-clobber outputs."""
         assert e.shape is not None
         outputs = [n for n, operand in enumerate(e.shape.operands) if operand.output]
         written = [r for n in outputs for r in registers[n]] + [*e.shape.clobbered]
         early = {r for n in outputs if e.shape.operands[n].early for r in registers[n]} | e.shape.clobbered
         if len(set(written)) < len(written) or read & early:
-            raise Refuted(f"{_said(e)}: operands share a register")
+            raise Refuted(f"{_describe(e)}: operands share a register")
 
     def _holds(self, registers: list[int], value: Any) -> bool:
         same = _is_value(value, [word(self.machine.w(n)) for n in registers])
-        found, _ = answer([*self.machine.given, z3.Not(same)])
+        found, _ = check([*self.machine.conditions, z3.Not(same)])
         if found == z3.unknown:
             raise Undecided("the solver gave up: an operand of an assembly statement")
         return bool(found == z3.unsat)
 
     def _is_number(self, text: str | None, term: Term) -> bool:
-        """Whether the text of an operand that is no register is the number it should be."""
+        """Whether the text of an immediate operand is the expected number."""
         wanted, found = known(term), NUMBER.fullmatch(text or "")
         if wanted is None or found is None:
             return False
-        base = 0 if found["name"] is None else self.subject.symbols.get(found["name"])
+        base = 0 if found["name"] is None else self.compiled.symbols.get(found["name"])
         return base is not None and (base + int(found["plus"] or 0) - wanted) % (1 << term.size()) == 0
 
     def _constants(self, where: str) -> None:
         same = self.machine.core(PSVPAG) == self.machine.page
-        demand(same, self.machine.given, f"PSVPAG is not that of constants at {where}")
+        require(same, self.machine.conditions, f"PSVPAG is not that of constants at {where}")
 
-    def _put(self, state: State, register: int, term: Term) -> None:
+    def _put(self, state: MachineState, register: int, term: Term) -> None:
         if term.size() < 16:
             term = z3.Concat(z3.FreshConst(z3.BitVecSort(16 - term.size()), "above"), term)
         state.w[register] = term
 
     def target(self, e: Event) -> Any:
-        """Program address of a call, or a term."""
+        """Return the program address of a call's target, or a term for a pointer."""
         if not isinstance(e.address, str):
             place = known(e.address)
             return e.address if place is None else place
         try:
-            return self.subject.address(e.address)
+            return self.compiled.address(e.address)
         except KeyError:
             raise Undecided(f"no address of {e.address}") from None
 
-    def _forget(self, state: State, pushed: int = 0) -> None:
-        """What a call leaves unknown: W0-W7, RCOUNT, flags, its arguments on the stack (bytes) and what lay above."""
+    def _forget(self, state: MachineState, pushed: int = 0) -> None:
+        """Make everything unknown that a call may change: W0-W7, RCOUNT, flags, and the stack from its arguments up."""
         for n in CALLER_SAVED:
             state.w[n] = z3.FreshConst(z3.BitVecSort(16), f"W{n}")
         state.regs["RCOUNT"] = narrow(z3.FreshConst(z3.BitVecSort(16), "RCOUNT"))
@@ -172,11 +176,11 @@ class Contract:
         for at in [at for at in state.frame if at >= state.w[SP] - pushed]:
             state.frame[at] = z3.FreshConst(z3.BitVecSort(8), "stack")
 
-    def _arguments(self, state: State, e: Event) -> int:
-        """Bytes of arguments on the stack."""
+    def _arguments(self, state: MachineState, e: Event) -> int:
+        """Check the arguments of a call; return the bytes of those on the stack."""
         if any(k.get("byval") is not None for _, _, k in e.arguments):
             raise Undecided("a struct as argument")
-        places = place_arguments([shape_of(v, k) for v, _, k in e.arguments], e.named)
+        places = argument_locations([shape_of(v, k) for v, _, k in e.arguments], e.named_arguments)
         top = state.w[SP]
         for n, ((_, value, _), place) in enumerate(zip(e.arguments, places, strict=True)):
             if isinstance(value, list):
@@ -185,93 +189,98 @@ class Contract:
                 words = [word(self.machine.w(place.register + k)) for k in range(place.words)]
             else:
                 low = top + RETURN_ADDRESS_BYTES - place.stack
-                words = [joined([self.machine.own(low + 2 * k + b) for b in (0, 1)]) for k in range(place.words)]
+                words = [concat([self.machine.frame_byte(low + 2 * k + b) for b in (0, 1)]) for k in range(place.words)]
             self._equal(value, words, f"argument {n + 1} of {e.address if isinstance(e.address, str) else 'the call'}")
         return max([RETURN_ADDRESS_BYTES, *(p.stack for p in places)]) - RETURN_ADDRESS_BYTES
 
     def _equal(self, value: Any, words: list[Term], what: str) -> None:
-        demand(_is_value(value, words), self.machine.given, f"{what} differs")
+        require(_is_value(value, words), self.machine.conditions, f"{what} differs")
 
-    def _by_model(self, state: State, helper: Helper) -> None:
-        """A function of the run-time library that stands for an operation of the IR."""
+    def _apply_model(self, state: MachineState, helper: Helper) -> None:
+        """Apply the model of a library function that implements an operation of the IR."""
         results = helper.call([word(self.machine.w(n)) for n in CALLER_SAVED])
         self._forget(state)
         state.w[: len(results)] = results
 
-    def handled(self, state: State) -> None:
-        """The end of an interrupt handler, which gives back W0-W7 and the core's registers, too."""
+    def check_handler_return(self, state: MachineState) -> None:
+        """Check the end of an interrupt handler, which restores W0-W7 and the core registers as well."""
         for n in CALLER_SAVED:
             same = word(self.machine.w(n)) == self.registers[n]
-            demand(same, self.machine.given, f"W{n} is not what it was")
-        self._core(CORE)
-        self.returned(state)
+            require(same, self.machine.conditions, f"W{n} is not what it was")
+        self._check_core_registers(CORE)
+        self.check_return(state)
 
-    def _core(self, places: Iterable[int]) -> None:
+    def _check_core_registers(self, places: Iterable[int]) -> None:
         for at in places:
             same = self.machine.core(at) == self.machine.before[at]
-            demand(same, self.machine.given, f"{CORE[at]} is not what it was")
+            require(same, self.machine.conditions, f"{CORE[at]} is not what it was")
 
-    def returned(self, state: State, popped: bool = True) -> None:
-        """Everything at the end. `popped`: the return address has been taken off the stack."""
-        if self.path.ended != "ret" or state.event != len(self.path.events):
+    def check_return(self, state: MachineState, popped: bool = True) -> None:
+        """Check the state at a return; `popped`: the return address has been popped from the stack."""
+        if self.path.end_kind != "ret" or state.event != len(self.path.events):
             e = self.machine.expected()
-            raise Refuted("returns where the source does not" if e is None else f"returns before: {_said(e)}")
+            raise Refuted("returns where the source does not" if e is None else f"returns before: {_describe(e)}")
         wanted = STACK - RETURN_ADDRESS_BYTES if popped else STACK
         if state.w[SP] != wanted:
             raise Refuted(f"W15 is {state.w[SP] - wanted:+d} bytes off at the end")
         for at in range(STACK - RETURN_ADDRESS_BYTES, STACK):
             if at in state.frame:
-                demand(
-                    state.frame[at] == z3.BitVec(f"stack.{at:x}", 8), self.machine.given, "the return address changes"
+                require(
+                    state.frame[at] == z3.BitVec(f"stack.{at:x}", 8),
+                    self.machine.conditions,
+                    "the return address changes",
                 )
         for n in CALLEE_SAVED:
-            demand(word(self.machine.w(n)) == self.registers[n], self.machine.given, f"W{n} is not what it was")
-        self._core(at for at, name in CORE.items() if name != "RCOUNT")
-        self._kept_accumulators(state)
+            require(word(self.machine.w(n)) == self.registers[n], self.machine.conditions, f"W{n} is not what it was")
+        self._check_core_registers(at for at, name in CORE.items() if name != "RCOUNT")
+        self._check_accumulators(state)
         if self.path.result is not None:
             self._result(state)
-        self.same_memory(state, self.path.memory, set(), "memory differs at the end")
+        self.check_equal_memory(state, self.path.memory, set(), "memory differs at the end")
 
-    def loop(self, state: State) -> None:
-        """Everything at the first block of a loop, but what registers hold: the same memory, and pages and accumulators
-        as at entry."""
-        self._core(at for at, name in CORE.items() if name != "RCOUNT")
-        self._kept_accumulators(state)
-        self.same_memory(state, self.path.memory, set(self.frame.objects), "memory differs at a loop")
+    def check_loop_head(self, state: MachineState) -> None:
+        """Check the state at a loop head: equal memory, and pages and accumulators as at entry."""
+        self._check_core_registers(at for at, name in CORE.items() if name != "RCOUNT")
+        self._check_accumulators(state)
+        self.check_equal_memory(state, self.path.memory, set(self.frame.objects), "memory differs at a loop")
 
-    def _kept_accumulators(self, state: State) -> None:
+    def _check_accumulators(self, state: MachineState) -> None:
         for n, before in enumerate(ACCUMULATORS):
-            demand(wide(state.accumulators[n]) == before.wide, self.machine.given, f"ACC{'AB'[n]} is not what it was")
+            require(
+                wide(state.accumulators[n]) == before.wide, self.machine.conditions, f"ACC{'AB'[n]} is not what it was"
+            )
 
-    def _result(self, state: State) -> None:
+    def _result(self, state: MachineState) -> None:
         at = 0
         for value in _leaves(self.path.result):
             count = max(1, (value[0].size() + 15) // 16)
             self._equal(value, [word(self.machine.w(at + k)) for k in range(count)], "the result")
             at += count
 
-    def same_memory(
-        self, state: State, wanted: Memory, objects: set[str], what: str, loose: Sequence[tuple[Term, Term]] = ()
+    def check_equal_memory(
+        self, state: MachineState, wanted: Memory, objects: set[str], what: str, loose: Sequence[tuple[Term, Term]] = ()
     ) -> None:
-        """Equal bytes everywhere but in the frame; of that, in these objects of the source. Where a store is `loose`
-        its value may be there already, or still."""
+        """Check that memory is equal outside the frame and in the given objects of the frame.
+
+        loose  stores that may be executed before or after this point
+        """
         ours, theirs = state.memory.copy(), wanted.copy()
         either: dict[int, list[Term]] = {}
         ranges = []
         for address, value in loose:
             place = known(address)
             if place is None:
-                ranges.append((address, len(split(value))))
+                ranges.append((address, len(bytes_of(value))))
             else:
-                for k, part in enumerate(split(value)):
+                for k, part in enumerate(bytes_of(value)):
                     either.setdefault(place + k & 0xFFFF, []).append(part)
         if ours.array.eq(theirs.array):
             places = set(ours.written) | set(theirs.written)
             for at in sorted(places):
-                if self._counts(at, objects):
+                if self._is_compared(at, objects):
                     mine, values = ours.byte(at), [theirs.byte(at), *either.get(at, [])]
                     same = z3.Or(*(mine == v for v in values), *(_within(vector(at, 16), r) for r in ranges))
-                    demand(same, self.machine.given, f"{what}: {at:#x}")
+                    require(same, self.machine.conditions, f"{what}: {at:#x}")
             return
         at = z3.BitVec("anywhere", 16)
         inside = [z3.And(z3.UGE(at, self.frame.objects[n][0]), z3.ULT(at, sum(self.frame.objects[n]))) for n in objects]
@@ -279,16 +288,16 @@ class Contract:
         same = z3.Select(ours.whole(), at) == z3.Select(theirs.whole(), at)
         values_there = [z3.And(at == k, z3.Select(ours.whole(), at) == v) for k, vs in either.items() for v in vs]
         free = [*values_there, *(_within(at, r) for r in ranges)]
-        demand(z3.Implies(outside, z3.Or(same, *free)), self.machine.given, what)
+        require(z3.Implies(outside, z3.Or(same, *free)), self.machine.conditions, what)
 
-    def _counts(self, at: int, objects: set[str]) -> bool:
+    def _is_compared(self, at: int, objects: set[str]) -> bool:
         if not self.frame.is_private(at) and not self.frame.is_object(at):
             return True
         return any(self.frame.objects[n][0] <= at < sum(self.frame.objects[n]) for n in objects)
 
 
 def _is_value(value: Any, words: list[Term]) -> Term:
-    """That registers or words of the stack hold a value, or that it is poison."""
+    """Return the condition that registers or stack words hold a value, or that the value is poison."""
     term, poison = value
     whole = words[0] if len(words) == 1 else z3.Concat(*reversed(words))
     same = term == (z3.Extract(term.size() - 1, 0, whole) if term.size() < whole.size() else whole)
@@ -299,7 +308,7 @@ def _within(at: Term, place: tuple[Term, int]) -> Term:
     return z3.ULT(at - place[0], vector(place[1], 16))
 
 
-def _said(e: Event) -> str:
+def _describe(e: Event) -> str:
     return f"{e.kind} {e.address if isinstance(e.address, str) else ''}".strip()
 
 
@@ -308,12 +317,12 @@ def _leaves(value: Any) -> list[Any]:
 
 
 def _words_of(value: Any) -> list[Term]:
-    """Register by register."""
+    """Return a value as register-sized terms."""
     out: list[Term] = []
     for term, _ in _leaves(value):
-        parts = split(term)
+        parts = bytes_of(term)
         if term.size() <= 16:
             out.append(term)
         else:
-            out += [joined(parts[k : k + 2]) for k in range(0, len(parts), 2)]
+            out += [concat(parts[k : k + 2]) for k in range(0, len(parts), 2)]
     return out

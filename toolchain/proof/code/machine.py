@@ -1,7 +1,7 @@
-"""Machine code on symbolic inputs: one more reader of the instruction table, whose values are z3 terms.
+"""Symbolic machine: evaluates the instruction table on z3 terms.
 
-Nothing of an instruction's meaning is written here. What the code does that the world sees (volatile accesses, calls,
-assembly statements) is held against what one path of the source does (`Event`), in order.
+The meaning of instructions comes from the table alone.  Observable actions of the code (volatile accesses, calls,
+assembly statements) are compared, in order, with the events of one path of the source (`Event`).
 """
 
 from __future__ import annotations
@@ -16,9 +16,9 @@ from emu.dspic30f.isa.builder import Context
 from emu.dspic30f.isa.row import Insn
 from emu.image.elf_facts import PSV_WINDOW
 from toolchain.abi.target import SFR_END, W_END, register
-from toolchain.proof.memory import STACK, Frame, Memory, joined, split
+from toolchain.proof.memory import STACK, Frame, Memory, bytes_of, concat
 from toolchain.proof.path import Event
-from toolchain.proof.solver import Refuted, Undecided, answer, demand
+from toolchain.proof.solver import Refuted, Undecided, check, require
 from toolchain.proof.terms import (
     BITS,
     Number,
@@ -36,17 +36,17 @@ from toolchain.proof.terms import (
 )
 
 CORE: Final = {register(name): name for name in ("TBLPAG", "PSVPAG", "RCOUNT")}
-"""Registers that a handler saves, and whose pages others rely on."""
+"""Core registers that an interrupt handler saves."""
 PSVPAG: Final = register("PSVPAG")
 ACCUMULATORS: Final = tuple(Number(z3.SignExt(BITS - 40, z3.BitVec(f"ACC{name}", 40))) for name in "AB")
-"""At entry."""
+"""Accumulators at entry."""
 SINGLE_BIT: Final = ("BSET", "BCLR", "BTG", "BTSS", "BTSC", "BTST", "BTSTS", "BSW")
-"""Instructions that touch a whole register in the device whichever byte they name (isa.md §5.4)."""
+"""Instructions that access a whole device register whichever byte they name (isa.md §5.4)."""
 
 
 @dataclass
-class State:
-    """Registers (ints or 16-bit terms), flags, own frame, shared memory, what holds on the path, the next event."""
+class MachineState:
+    """State of the symbolic machine on one path: registers are ints or 16-bit terms, `event` is the next event."""
 
     w: list[Any]
     memory: Memory
@@ -57,53 +57,53 @@ class State:
     regs: dict[str, Any] = field(default_factory=dict)
     path: list[Term] = field(default_factory=list)
     event: int = 0
-    done: frozenset[int] = frozenset()
-    """Bytes of the event's access that have been made."""
+    accessed_bytes: frozenset[int] = frozenset()
+    """Bytes of the current event's access that have been accessed."""
     top: int = STACK
     """W15 before the instruction."""
-    trace: list[State] = field(default_factory=list)
-    """Earlier states at addresses that were asked for (`Code.watched`)."""
+    trace: list[MachineState] = field(default_factory=list)
+    """Earlier states at the watched addresses (`CodeExecution.watched`)."""
 
-    def copy(self) -> State:
-        """An independent state."""
-        return State([*self.w], self.memory.copy(), self.pc, dict(self.flags), dict(self.frame),
-                     [*self.accumulators], dict(self.regs), [*self.path], self.event, self.done, self.top,
+    def copy(self) -> MachineState:
+        """Return an independent copy."""
+        return MachineState([*self.w], self.memory.copy(), self.pc, dict(self.flags), dict(self.frame),
+                     [*self.accumulators], dict(self.regs), [*self.path], self.event, self.accessed_bytes, self.top,
                      [*self.trace])  # fmt: skip
 
     def forget_flags(self) -> None:
-        """They may be anything."""
+        """Make all flags unknown."""
         for name in ("C", "Z", "OV", "N", "DC"):
             self.flags[name] = truth_number(z3.FreshConst(z3.BoolSort(), "flag"))
 
 
-class Machine:
-    """A `Builder` (emu.dspic30f.isa.builder) on terms."""
+class SymbolicMachine:
+    """A `Builder` (emu.dspic30f.isa.builder) on z3 terms."""
 
     context = Context()
 
     def __init__(self, frame: Frame, events: list[Event], assumed: list[Term], page: Term, entry: Term) -> None:
         self.page: Final = page
-        """What PSVPAG is for constants,"""
+        """Value of PSVPAG for constants."""
         self.before: Final = {at: z3.BitVec(name, 16) for at, name in CORE.items()} | {PSVPAG: entry}
-        """and registers of CORE at entry."""
+        """Registers of CORE at entry."""
         self.frame: Final = frame
         self.events: Final = events
-        self.assumed: Final = assumed
-        self.state: State
-        self.settle: Callable[[Event], None] = lambda e: None
-        """Holds memory against what an event says must have been written before."""
+        self.assumptions: Final = assumed
+        self.state: MachineState
+        self.check_memory: Callable[[Event], None] = lambda e: None
+        """Check of memory against the stores that must precede an event."""
         self.volatile: Set[int] = frozenset()
-        """Bytes of RAM that are accessed only where the source does."""
+        """Bytes of RAM that may be accessed only where the source accesses them."""
         self.insn: Insn
         self.pc = 0
 
-    def begin(self, state: State, insn: Insn) -> None:
+    def begin(self, state: MachineState, insn: Insn) -> None:
         """Prepare for the instruction at the state's PC."""
         self.state, self.insn, self.pc = state, insn, state.pc
-        self._release(state)
+        self._forget_above_stack_pointer(state)
 
-    def _release(self, state: State) -> None:
-        """From W15 on nothing stays: an interrupt may come before any instruction."""
+    def _forget_above_stack_pointer(self, state: MachineState) -> None:
+        """Make bytes above W15 unknown: an interrupt may overwrite them before any instruction."""
         top = state.w[15]
         places = {at for at in state.memory.written if self.frame.is_object(at)}
         if top < state.top:
@@ -115,9 +115,9 @@ class Machine:
         state.top = top
 
     @property
-    def given(self) -> list[Term]:
-        """All that holds."""
-        return [*self.assumed, *self.state.path]
+    def conditions(self) -> list[Term]:
+        """All conditions of the current state."""
+        return [*self.assumptions, *self.state.path]
 
     # -- values ------------------------------------------------------------------------------------------------------
 
@@ -177,7 +177,7 @@ class Machine:
         place = known(v.word)
         self.state.w[n] = v.word if place is None else place
         if n == 15 and place is None:
-            raise Undecided("W15 moves by an amount that is not known")
+            raise Undecided("W15 changes by an unknown amount")
 
     def set_wb(self, n: int, v: Any) -> None:
         old = word(self.w(n))
@@ -218,7 +218,7 @@ class Machine:
             fn()
 
     def trap_math(self, c: Any) -> None:
-        demand(z3.Not(holds(c)), self.given, "a math error trap")
+        require(z3.Not(holds(c)), self.conditions, "a math error trap")
 
     def prog(self, address: Any) -> Any:
         raise Undecided("a table read")
@@ -250,13 +250,13 @@ class Machine:
                 return narrow(self.core(at))
             self._not_volatile(at, size)
             if at < SFR_END:
-                raise Refuted(f"reads the register at {at:#x}, which the source does not here")
+                raise Refuted(f"reads the register at {at:#x}, where the source does not")
             if self.frame.is_private(at):
-                value = joined([self.own(at + k) for k in range(size)])
+                value = concat([self.frame_byte(at + k) for k in range(size)])
                 place = known(value)
                 return narrow(value) if place is None else place
         elif size == 2:
-            demand(z3.Extract(0, 0, at) == 0, self.given, "reads a word at an odd address")
+            require(z3.Extract(0, 0, at) == 0, self.conditions, "reads a word at an odd address")
         self._seen_page(at)
         return narrow(self.state.memory.read(at, size))
 
@@ -273,20 +273,22 @@ class Machine:
                 return
             self._not_volatile(at, size)
             if at < SFR_END:
-                raise Refuted(f"writes the register at {at:#x}, which the source does not here")
+                raise Refuted(f"writes the register at {at:#x}, where the source does not")
             if self.frame.is_private(at):
-                for k, part in enumerate(split(value)):
+                for k, part in enumerate(bytes_of(value)):
                     self.state.frame[at + k] = part
                 return
         else:
-            demand(self.frame.spared(at, size), self.given, "writes to its own frame through a pointer")
+            require(
+                self.frame.avoids_private_bytes(at, size), self.conditions, "writes to its own frame through a pointer"
+            )
             if size == 2:
-                demand(z3.Extract(0, 0, at) == 0, self.given, "writes a word at an odd address")
+                require(z3.Extract(0, 0, at) == 0, self.conditions, "writes a word at an odd address")
         self.state.memory.write(at, value)
 
     def _not_volatile(self, at: int, size: int) -> None:
         if not self.volatile.isdisjoint(range(at, at + size)):
-            raise Refuted(f"accesses what is volatile at {at:#x}, which the source does not here")
+            raise Refuted(f"accesses the volatile byte at {at:#x}, where the source does not")
 
     def _place(self, ea: Any, size: int) -> Any:
         found = ea if isinstance(ea, int) else known(ea.word)
@@ -295,69 +297,69 @@ class Machine:
         return ea.word if found is None else found
 
     def _seen_page(self, at: Any) -> None:
-        """Constants are read from their page."""
+        """Check that a read in the PSV window uses the page of constants."""
         page = self.core(PSVPAG)
         if not page.eq(self.page):
             constant = z3.UGE(vector(at, 16) if isinstance(at, int) else at, vector(PSV_WINDOW, 16))
-            demand(z3.Or(z3.Not(constant), page == self.page), self.given, "reads a constant by another PSVPAG")
+            require(z3.Or(z3.Not(constant), page == self.page), self.conditions, "reads a constant by another PSVPAG")
 
     def core(self, at: int) -> Term:
-        """A register of CORE, as a term."""
+        """Return a register of CORE as a term."""
         if CORE[at] not in self.state.regs:
             self.state.regs[CORE[at]] = narrow(self.before[at])
         return word(self.state.regs[CORE[at]])
 
-    def own(self, at: int) -> Term:
-        """A byte of its own frame."""
+    def frame_byte(self, at: int) -> Term:
+        """Return a byte of the private frame."""
         if at not in self.state.frame:
             self.state.frame[at] = z3.BitVec(f"stack.{at:x}", 8)
         return self.state.frame[at]
 
-    # -- what the world sees -----------------------------------------------------------------------------------------
+    # -- observable events -------------------------------------------------------------------------------------------
 
     def expected(self) -> Event | None:
-        """What the source does next."""
+        """Return the next event of the source, None after the last."""
         return self.events[self.state.event] if self.state.event < len(self.events) else None
 
-    def passed(self) -> None:
-        """The next event has happened."""
+    def advance(self) -> None:
+        """Advance to the event after the next one."""
         self.state.event += 1
-        self.state.done = frozenset()
+        self.state.accessed_bytes = frozenset()
 
     def _event(self, kind: str, at: Any, size: int, value: Term | None = None) -> Term | None:
-        """The access, if it is the next volatile one of the source: what it reads or has written."""
+        """Execute an access as the source's next volatile access; return its value, None if it is another one."""
         e = self.expected()
         if e is None or e.kind != kind:
             return None
         distance = self._distance(at, e, size)
         if distance is None:
             return None
-        if distance in self.state.done:
-            raise Refuted(f"a {kind} is done twice, which the source does once")
+        if distance in self.state.accessed_bytes:
+            raise Refuted(f"executes a {kind} twice that the source executes once")
         part = z3.Extract(8 * (distance + size) - 1, 8 * distance, e.value)
         single = size == 1 and self.insn.row.syntax.startswith(SINGLE_BIT)
         whole = e.size == 2 and single
-        if e.even and size < min(e.size, 2) and not single:
-            raise Refuted(f"a {kind} of a word is done in bytes")
+        if e.aligned and size < min(e.size, 2) and not single:
+            raise Refuted(f"splits the {kind} of a word into bytes")
         if kind == "write":
             assert value is not None
-            demand(
+            require(
                 part == value,
-                self.given,
-                f"writes something else than the source to {at if not isinstance(at, int) else hex(at)}",
+                self.conditions,
+                f"writes another value than the source to {at if not isinstance(at, int) else hex(at)}",
             )
             if whole:
                 self._rest_as_read(e, distance)
-        if e.memory is not None and not self.state.done:
-            self.settle(e)
-        bytes_done = set(range(e.size)) if whole else self.state.done | set(range(distance, distance + size))
-        self.state.done = frozenset(bytes_done)
+        if e.memory is not None and not self.state.accessed_bytes:
+            self.check_memory(e)
+        bytes_done = set(range(e.size)) if whole else self.state.accessed_bytes | set(range(distance, distance + size))
+        self.state.accessed_bytes = frozenset(bytes_done)
         if len(bytes_done) == e.size:
-            self.passed()
+            self.advance()
         return z3.simplify(part)
 
     def _distance(self, at: Any, e: Event, size: int) -> int | None:
-        """How far within the event's access this one begins; None if it is another."""
+        """Return the byte offset of an access within that of the event, None if it is outside."""
         start = known(e.address)
         if isinstance(at, int) and start is not None:
             distance = at - start
@@ -366,18 +368,18 @@ class Machine:
         return next((k for k in range(0, e.size, size) if self._same(here, e.address + k)), None)
 
     def _rest_as_read(self, e: Event, distance: int) -> None:
-        """A single bit is set in one byte: the other is written as it was read last."""
+        """Check that a single-bit write leaves the other byte as it was read."""
         before = self.events[self.state.event - 1] if self.state.event else None
         if before is None or before.kind != "read" or before.size != 2 or not self._same(before.address, e.address):
-            raise Refuted("a single bit is written where the source did not read the register right before")
+            raise Refuted("writes a single bit where the source did not read the register immediately before")
         other = 8 * (1 - distance)
         same = z3.Extract(other + 7, other, e.value) == z3.Extract(other + 7, other, before.value)
-        demand(same, self.given, "leaves a byte of a register that the source changes")
+        require(same, self.conditions, "does not write a byte of a register that the source changes")
 
     def _same(self, a: Any, b: Any) -> bool:
         if a is b:
             return True
-        found, _ = answer([*self.given, a != b])
+        found, _ = check([*self.conditions, a != b])
         if found == z3.unknown:
             raise Undecided("the solver gave up: whether two addresses are equal")
         return bool(found == z3.unsat)

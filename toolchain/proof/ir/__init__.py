@@ -1,1 +1,1 @@
-"""Optimised LLVM IR on symbolic inputs."""
+"""Symbolic execution of optimised LLVM IR."""

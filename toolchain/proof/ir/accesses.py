@@ -1,6 +1,6 @@
-"""Which variables a function's IR reaches, and how: whose addresses get out of sight, and which bytes are volatile.
+"""Escape analysis of a function's IR: variables whose addresses escape, and bytes accessed only as volatile.
 
-A place is the variable, `@name` or `%name`, and the byte in it; None for the byte where an index is not a constant.
+A location is a variable, `@name` or `%name`, and a byte offset, None if an index is not constant.
 """
 
 from __future__ import annotations
@@ -14,14 +14,14 @@ Place: TypeAlias = tuple[str, int | None]
 
 
 class Accesses:
-    """Of one function."""
+    """Accesses of one function to its variables."""
 
     def __init__(self, f: Function) -> None:
         self._instrs = [i for b in f.blocks for i in b.instrs]
         self._places: dict[int, Place] = {id(i): (f"%{i.name}", 0) for i in self._instrs if i.op == "alloca"}
         addresses = [i for i in self._instrs if i.op == "getelementptr"]
         found = -1
-        while found != len(self._places):  # blocks stand in any order
+        while found != len(self._places):  # blocks are in no particular order
             found = len(self._places)
             for i in addresses:
                 base = self._place(i.args[0])
@@ -41,11 +41,11 @@ class Accesses:
                     yield i, n, place
 
     def escaped(self) -> set[str]:
-        """Variables of the frame whose addresses are used otherwise than to load and store, without the `%`."""
+        """Return the frame variables, without `%`, whose addresses are used for more than loads and stores."""
         return {root[1:] for i, n, (root, _) in self._uses() if root[0] == "%" and not _stays(i, n)}
 
     def volatile(self) -> set[Place]:
-        """Bytes that the function accesses, and by no access that is not volatile."""
+        """Return the bytes that the function accesses by volatile accesses only."""
         known: dict[bool, set[Place]] = {True: set(), False: set()}
         mixed: set[str] = set()
         for i, n, (root, at) in self._uses():
@@ -61,7 +61,7 @@ class Accesses:
 
 
 def offset_of(i: Instr) -> int | None:
-    """Bytes that a getelementptr adds; None where an index is not a constant."""
+    """Return the byte offset of a getelementptr, None if an index is not constant."""
     t, total = i.extra["type"], 0
     assert isinstance(t, Type)
     for k, index in enumerate(i.args[1:]):
@@ -81,11 +81,11 @@ def _name(i: Instr) -> str:
 
 
 def _stays(i: Instr, n: int) -> bool:
-    """Whether an operand that is an address is only loaded from, stored to or moved."""
+    """Whether an address operand is only loaded from, stored to or offset."""
     if i.op in ("load", "getelementptr"):
         return n == 0
     if i.op == "store":
         return n == 1
     if i.op != "call" or not _name(i).startswith("llvm."):
         return False
-    return not _name(i).startswith("llvm.mem") or isinstance(i.args[2], ConstInt)  # else the library is called
+    return not _name(i).startswith("llvm.mem") or isinstance(i.args[2], ConstInt)  # else a library call

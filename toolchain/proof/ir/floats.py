@@ -1,7 +1,7 @@
-"""Floating point of the IR: numbers nobody looks into, made by the run-time library's functions (abi-elf.md §2.8).
+"""Floating-point operations of the IR as uninterpreted functions, named as in the run-time library (abi-elf.md §2.8).
 
-Which function stands for an operation is written here once more, apart from `lower/softfloat.py`: that the back end
-calls the right one, with the right operands, is what is proved.
+The mapping from operations to library functions is independent of the back end's, so that the proof checks that the
+back end calls the right function with the right operands.
 """
 
 from __future__ import annotations
@@ -17,18 +17,18 @@ from toolchain.proof.terms import Term, one_bit, vector
 MODES: Final = {32: "sf", 64: "df"}
 SUMS: Final = {"fadd": "add", "fsub": "sub", "fmul": "mul", "fdiv": "div"}
 ORDERED: Final = {"oeq": "eq", "une": "ne", "olt": "lt", "ole": "le", "ogt": "gt", "oge": "ge"}
-"""The library's function whose result compares with 0 as the operands do with each other; NaN makes it false."""
+"""Library function whose result compares with 0 as the operands compare with each other; false for NaN."""
 NEGATED: Final = {"ult": "oge", "ule": "ogt", "ugt": "ole", "uge": "olt"}
 
 
 def arithmetic(op: str, a: Term, b: Term) -> Term:
-    """fadd, fsub, fmul, fdiv."""
+    """Return the result of fadd, fsub, fmul or fdiv."""
     mode = MODES[a.size()]
     return opaque(f"__{SUMS[op]}{mode}3", a.size())(a, b)
 
 
 def compared(pred: str, a: Term, b: Term) -> Term:
-    """fcmp, as one bit. Raises Undecided."""
+    """Return the result of fcmp as one bit; raises Undecided for an unknown predicate."""
     if pred in NEGATED:
         return ~compared(NEGATED[pred], a, b)
     mode = MODES[a.size()]
@@ -42,20 +42,20 @@ def compared(pred: str, a: Term, b: Term) -> Term:
         raise Undecided(f"the comparison {pred}")
     name = ORDERED[pred]
     result, zero = opaque(f"__{name}{mode}2", 16)(a, b), vector(0, 16)
-    claims = {"eq": result == zero, "ne": result != zero, "lt": result < zero, "le": result <= zero,
+    invariants = {"eq": result == zero, "ne": result != zero, "lt": result < zero, "le": result <= zero,
               "gt": result > zero, "ge": result >= zero}  # fmt: skip
-    return one_bit(claims[name])
+    return one_bit(invariants[name])
 
 
 def converted(op: str, a: Term, bits: int) -> Term:
-    """Between floating point and integers, and between both kinds of floating point."""
+    """Return the result of a conversion between floating point and integers, or between floating-point widths."""
     if op in ("fpext", "fptrunc"):
         return opaque("__extendsfdf2" if op == "fpext" else "__truncdfsf2", bits)(a)
     signed = op in ("sitofp", "fptosi")
     if op in ("sitofp", "uitofp"):
         width = 32 if a.size() <= 32 else 64
         wide = (z3.SignExt if signed else z3.ZeroExt)(width - a.size(), a)
-        unsigned = "" if signed or a.size() < width else "un"  # what fits is positive either way
+        unsigned = "" if signed or a.size() < width else "un"  # what fits is positive either run
         return opaque(f"__float{unsigned}{'si' if width == 32 else 'di'}{MODES[bits]}", bits)(wide)
     width = 32 if bits <= 32 else 64
     name = f"__fix{'' if signed else 'uns'}{MODES[a.size()]}{'si' if width == 32 else 'di'}"

@@ -1,42 +1,40 @@
-"""Intrinsics of LLVM IR on symbolic inputs, by LLVM's language reference."""
+"""Symbolic meaning of LLVM intrinsics, by LLVM's language reference."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import z3
 
 from toolchain.ir.model import Instr
 from toolchain.proof.helpers import bits_set
 from toolchain.proof.ir import floats
+from toolchain.proof.ir.effects import Effects
+from toolchain.proof.path import Path
 from toolchain.proof.solver import Undecided
 from toolchain.proof.terms import Term, known, one_bit, truth, vector
 
-if TYPE_CHECKING:
-    from toolchain.proof.ir.source import Evaluator
-    from toolchain.proof.path import Path
-
-Meaning = Callable[["Evaluator", "Path", Instr], Any]
-MOST_BYTES: Final = 256
-"""Of a copy or fill that is followed byte by byte."""
+Meaning = Callable[[Effects, Path, Instr], Any]
+MAX_BYTES: Final = 256
+"""Greatest size of a copy or fill that is executed byte by byte."""
 
 
 def base_of(name: str) -> str:
-    """llvm.umin.i16 -> umin."""
+    """Return the name without types: llvm.umin.i16 -> umin."""
     words = name.removeprefix("llvm.").split(".")
     plain = [w for w in words if not (w[:1] in "ipf" and w[1:].isdigit())]
     return ".".join(plain)
 
 
-def _scalar(e: Evaluator, path: Path, i: Instr, n: int) -> tuple[Term, Term | None]:
+def _scalar(e: Effects, path: Path, i: Instr, n: int) -> tuple[Term, Term | None]:
     return e.scalar(path, i.args[n])
 
 
 def _of_words(make: Callable[..., Term], count: int = 2) -> Meaning:
-    """A function of its first operands, poison if one of them is."""
+    """Return the meaning of an intrinsic that is a function of its first operands, poison if one of them is."""
 
-    def meaning(e: Evaluator, path: Path, i: Instr) -> Any:
+    def meaning(e: Effects, path: Path, i: Instr) -> Any:
         parts = [_scalar(e, path, i, n) for n in range(count)]
         poisons = [p for _, p in parts if p is not None]
         return make(*(t for t, _ in parts)), (z3.Or(*poisons) if poisons else None)
@@ -44,25 +42,25 @@ def _of_words(make: Callable[..., Term], count: int = 2) -> Meaning:
     return meaning
 
 
-def _nothing(e: Evaluator, path: Path, i: Instr) -> None:
-    """A hint."""
+def _nothing(e: Effects, path: Path, i: Instr) -> None:
+    """Do nothing: the intrinsic is a hint."""
 
 
-def _assume(e: Evaluator, path: Path, i: Instr) -> None:
-    path.assumed.append(truth(e.sure(path, i.args[0])))
+def _assume(e: Effects, path: Path, i: Instr) -> None:
+    path.assumptions.append(truth(e.sure(path, i.args[0])))
 
 
-def _first(e: Evaluator, path: Path, i: Instr) -> Any:
+def _first(e: Effects, path: Path, i: Instr) -> Any:
     return e.value(path, i.args[0])
 
 
-def _abs(e: Evaluator, path: Path, i: Instr) -> Any:
+def _abs(e: Effects, path: Path, i: Instr) -> Any:
     a, p = _scalar(e, path, i, 0)
     return z3.If(a < 0, -a, a), p
 
 
 def _funnel(left: bool) -> Meaning:
-    def meaning(e: Evaluator, path: Path, i: Instr) -> Any:
+    def meaning(e: Effects, path: Path, i: Instr) -> Any:
         (a, p), (b, q), (n, r) = (_scalar(e, path, i, k) for k in range(3))
         bits = a.size()
         both, amount = z3.Concat(a, b), z3.ZeroExt(bits, z3.URem(n, vector(bits, bits)))
@@ -92,7 +90,7 @@ def _zeros(a: Term, from_top: bool) -> Term:
 
 
 def _count_zeros(from_top: bool) -> Meaning:
-    def meaning(e: Evaluator, path: Path, i: Instr) -> Any:
+    def meaning(e: Effects, path: Path, i: Instr) -> Any:
         a, p = _scalar(e, path, i, 0)
         if known(e.sure(path, i.args[1])):
             zero = a == 0
@@ -103,9 +101,9 @@ def _count_zeros(from_top: bool) -> Meaning:
 
 
 def _checked(op: str) -> Meaning:
-    """[result, whether it is not the exact one]."""
+    """Return the meaning of an intrinsic with result and overflow bit."""
 
-    def meaning(e: Evaluator, path: Path, i: Instr) -> Any:
+    def meaning(e: Effects, path: Path, i: Instr) -> Any:
         (a, p), (b, q) = _scalar(e, path, i, 0), _scalar(e, path, i, 1)
         bits, signed = a.size(), op[0] == "s"
         more = bits if op[1:] == "mul" else 1
@@ -121,7 +119,7 @@ def _checked(op: str) -> Meaning:
 
 
 def _saturated(op: str) -> Meaning:
-    def meaning(e: Evaluator, path: Path, i: Instr) -> Any:
+    def meaning(e: Effects, path: Path, i: Instr) -> Any:
         (a, p), (b, q) = _scalar(e, path, i, 0), _scalar(e, path, i, 1)
         bits, signed = a.size(), op[0] == "s"
         extend = z3.SignExt if signed else z3.ZeroExt
@@ -145,8 +143,8 @@ FRACTION_BITS: Final = {32: 23, 64: 52}
 """IEEE 754, single and double precision."""
 
 
-def _is_class(e: Evaluator, path: Path, i: Instr) -> Any:
-    """Whether a number is of one of the classes that bits of the second operand name."""
+def _is_class(e: Effects, path: Path, i: Instr) -> Any:
+    """Return whether a number is in one of the classes of the mask in the second operand."""
     (a, p), wanted = _scalar(e, path, i, 0), known(e.sure(path, i.args[1]))
     if wanted is None:
         raise Undecided("is.fpclass of a class that is not a constant")
@@ -165,28 +163,28 @@ def _is_class(e: Evaluator, path: Path, i: Instr) -> Any:
     return one_bit(z3.Or(*(one for k, one in enumerate(classes) if wanted >> k & 1))), p
 
 
-def _copy(e: Evaluator, path: Path, i: Instr) -> None:
-    """memcpy and memmove: all bytes are read before one is written."""
+def _copy(e: Effects, path: Path, i: Instr) -> None:
+    """Execute memcpy or memmove: all bytes are read before any is written."""
     size = _length(e, path, i)
     if size is None:
         _as_call(e, path, i)
     elif size:
         target, source = (e.sure(path, a) for a in i.args[:2])
-        e.reached(path, target, size, _is_even(i, 0))
-        e.reached(path, source, size, _is_even(i, 1))
-        if "memcpy" in getattr(i.args[-1], "name", ""):  # one place, or two apart
+        e.access(path, target, size, _is_even(i, 0))
+        e.access(path, source, size, _is_even(i, 1))
+        if "memcpy" in getattr(i.args[-1], "name", ""):  # operands are equal or do not overlap
             apart = [z3.UGE(one, vector(size, 16)) for one in (target - source, source - target)]
-            path.assumed.append(z3.Or(target == source, z3.And(*apart)))
+            path.assumptions.append(z3.Or(target == source, z3.And(*apart)))
         path.write(target, path.memory.read(source, size))
 
 
-def _fill(e: Evaluator, path: Path, i: Instr) -> None:
+def _fill(e: Effects, path: Path, i: Instr) -> None:
     size = _length(e, path, i)
     if size is None:
         _as_call(e, path, i)
     elif size:
         target, byte = (e.sure(path, a) for a in i.args[:2])
-        e.reached(path, target, size, _is_even(i, 0))
+        e.access(path, target, size, _is_even(i, 0))
         path.write(target, z3.Concat(*[byte] * size) if size > 1 else byte)
 
 
@@ -196,19 +194,19 @@ def _is_even(i: Instr, n: int) -> bool:
     return int(attributes[n].get("align", 1)) > 1
 
 
-def _length(e: Evaluator, path: Path, i: Instr) -> int | None:
+def _length(e: Effects, path: Path, i: Instr) -> int | None:
     size = known(e.sure(path, i.args[2]))
     if known(e.sure(path, i.args[3])):
         raise Undecided("a volatile copy or fill")
-    if size is not None and size > MOST_BYTES:
+    if size is not None and size > MAX_BYTES:
         raise Undecided(f"a copy or fill of {size} bytes")
     return size
 
 
-def _as_call(e: Evaluator, path: Path, i: Instr) -> None:
-    """Of so many bytes as a value says: the library's function."""
+def _as_call(e: Effects, path: Path, i: Instr) -> None:
+    """Execute a copy or fill of variable size as a call of the library function."""
     name = getattr(i.args[-1], "name", "")
-    e.called(path, "memset" if "memset" in name else "memcpy" if "memcpy" in name else "memmove", i.args[:3])
+    e.record_call(path, "memset" if "memset" in name else "memcpy" if "memcpy" in name else "memmove", i.args[:3])
 
 
 INTRINSICS: Final[dict[str, Meaning]] = {
@@ -226,4 +224,4 @@ INTRINSICS: Final[dict[str, Meaning]] = {
     **{f"{op}.with.overflow": _checked(op) for op in ("sadd", "ssub", "smul", "uadd", "usub", "umul")},
     **{f"{op}.sat": _saturated(op) for op in ("sadd", "ssub", "uadd", "usub")},
 }  # fmt: skip
-"""Meaning by name without types."""
+"""Meaning by intrinsic name without types."""

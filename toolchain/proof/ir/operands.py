@@ -1,6 +1,6 @@
-"""Operands of LLVM IR as terms, and the casts between them.
+"""Operands of LLVM IR as terms, and casts.
 
-A value is a vector and the condition under which it is poison (None: never); an aggregate is a list of values.
+A value is a vector and the condition under which it is poison (None: never).  An aggregate is a list of values.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from toolchain.proof.solver import Undecided
 from toolchain.proof.terms import Term, product, vector
 
 Symbolic: TypeAlias = tuple[Term, Term | None]
-"""A vector, and when it is poison."""
+"""A vector, and the condition under which it is poison."""
 SUMS: Final[dict[str, Callable[[Term, Term], Term]]] = {
     "add": lambda a, b: a + b, "sub": lambda a, b: a - b, "mul": product, "and": lambda a, b: a & b,
     "or": lambda a, b: a | b, "xor": lambda a, b: a ^ b,
@@ -36,14 +36,14 @@ SUMS: Final[dict[str, Callable[[Term, Term], Term]]] = {
 
 
 class Operands:
-    """What operands are on a path. `address` gives a global's place."""
+    """Values of operands on a path; `address` returns the address of a global."""
 
     def __init__(self, address: Callable[[str], int]) -> None:
         self.address: Final = address
         self.fresh = 0
 
     def value(self, path: Path, v: Value) -> Any:
-        """What an operand is."""
+        """Return the value of an operand."""
         match v:
             case Instr() | Arg():
                 return path.values[id(v)]
@@ -86,10 +86,10 @@ class Operands:
         raise Undecided(f"a value of type {t}")
 
     def sure(self, path: Path, v: Value) -> Term:
-        """An operand that must not be poison."""
+        """Return the term of an operand and assume that it is not poison."""
         term, poison = self.scalar(path, v)
         if poison is not None:
-            path.assumed.append(z3.Not(poison))
+            path.assumptions.append(z3.Not(poison))
         return term
 
     def scalar(self, path: Path, v: Value) -> Symbolic:
@@ -99,7 +99,7 @@ class Operands:
         return found  # type: ignore[no-any-return]
 
     def unknown(self, name: str, bits: int) -> Term:
-        """A new free vector."""
+        """Return a new unconstrained vector."""
         self.fresh += 1
         return z3.BitVec(f"{name}.{self.fresh}", bits)
 
@@ -114,7 +114,7 @@ class Operands:
 
 
 def either(a: Term | None, b: Term | None) -> Term | None:
-    """Whether one of them is poison."""
+    """Return the disjunction of two poison conditions."""
     if a is None or b is None:
         return b if a is None else a
     return z3.Or(a, b)

@@ -1,7 +1,7 @@
-"""Optimised LLVM IR on symbolic inputs: one path after the other, with what the world sees of each.
+"""Symbolic execution of optimised LLVM IR, path by path, with the observable events of each path.
 
-What would be undefined becomes an assumption of its path. The reader keeps no `nsw`, `nuw` or `exact`, so sums wrap
-here as they do in the machine: what is proved holds for more inputs than the IR promises.
+Undefined behaviour becomes an assumption of its path.  The IR reader drops `nsw`, `nuw` and `exact`, so sums wrap as
+they do in the machine, and a proof covers more inputs than the IR defines.
 """
 
 from __future__ import annotations
@@ -11,7 +11,6 @@ from typing import Any, Final
 
 import z3
 
-from toolchain.abi.target import SFR_END
 from toolchain.ir.model import (
     Block,
     ConstInt,
@@ -19,7 +18,6 @@ from toolchain.ir.model import (
     GlobalRef,
     InlineAsm,
     Instr,
-    ParameterAttributes,
     Type,
     Value,
     size_of,
@@ -28,18 +26,19 @@ from toolchain.ir.model import (
 )
 from toolchain.proof.asm_statements import Shape, plain, shape_of
 from toolchain.proof.ir import floats
+from toolchain.proof.ir.effects import Effects
 from toolchain.proof.ir.intrinsics import INTRINSICS, base_of
-from toolchain.proof.ir.operands import SUMS, Operands, Symbolic, either
+from toolchain.proof.ir.operands import SUMS, Symbolic, either
 from toolchain.proof.memory import Frame
 from toolchain.proof.path import Event, Path
 from toolchain.proof.solver import Undecided, feasible
 from toolchain.proof.terms import Term, known, one_bit, truth, vector
 
-MOST_VISITS: Final = 70
-"""Rounds of a loop that are followed on one path,"""
-MOST_FORKS: Final = 4
-"""and how many of them may end there or not, as the input says."""
-MOST_PATHS: Final = 400
+MAX_VISITS: Final = 70
+"""Greatest number of visits of a block on one path."""
+MAX_FORKS: Final = 4
+"""Greatest number of input-dependent branches of one block on a path."""
+MAX_PATHS: Final = 400
 COMPARISONS: Final[dict[str, Callable[[Term, Term], Term]]] = {
     "eq": lambda a, b: a == b, "ne": lambda a, b: a != b, "ugt": z3.UGT, "uge": z3.UGE, "ult": z3.ULT, "ule": z3.ULE,
     "sgt": lambda a, b: a > b, "sge": lambda a, b: a >= b, "slt": lambda a, b: a < b, "sle": lambda a, b: a <= b,
@@ -52,24 +51,25 @@ QUOTIENTS: Final[dict[str, Callable[[Term, Term], Term]]] = {
 }  # fmt: skip
 
 
-class Evaluator(Operands):
-    """Follows one function. `address` gives a global's place, `frame` says where its variables lie."""
+class Evaluator(Effects):
+    """Symbolic execution of one function; `frame` has the addresses of its variables."""
 
     def __init__(
         self, function: Function, frame: Frame, address: Callable[[str], int], watched: Set[str] = frozenset()
     ) -> None:
-        """`watched`: blocks whose values paths remember (`Path.heads`)."""
-        super().__init__(address)
+        """`watched`: blocks at whose visits paths record all values (`Path.loop_visits`)."""
+        super().__init__(frame, address)
         self.watched: Final = watched
         self.function: Final = function
-        self.frame: Final = frame
         self.blocks: Final = {b.name: b for b in function.blocks}
         self._slots = {i.name: i for b in function.blocks for i in b.instrs if i.op == "alloca"}
 
     def paths(self, start: Path, first: str = "", heads: Set[str] = frozenset(), most: int = 0) -> Iterator[Path]:
-        """Every path that some input takes, from the block `first`, whose phis have values, or the beginning, up to the
-        end or one of `heads`. Raises Undecided; with `most`, paths that decide more often whether to go round a loop
-        again are left out."""
+        """Yield every feasible path from the block `first`, or the entry, to a return or one of `heads`.
+
+        The phis of `first` have values on the path `start`.  With `most`, paths with more input-dependent branches of
+        one block are skipped.  Raises Undecided.
+        """
         work: list[tuple[Path, Block, str]] = [(start, self.blocks[first or self.function.blocks[0].name], "")]
         ended = 0
         while work:
@@ -78,19 +78,21 @@ class Evaluator(Operands):
                 if came:
                     self._enter(path, block, came)
                     if block.name in heads:
-                        path.part(barrier=False)
-                        path.ended, path.head = "loop", block.name
+                        path.fix_store_order(barrier=False)
+                        path.end_kind, path.head = "loop", block.name
                         yield path
                         break
                 following = self._block(path, block)
                 if not following:
                     ended += 1
-                    if ended > MOST_PATHS:
-                        raise Undecided(f"more than {MOST_PATHS} ways through it")
+                    if ended > MAX_PATHS:
+                        raise Undecided(f"more than {MAX_PATHS} paths")
                     yield path
                     break
                 possible = (
-                    following if len(following) == 1 else [(c, n) for c, n in following if feasible([*path.known, c])]
+                    following
+                    if len(following) == 1
+                    else [(c, n) for c, n in following if feasible([*path.conditions, c])]
                 )
                 if not possible:
                     break
@@ -99,32 +101,32 @@ class Evaluator(Operands):
                     path.forks[came] = path.forks.get(came, 0) + 1
                     if most and path.forks[came] > most:
                         break
-                    if path.forks[came] > MOST_FORKS:
-                        raise Undecided("a loop whose rounds are not known")
+                    if path.forks[came] > MAX_FORKS:
+                        raise Undecided("a loop with an unknown number of iterations")
                 for condition, name in possible[1:]:
                     other = path.copy()
-                    other.taken.append(condition)
+                    other.branch_conditions.append(condition)
                     work.append((other, self.blocks[name], came))
                 condition, name = possible[0]
                 if len(following) > 1:
-                    path.taken.append(condition)
+                    path.branch_conditions.append(condition)
                 block = self.blocks[name]
 
     # -- a block -----------------------------------------------------------------------------------------------------
 
     def _enter(self, path: Path, block: Block, came: str) -> None:
-        """By the edge from another block."""
+        """Assign the phis of a block entered from the block `came`."""
         entered = [(phi, self.value(path, phi.args[phi.blocks.index(came)])) for phi in block.phis()]
         for phi, value in entered:
             path.values[id(phi)] = value
 
     def _block(self, path: Path, block: Block) -> list[tuple[Term, str]]:
-        """Run it; where it goes on, by condition."""
+        """Execute a block; return (condition, block) of each successor."""
         path.visits[block.name] = path.visits.get(block.name, 0) + 1
-        if path.visits[block.name] > MOST_VISITS:
-            raise Undecided("a loop whose rounds are not known")
+        if path.visits[block.name] > MAX_VISITS:
+            raise Undecided("a loop with an unknown number of iterations")
         if block.name in self.watched:
-            path.heads.append((block.name, dict(path.values), len(path.events)))
+            path.loop_visits.append((block.name, dict(path.values), len(path.events)))
         for i in block.instrs:
             if i.op == "phi":
                 continue
@@ -137,12 +139,12 @@ class Evaluator(Operands):
 
     def _leave(self, path: Path, i: Instr) -> list[tuple[Term, str]]:
         if i.op in ("ret", "unreachable"):
-            path.part(barrier=False)
+            path.fix_store_order(barrier=False)
         if i.op == "ret":
-            path.result, path.ended = (self.value(path, i.args[0]) if i.args else None), "ret"
+            path.result, path.end_kind = (self.value(path, i.args[0]) if i.args else None), "ret"
             return []
         if i.op == "unreachable":
-            path.ended = "unreachable"
+            path.end_kind = "unreachable"
             return []
         if i.op == "indirectbr":
             raise Undecided("a computed goto")
@@ -168,7 +170,7 @@ class Evaluator(Operands):
     # -- instructions ------------------------------------------------------------------------------------------------
 
     def again(self, path: Path, i: Instr) -> None:
-        """An instruction that ran before, on a path that begins later."""
+        """Give an instruction before the start of a path a value: computed, or unknown where it depends on state."""
         if i.type.kind == "void":
             return
         callee = i.args[-1] if i.op == "call" else None
@@ -199,10 +201,10 @@ class Evaluator(Operands):
         poison = either(p, q)
         if i.op in QUOTIENTS:
             b = self.sure(path, i.args[1])
-            path.assumed.append(b != 0)
+            path.assumptions.append(b != 0)
             if i.op in ("sdiv", "srem"):
                 least = vector(1 << i.type.bits - 1, i.type.bits)
-                path.assumed.append(z3.Not(z3.And(a == least, b == vector(-1, i.type.bits))))
+                path.assumptions.append(z3.Not(z3.And(a == least, b == vector(-1, i.type.bits))))
             return QUOTIENTS[i.op](a, b), poison
         if i.op in SHIFTS:
             amount = known(b)
@@ -230,7 +232,7 @@ class Evaluator(Operands):
         if place is not None:
             return a if place else b
         if isinstance(a, list):
-            raise Undecided("a choice of aggregates")
+            raise Undecided("a select of aggregates")
         mixed = None
         if a[1] is not None or b[1] is not None:
             false = z3.BoolVal(False)
@@ -239,17 +241,17 @@ class Evaluator(Operands):
 
     def _freeze(self, path: Path, i: Instr) -> Any:
         term, poison = self.scalar(path, i.args[0])
-        if poison is not None and feasible([*path.known, poison]):
-            raise Undecided("freeze of what may be undefined")
+        if poison is not None and feasible([*path.conditions, poison]):
+            raise Undecided("freeze of a possibly undefined value")
         return term, None
 
     def _alloca(self, path: Path, i: Instr) -> Symbolic:
         if i.name not in self.frame.objects:
-            raise Undecided("a variable without a place in the frame")
+            raise Undecided("a variable without a frame location")
         return vector(self.frame.objects[i.name][0], 16), None
 
     def _address(self, path: Path, i: Instr) -> Symbolic:
-        """getelementptr: bases and strides are exact, the rest wraps."""
+        """Return the address of a getelementptr; sums wrap."""
         base, poison = self.scalar(path, i.args[0])
         t = i.extra["type"]
         assert isinstance(t, Type)
@@ -271,7 +273,7 @@ class Evaluator(Operands):
         if i.volatile:
             size = store_size(i.type)
             value = self.unknown("read", 8 * size)
-            path.show(Event("read", address, size, value, even=_is_even(i)))
+            path.record_event(Event("read", address, size, value, aligned=_is_even(i)))
             return self.cast("trunc", (value, None), i.type)
         return self._loaded(path, address, i.type)
 
@@ -289,7 +291,7 @@ class Evaluator(Operands):
         value = self.value(path, i.args[0])
         if i.volatile:
             term = self.cast("zext", (self.sure(path, i.args[0]), None), Type("int", 8 * store_size(t)))[0]
-            path.show(Event("write", address, term.size() // 8, term, even=_is_even(i)))
+            path.record_event(Event("write", address, term.size() // 8, term, aligned=_is_even(i)))
             return
         self._stored(path, address, t, value)
 
@@ -300,23 +302,14 @@ class Evaluator(Operands):
             return
         term, poison = value
         if poison is not None:
-            path.assumed.append(z3.Not(poison))
+            path.assumptions.append(z3.Not(poison))
         path.write(address, term)
 
     def _accessed(self, path: Path, pointer: Value, t: Type, i: Instr) -> Term:
-        """The address, with what may be assumed of it: nothing private lies there, words are even."""
+        """Return the address of a load or store, with the assumptions of `access`."""
         address = self.sure(path, pointer)
         size = store_size(t) if t.kind in ("int", "ptr", "float") else size_of(t)
-        return self.reached(path, address, size, _is_even(i))
-
-    def reached(self, path: Path, address: Term, size: int, even: bool) -> Term:
-        """As `_accessed`, of bytes at an address."""
-        if known(address) is None:
-            path.assumed.append(self.frame.spared(address, size))
-            path.preferred.append(z3.And(z3.UGE(address, SFR_END), z3.ULT(address, self.frame.lowest - size)))
-            if size > 1 and even:
-                path.assumed.append(z3.Extract(0, 0, address) == 0)
-        return address
+        return self.access(path, address, size, _is_even(i))
 
     def _extract(self, path: Path, i: Instr) -> Any:
         found = self.value(path, i.args[0])
@@ -345,65 +338,49 @@ class Evaluator(Operands):
         attributes = i.extra["attrs"]
         assert isinstance(attributes, list)
         target = callee.name if isinstance(callee, GlobalRef) else self._even(path, self.sure(path, callee))
-        event = self.called(path, target, i.args[:-1], attributes)
-        event.tail = i.extra.get("tail") in ("tail", "musttail")
+        event = self.record_call(path, target, i.args[:-1], attributes)
+        event.is_tail_call = i.extra.get("tail") in ("tail", "musttail")
         if i.extra.get("vararg"):
             assert isinstance(i.extra["fixed"], int)
-            event.named = i.extra["fixed"]
+            event.named_arguments = i.extra["fixed"]
         if i.type.kind != "void":
             event.value = self.of_type(i.type, lambda t: (self.unknown("result", t.bits), None))
         return event.value
 
     def _even(self, path: Path, pointer: Term) -> Term:
-        """A pointer to code: no function has an odd address, and the machine does not look at that bit."""
-        path.assumed.append(z3.Extract(0, 0, pointer) == 0)
+        """Assume that a code pointer is even: the machine ignores its lowest bit."""
+        path.assumptions.append(z3.Extract(0, 0, pointer) == 0)
         return pointer
-
-    def called(
-        self, path: Path, target: Any, values: list[Value], attributes: list[ParameterAttributes] | None = None
-    ) -> Event:
-        """A call of something that may change whatever others can reach."""
-        attributes = attributes or [{} for _ in values]
-        arguments = [(v, self.value(path, v), k) for v, k in zip(values, attributes, strict=True)]
-        event = Event("call", target, arguments=arguments, memory=path.memory.copy())
-        path.part(barrier=False)
-        path.events.append(event)
-        self._others_run(path, event)
-        return event
 
     def _assembly(self, path: Path, i: Instr, code: InlineAsm) -> Any:
         shape = shape_of(code)
         inputs = [(v, self.value(path, v)) for v in i.args[:-1]]
         if shape.memory:
-            path.part(barrier=True)
+            path.fix_store_order(barrier=True)
         if not code.text.strip():
             return self._unchanged(shape, inputs)
         event = Event("asm", plain(code.text), arguments=[(v, value, {}) for v, value in inputs], shape=shape)
         if i.type.kind != "void":
-            event.value = self.of_type(i.type, lambda t: (self.unknown("stated", t.bits), None))
+            event.value = self.of_type(i.type, lambda t: (self.unknown("execute_statement", t.bits), None))
         if shape.memory:
             event.memory = path.memory.copy()
             path.events.append(event)
-            self._others_run(path, event)
+            self.havoc_memory(path, event)
         else:
-            path.show(event)
+            path.record_event(event)
         return event.value
 
     def _unchanged(self, shape: Shape, inputs: list[tuple[Value, Any]]) -> Any:
-        """What a statement without text gives: its outputs are the inputs tied to them."""
+        """Return the outputs of an assembly statement without text: the inputs tied to them."""
         places = [o.tied for o in shape.operands if not o.output]
         tied = {n: value for n, (_, value) in zip(places, inputs, strict=True)}
         outputs = [n for n, o in enumerate(shape.operands) if o.output]
         if any(n not in tied for n in outputs):
-            raise Undecided("an assembly statement without text that gives something")
+            raise Undecided("an assembly statement without text that has an untied output")
         return tied[outputs[0]] if len(outputs) == 1 else [tied[n] for n in outputs] or None
 
-    def _others_run(self, path: Path, event: Event) -> None:
-        event.after = z3.Array(f"memory.{len(path.events)}", z3.BitVecSort(16), z3.BitVecSort(8))
-        path.memory.become(event.after, self.frame.kept())
-
     def _fence(self, path: Path, i: Instr) -> None:
-        path.part(barrier=True)
+        path.fix_store_order(barrier=True)
 
 
 def _is_even(i: Instr) -> bool:

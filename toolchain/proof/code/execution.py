@@ -1,4 +1,4 @@
-"""The machine code of a function, run on all inputs of one path of the source, along every way they make it take."""
+"""Symbolic execution of a function's machine code on all inputs of one path of the source."""
 
 from __future__ import annotations
 
@@ -10,105 +10,108 @@ import z3
 from emu.dspic30f.isa import flow
 from emu.dspic30f.isa.rows.multiply import DIVIDE_COUNT
 from toolchain.abi.target import RETURN_ADDRESS_BYTES, SP
-from toolchain.proof.code.calling_convention import Contract
-from toolchain.proof.code.machine import Machine, State
+from toolchain.proof.code.calling_convention import ConventionChecker
+from toolchain.proof.code.machine import MachineState, SymbolicMachine
 from toolchain.proof.memory import Frame
 from toolchain.proof.path import Path
-from toolchain.proof.problem import PAGE, WORD_UNITS, Subject
-from toolchain.proof.solver import Refuted, Undecided, answer, feasible
+from toolchain.proof.problem import PAGE, WORD_UNITS, CompiledFile
+from toolchain.proof.solver import Refuted, Undecided, check, feasible
 from toolchain.proof.terms import Term, holds, known, vector, word
 
-MOST_STEPS: Final = 6000
-"""Instructions on one path of the code."""
-MOST_TARGETS: Final = 64
-"""Of a computed jump."""
+MAX_STEPS: Final = 6000
+"""Greatest number of instructions on one path of the code."""
+MAX_TARGETS: Final = 64
+"""Greatest number of targets of a computed jump."""
 
 
-class Code:
-    """A function between two program addresses.
+class CodeExecution:
+    """Symbolic execution of the code between two program addresses.
 
-    `handler` is what kind of interrupt function it is (`interrupt_kind`).
+    `handler` is the kind of interrupt function (`interrupt_kind`), "" for other functions.
     """
 
-    def __init__(self, subject: Subject, start: int, end: int, frame: Frame, path: Path, handler: str = "") -> None:
-        self.subject: Final = subject
+    def __init__(
+        self, compiled: CompiledFile, start: int, end: int, frame: Frame, path: Path, handler: str = ""
+    ) -> None:
+        self.compiled: Final = compiled
         self.start: Final = start
         self.end: Final = end
         self.frame: Final = frame
         self.path: Final = path
         self.handler: Final = handler
-        page = vector(subject.symbols.get(PAGE, 0), 16)
+        page = vector(compiled.symbols.get(PAGE, 0), 16)
         entry = z3.BitVec("PSVPAG", 16) if handler == "auto_psv" else page
-        self.state: State
-        """What it is at."""
+        self.state: MachineState
+        """The state being executed."""
         self.watched: Set[int] = frozenset()
-        """Addresses: where a way comes through one, its trace keeps the state."""
-        self.machine: Final = Machine(frame, path.events, path.known, page, entry)
+        """Addresses at which a path records its state in its trace."""
+        self.machine: Final = SymbolicMachine(frame, path.events, path.conditions, page, entry)
 
     def run(
         self,
         registers: list[Term],
-        state: State,
+        state: MachineState,
         volatile: Set[int],
-        arrived: Callable[[State], bool] | None = None,
+        at_end: Callable[[MachineState], bool] | None = None,
         moved: bool = False,
-    ) -> list[State]:
-        """From a state on, along every way: the states at the end. Raises Refuted, Undecided.
+    ) -> list[MachineState]:
+        """Execute all paths from a state and return their final states.  Raises Refuted, Undecided.
 
-        `registers` are W0-W14 at the function's entry, `volatile` bytes that are accessed only where the source does.
-        `arrived` says whether the code has come to where the path of the source ends; it is not asked at the beginning
-        but with `moved`.
+        registers  W0-W14 at the function's entry
+        volatile   bytes that may be accessed only where the source accesses them
+        at_end    whether the code has reached the end of the source's path, which is a loop head
+        moved      whether `at_end` is also evaluated before the first instruction
         """
         self.machine.volatile = volatile
-        self.contract = Contract(self.subject, self.frame, registers, self.path, self.machine)
-        if arrived is not None and moved and self._end(state, arrived):
+        self.convention = ConventionChecker(self.compiled, self.frame, registers, self.path, self.machine)
+        if at_end is not None and moved and self._end(state, at_end):
             return [state]
         work, ended = [state], []
         while work:
             state = self.state = work.pop()
-            for _ in range(MOST_STEPS):
+            for _ in range(MAX_STEPS):
                 if state.pc in self.watched:
                     state.trace.append(state.copy())
                 following = self._sure_step(state)
-                if arrived is not None:
-                    following = [one for one in following if not self._end(one, arrived)]
+                if at_end is not None:
+                    following = [one for one in following if not self._end(one, at_end)]
                 if not following:
                     ended.append(state)
                 if len(following) != 1 or following[0] is not state:
                     work += following
                     break
             else:
-                raise Undecided(f"more than {MOST_STEPS} instructions on one path")
+                raise Undecided(f"more than {MAX_STEPS} instructions on one path")
         return ended
 
-    def _end(self, state: State, arrived: Callable[[State], bool]) -> bool:
+    def _end(self, state: MachineState, at_end: Callable[[MachineState], bool]) -> bool:
         self.machine.state = state
-        return arrived(state)
+        return at_end(state)
 
-    def _sure_step(self, state: State) -> list[State]:
-        """As `_step`; what is wrong on a path that no input takes does not count."""
+    def _sure_step(self, state: MachineState) -> list[MachineState]:
+        """Execute one instruction as `_step` does; a refutation on an infeasible path does not count."""
         try:
             return self._step(state)
         except Refuted as found:
             if found.conditions is not None:
                 raise
-            conditions = [*self.path.known, *state.path]
-            possible, _ = answer(conditions)
+            conditions = [*self.path.conditions, *state.path]
+            possible, _ = check(conditions)
             if possible == z3.unsat:
                 return []
             if possible == z3.unknown:
                 raise Undecided(f"the solver gave up: {found.what}") from None
             raise Refuted(found.what, conditions) from None
 
-    def _step(self, state: State) -> list[State]:
-        """The state itself where there is one way on; none at the end."""
-        if self.path.ended == "unreachable" and state.event == len(self.path.events):
-            return []  # whatever it does now is right
-        insn = self.subject.insn(state.pc)
+    def _step(self, state: MachineState) -> list[MachineState]:
+        """Execute one instruction and return the successor states: the state itself if single, none at the end."""
+        if self.path.end_kind == "unreachable" and state.event == len(self.path.events):
+            return []  # undefined behaviour: anything is right
+        insn = self.compiled.insn(state.pc)
         if insn is None or not self.start <= state.pc < self.end:
-            raise Refuted(f"runs out of the function, to {state.pc:#x}")
+            raise Refuted(f"leaves the function to {state.pc:#x}")
         self.machine.begin(state, insn)
-        if self._stated(state):
+        if self._statement(state):
             return [state]
         if insn.row.syntax.startswith("DIV"):
             raise Refuted(f"a division without REPEAT at {state.pc:#x}")
@@ -123,39 +126,39 @@ class Code:
             case flow.Branch():
                 return self._fork(state, holds(asked.cond), asked.target, behind)
             case flow.Skip():
-                skipped = self.subject.insn(behind)
+                skipped = self.compiled.insn(behind)
                 if skipped is None:
-                    raise Refuted(f"skips what is no instruction at {behind:#x}")
+                    raise Refuted(f"skips a word that is no instruction at {behind:#x}")
                 return self._fork(state, holds(asked.cond), behind + WORD_UNITS * skipped.words, behind)
             case flow.Call():
                 state.w[SP] -= RETURN_ADDRESS_BYTES
-                self.contract.call(state, asked.target)
+                self.convention.call(state, asked.target)
                 state.pc = behind
                 return [state]
             case flow.Return():
                 if (asked.kind == "retfie") != bool(self.handler):
                     raise Refuted(f"ends with {asked.kind.upper()}")
-                (self.contract.handled if self.handler else self.contract.returned)(state)
+                (self.convention.check_handler_return if self.handler else self.convention.check_return)(state)
                 return []
             case flow.Repeat():
                 return self._repeat(state, asked.count, behind)
             case flow.Disi() | flow.ClearWatchdog() | flow.Sleep() | flow.Reset():
-                raise Refuted(f"{insn.row.syntax} at {state.pc:#x}, which the source has not")
+                raise Refuted(f"{insn.row.syntax} at {state.pc:#x}, which the source does not have")
             case _:
                 raise Undecided(f"{insn.row.syntax}")
 
-    def _stated(self, state: State) -> bool:
-        """Whether an assembly statement of the source stands here, which is done then."""
+    def _statement(self, state: MachineState) -> bool:
+        """Execute an assembly statement of the source if it is here; return whether it is."""
         e = self.machine.expected()
         if e is None or e.kind != "asm":
             return False
-        for statement in self.subject.statements.get(state.pc, ()):
-            if statement.template == e.address and self.contract.stated(state, statement, e):
+        for statement in self.compiled.statements.get(state.pc, ()):
+            if statement.template == e.address and self.convention.execute_statement(state, statement, e):
                 state.pc = statement.end
                 return True
         return False
 
-    def _fork(self, state: State, taken: Term, there: int, behind: int) -> list[State]:
+    def _fork(self, state: MachineState, taken: Term, there: int, behind: int) -> list[MachineState]:
         out = []
         place = z3.simplify(taken)
         for condition, pc in ((taken, there), (z3.Not(taken), behind)):
@@ -165,62 +168,62 @@ class Code:
                 return self._jump(state, behind)
             other = state.copy()
             other.path.append(condition)
-            if feasible([*self.path.known, *other.path]):
+            if feasible([*self.path.conditions, *other.path]):
                 other.pc = pc
                 out.append(other)
-        if len(out) == 1:  # what is known of it is known anyway
+        if len(out) == 1:  # the condition follows from the conditions of the path
             return self._jump(state, out[0].pc)
         return [landed for one in out for landed in self._jump(one, one.pc)]
 
-    def _jump(self, state: State, target: Any) -> list[State]:
+    def _jump(self, state: MachineState, target: Any) -> list[MachineState]:
         if not isinstance(target, int):
             return self._computed(state, word(target))
         if self.start <= target < self.end and not self._calls_itself(target):
             state.pc = target
             return [state]
-        self.contract.call(state, target)  # a call whose return is ours
-        self.contract.returned(state, popped=False)
+        self.convention.call(state, target)  # a tail call
+        self.convention.check_return(state, popped=False)
         return []
 
     def _calls_itself(self, target: int) -> bool:
-        """Whether a jump to the beginning is a call in the source whose return is ours."""
+        """Whether a jump to the function's start is a recursive tail call in the source."""
         e = self.machine.expected()
-        return target == self.start and e is not None and e.kind == "call" and self.contract.target(e) == target
+        return target == self.start and e is not None and e.kind == "call" and self.convention.target(e) == target
 
-    def _computed(self, state: State, target: Term) -> list[State]:
-        """Every place a jump by a register can lead to."""
+    def _computed(self, state: MachineState, target: Term) -> list[MachineState]:
+        """Return a state for every target of a jump through a register."""
         place = known(target)
         if place is not None:
             return self._jump(state, place)
-        out: list[State] = []
+        out: list[MachineState] = []
         excluded: list[Term] = []
         while True:
-            answered, solver = answer([*self.path.known, *state.path, *excluded])
+            answered, solver = check([*self.path.conditions, *state.path, *excluded])
             if answered == z3.unknown:
-                raise Undecided("the solver gave up: where a jump leads")
+                raise Undecided("the solver gave up: targets of a jump")
             if answered == z3.unsat:
                 return out
             value = solver.model().eval(target, model_completion=True).as_long()
-            if len(out) == MOST_TARGETS:
-                raise Undecided(f"a jump to more than {MOST_TARGETS} places")
+            if len(out) == MAX_TARGETS:
+                raise Undecided(f"a jump with more than {MAX_TARGETS} targets")
             other = state.copy()
             other.path.append(target == value)
             other.pc = int(value)
             excluded.append(target != value)
             if not self.start <= other.pc < self.end:
-                raise Undecided("a jump by a register out of the function")
+                raise Undecided("a jump through a register out of the function")
             out.append(other)
 
-    def _repeat(self, state: State, count: Any, pc: int) -> list[State]:
+    def _repeat(self, state: MachineState, count: Any, pc: int) -> list[MachineState]:
         rounds = count if isinstance(count, int) else known(word(count))
-        insn = self.subject.insn(pc)
+        insn = self.compiled.insn(pc)
         if rounds is None or insn is None:
-            raise Undecided("REPEAT by a number that is not known")
+            raise Undecided("REPEAT with an unknown count")
         division = insn.row.syntax.startswith("DIV")
         if division and rounds != DIVIDE_COUNT:
             raise Refuted(f"a division of {rounds + 1} steps")
         steps = {rounds, 0} if division else range(rounds + 1)
-        for left in sorted(steps, reverse=True):  # of a division the steps between change nothing
+        for left in sorted(steps, reverse=True):  # the intermediate steps of a division change nothing
             state.pc = pc
             state.regs["RCOUNT"] = left
             self.machine.begin(state, insn)
