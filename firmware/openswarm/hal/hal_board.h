@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What a board provides to the kernel: contract here, code in board/<robot>/. */
+/* Contract of a board with the kernel; implemented in board/<robot>/. */
 #ifndef HAL_BOARD_H
 #define HAL_BOARD_H
 

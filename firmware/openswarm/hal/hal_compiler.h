@@ -1,20 +1,24 @@
 /* SPDX-License-Identifier: MIT */
-/* What every port and the kernel ask of the compiler: GCC, clang, XC16. A port on another one brings its own. */
+/* Compiler extensions used by the kernel and every port: GCC, clang, XC16. A port for another compiler has its own. */
 #ifndef HAL_COMPILER_H
 #define HAL_COMPILER_H
 
 #define HAL_USED __attribute__((used)) /* referenced from assembly only */
 #define HAL_NORETURN __attribute__((noreturn))
 #define HAL_LIKELY(condition) __builtin_expect(condition, 1)
-#define HAL_INLINE inline __attribute__((always_inline)) /* hot, although the rest is optimised for size */
+#define HAL_INLINE inline __attribute__((always_inline)) /* hot code in a file that is optimised for size */
 #define HAL_OUTLINE __attribute__((noinline))            /* cold */
-#define HAL_ZEROS /* an object of zeros that nobody writes: cleared RAM is cheaper than flash */
+#define HAL_ZEROS /* an object of zeros that is never written: cleared RAM is cheaper than flash */
 
-/* What bounds of time and stack take from the source (toolchain/include/bounds.h); nothing to other compilers. n threads,
- * m events, b newer events in the same bucket, s subscriptions of one event, q queued messages, i times idle, u bytes of a
- * stack never used, k bytes of the largest stack; where they are told, t subscriptions of all events together, o of one
- * thread, h holes on a path of the heap's tree, j runs of pieces given back that wait to be joined (0 outside of handlers),
- * x holes that become larger than the reserve. */
+/* Annotations for `toolchain bounds` (toolchain/include/bounds.h); empty for other compilers. Names in them:
+ *   n  threads                              m  events
+ *   b  newer events in the same bucket      s  subscriptions of one event
+ *   q  queued messages                      i  times idle
+ *   u  bytes of a stack never used          k  bytes of the largest stack
+ * Optional, for closer bounds:
+ *   t  subscriptions of all events          o  subscriptions of one thread
+ *   h  holes on a path of the heap's tree   j  free runs pending at a call (0 outside handlers)
+ *   x  holes that become larger than the reserve */
 #if defined(__clang__) && defined(__dsPIC30F__)
 #include <bounds.h>
 #else
@@ -39,12 +43,12 @@
 #define LINKS_IN_RAM(...) struct no_note
 #endif
 
-/* The value of a macro as text; a condition without which the file is not compiled. */
+/* HAL_TEXT: value of a macro as text. HAL_ASSUME: a condition checked at compile time. */
 #define HAL_TEXT(value) HAL_TEXT_(value)
 #define HAL_TEXT_(text) #text
 #define HAL_ASSUME(name, condition) typedef char name[(condition) ? 1 : -1]
 
-/* The compiler moves no memory access across. */
+/* Compiler barrier: no memory access moves across it. */
 static inline void hal_barrier(void)
 {
     __asm__ volatile("" ::: "memory");

@@ -5,11 +5,11 @@
  * Three levels of exclusion. The slice interrupt and everything that runs on the kernel stack outside ISRs is level
  * "slice"; ISRs that use the kernel are level "device". Code of a level cannot be interrupted by its own level.
  *
- * What is a single act, that is, cannot be interrupted half-way: the load or the store of one byte, on every CPU. The
- * load or store of a word (a pointer, or 16 bits) is one act on some CPUs and several on others, so that what ISRs share
- * with lower levels without a lock is read and written through HAL_LOAD and HAL_STORE below. Reading, changing and writing
- * back is a single act on no CPU: it takes a lock. ISRs of level device use plain accesses, nothing interrupts them that
- * shares.
+ * What is a single act, that is, cannot be interrupted half-way: the load or the store of one byte, on every CPU.
+ * The load or store of a word (a pointer, or 16 bits) is one act on some CPUs and several on others, so that what
+ * ISRs share with lower levels without a lock is read and written through HAL_LOAD and HAL_STORE below. Reading,
+ * changing and writing back is a single act on no CPU: it takes a lock. ISRs of level device use plain accesses,
+ * nothing interrupts them that shares.
  */
 #ifndef HAL_CPU_H
 #define HAL_CPU_H
@@ -32,25 +32,25 @@ typedef sys_pcb *(*hal_pick)(void); /* kernel stack, slice level; returns the th
  *   HAL_STACK_GROWS_DOWN          if it does
  *   HAL_ALLOCATION_FAILS()        for tests: true makes the next allocation fail. Without it, never
  *   HAL_STACK_IS_TAKEN            if hal_stack_init takes something that hal_stack_release must give back
- *   HAL_WORD_IS_ONE_ACT           1 if the load and the store of a pointer and of 16 bits are single acts, else 0
+ *   HAL_WORD_IS_ONE_ACT           1 if loads and stores of a pointer and of 16 bits are atomic, else 0
  * and declares or defines inline:
  *   hal_lock_state hal_lock_slice(void);      at least level slice; nests; any context
  *   hal_lock_state hal_lock_devices(void);    at least level device; nests; any context; held for <= 40 Tcy
- *   void hal_unlock(hal_lock_state before);   restore, never lower than before; takes what became due meanwhile
+ *   void hal_unlock(hal_lock_state before);   restores the level, never below `before`; pending interrupts are taken
  *   bool hal_in_thread(void);                 level is below slice: a thread outside critical sections
  *   bool hal_in_isr(void);                    level is device or above
- *   void hal_slice_restart(uint16_t spent);   a slice starts now, of which that much is spent; a pending interrupt of the one
- *                                             before is withdrawn, a forced one is not
- *   uint16_t hal_slice_spent(void);           how much of the slice is over, in units of the port's choice
- *   bool hal_slice_is_over(void);             its time has come to its end since it was restarted
- *   void hal_slice_force(void);               the slice interrupt comes as soon as the level allows, although the slice may
- *                                             not be over; any context. One too many does no harm
- *   void hal_slice_unforce(void);             unless it was forced in vain: withdraws what has not come yet
- *   void hal_guard_kernel_stack(void);        with HAL_STACK_TRAPS: kernel stack, slice level; until a thread is resumed the
- *                                             limit is the kernel stack's. ISRs, which move there, set and restore it
+ *   void hal_slice_restart(uint16_t spent);   starts a slice with `spent` already used; withdraws a pending interrupt of
+ *                                             the previous slice, but not a forced one
+ *   uint16_t hal_slice_spent(void);           used part of the slice, in units of the port's choice
+ *   bool hal_slice_is_over(void);             whether the slice has expired since it was restarted
+ *   void hal_slice_force(void);               requests the slice interrupt as soon as the level allows, before the slice
+ *                                             expires; any context. A superfluous request is harmless
+ *   void hal_slice_unforce(void);             withdraws a forced interrupt that has not been taken yet
+ *   void hal_guard_kernel_stack(void);        with HAL_STACK_TRAPS: kernel stack, slice level; sets the stack limit to the
+ *                                             kernel stack's until a thread is resumed. ISRs on that stack set and restore it
  */
 
-#if !HAL_STACK_TRAPS /* the kernel looks at the paint at the end of its stack behind every round of handlers */
+#if !HAL_STACK_TRAPS /* the kernel checks the paint at the end of its stack after every round of handlers */
 #define HAL_KERNEL_STACK_GUARD 0
 #define hal_guard_kernel_stack() ((void)0)
 #endif
@@ -78,7 +78,7 @@ typedef sys_pcb *(*hal_pick)(void); /* kernel stack, slice level; returns the th
     } while (0)
 #endif
 
-/* A change of a word or byte as a single act, if the CPU has an instruction for it: otherwise under a lock. */
+/* Atomic change of a word or byte: one instruction if the CPU has one, otherwise under a lock. */
 #ifndef HAL_ADD
 #define HAL_ADD(object, member, amount)                                                       \
     do {                                                                                      \
@@ -96,17 +96,17 @@ typedef sys_pcb *(*hal_pick)(void); /* kernel stack, slice level; returns the th
     } while (0)
 #endif
 
-/* Before any other call. No interrupt is enabled until hal_start() and the level is slice until then, so that what may
- * block is refused. Adopts the running context as process's; fills its sp and limit. */
+/* Called before any other function. Until hal_start() interrupts stay disabled and the level is slice, so that blocking
+ * calls are refused. Adopts the running context as that of process and sets its sp and limit. */
 void hal_init(sys_pcb *process);
-/* 1 ms clock (calls os_clock_tick at level device) and slice timer start and interrupts are enabled; then the level becomes
- * thread. The end of a slice that was forced before is taken now, with both timers running. */
+/* Starts the 1 ms clock (which calls os_clock_tick at level device) and the slice timer, enables interrupts and sets
+ * the level to thread. A slice interrupt forced before is taken now, with both timers running. */
 void hal_start(void);
 
-/* Builds the first frame of a thread that will call entry(arg), then os_thread_returned(). stack..stack + bytes ends
- * where process begins. Fills process->sp and limit. Slice locked. False: no memory. */
+/* Builds the first frame of a thread that calls entry(arg), then os_thread_returned(). The stack ends where process
+ * begins. Sets process->sp and limit. Slice locked. False: out of memory. */
 bool hal_stack_init(sys_pcb *process, uint8_t *stack, uint16_t bytes, void (*entry)(void *), void *arg);
-/* The thread is gone and not running; release what hal_stack_init took beside the block. */
+/* Releases what hal_stack_init took besides the block. The thread has ended and does not run. */
 #ifdef HAL_STACK_IS_TAKEN
 void hal_stack_release(sys_pcb *process);
 #else
@@ -116,18 +116,20 @@ static inline void hal_stack_release(const sys_pcb *process)
 }
 #endif
 /* Save the calling thread, run os_yield() or os_schedule() on the kernel stack at level slice and resume the thread
- * it returns. Both come back when the caller is resumed, at thread level. The slice interrupt does so with os_slice_end(). */
+ * it returns. Both come back when the caller is resumed, at thread level. The slice interrupt does so with
+ * os_slice_end(). */
 void hal_yield(void); /* called at thread level */
 void hal_block(void); /* called at level slice */
-/* The caller's context is given up: resume what pick() returns. Called at level slice. */
+/* Discards the caller's context and resumes the thread that pick() returns. Called at level slice. */
 HAL_NORETURN void hal_abandon(hal_pick pick);
 
-/* Kernel stack, slice level: sleep until an interrupt, unless the low byte of *pending is set. Test and sleep are
- * one act: an interrupt that sets *pending after the test ends the sleep. Comes back at slice level with interrupts
+/* Kernel stack, slice level: sleeps until an interrupt, unless the low byte of *pending is set. Test and sleep are
+ * atomic: an interrupt that sets *pending after the test ends the sleep. Returns at slice level with interrupts
  * taken. */
 void hal_idle(const volatile uint16_t *pending);
 
-/* After a fault: mask everything and stop for ever. An emulator knows the end of a run by the name of this function. */
+/* Masks all interrupts and stops for ever, after a fault. Emulators recognise the end of a run by this function's
+ * name. */
 HAL_NORETURN void hal_stop(void);
 
 #endif

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Lower layers of the devices: contract here, code in board/<robot>/. What the lower layer calls back is in io/io.h. */
+/* Lower layers of the devices: contract; implemented in board/<robot>/. Their callbacks are in io/io.h. */
 #ifndef HAL_IO_H
 #define HAL_IO_H
 
@@ -10,7 +10,7 @@
 void hal_motors_init(void);
 void hal_motors_drive(int16_t left_mm_s, int16_t right_mm_s);
 
-/* UARTs, 115,200 baud 8N1. hal_uart_transmit: bytes wait in uart_next_byte(); device interrupts are locked. */
+/* UARTs, 115,200 baud 8N1. hal_uart_transmit: uart_next_byte() has bytes to send; device interrupts are locked. */
 void hal_uart_init(uint8_t uart);
 void hal_uart_start(uint8_t uart);
 void hal_uart_transmit(uint8_t uart);

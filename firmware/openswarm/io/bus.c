@@ -1,10 +1,11 @@
 /* SPDX-License-Identifier: MIT */
-/* Who uses a bus (bus.h). */
+/* Ownership of a bus (bus.h). */
 #include "bus.h"
 
 #include "kernel.h"
 
-/* A thread loses OS_USES_BUS with its life; so a later thread with the same PID is not taken for it. */
+/* Whether the thread that took the bus still lives. OS_USES_BUS ends with the thread, so that a later thread with
+ * the same PID is not mistaken for it. */
 static bool is_used(const bus *b)
 {
     const sys_pcb *owner = b->block != NULL ? process_find(b->owner) : NULL;

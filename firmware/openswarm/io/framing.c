@@ -45,7 +45,7 @@ bool Sys_Frame_Tx(const uint8 *message, uint16 size, sys_put put)
     uint16 total = (uint16)(size + CRC_BYTES);
     uint16 from = 0;
     bool more = true;
-    while (more) { /* one run of non-zero bytes, led by its length + 1 */
+    while (more) { /* one run of non-zero bytes, preceded by its length + 1 */
         uint16 run = 0;
         while (from + run < total && run < LONGEST_RUN && byte_at(&s, (uint16)(from + run)) != 0) {
             run++;
@@ -58,7 +58,7 @@ bool Sys_Frame_Tx(const uint8 *message, uint16 size, sys_put put)
                 return false;
             }
         }
-        more = from + run < total; /* stopped at a zero, which the next run stands for, or at the longest run */
+        more = from + run < total; /* ended at a zero, which the next run implies, or at the maximum length */
         from = (uint16)(from + run + (run < LONGEST_RUN ? 1 : 0));
     }
     return put(0);

@@ -16,7 +16,7 @@ bool Sys_Default_MotorProcessor(uint16 event, const sys_event_data *data, sys_wh
     return event == SYS_LEFTMOTOR_SPEED || event == SYS_RIGHTMOTOR_SPEED;
 }
 
-/* A speed beyond the maximum is told by the last error; the getters tell what became of it. */
+/* Clamps a speed to the maximum and then sets the last error; the getters return the clamped speed. */
 static sint16 clamp(sint16 mm_s)
 {
     if (mm_s >= -SYS_MAXIMUM_SPEED && mm_s <= SYS_MAXIMUM_SPEED) {

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* UARTs: dynamically buffered transmission, back-pressure and replaceable Tx- and Rx-processors.
  *
- * A message is encoded into a chain of small blocks of the heap, which is committed as a whole or not at all. Writers lock
- * the slice; the ISR sends from the first block and hands it to the kernel when it is empty. */
+ * A message is encoded into a chain of small blocks of the heap, which is committed as a whole or not at all.
+ * Writers lock the slice; the ISR sends from the first block and hands it to the kernel when it is empty. */
 #include "io.h"
 #include "kernel.h"
 
@@ -11,11 +11,11 @@
 typedef struct {
     sys_tx_processor encode;
     sys_rx_processor decode;
-    message *first, *last; /* blocks to be sent; devices locked, as the next two */
-    uint16 position;       /* of the byte sent last in the first block */
-    uint16 taken;          /* bytes of the heap they are */
+    message *first, *last; /* blocks to send; devices locked, as the next two fields */
+    uint16 position;       /* index of the byte sent last in the first block */
+    uint16 taken;          /* heap bytes of the blocks */
     bool quiet;            /* no byte since the last 1 ms tick */
-    uint16 used;           /* bytes in received */
+    uint16 used;           /* bytes in `received` */
     uint8 received[SYS_UART_RX];
     sys_uart_statistics statistics;
 } channel;
@@ -32,10 +32,10 @@ static uint16 event_of(uint8 uart, uint16 of_uart1)
 
 /* ---- Sending ---------------------------------------------------------------------------------------------------- */
 
-/* A block is a message whose payload is the number of bytes in it, then the bytes. */
+/* A block is a message whose payload is a byte count, then the bytes. */
 enum {
-    LARGEST = SYS_SMALL_PAYLOAD - 1, /* bytes; such blocks are taken and given in constant time */
-    GROWTH = 7                       /* bytes by which an encoded message outgrows what was expected; odd, for even sizes */
+    LARGEST = SYS_SMALL_PAYLOAD - 1, /* bytes; such blocks are allocated and freed in constant time */
+    GROWTH = 7                       /* bytes added when a message exceeds its expected size; odd, for even sizes */
 };
 
 static uint8 *bytes_of(message *block)
@@ -48,14 +48,14 @@ static uint16 size_of(const message *block)
     return (uint16)(sizeof *block + block->queued.size);
 }
 
-/* The message under construction; slice locked. Of a writer that was stopped half-way the next one frees it. */
+/* Message under construction; slice locked. The next writer frees the message of a writer that was killed half-way. */
 static struct {
     const channel *to;
     message *first, *last;
-    uint16 expected; /* bytes for which there is no block yet */
-    uint16 taken;    /* bytes of the heap its blocks are */
-    uint16 limit;    /* of taken; the rest of SYS_UART_TX waits to be sent */
-    sys_error error; /* of a message that cannot be sent */
+    uint16 expected; /* bytes without a block yet */
+    uint16 taken;    /* heap bytes of its blocks */
+    uint16 limit;    /* maximum of taken: SYS_UART_TX less the bytes already queued */
+    sys_error error; /* why the message cannot be sent */
 } building;
 
 static void discard(void)
@@ -75,7 +75,7 @@ static HAL_OUTLINE bool begin_block(void)
     message *block = taken <= building.limit ? heap_alloc((uint16)(taken - building.taken)) : NULL;
     if (block == NULL) {
         if (taken <= SYS_UART_TX) {
-            building.error = SYS_ERROR_BUSY; /* there will be room */
+            building.error = SYS_ERROR_BUSY; /* room becomes free later */
         }
         return false;
     }
@@ -112,7 +112,7 @@ static HAL_OUTLINE bool write_message(uint8 uart, const void *message, uint16 si
     building.error = SYS_ERROR_ARGUMENT;
     building.limit = (uint16)(SYS_UART_TX - HAL_LOAD(c->taken));
     CALL_TARGETS(sys_tx_processor);
-    bool sound = c->encode(message, size, put) && building.to == c; /* not if the processor has written to a UART */
+    bool sound = c->encode(message, size, put) && building.to == c; /* false if the processor wrote to a UART */
     building.to = NULL;
     hal_lock_state lock = hal_lock_devices();
     if (!sound) {
@@ -133,7 +133,7 @@ static HAL_OUTLINE bool write_message(uint8 uart, const void *message, uint16 si
     return os_leave(building.error);
 }
 
-/* An ISR gives nothing back to the heap; the kernel stack does, with the next messages. */
+/* Passes a sent block to the kernel, which frees it with the next messages: ISRs must not free memory. */
 static void retire(message *block)
 {
     block->queued.event = NULL;
@@ -160,7 +160,7 @@ sint16 uart_next_byte(uint8 uart)
     return byte;
 }
 
-/* ISR. Without memory for the event the next tick tries again. */
+/* ISR. If there is no memory for the event, the next tick tries again. */
 static HAL_OUTLINE void tell_ready(void)
 {
     LOOP_BOUND(SYS_UARTS);
@@ -237,7 +237,7 @@ uint16 Sys_Chunk_Rx(uint8 byte, uint8 *buffer, uint16 *used)
     return *used < SYS_UART_RX ? 0 : *used;
 }
 
-/* A chunk also ends when the line was quiet from one tick to the next. */
+/* Ends a chunk if no byte arrived from one tick to the next. */
 void uart_tick(void)
 {
     LOOP_BOUND(SYS_UARTS);
@@ -270,7 +270,7 @@ sys_rx_processor Sys_Set_RxProcessor(uint8 uart, sys_rx_processor wanted)
 {
     channel *c = &channels[uart];
     uint8 left[SYS_UART_RX];
-    Sys_Start_CriticalSection(); /* the caller is not killed between taking the bytes and passing them on */
+    Sys_Start_CriticalSection(); /* the caller must not be killed between taking the bytes and passing them on */
     hal_lock_state lock = hal_lock_devices();
     sys_rx_processor before = c->decode;
     uint16 size = c->used;

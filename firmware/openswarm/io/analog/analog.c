@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Proximity, accelerometer and microphones from one stream of scans: the emitters of one pair of sensors are dark in one
- * scan and lit in the next, so the difference is free of ambient light. */
+/* Proximity, accelerometer and microphones from one stream of scans. The emitters of one pair of sensors are off in one
+ * scan and on in the next, so that the difference contains no ambient light. */
 #include "analog_parts.h"
 
 #include "hal_analog.h"

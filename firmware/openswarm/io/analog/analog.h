@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: MIT */
-/* Everything behind the analog converter: proximity, accelerometer, microphones. Each has a pre-processor between what the
- * converter measured and the event, to be exchanged at run time; NULL restores the default. */
+/* Devices on the analog converter: proximity, accelerometer, microphones. Each has a pre-processor between the
+ * measurement and the event, which can be exchanged at run time; NULL restores the default. */
 #ifndef ANALOG_H
 #define ANALOG_H
 
 #include "openswarm.h"
 
 enum {
-    SYS_IO_PROXIMITY = 0x11,    /* [uint8 mm of sensors 0-7, SYS_OUT_OF_RANGE = nothing near], every 50 ms */
+    SYS_IO_PROXIMITY = 0x11,    /* [uint8 mm of sensors 0-7, SYS_OUT_OF_RANGE = no object near], every 50 ms */
     SYS_IO_ACCELERATION = 0x12, /* [sys_acceleration], every 50 ms */
     SYS_IO_SOUND = 0x13,        /* [uint16 loudness of microphones 0-2], every 50 ms */
     SYS_PROXIMITY_SENSORS = 8,
@@ -20,18 +20,18 @@ typedef struct {
     sint16 x, y, z; /* right, backward, up; 800 counts per g */
 } sys_acceleration;
 
-/* Turns a reflection, ambient light already taken off, into mm 0-100 or SYS_OUT_OF_RANGE. ISR context. */
+/* Converts a reflection without ambient light into 0-100 mm or SYS_OUT_OF_RANGE. ISR context. */
 typedef uint8 (*sys_proximity_processor)(uint8 sensor, uint16 reflection);
 uint8 Sys_Default_ProximityProcessor(uint8 sensor, uint16 reflection);
 sys_proximity_processor Sys_Set_ProximityProcessor(sys_proximity_processor processor); /* MTHI */
 
-/* Sees the mean of SYS_ANALOG_SCANS measurements; may change it; true: it becomes the payload of SYS_IO_ACCELERATION. ISR
- * context. The default passes every one on. */
+/* Receives the mean of SYS_ANALOG_SCANS measurements and may change it; true: it is sent as SYS_IO_ACCELERATION. ISR
+ * context. The default sends every mean. */
 typedef bool (*sys_acceleration_processor)(sys_acceleration *mean);
 sys_acceleration_processor Sys_Set_AccelerationProcessor(sys_acceleration_processor processor); /* MTHI */
 
-/* Sees each sample of a microphone, around 0, and the value of that microphone in the next event so far, 0 to begin with;
- * returns the new one. ISR context, 3,840 times a second. */
+/* Receives each sample of a microphone, around 0, and that microphone's accumulated value, initially 0; returns the new
+ * value, which the next event reports. ISR context, 3,840 times a second. */
 typedef uint16 (*sys_sound_processor)(uint8 microphone, sint16 sample, uint16 so_far);
 uint16 Sys_Default_SoundProcessor(uint8 microphone, sint16 sample, uint16 so_far); /* the largest amplitude */
 sys_sound_processor Sys_Set_SoundProcessor(sys_sound_processor processor);         /* MTHI */

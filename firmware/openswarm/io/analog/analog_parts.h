@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Private to this folder: what the stream of scans is made of. */
+/* Private interface of this folder: the measurements in the stream of scans. */
 #ifndef ANALOG_PARTS_H
 #define ANALOG_PARTS_H
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Accelerometer: the last measurement by call, means as events. */
+/* Accelerometer: the last measurement on call, means as events. */
 #include "analog_parts.h"
 #include "kernel.h"
 
@@ -7,7 +7,7 @@
 
 enum { AXES = 3 };
 
-static sys_acceleration_processor processor; /* NULL: every mean as it is */
+static sys_acceleration_processor processor; /* NULL: every mean is sent unchanged */
 static uint16 latest[AXES];
 static uint32 sums[AXES];
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Microphones: the last sample by call, loudness as events. */
+/* Microphones: the last sample on call, loudness as events. */
 #include "analog_parts.h"
 #include "hal_cpu.h"
 

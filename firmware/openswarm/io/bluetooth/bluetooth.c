@@ -40,7 +40,8 @@ static void write_line(char first, uint8 count, sint32 a, sint32 b)
     (void)Sys_Write_UART1(text, line.size);
 }
 
-/* ---- Wheels and LEDs ------------------------------------------------------------------------------------------------ */
+/* ---- Wheels and LEDs
+ * ------------------------------------------------------------------------------------------------ */
 
 static sint16 nearest_quotient(sint32 number, sint16 divisor)
 {
@@ -79,7 +80,8 @@ static void stop(void)
     }
 }
 
-/* ---- Events by number ------------------------------------------------------------------------------------------------ */
+/* ---- Events by number
+ * ------------------------------------------------------------------------------------------------ */
 
 static bool on_reported(uint16 pid, uint16 event, sys_event_data *data)
 {
@@ -94,7 +96,8 @@ static bool report(sint32 event, bool wanted)
     return wanted ? Sys_Subscribe_to_Event(number, 0, on_reported, NULL) : Sys_Unsubscribe_Handler(number, 0, on_reported);
 }
 
-/* ---- Commands -------------------------------------------------------------------------------------------------------- */
+/* ---- Commands
+ * -------------------------------------------------------------------------------------------------------- */
 
 typedef struct {
     char letter;
@@ -104,7 +107,7 @@ typedef struct {
 static const command commands[] = {{'D', 2}, {'E', 0}, {'L', 2}, {'B', 1}, {'F', 1}, {'C', 0},
                                    {'S', 0}, {'V', 0}, {'H', 0}, {'!', 2}, {'+', 1}, {'-', 1}};
 
-/* Those that answer with more than their letter. */
+/* Commands whose answer has more than the letter. */
 static bool tell(char letter)
 {
     switch (letter) {

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
-/* Text protocol on UART1, which is the Bluetooth link: lines of text become events, and events lines of text.
+/* Text protocol on UART1, the Bluetooth link: converts lines of text to events, and events to lines of text.
  *
- * A line ends with CR or LF and has at most SYS_UART_RX - 1 characters; longer ones are dropped whole. Commands are those of
- * the robot's own firmware as far as they concern devices of every program (epuck.md §6, SerCom): a letter, then numbers
- * behind commas; the answer begins with the small letter.
+ * A line ends with CR or LF and has at most SYS_UART_RX - 1 characters; longer lines are dropped whole. The commands
+ * are those of the robot's own firmware that concern devices of every program (epuck.md §6, SerCom): a letter, then
+ * numbers after commas. The answer begins with the lower-case letter.
  *     D,l,r     wheel speeds in steps/s, +-1000; the driver keeps whole mm/s      d
  *     E         wheel speeds                                                      e,l,r
  *     L,n,v     LED n (8 body, 9 front): 0 off, 1 on, 2 toggle                    l
@@ -13,25 +13,26 @@
  * Any registered event, by number:
  *     !e,v      send event e with value v                                         !
  *     +e  -e    report event e, no longer report it                               +  -
- * and every occurrence of a reported event is a line !e,v. A command that cannot be carried out is answered ?. Lines that
- * match no command become SYS_BLUETOOTH_RECEIVED. Lines for which the transmit ring has no room are dropped whole and
- * counted (Sys_Get_UARTStatistics).
+ * Every occurrence of a reported event is sent as a line !e,v. The answer to a command that fails is ?. Lines that
+ * match no command become SYS_BLUETOOTH_RECEIVED. Lines for which the transmit buffer has no room are dropped whole
+ * and counted (Sys_Get_UARTStatistics).
  */
 #ifndef BLUETOOTH_H
 #define BLUETOOTH_H
 
 #include "openswarm_io.h"
 
-/* [characters of one line, without its end] that is no command. What is sent is SYS_SEND_UART1 or Sys_Write_UART1. */
+/* [characters of one line without its end] for a line that is no command. To send: SYS_SEND_UART1 or
+ * Sys_Write_UART1. */
 enum { SYS_BLUETOOTH_RECEIVED = 0x15 };
 
-/* Sees every line before anything else does; true: dealt with, or dropped; false: it becomes SYS_BLUETOOTH_RECEIVED. Handler
+/* Receives every line first; true: handled or dropped; false: the line becomes SYS_BLUETOOTH_RECEIVED. Handler
  * context. */
 typedef bool (*sys_bluetooth_processor)(const char *line, uint16 size);
 bool Sys_Default_BluetoothProcessor(const char *line, uint16 size); /* the commands above */
 sys_bluetooth_processor Sys_Set_BluetoothProcessor(sys_bluetooth_processor processor); /* MTH; NULL: default */
 
-/* The Rx- and the Tx-processor this driver gives UART1: a message is a line; CR LF is added unless it ends with LF. */
+/* Rx- and Tx-processor of UART1 under this driver: a message is a line; CR LF is added unless it ends with LF. */
 uint16 Sys_Line_Rx(uint8 byte, uint8 *buffer, uint16 *used);
 bool Sys_Line_Tx(const uint8 *message, uint16 size, sys_put put);
 

@@ -4,7 +4,7 @@
 
 enum { CR = '\r', LF = '\n' };
 
-/* A line that fills the buffer is too long: the rest is not kept, and its end drops it. */
+/* A line that fills the buffer is too long: its rest is discarded, and its end drops the whole line. */
 uint16 Sys_Line_Rx(uint8 byte, uint8 *buffer, uint16 *used)
 {
     uint16 size = *used;

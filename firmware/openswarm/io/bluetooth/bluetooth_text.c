@@ -10,7 +10,7 @@ static bool is_digit(char c)
     return c >= '0' && c <= '9';
 }
 
-/* Reads one number at *at; false: there is none, or it is out of range. */
+/* Reads one number at *at; false: no number, or out of range. */
 static bool read_number(const char *text, uint16 size, uint16 *at, sint32 *number)
 {
     bool negative = *at < size && text[*at] == '-';

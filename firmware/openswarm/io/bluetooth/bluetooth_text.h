@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Numbers as text, both ways, in a few bytes of stack. Private to this folder. */
+/* Conversion of numbers from and to text with little stack. Private to this folder. */
 #ifndef BLUETOOTH_TEXT_H
 #define BLUETOOTH_TEXT_H
 
@@ -7,11 +7,11 @@
 
 enum { TEXT_ARGUMENTS = 2 };
 
-/* Reads "number,number..." with or without a comma before the first, up to the end of the text. Returns how many, or -1 for
- * anything else and for more than TEXT_ARGUMENTS. Numbers are decimal, -32768 to 65535. */
+/* Parses "number,number..." with or without a leading comma, up to the end of the text. Returns the count, or -1 for
+ * any other text and for more than TEXT_ARGUMENTS numbers. Numbers are decimal, -32768 to 65535. */
 sint16 text_arguments(const char *text, uint16 size, sint32 *arguments);
 
-/* A line under construction; what does not fit is left out. */
+/* A line under construction; characters that do not fit are omitted. */
 typedef struct {
     char *text;
     uint16 size, room;

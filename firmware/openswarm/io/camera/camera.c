@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Camera: the capture's interrupt announces a frame, a handler on the kernel stack processes it and orders the next. */
+/* Camera: the capture's interrupt announces a frame; a handler on the kernel stack processes it and starts the next. */
 #include "camera.h"
 
 #include "camera_sensor.h"
@@ -31,7 +31,7 @@ static bool on_frame(uint16 pid, uint16 event, sys_event_data *data)
     return true;
 }
 
-/* Should the event find no memory, this frame is skipped and the next one announced. */
+/* If there is no memory for the event, this frame is skipped and the next one announced. */
 void camera_frame_complete(void)
 {
     frames++;

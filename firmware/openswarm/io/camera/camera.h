@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Camera device: frames, a pre-processor that can be exchanged, and the one-pixel sensor as its default. */
+/* Camera device: frames, and an exchangeable pre-processor whose default is the one-pixel sensor. */
 #ifndef CAMERA_H
 #define CAMERA_H
 
@@ -11,17 +11,17 @@ enum {
     SYS_CAMERA_HEIGHT = 20
 };
 
-/* Sees a complete frame, 20 x 20 pixels RGB565, high byte first; may change *colour; true: it becomes the payload of
- * SYS_IO_1PXSENSOR. Handler context; the next frame is not captured before it returns. */
+/* Receives a complete frame, 20 x 20 pixels RGB565, high byte first, and may set *colour; true: *colour is sent as
+ * SYS_IO_1PXSENSOR. Handler context; the next capture starts after it returns. */
 typedef bool (*sys_camera_processor)(const uint8 *frame, sys_colour *colour);
 
 bool Sys_LineOfSight_Processor(const uint8 *frame, sys_colour *colour); /* the default: line_of_sight.h */
 sys_camera_processor Sys_Set_CameraProcessor(sys_camera_processor processor); /* MTH */
 
-/* M | 20 ms, polls the I2C bus | - | 60 | none.  Between Sys_Init_Kernel and Sys_Start_Kernel. False: no camera answers;
- * the program goes on without its events. */
+/* M | 20 ms, polls the I2C bus | - | 60 | none.  Between Sys_Init_Kernel and Sys_Start_Kernel. False: no camera
+ * answers; the program runs without its events. */
 bool Sys_Start_Camera(void);
 uint16 Sys_Get_CameraType(void); /* MTHI.  0 = none, 0x3030, 0x6030, 0x8030 */
-const uint8 *Sys_Get_CameraFrame(void); /* MTHI.  The buffer that is captured into */
+const uint8 *Sys_Get_CameraFrame(void); /* MTHI.  The capture buffer */
 
 #endif

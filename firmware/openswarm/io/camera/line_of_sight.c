@@ -12,8 +12,8 @@ static uint16_t distance(uint16_t a, uint16_t b)
     return a > b ? a - b : b - a;
 }
 
-/* The first of the nearest, in the order dark, green, red, white, by the sum of absolute differences. Red and dark are
- * objects. Their references have no blue, so blue separates only white: (100, 80, 80). */
+/* Returns the nearest reference colour by the sum of absolute differences; the first of dark, green, red, white wins a
+ * tie. Red and dark are objects. Only white's reference has blue, (100, 80, 80). */
 static uint8_t classify(const uint8_t *pixel)
 {
     uint16_t high = pixel[0], low = pixel[1];
@@ -43,7 +43,7 @@ uint8_t line_of_sight(const uint8_t *frame)
         const uint8_t *row = frame + (uint16_t)(rows[y] * (WIDTH * PIXEL_BYTES));
         for (uint8_t x = 0; x < COLUMNS; x++) {
             uint8_t colour = classify(row + columns[x] * PIXEL_BYTES);
-            if (colour == SIGHT_RED && ++red == VOTES) { /* nothing outvotes them */
+            if (colour == SIGHT_RED && ++red == VOTES) { /* a majority that the rest cannot outvote */
                 return SIGHT_RED;
             }
             green += colour == SIGHT_GREEN;

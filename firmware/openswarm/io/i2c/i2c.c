@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* I2C: one transfer at a time, stepped by the interrupt on the bus's own block, guarded by a time-out. */
+/* I2C: one transfer at a time. The interrupt steps it on the bus's own block; a time-out guards it. */
 #include "i2c.h"
 
 #include "bus.h"
@@ -14,7 +14,7 @@ typedef struct {
 } job;
 
 static bus i2c;
-static volatile uint8 result; /* an i2c_result; I2C_BUSY while the interrupt works, and until the lines are known to rest */
+static volatile uint8 result; /* an i2c_result; I2C_BUSY during a transfer, and until the lines are known to be idle */
 
 bool i2c_stepped(void)
 {
@@ -24,7 +24,7 @@ bool i2c_stepped(void)
 
 static bool recover(void)
 {
-    result = I2C_BUSY; /* a thread killed half-way leaves it so */
+    result = I2C_BUSY; /* remains so if the thread is killed half-way */
     bool free = i2c_recover();
     result = I2C_DONE;
     return free;

@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: MIT */
-/* Hamming (15,11): bits 10-0 are data, 14-11 parity. Each bit has a place from 1 to 15, parity the powers of two; the
- * places of all ones of a code word add up, bit by bit, to 0, and to the place of the wrong one if one is wrong. */
+/* Hamming (15,11): bits 10-0 are data, 14-11 parity. Each bit has a position from 1 to 15; parity bits have the
+ * powers of two. The XOR of the positions of all ones (the syndrome) is 0, or the position of the bit in error. */
 #include "infrared_parts.h"
 
 static const uint8 place_of[DATA_BITS] = {3, 5, 6, 7, 9, 10, 11, 12, 13, 14, 15};
 
-/* By place the bit of the word, as a mask. */
+/* Mask of the bit at each position. */
 static const uint16 bit_at[CODE_BITS + 1] = {0,      0x0800, 0x1000, 0x0001, 0x2000, 0x0002, 0x0004, 0x0008,
                                              0x4000, 0x0010, 0x0020, 0x0040, 0x0080, 0x0100, 0x0200, 0x0400};
 
@@ -29,9 +29,9 @@ uint16 coder_encode(uint16 data)
 
 uint16 coder_decode(uint16 word, uint8 *repairs)
 {
-    uint8 wrong = (uint8)(parity_of(word) ^ (word >> DATA_BITS & 0x0Fu));
-    if (wrong != 0) {
-        word ^= bit_at[wrong];
+    uint8 syndrome = (uint8)(parity_of(word) ^ (word >> DATA_BITS & 0x0Fu));
+    if (syndrome != 0) {
+        word ^= bit_at[syndrome];
         ++*repairs;
     }
     return word & 0x07FFu;

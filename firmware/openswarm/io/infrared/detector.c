@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Light that comes and goes, sensor by sensor. Each has a level (mean of about four scans), a background that follows
- * slow changes and a threshold that follows its noise; all of them in sixteenths of a count. */
+/* Light detection per sensor. Each sensor has a level (mean of about four scans), a background that follows slow
+ * changes and a threshold that follows the noise; all in sixteenths of a count. */
 #include "infrared_parts.h"
 
 #include "hal_cpu.h"
@@ -11,19 +11,19 @@ enum {
     SPREAD_FINE = 4, /* the spread is in 1/64 of a count */
     SPREADS = 4,     /* 75 % of a normal distribution are within 1.15 sigma: the threshold is 4.6 sigma of the level */
     SPREAD_MOST = 15 * COUNT * SPREAD_FINE,
-    RISING = 3, /* of the spread per look, against 1 falling: in balance where one in four is above it */
-    STEP = 4,   /* of the background per look: 32 counts a second */
+    RISING = 3, /* increase of the spread per update; it decreases by 1: balanced if one level in four is above it */
+    STEP = 4,   /* change of the background per update: 32 counts a second */
     FIRST_THRESHOLD = 4
 };
 
 static struct {
     uint16 level;
-    uint16 limit; /* below: lit */
+    uint16 limit; /* the sensor is lit if its level is below */
 } filters[HAL_INFRARED_SENSORS];
 static uint16 background[HAL_INFRARED_SENSORS];
-static uint16 spread[HAL_INFRARED_SENSORS]; /* of the level: three in four are nearer to the background */
-static uint16 least = COUNT * FIRST_THRESHOLD; /* threshold, whatever the noise */
-static uint8 looked_at;
+static uint16 spread[HAL_INFRARED_SENSORS]; /* deviation: three levels in four are nearer to the background */
+static uint16 least = COUNT * FIRST_THRESHOLD; /* minimum threshold */
+static uint8 followed; /* sensor updated last */
 
 static uint16 margin(uint8 sensor)
 {
@@ -37,8 +37,8 @@ static void set_limit(uint8 sensor)
     filters[sensor].limit = (uint16)(dark > margin(sensor) ? dark - margin(sensor) : 0);
 }
 
-/* Background and spread take steps of fixed size, so that no single reading counts for much; only where a
- * light went out the background follows at once. */
+/* Updates background and spread by steps of fixed size, so that a single reading has little effect. If a light went
+ * out, the background follows at once. */
 static HAL_INLINE void follow(uint8 sensor)
 {
     uint16 level = filters[sensor].level, dark = background[sensor];
@@ -58,8 +58,8 @@ static HAL_INLINE void follow(uint8 sensor)
 
 HAL_OUTLINE void detector_follow(void)
 {
-    looked_at = (uint8)((looked_at + 1u) % HAL_INFRARED_SENSORS);
-    follow(looked_at);
+    followed = (uint8)((followed + 1u) % HAL_INFRARED_SENSORS);
+    follow(followed);
 }
 
 static HAL_INLINE bool filter_one(uint8 sensor, unsigned int reading)
@@ -70,7 +70,7 @@ static HAL_INLINE bool filter_one(uint8 sensor, unsigned int reading)
     return level < filters[sensor].limit;
 }
 
-/* Without a loop: a third faster, in what is done 4,096 times a second. */
+/* Unrolled: a third faster, and it runs 4,096 times a second. */
 bool detector_filter(scan raw)
 {
     bool lit = filter_one(0, raw[0]);
@@ -117,7 +117,7 @@ bool detector_is_dark(scan raw)
 {
     for (uint8 i = 0; i < HAL_INFRARED_SENSORS; i++) {
         uint16 reading = (uint16)(raw[i] * COUNT);
-        if (reading < background[i] && background[i] - reading > 2 * margin(i)) { /* a mean deviates less */
+        if (reading < background[i] && background[i] - reading > 2 * margin(i)) { /* noisier than the mean: twice */
             return false;
         }
     }

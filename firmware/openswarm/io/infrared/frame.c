@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: MIT */
 /* A frame is a header (number of the sender 11 bits, kind 1, size 4), the payload and a CRC of both, low bytes first.
- * On the air it is words of 15 bits, each for eleven bits of it, or the bytes as they are: what the link can carry. */
+ * On the air it is a series of 15-bit code words for 11 bits each, or of plain bytes, depending on the link. */
 #include "infrared_parts.h"
 
 #include <string.h>
 
-/* Each word is turned over by this, so that zeros and ones in a row alternate. It is no code word: a word without any
- * light is therefore a repaired one at best, and means that the sender is gone. */
+/* XORed with each word, so that runs of zeros and ones alternate. The mask is no code word: a word without any light
+ * needs at least one repair, and means that the sender has disappeared. */
 enum { WHITENING = 0x5555 };
 
 static uint8 total_bits(const frame_buffer *b)
@@ -43,7 +43,7 @@ void frame_begin(frame_buffer *b)
     memset(b, 0, sizeof *b);
 }
 
-/* What has come so far, behind another part of it. */
+/* Returns the state of a frame after another part has arrived. */
 static frame_state judge(const frame_buffer *b)
 {
     if (b->bits < 8 * FRAME_HEADER || b->bits < total_bits(b)) {

@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: MIT */
-/* Messages in and out: events, processors, the own number. */
+/* Messages to and from neighbours: events, processors, the robot's number. */
 #include "infrared_parts.h"
 #include "kernel.h"
 
 #include <string.h>
 
-enum { HOUSEKEEPINGS = 64 /* a second */, DRAWN_AFTER = 16 };
+enum { HOUSEKEEPINGS = 64 /* per second */, DRAWN_AFTER = 16 };
 
 uint16 infrared_number;
 void (*infrared_event_sink)(const frame *f);
@@ -39,7 +39,7 @@ void infrared_received(const frame_buffer *b, uint8 sensor, uint16 strength)
 {
     frame f;
     frame_unpack(b, &f);
-    if (f.number == 0) { /* nobody of ours */
+    if (f.number == 0) { /* no robot has this number */
         return;
     }
     if (f.number == infrared_number) {
@@ -136,7 +136,7 @@ static bool keep_number(uint16 number)
     if (number == 0 || number > NUMBER_MASK) {
         return false;
     }
-    number_is_kept = true; /* first: from now on nobody draws another */
+    number_is_kept = true; /* first, so that the link's interrupt draws no other number */
     hal_barrier();
     HAL_STORE(infrared_number, number);
     return true;

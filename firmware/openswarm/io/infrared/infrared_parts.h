@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Private to this folder: what a frame is made of, and who does what with it (README.md). All in ISR context unless said. */
+/* Private interface of this folder's files (README.md). ISR context unless stated otherwise. */
 #ifndef INFRARED_PARTS_H
 #define INFRARED_PARTS_H
 
@@ -25,71 +25,71 @@ enum {
 typedef enum { FRAME_MESSAGE, FRAME_EVENT } frame_kind;
 
 typedef struct {
-    uint16 number; /* of the sender */
+    uint16 number; /* of the sending robot */
     uint8 kind, size;
     const uint8 *payload;
 } frame;
 
 typedef struct {
-    uint8 bytes[FRAME_BYTES + 1]; /* one more: the last word may reach behind the last byte */
-    uint8 bits;                   /* done of them */
+    uint8 bytes[FRAME_BYTES + 1]; /* one more: the last word may extend beyond the last byte */
+    uint8 bits;                   /* bits sent or received so far */
     uint8 repairs;
 } frame_buffer;
 
 void frame_pack(frame_buffer *b, const frame *f);
-bool frame_next_word(frame_buffer *b, uint16 *word); /* to be sent; false: that was all */
-bool frame_next_byte(frame_buffer *b, uint8 *byte);  /* or so */
+bool frame_next_word(frame_buffer *b, uint16 *word); /* next word to send; false: the frame is complete */
+bool frame_next_byte(frame_buffer *b, uint8 *byte);  /* the same for links that carry bytes */
 typedef enum { FRAME_MORE, FRAME_WHOLE, FRAME_DAMAGED } frame_state;
 void frame_begin(frame_buffer *b);
-frame_state frame_word(frame_buffer *b, uint16 word); /* as received */
-frame_state frame_byte(frame_buffer *b, uint8 byte);  /* or so */
-void frame_unpack(const frame_buffer *b, frame *f);   /* of a whole one; payload points into b */
+frame_state frame_word(frame_buffer *b, uint16 word); /* adds a received word */
+frame_state frame_byte(frame_buffer *b, uint8 byte);  /* the same for links that carry bytes */
+void frame_unpack(const frame_buffer *b, frame *f);   /* decodes a whole frame; payload points into b */
 
-/* ---- detector.c: light that comes and goes, sensor by sensor. Levels are sixteenths of a count ---- */
-bool detector_filter(scan raw);        /* one scan; whether any sensor is darkened below its threshold */
-void detector_follow(void);            /* one sensor's background and noise; not in every scan */
+/* ---- detector.c: light detection per sensor. Levels are sixteenths of a count ---- */
+bool detector_filter(scan raw);        /* filters one scan; whether light takes any sensor below its threshold */
+void detector_follow(void);            /* updates background and noise of one sensor; not in every scan */
 uint8 detector_strongest(void);
-void detector_forget(void);            /* the light of a frame is gone: levels are the background again */
-void detector_adapt(scan raw);         /* what is there now is the background */
-bool detector_is_dark(scan raw);       /* no sensor is lit by more than its threshold */
+void detector_forget(void);            /* after a frame: resets the levels to the background */
+void detector_adapt(scan raw);         /* takes the present light as the background */
+bool detector_is_dark(scan raw);       /* whether no sensor is lit by more than its threshold */
 uint16 detector_background(uint8 sensor);
 uint16 detector_level(uint8 sensor);   /* mean of about four scans */
 
-/* ---- queue.c: frames that wait for their turn ---- */
+/* ---- queue.c: frames waiting to be sent ---- */
 typedef struct {
-    bool is_filled; /* its sender may have been interrupted */
+    bool is_filled; /* false while an interrupted sender still fills it */
     uint8 kind, size;
     uint8 payload[FRAME_PAYLOAD];
 } waiting_frame;
 
 bool queue_frame(frame_kind kind, const uint8 *payload, uint8 size); /* any context */
-extern waiting_frame queue[SYS_INFRARED_QUEUE]; /* the link's, to see whether the first is filled; and how many there are */
+extern waiting_frame queue[SYS_INFRARED_QUEUE]; /* read by the link: is the first frame filled? */
 extern volatile uint8 queue_first, queue_length;
-void queue_pack(frame_buffer *b);      /* takes the first out */
-void queue_sent(void);                 /* the last light of a frame is out */
-bool queue_has_sent(void);             /* since the last call */
+void queue_pack(frame_buffer *b);      /* takes the first frame */
+void queue_sent(void);                 /* the last bit of a frame is sent */
+bool queue_has_sent(void);             /* whether a frame was sent since the last call */
 extern sys_infrared_statistics infrared_statistics;
 
-/* ---- link.c, or the board's own: who may light up when ---- */
+/* ---- link.c, or the board's own link: medium access ---- */
 bool link_init(void);                  /* false: no memory */
 uint16 link_random(void);
 
 /* ---- infrared.c ---- */
 extern uint16 infrared_number;
 void infrared_received(const frame_buffer *b, uint8 sensor, uint16 strength);
-void infrared_leaving(uint8 *payload, uint8 size); /* a message, before its first light */
-void infrared_housekeeping(void);      /* 64 times a second */
+void infrared_leaving(uint8 *payload, uint8 size); /* a message before its first bit */
+void infrared_housekeeping(void);      /* 64 times per second */
 /* Takes frames of kind FRAME_EVENT; NULL unless remote_events.c is used. */
 extern void (*infrared_event_sink)(const frame *f);
 
 /* ---- neighbours.c ---- */
 void neighbours_heard(uint16 number, uint8 sensor, uint16 strength);
-void neighbours_age(void);             /* one of the table */
+void neighbours_age(void);             /* expires one entry of the table, in turn */
 uint8 neighbours_count(void);
 
 /* ---- reflections.c: proximity between frames ---- */
 bool reflections_init(void);           /* false: no memory */
-void reflections_lit(scan raw);        /* the own emitters have been on for two scans */
-void reflections_use(void);            /* nobody else lit anything meanwhile */
+void reflections_lit(scan raw);        /* reading with this robot's emitters on for two scans */
+void reflections_use(void);            /* no other robot sent light meanwhile: reports the reflections */
 
 #endif

@@ -1,33 +1,34 @@
 /* SPDX-License-Identifier: MIT */
-/* Who may light up when, and what light means. A frame on the air, three scans a bit: six ones, a zero, its words, a
- * zero.
+/* Medium access and reception. A frame on the air has three scans per bit: six ones (the preamble), a zero, its
+ * words, a zero.
  *
- * Receiver: light for two scans picks the strongest sensor; where the ones end, the bits begin, at half of what they
- * took from that sensor. So neither a late start nor a robot's own proximity costs more than a few of the ones. Shorter
- * light, as others' proximity makes it, begins nothing; light that stays is the room's from now on. */
+ * Receiver: light for two scans selects the strongest sensor. The bits begin where the ones end; the decision threshold
+ * is half of what the ones took from that sensor. A late start or a flash of the robot's own proximity therefore costs
+ * only a few of the ones. Shorter light, such as other robots' proximity, begins no frame; lasting light becomes the
+ * background. */
 #include "infrared_parts.h"
 #include "hal_cpu.h"
 
 enum {
     SCANS_PER_BIT = 3,
     PREAMBLE = 0x3F,
-    PREAMBLE_BITS = 7, /* as long as an own flash, faint light's way through the filter and LEAST_ONES */
+    PREAMBLE_BITS = 7, /* covers a flash of this robot, the filter's delay of faint light and LEAST_ONES */
     PICK_AFTER = 2,    /* scans of light */
     START_AFTER =
-        8, /* dark scans: what begins earlier is the middle of a frame that was not heard from its beginning */
-    LEAST_ONES = 10, /* scans of light that begin a frame: proximity lights for 3 or 4 */
+        8, /* dark scans: earlier light is the middle of a frame whose preamble was missed */
+    LEAST_ONES = 10, /* minimum scans of light of a preamble: a proximity flash has 3 or 4 */
     LEAST_BEHIND_FLASH = 5,
-    FLASH_COUNTS = 24, /* scans: where an own flash may have hidden the first ones */
-    LONGEST_ONES = 20, /* scans of a beginning: a bit less than 7 of them; more are ones in the middle of a frame */
-    MOST_ONES = 36,    /* then it is not a frame */
-    CLEAR = 12,        /* dark scans: more than any usual word has in a row */
-    SLOT = 6,          /* scans of back-off: faint light is seen so late */
+    FLASH_COUNTS = 24, /* scans after a flash of this robot that may have hidden the first ones */
+    LONGEST_ONES = 20, /* maximum scans of a preamble, somewhat less than 7 bits; more are ones inside a frame */
+    MOST_ONES = 36,    /* more scans of light are no frame */
+    CLEAR = 12,        /* dark scans before sending: more than usual words have in a row */
+    SLOT = 6,          /* scans of a back-off slot: the detection delay of faint light */
     FIRST_SLOTS = 12,
     SLOTS_PER_NEIGHBOUR = 4,
-    FLASH = 3,              /* scans of the own light: 0.5 ms settle the receivers, then they are read */
-    AFTERGLOW = 3, /* scans until the receivers have settled: a reading is a scan old, and light that touches, 3700
+    FLASH = 3,              /* scans of a proximity flash: the receivers settle in 0.5 ms, then they are read */
+    AFTERGLOW = 3, /* scans until the receivers have settled: a reading is a scan old, and light at contact, 3700
                     * counts, has fallen to 63 after one scan and to 1 after two (60 us) */
-    MOST_BUSY = 1000,       /* scans of light without so many dark ones between: more than any frame has */
+    MOST_BUSY = 1000,       /* scans of light without START_AFTER dark ones in between: longer than any frame */
     PROXIMITY_PERIOD = 205, /* scans: 50 ms */
     FOLLOW_EVERY = 4,       /* scans */
     HOUSEKEEPING = 64,
@@ -36,16 +37,16 @@ enum {
 };
 
 static enum { LISTEN, ONES, BITS, SEND, FLASHING, SETTLING, RESTING } state;
-static uint8 phase;      /* scans until something is due, or of a bit */
-static uint8 lit, quiet; /* scans with light, without; in LISTEN */
-static uint16 busy;      /* scans of light that could begin nothing */
-static uint8 rest;       /* scans of silence on top before an own flash */
-static uint16 backoff;   /* scans of silence on top before an own frame */
-static uint8 sensor;     /* that hears the frame best */
+static uint8 phase;      /* scans until the next step of the state, or scan within a bit */
+static uint8 lit, quiet; /* scans with and without light in state LISTEN */
+static uint16 busy;      /* scans of light that could not begin a frame */
+static uint8 rest;       /* further dark scans before a flash */
+static uint16 backoff;   /* further dark scans before sending a frame */
+static uint8 sensor;     /* sensor with the strongest signal of the frame */
 static uint8 ones;
-static bool falling;                /* the last scan was dark: the ones are over if the next is as well */
-static uint16 dark, bright, slicer; /* of that sensor, sixteenths of a count */
-static uint16 sum;                  /* of a bit's scans, the middle one twice */
+static bool falling;                /* the last scan was dark: a second one ends the ones */
+static uint16 dark, bright, slicer; /* background, lit level and decision threshold, sixteenths of a count */
+static uint16 sum;                  /* sum of a bit's scans, the middle one twice */
 static uint16 word;
 static uint8 word_bits;
 static frame_buffer buffer;
@@ -116,7 +117,7 @@ static HAL_OUTLINE void listen_again(void)
     lit = 0;
     quiet = 0;
     busy = 0;
-    if (backoff == 0) { /* others may have an answer as well */
+    if (backoff == 0) { /* other robots may answer the same frame */
         draw_backoff();
     }
     state = LISTEN;
@@ -164,8 +165,8 @@ static HAL_OUTLINE void measure_ones(scan raw)
         listen_again();
     } else {
         frame_begin(&buffer);
-        random_state = (uint16)(random_state + scans); /* robots in the same state part here */
-        phase = 2;                                     /* of the zero */
+        random_state = (uint16)(random_state + scans); /* separates robots with the same random state */
+        phase = 2;                                     /* third scan of the zero */
         word_bits = CODE_BITS + 1;
         state = BITS;
     }
@@ -196,7 +197,7 @@ static HAL_OUTLINE void receive(scan raw)
         return;
     }
     phase = 0;
-    if (word_bits > CODE_BITS) { /* the zero behind the ones */
+    if (word_bits > CODE_BITS) { /* the zero after the preamble */
         word_bits = CODE_BITS;
         return;
     }
@@ -211,7 +212,7 @@ static HAL_OUTLINE void receive(scan raw)
     }
 }
 
-/* -- taking turns -------------------------------------------------------------------------------------------------- */
+/* -- medium access ------------------------------------------------------------------------------------------------- */
 
 static HAL_OUTLINE void flash(void)
 {
@@ -222,7 +223,7 @@ static HAL_OUTLINE void flash(void)
     state = FLASHING;
 }
 
-/* Nobody has lit anything for long enough. */
+/* Uses a dark medium: sends a proximity flash or a frame when its back-off is over. */
 static HAL_OUTLINE void use_silence(void)
 {
     if ((uint16)(scans - flashed_at) >= PROXIMITY_PERIOD) {

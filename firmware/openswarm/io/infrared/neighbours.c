@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Who was heard of late: a table of fixed size. It is written by the link's interrupt alone. */
+/* Neighbour table of fixed size. Only the link's interrupt writes it. */
 #include "infrared_parts.h"
 #include "kernel.h"
 
@@ -13,7 +13,7 @@ static void lose(sys_neighbour *n)
     known--;
 }
 
-/* The entry of a number; else a free one; else that of who has not been heard for the longest time. */
+/* Returns the entry of a number; else a free one; else the entry not heard for the longest time. */
 static sys_neighbour *entry_of(uint16 number, uint16 now)
 {
     sys_neighbour *best = table;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Frames that wait for their turn: a ring of fixed size, filled in any context and emptied by the link. */
+/* Frames waiting to be sent: a ring of fixed size, filled in any context and emptied by the link. */
 #include "hal_cpu.h"
 #include "infrared_parts.h"
 #include "kernel.h"
@@ -28,7 +28,7 @@ static waiting_frame *reserve(void)
 
 bool queue_frame(frame_kind kind, const uint8 *payload, uint8 size)
 {
-    hal_lock_state lock = hal_lock_slice(); /* nobody is killed between reserving and filling */
+    hal_lock_state lock = hal_lock_slice(); /* a thread must not be killed between reserving and filling */
     waiting_frame *w = reserve();
     if (w != NULL) {
         w->kind = (uint8)kind;

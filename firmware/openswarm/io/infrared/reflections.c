@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Proximity between frames: all emitters are on for three scans, and what the last of them shows, less the background,
- * is the reflection. How it becomes millimetres and an event is said once, for both devices, of which a program has
- * one. */
+/* Proximity between frames: all emitters are on for three scans; the reading of the last one less the background is the
+ * reflection. proximity.c converts it into millimetres and an event; a program has this device or io/analog. */
 #include "../analog/proximity.c"
 
 #include "infrared_parts.h"

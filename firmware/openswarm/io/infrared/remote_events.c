@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: MIT */
-/* Events that neighbours share (openswarm_remote.h).
+/* Events shared by neighbours (openswarm_remote.h).
  *
- * A frame names the event, the hops that are left, the robot it began at and a number of that robot, by which those who
- * hear it twice know it. What arrives is sent here like any event, and so comes to the handler that sends what is sent
- * here to neighbours: it knows an arrival by its contents. Two of the same contents may be exchanged for each other,
- * which nobody can tell.
+ * A frame contains the event, the hops left, the robot of origin and its sequence number; origin and sequence identify
+ * duplicates. An arrival is sent on this robot like any event. It therefore also reaches the handler that sends local
+ * events to neighbours, which recognises the arrival by its contents. Two arrivals with equal contents may be confused;
+ * the difference has no effect.
  *
- * Arrivals are forgotten in time: a robot that starts again counts from the beginning, and is to be heard. */
+ * Arrivals expire: a robot that restarts counts its sequence from the beginning, and must be heard. */
 #include "infrared_parts.h"
 #include "kernel.h"
 #include "openswarm_remote.h"
@@ -18,7 +18,7 @@ enum {
     EVENT_BITS = 13,
     NUMBER_BITS = 11,
     SEQUENCES = 32,
-    TIME_SHIFT = 8 /* arrivals are dated in 256 ms, whose 16 bits are four hours */
+    TIME_SHIFT = 8 /* arrival times are in units of 256 ms: 16 bits are four hours */
 };
 
 typedef struct {
@@ -27,10 +27,10 @@ typedef struct {
 } shared_event;
 
 typedef struct {
-    uint16 origin;   /* number of the robot, and its sequence above */
-    uint16 contents; /* their CRC */
+    uint16 origin;   /* number of the robot; its sequence in the upper bits */
+    uint16 contents; /* CRC of the contents */
     uint16 when;
-    bool is_pending; /* sent here, and our own handler has not had it yet */
+    bool is_pending; /* sent on this robot, and not yet seen by on_event() */
 } arrival;
 
 static shared_event shared[SYS_REMOTE_EVENTS];
@@ -63,7 +63,7 @@ static bool is_recent(const arrival *a)
     return a->origin != 0 && (uint16)(date() - a->when) <= SYS_NEIGHBOUR_LIFETIME >> TIME_SHIFT;
 }
 
-/* Whether this is an arrival on its way to the listeners here. */
+/* Whether an event with these contents is a pending arrival, which it then ends. */
 static bool has_arrived(uint16 contents)
 {
     bool found = false;
@@ -131,7 +131,7 @@ static void arrive(const frame *f)
     uint16 origin = (uint16)(f->payload[2] | (uint16)f->payload[3] << 8);
     uint16 event = first & SYS_REMOTE_LAST_EVENT;
     uint8 hops = (uint8)(first >> EVENT_BITS);
-    if ((origin & NUMBER_MASK) == 0) { /* sent before the robot had a number, which it has now */
+    if ((origin & NUMBER_MASK) == 0) { /* sent before the robot had drawn its number */
         origin |= f->number;
     }
     if (is_known(origin)) {
@@ -139,7 +139,7 @@ static void arrive(const frame *f)
         return;
     }
     arrival *a = arrivals + next_arrival;
-    if (a->is_pending && is_recent(a)) { /* our handlers are far behind: forgotten, it would be taken for our own */
+    if (a->is_pending && is_recent(a)) { /* handlers lag behind: once displaced, it would count as a local event */
         return;
     }
     next_arrival = (uint8)((next_arrival + 1u) % SYS_REMOTE_MEMORY);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* LEDs by event: SYS_IO_LED. Sys_Set_LED and Sys_Toggle_LED (openswarm_io.h) stay the direct way. */
+/* LEDs by event: SYS_IO_LED. Sys_Set_LED and Sys_Toggle_LED (openswarm_io.h) access them directly. */
 #ifndef LED_H
 #define LED_H
 
@@ -7,7 +7,7 @@
 
 enum {
     SYS_IO_LED = 0x14, /* [sys_led_order] request, by anyone */
-    SYS_LED_ALL = 0xFF /* as number: all ten */
+    SYS_LED_ALL = 0xFF /* LED number that means all ten */
 };
 
 typedef enum { SYS_LED_OFF, SYS_LED_ON, SYS_LED_TOGGLE } sys_led_action;
@@ -17,9 +17,9 @@ typedef struct {
     uint8 action; /* a sys_led_action */
 } sys_led_order;
 
-/* Sees an order before it is carried out; may change it; false: dropped. Handler context. */
+/* Receives an order before its execution and may change it; false: the order is dropped. Handler context. */
 typedef bool (*sys_led_processor)(sys_led_order *order);
-sys_led_processor Sys_Set_LEDProcessor(sys_led_processor processor); /* MTH; NULL: orders as they are */
+sys_led_processor Sys_Set_LEDProcessor(sys_led_processor processor); /* MTH; NULL: orders unchanged */
 
 /* M | no | - | 40 | MEMORY.  Between Sys_Init_Kernel and Sys_Start_Kernel. */
 bool Sys_Start_LEDs(void);

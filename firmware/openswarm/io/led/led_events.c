@@ -6,7 +6,7 @@
 
 #include <string.h>
 
-static sys_led_processor processor; /* NULL: orders as they are */
+static sys_led_processor processor; /* NULL: orders unchanged */
 
 static void carry_out(uint8 led, uint8 action)
 {

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* RC-5 from edges (epuck.md §6). Every bit has an edge in its middle: falling is 1, rising 0. Edges between two bits come
- * half a bit later and say nothing, so only the distance to the last middle matters. */
+/* Decodes RC-5 from edges (epuck.md §6). Every bit has an edge in its middle: falling is 1, rising 0. Edges between two
+ * bits come half a bit later and carry no information, so only the distance to the last middle counts. */
 #include "remote.h"
 
 #include "hal_remote.h"
@@ -37,7 +37,7 @@ void remote_edge(bool falling, uint32 ticks)
     if (count != 0 && distance >= SHORTEST && distance < MIDDLE) {
         return;
     }
-    if (count == 0 || distance < SHORTEST || distance >= LONGEST) { /* perhaps the middle of a first start bit */
+    if (count == 0 || distance < SHORTEST || distance >= LONGEST) { /* may be the middle of a first start bit */
         count = falling ? 1 : 0;
         bits = 1;
     } else {

@@ -6,12 +6,12 @@
 #include "openswarm.h"
 
 typedef struct {
-    uint8 address; /* 0-31: the kind of device the sender means */
+    uint8 address; /* 0-31: type of the addressed device */
     uint8 command; /* 0-63 */
     bool toggle;   /* changes with every press */
 } sys_remote_frame;
 
-/* Sees a new frame; may change the command; true: the command becomes the payload of SYS_IO_REMOTECONTROL. ISR context. */
+/* Receives a new frame and may change the command; true: it is sent as SYS_IO_REMOTECONTROL. ISR context. */
 typedef bool (*sys_remote_processor)(sys_remote_frame *frame);
 sys_remote_processor Sys_Set_RemoteProcessor(sys_remote_processor processor); /* MTHI; NULL: every frame */
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* SPI: one transfer at a time, byte by byte from the interrupt on the bus's own block. */
+/* SPI: one transfer at a time; the interrupt exchanges single bytes of the bus's own block. */
 #include "spi.h"
 
 #include "bus.h"
@@ -41,7 +41,7 @@ static bool exchange(job *j)
     return j->done == j->size;
 }
 
-/* Why it failed. */
+/* Performs a transfer and returns its error. */
 static sys_error transfer(job *j, sys_spi_processor process)
 {
     if (process != NULL && !process(j->bytes, j->size, false)) {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* SPI master for threads: the interrupt exchanges the bytes, the thread sleeps. */
+/* SPI master for threads: the interrupt exchanges the bytes while the thread sleeps. */
 #ifndef SPI_H
 #define SPI_H
 
@@ -7,19 +7,21 @@
 
 enum { SYS_SPI_TIMEOUT_MS = 100 /* of one transfer: 65,535 bytes would take longer than any board's heap holds */ };
 
-/* Sees the bytes of a transfer twice and may change them: those to be sent, then those received in their place. False:
- * nothing is sent, or what came is damaged; the transfer fails. Thread context: the caller of Sys_SPI_Transfer. */
+/* Receives the bytes of a transfer twice and may change them: first those to send, then those received. False: the
+ * bytes are not sent, or those received are damaged; the transfer fails. Context: the thread that calls
+ * Sys_SPI_Transfer. */
 typedef bool (*sys_spi_processor)(uint8 *bytes, uint16 size, bool received);
-sys_spi_processor Sys_Set_SPIProcessor(sys_spi_processor processor); /* MTH; NULL: bytes as they are. In force from the next
-                                                                        transfer on */
+sys_spi_processor Sys_Set_SPIProcessor(sys_spi_processor processor); /* MTH; from the next transfer on; NULL: none */
 
-/* M | no | - | 20 | none.  Between Sys_Init_Kernel and Sys_Start_Kernel. Mode 0, 8 bits; rate and pins: board/epuck/spi. */
+/* M | no | - | 20 | none.  Between Sys_Init_Kernel and Sys_Start_Kernel. Mode 0, 8 bits; rate and pins:
+ * board/epuck/spi. */
 void Sys_Start_SPI(void);
 
-/* T | until done, at most SYS_SPI_TIMEOUT_MS | - | 60 | CONTEXT, BUSY, MEMORY, ARGUMENT.  Sends size bytes of out (NULL:
- * zeros) and puts what came meanwhile into in (NULL: dropped); the slave is selected all the while. False with ARGUMENT: the
- * processor refused, or size is 0 or above 1024; with BUSY: another thread's transfer is on its way, or the time is over. The
- * bytes travel in a block of the heap, size + 4; that of a thread killed meanwhile is kept until the next call. */
+/* T | until done, at most SYS_SPI_TIMEOUT_MS | - | 60 | CONTEXT, BUSY, MEMORY, ARGUMENT.  Sends size bytes of out
+ * (NULL: zeros) and stores the received bytes in in (NULL: dropped); chip select stays asserted. False with ARGUMENT:
+ * the processor refused, or size is 0 or above 1024; with BUSY: another thread's transfer is in progress, or time-out.
+ * The bytes are copied to a heap block of size + 4; the block of a thread killed meanwhile is kept until the next
+ * call. */
 bool Sys_SPI_Transfer(const uint8 *out, uint8 *in, uint16 size);
 
 #endif

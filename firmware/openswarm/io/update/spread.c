@@ -1,48 +1,48 @@
 /* SPDX-License-Identifier: MIT */
-/* Advertisement, request, data, and when to keep quiet (spread.h; README.md). Deluge's rules, with rows for pages. */
+/* Spreading of programs: advertisements, requests, data and their suppression (spread.h, docs/design/update.md). The
+ * rules are Deluge's, with rows instead of pages. */
 #include "spread.h"
 
 #include <string.h>
 
 enum {
     ADVERTISEMENT = 0x80, /* +1: activated.  version 2, rows, CRC 4 */
-    REQUEST = 0xA0,       /* + row.  version 2, parts that are missing 3, identity 2 */
-    DATA = 0xC0,          /* + row.  part * 8 + identity above its low byte, that, 5 bytes */
+    REQUEST = 0xA0,       /* + row.  version 2, missing parts 3, identity 2 */
+    DATA = 0xC0,          /* + row.  part * 8 + upper bits of the identity, its low byte, 5 bytes */
     KINDS = 0xE0,
     ROW = 0x1F,
-    IDENTITY = 0x07FF, /* of a program, in its CRC: two of one version share no rows */
+    IDENTITY = 0x07FF, /* bits of the CRC that identify a program: two of one version share no rows */
     DATA_HEADER = 3,
     PART = 5,
     PARTS = (HAL_UPDATE_ROW + PART - 1) / PART,
     SHORTEST = 1000, /* ms between advertisements, doubled while nothing is new */
     LONGEST = 60000,
-    PATIENCE = 3 * SYS_SPREAD_TICK, /* without data before a request is made again, and up to twice that more */
-    BEHIND = 2000,                  /* the same, when somebody was sent a row that is here already */
-    POLITENESS = 20000, /* ms without a part of use after which a robot asks for its row whoever else is served */
-    DOUBLINGS = 3,      /* of PATIENCE, while no data come */
-    MOST_ASKED = 16,    /* requests in vain: then another program may take the place, and there are no more of them */
-    MOST_SERVED = 180,  /* parts of a row; then a request for it is answered by one part */
-    FORGIVEN = 16000,   /* ms after which a part counts no more, of each row */
-    ENOUGH = 1,         /* equal advertisements heard that make the own one needless */
-    MOST_FAILED = 3     /* times that all rows of a program came and its CRC was wrong */
+    PATIENCE = 3 * SYS_SPREAD_TICK, /* ms without data before a request is repeated, plus up to twice that */
+    BEHIND = 2000,                  /* the same after data of a row that this robot has already */
+    POLITENESS = 20000, /* ms without a useful part after which a robot no longer postpones its requests */
+    DOUBLINGS = 3,      /* of PATIENCE while no data arrive */
+    MOST_ASKED = 16,    /* requests in vain; then requests stop and another program may replace this one */
+    MOST_SERVED = 180,  /* parts of a row; beyond that a request for the row is answered by one part */
+    FORGIVEN = 16000,   /* ms after which one served part of each row is forgotten */
+    ENOUGH = 1,         /* equal advertisements heard that suppress this robot's own */
+    MOST_FAILED = 3     /* times that a program arrived whole with a wrong CRC */
 };
 
-/* Neighbours are not trusted to stop, or to get on: no wait for them is without end, and no answer takes what others
- * need. */
+/* Neighbours may misbehave: no wait for them is unbounded, and answers to one never use up the share of the others. */
 static const uint32 ALL_PARTS = 0xFFFFFFFFu >> (32 - PARTS);
 
-static sys_update have; /* version 0: nothing */
+static sys_update have; /* stored program; version 0: none */
 static bool is_active;
-static sys_update want;   /* version 0: nothing */
-static sys_update vain;   /* what gave way to `want`, since nobody sent it */
-static sys_update failed; /* what failed last, */
-static uint8 failures;    /* and how often */
+static sys_update want;   /* program being received; version 0: none */
+static sys_update vain;   /* program that `want` replaced, because no neighbour sent it */
+static sys_update failed; /* program that failed last */
+static uint8 failures;    /* number of its failures */
 static uint8 row, asked, doublings, buffer[PARTS * PART];
 static bool is_asking, is_polite;
-static uint32 lacking; /* parts of `row`; bit n: part n */
+static uint32 lacking; /* missing parts of `row`; bit n: part n */
 static uint8 wanted_row, part_sent;
-static uint32 wanted_parts;   /* of `wanted_row`, by others */
-static uint8 served[ROW + 1]; /* parts of each row a message can name, by whomever, less what is forgiven */
+static uint32 wanted_parts;   /* parts of `wanted_row` that neighbours request */
+static uint8 served[ROW + 1]; /* parts of each row sent by any robot, less the forgotten ones */
 static uint32 forgiven_at;
 static uint32 clock, interval, begun, advertise_at, ask_at, useful_at;
 static uint8 heard;
@@ -62,7 +62,8 @@ static void begin_interval(uint32 length)
     advertise_at = clock + length / 2 + draw((uint16)(length / 2));
 }
 
-static void something_is_new(void)
+/* Shortens the interval of advertisements (Trickle's inconsistency). */
+static void reset_interval(void)
 {
     if (interval != SHORTEST) {
         begin_interval(SHORTEST);
@@ -80,8 +81,8 @@ static void ask_in(uint16 wait)
     is_asking = true;
 }
 
-/* Others are served: the own request is not made sooner than it would be, nor put off for ever. */
-static void put_off(uint16 wait)
+/* Postpones this robot's request while others are served: never to an earlier time, and not for ever. */
+static void postpone_request(uint16 wait)
 {
     is_polite = is_polite && clock - useful_at < POLITENESS;
     if (is_asking && is_polite) {
@@ -91,7 +92,8 @@ static void put_off(uint16 wait)
     }
 }
 
-static void go_on(void)
+/* Resets the counters of requests in vain after a useful part. */
+static void note_progress(void)
 {
     asked = doublings = 0;
     useful_at = clock;
@@ -105,13 +107,13 @@ static void next_row(void)
         missing >>= 1;
     }
     lacking = ALL_PARTS;
-    is_polite = true; /* until it has waited for too long: then for this row no more */
-    go_on();
+    is_polite = true; /* until it has waited too long for this row */
+    note_progress();
 }
 
 static void refresh(void)
 {
-    wanted_parts = 0; /* of what was here before */
+    wanted_parts = 0; /* they belong to the previous program */
     memset(served, 0, sizeof served);
     if (!Sys_Get_StoredUpdate(&have, &is_active)) {
         have = (sys_update){0, 0, 0};
@@ -139,9 +141,9 @@ bool Sys_Offer_Activation(uint16 version)
         return false;
     }
     if (!is_active) {
-        something_is_new();
+        reset_interval();
     }
-    is_active = true; /* the word goes round, even if the flag sticks here */
+    is_active = true; /* the activation is passed on even if the flag cannot be written here */
     return Sys_Activate_Update(version);
 }
 
@@ -172,18 +174,18 @@ static void on_advertisement(const uint8 *m)
         sys_update before = want;
         if (Sys_Begin_Update(&their)) {
             vain =
-                asked == MOST_ASKED ? before : vain; /* not again before this one has ended, or been in vain as well */
+                asked == MOST_ASKED ? before : vain; /* not begun again before this one ended or was in vain as well */
             want = their;
-            refresh(); /* the store may be that of a program that is not activated */
+            refresh(); /* the store may have held a program that was not activated */
             next_row();
-            something_is_new();
+            reset_interval();
         }
     } else if (want.version != 0 && is_same(&their, &want)) {
-        if (!is_asking) { /* once more: who has it is there, perhaps */
+        if (!is_asking) { /* request again: the advertising robot may have the program */
             ask_in(PATIENCE << DOUBLINGS);
         }
     } else if (their.version < have.version || (is_ours && is_active && !theirs_is_active)) {
-        something_is_new(); /* for them */
+        reset_interval(); /* so that the other robot hears of it soon */
     } else if (is_ours && theirs_is_active && !is_active) {
         (void)Sys_Offer_Activation(have.version);
     } else if (is_ours) {
@@ -191,8 +193,8 @@ static void on_advertisement(const uint8 *m)
     }
 }
 
-/* Somebody who does not get on, or has the row, may ask for it for ever. A part for a request leaves the others theirs,
- * and who really lacks it has it some time. */
+/* Returns the parts to send for a request. A robot that makes no progress, or has the row, may request it for ever. One
+ * part per request leaves time to the others, and a robot that lacks the row still completes it. */
 static uint32 allowed(uint8 their_row, uint32 parts)
 {
     uint8 part = (uint8)draw(PARTS);
@@ -212,15 +214,15 @@ static void on_request(const uint8 *m)
     }
     if (version == have.version && program == identity(&have) && their_row < have.rows) {
         parts = allowed(their_row, parts);
-        if (wanted_parts == 0 || their_row < wanted_row) { /* who is behind first: the others fill their gaps as well */
+        if (wanted_parts == 0 || their_row < wanted_row) { /* lowest row first: it fills gaps of the others as well */
             wanted_row = their_row;
             wanted_parts = parts;
-            part_sent = (uint8)draw(PARTS); /* so that two who have the row begin with different parts */
+            part_sent = (uint8)draw(PARTS); /* two robots with the row begin with different parts */
         } else if (their_row == wanted_row) {
             wanted_parts |= parts;
         }
     } else if (version == want.version && program == identity(&want) && their_row == row && (lacking & ~parts) == 0) {
-        put_off(PATIENCE); /* the answer will do here as well */
+        postpone_request(PATIENCE); /* the answer serves this robot as well */
     }
 }
 
@@ -234,7 +236,7 @@ static void on_data(const uint8 *m)
     uint8 their_row = m[0] & ROW, part = m[1] >> 3;
     uint16 program = (uint16)((uint16)(m[1] & 7u) << 8 | m[2]);
     uint32 bit = (uint32)1 << part;
-    if (have.version != 0 && program == identity(&have)) { /* somebody else has sent it */
+    if (have.version != 0 && program == identity(&have)) { /* another robot sent it */
         count_served(their_row);
         if (their_row == wanted_row) {
             wanted_parts = served[their_row] < MOST_SERVED ? wanted_parts & ~bit : 0;
@@ -245,12 +247,12 @@ static void on_data(const uint8 *m)
     }
     doublings = 0;
     if (their_row != row || (lacking & bit) == 0) {
-        if (their_row <= row) { /* who is behind comes first, so that all go on together: a row is sent once to all */
-            put_off(their_row < row ? BEHIND : PATIENCE);
+        if (their_row <= row) { /* robots that are behind come first, so that each row is sent once to all */
+            postpone_request(their_row < row ? BEHIND : PATIENCE);
         }
         return;
     }
-    go_on();
+    note_progress();
     memcpy(buffer + part * PART, m + DATA_HEADER, PART);
     lacking &= ~bit;
     if (lacking != 0) {
@@ -263,7 +265,7 @@ static void on_data(const uint8 *m)
     }
     if (is_put && Sys_End_Update()) {
         refresh();
-    } else { /* the next advertisement begins it anew, if there is a store for it */
+    } else { /* the next advertisement begins it again if a store is usable */
         failures = (uint8)(is_same(&want, &failed) ? failures + (failures != MOST_FAILED) : 1);
         failed = want;
     }
@@ -292,7 +294,7 @@ void Sys_Hear_Update(uint32 now, const uint8 *message)
 static bool send_part(uint8 *m)
 {
     uint8 whole[PARTS * PART] = {0}, part = part_sent;
-    do { /* in turn: none is left out because others are asked for again */
+    do { /* in turn, so that repeated requests for some parts do not starve the others */
         part = part + 1u < PARTS ? (uint8)(part + 1u) : 0;
     } while ((wanted_parts >> part & 1u) == 0);
     part_sent = part;
@@ -319,7 +321,7 @@ static bool ask(uint8 *m)
     asked += asked != MOST_ASKED;
     ask_in((uint16)(PATIENCE << doublings));
     doublings += doublings != DOUBLINGS;
-    is_asking = asked != MOST_ASKED; /* then only when somebody says that it has the program */
+    is_asking = asked != MOST_ASKED; /* afterwards only an advertisement of the program starts requests */
     return true;
 }
 
@@ -353,9 +355,9 @@ bool Sys_Spread(uint32 now, uint8 *message)
     if (now - forgiven_at >= FORGIVEN) {
         forgive();
     }
-    /* What is seldom goes first: parts may be asked for without end. */
+    /* Rare messages first: requests for parts may never end. */
     if (advertise_at != begun && is_due(advertise_at)) {
-        advertise_at = begun; /* once an interval */
+        advertise_at = begun; /* once per interval */
         if (heard < ENOUGH) {
             return advertise(message);
         }

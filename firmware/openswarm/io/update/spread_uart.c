@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The host as one more neighbour, at the other end of a UART (spread.h; openswarm/flashing/messages.py). */
+/* A host as a neighbour at the other end of a UART (spread.h; openswarm/flashing/messages.py). */
 #include "spread.h"
 
 bool Sys_Spread_Tx(const uint8 *message, uint16 size, sys_put put)

@@ -1,21 +1,21 @@
 /* SPDX-License-Identifier: MIT */
-/* Two stores, one of which always keeps the program that works (README.md: the order of writes and why it is safe). */
+/* Two stores, one of which always keeps the program that works. README.md has the order of writes. */
 #include "update.h"
 
 #include <string.h>
 
-/* Flags are 1 until something has happened. */
+/* A flag bit is 1 until its step has happened. */
 enum { ALL = 0xFFFF, NOT_ACTIVE = 0x8000, NOT_CONFIRMED = 0x4000, TRIES = (1 << SYS_UPDATE_TRIES) - 1 };
 
-enum { FACTS = 8, MARK = 0xA7, NONE = 0xFF, WRITES = 3 /* before a row counts as worn out */ };
+enum { FACTS = 8, MARK = 0xA7, NONE = 0xFF, WRITES = 3 /* attempts before a row counts as worn out */ };
 
 static uint8 target = NONE; /* store that is being filled */
 static uint8 running = NONE;
 static uint8 stored = NONE; /* store that Sys_Get_StoredUpdate found last */
 /* Since the last start: */
-static uint8 worn;                       /* bit n: store n has not held what was written, so nothing more is */
+static uint8 worn;                       /* bit n: store n did not hold a write and gets no more */
 static uint8 refused;                    /* bit n: the program of store n could not be tried */
-static uint16 frozen[HAL_UPDATE_STORES]; /* flags that did not change when they should have, and are not tried again */
+static uint16 frozen[HAL_UPDATE_STORES]; /* flags that did not change when written, and are not written again */
 static sys_update coming;
 static uint32 missing;
 
@@ -48,7 +48,7 @@ static void pack(uint8 *row, const sys_update *facts)
     memset(row, 0xFF, HAL_UPDATE_ROW);
     for (uint8 i = 0; i < FACTS; i++) {
         row[i] = plain[i];
-        row[FACTS + i] = (uint8)~plain[i]; /* a write that was cut short leaves 1s, which show in one of both */
+        row[FACTS + i] = (uint8)~plain[i]; /* an interrupted write leaves 1s, which one of the two copies reveals */
     }
 }
 
@@ -88,7 +88,7 @@ static bool is_confirmed(uint8 store)
     return (hal_update_flags(store) & NOT_CONFIRMED) == 0;
 }
 
-/* The store whose program is to run, or NONE. */
+/* Returns the store whose program should run, or NONE. */
 static uint8 choose(sys_update *best)
 {
     uint8 chosen = NONE;
@@ -128,7 +128,7 @@ static bool write_store(uint8 store, uint8 row, const uint8 *bytes)
     return false;
 }
 
-/* Whether these flags are 0, now. */
+/* Clears flags; returns whether they are 0 now. */
 static bool clear(uint8 store, uint16 bits)
 {
     if ((hal_update_flags(store) & bits & (uint16)~frozen[store]) != 0) {
@@ -143,7 +143,7 @@ bool Sys_Begin_Update(const sys_update *facts)
     sys_update other;
     uint8 kept = choose(&other);
     if (!is_possible(facts) || (kept != NONE && !is_confirmed(kept)) || (running != NONE && !is_confirmed(running))) {
-        return false; /* the last try has none left, and is still one */
+        return false; /* also during the last try, which leaves no tries */
     }
     for (uint8 store = 0; store < HAL_UPDATE_STORES; store++) {
         if (is_whole(store, &other) && facts->version <= other.version) {
@@ -154,10 +154,10 @@ bool Sys_Begin_Update(const sys_update *facts)
     if ((worn >> store & 1u) != 0) {
         return false;
     }
-    target = NONE; /* power may fail in what follows: nothing is begun until it is done */
+    target = NONE; /* power may fail below: the update is begun only once all is written */
     missing = 0;
     stored = stored == store ? NONE : stored;
-    hal_update_erase(store, 0); /* first: from here on the store holds nothing, whatever its flags say */
+    hal_update_erase(store, 0); /* first: an erased head invalidates the store whatever its flags are */
     hal_update_renew(store);
     frozen[store] = 0;
     if (hal_update_flags(store) != ALL) {
@@ -202,7 +202,7 @@ bool Sys_End_Update(void)
         return false;
     }
     pack(row, &coming);
-    return write_store(store, 0, row); /* last: now it holds a program */
+    return write_store(store, 0, row); /* last: the head makes the program valid */
 }
 
 static uint8 newest(sys_update *best)
@@ -250,8 +250,8 @@ uint16 Sys_Get_NextVersion(void)
     return choose(&facts) == NONE ? 0 : facts.version;
 }
 
-/* Before the program can do any harm: tries that are not counted would go on for ever. A bit that sticks leaves the
- * others. */
+/* Counts a try before the program runs, because an uncounted try could repeat for ever. If a bit sticks, it uses the
+ * next one. */
 static bool count_try(uint8 store)
 {
     uint16 tries = hal_update_flags(store) & TRIES;

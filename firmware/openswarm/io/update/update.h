@@ -1,14 +1,15 @@
 /* SPDX-License-Identifier: MIT */
-/* Programs that reach a robot while it runs and outlive its reset; linked where DEVICES names update. The firmware stays what
- * it is, and calls at most one such program: the newest that is whole, activated, and has started well or has tries left.
+/* Programs that a running robot receives and keeps across resets; linked where DEVICES names update. The firmware never
+ * changes. It calls at most one such program: the newest that is whole, activated, and confirmed or with tries left.
  *
- *     Sys_Start_Update();                        at start: calls the program, if there is one; then, once all is well,
- *     Sys_Confirm_Update();                      otherwise the one before is back after SYS_UPDATE_TRIES resets
+ *     Sys_Start_Update();                        at start: calls the program, if there is one
+ *     Sys_Confirm_Update();                      once it works; else SYS_UPDATE_TRIES resets restore the previous one
  *
  *     Sys_Begin_Update(&facts); Sys_Put_UpdateRow(0, bytes); ... Sys_End_Update(); Sys_Activate_Update(version);
  *
- * Power may fail at any write: the next start finds the old or the new program. README.md tells why. On an e-puck each write
- * stops everything for 2 ms, interrupts too: motors should stand. Not for handlers, and by one thread at a time. */
+ * Power may fail at any write: the next start finds the old or the new program (README.md). On an e-puck each write
+ * stops the CPU for 2 ms, including interrupts; the motors should stand still. Not for handlers; one thread at a
+ * time. */
 #ifndef OPENSWARM_UPDATE_H
 #define OPENSWARM_UPDATE_H
 
@@ -23,37 +24,40 @@ extern "C" {
 enum { SYS_UPDATE_TRIES = 3 }; /* starts without Sys_Confirm_Update */
 
 typedef struct {
-    uint16 version; /* above that of all that are stored */
+    uint16 version; /* greater than that of all stored programs */
     uint8 rows;     /* 1 to HAL_UPDATE_ROWS */
     uint32 crc;     /* CRC-32 (IEEE 802.3) of the rows' bytes, HAL_UPDATE_ROW each */
 } sys_update;
 
-/* The CRC register behind `count` more bytes. It begins with all ones, and sys_update.crc is its complement in the end. */
+/* Returns the CRC register after `count` more bytes. Its initial value is all ones; sys_update.crc is its final
+ * complement. */
 uint32 Sys_Add_UpdateCrc(uint32 crc, const uint8 *bytes, uint8 count);
 
-/* Makes room for a program. false, and what was begun goes on: its facts are wrong, it is not newer than one that is whole,
- * the one that runs is not confirmed yet, or the store it would come to has not held what was written to it since the start. */
+/* Makes room for a program. false, and an update in progress continues: the facts are invalid, the version is not
+ * newer than a whole program, the running program is not confirmed yet, or the store failed to hold a write since
+ * the start. */
 bool Sys_Begin_Update(const sys_update *facts);
-/* Stores a row, in any order; one that is there already is left alone. false: no such row, or flash does not hold
- * it after three writes; then nothing is begun any more, and no more asked of that store until the next start. */
+/* Stores a row, in any order; a row stored before stays. false: no such row, or flash does not hold it after three
+ * writes; the update is then abandoned and the store not used until the next start. */
 bool Sys_Put_UpdateRow(uint8 row, const uint8 *bytes);
-/* Bit n: row n is not there yet; 0 when nothing was begun. */
+/* Bit n: row n is missing; 0 if no update was begun. */
 uint32 Sys_Get_MissingRows(void);
-/* false, and nothing is stored: a row is missing, or the CRC is wrong. */
+/* Stores the program. false, and it is not stored: a row is missing, or the CRC is wrong. */
 bool Sys_End_Update(void);
-/* The newest program that is whole: its facts, and whether it is activated. false: there is none. */
+/* Returns the facts of the newest whole program, and whether it is activated. false: there is none. */
 bool Sys_Get_StoredUpdate(sys_update *facts, bool *is_active);
-/* Copies a row of the program that the last call before has told. */
+/* Copies a row of the program that the last Sys_Get_StoredUpdate returned. */
 void Sys_Get_UpdateRow(uint8 row, uint8 *bytes);
-/* The program with this version is to run from the next start on. false: there is none that is whole, or its
- * flag sticks, which is not tried again until the next start. */
+/* Makes the next start run the program of this version. false: there is no such whole program, or its flag cannot be
+ * written; the flag is not tried again until the next start. */
 bool Sys_Activate_Update(uint16 version);
-/* The version that the next start calls, or 0. One that did not start well is stored and activated, and not it. */
+/* Version that the next start calls, or 0. A program that used up its tries stays stored and activated, but is not
+ * called. */
 uint16 Sys_Get_NextVersion(void);
-/* Puts the program that is to run where it belongs and calls it; where its tries cannot be counted, or its rows not written,
- * the one before. Its version, or 0: none was called. */
+/* Copies the chosen program into the run slot and calls it. If its tries cannot be counted or its rows not written, it
+ * calls the previous one. Returns the version, or 0: no program was called. */
 uint16 Sys_Start_Update(void);
-/* The program that was called last works. false: none was, or its flag sticks, as above. */
+/* Confirms the program that was called last. false: none was called, or its flag cannot be written, as above. */
 bool Sys_Confirm_Update(void);
 
 #ifdef __cplusplus

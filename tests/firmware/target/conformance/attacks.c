@@ -1,5 +1,5 @@
-/* Attacks: legal calls, or refused ones, at the worst moment and in the worst number. Each of them brought a kernel down
- * once, ours or the original. docs/design/kernel-tests.md lists all of them, with those that need a certain CPU. */
+/* Attacks: legal calls, or refused ones, at the worst moment and in the worst number. Each brought a kernel down
+ * once, this one or the original. docs/design/kernel-tests.md lists all of them, with those that need a certain CPU. */
 #include "conformance.h"
 
 #define FILE_LETTER 'a'
