@@ -23,7 +23,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """The compiler checks itself in all tests and the programs they start; skipped tests are told at the end."""
+    """Turn on the machine verifier for all tests and their child processes, and register the plugins of this folder."""
     os.environ["DSPIC_VERIFY_MACHINE"] = "1"
     config.pluginmanager.register(WatchdogPlugin(), "watchdog")
     if not hasattr(config, "workerinput"):
@@ -33,16 +33,16 @@ def pytest_configure(config: pytest.Config) -> None:
 
 @pytest.fixture(autouse=True)
 def own_translations() -> None:
-    """No test finds native code of a machine that another one has left: machines with one program share it."""
+    """Clear the native code that machines with the same program share, so that tests do not depend on each other."""
     jit._shared.clear()
 
 
 @pytest.fixture(scope="session", autouse=True)
 def default_engine(request: pytest.FixtureRequest) -> Iterator[None]:
-    """What machines of this process get that are not given an engine by name."""
+    """Make `--engine NAME` the default engine of this process."""
     named = request.config.getoption("--engine")
     with pytest.MonkeyPatch.context() as patch:
-        if named in NAMES:  # the vectors know one more
+        if named in NAMES:
 
             def make(name: str, *arguments: Any) -> Any:
                 return make_engine(named if name == "auto" else name, *arguments)

@@ -1,5 +1,7 @@
-"""Skipped tests are told at the end of a run, with what would enable them; where everything can be installed, only the
-named ones may be skipped (`--allowed-skips FILE`, `.ci/allowed-skips`)."""
+"""pytest plugin: lists skipped tests at the end of a run with the package that would enable them.
+
+With `--allowed-skips FILE` (`.ci/allowed-skips`) any other skip is a failure.
+"""
 
 from __future__ import annotations
 
@@ -11,16 +13,16 @@ from typing import Any
 import pytest
 
 REMEDY = re.compile(r"(Debian packages?:? [\w ,.+-]+|extra: \w+)")
-"""How a reason names what would enable its test."""
+"""Part of a reason that names the package which would enable the test."""
 
 
 class Skips:
-    """Collects what was skipped. A plugin of pytest; the workers of xdist report to the one of the main process."""
+    """Collects skipped tests in the main process; the workers of xdist report to it."""
 
     def __init__(self, allowed: Path | None) -> None:
         self.allowed = patterns(allowed) if allowed is not None else None
         self.found: list[tuple[str, str]] = []
-        """Test and reason."""
+        """Pairs of test and reason."""
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         if report.skipped and not hasattr(report, "wasxfail"):
@@ -31,7 +33,7 @@ class Skips:
             self.found.append((report.nodeid, reason_of(report.longrepr)))
 
     def forbidden(self) -> list[tuple[str, str]]:
-        """What was skipped without being named in the file of allowed skips."""
+        """Return skipped tests that the file of allowed skips does not name."""
         if self.allowed is None:
             return []
         return sorted({one for one in self.found if not any(pattern.search(one[0]) for pattern in self.allowed)})
@@ -44,19 +46,19 @@ class Skips:
         if not self.found:
             return
         terminalreporter.section("skipped tests and what enables them")
-        for line in told(self.found):
+        for line in lines_of(self.found):
             terminalreporter.write_line(line)
         for test, reason in self.forbidden():
             terminalreporter.write_line(f"NOT ALLOWED: {test}: {reason}", red=True)
 
 
 def reason_of(longrepr: Any) -> str:
-    """The words of a skip."""
+    """Return the reason of a skip."""
     return str(longrepr[2] if isinstance(longrepr, tuple) else longrepr).removeprefix("Skipped: ")
 
 
-def told(found: list[tuple[str, str]]) -> list[str]:
-    """Lines for a reader: what to install, how many tests that enables, and in which files."""
+def lines_of(found: list[tuple[str, str]]) -> list[str]:
+    """Return one line per package: what to install, how many tests that enables, and in which files."""
     by_remedy: dict[str, set[str]] = defaultdict(set)
     for test, reason in found:
         named = REMEDY.search(reason)

@@ -13,7 +13,8 @@ import pytest
 ROOT = Path(__file__).resolve().parents[1]
 FOLDERS = ("docs/reference", "docs/design", "docs")
 """Where a cited page is looked for, in this order."""
-CITATION = re.compile(r"\b([a-z0-9][a-z0-9-]*)\.md`?,?\s+((?:§\s?[0-9]+(?:\.[0-9]+)*(?:(?:,| and|-| to)\s?(?=§))?\s?)+)")
+SECTIONS = r"(?:§\s?[0-9]+(?:\.[0-9]+)*(?:(?:,| and|-| to)\s?(?=§))?\s?)+"
+CITATION = re.compile(rf"\b([a-z0-9][a-z0-9-]*)\.md`?,?\s+({SECTIONS})")
 NUMBER = re.compile(r"§\s?([0-9]+(?:\.[0-9]+)*)")
 HEADING = re.compile(r"^#{1,6} +(?:§ ?)?([0-9]+(?:\.[0-9]+)*)\.? ", re.MULTILINE)
 SUFFIXES = {".py", ".c", ".h", ".S", ".s", ".md", ".toml", ".inc", ".csv", ".html", ".mk", ".ts"}

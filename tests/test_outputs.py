@@ -14,7 +14,7 @@ import pytest
 
 from arena.trial.record import RecordError, write_bytes
 from emu.boards.picture import write_picture
-from emu.host.files import is_opened, read_file, atomic_file, atomic_text_file
+from emu.host.files import atomic_file, atomic_text_file, is_opened, read_file
 from toolchain.errors import ToolError
 from toolchain.files import write_outputs
 

@@ -1,4 +1,4 @@
-"""Nobody reads what a command prints: `emu --help | head -0`. No traceback, no message, exit status 0."""
+"""A closed pipe as standard output (`emu --help | head -0`): no traceback, no message, exit status 0."""
 
 from __future__ import annotations
 

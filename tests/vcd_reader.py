@@ -1,5 +1,8 @@
-"""Somebody else's reader of waveforms, `VCDVCD`. It is a script first: importing it lets a broken pipe end the process,
-which a worker that runs other tests must not do; so it is imported here and nowhere else."""
+"""An independent reader of waveforms: `VCDVCD`.
+
+Importing that package changes how the process handles broken pipes, because it is written as a script. Tests therefore
+import it only through this module, which restores the handling.
+"""
 
 from __future__ import annotations
 

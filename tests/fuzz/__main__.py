@@ -1,8 +1,9 @@
-"""Every campaign of this folder, one after the other: `python -m tests.fuzz [--seconds S] [--seed N] [NAME...]`.
+"""Runs every campaign below this folder, one after the other.
 
-With --seconds the campaigns share S seconds evenly, else each takes its own number of tries. With --jobs several run
-at once, and each is printed when it ends. A failure does not stop the others. Seeds come from the commit unless --seed
-gives the first. Exit status 1 if any campaign failed.
+Usage: `python -m tests.fuzz [--seconds S] [--seed N] [NAME...]`. With --seconds the campaigns share S seconds evenly,
+else each takes its own number of tries. With --jobs several run at once, and each is printed when it ends. A failure
+does not stop the others. Seeds come from the commit unless --seed gives the first. Exit status 1 if any campaign
+failed.
 
 Example: python -m tests.fuzz --seconds 600; python -m tests.fuzz --seconds 60 --seed 7 devices jit
 """
@@ -27,12 +28,12 @@ PATIENCE = 600.0
 
 
 def campaigns() -> dict[str, Path]:
-    """Scripts by name."""
+    """Return the campaign scripts by name."""
     return {script.stem.removeprefix("fuzz_"): script for script in sorted(HERE.glob("*/fuzz_*.py"))}
 
 
 def run(script: Path, seed: int, seconds: float | None, output: IO[bytes] | None = None) -> str:
-    """One campaign, from the folder of the project, told on `output`; "passed", "skipped" or why it failed."""
+    """Run one campaign with its output on `output` and return "passed", "skipped" or the failure."""
     command = [sys.executable, str(script), "--seed", str(seed)]
     if seconds is not None:
         command += ["--seconds", f"{seconds:g}"]
@@ -69,10 +70,10 @@ def main() -> int:
             print(f"== {name}", flush=True)
             results[name] = run(known[name], seed, share), time.monotonic() - start
             return
-        with tempfile.TemporaryFile() as told:
-            results[name] = run(known[name], seed, share, told), time.monotonic() - start
-            told.seek(0)
-            print(f"== {name}\n{told.read().decode(errors='replace')}", end="", flush=True)
+        with tempfile.TemporaryFile() as printed:
+            results[name] = run(known[name], seed, share, printed), time.monotonic() - start
+            printed.seek(0)
+            print(f"== {name}\n{printed.read().decode(errors='replace')}", end="", flush=True)
 
     if given.jobs <= 1:
         for name in names:

@@ -2,7 +2,7 @@
 
 Every campaign takes `--seed N` (the first seed; default: from the hash of the commit that is checked out) and
 `--seconds S` (as long as that, instead of its own number of tries). What a seed does depends on nothing but the seed,
-so a campaign that was interrupted goes on with `--seed` of the last line it told.
+so an interrupted campaign resumes with the `--seed` of the last line it printed.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 SKIPPED = 77
 """Exit status of a campaign that cannot run here, because a program it needs is not installed."""
-TOLD_EVERY = 30.0
+REPORT_EVERY = 30.0
 """Seconds between two lines on standard error that say how far a campaign is."""
 WITHOUT_COMMIT = 1
 """Where a source tree without its history begins."""
@@ -28,11 +28,11 @@ WITHOUT_COMMIT = 1
 def base_seed() -> int:
     """First seed of this commit: the first 28 bits of its hash, so that seeds fit into 31 bits."""
     try:
-        told = subprocess.run(
+        commit = subprocess.run(
             ["git", "-C", str(ROOT), "rev-parse", "HEAD"], capture_output=True, text=True, check=True)  # fmt: skip
     except (OSError, subprocess.CalledProcessError):
         return WITHOUT_COMMIT
-    return int(told.stdout[:7], 16)
+    return int(commit.stdout[:7], 16)
 
 
 class Campaign:
@@ -58,7 +58,7 @@ class Campaign:
         self._start = time.monotonic()
 
     def parse(self, arguments: list[str] | None = None) -> argparse.Namespace:
-        """The options; the course begins."""
+        """The options; the campaign begins."""
         options = self.parser.parse_args(arguments)
         self.first = self.seed = base_seed() if options.seed is None else options.seed
         self._seconds = options.seconds
@@ -70,7 +70,7 @@ class Campaign:
 
     @property
     def spent(self) -> float:
-        """Seconds since the course began."""
+        """Seconds since the campaign began."""
         return time.monotonic() - self._start
 
     @property
@@ -80,13 +80,14 @@ class Campaign:
         return late or (self._count is not None and self.done >= self._count)
 
     def __iter__(self) -> Iterator[int]:
-        told = self.spent
+        reported = self.spent
         while not self.done or not self.over:
             self.seed = self.first + self.done
-            if self.spent >= told + TOLD_EVERY:
-                told = self.spent
+            if self.spent >= reported + REPORT_EVERY:
+                reported = self.spent
                 of = "" if self._count is None else f" of {self._count}"
-                print(f"{self.done}{of} {self.option}, {told:.0f} s, at seed {self.seed}", file=sys.stderr, flush=True)
+                line = f"{self.done}{of} {self.option}, {reported:.0f} s, at seed {self.seed}"
+                print(line, file=sys.stderr, flush=True)
             yield self.seed
             self.done += 1
 

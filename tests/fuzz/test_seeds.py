@@ -17,8 +17,8 @@ def test_the_first_seed_follows_from_the_commit() -> None:
     assert 0 < base_seed() < 1 << 28
 
 
-def course(*words: str) -> Campaign:
-    """A course of at most three tries if nothing else is said."""
+def campaign(*words: str) -> Campaign:
+    """A campaign of at most three tries if nothing else is said."""
     made = Campaign(parser("text"), "tries", 3, "tries")
     made.parse(list(words))
     return made
@@ -26,17 +26,17 @@ def course(*words: str) -> Campaign:
 
 def test_a_course_has_as_many_seeds_as_asked_for_or_as_fit_into_its_time() -> None:
     """Counts from the first seed; at least one in no time at all."""
-    assert list(course("--seed", "7")) == [7, 8, 9]
-    assert list(course("--seed", "7", "--tries", "2")) == [7, 8]
-    assert list(course("--seed", "7", "--seconds", "0")) == [7]
-    endless = iter(course("--seed", "7", "--seconds", "1000"))
+    assert list(campaign("--seed", "7")) == [7, 8, 9]
+    assert list(campaign("--seed", "7", "--tries", "2")) == [7, 8]
+    assert list(campaign("--seed", "7", "--seconds", "0")) == [7]
+    endless = iter(campaign("--seed", "7", "--seconds", "1000"))
     assert [next(endless) for _ in range(9)] == list(range(7, 16))
 
 
 def test_a_long_campaign_tells_where_it_is(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
-    """The next seed among it, with which it is gone on with; results alone are on standard output."""
+    """Progress names the next seed, to resume with; standard output holds results only."""
     monkeypatch.setattr("tests.fuzz.seeds.TOLD_EVERY", 0.0)
-    assert list(course("--seed", "7", "--tries", "2")) == [7, 8]
+    assert list(campaign("--seed", "7", "--tries", "2")) == [7, 8]
     said = capsys.readouterr()
     assert said.out == ""
     assert said.err.splitlines()[-1].startswith("1 of 2 tries, ")
@@ -48,7 +48,7 @@ def test_a_failure_names_its_seed_and_how_to_see_it_again(
 ) -> None:
     """With the options of the run, without its limits."""
     monkeypatch.setattr(sys, "argv", [str(ROOT / "tests/fuzz/fuzz_x.py"), "--engine", "jit", "--seconds", "5"])
-    failing = course("--seed", "40")
+    failing = campaign("--seed", "40")
     for seed in failing:
         if seed == 41:
             break
@@ -62,6 +62,6 @@ def test_a_failure_names_its_seed_and_how_to_see_it_again(
 def test_every_campaign_takes_a_seed_and_a_time(name: str) -> None:
     """What `python -m tests.fuzz --seconds S` gives it."""
     command = [sys.executable, str(campaigns()[name]), "--help"]
-    told = subprocess.run(command, capture_output=True, text=True, check=True, cwd=ROOT).stdout
-    assert "--seed " in told
-    assert "--seconds " in told
+    usage = subprocess.run(command, capture_output=True, text=True, check=True, cwd=ROOT).stdout
+    assert "--seed " in usage
+    assert "--seconds " in usage

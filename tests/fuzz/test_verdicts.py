@@ -1,4 +1,4 @@
-"""Files of verdicts: gone on with, shared, and of one compiler."""
+"""Files of verdicts: resumed, shared between processes, and bound to one compiler."""
 
 from __future__ import annotations
 
@@ -36,9 +36,9 @@ def examine(seed):
     Path(sys.argv[1] + ".begun").touch()
     time.sleep(0.5)
     return Verdict(seed, "agreed", "", ("-O0",))
-course = Campaign(parser("text"), "programs", 1000, "programs")
-course.parse(["--seed", "1"])
-sys.exit(run_all(course, examine, Book(Path(sys.argv[1]), "made up"), 1))
+campaign = Campaign(parser("text"), "programs", 1000, "programs")
+campaign.parse(["--seed", "1"])
+sys.exit(run_all(campaign, examine, Book(Path(sys.argv[1]), "made up"), 1))
 """
 
 
@@ -47,7 +47,7 @@ def judge(differing: set[int], seed: int) -> Verdict:
     return Verdict(seed, "failed", "it differs") if seed in differing else Verdict(seed, "agreed", "", ("-O0", "-Os"))
 
 
-def course(count: int) -> Campaign:
+def campaign(count: int) -> Campaign:
     """Seeds from 1 on."""
     made = Campaign(parser("text"), "programs", count, "programs")
     made.parse(["--seed", "1"])
@@ -57,17 +57,17 @@ def course(count: int) -> Campaign:
 def test_a_campaign_goes_on_where_its_file_ends(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """What has a verdict is not examined again and counts all the same; failures are named and stop nothing."""
     log = tmp_path / "log"
-    assert run_all(course(3), partial(judge, {2}), Book(log, "made up"), 1) == 1
+    assert run_all(campaign(3), partial(judge, {2}), Book(log, "made up"), 1) == 1
     assert "FAILED at seed 2: it differs" in capsys.readouterr().out
     known = Book(log, "made up").verdicts
     assert known == {1: judge(set(), 1), 2: judge({2}, 2), 3: judge(set(), 3)}
-    assert run_all(course(4), partial(judge, {1, 3}), Book(log, "made up"), 1) == 1
+    assert run_all(campaign(4), partial(judge, {1, 3}), Book(log, "made up"), 1) == 1
     assert "3 agreed, 1 failed" in capsys.readouterr().out
     assert len(log.read_text().splitlines()) == 1 + 4
 
 
 def test_two_processes_share_the_seeds_and_a_killed_one_leaves_its_own(tmp_path: Path) -> None:
-    """Nobody takes what another is at; verdicts are seen by all."""
+    """No process takes a seed that another examines; all see every verdict."""
     log = tmp_path / "log"
     with subprocess.Popen([sys.executable, "-c", OTHER, str(log)], cwd=ROOT, stdout=subprocess.PIPE, text=True) as one:
         assert one.stdout is not None
@@ -82,7 +82,7 @@ def test_two_processes_share_the_seeds_and_a_killed_one_leaves_its_own(tmp_path:
 
 
 def test_an_interrupted_campaign_writes_down_what_it_was_at(tmp_path: Path) -> None:
-    """Status 130, and a file that is gone on with."""
+    """An interrupted campaign ends with status 130, and its file can be resumed."""
     log = tmp_path / "log"
     with subprocess.Popen([sys.executable, "-c", SLOW, str(log)], cwd=ROOT, stderr=subprocess.PIPE) as running:
         while not log.with_name("log.begun").exists():

@@ -1,4 +1,4 @@
-"""Long campaigns over programs: verdicts in a file, several processes on one file, interrupted and gone on with.
+"""Long campaigns over programs: verdicts in a file that several processes share and that can be resumed.
 
 Enters: seeds, and a function that examines one. Leaves: `Verdict`s, counted and written down as they come. The file has
 a line of JSON per verdict, behind a first line that says which campaign and which compiler it is about. Who works on a
@@ -55,7 +55,7 @@ class Verdict:
 
 
 class LogError(Exception):
-    """A file of verdicts that cannot be gone on with."""
+    """A file of verdicts that cannot be resumed."""
 
 
 def judged() -> str:
@@ -112,7 +112,7 @@ class Book:
 
     @contextmanager
     def _alone(self) -> Iterator[None]:
-        """Nobody else reads the file's beginning or writes meanwhile: byte 0 of the locks."""
+        """Exclusive access to the file's beginning and to writing: byte 0 of the lock file."""
         fcntl.lockf(self._locks, fcntl.LOCK_EX, 1, 0)
         try:
             yield
@@ -161,10 +161,10 @@ class Book:
             raise LogError(f"{self.path}: its verdicts are about another compiler or emulator; begin another file")
 
 
-def run_all(course: Campaign, examine: Callable[[int], Verdict], book: Book, jobs: int) -> int:
-    """Examine the seeds of `course` in `jobs` processes; the exit status.
+def run_all(campaign: Campaign, examine: Callable[[int], Verdict], book: Book, jobs: int) -> int:
+    """Examine the seeds of `campaign` in `jobs` processes; the exit status.
 
-    It goes on behind failures. After SIGINT or SIGTERM the programs being examined are ended and written down; a second
+    A failure does not stop it. After SIGINT or SIGTERM the running programs are finished and recorded; a second
     signal ends at once.
     """
     stopped: list[int] = []
@@ -180,9 +180,9 @@ def run_all(course: Campaign, examine: Callable[[int], Verdict], book: Book, job
     try:
         with ProcessPoolExecutor(jobs, initializer=_worker) as pool:
             running: set[Future[Verdict]] = set()
-            for seed in course:
+            for seed in campaign:
                 while len(running) > jobs and not stopped:
-                    running = _noted(running, book, done, course)
+                    running = _noted(running, book, done, campaign)
                 if stopped:
                     break
                 if book.take(seed):
@@ -194,14 +194,14 @@ def run_all(course: Campaign, examine: Callable[[int], Verdict], book: Book, job
             for future in running if stopped else ():
                 future.cancel()
             while running := {future for future in running if not future.cancelled()}:
-                running = _noted(running, book, done, course)
+                running = _noted(running, book, done, campaign)
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
     counts = Counter(verdict.summary for verdict in done.values())
     if elsewhere:
         counts["with another process"] = len(elsewhere)
-    course.ended(", ".join(f"{count} {kind}" for kind, count in sorted(counts.items())) or "nothing")
+    campaign.ended(", ".join(f"{count} {kind}" for kind, count in sorted(counts.items())) or "nothing")
     if counts["failed"]:
         return 1
     return INTERRUPTED if stopped else 0
@@ -223,7 +223,9 @@ def _leave_with(campaign: int) -> None:
     os._exit(1)
 
 
-def _noted(running: set[Future[Verdict]], book: Book, done: dict[int, Verdict], course: Campaign) -> set[Future[Verdict]]:
+def _noted(
+    running: set[Future[Verdict]], book: Book, done: dict[int, Verdict], campaign: Campaign
+) -> set[Future[Verdict]]:
     """Wait for a verdict, write down what there is; what is left."""
     finished, left = wait(running, LOOK_AGAIN, FIRST_COMPLETED)
     for future in finished:
@@ -233,7 +235,7 @@ def _noted(running: set[Future[Verdict]], book: Book, done: dict[int, Verdict], 
         book.put(verdict)
         done[verdict.seed] = verdict
         if verdict.kind == "failed":
-            course.failed(verdict.reason, verdict.seed)
+            campaign.failed(verdict.reason, verdict.seed)
     return left
 
 

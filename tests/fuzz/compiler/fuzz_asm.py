@@ -1,7 +1,7 @@
 """Mutated sources and objects: assembler and linker give an image or clear errors, nothing else.
 
-`python tests/fuzz/compiler/fuzz_asm.py [--inputs N] [--seed S] [--seconds T]`; exits 1 with the first input that made something
-else happen.
+`python tests/fuzz/compiler/fuzz_asm.py [--inputs N] [--seed S] [--seconds T]`; exits 1 with the first input that made
+something else happen.
 """
 
 from __future__ import annotations
@@ -194,13 +194,13 @@ def campaign(seeds: Iterable[int]) -> Counter[str]:
 
 
 def main() -> int:
-    course = Campaign(parser(__doc__), "inputs", 20_000, "sources and objects")
-    course.parse()
+    plan = Campaign(parser(__doc__), "inputs", 20_000, "sources and objects")
+    plan.parse()
     try:
-        outcomes = campaign(course)
+        outcomes = campaign(plan)
     except AssertionError as error:
-        return course.failed(error)
-    return course.ended(", ".join(f"{n} {what}" for what, n in sorted(outcomes.items())))
+        return plan.failed(error)
+    return plan.ended(", ".join(f"{n} {what}" for what, n in sorted(outcomes.items())))
 
 
 if __name__ == "__main__":

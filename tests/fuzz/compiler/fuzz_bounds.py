@@ -1,11 +1,11 @@
 """Random C at every level: nothing runs longer, uses more stack or masks longer than `toolchain.bounds` says.
 
-`python tests/fuzz/compiler/fuzz_bounds.py [--programs N] [--seed S] [--seconds T]`; exits 1 with the first program that exceeds
-a bound. The programs are those of `c_shapes.py`: interrupts, escapes, volatile, large frames, loops of fixed counts;
-every second one has what `c_features.py` has, which often leaves no bound, and every third is one of `c_notes.py`,
-which only its annotations bound. Every sixth is one of `c_interrupts.py`: there the responses of interrupts, and the
-stack under nested interrupts, are compared at many phases. Prints how tight the bounds of `main` are; a campaign that
-is long enough fails if `c_interrupts.py` never made a shape that it exists for.
+`python tests/fuzz/compiler/fuzz_bounds.py [--programs N] [--seed S] [--seconds T]`; exits 1 with the first program
+that exceeds a bound. The programs are those of `c_shapes.py`: interrupts, escapes, volatile, large frames, loops of
+fixed counts; every second one has what `c_features.py` has, which often leaves no bound, and every third is one of
+`c_notes.py`, which only its annotations bound. Every sixth is one of `c_interrupts.py`: there the responses of
+interrupts, and the stack under nested interrupts, are compared at many phases. Prints how tight the bounds of `main`
+are; a campaign that is long enough fails if `c_interrupts.py` never made a shape that it exists for.
 """
 
 from __future__ import annotations
@@ -145,7 +145,7 @@ class Held:
     nested: int = 0
 
     def examine(self, seed: int, folder: Path) -> str:
-        """One program at one level: what became of it. Raises `AssertionError` where something is above its bound."""
+        """Run one program at one level and return the outcome. Raises AssertionError above a bound."""
         program, level = c_interrupts.Program(seed), LEVELS[seed // 6 % len(LEVELS)]
         (folder / "a.c").write_text(program.text)
         image = folder / "program.elf"
@@ -179,12 +179,12 @@ def _worst(seen: Watched) -> dict[str, int]:
 
 def main() -> int:
     """Command line."""
-    course = Campaign(parser(__doc__), "programs", 300, "programs")
-    course.parse()
+    campaign = Campaign(parser(__doc__), "programs", 300, "programs")
+    campaign.parse()
     outcomes: Counter[str] = Counter()
     ratios: list[float] = []
     held = Held(Counter())
-    for seed in course:
+    for seed in campaign:
         with tempfile.TemporaryDirectory(prefix="bounds-") as folder:
             try:
                 if seed % 6 == INTERRUPTED:
@@ -192,20 +192,20 @@ def main() -> int:
                     continue
                 outcome, pairs = examine(seed, Path(folder))
             except AssertionError as error:
-                return course.failed(error)
+                return campaign.failed(error)
         outcomes[outcome] += 1
         found = pairs.get("_main")
         if found is not None and found[1].cycles is not None:
             ratios.append(found[1].cycles / found[0].cycles)
     ratios.sort()
-    told = ", ".join(f"{count} {what}" for what, count in outcomes.most_common())
+    summary = ", ".join(f"{count} {what}" for what, count in outcomes.most_common())
     if ratios:
-        told += f"; main: bound / measured {ratios[len(ratios) // 2]:.2f} in the middle, {ratios[-1]:.2f} at most"
+        summary += f"; main: bound / measured {ratios[len(ratios) // 2]:.2f} median, {ratios[-1]:.2f} maximum"
     missing = held.missing()
     if missing:
         print(f"never made: {', '.join(missing)}", file=sys.stderr)
         return 1
-    return course.ended(told)
+    return campaign.ended(summary)
 
 
 if __name__ == "__main__":

@@ -1,8 +1,9 @@
 """Random firmware-like C (`c_shapes.py`) at every level, with and without -fno-lto, on the emulator: one checksum and
+
 one sequence of accesses to volatile registers, those of the host's model where gcc is installed.
 
-`python tests/fuzz/compiler/fuzz_compiler.py [--programs N] [--seed S] [--seconds T] [--jobs J] [--log FILE] [--keep DIR]`;
-exits 1 if a program differs; DIR gets its sources. With FILE a campaign can be interrupted and gone on with, and
+`python tests/fuzz/compiler/fuzz_compiler.py [--programs N] [--seed S] [--seconds T] [--jobs J] [--log FILE] [--keep
+DIR]`; exits 1 if a program differs; DIR gets its sources. With FILE a campaign can be interrupted and resumed, and
 several processes can share it (`verdicts.py`). The compiler verifies its machine code after every pass meanwhile.
 Shapes whose images are equal to the byte are run once.
 """
@@ -141,10 +142,10 @@ def main() -> int:
     options.add_argument("--jobs", type=int, default=2)
     options.add_argument("--log", type=Path, help="file of verdicts, read and continued")
     options.add_argument("--keep", type=Path, help="folder for the sources of failures")
-    course = Campaign(options, "programs", 200, "programs")
-    given = course.parse()
+    campaign = Campaign(options, "programs", 200, "programs")
+    given = campaign.parse()
     try:
-        return run_all(course, partial(examine, keep=given.keep), Book(given.log, "compiler"), given.jobs)
+        return run_all(campaign, partial(examine, keep=given.keep), Book(given.log, "compiler"), given.jobs)
     except LogError as error:
         print(f"error: {error}", file=sys.stderr)
         return BAD_INPUT

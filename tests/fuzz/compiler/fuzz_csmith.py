@@ -4,7 +4,7 @@ simavr the same one.
 `python tests/fuzz/compiler/fuzz_csmith.py [--count N] [--seed S] [--seconds T] [--jobs J] [--log FILE] [--keep DIR]`.
 Needs Debian's `csmith`; the AVR, another machine with 16-bit int, joins in when `gcc-avr avr-libc simavr` are there.
 Programs that run too long at -O0 or do not fit into 8 kB of RAM are skipped. With FILE a campaign can be interrupted
-and gone on with, and several processes can share it (`verdicts.py`). Exit status 0 when all checksums agree; DIR keeps
+and resumed, and several processes can share it (`verdicts.py`). Exit status 0 when all checksums agree; DIR keeps
 sources of failures. Shapes whose images are equal to the byte are run once.
 
 Two things csmith leaves undefined here are repaired, because a compiler may do anything with them:
@@ -183,13 +183,13 @@ def main() -> int:
     options.add_argument("--jobs", type=int, default=2)
     options.add_argument("--log", type=Path, help="file of verdicts, read and continued")
     options.add_argument("--keep", type=Path, help="folder for the sources of failures")
-    course = Campaign(options, "count", 1000, "programs")
-    given = course.parse()
+    campaign = Campaign(options, "count", 1000, "programs")
+    given = campaign.parse()
     if not available():
         print("csmith is not installed (Debian package csmith): nothing to do", file=sys.stderr)
         return SKIPPED
     try:
-        return run_all(course, partial(examine, keep=given.keep), Book(given.log, "csmith"), given.jobs)
+        return run_all(campaign, partial(examine, keep=given.keep), Book(given.log, "csmith"), given.jobs)
     except LogError as error:
         print(f"error: {error}", file=sys.stderr)
         return BAD_INPUT

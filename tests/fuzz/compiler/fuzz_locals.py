@@ -176,20 +176,20 @@ def tried(seed: int, folder: Path, tally: dict[str, Counter[str]]) -> None:
 
 
 def main() -> int:
-    course = Campaign(parser(__doc__), "files", 20, "files of ten functions")
-    course.parse()
+    campaign = Campaign(parser(__doc__), "files", 20, "files of ten functions")
+    campaign.parse()
     tally: dict[str, Counter[str]] = {"-O0": Counter(), "-Os": Counter()}
     with tempfile.TemporaryDirectory() as folder:
-        for seed in course:
+        for seed in campaign:
             try:
                 tried(seed, Path(folder), tally)
             except AssertionError as error:
-                return course.failed(error)
-    told = "; ".join(
+                return campaign.failed(error)
+    summary = "; ".join(
         f"{level}: {one['values']:,} values right, {one['others']:,} others, {one['without value']:,} optimised out"
         for level, one in tally.items()
     )
-    return course.ended(f"{tally['-O0']['functions']} functions, {told}")
+    return campaign.ended(f"{tally['-O0']['functions']} functions, {summary}")
 
 
 if __name__ == "__main__":

@@ -44,21 +44,21 @@ def examine(seed: int, most: int, counts: Counter[str]) -> None:
 
 
 def main() -> int:
-    course = Campaign(parser(__doc__), "files", 30, "files")
-    course.parser.add_argument("--functions", type=int, default=4, metavar="N", help="of each (default 4; 0: all)")
-    options = course.parse()
+    campaign = Campaign(parser(__doc__), "files", 30, "files")
+    campaign.parser.add_argument("--functions", type=int, default=4, metavar="N", help="of each (default 4; 0: all)")
+    options = campaign.parse()
     if find_spec("z3") is None:
         print("the solver is not installed (extra: test)")
         return SKIPPED
     counts: Counter[str] = Counter()
-    for seed in course:
+    for seed in campaign:
         try:
             examine(seed, options.functions, counts)
         except AssertionError as error:
-            return course.failed(error)
+            return campaign.failed(error)
     if sum(counts.values()) >= 40 and counts["proved"] < sum(counts.values()) // 3:
-        return course.failed(AssertionError(f"hardly anything is proved: {dict(counts)}"))
-    return course.ended(f"{counts['proved']} functions proved, {counts['undecided']} undecided")
+        return campaign.failed(AssertionError(f"hardly anything is proved: {dict(counts)}"))
+    return campaign.ended(f"{counts['proved']} functions proved, {counts['undecided']} undecided")
 
 
 if __name__ == "__main__":

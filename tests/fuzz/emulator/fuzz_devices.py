@@ -1,8 +1,8 @@
 """Engines against each other on random programs that live on device registers: state, UART bytes, rendered lines.
 
-`python tests/fuzz/emulator/fuzz_devices.py [--programs N] [--seed S] [--seconds T] [--engine NAME] [--chip NAME] [--show]`.
-Exits 1 at the first difference. Every fourth seed runs on a made-up chip unless --chip names one for all. What was
-touched how often is printed at the end; --show prints the program of a seed instead.
+`python tests/fuzz/emulator/fuzz_devices.py [--programs N] [--seed S] [--seconds T] [--engine NAME] [--chip NAME]
+[--show]`. Exits 1 at the first difference. Every fourth seed runs on a made-up chip unless --chip names one for all.
+What was touched how often is printed at the end; --show prints the program of a seed instead.
 """
 
 from __future__ import annotations
@@ -21,32 +21,32 @@ from tests.fuzz.seeds import Campaign, parser  # noqa: E402
 
 
 def main() -> int:
-    course = Campaign(parser(__doc__), "programs", 150, "random programs")
-    course.parser.add_argument("--engine", choices=("jit",), help="compared with the plain one")
-    course.parser.add_argument("--chip", choices=CHIPS, help="(default: by seed)")
-    course.parser.add_argument("--show", action="store_true", help="print the first program and end")
-    options = course.parse()
+    campaign = Campaign(parser(__doc__), "programs", 150, "random programs")
+    campaign.parser.add_argument("--engine", choices=("jit",), help="compared with the plain one")
+    campaign.parser.add_argument("--chip", choices=CHIPS, help="(default: by seed)")
+    campaign.parser.add_argument("--show", action="store_true", help="print the first program and end")
+    options = campaign.parse()
     real, made_up = CHIPS
 
     def chip(seed: int) -> Chip:
         return CHIPS[options.chip or (made_up if seed % 4 == 3 else real)]
 
     if options.show:
-        print(program(course.first, chip(course.first))[0])
+        print(program(campaign.first, chip(campaign.first))[0])
         return 0
     touched: Counter[tuple[str, str]] = Counter()
     engines = [options.engine] if options.engine else ["jit"]
-    for seed in course:
+    for seed in campaign:
         found = difference(seed, *engines, chip=chip(seed), tally=touched)
         if found is not None:
-            return course.failed(found)
+            return campaign.failed(found)
     ways: Counter[str] = Counter()
     for (_name, way), count in touched.items():
         ways[way] += count
     print(", ".join(f"{count} {way}" for way, count in sorted(ways.items())))
     words = {sfr.name for sfr in words_of(options.chip or real)}
     names = {name for name, _ in touched} & words
-    return course.ended(f"{len(names)} of {len(words)} registers touched, no difference")
+    return campaign.ended(f"{len(names)} of {len(words)} registers touched, no difference")
 
 
 if __name__ == "__main__":

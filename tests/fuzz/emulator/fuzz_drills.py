@@ -30,21 +30,21 @@ def one(seed: int, chip: str) -> tuple[str | None, Tally]:
     return check(seed, CHIPS[chip], tally), tally
 
 
-def results(course: Campaign, chip: str | None, jobs: int) -> Iterator[tuple[str | None, Tally]]:
-    """The seeds of a course, `jobs` at a time, each told of in order."""
+def results(campaign: Campaign, chip: str | None, jobs: int) -> Iterator[tuple[str | None, Tally]]:
+    """Run the seeds of a campaign, `jobs` at a time, and report them in order."""
     real, made_up = CHIPS
 
     def named(seed: int) -> str:
         return chip or (made_up if seed % 4 == 3 else real)
 
     if jobs < 2:
-        for seed in course:
+        for seed in campaign:
             yield one(seed, named(seed))
         return
     with ProcessPoolExecutor(jobs) as pool:
-        ahead = iter(range(course.first, 1 << 40))
+        ahead = iter(range(campaign.first, 1 << 40))
         waiting = [pool.submit(one, seed, named(seed)) for seed in islice(ahead, 2 * jobs)]
-        for _seed in course:
+        for _seed in campaign:
             yield waiting.pop(0).result()
             following = next(ahead)
             waiting.append(pool.submit(one, following, named(following)))
@@ -64,15 +64,15 @@ def never(tally: Tally, chip: str) -> dict[tuple[str, int, str], list[str]]:
 
 
 def main() -> int:
-    course = Campaign(parser(__doc__), "images", 60, "images of 40 drills, each run 30 times")
-    course.parser.add_argument("--chip", choices=CHIPS, help="(default: by seed)")
-    course.parser.add_argument("--jobs", type=int, default=1, metavar="N", help="processes (default 1)")
-    course.parser.add_argument("--table", action="store_true", help="print what accesses were never made")
-    options = course.parse()
+    campaign = Campaign(parser(__doc__), "images", 60, "images of 40 drills, each run 30 times")
+    campaign.parser.add_argument("--chip", choices=CHIPS, help="(default: by seed)")
+    campaign.parser.add_argument("--jobs", type=int, default=1, metavar="N", help="processes (default 1)")
+    campaign.parser.add_argument("--table", action="store_true", help="print what accesses were never made")
+    options = campaign.parse()
     total = Tally()
-    for found, tally in results(course, options.chip, options.jobs):
+    for found, tally in results(campaign, options.chip, options.jobs):
         if found is not None:
-            return course.failed(found)
+            return campaign.failed(found)
         total.add(tally)
     kinds = ", ".join(f"{count} {kind}" for kind, count in sorted(total.kinds.items()))
     print(f"{total.programs} programs ({kinds}), {total.cycles} Tcy, {total.left} images left early")
@@ -83,7 +83,7 @@ def main() -> int:
             print(f"{chip}: {cells - sum(map(len, gaps.values()))} of {cells} kinds of access made")
             for (kind, size, way), names in gaps.items() if options.table else ():
                 print(f"  {kind} {'byte' if size == 1 else 'word'} {way}: {len(names)} not: {' '.join(names)}")
-    return course.ended("no difference")
+    return campaign.ended("no difference")
 
 
 if __name__ == "__main__":

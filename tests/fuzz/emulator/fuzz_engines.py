@@ -26,19 +26,20 @@ PROGRAMS = 20
 
 
 def main() -> int:
-    course = Campaign(parser(__doc__), "batches", 220, f"batches of {len(ROWS) * CONTEXTS} pairs, {PROGRAMS} programs")
-    course.parser.add_argument("--engine", default="jit", help="compared with the plain one (default %(default)s)")
-    course.parser.add_argument("--chip", choices=CHIPS, default="dsPIC30F6014A", help="(default %(default)s)")
-    options = course.parse()
+    what = f"batches of {len(ROWS) * CONTEXTS} pairs, {PROGRAMS} programs"
+    campaign = Campaign(parser(__doc__), "batches", 220, what)
+    campaign.parser.add_argument("--engine", default="jit", help="compared with the plain one (default %(default)s)")
+    campaign.parser.add_argument("--chip", choices=CHIPS, default="dsPIC30F6014A", help="(default %(default)s)")
+    options = campaign.parse()
     chip = CHIPS[options.chip]
     pairs = cycles = 0
     try:
-        for seed in course:
+        for seed in campaign:
             pairs += check_pairs(seed, len(ROWS), CONTEXTS, options.engine, chip)
             cycles += check_programs(seed, PROGRAMS, options.engine, chip)
     except Difference as difference:
-        return course.failed(difference)
-    return course.ended(f"{pairs} pairs and {PROGRAMS * course.done} programs ({cycles} cycles), no difference")
+        return campaign.failed(difference)
+    return campaign.ended(f"{pairs} pairs and {PROGRAMS * campaign.done} programs ({cycles} cycles), no difference")
 
 
 if __name__ == "__main__":

@@ -1,8 +1,9 @@
 """Flags: short programs of instructions that write them and instructions that read them, on all engines.
 
-`python tests/fuzz/emulator/fuzz_flags.py [--images N] [--seed S] [--seconds T]`. An image is 24 programs, each run from 16
-states and cut behind every number of cycles. Exits 1 at the first difference. At the end it tells how many pairs there
-were of an instruction that writes a flag and one that reads it, of all in the table, which some 460 images go through.
+`python tests/fuzz/emulator/fuzz_flags.py [--images N] [--seed S] [--seconds T]`. An image is 24 programs, each run
+from 16 states and cut behind every number of cycles. Exits 1 at the first difference. At the end it tells how many
+pairs there were of an instruction that writes a flag and one that reads it, of all in the table, which some 460
+images go through.
 """
 
 from __future__ import annotations
@@ -19,15 +20,15 @@ from tests.fuzz.seeds import Campaign, parser  # noqa: E402
 
 
 def main() -> int:
-    course = Campaign(parser(__doc__), "images", 60, "images of 24 drills, each run 16 times")
-    course.parse()
+    campaign = Campaign(parser(__doc__), "images", 60, "images of 24 drills, each run 16 times")
+    campaign.parse()
     tally = Tally()
-    for seed in course:
+    for seed in campaign:
         if found := check(seed, tally):
-            return course.failed(found)
+            return campaign.failed(found)
     known = set(all_pairs())
     python = 100 * tally.python / tally.executed
-    return course.ended(
+    return campaign.ended(
         f"{tally.runs} runs without a difference; {len(known & tally.pairs.keys())} of {len(known)} pairs of writer, "
         f"flag and reader; {python:.0f} % of instructions were Python's"
     )

@@ -1,9 +1,9 @@
 """Damaged files of every other kind the commands read: each command ends with a status it documents and a sentence.
 
-`python tests/fuzz/emulator/fuzz_inputs.py [--inputs N] [--seed S] [--seconds T] [--format NAME]`; exits 1 with the first input
-that made something else happen. Scenes, stimuli, recorded input, pictures, baselines, counts, records, manifests,
-bundles, annotations, archives, C sources, option files, states of fault campaigns, and messages of the debug
-protocol; ELF, HEX and assembly have `fuzz_loader.py` and `fuzz_asm.py`.
+`python tests/fuzz/emulator/fuzz_inputs.py [--inputs N] [--seed S] [--seconds T] [--format NAME]`; exits 1 with the
+first input that made something else happen. Scenes, stimuli, recorded input, pictures, baselines, counts, records,
+manifests, bundles, annotations, archives, C sources, option files, states of fault campaigns, and messages of the
+debug protocol; ELF, HEX and assembly have `fuzz_loader.py` and `fuzz_asm.py`.
 """
 
 from __future__ import annotations
@@ -315,7 +315,7 @@ def _head(trial: pyarrow.Table) -> bytes:
 
 
 def _rows(trial: pyarrow.Table) -> bytes:
-    """The columns of a record as JSON; pictures of bytes are left out."""
+    """Return the columns of a record as JSON, without columns of raw bytes."""
     shown = [name for name in trial.column_names if not name.endswith("_strip")]
     empty = {name: [""] * len(trial) for name in trial.column_names if name not in shown}
     return json.dumps(trial.select(shown).to_pydict() | empty).encode()
@@ -367,8 +367,8 @@ def _conversation(image: Path) -> bytes:
 def converse(data: bytes) -> str:
     """Send every line as a message to a server; it answers to the end of the conversation."""
     reading, writing = os.pipe()
-    told = io.BytesIO()
-    wire = Wire(reading, told)
+    written = io.BytesIO()
+    wire = Wire(reading, written)
     try:
         with os.fdopen(writing, "wb") as sender, contextlib.suppress(BrokenPipeError):
             for line in data.split(b"\n"):
@@ -377,7 +377,7 @@ def converse(data: bytes) -> str:
     finally:
         wire.close()
         os.close(reading)
-    assert b"Traceback" not in told.getvalue()
+    assert b"Traceback" not in written.getvalue()
     return "answered"
 
 
@@ -410,14 +410,14 @@ def campaign(seeds: Iterable[int], only: str | None = None) -> Counter[str]:
 def main() -> int:
     made = parser(__doc__)
     made.add_argument("--format", metavar="NAME", help="this kind of file only")
-    course = Campaign(made, "inputs", 15_000, "files")
-    options = course.parse()
+    plan = Campaign(made, "inputs", 15_000, "files")
+    options = plan.parse()
     resource.setrlimit(resource.RLIMIT_AS, (MOST_MEMORY, resource.getrlimit(resource.RLIMIT_AS)[1]))
     try:
-        outcomes = campaign(course, options.format)
+        outcomes = campaign(plan, options.format)
     except Exception:
-        return course.failed(traceback.format_exc())
-    return course.ended(", ".join(f"{kind} {count}" for kind, count in sorted(outcomes.items())))
+        return plan.failed(traceback.format_exc())
+    return plan.ended(", ".join(f"{kind} {count}" for kind, count in sorted(outcomes.items())))
 
 
 if __name__ == "__main__":

@@ -96,7 +96,7 @@ class Campaign:
 
 
 def campaign(state: Campaign, options: argparse.Namespace, progress: Progress) -> None:
-    """Run until every target is met, always the kind of program that is furthest behind."""
+    """Run until every target is met, always with the kind of program that is furthest from its target."""
     tally, start = state.tally, time.monotonic()
     goals: dict[str, tuple[int, Callable[[], int]]] = {
         "native pairs": (options.pairs, lambda: len(tally.native)),
@@ -148,7 +148,7 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=base_seed(), help="first of each kind (default: from the commit)")
     parser.add_argument("--seconds", type=float, help="begin no new program after S seconds", metavar="S")
     parser.add_argument("--kind", choices=CHECKS, help="only the program of this kind and seed")
-    parser.add_argument("--state", type=Path, help="file to go on from and to keep the tallies in")
+    parser.add_argument("--state", type=Path, help="file that keeps the tallies, to resume from")
     parser.add_argument("--json", action="store_true", help="print the tallies as JSON")
     options = parser.parse_args()
     state, status = Campaign(options.seed, options.state), 0

@@ -1,7 +1,7 @@
 """Mutated ELF and HEX files: the loader gives a valid image or a clear refusal, nothing else.
 
-`python tests/fuzz/emulator/fuzz_loader.py [--inputs N] [--seed S] [--seconds T]`; exits 1 with the first input that made
-something else happen.
+`python tests/fuzz/emulator/fuzz_loader.py [--inputs N] [--seed S] [--seconds T]`; exits 1 with the first input that
+made something else happen.
 """
 
 from __future__ import annotations
@@ -104,13 +104,13 @@ def campaign(seeds: Iterable[int]) -> Counter[str]:
 
 
 def main() -> int:
-    course = Campaign(parser(__doc__), "inputs", 20_000, "files")
-    course.parse()
+    plan = Campaign(parser(__doc__), "inputs", 20_000, "files")
+    plan.parse()
     try:
-        outcomes = campaign(course)
+        outcomes = campaign(plan)
     except Exception:
-        return course.failed(traceback.format_exc())
-    return course.ended(str(dict(outcomes)))
+        return plan.failed(traceback.format_exc())
+    return plan.ended(str(dict(outcomes)))
 
 
 if __name__ == "__main__":

@@ -52,14 +52,14 @@ def check(seed: int) -> None:
 
 
 def main() -> int:
-    course = Campaign(parser(__doc__), "rounds", 200, f"rounds of {ACTIONS} accesses")
-    course.parse()
-    for seed in course:
+    campaign = Campaign(parser(__doc__), "rounds", 200, f"rounds of {ACTIONS} accesses")
+    campaign.parse()
+    for seed in campaign:
         try:
             check(seed)
         except Exception:
-            return course.failed(traceback.format_exc())
-    return course.ended("no failure")
+            return campaign.failed(traceback.format_exc())
+    return campaign.ended("no failure")
 
 
 if __name__ == "__main__":

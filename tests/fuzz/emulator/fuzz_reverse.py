@@ -1,9 +1,10 @@
-"""Steps back against steps forward: `python tests/fuzz/emulator/fuzz_reverse.py [--walks N] [--seed N] [--seconds S] [--json]`.
+"""Steps back against steps forward.
 
-The campaign behind tests/firmware/debugging/test_time_travel.py, which samples. A walk runs the clustering firmware or Listing 1
-to a random time, with bytes for UART1 now and then, steps forward some hundred times and notes a hash of the whole
-state before every step; then it steps back all the way, and every state must be the one that was there. It tells how
-many of the steps entered an interrupt, saw an I2C register change, ran the camera's code, or began with input.
+Usage: `python tests/fuzz/emulator/fuzz_reverse.py [--walks N] [--seed N] [--seconds S] [--json]`. The campaign behind
+tests/firmware/debugging/test_time_travel.py, which samples. A walk runs the clustering firmware or Listing 1 to a
+random time, with bytes for UART1 now and then, steps forward some hundred times and notes a hash of the whole state
+before every step; then it steps back all the way, and every state must be the one that was there. It tells how many
+of the steps entered an interrupt, saw an I2C register change, ran the camera's code, or began with input.
 """
 
 from __future__ import annotations
@@ -114,25 +115,25 @@ def walk(image: Path, selector: int, seed: int, tally: Counter[str]) -> None:
 
 
 def main() -> int:
-    course = Campaign(parser(__doc__), "walks", 40, "walks")
-    course.parser.add_argument("--json", action="store_true", help="print the tally as one JSON object")
-    options = course.parse()
+    campaign = Campaign(parser(__doc__), "walks", 40, "walks")
+    campaign.parser.add_argument("--json", action="store_true", help="print the tally as one JSON object")
+    options = campaign.parse()
     tally: Counter[str] = Counter()
     with tempfile.TemporaryDirectory() as folder:
         for app in APPS:
             words = [f"APP={app}", f"OUT={folder}/{app}", f"PYTHON={sys.executable}"]
             subprocess.run(["make", "-s", "-C", str(ROOT / "firmware"), *words], check=True, stdout=subprocess.DEVNULL)
-        for seed in course:
+        for seed in campaign:
             app = list(APPS)[seed % 5 == 0]
             try:
                 walk(Path(folder) / app / "firmware.elf", APPS[app], seed, tally)
             except AssertionError as error:
-                return course.failed(error)
+                return campaign.failed(error)
     if options.json:
         print(json.dumps(tally))
         return 0
-    told = ", ".join(f"{tally[kind]:,} {kind}" for kind in ("interrupts", "i2c", "camera", "input"))
-    return course.ended(f"{tally['steps']:,} steps back, among them {told}: every state as before")
+    counts = ", ".join(f"{tally[kind]:,} {kind}" for kind in ("interrupts", "i2c", "camera", "input"))
+    return campaign.ended(f"{tally['steps']:,} steps back, among them {counts}: every state as before")
 
 
 if __name__ == "__main__":

@@ -1,7 +1,7 @@
 """Damaged and random firmware, executed: a run always ends with a reason, never with an exception of the emulator.
 
-`python tests/fuzz/emulator/fuzz_run.py [--images N] [--seed S] [--seconds T]`; exits 1 with the first image that made something
-else happen.
+`python tests/fuzz/emulator/fuzz_run.py [--images N] [--seed S] [--seconds T]`; exits 1 with the first image that made
+something else happen.
 """
 
 from __future__ import annotations
@@ -74,13 +74,13 @@ def campaign(seeds: Iterable[int], engines: tuple[str, ...]) -> Counter[str]:
 
 
 def main() -> int:
-    course = Campaign(parser(__doc__), "images", 5_000, "images to run")
-    course.parse()
+    plan = Campaign(parser(__doc__), "images", 5_000, "images to run")
+    plan.parse()
     try:
-        outcomes = campaign(course, ("plain", "jit"))
+        outcomes = campaign(plan, ("plain", "jit"))
     except Exception:
-        return course.failed(traceback.format_exc())
-    return course.ended(str(dict(outcomes)))
+        return plan.failed(traceback.format_exc())
+    return plan.ended(str(dict(outcomes)))
 
 
 if __name__ == "__main__":

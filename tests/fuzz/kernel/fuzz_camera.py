@@ -1,8 +1,8 @@
 """The camera's HREF on every cycle: `python tests/fuzz/kernel/fuzz_camera.py [--rounds N] [--stride N] [--seconds T]`.
 
-The campaign behind tests/firmware/camera/test_camera_on_target.py, which samples: a round of every kernel and device call with
-all interrupts running, without (even seeds) and with IPL slip; every line must be right to the byte. Some 25,000 lines
-each. With --stride a round tries every N-th cycle, beginning at one that its seed says.
+The campaign behind tests/firmware/camera/test_camera_on_target.py, which samples: a round of every kernel and device
+call with all interrupts running, without (even seeds) and with IPL slip; every line must be right to the byte. Some
+25,000 lines each. With --stride a round tries every N-th cycle, beginning at one that its seed says.
 """
 
 from __future__ import annotations
@@ -25,21 +25,21 @@ SPARSE = 499
 
 
 def main() -> int:
-    course = Campaign(parser(__doc__), "rounds", 2, "rounds of calls")
-    course.parser.add_argument("--stride", type=int, help=f"every N-th cycle (default 1; {SPARSE} with --seconds)")
-    options = course.parse()
+    campaign = Campaign(parser(__doc__), "rounds", 2, "rounds of calls")
+    campaign.parser.add_argument("--stride", type=int, help=f"every N-th cycle (default 1; {SPARSE} with --seconds)")
+    options = campaign.parse()
     stride = options.stride or (1 if options.seconds is None else SPARSE)
     tried = 0
     with tempfile.TemporaryDirectory() as folder:
         words = ["APP=sights", "APPS=../tests/firmware/target", f"OUT={folder}", f"PYTHON={sys.executable}"]
         subprocess.run(["make", "-s", "-C", str(ROOT / "firmware"), *words], check=True)
-        for seed in course:
+        for seed in campaign:
             picture = np.random.default_rng(seed).integers(0, 256, (480, 640, 3), dtype=np.uint8)
             try:
                 tried += sweep(start(Path(folder) / "firmware.elf", picture, seed % 2), picture, stride, seed % stride)
             except AssertionError as error:
-                return course.failed(error)
-    return course.ended(f"HREF on {tried} cycles, every pixel right")
+                return campaign.failed(error)
+    return campaign.ended(f"HREF on {tried} cycles, every pixel right")
 
 
 if __name__ == "__main__":

@@ -22,17 +22,17 @@ HOUR = 3_600_000
 
 
 def main() -> int:
-    course = Campaign(parser(__doc__), "hours", 1, "hours of clock events")
-    options = course.parse()
+    campaign = Campaign(parser(__doc__), "hours", 1, "hours of clock events")
+    options = campaign.parse()
     with tempfile.TemporaryDirectory() as folder:
         image = build("slices", Path(folder))
-        for seed in course:
+        for seed in campaign:
             ticks = HOUR if options.seconds is None else 10_000 + 5 * (seed % 2_000)
             try:
                 print(count_clock(image, ticks), flush=True)
             except AssertionError as error:
-                return course.failed(error)
-    return course.ended("every event counted, none late")
+                return campaign.failed(error)
+    return campaign.ended("every event counted, none late")
 
 
 if __name__ == "__main__":

@@ -1,8 +1,8 @@
-"""Random histories of the heap, a million allocations: `python tests/fuzz/kernel/fuzz_heap.py [--histories N] [--seconds S]`.
+"""Random histories of the heap, a million allocations.
 
-The emulated robot sends, starts and kills threads, registers and subscribes at random and times each call by a timer of
-its own. Prints the worst Tcy of each kind; fails when Sys_Send_Event or Sys_Start_Process took longer than the contract
-in openswarm.h allows.
+Usage: `python tests/fuzz/kernel/fuzz_heap.py [--histories N] [--seconds S]`. The emulated robot sends, starts and
+kills threads, registers and subscribes at random and times each call by a timer of its own. Prints the worst Tcy of
+each kind; fails when Sys_Send_Event or Sys_Start_Process took longer than the contract in openswarm.h allows.
 """
 
 from __future__ import annotations
@@ -22,16 +22,17 @@ STEPS = 20_000
 
 
 def main() -> int:
-    course = Campaign(parser(__doc__), "histories", 80, f"histories of {STEPS:,} steps, about 14,000 measured calls each")
-    course.parse()
+    what = f"histories of {STEPS:,} steps, about 14,000 measured calls each"
+    campaign = Campaign(parser(__doc__), "histories", 80, what)
+    campaign.parse()
     with tempfile.TemporaryDirectory() as folder:
         histories = Histories(build("heap", Path(folder)))
-        for seed in course:
+        for seed in campaign:
             try:
                 histories.run(seed, STEPS)
             except AssertionError as error:
-                return course.failed(error)
-    return course.ended(str(histories))
+                return campaign.failed(error)
+    return campaign.ended(str(histories))
 
 
 if __name__ == "__main__":

@@ -1,8 +1,9 @@
-"""Infra-red messages and shared events under any light: `python tests/fuzz/kernel/fuzz_infrared.py [--tries N] [--seconds S]`.
+"""Infra-red messages and shared events under any light.
 
-Each seed is RUNS runs of the test `anything_seen_and_asked_is_survived` (tests/firmware/host/infrared_noise.c) under
-address and undefined-behaviour sanitizers: frames that are whole, damaged, cut or two at once, noise and light of the
-room, while the program makes every call; by seed with tables and queues of the usual size, of one entry, or of many.
+Usage: `python tests/fuzz/kernel/fuzz_infrared.py [--tries N] [--seconds S]`. Each seed is RUNS runs of the test
+`anything_seen_and_asked_is_survived` (tests/firmware/host/infrared_noise.c) under address and undefined-behaviour
+sanitizers: frames that are whole, damaged, cut or two at once, noise and light of the room, while the program makes
+every call; by seed with tables and queues of the usual size, of one entry, or of many.
 """
 
 from __future__ import annotations
@@ -37,14 +38,14 @@ def build(sizes: str, out: Path) -> Path:
 
 
 def main() -> int:
-    course = Campaign(parser(__doc__), "tries", 30, f"times {RUNS} runs")
-    course.parse()
+    campaign = Campaign(parser(__doc__), "tries", 30, f"times {RUNS} runs")
+    campaign.parse()
     if shutil.which("gcc") is None:
         print("skipped: gcc is not installed")
         return SKIPPED
     with tempfile.TemporaryDirectory() as folder:
         programs: dict[str, Path] = {}
-        for seed in course:
+        for seed in campaign:
             sizes = SIZES[seed % len(SIZES)]
             if sizes not in programs:
                 programs[sizes] = build(sizes, Path(folder, str(len(programs))))
@@ -52,8 +53,8 @@ def main() -> int:
                 words = [programs[sizes], TEST, str(seed * RUNS + run)]
                 done = subprocess.run(words, capture_output=True, text=True, check=False)
                 if done.returncode != 0:
-                    return course.failed(f"run {words[2]} with {sizes or 'the usual sizes'}: {done.stderr.strip()}")
-    return course.ended("nothing wrong arrived, everything was given back")
+                    return campaign.failed(f"run {words[2]} with {sizes or 'the usual sizes'}: {done.stderr.strip()}")
+    return campaign.ended("nothing wrong arrived, everything was given back")
 
 
 if __name__ == "__main__":

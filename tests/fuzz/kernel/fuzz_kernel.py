@@ -1,11 +1,11 @@
 """The kernel under interrupts and without memory: `python tests/fuzz/kernel/fuzz_kernel.py [--rounds N] [--stride N]`.
 
-The campaign behind tests/firmware/kernel/test_every_instruction.py, which samples: every kernel call is interrupted at every
-instruction boundary by all interrupts together or by them one after the other, without or with IPL slip (kernel.md
-§4): four rounds, in turn by seed. An interrupt itself makes every call of the public headers, those it may not make
-too. With --stride a round tries every N-th boundary, beginning at one that its seed says.
-Without --seconds also every allocation fails once, and threads that check all their registers are preempted. An
-interrupted round goes on with its --seed and --scene, as its last line said.
+The campaign behind tests/firmware/kernel/test_every_instruction.py, which samples: every kernel call is interrupted
+at every instruction boundary by all interrupts together or by them one after the other, without or with IPL slip
+(kernel.md §4): four rounds, in turn by seed. An interrupt itself makes every call of the public headers, those it may
+not make too. With --stride a round tries every N-th boundary, beginning at one that its seed says. Without --seconds
+also every allocation fails once, and threads that check all their registers are preempted. An interrupted round
+resumes with its --seed and --scene, as its last line said.
 """
 
 from __future__ import annotations
@@ -52,17 +52,17 @@ def preempt_patterns(path: Path, wanted: int) -> None:
 
 
 def main() -> int:
-    course = Campaign(parser(__doc__), "rounds", 4, "rounds of calls")
-    add = course.parser.add_argument
+    campaign = Campaign(parser(__doc__), "rounds", 4, "rounds of calls")
+    add = campaign.parser.add_argument
     add("--stride", type=int, help=f"every N-th boundary (default 1: 5 minutes a round; {SPARSE} with --seconds)")
     add("--scene", type=int, default=0, help="begin with this scene of target/calls")
     add("--preemptions", type=int, default=100_000, help="of threads with patterns (default %(default)s)")
-    options = course.parse()
+    options = campaign.parse()
     stride = options.stride or (1 if options.seconds is None else SPARSE)
     with tempfile.TemporaryDirectory() as folder:
         calls, registers = (build(app, Path(folder)) for app in ("calls", "registers"))
         try:
-            for seed in course:
+            for seed in campaign:
                 way, slip = WAYS[seed // 2 % len(WAYS)], seed % 2
                 for done, seen in sweep(calls, slip, way, stride, seed % stride, options.scene):
                     if options.seconds is None:
@@ -73,8 +73,8 @@ def main() -> int:
                     print(f"{failures} allocations failed in {done} scenes, nothing lost or leaked", flush=True)
                 preempt_patterns(registers, options.preemptions)
         except AssertionError as error:
-            return course.failed(error)
-    return course.ended("nothing lost, doubled or leaked")
+            return campaign.failed(error)
+    return campaign.ended("nothing lost, doubled or leaked")
 
 
 if __name__ == "__main__":

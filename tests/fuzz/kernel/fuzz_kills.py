@@ -1,9 +1,9 @@
 """Threads killed inside driver calls: `python tests/fuzz/kernel/fuzz_kills.py [--rounds N] [--stride N]`.
 
-The campaign behind tests/firmware/kernel/test_kills_on_target.py, which samples: in each round one scene of driver calls,
-without or with IPL slip (kernel.md §4), both in turn by seed, is killed at every boundary of the scene, and the devices
-are used again at once and after a while. With --stride a round tries every N-th boundary, beginning at one that its
-seed says.
+The campaign behind tests/firmware/kernel/test_kills_on_target.py, which samples: in each round one scene of driver
+calls, without or with IPL slip (kernel.md §4), both in turn by seed, is killed at every boundary of the scene, and
+the devices are used again at once and after a while. With --stride a round tries every N-th boundary, beginning at
+one that its seed says.
 """
 
 from __future__ import annotations
@@ -24,28 +24,28 @@ SPARSE = 97
 
 
 def main() -> int:
-    course = Campaign(parser(__doc__), "rounds", 2 * len(SCENES), "scenes")
-    course.parser.add_argument(
+    campaign = Campaign(parser(__doc__), "rounds", 2 * len(SCENES), "scenes")
+    campaign.parser.add_argument(
         "--stride", type=int, help=f"every N-th boundary (default 1: an hour; {SPARSE} with --seconds)"
     )
-    options = course.parse()
+    options = campaign.parse()
     stride = options.stride or (1 if options.seconds is None else SPARSE)
     boundaries = 0
     with tempfile.TemporaryDirectory() as folder:
         path = build("kills", Path(folder))
-        for seed in course:
+        for seed in campaign:
             seen = Seen()
             scene, slip = seed // 2 % len(SCENES), seed % 2
             try:
                 for last in sweep(path, slip, scene, stride, seed // (2 * len(SCENES)) % stride):
                     seen = last
-                    if course.over and options.seconds is not None:
+                    if campaign.over and options.seconds is not None:
                         break
             except AssertionError as error:
-                return course.failed(error)
+                return campaign.failed(error)
             boundaries += seen.boundaries
             print(f"--seed {seed} ({SCENES[scene]}, slip {slip}): {seen}", flush=True)
-    return course.ended(f"{boundaries} kills tried, every device went on")
+    return campaign.ended(f"{boundaries} kills tried, every device went on")
 
 
 if __name__ == "__main__":

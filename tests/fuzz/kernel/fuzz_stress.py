@@ -53,18 +53,18 @@ def stress(path: Path, seed: int, seconds: int) -> int:
 
 
 def main() -> int:
-    course = Campaign(parser(__doc__), "runs", 24, "runs of a simulated hour, or of half a minute with --seconds")
-    options = course.parse()
+    campaign = Campaign(parser(__doc__), "runs", 24, "runs of a simulated hour, or of half a minute with --seconds")
+    options = campaign.parse()
     handled = 0
     with tempfile.TemporaryDirectory() as folder:
         path = build("stress", Path(folder), "apps")
-        for seed in course:
+        for seed in campaign:
             try:
                 handled += stress(path, seed, HOUR if options.seconds is None else SPARSE)
             except AssertionError as error:
-                return course.failed(error)
+                return campaign.failed(error)
             print(f"--seed {seed}: {handled:,} messages handled so far, none lost", flush=True)
-    return course.ended(f"{handled:,} messages handled, none lost")
+    return campaign.ended(f"{handled:,} messages handled, none lost")
 
 
 if __name__ == "__main__":

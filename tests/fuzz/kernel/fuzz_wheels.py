@@ -1,7 +1,7 @@
 """Every wheel speed for a minute: `python tests/fuzz/kernel/fuzz_wheels.py [--speeds N] [--duration D] [--seconds T]`.
 
-The campaign behind tests/firmware/drivers/test_wheels_on_target.py: -129..129 mm/s on both wheels, unrelated to each other,
-beginning at the one the seed says; the steps of D simulated seconds (default 60) are within 1 of exact.
+The campaign behind tests/firmware/drivers/test_wheels_on_target.py: -129..129 mm/s on both wheels, unrelated to each
+other, beginning at the one the seed says; the steps of D simulated seconds (default 60) are within 1 of exact.
 """
 
 from __future__ import annotations
@@ -21,21 +21,21 @@ SPEEDS = 2 * FASTEST + 1
 
 
 def main() -> int:
-    course = Campaign(parser(__doc__), "speeds", SPEEDS, "speeds")
-    course.parser.add_argument("--duration", type=float, default=60.0, help="simulated seconds (default %(default)g)")
-    options = course.parse()
+    campaign = Campaign(parser(__doc__), "speeds", SPEEDS, "speeds")
+    campaign.parser.add_argument("--duration", type=float, default=60.0, help="simulated seconds (default %(default)g)")
+    options = campaign.parse()
     worst = 0.0
     with tempfile.TemporaryDirectory() as folder:
         words = ["APP=wheels", "APPS=../tests/firmware/target", f"OUT={folder}", f"PYTHON={sys.executable}"]
         subprocess.run(["make", "-s", "-C", str(ROOT / "firmware"), *words], check=True)
         machine = start(Path(folder) / "firmware.elf")
-        for seed in course:
+        for seed in campaign:
             speed = seed % SPEEDS - FASTEST
             errors = measure(machine, speed, partner(speed), options.duration)
             worst = max(worst, *(abs(error) for error in errors))
             if worst > 1:
-                return course.failed(f"{speed} and {partner(speed)} mm/s: {errors} steps away from exact")
-    return course.ended(f"{options.duration:g} s each, worst error {worst:.3f} steps")
+                return campaign.failed(f"{speed} and {partner(speed)} mm/s: {errors} steps away from exact")
+    return campaign.ended(f"{options.duration:g} s each, worst error {worst:.3f} steps")
 
 
 if __name__ == "__main__":

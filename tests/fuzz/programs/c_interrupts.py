@@ -2,7 +2,7 @@
 nesting, handlers in handlers, traps that come back, Idle, and all of that in functions, loops and behind conditions.
 
 Each of three timers comes once, at the cycle its variable says; a bit of `chance` decides each condition, so a run is
-given by four numbers. Priorities are told by INTERRUPT_LEVEL.
+given by four numbers. INTERRUPT_LEVEL states the priorities.
 """
 
 from __future__ import annotations

@@ -18,7 +18,7 @@ VISIT = """__attribute__((noinline)) static void visit(struct item *p)
     seen += p->key;
     __asm__ volatile("repeat #{}\\n nop");
 }}
-__attribute__((noinline)) static void mend(int n)
+__attribute__((noinline)) static void repair(int n)
 {{
     __asm__ volatile("repeat #{}\\n nop" :: "r"(n) : "memory");
     seen ^= n;
@@ -54,7 +54,7 @@ class Program:
         self.files["main.c"] = main
 
     def add(self, text: str, **values: object) -> None:
-        """Lines of the file; @name@ stands for a value."""
+        """Return lines of the file with each @name@ replaced by its value."""
         for key, value in values.items():
             text = text.replace(f"@{key}@", str(value))
         self.lines.append(text)
@@ -82,7 +82,7 @@ def walk(p: Program, part: str, times: int) -> None:
     body = p.rng.choice((
         "        visit(i);\n",
         "        if (i->key & 1)\n            continue;\n        visit(i);\n",
-        "        if (i->key & 1) {\n            visit(i);\n        } else {\n            mend(i->key);\n        }\n",
+        "        if (i->key & 1) {\n            visit(i);\n        } else {\n            repair(i->key);\n        }\n",
     ))  # fmt: skip
     note = f"    LOOP_BOUND({p.spare(length)}); ONE_LOOP();\n"
     form = form if "@note@" in form else "@note@    " + form
@@ -108,7 +108,7 @@ def table(p: Program, part: str, times: int) -> None:
 
 
 def shared(p: Program, part: str, times: int) -> None:
-    """LOOP_SHARE: what one walk leaves, the next goes on with."""
+    """LOOP_SHARE: each walk continues where the last one stopped."""
     length, first = p.rng.randrange(1, 12), p.rng.randrange(9)
     p.list(f"list_{part}", length)
     p.add("""__attribute__((noinline)) static struct item *down_@part@(struct item *i, int most)
@@ -135,14 +135,14 @@ def rare(p: Program, part: str, times: int) -> None:
     p.add("""void @part@(void)
 {
     for (int i = 0; i < @rounds@; i++) {
-        CALL_SHARE(mend, @part@, @count@);
-        if (wanted_@part@[i]) mend(i);
+        CALL_SHARE(repair, @part@, @count@);
+        if (wanted_@part@[i]) repair(i);
         @other@
-        CALL_IF(mend, @made@);
-        if (chance) mend(3);
+        CALL_IF(repair, @made@);
+        if (chance) repair(3);
     }
 }""", part=part, rounds=rounds, count=p.spare(sum(wanted)), made=p.rng.choice((0, 0, 1)),
-          other=p.rng.choice(("mend(7);", "", "visit((struct item *)wanted_@part@);".replace("@part@", part)))
+          other=p.rng.choice(("repair(7);", "", "visit((struct item *)wanted_@part@);".replace("@part@", part)))
           if rounds > 3 else "")  # fmt: skip
 
 
@@ -151,7 +151,7 @@ def pointed(p: Program, part: str, times: int) -> None:
     length, chosen = p.rng.randrange(9), p.rng.choice(("few", "many"))
     p.list(f"list_{part}", length)
     p.add("""LOOPS_OF(many_@part@, @length@);
-__attribute__((noinline)) static void few_@part@(struct item *i) { mend(i != 0); }
+__attribute__((noinline)) static void few_@part@(struct item *i) { repair(i != 0); }
 __attribute__((noinline)) static void many_@part@(struct item *i)
 {
     for (; i; i = i->next)
@@ -166,16 +166,16 @@ void @part@(void)
     p.start.append(f"    chosen_{part} = many_{part}, chosen_{part} = {chosen}_{part};")
 
 
-def told(p: Program, part: str, times: int) -> None:
-    """KNOWN_VALUE of what nobody changes."""
+def known_value(p: Program, part: str, times: int) -> None:
+    """KNOWN_VALUE of a variable that is never written."""
     value = p.rng.randrange(20)
     p.add("""volatile unsigned count_@part@ = @value@;
 KNOWN_VALUE(count_@part@, @value@);
 void @part@(void)
 {
     for (unsigned i = count_@part@; i; i--)
-        mend(i);
+        repair(i);
 }""", part=part, value=value)  # fmt: skip
 
 
-PARTS: tuple[Callable[[Program, str, int], None], ...] = (walk, table, shared, rare, pointed, told)
+PARTS: tuple[Callable[[Program, str, int], None], ...] = (walk, table, shared, rare, pointed, known_value)

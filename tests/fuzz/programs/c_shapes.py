@@ -547,7 +547,7 @@ class Program:
         }
 
     def _keepers(self) -> str:
-        """Functions that keep the address of somebody's local until it is forgotten, and write through it."""
+        """Functions that keep the address of a caller's local variable for a while and write through it."""
         out = []
         for t in ("u8", "u16", "i32"):
             out.append(

@@ -1,10 +1,10 @@
-"""A debugged swarm back and forth: `python tests/fuzz/swarm/fuzz_rewind.py [--walks N] [--seed N] [--seconds S]`.
+"""Debugs one robot of a swarm back and forth in time.
 
-The campaign behind tests/arena/debug/test_rewind.py, which samples. A walk debugs one robot of a trial: the robots push
-things they see with their cameras, avoid each other by infrared, or talk by it. It steps, goes on, back, to breakpoints
-and last writes both ways, and to times at which it was. Wherever it stands at a time a second time, the world (all
-bodies with their speeds, the whole state of all robots) must be what it was; and when it has left the trial goes on to
-its end, and the record must be that of a trial nobody debugged, byte for byte.
+Usage: `python tests/fuzz/swarm/fuzz_rewind.py [--walks N] [--seed N] [--seconds S]`; tests/arena/debug/test_rewind.py
+takes a sample. A walk debugs one robot of a trial whose robots push objects, avoid each other by infrared, or exchange
+messages. It steps, continues and goes back, to breakpoints, last writes and earlier times. At a time that is reached
+twice the world (all bodies with their speeds, the whole state of all robots) must be equal. After the debugger
+detaches, the record must equal, byte for byte, that of a trial without a debugger.
 """
 
 from __future__ import annotations
@@ -127,7 +127,7 @@ class Walk:
         self._client.ask("setFunctionBreakpoints", breakpoints=[{"name": one} for one in functions])
 
     def leave(self) -> None:
-        """Let the trial go on without a debugger."""
+        """Finish the trial without a debugger."""
         self._stop_at()
         self._client.ask("disconnect", terminateDebuggee=False)
 
@@ -165,16 +165,16 @@ def walk(
 
 
 def main() -> int:
-    course = Campaign(parser(__doc__), "walks", 12, "walks")
-    course.parse()
+    campaign = Campaign(parser(__doc__), "walks", 12, "walks")
+    campaign.parse()
     tally: Counter[str] = Counter()
-    for seed in course:
+    for seed in campaign:
         try:
             walk(seed, image_for, 40, tally)
         except AssertionError as error:
-            return course.failed(error)
-    told = ", ".join(f"{count:,} {kind}" for kind, count in sorted(tally.items()))
-    return course.ended(f"{told}: every world as before, every record as without a debugger")
+            return campaign.failed(error)
+    counts = ", ".join(f"{count:,} {kind}" for kind, count in sorted(tally.items()))
+    return campaign.ended(f"{counts}: every world as before, every record as without a debugger")
 
 
 if __name__ == "__main__":

@@ -1,9 +1,10 @@
-"""Swarms of random robots, run in every way there is: `python tests/fuzz/swarm/fuzz_swarm.py [--trials N] [--seconds S]`.
+"""Runs swarms of random robots in every mode of execution and compares them.
 
-A trial is a scene of two or three robots with up to two random programs (`tests/arena/random_robots.py`), while
-somebody talks to the robots and moves them about. Quantum after quantum, in lock-step by Python, and in compiled code
-with one thread and with several: what is recorded, where everything is, registers and RAM are the same, to the bit. At
-the end it tells what there was of all that it is to show, and fails if many trials had none of something.
+Usage: `python tests/fuzz/swarm/fuzz_swarm.py [--trials N] [--seconds S]`. A trial is a scene of two or three robots
+with up to two random programs (`tests/arena/random_robots.py`), while the campaign sends messages to the robots and
+moves them. Modes: quantum after quantum, lock-step in Python, compiled code with one thread and with several.
+Records, poses, registers and RAM must be equal to the bit. The summary counts what the trials contained; a long
+campaign fails if one kind of event never occurred.
 """
 
 from __future__ import annotations
@@ -89,7 +90,7 @@ class Trial:
         self._images: Final = [draw.choice(images) for _ in range(count)]
         self._selectors: Final = [draw.randrange(16) for _ in range(count)]
         self._waits: Final = draw.random() < 0.5
-        """Whether no robot goes on before its code is translated: else native code comes in anywhere."""
+        """Whether every robot waits until its code is translated; otherwise native code starts anywhere."""
         self.threads: Final = draw.choice((2, 5))
         moment, moments = 0, []
         while moment < QUANTA:
@@ -144,7 +145,7 @@ class Trial:
 
 
 def look(until: int, tally: Counter[str], robot: FirmwareController) -> list[Any]:
-    """A robot between two quanta; every other time it is not asked, which nobody may notice."""
+    """Return the state of a robot between two quanta; inspecting it must not change the run."""
     machine = robot.machine
     tally["robots asleep"] += machine.is_asleep
     seen = [machine.cycle, machine.pc, hashlib.sha256(machine.record.bytes[:0x2800]).hexdigest()]
@@ -180,19 +181,19 @@ def check(trial: Trial, tally: Counter[str]) -> str | None:
 
 
 def main() -> int:
-    course = Campaign(parser(__doc__), "trials", 30, "trials")
-    course.parse()
+    campaign = Campaign(parser(__doc__), "trials", 30, "trials")
+    campaign.parse()
     tally = Counter[str]()
     with tempfile.TemporaryDirectory() as folder:
-        for seed in course:
+        for seed in campaign:
             if found := check(Trial(seed, Path(folder)), tally):
-                return course.failed(found)
+                return campaign.failed(found)
     missing = [what for what in EXPECTED if not tally[what]]
-    if missing and course.done >= MANY:
-        return course.failed(f"{course.done} trials without {', '.join(missing)}")
-    told = ", ".join(f"{tally[what]} {what}" for what in EXPECTED)
+    if missing and campaign.done >= MANY:
+        return campaign.failed(f"{campaign.done} trials without {', '.join(missing)}")
+    counts = ", ".join(f"{tally[what]} {what}" for what in EXPECTED)
     share = 1e6 * tally["interpreted"] / tally["Tcy"]
-    return course.ended(f"no difference; {told}; {share:.0f} instructions in a million Tcy were Python's")
+    return campaign.ended(f"no difference; {counts}; {share:.0f} instructions in a million Tcy were Python's")
 
 
 if __name__ == "__main__":
