@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Final
 
 from arena.commands import studio as command
-from arena.commands.run import planned
+from arena.commands.run import plan_from
 from arena.studio.process import Studio
 
 FIGURE: Final = Path(__file__).resolve().parents[1] / "figures" / "studio.png"
@@ -47,7 +47,7 @@ def main() -> None:
     browser = os.environ.get("CHROMIUM") or shutil.which("chromium") or shutil.which("chromium-browser")
     if browser is None:
         parser.error("there is no Chromium (Debian package chromium); name one by CHROMIUM")
-    plan = planned(command.parser().parse_args(WORDS), 1)
+    plan = plan_from(command.parser().parse_args(WORDS), 1)
     studio = Studio(plan, plan.seed)
     try:
         ready(studio)

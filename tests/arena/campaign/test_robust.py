@@ -246,7 +246,7 @@ def test_a_worker_of_another_version_is_refused() -> None:
     """A worker of another version is refused, and the message names the versions."""
     plan = Plan(scripted(load_scene("clustering")), "scripted", "A", None, 1, 1.0, 1)
     with pytest.raises(ValueError, match=r"worker on .* has pymunk .* instead of 0\.1"):
-        cluster.run_remote_trial(plan, cluster.Files(None, None, []), 1, versions.versions() | {"pymunk": "0.1"})
+        cluster.run_remote_trial(plan, cluster.InputFiles(None, None, []), 1, versions.versions() | {"pymunk": "0.1"})
 
 
 def test_a_scheduler_that_dies_is_one_line_and_what_is_finished_stays(tmp_path: Path) -> None:

@@ -122,7 +122,7 @@ def test_without_checkpoints_a_trial_runs_again(tmp_path: Path, image_of: Callab
         assert session.checkpoint_count == checkpoints.MAX_CHECKPOINTS
         assert debugger.to(6_000_000) == seen[6_000_000]
         assert not [text for kind, text in debugger.events if kind == "said" and "run again" in text]
-        session._checkpoints.forget(-1)
+        session._checkpoints.discard_after(-1)
         assert debugger.to(3_000_000) == seen[3_000_000]
         assert [text for kind, text in debugger.events if kind == "said" and "run again" in text]
         assert session.checkpoint_count > 0, "the replay takes checkpoints"
