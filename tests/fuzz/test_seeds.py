@@ -35,7 +35,7 @@ def test_a_course_has_as_many_seeds_as_asked_for_or_as_fit_into_its_time() -> No
 
 def test_a_long_campaign_tells_where_it_is(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
     """Progress names the next seed, to resume with; standard output holds results only."""
-    monkeypatch.setattr("tests.fuzz.seeds.TOLD_EVERY", 0.0)
+    monkeypatch.setattr("tests.fuzz.seeds.REPORT_EVERY", 0.0)
     assert list(campaign("--seed", "7", "--tries", "2")) == [7, 8]
     said = capsys.readouterr()
     assert said.out == ""
