@@ -196,17 +196,17 @@ def on_freertos(checkout: Path, folder: Path) -> dict[str, Any]:
     def by_tick(meter: Meter) -> int:
         target.run_to("_T1Interrupt")
         before, spinning = running(), meter.inside("rtos_spin")
-        return meter.follow(lambda: spinning() and running() != before, meter.rise("T1")).cycles
+        return meter.measure_until(lambda: spinning() and running() != before, meter.rise("T1")).cycles
 
     def by_yield(meter: Meter) -> int:
         target.run_to("vPortYield")
         before, inside = running(), meter.inside("rtos_yield")
         call = 2  # cycles of CALL (isa.md §13.1)
-        return meter.follow(lambda: inside() and running() != before, meter.machine.cycle - call).cycles
+        return meter.measure_until(lambda: inside() and running() != before, meter.machine.cycle - call).cycles
 
     def sending(meter: Meter) -> int:
         target.run_to("rtos_send")
-        return meter.follow(meter.inside("rtos_received")).cycles
+        return meter.measure_until(meter.inside("rtos_received")).cycles
 
     switch, yielded, wake = settle(TICK, by_tick), settle(YIELD, by_yield), settle(QUEUE, sending)
     free = target.words("rtos_free", 3)

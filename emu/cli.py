@@ -1,8 +1,7 @@
-"""`python -m emu COMMAND`: finds the command, turns mistakes of the caller into one line and an exit status.
+"""`python -m emu COMMAND`: dispatches to a command and converts errors to one line and an exit status.
 
-What enters: arguments. What leaves: an exit status. A command is one module of `emu.commands`, named in COMMANDS and
-imported only when it is asked for, with `parser() -> Parser` and `run(options) -> int`. Nothing is ever coloured, so
-NO_COLOR holds without being asked.
+Input: arguments. Output: an exit status. A command is a module of `emu.commands`, listed in COMMANDS and imported on
+demand, with `parser() -> Parser` and `run(options) -> int`. Output is never coloured, as NO_COLOR requires.
 """
 
 from __future__ import annotations
@@ -22,12 +21,12 @@ _USAGE: Final = """usage: emu COMMAND [options]
 {commands}
 
 example: emu run firmware.elf --seconds 5
-`emu COMMAND --help` explains a command; `emu --version` tells the version."""
+`emu COMMAND --help` explains a command; `emu --version` prints the version."""
 
 
 @ignore_unread_output
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one command; returns the exit status."""
+    """Run one command and return the exit status."""
     return _answer(list(sys.argv[1:] if arguments is None else arguments))
 
 
@@ -41,13 +40,13 @@ def _answer(words: list[str]) -> int:
         return DONE
     name, rest = words[0], words[1:]
     if name not in COMMANDS:
-        print(f"emu: unknown command {name!r}; known are {', '.join(COMMANDS)}", file=sys.stderr)
+        print(f"emu: unknown command {name!r}; expected one of {', '.join(COMMANDS)}", file=sys.stderr)
         return BAD_INPUT
     return _call(name, rest)
 
 
 def _call(name: str, rest: list[str]) -> int:
-    """Parse and run; refusals become one line on stderr."""
+    """Parse the options and run a command; report errors as one line on stderr."""
     from emu.image.model import LoadError
 
     bad_input = BAD_INPUT_AS_STATUS if "--exit-code" in rest else BAD_INPUT

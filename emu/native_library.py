@@ -1,8 +1,8 @@
-"""C for the host: inner loops of boards and of the arena, compiled when first used and kept on disk like native code.
+"""C code for the host: inner loops of boards and of the arena, compiled on first use and cached on disk.
 
-In: a C file that needs no library but libm, whose functions it declares itself. Out: functions to call. The compiler is
-the clang of the `ziglang` package; it never contracts a multiplication and an addition, so a result is the same on
-every host, to the bit, and the one Python's own arithmetic gives.
+Input: a C file that needs no library but libm and declares libm's functions itself. Output: callable functions. The
+compiler is the clang of the `ziglang` package, without contraction of multiplications and additions. Results are
+therefore bit-identical on every host and equal to those of Python's arithmetic.
 """
 
 from __future__ import annotations
@@ -23,18 +23,18 @@ FLAGS: Final = ("-std=c11", "-O2", "-march=native", "-ffp-contract=off", "-fno-m
                 "-fno-stack-protector", "-Wall", "-Wextra", "-Werror")  # fmt: skip
 DOUBLE, INT, ADDRESS = ctypes.c_double, ctypes.c_int64, ctypes.c_void_p
 Signatures = Mapping[str, tuple[Any, Sequence[Any]]]
-"""Type of the result and types of the arguments of functions by name."""
+"""Result type and argument types of functions, by name."""
 
 _libraries: Final[list[Any]] = []
-"""Code is unloaded with the object that stands for it."""
+"""Loaded libraries; dropping the object would unload the code."""
 
 
 class HostCodeError(RuntimeError):
-    """The C compiler is missing or refused a file of this package."""
+    """The C compiler is missing or rejected a file of this package."""
 
 
 def functions(source: Path, signatures: Signatures) -> dict[str, Callable[..., Any]]:
-    """The functions of a C file. They keep Python's global lock: each is to be short. Raises HostCodeError."""
+    """Return the functions of a C file. They hold the GIL, so each must be short. Raises HostCodeError."""
     import llvmlite.binding as llvm
 
     compiler = shared_compiler()
@@ -56,12 +56,12 @@ def functions(source: Path, signatures: Signatures) -> dict[str, Callable[..., A
 
 
 def address_of(function: Callable[..., Any]) -> int:
-    """Where a function that `functions` gave begins, for other compiled code."""
+    """Return the host address of a function returned by `functions`, for use by native code."""
     return ctypes.cast(function, ctypes.c_void_p).value or 0  # type: ignore[arg-type]
 
 
 def _compiled(source: Path) -> bytes:
-    """The object file of a C file."""
+    """Compile a C file and return the object file."""
     spec = importlib.util.find_spec("ziglang")
     if spec is None or spec.origin is None:
         raise HostCodeError("the C compiler is missing: install the Python package 'ziglang' (pip install ziglang)")

@@ -1,7 +1,7 @@
-"""What a chip is, as data: registers, memory, vectors, configuration words, and which device sits on which pins.
+"""A chip as data: registers, memory, vectors, configuration words, and the pins of each device.
 
-Nothing here knows how anything behaves: devices, the CPU, the assembler, the linker and the header generator all read
-the same tables. A second chip is a second folder of tables, not a subclass.
+The tables contain no behaviour. Devices, the CPU, the assembler, the linker and the header generator read the same
+tables. A second chip is a second folder of tables, not a subclass.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from types import MappingProxyType
 
 @dataclass(frozen=True, slots=True)
 class Sfr:
-    """One special function register: data address, size in bytes (1 or 2), and what its bits are."""
+    """One special function register: data address, size in bytes (1 or 2), and its bits."""
 
     name: str
     address: int
@@ -103,7 +103,7 @@ class ConfigWord:
 
 @dataclass(frozen=True, slots=True)
 class InterruptSource:
-    """Where the flag, enable and priority of one interrupt live."""
+    """Locations of the flag, enable and priority bits of one interrupt."""
 
     irq: int
     name: str
@@ -114,7 +114,7 @@ class InterruptSource:
 
 @dataclass(frozen=True, slots=True)
 class TimerSite:
-    """Type A: may count asynchronously; B: low half of a 32-bit pair; C: high half."""
+    """A timer. Type A may count asynchronously; B is the low half of a 32-bit pair, C the high half."""
 
     number: int
     kind: str
@@ -194,7 +194,7 @@ class CanSite:
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Chip:
-    """Everything the machine, the toolchain and the documentation need to know about one part."""
+    """All data about one chip for the machine, the toolchain and the documentation."""
 
     name: str
     sfrs: Mapping[str, Sfr]
@@ -206,7 +206,7 @@ class Chip:
     device_id: int
     revision: int
     processors: tuple[int, ...]
-    """Processor ids of ELF files that fit, what a linker writes first (abi-elf.md §6.1)."""
+    """Accepted processor ids of ELF files; a linker writes the first (abi-elf.md §6.1)."""
     ports: tuple[str, ...]
     change_pins: tuple[str, ...]
     """Pin of CN0, CN1, ...; empty where the chip has none."""

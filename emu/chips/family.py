@@ -1,7 +1,7 @@
-"""What the tables of all dsPIC30F members have in common: vectors, where interrupts live, the map of both spaces.
+"""Data common to all dsPIC30F members: vectors, interrupt bit locations, the maps of both address spaces.
 
-A member's own folder says how much of it there is. Sources: dspic30f6014a.md §1, §2, §5, abi-elf.md §2.7, isa.md §14.
-Program addresses are in PC units (2 per 24-bit word).
+A member's own folder says which parts the member implements. Sources: dspic30f6014a.md §1, §2, §5, abi-elf.md §2.7,
+isa.md §14. Program addresses are in PC units (2 per 24-bit word).
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ _FLAG_NAMES: Final = {"ADC": "AD"}
 
 
 def interrupts_of(sfrs: Mapping[str, Sfr]) -> Mapping[int, InterruptSource]:
-    """The sources a chip has, by number: those whose flag its registers name."""
+    """Return the interrupt sources of a chip by number: those whose flag bit exists in its registers."""
     table = {}
     for irq, source in enumerate(_SOURCES):
         flag, enable, group = f"IFS{irq // 16}", f"IEC{irq // 16}", f"IPC{irq // 4}"
@@ -50,7 +50,7 @@ def interrupts_of(sfrs: Mapping[str, Sfr]) -> Mapping[int, InterruptSource]:
 
 
 def vectors_of(interrupts: Mapping[int, InterruptSource]) -> tuple[Vector, ...]:
-    """All 62 slots in order (§5.1, §5.2)."""
+    """Return all 62 vectors in order (§5.1, §5.2)."""
     names = [*_TRAPS, *(source + "Interrupt" for source in _SOURCES)]
     names += [f"Interrupt{irq}" for irq in range(len(_SOURCES), _SLOTS - len(_TRAPS))]
     return tuple(
@@ -71,7 +71,7 @@ def _by_name(*regions: Region) -> Mapping[str, Region]:
 
 
 def data_space(y_start: int, ram_end: int) -> Mapping[str, Region]:
-    """Data space in bytes (§1.1): RAM follows the SFRs, Y RAM is its upper part."""
+    """Return the map of data space in bytes (§1.1): RAM follows the SFRs, Y RAM is its upper part."""
     return _by_name(
         Region("sfr", 0x0000, _SFR_END),
         Region("ram", _SFR_END, ram_end),
@@ -83,7 +83,7 @@ def data_space(y_start: int, ram_end: int) -> Mapping[str, Region]:
 
 
 def program_space(flash_end: int, eeprom_bytes: int) -> Mapping[str, Region]:
-    """Program space in PC units (§1.2); a word of EEPROM takes two."""
+    """Return the map of program space in PC units (§1.2); a word of EEPROM takes two."""
     return _by_name(
         Region("flash", 0x000000, flash_end),
         Region("reset", 0x000000, IVT.start),
@@ -98,14 +98,14 @@ def program_space(flash_end: int, eeprom_bytes: int) -> Mapping[str, Region]:
 
 
 def config_word(name: str, address: int, mask: int, **fields: tuple[int, int]) -> ConfigWord:
-    """A configuration word; `mask`: the bits that read back as written."""
+    """Return a configuration word; `mask`: the bits that read back as written."""
     return ConfigWord(name, address, mask, MappingProxyType(fields))
 
 
 def config_words(*words: ConfigWord) -> Mapping[str, ConfigWord]:
-    """By name."""
+    """Return configuration words by name."""
     return MappingProxyType({word.name: word for word in words})
 
 
 SLOTS: Final = vectors_of({})
-"""Names and places of all vectors, which every member shares; which are implemented differs."""
+"""Names and addresses of all vectors, equal for every member; the implemented ones differ."""

@@ -1,6 +1,6 @@
-"""The options that put a robot around the chip: for `emu run` and `emu screenshot`.
+"""Command-line options of the board, for all commands that run a robot.
 
-What enters: parsed options. What leaves: what `Machine(board=...)` wants, a board set up as asked, lines for a watcher.
+Input: parsed options. Output: a board constructor for `Machine(board=...)`, a configured board, observer output.
 """
 
 from __future__ import annotations
@@ -28,11 +28,11 @@ MOST_HZ: Final = 40_000_000
 
 
 def add_board_options(parser: argparse.ArgumentParser) -> None:
-    """Add --board, --crystal, --selector, --camera, --sensor and --stimulus, and where the machine's code is kept."""
-    parser.add_argument("--cache", type=use_cache, metavar="DIR", help="keep native code there, not in the cache")
+    """Add --cache, --board, --crystal, --selector, --camera, --sensor and --stimulus."""
+    parser.add_argument("--cache", type=use_cache, metavar="DIR", help="keep native code in DIR instead of the cache")
     board = parser.add_argument_group("robot")
     board.add_argument(
-        "--board", choices=BOARDS, default=BOARDS[0], help="what is around the chip (default epuck; none: bare pins)"
+        "--board", choices=BOARDS, default=BOARDS[0], help="board around the chip (default epuck; none: bare pins)"
     )
     board.add_argument("--crystal", metavar="HZ", type=_crystal, help="crystal of bare pins (default 7372800)")
     board.add_argument("--selector", metavar="N", type=_selector, default=0, help="position of the selector, 0 to 15")
@@ -50,7 +50,7 @@ def add_board_options(parser: argparse.ArgumentParser) -> None:
 def add_watch_option(parser: argparse.ArgumentParser) -> None:
     """Add --watch."""
     parser.add_argument(
-        "--watch", metavar="LIST", type=_topics, default=[], help="tell what one sees: leds,motors,uart1,uart2,sound"
+        "--watch", metavar="LIST", type=_topics, default=[], help="report changes of: leds,motors,uart1,uart2,sound"
     )
 
 
@@ -71,13 +71,13 @@ def _topics(text: str) -> list[str]:
 
 
 def board_of(options: argparse.Namespace) -> Callable[[Peripherals], Any] | None:
-    """What to hand to `Machine(board=...)`."""
+    """Return the board constructor for `Machine(board=...)`."""
     if options.crystal and options.board != "none":
-        raise CommandError("--crystal is for bare pins, --board none; a robot has its own")
+        raise CommandError("--crystal needs --board none; a robot has its own crystal")
     if options.board != BOARDS[0]:
         wanted = [name for name in ("selector", "camera", "stimulus", "watch") if getattr(options, name, None)]
         if wanted:
-            raise CommandError(f"--{wanted[0]} needs a robot; leave out --board {options.board}")
+            raise CommandError(f"--{wanted[0]} needs a robot; omit --board {options.board}")
         return partial(_bare, options.crystal) if options.crystal else board_named(options.board)
     from emu.boards.epuck.board import Epuck
 
@@ -86,18 +86,18 @@ def board_of(options: argparse.Namespace) -> Callable[[Peripherals], Any] | None
 
 
 def _bare(crystal: int, chip: Peripherals) -> None:
-    """Nothing around the chip but a crystal."""
+    """Configure bare pins with a crystal."""
     chip.configure(crystal=crystal)
 
 
 def set_up(machine: Machine, options: argparse.Namespace) -> None:
-    """Put the picture before the camera and start the stimulus file of a machine that has its image."""
+    """Show the picture to the camera and start the stimulus file; the machine must have its image."""
     board: Epuck | None = machine.board
     if board is None:
         return
     if options.camera:
         if board.camera is None:
-            raise CommandError("--camera needs a sensor; leave out --sensor none")
+            raise CommandError("--camera needs a sensor; omit --sensor none")
         from emu.boards.picture import read_picture
 
         try:
@@ -114,13 +114,13 @@ def set_up(machine: Machine, options: argparse.Namespace) -> None:
 
 
 def links_of(machine: Machine) -> dict[int, Any]:
-    """What lies between UARTs and the host: Bluetooth on UART1 of a robot."""
+    """Return the devices between UARTs and the host: Bluetooth on UART1 of a robot."""
     bluetooth = getattr(machine.board, "bluetooth", None)
     return {} if bluetooth is None else {1: bluetooth}
 
 
 def start_watch(machine: Machine, options: argparse.Namespace) -> Callable[[], None]:
-    """Print what is watched on standard error. Returns what to call at the end of the run."""
+    """Report the watched outputs on standard error. Return a function to call at the end of the run."""
     if not options.watch:
         return lambda: None
     from emu.boards.epuck.observer import RobotObserver

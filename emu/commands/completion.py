@@ -1,4 +1,4 @@
-"""`emu completion`: what makes a shell complete the commands and their options."""
+"""`emu completion`: print a shell completion script for the commands and their options."""
 
 from __future__ import annotations
 

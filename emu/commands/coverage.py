@@ -1,4 +1,4 @@
-"""`emu coverage`: which lines, branches and instructions a run has executed, for lcov and Cobertura."""
+"""`emu coverage`: report the lines, branches and instructions that a run executes, for lcov and Cobertura."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from emu.image.model import Image
 from emu.instruments.coverage import Counts, CoverageReport, count_executions
 
 DESCRIPTION: Final = """\
-Run a firmware image and tell what of it was executed, from exact counts of the very code that a robot runs.
+Run a firmware image and report the executed code, from exact counts in the unmodified image.
 
-Reports: lcov (genhtml --branch-coverage makes pages of it) and Cobertura. Branches are those of the object code: both
-outcomes of every conditional branch and skip. Comments LCOV_EXCL_LINE, _START and _STOP leave lines out. --counts adds
-the counts of earlier runs of the same image, and keeps the sum. UART1 goes to standard output. Functions that the
-linker left out are not in the image and not in the report.
+Reports: lcov (genhtml --branch-coverage converts it to HTML) and Cobertura. Branches are those of the object code: both
+outcomes of every conditional branch and skip. Comments LCOV_EXCL_LINE, _START and _STOP exclude lines. --counts adds
+the counts of earlier runs of the same image, and stores the sum. UART1 goes to standard output. Functions that the
+linker removed are not in the report.
 
 Exit status: 0 done, 1 firmware fault (the reports are written), 2 bad input."""
 
@@ -36,8 +36,8 @@ def parser() -> Parser:
     made.add_argument("--seconds", metavar="S", type=seconds, default=Fraction(1), help="simulated time (default 1)")
     made.add_argument("--lcov", metavar="FILE", help="write an lcov tracefile")
     made.add_argument("--cobertura", metavar="FILE", help="write Cobertura XML")
-    made.add_argument("--counts", metavar="FILE", help="add the counts of this file, if it is there, and write the sum")
-    made.add_argument("--root", metavar="DIR", default=".", help="what relative file names are relative to (default .)")
+    made.add_argument("--counts", metavar="FILE", help="add the counts of this file, if it exists, and write the sum")
+    made.add_argument("--root", metavar="DIR", default=".", help="base folder of relative file names (default .)")
     made.add_argument("--json", action="store_true", help="print the totals as one JSON object")
     add_board_options(made)
     return made

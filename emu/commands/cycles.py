@@ -1,4 +1,4 @@
-"""`emu cycles`: exact cycles of the kernel's operations, printed, checked against a baseline, or made one."""
+"""`emu cycles`: print exact cycles of the kernel's operations, check them against a baseline, or update it."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from emu.kernel_metrics import options as kernel_options
 from emu.kernel_metrics.target import MeasureError
 
 DESCRIPTION = """\
-Run the scenarios of the `latency` application and print how many cycles the kernel's operations take, or those of
-`options` for the calls of its options.
+Run the scenarios of the `latency` application and print the cycles of the kernel's operations, or those of the
+`options` application and print the cycles of the options' calls.
 
-The numbers are exact and repeat exactly, so --check has no tolerance: any increase over the baseline is printed with
-the source lines that grew, and ends with status 1."""
+The numbers are exact and repeat exactly, so --check has no tolerance: it prints any increase over the baseline with
+the source lines that grew, and exits with status 1."""
 
 
 def parser() -> Parser:
@@ -30,14 +30,14 @@ def parser() -> Parser:
 
 
 def add_baseline_arguments(parser: Parser) -> None:
-    """--check FILE and --update FILE, as every command with exact numbers has them."""
+    """Add --check FILE and --update FILE, for commands with exact numbers."""
     group = parser.add_mutually_exclusive_group()
     group.add_argument("--check", metavar="FILE", help="compare with a baseline; status 1 if anything grew")
     group.add_argument("--update", metavar="FILE", help="write the baseline")
 
 
 def run(options: argparse.Namespace) -> int:
-    """Exit status: 0 printed or nothing grew, 1 something grew, 2 bad input."""
+    """Exit status: 0 printed or no increase, 1 a number grew, 2 bad input."""
     image = load_image(options.image)
     known = [each for each in (latency, kernel_options) if image.symbols.find(each.APPLICATION)]
     if not known:
@@ -60,7 +60,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def verdict(options: argparse.Namespace, numbers: dict[str, baseline.Number], unit: str) -> int:
-    """Print the comparison --check asks for; status 1 if something grew."""
+    """Print the comparison for --check. Return status 1 if a number grew."""
     try:
         rows = baseline.compare(baseline.load(options.check), numbers)
     except ValueError as error:

@@ -1,4 +1,4 @@
-"""`emu disasm`: a firmware image as assembly, with symbols and source lines where the file has them."""
+"""`emu disasm`: print a firmware image as assembly, with symbols and source lines if available."""
 
 from __future__ import annotations
 
@@ -19,14 +19,16 @@ from emu.instruments.disassembly import Item, items
 def parser() -> Parser:
     made = Parser(
         "disasm",
-        "Print a firmware image as assembly, with symbols and source lines where the file has them.",
+        "Print a firmware image as assembly, with symbols and source lines if available.",
         "emu disasm firmware.elf --from main --source",
     )
     made.add_argument("image", metavar="IMAGE", help="ELF executable or Intel HEX file")
     add_chip_option(made)
-    made.add_argument("--from", dest="start", metavar="SYM|ADDR", help="first address; a function alone is shown whole")
-    made.add_argument("--to", dest="end", metavar="SYM|ADDR", help="address behind the last one")
-    made.add_argument("--source", action="store_true", help="show the text of source lines that can be found")
+    made.add_argument(
+        "--from", dest="start", metavar="SYM|ADDR", help="first address; a function name alone shows the whole function"
+    )
+    made.add_argument("--to", dest="end", metavar="SYM|ADDR", help="end address (exclusive)")
+    made.add_argument("--source", action="store_true", help="show the text of source lines, if the files exist")
     made.add_argument("--json", action="store_true", help="print one JSON object per instruction")
     return made
 
@@ -46,36 +48,36 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _range(image: Image, start: str | None, end: str | None) -> tuple[int, int]:
-    """Addresses to show. One function is shown whole when only it is named."""
+    """Return the address range to show. A function name alone selects the whole function."""
     flash = image.chip.program["flash"]
     first = flash.start if start is None else code_address(image, start)
     if end is not None:
         last = code_address(image, end)
         if last <= first:
-            raise CommandError(f"--to {last:#x} does not lie behind the first address, {first:#x}")
+            raise CommandError(f"--to {last:#x} must be above the first address, {first:#x}")
         return first, last
     symbol = image.symbols.find(start) if start is not None else None
     return first, first + symbol.size if symbol is not None and symbol.size else flash.end
 
 
 def code_address(image: Image, text: str) -> int:
-    """A program address, an even number, from a symbol's name or a number. Raises CommandError if it is neither."""
+    """Return a program address from a symbol's name or an even number. Raises CommandError for anything else."""
     symbol = image.symbols.find(text)
     if symbol is not None:
         if symbol.space not in ("code", "absolute"):
-            raise CommandError(f"{text!r} is not code but lies in {symbol.space} memory")
+            raise CommandError(f"{text!r} is not code; it is in {symbol.space} memory")
         return symbol.address
     try:
         address = int(text, 0)
     except ValueError:
         raise CommandError(f"{image.path} has no symbol {text!r}, and it is not an address") from None
     if address & 1 or not 0 <= address <= PC_MASK:
-        raise CommandError(f"{text} is no program address: they are even, 0 to {PC_MASK:#x}")
+        raise CommandError(f"{text} is not a program address; expected an even number, 0 to {PC_MASK:#x}")
     return address
 
 
 def listing(image: Image, found: Iterator[Item], sources: _Sources) -> Iterator[str]:
-    """Lines for people."""
+    """Yield the listing as text lines."""
     line = None
     for item in found:
         labels = image.symbols.labels(item.address)
@@ -105,8 +107,11 @@ def _json(image: Image, found: Iterator[Item]) -> Iterator[str]:
 
 
 class _Sources:
-    """Texts of source files, read once; files that are not there simply have no text. Images name them from the folder
-    of the project on: they are looked for from here and from the folders around the image."""
+    """Texts of source files, read once; a missing file has no text.
+
+    File names in images are relative to the project folder. They are searched from the current folder and from the
+    parent folders of the image.
+    """
 
     def __init__(self, wanted: bool, image: Path) -> None:
         self.wanted = wanted

@@ -1,4 +1,4 @@
-"""`emu footprint`: what a firmware image costs in ROM and RAM, by part, source file and symbol."""
+"""`emu footprint`: print ROM and RAM use of a firmware image, by part, source file and symbol."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from emu.image.model import Image
 from emu.kernel_metrics.baseline import Number, save, short
 
 DESCRIPTION = """\
-Print what an image costs in ROM and RAM (bytes; 3 per program word), by part, source file and symbol.
+Print ROM and RAM use of an image (bytes; 3 per program word), by part, source file and symbol.
 
-Of the application `footprint` also what threads, events, subscriptions and messages take: it is run with 60 loads, the
-heap is read from the running image, and the memory equation RAM = A + B n + C m + D s + sum (E + d) is fitted. Of the
-application `options` what each option of the kernel takes, which is all that --check then looks at."""
+For the application `footprint`, also the memory of threads, events, subscriptions and messages: the command runs it with
+60 loads, reads the heap from the running image, and fits the memory equation RAM = A + B n + C m + D s + sum (E + d).
+For the application `options`, the memory of each kernel option; --check then compares these numbers only."""
 
 
 def parser() -> Parser:
@@ -39,7 +39,7 @@ def parser() -> Parser:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Exit status: 0 printed or nothing grew, 1 something grew, 2 bad input."""
+    """Exit status: 0 printed or no increase, 1 a number grew, 2 bad input."""
     image = load_image(options.image)
     facts = static(image)
     numbers = {name: Number(facts[key][size]) for name, key, size in _KEPT} | {
@@ -70,7 +70,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _places(facts: dict[str, Any], size: str) -> dict[str, int]:
-    """Bytes by source file, by names that do not depend on where the checkout lies."""
+    """Return bytes by source file, with names that do not depend on the checkout's location."""
     return {short(name): sizes[size] for name, sizes in sorted(facts["modules"].items()) if sizes[size]}
 
 
@@ -82,7 +82,7 @@ _KEPT = (
 
 
 def _equation(image: Image) -> dict[str, Any] | None:
-    """The memory equation as plain data, None for an image that is not the measuring application."""
+    """Return the memory equation as plain data, None for an image that is not the measuring application."""
     from emu.kernel_metrics.memory import APPLICATION, measure
     from emu.kernel_metrics.target import MeasureError
 
@@ -103,7 +103,7 @@ def _equation(image: Image) -> dict[str, Any] | None:
 
 
 def _options(image: Image) -> dict[str, int] | None:
-    """Bytes of the kernel's options, None for an image that is not the application `options`."""
+    """Return the bytes of the kernel's options, None for an image that is not the application `options`."""
     from emu.kernel_metrics.options import APPLICATION, sizes
     from emu.kernel_metrics.target import MeasureError
 
@@ -116,7 +116,7 @@ def _options(image: Image) -> dict[str, int] | None:
 
 
 def equation_text(equation: dict[str, Any]) -> str:
-    """The equation beside the paper's and the original's."""
+    """Return the equation as text, beside those of the paper and of the original."""
     from emu.kernel_metrics.memory import ORIGINAL, ORIGINAL_ROM, PAPER, PAPER_ROM
 
     alone, whole = equation["sizes"]["kernel"], equation["sizes"]["devices"]
@@ -148,15 +148,15 @@ def equation_text(equation: dict[str, Any]) -> str:
         "with one pending message per event and s = 0:"
         f" {alone['A']} (with devices {whole['A']}) + {ours['B']:g} n + {one_message:g} m + sum d",
         "ROM: code, constants, library code and slots for function pointers; no vectors, no start-up code",
-        "A consists of",
+        "parts of A",
         *(f"  {size:6,} {name}" for name, size in equation["constant"].items()),
-        f"not in A: heap of {equation['heap_capacity']:,} bytes, from which all the rest is taken",
+        f"not in A: heap of {equation['heap_capacity']:,} bytes, from which all other memory is allocated",
     ]
     return "\n".join(lines)
 
 
 def static(image: Image) -> dict[str, Any]:
-    """Sizes of the image as plain data, in bytes."""
+    """Return the sizes of the image as plain data, in bytes."""
     if image.kind != "elf":
         raise CommandError(f"{image.path}: a HEX file has neither symbols nor RAM sections; give the ELF file")
     found = pieces(image)
@@ -187,7 +187,7 @@ def _pairs(table: dict[str, tuple[int, int]]) -> dict[str, dict[str, int]]:
 
 
 def _by_name(found: list[Piece]) -> list[Piece]:
-    """Pieces of one symbol that come from several files (inlined code) joined under the file with the most of it."""
+    """Return the pieces with those of one symbol joined, under the file that contributes most."""
     joined: dict[tuple[str, str], list[Piece]] = {}
     for piece in found:
         joined.setdefault((piece.name, piece.kind), []).append(piece)
@@ -199,13 +199,13 @@ def _by_name(found: list[Piece]) -> list[Piece]:
 
 
 def _near(path: str) -> str:
-    """A path as seen from the current folder, if it lies below it."""
+    """Return a path relative to the current folder, if it lies below it."""
     near = os.path.relpath(path)
     return path if near.startswith("..") or not path.startswith("/") else near
 
 
 def static_text(facts: dict[str, Any], symbols: int) -> str:
-    """The sizes as lines for people."""
+    """Return the sizes as text."""
     lines = [f"{facts['path']}: ROM {facts['rom']:,} bytes, RAM {facts['ram']:,} bytes"]
     for key, words in (
         ("without_start_up", "without vectors and start-up code"),

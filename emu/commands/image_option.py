@@ -1,4 +1,4 @@
-"""The image a command is about, and the part it is for."""
+"""The image argument of a command, and its chip option."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ def add_chip_option(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--chip",
         metavar="NAME",
-        help=f"the part: {' or '.join(NAMES)} (default: what an ELF file says, else {NAMES[0]})",
+        help=f"the chip: {' or '.join(NAMES)} (default: the one in an ELF file's flags, else {NAMES[0]})",
     )
 
 
 def image_of(options: argparse.Namespace) -> Image:
-    """The image the options name, for the chip they name. Raises CommandError and LoadError."""
+    """Load the image named by the options, for their chip. Raises CommandError and LoadError."""
     try:
         return load_image(options.image, None if options.chip is None else chip_named(options.chip))
     except ValueError as error:

@@ -1,4 +1,4 @@
-"""`emu info`: what a firmware image contains, for people and (with --json) for scripts."""
+"""`emu info`: print the contents of a firmware image, as text or as JSON."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def describe(image: Image) -> dict[str, Any]:
-    """Everything the command prints, as plain data. Sizes say their unit in their name."""
+    """Return the output of the command as plain data. The names of sizes contain their unit."""
     return {
         "path": image.path,
         "format": image.kind,
@@ -81,7 +81,7 @@ def _memory(image: Image) -> dict[str, Any]:
 
 
 def _vectors(image: Image) -> list[dict[str, Any]]:
-    """Every vector the image defines, main and alternate table."""
+    """Return every vector that the image defines, of main and alternate table."""
     found = []
     for vector in image.chip.vectors:
         for table, address in (("ivt", vector.ivt), ("aivt", vector.aivt)):
@@ -113,7 +113,7 @@ def _config(image: Image) -> list[dict[str, Any]]:
 
 
 def text(facts: dict[str, Any]) -> str:
-    """The facts as lines for people."""
+    """Return the facts as text."""
     kind = {"elf": "ELF executable", "hex": "Intel HEX"}[facts["format"]]
     lines = [f"{facts['path']}: {kind} for {facts['chip']}"]
     lines += [f"warning: {warning}" for warning in facts["warnings"]]
@@ -151,7 +151,10 @@ def _memory_lines(memory: dict[str, Any]) -> list[str]:
 
 
 def _vector_lines(vectors: list[dict[str, Any]]) -> list[str]:
-    """Vectors with a handler of their own; the one most share is counted. Equal entries of both tables are one line."""
+    """Return the lines of the vectors: each handler of its own, and the number with the most common handler.
+
+    Equal entries of both tables share a line.
+    """
     handlers = [vector["handler"] for vector in vectors]
     usual = max(set(handlers), key=handlers.count)
     shared = [vector for vector in vectors if vector["handler"] == usual]

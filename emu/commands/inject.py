@@ -1,4 +1,4 @@
-"""`emu inject`: faults by a campaign file, and what becomes of them."""
+"""`emu inject`: run a fault injection campaign and classify the outcomes."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ from emu.inject.trial import OUTCOMES, Outcome, Trials
 from emu.instruments.coverage import fingerprint
 
 DESCRIPTION: Final = """\
-Run firmware many times with one fault each, chosen at random by the campaign's seed, and tell what becomes of them:
-masked, detected, silent (wrong output that nobody noticed), hang or trap, each with its 95 % Wilson interval.
+Run firmware many times with one fault each, chosen at random from the campaign's seed, and classify the outcomes:
+masked, detected, silent (wrong output without detection), hang or trap, each with its 95 % Wilson interval.
 
-Faults: bits of RAM, W registers and flash flip; an instruction is skipped; a byte for a UART is lost; a sensor sticks;
-a brown-out. Every trial goes on from a state kept before its fault, and ends as soon as the state is that of the run
-without faults. The same campaign gives the same bytes whatever --jobs; with --state FILE an interrupted one goes on.
+Faults: bit flips in RAM, W registers and flash; a skipped instruction; a lost byte for a UART; a stuck sensor; a
+brown-out. Every trial starts from a checkpoint before its fault, and ends when its state equals that of the run without
+faults. The same campaign gives the same bytes for any --jobs; with --state FILE an interrupted campaign continues.
 
 A campaign file (TOML):
 
@@ -41,10 +41,10 @@ A campaign file (TOML):
     [run]
     seconds = 1.0               also: start, selector, hang
     [detect]
-    uart1 = ["assert", "trap"]  what firmware says when it has noticed
+    uart1 = ["assert", "trap"]  messages of the firmware about a detected fault
     [input]
     uart1 = [[0.2, "go\\r"]]
-    [faults]                    shares
+    [faults]                    weights
     ram = 4
     register = 2
     flash = 1                   also: skip, uart, sensor, brownout
@@ -58,13 +58,13 @@ def parser() -> Parser:
     )
     made.add_argument("image", metavar="IMAGE", help="ELF executable")
     add_chip_option(made)
-    made.add_argument("--campaign", metavar="FILE", required=True, type=Path, help="what to do")
+    made.add_argument("--campaign", metavar="FILE", required=True, type=Path, help="campaign file")
     made.add_argument("--jobs", metavar="N", type=_jobs, default=1, help="processes (default 1)")
-    made.add_argument("--state", metavar="FILE", type=Path, help="keep what is done, and go on from it")
+    made.add_argument("--state", metavar="FILE", type=Path, help="store finished trials, and continue from them")
     made.add_argument("--out", metavar="FILE", help="write one line for every trial, CSV")
     made.add_argument("--only", metavar="N", type=count, help="run trial N alone and print it")
     made.add_argument("--json", action="store_true", help="print one JSON object")
-    made.add_argument("--cache", type=use_cache, metavar="DIR", help="keep native code there, not in the cache")
+    made.add_argument("--cache", type=use_cache, metavar="DIR", help="keep native code in DIR instead of the cache")
     return made
 
 
@@ -105,9 +105,13 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _all(image: Image, campaign: Campaign, options: argparse.Namespace) -> list[Outcome]:
-    """Every outcome in the order of the numbers; those of the state file are not run again."""
+    """Return every outcome in order of the numbers; trials in the state file are not run again."""
     header = {"image": fingerprint(image), "campaign": campaign.fingerprint}
-    done = _kept(options.state, header, campaign.trials) if options.state is not None and options.state.exists() else {}
+    done = (
+        _read_state(options.state, header, campaign.trials)
+        if options.state is not None and options.state.exists()
+        else {}
+    )
     missing = [number for number in range(campaign.trials) if number not in done]
     with ExitStack() as stack:
         state: TextIO | None = None
@@ -124,8 +128,8 @@ def _all(image: Image, campaign: Campaign, options: argparse.Namespace) -> list[
     return [done[number] for number in sorted(done)]
 
 
-def _kept(path: Path, header: dict[str, str], trials: int) -> dict[int, Outcome]:
-    """What a state file holds; an unfinished last line is cut off."""
+def _read_state(path: Path, header: dict[str, str], trials: int) -> dict[int, Outcome]:
+    """Read a state file; an incomplete last line is removed."""
     try:
         text = path.read_text(encoding="utf-8")
     except UnicodeDecodeError as error:
@@ -137,7 +141,7 @@ def _kept(path: Path, header: dict[str, str], trials: int) -> dict[int, Outcome]
             facts = json.loads(line)
             if number == 1:
                 if facts != header:
-                    raise CommandError(f"{path}:1: this is the state of another image or campaign")
+                    raise CommandError(f"{path}:1: the state belongs to another image or campaign")
                 continue
             outcome = Outcome(**facts)
             if any(type(getattr(outcome, one.name)).__name__ != one.type for one in fields(Outcome)):
@@ -152,8 +156,8 @@ def _kept(path: Path, header: dict[str, str], trials: int) -> dict[int, Outcome]
     return found
 
 
-_OWN: list[Trials] = []
-"""Of a process."""
+_PROCESS_TRIALS: list[Trials] = []
+"""The trial runner of this process."""
 
 
 def _trials(image: Image, campaign: Campaign) -> Trials:
@@ -164,20 +168,20 @@ def _trials(image: Image, campaign: Campaign) -> Trials:
 
 
 def _begin(options: argparse.Namespace, campaign: Campaign) -> None:
-    _OWN[:] = [_trials(image_of(options), campaign)]
+    _PROCESS_TRIALS[:] = [_trials(image_of(options), campaign)]
 
 
 def _one(number: int) -> Outcome:
-    return _OWN[0].run(number)
+    return _PROCESS_TRIALS[0].run(number)
 
 
 def _run(options: argparse.Namespace, campaign: Campaign, numbers: list[int]) -> Iterator[Outcome]:
     if not numbers:
         return
-    _begin(options, campaign)  # what is wrong with the run without faults is told here
+    _begin(options, campaign)  # reports errors of the golden run
     if options.jobs == 1:
         yield from map(_one, numbers)
         return
-    around = argparse.Namespace(image=options.image, chip=options.chip)
-    with get_context("spawn").Pool(options.jobs, _begin, (around, campaign)) as pool:
+    image_options = argparse.Namespace(image=options.image, chip=options.chip)
+    with get_context("spawn").Pool(options.jobs, _begin, (image_options, campaign)) as pool:
         yield from pool.imap_unordered(_one, numbers, chunksize=4)

@@ -1,4 +1,4 @@
-"""`emu profile`: CPU load in percent from exact cycles, by function, interrupt level and named group."""
+"""`emu profile`: print the CPU load in percent from exact cycles, by function, interrupt level and named group."""
 
 from __future__ import annotations
 
@@ -21,19 +21,18 @@ from emu.profile.timelines import perfetto, speedscope
 from emu.profile.tracks import Tracks
 
 DESCRIPTION: Final = """\
-Run a firmware image and print what share of the CPU each function and interrupt level takes.
+Run a firmware image and print the CPU share of each function and interrupt level.
 
-Every cycle is counted, none is sampled: the shares and the idle time add up to 100 %. Entering an interrupt counts for
-its handler. --group adds up code by function or source file (shell patterns) under a name of yours; inlined code keeps
-its file:
+Every cycle is counted, without sampling: the shares and the idle time add up to 100 %. Interrupt entry counts for the
+handler. --group sums code by function or source file (shell patterns) under a given name; inlined code keeps its file:
 
     --group "capture=__T[45]Interrupt" --group "vision=*/line_of_sight.c"
 
 --callgrind is for callgrind_annotate and KCachegrind: cycles by line, calls with their inclusive cycles.
---speedscope and --perfetto are timelines: threads, interrupt levels, calls. In all of them time in interrupts, asleep
-and in other threads is nobody's.
+--speedscope and --perfetto are timelines: threads, interrupt levels, calls. None of them attributes time in interrupts,
+sleep or other threads to a function.
 
-Exit status: 0 done, 1 firmware fault (what was counted is printed), 2 bad input."""
+Exit status: 0 done, 1 firmware fault (the counts are printed), 2 bad input."""
 
 
 def parser() -> Parser:
@@ -42,7 +41,7 @@ def parser() -> Parser:
     made.add_argument("image", metavar="IMAGE", help="ELF executable")
     add_chip_option(made)
     made.add_argument(
-        "--skip", metavar="S", type=seconds, default=Fraction(0), help="simulated time before (default 0)"
+        "--skip", metavar="S", type=seconds, default=Fraction(0), help="simulated time to skip first (default 0)"
     )
     made.add_argument("--seconds", metavar="S", type=seconds, default=Fraction(1), help="simulated time (default 1)")
     made.add_argument("--group", metavar="NAME=PATTERN,...", action="append", default=[], type=_group, help="see above")
@@ -87,28 +86,28 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _write(profile: Profile, profiler: Profiler, image: Image, options: argparse.Namespace) -> None:
-    """The files that were asked for."""
+    """Write the requested files."""
     if options.callgrind:
         with atomic_text_file(options.callgrind) as stream:
-            stream.writelines(f"{line}\n" for line in callgrind.lines(profile, str(image.path), profiler.place))
+            stream.writelines(f"{line}\n" for line in callgrind.lines(profile, str(image.path), profiler.location))
     if not (options.speedscope or options.perfetto):
         return
-    tracks = Tracks(profile.turns, lambda pc: profiler.place(pc)[0], profile.start, profile.end, profile.entry)
+    tracks = Tracks(profile.events, lambda pc: profiler.location(pc)[0], profile.start, profile.end, profile.entry)
     name = Path(image.path).name
     if options.speedscope:
         with atomic_text_file(options.speedscope) as stream:
-            stream.writelines(speedscope(tracks, profiler.place, name, profile.start, profile.end))
+            stream.writelines(speedscope(tracks, profiler.location, name, profile.start, profile.end))
     if options.perfetto:
         with atomic_text_file(options.perfetto) as stream:
-            stream.writelines(perfetto(tracks, profiler.place, name, float(profiler.hz), profiler.inside))
+            stream.writelines(perfetto(tracks, profiler.location, name, float(profiler.hz), profiler.inside))
 
 
 def _check_groups(profile: Profile, groups: list[tuple[str, list[str]]]) -> None:
-    """A pattern that fits nothing is a misspelling more often than a function that did not run."""
+    """Reject group patterns without a match, which are usually misspelled. Raises CommandError."""
     for name, patterns in groups:
         for pattern in patterns:
             if not profile.matched(pattern):
-                raise CommandError(f"--group {name}: nothing that ran has a function or file like {pattern!r}")
+                raise CommandError(f"--group {name}: no executed function or file matches {pattern!r}")
 
 
 def _percent(profile: Profile, cycles: int) -> float:

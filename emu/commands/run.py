@@ -1,4 +1,4 @@
-"""`emu run`: run a firmware image and show what its UART says."""
+"""`emu run`: run a firmware image and show its UART output."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import json
 import sys
 from collections.abc import Iterator
 from contextlib import ExitStack
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any, Final, TextIO
 
@@ -18,7 +18,7 @@ from emu.host.command import CommandError, Parser, cycles, seconds
 from emu.host.exit_status import DONE, FAULT, FAULT_AS_STATUS, INTERRUPTED, LIMIT_AS_STATUS
 from emu.host.files import atomic_text_file
 from emu.image.model import Image
-from emu.run.console import SPECIFICATIONS, Port, open_port
+from emu.run.console import SPECIFICATIONS, ConsolePort, open_port
 from emu.run.input_log import HEADER, TimestampedInput, read_input_log
 from emu.run.session import FOREVER, Session
 
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from emu.machine.stops import Stop
 
 EXIT_SYMBOL: Final = "__exit_status"
-"""Where start-up code leaves what main returned, before it sleeps for ever."""
+"""Symbol at which the start-up code stores the result of main, before it sleeps forever."""
 
 STATISTICS: Final = "os_statistics"
 REFUSED: Final = 6
@@ -38,12 +38,12 @@ CLOCK_RUNS: Final = 1 << 15
 """TON of T1CON, OpenSwarm's clock, which Sys_Start_Kernel starts (firmware/openswarm/port/dspic30f)."""
 
 DESCRIPTION: Final = """\
-Run a firmware image and show what its UART says.
+Run a firmware image and show its UART output.
 
-The run ends when the firmware sleeps with nothing left that could wake it, executes the debugger word DA4000,
-faults, or reaches the limit; Ctrl-C ends it cleanly. The last line, on stderr, says why, where and when.
+The run ends when the firmware sleeps without a wake-up source, executes the debugger word DA4000, faults, or
+reaches the limit; Ctrl-C ends it cleanly. The last line, on stderr, gives reason, address and time.
 
-Exit status: 0 ended by itself or limit reached, 1 firmware fault, 2 bad input.
+Exit status: 0 firmware ended or limit reached, 1 firmware fault, 2 bad input.
 With --exit-code: the firmware's own status (main's result, low 8 bits), 124 limit, 125 fault, 126 bad input."""
 
 
@@ -73,91 +73,143 @@ def parser() -> Parser:
         help="add ipl, asleep, thread and variables to the waveform (slow)",
     )
     made.add_argument("--json", action="store_true", help="print one JSON object instead of text; UARTs go into it")
-    made.add_argument("--exit-code", action="store_true", help="let the firmware's status be the exit status")
+    made.add_argument("--exit-code", action="store_true", help="use the firmware's status as the exit status")
     made.add_argument("--engine", metavar="NAME", default="auto", help="auto, jit or plain (default auto)")
     made.add_argument(
         "--ipl-slip", type=int, choices=(0, 1), default=0, help="1: one interrupt may slip through after raising IPL"
     )
     made.add_argument("--record", metavar="FILE", help="write every input with the cycle of its arrival")
     made.add_argument("--replay", metavar="FILE", help="take input from a recorded file instead")
-    made.add_argument("--pace", choices=("realtime",), help="run no faster than the robot would")
+    made.add_argument("--pace", choices=("realtime",), help="run no faster than the real robot")
     made.add_argument(
         "--strict",
         action="store_true",
         help="null pointers, uninitialised reads and stores into another thread's stack are faults (slow)",
     )
-    made.add_argument("--stats", action="store_true", help="print what the engine did")
+    made.add_argument("--stats", action="store_true", help="print statistics of the engine")
     made.add_argument(
         "--dump-native",
         metavar="PLACE",
-        help="print the native code made for a function or address (0x...), with the instructions it comes from",
+        help="print the native code compiled for a function or address (0x...), with its source instructions",
     )
     add_board_options(made)
     add_watch_option(made)
     return made
 
 
+@dataclass(frozen=True, slots=True)
+class RunResult:
+    """End of a run: the stop, the host time, bytes lost by each UART, and captured UART output."""
+
+    stop: Stop
+    host_seconds: float
+    lost: dict[int, int]
+    captured: dict[int, bytearray]
+
+
 def run(options: argparse.Namespace) -> int:
     """Exit status as DESCRIPTION says."""
     image = image_of(options)
-    for warning in image.warnings:
-        print(f"emu run: warning: {image.path}: {warning}", file=sys.stderr)
+    _print_warnings(image)
     machine = _machine(options, image)
-    native = _native(machine, options.dump_native) if options.dump_native else None
+    native_address = _native_address(machine, options.dump_native) if options.dump_native else None
     replay = _replay(options, machine) if options.replay else []
-    captured: dict[int, bytearray] = {}
     with ExitStack() as stack:
-        ports = _ports(options, stack, captured)
-        trace = stack.enter_context(atomic_text_file(options.trace)) if options.trace else None
-        record = stack.enter_context(_recording(options.record)) if options.record else None
-        advance = _tracer(machine, image, trace) if trace is not None else None
-        if options.vcd:
-            waves = _waves(options, machine, stack.enter_context(atomic_text_file(options.vcd)), advance)
-            stack.callback(waves.close)
-            advance = waves.advance
-        elif options.vcd_watch:
-            raise CommandError("--vcd-watch needs --vcd FILE")
-        session = Session(
-            machine,
-            ports,
-            limit=_limit(options, machine),
-            replay=replay,
-            record=record,
-            realtime=options.pace == "realtime",
-            advance=advance,
-            links=links_of(machine),
-        )
-        end_watch = start_watch(machine, options)
-        stop, host_seconds = session.run()
-        end_watch()
-        if stop.reason in ("halt", "limit", "interrupted") and (refused := _refused_before_start(machine, image)):
-            from emu.debug.fault_report import never_started
-
-            stop = never_started(machine, stop, refused)
-        lost = {number: port.lost for number, port in ports.items() if port.lost}
-    fault = stop.reason == "fault"
-    status = exit_status(machine, image, stop) if options.exit_code else FAULT if fault else DONE
-    facts = _facts(machine, image, stop, host_seconds)
-    if options.stats:
-        facts["stats"] = _statistics(machine, host_seconds)
-    for number, count in lost.items():
-        print(f"emu run: UART{number}: {count} bytes lost, nobody read them", file=sys.stderr)
-    if options.json:
-        facts |= {f"uart{number}": bytes(data).decode("latin-1") for number, data in captured.items()}
-        print(json.dumps(facts | {"status": status}))
-    else:
-        _print_end(facts, stop)
-    if native is not None:
-        _dump_native(native, machine, image, options.dump_native)
+        result = _run_session(options, machine, image, replay, stack)
+    status = _status(options, machine, image, result.stop)
+    _report(options, machine, image, result, status)
+    if native_address is not None:
+        _dump_native(native_address, machine, image, options.dump_native)
     return status
 
 
-def _native(machine: Machine, text: str) -> int:
-    """The place of which native code is wanted. Raises CommandError if there is none, or there will be no such code."""
+def _print_warnings(image: Image) -> None:
+    """Print the loader's warnings on standard error."""
+    for warning in image.warnings:
+        print(f"emu run: warning: {image.path}: {warning}", file=sys.stderr)
+
+
+def _run_session(
+    options: argparse.Namespace, machine: Machine, image: Image, replay: list[TimestampedInput], stack: ExitStack
+) -> RunResult:
+    """Open the files and ports of the run in `stack`, and run to the end."""
+    captured: dict[int, bytearray] = {}
+    ports = _ports(options, stack, captured)
+    advance = _instruments(options, machine, image, stack)
+    record = stack.enter_context(_recording(options.record)) if options.record else None
+    session = Session(
+        machine,
+        ports,
+        limit=_limit(options, machine),
+        replay=replay,
+        record=record,
+        realtime=options.pace == "realtime",
+        advance=advance,
+        links=links_of(machine),
+    )
+    end_watch = start_watch(machine, options)
+    stop, host_seconds = session.run()
+    end_watch()
+    lost = {number: port.lost for number, port in ports.items() if port.lost}
+    return RunResult(_checked_start(machine, image, stop), host_seconds, lost, captured)
+
+
+def _instruments(options: argparse.Namespace, machine: Machine, image: Image, stack: ExitStack) -> Any:
+    """Open trace and waveform files in `stack`. Return the function that runs the machine, None without instruments."""
+    advance = None
+    if options.trace:
+        advance = _tracer(machine, image, stack.enter_context(atomic_text_file(options.trace)))
+    if options.vcd:
+        waveforms = _waveforms(options, machine, stack.enter_context(atomic_text_file(options.vcd)), advance)
+        stack.callback(waveforms.close)
+        advance = waveforms.advance
+    elif options.vcd_watch:
+        raise CommandError("--vcd-watch needs --vcd FILE")
+    return advance
+
+
+def _checked_start(machine: Machine, image: Image, stop: Stop) -> Stop:
+    """Return `stop`, or a fault if the firmware called the OpenSwarm kernel without ever starting it."""
+    if stop.reason not in ("halt", "limit", "interrupted"):
+        return stop
+    refused = _refused_before_start(machine, image)
+    if not refused:
+        return stop
+    from emu.debug.fault_report import never_started
+
+    return never_started(machine, stop, refused)
+
+
+def _status(options: argparse.Namespace, machine: Machine, image: Image, stop: Stop) -> int:
+    """Return the exit status, as DESCRIPTION says."""
+    if options.exit_code:
+        return exit_status(machine, image, stop)
+    return FAULT if stop.reason == "fault" else DONE
+
+
+def _report(options: argparse.Namespace, machine: Machine, image: Image, result: RunResult, status: int) -> None:
+    """Print how the run ended: text on standard error, or one JSON object on standard output."""
+    facts = _facts(machine, image, result.stop, result.host_seconds)
+    if options.stats:
+        facts["stats"] = _statistics(machine, result.host_seconds)
+    for number, count in result.lost.items():
+        print(f"emu run: UART{number}: {count} bytes lost; the host side did not read them", file=sys.stderr)
+    if options.json:
+        facts |= {f"uart{number}": bytes(data).decode("latin-1") for number, data in result.captured.items()}
+        print(json.dumps(facts | {"status": status}))
+    else:
+        _print_end(facts, result.stop)
+
+
+def _native_address(machine: Machine, text: str) -> int:
+    """Return the address for --dump-native.
+
+    Raises CommandError for an unknown one, or an engine without native code.
+    """
     from emu.dspic30f.jit.engine import JitEngine
 
     if not isinstance(machine.runner, JitEngine):
-        raise CommandError(f"--dump-native: the engine {machine.engine} makes no native code")
+        raise CommandError(f"--dump-native: the engine {machine.engine} compiles no native code")
     try:
         return machine.program_address(int(text, 16) if text.lower().startswith("0x") else text)
     except (KeyError, ValueError) as error:
@@ -165,29 +217,29 @@ def _native(machine: Machine, text: str) -> int:
 
 
 def _dump_native(address: int, machine: Machine, image: Image, text: str) -> None:
-    """Print what native code was made for a place. Raises CommandError if none was."""
+    """Print the native code compiled for an address or function. Raises CommandError if there is none."""
     from emu.dspic30f.jit.dump import dump
     from emu.dspic30f.jit.engine import JitEngine
     from emu.instruments.disassembly import instruction
 
-    assert isinstance(machine.runner, JitEngine)  # _native has looked
+    assert isinstance(machine.runner, JitEngine)  # checked by _native_address
 
-    def naming(pc: int, insn: Insn) -> str:
+    def text_of(pc: int, insn: Insn) -> str:
         item = instruction(image, pc, insn.word1, insn.word2)
         return "" if item is None else item.text
 
-    def is_meant(pc: int) -> bool:
+    def is_selected(pc: int) -> bool:
         function = None if text.lower().startswith("0x") else image.symbols.code(pc)
         return pc == address if function is None else function[0].address == address
 
-    stretches = list(dump(machine.runner, is_meant, naming))
-    if not stretches:
-        raise CommandError(f"--dump-native: no native code was made for {text}: it was reached too seldom")
-    print("\n".join(stretches))
+    listings = list(dump(machine.runner, is_selected, text_of))
+    if not listings:
+        raise CommandError(f"--dump-native: no native code was compiled for {text}: it was executed too rarely")
+    print("\n".join(listings))
 
 
 def _refused_before_start(machine: Machine, image: Image) -> int:
-    """How many calls an OpenSwarm kernel refused that was never started: what called them cannot have worked."""
+    """Return the number of calls refused by an OpenSwarm kernel that was never started, 0 if it was started."""
     kernel = image.symbols.find(STATISTICS)
     if kernel is None or machine.peek("T1CON") & CLOCK_RUNS:
         return 0
@@ -195,7 +247,7 @@ def _refused_before_start(machine: Machine, image: Image) -> int:
 
 
 def _machine(options: argparse.Namespace, image: Image) -> Machine:
-    """A machine with the image, breakpoints set, telling about registers nobody models."""
+    """Construct the machine: image loaded, breakpoints set, accesses to unmodelled registers reported."""
     from emu.api import Machine
 
     try:
@@ -214,14 +266,14 @@ def _machine(options: argparse.Namespace, image: Image) -> Machine:
 
     def report(address: int, is_write: bool) -> None:
         name = image.register_names.get(address, f"address {address:#06x}")
-        tell(f"{name} is {'written' if is_write else 'read'}", "but has no model; it behaves as plain memory")
+        note(f"{name} is {'written' if is_write else 'read'}", "but has no model; it behaves as plain memory")
 
-    def tell(what: str, how: str) -> None:
-        here = machine.pc - 2  # PC has moved on already; no two-word instruction accesses a register
+    def note(what: str, how: str) -> None:
+        here = machine.pc - 2  # PC points to the next instruction; no two-word instruction accesses a register
         print(f"emu run: note: {what} at {here:#08x} ({image.symbols.text(here)}) {how}", file=sys.stderr)
 
     machine.bus.report = report
-    machine.bus.note = lambda what: tell("a device is set up", f"for what has no model: {what}")
+    machine.bus.note = lambda what: note("a device is configured", f"for an unmodelled function: {what}")
     return machine
 
 
@@ -240,12 +292,12 @@ def _replay(options: argparse.Namespace, machine: Machine) -> list[TimestampedIn
         raise CommandError(str(error)) from None
 
 
-def _ports(options: argparse.Namespace, stack: ExitStack, captured: dict[int, bytearray]) -> dict[int, Port]:
-    """Both UARTs' host ends; with --json what would go to standard output is captured."""
+def _ports(options: argparse.Namespace, stack: ExitStack, captured: dict[int, bytearray]) -> dict[int, ConsolePort]:
+    """Open both UARTs' ports; with --json, capture output for standard output."""
     texts = [options.trace, options.record]
     places = {1: options.uart1 or ("none" if "-" in texts else "-"), 2: options.uart2}
     if [*places.values(), *texts].count("-") + (options.json and "-" in texts) > 1:
-        raise CommandError("only one of UARTs, --trace, --record and --json can have standard output")
+        raise CommandError("only one of the UARTs, --trace, --record and --json can use standard output")
     ports = {}
     for number, place in places.items():
         try:
@@ -280,7 +332,7 @@ def _tracer(machine: Machine, image: Image, stream: TextIO) -> Any:
     return Tracer(machine, image, stream).advance
 
 
-def _waves(options: argparse.Namespace, machine: Machine, stream: TextIO, advance: Any) -> WaveformRecorder:
+def _waveforms(options: argparse.Namespace, machine: Machine, stream: TextIO, advance: Any) -> WaveformRecorder:
     from emu.instruments.vcd import WaveformRecorder
 
     if advance is not None and options.vcd_watch:
@@ -292,7 +344,7 @@ def _waves(options: argparse.Namespace, machine: Machine, stream: TextIO, advanc
 
 
 def exit_status(machine: Machine, image: Image, stop: Stop) -> int:
-    """What the shell gets with --exit-code."""
+    """Return the exit status for --exit-code."""
     if stop.reason == "fault":
         return FAULT_AS_STATUS
     if stop.reason == "breakpoint":
@@ -304,7 +356,7 @@ def exit_status(machine: Machine, image: Image, stop: Stop) -> int:
 
 
 def _facts(machine: Machine, image: Image, stop: Stop, host_seconds: float) -> dict[str, Any]:
-    """What the last line says, as data."""
+    """Return the content of the last line as data."""
     seconds = machine.peripherals.seconds(stop.cycle)
     facts: dict[str, Any] = {
         "reason": stop.reason,
@@ -322,7 +374,7 @@ def _facts(machine: Machine, image: Image, stop: Stop, host_seconds: float) -> d
 
 
 def _statistics(machine: Machine, host_seconds: float) -> dict[str, Any]:
-    """What the engine counted, if it counts, the resets seen, and where the time of the host went."""
+    """Return the engine's counters, the number of resets, and the host time by activity."""
     runner = machine.runner
     counts = getattr(runner, "counts", None)
     facts = {"engine": machine.engine, "resets": len(machine.resets), **(asdict(counts) if counts else {})}
@@ -348,7 +400,7 @@ def _where(place: dict[str, Any]) -> str:
 
 
 def _print_end(facts: dict[str, Any], stop: Stop) -> None:
-    """The fault, if any, and the last line."""
+    """Print the fault, if any, and the last line."""
     sys.stdout.flush()
     if stop.fault is not None:
         print(f"emu run: {stop.fault.report()}", file=sys.stderr)

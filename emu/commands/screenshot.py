@@ -1,4 +1,4 @@
-"""`emu screenshot`: run a firmware image and write the picture its camera driver captured, or what its sensor sees."""
+"""`emu screenshot`: run a firmware image and write the picture captured by its driver, or the sensor's view."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ FORMATS: Final = {"rgb565": 2, "yuv": 2, "grey": 1}
 DESCRIPTION: Final = """\
 Run a firmware image for a while and write a picture as PNG.
 
-With --buffer: the frame its camera driver has put there, --size pixels wide and high, lines from top to bottom.
-Without: what the sensor sees through the window the firmware has programmed.
+With --buffer: the frame stored there by the camera driver, --size pixels wide and high, lines from top to bottom.
+Without: the sensor's view through the window programmed by the firmware.
 
-Exit status: 0 done, 1 firmware fault (the picture is written all the same), 2 bad input."""
+Exit status: 0 done, 1 firmware fault (the picture is still written), 2 bad input."""
 
 
 def parser() -> Parser:
@@ -65,11 +65,11 @@ def run(options: argparse.Namespace) -> int:
     from emu.boards.picture import write_picture
 
     if (options.buffer is None) != (options.size is None):
-        raise CommandError("--buffer and --size belong together")
+        raise CommandError("--buffer and --size must be given together")
     if options.board == "none" and options.buffer is None:
-        raise CommandError("a bare chip has no sensor; leave out --board none or give --buffer")
+        raise CommandError("a bare chip has no sensor; omit --board none or give --buffer")
     if options.json and is_standard(options.output):
-        raise CommandError("only one of --output and --json can have standard output")
+        raise CommandError("only one of --output and --json can use standard output")
     image = image_of(options)
     try:
         machine = Machine(image.chip, engine=options.engine, board=board_of(options))
@@ -96,7 +96,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _place(machine: Machine, options: argparse.Namespace) -> int:
-    """Data address of the buffer, which must lie in data memory as a whole."""
+    """Return the data address of the buffer, which must be in RAM entirely."""
     try:
         address = int(options.buffer, 0)
     except ValueError:
@@ -108,7 +108,7 @@ def _place(machine: Machine, options: argparse.Namespace) -> int:
     end = address + width * height * FORMATS[options.format]
     ram = machine.chip.data["ram"]
     if not ram.start <= address < end <= ram.end:
-        raise CommandError(f"{address:#x}..{end - 1:#x} does not lie in RAM, {ram.start:#x}..{ram.end - 1:#x}")
+        raise CommandError(f"{address:#x}..{end - 1:#x} is outside RAM, {ram.start:#x}..{ram.end - 1:#x}")
     return address
 
 
@@ -126,8 +126,8 @@ def _captured(machine: Machine, address: int, options: argparse.Namespace) -> An
 def _sensor(machine: Machine) -> Any:
     camera = machine.board.camera
     if camera is None:
-        raise CommandError("this robot has no camera; leave out --sensor none or give --buffer")
+        raise CommandError("this robot has no camera; omit --sensor none or give --buffer")
     pixels = camera.frame()
     if not pixels.size:
-        raise CommandError("the window the firmware has programmed holds no pixel")
+        raise CommandError("the window programmed by the firmware contains no pixels")
     return pixels

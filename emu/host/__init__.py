@@ -1,1 +1,1 @@
-"""What the commands need of the host: files, cache paths, exit status, option parsing, shell completion."""
+"""Host services of the commands: files, cache paths, exit statuses, option parsing, shell completion."""

@@ -1,4 +1,4 @@
-"""What every command of `python -m emu` is made with: its parser, its units, its way to refuse."""
+"""Common parts of the commands of `python -m emu`: option parser, argument types, error class."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ TEN_YEARS: Final = 10 * 366 * 24 * 3600
 
 
 class CommandError(Exception):
-    """A mistake of the caller, told in one line."""
+    """A user error, reported in one line."""
 
 
 class Parser(argparse.ArgumentParser):
-    """argparse that keeps descriptions as written and ends with status 126 when `--exit-code` is wanted."""
+    """An argument parser that keeps the layout of descriptions and exits with 126 on errors under `--exit-code`."""
 
     def __init__(self, command: str, description: str, example: str) -> None:
         super().__init__(
@@ -34,13 +34,13 @@ class Parser(argparse.ArgumentParser):
         self.arguments: Sequence[str] = ()
 
     def error(self, message: str) -> NoReturn:
-        """Print what is wrong in one line and leave."""
+        """Print an error in one line and exit."""
         print(f"{self.prog}: {message} (see {self.prog} --help)", file=sys.stderr)
         sys.exit(BAD_INPUT_AS_STATUS if "--exit-code" in self.arguments else BAD_INPUT)
 
 
 def seconds(text: str) -> Fraction:
-    """A time above 0 s and up to ten years, like `5`, `0.25` or `1/3`, exactly. Raises argparse's error otherwise."""
+    """Parse a time above 0 s and up to ten years, like `5`, `0.25` or `1/3`, exactly. Raises ArgumentTypeError."""
     if re.fullmatch(r"\d{1,12}(\.\d{0,12})?|\.\d{1,12}|\d{1,12}/\d{1,12}", text):
         with contextlib.suppress(ZeroDivisionError):
             value = Fraction(text)
@@ -50,21 +50,21 @@ def seconds(text: str) -> Fraction:
 
 
 def count(text: str) -> int:
-    """A number of things, 0 or more. Raises argparse's error otherwise."""
+    """Parse a count, 0 or more. Raises ArgumentTypeError."""
     if re.fullmatch(r"\d{1,9}", text, re.ASCII):
         return int(text)
     raise argparse.ArgumentTypeError(f"expected a number, 0 or more, not {text!r}")
 
 
 def port(text: str) -> int:
-    """A TCP port of this machine. Raises argparse's error for anything else."""
+    """Parse a TCP port number, 0 to 65535. Raises ArgumentTypeError."""
     if re.fullmatch(r"\d{1,5}", text, re.ASCII) and int(text) < 1 << 16:
         return int(text)
     raise argparse.ArgumentTypeError(f"expected a port from 0 to 65535, not {text!r}")
 
 
 def cycles(text: str) -> int:
-    """A number of instruction cycles above 0, decimal or 0x. Raises argparse's error otherwise."""
+    """Parse a number of instruction cycles above 0, decimal or 0x. Raises ArgumentTypeError."""
     if re.fullmatch(r"\d{1,18}|0x[0-9a-fA-F]{1,15}", text):
         value = int(text, 16 if text.startswith("0x") else 10)
         if value:

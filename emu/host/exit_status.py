@@ -1,6 +1,8 @@
-"""The exit statuses of every command of the project, and that a reader who leaves is none of them. A leaf: it imports
-nothing of ours; the table in the documents is `table()`. 124 and 130 are what `timeout` of GNU coreutils and shells use
-for the same."""
+"""Exit statuses of all commands of the project, and the handling of closed output streams.
+
+The module imports nothing of the project. The table in the documentation is `table()`. 124 and 130 follow `timeout` of
+GNU coreutils and the shells.
+"""
 
 from __future__ import annotations
 
@@ -24,9 +26,9 @@ INTERRUPTED: Final = 130
 
 MEANING: Final = {
     DONE: "done; for `emu run` also: the limit of `--seconds` or `--cycles` was reached",
-    FAULT: "what was looked at is wrong: a fault of the firmware, a robot that something happened to, errors in the C "
-    "source, a number over its baseline or limit, something that `openswarm doctor` misses and that is needed, "
-    "a robot that does not answer `openswarm flash` or refuses a row",
+    FAULT: "the examined object is faulty: a fault of the firmware, a robot with a fault in `arena`, errors in the C "
+    "source, a number over its baseline or limit, a required component that `openswarm doctor` does not find, "
+    "a robot that does not answer `openswarm flash` or rejects a row",
     BAD_INPUT: "bad input or usage, or an extra that is not installed; the message says what was expected",
     CANNOT_CONTINUE: "`arena`: cluster lost, or folder in use by another run; finished trials are kept",
     LIMIT_AS_STATUS: "`emu run --exit-code`: the limit was reached before the firmware ended",
@@ -37,29 +39,31 @@ MEANING: Final = {
 
 
 def table() -> str:
-    """Every status with its meaning, as a table in Markdown."""
+    """Return every status with its meaning, as a table in Markdown."""
     rows = [f"| {status} | {meaning} |" for status, meaning in MEANING.items()]
     return "\n".join(["| status | meaning |", "|---:|---|", *rows])
 
 
 def _open_standard() -> None:
-    """A standard stream that is closed (`<&-`) is as the null device: empty to read, and nobody reads what is written.
-    Otherwise Python has None for it, and the next file that is opened its descriptor."""
+    """Open the null device for closed standard streams (`<&-`).
+
+    Python would use None for such a stream, and the next opened file would get its descriptor.
+    """
     for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
         if getattr(sys, name) is None:
             setattr(sys, name, open(os.devnull, mode, encoding="utf-8"))  # noqa: SIM115
 
 
 def _drop_output() -> None:
-    """What Python still holds for standard output goes nowhere when it ends."""
+    """Discard buffered standard output, which Python would flush at exit."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def ignore_unread_output(main: Callable[P, int]) -> Callable[P, int]:
-    """Wrap a command line: that nobody reads its output to the end (`| head`) is no failure, and nothing is said of it;
-    a full disk under it is one line, and who closed it before wants none.
+    """Wrap a command's `main`: a closed output pipe (`| head`) is not an error, a full disk is reported in one line.
 
-    What is printed may only be refused when it is flushed, which Python does behind `main`, also behind `--help`.
+    The wrapper flushes standard output, because a write error may only show when Python flushes after `main` or
+    `--help`.
     """
 
     @wraps(main)

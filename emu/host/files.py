@@ -1,6 +1,6 @@
-"""Files by name: `-` is standard input or output, and what is written appears whole or not at all.
+"""File access by name: `-` is standard input or output, and files are written atomically.
 
-A leaf: every part of the project reads and writes what a user names on a command line here.
+All commands of the project read and write the files named on their command lines through this module.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from pathlib import Path
 from typing import Final, TextIO
 
 STANDARD: Final = "-"
-MOST_LETTERS: Final = 60
-"""Of four octets each they leave room for what makes a name temporary: a name has 255."""
+MAX_NAME_CHARACTERS: Final = 60
+"""Characters kept of a name in a temporary name: at four octets each they fit the limit of 255 octets."""
 
 
 def is_standard(path: str | os.PathLike[str]) -> bool:
@@ -27,16 +27,17 @@ def is_standard(path: str | os.PathLike[str]) -> bool:
 
 
 def is_opened(path: str | os.PathLike[str]) -> bool:
-    """Whether a path is a device, a pipe, or a name that the system gives to an open file (/dev/stdout): to be opened
-    and written, never to be replaced by a file."""
+    """Whether a path is a device, a pipe, or a system name of an open file (/dev/stdout).
+
+    Such a path is written directly, never replaced by a file.
+    """
     target = Path(path)
     of_system = os.path.abspath(target).startswith(("/dev/", "/proc/"))
     return target.exists() and (not target.is_file() or (of_system and target.is_symlink()))
 
 
 def read_file(path: str | os.PathLike[str], limit: int = -1) -> bytes:
-    """The octets of a file, at most `limit` of them if that is not negative. Raises OSError, and ValueError for a name
-    that no file can have."""
+    """Read a file, at most `limit` octets if that is not negative. Raises OSError, ValueError for an invalid name."""
     if is_standard(path):
         octets = _standard_input()
         return octets if limit < 0 else octets[:limit]
@@ -46,12 +47,12 @@ def read_file(path: str | os.PathLike[str], limit: int = -1) -> bytes:
 
 @cache
 def _standard_input() -> bytes:
-    """Once for all who ask: a command may look at its image twice."""
+    """Read standard input once; a command may read its image twice."""
     return sys.stdin.buffer.read()
 
 
 def write_standard(data: bytes) -> None:
-    """Octets to standard output, behind what was printed. Raises OSError."""
+    """Write octets to standard output, after flushing printed text. Raises OSError."""
     sys.stdout.flush()
     sys.stdout.buffer.write(data)
     sys.stdout.buffer.flush()
@@ -59,9 +60,9 @@ def write_standard(data: bytes) -> None:
 
 @contextmanager
 def atomic_text_file(path: str | os.PathLike[str]) -> Iterator[TextIO]:
-    """A text file that becomes `path` when the block ends without an exception.
+    """Open a text file that replaces `path` when the block ends without an exception.
 
-    Pipes and devices are written directly, and so is standard output. Raises OSError as `open` does.
+    Pipes, devices and standard output are written directly. Raises OSError as `open` does.
     """
     if is_standard(path):
         yield sys.stdout
@@ -77,8 +78,9 @@ def atomic_text_file(path: str | os.PathLike[str]) -> Iterator[TextIO]:
 
 @contextmanager
 def atomic_file(path: str | os.PathLike[str]) -> Iterator[Path]:
-    """A new, empty file beside `path`, to be written by name. It becomes `path` when the block ends without an
-    exception; for standard output, a pipe or a device what it holds is copied. Raises OSError as `open` does.
+    """Create an empty file beside `path` that replaces it when the block ends without an exception.
+
+    For standard output, a pipe or a device the content is copied instead. Raises OSError as `open` does.
     """
     copied = is_standard(path) or is_opened(path)
     part = _temporary(path) if copied else temporary_beside(path)
@@ -95,7 +97,7 @@ def atomic_file(path: str | os.PathLike[str]) -> Iterator[Path]:
 
 
 def temporary_beside(path: str | os.PathLike[str]) -> Path:
-    """A new, empty file that may become `path`. Raises OSError as `open` would for `path`."""
+    """Create an empty file beside `path`, for `replace_file`. Raises OSError as `open` would for `path`."""
     target = _followed(path)
     if target.exists() and not os.access(target, os.W_OK):
         raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), os.fspath(path))
@@ -106,7 +108,7 @@ def temporary_beside(path: str | os.PathLike[str]) -> Path:
 
 
 def replace_file(part: Path, path: str | os.PathLike[str]) -> None:
-    """What `temporary_beside` made becomes `path`, with the permissions of the file that was there. Raises OSError."""
+    """Replace `path` by a file of `temporary_beside`, keeping the permissions of an existing file. Raises OSError."""
     target = _followed(path)
     try:
         mode = stat.S_IMODE(target.stat().st_mode)
@@ -119,12 +121,12 @@ def replace_file(part: Path, path: str | os.PathLike[str]) -> None:
 
 
 def _followed(path: str | os.PathLike[str]) -> Path:
-    """The file that `open` would write: symbolic links stay."""
+    """Return the path that `open` would write, with symbolic links resolved."""
     return Path(os.path.realpath(path))
 
 
 def _temporary(path: str | os.PathLike[str], folder: Path | None = None) -> Path:
-    """Begins with the name of what it becomes, as far as one name may be long."""
-    handle, name = tempfile.mkstemp(dir=folder, prefix=f"{Path(path).name[:MOST_LETTERS]}.", suffix=".part")
+    """Create a temporary file whose name begins with that of `path`, truncated to a valid length."""
+    handle, name = tempfile.mkstemp(dir=folder, prefix=f"{Path(path).name[:MAX_NAME_CHARACTERS]}.", suffix=".part")
     os.close(handle)
     return Path(name)

@@ -1,6 +1,6 @@
-"""Where things lie on this machine that belong to no project: the user's cache, and what comes along as files.
+"""Locations of the user's cache and of the files installed with the package.
 
-A leaf: it imports nothing of ours, and every part of the project asks here. Nothing is created by asking.
+The module imports nothing of the project. Its functions create no files or folders.
 """
 
 from __future__ import annotations
@@ -14,8 +14,10 @@ _ROOT: Final = Path(__file__).resolve().parents[2]
 
 
 def cache() -> Path:
-    """The folder of everything that can be made again: `$OPENSWARM_CACHE`, else `openswarm` in the user's cache folder
-    (`$XDG_CACHE_HOME` or `~/.cache`; on macOS and Windows what is usual there)."""
+    """Return the cache folder: `$OPENSWARM_CACHE`, else `openswarm` in the user's cache folder.
+
+    The user's cache folder is `$XDG_CACHE_HOME` or `~/.cache`, and the platform's standard on macOS and Windows.
+    """
     own = os.environ.get("OPENSWARM_CACHE")
     if own:
         return Path(own)
@@ -25,43 +27,43 @@ def cache() -> Path:
 
 
 def use_cache(folder: str) -> Path:
-    """Keep everything below another folder from now on, in this process and those it starts: `--cache DIR`."""
+    """Set the cache folder for this process and its children, as `--cache DIR` does."""
     os.environ["OPENSWARM_CACHE"] = os.path.abspath(folder)
     return cache()
 
 
 def native_code() -> Path:
-    """Machine code that the emulator's compiler has made of firmware; at most 128 MB."""
+    """Return the cache folder of native code compiled from firmware; at most 128 MB."""
     return cache() / "jit"
 
 
 def runtime_libraries() -> Path:
-    """The C library for the robot, one archive per version of the compiler; at most eight."""
+    """Return the cache folder of the target C library: one archive per compiler version, at most eight."""
     return cache() / "toolchain"
 
 
 def images() -> Path:
-    """Applications of `firmware/apps` that `arena run` has built from an installed package."""
+    """Return the cache folder of `firmware/apps` images that `arena run` builds from an installed package."""
     return cache() / "firmware"
 
 
 def history() -> Path:
-    """What was typed at the debugger's prompt, in the user's folder for such things (`$XDG_STATE_HOME`)."""
+    """Return the history file of the debugger prompt, in the user's state folder (`$XDG_STATE_HOME`)."""
     from platformdirs import user_state_path
 
     return user_state_path("openswarm", appauthor=False) / "debug-history"
 
 
 def in_checkout() -> bool:
-    """Whether this code runs in the project's own folder and not from an installed package."""
+    """Whether this code runs from a checkout and not from an installed package."""
     return (_ROOT / "firmware" / "Makefile").is_file()
 
 
 def firmware() -> Path:
-    """The folder with the kernel's Makefile: the checkout's, or the copy that comes with the package."""
+    """Return the folder with the kernel's Makefile: the checkout's, or the copy installed with the package."""
     return _ROOT / "firmware" if in_checkout() else _ROOT / "openswarm" / "firmware"
 
 
 def cmake() -> Path:
-    """The folder with CMake's toolchain file `openswarm.cmake`."""
+    """Return the folder with the CMake toolchain file `openswarm.cmake`."""
     return _ROOT / "openswarm" / "cmake"

@@ -1,1 +1,1 @@
-"""Firmware images: ELF and HEX readers, symbols, source lines and static footprint. Knows no machine."""
+"""Firmware images: ELF and HEX readers, symbols, source lines and static footprint."""

@@ -1,6 +1,6 @@
-"""ELF executables for dsPIC30F into program words, sections and symbols, by the recipe of abi-elf.md §6.8.
+"""Reader of dsPIC30F ELF executables: program words, sections and symbols, as abi-elf.md §6.8 specifies.
 
-What enters: file contents, written by our linker, XC16 or C30. What leaves: an `Image`. Content comes from section
+Input: contents of a file written by this project's linker, XC16 or C30. Output: an `Image`. Content comes from section
 headers; program headers only translate the addresses of psv and EEPROM sections (abi-elf.md §6.4).
 """
 
@@ -23,7 +23,7 @@ PT_LOAD = 1
 SHN_UNDEF, SHN_LORESERVE, SHN_ABS = 0, 0xFF00, 0xFFF1
 STB_LOCAL = 0
 INITIAL_DATA: Final = ".dinit"
-"""Section with code flags that holds no instructions: the table crt0 initialises RAM from (abi-elf.md §3.2)."""
+"""Section with code flags but without instructions: the table from which crt0 initialises RAM (abi-elf.md §3.2)."""
 STT_KINDS: Final = {0: "label", 1: "object", 2: "function"}
 
 _HEADER: Final = struct.Struct("<16sHHIIIIIHHHHHH")
@@ -33,7 +33,7 @@ _SYMBOL: Final = struct.Struct("<IIIBBH")
 
 _MACHINES: Final = {2: "SPARC", 3: "x86", 8: "MIPS", 40: "ARM", 62: "x86-64", 83: "AVR", 105: "MSP430", 183: "AArch64",
                     204: "PIC18", 243: "RISC-V"}  # fmt: skip
-"""Names for the message about a wrong machine (ELF e_machine registry)."""
+"""Machine names for the error message (ELF e_machine registry)."""
 
 
 class _Header(NamedTuple):
@@ -61,7 +61,7 @@ class _Segment(NamedTuple):
 
 
 class _Reader:
-    """One file being read; every access is checked against the file's length."""
+    """A file being read; every access is checked against the file's length."""
 
     def __init__(self, data: bytes, path: str) -> None:
         self.data: Final = data
@@ -72,7 +72,7 @@ class _Reader:
         return LoadError(self.path, message)
 
     def piece(self, offset: int, size: int, what: str) -> bytes:
-        """`size` octets at `offset`. Raises LoadError if the file ends before."""
+        """Return `size` octets at `offset`. Raises LoadError if the file is shorter."""
         if offset + size > len(self.data):
             raise self.fail(
                 f"is truncated: {what} needs octets {offset:#x}..{offset + size:#x}, the file has {len(self.data):#x}"
@@ -80,7 +80,7 @@ class _Reader:
         return self.data[offset : offset + size]
 
     def table(self, row: struct.Struct, offset: int, count: int, size: int, what: str) -> list[tuple[int, ...]]:
-        """A header table whose entries are `size` octets. Raises LoadError if that is not what the format says."""
+        """Return the rows of a header table. Raises LoadError if the entry size `size` is not that of the format."""
         if count and size != row.size:
             raise self.fail(f"{what} entries have {size} octets, expected {row.size}")
         return list(row.iter_unpack(self.piece(offset, count * row.size, what)))
@@ -114,7 +114,7 @@ def read_elf(data: bytes, path: str, chip: Chip | None) -> Image:
 
 
 def _identify(reader: _Reader) -> tuple[int, ...]:
-    """The file header's fields, after checking that this is a dsPIC30F executable (abi-elf.md §6.1)."""
+    """Return the file header's fields, after checking that this is a dsPIC30F executable (abi-elf.md §6.1)."""
     fields = _HEADER.unpack(reader.piece(0, _HEADER.size, "the ELF header"))
     ident, kind, machine = fields[:3]
     if machine != EM_DSPIC30F:
@@ -130,20 +130,20 @@ def _identify(reader: _Reader) -> tuple[int, ...]:
 
 
 def _strings(reader: _Reader, headers: list[_Header], index: int) -> bytes:
-    """The string table in section `index`, empty if there is none."""
+    """Return the string table in section `index`, empty if there is none."""
     if not 0 < index < len(headers) or headers[index].type != SHT_STRTAB:
         return b""
     return reader.piece(headers[index].offset, headers[index].size, "a string table")
 
 
 def _name(strings: bytes, offset: int) -> str:
-    """The NUL-terminated name at `offset`, empty if it lies outside."""
+    """Return the NUL-terminated name at `offset`, empty if it lies outside."""
     end = strings.find(b"\0", offset)
     return strings[offset : end if end >= 0 else len(strings)].decode("latin-1")
 
 
 def _kind(header: _Header) -> str:
-    """What a section holds, from its flags (abi-elf.md §6.3)."""
+    """Return the kind of a section from its flags (abi-elf.md §6.3)."""
     if not header.flags & SectionFlag.ALLOC:
         return "info"
     if header.type == SHT_NOBITS:
@@ -156,7 +156,7 @@ def _kind(header: _Header) -> str:
 
 
 def _section(reader: _Reader, header: _Header, name: str, segments: list[_Segment]) -> Section:
-    """Content and load address of one section (abi-elf.md §6.8 step 2)."""
+    """Read the content and load address of one section (abi-elf.md §6.8 step 2)."""
     kind = _kind(header)
     has_octets = header.type != SHT_NOBITS and header.size > 0
     octets = reader.piece(header.offset, header.size, f"section {name!r}") if has_octets else b""
@@ -173,7 +173,7 @@ def _section(reader: _Reader, header: _Header, name: str, segments: list[_Segmen
 
 
 def _load_address(reader: _Reader, header: _Header, name: str, segments: list[_Segment]) -> int:
-    """Program address of a psv or EEPROM section, through the program header that covers it (abi-elf.md §6.4)."""
+    """Return the program address of a psv or EEPROM section from the program header covering it (abi-elf.md §6.4)."""
     for segment in segments:
         if (
             segment.type == PT_LOAD
@@ -186,7 +186,7 @@ def _load_address(reader: _Reader, header: _Header, name: str, segments: list[_S
 
 
 def _block(reader: _Reader, section: Section) -> Block:
-    """The program words of a loadable section, phantom octets dropped."""
+    """Return the program words of a loadable section, without phantom octets."""
     base = section.load_address
     assert base is not None
     what = f"section {section.name!r}"
@@ -207,7 +207,7 @@ def _block(reader: _Reader, section: Section) -> Block:
 
 
 def _symbols(reader: _Reader, headers: list[_Header], sections: list[Section]) -> tuple[Symbol, ...]:
-    """Named, defined symbols of all symbol tables (abi-elf.md §6.5)."""
+    """Return the named, defined symbols of all symbol tables (abi-elf.md §6.5)."""
     found: list[Symbol] = []
     for header in headers:
         if header.type != SHT_SYMTAB:

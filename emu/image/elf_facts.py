@@ -1,6 +1,6 @@
-"""ELF facts of the dsPIC30F: machine number, flag bits, relocation table, octet rule.
+"""ELF constants of the dsPIC30F: machine number, flag bits, relocation table, octet rule.
 
-A leaf: pure data read by the emulator's loader and by `toolchain.elf`, `toolchain.asm` and `toolchain.link`.
+Pure data for the emulator's loader and for `toolchain.elf`, `toolchain.asm` and `toolchain.link`.
 Units: an *address unit* is a PC step of 1 in code (an instruction is 2) and a byte in data; an *octet* is a byte
 of the file.  Source of everything here: abi-elf.md §5 and §6, cited line by line.
 """
@@ -58,7 +58,7 @@ class ExtendedAttribute(IntFlag):
 
 
 class Content(Enum):
-    """How the octets of a section carry its bytes or words (abi-elf.md §6.2)."""
+    """Encoding of a section's bytes or words in octets (abi-elf.md §6.2)."""
 
     WORDS = "words"  # lo, mid, hi, 0: one program word, 2 units
     BYTES = "bytes"  # b0, 0, b1, 0: two bytes, 2 units
@@ -75,7 +75,7 @@ def content_kind(flags: int, executable: bool) -> Content:
 
 
 class Formula(Enum):
-    """How a relocation computes its value from S (address), L (load address), A (addend), P (place); §5."""
+    """Formula of a relocation's value from S (address), L (load address), A (addend), P (place); §5."""
 
     NONE = "none"
     ADDRESS = "S+A"
@@ -97,8 +97,8 @@ class Formula(Enum):
     OTHER_CORE = "unsupported"
 
 
-class Place(Enum):
-    """What the relocated field lives in."""
+class RelocatedField(Enum):
+    """Kind of the data that contains the relocated field."""
 
     WORD = "bits of one program word"
     DATA = "little-endian data bytes that skip phantom (and, in code, upper) octets"
@@ -109,13 +109,13 @@ class Place(Enum):
 class RelocationType:
     """One row of the relocation table (abi-elf.md §5).
 
-    `lsb` and `width` are in bits: within the 24-bit word for `Place.WORD`, else `width` counts data bits.
+    `lsb` and `width` are in bits: within the 24-bit word for `RelocatedField.WORD`, else `width` counts data bits.
     `low`..`high` is the accepted value; `even` demands bit 0 of the value to be 0.
     """
 
     number: int
     name: str
-    place: Place
+    place: RelocatedField
     lsb: int
     width: int
     formula: Formula
@@ -124,7 +124,7 @@ class RelocationType:
     even: bool = False
 
 
-_W, _D, _P = Place.WORD, Place.DATA, Place.PDATA
+_W, _D, _P = RelocatedField.WORD, RelocatedField.DATA, RelocatedField.PDATA
 _F = Formula
 _WORD_RANGE = (-0x8000, 0xFFFF)  # abi-elf.md §4.1: a word literal accepts both readings
 _ANY32 = (-0x80000000, 0xFFFFFFFF)
@@ -132,7 +132,7 @@ _ANY24 = (-0x800000, 0xFFFFFF)
 _BRANCH_RANGE = (-0x8000, 0x7FFF)  # isa.md §3.2 Slit16, instruction words
 _NEAR_RANGE = (0, 0x1FFF)  # isa.md §3.3: 13-bit file register address
 
-_ROWS: tuple[tuple[int, str, Place, int, int, Formula, tuple[int, int], bool], ...] = (
+_ROWS: tuple[tuple[int, str, RelocatedField, int, int, Formula, tuple[int, int], bool], ...] = (
     (0, "NONE", _D, 0, 0, _F.NONE, (0, 0), False),
     (1, "8", _D, 0, 8, _F.ADDRESS, (-128, 255), False),
     (2, "16", _D, 0, 16, _F.ADDRESS, _WORD_RANGE, False),
@@ -185,8 +185,8 @@ _ROWS: tuple[tuple[int, str, Place, int, int, Formula, tuple[int, int], bool], .
     (62, "EDSOFFSET", _D, 0, 16, _F.EDSOFFSET, (0, 0xFFFF), False),
     (63, "P_EDSOFFSET", _P, 0, 24, _F.EDSOFFSET, (0, 0xFFFF), False),
     (64, "WORD_EDSOFFSET", _W, 4, 16, _F.EDSOFFSET, (0, 0xFFFF), False),
-    # 72-80: lit10 of an instruction stands in bits 13-4 (isa.md §5); §5 of abi-elf.md quotes 9-0 from a table that was
-    # read but never exercised.  UNVERIFIED against Microchip's linker.
+    # 72-80: lit10 of an instruction is in bits 13-4 (isa.md §5); §5 of abi-elf.md quotes 9-0 from a table that was
+    # never tested.  UNVERIFIED against Microchip's linker.
     (72, "UNSIGNED_10_TBLOFFSET", _W, 4, 10, _F.TBLOFFSET, (0, 1023), False),
     (73, "UNSIGNED_10_PSVOFFSET", _W, 4, 10, _F.PSVOFFSET, (0, 1023), False),
     (74, "UNSIGNED_10_TBLPAGE", _W, 4, 10, _F.TBLPAGE, (0, 1023), False),

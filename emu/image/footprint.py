@@ -1,7 +1,7 @@
-"""Static memory of an image, byte for byte: which symbol and which source file every ROM word and RAM byte belongs to.
+"""Static memory of an image: the symbol and source file of every ROM word and RAM byte.
 
-What enters: an image, best with symbols and DWARF. What leaves: `Piece`s whose sizes add up to what `emu info` counts.
-A piece without a symbol carries its section's name, one without source `UNKNOWN`.
+Input: an image, preferably with symbols and DWARF. Output: `Piece`s whose sizes add up to the totals of `emu info`. A
+piece without a symbol has its section's name, one without source `UNKNOWN`.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ UNKNOWN: Final = "(no source)"
 START_UP: Final = frozenset(
     ("__reset", "__resetPRI", "__resetALT", "__psv_init", "__data_init", "_exit", "__Exit", "__exit_status")
 )
-"""What crt0 consists of (abi-elf.md §3.1), with exit."""
+"""Symbols of crt0 (abi-elf.md §3.1) and exit."""
 START_UP_SECTIONS: Final = frozenset((".reset", ".dinit", ".init"))
 PRINTF: Final = ("printf", "_format", "putchar", "_puts", "__fout")
-"""Parts of names by which formatted output is told."""
+"""Symbol substrings that identify formatted output."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,7 +36,7 @@ class Piece:
 
 
 def pieces(image: Image) -> list[Piece]:
-    """All of flash and RAM the image takes, biggest first."""
+    """Return all pieces of flash and RAM of the image, largest first."""
     found: list[Piece] = []
     flash = image.chip.program["flash"]
     for section in image.sections:
@@ -48,7 +48,7 @@ def pieces(image: Image) -> list[Piece]:
 
 
 def group(piece: Piece) -> str:
-    """ "start-up", "printf", "vectors" or "program": what a footprint is quoted with and without."""
+    """Return the group of a piece: "start-up", "printf", "vectors" or "program"."""
     if piece.name in START_UP or piece.name in START_UP_SECTIONS or "crt0" in piece.module:
         return "start-up"
     if piece.name in (".ivt", ".aivt"):
@@ -59,7 +59,7 @@ def group(piece: Piece) -> str:
 
 
 def totals(items: Iterable[Piece], key: str) -> dict[str, tuple[int, int]]:
-    """(ROM, RAM) bytes by `key`: "module", "kind", "name" or "group"; biggest first."""
+    """Return (ROM, RAM) bytes by `key` ("module", "kind", "name" or "group"), largest first."""
     rom: Counter[str] = Counter()
     ram: Counter[str] = Counter()
     for piece in items:
@@ -72,7 +72,7 @@ def totals(items: Iterable[Piece], key: str) -> dict[str, tuple[int, int]]:
 
 
 def _program_pieces(image: Image, section: Section) -> list[Piece]:
-    """A loaded section cut at its symbols, and its code further at changes of source file."""
+    """Split a loaded section at its symbols, and its code also at changes of source file."""
     assert section.load_address is not None
     space = {"code": "code", "psv": "psv"}.get(section.kind, "")
     kind = {"code": "code", "psv": "const"}.get(section.kind, "table")
@@ -80,10 +80,12 @@ def _program_pieces(image: Image, section: Section) -> list[Piece]:
     for symbol, start, end in _cuts(image, section, space):
         named = start + symbol.size if symbol and symbol.size and kind == "const" else end
         shift = section.load_address - section.address
-        first = start + start % 2  # constants may begin at odd addresses: a word belongs to whose byte comes first
+        first = (
+            start + start % 2
+        )  # constants may begin at odd addresses: a word belongs to the symbol of its first byte
         for address in range(first + shift, end + shift, 2):
             line = image.lines.find(address) if kind == "code" else None
-            is_named = symbol is not None and address - shift < named  # behind it: strings, which have no symbol
+            is_named = symbol is not None and address - shift < named  # unnamed strings follow a named constant
             file = line.file if line else image.lines.files.get(start, UNKNOWN) if is_named else UNKNOWN
             words[symbol.name if symbol and is_named else section.name, file] += 1
     if section.name in START_UP_SECTIONS or section.name in (".ivt", ".aivt"):
@@ -92,7 +94,7 @@ def _program_pieces(image: Image, section: Section) -> list[Piece]:
 
 
 def _data_pieces(image: Image, section: Section) -> list[Piece]:
-    """A RAM section cut at its symbols; what no symbol covers keeps the section's name."""
+    """Split a RAM section at its symbols; bytes without a symbol get the section's name."""
     found = []
     for symbol, start, end in _cuts(image, section, "data"):
         named = min(end - start, symbol.size or end - start) if symbol else 0
@@ -104,7 +106,7 @@ def _data_pieces(image: Image, section: Section) -> list[Piece]:
 
 
 def _cuts(image: Image, section: Section, space: str) -> list[tuple[Symbol | None, int, int]]:
-    """(symbol, start, end) of the stretches of a section, in its own addresses; the first may have no symbol."""
+    """Return (symbol, start, end) of the ranges of a section, in its own addresses; the first may have no symbol."""
     end = section.address + section.size
     names: dict[int, Symbol] = {}
     for symbol in image.symbols.all:

@@ -1,8 +1,7 @@
-"""Intel HEX into program words: byte address = 2 x PC, four bytes per word, the fourth one phantom (abi-elf.md §6.8).
+"""Reader of Intel HEX: byte address = 2 x PC, four bytes per word, the fourth a phantom (abi-elf.md §6.8).
 
-What enters: file contents. What leaves: an `Image` without symbols. Words may lack their fourth byte or more;
-missing bytes read as erased. The package intelhex, with which the tests compare, reads the format too, but forgets
-where in the file a byte was, which the message about one outside the chip's memory needs.
+Input: file contents. Output: an `Image` without symbols. Missing bytes of a word read as erased. The package intelhex,
+with which the tests compare, does not keep the line of a byte, which the error messages need.
 """
 
 from __future__ import annotations
@@ -14,7 +13,7 @@ from emu.image.elf_facts import OCTETS_PER_WORD, UNITS_PER_WORD
 from emu.image.model import ERASED, LOADABLE, Block, Image, LoadError, check_blocks
 
 DATA, END, SEGMENT, START_SEGMENT, LINEAR, START_LINEAR = range(6)
-"""Record types. 02, 03 and 05 are never written by Microchip's tools but are part of the format."""
+"""Record types. Microchip's tools never write 02, 03 and 05, but they are part of the format."""
 
 _LENGTHS = {END: 0, SEGMENT: 2, START_SEGMENT: 4, LINEAR: 2, START_LINEAR: 4}
 
@@ -30,7 +29,7 @@ def read_hex(data: bytes, path: str, chip: Chip) -> Image:
 
 
 def _collect(data: bytes, path: str, chip: Chip) -> tuple[dict[int, int], tuple[str, ...]]:
-    """Octets by byte address, phantom octets left out; and warnings about phantoms that are not 0."""
+    """Return the octets by byte address, without phantom octets, and warnings about phantoms that are not 0."""
     octets: dict[int, int] = {}
     upper = 0
     ended = False
@@ -41,7 +40,7 @@ def _collect(data: bytes, path: str, chip: Chip) -> tuple[dict[int, int], tuple[
         if not text:
             continue
         if ended:
-            raise LoadError(path, f"line {number}: text behind the end-of-file record")
+            raise LoadError(path, f"line {number}: text after the end-of-file record")
         kind, address, payload = _record(text, f"line {number}", path)
         if kind == END:
             ended = True
@@ -76,7 +75,7 @@ def _check_place(first: int, length: int, chip: Chip, where: str, path: str) -> 
 
 
 def _record(text: bytes, where: str, path: str) -> tuple[int, int, bytes]:
-    """Type, 16-bit address and payload of one line, checked."""
+    """Parse and check one line. Return record type, 16-bit address and payload."""
     if not text.startswith(b":"):
         raise LoadError(path, f"{where}: a record starts with ':', found {text[:1]!r}")
     try:
@@ -101,7 +100,7 @@ def _wanted(record: bytes) -> int:
 
 
 def _words(octets: dict[int, int]) -> dict[int, int]:
-    """24-bit words by program address. A word of which some byte is missing keeps erased bits there."""
+    """Return 24-bit words by program address; missing bytes of a word are erased (0xFF)."""
     words: dict[int, int] = {}
     for place, octet in octets.items():
         address, lane = place // OCTETS_PER_WORD * UNITS_PER_WORD, place % OCTETS_PER_WORD * 8
@@ -110,7 +109,7 @@ def _words(octets: dict[int, int]) -> dict[int, int]:
 
 
 def _blocks(words: dict[int, int]) -> list[Block]:
-    """Runs of consecutive words."""
+    """Return the words as blocks of consecutive addresses."""
     blocks: list[Block] = []
     for address in sorted(words):
         if not blocks or blocks[-1].end != address:

@@ -1,8 +1,8 @@
 """Source lines of program addresses, from DWARF (abi-elf.md §6.7).
 
-What enters: the raw octets of debug sections. What leaves: file and line per address. Microchip's tools store every
-DWARF byte twice as wide (octet, phantom 0), and ours in objects and where asked to; plain DWARF is understood too.
-Debug information that cannot be read is worth a note, never a failed run.
+Input: the raw octets of debug sections. Output: file and line per address. Microchip's tools store every DWARF byte as
+two octets (byte, phantom 0); this project's tools do so in objects and on request. Plain DWARF is accepted too.
+Unreadable debug information causes a warning, never an error.
 """
 
 from __future__ import annotations
@@ -18,16 +18,16 @@ if TYPE_CHECKING:
     from elftools.dwarf.dwarfinfo import DWARFInfo
 
 _NEEDED: Final = (".debug_info", ".debug_abbrev", ".debug_line")
-_TELLING: Final = (".debug_info", ".debug_abbrev")
+_TEXT_SECTIONS: Final = (".debug_info", ".debug_abbrev")
 DW_OP_ADDR: Final = 0x03
 """DWARF 2 §7.7.1: a fixed address, 4 bytes here."""
 _DOUBLED_SHARE: Final = 0.9
-"""Share of zero odd octets from which a section counts as doubled. Not 1: one attribute of assembler units is stored
-with its high byte in the phantom (abi-elf.md §6.7)."""
+"""Minimum share of zero odd octets in a doubled section. It is below 1 because one attribute of assembler units has its
+high byte in the phantom (abi-elf.md §6.7)."""
 
 
 @dataclass(frozen=True, slots=True)
-class Line:
+class SourceLine:
     """Program addresses `start`..`end` (exclusive, PC units) come from `line` of `file`."""
 
     start: int
@@ -40,24 +40,25 @@ class Line:
 
 
 def remove_phantom_octets(sections: Mapping[str, bytes]) -> dict[str, bytes]:
-    """DWARF bytes of debug sections stored with phantoms, by name; the octets themselves if they are not.
+    """Return debug sections by name, without phantom octets if they have any.
 
-    Names and strings of the entries decide for all: a plain list of small addresses has zeros at the same places.
+    The decision uses the sections with names and strings only: a plain list of small addresses has zeros at odd octets
+    too.
     """
-    phantoms = b"".join(sections.get(name, b"")[1::2] for name in _TELLING)
+    phantoms = b"".join(sections.get(name, b"")[1::2] for name in _TEXT_SECTIONS)
     if phantoms and phantoms.count(0) >= _DOUBLED_SHARE * len(phantoms):
         return {name: octets[::2] for name, octets in sections.items()}
     return dict(sections)
 
 
-class Lines:
-    """Line table of an image. `broken` counts units that could not be read."""
+class LineTable:
+    """Line table of an image. `broken` counts the compilation units that could not be read."""
 
     def __init__(self, sections: Mapping[str, bytes]) -> None:
         self.broken = 0
         self.files: Final[dict[int, str]] = {}
         """Source file of variables by address."""
-        self.rows: Final[list[Line]] = []
+        self.rows: Final[list[SourceLine]] = []
         if all(sections.get(name) for name in _NEEDED):
             self._read(sections)
         self.rows.sort(key=lambda row: (row.start, row.end))
@@ -66,15 +67,15 @@ class Lines:
     def __len__(self) -> int:
         return len(self.rows)
 
-    def find(self, pc: int) -> Line | None:
-        """The line the instruction at `pc` was made from, None if unknown."""
+    def find(self, pc: int) -> SourceLine | None:
+        """Return the source line of the instruction at `pc`, None if unknown."""
         index = bisect_right(self._starts, pc) - 1
         if index >= 0 and pc < self.rows[index].end:
             return self.rows[index]
         return None
 
     def _read(self, sections: Mapping[str, bytes]) -> None:
-        # pyelftools answers damaged input with exceptions of a dozen unrelated types; each unit stands alone.
+        # pyelftools raises many unrelated exception types for damaged input; each unit is read on its own.
         try:
             dwarf = dwarf_of(sections)
             units = dwarf.iter_CUs()
@@ -97,7 +98,7 @@ class Lines:
 
 
 def dwarf_of(sections: Mapping[str, bytes]) -> DWARFInfo:
-    """A pyelftools view of debug sections, doubled or plain."""
+    """Return a pyelftools view of debug sections, doubled or plain."""
     from elftools.dwarf.dwarfinfo import DebugSectionDescriptor, DwarfConfig, DWARFInfo
 
     plain = remove_phantom_octets({name: octets for name, octets in sections.items() if name.startswith(".debug_")})
@@ -113,13 +114,13 @@ def dwarf_of(sections: Mapping[str, bytes]) -> DWARFInfo:
     return DWARFInfo(config, **{name: descriptor("." + name.removesuffix("_sec")) for name in wanted})
 
 
-def _unit_rows(dwarf: DWARFInfo, unit: Any) -> list[Line]:
-    """The line table of one compilation unit as address ranges."""
+def _unit_rows(dwarf: DWARFInfo, unit: Any) -> list[SourceLine]:
+    """Return the line table of one compilation unit as address ranges."""
     program = dwarf.line_program_for_CU(unit)
     if program is None:
         return []
     names = file_names(program.header)
-    rows: list[Line] = []
+    rows: list[SourceLine] = []
     before = None
     for entry in program.get_entries():
         state = entry.state
@@ -127,13 +128,13 @@ def _unit_rows(dwarf: DWARFInfo, unit: Any) -> list[Line]:
             continue
         if before is not None and state.address > before.address:
             name = names[before.file] if 0 <= before.file < len(names) else "?"
-            rows.append(Line(before.address, state.address, name, before.line))
+            rows.append(SourceLine(before.address, state.address, name, before.line))
         before = None if state.end_sequence else state
     return rows
 
 
 def _variables(dwarf: DWARFInfo, unit: Any) -> dict[int, str]:
-    """Declaring file of the variables of one unit that stand at a fixed address."""
+    """Return the declaring file of a unit's variables at fixed addresses, by address."""
     program = dwarf.line_program_for_CU(unit)
     names = file_names(program.header) if program is not None else []
     found = {}
@@ -149,7 +150,7 @@ def _variables(dwarf: DWARFInfo, unit: Any) -> dict[int, str]:
 
 
 def file_names(header: Any) -> list[str]:
-    """Path of every file number of a line program; DWARF before version 5 counts files from 1."""
+    """Return the path of every file number of a line program; DWARF before version 5 counts files from 1."""
     folders = [folder.decode("utf-8", "replace") for folder in header["include_directory"]]
     names = [] if header["version"] >= 5 else ["?"]
     for entry in header["file_entry"]:

@@ -1,6 +1,6 @@
-"""Firmware files into images: ELF (ours, XC16's and C30's) and Intel HEX; a clear message for anything else.
+"""Loader of firmware files: ELF (this project's, XC16's and C30's) and Intel HEX.
 
-What enters: a path. What leaves: an `Image`, or a `LoadError` that says what the file is and what to use instead.
+Input: a path. Output: an `Image`, or a `LoadError` that says what the file is and what to use instead.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from emu.host.files import read_file
 from emu.image.model import Image, LoadError
 
 MAX_OCTETS: Final = 32 << 20
-"""Largest file that is read at all. A full image with debug information is a few megabytes."""
+"""Largest accepted file. A full image with debug information is a few megabytes."""
 
 COFF_MAGIC: Final = b"\x36\x12"
 """File magic 0x1236 of Microchip's COFF, little endian (abi-elf.md §6.8, COFF)."""
@@ -26,7 +26,7 @@ EXPECTED: Final = "expected an ELF executable for dsPIC30F or an Intel HEX file"
 def load_image(path: str | os.PathLike[str], chip: Chip | None = None) -> Image:
     """Read the firmware file at `path`, ELF or Intel HEX by content, for `chip`.
 
-    Without one an ELF file is for the chip it names in its flags, a HEX file for the dsPIC30F6014A.
+    Without `chip`, an ELF file is for the chip named in its flags, a HEX file for the dsPIC30F6014A.
 
     Raises LoadError for anything that is not a usable image, OSError never.
     """
@@ -49,7 +49,7 @@ def parse_image(data: bytes, name: str, chip: Chip | None = None) -> Image:
 
 
 def _contents(name: str) -> bytes:
-    """The file's octets. Raises LoadError when it cannot be read."""
+    """Return the file's octets. Raises LoadError if it cannot be read."""
     try:
         if Path(name).is_dir():
             raise LoadError(name, f"is a directory; {EXPECTED}")
@@ -65,7 +65,7 @@ def _contents(name: str) -> bytes:
 
 
 def _what_it_is(data: bytes) -> str:
-    """A sentence about a file that is neither ELF nor HEX."""
+    """Return the error message for a file that is neither ELF nor HEX."""
     if not data:
         return f"is empty; {EXPECTED}"
     if data.startswith(COFF_MAGIC):

@@ -1,8 +1,7 @@
-"""A firmware image in memory: program words by address, sections, symbols and lines, whatever file it came from.
+"""A firmware image in memory: program words by address, sections, symbols and source lines.
 
-What enters: blocks and sections found by a reader (`emu.image.elf`, `emu.image.hex`).
-What leaves: words for the machine's
-program memory, names and source lines for people. Nothing here knows how a machine works.
+Input: blocks and sections from a reader (`emu.image.elf`, `emu.image.hex`). Output: words for the machine's program
+memory, and names and source lines for reports.
 """
 
 from __future__ import annotations
@@ -17,21 +16,21 @@ from typing import TYPE_CHECKING, Final
 from emu.chips.chip import Chip, Region
 
 if TYPE_CHECKING:
-    from emu.image.lines import Lines
+    from emu.image.lines import LineTable
     from emu.image.symbols import Symbol, Symbols
 
 BYTES_PER_WORD: Final = 3
 """Flash bytes of one program word, as data sheets count them."""
 
 ERASED: Final = 0xFFFFFF
-"""What a program word that no file defines reads (abi-elf.md §6.8 step 6)."""
+"""Value of a program word that the file does not define (abi-elf.md §6.8 step 6)."""
 
 LOADABLE: Final = ("flash", "eedata", "unitid", "config")
 """Regions of program space an image may define (abi-elf.md §6.8 step 4)."""
 
 
 class LoadError(ValueError):
-    """The file cannot be used. The text says what was found, where, and what was expected; the path comes first."""
+    """The file cannot be loaded. The message gives path, location, finding and expectation."""
 
     def __init__(self, path: str, message: str) -> None:
         super().__init__(f"{path}: {message}")
@@ -44,13 +43,13 @@ class Block:
     base: int
     words: array[int]
     origin: str
-    """Where they came from, for messages: a section or a line."""
+    """Source of the words, for messages: a section or a line."""
     is_code: bool = True
-    """False for constants and tables; the loader cannot tell in a HEX file."""
+    """False for constants and tables; always True for HEX files, which do not distinguish them."""
 
     @property
     def end(self) -> int:
-        """First address behind the block."""
+        """First address after the block."""
         return self.base + 2 * len(self.words)
 
 
@@ -91,13 +90,13 @@ class Image:
     warnings: tuple[str, ...] = field(default=())
 
     def words(self, region: Region | None = None) -> Iterator[tuple[int, int]]:
-        """(address, word) of every defined program word in address order, of one region or of all."""
+        """Yield (address, word) of every defined program word in address order, of one region or of all."""
         for block in self.blocks:
             if region is None or block.base in region:
                 yield from zip(range(block.base, block.end, 2), block.words, strict=True)
 
     def flash(self) -> array[int]:
-        """All of flash, one element per program word, erased where the image says nothing."""
+        """Return the content of flash, one element per program word; undefined words are erased."""
         region = self.chip.program["flash"]
         words = array("I", [ERASED]) * (region.size // 2)
         for block in self.blocks:
@@ -107,11 +106,11 @@ class Image:
         return words
 
     def used(self, region: Region) -> int:
-        """Number of program words the image defines in `region`."""
+        """Return the number of program words that the image defines in `region`."""
         return sum(len(block.words) for block in self.blocks if block.base in region)
 
     def word(self, address: int) -> int | None:
-        """The program word at an even address, None where the image defines nothing."""
+        """Return the program word at an even address, None if undefined."""
         for block in self.blocks:
             if block.base <= address < block.end:
                 return block.words[(address - block.base) // 2]
@@ -119,7 +118,7 @@ class Image:
 
     @cached_property
     def register_names(self) -> dict[int, str]:
-        """Names of the bytes of all special function registers by data address."""
+        """Names of the special function registers' bytes, by data address."""
         names = {}
         for sfr in self.chip.sfrs.values():
             names[sfr.address] = sfr.name
@@ -135,15 +134,15 @@ class Image:
         return Symbols(self.raw_symbols)
 
     @cached_property
-    def lines(self) -> Lines:
+    def lines(self) -> LineTable:
         """Source lines by program address; empty when the image has no DWARF or it cannot be read."""
-        from emu.image.lines import Lines
+        from emu.image.lines import LineTable
 
-        return Lines({section.name: section.octets for section in self.sections if section.kind == "info"})
+        return LineTable({section.name: section.octets for section in self.sections if section.kind == "info"})
 
 
 def check_blocks(path: str, chip: Chip, blocks: list[Block]) -> tuple[Block, ...]:
-    """Sort blocks; raise LoadError if two overlap or one leaves the chip's program memory."""
+    """Return the blocks in address order. Raises LoadError if two overlap or one exceeds the program memory."""
     regions = [chip.program[name] for name in LOADABLE]
     blocks = sorted(blocks, key=lambda block: block.base)
     for block in blocks:

@@ -1,1 +1,4 @@
-"""Fault injection: `campaign` reads what is wanted, `faults` does it, `trial` runs and judges, `report` counts."""
+"""Fault injection:
+
+`campaign` reads the configuration, `faults` injects, `trial` runs and classifies, `report` counts.
+"""

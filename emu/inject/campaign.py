@@ -1,17 +1,17 @@
-"""A campaign file: what to run, what to break, how to judge. TOML; mistakes are told with file and line.
+"""Campaign files: run, faults and detection patterns, in TOML. Errors are reported with file and line.
 
-seed = 1                      # whose faults they are
+seed = 1                      # determines the faults
 trials = 400
 [run]
-seconds = 1.0                 # what the output of is compared
-start = 0.1                   # no fault before (default 0)
+seconds = 1.0                 # duration whose output is compared
+start = 0.1                   # earliest time of a fault (default 0)
 selector = 0                  # of the robot (default 0)
-hang = 2.0                    # so many times `seconds` without the output: a hang (default 2)
+hang = 2.0                    # a hang: output incomplete after this multiple of `seconds` (default 2)
 [input]                       # bytes for the UARTs (default none), each with its time in s
 uart1 = [[0.2, "go\\r"], [0.5, "stop\\r"]]
 [detect]
-uart1 = ["assert", "trap"]    # regular expressions: the firmware has noticed (default none)
-[faults]                      # shares of the kinds, whole numbers
+uart1 = ["assert", "trap"]    # regular expressions of messages about a detected fault (default none)
+[faults]                      # weights of the kinds, whole numbers
 ram = 4
 register = 2
 flash = 1
@@ -45,12 +45,12 @@ _KEYS: Final[dict[str, tuple[str, ...]]] = {
 
 
 class CampaignError(ValueError):
-    """A campaign file is wrong; the text has file, line and what was expected."""
+    """A campaign file is invalid; the message names file, line and expectation."""
 
 
 @dataclass(frozen=True)
 class Campaign:
-    """What a file says. Times in s."""
+    """Content of a campaign file. Times in s."""
 
     seed: int
     trials: int
@@ -62,7 +62,7 @@ class Campaign:
     detect: Mapping[int, tuple[str, ...]]
     faults: Mapping[str, int]
     fingerprint: str
-    """Hash of the file's text."""
+    """SHA-256 of the file's text."""
 
 
 class _Reader:
@@ -76,7 +76,7 @@ class _Reader:
             raise CampaignError(f"{name}:{where}: {error}") from None
 
     def fail(self, section: str, key: str, expected: str) -> CampaignError:
-        """With the line of a key, or of its section."""
+        """Return an error at the line of a key, or of its section."""
         here, found = "", 0
         for number, line in enumerate(self.text.splitlines(), 1):
             if match := re.match(r"\s*\[([^\]]+)\]", line):
@@ -86,7 +86,7 @@ class _Reader:
                 return CampaignError(f"{self.name}:{number}: {expected}")
         return CampaignError(f"{self.name}:{found or 1}: {expected}")
 
-    def known(self) -> None:
+    def check_keys(self) -> None:
         for section, keys in _KEYS.items():
             table = self.section(section)
             for key in table:
@@ -109,13 +109,13 @@ class _Reader:
 
 
 def read(path: Path) -> Campaign:
-    """The campaign in a file. Raises CampaignError, OSError."""
+    """Read a campaign file. Raises CampaignError, OSError."""
     try:
         text = read_file(path).decode()
     except UnicodeDecodeError as error:
         raise CampaignError(f"{path}: expected UTF-8: {error}") from None
     reader = _Reader(str(path), text)
-    reader.known()
+    reader.check_keys()
     faults = {kind: reader.number("faults", kind, int, 0, 0, 1_000_000) for kind in KINDS}
     if not any(faults.values()):
         raise reader.fail("", "faults", "expected a share above 0 for a kind of fault")
@@ -130,17 +130,17 @@ def read(path: Path) -> Campaign:
         start=start,
         selector=reader.number("run", "selector", int, 0, 0, 15),
         hang=reader.number("run", "hang", float, 2.0, 1, 100),
-        input={n: _said(reader, f"uart{n}") for n in (1, 2)},
+        input={n: _timed_input(reader, f"uart{n}") for n in (1, 2)},
         detect={n: _patterns(reader, f"uart{n}") for n in (1, 2)},
         faults=faults,
         fingerprint=hashlib.sha256(text.encode()).hexdigest(),
     )
 
 
-def _said(reader: _Reader, key: str) -> tuple[tuple[float, bytes], ...]:
+def _timed_input(reader: _Reader, key: str) -> tuple[tuple[float, bytes], ...]:
     expected = f'{key}: expected a list of [seconds, "text"] in the order of time'
     found: list[tuple[float, bytes]] = []
-    for one in _listed(reader, "input", key):
+    for one in _list_value(reader, "input", key):
         is_pair = isinstance(one, list) and len(one) == 2
         if not is_pair or not isinstance(one[0], int | float) or not isinstance(one[1], str) or one[0] < 0:
             raise reader.fail("input", key, expected)
@@ -154,7 +154,7 @@ def _said(reader: _Reader, key: str) -> tuple[tuple[float, bytes], ...]:
 
 
 def _patterns(reader: _Reader, key: str) -> tuple[str, ...]:
-    found = _listed(reader, "detect", key)
+    found = _list_value(reader, "detect", key)
     for one in found:
         try:
             re.compile(one.encode("latin-1"))
@@ -163,7 +163,7 @@ def _patterns(reader: _Reader, key: str) -> tuple[str, ...]:
     return tuple(found)
 
 
-def _listed(reader: _Reader, section: str, key: str) -> list[Any]:
+def _list_value(reader: _Reader, section: str, key: str) -> list[Any]:
     value = reader.section(section).get(key, [])
     if not isinstance(value, list):
         raise reader.fail(section, key, f"{key}: expected a list")

@@ -1,10 +1,10 @@
-"""The kinds of faults: which of them comes, where, and what it does to a machine that stands between two instructions.
+"""Faults: random choice of kind, time and location, and injection at an instruction boundary.
 
 ram       a bit of RAM flips                          register  a bit of W0 to W15 flips
-flash     a bit of an instruction flips, for good     skip      an instruction is not executed
-uart      the next byte on its way to UART1 or 2 is lost
-sensor    an infra-red sensor of the robot sticks at one distance
-brownout  reset by BOR, with some bits of RAM lost
+flash     a bit of an instruction flips permanently     skip      an instruction is not executed
+uart      the next byte queued for UART1 or 2 is lost
+sensor    an infrared sensor of the robot is stuck at one distance
+brownout  reset by BOR, with some bits of RAM flipped
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ REGISTERS: Final = 16
 WORD_BITS, BYTE_BITS, CODE_BITS, SENSORS = 16, 8, 24, 8
 NEAREST_MM, FURTHEST_MM = 5.0, 100.0
 MOST_LOST: Final = 32
-"""Bits of RAM that a brown-out flips at most."""
+"""Maximum number of RAM bits that a brown-out flips."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,8 +43,8 @@ class Fault:
     """Bit, distance in tenths of a mm, or the seed of the bits that a brown-out flips."""
 
 
-def choose(number: int, seed: int, shares: Mapping[str, int], image: Image, first: int, last: int) -> Fault:
-    """Fault `number` of a campaign: of its seed and number alone, in cycles `first` to `last`."""
+def choose_fault(number: int, seed: int, shares: Mapping[str, int], image: Image, first: int, last: int) -> Fault:
+    """Choose fault `number` of a campaign, in cycles `first` to `last`; it depends on seed and number only."""
     rng = random.Random(f"{seed}:{number}")
     kind = rng.choices(KINDS, [shares[kind] for kind in KINDS])[0]
     cycle = rng.randrange(first, last)
@@ -66,8 +66,8 @@ def choose(number: int, seed: int, shares: Mapping[str, int], image: Image, firs
     return Fault(number, kind, cycle, 0, 0)
 
 
-def do(fault: Fault, machine: Machine) -> str:
-    """Break `machine`; returns what was done, for people."""
+def inject_fault(fault: Fault, machine: Machine) -> str:
+    """Inject a fault into `machine` and return a description."""
     if fault.kind == "ram":
         machine.poke(fault.place, machine.peek(fault.place, 1) ^ 1 << fault.value, 1)
         return f"bit {fault.value} at {fault.place:#06x}{_variable(machine, fault.place)}"
@@ -80,8 +80,8 @@ def do(fault: Fault, machine: Machine) -> str:
     if fault.kind == "skip":
         return _skip(machine)
     if fault.kind == "uart":
-        was = machine.uart[fault.place].drop_next_frame()
-        return f"a byte for UART{fault.place}" if was else f"no byte for UART{fault.place} was on its way"
+        dropped = machine.uart[fault.place].drop_next_frame()
+        return f"a byte for UART{fault.place}" if dropped else f"no byte for UART{fault.place} was queued"
     if fault.kind == "sensor":
         distance = NEAREST_MM + fault.value / 10
         machine.board.ir.set_distances([(fault.place, distance, 1.0)])
@@ -95,7 +95,7 @@ def do(fault: Fault, machine: Machine) -> str:
 
 
 def _skip(machine: Machine) -> str:
-    """The next instruction; of a sleeping CPU the second one after it wakes."""
+    """Skip the next instruction; in a sleeping CPU, the second one after the wake-up."""
     while machine.is_asleep or machine.state.repeat != NOT_REPEATING:
         if machine.step() is not None:
             return "no instruction to skip"

@@ -1,4 +1,4 @@
-"""Outcomes counted, with Wilson intervals (scipy)."""
+"""Counts of outcomes, with Wilson intervals (scipy)."""
 
 from __future__ import annotations
 
@@ -13,8 +13,11 @@ CONFIDENCE: Final = 0.95
 
 
 def summary(outcomes: Iterable[Outcome]) -> dict[str, dict[str, Any]]:
-    """By kind, and "all": number of trials, and for every outcome its number, share and 95 % Wilson interval. Raises
-    ImportError without scipy."""
+    """Return the statistics by fault kind, and for "all".
+
+    They contain the number of trials and, for every outcome, number, share and 95 % Wilson interval. Raises ImportError
+    without scipy.
+    """
     from scipy.stats import binomtest
 
     counts: dict[str, Counter[str]] = {kind: Counter() for kind in (*KINDS, "all")}
@@ -39,7 +42,7 @@ def summary(outcomes: Iterable[Outcome]) -> dict[str, dict[str, Any]]:
 
 
 def lines(found: dict[str, dict[str, Any]]) -> list[str]:
-    """A table for people: percent, with the interval."""
+    """Return the statistics as a table in percent, with intervals."""
     rows = [f"{'':10} {'trials':>6} " + " ".join(f"{outcome:>22}" for outcome in OUTCOMES)]
     for kind, facts in found.items():
         shares = (

@@ -1,11 +1,11 @@
-"""The run without faults, and one trial after another from the last state kept before its fault.
+"""The golden run without faults, and trials that start from its last checkpoint before the fault.
 
-What enters: an image, a campaign. What leaves: an `Outcome` for every number of a fault, the same in any order and in
-any process. What counts as output is what the UARTs say.
+Input: an image and a campaign. Output: an `Outcome` for every fault number, independent of order and process. The
+output that is compared is that of the UARTs.
 
-    masked    the output is the same                  detected  the firmware said so (`[detect]`, its kernel's stop)
-    silent    the output is another, or late          hang      no more output until `hang` times the time
-    trap      a trap or a reset for a fault, whatever the firmware made of it, unless it said so
+    masked    the output is equal                     detected  the firmware reports it (`[detect]`, a kernel stop)
+    silent    the output differs, or is late          hang      output incomplete after `hang` times the duration
+    trap      a trap or a fault reset that the firmware does not report
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Final
 
 from emu.debug.fault_report import attach
 from emu.inject.campaign import Campaign
-from emu.inject.faults import choose, do
+from emu.inject.faults import choose_fault, inject_fault
 from emu.machine.machine import Machine
 
 if TYPE_CHECKING:
@@ -25,43 +25,43 @@ if TYPE_CHECKING:
     from emu.machine.stops import Stop
 
 OUTCOMES: Final = ("masked", "detected", "silent", "hang", "trap")
-STATES: Final = 64
-"""States that are kept of the run without faults."""
-SHOWN: Final = 160
+CHECKPOINTS: Final = 64
+"""Number of checkpoints of the golden run."""
+MAX_REASON_LENGTH: Final = 160
 KERNEL_STOPPED: Final = "the kernel stopped"
-"""How the explanation of a fault begins that the firmware's kernel found itself (emu/debug/fault_report.py)."""
+"""Start of the explanation of a fault that the kernel detected itself (emu/debug/fault_report.py)."""
 
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What became of a fault."""
+    """Outcome of one trial."""
 
     number: int
     kind: str
     cycle: int
     what: str
-    """What was broken."""
+    """Description of the injected fault."""
     outcome: str
     """One of OUTCOMES."""
     latent: bool
-    """Masked so far: at the end the state is another."""
+    """Masked, but the final state differs from that of the golden run."""
     end: int
-    """Cycle in which it was known."""
+    """Cycle in which the outcome was determined."""
     why: str
 
 
 @dataclass(slots=True)
 class GoldenRun:
-    """The run without faults."""
+    """The run without faults: checkpoints and output."""
 
     states: list[tuple[int, bytes, tuple[int, ...]]] = field(default_factory=list)
-    """Cycle, state, and how many bytes every UART had said."""
-    said: dict[int, bytes] = field(default_factory=dict)
+    """Checkpoints: cycle, snapshot, and the number of bytes each UART had sent."""
+    output: dict[int, bytes] = field(default_factory=dict)
     stop: Stop | None = None
 
 
 class Trials:
-    """Runs the faults of a campaign. Raises ValueError if the run without faults ends before its time."""
+    """Runs the trials of a campaign. Raises ValueError if the golden run ends early."""
 
     def __init__(self, image: Image, campaign: Campaign) -> None:
         from emu.boards.epuck.board import Epuck
@@ -72,80 +72,80 @@ class Trials:
         self._machine.load(image)
         attach(self._machine)
         self._restore_host_state: Final = self._machine.save_host_state()
-        self._said: Final = {number: bytearray() for number in self._machine.uart}
+        self._output: Final = {number: bytearray() for number in self._machine.uart}
         self._trapped = ""
         for number, uart in self._machine.uart.items():
-            uart.listen(partial(self._hear, number), lazy=True)
+            uart.listen(partial(self._append_output, number), lazy=True)
             for time, data in campaign.input.get(number, ()):
                 uart.feed(data, int(time * self._machine.hz))
-        told = self._machine.core.exceptions.on_trap
+        previous = self._machine.core.exceptions.on_trap
 
         def trapped(vector: object) -> None:
             self._trapped = self._trapped or str(getattr(vector, "name", vector))
-            if told is not None:
-                told(vector)  # type: ignore[arg-type]
+            if previous is not None:
+                previous(vector)  # type: ignore[arg-type]
 
         self._machine.core.exceptions.on_trap = trapped
         self._end: Final = int(campaign.seconds * self._machine.hz)
         self._first: Final = max(1, int(campaign.start * self._machine.hz))
         self.golden: Final = self._run_golden()
 
-    def _hear(self, number: int, byte: int, _start: int) -> None:
-        self._said[number].append(byte & 0xFF)
+    def _append_output(self, number: int, byte: int, _start: int) -> None:
+        self._output[number].append(byte & 0xFF)
 
     def _run_golden(self) -> GoldenRun:
         machine, golden = self._machine, GoldenRun()
-        for part in range(STATES + 1):
-            golden.stop = machine.run_until(self._end * part // STATES) if part else None
+        for part in range(CHECKPOINTS + 1):
+            golden.stop = machine.run_until(self._end * part // CHECKPOINTS) if part else None
             if golden.stop is not None:
                 raise ValueError(f"the run without faults ends at cycle {machine.cycle:,}: {golden.stop.reason}")
-            golden.states.append((machine.cycle, machine.snapshot(), tuple(map(len, self._said.values()))))
-        golden.said = {number: bytes(said) for number, said in self._said.items()}
+            golden.states.append((machine.cycle, machine.snapshot(), tuple(map(len, self._output.values()))))
+        golden.output = {number: bytes(said) for number, said in self._output.items()}
         return golden
 
     def run(self, number: int) -> Outcome:
-        """What becomes of fault `number`."""
+        """Run the trial of fault `number`."""
         machine, campaign = self._machine, self._campaign
-        fault = choose(number, campaign.seed, campaign.faults, self._image, self._first, self._end)
+        fault = choose_fault(number, campaign.seed, campaign.faults, self._image, self._first, self._end)
         place = max(n for n, one in enumerate(self.golden.states) if one[0] <= fault.cycle)
         _, state, counts = self.golden.states[place]
         machine.restore(state)
         self._restore_host_state()
         self._trapped = ""
-        for (which, said), count in zip(self._said.items(), counts, strict=True):
-            said[:] = self.golden.said[which][:count]
+        for (which, said), count in zip(self._output.items(), counts, strict=True):
+            said[:] = self.golden.output[which][:count]
         machine.run_until(fault.cycle)
-        what = do(fault, machine)
-        outcome, why, latent = self._judged(place + 1)
+        what = inject_fault(fault, machine)
+        outcome, why, latent = self._classify(place + 1)
         return Outcome(number, fault.kind, fault.cycle, what, outcome, latent, machine.cycle, why)
 
-    def _judged(self, place: int) -> tuple[str, str, bool]:
-        """Run on and see. A state that the run without faults had too ends it."""
+    def _classify(self, place: int) -> tuple[str, str, bool]:
+        """Run on and classify the outcome. A state equal to the golden run's at a checkpoint ends the trial."""
         machine, golden = self._machine, self.golden
         for cycle, state, counts in golden.states[place:]:
             stop = machine.advance(cycle)
             if stop is not None:
-                return self._stopped(stop)
+                return self._classify_stop(stop)
             said_same = all(
-                said == golden.said[n][:count] for (n, said), count in zip(self._said.items(), counts, strict=True)
+                said == golden.output[n][:count] for (n, said), count in zip(self._output.items(), counts, strict=True)
             )
             if machine.cycle == cycle and said_same and machine.snapshot() == state:
                 return "masked", "", False
         detected = self._detected()
         if detected:
             return "detected", detected, False
-        if self._said == golden.said:
+        if self._output == golden.output:
             return ("trap", f"{self._trapped} trap", False) if self._trapped else ("masked", "", True)
-        wrong = [n for n, said in self._said.items() if not golden.said[n].startswith(said)]
+        wrong = [n for n, said in self._output.items() if not golden.output[n].startswith(said)]
         late = int(self._campaign.hang * self._end)
-        while not wrong and not self._same() and machine.cycle < late:
-            stop = machine.advance(min(late, machine.cycle + self._end // STATES + 1))
+        while not wrong and not self._is_complete() and machine.cycle < late:
+            stop = machine.advance(min(late, machine.cycle + self._end // CHECKPOINTS + 1))
             if stop is not None:
-                return self._stopped(stop)
-            wrong = [n for n, said in self._said.items() if not _compatible(said, golden.said[n])]
-        return self._other(bool(wrong))
+                return self._classify_stop(stop)
+            wrong = [n for n, said in self._output.items() if not _compatible(said, golden.output[n])]
+        return self._classify_late(bool(wrong))
 
-    def _other(self, is_wrong: bool) -> tuple[str, str, bool]:
+    def _classify_late(self, is_wrong: bool) -> tuple[str, str, bool]:
         detected = self._detected()
         if detected:
             return "detected", detected, False
@@ -153,33 +153,33 @@ class Trials:
             return "trap", f"{self._trapped} trap", False
         if is_wrong:
             return "silent", self._difference(), False
-        return ("silent", "late", False) if self._same() else ("hang", "no more output", False)
+        return ("silent", "late", False) if self._is_complete() else ("hang", "no more output", False)
 
-    def _same(self) -> bool:
-        """Whether all that was expected has been said, from the beginning."""
-        return all(self._said[number].startswith(said) for number, said in self.golden.said.items())
+    def _is_complete(self) -> bool:
+        """Whether every UART has sent the complete output of the golden run."""
+        return all(self._output[number].startswith(said) for number, said in self.golden.output.items())
 
-    def _stopped(self, stop: Stop) -> tuple[str, str, bool]:
+    def _classify_stop(self, stop: Stop) -> tuple[str, str, bool]:
         detected = self._detected()
         cause = stop.fault.cause if stop.fault is not None else stop.reason
         if detected or cause.startswith(KERNEL_STOPPED):
             return "detected", detected or cause, False
         if stop.fault is not None:
-            return "trap", f"{cause} at {stop.fault.where}"[:SHOWN], False
+            return "trap", f"{cause} at {stop.fault.where}"[:MAX_REASON_LENGTH], False
         return "hang", stop.reason, False
 
     def _detected(self) -> str:
-        """What the firmware has said that it does not say without faults."""
+        """Return a report of the firmware that does not occur in the golden run, "" if none."""
         for number, patterns in self._campaign.detect.items():
             for pattern in patterns:
                 wanted = pattern.encode("latin-1")
-                if len(re.findall(wanted, self._said[number])) > len(re.findall(wanted, self.golden.said[number])):
+                if len(re.findall(wanted, self._output[number])) > len(re.findall(wanted, self.golden.output[number])):
                     return f"uart{number} said {pattern!r}"
         return ""
 
     def _difference(self) -> str:
-        for number, said in self._said.items():
-            expected = self.golden.said[number]
+        for number, said in self._output.items():
+            expected = self.golden.output[number]
             if said != expected:
                 pairs = zip(said, expected, strict=False)
                 shorter = min(len(said), len(expected))
@@ -189,5 +189,5 @@ class Trials:
 
 
 def _compatible(said: bytearray, expected: bytes) -> bool:
-    """Whether one is the beginning of the other."""
+    """Whether one output is a prefix of the other."""
     return expected.startswith(said) or said.startswith(expected)

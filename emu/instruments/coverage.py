@@ -1,7 +1,7 @@
-"""Coverage from exact counts: how often every instruction ran and which way every condition went.
+"""Coverage from exact counts of executed instructions and taken branches.
 
-What enters: a machine with the plain engine. What leaves: `Counts`, and from them lcov and Cobertura reports. Code is
-measured as it is in the image, optimised or not; functions the linker left out are not in it and not in the reports.
+Input: a machine with the plain engine. Output: `Counts`, and from them lcov and Cobertura reports. The code in the
+image is measured, optimised or not; functions that the linker removed are not in the reports.
 """
 
 from __future__ import annotations
@@ -25,23 +25,23 @@ if TYPE_CHECKING:
     from emu.machine.machine import Machine
 
 EXCLUDED: Final = re.compile(r"LCOV_EXCL_(LINE|START|STOP)")
-"""Comments that take lines out of a report, as lcov's own tools read them."""
+"""Comments that exclude lines from a report, as in lcov's own tools."""
 
 
 @dataclass(slots=True)
 class Counts:
-    """Executions by program address, and of conditional branches and skips how often they were taken."""
+    """Executions by program address, and how often each conditional branch or skip was taken."""
 
     executed: Counter[int] = field(default_factory=Counter)
     taken: Counter[int] = field(default_factory=Counter)
 
     def add(self, other: Counts) -> None:
-        """Sum of two runs of the same image."""
+        """Add the counts of another run of the same image."""
         self.executed.update(other.executed)
         self.taken.update(other.taken)
 
     def facts(self, image: Image) -> dict[str, Any]:
-        """As plain data, with what tells the image."""
+        """Return the counts as plain data, with the fingerprint of the image."""
         return {
             "image": fingerprint(image),
             "executed": {str(pc): count for pc, count in sorted(self.executed.items())},
@@ -50,7 +50,7 @@ class Counts:
 
     @classmethod
     def of(cls, facts: Any, image: Image) -> Counts:
-        """From what `facts` gave. Raises ValueError if it is of another image, or no such thing."""
+        """Create counts from the data of `facts`. Raises ValueError for invalid data or another image."""
         if not isinstance(facts, dict) or not {"image", "executed", "taken"} <= facts.keys():
             raise ValueError("expected counts of an earlier run")
         if facts["image"] != fingerprint(image):
@@ -62,7 +62,7 @@ class Counts:
 
 
 def fingerprint(image: Image) -> str:
-    """Hash of all program words."""
+    """Return the SHA-256 of all program words and their addresses."""
     text = hashlib.sha256()
     for block in image.blocks:
         text.update(block.base.to_bytes(4, "little") + block.words.tobytes())
@@ -70,7 +70,10 @@ def fingerprint(image: Image) -> str:
 
 
 def count_executions(machine: Machine, counts: Counts) -> Callable[[], None]:
-    """Count from now on what `machine` executes; returns how to stop. Raises ValueError unless its engine is plain."""
+    """Count the instructions that `machine` executes. Return a function that stops counting.
+
+    Raises ValueError for another engine than plain.
+    """
     if machine.engine != "plain":
         raise ValueError(f"counting needs the plain engine, not {machine.engine!r}")
     sequencer, state = machine.core.sequencer, machine.state
@@ -101,14 +104,14 @@ def count_executions(machine: Machine, counts: Counts) -> Callable[[], None]:
 
 
 def _following(machine: Machine, pc: int) -> int:
-    """Where a conditional instruction goes on if it is not taken; 0 for any other."""
+    """Return the fall-through address of a conditional instruction, 0 for any other."""
     program = machine.program
     insn = decode_for_execution(program.word(pc), program.word(pc + 2))
     return pc + 2 * insn.words if insn is not None and is_conditional(program.word(pc), program.word(pc + 2), pc) else 0
 
 
 def is_conditional(word1: int, word2: int, pc: int) -> bool:
-    """Whether an instruction has two ways to go on."""
+    """Whether an instruction is a conditional branch or a skip."""
     insn = decode_for_execution(word1, word2)
     flow = flow_of(insn, pc) if insn is not None else None
     return isinstance(flow, Skip) or (isinstance(flow, Branch) and not isinstance(flow.cond, int))
@@ -116,7 +119,7 @@ def is_conditional(word1: int, word2: int, pc: int) -> bool:
 
 @dataclass(slots=True)
 class FileCoverage:
-    """One source file: counts by line, of branches by line, functions by name."""
+    """Coverage of one source file: counts by line, branches by line, functions by name."""
 
     lines: dict[int, int] = field(default_factory=dict)
     branches: dict[int, list[tuple[int, int]]] = field(default_factory=dict)
@@ -126,7 +129,7 @@ class FileCoverage:
 
 
 class CoverageReport:
-    """Counts by source file. `path_of` finds a file of the line table on this machine, for exclusion comments."""
+    """Coverage by source file. `path_of` maps a file of the line table to a path, to read exclusion comments."""
 
     def __init__(self, inspector: Inspector, counts: Counts, path_of: Callable[[str], Path]) -> None:
         self.files: Final[dict[str, FileCoverage]] = {}
@@ -137,7 +140,7 @@ class CoverageReport:
         self._branches()
         self._functions()
         for name, one in self.files.items():
-            for line in excluded(path_of(name)):
+            for line in excluded_lines(path_of(name)):
                 one.lines.pop(line, None)
                 one.branches.pop(line, None)
 
@@ -145,7 +148,7 @@ class CoverageReport:
         return self.files.setdefault(name, FileCoverage())
 
     def _lines(self) -> None:
-        """A line counts how often it was begun: the most of its stretches in one copy, summed over inlined copies."""
+        """Count lines: the maximum over a line's address ranges in one copy, summed over inlined copies."""
         copies: dict[tuple[str, int], dict[object, int]] = defaultdict(dict)
         for row in self._inspector.image.lines.rows:
             if not row.line or not self._inspector.is_code(row.start):
@@ -185,7 +188,7 @@ class CoverageReport:
                 self._file(one.file).functions[one.name] = (one.line, self._counts.executed[one.ranges[0][0]])
 
     def lcov(self, path_of: Callable[[str], Path]) -> Iterator[str]:
-        """Lines of an lcov tracefile."""
+        """Yield the lines of an lcov tracefile."""
         for name, one in sorted(self.files.items()):
             yield "TN:"
             yield f"SF:{path_of(name)}"
@@ -209,7 +212,7 @@ class CoverageReport:
             yield "end_of_record"
 
     def cobertura(self, path_of: Callable[[str], Path]) -> str:
-        """A Cobertura document. Its time stamp is 0, so that equal runs give equal files."""
+        """Return a Cobertura document. Its timestamp is 0, so equal runs give equal files."""
         found = sum(len(one.lines) for one in self.files.values())
         hit = sum(count > 0 for one in self.files.values() for count in one.lines.values())
         top = ElementTree.Element("coverage", {
@@ -246,8 +249,8 @@ def _rate(part: int, whole: int) -> str:
     return f"{part / whole if whole else 1:.6f}"
 
 
-def excluded(path: Path) -> set[int]:
-    """Lines that comments in a source file take out; none if it cannot be read."""
+def excluded_lines(path: Path) -> set[int]:
+    """Return the lines that comments in a source file exclude; none if it cannot be read."""
     try:
         text = path.read_text(encoding="utf-8", errors="replace")
     except OSError:

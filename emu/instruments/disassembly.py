@@ -1,6 +1,6 @@
-"""Program words of an image as assembly: what each address holds, with labels and source lines.
+"""Disassembly of an image's program words, with symbols as operands.
 
-What enters: an image. What leaves: `Item`s in address order, for `emu disasm`, traces and fault reports.
+Input: an image. Output: `Item`s in address order, for `emu disasm`, traces and fault reports.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ class Item:
 
 
 def instruction(image: Image, pc: int, word1: int, word2: int = 0) -> Item | None:
-    """The instruction at `pc`, None if the words are not one. Targets are named by the image's symbols."""
+    """Disassemble the instruction at `pc`; None if the words are not one. Operands use the image's symbols."""
     insn = codec.decode(word1, word2)
     if insn is None:
         return None
@@ -31,7 +31,7 @@ def instruction(image: Image, pc: int, word1: int, word2: int = 0) -> Item | Non
 
 
 def items(image: Image, start: int, end: int) -> Iterator[Item]:
-    """Everything the image defines in flash from `start` up to `end`."""
+    """Yield all items that the image defines in flash from `start` up to `end`."""
     flash = image.chip.program["flash"]
     vectors = {table: vector.name for vector in image.chip.vectors for table in (vector.ivt, vector.aivt)}
     for block in image.blocks:
@@ -45,7 +45,7 @@ def items(image: Image, start: int, end: int) -> Iterator[Item]:
 
 
 def _item(image: Image, block: Block, address: int, vectors: dict[int, str]) -> Item:
-    """What stands at `address` inside `block`."""
+    """Return the item at `address` inside `block`."""
     index = (address - block.base) // 2
     word = block.words[index]
     if address in vectors:
@@ -59,7 +59,7 @@ def _item(image: Image, block: Block, address: int, vectors: dict[int, str]) -> 
 
 
 def _name(image: Image, address: int, space: str) -> str | None:
-    """What an operand points to, by the name people know it by; None where there is none."""
+    """Return the symbol name of an operand's target, None if it has none."""
     if space == "code":
         return image.symbols.text(address) if image.symbols.code(address) else None
     if address in image.chip.data["sfr"]:

@@ -1,8 +1,8 @@
-"""Waveforms of a run as a VCD file, for GTKWave and its like, written by pyvcd.
+"""Waveforms of a run as a VCD file, for GTKWave and similar viewers, written by pyvcd.
 
-What enters: a machine, a stream, names to watch. What leaves: changes of pins, bytes of UARTs and, if watched, the
-CPU's priority, sleep, the running OpenSwarm thread and variables. Pins and bytes cost little; watching makes the
-machine step. Times are those of the cycles at the clock the run begins with, rounded to 1 ps and never added up.
+Input: a machine, a stream, names to watch. Output: changes of pins, bytes of UARTs and, if watched, the CPU's priority,
+sleep, the running OpenSwarm thread and variables. Watching makes the machine single-step; pins and bytes do not. Each
+time is computed from the cycle and the initial clock, rounded to 1 ps, so rounding errors do not accumulate.
 """
 
 from __future__ import annotations
@@ -22,17 +22,17 @@ if TYPE_CHECKING:
     from emu.machine.stops import Stop
 
 PICOSECONDS: Final = 10**12
-LOOK_CYCLES: Final = 1_000_000
-"""Longest stretch between two looks at what has changed."""
+FLUSH_CYCLES: Final = 1_000_000
+"""Longest run between two writes of the collected changes."""
 CPU: Final = ("ipl", "asleep", "thread")
-"""What can be watched beside variables."""
+"""CPU states that can be watched, besides variables."""
 
 
 class WaveformRecorder:
-    """Records `machine` while it is run by `advance`. `watch`: names of CPU, or expressions that name a variable.
+    """Records `machine` while `advance` runs it. `watch`: names of CPU, or expressions that name a variable.
 
-    With `again` it also sees what is run again aside, which nobody else is told. Raises ValueError for what cannot be
-    watched.
+    With `again` it also records replayed cycles, of which other listeners are not notified. Raises ValueError for a
+    name that cannot be watched.
     """
 
     def __init__(
@@ -55,7 +55,7 @@ class WaveformRecorder:
         self._edges: list[tuple[int, int, int]] = []
         self._frames: list[tuple[int, int, int, int, int, int]] = []
         self._pending: list[tuple[int, Any, Any]] = []
-        """Changes by cycle that are still to be written: a frame is known before its last bit."""
+        """Changes by cycle that are not written yet: a frame is known before its last bit."""
         self._transmit: Final = [0] * len(PORTS)
         for uart in machine.uart.values():
             port, mask = parse_pin(uart.site.tx_pin)
@@ -93,7 +93,7 @@ class WaveformRecorder:
         return found
 
     def _watch(self, name: str) -> tuple[Any, Callable[[], Any]]:
-        """The variable in the file, and how to get its value."""
+        """Return the variable in the file, and a function that reads its value."""
         machine, state = self._machine, self._machine.state
         if name == "ipl":
             return self._writer.register_var("cpu", name, "reg", size=4, init=0), lambda: state.ipl
@@ -104,18 +104,18 @@ class WaveformRecorder:
         value = symbolic.variable(Inspector(machine), name)
         address, size = value.address, value.type.bytes
         if address is None or not value.type.is_number or value.bits is not None:
-            raise ValueError(f"{name!r} is no variable in memory that holds one number")
+            raise ValueError(f"{name!r} is not a variable in memory with a numeric type")
         variable = self._writer.register_var("variables", name.replace(" ", ""), "reg", size=8 * size, init=0)
         return variable, lambda: machine.peek(address, size)
 
     def _thread(self) -> Callable[[], int]:
-        """The PID of the running thread."""
+        """Return a function that reads the PID of the running thread."""
         inspector = Inspector(self._machine)
         running = inspector.variable(RUNNING)
         pcb = running.type.target if running is not None else None
         pid = pcb.member("pid") if pcb is not None else None
         if running is None or pid is None:
-            raise ValueError("'thread' can be watched in an OpenSwarm firmware only")
+            raise ValueError("'thread' can be watched in OpenSwarm firmware only")
         place = inspector.value(running).address or 0
 
         def number() -> int:
@@ -133,25 +133,25 @@ class WaveformRecorder:
     # Running
 
     def advance(self, cycle: int) -> Stop | None:
-        """As `Machine.advance`, and what changes is written."""
+        """Run like `Machine.advance`, and write the changes."""
         machine, stop = self._machine, None
         while stop is None and machine.cycle < cycle:
-            stop = self._step(cycle) if self._watched else self._advance(min(cycle, machine.cycle + LOOK_CYCLES))
+            stop = self._step(cycle) if self._watched else self._advance(min(cycle, machine.cycle + FLUSH_CYCLES))
             if not self._watched or len(self._edges) + len(self._pending) > 1000 or machine.cycle >= cycle or stop:
                 machine.pins.flush()
                 self._write(machine.cycle)
         return stop
 
     def _step(self, limit: int) -> Stop | None:
-        """What is due before the next instruction, then that, with a look after each."""
+        """Process due events, then one instruction, and sample the watched values after each."""
         stop = self._machine.service_boundary(limit)
-        self._look()
+        self._sample()
         if stop is None and self._machine.cycle < limit:
             stop = self._machine.step()
-            self._look()
+            self._sample()
         return stop
 
-    def _look(self) -> None:
+    def _sample(self) -> None:
         now = self._machine.cycle
         for index, (variable, get) in enumerate(self._watched):
             value = get()
@@ -160,7 +160,7 @@ class WaveformRecorder:
                 self._pending.append((now, variable, value))
 
     def _write(self, until: int) -> None:
-        """Write everything up to cycle `until` in order."""
+        """Write all changes up to cycle `until` in order."""
         for cycle, port, levels in self._edges:
             changed = (levels ^ self._levels[port]) & ~self._transmit[port]
             self._levels[port] = levels
@@ -183,7 +183,7 @@ class WaveformRecorder:
         del self._pending[:ready]
 
     def close(self) -> None:
-        """Write what is left and end the file."""
+        """Write the remaining changes and close the file."""
         machine = self._machine
         machine.pins.flush()
         self._write(machine.cycle)
@@ -194,7 +194,7 @@ class WaveformRecorder:
 
 
 def _board_names(machine: Machine) -> dict[str, str]:
-    """What the robot has on its pins."""
+    """Return the names of the robot's parts by pin."""
     if machine.board is None:
         return {}
     from emu.boards.epuck.simple import LED_PINS

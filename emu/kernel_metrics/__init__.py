@@ -1,1 +1,1 @@
-"""What the measuring commands know of our kernel: symbols of the `footprint`, `latency` and `options` applications."""
+"""Measurements of the OpenSwarm kernel, using symbols of the `footprint`, `latency` and `options` applications."""

@@ -1,12 +1,13 @@
 """Exact numbers kept in the repository: written by --update, compared by --check. Any increase is a regression.
 
-What enters: numbers by name, each with the places they were spent on. What leaves: `Row`s of a table, and a JSON file
-that names places by file and text of the line, so that lines may move without being taken for changes.
+Input: numbers by name, each with its distribution over source lines. Output: `Row`s of a table, and a JSON file that
+names a source line by file and code text, so that moved lines and changed comments do not count as changes.
 """
 
 from __future__ import annotations
 
 import json
+import re
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -16,12 +17,15 @@ from typing import Any, Final
 from emu.host.files import atomic_text_file, read_file
 
 GREW_SHOWN: Final = 4
-"""Places shown for a number that grew."""
+"""Number of source lines shown for a number that grew."""
+
+C_COMMENT: Final = re.compile(r"/\*.*?(\*/|$)|//.*")
+ASSEMBLY_COMMENT: Final = re.compile(r"/\*.*?(\*/|$)|//.*|;.*")
 
 
 @dataclass(frozen=True, slots=True)
 class Number:
-    """A measured value and what it consists of."""
+    """A measured value and its distribution over source lines."""
 
     value: int
     where: Mapping[str, int] = field(default_factory=dict)
@@ -29,7 +33,7 @@ class Number:
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """One line of a comparison; `old` is None for what the baseline does not know, `new` for what is gone."""
+    """One line of a comparison; `old` is None for a new number, `new` for one that is no longer measured."""
 
     name: str
     old: int | None
@@ -38,29 +42,29 @@ class Row:
 
     @property
     def is_worse(self) -> bool:
-        """Whether this fails a check: a number grew, or is no longer measured."""
+        """Whether this row fails a check: the number grew, or is no longer measured."""
         return self.new is None or (self.old is not None and self.new > self.old)
 
 
 class Sources:
-    """Names places for the baseline: file below `firmware/`, and the text of the line where the file can be read."""
+    """Names of source lines for the baseline: file below `firmware/`, and the code of the line if it can be read."""
 
     def __init__(self, image_path: str) -> None:
         self._roots: Final = [Path(), Path("firmware"), *Path(image_path).resolve().parents[:4]]
         self._files: Final[dict[str, list[str]]] = {}
 
     def name(self, place: str) -> str:
-        """`kernel/event.c: return m;` for `/somewhere/firmware/openswarm/kernel/event.c:93`."""
+        """Convert `/somewhere/firmware/openswarm/kernel/event.c:93` to `kernel/event.c: return m;`."""
         file, _, line = place.rpartition(":")
         if not file or not line.isdecimal():
             return place
         lines = self._lines(file)
         number = int(line)
-        text = " ".join(lines[number - 1].split()) if 0 < number <= len(lines) else f"line {number}"
-        return f"{short(file)}: {text}"
+        code = without_comments(lines[number - 1], file) if 0 < number <= len(lines) else ""
+        return f"{short(file)}: {code or f'line {number}'}"
 
     def names(self, where: Mapping[str, int]) -> dict[str, int]:
-        """The same cycles by lasting names."""
+        """Return the same counts by name instead of by line number."""
         named: Counter[str] = Counter()
         for place, count in where.items():
             named[self.name(place)] += count
@@ -79,8 +83,14 @@ class Sources:
         return self._files[file]
 
 
+def without_comments(line: str, file: str) -> str:
+    """Return the code of a source line: comments removed, white space normalised."""
+    comment = ASSEMBLY_COMMENT if file.endswith((".s", ".S")) else C_COMMENT
+    return " ".join(comment.sub("", line).split())
+
+
 def short(file: str) -> str:
-    """A path without the folders that differ from checkout to checkout."""
+    """Return a path without the folders that differ between checkouts."""
     for folder in ("/openswarm/", "/apps/", "/runtime/"):
         _, found, rest = f"/{file}".rpartition(folder)
         if found:
@@ -89,7 +99,7 @@ def short(file: str) -> str:
 
 
 def save(path: str, numbers: Mapping[str, Number]) -> None:
-    """Write a baseline, whole or not at all."""
+    """Write a baseline atomically."""
     table = {name: {"value": number.value, "where": number.where} for name, number in numbers.items()}
     with atomic_text_file(path) as stream:
         json.dump(table, stream, indent=1)
@@ -109,7 +119,7 @@ def load(path: str) -> dict[str, Number]:
 
 
 def compare(old: Mapping[str, Number], new: Mapping[str, Number]) -> list[Row]:
-    """One row per name of either, in the order of the new ones."""
+    """Return one row per name, in the order of `new`, then the names that only `old` has."""
     rows = []
     for name, number in new.items():
         before = old.get(name)
@@ -123,7 +133,7 @@ def compare(old: Mapping[str, Number], new: Mapping[str, Number]) -> list[Row]:
 
 
 def table(rows: list[Row], unit: str) -> str:
-    """The comparison for people."""
+    """Return the comparison as a text table."""
     lines = [f"{'':58} {'baseline':>9} {'now':>9}"]
     for row in rows:
         old = "-" if row.old is None else f"{row.old:,}"

@@ -1,7 +1,7 @@
-"""What the kernel's operations cost in cycles: the list of measures and how each is taken.
+"""Cycles of the kernel's operations: the list of measures and their measurement.
 
-The `latency` application runs a scenario; every number is counted from outside between symbols, so nothing is added to
-it. Each window is taken at its first undisturbed occurrence once the scenario has settled; the numbers are exact and
+The `latency` application runs a scenario. The emulator counts cycles between symbols, without instrumentation in the
+firmware. Each measure uses the first undisturbed occurrence after the scenario has settled. The numbers are exact and
 repeat exactly.
 """
 
@@ -18,28 +18,28 @@ from emu.kernel_metrics.target import MeasureError, Target
 from emu.system.events import NEVER
 
 APPLICATION: Final = "latency_wanted"
-"""Symbol by which the application is told."""
+"""Symbol that identifies the application."""
 DEVICE_LEVEL: Final = 4
 """Priority of C device interrupts (kernel.md §4)."""
 ATTEMPTS: Final = 50
-"""Windows looked at for one that no other interrupt disturbs."""
+"""Maximum number of windows examined for one without another interrupt."""
 SETTLING: Final = 5
-"""Windows passed over until every thread has yielded once."""
+"""Windows skipped until every thread has yielded once."""
 CALL_CYCLES: Final = 2
 """Cycles of CALL and RCALL (isa.md §13.1)."""
 MASK_STEPS: Final = 150_000
-"""Instructions watched for the longest masked window."""
+"""Instructions examined for the longest masked window."""
 JITTER_CYCLES: Final = 4_423_680
-"""Tcy watched for the jitter of the clock: 300 ms."""
+"""Tcy examined for the jitter of the clock: 300 ms."""
 BYTE_CYCLES: Final = 1280
 """Tcy of a byte at 115,200 baud (epuck.md §2)."""
 DISI_LEVEL: Final = 6
-"""DISI holds back priorities up to 6 (isa.md §12)."""
+"""DISI masks priorities up to 6 (isa.md §12)."""
 
 
 @dataclass(frozen=True, slots=True)
 class Scenario:
-    """The application's request, in the order of its fields."""
+    """Request to the application, in the order of its fields."""
 
     threads: int = 0
     yielders: int = 0
@@ -50,44 +50,46 @@ class Scenario:
     sender: int = 0
 
 
-Taken = Callable[[Meter], Window]
+MeasureFunction = Callable[[Meter], Window]
 
 
 @dataclass(frozen=True, slots=True)
 class Measure:
-    """One row of the table: a name, the scenario it needs, how to take it."""
+    """One row of the table: name, scenario and measuring function."""
 
     name: str
     scenario: Scenario
-    take: Taken
+    take: MeasureFunction
 
 
 def measures() -> Iterator[Measure]:
-    """All rows that are windows between two points, in the order they are printed."""
+    """Yield all measures of a window between two points, in the order of the table."""
     for ready in (2, 4, 8):
         yield Measure(f"preemptive switch, {ready} ready threads", Scenario(threads=ready), preemption(ready))
-    yield Measure("Sys_Yield to a yielded thread", Scenario(yielders=2), switch("latency_yield"))
-    yield Measure("Sys_Yield to a preempted thread", Scenario(threads=1, yielders=1), switch("latency_spin"))
+    yield Measure("Sys_Yield to a yielded thread", Scenario(yielders=2), yield_switch("latency_yield"))
+    yield Measure("Sys_Yield to a preempted thread", Scenario(threads=1, yielders=1), yield_switch("latency_spin"))
     for subscribers in (0, 1, 4):
         for payload in (2, 24):
             what = f"send {payload} bytes, {subscribers} subscriber{'s' if subscribers != 1 else ''}"
-            yield Measure(f"{what}, thread", Scenario(subscribers=subscribers, payload=payload, sender=1), sending)
+            yield Measure(f"{what}, thread", Scenario(subscribers=subscribers, payload=payload, sender=1), send_call)
             scenario = Scenario(threads=1, subscribers=subscribers, payload=payload)
-            yield Measure(f"{what}, ISR", scenario, sending_from_isr)
+            yield Measure(f"{what}, ISR", scenario, send_call_from_isr)
     for events in (8, 16):
         scenario = Scenario(subscribers=1, events=events, sender=1)
-        yield Measure(f"send 2 bytes, 1 subscriber, thread, {events} more events", scenario, sending)
-    yield Measure("send to handler entry", Scenario(subscribers=1, sender=1), reaching("latency_handler"))
-    yield Measure("send to waiting thread running", Scenario(waiters=1, sender=2), reaching("latency_woken"))
+        yield Measure(f"send 2 bytes, 1 subscriber, thread, {events} more events", scenario, send_call)
+    yield Measure("send to handler entry", Scenario(subscribers=1, sender=1), send_until_entry("latency_handler"))
+    yield Measure("send to waiting thread running", Scenario(waiters=1, sender=2), send_until_entry("latency_woken"))
     yield Measure("C interrupt: flag to first instruction", Scenario(threads=1), isr_entry)
     yield Measure("C interrupt: last instruction to interrupted thread", Scenario(threads=1), isr_exit)
-    yield Measure("1 ms clock with nothing to do, thread running", Scenario(threads=1), tick("T1", "_T1Interrupt"))
-    yield Measure("1 ms clock with nothing to do, idle", Scenario(), tick("T1", "_T1Interrupt", "hal_idle"))
-    yield Measure("slice end with one ready thread", Scenario(threads=1), tick("T2", "_T2Interrupt"))
+    yield Measure(
+        "1 ms clock with nothing to do, thread running", Scenario(threads=1), clock_interrupt("T1", "_T1Interrupt")
+    )
+    yield Measure("1 ms clock with nothing to do, idle", Scenario(), clock_interrupt("T1", "_T1Interrupt", "hal_idle"))
+    yield Measure("slice end with one ready thread", Scenario(threads=1), clock_interrupt("T2", "_T2Interrupt"))
 
 
 def run_measures(image: Image, engine: str = "auto") -> dict[str, Window]:
-    """Take all of them. Raises MeasureError when a scenario does not show what it should."""
+    """Take all measures. Raises MeasureError if a scenario does not behave as expected."""
     target = Target(image, "latency_begin", engine)
     taken = {}
     for measure in measures():
@@ -98,7 +100,7 @@ def run_measures(image: Image, engine: str = "auto") -> dict[str, Window]:
             raise MeasureError(f"{measure.name}: {error}") from None
     busy = Scenario(threads=1, yielders=1, subscribers=4, waiters=1, payload=24, sender=1)
     taken.update(masked(_start(target, busy)))
-    busy = Scenario(yielders=1, subscribers=4, waiters=1, payload=24, sender=1)  # no thread that only spins
+    busy = Scenario(yielders=1, subscribers=4, waiters=1, payload=24, sender=1)  # without a spinning thread
     taken["1 ms clock: worst jitter, busy kernel"] = jitter(_start(target, busy), b"")
     traffic = bytes(range(256)) * (JITTER_CYCLES // BYTE_CYCLES // 256 + 1)
     taken["1 ms clock: worst jitter, busy kernel and UART traffic"] = jitter(_start(target, busy), traffic)
@@ -116,8 +118,8 @@ def _running(meter: Meter) -> int:
     return meter.target.words("os_running", 1)[0]
 
 
-def _undisturbed(take: Taken) -> Taken:
-    """The first window without an interrupt in it."""
+def _undisturbed(take: MeasureFunction) -> MeasureFunction:
+    """Wrap a measuring function: return the first window without an interrupt in it."""
 
     def taken(meter: Meter) -> Window:
         for _ in range(ATTEMPTS):
@@ -129,8 +131,8 @@ def _undisturbed(take: Taken) -> Taken:
     return taken
 
 
-def preemption(ready: int) -> Taken:
-    """From T2IF to the first instruction of the next thread, after every thread has been preempted once."""
+def preemption(ready: int) -> MeasureFunction:
+    """Measure from T2IF to the first instruction of the next thread, once every thread has been preempted."""
 
     def take(meter: Meter) -> Window:
         target = meter.target
@@ -138,16 +140,16 @@ def preemption(ready: int) -> Taken:
             target.run_to("_T2Interrupt")
             before = _running(meter)
             spinning = meter.inside("latency_spin")
-            window = meter.follow(lambda: spinning() and meter.machine.state.ipl == 0, meter.rise("T2"))  # noqa: B023
+            window = meter.measure_until(lambda: spinning() and meter.machine.state.ipl == 0, meter.rise("T2"))  # noqa: B023
         if before == _running(meter):
-            raise MeasureError("the same thread went on")
+            raise MeasureError("the same thread continued")
         return window
 
     return take
 
 
-def switch(into: str) -> Taken:
-    """From the call of Sys_Yield to the first instruction of another thread in `into`."""
+def yield_switch(into: str) -> MeasureFunction:
+    """Measure from the call of Sys_Yield to the first instruction of another thread in `into`."""
 
     @_undisturbed
     def take(meter: Meter) -> Window:
@@ -158,7 +160,7 @@ def switch(into: str) -> Taken:
             target.run_to("Sys_Yield")
         before = _running(meter)
         arrived = meter.inside(into)
-        return meter.follow(lambda: arrived() and _running(meter) != before, meter.machine.cycle - CALL_CYCLES)
+        return meter.measure_until(lambda: arrived() and _running(meter) != before, meter.machine.cycle - CALL_CYCLES)
 
     def settled(meter: Meter) -> Window:
         for _ in range(SETTLING):
@@ -169,77 +171,77 @@ def switch(into: str) -> Taken:
 
 
 def _to_send(meter: Meter) -> None:
-    """To the first instruction of Sys_Send_Event, called by the application and by nobody else."""
+    """Run to the first instruction of Sys_Send_Event, called by the application."""
     meter.target.run_to("latency_send")
     meter.target.run_to("Sys_Send_Event")
 
 
 @_undisturbed
-def sending(meter: Meter) -> Window:
-    """From the first instruction of Sys_Send_Event to the one after its call."""
+def send_call(meter: Meter) -> Window:
+    """Measure from the first instruction of Sys_Send_Event to the one after its call."""
     _to_send(meter)
-    return meter.follow(meter.returned())
+    return meter.measure_until(meter.returned())
 
 
 def _interrupt(meter: Meter) -> None:
-    """Let INT1 come while a thread runs at priority 0."""
+    """Raise INT1 while a thread runs at priority 0."""
     meter.target.run_to("latency_spin")
-    meter.follow(lambda: meter.machine.state.ipl == 0)
+    meter.measure_until(lambda: meter.machine.state.ipl == 0)
     meter.request("INT1", DEVICE_LEVEL)
 
 
 @_undisturbed
-def sending_from_isr(meter: Meter) -> Window:
-    """As `sending`, called from a C interrupt function."""
+def send_call_from_isr(meter: Meter) -> Window:
+    """Measure Sys_Send_Event called from a C interrupt function."""
     _interrupt(meter)
     _to_send(meter)
-    return meter.follow(meter.returned())
+    return meter.measure_until(meter.returned())
 
 
 def isr_entry(meter: Meter) -> Window:
-    """From the interrupt flag to the first instruction of the C function."""
+    """Measure from the interrupt flag to the first instruction of the C function."""
     _interrupt(meter)
-    return meter.follow(meter.inside("latency_isr"), meter.rise("INT1"))
+    return meter.measure_until(meter.inside("latency_isr"), meter.rise("INT1"))
 
 
 @_undisturbed
 def isr_exit(meter: Meter) -> Window:
-    """From the C function's return to the next instruction of the interrupted thread."""
+    """Measure from the C function's return to the next instruction of the interrupted thread."""
     _interrupt(meter)
     meter.target.run_to("latency_isr")
     meter.release("INT1")
-    meter.follow(meter.returned())
+    meter.measure_until(meter.returned())
     spinning = meter.inside("latency_spin")
-    return meter.follow(lambda: spinning() and meter.machine.state.ipl == 0)
+    return meter.measure_until(lambda: spinning() and meter.machine.state.ipl == 0)
 
 
-def reaching(name: str) -> Taken:
-    """From the first instruction of Sys_Send_Event to that of the function `name`."""
+def send_until_entry(name: str) -> MeasureFunction:
+    """Measure from the first instruction of Sys_Send_Event to that of the function `name`."""
 
     @_undisturbed
     def take(meter: Meter) -> Window:
         _to_send(meter)
-        return meter.follow(meter.inside(name))
+        return meter.measure_until(meter.inside(name))
 
     return take
 
 
-def tick(irq: str, vector: str, back: str = "latency_spin") -> Taken:
-    """From an interrupt's flag to the next instruction of the function it interrupted, or woke."""
+def clock_interrupt(irq: str, vector: str, back: str = "latency_spin") -> MeasureFunction:
+    """Measure from an interrupt's flag to the next instruction of the function it interrupted, or woke."""
 
     def take(meter: Meter) -> Window:
         for _ in range(2):
             level = meter.level(irq)
             meter.target.run_to(vector)
             there = meter.inside(back)
-            window = meter.follow(lambda: there() and meter.machine.state.ipl < level, meter.rise(irq))  # noqa: B023
+            window = meter.measure_until(lambda: there() and meter.machine.state.ipl < level, meter.rise(irq))  # noqa: B023
         return window
 
     return take
 
 
 def jitter(meter: Meter, traffic: bytes) -> Window:
-    """By how much the time from the clock's flag to its interrupt varies, while UART1 receives `traffic`."""
+    """Measure the variation of the time from the clock's flag to its interrupt, while UART1 receives `traffic`."""
     machine = meter.machine
     late: list[int] = []
 
@@ -252,12 +254,12 @@ def jitter(meter: Meter, traffic: bytes) -> Window:
     stop = machine.run(cycles=JITTER_CYCLES)
     remove()
     if stop.reason != "limit" or len(late) < JITTER_CYCLES // 14_746:
-        raise MeasureError(f"the clock was watched {len(late)} times only: {stop.reason} {stop.detail}")
+        raise MeasureError(f"only {len(late)} clock interrupts occurred: {stop.reason} {stop.detail}")
     return Window(max(late) - min(late), False)
 
 
 def masked(meter: Meter) -> dict[str, Window]:
-    """Longest time in which interrupts of priority 1..7 were held back, while everything goes on at once."""
+    """Measure the longest time in which interrupts of priority 1..7 are masked, in the busiest scenario."""
     machine = meter.machine
     longest = {level: Window(0, False) for level in range(1, 8)}
     since: dict[int, tuple[int, str]] = {}

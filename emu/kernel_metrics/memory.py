@@ -1,8 +1,8 @@
-"""The memory equation, measured: RAM = A + B n + C m + D s + sum over pending messages of (E + d).
+"""Measurement of the memory equation: RAM = A + B n + C m + D s + sum over pending messages of (E + d).
 
-The `footprint` application makes a load of n threads, m events, s subscriptions and messages of d bytes; what it takes
-is seen from outside, as the heap's capacity less its reserve and its tree of holes (kernel/memory.c).
-The allocator's own count must say the same.
+The `footprint` application builds a load of n threads, m events, s subscriptions and messages of d bytes. The emulator
+reads the heap: used memory is the capacity minus the reserve and the free blocks (kernel/memory.c). The allocator's own
+count must agree.
 """
 
 from __future__ import annotations
@@ -18,37 +18,37 @@ from emu.kernel_metrics.owners import DEVICES, KERNEL, sizes_by_owner
 from emu.kernel_metrics.target import WORD, MeasureError, Target
 
 APPLICATION: Final = "footprint_wanted"
-"""Symbol by which the application is told."""
+"""Symbol that identifies the application."""
 
 PAPER: Final = {"A": 1142, "B": 146, "C": 6}
 """Eq. (1) of the paper (Trenkwalder et al., IROS 2016); it has no term for subscriptions."""
 ORIGINAL: Final = {"B": 228, "C": 12, "D": 24, "E": 26}
-"""What the original's allocator really takes: 28 bytes per pending message of 2 (openswarm-original.md §4.6)."""
+"""Bytes that the original's allocator takes: 28 per pending message of 2 (openswarm-original.md §4.6)."""
 
 PAPER_ROM: Final = 12 * 1024
-"""With motors, UART and remote control (openswarm-original.md §1)."""
+"""ROM of the paper, with motors, UART and remote control (openswarm-original.md §1)."""
 ORIGINAL_ROM: Final = {"kernel": 9072, "devices": 12288}
-"""Decoded from the authors' own image (openswarm-original.md §1)."""
+"""ROM of the original, decoded from the authors' image (openswarm-original.md §1)."""
 
 _APPLICATION: Final = ("_footprint_wanted", "_footprint_now", "_pids", "_any")
-"""Variables of the application itself, which are no cost of the kernel."""
+"""Variables of the application itself, which do not count for the kernel."""
 OF_DEVICES: Final = ("device", "UART")
-"""Words by which parts of A are told that the kernel alone would not have."""
+"""Substrings that identify the parts of A that belong to devices."""
 KERNEL_EVENTS: Final = (0x01, 0x07)
 """Events Sys_Init_Kernel registers for itself: termination and 1 ms (openswarm.h)."""
 EVENT: Final = 6
 """Bytes of a registered event (kernel.h)."""
 _PIECES: Final = (("reserve_begin", "reserve_end"), ("free_run", "free_run_end"))
-"""Variables that hold the ends of free pieces that are no holes: the reserve, and what is given back in this moment."""
+"""Variables with the ends of free ranges outside the free blocks: the reserve, and the block being freed."""
 _SIZE: Final = 4
-"""Offset of the size in a hole (kernel/memory.c)."""
+"""Offset of the size in a free block (kernel/memory.c)."""
 _RESULT_WORDS: Final = 6
 _LONGEST_LIST: Final = 4096
 
 
 @dataclass(frozen=True, slots=True)
 class Load:
-    """What the application is asked to build."""
+    """Load that the application is to build."""
 
     threads: int = 0
     events: int = 0
@@ -58,19 +58,19 @@ class Load:
 
     @property
     def payload_bytes(self) -> int:
-        """Payload of all messages as stored: memory is handed out in words."""
+        """Bytes of all payloads as stored: the allocator hands out whole words."""
         return self.messages * (self.payload + self.payload % WORD)
 
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """A load and the bytes it took, as seen from outside and as the allocator counts."""
+    """A load and its memory, as read from the heap and as counted by the allocator."""
 
     load: Load
     taken: int
     counted: int
     left: int
-    """Bytes still taken after everything was given back, less those of the empty kernel."""
+    """Bytes still allocated after everything was freed, minus those of the empty kernel."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,11 +79,11 @@ class Equation:
 
     coefficients: dict[str, Fraction]
     constant: dict[str, int]
-    """What A consists of, in bytes."""
+    """Parts of A, in bytes."""
     sizes: dict[str, dict[str, int]]
     """ROM and A of the kernel alone and of the kernel with its devices, in bytes."""
     heap: int
-    """Capacity of the heap, which is no part of A."""
+    """Capacity of the heap, which is not part of A."""
     residual: Fraction
     cases: list[Case]
 
@@ -94,16 +94,16 @@ class Heap:
     def __init__(self, target: Target) -> None:
         self._target: Final = target
         self.capacity: Final = self.free() + target.words("os_statistics", 1)[0]
-        """Bytes of the whole heap: what is free plus what the kernel had taken for itself when first looked at."""
+        """Bytes of the whole heap: free bytes plus those that the kernel had allocated at the first read."""
 
     def free(self) -> int:
-        """Bytes of the reserve and of all holes."""
+        """Return the bytes of the reserve and of all free blocks."""
         target = self._target
         free = sum(target.word(target.address(end)) - target.word(target.address(begin)) for begin, end in _PIECES)
         return free + sum(target.word(hole + _SIZE) for hole in self._holes())
 
     def _holes(self) -> Iterator[int]:
-        """Addresses of the holes. Raises MeasureError if a side leads to a larger hole, or for ever."""
+        """Yield the addresses of the free blocks. Raises MeasureError if their tree is not a heap by size."""
         found = [self._target.word(self._target.address("holes"))]
         no_hole = self._target.address("no_hole")
         seen = 0
@@ -115,23 +115,23 @@ class Heap:
             sides = [self._target.word(hole + WORD * side) for side in range(2)]
             size = self._target.word(hole + _SIZE)
             if seen > _LONGEST_LIST or any(self._target.word(side + _SIZE) > size for side in sides):
-                raise MeasureError("the holes of the kernel's heap are not a heap on their sizes")
+                raise MeasureError("the tree of free blocks in the kernel's memory is not a heap by size")
             found += sides
             yield hole
 
-    def taken(self) -> int:
-        """Bytes handed out."""
+    def used(self) -> int:
+        """Return the allocated bytes."""
         return self.capacity - self.free()
 
     def events(self) -> Iterator[int]:
-        """Identifiers of all registered events."""
+        """Yield the identifiers of all registered events."""
         target = self._target
         for bucket in range(target.address("events"), target.address("events") + target.size("events"), WORD):
             for event in self._list(target.word(bucket), WORD):
                 yield target.word(event)
 
     def _list(self, block: int, link: int = 0) -> Iterator[int]:
-        """Addresses along a list whose elements are linked at offset `link`."""
+        """Yield the addresses of a list whose elements are linked at offset `link`."""
         for _ in range(_LONGEST_LIST):
             if not block:
                 return
@@ -145,17 +145,17 @@ def measure(image: Image, engine: str = "auto") -> Equation:
     target = Target(image, "footprint_begin", engine)
     heap = Heap(target)
     target.run_to("footprint_empty")
-    empty = heap.taken()
+    empty = heap.used()
     cases = [_case(target, heap, load, empty) for load in loads()]
     for case in cases:
         if case.taken != case.counted or case.left:
-            raise MeasureError(f"{case}: memory seen, counted by the allocator and given back do not agree")
+            raise MeasureError(f"{case}: the memory read, counted by the allocator and freed does not agree")
     own = EVENT * sum(1 for number in heap.events() if number in KERNEL_EVENTS)
     return _fit(cases, _constant(target, heap, empty, own), _roms(image), heap.capacity)
 
 
 def loads() -> Iterator[Load]:
-    """n = 0..8, m = 0..16, s = 0..16, messages of several sizes, and everything together."""
+    """Yield all loads: n = 0..8, m = 0..16, s = 0..16, messages of several sizes, and combinations."""
     yield from (Load(threads=n) for n in range(9))
     yield from (Load(events=m) for m in range(1, 17))
     yield from (Load(events=8, subscriptions=s) for s in range(1, 17))
@@ -172,14 +172,14 @@ def _case(target: Target, heap: Heap, load: Load, empty: int) -> Case:
     target.run_to("footprint_built")
     result = target.words("footprint_now", _RESULT_WORDS)
     if tuple(result[:4]) != request[:4]:
-        raise MeasureError(f"asked for {request[:4]} threads, events, subscriptions, messages; got {tuple(result[:4])}")
-    taken, counted = heap.taken() - empty, result[4] - empty
+        raise MeasureError(f"requested {request[:4]} threads, events, subscriptions, messages; got {tuple(result[:4])}")
+    taken, counted = heap.used() - empty, result[4] - empty
     target.run_to("footprint_undone")
-    return Case(load, taken, counted, heap.taken() - empty)
+    return Case(load, taken, counted, heap.used() - empty)
 
 
 def _constant(target: Target, heap: Heap, empty: int, own: int) -> dict[str, int]:
-    """The parts of A: RAM that is there before the first thread, heap capacity and the application's own left out."""
+    """Return the parts of A: RAM in use before the first thread, without the heap and the application's variables."""
     parts = {
         "kernel stack": target.size("os_memory") - heap.capacity,
         "kernel events": own,
@@ -194,20 +194,20 @@ def _constant(target: Target, heap: Heap, empty: int, own: int) -> dict[str, int
 
 
 def _roms(image: Image) -> dict[str, int]:
-    """ROM of the kernel alone and with its devices."""
+    """Return the ROM of the kernel alone and with its devices."""
     owned = sizes_by_owner(image)
     return {KERNEL: owned[KERNEL].rom, DEVICES: owned[KERNEL].rom + owned[DEVICES].rom}
 
 
 def _part_of(module: str) -> str:
-    """Whose variables those of a source file are."""
+    """Return the part of A to which the variables of a source file belong."""
     folders = {"/kernel/": "kernel variables", "/port/": "kernel variables", "/io/": "device variables",
                "/board/": "device variables"}  # fmt: skip
     return next((part for folder, part in folders.items() if folder in f"/{module}"), "library variables, padding")
 
 
 def _fit(cases: list[Case], parts: dict[str, int], roms: dict[str, int], capacity: int) -> Equation:
-    """Slopes from single-parameter loads; the residual is taken over all of them."""
+    """Fit the equation: slopes from single-parameter loads; the residual covers all loads."""
     by_load = {case.load: case.taken for case in cases}
 
     def slope(many: Load, few: Load, difference: int) -> Fraction:

@@ -1,7 +1,6 @@
-"""Exact cycles between two points of a running kernel, and the source lines they were spent on.
+"""Exact cycles between two points of a running kernel, by source line.
 
-What enters: a `Target` that stands where the count begins. What leaves: a `Window`. The machine is stepped, so a window
-costs host time by the instruction; getting to its beginning does not.
+Input: a `Target` stopped at the first point. Output: a `Window`. The machine single-steps within a window only.
 """
 
 from __future__ import annotations
@@ -15,32 +14,32 @@ from emu.kernel_metrics.target import MeasureError, Target
 from emu.system.device import flag_since
 from emu.system.events import NEVER
 
-LONGEST: Final = 100_000
-"""Tcy after which a window that has not ended will not."""
+MAX_WINDOW_CYCLES: Final = 100_000
+"""Tcy after which the end of a window counts as unreachable."""
 STACK_POINTER: Final = 15
 CALL_BYTES: Final = 4
-"""What a call pushes (isa.md §7.4)."""
+"""Bytes that a call pushes (isa.md §7.4)."""
 
 
 @dataclass(slots=True)
 class Window:
-    """`cycles` from the beginning to the end; `where` says on which source lines (or symbols)."""
+    """`cycles` from the beginning to the end; `where` has the cycles by source line (or symbol)."""
 
     cycles: int
     interrupted: bool
-    """An exception was entered in between."""
+    """Whether an exception was entered in between."""
     where: Counter[str] = field(default_factory=Counter)
 
 
 class Meter:
-    """Follows a machine from boundary to boundary."""
+    """Measures windows by running a machine from instruction to instruction."""
 
     def __init__(self, target: Target) -> None:
         self.target: Final = target
         self.machine: Final = target.machine
 
-    def follow(self, end: Callable[[], bool], start: int | None = None) -> Window:
-        """Step until `end()` is true at an instruction boundary. `start`: cycle from which to count (default: now)."""
+    def measure_until(self, end: Callable[[], bool], start: int | None = None) -> Window:
+        """Step until `end()` is true at an instruction boundary. `start`: first counted cycle (default: now)."""
         machine = self.machine
         begin = machine.cycle if start is None else start
         window = Window(0, False)
@@ -48,8 +47,10 @@ class Meter:
             window.where["(before the first instruction)"] = machine.cycle - begin
         while True:
             cycle, pc = machine.cycle, machine.pc
-            if machine.service_boundary(NEVER) is not None or cycle - begin > LONGEST:
-                raise MeasureError(f"the end was not reached: {self.place(machine.pc)}, {cycle - begin} cycles on")
+            if machine.service_boundary(NEVER) is not None or cycle - begin > MAX_WINDOW_CYCLES:
+                raise MeasureError(
+                    f"the end was not reached within {cycle - begin} cycles; the program is at {self.place(machine.pc)}"
+                )
             if machine.pc != pc:
                 window.interrupted = True
                 window.where["(exception entry)"] += machine.cycle - cycle
@@ -62,32 +63,32 @@ class Meter:
             window.where[place] += machine.cycle - cycle
 
     def place(self, pc: int) -> str:
-        """Source line of an address, or its symbol."""
+        """Return the source line of an address, or its symbol."""
         line = self.target.image.lines.find(pc)
         return str(line) if line else self.target.image.symbols.text(pc).split("+")[0]
 
     def inside(self, name: str) -> Callable[[], bool]:
-        """A condition: the next instruction belongs to the function `name`."""
+        """Return a condition: the next instruction belongs to the function `name`."""
         first = self.target.address(name)
         last = first + (self.target.size(name) or 2)
         return lambda: first <= self.machine.pc < last
 
     def returned(self) -> Callable[[], bool]:
-        """A condition: the function whose first instruction comes next has returned."""
+        """Return a condition: the function whose first instruction is next has returned."""
         machine = self.machine
         stack = machine.w[STACK_POINTER] - CALL_BYTES
         back = (machine.peek(stack + 2) & 0x7F) << 16 | machine.peek(stack)
         return lambda: machine.pc == back and machine.w[STACK_POINTER] == stack
 
     def rise(self, irq_name: str) -> int:
-        """Cycle in which an interrupt flag rose last."""
+        """Return the cycle in which an interrupt flag last rose."""
         chip, record = self.machine.chip, self.machine.record
         source = next(s for s in chip.interrupts.values() if s.name == irq_name)
         register, bit = source.flag
         return int(record.u64[flag_since(record, chip.sfrs[register].address, bit)])
 
     def level(self, irq_name: str) -> int:
-        """Priority an interrupt has been given."""
+        """Return the configured priority of an interrupt."""
         source = next(s for s in self.machine.chip.interrupts.values() if s.name == irq_name)
         group, shift = source.priority
         return int(self.machine.peek(group)) >> shift & 7

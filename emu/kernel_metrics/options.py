@@ -1,7 +1,7 @@
-"""What the kernel's options cost: cycles of their calls, bytes of code, variables and objects.
+"""Cost of the kernel's options: cycles of their calls, bytes of code, variables and objects.
 
-The `options` application plays a scene; each window is counted from outside, between symbols, as in `latency`. Every
-number is exact and repeats exactly.
+The `options` application plays a scene. The emulator counts cycles between symbols, as in `latency`. Every number is
+exact and repeats exactly.
 """
 
 from __future__ import annotations
@@ -12,11 +12,11 @@ from typing import Final
 from emu.image.footprint import pieces
 from emu.image.model import Image
 from emu.kernel_metrics.meter import Meter, Window
-from emu.kernel_metrics.shares import handles
+from emu.kernel_metrics.owners import handles
 from emu.kernel_metrics.target import MeasureError, Target
 
 APPLICATION: Final = "options_wanted"
-"""Symbol by which the application is told."""
+"""Symbol that identifies the application."""
 SCENES: Final = (
     *("LOCK", "LOCK_SECOND", "LOCK_TAKEN", "UNLOCK", "UNLOCK_SECOND", "UNLOCK_ONE_WAITS", "UNLOCK_TWO_WAIT"),
     *("UNLOCK_SECOND_ONE_WAITS", "UNLOCK_PRIORITIES", "UNLOCK_TO_BETTER", "START", "START_JOINABLE"),
@@ -35,100 +35,100 @@ SCENES: Final = (
     *("SEND_REPLACED", "SEND_SECOND_QUOTA", "SEND_NEIGHBOUR", "SEND_ELSEWHERE", "START_SERVICE", "FEED"),
     *("FEED_BEHIND_TWO", "TICK", "TICK_SERVICE"),
 )
-"""As the enumeration of firmware/apps/options/options.h."""
+"""Scenes in the order of the enumeration in firmware/apps/options/options.h."""
 OPTIONS: Final = ("mutex", "join", "cleanup", "quota", "service", "woken_first")
-"""Files of firmware/openswarm/option."""
+"""Options by their files in firmware/openswarm/option."""
 KERNEL_PARTS: Final = {"_os_call_in_section": "cleanup", "_event_bucket": "quota"}
-"""Functions of the kernel that are linked for an option alone."""
+"""Kernel functions that are linked for one option only."""
 OBJECTS: Final = {"sys_mutex": "mutex", "sys_cleanup": "cleanup", "sys_quota": "quota", "sys_service": "service"}
-"""Type, and the option one of which the application calls `options_` and that name."""
+"""Object types, and the suffix of the application's variable `options_NAME` of that type."""
 HEAP: Final = (("a quota", "LIMIT", "options_done"), ("a zombie", "JOIN_ZOMBIE", "options_done"))
-"""What is taken from, or given back to, the heap between `options_ready` and another stop of a scene."""
+"""(what, scene, stop): heap changes measured between `options_ready` and another stop of a scene."""
 _ENDS_LATER: Final = ("END", "END_JOINED", "END_CLEANED", "TICK", "TICK_SERVICE")
-"""Scenes whose window begins when time has passed."""
+"""Scenes whose window begins after a delay."""
 
-Taken = Callable[[Meter], Window]
+MeasureFunction = Callable[[Meter], Window]
 
 
-def returning(call: str) -> Taken:
-    """From the first instruction of a call to the one behind it."""
+def until_return(call: str) -> MeasureFunction:
+    """Measure from the first instruction of a call to the one after it."""
 
     def take(meter: Meter) -> Window:
         meter.target.run_to(call)
-        return meter.follow(meter.returned())
+        return meter.measure_until(meter.returned())
 
     return take
 
 
-def reaching(call: str, place: str) -> Taken:
-    """From the first instruction of a call to that of a function, or to where a thread goes on in it."""
+def until_entry(call: str, place: str) -> MeasureFunction:
+    """Measure from the first instruction of a call to the entry of a function, or to a thread's resumption in it."""
 
     def take(meter: Meter) -> Window:
         meter.target.run_to(call)
         there = meter.inside(place)
-        return meter.follow(lambda: there() and meter.machine.state.ipl == 0)
+        return meter.measure_until(lambda: there() and meter.machine.state.ipl == 0)
 
     return take
 
 
-def measures() -> Iterator[tuple[str, str, Taken]]:
-    """(name, scene, how it is taken) of every row, in the order they are printed."""
+def measures() -> Iterator[tuple[str, str, MeasureFunction]]:
+    """Yield (name, scene, measuring function) of every row, in the order of the table."""
     lock, unlock, send = "Sys_Lock_Mutex", "Sys_Unlock_Mutex", "Sys_Send_Event"
-    yield f"{lock}", "LOCK", returning(lock)
-    yield f"{lock}, another thread owns another", "LOCK_SECOND", returning(lock)
-    yield f"{lock} of another thread's, to the next thread", "LOCK_TAKEN", reaching(lock, "options_spin")
-    yield f"{unlock}", "UNLOCK", returning(unlock)
-    yield f"{unlock}, another thread owns another", "UNLOCK_SECOND", returning(unlock)
-    yield f"{unlock}, one thread waits", "UNLOCK_ONE_WAITS", returning(unlock)
-    yield f"{unlock}, two threads wait", "UNLOCK_TWO_WAIT", returning(unlock)
-    yield f"{unlock}, one waits, another owns another", "UNLOCK_SECOND_ONE_WAITS", returning(unlock)
-    yield f"{unlock}, fixed priorities", "UNLOCK_PRIORITIES", returning(unlock)
-    yield f"{unlock}, a better thread waits, to that", "UNLOCK_TO_BETTER", reaching(unlock, "options_woken")
-    yield f"{unlock}, a better thread locks, unlocks, sleeps", "UNLOCK_TO_BETTER", returning(unlock)
-    yield "Sys_Start_ProcessWith, for comparison", "START", returning("Sys_Start_ProcessWith")
-    yield "Sys_Start_Joinable", "START_JOINABLE", returning("Sys_Start_Joinable")
-    yield "Sys_Join of a zombie", "JOIN_ZOMBIE", returning("Sys_Join")
-    yield "Sys_Join of a living thread, to the next thread", "JOIN_LIVING", reaching("Sys_Join", "options_spin")
-    yield "end of a thread, to the next, for comparison", "END", reaching("os_thread_returned", "options_spin")
-    yield "end of a thread, to the one that joins it", "END_JOINED", reaching("os_thread_returned", "options_woken")
-    yield "Sys_Push_Cleanup", "PUSH", returning("Sys_Push_Cleanup")
-    yield "Sys_Push_Cleanup, two of others are there", "PUSH_BEHIND_TWO", returning("Sys_Push_Cleanup")
-    yield "Sys_Pop_Cleanup", "POP", returning("Sys_Pop_Cleanup")
-    yield "Sys_Pop_Cleanup, an empty function is run", "POP_AND_RUN", returning("Sys_Pop_Cleanup")
-    yield "Sys_Pop_Cleanup, two of others are newer", "POP_BEHIND_TWO", returning("Sys_Pop_Cleanup")
-    yield "end of a thread, to its cleanup", "END_CLEANED", reaching_on_kernel_stack("options_woken")
-    yield "Sys_Limit_Event", "LIMIT", returning("Sys_Limit_Event")
-    yield "send 2 bytes, for comparison", "SEND", returning(send)
-    yield "send 2 bytes, limited", "SEND_LIMITED", returning(send)
-    yield "send 2 bytes, limited, four wait", "SEND_LIMITED_BEHIND_FOUR", returning(send)
-    yield "send 2 bytes, limited, a newer quota", "SEND_SECOND_QUOTA", returning(send)
-    yield "send 2 bytes, limited, dropped", "SEND_DROPPED", returning(send)
-    yield "send 2 bytes, the latest is replaced", "SEND_REPLACED", returning(send)
-    yield "send 2 bytes, another event of the bucket is limited", "SEND_NEIGHBOUR", returning(send)
-    yield "send 2 bytes, an event elsewhere is limited", "SEND_ELSEWHERE", returning(send)
-    yield "Sys_Start_Service", "START_SERVICE", returning("Sys_Start_Service")
-    yield "Sys_Feed_Watchdog", "FEED", returning("Sys_Feed_Watchdog")
-    yield "Sys_Feed_Watchdog, two services are newer", "FEED_BEHIND_TWO", returning("Sys_Feed_Watchdog")
-    yield "1 ms clock, idle, for comparison", "TICK", idle_again
-    yield "1 ms clock, idle, one service", "TICK_SERVICE", idle_again
+    yield f"{lock}", "LOCK", until_return(lock)
+    yield f"{lock}, another thread owns another", "LOCK_SECOND", until_return(lock)
+    yield f"{lock} of another thread's, to the next thread", "LOCK_TAKEN", until_entry(lock, "options_spin")
+    yield f"{unlock}", "UNLOCK", until_return(unlock)
+    yield f"{unlock}, another thread owns another", "UNLOCK_SECOND", until_return(unlock)
+    yield f"{unlock}, one thread waits", "UNLOCK_ONE_WAITS", until_return(unlock)
+    yield f"{unlock}, two threads wait", "UNLOCK_TWO_WAIT", until_return(unlock)
+    yield f"{unlock}, one waits, another owns another", "UNLOCK_SECOND_ONE_WAITS", until_return(unlock)
+    yield f"{unlock}, fixed priorities", "UNLOCK_PRIORITIES", until_return(unlock)
+    yield f"{unlock}, a better thread waits, to that", "UNLOCK_TO_BETTER", until_entry(unlock, "options_woken")
+    yield f"{unlock}, a better thread locks, unlocks, sleeps", "UNLOCK_TO_BETTER", until_return(unlock)
+    yield "Sys_Start_ProcessWith, for comparison", "START", until_return("Sys_Start_ProcessWith")
+    yield "Sys_Start_Joinable", "START_JOINABLE", until_return("Sys_Start_Joinable")
+    yield "Sys_Join of a zombie", "JOIN_ZOMBIE", until_return("Sys_Join")
+    yield "Sys_Join of a living thread, to the next thread", "JOIN_LIVING", until_entry("Sys_Join", "options_spin")
+    yield "end of a thread, to the next, for comparison", "END", until_entry("os_thread_returned", "options_spin")
+    yield "end of a thread, to the one that joins it", "END_JOINED", until_entry("os_thread_returned", "options_woken")
+    yield "Sys_Push_Cleanup", "PUSH", until_return("Sys_Push_Cleanup")
+    yield "Sys_Push_Cleanup, two of others are there", "PUSH_BEHIND_TWO", until_return("Sys_Push_Cleanup")
+    yield "Sys_Pop_Cleanup", "POP", until_return("Sys_Pop_Cleanup")
+    yield "Sys_Pop_Cleanup, an empty function is run", "POP_AND_RUN", until_return("Sys_Pop_Cleanup")
+    yield "Sys_Pop_Cleanup, two of others are newer", "POP_BEHIND_TWO", until_return("Sys_Pop_Cleanup")
+    yield "end of a thread, to its cleanup", "END_CLEANED", until_entry_on_kernel_stack("options_woken")
+    yield "Sys_Limit_Event", "LIMIT", until_return("Sys_Limit_Event")
+    yield "send 2 bytes, for comparison", "SEND", until_return(send)
+    yield "send 2 bytes, limited", "SEND_LIMITED", until_return(send)
+    yield "send 2 bytes, limited, four wait", "SEND_LIMITED_BEHIND_FOUR", until_return(send)
+    yield "send 2 bytes, limited, a newer quota", "SEND_SECOND_QUOTA", until_return(send)
+    yield "send 2 bytes, limited, dropped", "SEND_DROPPED", until_return(send)
+    yield "send 2 bytes, the latest is replaced", "SEND_REPLACED", until_return(send)
+    yield "send 2 bytes, another event of the bucket is limited", "SEND_NEIGHBOUR", until_return(send)
+    yield "send 2 bytes, an event elsewhere is limited", "SEND_ELSEWHERE", until_return(send)
+    yield "Sys_Start_Service", "START_SERVICE", until_return("Sys_Start_Service")
+    yield "Sys_Feed_Watchdog", "FEED", until_return("Sys_Feed_Watchdog")
+    yield "Sys_Feed_Watchdog, two services are newer", "FEED_BEHIND_TWO", until_return("Sys_Feed_Watchdog")
+    yield "1 ms clock, idle, for comparison", "TICK", clock_until_idle
+    yield "1 ms clock, idle, one service", "TICK_SERVICE", clock_until_idle
 
 
-def reaching_on_kernel_stack(place: str) -> Taken:
-    """From the end of a thread to the first instruction of a function that runs on the kernel stack."""
+def until_entry_on_kernel_stack(place: str) -> MeasureFunction:
+    """Measure from the end of a thread to the entry of a function that runs on the kernel stack."""
 
     def take(meter: Meter) -> Window:
         meter.target.run_to("os_thread_returned")
-        return meter.follow(meter.inside(place))
+        return meter.measure_until(meter.inside(place))
 
     return take
 
 
-def idle_again(meter: Meter) -> Window:
-    """From the clock's flag until everything is worked off and the kernel idles again."""
+def clock_until_idle(meter: Meter) -> Window:
+    """Measure from the clock's flag until the kernel is idle again."""
     for _ in range(2):
         meter.target.run_to("_T1Interrupt")
         idle = meter.target.address("hal_idle")
-        window = meter.follow(lambda: meter.machine.pc == idle, meter.rise("T1"))  # noqa: B023
+        window = meter.measure_until(lambda: meter.machine.pc == idle, meter.rise("T1"))  # noqa: B023
     return window
 
 
@@ -140,7 +140,7 @@ def _play(target: Target, scene: str, stop: str = "options_ready") -> Meter:
 
 
 def run_measures(image: Image, engine: str = "auto") -> dict[str, Window]:
-    """Take all of them. Raises MeasureError when a scene does not show what it should."""
+    """Take all measures. Raises MeasureError if a scene does not behave as expected."""
     target = Target(image, "options_begin", engine)
     taken: dict[str, Window] = {}
     for name, scene, take in measures():
@@ -151,12 +151,12 @@ def run_measures(image: Image, engine: str = "auto") -> dict[str, Window]:
         except MeasureError as error:
             raise MeasureError(f"{name}: {error}") from None
         if scene not in _ENDS_LATER and target.words("now_ms", 1) != before:
-            raise MeasureError(f"{name}: the clock came in between")
+            raise MeasureError(f"{name}: disturbed by the clock interrupt")
     return taken
 
 
 def sizes(image: Image, engine: str = "auto") -> dict[str, int]:
-    """Bytes by name: ROM and RAM of each option, of its objects, and what it takes from the heap."""
+    """Return bytes by name: ROM and RAM of each option and of its objects, and its heap use."""
     target = Target(image, "options_begin", engine)
     found: dict[str, int] = {}
     parts = pieces(image)

@@ -1,7 +1,7 @@
-"""A measuring application under control: stops, words of its request and result, snapshots between cases.
+"""Control of a measuring application: stops, request and result words, snapshots between cases.
 
-What enters: an image with the symbols of one of the kernel's measuring applications. What leaves: a machine that stands
-where it is wanted, and numbers read from its memory without side effects.
+Input: an image with the symbols of one of the kernel's measuring applications. Output: a machine stopped at a symbol,
+and numbers read from its memory without side effects.
 """
 
 from __future__ import annotations
@@ -13,12 +13,12 @@ from emu.image.model import Image
 from emu.machine.machine import Machine
 
 WORD: Final = 2
-PATIENCE: Final = 50_000_000
-"""Tcy after which a stop that was not reached will not be."""
+STOP_TIMEOUT_CYCLES: Final = 50_000_000
+"""Tcy after which a stop counts as unreachable."""
 
 
 class MeasureError(Exception):
-    """The application did not do what its README says."""
+    """The application did not behave as its README specifies."""
 
 
 class Target:
@@ -32,18 +32,18 @@ class Target:
         self._start: Final = self.machine.snapshot()
 
     def restart(self) -> None:
-        """Back to the `begin` stop."""
+        """Return to the `begin` stop."""
         self.machine.restore(self._start)
 
     def address(self, name: str) -> int:
-        """Address of a symbol. Raises MeasureError if the image lacks it."""
+        """Return the address of a symbol. Raises MeasureError if the image lacks it."""
         symbol = self.image.symbols.find(name)
         if symbol is None:
             raise MeasureError(f"{self.image.path} has no symbol {name!r}")
         return symbol.address
 
     def size(self, name: str) -> int:
-        """Size of a symbol in its own units; up to the next symbol where the compiler tells none."""
+        """Return the size of a symbol in its own units; without a recorded size, the distance to the next symbol."""
         symbol = self.image.symbols.find(name)
         if symbol is None or symbol.size:
             return symbol.size if symbol is not None else 0
@@ -51,11 +51,11 @@ class Target:
         return min(behind, default=symbol.address) - symbol.address
 
     def word(self, address: int) -> int:
-        """A word of RAM."""
+        """Return a word of RAM."""
         return self.machine.peek(address)
 
     def words(self, name: str, count: int) -> list[int]:
-        """The first words of a variable."""
+        """Return the first words of a variable."""
         address = self.address(name)
         return [self.word(address + WORD * index) for index in range(count)]
 
@@ -66,11 +66,11 @@ class Target:
             self.machine.poke(address + WORD * index, value)
 
     def run_to(self, name: str) -> None:
-        """Run until the program counter stands at a symbol. Raises MeasureError if that does not happen."""
+        """Run until the program counter reaches a symbol. Raises MeasureError if it does not."""
         address = self.address(name)
         remove = self.machine.hook_pc(address, lambda: True)
         try:
-            stop = self.machine.run(cycles=PATIENCE)
+            stop = self.machine.run(cycles=STOP_TIMEOUT_CYCLES)
         finally:
             remove()
         if stop.reason != "breakpoint" or stop.pc != address:

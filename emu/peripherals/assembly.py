@@ -8,7 +8,7 @@ from typing import Final
 
 from emu.chips.chip import Chip
 from emu.peripherals.adc.adc import Adc
-from emu.peripherals.base import IDLE, SLEEP, StateCell, ChipContext, CpuSignals, Peripheral
+from emu.peripherals.base import IDLE, SLEEP, ChipContext, CpuSignals, Peripheral, StateCell
 from emu.peripherals.can.can import Can
 from emu.peripherals.i2c.i2c import I2c
 from emu.peripherals.interrupt_lines import Interrupts

@@ -1,1 +1,1 @@
-"""Where cycles go: `shares` counts them, `follow` knows who called whom, the rest writes files for viewers."""
+"""Profiling: `cycle_shares` counts cycles, `call_graph` reconstructs calls, the other modules write viewer files."""

@@ -1,8 +1,9 @@
-/* Who called whom, followed from the notes of emu/dspic30f/cycle_accounting.py: stacks of frames, one for each stack of the
-   firmware, and for every place of a call how often it called what and how long that took.
+/* Call graph, built from the records of emu/dspic30f/cycle_accounting.py: one stack of frames for each stack of the
+   firmware, and for every call site the callee, the number of calls and their cycles.
 
-   A return belongs to the call whose return address lay where it takes its own from. So a return into another stack is a
-   switch of threads, and what is left above is gone. Time asleep, in interrupts and in other threads is nobody's time. */
+   A return belongs to the call whose return address was stored at the address from which the return reads. A return into
+   another stack is therefore a thread switch, and frames above it are dropped. Time in Sleep, in interrupts and in other
+   threads is attributed to no function. */
 typedef unsigned char u8;
 typedef unsigned short u16;
 typedef unsigned int u32;
@@ -19,8 +20,8 @@ typedef struct { u64 cycle, since; u32 what, stack, level, entry, site, length; 
 typedef struct {
     u64 now;
     u32 current, lost, edges, spare;
-    CallEvent *turn;
-    u64 turns;
+    CallEvent *event;
+    u64 events;
     CallEdge edge[EDGES];
     Stack stack[STACKS];
 } CallGraph;
@@ -40,17 +41,17 @@ static u32 edge_of(CallGraph *t, u32 site, u32 entry) {
     return at;
 }
 
-static void tell(CallGraph *t, u32 what, const Frame *f, u64 since, u32 length) {
-    if (!t->turn) return;
-    CallEvent *turn = &t->turn[t->turns++];
-    turn->cycle = t->now;
-    turn->since = since;
-    turn->what = what;
-    turn->stack = t->current;
-    turn->level = f ? f->level : 0;
-    turn->entry = f ? f->entry : 0;
-    turn->site = f ? f->site : 0;
-    turn->length = length;
+static void record_event(CallGraph *t, u32 what, const Frame *f, u64 since, u32 length) {
+    if (!t->event) return;
+    CallEvent *event = &t->event[t->events++];
+    event->cycle = t->now;
+    event->since = since;
+    event->what = what;
+    event->stack = t->current;
+    event->level = f ? f->level : 0;
+    event->entry = f ? f->entry : 0;
+    event->site = f ? f->site : 0;
+    event->length = length;
 }
 
 static void push(CallGraph *t, u64 start, u32 site, u32 entry, u32 place, u32 level, u64 since) {
@@ -64,11 +65,11 @@ static void push(CallGraph *t, u64 start, u32 site, u32 entry, u32 place, u32 le
     t->edge[f->edge].calls++;
     u64 now = t->now;
     t->now = start;
-    tell(t, OPEN, f, since, 0);
+    record_event(t, OPEN, f, since, 0);
     t->now = now;
 }
 
-/* The top frame of the present stack ends. Inclusive time of recursion counts for the outermost call. */
+/* End the top frame of the current stack. Inclusive time of recursion counts for the outermost call. */
 static void pop(CallGraph *t) {
     Stack *s = &t->stack[t->current];
     Frame *f = &s->frame[--s->depth];
@@ -87,7 +88,7 @@ static void pop(CallGraph *t) {
         if (!e->least || own < e->least) e->least = own;
     }
     if (s->depth) s->frame[s->depth - 1].stolen += f->level ? all : f->stolen;
-    tell(t, CLOSE, f, 0, 0);
+    record_event(t, CLOSE, f, 0, 0);
 }
 
 static void to_stack(CallGraph *t, u32 other) {
@@ -95,7 +96,7 @@ static void to_stack(CallGraph *t, u32 other) {
     t->stack[t->current].left = t->now;
     t->current = other;
     if (s->depth) s->frame[s->depth - 1].stolen += t->now - s->left;
-    tell(t, SWITCH, 0, 0, 0);
+    record_event(t, SWITCH, 0, 0, 0);
 }
 
 static int find(const Stack *s, u32 place) {
@@ -104,8 +105,8 @@ static int find(const Stack *s, u32 place) {
     return -1;
 }
 
-/* An unused stack, else the one that was left first. */
-static u32 fresh(CallGraph *t) {
+/* Return an unused stack, else the one left the longest time ago. */
+static u32 new_stack(CallGraph *t) {
     u32 best = t->current ? 0 : 1;
     for (u32 i = 0; i < STACKS; i++) {
         if (i == t->current) continue;
@@ -123,7 +124,7 @@ static void returned(CallGraph *t, u32 site, u32 place, u32 target) {
         for (u32 i = 0; i < STACKS && at < 0; i++)
             if (i != t->current && (at = find(&t->stack[i], place)) >= 0) other = i;
         if (other == STACKS) {
-            to_stack(t, fresh(t));
+            to_stack(t, new_stack(t));
             push(t, t->now, site, target, ~0u, 0, 0);
             return;
         }
@@ -140,16 +141,16 @@ static void close_all(CallGraph *t) {
     }
 }
 
-u64 tree_size(void) { return sizeof(CallGraph); }
+u64 call_graph_size(void) { return sizeof(CallGraph); }
 
-/* The program is at `entry` in cycle `now`. */
-void tree_begin(CallGraph *t, u64 now, u64 entry) {
+/* Start with the program at `entry` in cycle `now`. */
+void call_graph_begin(CallGraph *t, u64 now, u64 entry) {
     t->now = now;
     push(t, now, TOP, (u32)entry, ~0u, 0, 0);
 }
 
-/* Forget what has been counted; who is where stays. */
-void tree_clear(CallGraph *t, u64 now) {
+/* Reset all counts; keep the stacks. */
+void call_graph_clear(CallGraph *t, u64 now) {
     for (u32 i = 0; i < EDGES; i++) t->edge[i].calls = t->edge[i].cycles = t->edge[i].most = t->edge[i].least = 0;
     for (u32 i = 0; i < STACKS; i++) {
         Stack *s = &t->stack[i];
@@ -159,47 +160,47 @@ void tree_clear(CallGraph *t, u64 now) {
     t->now = now;
 }
 
-void tree_end(CallGraph *t, u64 now) {
+void call_graph_end(CallGraph *t, u64 now) {
     t->now = now;
     close_all(t);
 }
 
-/* Frames that are open, in all stacks. */
-u64 tree_open(const CallGraph *t) {
+/* Return the number of open frames in all stacks. */
+u64 call_graph_open(const CallGraph *t) {
     u64 sum = 0;
     for (u32 i = 0; i < STACKS; i++) sum += t->stack[i].depth;
     return sum;
 }
 
-/* Follow `count` notes; `turn` gets what happened, at most 2 * count turns and one for every open frame and stack. */
-u64 tree_follow(CallGraph *t, const u64 *note, u64 count, CallEvent *turn) {
-    t->turn = turn;
-    t->turns = 0;
-    for (; count; count--, note += 4) {
-        u32 kind = note[1] & 0xFF, level = note[1] >> 8 & 0xFF, place = note[1] >> 16 & 0xFFFF;
-        u32 site = (u32)(note[1] >> 32), target = (u32)note[2], cycles = (u32)(note[2] >> 32);
-        t->now = note[0];
+/* Process `count` records. `event` receives the call events: at most 2 * count, plus one for every open frame and stack. */
+u64 call_graph_process(CallGraph *t, const u64 *record, u64 count, CallEvent *event) {
+    t->event = event;
+    t->events = 0;
+    for (; count; count--, record += 4) {
+        u32 kind = record[1] & 0xFF, level = record[1] >> 8 & 0xFF, place = record[1] >> 16 & 0xFFFF;
+        u32 site = (u32)(record[1] >> 32), target = (u32)record[2], cycles = (u32)(record[2] >> 32);
+        t->now = record[0];
         if (kind == CALLED)
             push(t, t->now, site, target, place, 0, 0);
         else if (kind == RETURNED)
             returned(t, site, place, target);
         else if (kind == ENTERED)
-            push(t, t->now - cycles, site, target, place, level + 1, note[3]);
+            push(t, t->now - cycles, site, target, place, level + 1, record[3]);
         else if (kind == SLEPT) {
             Stack *s = &t->stack[t->current];
             if (s->depth) s->frame[s->depth - 1].stolen += cycles;
-            tell(t, SLEEP, 0, 0, cycles);
+            record_event(t, SLEEP, 0, 0, cycles);
         } else if (kind == RESET) {
             close_all(t);
             push(t, t->now, TOP, 0, ~0u, 0, 0);
         }
     }
-    t->turn = 0;
-    return t->turns;
+    t->event = 0;
+    return t->events;
 }
 
-/* The edges in use: call site or 0xFFFFFF, entry, calls, cycles, those of the longest and the shortest call. */
-u64 tree_edges(const CallGraph *t, u64 *out) {
+/* Write the edges in use: call site or 0xFFFFFF, entry, calls, cycles, cycles of the longest and the shortest call. */
+u64 call_graph_edges(const CallGraph *t, u64 *out) {
     u64 n = 0;
     for (u32 i = 0; i < EDGES; i++)
         if (t->edge[i].key && (t->edge[i].calls || t->edge[i].cycles)) {
@@ -212,4 +213,4 @@ u64 tree_edges(const CallGraph *t, u64 *out) {
     return n;
 }
 
-u64 tree_lost(const CallGraph *t) { return t->lost; }
+u64 call_graph_lost(const CallGraph *t) { return t->lost; }

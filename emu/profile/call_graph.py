@@ -1,7 +1,7 @@
-"""Who called whom while a program ran, through interrupts and threads; the work is done by follow.c.
+"""Call graph of a run, across interrupts and threads, computed by call_graph.c.
 
-What enters: notes of a ledger. What leaves: `CallEdge`s, one for every place that called something, and if wanted
-`CallEvent`s, everything that happened in order.
+Input: records of the cycle accounting. Output: `CallEdge`s, one per call site and callee, and optionally `CallEvent`s
+in order.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ import numpy as np
 from emu.native_library import ADDRESS, INT, functions
 
 OPEN, CLOSE, SWITCH, SLEEP = range(1, 5)
-"""What a turn tells: a function or handler begins, ends; the program is on another stack; it has slept."""
+"""Kinds of call events: a function or handler begins or ends, the stack changes, the CPU has slept."""
 NOWHERE: Final = 0xFFFFFF
-"""Call site of what nobody called: handlers, and where a stack begins."""
+"""Call site of handlers and of a stack's first function, which no instruction calls."""
 _EDGE_WORDS, _MOST_EDGES, _STACKS = 6, 1 << 16, 128
-_TURN: Final = np.dtype([
+_EVENT_TYPE: Final = np.dtype([
     ("cycle", "<u8"), ("since", "<u8"), ("what", "<u4"), ("stack", "<u4"), ("raised", "<u4"), ("entry", "<u4"),
     ("site", "<u4"), ("length", "<u4"),
 ])  # fmt: skip
@@ -31,90 +31,90 @@ _TURN: Final = np.dtype([
 @cache
 def _code() -> dict[str, Callable[..., int]]:
     return functions(Path(__file__).with_name("call_graph.c"), {
-        "tree_size": (INT, ()),
-        "tree_begin": (None, (ADDRESS, INT, INT)),
-        "tree_clear": (None, (ADDRESS, INT)),
-        "tree_end": (None, (ADDRESS, INT)),
-        "tree_open": (INT, (ADDRESS,)),
-        "tree_follow": (INT, (ADDRESS, ADDRESS, INT, ADDRESS)),
-        "tree_edges": (INT, (ADDRESS, ADDRESS)),
-        "tree_lost": (INT, (ADDRESS,)),
+        "call_graph_size": (INT, ()),
+        "call_graph_begin": (None, (ADDRESS, INT, INT)),
+        "call_graph_clear": (None, (ADDRESS, INT)),
+        "call_graph_end": (None, (ADDRESS, INT)),
+        "call_graph_open": (INT, (ADDRESS,)),
+        "call_graph_process": (INT, (ADDRESS, ADDRESS, INT, ADDRESS)),
+        "call_graph_edges": (INT, (ADDRESS, ADDRESS)),
+        "call_graph_lost": (INT, (ADDRESS,)),
     })  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
 class CallEdge:
-    """Calls from one place to one function. Handlers of interrupts, and where a stack begins, are called by nobody."""
+    """Calls from one call site to one function. Handlers and a stack's first function have no call site."""
 
     site: int | None
-    """Program address of the call."""
+    """Program address of the call instruction, None for handlers and a stack's first function."""
     entry: int
     calls: int
     cycles: int
-    """Tcy from entry to return, with all calls, without interrupts, sleep and other threads."""
+    """Inclusive Tcy from entry to return, without interrupts, sleep and other threads."""
     most: int
-    """Those of the longest call, recursion left out."""
+    """Cycles of the longest call, without recursive calls."""
     least: int
 
 
 class CallEvent(NamedTuple):
-    """Something that happened in `cycle`. There are many: tuples are made at half the cost."""
+    """A call event in `cycle`. A named tuple, because constructing one takes half the time of a dataclass."""
 
     cycle: int
     since: int
-    """Cycle in which the interrupt of a handler was requested."""
+    """Cycle in which the handler's interrupt was requested."""
     what: int
     """OPEN, CLOSE, SWITCH or SLEEP."""
     stack: int
-    """Number of the stack the program is on."""
+    """Number of the current stack."""
     raised: int
     """1 + CPU priority of a handler; 0 for a called function."""
     entry: int
     site: int
-    """Program address of a call, or of what an interrupt interrupted."""
+    """Program address of the call, or of the interrupted instruction."""
     length: int
-    """Tcy of a sleep that ends now."""
+    """Tcy of a sleep that ends in `cycle`."""
 
 
 class CallGraph:
-    """Follows the notes it is given, from a program that is at `entry` in `cycle`. `timed` keeps the turns."""
+    """Builds the call graph from accounting records; the program is at `entry` in `cycle`. `timed` keeps the events."""
 
     def __init__(self, cycle: int, entry: int, timed: bool = False) -> None:
         self._code: Final = _code()
-        self._memory: Final[Any] = ctypes.create_string_buffer(self._code["tree_size"]())
+        self._memory: Final[Any] = ctypes.create_string_buffer(self._code["call_graph_size"]())
         self._at: Final = ctypes.addressof(self._memory)
         self._parts: Final[list[Any]] = []
-        self._room = np.empty(0, dtype=_TURN)
-        """Where turns are written, again and again: fresh memory would cost more than writing them."""
+        self._room = np.empty(0, dtype=_EVENT_TYPE)
+        """Reused buffer for events: allocating it each time would take longer than filling it."""
         self._timed: Final = timed
-        self._code["tree_begin"](self._at, cycle, entry)
+        self._code["call_graph_begin"](self._at, cycle, entry)
 
-    def take(self, notes: int, count: int) -> None:
-        """Follow `count` notes at the host address `notes`."""
+    def process(self, records: int, count: int) -> None:
+        """Process `count` records at the host address `records`."""
         if not self._timed:
-            self._code["tree_follow"](self._at, notes, count, None)
+            self._code["call_graph_process"](self._at, records, count, None)
             return
-        most = 2 * count + self._code["tree_open"](self._at) + _STACKS
+        most = 2 * count + self._code["call_graph_open"](self._at) + _STACKS
         if len(self._room) < most:
-            self._room = np.empty(most, dtype=_TURN)
-        made = self._code["tree_follow"](self._at, notes, count, int(self._room.ctypes.data))
+            self._room = np.empty(most, dtype=_EVENT_TYPE)
+        made = self._code["call_graph_process"](self._at, records, count, int(self._room.ctypes.data))
         self._parts.append(self._room[:made].copy())
 
     def clear(self, cycle: int) -> None:
-        """Count from now on; who is where stays. The turns up to now are dropped but for what is still open."""
-        self._code["tree_clear"](self._at, cycle)
+        """Restart counting in `cycle`, with the current stacks."""
+        self._code["call_graph_clear"](self._at, cycle)
 
     def end(self, cycle: int) -> list[CallEdge]:
-        """The program ends in `cycle`: all edges. Raises OverflowError if there are more than can be followed."""
-        self._code["tree_end"](self._at, cycle)
-        if self._code["tree_lost"](self._at):
-            raise OverflowError(f"more than {_MOST_EDGES - 1} call sites, or calls nested deeper than RAM is")
+        """End the run in `cycle` and return all edges. Raises OverflowError if a table of call_graph.c is full."""
+        self._code["call_graph_end"](self._at, cycle)
+        if self._code["call_graph_lost"](self._at):
+            raise OverflowError(f"more than {_MOST_EDGES - 1} call edges, or calls nested deeper than the tables allow")
         room = np.zeros((_MOST_EDGES, _EDGE_WORDS), dtype=np.uint64)
-        made = self._code["tree_edges"](self._at, int(room.ctypes.data))
+        made = self._code["call_graph_edges"](self._at, int(room.ctypes.data))
         rows: list[list[int]] = room[:made].tolist()
         return [CallEdge(None if site == NOWHERE else site, *rest) for site, *rest in sorted(rows)]
 
-    def turns(self) -> Iterator[CallEvent]:
-        """What happened, in order."""
+    def events(self) -> Iterator[CallEvent]:
+        """Yield the call events in order."""
         for part in self._parts:
             yield from map(CallEvent._make, part.tolist())

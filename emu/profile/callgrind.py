@@ -1,7 +1,7 @@
 """A profile in Callgrind's format, for callgrind_annotate and KCachegrind.
 
 Format: "Callgrind Format Specification" of the Valgrind documentation, version 1, positions "instr line", absolute.
-Costs are Tcy. Inlined code keeps its file (fi/fe). Sleep is not in it: the sum is the time in which the CPU worked.
+Costs are Tcy. Inlined code keeps its file (fi/fe). Sleep is not included: the sum is the busy time of the CPU.
 """
 
 from __future__ import annotations
@@ -10,11 +10,11 @@ from collections import defaultdict
 from collections.abc import Callable, Iterator
 
 from emu.profile.call_graph import CallEdge
-from emu.profile.cycle_shares import Place, Profile
+from emu.profile.cycle_shares import CodeLocation, Profile
 
 
-def lines(profile: Profile, image: str, place_of: Callable[[int], Place]) -> Iterator[str]:
-    """The file, line by line."""
+def lines(profile: Profile, image: str, location_of: Callable[[int], CodeLocation]) -> Iterator[str]:
+    """Yield the lines of the file."""
     yield "# callgrind format"
     yield "version: 1"
     yield "creator: emu profile"
@@ -27,12 +27,12 @@ def lines(profile: Profile, image: str, place_of: Callable[[int], Place]) -> Ite
     home: dict[str, str] = {}
     calls: dict[str, list[CallEdge]] = defaultdict(list)
     for pc, cycles in profile.addresses.items():
-        name, file, line = place_of(pc)
+        name, file, line = location_of(pc)
         costs[name, file].append((pc, line, cycles, file))
     for edge in profile.edges:
-        home.setdefault(place_of(edge.entry)[0], place_of(edge.entry)[1])
+        home.setdefault(location_of(edge.entry)[0], location_of(edge.entry)[1])
         if edge.site is not None and edge.calls:
-            calls[place_of(edge.site)[0]].append(edge)
+            calls[location_of(edge.site)[0]].append(edge)
     names: dict[str, list[str]] = defaultdict(list)
     for name, file in costs:
         names[name].append(file)
@@ -47,8 +47,8 @@ def lines(profile: Profile, image: str, place_of: Callable[[int], Place]) -> Ite
             for pc, line, cycles, _ in sorted(costs[name, file]):
                 yield f"{pc:#x} {line} {cycles}"
         for edge in calls[name]:
-            callee, file, line = place_of(edge.entry)
-            _, site_file, site_line = place_of(edge.site or 0)
+            callee, file, line = location_of(edge.entry)
+            _, site_file, site_line = location_of(edge.site or 0)
             yield f"fi={site_file or '???'}"
             yield f"cfi={file or '???'}"
             yield f"cfn={callee}"

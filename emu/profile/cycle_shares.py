@@ -1,7 +1,7 @@
-"""Where every cycle goes: instructions, functions, interrupt levels, Idle, and who called whom. Counted, not sampled.
+"""Exact cycle counts by instruction, function, interrupt level and Idle, with the call graph.
 
-What enters: a machine with its image. What leaves: a `Profile`, whose numbers add up to the cycles run. Entering an
-exception (the forced NOPs and pushes, isa.md §14.2) counts for the handler that is entered, at its level.
+Input: a machine with its image. Output: a `Profile`, whose numbers add up to the cycles run. Exception entry (the
+forced NOPs and pushes, isa.md §14.2) counts for the handler, at its level.
 """
 
 from __future__ import annotations
@@ -25,54 +25,54 @@ if TYPE_CHECKING:
     from emu.machine.machine import Machine
     from emu.machine.stops import Stop
 
-Place = tuple[str, str, int]
+CodeLocation = tuple[str, str, int]
 """Function, source file and line; "" and 0 for code without lines."""
 
 
 @dataclass(slots=True)
 class Profile:
-    """Cycles by what they were spent on."""
+    """Cycles of a run by address, function, line and priority, with the call graph."""
 
     entry: int = 0
-    """Program address at which the machine stood before."""
+    """Program counter at the start."""
     start: int = 0
-    """First cycle that is counted."""
+    """First counted cycle."""
     end: int = 0
     idle: int = 0
-    """In Idle or Sleep."""
+    """Cycles in Idle or Sleep."""
     addresses: dict[int, int] = field(default_factory=dict)
-    """By the first program address of a source line's stretch of code."""
-    places: Counter[Place] = field(default_factory=Counter)
-    """By function, source file and line: code that was inlined keeps its file."""
+    """Cycles by the first program address of a source line's code range."""
+    locations: Counter[CodeLocation] = field(default_factory=Counter)
+    """Cycles by function, source file and line; inlined code keeps its file."""
     levels: Counter[int] = field(default_factory=Counter)
-    """By CPU priority: 0 to 7, traps 8 and above."""
+    """Cycles by CPU priority: 0 to 7, traps 8 and above."""
     edges: list[CallEdge] = field(default_factory=list)
-    """Who called whom, how often, for how long."""
-    turns: Iterable[CallEvent] = ()
-    """What happened in order, if it was asked for: to be gone through once."""
+    """Call graph: call sites, callees, numbers and cycles of calls."""
+    events: Iterable[CallEvent] = ()
+    """Call events in order, if `timed`; an iterable that can be consumed once."""
     stop: Stop | None = None
-    """What ended the run before its time."""
+    """Why the run ended early, None if it did not."""
 
     @property
     def functions(self) -> Counter[str]:
-        """By function, without what it calls."""
+        """Exclusive cycles by function."""
         return self._summed(0)
 
     @property
     def files(self) -> Counter[str]:
-        """By source file; "" is code without lines."""
+        """Cycles by source file; "" is code without lines."""
         return self._summed(1)
 
     def _summed(self, part: int) -> Counter[str]:
         sums: Counter[str] = Counter()
-        for place, cycles in self.places.items():
+        for place, cycles in self.locations.items():
             sums[str(place[part])] += cycles
         return sums
 
     @property
     def busy(self) -> int:
-        """Cycles in which the CPU worked."""
-        return sum(self.places.values())
+        """Cycles in which the CPU executed instructions."""
+        return sum(self.locations.values())
 
     @property
     def cycles(self) -> int:
@@ -80,20 +80,20 @@ class Profile:
         return self.busy + self.idle
 
     def group(self, patterns: list[str]) -> int:
-        """Cycles of code whose function or source file matches one of the patterns (`*`, `?`, `[...]`)."""
-        return sum(cycles for place, cycles in self.places.items() if _matches(place, patterns))
+        """Return the cycles of code whose function or source file matches one of the patterns (`*`, `?`, `[...]`)."""
+        return sum(cycles for place, cycles in self.locations.items() if _matches(place, patterns))
 
     def matched(self, pattern: str) -> bool:
-        """Whether a pattern fits anything that ran."""
-        return any(_matches(place, [pattern]) for place in self.places)
+        """Whether a pattern matches any executed code."""
+        return any(_matches(place, [pattern]) for place in self.locations)
 
 
-def _matches(place: Place, patterns: list[str]) -> bool:
+def _matches(place: CodeLocation, patterns: list[str]) -> bool:
     return any(fnmatch(name, pattern) for name in place[:2] for pattern in patterns)
 
 
 class Profiler:
-    """Counts what `machine` does; its engine is to be jit or plain. `timed` also keeps what happened in order.
+    """Profiles `machine`, whose engine must be jit or plain. `timed` also keeps the call events.
 
     Raises ValueError for another engine.
     """
@@ -106,11 +106,11 @@ class Profiler:
         self._runner: Final = machine.runner
         self._native: Final = self._runner if isinstance(self._runner, JitEngine) else None
         self._timed: Final = timed
-        self._tree: Final = CallGraph(machine.cycle, machine.pc, timed)
-        self._accounting: Final = CycleAccounting(machine.core, self._tree.take)
+        self._call_graph: Final = CallGraph(machine.cycle, machine.pc, timed)
+        self._accounting: Final = CycleAccounting(machine.core, self._call_graph.process)
         self._rows: Final[dict[int, int]] = {}
         self._inside: Final[dict[int, frozenset[str]]] = {}
-        self._places: Final[dict[int, Place]] = {}
+        self._locations: Final[dict[int, CodeLocation]] = {}
         self.hz: Final = machine.hz
         """Cycles in a second."""
 
@@ -119,14 +119,14 @@ class Profiler:
         return Inspector(self._machine)
 
     def run(self, until: int, skip: int = 0) -> Profile:
-        """Run to cycle `until`, and count from cycle `skip` on; ends earlier with whatever stops the machine."""
+        """Run to cycle `until`, counting from cycle `skip` on; a stop of the machine ends the run early."""
         machine, accounting, entry = self._machine, self._accounting, self._machine.pc
         close = self._open()
         try:
             stop = self._advance(skip) if skip > machine.cycle else None
             accounting.flush_log()
             accounting.clear()
-            self._tree.clear(machine.cycle)
+            self._call_graph.clear(machine.cycle)
             profile = Profile(entry, machine.cycle)
             profile.stop = stop or self._advance(until)
         finally:
@@ -136,7 +136,7 @@ class Profiler:
 
     @contextmanager
     def counting(self) -> Iterator[Profile]:
-        """Count what is run inside the block; the profile is filled in at its end."""
+        """Count the cycles run inside the block; the profile is complete after it."""
         profile = Profile(self._machine.pc, self._machine.cycle)
         close = self._open()
         try:
@@ -144,7 +144,9 @@ class Profiler:
         finally:
             close()
             self._read(profile)
-            profile.idle = profile.end - profile.start - profile.busy  # a sleep may be passed over at once, unseen
+            profile.idle = (
+                profile.end - profile.start - profile.busy
+            )  # a sleep may be skipped in one step without a record
 
     def _open(self) -> Callable[[], None]:
         if self._native is not None:
@@ -153,7 +155,7 @@ class Profiler:
         return self._accounting.stop
 
     def _advance(self, until: int) -> Stop | None:
-        self._machine.events.kick()  # no cycle passes unseen
+        self._machine.events.kick()  # make native code account every cycle
         return self._machine.advance(until)
 
     def _read(self, profile: Profile) -> None:
@@ -169,13 +171,13 @@ class Profiler:
             rows[self.row_of(2 * word)] += int(spent[word])
         profile.addresses = dict(rows)
         for row, cycles in rows.items():
-            profile.places[self.place(row)] += cycles
-        profile.edges = self._tree.end(profile.end)
+            profile.locations[self.location(row)] += cycles
+        profile.edges = self._call_graph.end(profile.end)
         if self._timed:
-            profile.turns = self._tree.turns()
+            profile.events = self._call_graph.events()
 
     def row_of(self, pc: int) -> int:
-        """First address of the stretch of code around `pc` that has one function and one line."""
+        """Return the first address of the code range around `pc` with the same function and line."""
         row = self._rows.get(pc)
         if row is None:
             line, symbol = self._image.lines.find(pc), self._image.symbols.code(pc)
@@ -186,7 +188,7 @@ class Profiler:
         return row
 
     def inside(self, pc: int) -> frozenset[str]:
-        """The functions around an instruction, inlined ones too, as the debug information has them."""
+        """Return the functions that contain an instruction, inlined ones included, from the debug information."""
         known = self._inside.get(pc)
         if known is None:
             function = self._inspector.debug.function(pc)
@@ -194,10 +196,10 @@ class Profiler:
             known = self._inside[pc] = frozenset(scope.name for scope in scopes if scope.kind != "block")
         return known
 
-    def place(self, pc: int) -> Place:
-        """Function, file and line of an instruction."""
-        known = self._places.get(pc)
+    def location(self, pc: int) -> CodeLocation:
+        """Return function, file and line of an instruction."""
+        known = self._locations.get(pc)
         if known is None:
             line, name = self._image.lines.find(pc), self._image.symbols.text(pc).split("+")[0]
-            known = self._places[pc] = (name, line.file, line.line) if line is not None else (name, "", 0)
+            known = self._locations[pc] = (name, line.file, line.line) if line is not None else (name, "", 0)
         return known

@@ -1,1 +1,1 @@
-"""One run from the command line: session, UART consoles and the log of timestamped input."""
+"""A run from the command line: session, UART consoles and the log of timestamped input."""

@@ -1,8 +1,8 @@
 """The host end of the emulated UARTs: standard streams, files, pseudo terminals, TCP connections.
 
-What enters: a specification from the command line (`-`, FILE, `pty`, `tcp:PORT`, `none`). What leaves: `Port`s with
-bytes going both ways. Files and standard output get every byte; a terminal or peer that does not read loses bytes,
-counted in `Port.lost`.
+Input: a specification from the command line (`-`, FILE, `pty`, `tcp:PORT`, `none`). Output: bidirectional
+`ConsolePort`s. Files and standard output get every byte. A terminal or peer that does not read loses bytes, which
+`ConsolePort.lost` counts.
 """
 
 from __future__ import annotations
@@ -20,24 +20,24 @@ READ_SIZE: Final = 4096
 SPECIFICATIONS: Final = "-, FILE, pty, tcp:PORT or none"
 
 
-class Port:
-    """One UART's connection. `out_fd` and `in_fd` are None when that direction does not exist or has ended."""
+class ConsolePort:
+    """Host connection of one UART. `out_fd` or `in_fd` is None if that direction does not exist or has ended."""
 
     def __init__(
-        self, out_fd: int | None, in_fd: int | None, close: Callable[[], None] | None = None, patient: bool = True
+        self, out_fd: int | None, in_fd: int | None, close: Callable[[], None] | None = None, blocking: bool = True
     ) -> None:
         self.out_fd = out_fd
         self.in_fd = in_fd
-        self.patient: Final = patient
+        self.blocking: Final = blocking
         self.capture: bytearray | None = None
-        """If set, what the firmware sends is collected here instead."""
+        """If set, collects the firmware's output instead of sending it."""
         self.lost = 0
-        """Bytes the firmware sent that nobody took."""
+        """Bytes sent by the firmware that the host side did not accept."""
         self._discards: Final = out_fd is None
         self._close: Final = close
 
     def write(self, data: bytes) -> None:
-        """Pass on what the firmware sent. Raises BrokenPipeError when standard output was closed by its reader."""
+        """Write output of the firmware. Raises BrokenPipeError if the reader has closed standard output."""
         if self.capture is not None:
             self.capture += data
             return
@@ -45,7 +45,7 @@ class Port:
             try:
                 data = data[os.write(self.out_fd, data) :]
             except BlockingIOError:
-                if not self.patient:
+                if not self.blocking:
                     break
                 select.select([], [self.out_fd], [])
             except BrokenPipeError:
@@ -58,7 +58,7 @@ class Port:
             self.lost += len(data)
 
     def read(self) -> bytes:
-        """What has arrived from outside, at once; an ended input sets `in_fd` to None."""
+        """Return the input that is available now, without waiting; at end of input set `in_fd` to None."""
         if self.in_fd is None or not select.select([self.in_fd], [], [], 0)[0]:
             return b""
         try:
@@ -72,23 +72,26 @@ class Port:
         return data
 
     def close(self) -> None:
-        """Give back what the port opened itself."""
+        """Close the resources that the port has opened."""
         if self._close is not None:
             self._close()
 
 
-def open_port(specification: str, uart: int, with_input: bool = True) -> Port:
-    """The port for UART number `uart`. Raises ValueError for a bad specification, OSError if it cannot be opened."""
+def open_port(specification: str, uart: int, with_input: bool = True) -> ConsolePort:
+    """Open the port for UART number `uart`.
+
+    Raises ValueError for a bad specification, OSError if it cannot be opened.
+    """
     if specification == "none":
-        return Port(None, None)
+        return ConsolePort(None, None)
     if specification == "-":
-        return Port(1, 0 if with_input and _is_open(0) else None)
+        return ConsolePort(1, 0 if with_input and _is_open(0) else None)
     if specification == "pty":
         return _open_pty(uart, with_input)
     if specification.startswith("tcp:"):
         return _open_tcp(specification, uart, with_input)
     file = os.open(specification, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o666)
-    return Port(file, None, lambda: os.close(file))
+    return ConsolePort(file, None, lambda: os.close(file))
 
 
 def _is_open(fd: int) -> bool:
@@ -99,8 +102,8 @@ def _is_open(fd: int) -> bool:
     return True
 
 
-def _open_pty(uart: int, with_input: bool) -> Port:
-    """A pseudo terminal in raw mode, so that the firmware's own output is not echoed back to it."""
+def _open_pty(uart: int, with_input: bool) -> ConsolePort:
+    """Open a pseudo terminal in raw mode, so that the firmware's output is not echoed back to it."""
     import pty
     import tty
 
@@ -111,13 +114,13 @@ def _open_pty(uart: int, with_input: bool) -> Port:
 
     def close() -> None:
         os.close(master)
-        os.close(slave)  # kept open until now: without any reader the terminal would report its end
+        os.close(slave)  # kept open until now: without a reader the terminal would report end of file
 
-    return Port(master, master if with_input else None, close, patient=False)
+    return ConsolePort(master, master if with_input else None, close, blocking=False)
 
 
-def _open_tcp(specification: str, uart: int, with_input: bool) -> Port:
-    """Wait for one connection on the loopback interface. PORT 0 takes any free one; it is printed."""
+def _open_tcp(specification: str, uart: int, with_input: bool) -> ConsolePort:
+    """Wait for one connection on the loopback interface. PORT 0 selects a free port; the number is printed."""
     text = specification.removeprefix("tcp:")
     if not text.isdecimal() or int(text) > 0xFFFF:
         raise ValueError(f"{specification!r}: expected tcp:PORT with a number up to 65535")
@@ -133,10 +136,10 @@ def _open_tcp(specification: str, uart: int, with_input: bool) -> Port:
             connection.shutdown(socket.SHUT_RDWR)
         connection.close()
 
-    return Port(connection.fileno(), connection.fileno() if with_input else None, close, patient=False)
+    return ConsolePort(connection.fileno(), connection.fileno() if with_input else None, close, blocking=False)
 
 
-def wait_for_input(ports: list[Port], seconds: float) -> bool:
-    """Wait at most `seconds` until one of the ports has input or has ended; whether it happened."""
+def wait_for_input(ports: list[ConsolePort], seconds: float) -> bool:
+    """Wait at most `seconds` until a port has input or has ended. Return whether one has."""
     sources = [port.in_fd for port in ports if port.in_fd is not None]
     return bool(select.select(sources, [], [], max(seconds, 0.0))[0])

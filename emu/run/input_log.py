@@ -1,6 +1,6 @@
-"""Input stamped with the cycle of its arrival: what a live session records and a replay gives back.
+"""Log of input with the cycle of its arrival, written by a live session and read by a replay.
 
-The file is text, one line per arrival, `CYCLE UART HEX`, in order of time; lines that start with # are remarks.
+The file is text, one line per arrival, `CYCLE UART HEX`, in order of time; lines that start with # are comments.
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ class TimestampedInput:
     data: bytes
 
     def write(self, stream: TextIO) -> None:
-        """Append the stamp to a record file."""
+        """Append the entry to an input log."""
         stream.write(f"{self.cycle} {self.uart} {self.data.hex()}\n")
 
 
 def read_input_log(path: str, uarts: tuple[int, ...]) -> list[TimestampedInput]:
-    """The stamps of a record file. Raises ValueError with the line of the first mistake, OSError if unreadable."""
+    """Read an input log. Raises ValueError with the line of the first error, OSError if unreadable."""
     stamps: list[TimestampedInput] = []
     for number, line in enumerate(read_file(path).decode("ascii", "replace").splitlines(), start=1):
         if not line.strip() or line.startswith("#"):
@@ -40,6 +40,6 @@ def read_input_log(path: str, uarts: tuple[int, ...]) -> list[TimestampedInput]:
         if stamp.uart not in uarts:
             raise ValueError(f"{path}: line {number}: there is no UART{stamp.uart}")
         if stamp.cycle < (stamps[-1].cycle if stamps else 0):
-            raise ValueError(f"{path}: line {number}: cycle {stamp.cycle} lies before the line above it")
+            raise ValueError(f"{path}: line {number}: cycle {stamp.cycle} is lower than that of the line before")
         stamps.append(stamp)
     return stamps

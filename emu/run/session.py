@@ -1,7 +1,7 @@
-"""One run of a machine with people attached: slices of cycles, live or recorded input, pace, a clean stop.
+"""Interactive run of a machine: time slices, live or recorded input, pacing, a clean stop.
 
-What enters: a machine, ports, stamps, limits. What leaves: a `Stop`. Slices change nothing the firmware can see: input
-is stamped with the cycle it is handed over in, and the same stamps give the same run.
+Input: a machine, ports, timestamped input, limits. Output: a `Stop`. Slices do not affect the firmware: input has the
+cycle of its delivery as timestamp, and equal timestamped input gives an equal run.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from dataclasses import replace
 from types import FrameType
 from typing import TYPE_CHECKING, Any, Final, TextIO
 
-from emu.run.console import Port, wait_for_input
+from emu.run.console import ConsolePort, wait_for_input
 from emu.run.input_log import TimestampedInput
 
 if TYPE_CHECKING:
@@ -21,16 +21,16 @@ if TYPE_CHECKING:
     from emu.machine.stops import Stop
 
 SLICE_SECONDS: Final = 0.02
-"""Host time a slice should take: output and Ctrl-C wait no longer than this."""
+"""Target host time of a slice, and so the longest delay of output and Ctrl-C."""
 FIRST_SLICE, SHORTEST_SLICE, LONGEST_SLICE = 20_000, 2_000, 100_000_000
-"""Tcy."""
+"""Lengths of slices in Tcy."""
 PACED_SLICES_PER_SECOND: Final = 200
 POLL_SECONDS: Final = 0.1
-"""Longest wait without looking for Ctrl-C."""
+"""Longest wait for input without a check for Ctrl-C."""
 STUCK_SECONDS: Final = 3.0
-"""How long a run may take to notice that it should end."""
+"""Host time after which a run that does not end on Ctrl-C is aborted."""
 FOREVER: Final = 1 << 62
-"""Limit in Tcy when there is none: 10,000 years."""
+"""Limit in Tcy if the user gives none: 10,000 years."""
 
 
 class Session:
@@ -39,7 +39,7 @@ class Session:
     def __init__(
         self,
         machine: Machine,
-        ports: dict[int, Port],
+        ports: dict[int, ConsolePort],
         *,
         limit: int = FOREVER,
         replay: list[TimestampedInput] | None = None,
@@ -48,9 +48,12 @@ class Session:
         advance: Callable[[int], Stop | None] | None = None,
         links: dict[int, Any] | None = None,
     ) -> None:
-        """`limit`: last cycle. `realtime`: no faster than the wall clock. `advance(cycle)` replaces the machine's
-        `run_until`, for traces. `links`: what lies between a UART's pins and its port, by UART number: `listen` and
-        `feed` like the UART's own."""
+        """Connect the machine's UARTs to `ports`.
+
+        `limit`: last cycle. `realtime`: not faster than the wall clock. `advance(cycle)` replaces the machine's
+        `run_until`, for traces. `links`: devices between a UART's pins and its port, by UART number; they have `listen`
+        and `feed` like a UART.
+        """
         self.machine: Final = machine
         self.ports: Final = ports
         self.limit: Final = limit
@@ -67,7 +70,7 @@ class Session:
         self._removals: Final = [self._links[number].listen(self._collector(number), lazy=True) for number in ports]
 
     def run(self) -> tuple[Stop, float]:
-        """Run to the end; returns how it ended and the seconds of host time it took."""
+        """Run to the end. Return the stop and the host time in seconds."""
         earlier = [(number, signal.signal(number, self._on_signal)) for number in (signal.SIGINT, signal.SIGTERM)]
         self._start = time.perf_counter()
         try:
@@ -90,10 +93,10 @@ class Session:
         while not self.interrupted:
             self._take_input(machine.cycle)
             before = time.perf_counter()
-            stop = self._advance(min(self.limit, machine.cycle + slice_cycles, self._next_stamp()))
+            stop = self._advance(min(self.limit, machine.cycle + slice_cycles, self._next_input_cycle()))
             self._show_output()
             if stop is not None and stop.reason == "halt":
-                stop = self._outlive(stop)
+                stop = self._wait_for_wakeup(stop)
             if stop is not None:
                 return stop
             if self._realtime:
@@ -106,7 +109,10 @@ class Session:
         return machine.stopped("interrupted")
 
     def _on_signal(self, number: int, frame: FrameType | None) -> None:
-        """Ctrl-C and SIGTERM end the run at the next boundary; the second one, or a run that is stuck, at once."""
+        """Handle Ctrl-C and SIGTERM: end the run at the next boundary.
+
+        The second signal, or `STUCK_SECONDS` without an end, aborts the run at once.
+        """
         if self.interrupted:
             raise KeyboardInterrupt
         self.interrupted = True
@@ -127,53 +133,56 @@ class Session:
 
     # Input
 
-    def _next_stamp(self) -> int:
+    def _next_input_cycle(self) -> int:
         return self._replay[-1].cycle if self._replay else FOREVER
 
     def _take_input(self, cycle: int) -> bool:
-        """Hand over what has arrived by now, stamped with `cycle`; whether there was any."""
+        """Deliver the input that has arrived by now, with timestamp `cycle`. Return whether there was any."""
         taken = False
         while self._replay and self._replay[-1].cycle <= cycle:
-            self._hand_over(self._replay.pop())
+            self._deliver(self._replay.pop())
             taken = True
         for number, port in self.ports.items():
             data = port.read()
             if data:
-                self._hand_over(TimestampedInput(cycle, number, data))
+                self._deliver(TimestampedInput(cycle, number, data))
                 taken = True
         return taken
 
-    def _hand_over(self, stamp: TimestampedInput) -> None:
-        """Bytes for a running machine wait until its receiver is on; for a sleeping one they come at their date."""
+    def _deliver(self, stamp: TimestampedInput) -> None:
+        """Deliver input to the UART: now, waiting for an enabled receiver, or at its future cycle."""
         late = stamp.cycle > self.machine.cycle
         self._links[stamp.uart].feed(stamp.data, stamp.cycle if late else None)
         if self._record is not None:
             stamp.write(self._record)
 
     def _wall_cycle(self) -> int:
-        """The cycle a robot started together with this run would be in."""
+        """Return the cycle that a real robot, started together with this run, would have reached."""
         return self._first_cycle + round((time.perf_counter() - self._start) * self._hz)
 
-    def _outlive(self, stop: Stop) -> Stop | None:
-        """A machine sleeps with nothing of its own to wake it. None if input brings it back, else how the run ends."""
+    def _wait_for_wakeup(self, stop: Stop) -> Stop | None:
+        """Wait for input that wakes a machine without internal wake-up source.
+
+        Return None if it arrives, else the stop.
+        """
         machine = self.machine
         if self._replay:
-            return None if self._take_input(self._next_stamp()) else stop
+            return None if self._take_input(self._next_input_cycle()) else stop
         sources = [port for number, port in self.ports.items() if self._can_wake(number)]
         while any(port.in_fd is not None for port in sources):
             if self.interrupted:
                 return machine.stopped("interrupted")
-            patient = self._realtime or self.limit == FOREVER
-            ready = wait_for_input(sources, POLL_SECONDS if patient else 0)
+            may_wait = self._realtime or self.limit == FOREVER
+            ready = wait_for_input(sources, POLL_SECONDS if may_wait else 0)
             now = max(machine.cycle, self._wall_cycle() if self._realtime else 0)
-            if now >= self.limit or not (ready or patient):
+            if now >= self.limit or not (ready or may_wait):
                 return replace(stop, reason="limit", cycle=self.limit)
             if ready and self._take_input(now):
                 return None
         return stop
 
     def _can_wake(self, number: int) -> bool:
-        """Whether a byte for this UART would wake the CPU: receiver on, its interrupt enabled above priority 0."""
+        """Whether a byte for this UART would wake the CPU: receiver enabled, its interrupt enabled above priority 0."""
         machine = self.machine
         uart = machine.uart[number]
         source = machine.chip.interrupts[uart.site.rx_irq]
@@ -183,7 +192,7 @@ class Session:
 
 
 def _adapted(cycles: int, seconds: float) -> int:
-    """Length of the next slice after one of `cycles` took `seconds`."""
+    """Return the length of the next slice after one of `cycles` took `seconds`."""
     if seconds < SLICE_SECONDS / 2:
         return min(2 * cycles, LONGEST_SLICE)
     if seconds > SLICE_SECONDS * 2:

@@ -28,4 +28,4 @@ def test_the_program_blinks_and_drives(tmp_path: Path, capsys: pytest.CaptureFix
     assert main(["run", image, *options]) == 0
     seen = capsys.readouterr().err
     assert len(re.findall(r"leds (?:body|off)", seen)) >= 4, seen
-    assert re.search(r"motors [1-9]\d* 0 steps in all", seen), seen
+    assert re.search(r"motors [1-9]\d* 0 steps in total", seen), seen

@@ -37,7 +37,7 @@ def test_watch_tells_what_happens_on_the_robot(program, tmp_path, capsys):
     assert main(arguments) == 0
     lines = [line.split("  ")[-1] for line in capsys.readouterr().err.splitlines()]
     assert "motors 101 -33 steps, 1000 -330 steps/s" in lines
-    assert "motors 349 -116 steps in all" in lines
+    assert "motors 349 -116 steps in total" in lines
 
 
 def test_stimulus_file_reaches_the_program(program, tmp_path, capsys):
@@ -82,9 +82,9 @@ def test_screenshot_without_buffer_shows_what_the_sensor_sees(program, scene, tm
         (["run", "IMAGE", "--camera", "absent.png"], "No such file"),
         (["run", "IMAGE", "--stimulus", "SCRIPT"], "events.txt:2: expected one of selector"),
         (["run", "IMAGE", "--watch", "smell"], "cannot watch 'smell'"),
-        (["screenshot", "IMAGE", "--buffer", "frame"], "belong together"),
+        (["screenshot", "IMAGE", "--buffer", "frame"], "must be given together"),
         (["screenshot", "IMAGE", "--buffer", "nowhere", "--size", "2x2"], "no register or variable 'nowhere'"),
-        (["screenshot", "IMAGE", "--buffer", "0x2700", "--size", "20x20"], "does not lie in RAM"),
+        (["screenshot", "IMAGE", "--buffer", "0x2700", "--size", "20x20"], "is outside RAM"),
         (["screenshot", "IMAGE", "--size", "20"], "WIDTHxHEIGHT"),
         (["screenshot", "IMAGE", "--seconds", "0"], "expected seconds above 0"),
         (["screenshot", "IMAGE", "--board", "none"], "no sensor"),

@@ -44,8 +44,11 @@ def random_settings(generator: random.Random) -> dict[str, int]:
 
 @pytest.mark.parametrize("seed", range(16))
 def test_engines_agree_in_any_setting(program, seed):
-    """engines.md §4.3: odd half Tcy, channel lists that do not divide the round, emitters that settle, levels that change
-    between runs, ADCON1 read while it works, Idle."""
+    """Engines agree (engines.md §4.3) for any converter setting.
+
+    Cases: odd half Tcy, scan sequences that do not divide the results per interrupt, settling emitters, levels that change
+    between runs, ADCON1 read during conversions, Idle.
+    """
     generator = random.Random(seed)
     image, settings = load_image(program("convert.c")), random_settings(generator)
     one, other = (machine_with(image, engine, settings) for engine in ("plain", "jit"))

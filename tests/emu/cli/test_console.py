@@ -90,7 +90,8 @@ def test_a_bad_tcp_port_is_refused(text):
 
 def test_stamps_come_back_as_they_were_written(tmp_path):
     path = tmp_path / "stamps"
-    stamps = [TimestampedInput(0, 1, b"\x00\xff"), TimestampedInput(147456, 2, b"go\n"), TimestampedInput(147456, 1, b"!")]
+    entries = (0, 1, b"\x00\xff"), (147456, 2, b"go\n"), (147456, 1, b"!")
+    stamps = [TimestampedInput(*entry) for entry in entries]
     with path.open("w") as stream:
         stream.write(HEADER + "\n\n")
         for stamp in stamps:

@@ -57,8 +57,8 @@ def test_what_is_nowhere_is_said_before_the_run(spin: str, monkeypatch: pytest.M
     ("arguments", "message"),
     [
         (["--dump-native", "_nobody"], "no function or label '_nobody'"),
-        (["--dump-native", "0x4000"], "no native code was made for 0x4000"),
-        (["--dump-native", "_spin", "--engine", "plain"], "plain makes no native code"),
+        (["--dump-native", "0x4000"], "no native code was compiled for 0x4000"),
+        (["--dump-native", "_spin", "--engine", "plain"], "plain compiles no native code"),
     ],
 )
 def test_what_cannot_be_shown_is_said(

@@ -325,14 +325,14 @@ def test_a_run_on_a_terminal_takes_typed_input(build):
 @pytest.mark.parametrize(
     ("arguments", "expected"),
     [
-        (["--uart2", "-"], "only one of UARTs, --trace, --record and --json can have standard output"),
+        (["--uart2", "-"], "only one of the UARTs, --trace, --record and --json can use standard output"),
         (["--uart1", "tcp:x"], "expected tcp:PORT"),
         (["--uart1", "/nowhere/log"], "/nowhere/log: No such file or directory"),
         (["--break", "nowhere"], "no symbol 'nowhere'"),
         (["--break", "counter"], "not code"),
-        (["--break", "0x101"], "0x101 is no program address: they are even, 0 to 0x7ffffe"),
-        (["--break", "-2"], "-2 is no program address"),
-        (["--break", "99999999999"], "99999999999 is no program address"),
+        (["--break", "0x101"], "0x101 is not a program address; expected an even number, 0 to 0x7ffffe"),
+        (["--break", "-2"], "-2 is not a program address"),
+        (["--break", "99999999999"], "99999999999 is not a program address"),
         (["--replay", "/nowhere/stamps"], "/nowhere/stamps: No such file or directory"),
         (["--trace", "/nowhere/trace"], "No such file or directory"),
         (["--engine", "steam"], "there is no engine 'steam'"),
@@ -392,4 +392,4 @@ def test_a_setting_without_a_model_is_named_once(build, capfd, engine):
     source = "main:\nmov #0x4020, w0\nmov w0, {SPI1CON}\nmov w0, {SPI1CON}\npwrsav #1\n"
     main(["run", build(source), "--engine", engine])
     (note,) = [line for line in capfd.readouterr().err.splitlines() if "note:" in line]
-    assert "at 0x000102 (_main+0x2) for what has no model: SPI1CON.FRMEN" in note
+    assert "at 0x000102 (_main+0x2) for an unmodelled function: SPI1CON.FRMEN" in note

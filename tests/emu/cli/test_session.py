@@ -14,7 +14,7 @@ import emu
 import emu.api
 from emu.image.loader import parse_image
 from emu.run import session as sessions
-from emu.run.console import Port
+from emu.run.console import ConsolePort
 from emu.run.input_log import TimestampedInput
 from emu.run.session import Session
 
@@ -37,7 +37,7 @@ def test_slices_change_nothing(monkeypatch, length, engine):
         monkeypatch.setattr(sessions, "FIRST_SLICE", slice_cycles)
         monkeypatch.setattr(sessions, "_adapted", lambda cycles, seconds: cycles)
         machine = machine_with(ECHO, {"U1RXInterrupt": "receive"}, name)
-        port = Port(None, None)
+        port = ConsolePort(None, None)
         port.capture = bytearray()
         stop, _ = Session(machine, {1: port}, limit=200_000, replay=list(stamps)).run()
         return stop, bytes(port.capture), machine.snapshot()

@@ -14,7 +14,7 @@ from emu.api import Machine
 from emu.cli import main
 from emu.image.loader import load_image
 from emu.inject.campaign import CampaignError, read
-from emu.inject.faults import KINDS, Fault, choose, do
+from emu.inject.faults import KINDS, Fault, choose_fault, inject_fault
 from emu.inject.report import summary
 from emu.inject.trial import OUTCOMES, Trials
 from toolchain.driver.driver import main as compile_program
@@ -110,26 +110,26 @@ def test_every_fault_does_what_it_says(firmware):
     machine.run(cycles=100_000)
     place, register = image.symbols.find("_unused").address, machine.w[5]
     before = machine.peek(place, 1)
-    do(Fault(0, "ram", 0, place, 3), machine)
+    inject_fault(Fault(0, "ram", 0, place, 3), machine)
     assert machine.peek(place, 1) == before ^ 8
-    do(Fault(0, "register", 0, 5, 9), machine)
+    inject_fault(Fault(0, "register", 0, 5, 9), machine)
     assert machine.w[5] == register ^ 512
     start = image.symbols.find("_main").address
     word = machine.program.word(start)
-    do(Fault(0, "flash", 0, start, 20), machine)
+    inject_fault(Fault(0, "flash", 0, start, 20), machine)
     assert machine.program.word(start) == word ^ 1 << 20
-    do(Fault(0, "flash", 0, start, 20), machine)
+    inject_fault(Fault(0, "flash", 0, start, 20), machine)
     pc, cycle = machine.pc, machine.cycle
-    assert do(Fault(0, "skip", 0, 0, 0), machine) == f"the instruction at {machine.inspector.where(pc)}"
+    assert inject_fault(Fault(0, "skip", 0, 0, 0), machine) == f"the instruction at {machine.inspector.where(pc)}"
     assert (machine.pc > pc, machine.cycle) == (True, cycle)
-    assert do(Fault(0, "uart", 0, 1, 0), machine) == "no byte for UART1 was on its way"
+    assert inject_fault(Fault(0, "uart", 0, 1, 0), machine) == "no byte for UART1 was queued"
     machine.uart[1].feed(b"ab")
     machine.uart[1].listen(lambda byte, _: heard.append(chr(byte)))
     heard = []
-    do(Fault(0, "uart", 0, 1, 0), machine)
+    inject_fault(Fault(0, "uart", 0, 1, 0), machine)
     machine.run(cycles=60_000)
     assert heard.count("?") == 1
-    do(Fault(0, "brownout", 0, 0, 1), machine)
+    inject_fault(Fault(0, "brownout", 0, 0, 1), machine)
     assert (machine.pc, machine.resets[-1][1]) == (0, "BOR")
 
 
@@ -158,8 +158,8 @@ def test_the_same_campaign_gives_the_same_bytes_whatever_the_jobs(firmware, caps
 
 def test_choices_follow_from_seed_and_number_and_keep_the_shares(firmware):
     image, campaign = load_image(firmware / "main.elf"), read(firmware / "campaign.toml")
-    faults = [choose(n, 5, campaign.faults, image, 100, 200) for n in range(2_600)]
-    assert faults == [choose(n, 5, campaign.faults, image, 100, 200) for n in range(2_600)]
+    faults = [choose_fault(n, 5, campaign.faults, image, 100, 200) for n in range(2_600)]
+    assert faults == [choose_fault(n, 5, campaign.faults, image, 100, 200) for n in range(2_600)]
     assert all(100 <= fault.cycle < 200 for fault in faults)
     for kind in KINDS:
         share = sum(fault.kind == kind for fault in faults) / 2_600
@@ -207,4 +207,4 @@ def test_the_state_of_another_campaign_is_refused(firmware, capsys):
     state.write_text('{"image": "1", "campaign": "2"}\n')
     words = ["inject", firmware / "main.elf", "--campaign", firmware / "campaign.toml", "--state", state]
     assert main([str(word) for word in words]) == 2
-    assert "other.state:1: this is the state of another image or campaign" in capsys.readouterr().err
+    assert "other.state:1: the state belongs to another image or campaign" in capsys.readouterr().err

@@ -78,7 +78,7 @@ def test_elf_and_hex_of_the_same_program_hold_the_same_words():
     ("text", "expected"),
     [
         (GOTO, "is truncated: no end-of-file record after line 1"),
-        (GOTO + END + GOTO, "line 3: text behind the end-of-file record"),
+        (GOTO + END + GOTO, "line 3: text after the end-of-file record"),
         (GOTO + "hello\n" + END, "line 2: a record starts with ':'"),
         (":0\n", "line 1: not an even number of hexadecimal digits"),
         (":zz\n", "line 1: not an even number of hexadecimal digits"),

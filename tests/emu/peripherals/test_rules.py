@@ -6,7 +6,7 @@ import random
 
 import pytest
 
-from emu.system.rules import RuleInterpreter, Cell, Rule
+from emu.system.rules import Cell, Rule, RuleInterpreter
 
 from .conftest import Rig
 from .test_fuzz import WORDS, act

@@ -1,8 +1,9 @@
-"""Whose memory it is: kernel, devices or application, by the folder of the source file it comes from.
+"""Memory by owner (kernel, devices, application), from the folder of the source file.
 
-What enters: an image built with -g. What leaves: bytes of ROM and RAM by owner. Start-up code and vectors have none:
-they are there without a kernel too. Code of headers belongs to whoever it was inlined into; a slot of `.handle`
-(function pointers, abi-elf.md §1.5) to whoever's function it leads to; library code and strings to the kernel.
+Input: an image built with -g. Output: bytes of ROM and RAM by owner. Start-up code and vectors have no owner, because a
+program without a kernel has them too. Header code belongs to the owner of the function it was inlined into. A slot of
+`.handle` (function pointers, abi-elf.md §1.5) belongs to the owner of its target. Library code and strings belong to
+the kernel.
 """
 
 from __future__ import annotations
@@ -29,14 +30,14 @@ _HANDLES: Final = ".handle"
 
 @dataclass(frozen=True, slots=True)
 class OwnerSize:
-    """Bytes of one owner."""
+    """ROM and RAM bytes of one owner."""
 
     rom: int
     ram: int
 
 
 def sizes_by_owner(image: Image) -> dict[str, OwnerSize]:
-    """Bytes by owner; those of variables include the array that heap and kernel stack are cut from."""
+    """Return the bytes by owner; RAM includes the array of heap and kernel stack."""
     found = [piece for piece in pieces(image) if piece.name not in _WITHOUT_OWNER]
     homes = _homes(found)
     rom: Counter[str] = Counter()
@@ -58,7 +59,7 @@ def _owner(module: str) -> str:
 
 
 def _homes(found: list[Piece]) -> dict[str, str]:
-    """By symbol: whose source files most of its code comes from, headers apart."""
+    """Return the owner of each symbol: the one with most of its code, header code excluded."""
     sizes: dict[str, Counter[str]] = {}
     for piece in found:
         if piece.module != UNKNOWN and not piece.module.endswith(".h"):
@@ -67,7 +68,7 @@ def _homes(found: list[Piece]) -> dict[str, str]:
 
 
 def handles(image: Image) -> list[tuple[str, int]]:
-    """(source file of its target, bytes) of every slot of `.handle`."""
+    """Return (source file of the target, bytes) of every slot of `.handle`."""
     symbol = image.symbols.find(_HANDLES)
     section = next((s for s in image.sections if s.name == _HANDLES), None)
     start, size = (section.address, section.size) if section else (symbol.address, symbol.size) if symbol else (0, 0)
