@@ -1,10 +1,8 @@
-"""Where every cycle goes, written down while a machine runs in any engine: by instruction and CPU priority, and who
-called whom.
+"""Cycle accounting: cycles by instruction address and CPU priority, and a log of calls, interrupts and sleeps.
 
-What enters: a wired core. What leaves: cells of cycles that add up to those that passed, and a list of calls, returns,
-interrupts and sleeps for whoever follows them.
-Native code keeps the ledger itself (jit/counting.py); here is the part of the sequencer, by which the plain engine is
-counted whole. Nothing of it is in the way of a machine without a ledger.
+Input: a wired core. Output: cells whose cycles add up to the cycles that passed, and log entries for a consumer.
+Native code accounts for itself (jit/translate/cycle_counters.py). This module wraps the sequencer, through which the
+plain engine runs entirely. A machine without accounting runs the unwrapped functions.
 """
 
 from __future__ import annotations
@@ -25,99 +23,105 @@ from emu.dspic30f.isa.flow import Call, Return
 from emu.dspic30f.state.state import STACK_POINTER
 
 LEVELS: Final = 16
-"""CPU priorities, traps included (isa.md §14.1)."""
-IDLE, NOTED, CELL, NOTES = range(4)
-"""Words behind the cells: cycles asleep; how many notes there are; address of the cell of the RETFIE that native code
-ran last; the first note."""
-NOTE_WORDS: Final = 4
-"""A note: cycle; kind, level << 8, W15 << 16 (where the return address is), instruction << 32; target, cycles of an
-interrupt's entry or of a sleep << 32; cycle of the request."""
+"""Number of CPU priorities, traps included (isa.md §14.1)."""
+IDLE, LOG_COUNT, RETFIE_CELL, LOG = range(4)
+"""Words behind the cells: cycles in Idle and Sleep; number of log entries; address of the cell of the RETFIE that
+native code ran last; first log entry."""
+ENTRY_WORDS: Final = 4
+"""Words of a log entry:
+
+0. cycle
+1. kind | level << 8 | W15 << 16 | instruction address << 32, where W15 points to the return address
+2. target address | cycles of an interrupt's entry or of a sleep << 32
+3. cycle of the interrupt request
+"""
 CALLED, RETURNED, ENTERED, SLEPT, RESET = range(1, 6)
-"""Kinds of notes."""
-STRETCH: Final = 1 << 20
-"""Tcy after which native code has its notes taken: there is at most one in a cycle."""
-ROOM: Final = 1024
-"""Notes of the sequencer that are kept."""
+"""Kinds of log entries."""
+LONGEST_RUN: Final = 1 << 20
+"""Longest native run between two flushes of the log, in Tcy: a cycle makes at most one entry."""
+LOG_ROOM: Final = 1024
+"""Log entries of the sequencer after which the log is flushed."""
 
-Taker = Callable[[int, int], None]
-"""Gets the host address of the notes and their number."""
+LogConsumer = Callable[[int, int], None]
+"""consumer(address, count): gets the host address and the number of log entries."""
 
 
-class Ledger:
-    """Counts from `open` to `close`. `take` is called with notes, often enough; without it they are dropped."""
+class CycleAccounting:
+    """Accounts for all cycles between `start` and `stop`. Without a consumer, log entries are dropped."""
 
-    def __init__(self, core: Core, take: Taker | None = None) -> None:
+    def __init__(self, core: Core, consumer: LogConsumer | None = None) -> None:
         self._core: Final = core
-        self._take: Final = take
+        self._consumer: Final = consumer
         self.words: Final = core.chip.program["flash"].end // 2
-        """Cells of one level: one per program word of flash."""
+        """Cells of one CPU priority: one per program word of flash."""
         cells = LEVELS * self.words
-        self._memory: Final = np.zeros(cells + NOTES + NOTE_WORDS * (STRETCH + 2 * ROOM), dtype=np.uint64)
+        self._memory: Final = np.zeros(cells + LOG + ENTRY_WORDS * (LONGEST_RUN + 2 * LOG_ROOM), dtype=np.uint64)
         self.address: Final = int(self._memory.ctypes.data)
-        """Of the cells, on the host; the words of IDLE and so on follow them."""
+        """Host address of the cells."""
         self.tail: Final = 8 * cells
+        """Byte offset of the words behind the cells."""
         self._tail: Final = self._memory[cells:]
         self._undo: Final[list[Callable[[], None]]] = []
 
     @property
     def cells(self) -> npt.NDArray[np.uint64]:
-        """Cycles by CPU priority and program word, shape (16, words)."""
+        """Return the cycles by CPU priority and program word, shape (16, words)."""
         return self._memory[: LEVELS * self.words].reshape(LEVELS, self.words)
 
     @property
     def idle(self) -> int:
-        """Cycles in Idle and Sleep."""
+        """Return the cycles in Idle and Sleep."""
         return int(self._tail[IDLE])
 
     def clear(self) -> None:
-        """Nothing has been counted yet."""
+        """Set all cells and the idle cycles to 0."""
         self._memory[: LEVELS * self.words] = 0
         self._tail[IDLE] = 0
 
-    def drain(self) -> None:
-        """Hand the notes over."""
-        count = int(self._tail[NOTED])
-        self._tail[NOTED] = 0
-        if count and self._take is not None:
-            self._take(self.address + self.tail + 8 * NOTES, count)
+    def flush_log(self) -> None:
+        """Pass the log entries to the consumer and empty the log."""
+        count = int(self._tail[LOG_COUNT])
+        self._tail[LOG_COUNT] = 0
+        if count and self._consumer is not None:
+            self._consumer(self.address + self.tail + 8 * LOG, count)
 
-    # What the sequencer does
+    # The sequencer
 
-    def open(self) -> None:
-        """Write down from now on what Python runs."""
+    def start(self) -> None:
+        """Account for everything that the sequencer runs from now on."""
         sequencer = self._core.sequencer
-        for thing, name, made in (
-            (sequencer, "execute", self._executing),
-            (sequencer, "boundary", self._holding),
-            (sequencer, "after_retfie", self._third_cycle),
-            (sequencer.exceptions, "enter", self._entering),
-            (sequencer.power, "pass_time", self._sleeping),
+        for owner, name, wrap in (
+            (sequencer, "execute", self._count_instruction),
+            (sequencer, "boundary", self._count_hold),
+            (sequencer, "after_retfie", self._count_third_cycle),
+            (sequencer.exceptions, "enter", self._count_entry),
+            (sequencer.power, "pass_time", self._count_sleep),
         ):
-            vars(thing)[name] = made(getattr(thing, name))
-            self._undo.append(partial(delattr, thing, name))
+            vars(owner)[name] = wrap(getattr(owner, name))
+            self._undo.append(partial(delattr, owner, name))
 
-    def close(self) -> None:
-        """Write nothing down any more."""
+    def stop(self) -> None:
+        """Restore the sequencer and flush the log."""
         while self._undo:
             self._undo.pop()()
-        self.drain()
+        self.flush_log()
 
     def _spend(self, pc: int, level: int, cycles: int) -> None:
         word = min(pc >> 1, self.words - 1)
         self._memory[level * self.words + word] += np.uint64(cycles)
 
-    def note(self, kind: int, site: int, target: int, cycles: int = 0, level: int = 0, since: int = 0) -> None:
-        """Add a note of the present cycle and stack pointer."""
-        state, place = self._core.state, NOTES + NOTE_WORDS * int(self._tail[NOTED])
-        where = state.u16[STACK_POINTER]
-        self._tail[place : place + NOTE_WORDS] = [
-            state.cycle, kind | level << 8 | where << 16 | site << 32, target | cycles << 32, since,
+    def _log(self, kind: int, site: int, target: int, cycles: int = 0, level: int = 0, since: int = 0) -> None:
+        """Append a log entry with the present cycle and stack pointer."""
+        state, entry = self._core.state, LOG + ENTRY_WORDS * int(self._tail[LOG_COUNT])
+        stack = state.u16[STACK_POINTER]
+        self._tail[entry : entry + ENTRY_WORDS] = [
+            state.cycle, kind | level << 8 | stack << 16 | site << 32, target | cycles << 32, since,
         ]  # fmt: skip
-        self._tail[NOTED] += np.uint64(1)
-        if self._tail[NOTED] >= ROOM:
-            self.drain()
+        self._tail[LOG_COUNT] += np.uint64(1)
+        if self._tail[LOG_COUNT] >= LOG_ROOM:
+            self.flush_log()
 
-    def _executing(self, execute: Callable[[], None]) -> Callable[[], None]:
+    def _count_instruction(self, execute: Callable[[], None]) -> Callable[[], None]:
         state, sequencer = self._core.state, self._core.sequencer
         steps: dict[int, Any] = vars(sequencer)["_steps"]
 
@@ -127,7 +131,7 @@ class Ledger:
                 execute()
             except DeviceReset as reset:
                 self._spend(pc, level, state.cycle - before + reset.fault)
-                self.note(RESET, pc, 0)
+                self._log(RESET, pc, 0)
                 raise
             except BaseException:
                 self._spend(pc, level, state.cycle - before)
@@ -137,14 +141,14 @@ class Ledger:
             flow = step.facts.flow if step is not None else None
             if flow is Call:
                 state.u16[STACK_POINTER] -= 4
-                self.note(CALLED, pc, state.pc)
+                self._log(CALLED, pc, state.pc)
                 state.u16[STACK_POINTER] += 4
             elif flow is Return:
-                self.note(RETURNED, pc, state.pc)
+                self._log(RETURNED, pc, state.pc)
 
         return counted
 
-    def _holding(self, boundary: Callable[[int], bool]) -> Callable[[int], bool]:
+    def _count_hold(self, boundary: Callable[[int], bool]) -> Callable[[int], bool]:
         state, hold = self._core.state, self._core.record.fields["cpu.hold"].index
 
         def counted(limit: int) -> bool:
@@ -155,19 +159,19 @@ class Ledger:
 
         return counted
 
-    def _third_cycle(self, after_retfie: Callable[[], None]) -> Callable[[], None]:
+    def _count_third_cycle(self, after_retfie: Callable[[], None]) -> Callable[[], None]:
         state = self._core.state
 
         def counted() -> None:
             before = state.cycle
             after_retfie()
             third = state.cycle - before
-            ctypes.c_uint64.from_address(int(self._tail[CELL])).value += third
-            self._tail[NOTES + NOTE_WORDS * (int(self._tail[NOTED]) - 1)] += np.uint64(third)
+            ctypes.c_uint64.from_address(int(self._tail[RETFIE_CELL])).value += third
+            self._tail[LOG + ENTRY_WORDS * (int(self._tail[LOG_COUNT]) - 1)] += np.uint64(third)
 
         return counted
 
-    def _entering(self, enter: Callable[[Accepted, int], None]) -> Callable[[Accepted, int], None]:
+    def _count_entry(self, enter: Callable[[Accepted, int], None]) -> Callable[[Accepted, int], None]:
         state = self._core.state
 
         def counted(accepted: Accepted, last: int) -> None:
@@ -175,12 +179,12 @@ class Ledger:
             enter(accepted, last)
             self._spend(state.pc, state.ipl, state.cycle - before)
             state.u16[STACK_POINTER] -= 4
-            self.note(ENTERED, pc, state.pc, state.cycle - before, accepted.level, accepted.since)
+            self._log(ENTERED, pc, state.pc, state.cycle - before, accepted.level, accepted.since)
             state.u16[STACK_POINTER] += 4
 
         return counted
 
-    def _sleeping(self, pass_time: Callable[[int], Sleeping]) -> Callable[[int], Sleeping]:
+    def _count_sleep(self, pass_time: Callable[[int], Sleeping]) -> Callable[[int], Sleeping]:
         state = self._core.state
 
         def counted(limit: int) -> Sleeping:
@@ -190,6 +194,6 @@ class Ledger:
             finally:
                 self._tail[IDLE] += np.uint64(state.cycle - before)
                 if state.cycle > before:
-                    self.note(SLEPT, state.pc, state.pc, state.cycle - before)
+                    self._log(SLEPT, state.pc, state.pc, state.cycle - before)
 
         return counted

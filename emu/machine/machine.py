@@ -36,7 +36,7 @@ class _WRegisters(Protocol):
 
 
 class Machine(StateAccess):
-    """A chip with a program. `emu/README.md` describes the engines.
+    """A chip with a program. `docs/reference/engines.md` describes the engines.
 
     `ipl_slip` = 1 accepts an interrupt right after a write that raises IPL or clears IEC (isa.md §14.3).
     `board` is called with the peripherals and returns the board around the chip (`emu.boards`).

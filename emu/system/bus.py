@@ -13,7 +13,7 @@ from typing import Final
 
 from emu.system.events import Events
 from emu.system.record import Record
-from emu.system.rules import Integers, Rule
+from emu.system.rules import Rule, RuleInterpreter
 
 ReadHook = Callable[[], int]
 WriteHook = Callable[[int, int, int], None]
@@ -84,7 +84,7 @@ class Bus:
         self.on_write: Final[list[WriteHook | None]] = [None] * words
         self.rules: Final[list[Rule | None]] = [None] * words
         """What accesses do in the common case; the hooks answer where a rule does not."""
-        self.integers: Final = Integers(record, events)
+        self.integers: Final = RuleInterpreter(record, events)
         self.modelled: Final = [False] * words
         """Set for registers a device or the CPU stands behind; others are reported once when touched."""
         self.off: frozenset[int] = frozenset()

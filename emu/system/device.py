@@ -13,7 +13,7 @@ from typing import Final
 from emu.system.bus import Bus, ReadHook, WriteHook
 from emu.system.events import Events
 from emu.system.record import Record
-from emu.system.rules import Line, Place, Rule, place_of
+from emu.system.rules import Cell, InterruptLine, Rule, cell_of
 
 
 class Register:
@@ -48,14 +48,14 @@ class Register:
         lsb, ones = self._fields[field]
         self._u16[self._word] = self._u16[self._word] & ~(ones << lsb) & 0xFFFF | (number & ones) << lsb
 
-    def ruled(self, rule: Rule) -> None:
+    def set_rule(self, rule: Rule) -> None:
         """Accesses follow `rule` where it can say what they do."""
         self.bus.rules[self._word] = rule
 
     @property
-    def place(self) -> Place:
+    def place(self) -> Cell:
         """Where the word is, for rules."""
-        return Place(self.address, 16)
+        return Cell(self.address, 16)
 
     def computed(self, hook: ReadHook) -> None:
         """Reads return `hook()`, a function of the cycle and of device state without side effects."""
@@ -97,8 +97,8 @@ class Irq:
         self._word: Final = flag_address >> 1
         self._bit: Final = 1 << flag_bit
         self._since: Final = flag_since(record, flag_address, flag_bit)
-        self.line: Final = Line(
-            Place(flag_address, 16), self._bit, Place(8 * self._since, 64), place_of(record, "events.deadline")
+        self.line: Final = InterruptLine(
+            Cell(flag_address, 16), self._bit, Cell(8 * self._since, 64), cell_of(record, "events.deadline")
         )
         """For rules."""
 

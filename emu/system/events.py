@@ -65,7 +65,7 @@ class Events:
         self._fire.append(fire)
         return len(self.names) - 1
 
-    def ruled(self, slot: int, rule: Any, runs: Callable[[Any], bool]) -> None:
+    def set_rule(self, slot: int, rule: Any, runs: Callable[[Any], bool]) -> None:
         """A slot follows `rule` where `runs(rule)` says that it did it all."""
         fire = self._fire[slot]
         self.rules[slot] = rule

@@ -1,7 +1,7 @@
 """Device rules as text that several readers run: integers in every engine, LLVM values in native code.
 
 A `Rule` says what an access to one register or an event does, in a straight line: it gets places of the record,
-computes, says what it needs, then puts places. Nothing is put before the last `need`. Where a need does not hold
+computes, says what it needs, then puts places. Nothing is put before the last `require`. Where a need does not hold
 nothing has been done, and the device's own hooks answer instead, in every engine alike. So engines cannot disagree on a
 rule, and what is rare stays in Python. Entering an exception is such a text too (dspic30f/exceptions.py).
 """
@@ -20,7 +20,7 @@ Number = Any
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
+class Cell:
     """An unsigned number in the record: byte offset and bits (8, 16, 32, 64)."""
 
     offset: int
@@ -33,36 +33,36 @@ class Place:
 
 
 @dataclass(frozen=True, slots=True)
-class Slot:
+class EventSlot:
     """An event slot: its due cycle, and the deadline of all slots."""
 
-    due: Place
-    deadline: Place
+    due: Cell
+    deadline: Cell
 
 
-def place_of(record: Record, name: str, index: int = 0) -> Place:
+def cell_of(record: Record, name: str, index: int = 0) -> Cell:
     """Element `index` of a reserved field."""
     reserved = record.fields[name]
     size = SIZES[reserved.kind]
-    return Place(reserved.offset + size * index, 8 * size)
+    return Cell(reserved.offset + size * index, 8 * size)
 
 
-def slot_of(record: Record, number: int) -> Slot:
+def event_slot(record: Record, number: int) -> EventSlot:
     """The event slot with that number."""
-    return Slot(place_of(record, "events.due", number), place_of(record, "events.deadline"))
+    return EventSlot(cell_of(record, "events.due", number), cell_of(record, "events.deadline"))
 
 
 @dataclass(frozen=True, slots=True)
-class Line:
+class InterruptLine:
     """An interrupt request line: its flag, the cycle in which that was first 1, and the deadline of all slots."""
 
-    flags: Place
+    flags: Cell
     bit: int
-    since: Place
-    deadline: Place
+    since: Cell
+    deadline: Cell
 
 
-def request(m: Reader, line: Line, cycle: Number, when: Number = True) -> None:
+def request(m: RuleBuilder, line: InterruptLine, cycle: Number, when: Number = True) -> None:
     """`when` that holds, the flag is 1 from `cycle` on, if it is not already, and the engine looks."""
     word = m.get(line.flags)
     m.put(line.since, m.select(((word & line.bit) == 0) & when, cycle, m.get(line.since)))
@@ -70,20 +70,20 @@ def request(m: Reader, line: Line, cycle: Number, when: Number = True) -> None:
     m.put(line.deadline, m.select(when, 0, m.get(line.deadline)))
 
 
-class Reader(Protocol):
+class RuleBuilder(Protocol):
     """What a rule may do."""
 
     @property
     def now(self) -> Number:
         """Cycle of the access or event."""
 
-    def get(self, place: Place, index: Number = 0) -> Number:
+    def get(self, place: Cell, index: Number = 0) -> Number:
         """The number at a place, or `index` places behind it."""
 
-    def put(self, place: Place, value: Number, index: Number = 0) -> None:
+    def put(self, place: Cell, value: Number, index: Number = 0) -> None:
         """Store the low bits of a number, once the whole rule has been read."""
 
-    def need(self, condition: Number) -> None:
+    def require(self, condition: Number) -> None:
         """Leave the access to the device's hooks unless this holds."""
 
     def select(self, condition: Number, a: Number, b: Number) -> Number:
@@ -101,14 +101,14 @@ class Reader(Protocol):
     def table(self, values: tuple[int, ...], index: Number) -> Number:
         """values[index], of a table that never changes."""
 
-    def can_ask(self, code: Number) -> Number:
+    def can_call(self, code: Number) -> Number:
         """Whether `code`, an address of host code that the record names (`Record.reserve_addresses`), can be asked: it
         is not 0, and whoever reads is native code. The others leave it to the device's hooks."""
 
-    def ask(self, code: Number, data: Number, *numbers: Number) -> Number:
+    def call(self, code: Number, data: Number, *numbers: Number) -> Number:
         """What host code answers: int64 code(record, data, numbers...). It changes nothing that a rule sees."""
 
-    def either(
+    def lazy_select(
         self, condition: Number, costly: Callable[[], tuple[Number, ...]], *others: Number
     ) -> tuple[Number, ...]:
         """costly() if `condition`, else `others`; it is computed only then, and puts and needs nothing."""
@@ -119,7 +119,7 @@ class Reader(Protocol):
     def scan(self, bits: Number, body: Callable[..., tuple[Number, ...]], *carried: Number) -> tuple[Number, ...]:
         """For every bit set, from bit 0 up: carried = body(number of the bit, *carried). What is left in the end."""
 
-    def post(self, slot: Slot, due: Number) -> None:
+    def post(self, slot: EventSlot, due: Number) -> None:
         """Let an event slot fire at cycle `due`."""
 
 
@@ -127,7 +127,7 @@ class Reader(Protocol):
 class Rule:
     """What accesses to one register do, or an event slot that falls due; None: that has no rule."""
 
-    places: Any
+    operands: Any
     reads: Callable[[Any, Any], Number] | None = None
     """reads(reader, places): the word an instruction reads."""
     writes: Callable[[Any, Any, Number, int], bool] | None = None
@@ -135,19 +135,20 @@ class Rule:
     0x00FF or 0xFF00 is known when the rule is read, the value need not be."""
     fires: Callable[[Any, Any], None] | None = None
     """fires(reader, places): the slot is idle already; the rule may post it again."""
-    takes: Callable[[Any, Any], Number] | None = None
+    reads_with_effect: Callable[[Any, Any], Number] | None = None
     """takes(reader, places): as `reads`, and the device changes by it."""
 
     def __repr__(self) -> str:
-        names = [rule.__qualname__ for rule in (self.reads, self.takes, self.writes, self.fires) if rule is not None]
-        return f"Rule({self.places!r}, {', '.join(names)})"
+        functions = (self.reads, self.reads_with_effect, self.writes, self.fires)
+        names = [function.__qualname__ for function in functions if function is not None]
+        return f"Rule({self.operands!r}, {', '.join(names)})"
 
 
-class Rare(Exception):
+class RuleNotApplicable(Exception):
     """A need does not hold."""
 
 
-class Numbers:
+class IntegerOperations:
     """What a reader on ints computes with, no machine behind it."""
 
     def select(self, condition: Number, a: Number, b: Number) -> Number:
@@ -165,13 +166,13 @@ class Numbers:
     def table(self, values: tuple[int, ...], index: int) -> int:
         return values[index]
 
-    def can_ask(self, _code: int) -> bool:
+    def can_call(self, _code: int) -> bool:
         return False
 
-    def ask(self, _code: int, _data: int, *_numbers: int) -> int:
-        raise Rare
+    def call(self, _code: int, _data: int, *_numbers: int) -> int:
+        raise RuleNotApplicable
 
-    def either(self, condition: Number, costly: Callable[[], tuple[int, ...]], *others: int) -> tuple[int, ...]:
+    def lazy_select(self, condition: Number, costly: Callable[[], tuple[int, ...]], *others: int) -> tuple[int, ...]:
         return costly() if condition else others
 
     def loop(self, count: int, body: Callable[..., tuple[int, ...]], *carried: int) -> tuple[int, ...]:
@@ -186,10 +187,10 @@ class Numbers:
         return carried
 
 
-NUMBERS: Final[Any] = Numbers()
+INTEGER_OPERATIONS: Final[Any] = IntegerOperations()
 
 
-class Integers(Numbers):
+class RuleInterpreter(IntegerOperations):
     """The reader on ints: runs rules on the record itself."""
 
     def __init__(self, record: Record, events: Events) -> None:
@@ -199,12 +200,12 @@ class Integers(Numbers):
 
     def read(self, rule: Rule) -> int | None:
         """The word read now, or None where the hooks answer."""
-        reads = rule.reads or rule.takes
+        reads = rule.reads or rule.reads_with_effect
         if reads is None:
             return None
         try:
-            return int(reads(self, rule.places))
-        except Rare:
+            return int(reads(self, rule.operands))
+        except RuleNotApplicable:
             return None
 
     def write(self, rule: Rule, value: int, lanes: int) -> bool:
@@ -212,8 +213,8 @@ class Integers(Numbers):
         if rule.writes is None:
             return False
         try:
-            return rule.writes(self, rule.places, value, lanes)
-        except Rare:
+            return rule.writes(self, rule.operands, value, lanes)
+        except RuleNotApplicable:
             return False
 
     def fire(self, rule: Rule) -> bool:
@@ -221,8 +222,8 @@ class Integers(Numbers):
         if rule.fires is None:
             return False
         try:
-            rule.fires(self, rule.places)
-        except Rare:
+            rule.fires(self, rule.operands)
+        except RuleNotApplicable:
             return False
         return True
 
@@ -230,17 +231,17 @@ class Integers(Numbers):
     def now(self) -> int:
         return self._events.now
 
-    def get(self, place: Place, index: int = 0) -> int:
+    def get(self, place: Cell, index: int = 0) -> int:
         return self._views[place.bits][place.index + index]
 
-    def put(self, place: Place, value: int, index: int = 0) -> None:
+    def put(self, place: Cell, value: int, index: int = 0) -> None:
         self._views[place.bits][place.index + index] = value & self._tops[place.bits]
 
-    def need(self, condition: Number) -> None:
+    def require(self, condition: Number) -> None:
         if not condition:
-            raise Rare
+            raise RuleNotApplicable
 
-    def post(self, slot: Slot, due: int) -> None:
+    def post(self, slot: EventSlot, due: int) -> None:
         self.put(slot.due, due)
         if due < self.get(slot.deadline):
             self.put(slot.deadline, due)

@@ -15,18 +15,18 @@ from emu.chips.chip import Chip
 from emu.dspic30f.state.registers import NSTDIS
 from emu.dspic30f.state.state import IPL3, IPL_MASK, NOT_REPEATING, PC_MASK, RA, RUN, State
 from emu.system.device import flag_since
-from emu.system.rules import Number, Place, Reader, Slot, place_of, slot_of
+from emu.system.rules import Cell, EventSlot, Number, RuleBuilder, cell_of, event_slot
 
 ALTIVT: Final = 1 << 15
 """INTCON2<15> (isa.md §14.4)."""
 UNMASKABLE: Final = 7
 """User interrupt priority that DISI does not block (isa.md §12)."""
-NOBODY: Final = -1
+NO_REQUEST: Final = -1
 """Instead of a request's number."""
 _IPL_SHIFT: Final = 5
 
 
-class BoundaryReader(Reader, Protocol):
+class BoundaryBuilder(RuleBuilder, Protocol):
     """What a reader can do between two instructions."""
 
     def push(self, low: Number, high: Number, cycle: Number) -> None:
@@ -37,10 +37,10 @@ class BoundaryReader(Reader, Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class ExceptionPlaces:
+class ExceptionOperands:
     """Registers and cells of acceptance and entry. A request's number: 16 x place of its flag register + its bit."""
 
-    words: tuple[tuple[Place, Place], ...]
+    words: tuple[tuple[Cell, Cell], ...]
     """Flags and enables."""
     implemented: int
     """Numbers there are, as bits."""
@@ -52,28 +52,28 @@ class ExceptionPlaces:
     ivt: tuple[int, ...]
     aivt: tuple[int, ...]
     slot: tuple[int, ...]
-    first_word: Place
+    first_word: Cell
     """Data address 0, to which `priority` counts."""
-    first_rise: Place
-    look: Slot
+    first_rise: Cell
+    look: EventSlot
     """Makes the engine look again."""
-    slip_cycle: Place
-    slip_words: Place
+    slip_cycle: Cell
+    slip_words: Cell
     """With `ipl_slip`: the cycle behind the last write, and SR and enables from before it."""
-    sr: Place
-    corcon: Place
-    intcon1: Place
-    intcon2: Place
-    inttreg: Place
-    disi_end: Place
-    cycle: Place
-    pc: Place
-    mode: Place
-    repeat: Place
-    stall: Place
+    sr: Cell
+    corcon: Cell
+    intcon1: Cell
+    intcon2: Cell
+    inttreg: Cell
+    disi_end: Cell
+    cycle: Cell
+    pc: Cell
+    mode: Cell
+    repeat: Cell
+    stall: Cell
 
 
-def places_of(state: State, chip: Chip, look: int) -> ExceptionPlaces:
+def operands_of(state: State, chip: Chip, look: int) -> ExceptionOperands:
     """From a chip's data, once the cells of `Exceptions` are reserved; `look` is its event slot."""
     record, sfrs = state.record, chip.sfrs
     names = sorted({(sfrs[s.flag[0]].address, sfrs[s.enable[0]].address) for s in chip.interrupts.values()})
@@ -90,21 +90,21 @@ def places_of(state: State, chip: Chip, look: int) -> ExceptionPlaces:
         rows[number] = (sfrs[group].address >> 1, shift, since, vector.ivt, vector.aivt, vector.slot)
         implemented |= 1 << number
     columns = zip(("priority", "shift", "since", "ivt", "aivt", "slot"), zip(*rows, strict=True), strict=True)
-    registers = {name.lower(): Place(sfrs[name].address, 16)
+    registers = {name.lower(): Cell(sfrs[name].address, 16)
                  for name in ("SR", "CORCON", "INTCON1", "INTCON2", "INTTREG")}  # fmt: skip
     cells = ("slip_cycle", "slip_words", "disi_end", "cycle", "pc", "mode", "repeat", "stall")
-    rest: dict[str, Any] = dict(columns) | registers | {name: place_of(record, f"cpu.{name}") for name in cells}
-    return ExceptionPlaces(
-        words=tuple((Place(flags, 16), Place(enables, 16)) for flags, enables in names),
+    rest: dict[str, Any] = dict(columns) | registers | {name: cell_of(record, f"cpu.{name}") for name in cells}
+    return ExceptionOperands(
+        words=tuple((Cell(flags, 16), Cell(enables, 16)) for flags, enables in names),
         implemented=implemented,
-        first_word=Place(0, 16),
-        first_rise=place_of(record, "irq.since"),
-        look=slot_of(record, look),
+        first_word=Cell(0, 16),
+        first_rise=cell_of(record, "irq.since"),
+        look=event_slot(record, look),
         **rest,
     )
 
 
-def requested(m: Reader, p: ExceptionPlaces, slip: Number | None = None) -> Number:
+def requested(m: RuleBuilder, p: ExceptionOperands, slip: Number | None = None) -> Number:
     """Numbers of the enabled requests as bits. `slip`, if interrupts may slip through: the cycle that comes next."""
     bits: Number = 0
     for number, (flags, enables) in enumerate(p.words):
@@ -115,7 +115,7 @@ def requested(m: Reader, p: ExceptionPlaces, slip: Number | None = None) -> Numb
     return bits & p.implemented
 
 
-def ipl(m: Reader, p: ExceptionPlaces, slip: Number | None = None) -> Number:
+def ipl(m: RuleBuilder, p: ExceptionOperands, slip: Number | None = None) -> Number:
     """CPU priority that an exception must beat, 0..15. `slip` as for `requested`."""
     priority = m.get(p.sr) & IPL_MASK
     if slip is not None:
@@ -124,20 +124,20 @@ def ipl(m: Reader, p: ExceptionPlaces, slip: Number | None = None) -> Number:
     return (m.get(p.corcon) & IPL3) | priority >> _IPL_SHIFT
 
 
-def level_of(m: Reader, p: ExceptionPlaces, number: Number) -> Number:
+def level_of(m: RuleBuilder, p: ExceptionOperands, number: Number) -> Number:
     """Priority of a request, 0..7."""
     return m.get(p.first_word, m.table(p.priority, number)) >> m.table(p.shift, number) & 7
 
 
 def accepted(
-    m: Reader, p: ExceptionPlaces, bits: Number, last: Number, slip: Number | None = None
+    m: RuleBuilder, p: ExceptionOperands, bits: Number, last: Number, slip: Number | None = None
 ) -> tuple[Number, Number]:
     """Number and level of the request among `bits` that wins behind cycle `last`, or NOBODY. What time alone makes
     acceptable later is noted: the engine will look again then."""
     disi_end = m.get(p.disi_end)
 
     def better(number: Number, level: Number, winner: Number, look: Number) -> tuple[Number, ...]:
-        mine, since = level_of(m, p, number), rise(m, p, number)
+        mine, since = level_of(m, p, number), request_cycle(m, p, number)
         held = (mine < UNMASKABLE) & (last < disi_end)
         until, higher = m.select(held, disi_end, since), mine > level
         waits = higher & (held | (last < since))
@@ -145,28 +145,28 @@ def accepted(
         return m.select(wins, mine, level), m.select(wins, number, winner), m.select(
             waits & m.below(until, look), until, look)  # fmt: skip
 
-    level, winner, look = m.scan(bits, better, ipl(m, p, slip), NOBODY, m.get(p.look.due))
+    level, winner, look = m.scan(bits, better, ipl(m, p, slip), NO_REQUEST, m.get(p.look.due))
     m.post(p.look, look)
     return winner, level
 
 
-def waking(m: Reader, p: ExceptionPlaces, bits: Number) -> Number:
+def waking(m: RuleBuilder, p: ExceptionOperands, bits: Number) -> Number:
     """The first request among `bits` that ends Idle or Sleep: of priority 1 or more, whatever the CPU priority (isa.md
     §11); or NOBODY."""
 
     def first(number: Number, found: Number) -> tuple[Number, ...]:
-        return (m.select((found == NOBODY) & (level_of(m, p, number) != 0), number, found),)
+        return (m.select((found == NO_REQUEST) & (level_of(m, p, number) != 0), number, found),)
 
-    return m.scan(bits, first, NOBODY)[0]
+    return m.scan(bits, first, NO_REQUEST)[0]
 
 
-def rise(m: Reader, p: ExceptionPlaces, number: Number) -> Number:
+def request_cycle(m: RuleBuilder, p: ExceptionOperands, number: Number) -> Number:
     """The cycle in which a request was first visible: c of isa.md §14.3."""
     return m.get(p.first_rise, m.table(p.since, number))
 
 
 def enter(
-    m: BoundaryReader, p: ExceptionPlaces, level: Number, since: Number, last: Number, vectors: tuple[Number, ...]
+    m: BoundaryBuilder, p: ExceptionOperands, level: Number, since: Number, last: Number, vectors: tuple[Number, ...]
 ) -> None:
     """Push PC, SRL and IPL3, and continue at the handler (isa.md §14.2). `vectors`: its address in the vector table and
     in the alternate one, and its number."""

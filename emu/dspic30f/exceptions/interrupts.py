@@ -14,14 +14,14 @@ from typing import Final
 
 from emu.chips.chip import Chip, Vector
 from emu.dspic30f.exceptions.exceptions import (
-    NOBODY,
+    NO_REQUEST,
     UNMASKABLE,
     accepted,
     enter,
     ipl,
-    places_of,
+    operands_of,
+    request_cycle,
     requested,
-    rise,
     waking,
 )
 from emu.dspic30f.exceptions.traps import Traps
@@ -31,7 +31,7 @@ from emu.system.bus import Bus, WriteHook
 from emu.system.device import FLAG_WORDS
 from emu.system.events import Events
 from emu.system.program import ProgramMemory
-from emu.system.rules import Integers, Rule
+from emu.system.rules import Rule, RuleInterpreter
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +43,7 @@ class Accepted:
     since: int
 
 
-class Exceptions(Integers):
+class Exceptions(RuleInterpreter):
     """Acceptance and entry. One event slot makes the engine look again when time alone can change the answer."""
 
     def __init__(
@@ -65,15 +65,15 @@ class Exceptions(Integers):
         self.ipl_slip = 0
         self._slip_cycle: Final = state.record.reserve("cpu.slip_cycle", "Q").index
         self._slip_words: Final = state.record.reserve("cpu.slip_words", "H", 1 + FLAG_WORDS).index
-        self.places: Final = places_of(state, chip, self._look)
-        self._words: Final = [(flags.index, enables.index) for flags, enables in self.places.words]
+        self.operands: Final = operands_of(state, chip, self._look)
+        self._words: Final = [(flags.index, enables.index) for flags, enables in self.operands.words]
         self._vectors: Final = {vector.slot: vector for vector in chip.vectors}
         self._hook(bus)
-        events.ruled(self._look, Rule(self.places.look, fires=lambda m, look: m.put(look.deadline, 0)), self.fire)
+        events.set_rule(self._look, Rule(self.operands.look, fires=lambda m, look: m.put(look.deadline, 0)), self.fire)
 
     def _hook(self, bus: Bus) -> None:
         """Hear of every write that can change the answer of `acceptable`."""
-        rises, priorities = iter(self.places.since), iter(self.places.priority)
+        rises, priorities = iter(self.operands.since), iter(self.operands.priority)
         for flags, enables in self._words:
             bus.modelled[flags] = bus.modelled[enables] = True
             bus.on_write[flags] = partial(self._flags_written, [next(rises) for _ in range(16)])
@@ -113,7 +113,7 @@ class Exceptions(Integers):
         set_now = new & ~old
         for bit, place in enumerate(rises):
             if set_now >> bit & 1:
-                self._u64[self.places.first_rise.index + place] = self._events.now + 1
+                self._u64[self.operands.first_rise.index + place] = self._events.now + 1
         self._events.kick()
 
     def _remember(self, word: int, old: int) -> None:
@@ -138,18 +138,18 @@ class Exceptions(Integers):
         pending = self._state.intcon1 & self.traps.flags
         slip = last + 1 if self.ipl_slip else None
         if pending:
-            level = ipl(self, self.places, slip)
+            level = ipl(self, self.operands, slip)
             for trap in self.traps.all:
                 if pending & trap.flag and trap.vector.level > level and self._visible(trap.since, last):
                     return Accepted(trap.vector.level, trap.vector, self._u64[trap.since])
         u16 = self._u16
         if slip is None and not any(u16[flags] & u16[enables] for flags, enables in self._words):
             return None  # most often, and told more quickly
-        bits = requested(self, self.places, slip)
-        number, level = accepted(self, self.places, bits, last, slip)
-        if number == NOBODY:
+        bits = requested(self, self.operands, slip)
+        number, level = accepted(self, self.operands, bits, last, slip)
+        if number == NO_REQUEST:
             return None
-        return Accepted(level, self._vectors[self.places.slot[number]], rise(self, self.places, number))
+        return Accepted(level, self._vectors[self.operands.slot[number]], request_cycle(self, self.operands, number))
 
     def _visible(self, since: int, last: int) -> bool:
         if self._u64[since] <= last:
@@ -164,20 +164,20 @@ class Exceptions(Integers):
         for trap in self.traps.all:
             if self._state.intcon1 & trap.flag:
                 return self._u64[trap.since]
-        number = waking(self, self.places, requested(self, self.places))
-        return None if number == NOBODY else rise(self, self.places, number)
+        number = waking(self, self.operands, requested(self, self.operands))
+        return None if number == NO_REQUEST else request_cycle(self, self.operands, number)
 
     def armed(self) -> bool:
         """Whether any interrupt of priority 1 or more is enabled."""
-        bits = sum(self.get(enables) << 16 * number for number, (_flags, enables) in enumerate(self.places.words))
-        return bool(waking(self, self.places, bits & self.places.implemented) != NOBODY)
+        bits = sum(self.get(enables) << 16 * number for number, (_flags, enables) in enumerate(self.operands.words))
+        return bool(waking(self, self.operands, bits & self.operands.implemented) != NO_REQUEST)
 
     def enter(self, chosen: Accepted, last: int) -> None:
         """Continue at the handler."""
         vector = chosen.vector
         if chosen.level > UNMASKABLE and self.on_trap is not None:
             self.on_trap(vector)
-        enter(self, self.places, chosen.level, chosen.since, last, (vector.ivt, vector.aivt, vector.slot))
+        enter(self, self.operands, chosen.level, chosen.since, last, (vector.ivt, vector.aivt, vector.slot))
 
     def latest(self) -> str:
         """The exception entered last, as INTTREG and the stack tell it, for messages; empty if there was none."""

@@ -12,8 +12,8 @@ from emu.dspic30f.state.state import RUN, SLEEP, State
 from emu.system.events import NEVER, Events
 from emu.system.rules import Rule
 
-NOTHING: Final = Rule(None)
-STIR: Final = 1_000_000
+NO_RULE: Final = Rule(None)
+DRAIN_CYCLES: Final = 1_000_000
 """Tcy for which devices still run when the CPU sleeps with nothing enabled that could wake it: transmitters drain."""
 
 
@@ -32,8 +32,8 @@ class PowerSignals:
     clear_watchdog: Callable[[], None] = lambda: None
     power: Callable[[int, int], None] = lambda mode, cycle: None
     """power(mode, cycle): the CPU stops (IDLE, SLEEP) or runs again (RUN) from `cycle`."""
-    idling: Rule = NOTHING
-    clearing: Rule = NOTHING
+    idle_rule: Rule = NO_RULE
+    clrwdt_rule: Rule = NO_RULE
     """What PWRSAV #1 and CLRWDT do in the common case, as text for every engine."""
     can_wake: Callable[[], bool] = lambda: False
     """Whether something other than an interrupt or trap can wake a sleeping CPU (the watchdog)."""
@@ -93,7 +93,7 @@ class PowerSaving:
             if limit <= due < NEVER:
                 state.cycle = max(state.cycle, limit)
                 return Sleeping.GOES_ON
-            if due == NEVER or (due > state.record.u64[self._slept] + STIR and self._is_final()):
+            if due == NEVER or (due > state.record.u64[self._slept] + DRAIN_CYCLES and self._is_final()):
                 events.settle(state.cycle)
                 return Sleeping.FOR_EVER
             state.cycle = max(state.cycle, due)

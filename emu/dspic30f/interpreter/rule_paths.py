@@ -14,7 +14,7 @@ from typing import Any, Final, TypeVar
 
 from emu.dspic30f.interpreter.expressions import LIMIT, Expr, Number, choose
 from emu.system.record import Record
-from emu.system.rules import Place
+from emu.system.rules import Cell
 
 R = TypeVar("R")
 
@@ -27,12 +27,12 @@ class _Parts(Exception):
         self.condition: Final = condition
 
 
-class Ways(ABC):
+class RulePaths(ABC):
     """Reads rules way by way; subclasses write the code. `known`: what stands at places already."""
 
-    def __init__(self, known: Mapping[Place, Any]) -> None:
-        self._known: dict[Place, Any] = dict(known)
-        self._puts: Final[dict[Place, Any]] = {}
+    def __init__(self, known: Mapping[Cell, Any]) -> None:
+        self._known: dict[Cell, Any] = dict(known)
+        self._puts: Final[dict[Cell, Any]] = {}
         self._turns: Iterator[bool] = iter(())
 
     def each(self, rule: Callable[[Any], R], end: Callable[[R], None], turns: tuple[bool, ...] = ()) -> None:
@@ -55,17 +55,17 @@ class Ways(ABC):
         """Write a rule that has no ways."""
         self.each(rule, lambda _result: None)
 
-    def get(self, place: Place) -> Any:
+    def get(self, place: Cell) -> Any:
         """Loaded once on each way."""
         if place not in self._known:
             self._known[place] = self.load(place)
         return self._known[place]
 
-    def put(self, place: Place, value: Any) -> None:
+    def put(self, place: Cell, value: Any) -> None:
         """At the end of the way."""
         self._puts[place] = value
 
-    def true(self, condition: Any) -> bool:
+    def is_true(self, condition: Any) -> bool:
         """Which way this is."""
         if isinstance(condition, int):
             return bool(condition)
@@ -74,11 +74,11 @@ class Ways(ABC):
         raise _Parts(condition)
 
     @abstractmethod
-    def load(self, place: Place) -> Any:
+    def load(self, place: Cell) -> Any:
         """The number at a place."""
 
     @abstractmethod
-    def store(self, place: Place, value: Any) -> None:
+    def store(self, place: Cell, value: Any) -> None:
         """Write it."""
 
     @abstractmethod
@@ -86,11 +86,11 @@ class Ways(ABC):
         """Open the branch for True, then that for False."""
 
 
-class PythonWays(Ways):
+class PythonRulePaths(RulePaths):
     """Writes Python on the record's views `u16`, `u64`, ... `emit` takes a line."""
 
     def __init__(
-        self, emit: Callable[[str], None], known: Mapping[Place, Number], kept: tuple[Place, Expr] | None = None
+        self, emit: Callable[[str], None], known: Mapping[Cell, Number], kept: tuple[Cell, Expr] | None = None
     ) -> None:
         """`kept`: a name that holds what a place does, before and behind the rule."""
         super().__init__(known if kept is None else {**known, kept[0]: kept[1]})
@@ -102,13 +102,13 @@ class PythonWays(Ways):
         """One statement on the present way."""
         self._emit(self._indent + text)
 
-    def load(self, place: Place) -> Expr:
+    def load(self, place: Cell) -> Expr:
         """Under a name of its own."""
         name = f"p{place.offset:x}"
         self.line(f"{name} = u{place.bits}[{place.index}]")
         return Expr(name, 0, (1 << place.bits) - 1, atom=True)
 
-    def store(self, place: Place, value: Number) -> None:
+    def store(self, place: Cell, value: Number) -> None:
         """An assignment."""
         name = f"{self._kept[1]} = " if self._kept is not None and self._kept[0] == place else ""
         self.line(f"{name}u{place.bits}[{place.index}] = {value & (1 << place.bits) - 1}")
@@ -134,13 +134,13 @@ def compiled(text: str) -> CodeType:
     return compile(text, "<specialised>", "exec")
 
 
-def function_of(record: Record, rule: Callable[..., R], places: Any, *parameters: str) -> Callable[..., R]:
+def function_of(record: Record, rule: Callable[..., R], operands: Any, *parameters: str) -> Callable[..., R]:
     """rule(reader, places, *parameters) as a Python function of its parameters, ints from 0 on, on `record`."""
     views = {"u16": record.u16, "u64": record.u64}
     lines = [f"def run({', '.join(parameters + tuple(f'{name}={name}' for name in views))}):"]
     values = [Expr(name, 0, LIMIT, atom=True) for name in parameters]
-    ways = PythonWays(lambda line: lines.append("    " + line), {})
-    ways.each(lambda m: rule(m, places, *values), lambda result: ways.line(f"return {result}"))
+    ways = PythonRulePaths(lambda line: lines.append("    " + line), {})
+    ways.each(lambda m: rule(m, operands, *values), lambda result: ways.line(f"return {result}"))
     namespace: dict[str, Any] = dict(views)
     exec(compiled("\n".join(lines)), namespace)
     function: Callable[..., R] = namespace["run"]

@@ -82,13 +82,13 @@ class Sequencer:
         self._hold: Final = state.record.reserve("cpu.hold", "Q").index
         self._steps: Final[dict[int, Step]] = {}
         program.changed.append(self._forget)
-        places, record = flow_rules.places_of(state), state.record
-        self._repeat: Final = function_of(record, flow_rules.repeat, places, "count")
-        self._repeated: Final = function_of(record, flow_rules.repeated, places, "counting")
-        self._do: Final = function_of(record, flow_rules.do, places, "count", "start", "end")
-        self._loop_again: Final = function_of(record, flow_rules.loop_again, places)
-        self._resume: Final = function_of(record, flow_rules.resume, places, "srl", "ipl3")
-        self._disi: Final = function_of(record, flow_rules.disi, places, "count", "after")
+        operands, record = flow_rules.operands_of(state), state.record
+        self._repeat: Final = function_of(record, flow_rules.repeat, operands, "count")
+        self._repeated: Final = function_of(record, flow_rules.repeated, operands, "counting")
+        self._do: Final = function_of(record, flow_rules.do, operands, "count", "start", "end")
+        self._loop_again: Final = function_of(record, flow_rules.loop_again, operands)
+        self._resume: Final = function_of(record, flow_rules.resume, operands, "srl", "ipl3")
+        self._disi: Final = function_of(record, flow_rules.disi, operands, "count", "after")
 
     def _forget(self, start: int, end: int) -> None:
         """Flash words in [start, end) changed."""

@@ -95,7 +95,7 @@ def size_of(x: Operands) -> Size:
     return 1 if x.B else 2
 
 
-class Place:
+class Location:
     """An operand whose address is formed: ``read`` and ``write`` it in the later phases of a row.
 
     A direct register is read at once, before any pointer moves: the data operand is the old value (isa.md §3.4).
@@ -132,29 +132,29 @@ class Place:
             self.m.set_ptr(self.register, self.moved, "dst")
 
 
-def source(m: Builder, x: Operands, size: Size, mode: int | None = None) -> Place:
+def source(m: Builder, x: Operands, size: Size, mode: int | None = None) -> Location:
     """Ws in mode ``p``, or in ``mode`` of the 8-mode set with Wb as index. Its pointer moves at once.
 
     UNVERIFIED: where it points to its own place in data memory, the new value is read.
     """
     mode = x.p if mode is None else mode
     if mode == 0:
-        place = Place(m, x.s, size)
+        place = Location(m, x.s, size)
         place.held = truncated(m.w(x.s), size)
         return place
     ea, moved = indirect(m, x.s, mode, size, "src", x.w if mode >= INDEXED else None)
     if moved is not None:
         m.set_ptr(x.s, moved, "src")
-    return Place(m, x.s, size, ea)
+    return Location(m, x.s, size, ea)
 
 
-def destination(m: Builder, x: Operands, size: Size, mode: int | None = None) -> Place:
+def destination(m: Builder, x: Operands, size: Size, mode: int | None = None) -> Location:
     """Wd in mode ``q``, or in ``mode`` of the 8-mode set; only written. Follows ``source``, whose update it sees."""
     mode = x.q if mode is None else mode
     if mode == 0:
-        return Place(m, x.d, size)
+        return Location(m, x.d, size)
     index = x.w if mode >= INDEXED else None
-    return Place(m, x.d, size, *indirect(m, x.d, mode, size, "dst", index, reversible=size == 2))
+    return Location(m, x.d, size, *indirect(m, x.d, mode, size, "dst", index, reversible=size == 2))
 
 
 def push(m: Builder, *values: Value) -> None:

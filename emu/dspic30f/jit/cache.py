@@ -1,11 +1,11 @@
-"""Machine code kept between runs: one file per translated piece, named by the hash of all that went into it.
+"""Disk cache of native code: one file per object, named by the hash of all inputs of its translation.
 
-A file is a checksum followed by an object file. Several processes may share the folder: files appear by atomic
-rename, and one that is short, damaged or foreign counts as absent. Objects contain no absolute address (the record
-and the table of callbacks are arguments), so they can be loaded by any later process on the same kind of CPU.
+A file is a checksum followed by an object file. Several processes may share the folder: a file appears by an atomic
+rename, and a file that is short, damaged or foreign counts as absent. Objects contain no absolute address, because the
+record and the environment are arguments. So any later process on the same kind of CPU can load them.
 
-The folder is bounded. Names are hashes and their first two digits a subfolder, a *shelf*: each has an equal share of
-the space, and what was used least recently leaves a shelf that is full.
+The folder is bounded. The first two digits of a name are a subfolder, a *shelf*, and all shelves have equal shares of
+the space. A shelf that exceeds its share evicts its least recently used objects.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ from emu.host.paths import native_code
 CHECKSUM_BYTES: Final = 32
 SHELVES: Final = 256
 LIMIT_BYTES: Final = 128 << 20
-"""Space for all objects, some 25,000 of them: they take 5 kB on average, 55 kB at most."""
+"""Space for about 25,000 objects, which take 5 kB on average and 55 kB at most."""
 
 
 @cache
 def sources_hash() -> bytes:
-    """Hash of every module whose text decides what is generated: table, translator, device descriptions."""
+    """Return the hash of all modules that determine generated code: instruction table, translator, devices."""
     root = Path(__file__).resolve().parents[2]
     digest = hashlib.sha256()
     for part in ("dspic30f", "peripherals", "boards", "chips", "system"):
@@ -38,24 +38,24 @@ def sources_hash() -> bytes:
 
 
 class ObjectCache:
-    """Objects on disk by key. A folder that cannot be written only costs speed: objects are then not kept."""
+    """Objects on disk by key. If the folder cannot be written, objects are not stored."""
 
     def __init__(self, where: Path | None = None, limit: int = LIMIT_BYTES) -> None:
         self.where: Final = where if where is not None else native_code()
         self.limit: Final = limit
-        """Bytes that all objects together may take."""
+        """Space for all objects, in bytes."""
         self.hits = 0
         self.stores = 0
 
     def key(self, *parts: bytes) -> str:
-        """Name of the object that the given inputs lead to."""
+        """Return the key of the object with these inputs."""
         digest = hashlib.sha256(sources_hash())
         for part in parts:
             digest.update(len(part).to_bytes(4, "little") + part)
         return digest.hexdigest()
 
     def get(self, key: str) -> bytes | None:
-        """The object kept under `key`, or None when there is none that is whole."""
+        """Return the object stored under `key`, or None if there is none or its checksum is wrong."""
         path = self.where / key[:2] / key
         try:
             blob = path.read_bytes()
@@ -70,7 +70,7 @@ class ObjectCache:
         return code
 
     def put(self, key: str, code: bytes) -> None:
-        """Keep `code` under `key`; readers see all of it or nothing."""
+        """Store `code` under `key`. Readers see the whole file or none."""
         try:
             parent = self.where / key[:2]
             parent.mkdir(mode=0o700, parents=True, exist_ok=True)
@@ -78,19 +78,20 @@ class ObjectCache:
             with os.fdopen(handle, "wb") as file:
                 file.write(hashlib.sha256(code).digest() + code)
             os.replace(name, parent / key)
-            self._tidy(parent, key)
+            self._evict(parent, key)
         except OSError:
             return
         self.stores += 1
 
-    def _tidy(self, shelf: Path, kept: str) -> None:
-        """Let the least recently used objects leave a shelf that is over its share; others may be doing the same."""
+    def _evict(self, shelf: Path, new: str) -> None:
+        """Evict the least recently used objects of a shelf that exceeds its share, except `new`. Other processes may do
+        so at the same time."""
         with os.scandir(shelf) as entries:
             found = sorted((entry.stat().st_mtime_ns, entry.stat().st_size, entry.name) for entry in entries)
         excess = sum(size for _, size, _ in found) - self.limit // SHELVES
         for _, size, name in found:
             if excess <= 0:
                 return
-            if name != kept:
+            if name != new:
                 (shelf / name).unlink(missing_ok=True)
                 excess -= size

@@ -1,10 +1,10 @@
-"""From IR text to callable code: disk cache, compile process, loading.
+"""Compilation of IR text to callable code: disk cache, compile process, loading.
 
-`request` never waits: cached objects are ready at once, others come back from the compile process and are collected
-by `poll`. `now` compiles at once, in this process, for the few pieces the engine cannot start without.
+`request` returns at once. Cached objects are loaded with `lookup`; other objects come from the compile process, and
+`poll` collects them. `compile_now` compiles in this process, for the few objects that the engine needs to start.
 
-A compile process that dies is replaced, and its piece tried once more. If that does not help, or the next one dies too,
-what has no code yet stays interpreted, and a line on standard error says so.
+If the compile process dies, it is replaced and its request is sent again once. If processes keep dying, code that is
+not compiled yet stays interpreted, and a line on standard error says so.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from emu.host.paths import native_code
 
 @dataclass(slots=True)
 class Statistics:
-    """What translation cost so far."""
+    """Numbers of objects: requested, compiled, read from disk, loaded."""
 
     requested: int = 0
     compiled: int = 0
@@ -40,33 +40,33 @@ class Statistics:
     loaded: int = 0
 
 
-PATIENCE: Final = 3
-"""Compile processes in a row that may die without having compiled anything."""
+MAX_DEATHS: Final = 3
+"""Number of compile processes in a row that may die before they have compiled an object."""
 
 
 @dataclass(slots=True, weakref_slot=True, eq=False)
-class Loaded:
-    """Native code in memory: it stays as long as somebody holds this."""
+class LoadedCode:
+    """Native code in memory. It is unloaded together with this object."""
 
     address: int
-    """Of the one function `entry`."""
+    """Address of its function `entry`."""
     entries: Sequence[int]
-    """Program addresses at which it can be entered."""
+    """Program addresses at which the function can be entered."""
     library: Any
-    """Its owner within LLVM."""
+    """LLVM library that owns the code."""
 
 
-class Refused(RuntimeError):
-    """LLVM did not accept generated IR: a defect of the translator."""
+class CompileError(RuntimeError):
+    """LLVM rejected generated IR: a defect of the translator."""
 
 
-def packed(entries: Sequence[int], code: bytes) -> bytes:
-    """An object and the program addresses at which it can be entered, as one blob."""
+def pack_object(entries: Sequence[int], code: bytes) -> bytes:
+    """Return an object file and the program addresses at which it can be entered, as one byte string."""
     return struct.pack(f"<I{len(entries)}I", len(entries), *entries) + code
 
 
-def unpacked(blob: bytes) -> tuple[list[int], bytes]:
-    """The two parts of `packed`."""
+def unpack_object(blob: bytes) -> tuple[list[int], bytes]:
+    """Return the two parts of `pack_object`."""
     (count,) = struct.unpack_from("<I", blob)
     return list(struct.unpack_from(f"<{count}I", blob, 4)), blob[4 + 4 * count :]
 
@@ -77,15 +77,15 @@ def _shared(_where: Path) -> Compiler:
 
 
 def shared_compiler() -> Compiler:
-    """The compiler all machines of this process use: one compile process, one cache."""
+    """Return the compiler that all machines of this process share, with one compile process and one cache."""
     return _shared(native_code())
 
 
 class Compiler:
-    """Objects by name. Every module exports one function, called `entry`. Threads may share one.
+    """Compiler with a cache of objects by key. Each object exports one function, `entry`. Threads may share a compiler.
 
-    What is in memory is there once, however many machines run it, and no longer than the last of them: Linux allows a
-    process 65,530 mappings (vm.max_map_count), and each object takes two.
+    An object is loaded once for all machines and unloaded with the last of them: Linux allows a process 65,530 mappings
+    (vm.max_map_count), and each object takes two.
     """
 
     def __init__(self, cache: ObjectCache | None = None) -> None:
@@ -97,20 +97,20 @@ class Compiler:
         self._received = bytearray()
         self._waiting: dict[int, tuple[str, Sequence[int]]] = {}
         self._tags: dict[str, list[object]] = {}
-        """Who waits for a piece, by its name."""
+        """Tags of the requests that wait for an object, by key."""
         self._outbox: deque[tuple[int, int, bytes]] = deque()
         self._in_flight: tuple[int, int, bytes] | None = None
-        """(ticket, level, text) the process is compiling."""
+        """(ticket, level, text) of the object that the process is compiling."""
         self._retried = 0
-        """The last ticket that was given to a second process."""
+        """Last ticket that was sent to a second process."""
         self._deaths = 0
-        """Processes that died since one compiled something."""
+        """Number of processes that died since the last object was compiled."""
         self._warned = False
         self._tickets = 0
         self._loader: Any = None
         self._modules = 0
-        self._ready: list[tuple[object, Loaded]] = []
-        self._loaded: WeakValueDictionary[str, Loaded] = WeakValueDictionary()
+        self._ready: list[tuple[object, LoadedCode]] = []
+        self._loaded: WeakValueDictionary[str, LoadedCode] = WeakValueDictionary()
         self._backend: Backend | None = None
         self._host = b""
         _compilers.add(self)
@@ -125,11 +125,11 @@ class Compiler:
         return self._host
 
     def key(self, level: int, *identity: bytes) -> str:
-        """Name of the object for a piece of code identified by what it is made from (not by its IR text)."""
+        """Return the key of an object, from the inputs of its translation, its level and the host."""
         return self.cache.key(self._host_name(), bytes([level]), *identity)
 
-    def kept(self, key: str) -> Loaded | None:
-        """The code called `key`, if it is in memory or on disk."""
+    def lookup(self, key: str) -> LoadedCode | None:
+        """Return the code with this key if it is in memory or on disk, else None."""
         loaded = self._loaded.get(key)
         if loaded is not None:
             return loaded
@@ -137,20 +137,20 @@ class Compiler:
         if blob is None:
             return None
         self.statistics.from_disk += 1
-        entries, code = unpacked(blob)
+        entries, code = unpack_object(blob)
         return self.load(code, key, entries)
 
-    def now(self, text: str, level: int, key: str, entries: Sequence[int] = ()) -> Loaded:
-        """Compile `text` in this process."""
+    def compile_now(self, text: str, level: int, key: str, entries: Sequence[int] = ()) -> LoadedCode:
+        """Compile `text` in this process and load it."""
         if self._backend is None:
             self._backend = Backend()
         code = self._backend.compile(text, level)
         self.statistics.compiled += 1
-        self.cache.put(key, packed(entries, code))
+        self.cache.put(key, pack_object(entries, code))
         return self.load(code, key, entries)
 
     def request(self, text: str, level: int, key: str, entries: Sequence[int], tag: object) -> None:
-        """Have `text` compiled in the background, once for all who ask; `poll` will yield (tag, code)."""
+        """Compile `text` in the background, once for all requests with this key. `poll` will return (tag, code)."""
         with self._lock:
             if key in self._tags:
                 self._tags[key].append(tag)
@@ -162,17 +162,17 @@ class Compiler:
         self.statistics.requested += 1
         self._tickets += 1
         self._waiting[self._tickets] = (key, entries)
-        piece = (self._tickets, level, text.encode())
+        request = (self._tickets, level, text.encode())
         if level:
-            self._outbox.append(piece)
-        else:  # quick to compile, and it ends the interpreter's share
-            self._outbox.appendleft(piece)
+            self._outbox.append(request)
+        else:  # it compiles quickly, and ends the use of the interpreter
+            self._outbox.appendleft(request)
         self._send()
 
     def _send(self) -> None:
-        """Give the idle process its next piece. One at a time: two full pipes would wait for each other."""
+        """Send the idle process its next request. Only one is in flight, because two full pipes would deadlock."""
         while self._outbox and self._in_flight is None:
-            if self._deaths >= PATIENCE:
+            if self._deaths >= MAX_DEATHS:
                 self._outbox.clear()
                 self._waiting.clear()
                 self._tags.clear()
@@ -184,10 +184,10 @@ class Compiler:
                 process.stdin.write(REQUEST.pack(ticket, level, len(data)) + data)
                 process.stdin.flush()
             except OSError as error:
-                self._lost(error)
+                self._replace_process(error)
 
-    def _lost(self, why: object) -> None:
-        """The compile process has died or could not be started: its piece goes first to the next one, but only once."""
+    def _replace_process(self, reason: object) -> None:
+        """Handle a compile process that died or did not start: send its request again, but only once."""
         process, self._process = self._process, None
         if process is not None:
             assert process.stdin is not None
@@ -198,62 +198,63 @@ class Compiler:
             with suppress(OSError):
                 process.stdin.close()
             process.stdout.close()
-            why = f"exit status {process.wait()}"
+            reason = f"exit status {process.wait()}"
         self._received.clear()
         self._deaths += 1
-        piece, self._in_flight = self._in_flight, None
-        if piece is None:
+        request, self._in_flight = self._in_flight, None
+        if request is None:
             return
-        if piece[0] != self._retried and self._deaths < PATIENCE:
-            self._retried = piece[0]
-            self._outbox.appendleft(piece)
+        if request[0] != self._retried and self._deaths < MAX_DEATHS:
+            self._retried = request[0]
+            self._outbox.appendleft(request)
             return
-        lost = self._waiting.pop(piece[0], None)
-        if lost is not None:
-            del self._tags[lost[0]]
+        dropped = self._waiting.pop(request[0], None)
+        if dropped is not None:
+            del self._tags[dropped[0]]
         if not self._warned:
             self._warned = True
-            print(f"emu: warning: compile process died ({why}); code it has not made is interpreted", file=sys.stderr)
+            message = f"emu: warning: compile process died ({reason}); code that is not compiled yet is interpreted"
+            print(message, file=sys.stderr)
 
-    def poll(self) -> list[tuple[object, Loaded]]:
-        """Code that has arrived since the last call, loaded. Raises Refused on a translator defect."""
+    def poll(self) -> list[tuple[object, LoadedCode]]:
+        """Load the code that has arrived since the last call. Raises CompileError on a defect of the translator."""
         if not self._waiting:
             return []
         with self._lock:
             return self._collect()
 
-    def _collect(self) -> list[tuple[object, Loaded]]:
+    def _collect(self) -> list[tuple[object, LoadedCode]]:
         self._send()
         while self._selector.select(0):
             assert self._process is not None
             assert self._process.stdout is not None
             data = os.read(self._process.stdout.fileno(), 1 << 20)
             if not data:
-                self._lost("it closed its end")
+                self._replace_process("it closed its output")
                 self._send()
                 continue
             self._received += data
             if len(data) < 1 << 16:
                 break
-        while self._take():
+        while self._receive():
             pass
         ready, self._ready = self._ready, []
         return ready
 
     @property
     def busy(self) -> int:
-        """Number of pieces under way in the compile process."""
+        """Return the number of requests that are not finished."""
         return len(self._waiting)
 
-    def load(self, code: bytes, key: str, entries: Sequence[int]) -> Loaded:
-        """The object file `code` in memory, called `key` from now on."""
+    def load(self, code: bytes, key: str, entries: Sequence[int]) -> LoadedCode:
+        """Load the object file `code` into memory under `key`."""
         import llvmlite.binding as llvm
 
         with self._lock:
             if self._loader is None:
                 llvm.initialize_native_target()
                 llvm.initialize_native_asmprinter()
-                # LLVM's older linker maps sections one by one: 2 GB apart in a fragmented process, it aborts
+                # LLVM's older linker maps each section alone and aborts if two lie 2 GB apart in a fragmented process
                 self._loader = llvm.create_lljit_compiler(use_jit_link=True)
             self._modules += 1
             library = (
@@ -263,7 +264,7 @@ class Compiler:
                 .link(self._loader, f"m{self._modules}")
             )
             self.statistics.loaded += 1
-            loaded = self._loaded[key] = Loaded(int(library["entry"]), entries, library)
+            loaded = self._loaded[key] = LoadedCode(int(library["entry"]), entries, library)
             return loaded
 
     def _start(self) -> subprocess.Popen[bytes]:
@@ -279,9 +280,9 @@ class Compiler:
             self._selector.register(self._process.stdout, selectors.EVENT_READ)
         return self._process
 
-    def copied(self) -> None:
-        """This process is a copy of another, to which alone the compile process answers: what is under way is asked
-        for again from one's own."""
+    def after_fork(self) -> None:
+        """Reset the state in a forked process: the compile process answers only its parent, so requests are sent again
+        to a process of its own."""
         self._lock = RLock()
         self._selector.close()
         self._selector = selectors.DefaultSelector()
@@ -292,13 +293,13 @@ class Compiler:
             atexit.unregister(process.kill)
             process.stdin.close()
             process.stdout.close()
-            process.returncode = 0  # it is the other's to wait for
+            process.returncode = 0  # the parent process waits for it
         self._received.clear()
-        piece, self._in_flight = self._in_flight, None
-        if piece is not None:
-            self._outbox.appendleft(piece)
+        request, self._in_flight = self._in_flight, None
+        if request is not None:
+            self._outbox.appendleft(request)
 
-    def _take(self) -> bool:
+    def _receive(self) -> bool:
         received = self._received
         if len(received) < REPLY.size:
             return False
@@ -309,7 +310,7 @@ class Compiler:
             (size,) = struct.unpack_from("<I", received, REPLY.size)
             if len(received) < REPLY.size + 4 + size:
                 return False
-            raise Refused(bytes(received[REPLY.size + 4 : REPLY.size + 4 + size]).decode())
+            raise CompileError(bytes(received[REPLY.size + 4 : REPLY.size + 4 + size]).decode())
         end = REPLY.size + length
         if len(received) < end:
             return False
@@ -319,7 +320,7 @@ class Compiler:
         self._send()
         key, entries = self._waiting.pop(ticket)
         self.statistics.compiled += 1
-        self.cache.put(key, packed(entries, code))
+        self.cache.put(key, pack_object(entries, code))
         loaded = self.load(code, key, entries)
         self._ready += [(tag, loaded) for tag in self._tags.pop(key)]
         return True
@@ -328,10 +329,10 @@ class Compiler:
 _compilers: Final[WeakSet[Compiler]] = WeakSet()
 
 
-def _copied() -> None:
+def _after_fork() -> None:
     for one in _compilers:
-        one.copied()
+        one.after_fork()
 
 
 if hasattr(os, "register_at_fork"):
-    os.register_at_fork(after_in_child=_copied)
+    os.register_at_fork(after_in_child=_after_fork)

@@ -1,8 +1,7 @@
-"""What native code was made of a stretch of program, for whoever debugs the engine.
+"""Dump of native code for debugging the translator: LLVM IR with guest instructions, and host assembly.
 
-Enters: an engine that has run, and which addresses are meant. Leaves: text, for every set of processor modes in which
-one of them was reached: the LLVM IR with the instruction of each part in front of it, then the host's assembly, whose
-blocks are named by program addresses (`b434`) as in the IR.
+Input: an engine that has run, and the addresses of interest. Output: one text for every set of processor modes in which
+an address was reached. Blocks are named by program addresses (`b434`) in the IR and in the assembly.
 """
 
 from __future__ import annotations
@@ -12,43 +11,43 @@ from dataclasses import asdict
 from typing import Protocol
 
 from emu.dspic30f.isa.row import Insn
-from emu.dspic30f.jit.engine import BLOCK_LEVEL, Code, JitEngine
+from emu.dspic30f.jit.engine import BLOCK_LEVEL, CodeTable, JitEngine
 from emu.dspic30f.jit.translate.function import Translator
 from emu.dspic30f.jit.translate.region import Region, Step
 from emu.dspic30f.jit.translate.values import Number
 from emu.dspic30f.jit.worker import Backend
 
 
-class Naming(Protocol):
-    """Text of a decoded instruction."""
+class Disassembler(Protocol):
+    """Returns the text of a decoded instruction."""
 
     def __call__(self, pc: int, insn: Insn) -> str: ...
 
 
-class _Annotated(Translator):
-    """Writes the guest's instruction in front of what it becomes."""
+class _AnnotatingTranslator(Translator):
+    """Translator that writes each guest instruction as a comment in front of its IR."""
 
-    naming: Naming
+    disassemble: Disassembler
 
     def _instruction(self, step: Step, written: Number) -> tuple[bool, Number]:
-        self.e.line(f"; {step.pc:06x}  {self.naming(step.pc, step.insn)}")
+        self.e.line(f"; {step.pc:06x}  {self.disassemble(step.pc, step.insn)}")
         return super()._instruction(step, written)
 
 
-def dump(engine: JitEngine, is_meant: Callable[[int], bool], naming: Naming) -> Iterator[str]:
-    """The stretches with an instruction at an address that is meant, a text each; none if none was translated."""
+def dump(engine: JitEngine, is_meant: Callable[[int], bool], disassemble: Disassembler) -> Iterator[str]:
+    """Yield the text of each region with an instruction whose address `is_meant` accepts."""
     backend = Backend()
     for code in engine.translated():
         for region in code.regions.values():
             if any(map(is_meant, region.steps)):
-                yield _stretch(backend, code, region, naming)
+                yield _region_text(backend, code, region, disassemble)
 
 
-def _stretch(backend: Backend, code: Code, region: Region, naming: Naming) -> str:
-    translator = _Annotated(region, code.around, code.context, exact=False)
-    translator.naming = naming
+def _region_text(backend: Backend, code: CodeTable, region: Region, disassemble: Disassembler) -> str:
+    translator = _AnnotatingTranslator(region, code.layout, code.context, exact=False)
+    translator.disassemble = disassemble
     text = translator.text()
     modes = ", ".join(f"{name}={value}" for name, value in asdict(code.context).items() if value)
-    loop = f", DO loop {code.around.do_start:06x}..{code.around.do_end:06x}" if code.around.do_end >= 0 else ""
+    loop = f", DO loop {code.layout.do_start:06x}..{code.layout.do_end:06x}" if code.layout.do_end >= 0 else ""
     head = f"; region {region.start:06x}, {len(region.steps)} instructions, modes {modes or 'as after reset'}{loop}"
     return f"{head}\n{text}\n; host code\n{backend.assembly(text, BLOCK_LEVEL)}"

@@ -1,7 +1,7 @@
-"""The native engine: translated regions, found by PC and processor modes, run between two boundaries.
+"""The native engine: finds translated regions by PC and processor modes and runs them between two boundaries.
 
-Python only sees what native code hands back: instructions with side effects, events, and addresses that have no code
-yet. Code arrives from the disk cache at once or from the compile process later; until then the interpreter runs.
+Native code returns to Python for instructions with side effects, for events, and at addresses that have no code yet.
+Code comes from the disk cache at once, or from the compile process later; until then the interpreter runs.
 """
 
 from __future__ import annotations
@@ -16,45 +16,43 @@ from typing import Any, Final
 from weakref import WeakValueDictionary
 
 from emu.dspic30f.core import Core
-from emu.dspic30f.cycle_accounting import STRETCH, Ledger
+from emu.dspic30f.cycle_accounting import LONGEST_RUN, CycleAccounting
 from emu.dspic30f.isa.builder import Context
 from emu.dspic30f.isa.codec import decode_for_execution
 from emu.dspic30f.isa.facts import facts_of
 from emu.dspic30f.isa.row import Insn
 from emu.dspic30f.jit.cold_runner import ColdRunner
-from emu.dspic30f.jit.compiler import Loaded, shared_compiler
-from emu.dspic30f.jit.exit_reasons import (
-    DEADLINE,
-    ENTERS,
-    HOOK,
-    INTERPRET,
-    MISS,
-    RETFIE,
-    SERVICE,
-    Surroundings,
-    identity_of,
-    offsets,
-    surroundings_of,
-    wiring_of,
-)
-from emu.dspic30f.jit.runtime import (
+from emu.dspic30f.jit.compiler import LoadedCode, shared_compiler
+from emu.dspic30f.jit.environment import (
+    ACCOUNTING,
+    AT_BOUNDARY,
     BLOCKS,
-    BOUNDARY,
-    ENTERED,
     ENV_WORDS,
-    FRESH,
-    LAST,
+    INDIRECT_SFR,
+    INTERRUPTS,
+    LAST_LIMIT,
     LIMIT,
-    NOTED,
-    NOTES,
+    NOWHERE,
+    PASSED,
+    PASSED_COUNT,
+    PASSED_ROOM,
     PERIOD,
-    ROOM,
+    REFRESHED,
+    RESUME,
     STEPS,
-    dispatch_text,
 )
-from emu.dspic30f.jit.translate.cycle_counters import LEDGER, BoundaryCounting, Counting, RowOf
-from emu.dspic30f.jit.translate.function import NOWHERE, RESUME, Translator
-from emu.dspic30f.jit.translate.indirect_sfr import POINTED, pointed_text
+from emu.dspic30f.jit.exit_reasons import BOUNDARY_WORK, DEADLINE, HOOK, INTERPRET, MISS, RETFIE, UNFINISHED
+from emu.dspic30f.jit.machine_layout import (
+    MachineLayout,
+    machine_layout,
+    record_offsets,
+    translation_hash,
+    wiring_hash,
+)
+from emu.dspic30f.jit.runtime import dispatch_text
+from emu.dspic30f.jit.translate.cycle_counters import AccountingBoundaryCounter, AccountingCounter, RowOf
+from emu.dspic30f.jit.translate.function import Translator
+from emu.dspic30f.jit.translate.indirect_sfr import indirect_sfr_text
 from emu.dspic30f.jit.translate.region import Region, discover
 from emu.dspic30f.state.modes import Key, Modes
 from emu.dspic30f.state.state import IPL3, NOT_REPEATING, RUN
@@ -62,54 +60,54 @@ from emu.system.native_handle import FRESH_ROOM, Native, Run
 from emu.system.rules import Rule
 
 BLOCK_LEVEL, STEP_LEVEL = 2, 0
-"""LLVM effort for blocks and for single-step code."""
+"""LLVM optimisation levels of block code and of exact code."""
 
 COLD_CYCLES: Final = 1000
-"""Longest cold run before native code is looked for again, in Tcy."""
+"""Longest interpreted run before native code is looked up again, in Tcy."""
 
 NATIVE_CYCLES: Final = 30_000_000
-"""Longest native run before Python can handle signals, in Tcy."""
+"""Longest native run before Python handles signals, in Tcy."""
 
 NATIVE_FIELDS: Final = {"cycle": "cpu.cycle", "now": "events.now", "deadline": "events.deadline", "pc": "cpu.pc",
                         "mode": "cpu.mode"}  # fmt: skip
 NATIVE_SFRS: Final = {"corcon": "CORCON", "ie0": "IEC0", "ie1": "IEC1", "ie2": "IEC2"}
-"""Where in the record `Native` has what it names."""
+"""Fields and registers of the record by the names of `Native`'s fields."""
 
 Call = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_void_p, ctypes.c_void_p)
 
 
 @dataclass(eq=False)
-class Code:
-    """Native code for one set of processor modes: tables of addresses by program word, and what they came from.
+class CodeTable:
+    """Native code for one set of processor modes: two tables of code addresses by program word.
 
-    Machines of one kind with the same program share it: what one of them has met is there for all.
+    Machines of one kind with the same program share it, so a region is translated once for all of them.
     """
 
     context: Context
-    around: Surroundings
+    layout: MachineLayout
     identity: bytes
-    """Hash of all that code depends on apart from program words."""
-    pointed: Loaded
-    """The function for registers that are reached by pointer."""
+    """Hash of everything that the code depends on apart from program words."""
+    indirect_sfr: LoadedCode
+    """The helper for indirect SFR access."""
     blocks: Any
     steps: Any
-    held: list[Loaded] = field(default_factory=list)
-    """What the tables point into."""
+    loaded: list[LoadedCode] = field(default_factory=list)
+    """Code that the tables point into."""
     regions: dict[int, Region] = field(default_factory=dict)
-    """Requested regions by where they start."""
+    """Requested regions by start address."""
     entries: set[int] = field(default_factory=set)
     """Leaders of all requested regions."""
     heat: dict[int, int] = field(default_factory=dict)
-    """How often an address without code was reached."""
+    """Number of times that each address without code was reached."""
 
 
-_shared: Final[WeakValueDictionary[object, Code]] = WeakValueDictionary()
-"""For as long as a machine uses it: by all it depends on."""
+_shared: Final[WeakValueDictionary[object, CodeTable]] = WeakValueDictionary()
+"""Tables in use, by everything that they depend on."""
 
 
 @dataclass
-class Counts:
-    """How often native code came back, and why (`emu run --stats`)."""
+class EngineStatistics:
+    """Numbers of native runs, interpreted instructions, cold runs and regions (`emu run --stats`)."""
 
     runs: int = 0
     interpreted: int = 0
@@ -118,7 +116,7 @@ class Counts:
 
 
 class JitEngine:
-    """`Engine` on native code, with the interpreter for what has none yet."""
+    """Engine on native code; the interpreter runs code that is not translated yet."""
 
     name = "jit"
 
@@ -126,13 +124,13 @@ class JitEngine:
         self._core: Final = core
         self._hooks: Final = pc_hooks
         self.threshold = 4
-        """Times an address without code is reached before code is made for it."""
+        """Number of times that an address without code is reached before it is translated."""
         self.wait = False
-        """Let code be compiled before it is run (tests, benchmarks)."""
-        self.circle: object = None
-        """Translations are shared with machines that have the same here: who changes them sets one of its own."""
+        """Whether code is compiled before it is run, for tests and benchmarks."""
+        self.share_group: object = None
+        """Machines with equal values share translations. Tests that change translations set an object of their own."""
         self._longest = NATIVE_CYCLES
-        self._ledger: Ledger | None = None
+        self._accounting: CycleAccounting | None = None
         self._row_of: RowOf = lambda pc: pc
         self._state: Final = core.state
         self._u16: Final = core.record.u16
@@ -141,12 +139,12 @@ class JitEngine:
         self._computed: Final[dict[int, int]] = {}
         self._env: Final = (ctypes.c_uint64 * ENV_WORDS)()
         self._env_address: Final = ctypes.addressof(self._env)
-        self._codes: Final[dict[object, Code]] = {}
-        self._pointers: Final[dict[object, Loaded]] = {}
-        self._code: Code | None = None
+        self._codes: Final[dict[object, CodeTable]] = {}
+        self._indirect_sfr: Final[dict[object, LoadedCode]] = {}
+        self._code: CodeTable | None = None
         self._key: object = None
         self._dispatch: Any = None
-        self._dispatcher: Loaded | None = None
+        self._dispatcher: LoadedCode | None = None
         self._native: Callable[..., Any] = lambda record, env: self._dispatch(record, env)
         self._run: Run | None = None
         self._lent: Callable[..., Any] | None = None
@@ -160,20 +158,19 @@ class JitEngine:
         self._pc: Final = core.state.at["cpu.pc"]
         self._mode: Final = core.state.at["cpu.mode"]
         self._modes: Final = Modes(core.state)
-        self._offset: Final = offsets(core)
+        self._offset: Final = record_offsets(core)
         self._wiring: tuple[list[Rule | None], bytes] = [], b""
-        self.counts: Final = Counts()
+        self.counts: Final = EngineStatistics()
         self.seconds: dict[str, float] | None = None
-        """Host seconds by activity once `measure_time` was called."""
+        """Host seconds by activity, after `measure_time` was called."""
         core.program.changed.append(self._flash_changed)
 
     # -- the engine -------------------------------------------------------------------------------------------------
     def run(self, limit: int) -> None:
-        """At least one instruction, natively where possible."""
+        """Run at least one instruction, natively where possible."""
         state = self._state
-        sequencer = self._core.sequencer
         if state.edt:
-            sequencer.execute()
+            self._core.sequencer.execute()
             return
         if self.compiler.busy:
             self._collect()
@@ -187,101 +184,120 @@ class JitEngine:
         self._env[LIMIT] = min(limit, state.cycle + self._longest)
         self._env[RESUME] = state.pc
         start = state.cycle
-        why = self._native(self._core.record.address, self._env_address)
+        reason = self._native(self._core.record.address, self._env_address)
         self._env[RESUME] = NOWHERE
         self.counts.runs += 1
-        if why == RETFIE:
+        self._after_run(reason, start, limit)
+
+    def _after_run(self, reason: int, start: int, limit: int) -> None:
+        """Do the work for which native code has returned to `run`."""
+        state, sequencer = self._state, self._core.sequencer
+        if reason == RETFIE:
             sequencer.after_retfie()
-        elif why == ENTERS:
+        elif reason == UNFINISHED:
             sequencer.boundary(limit)
-        elif (why == INTERPRET and (state.cycle == start or state.pc not in self._hooks)) or (
-            why == HOOK and state.cycle == start  # behind the hook the block did not fit: exact code stops there again
+        elif (reason == INTERPRET and (state.cycle == start or state.pc not in self._hooks)) or (
+            reason == HOOK and state.cycle == start  # the block behind the hook did not fit; exact code stops there too
         ):
             self.counts.interpreted += 1
             self._interpret()
-        elif why in (MISS, DEADLINE):
+        elif reason in (MISS, DEADLINE):
             cycle = state.cycle
             quiet = cycle < limit and self._core.events.deadline >= cycle and state.pc not in self._hooks
             if cycle == start or quiet:
                 self._miss(limit)
 
     def natively(self, limit: int) -> bool:
-        """As `Engine.natively`. Many runs are short: what is looked at is read from the record directly."""
-        u16, u64, now = self._u16, self._u64, self._now
-        start = before = u64[now]
-        if self._dispatch is None or not start or u16[self._edt]:  # native boundaries count with the cycle before
+        """As `Engine.natively`. Many calls are short, so this function reads the record directly."""
+        start = self._u64[self._now]
+        if self._dispatch is None or not start or self._u16[self._edt]:  # native boundaries need an earlier cycle
             return False
         if self.compiler.busy:
             self._collect()
         self._select()
-        env, record, surroundings = self._env, self._core.record.address, self._env_address
-        native = self._native if self._lent is None or self._native is not self._dispatch else self._lent
-        env[LIMIT] = min(limit, start + self._longest)
-        env[BOUNDARY] = 1
-        why = native(record, surroundings)
-        limit = max(limit, env[LIMIT]) if env[LAST] else limit
-        interrupted = self._core.sequencer.power.signals.interrupted
-        while before != (cycle := u64[now]) < limit:
-            before = cycle
-            if why == SERVICE:  # most often some device's event is due
-                self._core.events.fire_until(cycle if u16[self._mode] != RUN else cycle - 1)
-                if interrupted():
-                    break
-            elif why == INTERPRET and self._refresh(self._u32[self._pc], cycle):
-                env[BOUNDARY] = 0  # that of this instruction has been done
-            else:
-                break
-            why = native(record, surroundings)
-            env[BOUNDARY] = 1
-            limit = max(limit, env[LIMIT]) if env[LAST] else limit
-            self.counts.runs += 1
-        env[BOUNDARY] = 0
-        self.counts.runs += 1
-        if why == INTERPRET and self._u32[self._pc] not in self._hooks:
+        reason, cycle, limit = self._run_native(start, limit)
+        if reason == INTERPRET and self._u32[self._pc] not in self._hooks:
             self.counts.interpreted += 1
             self._interpret()
             return True
-        if why == RETFIE:
+        if reason == RETFIE:
             self._core.sequencer.after_retfie()
             return True
-        if why == ENTERS:
+        if reason == UNFINISHED:
             self._core.sequencer.boundary(limit)
             return True
-        return cycle >= limit or (why != SERVICE and cycle != start)
+        return cycle >= limit or (reason != BOUNDARY_WORK and cycle != start)
+
+    def _run_native(self, start: int, limit: int) -> tuple[int, int, int]:
+        """Run native code from the boundary at cycle `start` as long as Python can continue it without an instruction.
+        Return the last exit reason, its cycle, and the limit, which native code may have passed."""
+        u64, now, env = self._u64, self._now, self._env
+        record, environment = self._core.record.address, self._env_address
+        native = self._native if self._lent is None or self._native is not self._dispatch else self._lent
+        env[LIMIT] = min(limit, start + self._longest)
+        env[AT_BOUNDARY] = 1
+        reason, before = native(record, environment), start
+        limit = max(limit, env[LIMIT]) if env[LAST_LIMIT] else limit
+        while before != (cycle := u64[now]) < limit and self._continue(reason, cycle):
+            before = cycle
+            reason = native(record, environment)
+            env[AT_BOUNDARY] = 1
+            limit = max(limit, env[LIMIT]) if env[LAST_LIMIT] else limit
+            self.counts.runs += 1
+        env[AT_BOUNDARY] = 0
+        self.counts.runs += 1
+        return reason, cycle, limit
+
+    def _continue(self, reason: int, cycle: int) -> bool:
+        """Fire events, or refresh a device, if native code has returned for that. Return whether it may run again."""
+        if reason == BOUNDARY_WORK:  # in most cases the event of a device is due
+            self._core.events.fire_until(cycle if self._u16[self._mode] != RUN else cycle - 1)
+            return not self._core.sequencer.power.signals.interrupted()
+        if reason == INTERPRET and self._refresh(self._u32[self._pc], cycle):
+            self._env[AT_BOUNDARY] = 0  # the boundary of this instruction is done
+            return True
+        return False
 
     def pass_limits(self, period: int, last: int) -> None:
         """As `Engine.pass_limits`."""
-        self._env[PERIOD], self._env[LAST] = period, last
+        self._env[PERIOD], self._env[LAST_LIMIT] = period, last
 
     def passed(self) -> list[int]:
         """As `Engine.passed`."""
-        count = self._env[NOTED]
+        count = self._env[PASSED_COUNT]
         if not count:
             return []
-        self._env[NOTED] = 0
-        return list(self._env[NOTES : NOTES + count])
+        self._env[PASSED_COUNT] = 0
+        return list(self._env[PASSED : PASSED + count])
 
     def lend(self, run: Run) -> Native:
         """As `Engine.lend`."""
         core, env, record = self._core, self._env_address, self._core.record
         at = {name: record.address + record.fields[field].offset for name, field in NATIVE_FIELDS.items()}
         at |= {name: record.address + core.chip.sfrs[sfr].address for name, sfr in NATIVE_SFRS.items()}
-        words = {"begins": BOUNDARY, "limit": LIMIT, "last": LAST, "noted": NOTED, "notes": NOTES, "fresh": FRESH}
+        words = {
+            "begins": AT_BOUNDARY,
+            "limit": LIMIT,
+            "last": LAST_LIMIT,
+            "noted": PASSED_COUNT,
+            "notes": PASSED,
+            "fresh": REFRESHED,
+        }
         at |= {name: env + 8 * word for name, word in words.items()}
         self._run = run
-        self._lent_as = Native(record=record.address, env=env, room=ROOM, interpret=INTERPRET, service=SERVICE,
-                               awake=RUN, trap=IPL3, **at)  # fmt: skip
-        self._hand_out()
+        self._lent_as = Native(record=record.address, env=env, room=PASSED_ROOM, interpret=INTERPRET,
+                               service=BOUNDARY_WORK, awake=RUN, trap=IPL3, **at)  # fmt: skip
+        self._publish_native_handle()
         return self._lent_as
 
-    def _hand_out(self) -> None:
-        """Who runs native code gets to know what there is."""
+    def _publish_native_handle(self) -> None:
+        """Publish the dispatch loop to the program that runs native code."""
         if self._run is not None and self._lent_as is not None and self._dispatcher is not None:
             self._lent, self._lent_as.entry = partial(self._run, self._dispatch), self._dispatcher.address
 
     def _refresh(self, pc: int, cycle: int) -> bool:
-        """Have a device bring up to date what native code reads from the record, if that is what the instruction at
-        `pc` waits for."""
+        """Let a device update the register in the record that the instruction at `pc` reads. Return whether native
+        code can then run that instruction."""
         word = self._computed.get(pc)
         if word is None:
             word = self._computed[pc] = self._computed_word(pc)
@@ -295,56 +311,58 @@ class JitEngine:
         if refresh is None or not refresh(cycle):
             compute()
         else:
-            self._note_fresh(pc | word << 32)
+            self._remember_refresh(pc | word << 32)
         return True
 
-    def _note_fresh(self, instruction: int) -> None:
-        """Let who runs native code know for what it came back; where there is no room it hears of it each time."""
-        fresh = self._env[FRESH : FRESH + FRESH_ROOM]
-        place = fresh.index(0)
-        if instruction not in fresh and place < FRESH_ROOM - 1:
-            self._env[FRESH + place] = instruction
+    def _remember_refresh(self, instruction: int) -> None:
+        """Record an instruction that waits for a device, so that the program that runs native code can serve it."""
+        fresh = self._env[REFRESHED : REFRESHED + FRESH_ROOM]
+        free = fresh.index(0)
+        if instruction not in fresh and free < FRESH_ROOM - 1:
+            self._env[REFRESHED + free] = instruction
 
     def _forget_computed(self) -> None:
         self._computed.clear()
-        self._env[FRESH : FRESH + FRESH_ROOM] = [0] * FRESH_ROOM
+        self._env[REFRESHED : REFRESHED + FRESH_ROOM] = [0] * FRESH_ROOM
 
     def _computed_word(self, pc: int) -> int:
-        """Index of the register a one-cycle instruction reads by address, if native code can read it; else 0."""
+        """Return the index of the register that the one-cycle instruction at `pc` reads by its address, if native code
+        can read it; else 0."""
         insn = self._fetch(pc)
         if insn is None or insn.row.cycles != 1 or self._code is None:
             return 0
         words = [address >> 1 for address in facts_of(insn).reads]
-        return words[0] if words and 2 * words[0] in self._code.around.rules else 0
+        return words[0] if words and 2 * words[0] in self._code.layout.rules else 0
 
-    def keep(self, ledger: Ledger, row_of: RowOf) -> Callable[[], None]:
-        """Have all that is run counted in `ledger`, lines by their first address; returns how to stop. All code is
-        compiled before it is run meanwhile, and what is not compiled is run by the sequencer."""
-        kept = self._interpret, self._run_cold, self.wait, self._native
+    def start_accounting(self, accounting: CycleAccounting, row_of: RowOf) -> Callable[[], None]:
+        """Account for all cycles in `accounting`, per source line by `row_of`. Return the function that stops it.
+
+        Until then, all code is compiled before it runs, and the sequencer runs code that is not compiled."""
+        saved = self._interpret, self._run_cold, self.wait, self._native
 
         def run(record: int, env: int) -> Any:
-            why = self._dispatch(record, env)
-            if why != RETFIE:  # else the cycle of the last note is not sure
-                ledger.drain()
-            return why
+            reason = self._dispatch(record, env)
+            if reason != RETFIE:  # else the cycle of the last log entry may still change
+                accounting.flush_log()
+            return reason
 
-        ledger.open()
+        accounting.start()
         execute = self._core.sequencer.execute
         self._interpret, self._run_cold, self.wait, self._native = execute, lambda _limit: execute(), True, run
-        self._ledger, self._row_of, self._longest, self._dispatch = ledger, row_of, STRETCH, None
-        self._env[LEDGER] = ledger.address
+        self._accounting, self._row_of, self._longest, self._dispatch = accounting, row_of, LONGEST_RUN, None
+        self._env[ACCOUNTING] = accounting.address
         self.forget()
 
         def stop() -> None:
-            ledger.close()
-            self._interpret, self._run_cold, self.wait, self._native = kept
-            self._ledger, self._longest, self._dispatch = None, NATIVE_CYCLES, None
+            accounting.stop()
+            self._interpret, self._run_cold, self.wait, self._native = saved
+            self._accounting, self._longest, self._dispatch = None, NATIVE_CYCLES, None
             self.forget()
 
         return stop
 
     def measure_time(self) -> None:
-        """Note from now on where host time goes (`emu run --stats`); costs a little itself."""
+        """Measure the host time of each activity from now on (`emu run --stats`)."""
         seconds = self.seconds = dict.fromkeys(("native code", "side effects", "cold code", "translation"), 0.0)
 
         def timed(activity: str, work: Callable[..., Any]) -> Callable[..., Any]:
@@ -363,22 +381,22 @@ class JitEngine:
         self._request = timed("translation", self._request)  # type: ignore[method-assign]
 
     def forget(self) -> None:
-        """Hooked addresses must come back to Python: translate anew around them."""
+        """Discard the translations: native code must return to Python at hooked addresses, which have changed."""
         self._codes.clear()
         self._forget_computed()
         self._key = None
 
-    def translated(self) -> Iterable[Code]:
-        """What was requested so far, for each set of processor modes."""
+    def translated(self) -> Iterable[CodeTable]:
+        """Return the code of each set of processor modes."""
         return self._codes.values()
 
     @property
     def interrupts(self) -> int:
-        """Interrupts entered natively so far."""
-        return int(self._env[ENTERED])
+        """Return the number of interrupts that native code has entered."""
+        return int(self._env[INTERRUPTS])
 
     def _miss(self, limit: int) -> None:
-        """No code at PC: ask for some, meanwhile run cold."""
+        """Handle a PC without code: request a translation if it is reached often, and run the interpreter."""
         pc = self._state.pc
         code = self._code
         assert code is not None
@@ -389,14 +407,14 @@ class JitEngine:
         code.heat[pc] = heat
         if heat >= self.threshold and pc not in code.regions and pc >> 1 < self._words:
             self._request(code, pc)
-            if code.steps[pc >> 1] and pc not in self._hooks:  # a hook has been called and must not be again
+            if code.steps[pc >> 1] and pc not in self._hooks:  # the hook at PC was called already
                 return
         self.counts.cold += 1
         self._run_cold(min(limit, self._state.cycle + COLD_CYCLES))
 
     # -- modes ------------------------------------------------------------------------------------------------------
     def _select(self) -> None:
-        """Make the tables of the present processor modes current."""
+        """Select the tables of the current processor modes."""
         key = (self._modes.key(), self._core.bus.off)
         if key == self._key:
             return
@@ -407,98 +425,99 @@ class JitEngine:
         self._code = code
         self._env[BLOCKS] = ctypes.addressof(code.blocks)
         self._env[STEPS] = ctypes.addressof(code.steps)
-        self._env[POINTED] = code.pointed.address
+        self._env[INDIRECT_SFR] = code.indirect_sfr.address
 
-    def _new_code(self, key: Key) -> Code:
+    def _new_code(self, key: Key) -> CodeTable:
         core = self._core
-        around = surroundings_of(core, key, frozenset(self._hooks), self._offset)
+        layout = machine_layout(core, key, frozenset(self._hooks), self._offset)
         if self._wiring[0] != core.bus.rules:
-            self._wiring = core.bus.rules[:], wiring_of(around)
-        identity = identity_of(key.context, around, self._wiring[1])
+            self._wiring = core.bus.rules[:], wiring_hash(layout)
+        identity = translation_hash(key.context, layout, self._wiring[1])
         program = hashlib.sha256(core.program.flash).digest()
-        counted = 0 if self._ledger is None else self._env_address  # code that counts names its own ledger
-        switches = core.bus.off, frozenset(core.bus.watched), self.wait, counted, self.circle
-        shared = identity, program, around.hooks, *switches
+        counted = 0 if self._accounting is None else self._env_address  # code that counts names its own ledger
+        switches = core.bus.off, frozenset(core.bus.watched), self.wait, counted, self.share_group
+        shared = identity, program, layout.hooks, *switches
         code = _shared.get(shared)
         if code is None:
             table = ctypes.c_uint64 * self._words
-            code = _shared[shared] = Code(key.context, around, identity, self._pointed(around), table(), table())
+            helper = self._indirect_sfr_code(layout)
+            code = _shared[shared] = CodeTable(key.context, layout, identity, helper, table(), table())
         return code
 
-    def _pointed(self, around: Surroundings) -> Loaded:
-        """Native accesses to registers that are reached by pointer."""
+    def _indirect_sfr_code(self, layout: MachineLayout) -> LoadedCode:
+        """Return the helper for indirect SFR access."""
         bus = self._core.bus
-        key = bus.off, frozenset(bus.watched), around.limit_armed
-        if key not in self._pointers:
-            text = pointed_text(self._core, around)
-            self._pointers[key] = self._at_once(text, STEP_LEVEL)
-        return self._pointers[key]
+        key = bus.off, frozenset(bus.watched), layout.limit_armed
+        if key not in self._indirect_sfr:
+            text = indirect_sfr_text(self._core, layout)
+            self._indirect_sfr[key] = self._at_once(text, STEP_LEVEL)
+        return self._indirect_sfr[key]
 
     # -- translation ------------------------------------------------------------------------------------------------
     def _prepare(self) -> None:
-        ledger = self._ledger
-        counts = None if ledger is None else BoundaryCounting(ledger.words, ledger.tail, ENTERED)
-        text = dispatch_text(self._core, 2 * self._words, counts)
+        accounting = self._accounting
+        counter = None if accounting is None else AccountingBoundaryCounter(accounting.words, accounting.tail)
+        text = dispatch_text(self._core, 2 * self._words, counter)
         self._dispatcher = self._at_once(text, BLOCK_LEVEL)
         self._dispatch = Call(self._dispatcher.address)
-        self._hand_out()
-        if self.seconds is None and ledger is None:
+        self._publish_native_handle()
+        if self.seconds is None and accounting is None:
             self._native = self._dispatch
 
-    def _at_once(self, text: str, level: int) -> Loaded:
-        """Code the engine cannot start without."""
+    def _at_once(self, text: str, level: int) -> LoadedCode:
+        """Return compiled code that the engine needs to start."""
         key = self.compiler.key(level, text.encode())
-        return self.compiler.kept(key) or self.compiler.now(text, level, key)
+        return self.compiler.lookup(key) or self.compiler.compile_now(text, level, key)
 
     def _fetch(self, pc: int) -> Insn | None:
-        """Decoded instruction for the translator; none where nothing can be run."""
+        """Return the decoded instruction at `pc` for the translator, or None if none can be executed there."""
         if pc >> 1 >= self._words or not self._core.program.executable(pc):
             return None
         flash = self._core.program.flash
         second = flash[(pc >> 1) + 1] if (pc >> 1) + 1 < self._words else 0
         return decode_for_execution(flash[pc >> 1], second)
 
-    def _request(self, code: Code, pc: int) -> None:
-        """Get native code for the region at `pc`, from disk or from the compile process."""
+    def _request(self, code: CodeTable, pc: int) -> None:
+        """Install the region at `pc` from memory or disk, or request it from the compile process."""
         region = discover(pc, self._fetch, code.entries, self._hooks)
         code.regions[pc] = region
         if not region.steps:
             return
         code.entries |= region.leaders
         self.counts.regions += 1
-        hooked = sorted(code.around.hooks & region.steps.keys())
-        ledger = self._ledger
-        rows = [self._row_of(at) for at in sorted(region.steps)] if ledger is not None else None
+        hooked = sorted(code.layout.hooks & region.steps.keys())
+        accounting = self._accounting
+        rows = [self._row_of(at) for at in sorted(region.steps)] if accounting is not None else None
         identity = repr((region.words(), sorted(region.leaders), pc, hooked, rows)).encode()
         for exact, level in ((True, STEP_LEVEL), (False, BLOCK_LEVEL)):
             key = self.compiler.key(level, b"exact" if exact else b"block", code.identity, identity)
-            kept = self.compiler.kept(key)
-            if kept is not None:
-                self._install((code, exact), kept)
+            known = self.compiler.lookup(key)
+            if known is not None:
+                self._install((code, exact), known)
                 continue
-            count = None if ledger is None else Counting(ledger.words, ledger.tail, self._row_of)
-            translator = Translator(region, code.around, code.context, exact, count)
+            counter = None if accounting is None else AccountingCounter(accounting.words, accounting.tail, self._row_of)
+            translator = Translator(region, code.layout, code.context, exact, counter)
             text, entries = translator.text(), translator.entries
             if self.wait:
-                self._install((code, exact), self.compiler.now(text, level, key, entries))
+                self._install((code, exact), self.compiler.compile_now(text, level, key, entries))
             else:
                 self.compiler.request(text, level, key, entries, (code, exact))
 
     def _collect(self) -> None:
-        """Install what the compile process has made meanwhile, for whichever machine, and let it go on."""
+        """Install the code that the compile process has finished, for any machine, and send it the next request."""
         for tag, loaded in self.compiler.poll():
             self._install(tag, loaded)
 
-    def _install(self, tag: Any, loaded: Loaded) -> None:
+    def _install(self, tag: Any, loaded: LoadedCode) -> None:
         code, exact = tag
-        code.held.append(loaded)
+        code.loaded.append(loaded)
         table = code.steps if exact else code.blocks
         for pc in loaded.entries:
             if not table[pc >> 1]:
                 table[pc >> 1] = loaded.address
 
     def _flash_changed(self, start: int, end: int) -> None:
-        """Program words in [start, end) are new: whatever was made from the old ones is stale."""
+        """Discard the translations: program words in [start, end) have changed."""
         self._codes.clear()
         self._forget_computed()
         self._key = None

@@ -1,32 +1,37 @@
-"""The native loop around translated code: from PC to code and back, until Python is needed.
-
-`ENV` is what native code needs that is not machine state, as 64-bit words: it never enters the record or an object.
-"""
+"""The native dispatch loop: from PC to native code and back, until Python is needed."""
 
 from __future__ import annotations
 
 from typing import Final
 
 from emu.dspic30f.core import Core
-from emu.dspic30f.jit.exit_reasons import ARRIVE, DEADLINE, ENTERS, INTERPRET, MISS, NEXT, RETFIE, SERVICE
-from emu.dspic30f.jit.translate.boundary import DONE, HALFWAY, service_text
-from emu.dspic30f.jit.translate.cycle_counters import BoundaryCount
-from emu.dspic30f.jit.translate.function import ARRIVED
-from emu.dspic30f.jit.translate.indirect_sfr import POINTED
+from emu.dspic30f.jit.environment import (
+    ARRIVED,
+    AT_BOUNDARY,
+    BLOCKS,
+    INTERRUPTS,
+    LAST_LIMIT,
+    PASSED,
+    PASSED_COUNT,
+    PASSED_ROOM,
+    PERIOD,
+    STEPS,
+)
+from emu.dspic30f.jit.exit_reasons import (
+    ARRIVE,
+    BOUNDARY_WORK,
+    DEADLINE,
+    INTERPRET,
+    MISS,
+    NEXT,
+    RETFIE,
+)
+from emu.dspic30f.jit.exit_reasons import (
+    UNFINISHED as UNFINISHED_EXIT,
+)
+from emu.dspic30f.jit.translate.boundary import DONE, UNFINISHED, boundary_text
+from emu.dspic30f.jit.translate.cycle_counters import BoundaryCounter
 from emu.system.events import NEVER
-from emu.system.native_handle import FRESH_ROOM
-
-LIMIT, BLOCKS, STEPS, ENTERED, BOUNDARY = range(5)
-"""Words of the environment: cycle to stop at; tables of code addresses by program word: blocks, single
-steps; interrupts entered so far; whether to begin with the boundary before PC."""
-PERIOD, LAST, NOTED = range(7, 10)
-"""A limit before the last one is noted instead: the next is a period later. How many are noted; `NOTES`: the cycles."""
-NOTES: Final = POINTED + 1
-ROOM: Final = 1024
-"""Notes that are kept until Python takes them."""
-FRESH: Final = NOTES + ROOM
-"""Instructions whose devices have been brought up to date (`Native.fresh`)."""
-ENV_WORDS: Final = FRESH + FRESH_ROOM
 
 DISPATCH: Final = """
 declare i64 @llvm.cttz.i64(i64, i1)
@@ -48,8 +53,8 @@ first:
 loop:
   %pc = load i32, ptr %pc_place
   %known = icmp ult i32 %pc, {flash_end}
-  br i1 %known, label %look, label %miss, !prof !0
-look:
+  br i1 %known, label %lookup, label %miss, !prof !0
+lookup:
   %half = lshr i32 %pc, 1
   %word = zext i32 %half to i64
   %repeat = load i16, ptr %repeat_place
@@ -63,7 +68,7 @@ block:
 call:
   %why = call i64 %code(ptr %rec, ptr %env)
   switch i64 %why, label %back [ i64 {next}, label %loop
-                                 i64 {service}, label %serve
+                                 i64 {boundary_work}, label %serve
                                  i64 {deadline}, label %again
                                  i64 {retfie}, label %returned ]
 again:
@@ -72,7 +77,7 @@ again:
   %word2 = zext i32 %half2 to i64
   br label %single
 single:
-  %at = phi i64 [ %word, %look ], [ %word, %block ], [ %word2, %again ]
+  %at = phi i64 [ %word, %lookup ], [ %word, %block ], [ %word2, %again ]
   %place2 = getelementptr ptr, ptr %steps, i64 %at
   %code2 = load ptr, ptr %place2
   %none2 = icmp eq ptr %code2, null
@@ -80,7 +85,7 @@ single:
 step:
   %why2 = call i64 %code2(ptr %rec, ptr %env)
   switch i64 %why2, label %back2 [ i64 {next}, label %loop
-                                   i64 {service}, label %serve
+                                   i64 {boundary_work}, label %serve
                                    i64 {arrive}, label %arrive
                                    i64 {retfie}, label %returned ]
 arrive:
@@ -104,7 +109,7 @@ returned:
   %limit3 = load i64, ptr %env
   %entered3 = getelementptr i64, ptr %env, i64 {entered}
   %count3 = load i64, ptr %entered3
-  %rest3 = call i64 @service(ptr %rec, i64 %limit3, ptr %entered3)
+  %rest3 = call i64 @boundary(ptr %rec, i64 %limit3, ptr %entered3)
   %done3 = icmp eq i64 %rest3, {done}
   %count4 = load i64, ptr %entered3
   %refused = icmp eq i64 %count3, %count4
@@ -125,15 +130,15 @@ last:
 serve:
   %limit = load i64, ptr %env
   %entered = getelementptr i64, ptr %env, i64 {entered}
-  %rest = call i64 @service(ptr %rec, i64 %limit, ptr %entered)
+  %rest = call i64 @boundary(ptr %rec, i64 %limit, ptr %entered)
   %served = icmp eq i64 %rest, {done}
   br i1 %served, label %loop, label %boundary
 boundary:
   %rest1 = phi i64 [ %rest3, %accepted ], [ %rest, %serve ]
-  %halfway = icmp eq i64 %rest1, {halfway}
-  br i1 %halfway, label %enters, label %limited
-enters:
-  ret i64 {enters}
+  %unfinished = icmp eq i64 %rest1, {unfinished}
+  br i1 %unfinished, label %finish, label %limited
+finish:
+  ret i64 {unfinished_exit}
 limited:
   %limit_now = load i64, ptr %env
   %cycle_place2 = getelementptr i8, ptr %rec, i64 {cycle}
@@ -142,20 +147,20 @@ limited:
   %last_place = getelementptr i64, ptr %env, i64 {last}
   %last_limit = load i64, ptr %last_place
   %further = icmp ult i64 %limit_now, %last_limit
-  %noted_place = getelementptr i64, ptr %env, i64 {noted}
-  %noted = load i64, ptr %noted_place
-  %room = icmp ult i64 %noted, {rooms}
+  %passed_count_place = getelementptr i64, ptr %env, i64 {passed_count}
+  %passed_count = load i64, ptr %passed_count_place
+  %room = icmp ult i64 %passed_count, {room}
   %further_room = and i1 %further, %room
-  %goes_on = and i1 %reached, %further_room
-  br i1 %goes_on, label %note, label %handed
-handed:
-  ret i64 {service}
-note:
-  %notes = getelementptr i64, ptr %env, i64 {notes}
-  %note_place = getelementptr i64, ptr %notes, i64 %noted
-  store i64 %cycle5, ptr %note_place
-  %noted1 = add i64 %noted, 1
-  store i64 %noted1, ptr %noted_place
+  %passes = and i1 %reached, %further_room
+  br i1 %passes, label %pass, label %stop
+stop:
+  ret i64 {boundary_work}
+pass:
+  %passed_list = getelementptr i64, ptr %env, i64 {passed}
+  %entry_place = getelementptr i64, ptr %passed_list, i64 %passed_count
+  store i64 %cycle5, ptr %entry_place
+  %passed_count1 = add i64 %passed_count, 1
+  store i64 %passed_count1, ptr %passed_count_place
   %period_place = getelementptr i64, ptr %env, i64 {period}
   %period = load i64, ptr %period_place
   %limit_next = add i64 %limit_now, %period
@@ -173,18 +178,18 @@ miss:
 """
 
 
-def dispatch_text(core: Core, flash_end: int, counts: BoundaryCount | None = None) -> str:
-    """The dispatch loop, with what it does at boundaries; flash ends at `flash_end` (PC units)."""
-    counts = counts if counts is not None else BoundaryCount()
+def dispatch_text(core: Core, flash_end: int, counter: BoundaryCounter | None = None) -> str:
+    """Return the IR of the dispatch loop and of its boundaries. Flash ends at `flash_end` (PC units)."""
+    counter = counter if counter is not None else BoundaryCounter()
     offset = {name: core.record.fields[f"cpu.{name}"].offset for name in ("pc", "repeat", "cycle")}
-    return service_text(core, counts) + DISPATCH.format(
+    return boundary_text(core, counter) + DISPATCH.format(
         **offset,
-        third=counts.third_cycle(),
+        third=counter.third_cycle(),
         flash_end=flash_end,
         blocks=BLOCKS,
         steps=STEPS,
-        entered=ENTERED,
-        begin=BOUNDARY,
+        entered=INTERRUPTS,
+        begin=AT_BOUNDARY,
         arrived=ARRIVED,
         never=NEVER,
         arrive=ARRIVE,
@@ -193,14 +198,14 @@ def dispatch_text(core: Core, flash_end: int, counts: BoundaryCount | None = Non
         next=NEXT,
         retfie=RETFIE,
         deadline=DEADLINE,
-        service=SERVICE,
+        boundary_work=BOUNDARY_WORK,
         miss=MISS,
         done=DONE,
-        halfway=HALFWAY,
-        enters=ENTERS,
+        unfinished=UNFINISHED,
+        unfinished_exit=UNFINISHED_EXIT,
         period=PERIOD,
-        last=LAST,
-        noted=NOTED,
-        notes=NOTES,
-        rooms=ROOM,
+        last=LAST_LIMIT,
+        passed_count=PASSED_COUNT,
+        passed=PASSED,
+        room=PASSED_ROOM,
     )

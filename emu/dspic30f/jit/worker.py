@@ -1,8 +1,8 @@
-"""The compile process: LLVM IR text in, object file out, so that translation never stops the machine.
+"""The compile process: reads LLVM IR and writes object files, so that translation never stops the machine.
 
-llvmlite holds one global lock while it compiles; a process of its own keeps that lock away from the engine.
-Messages on stdin: u32 ticket, u32 level, u32 length, IR text. On stdout: u32 ticket, u32 length, object
-(length 0xFFFFFFFF: LLVM refused; then u32 length and its message).
+llvmlite holds a global lock while it compiles. A process of its own keeps that lock away from the engine.
+Messages on stdin: u32 ticket, u32 level, u32 length, IR text. Messages on stdout: u32 ticket, u32 length, object. If
+LLVM rejects the IR, the length is 0xFFFFFFFF, followed by u32 length and an error message.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ REFUSED: Final = 0xFFFF_FFFF
 
 
 class Backend:
-    """LLVM set up for the host: one target machine per optimisation level of the code generator."""
+    """LLVM for the host, with one target machine per optimisation level of the code generator."""
 
     def __init__(self) -> None:
         import llvmlite.binding as llvm
@@ -29,7 +29,8 @@ class Backend:
         self._machines: dict[int, Any] = {}
 
     def machine(self, level: int) -> Any:
-        """The host's target machine; position-independent, as objects are loaded anywhere."""
+        """Return the target machine of the host. Its code is position-independent, since objects are loaded
+        anywhere."""
         if level not in self._machines:
             llvm = self._llvm
             self._machines[level] = llvm.Target.from_default_triple().create_target_machine(
@@ -42,19 +43,19 @@ class Backend:
         return self._machines[level]
 
     def compile(self, text: str, level: int) -> bytes:
-        """Object code for a module. Level 0 is for code that runs once; level 2 runs the short pass list."""
+        """Return the object code of a module. Level 0 is for exact code; level 2 runs the short list of passes."""
         code: bytes = self.machine(level).emit_object(self._optimised(text, level))
         return code
 
     def assembly(self, text: str, level: int) -> str:
-        """The same as the host's assembly, blocks named in comments."""
+        """Return the assembly of a module for the host, with block names in comments."""
         machine = self.machine(level)
         machine.set_asm_verbosity(True)
         code: str = machine.emit_assembly(self._optimised(text, level))
         return code
 
     def _optimised(self, text: str, level: int) -> Any:
-        """The module behind the passes of `level`."""
+        """Return the module after the passes of `level`."""
         llvm = self._llvm
         module = llvm.parse_assembly(text)
         machine = self.machine(level)
@@ -63,7 +64,7 @@ class Backend:
         if level == 0:
             passes.add_sroa_pass()
             passes.add_simplify_cfg_pass()
-        else:  # the design's measured choice: a quarter of the time of O2 for 7 % of its speed
+        else:  # a quarter of the compile time of O2, at a loss of 7 % of speed (measured)
             passes.add_sroa_pass()
             passes.add_instruction_combine_pass()
             passes.add_simplify_cfg_pass()
@@ -84,7 +85,7 @@ def _exactly(stream: BinaryIO, count: int) -> bytes:
 
 
 def serve(source: BinaryIO, sink: BinaryIO) -> None:
-    """Answer requests until the other end closes."""
+    """Answer requests until the input closes."""
     backend = Backend()
     while True:
         try:
@@ -102,8 +103,8 @@ def serve(source: BinaryIO, sink: BinaryIO) -> None:
 
 
 if __name__ == "__main__":
-    os.nice(1)  # the machine itself comes first when cores are short
+    os.nice(1)  # the machine has priority when cores are scarce
     try:
         serve(sys.stdin.buffer, sys.stdout.buffer)
     except BrokenPipeError:
-        os._exit(0)  # the machine has ended and nobody waits for the object; do not flush it once more
+        os._exit(0)  # the machine has ended; skip the flush of the object at exit

@@ -17,7 +17,7 @@ from twins import NO_WATCHDOG, Difference, QuickCompiler, Tally, advance
 
 from emu.dspic30f.jit import engine as jit_engine
 from emu.dspic30f.jit.engine import JitEngine
-from emu.dspic30f.jit.runtime import ENV_WORDS
+from emu.dspic30f.jit.environment import ENV_WORDS
 from emu.dspic30f.jit.translate.function import Translator
 from emu.dspic30f.jit.translate.values import Number
 from emu.machine.machine import Machine
@@ -59,7 +59,7 @@ class CountedExact:
         runner = machine.runner
         assert isinstance(runner, JitEngine)
         self._runner: Final = runner
-        runner.circle = object()
+        runner.share_group = object()
         self.python = 0
         execute = machine.core.sequencer.execute
 

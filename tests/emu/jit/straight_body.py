@@ -84,7 +84,7 @@ class BodyWriter:
         self.at = BODY
         self.good = 0
         """Registers that hold usable even pointers."""
-        self.psv = corcon >> 2 & 1
+        self.psv_reads = corcon >> 2 & 1
         self.split()
 
     def put(self, words: list[int]) -> None:
@@ -97,7 +97,7 @@ class BodyWriter:
         if self.generator.random() < 0.6:
             registers.sort(key=lambda n: n not in (8, 9, 10, 11))
         self.pointers, self.index, self.data = registers[:7], registers[7], registers[8:]
-        self.window = self.data.pop() if self.psv else None
+        self.window = self.data.pop() if self.psv_reads else None
         for n in self.pointers:
             if not self.good >> n & 1 or self.generator.random() < 0.3:
                 self.point(n)
@@ -350,7 +350,7 @@ class BodyWriter:
         value = generator.getrandbits(16)
         if name == "CORCON":
             value &= MODE_CORCON
-            self.psv = value >> 2 & 1
+            self.psv_reads = value >> 2 & 1
         elif name == "INTCON1":
             value &= 0x0700
         elif name == "PSVPAG":

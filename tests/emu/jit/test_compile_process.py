@@ -19,7 +19,7 @@ from twins import load
 
 from emu.dspic30f.jit import compiler as compiler_module
 from emu.dspic30f.jit.cache import SHELVES, ObjectCache
-from emu.dspic30f.jit.compiler import PATIENCE, Compiler, Loaded
+from emu.dspic30f.jit.compiler import MAX_DEATHS, Compiler, LoadedCode
 from emu.dspic30f.jit.engine import JitEngine
 from emu.machine.machine import Machine
 
@@ -32,9 +32,9 @@ def compiler(tmp_path: Path) -> Compiler:
     return Compiler(ObjectCache(tmp_path))
 
 
-def collect(compiler: Compiler, count: int) -> dict[object, Loaded]:
+def collect(compiler: Compiler, count: int) -> dict[object, LoadedCode]:
     """What arrives within ten seconds, until there are `count`."""
-    found: dict[object, Loaded] = {}
+    found: dict[object, LoadedCode] = {}
     end = time.monotonic() + 30
     while len(found) < count and time.monotonic() < end:
         found.update(compiler.poll())
@@ -116,7 +116,7 @@ def test_without_any_process_the_run_goes_on_interpreted_with_one_warning(
     ask(compiler, 20)
     compiler.poll()
     assert compiler.busy == 0
-    assert compiler._deaths >= PATIENCE
+    assert compiler._deaths >= MAX_DEATHS
     said = capfd.readouterr().err.splitlines()
     assert len(said) == 1, said
     assert "interpreted" in said[0]
@@ -130,13 +130,13 @@ def test_a_piece_wanted_by_many_is_compiled_once_and_is_in_memory_as_long_as_one
     found = collect(compiler, 2)
     assert found["first"] is found["second"]
     assert compiler.statistics.requested == compiler.statistics.compiled == compiler.statistics.loaded == 1
-    assert compiler.kept(compiler.key(0, b"piece")) is found["first"]
+    assert compiler.lookup(compiler.key(0, b"piece")) is found["first"]
 
     def mappings() -> int:
         return len(Path("/proc/self/maps").read_text().splitlines())
 
     before = mappings()
-    held = [compiler.now(IR.format(number), 0, compiler.key(0, b"%d" % number)) for number in range(100)]
+    held = [compiler.compile_now(IR.format(number), 0, compiler.key(0, b"%d" % number)) for number in range(100)]
     assert mappings() >= before + 100
     assert [ctypes.CFUNCTYPE(ctypes.c_int64)(loaded.address)() for loaded in held] == list(range(100))
     held.clear()

@@ -15,7 +15,7 @@ from test_native_code import own_cache, pair  # noqa: F401  (the fixture)
 from emu.chips.dspic30f6014a import DSPIC30F6014A
 from emu.dspic30f.isa.codec import decode_for_execution
 from emu.dspic30f.isa.row import Insn
-from emu.dspic30f.jit.exit_reasons import offsets, surroundings_of
+from emu.dspic30f.jit.machine_layout import machine_layout, record_offsets
 from emu.dspic30f.jit.translate.polling import empty_loops
 from emu.dspic30f.jit.translate.region import discover
 from emu.dspic30f.state.modes import Modes
@@ -75,8 +75,8 @@ def loops_of(words: list[int]) -> int:
         return decode_for_execution(flash[pc >> 1], flash[(pc >> 1) + 1])
 
     key = Modes(machine.state).key()
-    around = surroundings_of(machine.core, key, frozenset(), offsets(machine.core))
-    return len(empty_loops(discover(START, fetch), around, key.context))
+    layout = machine_layout(machine.core, key, frozenset(), record_offsets(machine.core))
+    return len(empty_loops(discover(START, fetch), layout, key.context))
 
 
 @pytest.mark.parametrize("words", EMPTY.values(), ids=EMPTY)

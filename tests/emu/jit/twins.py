@@ -23,7 +23,7 @@ from emu.chips.chip import Chip
 from emu.chips.dspic30f6014a import DSPIC30F6014A
 from emu.dspic30f.exceptions.faults import Breakpoint, IllegalOpcode
 from emu.dspic30f.isa.flow import Branch, Return, Skip, Sleep
-from emu.dspic30f.jit.compiler import Compiler, Loaded
+from emu.dspic30f.jit.compiler import Compiler, LoadedCode
 from emu.dspic30f.jit.engine import JitEngine
 from emu.dspic30f.jit.worker import Backend
 from emu.dspic30f.state.state import DA, NOT_REPEATING, RA
@@ -139,11 +139,11 @@ class QuickCompiler(Compiler):
         self._block_level = block_level
         self._backend = self.backend
 
-    def now(self, text: str, level: int, key: str, entries: Any = ()) -> Loaded:
+    def compile_now(self, text: str, level: int, key: str, entries: Any = ()) -> LoadedCode:
         if not entries:
             code = self.dispatchers.get(text) or self.dispatchers.setdefault(text, self.backend.compile(text, level))
             return self.load(code, key, ())
-        return super().now(text, min(level, self._block_level), key, entries)
+        return super().compile_now(text, min(level, self._block_level), key, entries)
 
 
 class RobotObserver:
@@ -313,7 +313,7 @@ def check_straight(seed: int, shape: Shape | None = None) -> Tally:
     watch, runner = RobotObserver(plain, native), native.runner
     assert isinstance(runner, JitEngine)
     hooks = Hooks((plain, native), range(BODY, firmware.end, 2), generator) if seed % 3 == 0 else None
-    runner.circle = object()
+    runner.share_group = object()
     for exact_only in (False, True):
         before = watch.native_now()
         ran = Counter(watch.ran)

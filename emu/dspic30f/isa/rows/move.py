@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import partial
 
 from emu.dspic30f.isa.addressing import (
-    Place,
+    Location,
     destination,
     indirect,
     offset_address,
@@ -116,7 +116,7 @@ def table_address(m: Builder, ea: Value) -> Value:
     return m.reg("TBLPAG") << 16 | ea & 0xFFFE
 
 
-def table_pointer(place: Place) -> Value:
+def table_pointer(place: Location) -> Value:
     """The address a table instruction takes from a place; as a destination it moves now, behind all reads."""
     assert place.ea is not None, "a table pointer is never register direct"
     place.move_pointer()

@@ -1,8 +1,8 @@
 """Native work at an instruction boundary: events that have rules, interrupts, and the time spent in Idle.
 
-What happens is the text of the devices' rules and of exceptions.py; the order is that of `Sequencer.boundary`. What has
-no rule, or needs more than its rule says, and traps are left to them: the function then returns with what was due
-before done, and Python does the rest of the boundary.
+The rules are those of the devices and of exceptions.py, in the order of `Sequencer.boundary`. Python handles traps,
+events without a rule and cases that a rule does not cover. Then the function returns with all earlier work done, and
+Python finishes the boundary.
 """
 
 from __future__ import annotations
@@ -11,42 +11,42 @@ from typing import Final
 
 from emu.dspic30f.core import Core
 from emu.dspic30f.exceptions import exceptions
-from emu.dspic30f.exceptions.power import STIR
-from emu.dspic30f.jit.translate.cycle_counters import BoundaryCount
-from emu.dspic30f.jit.translate.rule_emitter import BoundaryReader
+from emu.dspic30f.exceptions.power import DRAIN_CYCLES
+from emu.dspic30f.jit.translate.cycle_counters import BoundaryCounter
+from emu.dspic30f.jit.translate.rule_emitter import BoundaryEmitter
 from emu.dspic30f.jit.translate.values import Emitter, Value, truth, wide
 from emu.dspic30f.state.state import IDLE, RUN, STACK_POINTER
 from emu.system.events import NEVER
-from emu.system.rules import Number, Place, place_of, slot_of
+from emu.system.rules import Cell, Number, cell_of, event_slot
 
-DONE, PYTHON, HALFWAY = 0, 1, 2
-"""Results: the boundary has no work left; Python must do it; or go on with it, as somebody was accepted already: a
-limit that has been reached since does not count before it ends."""
+DONE, PYTHON, UNFINISHED = 0, 1, 2
+"""Results. DONE: the boundary has no work left. PYTHON: Python must do the boundary. UNFINISHED: Python must finish it;
+an exception was entered already, so a limit that was reached meanwhile counts only after the boundary."""
 
 LANES: Final = 8
 """Due cycles in the widest vector register."""
 
-DECLARED: Final = f"""declare i64 @llvm.vector.reduce.umin.v{LANES}i64(<{LANES} x i64>)
+DECLARATIONS: Final = f"""declare i64 @llvm.vector.reduce.umin.v{LANES}i64(<{LANES} x i64>)
 declare <{LANES} x i64> @llvm.umin.v{LANES}i64(<{LANES} x i64>, <{LANES} x i64>)
 declare i128 @llvm.cttz.i128(i128, i1)
 declare i64 @llvm.umin.i64(i64, i64)"""
 
-PLACES: Final = {"cycle": "cpu.cycle", "deadline": "events.deadline", "hold": "cpu.hold", "due": "events.due",
+FIELDS: Final = {"cycle": "cpu.cycle", "deadline": "events.deadline", "hold": "cpu.hold", "due": "events.due",
                  "mode": "cpu.mode", "slept": "cpu.slept", "power": "wdt.mode",
                  "stopped": "power.stopped"}  # fmt: skip
-"""Fields of the record that have names here."""
+"""Record fields by their names in the IR of this module."""
 
 
-def service_text(core: Core, counts: BoundaryCount) -> str:
-    """IR of `i64 @service(ptr %rec, i64 %limit, ptr %entered)`."""
+def boundary_text(core: Core, counter: BoundaryCounter) -> str:
+    """Return the IR of `i64 @boundary(ptr %rec, i64 %limit, ptr %entered)`."""
     fired, accepted = Emitter(), Emitter()
-    events = BoundaryReader(core, fired, Value(fired, "%least1", False), "python")
+    events = BoundaryEmitter(core, fired, Value(fired, "%least1", False), "python")
     _fire(core, events)
-    entering = BoundaryReader(core, accepted, Value(accepted, "%first.due", False), "python", events.tables)
-    _accept(core, entering, counts)
+    entering = BoundaryEmitter(core, accepted, Value(accepted, "%first.due", False), "python", events.tables)
+    _accept(core, entering, counter)
     fire = "\n".join([_events(core), fired.text(), "}"])
-    service = "\n".join([_head(core, counts), _SETTLE, accepted.text(), "}"])
-    return "\n".join([DECLARED, events.constants(), fire, service])
+    boundary = "\n".join([_head(core, counter), _SETTLE, accepted.text(), "}"])
+    return "\n".join([DECLARATIONS, events.constants(), fire, boundary])
 
 
 _SETTLE: Final = """fire:
@@ -56,17 +56,17 @@ _SETTLE: Final = """fire:
 settled:
   store i64 %first.due, ptr %p.deadline
   br label %accept"""
-"""What is due at the boundary, before somebody is accepted."""
+"""Fires the events that are due at the boundary, before an exception may be accepted."""
 
 
-def _head(core: Core, counts: BoundaryCount) -> str:
-    """From the call to an event that is due (`fire`), through the time spent in Idle."""
-    offsets = {name: core.record.fields[field].offset for name, field in PLACES.items()}
+def _head(core: Core, counter: BoundaryCounter) -> str:
+    """Return the IR from the call up to an event that is due (`fire`), including the time spent in Idle."""
+    record_offsets = {name: core.record.fields[field].offset for name, field in FIELDS.items()}
     return "\n".join(
         [
-            "define internal i64 @service(ptr noalias %rec, i64 %limit, ptr %entered) {",
+            "define internal i64 @boundary(ptr noalias %rec, i64 %limit, ptr %entered) {",
             "first:",
-            *(f"  %p.{name} = getelementptr i8, ptr %rec, i64 {offset}" for name, offset in offsets.items()),
+            *(f"  %p.{name} = getelementptr i8, ptr %rec, i64 {offset}" for name, offset in record_offsets.items()),
             f"""  %left = alloca i64
   store i64 {PYTHON}, ptr %left
   %hold = load i64, ptr %p.hold
@@ -82,7 +82,7 @@ stop:
   ret i64 {PYTHON}
 again:
   %within = phi i1 [ false, %first ], [ false, %jump ], [ false, %asleep ], [ true, %rouse ], [ true, %entered.one ]
-  %half = select i1 %within, i64 {HALFWAY}, i64 {PYTHON}
+  %half = select i1 %within, i64 {UNFINISHED}, i64 {PYTHON}
   store i64 %half, ptr %left
   %cycle = load i64, ptr %p.cycle
   %before = sub i64 %cycle, 1
@@ -108,7 +108,7 @@ idling:
   br i1 %early, label %sleep, label %fire
 sleep:
   %slept = load i64, ptr %p.slept
-  %stir = add i64 %slept, {STIR}
+  %stir = add i64 %slept, {DRAIN_CYCLES}
   %long = icmp ugt i64 %deadline, %stir
   br i1 %long, label %python, label %nap
 nap:
@@ -117,29 +117,31 @@ nap:
 doze:
   %until = call i64 @llvm.umax.i64(i64 %cycle, i64 %limit)
   store i64 %until, ptr %p.cycle
-{counts.idle("doze", "%until")}
+{counter.idle("doze", "%until")}
   ret i64 {PYTHON}
 jump:
   store i64 %deadline, ptr %p.cycle
-{counts.idle("jump", "%deadline")}
+{counter.idle("jump", "%deadline")}
   br label %again""",
         ]
     )
 
 
 def _events(core: Core) -> str:
-    """IR of `i64 @fire(ptr %rec, i64 %last)`: the events due up to cycle `%last`, in order of (due, slot). The earliest
-    due cycle behind it, or 0 if Python must go on; the deadline is the caller's."""
-    due = core.record.fields[PLACES["due"]].offset
+    """Return the IR of `i64 @fire(ptr %rec, i64 %last)`.
+
+    It fires the events due up to cycle `%last`, in order of (due, slot). It returns the earliest later due cycle, or 0
+    if Python must continue. The caller updates the deadline."""
+    due = core.record.fields[FIELDS["due"]].offset
     lanes, groups = f"<{LANES} x i64>", range(-(-len(core.events.names) // LANES))
-    looked, hits, least = [], [], "%dues0"
+    loads, hits, least = [], [], "%dues0"
     for g in groups:  # slots behind the last one are never due
-        looked += [
+        loads += [
             f"  %p.group{g} = getelementptr i64, ptr %p.due, i64 {LANES * g}",
             f"  %dues{g} = load {lanes}, ptr %p.group{g}, align 8",
         ]
         if g:
-            looked.append(f"  %min{g} = call {lanes} @llvm.umin.v{LANES}i64({lanes} {least}, {lanes} %dues{g})")
+            loads.append(f"  %min{g} = call {lanes} @llvm.umin.v{LANES}i64({lanes} {least}, {lanes} %dues{g})")
             least = f"%min{g}"
         hits += [
             f"  %equal{g} = icmp eq {lanes} %dues{g}, %least.all",
@@ -156,7 +158,7 @@ first:
 python:
   ret i64 0
 fire:
-{newline.join(looked)}
+{newline.join(loads)}
   %least1 = call i64 @llvm.vector.reduce.umin.v{LANES}i64({lanes} {least})
   %later = icmp ugt i64 %least1, %last
   br i1 %later, label %settled, label %choose
@@ -171,23 +173,23 @@ choose:
   switch i64 %who, label %python [ {" ".join(f"i64 {slot}, label %t{slot}" for slot in core.events.rules)} ]"""
 
 
-def _fire(core: Core, m: BoundaryReader) -> None:
-    """The events that have rules."""
+def _fire(core: Core, m: BoundaryEmitter) -> None:
+    """Emit the rules of events."""
     for number, rule in core.events.rules.items():
-        slot = slot_of(core.record, number)
+        slot = event_slot(core.record, number)
         m.e.start(f"t{number}")
-        rule.fires(m, rule.places)
+        rule.fires(m, rule.operands)
         if slot not in m.posted:
             m.put(slot.due, NEVER)
         m.e.end("br label %fire")
 
 
-def _accept(core: Core, m: BoundaryReader, counts: BoundaryCount) -> None:
-    """Which interrupt is accepted behind `%last`, or wakes the CPU, if one does."""
-    e, p = m.e, core.exceptions.places
+def _accept(core: Core, m: BoundaryEmitter, counter: BoundaryCounter) -> None:
+    """Emit the search for an interrupt that is accepted after cycle `%last`, or that wakes the CPU."""
+    e, p = m.e, core.exceptions.operands
     cycle, last = (Value(e, name, False) for name in ("%cycle", "%last"))
     e.start("accept")
-    m.need((m.get(p.intcon1) & core.traps.flags) == 0)
+    m.require((m.get(p.intcon1) & core.traps.flags) == 0)
     e.end("br i1 %awake, label %running.on, label %wake")
     e.start("wake")
     bits = exceptions.requested(m, p)
@@ -196,13 +198,14 @@ def _accept(core: Core, m: BoundaryReader, counts: BoundaryCount) -> None:
     e.end("br label %again")
     e.start("seek")
     found = exceptions.waking(m, p, bits)
-    e.end(f"br i1 {truth(found == exceptions.NOBODY)}, label %asleep, label %rouse")
+    e.end(f"br i1 {truth(found == exceptions.NO_REQUEST)}, label %asleep, label %rouse")
     e.start("rouse")
-    risen = exceptions.rise(m, p, found) + 1
+    risen = exceptions.request_cycle(
+m, p, found) + 1
     until = e.select(cycle < risen, risen, cycle)
     for name, value in (("cycle", until), ("mode", RUN), ("power", RUN), ("deadline", 0)):
-        m.put(place_of(core.record, PLACES[name]), value)
-    e.line(counts.idle("rouse", wide(until)))
+        m.put(cell_of(core.record, FIELDS[name]), value)
+    e.line(counter.idle("rouse", wide(until)))
     e.end("br label %again")
     e.start("running.on")
     slip = cycle if core.exceptions.ipl_slip else None
@@ -210,18 +213,18 @@ def _accept(core: Core, m: BoundaryReader, counts: BoundaryCount) -> None:
     e.end(f"br i1 {truth(bits)}, label %pick, label %done")
     e.start("pick")
     winner, level = exceptions.accepted(m, p, bits, last, slip)
-    e.end(f"br i1 {truth(winner == exceptions.NOBODY)}, label %done, label %enter")
-    _enter(core, m, counts, winner, level)
+    e.end(f"br i1 {truth(winner == exceptions.NO_REQUEST)}, label %done, label %enter")
+    _enter(core, m, counter, winner, level)
 
 
-def _enter(core: Core, m: BoundaryReader, counts: BoundaryCount, winner: Number, level: Number) -> None:
-    """The interrupt with that number, counted."""
-    e, p = m.e, core.exceptions.places
+def _enter(core: Core, m: BoundaryEmitter, counter: BoundaryCounter, winner: Number, level: Number) -> None:
+    """Emit the entry of the interrupt numbered `winner`, and count it."""
+    e, p = m.e, core.exceptions.operands
     e.start("enter")
     vectors = tuple(m.table(column, winner) for column in (p.ivt, p.aivt, p.slot))
-    since, site, place = exceptions.rise(m, p, winner), m.get(p.pc), m.get(Place(2 * STACK_POINTER, 16))
+    since, site, stack = exceptions.request_cycle(m, p, winner), m.get(p.pc), m.get(Cell(2 * STACK_POINTER, 16))
     exceptions.enter(m, p, level, since, Value(e, "%last", False), vectors)
-    e.line(counts.entered(*map(wide, (m.get(p.cycle), m.get(p.pc), site, place, level, since))))
+    e.line(counter.entered(*map(wide, (m.get(p.cycle), m.get(p.pc), site, stack, level, since))))
     e.end("br label %entered.one")
     e.start("entered.one")
     e.line("%count = load i64, ptr %entered")

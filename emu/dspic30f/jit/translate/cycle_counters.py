@@ -1,8 +1,7 @@
-"""The ledger in native code (emu/dspic30f/cycle_accounting.py): cycles into cells, calls into notes.
+"""Cycle accounting in native code (emu/dspic30f/cycle_accounting.py): adds cycles to cells and logs calls.
 
-Cycles of a block are added up while it is translated and written where it ends, one addition per source line: code that
-is counted runs at more than half of its speed. An exit out of the middle of a block carries what has passed until then.
-Code that is not counted has none of this: `Count` writes nothing.
+The translator sums the cycles of a block per source line and emits one addition per line at the end of the block. An
+exit from the middle of a block first adds the cycles up to there. Without accounting, `CycleCounter` emits nothing.
 """
 
 from __future__ import annotations
@@ -10,52 +9,62 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Final
 
-from emu.dspic30f.cycle_accounting import CALLED, CELL, ENTERED, IDLE, NOTE_WORDS, NOTED, NOTES, RETURNED, SLEPT
+from emu.dspic30f.cycle_accounting import (
+    CALLED,
+    ENTERED,
+    ENTRY_WORDS,
+    IDLE,
+    LOG,
+    LOG_COUNT,
+    RETFIE_CELL,
+    RETURNED,
+    SLEPT,
+)
+from emu.dspic30f.jit.environment import ACCOUNTING, INTERRUPTS
 from emu.dspic30f.jit.translate.values import Emitter, Number, Value, wide
 from emu.dspic30f.state.state import IPL3, IPL_MASK
 
-LEDGER: Final = 6
-"""Word of the environment: where the cells are."""
 RowOf = Callable[[int], int]
-"""The first program address of the source line around an instruction."""
+"""Returns the first program address of the source line that contains an instruction."""
 
 
-class Count:
-    """Nothing is written down."""
+class CycleCounter:
+    """Counter of a translated function that emits nothing: the interface of `AccountingCounter`."""
 
     unsettled: tuple[object, ...] = ()
-    """What a way out of a block would carry, to tell it from others."""
+    """Cycles that an exit would add. Exits that add different cycles need different blocks."""
 
     def begin(self, emitter: Emitter, offset: Mapping[str, int]) -> None:
-        """A function is to be written."""
+        """Prepare for a function that `emitter` writes."""
 
-    def head(self, head: Emitter) -> None:
-        """Into the first block of a function."""
+    def prologue(self, head: Emitter) -> None:
+        """Emit the preparation into the first block of the function."""
 
     def spend(self, pc: int, cycles: Number) -> None:
-        """`cycles` pass with the instruction at `pc`."""
+        """Account `cycles` to the instruction at `pc`."""
 
     def settle(self) -> None:
-        """The block ends here."""
+        """Emit the additions at the end of a block."""
 
-    def carry(self) -> None:
-        """A way out of the block begins here; the block goes on."""
+    def store(self) -> None:
+        """Emit the additions at an exit from the middle of a block."""
 
     def level_changed(self) -> None:
-        """SR has been written."""
+        """Select the cells of the new CPU priority after a write of SR."""
 
-    def called(self, site: int, target: Number, place: Number, cycle: Number) -> None:
-        """The call at `site` has put its return address at `place`."""
+    def called(self, site: int, target: Number, stack: Number, cycle: Number) -> None:
+        """Log the call at `site`, whose return address lies at `stack`."""
 
-    def returned(self, site: int, target: Number, place: Number, cycle: Number) -> None:
-        """The return at `site` has taken its address from `place`."""
+    def returned(self, site: int, target: Number, stack: Number, cycle: Number) -> None:
+        """Log the return at `site`, whose return address lay at `stack`."""
 
-    def shortened(self, pc: int) -> None:
-        """A RETFIE whose third cycle is not sure."""
+    def take_back_cycle(self, pc: int) -> None:
+        """Subtract the third cycle of the RETFIE at `pc`, which an exception may replace."""
 
 
-class Counting(Count):
-    """One function's share of the ledger. `words`: cells of a level, `tail`: bytes up to what follows the cells."""
+class AccountingCounter(CycleCounter):
+    """Counter that emits cycle accounting. `words` is the number of cells per CPU priority, `tail` the offset of the
+    words behind the cells."""
 
     def __init__(self, words: int, tail: int, row_of: RowOf) -> None:
         self._level_bytes: Final = 8 * words
@@ -64,24 +73,24 @@ class Counting(Count):
         self._spent: Final[dict[int, Number]] = {}
 
     def begin(self, emitter: Emitter, offset: Mapping[str, int]) -> None:
-        """A function is to be written."""
+        """Prepare for a function that `emitter` writes."""
         self._e, self._offset = emitter, offset
 
     @property
     def unsettled(self) -> tuple[object, ...]:  # type: ignore[override]
-        """Cells and what goes there."""
+        """Return the cycles that an exit would add, by source line."""
         return tuple((row, n.text if isinstance(n, Value) else n) for row, n in self._spent.items())
 
-    def head(self, head: Emitter) -> None:
-        """Where the cells of the present level are."""
+    def prologue(self, head: Emitter) -> None:
+        """Emit a variable for the cells of the current CPU priority."""
         head.line("%x.cells = alloca ptr")
         self._select_level(head)
 
     def _select_level(self, e: Emitter) -> None:
         sr, corcon = (e.load(self._record(e, self._offset[name]), 16) for name in ("SR", "CORCON"))
         level = (sr & IPL_MASK) >> IPL_MASK.bit_length() - 3 | corcon & IPL3
-        ledger, cells = self._ledger(e), e.name()
-        e.line(f"{cells} = getelementptr i8, ptr {ledger}, i64 {wide(level * self._level_bytes)}")
+        accounting, cells = self._accounting(e), e.name()
+        e.line(f"{cells} = getelementptr i8, ptr {accounting}, i64 {wide(level * self._level_bytes)}")
         e.line(f"store ptr {cells}, ptr %x.cells")
 
     @staticmethod
@@ -91,11 +100,11 @@ class Counting(Count):
         return name
 
     @staticmethod
-    def _ledger(e: Emitter) -> str:
-        place, ledger = e.name(), e.name()
-        e.line(f"{place} = getelementptr i64, ptr %env, i64 {LEDGER}")
-        e.line(f"{ledger} = load ptr, ptr {place}")
-        return ledger
+    def _accounting(e: Emitter) -> str:
+        word, accounting = e.name(), e.name()
+        e.line(f"{word} = getelementptr i64, ptr %env, i64 {ACCOUNTING}")
+        e.line(f"{accounting} = load ptr, ptr {word}")
+        return accounting
 
     def _cell(self, pc: int) -> str:
         cells, cell = self._e.name(), self._e.name()
@@ -104,88 +113,88 @@ class Counting(Count):
         return cell
 
     def spend(self, pc: int, cycles: Number) -> None:
-        """Keep it until the block ends."""
+        """Sum the cycles until the block ends."""
         row = self._row_of(pc)
         self._spent[row] = self._spent.get(row, 0) + cycles
 
     def settle(self) -> None:
-        """Write what has been kept."""
-        self.carry()
+        """Emit the additions and reset the sums."""
+        self.store()
         self._spent.clear()
 
-    def carry(self) -> None:
-        """Write it, and keep it for those who stay."""
+    def store(self) -> None:
+        """Emit the additions and keep the sums for the rest of the block."""
         for row, cycles in self._spent.items():
             cell = self._cell(row)
             self._e.store(cell, self._e.load(cell, 64) + cycles, 64)
 
     def level_changed(self) -> None:
-        """What has passed belongs to the old level."""
+        """Account the cycles so far to the old CPU priority, and select the cells of the new one."""
         self.settle()
         self._select_level(self._e)
 
-    def called(self, site: int, target: Number, place: Number, cycle: Number) -> None:
-        """A note."""
-        self._note(CALLED, site, target, place, cycle)
+    def called(self, site: int, target: Number, stack: Number, cycle: Number) -> None:
+        """Emit a log entry."""
+        self._log(CALLED, site, target, stack, cycle)
 
-    def returned(self, site: int, target: Number, place: Number, cycle: Number) -> None:
-        """A note."""
-        self._note(RETURNED, site, target, place, cycle)
+    def returned(self, site: int, target: Number, stack: Number, cycle: Number) -> None:
+        """Emit a log entry."""
+        self._log(RETURNED, site, target, stack, cycle)
 
-    def _note(self, kind: int, site: int, target: Number, place: Number, cycle: Number) -> None:
+    def _log(self, kind: int, site: int, target: Number, stack: Number, cycle: Number) -> None:
         e, tail = self._e, self._e.name()
-        e.line(f"{tail} = getelementptr i8, ptr {self._ledger(e)}, i64 {self._tail}")
-        count_place, note = e.name(), e.name()
-        e.line(f"{count_place} = getelementptr i64, ptr {tail}, i64 {NOTED}")
-        count = e.load(count_place, 64)
-        e.line(f"{note} = getelementptr i64, ptr {tail}, i64 {wide(count * NOTE_WORDS + NOTES)}")
-        for index, word in enumerate((cycle, (place & 0xFFFF) << 16 | (kind | site << 32), target)):
+        e.line(f"{tail} = getelementptr i8, ptr {self._accounting(e)}, i64 {self._tail}")
+        count_word, entry = e.name(), e.name()
+        e.line(f"{count_word} = getelementptr i64, ptr {tail}, i64 {LOG_COUNT}")
+        count = e.load(count_word, 64)
+        e.line(f"{entry} = getelementptr i64, ptr {tail}, i64 {wide(count * ENTRY_WORDS + LOG)}")
+        for index, word in enumerate((cycle, (stack & 0xFFFF) << 16 | (kind | site << 32), target)):
             at = e.name()
-            e.line(f"{at} = getelementptr i64, ptr {note}, i64 {index}")
+            e.line(f"{at} = getelementptr i64, ptr {entry}, i64 {index}")
             e.store(at, word, 64)
-        e.store(count_place, count + 1, 64)
+        e.store(count_word, count + 1, 64)
 
-    def shortened(self, pc: int) -> None:
-        """Take the third cycle back, and remember where it goes if it is run after all."""
-        e, cell, place = self._e, self._cell(self._row_of(pc)), self._e.name()
+    def take_back_cycle(self, pc: int) -> None:
+        """Subtract the third cycle, and store the address of its cell for `AccountingBoundaryCounter.third_cycle`."""
+        e, cell, word = self._e, self._cell(self._row_of(pc)), self._e.name()
         e.store(cell, e.load(cell, 64) - 1, 64)
-        e.line(f"{place} = getelementptr i8, ptr {self._ledger(e)}, i64 {self._tail + 8 * CELL}")
-        e.line(f"store ptr {cell}, ptr {place}")
+        e.line(f"{word} = getelementptr i8, ptr {self._accounting(e)}, i64 {self._tail + 8 * RETFIE_CELL}")
+        e.line(f"store ptr {cell}, ptr {word}")
 
 
-class BoundaryCount:
-    """What native boundaries write down: nothing."""
+class BoundaryCounter:
+    """Counter of native boundaries that emits nothing: the interface of `AccountingBoundaryCounter`."""
 
     def idle(self, prefix: str, until: str) -> str:
-        """IR behind which the cycles from %cycle to `until` count as Idle; `prefix` makes names unique."""
+        """Return IR that accounts the cycles from %cycle to `until` as Idle. `prefix` makes its names unique."""
         return ""
 
-    def entered(self, start: str, handler: str, site: str, place: str, level: str, since: str) -> str:
-        """IR behind which those from %cycle to `start` count for `handler` at `level`; `site` was pushed at `place`,
-        the request rose in cycle `since`."""
+    def entered(self, start: str, handler: str, site: str, stack: str, level: str, since: str) -> str:
+        """Return IR that accounts the cycles from %cycle to `start` to `handler` at `level`. `site` was pushed at
+        `stack`; the interrupt was requested in cycle `since`."""
         return ""
 
     def third_cycle(self) -> str:
-        """IR that counts a cycle for the RETFIE run last, whose note is the last one."""
+        """Return IR that accounts a cycle to the RETFIE that ran last. Its log entry is the last one."""
         return ""
 
 
-class BoundaryCounting(BoundaryCount):
-    """Into the ledger, which is found from %entered, word `entered` of the environment."""
+class AccountingBoundaryCounter(BoundaryCounter):
+    """Counter of native boundaries with cycle accounting. It finds the cells relative to %entered, a word of the
+    environment."""
 
-    def __init__(self, words: int, tail: int, entered: int) -> None:
+    def __init__(self, words: int, tail: int) -> None:
         self._level_bytes: Final = 8 * words
         self._tail: Final = tail
-        self._entered: Final = entered
 
-    def _note(self, p: str, kind: str, words: tuple[str, str, str]) -> str:
-        """A note; `kind` and `words` name i64 values, the first and third word being given."""
-        return f"""  %{p}.np = getelementptr i64, ptr %{p}.tail, i64 {NOTED}
+    def _log(self, p: str, kind: str, words: tuple[str, str, str]) -> str:
+        """Return IR that appends a log entry. `kind` is its second word, `words` are the other three."""
+        return f"""  %{p}.np = getelementptr i64, ptr %{p}.tail, i64 {LOG_COUNT}
   %{p}.n = load i64, ptr %{p}.np
   %{p}.n1 = add i64 %{p}.n, 1
   store i64 %{p}.n1, ptr %{p}.np
-  %{p}.nw = mul i64 %{p}.n, {NOTE_WORDS}
-  %{p}.no = add i64 %{p}.nw, {NOTES}
+  %{p}.nw = mul i64 %{p}.n, {ENTRY_WORDS}
+  %{p}.no = add i64 %{p}.nw, {LOG}
   %{p}.w0 = getelementptr i64, ptr %{p}.tail, i64 %{p}.no
   store i64 {words[0]}, ptr %{p}.w0
   %{p}.w1 = getelementptr i64, ptr %{p}.w0, i64 1
@@ -196,12 +205,12 @@ class BoundaryCounting(BoundaryCount):
   store i64 {words[2]}, ptr %{p}.w3"""
 
     def _find(self, p: str) -> str:
-        return f"""  %{p}.lp = getelementptr i64, ptr %entered, i64 {LEDGER - self._entered}
-  %{p}.ledger = load ptr, ptr %{p}.lp
-  %{p}.tail = getelementptr i8, ptr %{p}.ledger, i64 {self._tail}"""
+        return f"""  %{p}.lp = getelementptr i64, ptr %entered, i64 {ACCOUNTING - INTERRUPTS}
+  %{p}.accounting = load ptr, ptr %{p}.lp
+  %{p}.tail = getelementptr i8, ptr %{p}.accounting, i64 {self._tail}"""
 
     def idle(self, prefix: str, until: str) -> str:
-        """Into the word of Idle, and a note."""
+        """Return IR that adds to the idle cycles and logs the sleep."""
         p = f"c.{prefix}"
         return f"""{self._find(p)}
   %{p}.ip = getelementptr i64, ptr %{p}.tail, i64 {IDLE}
@@ -210,14 +219,14 @@ class BoundaryCounting(BoundaryCount):
   %{p}.new = add i64 %{p}.old, %{p}.slept
   store i64 %{p}.new, ptr %{p}.ip
   %{p}.long = shl i64 %{p}.slept, 32
-{self._note(p, str(SLEPT), (until, f"%{p}.long", "0"))}"""
+{self._log(p, str(SLEPT), (until, f"%{p}.long", "0"))}"""
 
-    def entered(self, start: str, handler: str, site: str, place: str, level: str, since: str) -> str:
-        """Into the handler's cell, and a note."""
+    def entered(self, start: str, handler: str, site: str, stack: str, level: str, since: str) -> str:
+        """Return IR that adds to the handler's cell and logs the entry."""
         p = "c.in"
         return f"""{self._find(p)}
   %{p}.level = mul i64 {level}, {self._level_bytes}
-  %{p}.cells = getelementptr i8, ptr %{p}.ledger, i64 %{p}.level
+  %{p}.cells = getelementptr i8, ptr %{p}.accounting, i64 %{p}.level
   %{p}.word = lshr i64 {handler}, 1
   %{p}.cell = getelementptr i64, ptr %{p}.cells, i64 %{p}.word
   %{p}.old = load i64, ptr %{p}.cell
@@ -225,29 +234,30 @@ class BoundaryCounting(BoundaryCount):
   %{p}.new = add i64 %{p}.old, %{p}.took
   store i64 %{p}.new, ptr %{p}.cell
   %{p}.site = shl i64 {site}, 32
-  %{p}.sp = shl i64 {place}, 16
+  %{p}.sp = shl i64 {stack}, 16
   %{p}.lev = shl i64 {level}, 8
   %{p}.k1 = or i64 %{p}.site, %{p}.sp
   %{p}.k2 = or i64 %{p}.k1, %{p}.lev
   %{p}.k3 = or i64 %{p}.k2, {ENTERED}
   %{p}.long = shl i64 %{p}.took, 32
   %{p}.where = or i64 %{p}.long, {handler}
-{self._note(p, f"%{p}.k3", (start, f"%{p}.where", since))}"""
+{self._log(p, f"%{p}.k3", (start, f"%{p}.where", since))}"""
 
     def third_cycle(self) -> str:
-        """Where `Counting.shortened` has said."""
-        return f"""  %c.lp = getelementptr i64, ptr %env, i64 {LEDGER}
-  %c.ledger = load ptr, ptr %c.lp
-  %c.tail = getelementptr i8, ptr %c.ledger, i64 {self._tail}
-  %c.place = getelementptr i64, ptr %c.tail, i64 {CELL}
+        """Return IR that adds to the cell that `AccountingCounter.take_back_cycle` has stored."""
+
+        return f"""  %c.lp = getelementptr i64, ptr %env, i64 {ACCOUNTING}
+  %c.accounting = load ptr, ptr %c.lp
+  %c.tail = getelementptr i8, ptr %c.accounting, i64 {self._tail}
+  %c.place = getelementptr i64, ptr %c.tail, i64 {RETFIE_CELL}
   %c.cell = load ptr, ptr %c.place
   %c.old = load i64, ptr %c.cell
   %c.new = add i64 %c.old, 1
   store i64 %c.new, ptr %c.cell
-  %c.np = getelementptr i64, ptr %c.tail, i64 {NOTED}
+  %c.np = getelementptr i64, ptr %c.tail, i64 {LOG_COUNT}
   %c.n = load i64, ptr %c.np
-  %c.nw = mul i64 %c.n, {NOTE_WORDS}
-  %c.no = add i64 %c.nw, {NOTES - NOTE_WORDS}
+  %c.nw = mul i64 %c.n, {ENTRY_WORDS}
+  %c.no = add i64 %c.nw, {LOG - ENTRY_WORDS}
   %c.note = getelementptr i64, ptr %c.tail, i64 %c.no
   %c.at = load i64, ptr %c.note
   %c.at1 = add i64 %c.at, 1

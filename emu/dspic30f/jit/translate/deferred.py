@@ -1,4 +1,4 @@
-"""What an instruction that is being translated will do, until all of its addresses have been probed."""
+"""Deferred effects of the instruction being translated: they are committed after all of its addresses were checked."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from emu.dspic30f.isa.builder import Size
 from emu.dspic30f.jit.translate.values import Number, Value
 
 
-class Store(NamedTuple):
-    """A store to an address that is `in_ram` or a register's."""
+class IndirectStore(NamedTuple):
+    """A store whose address is known only at run time: to RAM if `in_ram` holds, else to an SFR."""
 
     address: Value
     value: Number
@@ -20,8 +20,8 @@ class Store(NamedTuple):
 
 
 @dataclass
-class Pending:
-    """What the instruction being translated will commit."""
+class DeferredEffects:
+    """Effects that the instruction will commit, and what they imply for the code behind it."""
 
     w: dict[int, Number] = field(default_factory=dict)
     flags: dict[str, Number] = field(default_factory=dict)
@@ -29,21 +29,20 @@ class Pending:
     registers: dict[str, Number] = field(default_factory=dict)
     stores: list[Callable[[], None]] = field(default_factory=list)
     initialises: int = 0
-    psv: list[Value] = field(default_factory=list)
-    """Truth values: the instruction read the PSV window."""
-    stop: bool = False
-    """The next boundary must look at interrupts."""
-    replanned: bool = False
-    """The deadline may have come nearer: the function must be left."""
+    psv_reads: list[Value] = field(default_factory=list)
+    """One truth value per load: whether it read the PSV window."""
+    check_interrupts: bool = False
+    """An interrupt may have become acceptable at the next boundary."""
+    deadline_moved: bool = False
+    """The deadline may have moved nearer, so the function must be left."""
     touches_sfr: bool = False
-    """An SFR that events may change, or that devices hear of, is accessed."""
-    taken: bool = False
-    """A device changes because it is read."""
+    """The instruction accesses an SFR that events may change, or whose writes a device observes."""
+    read_effect: bool = False
+    """A read changes the state of a device."""
     sr: tuple[Number, int] | None = None
-    """A data write to SR: what, and to which bits."""
-    pointed: Store | None = None
-    """A store of which only the address that it has when it is made says whether it is to RAM or to a register."""
-    left: Value | None = None
-    """Truth value: it was to a register, whose device may have asked for attention. The function must be left."""
-    mapped: int = 0
-    """W registers written through their data addresses: stall sources like any written register."""
+    """Value and mask of a data write to SR."""
+    indirect_store: IndirectStore | None = None
+    sfr_written: Value | None = None
+    """Truth value: the indirect store went to an SFR, so the function must be left."""
+    mapped_w: int = 0
+    """W registers written through their data addresses: they cause stalls like any written register."""

@@ -1,8 +1,8 @@
-"""From a region to one LLVM function: the sequencer's rules (isa.md §7, §13) as control flow.
+"""Translation of a region to one LLVM function: the rules of the sequencer (isa.md §7, §13) as control flow.
 
-A block first asks whether all of it fits before the next deadline; if not it leaves, and the rest is stepped exactly.
-So inside a block no event is due, nothing asynchronous happens, and every cycle is a constant or a choice of two.
-Whatever is not native here (see `LlvmBuilder`) leaves with nothing of the instruction done.
+A block of block code first checks that all of it fits before the next deadline. If it does not, the function returns
+and exact code runs instead. So no event is due inside a block, and every cycle in it is a constant or one of two.
+An instruction that is not native (see `LlvmBuilder`) leaves the function before it has had an effect.
 """
 
 from __future__ import annotations
@@ -13,8 +13,10 @@ from typing import Final
 from emu.dspic30f.interpreter import flow_rules
 from emu.dspic30f.isa.builder import Context
 from emu.dspic30f.isa.flow import Branch, Call, ClearWatchdog, Disi, Flow, Goto, Repeat, Return, Skip, Sleep
+from emu.dspic30f.jit.environment import ARRIVED, NOWHERE, RESUME
 from emu.dspic30f.jit.exit_reasons import (
     ARRIVE,
+    BOUNDARY_WORK,
     DEADLINE,
     HOOK,
     INTERPRET,
@@ -22,30 +24,24 @@ from emu.dspic30f.jit.exit_reasons import (
     MODES,
     NEXT,
     RETFIE,
-    SERVICE,
-    Surroundings,
 )
-from emu.dspic30f.jit.translate.builder import LlvmBuilder, NeedsInterpreter
-from emu.dspic30f.jit.translate.cycle_counters import Count
-from emu.dspic30f.jit.translate.indirect_sfr import requested
+from emu.dspic30f.jit.machine_layout import MachineLayout
+from emu.dspic30f.jit.translate.builder import NeedsInterpreter
+from emu.dspic30f.jit.translate.cycle_counters import CycleCounter
+from emu.dspic30f.jit.translate.frame import FunctionFrame
+from emu.dspic30f.jit.translate.indirect_sfr import interrupt_requested
 from emu.dspic30f.jit.translate.polling import empty_loops
 from emu.dspic30f.jit.translate.region import Region, Step
-from emu.dspic30f.jit.translate.repeat import Repeats
-from emu.dspic30f.jit.translate.rule_emitter import LlvmWays, NativeReader
-from emu.dspic30f.jit.translate.trace_block import Part, course, extra
+from emu.dspic30f.jit.translate.repeat import RepeatTranslator
+from emu.dspic30f.jit.translate.rule_emitter import AccessEmitter, LlvmRulePaths
+from emu.dspic30f.jit.translate.trace_block import TraceItem, taken_cost, trace_block
 from emu.dspic30f.jit.translate.values import Emitter, Number, Value, truth, wide
-from emu.dspic30f.jit.translate.variables import MemoryVariables, Variables, pointer
+from emu.dspic30f.jit.translate.variables import pointer
 from emu.dspic30f.state.data_space import W_END
 from emu.dspic30f.state.state import IDLE, IPL3, NOT_REPEATING, PC_MASK
 from emu.system.events import NEVER
 from emu.system.rules import Rule
 
-RESUME: Final = 5
-"""Word of the environment: the hooked address Python has just seen, or"""
-NOWHERE: Final = -1
-ARRIVED: Final = 10
-"""Word of the environment: cycle in which an instruction begins before whose access all events have happened; on the
-way there (`ARRIVE`) the cycle of the access."""
 PROLOGUE: Final = """declare i16 @llvm.fshl.i16(i16, i16, i16)
 declare i16 @llvm.ctlz.i16(i16, i1)
 declare i16 @llvm.cttz.i16(i16, i1)
@@ -53,61 +49,55 @@ declare i64 @llvm.umin.i64(i64, i64)
 define i64 @entry(ptr noalias %rec, ptr noalias %env) {
 """
 EPILOGUE: Final = '\n}\n!0 = !{!"branch_weights", i32 2000, i32 1}\n!1 = !{}\n'
+NATIVE_FLOWS: Final = (type(None), Goto, Branch, Call, Return, Skip, Disi, ClearWatchdog)
+"""Flows that native code implements, besides Repeat and Sleep to Idle."""
 
 
-class Translator:
-    """Translates one region under fixed circumstances.
-
-    With `exact` every instruction can be entered and looks at the deadline before it runs; the registers stay in the
-    record. Such code is compiled quickly and runs the few instructions up to the next event, or cold code.
-    """
+class Translator(FunctionFrame):
+    """Translates one region for one machine layout and one set of processor modes."""
 
     def __init__(
-        self, region: Region, around: Surroundings, context: Context, exact: bool, count: Count | None = None
+        self, region: Region, layout: MachineLayout, context: Context, exact: bool, counter: CycleCounter | None = None
     ) -> None:
-        self.region: Final = region
-        self.around: Final = around
-        self.exact: Final = exact
-        self.e: Final = Emitter()
-        self.v: Final = (MemoryVariables if exact else Variables)(self.e, around.offset)
-        self.b: Final = LlvmBuilder(self.e, self.v, around, context)
-        self.count: Final[Count] = count if count is not None else Count()
-        self.count.begin(self.e, around.offset)
-        self.b.before_slow = self.count.carry
-        self.at = 0
-        """The instruction whose cycles pass."""
+        super().__init__(region, layout, context, exact, counter)
         self.b.dsp_region = any("OA" in step.insn.row.flags for step in region.steps.values())
         self._psv: Final = bool(context.psv)
-        self._repeats: Final = Repeats(self)
-        self._labels: dict[int, str] = {}
-        self._todo: list[int] = []
-        self._exits: dict[tuple[object, ...], str] = {}
-        self._unsure: Value | None = None
+        self._repeats: Final = RepeatTranslator(self)
+        self._early_exception: Value | None = None
         """Whether an interrupt may be accepted in front of the third cycle of the return being translated."""
-        self._polling: Final = {} if exact else empty_loops(region, around, context)
+        self._polling: Final = {} if exact else empty_loops(region, layout, context)
         self._heads: Final = {loop.head for loop in self._polling.values()}
         self._polled: Final = {pc for loop in self._polling.values() for pc, _ in loop.costs}
-        self._apart: Final = set(region.steps) if exact else self._heads | set(around.hooks)
-        """Instructions before which something is looked at: the deadline, that an empty loop begins, a hook."""
-        self._arm: tuple[Step, ...] = ()
-        """What the branch being translated goes round within its block."""
+        self._barriers: Final = set(region.steps) if exact else self._heads | set(layout.hooks)
+        """Instructions that must begin a block, because the deadline, a polling loop or a hook is checked there."""
+        self._skipped: tuple[Step, ...] = ()
+        """Instructions that the branch being translated skips within its block."""
 
     def text(self) -> str:
-        """The module."""
-        e = self.e
+        """Return the LLVM IR of the module."""
         self.v.touch("pc", "stall", "cycle")
-        steps = set(self.region.steps)
-        for pc in sorted(steps if self.exact else self.region.leaders):
-            self._label(pc)
-        while self._todo:
-            self._block(self._todo.pop(0))
-        entries = " ".join(f"i64 {pc}, label %{label}" for pc, label in self._labels.items())
-        head = Emitter(e.last_name)
+        for pc in sorted(self.region.steps if self.exact else self.region.leaders):
+            self.label(pc)
+        while self.unwritten:
+            self._block(self.unwritten.pop(0))
+        head = self._entry_block()
+        tail = Emitter(head.last_name)
+        tail.start("exit")
+        self.v.write_back(tail)
+        reason = str(MISS) if self.exact else tail.let("load i64, ptr %x.reason").text
+        tail.end(f"ret i64 {reason}")
+        body = "\n".join(part.text() for part in (head, self.e, tail))
+        return PROLOGUE + body + EPILOGUE
+
+    def _entry_block(self) -> Emitter:
+        """Return the first block, which loads the variables and dispatches on PC. It is written last."""
+        entries = " ".join(f"i64 {pc}, label %{label}" for pc, label in self.labels.items())
+        head = Emitter(self.e.last_name)
         head.start("first")
-        here = head.load(pointer(head, self.around.offset["cpu.pc"]), 32)
-        if self.exact:  # odd: in the middle of a REPEAT
+        here = head.load(pointer(head, self.layout.offset["cpu.pc"]), 32)
+        if self.exact:  # an odd number: in the middle of a REPEAT
             entries += "".join(f" i64 {pc + 1}, label %{label}" for pc, label in self._repeats.resumes.items())
-            here = here + (head.load(pointer(head, self.around.offset["cpu.repeat"]), 16) != NOT_REPEATING)
+            here = here + (head.load(pointer(head, self.layout.offset["cpu.repeat"]), 16) != NOT_REPEATING)
         self.v.prologue(head)
         if not self.exact:
             head.line("%x.reason = alloca i64")
@@ -116,19 +106,13 @@ class Translator:
             head.line(f"%passed.{pc:x} = alloca i1")
             head.line(f"store i1 false, ptr %passed.{pc:x}")
         self._deadline(head)
-        self.count.head(head)
+        self.counter.prologue(head)
         head.end(f"switch i64 {here.text}, label %exit [ {entries} ]")
-        tail = Emitter(head.last_name)
-        tail.start("exit")
-        self.v.write_back(tail)
-        reason = str(MISS) if self.exact else tail.let("load i64, ptr %x.reason").text
-        tail.end(f"ret i64 {reason}")
-        body = "\n".join(part.text() for part in (head, e, tail))
-        return PROLOGUE + body + EPILOGUE
+        return head
 
     def _deadline(self, head: Emitter) -> None:
-        """%stop: no instruction may start in that cycle or later before somebody has looked (sequencer.py)."""
-        due = head.load(pointer(head, self.around.offset["events.deadline"]), 64)
+        """Define %stop: no instruction may start in that cycle or later before the boundary was handled."""
+        due = head.load(pointer(head, self.layout.offset["events.deadline"]), 64)
         limit = head.let("load i64, ptr %env, align 8")
         head.line(f"%before = call i64 @llvm.umin.i64(i64 {due.text}, i64 {NEVER - 2})")
         head.line("%behind = add i64 %before, 1")
@@ -137,40 +121,11 @@ class Translator:
     @property
     def entries(self) -> list[int]:
         """Program addresses at which the function can be entered."""
-        return sorted(self._labels)
-
-    # -- labels and exits -------------------------------------------------------------------------------------------
-    def _label(self, pc: int) -> str:
-        """Label of the block at `pc`; outside the region, of an exit that goes on there."""
-        if pc not in self.region.steps:
-            return self.exit(pc, NEXT)
-        if pc not in self._labels:
-            self._labels[pc] = f"b{pc:x}"
-            self._todo.append(pc)
-        return self._labels[pc]
-
-    def exit(self, pc: int, reason: int) -> str:
-        """Label of a block that leaves for `reason` with PC = `pc`."""
-        key = (pc, reason, *self.count.unsettled)
-        if key not in self._exits:
-            label = f"out{reason}.{pc:x}" + (f".{len(self._exits)}" if len(key) > 2 else "")
-            self._exits[key] = label
-            current = self.e.block
-            self.e.start(label)
-            self.count.carry()
-            self.v.leave(pc, reason)
-            self.e.block = current
-        return self._exits[key]
-
-    def jump(self, pc: int) -> None:
-        """Go on at `pc`; exact code hands over where better code may exist."""
-        self.count.settle()
-        hand_over = self.exact and pc in self.region.leaders
-        self.e.end(f"br label %{self.exit(pc, NEXT) if hand_over else self._label(pc)}")
+        return sorted(self.labels)
 
     def _jump_back(self, back: int, pc: int) -> None:
-        """Go on at `pc`. From the end of an empty loop that has been run once, skip the iterations before the last one
-        that ends before the deadline."""
+        """End the block with a jump to `pc`. At the end of an empty loop that has run once, first skip the iterations
+        before the last one that ends before the deadline."""
         loop = self._polling.get(back)
         if loop is not None:
             e = self.e
@@ -181,76 +136,82 @@ class Translator:
             some = passed & (whole > 0)
             skipped = self.b.select(some, whole, 0)
             self.v.set("cycle", cycle + skipped * loop.cycles)
-            for place, cycles in loop.costs:
-                self.count.spend(place, skipped * cycles)
+            for address, cycles in loop.costs:
+                self.counter.spend(address, skipped * cycles)
         self.jump(pc)
 
     # -- blocks -----------------------------------------------------------------------------------------------------
-    def _cost(self, parts: Sequence[Part]) -> int:
-        """Upper bound of the cycles of a block, without REPEATs (they make their own check)."""
+    def _cost(self, items: Sequence[TraceItem]) -> int:
+        """Return an upper bound of the cycles of a block, without REPEATs, which have a check of their own."""
         total = 0
-        for part in parts:
-            total += self._most(part.step)
-            if part.arm:
-                total += max(sum(map(self._most, part.arm)), extra(part.step))
-            elif part.step.facts.flow is not None:
+        for item in items:
+            total += self._most(item.step)
+            if item.skipped:
+                total += max(sum(map(self._most, item.skipped)), taken_cost(item.step))
+            elif item.step.facts.flow is not None:
                 total += 2
         return total
 
     def _most(self, step: Step) -> int:
-        """Upper bound of an instruction's cycles, if it is no flow or one that is not taken."""
+        """Return an upper bound of the cycles of an instruction without flow, or whose branch is not taken."""
         window = step.facts.window_cycles if self._psv and step.facts.loads else 0
         return step.insn.row.cycles + (step.facts.source_pointers != 0) + window
 
     def _block(self, start: int) -> None:
         e, v = self.e, self.v
-        parts = course(self.region, start, self._labels, self._apart, self.around.do_end)
-        e.start(self._labels[start])
+        items = trace_block(self.region, start, self.labels, self._barriers, self.layout.do_end)
+        e.start(self.labels[start])
         v.new_block()
-        if self.exact:
-            fits = e.let(f"icmp ult i64 {wide(v.get('cycle'))}, %stop", bit=True)
-            arrived = self._arrived(parts[0].step)
-            fits = fits | arrived if isinstance(arrived, Value) else fits
-        else:
-            fits = self.fits(self._cost(parts))
+        fits = self._block_fits(items)
         go = e.fresh("go")
-        late = self.exit(start, SERVICE if self.exact else DEADLINE)
+        late = self.exit(start, BOUNDARY_WORK if self.exact else DEADLINE)
         e.end(f"br i1 {fits.text}, label %{go}, label %{late}, !prof !0")
         e.start(go)
-        if start in self.around.hooks:
+        if start in self.layout.hooks:
             self._stop_for_hook(start)
         if start in self._heads:
             e.line(f"store i1 true, ptr %passed.{start:x}")
         written: Number = v.get("stall")
-        for part in parts:
-            self._arm = part.arm
+        for item in items:
+            self._skipped = item.skipped
             try:
-                ended, written = self._instruction(part.step, written)
+                ended, written = self._instruction(item.step, written)
             except NeedsInterpreter:
-                self.count.settle()
-                e.end(f"br label %{self.exit(part.step.pc, INTERPRET)}")
-                self._label(part.step.next_pc)
+                self.counter.settle()
+                e.end(f"br label %{self.exit(item.step.pc, INTERPRET)}")
+                self.label(item.step.next_pc)
                 return
             if ended:
                 return
-        self.jump(part.next_pc)
+        self.jump(items[-1].next_pc)
+
+    def _block_fits(self, items: Sequence[TraceItem]) -> Value:
+        """Return whether the block may run now: all of it in block code, its first instruction in exact code."""
+        if not self.exact:
+            return self.fits(self._cost(items))
+        fits = self.e.let(f"icmp ult i64 {wide(self.v.get('cycle'))}, %stop", bit=True)
+        arrived = self._arrived(items[0].step)
+        return fits | arrived if isinstance(arrived, Value) else fits
 
     def _arrived(self, step: Step) -> Number:
-        """Truth of "what is due before the access of this instruction has happened". It is asked for those that read a
-        register by address, in one cycle: waiting for a flag hits the cycle of its event often."""
-        if step.insn.row.cycles != 1 or step.facts.flow not in (None, Skip) or step.pc in self.around.hooks:
+        """Return whether the events that are due before the access of this instruction have fired.
+
+        The check exists for instructions of one cycle that read an SFR by its address: a loop that waits for a flag
+        often makes its access in the cycle of the event.
+        """
+        if step.insn.row.cycles != 1 or step.facts.flow not in (None, Skip) or step.pc in self.layout.hooks:
             return 0
-        if not any(W_END <= address < self.around.ram[0] for address in step.facts.reads):
+        if not any(W_END <= address < self.layout.ram[0] for address in step.facts.reads):
             return 0
         return self.e.load(self._arrival(), 64) == self.v.get("cycle")
 
     def _arrival(self) -> str:
-        place = self.e.name()
-        self.e.line(f"{place} = getelementptr i64, ptr %env, i64 {ARRIVED}")
-        return place
+        word = self.e.name()
+        self.e.line(f"{word} = getelementptr i64, ptr %env, i64 {ARRIVED}")
+        return word
 
     def _arrive(self, step: Step, in_time: Value) -> None:
-        """Leave unless `in_time`, to have happen what is due before the access."""
+        """Leave unless `in_time` holds, so that the events that are due before the access fire."""
         e, b = self.e, self.b
         ready, late = e.fresh("ready"), e.fresh("late")
         e.end(f"br i1 {in_time.text}, label %{ready}, label %{late}, !prof !0")
@@ -261,242 +222,267 @@ class Translator:
         e.start(ready)
 
     def _stop_for_hook(self, pc: int) -> None:
-        """Python is to see that `pc` is reached, unless it has just done so."""
+        """Leave in front of the hooked address `pc`, unless Python has just called its hook."""
         e = self.e
-        place, seen = e.name(), e.fresh("seen")
-        e.line(f"{place} = getelementptr i64, ptr %env, i64 {RESUME}")
-        hooked = e.load(place, 64)
+        word, seen = e.name(), e.fresh("seen")
+        e.line(f"{word} = getelementptr i64, ptr %env, i64 {RESUME}")
+        hooked = e.load(word, 64)
         e.end(f"br i1 {truth(hooked == pc)}, label %{seen}, label %{self.exit(pc, HOOK)}")
         e.start(seen)
-        e.line(f"store i64 {NOWHERE}, ptr {place}, align 1")
+        e.line(f"store i64 {NOWHERE}, ptr {word}, align 1")
 
-    def fits(self, cost: Number, start: Number | None = None) -> Value:
-        """Whether `cost` cycles from `start` (now) on end before the cycle of the deadline."""
-        begun = self.v.get("cycle") if start is None else start
-        return self.e.let(f"icmp ult i64 {wide(begun + cost)}, %stop", bit=True)
-
+    # -- instructions -----------------------------------------------------------------------------------------------
     def _instruction(self, step: Step, written: Number) -> tuple[bool, Number]:
-        """One instruction; returns whether the block ends and the W registers written on the destination side."""
-        b, row = self.b, step.insn.row
+        """Translate one instruction. Return whether the block has ended, and the W registers that the instruction has
+        written on its destination side. `written` are those of the instruction before it."""
         stall = flow_rules.stall(written, step.facts.source_pointers)
-        b.begin(step.pc, step.facts.window_cycles)
-        self.at = step.pc
         start = self.v.get("cycle")
-        b.now = start + stall + step.facts.access
-        b.several_stores = step.facts.stores > 1
-        b.loads_ahead = max(step.facts.loads - 1, 0)
-        if step.pc not in self._polled:  # iterations that are skipped may not read what time changes
-            b.reach = lambda waited: self.fits(row.cycles + stall + waited, start) if self.exact else 1
-        flow = row.does(b, step.insn.x)  # type: ignore[arg-type]
-        if flow is not None and step.pc == self.around.do_end:
-            raise NeedsInterpreter  # undefined on silicon; the sequencer says what happens here
+        self._prepare_builder(step, stall, start)
+        flow: Flow = step.insn.row.does(self.b, step.insn.x)  # type: ignore[arg-type]
+        if flow is not None and step.pc == self.layout.do_end:
+            raise NeedsInterpreter  # undefined on silicon; the sequencer defines what happens here
         if isinstance(flow, Repeat):
             self._repeats.translate(step, flow, stall)
             return True, 0
-        if isinstance(flow, Sleep) and flow.mode == "idle":
-            self._read(self.around.idling)
-            if self.exact:
-                b.guard(self.fits(2))
-        elif isinstance(flow, ClearWatchdog):
-            self._read(self.around.clearing)
-            b.pending.touches_sfr = True
-        elif not isinstance(flow, (type(None), Goto, Branch, Call, Return, Skip, Disi)):
-            raise NeedsInterpreter
-        self._unsure = None
-        if isinstance(flow, Return) and flow.kind == "retfie":
-            self._check_retfie(flow)
-        if isinstance(flow, Skip) and step.target is None:
-            raise NeedsInterpreter
-        if self.exact and b.pending.touches_sfr:  # an event up to the access would matter
-            fits, arrived = self.fits(row.cycles + stall), self._arrived(step)
-            if isinstance(arrived, Value):
-                self._arrive(step, fits | arrived)
-            else:
-                b.guard(fits)
-        b.commit()
-        cycles: Number = row.cycles + stall + b.waited()
-        if self.exact and isinstance(flow, Return):  # an event up to the second cycle may end it there
+        self._prepare_flow(step, flow)
+        self._check_events(step, stall)
+        self.b.commit()
+        cycles: Number = step.insn.row.cycles + stall + self.b.waited()
+        if self.exact and isinstance(flow, Return):  # an event up to the second cycle may end the return there
             due = self.e.let(f"icmp uge i64 {wide(start + cycles - 2)}, %before", bit=True)
-            self._unsure = due if self._unsure is None else due | self._unsure
-        mask = step.facts.writes | b.pending.mapped
+            self._early_exception = due if self._early_exception is None else due | self._early_exception
+        mask = step.facts.writes | self.b.deferred.mapped_w
         if flow is None:
-            self.advance(cycles, mask)
-            if b.pending.sr is not None:
-                self.count.level_changed()
-            if step.pc == self.around.do_end:
-                self._end_of_loop(step)
-            elif b.pending.replanned or b.pending.stop:
-                self._behind(step.next_pc)
-            else:
-                self._leave_behind_register(step.next_pc)
-                return False, mask
-            return True, mask
-        if self._arm:
+            return self._end_instruction(step, cycles, mask), mask
+        if self._skipped:
             assert isinstance(flow, (Branch, Skip))
-            return False, self._round(step, flow, cycles, mask)
+            return False, self._convert_branch(step, flow, cycles, mask)
         self._flow(step, flow, cycles, mask)
         return True, mask
 
-    def _behind(self, pc: int) -> None:
-        """Go on at `pc` behind an instruction without flow, which may have asked for attention."""
-        if self.b.pending.replanned:
-            self.count.settle()
-            self.e.end(f"br label %{self.exit(pc, NEXT)}")
-        elif self.b.pending.stop:
-            self._look(pc)
+    def _prepare_builder(self, step: Step, stall: Number, start: Value) -> None:
+        """Begin the instruction at `step`, which starts in cycle `start`."""
+        b, row = self.b, step.insn.row
+        b.begin(step.pc, step.facts.window_cycles)
+        self.at = step.pc
+        b.now = start + stall + step.facts.access
+        b.several_stores = step.facts.stores > 1
+        b.loads_ahead = max(step.facts.loads - 1, 0)
+        if step.pc not in self._polled:  # iterations that are skipped may not read what changes with time
+            b.reach = lambda waited: self.fits(row.cycles + stall + waited, start) if self.exact else 1
+
+    def _prepare_flow(self, step: Step, flow: Flow) -> None:
+        """Emit the checks and device rules of a flow, before the instruction is committed.
+
+        Raises NeedsInterpreter for a flow that is not native.
+        """
+        self._early_exception = None
+        if isinstance(flow, Sleep) and flow.mode == "idle":
+            self._apply_rule(self.layout.idle_rule)
+            if self.exact:
+                self.b.guard(self.fits(2))
+        elif isinstance(flow, ClearWatchdog):
+            self._apply_rule(self.layout.clrwdt_rule)
+            self.b.deferred.touches_sfr = True
+        elif not isinstance(flow, NATIVE_FLOWS) or (isinstance(flow, Skip) and step.target is None):
+            raise NeedsInterpreter
+        elif isinstance(flow, Return) and flow.kind == "retfie":
+            self._check_retfie(flow)
+
+    def _check_events(self, step: Step, stall: Number) -> None:
+        """In exact code, leave before an SFR access if events are due up to its cycle."""
+        if not (self.exact and self.b.deferred.touches_sfr):
+            return
+        fits, arrived = self.fits(step.insn.row.cycles + stall), self._arrived(step)
+        if isinstance(arrived, Value):
+            self._arrive(step, fits | arrived)
         else:
-            self._leave_behind_register(pc)
+            self.b.guard(fits)
+
+    def _end_instruction(self, step: Step, cycles: Number, mask: int) -> bool:
+        """End an instruction without flow. Return whether the block ends with it."""
+        deferred = self.b.deferred
+        self.advance(cycles, mask)
+        if deferred.sr is not None:
+            self.counter.level_changed()
+        if step.pc == self.layout.do_end:
+            self._end_of_loop(step)
+        elif deferred.deadline_moved or deferred.check_interrupts:
+            self._continue_after_effects(step.next_pc)
+        else:
+            self._leave_after_sfr_write(step.next_pc)
+            return False
+        return True
+
+    def _continue_after_effects(self, pc: int) -> None:
+        """Continue at `pc` after an instruction that may have moved the deadline or made an interrupt acceptable."""
+        if self.b.deferred.deadline_moved:
+            self.counter.settle()
+            self.e.end(f"br label %{self.exit(pc, NEXT)}")
+        elif self.b.deferred.check_interrupts:
+            self._check_interrupts(pc)
+        else:
+            self._leave_after_sfr_write(pc)
             self.jump(pc)
 
-    def _leave_behind_register(self, pc: int) -> None:
-        """If an instruction without flow has written a register by pointer."""
-        if self.b.pending.left is not None:
+    def _leave_after_sfr_write(self, pc: int) -> None:
+        """Leave if an indirect store has written an SFR."""
+        written = self.b.deferred.sfr_written
+        if written is not None:
             on = self.e.fresh("on")
-            self.e.end(f"br i1 {self.b.pending.left.text}, label %{self.exit(pc, NEXT)}, label %{on}")
+            self.e.end(f"br i1 {written.text}, label %{self.exit(pc, NEXT)}, label %{on}")
             self.e.start(on)
 
     def _end_of_loop(self, step: Step) -> None:
-        """The instruction at DOEND. EDT is the sequencer's; who leaves the loop leaves its translation."""
-        flow = self.around.flow
-        self.count.settle()
+        """End the instruction at DOEND. The sequencer handles EDT; the end of the loop leaves this translation."""
+        flow = self.layout.flow
+        self.counter.settle()
 
         def end(again: bool) -> None:
             if again:
-                self._behind(self.around.do_start)
+                self._continue_after_effects(self.layout.do_start)
                 return
-            if self.b.pending.stop:
-                self.e.store(pointer(self.e, self.around.offset["events.deadline"]), 0, 64)
+            if self.b.deferred.check_interrupts:
+                self.e.store(pointer(self.e, self.layout.offset["events.deadline"]), 0, 64)
             self.v.leave(step.next_pc, MODES)
 
-        LlvmWays(self.e, {flow.edt: 0}, self.v.new_block).each(lambda m: flow_rules.loop_again(m, flow), end)
+        LlvmRulePaths(self.e, {flow.edt: 0}, self.v.new_block).each(lambda m: flow_rules.loop_again(m, flow), end)
 
-    def advance(self, cycles: Number, mask: int) -> None:
-        self.v.set("cycle", self.v.get("cycle") + cycles)
-        self.v.set("stall", mask)
-        self.count.spend(self.at, cycles)
-
-    def _round(self, step: Step, flow: Branch | Skip, cycles: Number, mask: int) -> Value:
-        """A branch round `_arm`, both ways to its end; the W registers written last, on either."""
-        e, v, arm = self.e, self.v, self._arm
+    # -- flow -------------------------------------------------------------------------------------------------------
+    def _convert_branch(self, step: Step, flow: Branch | Skip, cycles: Number, mask: int) -> Value:
+        """Translate a branch over a few instructions so that both paths join in the block (if-conversion). Return the
+        W registers written last on either path."""
+        e, v, skipped = self.e, self.v, self._skipped
         taken, through, join = e.fresh("taken"), e.fresh("through"), e.fresh("join")
         self.advance(cycles, mask)
-        self.count.settle()
+        self.counter.settle()
         e.end(f"br i1 {truth(flow.cond)}, label %{taken}, label %{through}, !unpredictable !1")
-        e.start(taken)
-        v.new_block()
-        v.set("cycle", v.get("cycle") + extra(step))
-        self.count.spend(step.pc, extra(step))
-        self.count.settle()
+        self._take(step, taken)
+        self.counter.settle()
         e.end(f"br label %{join}")
         e.start(through)
         v.new_block()
-        self._arm = ()
+        self._skipped = ()
         written: Number = mask
         try:
-            for one in arm:
+            for one in skipped:
                 ended, written = self._instruction(one, written)
                 if ended:  # it may have made an interrupt acceptable
                     break
             else:
-                self.count.settle()
+                self.counter.settle()
                 e.end(f"br label %{join}")
         except NeedsInterpreter:
-            self.count.settle()
+            self.counter.settle()
             e.end(f"br label %{self.exit(self.at, INTERPRET)}")
         e.start(join)
         v.new_block()
         return v.get("stall")
 
+    def _take(self, step: Step, label: str) -> None:
+        """Start the block of a taken branch or skip, and account for its additional cycles."""
+        self.e.start(label)
+        self.v.new_block()
+        self.v.set("cycle", self.v.get("cycle") + taken_cost(step))
+        self.counter.spend(step.pc, taken_cost(step))
+
     def _flow(self, step: Step, flow: Flow, cycles: Number, mask: int) -> None:
-        e = self.e
-        if isinstance(flow, (Branch, Skip)):
-            taken, other = e.fresh("taken"), e.fresh("fall")
-            self.advance(cycles, mask)
-            self.count.settle()
-            e.end(f"br i1 {truth(flow.cond)}, label %{taken}, label %{other}")
-            assert step.target is not None
-            e.start(taken)
-            self.v.new_block()
-            self.v.set("cycle", self.v.get("cycle") + extra(step))
-            self.count.spend(step.pc, extra(step))
-            self._jump_back(step.pc, step.target)
-            e.start(other)
-            self.jump(step.next_pc)
-            return
+        """Translate a flow that ends the block."""
         self.advance(cycles, mask)
-        self.count.settle()
-        if isinstance(flow, ClearWatchdog):
-            self.jump(step.next_pc)
+        if isinstance(flow, (Branch, Skip)):
+            self._branch(step, flow)
             return
-        if isinstance(flow, Disi):
-            count, after = flow.count, self.v.get("cycle")
-            LlvmWays(e).all(lambda m: flow_rules.disi(m, self.around.flow, count, after))
-            self._look(step.next_pc)
-            return
-        assert isinstance(flow, (Goto, Call, Return, Sleep))
-        if isinstance(flow, Sleep):
-            self._idle(step.next_pc)
-            return
-        if isinstance(flow, Call):
-            self.count.called(step.pc, flow.target, self.v.get("W15") - 4, self.v.get("cycle"))
-        if isinstance(flow.target, int):
-            self._jump_back(step.pc, flow.target)
-            return
-        if isinstance(flow, Return):
-            self._leave_if_unsure(step, flow)
-            self.count.returned(step.pc, flow.target & PC_MASK, self.v.get("W15"), self.v.get("cycle"))
+        self.counter.settle()
+        match flow:
+            case ClearWatchdog():
+                self.jump(step.next_pc)
+            case Disi(count):
+                after = self.v.get("cycle")
+                LlvmRulePaths(self.e).all(lambda m: flow_rules.disi(m, self.layout.flow, count, after))
+                self._check_interrupts(step.next_pc)
+            case Sleep():
+                self._idle(step.next_pc)
+            case Goto(target):
+                self._go_to(step, target)
+            case Call(target):
+                self.counter.called(step.pc, target, self.v.get("W15") - 4, self.v.get("cycle"))
+                self._go_to(step, target)
+            case Return():
+                self._return(step, flow)
+            case _:
+                raise AssertionError(f"{flow} is not native")
+
+    def _branch(self, step: Step, flow: Branch | Skip) -> None:
+        """Translate a conditional branch or skip that ends the block."""
+        e = self.e
+        taken, other = e.fresh("taken"), e.fresh("fall")
+        self.counter.settle()
+        e.end(f"br i1 {truth(flow.cond)}, label %{taken}, label %{other}")
+        assert step.target is not None
+        self._take(step, taken)
+        self._jump_back(step.pc, step.target)
+        e.start(other)
+        self.jump(step.next_pc)
+
+    def _go_to(self, step: Step, target: Number) -> None:
+        """Jump to a static target, or leave the function for a computed one."""
+        if isinstance(target, int):
+            self._jump_back(step.pc, target)
+        else:
+            self.v.leave(target & PC_MASK, NEXT)
+
+    def _return(self, step: Step, flow: Return) -> None:
+        """Leave the function for the return address. If an exception may be accepted after two cycles of the return,
+        leave before its third: the boundary decides."""
+        e = self.e
+        if self._early_exception is not None:
+            some, none = e.fresh("some"), e.fresh("none")
+            e.end(f"br i1 {self._early_exception.text}, label %{some}, label %{none}")
+            e.start(some)
+            if flow.kind == "retfie":
+                e.store(pointer(e, self.layout.offset["events.deadline"]), 0, 64)
+            cycle = self.v.get("cycle")
+            self.v.set("cycle", cycle - 1)
+            self.counter.take_back_cycle(step.pc)
+            self.counter.returned(step.pc, flow.target & PC_MASK, self.v.get("W15"), cycle - 1)
+            self.v.leave(flow.target & PC_MASK, RETFIE)
+            e.start(none)
+            self.v.new_block()
+        self.counter.returned(step.pc, flow.target & PC_MASK, self.v.get("W15"), self.v.get("cycle"))
         self.v.leave(flow.target & PC_MASK, NEXT)
 
-    def _leave_if_unsure(self, step: Step, flow: Return) -> None:
-        """A return ends after two cycles if an interrupt is accepted then: the boundary decides."""
-        e = self.e
-        if self._unsure is None:
-            return
-        some, none = e.fresh("some"), e.fresh("none")
-        e.end(f"br i1 {self._unsure.text}, label %{some}, label %{none}")
-        e.start(some)
-        if flow.kind == "retfie":
-            e.store(pointer(e, self.around.offset["events.deadline"]), 0, 64)
-        cycle = self.v.get("cycle")
-        self.v.set("cycle", cycle - 1)
-        self.count.shortened(step.pc)
-        self.count.returned(step.pc, flow.target & PC_MASK, self.v.get("W15"), cycle - 1)
-        self.v.leave(flow.target & PC_MASK, RETFIE)
-        e.start(none)
-        self.v.new_block()
-
     # -- watchdog and Idle ------------------------------------------------------------------------------------------
-    def _read(self, rule: Rule) -> None:
-        """What the devices do with the instruction."""
+    def _apply_rule(self, rule: Rule) -> None:
+        """Emit the effect of the instruction on devices."""
         if rule.fires is None:
             raise NeedsInterpreter
-        rule.fires(NativeReader(self.b), rule.places)
+        rule.fires(AccessEmitter(self.b), rule.operands)
 
     def _idle(self, next_pc: int) -> None:
-        """The CPU stops; the boundary behind lets time pass."""
-        e, offset = self.e, self.around.offset
+        """Stop the CPU; the next boundary lets time pass."""
+        e, offset = self.e, self.layout.offset
         e.store(pointer(e, offset["cpu.mode"]), IDLE, 16)
         e.store(pointer(e, offset["cpu.slept"]), self.v.get("cycle") - 1, 64)
         e.store(pointer(e, offset["events.deadline"]), 0, 64)
-        e.end(f"br label %{self.exit(next_pc, SERVICE)}")
+        e.end(f"br label %{self.exit(next_pc, BOUNDARY_WORK)}")
 
     # -- interrupts -------------------------------------------------------------------------------------------------
-    def _look(self, next_pc: int) -> None:
-        """The instruction before may have made an interrupt acceptable: look if any is requested at all."""
+    def _check_interrupts(self, next_pc: int) -> None:
+        """Leave for the boundary if any enabled interrupt is requested, else continue at `next_pc`."""
         e = self.e
-        self.count.settle()
+        self.counter.settle()
         some = e.fresh("some")
-        e.end(f"br i1 {requested(e, self.around).text}, label %{some}, label %{self._label(next_pc)}")
+        e.end(f"br i1 {interrupt_requested(e, self.layout).text}, label %{some}, label %{self.label(next_pc)}")
         e.start(some)
-        e.store(pointer(e, self.around.offset["events.deadline"]), 0, 64)
-        e.end(f"br label %{self.exit(next_pc, SERVICE)}")
+        e.store(pointer(e, self.layout.offset["events.deadline"]), 0, 64)
+        e.end(f"br label %{self.exit(next_pc, BOUNDARY_WORK)}")
 
     def _check_retfie(self, flow: Return) -> None:
-        """Native RETFIE: no trap level involved (isa.md §14.3)."""
+        """Leave RETFIE to the interpreter if a trap is involved (isa.md §14.3), else emit its rule."""
         b, e = self.b, self.e
-        corcon = e.load(pointer(e, self.around.offset["CORCON"]), 16)
-        traps = e.load(pointer(e, self.around.offset["INTCON1"]), 16) & self.around.trap_flags
+        corcon = e.load(pointer(e, self.layout.offset["CORCON"]), 16)
+        traps = e.load(pointer(e, self.layout.offset["INTCON1"]), 16) & self.layout.trap_flags
         plain = (flow.ipl3 == 0) & (((corcon & IPL3) | traps) == 0)
         b.guard(plain)
-        self._unsure = requested(self.e, self.around)
-        flow_rules.resume(NativeReader(b), self.around.flow, flow.srl & 0xFF, 0)
+        self._early_exception = interrupt_requested(self.e, self.layout)
+        flow_rules.resume(AccessEmitter(b), self.layout.flow, flow.srl & 0xFF, 0)

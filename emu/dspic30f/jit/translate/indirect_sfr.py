@@ -1,11 +1,12 @@
-"""Registers reached by a pointer: one native function for all accesses whose address is only known at run time.
+"""Indirect SFR access: one native helper for SFR addresses that are known only at run time.
 
-In: how native code treats each SFR (`Surroundings`), the rules of devices. Out: IR of `i64 entry(rec, now, address,
-lanes, value)`. Translated code calls it, through a word of the environment, for addresses below RAM, which are rare:
-the text is that of direct accesses, once for all instructions instead of in each.
+Input: how native code accesses each SFR (`MachineLayout`) and the rules of devices. Output: the IR of
+`i64 entry(rec, now, address, lanes, value)`. Translated code calls it through a word of the environment, for addresses
+below RAM, which are rare. The helper holds the code of all direct accesses once, instead of once per instruction.
 
-lanes = 0 reads the word at an even address: it, or -1 where Python must. Otherwise those lanes of `value` are
-written: 1, or 0 where Python must, with nothing done. What lives in variables of translated code is left to Python.
+With `lanes` = 0 the helper reads the word at an even address. It returns the word, or -1 if Python must read it.
+Otherwise it writes these lanes of `value`. It returns 1, or 0 without any effect if Python must write it. Registers
+that translated code keeps in variables are left to Python.
 """
 
 from __future__ import annotations
@@ -14,59 +15,57 @@ from collections.abc import Callable, Mapping
 from typing import Final
 
 from emu.dspic30f.core import Core
-from emu.dspic30f.jit.exit_reasons import Access, Surroundings
-from emu.dspic30f.jit.translate.rule_emitter import BoundaryReader
+from emu.dspic30f.jit.machine_layout import MachineLayout, SfrAccess
+from emu.dspic30f.jit.translate.builder import CALLING_CONVENTION
+from emu.dspic30f.jit.translate.rule_emitter import BoundaryEmitter
 from emu.dspic30f.jit.translate.values import Emitter, Number, Value, truth, wide
 from emu.dspic30f.jit.translate.variables import pointer
-from emu.system.rules import Place, Rule
+from emu.system.rules import Cell, Rule
 
-POINTED: Final = 11
-"""Word of the environment: where the function is."""
-CONVENTION: Final = "preserve_mostcc"
-"""The callee saves registers: those around a rare call keep theirs."""
 LANES: Final = (0xFFFF, 0x00FF, 0xFF00)
-SLOW, PLAIN, LOUD, FLAGS, RULED = range(5)
-"""How a word is accessed: by Python; as memory; as memory that may make an interrupt acceptable; flags, which are only
-cleared; from here on by rules."""
-_KINDS: Final[Mapping[Access, int]] = {"plain": PLAIN, "irq": LOUD, "flags": FLAGS}
+SLOW, PLAIN, INTERRUPT_CONTROL, FLAGS, FIRST_RULE = range(5)
+"""Kinds of access to a word: by Python; as memory; as memory that may make an interrupt acceptable; interrupt flags,
+which native code only clears; numbers from FIRST_RULE on: by a rule."""
+_KINDS: Final[Mapping[SfrAccess, int]] = {"plain": PLAIN, "irq": INTERRUPT_CONTROL, "flags": FLAGS}
 
 DECLARED: Final = "declare i64 @llvm.umin.i64(i64, i64)"
 
 
-def pointed_text(core: Core, around: Surroundings) -> str:
-    """The module."""
+def indirect_sfr_text(core: Core, layout: MachineLayout) -> str:
+    """Return the LLVM IR of the module."""
     e = Emitter()
-    words = around.ram[0] >> 1
+    words = layout.ram[0] >> 1
     now, address, lanes, value = (Value(e, name, False) for name in ("%now", "%address", "%lanes", "%value"))
-    m = BoundaryReader(core, e, now, "slow")
+    m = BoundaryEmitter(core, e, now, "slow")
     e.start("first")
     word = address >> 1
     e.end(f"br i1 {truth(m.below(word, words))}, label %inside, label %slow")
     e.start("inside")
     e.end(f"br i1 {truth(lanes == 0)}, label %read, label %write")
-    _read(e, m, around, word, address)
-    _write(e, m, around, word, address, lanes, value)
+    _read(e, m, layout, word, address)
+    _write(e, m, layout, word, address, lanes, value)
     e.start("slow")
     e.end(f"ret i64 {wide(e.select(lanes == 0, -1, 0))}")
-    head = f"define {CONVENTION} i64 @entry(ptr noalias %rec, i64 %now, i64 %address, i64 %lanes, i64 %value) {{"
+    parameters = "ptr noalias %rec, i64 %now, i64 %address, i64 %lanes, i64 %value"
+    head = f"define {CALLING_CONVENTION} i64 @entry({parameters}) {{"
     return "\n".join([DECLARED, m.constants(), head, e.text(), "}"])
 
 
-def _switch(e: Emitter, m: BoundaryReader, kinds: list[int], word: Number, rules: list[Rule], plain: str) -> None:
-    """Go to where a word's kind is dealt with: `plain` or, by the number of its rule, `plain`.number."""
-    cases = " ".join(f"i64 {RULED + number}, label %{plain}.{number}" for number in range(len(rules)))
-    simple = " ".join(f"i64 {kind}, label %{plain}" for kind in (PLAIN, LOUD, FLAGS))
+def _switch(e: Emitter, m: BoundaryEmitter, kinds: list[int], word: Number, rules: list[Rule], plain: str) -> None:
+    """Branch by the kind of the word: to the block `plain`, or to the block `plain`.number of its rule."""
+    cases = " ".join(f"i64 {FIRST_RULE + number}, label %{plain}.{number}" for number in range(len(rules)))
+    simple = " ".join(f"i64 {kind}, label %{plain}" for kind in (PLAIN, INTERRUPT_CONTROL, FLAGS))
     e.end(f"switch i64 {wide(m.table(tuple(kinds), word))}, label %slow [ {simple} {cases} ]")
 
 
-def _read(e: Emitter, m: BoundaryReader, around: Surroundings, word: Number, address: Number) -> None:
-    kinds = [SLOW] * (around.ram[0] >> 1)
+def _read(e: Emitter, m: BoundaryEmitter, layout: MachineLayout, word: Number, address: Number) -> None:
+    kinds = [SLOW] * (layout.ram[0] >> 1)
     rules: list[Rule] = []
-    for at, how in around.reads.items():
-        kinds[at >> 1] = PLAIN if how == "plain" and not _in_variables(around, at) else SLOW
-    for at, rule in around.rules.items():
+    for at, how in layout.reads.items():
+        kinds[at >> 1] = PLAIN if how == "plain" and not _in_variables(layout, at) else SLOW
+    for at, rule in layout.rules.items():
         if rule.reads is not None:
-            kinds[at >> 1] = RULED + len(rules)
+            kinds[at >> 1] = FIRST_RULE + len(rules)
             rules.append(rule)
     e.start("read")
     _switch(e, m, kinds, word, rules, "plain")
@@ -75,20 +74,20 @@ def _read(e: Emitter, m: BoundaryReader, around: Surroundings, word: Number, add
     for number, rule in enumerate(rules):
         e.start(f"plain.{number}")
         assert rule.reads is not None
-        e.end(f"ret i64 {wide(rule.reads(m, rule.places))}")
+        e.end(f"ret i64 {wide(rule.reads(m, rule.operands))}")
 
 
 def _write(
-    e: Emitter, m: BoundaryReader, around: Surroundings, word: Number, address: Number, lanes: Value, value: Value
+    e: Emitter, m: BoundaryEmitter, layout: MachineLayout, word: Number, address: Number, lanes: Value, value: Value
 ) -> None:
-    kinds, masks = [SLOW] * (around.ram[0] >> 1), [0] * (around.ram[0] >> 1)
+    kinds, masks = [SLOW] * (layout.ram[0] >> 1), [0] * (layout.ram[0] >> 1)
     rules: list[Rule] = []
-    for at, (how, mask) in around.writes.items():
-        if not _in_variables(around, at):
+    for at, (how, mask) in layout.writes.items():
+        if not _in_variables(layout, at):
             kinds[at >> 1], masks[at >> 1] = _KINDS.get(how, SLOW), mask
-    for at, rule in around.rules.items():
+    for at, rule in layout.rules.items():
         if rule.writes is not None:
-            kinds[at >> 1] = RULED + len(rules)
+            kinds[at >> 1] = FIRST_RULE + len(rules)
             rules.append(rule)
     e.start("write")
     _switch(e, m, kinds, word, rules, "memory")
@@ -96,48 +95,48 @@ def _write(
     kind = m.table(tuple(kinds), word)
     free = m.table(tuple(masks), word) & lanes
     old = e.load(pointer(e, address), 16)
-    m.need((kind != FLAGS) | ((value & free & (old ^ 0xFFFF)) == 0))
+    m.require((kind != FLAGS) | ((value & free & (old ^ 0xFFFF)) == 0))
     e.store(pointer(e, address), (old & (free ^ 0xFFFF)) | (value & free), 16)
     e.end(f"br i1 {truth(kind == PLAIN)}, label %done, label %loud")
     e.start("loud")
-    deadline = Place(around.offset["events.deadline"], 64)
-    m.put(deadline, e.select(requested(e, around), 0, m.get(deadline)))
+    deadline = Cell(layout.offset["events.deadline"], 64)
+    m.put(deadline, e.select(interrupt_requested(e, layout), 0, m.get(deadline)))
     e.end("br label %done")
     e.start("done")
     e.end("ret i64 1")
     for number, rule in enumerate(rules):
         assert rule.writes is not None
-        ways = _ways(e, m, rule, value)
+        labels = _lane_blocks(e, m, rule, value)
         e.start(f"memory.{number}")
-        cases = " ".join(f"i64 {lane}, label %{label}" for lane, label in ways.items())
+        cases = " ".join(f"i64 {lane}, label %{label}" for lane, label in labels.items())
         e.end(f"switch i64 {lanes.text}, label %slow [ {cases} ]")
 
 
-def _ways(e: Emitter, m: BoundaryReader, rule: Rule, value: Value) -> dict[int, str]:
-    """Labels at which a rule writes, by lanes it is for."""
-    ways = {}
+def _lane_blocks(e: Emitter, m: BoundaryEmitter, rule: Rule, value: Value) -> dict[int, str]:
+    """Emit a block that writes by the rule for each combination of lanes that it supports. Return their labels."""
+    labels = {}
     writes: Callable[..., bool] | None = rule.writes
     assert writes is not None
     for lanes in LANES:
         label = e.fresh("lanes")
         e.start(label)
-        if writes(m, rule.places, value, lanes):
+        if writes(m, rule.operands, value, lanes):
             e.end("br label %done")
-            ways[lanes] = label
+            labels[lanes] = label
         else:
             e.end("br label %slow")
-    return ways
+    return labels
 
 
-def _in_variables(around: Surroundings, address: int) -> bool:
-    """Whether translated code may keep a register out of the record."""
-    return address == around.offset["SR"] or around.accumulator_at(address) is not None
+def _in_variables(layout: MachineLayout, address: int) -> bool:
+    """Return whether translated code may keep the register in variables."""
+    return address == layout.offset["SR"] or layout.accumulator_at(address) is not None
 
 
-def requested(e: Emitter, around: Surroundings) -> Value:
-    """Truth of "some enabled interrupt is requested"."""
+def interrupt_requested(e: Emitter, layout: MachineLayout) -> Value:
+    """Return whether any enabled interrupt is requested."""
     total: Number = 0
-    for flags, enables in around.flag_words:
+    for flags, enables in layout.flag_words:
         total = total | (e.load(pointer(e, flags), 16) & e.load(pointer(e, enables), 16))
     assert isinstance(total, Value)
     return total != 0

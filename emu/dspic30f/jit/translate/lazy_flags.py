@@ -1,8 +1,8 @@
-"""Flags as native code carries them: not the bit, but a word it can be made from, mostly one that is there anyway.
+"""Lazy flags: native code keeps a word from which a flag is computed where it is read.
 
-Most flags are overwritten before anybody asks: of a sum that is all five, whose bits would cost more than the sum. So a
-variable holds the sum itself (C, N, Z) or what overflow and half carry are a bit of; the bit is made where it is read,
-and where code leaves. In: what a row says a flag is. Out: the word to keep, and the flag's truth from such a word.
+Most flags are overwritten before an instruction reads them. The five flags of a sum would cost more than the sum. So a
+variable holds the sum itself (C, N, Z), or the word of which overflow and half carry are a bit. Code computes the flag
+where an instruction reads it and where the function is left.
 """
 
 from __future__ import annotations
@@ -11,27 +11,27 @@ from typing import Final, Literal
 
 from emu.dspic30f.jit.translate.values import Emitter, Number, Value, truth, wide
 
-PLACES: Final[dict[str, tuple[Literal["zero", "bit", "above"], int]]] = {
+FLAG_ENCODING: Final[dict[str, tuple[Literal["zero", "bit", "above"], int]]] = {
     "C": ("above", 16), "Z": ("zero", 0), "OV": ("bit", 15), "N": ("above", 15), "DC": ("bit", 8),
 }  # fmt: skip
-"""By flag, what of its word says that it is set (`values.Origin`)."""
+"""Property of a flag's word that means the flag is set (`values.Origin`)."""
 
 
-def carried(emitter: Emitter, name: str, value: Number) -> str:
-    """The word that carries a flag, as operand text."""
-    kind, place = PLACES[name]
+def encode_flag(emitter: Emitter, name: str, value: Number) -> str:
+    """Return the word that encodes a flag with the truth of `value`, as operand text."""
+    kind, bit = FLAG_ENCODING[name]
     origin = value.origin if isinstance(value, Value) else None
-    if origin is not None and origin.kind == kind and origin.place <= place:
-        return wide(origin.word if origin.place == place else origin.word << place - origin.place)
+    if origin is not None and origin.kind == kind and origin.bit <= bit:
+        return wide(origin.word if origin.bit == bit else origin.word << bit - origin.bit)
     if isinstance(value, int):
-        return str((not value) if kind == "zero" else bool(value) << place)
-    bit = Value(emitter, truth(value), True)
-    return wide(bit == 0 if kind == "zero" else bit << place)
+        return str((not value) if kind == "zero" else bool(value) << bit)
+    flag = Value(emitter, truth(value), True)
+    return wide(flag == 0 if kind == "zero" else flag << bit)
 
 
-def told(name: str, word: Value) -> Value:
-    """The flag, from the word that carries it."""
-    kind, place = PLACES[name]
+def decode_flag(name: str, word: Value) -> Value:
+    """Return the flag that `word` encodes."""
+    kind, bit = FLAG_ENCODING[name]
     if kind == "zero":
         return word == 0
-    return (word >> place if kind == "above" else word & 1 << place) != 0
+    return (word >> bit if kind == "above" else word & 1 << bit) != 0

@@ -1,8 +1,8 @@
-"""Polling loops: waiting for something that only an event or an interrupt can change.
+"""Polling loops: loops that wait for a change that only an event or an interrupt can make.
 
-A loop is empty if an iteration leaves everything as the iteration before left it: it stores nothing, reads nothing that
-time changes, and computes nothing from its own results. Then all iterations up to the next deadline are alike, and
-whole ones can be skipped by adding their cycles.
+A loop is empty if each iteration leaves the state that the iteration before it left. It stores nothing, reads nothing
+that changes with time, and computes nothing from its own results. Then all iterations before the next deadline are
+alike, and native code skips whole ones by adding their cycles.
 """
 
 from __future__ import annotations
@@ -13,63 +13,63 @@ from typing import Final
 from emu.dspic30f.interpreter import flow_rules
 from emu.dspic30f.isa.builder import Context, Size
 from emu.dspic30f.isa.flow import Branch, Goto, Skip
-from emu.dspic30f.jit.exit_reasons import Surroundings
+from emu.dspic30f.jit.machine_layout import MachineLayout
 from emu.dspic30f.jit.translate.builder import LlvmBuilder, NeedsInterpreter
 from emu.dspic30f.jit.translate.region import Region, Step
 from emu.dspic30f.jit.translate.values import Emitter, Number, Value
 from emu.dspic30f.jit.translate.variables import Variables
 
-LONGEST: Final = 12
-"""Instructions in a loop that is looked at: polling loops are short."""
+MAX_LOOP: Final = 12
+"""Most instructions in a loop that is examined: polling loops are short."""
 
 
 @dataclass(frozen=True)
-class Loop:
-    """An empty loop: it is entered at `head`, and its last instruction branches back."""
+class EmptyLoop:
+    """An empty loop. It is entered at `head`; its last instruction, at `back`, branches to `head`."""
 
     head: int
     back: int
     costs: tuple[tuple[int, int], ...]
-    """Its instructions and the Tcy of each."""
+    """Addresses of its instructions, each with its cycles (Tcy)."""
 
     @property
     def cycles(self) -> int:
-        """Tcy of an iteration."""
+        """Return the cycles of an iteration, in Tcy."""
         return sum(cycles for _, cycles in self.costs)
 
 
-def empty_loops(region: Region, around: Surroundings, context: Context) -> dict[int, Loop]:
-    """The empty loops of a region by the address of their last instruction."""
+def empty_loops(region: Region, layout: MachineLayout, context: Context) -> dict[int, EmptyLoop]:
+    """Return the empty loops of a region, by the address of their last instruction."""
     loops = {}
     for pc, step in region.steps.items():
         if step.facts.flow in (Branch, Goto) and step.target is not None and step.target <= pc:
-            loop = _empty_loop(region, step, around, context)
+            loop = _empty_loop(region, step, layout, context)
             if loop is not None:
                 loops[pc] = loop
     return loops
 
 
-def _empty_loop(region: Region, back: Step, around: Surroundings, context: Context) -> Loop | None:
+def _empty_loop(region: Region, back: Step, layout: MachineLayout, context: Context) -> EmptyLoop | None:
     head = back.target
     assert head is not None
     path = _path(region, head, back.pc)
-    if path is None or any(step.pc == around.do_end or step.pc in around.hooks for step in path):
+    if path is None or any(step.pc == layout.do_end or step.pc in layout.hooks for step in path):
         return None
     inside = range(head + 1, back.pc + 1)
     if any(step.target in inside for step in region.steps.values()):
-        return None  # it can be entered behind its head
+        return None  # it can be entered in the middle
     try:
-        costs = _costs(path, around, context)
+        costs = _costs(path, layout, context)
     except NeedsInterpreter:
         return None
-    return Loop(head, back.pc, costs)
+    return EmptyLoop(head, back.pc, costs)
 
 
 def _path(region: Region, head: int, back: int) -> list[Step] | None:
-    """The instructions from `head` to `back`, one behind the other."""
+    """Return the instructions from `head` to `back` in address order, or None if that path is interrupted."""
     path: list[Step] = []
     pc = head
-    while pc <= back and len(path) < LONGEST:
+    while pc <= back and len(path) < MAX_LOOP:
         step = region.steps.get(pc)
         if step is None:
             return None
@@ -78,9 +78,10 @@ def _path(region: Region, head: int, back: int) -> list[Step] | None:
     return path if path[-1].pc == back else None
 
 
-def _costs(path: list[Step], around: Surroundings, context: Context) -> tuple[tuple[int, int], ...]:
-    """Tcy of each instruction of an iteration. Raises NeedsInterpreter if iterations may differ."""
-    probe = _Probe(around, context)
+def _costs(path: list[Step], layout: MachineLayout, context: Context) -> tuple[tuple[int, int], ...]:
+    """Return address and cycles of each instruction of an iteration. Raises NeedsInterpreter if iterations may
+    differ."""
+    probe = _LoopProbe(layout, context)
     costs, written = [], path[-1].facts.writes
     for step in path:
         last = step is path[-1]
@@ -91,54 +92,56 @@ def _costs(path: list[Step], around: Surroundings, context: Context) -> tuple[tu
         stall = flow_rules.stall(written, step.facts.source_pointers)
         costs.append((step.pc, step.insn.row.cycles + stall + flow_rules.TAKEN * (last and isinstance(flow, Branch))))
         written = step.facts.writes
-    if probe.notes.carried & probe.notes.changed:
+    if probe.variables.read_first & probe.variables.written:
         raise NeedsInterpreter
     return tuple(costs)
 
 
-class _Notes(Variables):
-    """Variables that remember which were read before they were written."""
+class _RecordingVariables(Variables):
+    """Variables that record their reads before writes, and their writes."""
 
-    def __init__(self, emitter: Emitter, around: Surroundings) -> None:
-        super().__init__(emitter, around.offset)
-        self.carried: Final[set[str]] = set()
-        self.changed: Final[set[str]] = set()
+    def __init__(self, emitter: Emitter, layout: MachineLayout) -> None:
+        super().__init__(emitter, layout.offset)
+        self.read_first: Final[set[str]] = set()
+        """Variables that were read before they were written."""
+        self.written: Final[set[str]] = set()
 
     def get(self, name: str) -> Value:
-        """Note a read."""
-        if name not in self.changed:
-            self.carried.add(name)
+        """Record a read."""
+        if name not in self.written:
+            self.read_first.add(name)
         return super().get(name)
 
     def set(self, name: str, value: Number) -> None:
-        """Note a write."""
-        self.changed.add(name)
+        """Record a write."""
+        self.written.add(name)
         super().set(name, value)
 
 
-class _Probe(LlvmBuilder):
-    """Translates a loop for nothing, to see what it touches."""
+class _LoopProbe(LlvmBuilder):
+    """Builder that translates a loop into a scratch block, to find out what the loop accesses."""
 
-    def __init__(self, around: Surroundings, context: Context) -> None:
+    def __init__(self, layout: MachineLayout, context: Context) -> None:
         emitter = Emitter()
         emitter.start("probe")
-        self.notes: Final = _Notes(emitter, around)
-        steady = {at: how for at, how in around.reads.items() if at not in around.rules}
-        super().__init__(emitter, self.notes, replace(around, reads=steady, rules={}), context)
+        self.variables: Final = _RecordingVariables(emitter, layout)
+        steady = {at: how for at, how in layout.reads.items() if at not in layout.rules}
+        super().__init__(emitter, self.variables, replace(layout, reads=steady, rules={}), context)
 
     def run(self, step: Step) -> object:
-        """Translate an instruction; its flow."""
+        """Translate an instruction and return its flow."""
         self.begin(step.pc, 2)
         flow = step.insn.row.does(self, step.insn.x)  # type: ignore[arg-type]
-        if self.pending.psv or self.pending.registers or self.pending.mapped:
+        if self.deferred.psv_reads or self.deferred.registers or self.deferred.mapped_w:
             raise NeedsInterpreter
         self.commit()
         return flow
 
     def store(self, ea: Number, v: Number, size: Size, ptr: int | None = None) -> None:
-        """An iteration with a store is not empty."""
+        """Refuse: a loop with a store is not empty."""
         raise NeedsInterpreter
 
     def table_write(self, address: Number, byte_mask: Number, v: Number) -> None:
-        """Nor is one that writes latches."""
+        """Refuse: a loop that writes latches is not empty."""
+
         raise NeedsInterpreter

@@ -1,7 +1,7 @@
-"""Which instructions are translated together: the part of a program reachable from one address without leaving.
+"""Regions: the instructions that are translated together, reachable from one address through static successors.
 
-A region is found by following static successors; calls, returns and computed jumps lead out of it. Its leaders are the
-addresses at which native code can be entered; a block runs from a leader to the next one.
+Calls, returns and computed jumps leave the region. Its leaders are the addresses at which native code can be entered. A
+block runs from a leader to the next one.
 """
 
 from __future__ import annotations
@@ -17,39 +17,39 @@ from emu.dspic30f.isa.row import Insn
 from emu.dspic30f.state.state import PC_MASK
 
 LIMIT: Final = 150
-"""Instructions in a region: compile time per instruction grows behind that (engines.md §4.3, measured)."""
+"""Most instructions in a region: compile time per instruction grows in larger ones (engines.md §4.3, measured)."""
 
 Fetch = Callable[[int], Insn | None]
-"""Decoded instruction at a program address; None where nothing legal stands."""
+"""Returns the decoded instruction at a program address, or None if there is no legal one."""
 
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """One instruction of a region: where it is, what it is, and the addresses that may follow inside the region."""
+    """One instruction of a region, with its address and the addresses that may follow it inside the region."""
 
     pc: int
     insn: Insn
     facts: Facts
     next_pc: int
     target: int | None
-    """Static target of a branch or jump; address behind the skipped instruction of a skip."""
+    """Static target of a branch or jump, or the address after the instruction that a skip skips; None if computed."""
 
 
 @dataclass
 class Region:
-    """Steps by address, in address order, and the leaders among them."""
+    """Steps by address, and the leaders among them."""
 
     start: int
     steps: dict[int, Step] = field(default_factory=dict)
     leaders: set[int] = field(default_factory=set)
 
     def words(self) -> list[tuple[int, int, int]]:
-        """(address, word1, word2) of everything translated: what the code depends on."""
+        """Return (address, word 1, word 2) of each instruction: the program words that the translation depends on."""
         return [(pc, step.insn.word1, step.insn.word2) for pc, step in sorted(self.steps.items())]
 
 
 def static_target(pc: int, insn: Insn, fetch: Fetch) -> int | None:
-    """Target of a branch or jump that the instruction itself names, or where a skip leads; None if computed."""
+    """Return the target of a branch, jump or skip if the instruction itself encodes it; None if it is computed."""
     flow = flow_of(insn, pc)
     if isinstance(flow, Skip):
         skipped = fetch((pc + 2) & PC_MASK)
@@ -60,11 +60,13 @@ def static_target(pc: int, insn: Insn, fetch: Fetch) -> int | None:
 
 
 ENDS: Final = (Goto, Call, Return, Reset, Sleep)
-"""Flows behind which the next word is not reached by falling through."""
+"""Flows that never continue with the next word."""
 
 
 def discover(start: int, fetch: Fetch, known: Container[int] = (), hooks: Container[int] = ()) -> Region:
-    """The region entered at `start`; it ends where `known` code can be entered. At `hooks` Python goes in and out."""
+    """Return the region entered at `start`. It ends at addresses in `known`, which have code already. Addresses in
+    `hooks` become leaders, because native code leaves and is entered there."""
+
     region = Region(start)
     work = [start]
     region.leaders.add(start)

@@ -1,203 +1,227 @@
-"""The readers of rules that write LLVM IR (contract: emu/system/rules.py).
+"""Builders of rules that emit LLVM IR (contract: emu/system/rules.py, emu/dspic30f/interpreter/flow_rules.py).
 
-A need that does not hold leaves before anything is done: an access through its slow exit, so that the sequencer makes
-it; what happens at a boundary to Python.
+A requirement that does not hold leaves before the rule has had an effect. An access leaves through its slow exit, and
+the sequencer makes it; work at a boundary is left to Python.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, Protocol
 
-from emu.dspic30f.interpreter.rule_paths import Ways
+from emu.dspic30f.interpreter.rule_paths import RulePaths
+from emu.dspic30f.jit.machine_layout import MachineLayout
+from emu.dspic30f.jit.translate.deferred import DeferredEffects
 from emu.dspic30f.jit.translate.values import Emitter, Number, Value, truth, wide
 from emu.dspic30f.jit.translate.variables import pointer
 from emu.dspic30f.state.state import STACK_POINTER
-from emu.system.rules import Place, Slot, place_of
+from emu.system.rules import Cell, EventSlot, cell_of
 
 if TYPE_CHECKING:
     from emu.dspic30f.core import Core
-    from emu.dspic30f.jit.translate.builder import LlvmBuilder
 
 
-class LlvmReader:
-    """What both have in common: values."""
+class RuleEmitter:
+    """Operations that all emitters of rules share."""
 
     def __init__(self, e: Emitter) -> None:
         self.e: Final = e
 
-    def get(self, place: Place, index: Number = 0) -> Value:
-        """Load."""
-        return self.e.load(pointer(self.e, index * (place.bits // 8) + place.offset), place.bits)
+    def get(self, cell: Cell, index: Number = 0) -> Value:
+        """Emit a load from the record."""
+        return self.e.load(pointer(self.e, index * (cell.bits // 8) + cell.offset), cell.bits)
 
     def select(self, condition: Number, a: Number, b: Number) -> Number:
-        """Choice."""
+        """Emit a selection."""
         return self.e.select(condition, a, b)
 
     def below(self, a: Number, b: Number) -> Value:
-        """Unsigned comparison."""
+        """Emit an unsigned comparison."""
         return self.e.let(f"icmp ult i64 {wide(a)}, {wide(b)}", bit=True)
 
     def div(self, a: Number, b: Number) -> Value:
-        """Unsigned quotient."""
+        """Emit an unsigned division."""
         return self.e.let(f"udiv i64 {wide(a)}, {wide(b)}")
 
     def mod(self, a: Number, b: Number) -> Value:
-        """Unsigned remainder."""
+        """Emit an unsigned remainder."""
         return self.e.let(f"urem i64 {wide(a)}, {wide(b)}")
 
     def least(self, a: Number, b: Number) -> Value:
-        """The lesser, unsigned."""
+        """Emit an unsigned minimum."""
         return self.e.let(f"call i64 @llvm.umin.i64(i64 {wide(a)}, i64 {wide(b)})")
 
 
-class NativeReader(LlvmReader):
-    """One access of the instruction a builder is at; what it puts is committed with the instruction."""
+class AccessContext(Protocol):
+    """The part of a builder that rules of accesses need."""
 
-    def __init__(self, b: LlvmBuilder) -> None:
+    @property
+    def e(self) -> Emitter: ...
+
+    @property
+    def layout(self) -> MachineLayout: ...
+
+    @property
+    def now(self) -> Number: ...
+
+    @property
+    def deferred(self) -> DeferredEffects: ...
+
+    def sr_word(self) -> Value: ...
+
+    def guard(self, ok: Number) -> None: ...
+
+
+class AccessEmitter(RuleEmitter):
+    """Emits the rule of one access of the instruction being translated; its stores are committed with the
+    instruction."""
+
+    def __init__(self, b: AccessContext) -> None:
         super().__init__(b.e)
         self._b: Final = b
         self.now: Final = b.now
 
-    def get(self, place: Place, index: Number = 0) -> Value:
-        """Load; flags of SR may be in variables."""
-        return self._b.sr_word() if place == self._b.around.flow.sr else super().get(place, index)
+    def get(self, cell: Cell, index: Number = 0) -> Value:
+        """Emit a load; SR is assembled from flag variables."""
+        return self._b.sr_word() if cell == self._b.layout.flow.sr else super().get(cell, index)
 
-    def put(self, place: Place, value: Number, index: Number = 0) -> None:
-        """Store, with the instruction's other effects."""
-        if place == self._b.around.flow.sr:
-            self._b.pending.sr = value, 0xFFFF
+    def put(self, cell: Cell, value: Number, index: Number = 0) -> None:
+        """Defer a store until the instruction is committed."""
+        if cell == self._b.layout.flow.sr:
+            self._b.deferred.sr = value, 0xFFFF
             return
-        e, offset = self.e, index * (place.bits // 8) + place.offset
-        self._b.pending.stores.append(lambda: e.store(pointer(e, offset), value, place.bits))
+        e, offset = self.e, index * (cell.bits // 8) + cell.offset
+        self._b.deferred.stores.append(lambda: e.store(pointer(e, offset), value, cell.bits))
 
-    def need(self, condition: Number) -> None:
-        """Leave before the instruction unless this holds."""
+    def require(self, condition: Number) -> None:
+        """Leave before the instruction unless `condition` holds."""
         self._b.guard(condition)
 
     def table(self, values: tuple[int, ...], index: Number) -> Number:
-        """A choice for each value: an access has no constants of its own, and tables are short."""
+        """Emit a chain of selections: tables of accesses are short."""
         found: Number = values[-1]
         for number, value in enumerate(values[:-1]):
             found = self.select(index == number, value, found)
         return found
 
-    def post(self, slot: Slot, due: Number) -> None:
-        """Store the due cycle; the deadline may come nearer, so the function is left behind the instruction."""
+    def post(self, slot: EventSlot, due: Number) -> None:
+        """Defer the posting of an event. The deadline may move nearer, so the function ends after the instruction."""
         deadline = self.get(slot.deadline)
         self.put(slot.due, due)
         self.put(slot.deadline, self.least(deadline, due))
-        self._b.pending.replanned = True
+        self._b.deferred.deadline_moved = True
 
 
-class LlvmWays(Ways):
-    """Rules of flow behind an instruction, done as they are read; RA and DA of SR are in the record. `known` as for
-    `Ways`; begun() is called where a way begins."""
+class LlvmRulePaths(RulePaths):
+    """Emits flow rules behind an instruction. RA and DA of SR are always in the record. `known` is as for `RulePaths`;
+    `on_path()` is called at the start of each path."""
 
     def __init__(
-        self, e: Emitter, known: Mapping[Place, int] = MappingProxyType({}), begun: Callable[[], None] = lambda: None
+        self, e: Emitter, known: Mapping[Cell, int] = MappingProxyType({}), on_path: Callable[[], None] = lambda: None
     ) -> None:
         super().__init__(known)
         self.e: Final = e
-        self._begun: Final = begun
+        self._on_path: Final = on_path
 
-    def load(self, place: Place) -> Value:
-        """From the record."""
-        return self.e.load(pointer(self.e, place.offset), place.bits)
+    def load(self, cell: Cell) -> Value:
+        """Emit a load from the record."""
+        return self.e.load(pointer(self.e, cell.offset), cell.bits)
 
-    def store(self, place: Place, value: Number) -> None:
-        """To the record."""
-        self.e.store(pointer(self.e, place.offset), value, place.bits)
+    def store(self, cell: Cell, value: Number) -> None:
+        """Emit a store to the record."""
+        self.e.store(pointer(self.e, cell.offset), value, cell.bits)
 
     def select(self, condition: Number, a: Number, b: Number) -> Number:
-        """Choice."""
+        """Emit a selection."""
         return self.e.select(condition, a, b)
 
     def branches(self, condition: Number) -> Iterator[bool]:
-        """Two blocks."""
+        """Emit a conditional branch and start its two blocks in turn."""
         yes, no = self.e.fresh("yes"), self.e.fresh("no")
         self.e.end(f"br i1 {truth(condition)}, label %{yes}, label %{no}")
-        for label, turn in ((yes, True), (no, False)):
+        for label, decision in ((yes, True), (no, False)):
             self.e.start(label)
-            self._begun()
-            yield turn
+            self._on_path()
+            yield decision
 
 
-class BoundaryReader(LlvmReader):
-    """What happens between two instructions, in the function of `service.py`; it is done as it is read."""
+class BoundaryEmitter(RuleEmitter):
+    """Emits rules of events and exceptions, and rules of indirect accesses. Effects are emitted in the order of the
+    rule."""
 
     def __init__(
         self, core: Core, e: Emitter, now: Number, otherwise: str, tables: dict[tuple[int, ...], str] | None = None
     ) -> None:
-        """`otherwise`: label of the block that hands over to Python; `tables`: of a reader of the same module."""
+        """`otherwise` is the label of the block that leaves the work to Python. `tables` shares the constants of
+        another emitter of the same module."""
         super().__init__(e)
         self.now: Final = now
         self._core: Final = core
         self._otherwise: Final = otherwise
         self.tables: Final[dict[tuple[int, ...], str]] = tables if tables is not None else {}
-        self.posted: Final[set[Slot]] = set()
+        self.posted: Final[set[EventSlot]] = set()
         """Slots that were posted."""
 
-    def put(self, place: Place, value: Number, index: Number = 0) -> None:
-        """Store."""
-        self.e.store(pointer(self.e, index * (place.bits // 8) + place.offset), value, place.bits)
+    def put(self, cell: Cell, value: Number, index: Number = 0) -> None:
+        """Emit a store to the record."""
+        self.e.store(pointer(self.e, index * (cell.bits // 8) + cell.offset), value, cell.bits)
 
-    def need(self, condition: Number) -> None:
-        """Let Python do it unless this holds."""
+    def require(self, condition: Number) -> None:
+        """Branch to `otherwise` unless `condition` holds."""
         go = self.e.fresh("go")
         self.e.end(f"br i1 {truth(condition)}, label %{go}, label %{self._otherwise}")
         self.e.start(go)
 
-    def post(self, slot: Slot, due: Number) -> None:
-        """Store the due cycle and the deadline."""
+    def post(self, slot: EventSlot, due: Number) -> None:
+        """Emit stores of the due cycle and the deadline."""
         self.put(slot.due, due)
         self.put(slot.deadline, self.least(self.get(slot.deadline), due))
         self.posted.add(slot)
 
     def push(self, low: Number, high: Number, _cycle: Number) -> None:
-        """Python does what does not fit into the stack."""
+        """Emit a push of two words; Python handles a push that does not fit into the stack."""
         state, ram = self._core.state, self._core.chip.data["ram"]
-        top, limit = Place(2 * STACK_POINTER, 16), Place(2 * state.at["SPLIM"], 16)
+        top, limit = Cell(2 * STACK_POINTER, 16), Cell(2 * state.at["SPLIM"], 16)
         ea = self.get(top)
-        unlimited = self.get(place_of(state.record, "cpu.limit_armed")) == 0
-        self.need((unlimited | (ea + 2 <= self.get(limit))) & (ea >= ram.start) & (ea < ram.end - 2))
+        unlimited = self.get(cell_of(state.record, "cpu.limit_armed")) == 0
+        self.require((unlimited | (ea + 2 <= self.get(limit))) & (ea >= ram.start) & (ea < ram.end - 2))
         for word, value in ((0, low), (2, high)):
             self.e.store(pointer(self.e, ea + word), value, 16)
         self.put(top, ea + 4)
 
     def handler(self, vector: Number) -> Value:
-        """A word of flash."""
+        """Emit a load of a word of flash."""
         return self.e.load(pointer(self.e, (vector << 1) + self._core.program.flash_offset), 32)
 
     def table(self, values: tuple[int, ...], index: Number) -> Value:
-        """Load from a constant."""
+        """Emit a load from a constant array."""
         name = self.tables.setdefault(values, f"@table{len(self.tables)}")
-        place = self.e.name()
-        self.e.line(f"{place} = getelementptr [{len(values)} x i64], ptr {name}, i64 0, i64 {wide(index)}")
-        return self.e.let(f"load i64, ptr {place}")
+        element = self.e.name()
+        self.e.line(f"{element} = getelementptr [{len(values)} x i64], ptr {name}, i64 0, i64 {wide(index)}")
+        return self.e.let(f"load i64, ptr {element}")
 
-    def can_ask(self, code: Number) -> Number:
-        """Native code can."""
+    def can_call(self, code: Number) -> Number:
+        """Return whether host code is there: native code can call it."""
         return code != 0
 
-    def ask(self, code: Number, data: Number, *numbers: Number) -> Value:
-        """A call; what it reads has been stored."""
+    def call(self, code: Number, data: Number, *numbers: Number) -> Value:
+        """Emit a call of host code; everything it reads has been stored before."""
         address = self.e.name()
         self.e.line(f"{address} = inttoptr i64 {wide(code)} to ptr")
         passed = "".join(f", i64 {wide(number)}" for number in (data, *numbers))
         return self.e.let(f"call i64 {address}(ptr %rec{passed})")
 
     def constants(self) -> str:
-        """IR of the tables used so far."""
+        """Return the IR of the constant arrays used so far."""
         return "\n".join(
             f"{name} = private unnamed_addr constant [{len(values)} x i64] [{', '.join(f'i64 {v}' for v in values)}]"
             for values, name in self.tables.items())  # fmt: skip
 
-    def either(
+    def lazy_select(
         self, condition: Number, costly: Callable[[], tuple[Number, ...]], *others: Number
     ) -> tuple[Number, ...]:
-        """A branch around it."""
+        """Emit a branch around the computation of `costly`."""
         e, texts = self.e, [wide(value) for value in others]
         start, yes, done = e.block, e.fresh("yes"), e.fresh("done")
         e.end(f"br i1 {truth(condition)}, label %{yes}, label %{done}")
@@ -209,29 +233,29 @@ class BoundaryReader(LlvmReader):
                      for value, other in zip(found, texts, strict=True))  # fmt: skip
 
     def loop(self, count: Number, body: Callable[..., tuple[Number, ...]], *carried: Number) -> tuple[Number, ...]:
-        """The test is behind the body."""
+        """Emit a loop with its test behind the body."""
 
-        def turn(number: Value, *values: Value) -> tuple[Value, tuple[Number, ...], Number]:
+        def iteration(number: Value, *values: Value) -> tuple[Value, tuple[Number, ...], Number]:
             after = body(number, *values)
             return number + 1, after, number + 1 < count
 
-        return self._around(turn, 0, *carried)
+        return self._emit_loop(iteration, 0, *carried)
 
     def scan(self, bits: Number, body: Callable[..., tuple[Number, ...]], *carried: Number) -> tuple[Number, ...]:
-        """As `loop`; `bits` is not 0."""
+        """Emit a loop over the bits that are set; `bits` is not 0."""
 
-        def turn(left: Value, *values: Value) -> tuple[Value, tuple[Number, ...], Number]:
+        def iteration(left: Value, *values: Value) -> tuple[Value, tuple[Number, ...], Number]:
             after = body(self.e.let(f"call i64 @llvm.cttz.i64(i64 {left.text}, i1 true)"), *values)
             rest = left & (left - 1)
             return rest, after, rest != 0
 
-        return self._around(turn, bits, *carried)
+        return self._emit_loop(iteration, bits, *carried)
 
-    def _around(
-        self, turn: Callable[..., tuple[Value, tuple[Number, ...], Number]], *before: Number
+    def _emit_loop(
+        self, iteration: Callable[..., tuple[Value, tuple[Number, ...], Number]], *before: Number
     ) -> tuple[Number, ...]:
-        """A loop whose first value controls it: turn(*values) = what that becomes, what the others become, whether to
-        go on."""
+        """Emit a loop over values of which the first controls it. iteration(*values) returns the next control value,
+        the next other values, and whether to continue."""
         e = self.e
         entry, texts = e.block, [wide(value) for value in before]
         loop, done = e.fresh("loop"), e.fresh("done")
@@ -239,11 +263,11 @@ class BoundaryReader(LlvmReader):
         head = e.start(loop)
         values = [Value(e, e.name(), False) for _ in before]
         head.lines.extend("" for _ in values)
-        control, after, more = turn(*values)
+        control, after, more = iteration(*values)
         ends = [wide(control), *(wide(value) for value in after)]
         again = truth(more)
-        for place, (value, first, following) in enumerate(zip(values, texts, ends, strict=True)):
-            head.lines[place] = f"{value.text} = phi i64 [ {first}, %{entry.label} ], [ {following}, %{e.block.label} ]"
+        for line, (value, first, following) in enumerate(zip(values, texts, ends, strict=True)):
+            head.lines[line] = f"{value.text} = phi i64 [ {first}, %{entry.label} ], [ {following}, %{e.block.label} ]"
         e.end(f"br i1 {again}, label %{loop}, label %{done}")
         e.start(done)
         return tuple(Value(e, text, False) for text in ends[1:])

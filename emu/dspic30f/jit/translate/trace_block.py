@@ -1,7 +1,7 @@
-"""What one block runs: instructions one behind the other, and past branches that only go round a few of them.
+"""Trace blocks: the instructions of one block, including branches that skip only a few register instructions.
 
-A branch or skip round instructions that compute in registers is no end of a block: both ways go on behind it. Without
-a look at the deadline between, LLVM makes selections of them, and a host that cannot guess such a branch need not.
+Such a branch or skip does not end its block: both paths join behind it. There is no deadline check between them, so
+LLVM turns the paths into selections, and a host that mispredicts the branch loses no time.
 """
 
 from __future__ import annotations
@@ -14,64 +14,67 @@ from emu.dspic30f.interpreter import flow_rules
 from emu.dspic30f.isa.flow import Branch, Skip
 from emu.dspic30f.jit.translate.region import Region, Step
 
-ARM: Final = 4
-"""Instructions a branch may go round: selecting costs what they cost, each time."""
-ARMS: Final = 4
-"""Branches in one block: what is behind them is translated once more for who comes from elsewhere."""
+MAX_SKIPPED: Final = 4
+"""Most instructions that a branch within a block may skip: a selection always costs both paths."""
+MAX_BRANCHES: Final = 4
+"""Most branches within a block: the code behind them is translated again for other predecessors."""
 
 
 @dataclass(frozen=True, slots=True)
-class Part:
-    """An instruction, and those it goes round if it is a branch or skip that does not end the block."""
+class TraceItem:
+    """An instruction of a block. `skipped` are the instructions that it skips, if it is a branch within the block."""
 
     step: Step
-    arm: tuple[Step, ...] = ()
+    skipped: tuple[Step, ...] = ()
 
     @property
     def next_pc(self) -> int:
-        """Where the block goes on."""
-        return self.step.target if self.arm and self.step.target is not None else self.step.next_pc
+        """Return the address at which the block continues."""
+        return self.step.target if self.skipped and self.step.target is not None else self.step.next_pc
 
 
-def extra(step: Step) -> int:
-    """Cycles that a branch or skip takes longer if it is taken (isa.md §13.1)."""
+def taken_cost(step: Step) -> int:
+    """Return the additional cycles of a branch or skip that is taken (isa.md §13.1)."""
     assert step.target is not None
     return flow_rules.TAKEN if step.facts.flow is Branch else (step.target - step.next_pc) // 2
 
 
-def course(region: Region, start: int, ends: Container[int], apart: Container[int], last: int) -> list[Part]:
-    """The block at `start`: up to a flow, to `last`, or to one of `ends`; nothing that is in `apart` is gone past."""
-    parts: list[Part] = []
-    pc, arms, joined = start, 0, start
+def trace_block(
+    region: Region, start: int, ends: Container[int], barriers: Container[int], last: int
+) -> list[TraceItem]:
+    """Return the block at `start`. It ends with a flow, with the instruction at `last`, or before an address in `ends`.
+    A branch does not skip an instruction in `barriers`."""
+    items: list[TraceItem] = []
+    pc, branches, joined = start, 0, start
     while (step := region.steps.get(pc)) is not None and (pc == joined or pc not in ends):
-        part = Part(step, tuple(_arm(region, step, apart, last)) if arms < ARMS else ())
-        parts.append(part)
-        if pc == last or (step.facts.flow is not None and not part.arm):
+        item = TraceItem(step, tuple(_skipped(region, step, barriers, last)) if branches < MAX_BRANCHES else ())
+        items.append(item)
+        if pc == last or (step.facts.flow is not None and not item.skipped):
             break
-        pc = part.next_pc
-        if part.arm:
-            arms, joined = arms + 1, pc
-    return parts
+        pc = item.next_pc
+        if item.skipped:
+            branches, joined = branches + 1, pc
+    return items
 
 
-def _arm(region: Region, branch: Step, apart: Container[int], last: int) -> Iterator[Step]:
-    """What a branch or skip goes round; nothing if it cannot stay in the block."""
+def _skipped(region: Region, branch: Step, barriers: Container[int], last: int) -> Iterator[Step]:
+    """Yield the instructions that a branch or skip skips; none if the branch must end its block."""
     target = branch.target
-    if branch.facts.flow not in (Branch, Skip) or target is None or target not in region.steps or target in apart:
+    if branch.facts.flow not in (Branch, Skip) or target is None or target not in region.steps or target in barriers:
         return
     pc = branch.next_pc
-    arm: list[Step] = []
-    while pc < target and len(arm) < ARM:
+    skipped: list[Step] = []
+    while pc < target and len(skipped) < MAX_SKIPPED:
         step = region.steps.get(pc)
-        if step is None or pc in apart or pc == last or not _computes(step):
+        if step is None or pc in barriers or pc == last or not _is_register_only(step):
             return
-        arm.append(step)
+        skipped.append(step)
         pc = step.next_pc
     if pc == target:
-        yield from arm
+        yield from skipped
 
 
-def _computes(step: Step) -> bool:
-    """Whether an instruction touches nothing but registers."""
+def _is_register_only(step: Step) -> bool:
+    """Return whether an instruction accesses only registers."""
     facts = step.facts
     return facts.flow is None and not (facts.loads or facts.stores or facts.source_pointers)

@@ -1,7 +1,7 @@
-"""Values of generated code: what an instruction row computes with when it is translated instead of run.
+"""Values of generated code: the operands of instruction rows during translation.
 
-A `Value` is a 64-bit integer (or a truth value, one bit) in LLVM IR. The operators emit one line of IR each into the
-block being built. Plain Python ints are constants. Rows never know which of the two they hold.
+A `Value` is a 64-bit integer or a truth value of one bit in LLVM IR. Each operator emits one line of IR into the
+current block. Python ints are constants. Rows treat both kinds alike.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from typing import Final, Literal
 
 
 class Block:
-    """A basic block being written: a label and its lines."""
+    """Basic block under construction: a label and its lines."""
 
     __slots__ = ("ended", "label", "lines")
 
@@ -22,7 +22,7 @@ class Block:
 
 
 class Emitter:
-    """Writes IR lines into the current block and hands out names."""
+    """Writes IR lines into the current block and generates names."""
 
     def __init__(self, last_name: int = 0) -> None:
         self.blocks: Final[list[Block]] = []
@@ -30,38 +30,38 @@ class Emitter:
         self.last_name = last_name
 
     def name(self) -> str:
-        """A fresh SSA name."""
+        """Return a new SSA name."""
         self.last_name += 1
         return f"%v{self.last_name}"
 
     def start(self, label: str) -> Block:
-        """Begin the block `label`; following lines go there."""
+        """Begin the block `label`, into which the following lines are written."""
         self.block = Block(label)
         self.blocks.append(self.block)
         return self.block
 
     def fresh(self, stem: str) -> str:
-        """A fresh label."""
+        """Return a new label that begins with `stem`."""
         self.last_name += 1
         return f"{stem}.{self.last_name}"
 
     def line(self, text: str) -> None:
-        """One line without result."""
+        """Write a line that has no result."""
         self.block.lines.append(text)
 
     def end(self, text: str) -> None:
-        """The terminator of the current block."""
+        """Write the terminator of the current block."""
         self.block.lines.append(text)
         self.block.ended = True
 
     def let(self, text: str, bit: bool = False) -> Value:
-        """One line with a 64-bit (or 1-bit) result."""
+        """Write a line with a result of 64 bits, or of 1 bit if `bit`. Return the result."""
         name = self.name()
         self.block.lines.append(f"{name} = {text}")
         return Value(self, name, bit)
 
     def select(self, c: Number, a: Number, b: Number) -> Number:
-        """`a` if `c` else `b`."""
+        """Emit a selection: `a` if `c` else `b`."""
         if isinstance(c, int):
             return a if c else b
         if isinstance(a, Value) and isinstance(b, Value) and a.bit and b.bit:
@@ -69,7 +69,7 @@ class Emitter:
         return self.let(f"select i1 {truth(c)}, i64 {wide(a)}, i64 {wide(b)}")
 
     def load(self, pointer: str, bits: int) -> Value:
-        """Zero-extended load of 8, 16, 32 or 64 bits."""
+        """Emit a zero-extended load of 8, 16, 32 or 64 bits."""
         if bits == 64:
             return self.let(f"load i64, ptr {pointer}, align 1")
         raw = self.name()
@@ -77,7 +77,7 @@ class Emitter:
         return self.let(f"zext i{bits} {raw} to i64")
 
     def store(self, pointer: str, value: Number, bits: int) -> None:
-        """Store of the low 8, 16, 32 or 64 bits."""
+        """Emit a store of the low 8, 16, 32 or 64 bits."""
         text = wide(value)
         if bits == 64 or isinstance(value, int):
             constant = text if bits == 64 else str(int(text) & ((1 << bits) - 1))
@@ -88,7 +88,7 @@ class Emitter:
         self.block.lines.append(f"store i{bits} {raw}, ptr {pointer}, align 1")
 
     def text(self) -> str:
-        """All blocks, in order."""
+        """Return the text of all blocks, in order."""
         parts: list[str] = []
         for block in self.blocks:
             parts.append(block.label + ":")
@@ -98,15 +98,16 @@ class Emitter:
 
 @dataclass(frozen=True, slots=True)
 class Origin:
-    """Of what a value is the truth: whether `word` is zero, has its bit `place`, or any from there on ("above")."""
+    """Source of a truth value: whether `word` is zero ("zero"), has the bit `bit` set ("bit"), or is not zero after a
+    shift right by `bit` ("above")."""
 
     kind: Literal["zero", "bit", "above"]
     word: Value
-    place: int
+    bit: int
 
 
 class Value:
-    """A value known only when the code runs. `origin` is what its truth was made of, where that is known."""
+    """Value that is known only at run time. `origin` is the source of its truth, where that is known."""
 
     __slots__ = ("bit", "emitter", "origin", "text")
 
@@ -116,8 +117,8 @@ class Value:
         self.bit: Final = bit
         self.origin: Final = origin
 
-    def _made_of(self, kind: Literal["zero", "bit", "above"], word: Value, place: int) -> Value:
-        return self if word.bit else Value(self.emitter, self.text, self.bit, Origin(kind, word, place))
+    def _with_origin(self, kind: Literal["zero", "bit", "above"], word: Value, bit: int) -> Value:
+        return self if word.bit else Value(self.emitter, self.text, self.bit, Origin(kind, word, bit))
 
     def _op(self, op: str, left: Number, right: Number) -> Value:
         if (
@@ -154,7 +155,7 @@ class Value:
     def __and__(self, other: Number) -> Value:
         made, shifted = self._op("and", self, other), self.origin
         if isinstance(other, int) and other == 1 and shifted is not None and shifted.kind == "above":
-            return made._made_of("bit", shifted.word, shifted.place)
+            return made._with_origin("bit", shifted.word, shifted.bit)
         return made
 
     def __rand__(self, other: int) -> Value:
@@ -180,7 +181,7 @@ class Value:
 
     def __rshift__(self, other: Number) -> Value:
         made = self._op("ashr", self, other)
-        return made._made_of("above", self, other) if isinstance(other, int) else made
+        return made._with_origin("above", self, other) if isinstance(other, int) else made
 
     def __rrshift__(self, other: int) -> Value:
         return self._op("ashr", other, self)
@@ -206,7 +207,7 @@ class Value:
     def __eq__(self, other: object) -> Value:  # type: ignore[override]
         assert isinstance(other, (int, Value))
         made = self._compare("eq", other)
-        return made._made_of("zero", self, 0) if isinstance(other, int) and other == 0 else made
+        return made._with_origin("zero", self, 0) if isinstance(other, int) and other == 0 else made
 
     def __ne__(self, other: object) -> Value:  # type: ignore[override]
         assert isinstance(other, (int, Value))
@@ -222,7 +223,7 @@ Number = int | Value
 
 
 def wide(value: Number) -> str:
-    """Operand text as i64."""
+    """Return a value as operand text of type i64."""
     if isinstance(value, int):
         return str(int(value))
     if value.bit:
@@ -231,7 +232,8 @@ def wide(value: Number) -> str:
 
 
 def truth(value: Number) -> str:
-    """Operand text as i1: value != 0."""
+    """Return the truth of a value (value != 0) as operand text of type i1."""
+
     if isinstance(value, int):
         return "true" if value else "false"
     if value.bit:

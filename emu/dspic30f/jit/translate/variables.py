@@ -1,8 +1,7 @@
-"""Registers and flags of the machine while translated code runs: SSA variables, in the record only at its edges.
+"""Variables of translated code: the registers and flags of the machine, kept outside the record while a function runs.
 
-Each is an `alloca` that LLVM turns into registers. The prologue loads those a region uses from the record, the exit
-stores back those it writes; SR is put together there and nowhere else. Arithmetic flags are carried by words
-(`carried.py`).
+Each variable is an `alloca` that LLVM turns into host registers. The prologue loads the variables that a region uses
+from the record. The exit block stores those that it writes and assembles SR. Arithmetic flags are lazy (lazy_flags.py).
 """
 
 from __future__ import annotations
@@ -10,17 +9,17 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Final
 
-from emu.dspic30f.jit.translate.lazy_flags import PLACES, carried, told
+from emu.dspic30f.jit.translate.lazy_flags import FLAG_ENCODING, decode_flag, encode_flag
 from emu.dspic30f.jit.translate.values import Emitter, Number, Value, truth, wide
 from emu.dspic30f.state.state import FLAGS, OAB, SAB
 
 ACCUMULATOR_FLAGS: Final = ("OA", "OB", "SA", "SB")
 BITS: Final = FLAGS | {"OAB": OAB.bit_length() - 1, "SAB": SAB.bit_length() - 1}
-"""SR bits that are variables: what rows name, and the two sums that follow."""
+"""SR bits that are variables: the flags that rows name, and the summary flags OAB and SAB."""
 
 
 class Variables:
-    """The machine's registers as variables of one function. `offset` gives byte offsets in the record by name."""
+    """Variables of one function in block code. `offset` holds byte offsets in the record by name."""
 
     def __init__(self, emitter: Emitter, offset: Mapping[str, int]) -> None:
         self._emitter: Final = emitter
@@ -30,17 +29,18 @@ class Variables:
         self._known: dict[str, Value] = {}
 
     def new_block(self) -> None:
-        """Forget which SSA values the variables hold: control may come from elsewhere."""
+        """Forget the known SSA values of variables: a new block may have several predecessors."""
         self._known.clear()
 
     def touch(self, *names: str) -> None:
-        """Have variables loaded and stored back whether or not an instruction names them."""
+        """Load and store back the variables `names` even if no instruction uses them."""
         for name in names:
             self._used.setdefault(name)
             self._written.add(name)
 
     def get(self, name: str) -> Value:
-        """Current value: "W0".."W15", a flag of `state.FLAGS`, "A0"/"A1" (accumulators), "cycle", "stall", "pc"."""
+        """Return the current value of "W0".."W15", a flag of `state.FLAGS`, accumulator "A0" or "A1", "cycle", "stall"
+        or "pc"."""
         self._used.setdefault(name)
         if name not in self._known:
             self._known[name] = self._loaded(self._emitter, name)
@@ -48,16 +48,16 @@ class Variables:
 
     @staticmethod
     def _loaded(emitter: Emitter, name: str) -> Value:
-        bit = name in BITS and name not in PLACES
+        bit = name in BITS and name not in FLAG_ENCODING
         found = emitter.let(f"load {'i1' if bit else 'i64'}, ptr %x.{name}", bit)
-        return told(name, found) if name in PLACES else found
+        return decode_flag(name, found) if name in FLAG_ENCODING else found
 
     def set(self, name: str, value: Number) -> None:
-        """Assign."""
+        """Assign a variable."""
         self._used.setdefault(name)
         self._written.add(name)
-        if name in PLACES:
-            self._emitter.line(f"store i64 {carried(self._emitter, name, value)}, ptr %x.{name}")
+        if name in FLAG_ENCODING:
+            self._emitter.line(f"store i64 {encode_flag(self._emitter, name, value)}, ptr %x.{name}")
             self._known[name] = Value(self._emitter, truth(value), True)
             return
         bit = name in BITS
@@ -66,13 +66,13 @@ class Variables:
         self._known[name] = Value(self._emitter, text, bit)
 
     def leave(self, pc: Number, reason: int) -> None:
-        """Set where and why the function is left, and leave; ends the block."""
+        """End the block: leave the function for `reason` with the given PC."""
         self._emitter.line(f"store i64 {wide(pc)}, ptr %x.pc")
         self._emitter.line(f"store i64 {reason}, ptr %x.reason")
         self._emitter.end("br label %exit")
 
     def set_flags(self, flags: Mapping[str, Number]) -> None:
-        """Assign several flags."""
+        """Assign several flags, and the summary flags that depend on them."""
         for name, value in flags.items():
             self.set(name, value)
         if any(name in ACCUMULATOR_FLAGS for name in flags):
@@ -80,16 +80,16 @@ class Variables:
             self.set("SAB", self.get("SA") | self.get("SB"))
 
     def prologue(self, emitter: Emitter) -> None:
-        """Declare and load everything used; goes into the function's first block, written last."""
+        """Declare and load all variables that are used, in the function's first block, which is written last."""
         for name in self._used:
-            emitter.line(f"%x.{name} = alloca {'i1' if name in BITS and name not in PLACES else 'i64'}")
+            emitter.line(f"%x.{name} = alloca {'i1' if name in BITS and name not in FLAG_ENCODING else 'i64'}")
         sr = emitter.load(pointer(emitter, self._offset["SR"]), 16) if any(n in BITS for n in self._used) else None
         for name in self._used:
             if name in BITS:
                 assert sr is not None
                 bit = sr & (1 << BITS[name])
-                if name in PLACES:
-                    emitter.line(f"store i64 {carried(emitter, name, bit)}, ptr %x.{name}")
+                if name in FLAG_ENCODING:
+                    emitter.line(f"store i64 {encode_flag(emitter, name, bit)}, ptr %x.{name}")
                 else:
                     emitter.line(f"store i1 {truth(bit)}, ptr %x.{name}")
             elif name[0] == "A":
@@ -100,7 +100,7 @@ class Variables:
                 emitter.line(f"store i64 {emitter.load(pointer(emitter, offset), bits).text}, ptr %x.{name}")
 
     def write_back(self, emitter: Emitter) -> None:
-        """Store everything written to the record; goes into the function's one exit block."""
+        """Store all variables that were written, in the function's exit block."""
         flags = [name for name in BITS if name in self._written]
         if flags:
             self._write_sr(emitter, flags)
@@ -133,10 +133,10 @@ class Variables:
 
 
 class MemoryVariables(Variables):
-    """The same, but kept in the record all the time: for code that may leave after every instruction."""
+    """Variables of exact code: they stay in the record, because the code may leave after every instruction."""
 
     def get(self, name: str) -> Value:
-        """Load."""
+        """Emit a load from the record."""
         emitter = self._emitter
         if name in FLAGS:
             word = emitter.load(pointer(emitter, self._offset["SR"]), 16)
@@ -147,7 +147,7 @@ class MemoryVariables(Variables):
         return emitter.load(pointer(emitter, offset), bits)
 
     def set(self, name: str, value: Number) -> None:
-        """Store."""
+        """Emit a store to the record."""
         emitter = self._emitter
         if name in FLAGS:
             self.set_flags({name: value})
@@ -160,7 +160,7 @@ class MemoryVariables(Variables):
             emitter.store(pointer(emitter, offset), value, bits)
 
     def set_flags(self, flags: Mapping[str, Number]) -> None:
-        """Change several SR bits by one read and one write."""
+        """Change several SR bits with one load and one store."""
         emitter = self._emitter
         place = pointer(emitter, self._offset["SR"])
         word: Number = emitter.load(place, 16) & (0xFFFF & ~sum(1 << FLAGS[name] for name in flags))
@@ -171,30 +171,31 @@ class MemoryVariables(Variables):
         emitter.store(place, word, 16)
 
     def leave(self, pc: Number, reason: int) -> None:
-        """Set PC, return why; ends the block."""
+        """End the block: set PC and return `reason`."""
         self.set("pc", pc)
         self._emitter.end(f"ret i64 {reason}")
 
     def write_back(self, emitter: Emitter) -> None:
-        """Nothing is kept back."""
+        """Do nothing: the record is up to date."""
 
 
 def _with_sums(emitter: Emitter, word: Number) -> Number:
-    """SR with OAB = OA | OB and SAB = SA | SB."""
+    """Return SR with OAB = OA | OB and SAB = SA | SB."""
     overflow = Value(emitter, truth(word & (1 << FLAGS["OA"] | 1 << FLAGS["OB"])), True)
     sticky = Value(emitter, truth(word & (1 << FLAGS["SA"] | 1 << FLAGS["SB"])), True)
     return word | (overflow << OAB.bit_length() - 1) | (sticky << SAB.bit_length() - 1)
 
 
 def pointer(emitter: Emitter, offset: Number) -> str:
-    """Pointer to a byte offset in the record."""
+    """Emit a pointer to a byte offset in the record. Return its name."""
     name = emitter.name()
     emitter.line(f"{name} = getelementptr i8, ptr %rec, i64 {wide(offset)}")
     return name
 
 
 def accumulator(emitter: Emitter, offset: int) -> Value:
-    """The 40 bits of an accumulator at its data addresses, sign-extended."""
+    """Emit a load of an accumulator's 40 bits at byte offset `offset`, sign-extended."""
+
     low = emitter.load(pointer(emitter, offset), 32)
     high = emitter.load(pointer(emitter, offset + 4), 8)
     return ((low | (high << 32)) ^ (1 << 39)) - (1 << 39)

@@ -13,25 +13,25 @@ from emu.dspic30f.interpreter.rule_paths import function_of
 from emu.dspic30f.jit.engine import JitEngine
 from emu.dspic30f.state.state import NOT_REPEATING, RA, State
 from emu.machine.machine import Machine
-from emu.system.rules import NUMBERS, Place
+from emu.system.rules import INTEGER_OPERATIONS, Cell
 
 
 class OnNumbers:
     """Reads rules on the record, one step at a time; what they put is stored behind them."""
 
-    select = NUMBERS.select
+    select = INTEGER_OPERATIONS.select
 
     def __init__(self, state: State) -> None:
         self._views = {16: state.u16, 64: state.record.u64}
-        self._puts: list[tuple[Place, int]] = []
+        self._puts: list[tuple[Cell, int]] = []
 
-    def get(self, place: Place) -> int:
+    def get(self, place: Cell) -> int:
         return self._views[place.bits][place.index]
 
-    def put(self, place: Place, value: int) -> None:
+    def put(self, place: Cell, value: int) -> None:
         self._puts.append((place, value & (1 << place.bits) - 1))
 
-    def true(self, condition: Any) -> bool:
+    def is_true(self, condition: Any) -> bool:
         return bool(condition)
 
     def run(self, rule: Any, *arguments: Any) -> Any:
@@ -58,19 +58,19 @@ def test_generated_python_does_what_the_rule_says(name: str) -> None:
     rule, parameters = RULES[name]
     generator = random.Random(name)
     one, other = (Machine(engine="plain").state for _ in range(2))
-    places = flow_rules.places_of(one)
-    run = function_of(other.record, rule, places, *parameters)
+    operands = flow_rules.operands_of(one)
+    run = function_of(other.record, rule, operands, *parameters)
     results = set()
     for _ in range(100):
-        for place in (places.rcount, places.dcount):
+        for place in (operands.rcount, operands.dcount):
             one.u16[place.index] = generator.choice((0, 1, 2, generator.randrange(0x4000)))
-        for place in (places.sr, places.corcon, *places.loop[1:], *places.shadow):
+        for place in (operands.sr, operands.corcon, *operands.loop[1:], *operands.shadow):
             one.u16[place.index] = generator.getrandbits(16)
-        one.u16[places.edt.index] = generator.randrange(4)
+        one.u16[operands.edt.index] = generator.randrange(4)
         one.repeat = generator.randrange(4)
         other.record.bytes[:] = one.record.bytes
         arguments = [generator.choice((0, 1, generator.randrange(0x100))) for _ in parameters]
-        result = OnNumbers(one).run(rule, places, *arguments)
+        result = OnNumbers(one).run(rule, operands, *arguments)
         assert run(*arguments) == result
         assert bytes(one.record.bytes) == bytes(other.record.bytes)
         results.add(result)
@@ -80,13 +80,13 @@ def test_generated_python_does_what_the_rule_says(name: str) -> None:
 @pytest.mark.parametrize("count", range(1, 6))
 def test_a_repeat_that_is_counted_elsewhere_leaves_the_same_state(count: int) -> None:
     state, closed = (Machine(engine="plain").state for _ in range(2))
-    places = flow_rules.places_of(state)
+    operands = flow_rules.operands_of(state)
     stepped, jumped = OnNumbers(state), OnNumbers(closed)
-    assert stepped.run(flow_rules.repeat, places, count)
+    assert stepped.run(flow_rules.repeat, operands, count)
     for left in range(count, -1, -1):
-        jumped.run(flow_rules.repeating, places, count, left)
+        jumped.run(flow_rules.repeating, operands, count, left)
         assert (state.rcount, state.repeat, state.sr) == (closed.rcount, closed.repeat, closed.sr)
-        assert stepped.run(flow_rules.repeated, places, state.sr & RA) == (left != 0)
+        assert stepped.run(flow_rules.repeated, operands, state.sr & RA) == (left != 0)
     assert state.repeat == NOT_REPEATING
 
 

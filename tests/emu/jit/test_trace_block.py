@@ -14,11 +14,11 @@ from random_firmware import Firmware, difference, literal, to_sfr, words_of
 from test_native_code import own_cache, pair  # noqa: F401  (the fixture)
 
 from emu.chips.dspic30f6014a import DSPIC30F6014A
-from emu.dspic30f.cycle_accounting import Ledger
+from emu.dspic30f.cycle_accounting import CycleAccounting
 from emu.dspic30f.isa.codec import decode_for_execution
 from emu.dspic30f.jit.engine import JitEngine
 from emu.dspic30f.jit.translate.region import Region, discover
-from emu.dspic30f.jit.translate.trace_block import ARM, ARMS, course
+from emu.dspic30f.jit.translate.trace_block import MAX_BRANCHES, MAX_SKIPPED, trace_block
 
 IFS0 = DSPIC30F6014A.sfrs["IFS0"].address
 START = 0x200
@@ -31,9 +31,9 @@ POP = words_of("POP.S")
 WIDE = words_of("MOV{.W} #lit16, Wnd", k=7, d=6)
 
 
-def over(*arm: list[int]) -> list[int]:
-    """BRA NC over `arm`."""
-    words = [word for one in arm for word in one]
+def over(*skipped: list[int]) -> list[int]:
+    """BRA NC over `skipped`."""
+    words = [word for one in skipped for word in one]
     return words_of("BRA NC, Expr", n=len(words)) + words
 
 
@@ -45,8 +45,8 @@ def past(words: list[int]) -> list[int]:
 BODIES = {
     "a branch round one": SHIFT + over(XOR),
     "round two": SHIFT + over(XOR, COUNT),
-    "as many as may be": SHIFT + over(*[COUNT] * ARM),
-    "one more": SHIFT + over(*[COUNT] * (ARM + 1)),
+    "as many as may be": SHIFT + over(*[COUNT] * MAX_SKIPPED),
+    "one more": SHIFT + over(*[COUNT] * (MAX_SKIPPED + 1)),
     "round a load": SHIFT + over(LOAD),
     "round a store": SHIFT + over(STORE),
     "round what changes SR": SHIFT + over(POP, COUNT),
@@ -87,15 +87,15 @@ def region_of(body: list[int]) -> Region:
     return discover(START, lambda pc: decode_for_execution(flash.get(pc, 0), flash.get(pc + 2, 0)))
 
 
-def arms(body: list[int], apart: set[int] | None = None, last: int = -1) -> list[int]:
+def arms(body: list[int], barriers: set[int] | None = None, last: int = -1) -> list[int]:
     """Lengths of what branches go round in the first block."""
     region = region_of(body)
-    return [len(part.arm) for part in course(region, START, region.leaders, apart or set(), last) if part.arm]
+    return [len(part.skipped) for part in trace_block(region, START, region.leaders, barriers or set(), last) if part.skipped]
 
 
 @pytest.mark.parametrize(("name", "lengths"), [
-    ("a branch round one", [1]), ("round two", [2]), ("as many as may be", [ARM]), ("one more", []), ("a skip", [1]),
-    ("round a load", []), ("round a store", []), ("one behind the other", [1] * ARMS), ("before a call", [1]),
+    ("a branch round one", [1]), ("round two", [2]), ("as many as may be", [MAX_SKIPPED]), ("one more", []), ("a skip", [1]),
+    ("round a load", []), ("round a store", []), ("one behind the other", [1] * MAX_BRANCHES), ("before a call", [1]),
 ])  # fmt: skip
 def test_a_block_goes_past_what_only_computes(name: str, lengths: list[int]) -> None:
     """Up to so many instructions, so many times."""
@@ -104,10 +104,10 @@ def test_a_block_goes_past_what_only_computes(name: str, lengths: list[int]) -> 
 
 def test_a_block_ends_where_something_is_looked_at() -> None:
     """A hook among what is gone round, or behind it; the end of a DO loop."""
-    arm, behind = START + 4, START + 6
+    skipped, behind = START + 4, START + 6
     body = BODIES["a branch round one"]
     assert arms(body) == [1]
-    assert arms(body, {arm}) == arms(body, {behind}) == arms(body, last=arm) == []
+    assert arms(body, {skipped}) == arms(body, {behind}) == arms(body, last=skipped) == []
 
 
 @pytest.mark.parametrize("body", BODIES.values(), ids=BODIES)
@@ -139,12 +139,12 @@ def test_cycles_are_counted_on_both_ways(name: str) -> None:
     """`emu profile`: the same by address, native and interpreted."""
     counted = []
     for machine in pair(firmware_of(BODIES[name])):
-        ledger = Ledger(machine.core, lambda _at, _count: None)
+        accounting = CycleAccounting(machine.core, lambda _at, _count: None)
         if isinstance(machine.runner, JitEngine):
-            machine.runner.keep(ledger, lambda pc: pc)
+            machine.runner.start_accounting(accounting, lambda pc: pc)
         else:
-            ledger.open()
+            accounting.start()
         machine.run(20_000)
-        counted.append(np.array(ledger.cells))
+        counted.append(np.array(accounting.cells))
     assert counted[0].sum() > 19_000
     assert (counted[0] == counted[1]).all()

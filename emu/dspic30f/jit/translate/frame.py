@@ -1,0 +1,81 @@
+"""The frame of a translated function: its blocks, exits, cycles and the deadline check."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from emu.dspic30f.isa.builder import Context
+from emu.dspic30f.jit.exit_reasons import NEXT
+from emu.dspic30f.jit.machine_layout import MachineLayout
+from emu.dspic30f.jit.translate.builder import LlvmBuilder
+from emu.dspic30f.jit.translate.cycle_counters import CycleCounter
+from emu.dspic30f.jit.translate.region import Region
+from emu.dspic30f.jit.translate.values import Emitter, Number, Value, wide
+from emu.dspic30f.jit.translate.variables import MemoryVariables, Variables
+
+
+class FunctionFrame:
+    """State and helpers that all parts of the translator share while they write one function.
+
+    With `exact`, every instruction can be entered and checks the deadline before it runs, and registers stay in the
+    record. Such code compiles quickly. It runs cold code and the few instructions before an event.
+    """
+
+    def __init__(
+        self, region: Region, layout: MachineLayout, context: Context, exact: bool, counter: CycleCounter | None = None
+    ) -> None:
+        self.region: Final = region
+        self.layout: Final = layout
+        self.exact: Final = exact
+        self.e: Final = Emitter()
+        self.v: Final = (MemoryVariables if exact else Variables)(self.e, layout.offset)
+        self.b: Final = LlvmBuilder(self.e, self.v, layout, context)
+        self.counter: Final[CycleCounter] = counter if counter is not None else CycleCounter()
+        self.counter.begin(self.e, layout.offset)
+        self.b.before_slow = self.counter.store
+        self.at = 0
+        """Address of the instruction to which passing cycles are accounted."""
+        self.labels: Final[dict[int, str]] = {}
+        """Labels of blocks by the address of their first instruction."""
+        self.unwritten: Final[list[int]] = []
+        """Addresses whose blocks have a label but no code yet."""
+        self._exits: Final[dict[tuple[object, ...], str]] = {}
+
+    def label(self, pc: int) -> str:
+        """Return the label of the block at `pc`, or of an exit to `pc` if it lies outside the region."""
+        if pc not in self.region.steps:
+            return self.exit(pc, NEXT)
+        if pc not in self.labels:
+            self.labels[pc] = f"b{pc:x}"
+            self.unwritten.append(pc)
+        return self.labels[pc]
+
+    def exit(self, pc: int, reason: int) -> str:
+        """Return the label of a block that leaves the function for `reason` with PC = `pc`."""
+        key = (pc, reason, *self.counter.unsettled)
+        if key not in self._exits:
+            label = f"out{reason}.{pc:x}" + (f".{len(self._exits)}" if len(key) > 2 else "")
+            self._exits[key] = label
+            current = self.e.block
+            self.e.start(label)
+            self.counter.store()
+            self.v.leave(pc, reason)
+            self.e.block = current
+        return self._exits[key]
+
+    def jump(self, pc: int) -> None:
+        """End the block with a jump to `pc`. Exact code leaves the function where block code may exist."""
+        self.counter.settle()
+        leaves = self.exact and pc in self.region.leaders
+        self.e.end(f"br label %{self.exit(pc, NEXT) if leaves else self.label(pc)}")
+
+    def fits(self, cost: Number, start: Number | None = None) -> Value:
+        """Return whether `cost` cycles from `start` (default: now) end before the cycle of the deadline."""
+        begun = self.v.get("cycle") if start is None else start
+        return self.e.let(f"icmp ult i64 {wide(begun + cost)}, %stop", bit=True)
+
+    def advance(self, cycles: Number, mask: int) -> None:
+        """Let `cycles` pass. `mask` holds the W registers that the instruction writes on its destination side."""
+        self.v.set("cycle", self.v.get("cycle") + cycles)
+        self.v.set("stall", mask)
+        self.counter.spend(self.at, cycles)
