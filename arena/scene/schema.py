@@ -190,7 +190,7 @@ class Clock:
 
 
 INHERIT: Final = "as in [start]"
-"""Value of a group's key that stands for the value in [start]."""
+"""Value of a group's key by which the group takes the value in [start]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -224,7 +224,7 @@ class RobotGroup(Placed):
 
     - `image`: their controller, as `--brain`; a path is relative to the scene file; empty: that of the run
     - `controller`: A or B; empty: that of the run
-    - `id_first`: number of the first robot; the next ones count up. `{id}` in `stimulus` stands for the number.
+    - `id_first`: number of the first robot; the next ones count up. `{id}` in `stimulus` is replaced by it.
     - `heading_deg`: heading at the start; nan: random
     - `selector`, `remote`, `stimulus`: as in [start]
     """

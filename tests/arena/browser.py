@@ -1,4 +1,4 @@
-"""The browser that pages are opened in: Debian's chromium, which the project's own environment cannot install."""
+"""The browser for tests of pages: Debian's chromium, which the project's own environment cannot install."""
 
 from __future__ import annotations
 
@@ -9,4 +9,4 @@ import pytest
 
 BROWSER: Final = shutil.which("chromium") or shutil.which("chromium-browser")
 needs_browser = pytest.mark.skipif(BROWSER is None, reason="no chromium here (Debian package chromium)")
-"""For tests that look at a page as its users do: nothing else runs what is written in it."""
+"""Marker of tests that run the scripts of a page."""

@@ -1,4 +1,4 @@
-"""Images the tests put into robots."""
+"""Fixtures: firmware images for robots, and full disks."""
 
 from __future__ import annotations
 
@@ -18,19 +18,19 @@ ROOT = Path(__file__).resolve().parents[2]
 
 @pytest.fixture(scope="session")
 def clustering_image(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The project's clustering firmware, built once per run of tests."""
+    """Return the project's clustering firmware, built once per test session."""
     return built_once(tmp_path_factory, "clustering")
 
 
 @pytest.fixture(scope="session")
 def talking_image(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Starts the left motor's coils, says a line, and runs into an illegal opcode after about a second."""
+    """Return firmware that sends a line, lights LED 0, and reaches an illegal opcode after about a second."""
     return _assembled(tmp_path_factory.mktemp("talking"), TALKING)
 
 
 @pytest.fixture(scope="session")
 def assembled(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
-    """Makes an image of an assembly text."""
+    """Return a function that assembles a text to an image."""
     return lambda text: _assembled(tmp_path_factory.mktemp("assembled"), text)
 
 
@@ -65,7 +65,7 @@ TALKING = f"""{BEGIN}
 
 @pytest.fixture
 def full_disk() -> Path:
-    """A file that answers every write with ENOSPC; elsewhere than on Linux it takes a mount, and that takes root."""
+    """Return a file whose writes fail with ENOSPC. Only Linux has one without mounting a file system as root."""
     device = Path("/dev/full")
     if not device.exists():
         pytest.skip("only Linux has /dev/full")
@@ -74,7 +74,7 @@ def full_disk() -> Path:
 
 @pytest.fixture
 def unwritable(full_disk: Path, monkeypatch: pytest.MonkeyPatch) -> set[str]:
-    """Names of files: while a name is in it, every write of such a file is answered with ENOSPC."""
+    """Return a set of file names. While a name is in it, every write of such a file fails with ENOSPC."""
     names: set[str] = set()
     make = tempfile.mkstemp
 

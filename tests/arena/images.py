@@ -1,6 +1,6 @@
-"""Assembly programs that the tests of several files put into robots.
+"""Assembly programs for robots, shared by several test files.
 
-In: nothing. Out: texts for the fixture `assembled`.
+They are texts for the fixture `assembled`.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Structs that Python and compiled code share lie the same way: every field of every one, by the compiler itself."""
+"""Structs shared by Python and C have the same layout; the compiler reports the offset of every field."""
 
 from __future__ import annotations
 
@@ -43,11 +43,11 @@ TWINS: dict[Path, dict[str, type[Structure]]] = {
     BOARD / "ring.c": {"ring": analog._Ring},
 }  # fmt: skip
 WITHIN = {"ie1", "ie2"}
-"""Later elements of what is an array for the compiled code."""
+"""Fields that are later elements of an array in C."""
 
 
 def fields_of(text: str, name: str) -> list[str]:
-    """Names of a struct's fields, in order."""
+    """Return the names of a struct's fields, in order."""
     body = re.search(rf"^struct {name} \{{\n(.*?)^\}};", text, re.S | re.M)
     assert body is not None, name
     found: list[str] = []
@@ -59,7 +59,7 @@ def fields_of(text: str, name: str) -> list[str]:
 
 @pytest.mark.parametrize("source", TWINS, ids=lambda source: source.name)
 def test_a_struct_has_the_offsets_and_the_size_of_its_twin(source: Path, tmp_path: Path) -> None:
-    """A field more, less or elsewhere on one side would be somebody else's memory on the other."""
+    """A missing, extra or misplaced field on one side would read other memory on the other side."""
     text = source.read_text()
     names = {name: fields_of(text, name) for name in TWINS[source]}
     numbers = [number for name in names for number in (
@@ -77,8 +77,8 @@ def test_a_struct_has_the_offsets_and_the_size_of_its_twin(source: Path, tmp_pat
         assert next(told) == ctypes.sizeof(twin), name
 
 
-def test_every_struct_that_is_shared_is_looked_at() -> None:
-    """A new one gets a line above, unless it is the compiled code's own."""
+def test_every_shared_struct_is_compared() -> None:
+    """A new struct needs an entry in TWINS, unless only C uses it."""
     own = {("renderer.c", "pixel"), ("renderer.c", "hit"), ("physics.c", "vect"),
            ("line.c", "scan"), ("motors.c", "state")}  # fmt: skip
     found = {(path.name, name) for folder in (ARENA, BOARD) for path in folder.rglob("*.c")

@@ -1,4 +1,4 @@
-"""LEDs in other robots' cameras: where on a robot they shine, when, and firmware that goes by it (epuck.md §2)."""
+"""LEDs in other robots' cameras: position on the robot, delay, and firmware that reacts to them (epuck.md §2)."""
 
 from __future__ import annotations
 
@@ -48,14 +48,14 @@ def scene() -> Scene:
 
 
 def facing(centimetres: float, turned_deg: float = 0.0) -> Poses:
-    """A camera, and a robot so far before its lens that shows its front to it, turned to its left from there."""
+    """Return poses of a camera robot and a robot before its lens that faces it, turned to the left by an angle."""
     there = LENS_X + centimetres + dimensions.ROBOT_RADIUS
     return Poses([CAMERA, (there, 150.0, math.pi + math.radians(turned_deg))], [])
 
 
 @pytest.mark.parametrize("led", range(8))
-def test_a_led_of_the_ring_shines_at_its_bearing_and_height(scene: Scene, led: int) -> None:
-    """Clockwise from the front in steps of 45 degrees; a centimetre wide and high, in the middle of what it faces."""
+def test_a_ring_led_is_visible_at_its_bearing_and_height(scene: Scene, led: int) -> None:
+    """Ring LEDs are 45 degrees apart, clockwise from the front, and 1 cm wide and high."""
     red, _ = led_classes(scene)
     lens_to_edge = 20.0
     camera = ReferenceCamera(scene, facing(lens_to_edge, 45.0 * led), 0, leds=(0, 1 << led))
@@ -70,7 +70,7 @@ def test_a_led_of_the_ring_shines_at_its_bearing_and_height(scene: Scene, led: i
     assert np.mean(columns) == pytest.approx(320, abs=1)
 
 
-def test_a_body_is_lit_as_a_whole_and_a_led_behind_is_not_seen(scene: Scene) -> None:
+def test_the_body_is_lit_as_a_whole_and_a_led_behind_is_invisible(scene: Scene) -> None:
     _, green = led_classes(scene)
     kinds = {leds: set(ReferenceCamera(scene, facing(20.0), 0, leds=(0, leds)).column(320, tuple(range(170, 300))))
              for leds in (0, 1 << 9, 1 << 4, 1 << 8)}  # fmt: skip
@@ -82,8 +82,8 @@ def test_a_body_is_lit_as_a_whole_and_a_led_behind_is_not_seen(scene: Scene) -> 
     assert colours_of(scene)[list(led_classes(scene))].tolist() == [list(one) for one in LED_COLOURS]
 
 
-def test_two_ways_to_see_leds_agree() -> None:
-    """The compiled rows and the plain columns, for robots and LEDs at random."""
+def test_renderer_and_reference_camera_agree_on_leds() -> None:
+    """Random robots and LEDs; rows of the renderer, columns of the reference."""
     scene = load_scene("clustering").with_values(
         robots__count=6, objects__count=6, camera__sees_leds=True, camera__pitch_deg=1.0
     )
@@ -105,7 +105,7 @@ def test_two_ways_to_see_leds_agree() -> None:
     assert found >= {ROBOT, *led_classes(scene)}
 
 
-def test_leds_are_seen_a_quantum_late() -> None:
+def test_leds_are_visible_one_quantum_late() -> None:
     channel = OpticalChannel(2, 1000)
     channel.switch(1, 5000, LINES + 9, lit=True)
     assert [channel.leds(1, cycle) for cycle in (6063, 6064)] == [0, 1 << 9]
@@ -116,11 +116,11 @@ def test_leds_are_seen_a_quantum_late() -> None:
     assert len(channel._leds[1]) <= 310
 
 
-def test_firmware_turns_to_another_robot_whose_red_led_is_lit(
+def test_firmware_takes_a_robot_with_a_lit_red_led_for_an_object(
     clustering_image: Path, assembled: Callable[[str], Path], scene: Scene
 ) -> None:
-    """The clustering firmware takes the robot before it for an object while its LED is lit, for a robot in between;
-    without the key it never does."""
+    """The clustering firmware takes the robot before it for an object while that robot's LED is lit, else for a robot.
+    Without `camera.sees_leds` it never takes it for an object."""
     blinker = assembled(BLINKER)
     poses = facing(14.0)
     for sees, until in ((True, 1200), (False, 800)):

@@ -1,4 +1,4 @@
-"""The camera's view and the line-of-sight sensor (epuck.md §7.6; openswarm-original.md §8)."""
+"""Camera renderer and line-of-sight sensor (epuck.md §7.6; openswarm-original.md §8)."""
 
 import math
 from itertools import pairwise
@@ -24,7 +24,7 @@ def scene() -> Scene:
 
 
 def one_object(distance_cm: float, bearing: float = 0.0) -> Poses:
-    """An object whose surface is `distance_cm` from the lens."""
+    """Return poses of a robot and an object whose surface is `distance_cm` from the lens."""
     centre = distance_cm + dimensions.OBJECT_RADIUS
     return Poses([ROBOT_AT], [(LENS_X + centre * math.cos(bearing), 150 + centre * math.sin(bearing))])
 
@@ -47,7 +47,7 @@ def test_columns_show_bearings_by_the_pinhole_formula(scene: Scene) -> None:
         WALL, OBJECT, OBJECT, WALL]  # fmt: skip
 
 
-def test_a_pitched_camera_sees_everything_lower_by_its_angle(scene: Scene) -> None:
+def test_pitch_lowers_the_picture_by_its_angle(scene: Scene) -> None:
     """epuck.md §7.6: up to 3 degrees of mounting error; on the axis a degree is 602 tan 1 deg = 10.5 rows."""
     plain, pitched = (ReferenceCamera(scene.with_values(camera__pitch_deg=a), one_object(100.0), 0) for a in (0.0, 1.0))
     rows = tuple(range(180, 280))
@@ -55,8 +55,8 @@ def test_a_pitched_camera_sees_everything_lower_by_its_angle(scene: Scene) -> No
     assert first[1] - first[0] == pytest.approx(602 * math.tan(math.pi / 180), abs=1)
 
 
-def test_a_mirrored_camera_sees_left_as_right_and_up_as_down(scene: Scene) -> None:
-    """experiment-contract.md §5: the mirror is part of the sensitivity table."""
+def test_a_mirrored_camera_exchanges_left_and_right_and_up_and_down(scene: Scene) -> None:
+    """experiment-contract.md §5: mirroring is part of the sensitivity table."""
     poses = one_object(60.0, bearing=0.2)
     plain, mirrored = (ReferenceCamera(scene.with_values(camera__mirrored=one), poses, 0) for one in (False, True))
     for u in range(0, 640, 40):
@@ -65,8 +65,8 @@ def test_a_mirrored_camera_sees_left_as_right_and_up_as_down(scene: Scene) -> No
     assert OBJECT in plain.column(200, (240,))
 
 
-def test_a_barrel_shows_the_same_angle_nearer_to_the_axis(scene: Scene) -> None:
-    """lens.py: what is at r (1 + k r^2) appears at r."""
+def test_barrel_distortion_shows_an_angle_nearer_to_the_axis(scene: Scene) -> None:
+    """lens.py: the point at r (1 + k r^2) appears at r."""
     bearing = 0.3
     camera = ReferenceCamera(scene.with_values(camera__distortion=0.2), one_object(95.0, bearing), 0)
     columns = [u for u in range(640) if camera.column(u, (240,))[0] == OBJECT]
@@ -76,7 +76,7 @@ def test_a_barrel_shows_the_same_angle_nearer_to_the_axis(scene: Scene) -> None:
         assert r * (1 + 0.2 * r * r) == pytest.approx(math.tan(angle), abs=1.5 / 602)
 
 
-def test_corners_are_darker_by_the_share_asked_for(scene: Scene) -> None:
+def test_vignetting_darkens_the_corners_by_its_share(scene: Scene) -> None:
     """epuck.md §7.6: up to 30 % in the corners, nothing on the axis."""
     bright = Lens().vignetting(240, np.array([320, 0]), 0.3)
     corner = Lens().vignetting(0, np.array([0]), 0.3)
@@ -85,8 +85,8 @@ def test_corners_are_darker_by_the_share_asked_for(scene: Scene) -> None:
     assert corner[0] == pytest.approx(0.7, abs=1e-9)
 
 
-def test_what_is_near_hides_what_is_far_but_not_what_is_taller(scene: Scene) -> None:
-    """A robot of 55 mm before an object of 100 mm: the object shows above it, the room above the wall."""
+def test_a_near_body_hides_a_far_one_up_to_its_height(scene: Scene) -> None:
+    """A robot of 55 mm before an object of 100 mm: the object is visible above it, the room above the wall."""
     poses = Poses([ROBOT_AT, (LENS_X + 50, 150, 0.0)], [(LENS_X + 80, 150)])
     rows = (0, 190, 200, 240, 265, 400)
     assert ReferenceCamera(scene, poses, 0).column(320, rows) == [ABOVE, OBJECT, OBJECT, ROBOT, ROBOT, FLOOR]
@@ -101,8 +101,8 @@ LENSES = [
 
 
 @pytest.mark.parametrize("lens", LENSES)
-def test_a_row_at_once_is_the_same_as_column_by_column(lens: dict[str, object]) -> None:
-    """Two ways to the same answer, for every lens."""
+def test_rows_of_the_renderer_equal_columns_of_the_reference(lens: dict[str, object]) -> None:
+    """For every lens."""
     scene = load_scene("clustering").with_values(**lens)
     world = World(scene, 2)
     columns = np.arange(0, 640, 7)
@@ -127,13 +127,13 @@ def test_objects_are_detected_to_150_cm(scene: Scene) -> None:
 
 
 def test_the_range_ends_detection(scene: Scene) -> None:
-    """docs/experiment.md §2: beyond it things look like the wall."""
+    """docs/experiment.md §2: bodies beyond the range look like the wall."""
     near, far = (ReferenceCamera(scene.with_values(camera__range_cm=150.0), one_object(cm), 0) for cm in (149.0, 151.0))
     assert (sensor_of(near), sensor_of(far)) == (OBJECT, NOTHING)
 
 
 def test_robots_are_detected_nearer_than_objects(scene: Scene) -> None:
-    """docs/experiment.md §3: all at 1 m, under half at 1.4 m, where a robot of 55 mm fills one row."""
+    """docs/experiment.md §3: all at 1 m, less than half at 1.4 m, where a robot of 55 mm fills one row."""
     rng = np.random.default_rng(1)
     shares = []
     for distance in (60.0, 100.0, 140.0, 200.0):
@@ -152,7 +152,7 @@ def test_robots_are_detected_nearer_than_objects(scene: Scene) -> None:
     [(0.0, 104.0, 1.0, 1.0), (0.0, 125.0, 0.4, 0.65), (-0.38, 134.0, 0.95, 1.0), (-0.38, 140.0, 0.2, 0.5),
      (1.0, 150.0, 1.0, 1.0), (-1.0, 150.0, 1.0, 1.0)],
 )  # fmt: skip
-def test_pitch_decides_how_far_robots_are_seen(
+def test_pitch_determines_the_detection_range_of_robots(
     scene: Scene, pitch_deg: float, distance: float, low: float, high: float
 ) -> None:
     """docs/experiment.md §3: two rows of the window to 105 cm, to 135 cm four rows lower, to 150 cm at a degree."""
@@ -165,7 +165,7 @@ def test_pitch_decides_how_far_robots_are_seen(
     assert low <= np.mean(seen) <= high
 
 
-def test_an_object_before_a_robot_wins_the_vote(scene: Scene) -> None:
-    """openswarm-original.md §8: red is asked first."""
+def test_object_votes_count_before_robot_votes(scene: Scene) -> None:
+    """openswarm-original.md §8: the firmware counts red pixels first."""
     poses = Poses([ROBOT_AT, (LENS_X + 40, 152, 0.0)], [(LENS_X + 60, 146)])
     assert sensor_of(ReferenceCamera(scene, poses, 0)) == OBJECT

@@ -1,4 +1,4 @@
-"""Infrared between robots and world: reflections, room light, a lamp, other robots' emitters; battery (epuck.md §5)."""
+"""Infrared sensors in the world: reflections, room light, lamps, other robots' emitters; battery (epuck.md §5)."""
 
 from __future__ import annotations
 
@@ -137,17 +137,17 @@ def built(folder: Path, text: str, name: str) -> Path:
     return image
 
 
-def test_rays_measure_from_the_body_to_walls_and_discs_with_their_reflection(scene: Scene) -> None:
-    """Bearings clockwise from the front, mm; share by body and angle; nothing beyond the response table."""
+def test_surfaces_have_distance_and_reflection(scene: Scene) -> None:
+    """Bearings clockwise from the front, distances in mm, share by body and angle; inf beyond the response table."""
     scene = scene.with_values(infrared__object_share=0.6, infrared__wall_share=0.9)
     seen = Optics(scene).surfaces(Poses([(8.7, 150.0, UP)], [(17.5, 150.0)]), 0)
-    assert seen[2] == pytest.approx((10 * (8.8 - 3.7 - 5.0), 0.6))  # sensor 2 looks right, where the object is
-    assert seen[5] == pytest.approx((10 * (8.7 - 3.7), 0.9))  # sensor 5 looks left, to the wall
+    assert seen[2] == pytest.approx((10 * (8.8 - 3.7 - 5.0), 0.6))  # sensor 2 faces right, to the object
+    assert seen[5] == pytest.approx((10 * (8.7 - 3.7), 0.9))  # sensor 5 faces left, to the wall
     assert seen[0] == seen[7] == (math.inf, 0.0)
 
 
-def test_an_askew_wall_reflects_by_the_cosine(scene: Scene) -> None:
-    """Sensor 2 looks 90 degrees to the right; turned by 30 degrees it sees 2/sqrt(3) as far and cos 30 as much."""
+def test_a_wall_at_an_angle_reflects_by_the_cosine(scene: Scene) -> None:
+    """Sensor 2 faces 90 degrees to the right. Turned by 30 degrees, the distance is 2/sqrt(3) and the share cos 30."""
     optics = Optics(scene)
     straight, askew = (optics.surfaces(Poses([(8.7, 150.0, a)], []), 0)[2] for a in (-UP, -UP + math.pi / 6))
     assert straight == pytest.approx((50.0, 1.0))
@@ -155,8 +155,8 @@ def test_an_askew_wall_reflects_by_the_cosine(scene: Scene) -> None:
     assert askew.share == pytest.approx(math.cos(math.pi / 6))
 
 
-def test_a_lamp_lights_the_sensors_that_face_it_by_the_inverse_square(scene: Scene) -> None:
-    """Raw counts fall with light, never under 0 (epuck.md §5)."""
+def test_a_lamp_lowers_the_counts_of_facing_sensors_by_the_inverse_square(scene: Scene) -> None:
+    """Raw counts fall with light, but not below 0 (epuck.md §5)."""
     pose = (100.0, 150.0, 0.0)
     assert ambient(scene, pose) == [3800] * 8
     lit = ambient(scene.with_values(light__lamp_x_cm=200.0, light__lamp_y_cm=150.0, light__lamp_counts=800.0), pose)
@@ -167,17 +167,17 @@ def test_a_lamp_lights_the_sensors_that_face_it_by_the_inverse_square(scene: Sce
 
 
 def received(scene: Scene, *robots: tuple[float, float, float], objects: tuple[tuple[float, float], ...] = ()) -> float:
-    """Counts on the strongest sensor of robot 0 when robot 1 lights everything."""
+    """Return the counts on the strongest sensor of robot 0 if all emitters of robot 1 are lit."""
     found = Optics(scene).signals(Poses(robots, objects), 0, [1])
     return max((sum(one.counts) * max(one.shares) for one in found), default=0.0)
 
 
-def test_the_strength_of_light_is_the_published_table(scene: Scene) -> None:
-    """swarmcom.md §3.1: the fit is 6.3 % off in the logarithm; weak light is not cut off, the strongest is."""
+def test_the_strength_of_light_equals_the_published_table(scene: Scene) -> None:
+    """swarmcom.md §3.1: the fit has a logarithmic error of 6.3 %. Only the strongest light is limited."""
     right = (100.0, 150.0, UP)
     errors = []
     for distance, counts in PUBLISHED:
-        shining = (100 + distance, 150.0, math.pi + math.radians(31.5))  # its front is turned right past the line
+        shining = (100 + distance, 150.0, math.pi + math.radians(31.5))  # its front points to the right of the line
         errors.append(math.log(received(scene, right, shining) / counts))
     assert math.sqrt(sum(error**2 for error in errors) / len(errors)) == pytest.approx(0.063, abs=0.004)
     assert [amplitude(distance) for distance in (3.0, 7.4)] == [3500.0, 3500.0]
@@ -188,7 +188,7 @@ def test_the_strength_of_light_is_the_published_table(scene: Scene) -> None:
 
 def test_light_falls_off_both_axes_as_powers_of_the_cosine(scene: Scene) -> None:
     """Half at 15 degrees from an emitter's axis, at 36 from a receiver's (swarmcom.md §7)."""
-    here, there = (100.0, 150.0, UP), (120.0, 150.0, UP)  # sensor 2 right at the other's sensor 5
+    here, there = (100.0, 150.0, UP), (120.0, 150.0, UP)  # sensor 2 faces sensor 5 of the other robot
     counts = amplitude(20.0) / brightest(20.0)
     assert received(scene, here, there) == pytest.approx(counts, rel=3e-3)
     turned = Optics(scene).signals(Poses([here, (120.0, 150.0, UP + math.radians(15))], []), 0, [1])[0]
@@ -200,7 +200,7 @@ def test_light_falls_off_both_axes_as_powers_of_the_cosine(scene: Scene) -> None
     assert received(wide, here, there) == pytest.approx(2 * amplitude(20.0))
 
 
-def test_walls_objects_and_other_robots_hide_the_light(scene: Scene) -> None:
+def test_walls_objects_and_other_robots_block_the_light(scene: Scene) -> None:
     here, there = (100.0, 150.0, UP), (130.0, 150.0, UP)
     assert received(scene, here, there, objects=((115.0, 144.9),)) > 0
     assert received(scene, here, there, objects=((115.0, 145.1),)) == 0
@@ -212,7 +212,7 @@ def test_walls_objects_and_other_robots_hide_the_light(scene: Scene) -> None:
 
 
 def meeting(x: float, y: float, east: float, north: float, side: geometry.Side) -> float:
-    """How far along a ray from a point it meets a side; inf if it does not."""
+    """Return the distance at which a ray from a point hits a side; inf if it does not."""
     x1, y1, x2, y2 = side
     ex, ey = x2 - x1, y2 - y1
     across = east * ey - north * ex
@@ -224,7 +224,7 @@ def meeting(x: float, y: float, east: float, north: float, side: geometry.Side) 
 
 
 def plain_signals(scene: Scene, poses: Poses, robot: int) -> list[tuple[int, float, list[float]]]:
-    """(robot, all its counts on a sensor that faces it, shares of the sensors), as optics.py says it."""
+    """Return (robot, counts on a sensor that faces it, shares of the sensors) of each signal: the reference."""
     x, y, heading = poses.robots[robot]
     discs = [(*place[:2], dimensions.ROBOT_RADIUS) for place in poses.robots]
     discs += [(*place, scene.kind_of(number).radius_cm) for number, place in enumerate(poses.objects)]
@@ -246,7 +246,7 @@ def plain_signals(scene: Scene, poses: Poses, robot: int) -> list[tuple[int, flo
 
 
 def plain_surfaces(scene: Scene, poses: Poses, robot: int) -> list[tuple[float, float]]:
-    """What each sensor's axis meets: mm and share."""
+    """Return the surface that each sensor axis hits, as mm and share: the reference."""
     x, y, heading = poses.robots[robot]
     width, height = scene.arena.width_cm, scene.arena.height_cm
     corners = [(0.0, 0.0), (width, 0.0), (width, height), (0.0, height)]
@@ -278,8 +278,8 @@ def plain_surfaces(scene: Scene, poses: Poses, robot: int) -> list[tuple[float, 
     return found
 
 
-def test_the_compiled_optics_is_the_plain_one() -> None:
-    """Signals and reflections of robots and things at random, about a yard with everything that stands fast."""
+def test_native_propagation_equals_the_reference() -> None:
+    """Signals and surfaces for random robots and objects, in a yard with all kinds of obstacles."""
     scene = load_scene("avoidance").with_values(infrared__wall_share=0.7)
     kinds = load_scene("foraging").kinds
     scene = replace(scene, kinds=kinds, objects=replace(scene.objects, count=6))
@@ -299,8 +299,8 @@ def test_the_compiled_optics_is_the_plain_one() -> None:
         optics.surfaces(Poses([(9.0, 9.0, 0.0)], [(9.0, 9.0)] * 7), 0)
 
 
-def test_light_arrives_a_quantum_late_whoever_lived_first() -> None:
-    """trial.py: no robot depends on the order of the others."""
+def test_light_arrives_one_quantum_late_for_any_order_of_robots() -> None:
+    """A record does not depend on the order of the robots."""
     channel = OpticalChannel(2, 1000, tau=1e-3)
     channel.switch(1, 5000, 2, lit=True)
     channel.switch(1, 6500, 2, lit=False)
@@ -313,9 +313,9 @@ def test_light_arrives_a_quantum_late_whoever_lived_first() -> None:
     assert channel.emitter(1).count <= 257
 
 
-def test_receivers_follow_as_a_first_order_whatever_was_asked_before() -> None:
-    """Against the recursion from the trial's start, with pulses much shorter than the time constant between pauses; the
-    order of questions and what has been forgotten since do not matter."""
+def test_receivers_are_first_order_low_passes_for_any_order_of_queries() -> None:
+    """Compared with the recursion from the start of the trial, with pulses much shorter than the time constant. The
+    order of the queries and dropped changes have no effect."""
     tau, quantum, rng = 885.0, 14_746, random.Random(5)
     at, switches = 0, []
     for number in range(2000):
@@ -342,7 +342,7 @@ def test_receivers_follow_as_a_first_order_whatever_was_asked_before() -> None:
 
 
 def test_firmware_reads_reflections_and_another_robots_light(scene: Scene, tmp_path: Path) -> None:
-    """Sensor 2 converts with its emitter off and on, beside an object, then beside a robot that blinks."""
+    """Sensor 2 converts with its emitter off and on, beside an object, then beside a blinking robot."""
     listener, sender = built(tmp_path, LISTENER, "listener"), built(tmp_path, SENDER, "sender")
     channel = OpticalChannel(2, scene.clock.quantum_tcy)
     ears = FirmwareController(scene, 1, 0, listener, 0, channel)
@@ -367,7 +367,7 @@ def test_firmware_reads_reflections_and_another_robots_light(scene: Scene, tmp_p
 
 
 def test_samples_have_the_scenes_noise_ripple_and_spread(scene: Scene, tmp_path: Path) -> None:
-    """What the firmware converts, against the keys; the same again, other robots and seeds otherwise."""
+    """Statistics of the converted samples. The same seed gives the same samples, other robots and seeds others."""
     listener = built(tmp_path, LISTENER, "listener")
     poses = Poses([(100.0, 150.0, UP), (300.0, 150.0, 0.0)], [(300.0, 20.0)])
 
@@ -395,8 +395,11 @@ def test_samples_have_the_scenes_noise_ripple_and_spread(scene: Scene, tmp_path:
 
 
 def lit_of_frames(scene: Scene, seed: int, share: float) -> list[list[int]]:
-    """Of a frame that another robot sends 30 times, 100 ms apart: scans of 0.25 ms in which a sensor sees it. A flash
-    for proximity ends 2 ms before; darkness in the frame lasts up to 20 bits, with a one of 0.73 ms between."""
+    """Return for 30 frames of another robot, 100 ms apart, in which scans of 0.25 ms a sensor detects light.
+
+    A proximity flash ends 2 ms before each frame. A frame is dark for up to 20 bits, with a one of 0.73 ms
+    between.
+    """
     scene, channel = scene.with_values(infrared__lost_share=share), OpticalChannel.of(scene)
     ring = InfraredRing(scene, seed, (board := Machine(DSPIC30F6014A, board=Epuck).board), channel, 0, 0)
     poses = Poses([(100.0, 150.0, UP), (100 + 7.4 + 12.5, 150.0, -UP)], [(300.0, 20.0)])
@@ -418,9 +421,10 @@ def lit_of_frames(scene: Scene, seed: int, share: float) -> list[list[int]]:
     return found
 
 
-def test_a_share_of_the_frames_of_others_is_lost_whole(scene: Scene) -> None:
-    """However long it is dark in one, and whatever was lit before: of a lost frame nobody sees ten scans of light in a
-    row, with which frames begin (firmware/openswarm/io/infrared), of others all; the same again, and by the seed."""
+def test_a_share_of_the_frames_is_lost_as_a_whole(scene: Scene) -> None:
+    """In a lost frame no receiver detects ten scans of light in a row, with which frames begin
+    (firmware/openswarm/io/infrared); in other frames it detects all. This holds for any darkness within and light
+    before a frame. The seed determines which frames are lost."""
     (whole,) = {tuple(one) for one in lit_of_frames(scene, 2, 0.0)}
     assert whole[:18] == tuple(range(18))
     half = lit_of_frames(scene, 2, 0.5)
@@ -435,8 +439,8 @@ def test_a_share_of_the_frames_of_others_is_lost_whole(scene: Scene) -> None:
         assert 0.2 * len(whole) < len(one) < 0.5 * len(whole)
 
 
-def test_a_robot_without_battery_stands_in_the_dark(scene: Scene, tmp_path: Path) -> None:
-    """From the second the scene names; nothing has happened to it that would be a fault."""
+def test_a_robot_without_battery_is_at_rest_and_dark(scene: Scene, tmp_path: Path) -> None:
+    """From the second in the scene on; the record has no fault of it."""
     sender = built(tmp_path, SENDER, "sender")
     scene = scene.with_values(start__off=[[1, 0.2]], start__silent_s=0.1)
     channel = OpticalChannel.of(scene)
@@ -453,9 +457,9 @@ def test_a_robot_without_battery_stands_in_the_dark(scene: Scene, tmp_path: Path
     assert not mouth.reading().fault
 
 
-def test_the_compiled_light_is_the_plain_one_to_the_bit(scene: Scene) -> None:
-    """Three robots that switch at random, some for longer than is kept, a third of their transmissions lost, noise:
-    what each sensor gets."""
+def test_native_light_equals_the_reference_to_the_bit(scene: Scene) -> None:
+    """Three robots switch at random, some for longer than the history, with noise and a third of the transmissions
+    lost; the light at each sensor is compared."""
     rng, checked = random.Random(3), 0
     scene = scene.with_values(robots__count=4, infrared__lost_share=0.3, infrared__noise_counts=2.0)
     for trial in range(6):
@@ -492,8 +496,8 @@ def test_the_compiled_light_is_the_plain_one_to_the_bit(scene: Scene) -> None:
     assert checked > 200
 
 
-def test_the_compiled_sensors_are_the_plain_ones_to_the_bit() -> None:
-    """Emitters that are switched at random, surfaces, room light and noise."""
+def test_native_sensors_equal_the_reference_to_the_bit() -> None:
+    """Randomly switched emitters, surfaces, room light and noise."""
     rng, machine = random.Random(4), Machine(DSPIC30F6014A, board=partial(Epuck, seed=9))
     ir, noise = machine.board.ir, Noise(Record(0), 9)
     state, now, tau = dict.fromkeys(range(4), (0, 0, 0.0)), 0, ir.tau_seconds * machine.peripherals.fcy
@@ -522,9 +526,11 @@ def test_the_compiled_sensors_are_the_plain_ones_to_the_bit() -> None:
             assert ir._level(sensor, cycle) == min(max(raw, 0), 4095) << 4
 
 
-def test_native_code_converts_as_python_does(scene: Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Eight sensors in halves without end, beside a robot that blinks and comes nearer, with noise: the machine's whole
-    state after 150 quanta, once with every level asked for in Python, once with hardly any."""
+def test_native_conversions_equal_those_in_python(
+    scene: Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Endless conversions of eight sensors, beside an approaching robot that blinks, with noise. The whole state of the
+    machine after 150 quanta is compared: once Python computes every level, once hardly any."""
     scanner, sender = built(tmp_path, SCANNER, "scanner"), built(tmp_path, SENDER, "sender")
     scene = scene.with_values(infrared__noise_counts=2.0)
     found, asked = [], []
@@ -556,7 +562,7 @@ def test_native_code_converts_as_python_does(scene: Scene, tmp_path: Path, monke
 
 
 def test_noise_is_gaussian_with_its_tails() -> None:
-    """300,000 draws: shares beyond 1, 3 and 4 deviations."""
+    """Shares of 300,000 draws beyond 1, 3 and 4 deviations."""
     draws = [reference_light.gaussian(7, cycle % 8, cycle) for cycle in range(300_000)]
     assert statistics.fmean(draws) == pytest.approx(0, abs=0.005)
     for limit, share in ((1, 0.31731), (3, 0.0027), (4, 6.3e-5)):
@@ -565,7 +571,7 @@ def test_noise_is_gaussian_with_its_tails() -> None:
 
 
 def test_the_channel_is_printed_and_drawn(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """The docs' figure by one command."""
+    """One command makes the figure of the documentation."""
     path = tmp_path / "channel.svg"
     assert main(["channel", "--set", "infrared.signal_gain=0.5", "--figure", str(path), "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
@@ -576,15 +582,15 @@ def test_the_channel_is_printed_and_drawn(tmp_path: Path, capsys: pytest.Capture
     assert main(["channel", "nowhere"]) == 2
 
 
-def test_the_battery_runs_down_in_a_line_and_its_pin_falls(scene: Scene) -> None:
-    """epuck.md §1, §2: full to low in about 3 h; BATT_LOW is 0 below 3.4 V."""
+def test_the_battery_discharges_linearly_and_its_pin_falls(scene: Scene) -> None:
+    """epuck.md §1, §2: from full to low in about 3 h; BATT_LOW is 0 below 3.4 V."""
     assert volts_after(scene.battery, 0) == 4.0
     assert volts_after(scene.battery, 3600) == pytest.approx(4.0 - 0.8 / 3)
     assert volts_after(scene.battery, 1e6) == 3.0
 
 
 def test_a_low_battery_shows_on_the_pin(scene: Scene, tmp_path: Path) -> None:
-    """Half a second empties a battery that lasts a second from 3.5 V."""
+    """A battery that lasts one second reaches the low level from 3.5 V within half a second."""
     low = scene.with_values(battery__volts=3.45, battery__hours=0.01)
     controller = FirmwareController(low, 1, 0, built(tmp_path, SENDER, "sender"))
     pins = []

@@ -1,4 +1,4 @@
-"""Trials that an exception ends in the middle of a quantum: nothing of them stays, nothing goes on by accident."""
+"""Trials that an exception ends in the middle of a quantum: all objects are freed, and no run continues."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ LOOKING = f"""{BEGIN}
         bra     1b
 """
 FIRST_LINES = 3
-"""Lines that are seen before somebody has had enough."""
+"""Camera lines before the exception."""
 
 
-def interrupted(robot: FirmwareController) -> None:
-    """Let the robot's camera be interrupted after some lines."""
+def interrupt(robot: FirmwareController) -> None:
+    """Make the robot's camera raise an exception after FIRST_LINES lines."""
     camera, paint = robot.machine.board.camera, robot._pixels
     lines = 0
 
@@ -41,12 +41,12 @@ def interrupted(robot: FirmwareController) -> None:
 
 
 @pytest.mark.parametrize("is_native", [True, False])
-def test_a_swarm_that_was_interrupted_is_let_go(assembled: Callable[[str], Path], is_native: bool) -> None:
-    """Others wait for poses or are to be run: their machines, the world and the threads go with the swarm."""
+def test_an_aborted_trial_is_freed(assembled: Callable[[str], Path], is_native: bool) -> None:
+    """Other robots wait for poses or are runnable. Their machines, the world and the threads are freed."""
     before = set(enumerate_threads())
     scene = load_scene("clustering").with_values(robots__count=3)
     robots = [FirmwareController(scene, 1, i, assembled(LOOKING), 0) for i in range(3)]
-    interrupted(robots[1])
+    interrupt(robots[1])
     lockstep = LockStep(World(scene, 1), robots, is_native=is_native, threads=3)
     with pytest.raises(KeyboardInterrupt):
         lockstep.advance(300)
@@ -63,10 +63,10 @@ def test_a_swarm_that_was_interrupted_is_let_go(assembled: Callable[[str], Path]
         assert not helper.is_alive()
 
 
-def test_a_machine_that_was_interrupted_has_no_limits_of_another_run(assembled: Callable[[str], Path]) -> None:
+def test_an_interrupted_machine_keeps_no_limits(assembled: Callable[[str], Path]) -> None:
     scene = load_scene("clustering").with_values(robots__count=1)
     robot = FirmwareController(scene, 1, 0, assembled(LOOKING), 0)
-    interrupted(robot)
+    interrupt(robot)
     with pytest.raises(KeyboardInterrupt):
         LockStep(World(scene, 1), [robot]).advance(300)
     machine = robot.machine

@@ -1,4 +1,4 @@
-"""Demand lock-step: what is recorded cannot tell it from quantum after quantum."""
+"""Demand lock-step: the record equals that of a run quantum after quantum."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from tests.arena.images import BEGIN
 
 
 class Stepwise:
-    """A robot that is told the poses of every quantum: it cannot run ahead."""
+    """A controller without `RunAheadRobot`: it takes the poses of every quantum."""
 
     def __init__(self, controller: FirmwareController) -> None:
         self._controller = controller
@@ -61,10 +61,10 @@ def trial(scene: Scene, seed: int, image: Path, selector: int, seconds: float, a
 @pytest.mark.parametrize(("image", "seed", "selector"), [
     ("clustering_image", 3, 0), ("clustering_image", 4, 1), ("talking_image", 5, 0),
 ])  # fmt: skip
-def test_records_are_those_of_quantum_after_quantum(
+def test_records_equal_those_of_single_quanta(
     image: str, seed: int, selector: int, request: pytest.FixtureRequest
 ) -> None:
-    """Cameras of three robots that stand about each other; one that talks and measures by infrared."""
+    """Three robots that see each other; robots that send lines."""
     scene = load_scene("clustering").with_values(robots__count=3, objects__count=8)
     path = request.getfixturevalue(image)
     ahead, stepwise = (trial(scene, seed, path, selector, 2.0, how) for how in (True, False))
@@ -72,8 +72,8 @@ def test_records_are_those_of_quantum_after_quantum(
     assert image != "clustering_image" or any(ahead["r0_left"])
 
 
-def test_robots_do_run_ahead(clustering_image: Path) -> None:
-    """Otherwise the comparison above compares nothing: one robot is far in front of the world when it first looks."""
+def test_robots_run_ahead(clustering_image: Path) -> None:
+    """A robot is far ahead of the world when it first reads its camera. Otherwise the test above compares nothing."""
     scene = load_scene("clustering").with_values(robots__count=2)
     robots = [FirmwareController(scene, 1, i, clustering_image, 8) for i in range(2)]
     world = World(scene, 1)
@@ -94,8 +94,8 @@ def test_robots_do_run_ahead(clustering_image: Path) -> None:
 def samples(
     image: Path, is_native: bool, seconds: float = 3.0, count: int = 3, threads: int = 1
 ) -> tuple[list[Any], int, int]:
-    """What robots read and where everything is, twice a second; how often Python painted a line, and ran an instruction
-    in place of native code, in the last second."""
+    """Return readings and poses twice a second, and for the last second how often Python rendered a line and
+    interpreted an instruction."""
     scene = load_scene("clustering").with_values(robots__count=count, objects__count=8)
     robots = [FirmwareController(scene, 5, i, image, 0) for i in range(count)]
     painted = interpreted = 0
@@ -123,8 +123,8 @@ def samples(
     return found, painted, sum(robot.machine.runner.counts.interpreted for robot in robots) - interpreted
 
 
-def test_compiled_code_sees_and_probes_as_python_does_and_leaves_it_out(clustering_image: Path) -> None:
-    """Lines of cameras, ends of quanta and looks at the CPU: the same numbers, Python only where a device says so."""
+def test_native_code_renders_and_probes_as_python_does(clustering_image: Path) -> None:
+    """Camera lines, ends of quanta and CPU probes are equal. Python runs only where a device needs it."""
     native, painted, interpreted = samples(clustering_image, True)
     plain, seen, _ = samples(clustering_image, False)
     assert native == plain
@@ -135,8 +135,8 @@ def test_compiled_code_sees_and_probes_as_python_does_and_leaves_it_out(clusteri
     assert interpreted < 40
 
 
-def test_it_cannot_show_which_thread_runs_a_robot(clustering_image: Path) -> None:
-    """More threads than cores, too."""
+def test_the_threads_that_run_robots_do_not_show(clustering_image: Path) -> None:
+    """Also with more threads than cores."""
     alone, *_ = samples(clustering_image, True, 2.0, 12)
     for threads in (2, 5):
         found, painted, _ = samples(clustering_image, True, 2.0, 12, threads)
@@ -144,27 +144,27 @@ def test_it_cannot_show_which_thread_runs_a_robot(clustering_image: Path) -> Non
         assert painted == 0
 
 
-def test_threads_end_with_their_swarm(clustering_image: Path) -> None:
+def test_threads_end_with_their_scheduler(clustering_image: Path) -> None:
     before = set(enumerate_threads())
     scene = load_scene("clustering").with_values(robots__count=3)
     robots = [FirmwareController(scene, 1, i, clustering_image, 8) for i in range(3)]
     lockstep = LockStep(World(scene, 1), robots, threads=3)
     lockstep.advance(50)
-    helpers = set(enumerate_threads()) - before
-    assert len(helpers) == 2
+    workers = set(enumerate_threads()) - before
+    assert len(workers) == 2
     for robot in robots:
         robot.close()
     del lockstep, robots, robot
     gc.collect()
-    for helper in helpers:
-        helper.join(10)
-        assert not helper.is_alive()
+    for worker in workers:
+        worker.join(10)
+        assert not worker.is_alive()
 
 
 @pytest.mark.skipif(shutil.which("gcc") is None, reason="no sanitizers here (Debian package gcc)")
 @pytest.mark.parametrize("sanitizer", ["thread", "address,undefined"])
 def test_rounds_have_no_race(sanitizer: str, tmp_path: Path) -> None:
-    """Threads that come late, fall asleep, and are dismissed."""
+    """Workers that come late, fall asleep, and are stopped."""
     source, program = Path(arena.__path__[0]) / "lockstep" / "lockstep.c", tmp_path / "race"
     command = ["gcc", "-g", "-O1", "-std=c11", "-Wall", "-Wextra", "-Werror", f"-fsanitize={sanitizer}", "-include"]
     command += [str(source), str(Path(__file__).with_name("race.c")), "-o", str(program), "-lpthread"]
@@ -180,15 +180,15 @@ LOOKING = f"""{BEGIN}
 
 
 def write(robot: FirmwareController, register: int, value: int) -> None:
-    """Give the camera's register another value, as over I2C."""
+    """Set a register of the camera, as over I2C."""
     machine = robot.machine
     machine.board.camera.start(False, machine.cycle)
     machine.board.camera.write(register, machine.cycle)
     machine.board.camera.write(value, machine.cycle)
 
 
-def test_there_is_noise_for_the_widest_line_a_camera_sends(assembled: Callable[[str], Path]) -> None:
-    """A window of 1024 columns: noise of a line may begin at each of the values drawn, and lasts to the line's end."""
+def test_the_noise_is_long_enough_for_the_widest_line(assembled: Callable[[str], Path]) -> None:
+    """A window of 1024 columns: a line can begin at any noise value, and the values last to its end."""
     scene = load_scene("clustering").with_values(robots__count=1, camera__sensor="PO3030K")
     robot = FirmwareController(scene, 5, 0, assembled(LOOKING), 0)
     LockStep(World(scene, 5), [robot]).advance(200)
@@ -200,10 +200,10 @@ def test_there_is_noise_for_the_widest_line_a_camera_sends(assembled: Callable[[
 
 
 @pytest.mark.parametrize("off_s", [0.0, 0.1, 60.0], ids=["never on", "no more", "on"])
-def test_the_camera_of_a_robot_without_power_sees_the_world_as_it_is(
+def test_the_camera_of_a_robot_without_power_shows_the_current_world(
     off_s: float, assembled: Callable[[str], Path]
 ) -> None:
-    """For who looks from outside, like that of a robot which runs; its own time stands still."""
+    """Read from outside, like the camera of a running robot, though its own time does not advance."""
     scene = load_scene("clustering").with_values(
         robots__count=1, objects__count=1, robots__wheel_noise=0.0, start__off=[[0, off_s]]
     )
@@ -221,8 +221,8 @@ def test_the_camera_of_a_robot_without_power_sees_the_world_as_it_is(
     assert reds[1] < 0.001 < 0.02 < min(reds[0], reds[2])
 
 
-def test_the_strip_is_the_last_line_of_a_window_that_is_left_in_its_middle(assembled: Callable[[str], Path]) -> None:
-    """Rows that are recorded are read in two frames, and up to one of them in the third; none is in the new window."""
+def test_the_strip_is_the_last_line_before_the_window_changes(assembled: Callable[[str], Path]) -> None:
+    """The recorded rows are read in two frames, some of them in the third; none is in the new window."""
     image = assembled(LOOKING)
     scene = load_scene("clustering").with_values(robots__count=1, camera__sensor="PO3030K")
     strips = []

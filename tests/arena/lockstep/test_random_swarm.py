@@ -1,4 +1,4 @@
-"""A sample of tests/fuzz/swarm/fuzz_swarm.py: a swarm of random robots is the same however it is run."""
+"""A sample of tests/fuzz/swarm/fuzz_swarm.py: random swarms are equal in all modes of lock-step."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from tests.fuzz.swarm import fuzz_swarm
 from tests.fuzz.swarm.fuzz_swarm import EXPECTED, Trial, check
 
 
-def test_swarms_of_random_robots_are_the_same_in_every_way(tmp_path: Path) -> None:
-    """Quantum after quantum, by Python, in compiled code; three trials show nearly all that the campaign is to show."""
+def test_random_swarms_are_equal_in_all_modes(tmp_path: Path) -> None:
+    """Quantum after quantum, in Python, and in native code. Three trials reach nearly all counters of the campaign."""
     tally = Counter[str]()
     for seed in (5, 104, 105):
         assert check(Trial(seed, tmp_path), tally) is None
@@ -23,8 +23,8 @@ def test_swarms_of_random_robots_are_the_same_in_every_way(tmp_path: Path) -> No
     assert set(missing) <= {"robots away", "turns of other threads", "robots that measure light"}
 
 
-def test_a_difference_is_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Registers, bodies and records are compared: one robot that is pushed in one of the ways is enough."""
+def test_the_campaign_detects_a_difference(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Registers, bodies and records are compared. Pushing one robot in one of the modes is a difference."""
     trial, run = Trial(104, tmp_path), Trial.run
 
     def pushed(self: Trial, way: str, tally: Counter[str]) -> list[list[object]]:

@@ -1,4 +1,4 @@
-"""Bluetooth between robots: what one writes another reads, at times that depend on nothing but the trial."""
+"""Bluetooth between robots: bytes arrive at the partner at times that depend on the trial only."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ period_ms = 50
 
 
 def played(folder: Path, image: Path, *words: str, text: str = SCENE) -> Trial:
-    """The record of half a second in which three robots repeat what they are told."""
+    """Return the record of half a second in which three robots echo their input."""
     scene = folder / "pair.toml"
     scene.write_text(text)
     command = ["run", str(scene), "--brain", str(image), "--trials", "1", "--minutes", "0.0084", "--out"]
@@ -39,8 +39,8 @@ def played(folder: Path, image: Path, *words: str, text: str = SCENE) -> Trial:
     return read_trial(folder / "out" / "trial-0001.parquet")
 
 
-def test_words_pass_from_robot_to_robot(assembled: Callable[[str], Path], tmp_path: Path) -> None:
-    """Robot 2 repeats what it is told at 0.2 s; its partner hears it a period later, and so on along the links."""
+def test_bytes_pass_from_robot_to_robot(assembled: Callable[[str], Path], tmp_path: Path) -> None:
+    """Robot 2 echoes its input at 0.2 s; its partner receives it one period later, and so on along the links."""
     trial = played(tmp_path, assembled(ECHO))
     messages = [one for row in trial.columns["messages"] for one in row]
     said = [(one["robot"], one["to"], round(1000 * one["cycle"] / FCY), one["text"]) for one in messages]
@@ -62,7 +62,7 @@ def test_the_record_is_the_same_for_two_threads(assembled: Callable[[str], Path]
 
 
 def test_without_links_there_is_no_column_of_messages(assembled: Callable[[str], Path], tmp_path: Path) -> None:
-    """Records of other scenes are what they were."""
+    """A scene without links has a record without the column."""
     trial = played(tmp_path, assembled(ECHO), text=SCENE[: SCENE.index("[bluetooth]")])
     assert "messages" not in trial.columns
     assert sample_data(trial)["messages"] == [[] for _ in trial.times]
@@ -79,13 +79,13 @@ def test_without_links_there_is_no_column_of_messages(assembled: Callable[[str],
         ([0, 1], "expected a list of points"),
     ],
 )
-def test_links_that_cannot_be_are_refused(links: list[object], words: str) -> None:
-    """With the numbers there are."""
+def test_invalid_links_are_refused(links: list[object], words: str) -> None:
+    """The message names the valid robot numbers."""
     with pytest.raises(SceneError, match=words):
         load_scene("clustering").with_values(bluetooth__links=links)
 
 
-def test_a_supervisor_may_call_its_numbers_what_it_likes() -> None:
-    """Names of other columns too: its numbers stay numbers."""
+def test_columns_of_supervisor_numbers_are_numbers_for_any_name() -> None:
+    """Also for the names of other columns."""
     for name in ("log", "messages", "lights", "seen", "strip"):
         assert kind_of(f"n_{name}") == kind_of("t")

@@ -1,4 +1,4 @@
-"""Robots with firmware in the world (docs/experiment.md)."""
+"""Firmware controllers in the world (docs/experiment.md)."""
 
 import math
 from functools import partial
@@ -23,7 +23,7 @@ from emu.boards.epuck.board import Epuck
 from tests.arena.reference_camera import ReferenceCamera
 
 AT_ONCE = 8
-"""Selector bit with which the project's firmware does not wait for the remote control."""
+"""Selector bit that starts the project's firmware without the remote control."""
 
 
 @pytest.fixture
@@ -33,15 +33,15 @@ def alone() -> Scene:
 
 
 @pytest.mark.parametrize(("controller", "wanted"), [("A", (64, 129, 129, 64)), ("B", (70, 127, 126, 64))])
-def test_a_robot_turns_as_its_controller_says_for_what_its_camera_sees(
+def test_wheel_speeds_are_those_of_the_table_for_what_the_camera_shows(
     clustering_image: Path, alone: Scene, controller: str, wanted: tuple[int, ...]
 ) -> None:
-    """Issue "Must show" 1: nothing ahead, then an object that is put there; wheel speeds in mm/s (epuck.md §8)."""
+    """Nothing ahead, then an object; wheel speeds in mm/s (epuck.md §8)."""
     scene = alone.with_values(objects__count=1, robots__thrust_n="inf")
     for place, speeds in (((20.0, 20.0), wanted[:2]), ((240.0, 150.0), wanted[2:])):
         firmware = FirmwareController(scene, 1, 0, clustering_image, SELECTOR[controller] | AT_ONCE)
         world = World.of(scene, 1, [(200, 150, 0.0)], [place])
-        poses = world.poses  # the world stands still: the same picture all the time
+        poses = world.poses  # the poses are constant, so the picture is too
         wheels = [firmware.control_step(tick, poses) for tick in range(400)]
         mean = np.mean(wheels[-200:], axis=0)
         assert mean * 10 / 0.128 * 0.129 == pytest.approx(speeds, rel=0.03)
@@ -53,7 +53,7 @@ def test_a_robot_turns_as_its_controller_says_for_what_its_camera_sees(
 
 
 @pytest.mark.parametrize("vignetting", [0.0, 0.3])
-def test_pixels_are_the_colours_of_what_is_seen_with_noise(
+def test_pixels_are_the_colours_of_their_classes_with_noise(
     clustering_image: Path, alone: Scene, vignetting: float
 ) -> None:
     """docs/experiment.md §2: normal noise of sd 3 in each channel, in rows of one class and of several."""
@@ -71,9 +71,9 @@ def test_pixels_are_the_colours_of_what_is_seen_with_noise(
     assert np.std(left_over, axis=(0, 1)) == pytest.approx(3.0, abs=0.3)
 
 
-def test_the_scripted_sensor_has_the_firmwares_first_look_and_latency(clustering_image: Path, alone: Scene) -> None:
-    """docs/experiment.md §2: both were measured on the firmware, the look to a fifth of a millisecond; the latency
-    changes with the kernel, to a quarter."""
+def test_the_scripted_sensor_has_first_frame_and_latency_of_the_firmware(clustering_image: Path, alone: Scene) -> None:
+    """docs/experiment.md §2: both are measured on the firmware: the first frame within 0.2 ms, the latency, which
+    depends on the kernel, within 0.25 ms."""
     firmware = FirmwareController(alone, 1, 0, clustering_image, SELECTOR["A"] | AT_ONCE)
     world = World(alone, 1)
     rows: dict[int, int] = {}
@@ -92,7 +92,7 @@ def test_the_scripted_sensor_has_the_firmwares_first_look_and_latency(clustering
         assert tick < 1000
     middle = (WINDOW_ROWS[0] + WINDOW_ROWS[-1]) // 2
     assert rows[middle] == pytest.approx(FIRST_FRAME_TCY, abs=FCY // 5_000)
-    seen = firmware.machine.cycle  # within the quantum in which it happened
+    seen = firmware.machine.cycle  # within the quantum of the change
     margin = FCY // 4_000
     assert seen - alone.clock.quantum_tcy - margin <= FIRST_FRAME_TCY + LATENCY_TCY <= seen + margin
 
@@ -116,8 +116,8 @@ def test_the_remote_controls_ok_starts_all_robots_together(clustering_image: Pat
     assert min(sum(speeds) for speeds in emulated + scripted) > 10
 
 
-def test_twins_start_alike(clustering_image: Path) -> None:
-    """Issue "Must show" 2: scripted and emulated robots of one seed within 5 mm 2 s after OK and 30 mm after 5 s."""
+def test_scripted_and_emulated_robots_start_on_equal_paths(clustering_image: Path) -> None:
+    """Robots of one seed are within 5 mm 2 s after OK, and within 30 mm after 5 s."""
     scene = load_scene("clustering")
     paths = []
     for scripted in (False, True):
@@ -136,8 +136,8 @@ def test_twins_start_alike(clustering_image: Path) -> None:
     assert np.abs(paths[0][:, :, -1] - paths[0][:, :, 0]).max() > 5
 
 
-def test_steps_become_the_distance_they_are_worth(clustering_image: Path, alone: Scene) -> None:
-    """epuck.md §3: 0.128 mm per step, summed over a drive in a circle, at a 1 ms lock-step."""
+def test_motor_steps_give_the_distance_travelled(clustering_image: Path, alone: Scene) -> None:
+    """epuck.md §3: 0.128 mm per step, summed over a circle, with quanta of 1 ms."""
     firmware = FirmwareController(alone, 1, 0, clustering_image, AT_ONCE)
     world = World.of(alone, 1, [(200, 150, 0.0)], [])
     path = 0.0
@@ -149,15 +149,15 @@ def test_steps_become_the_distance_they_are_worth(clustering_image: Path, alone:
     assert path == pytest.approx((motors.left.steps + motors.right.steps) / 2 * 0.0128, rel=0.01)
 
 
-def test_a_robot_whose_firmware_traps_stops_and_the_trial_goes_on(
+def test_a_trial_continues_after_the_firmware_of_a_robot_trapped(
     talking_image: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Issue "Must show" 7: exit status 1, who, when and why; lines and LEDs until then are kept."""
+    """Exit status 1; the fault has robot, time and reason. Lines and LED changes before it are in the record."""
     out = tmp_path / "out"
     status = main(["run", "clustering", "--brain", str(talking_image), "--robots", "2", "--trials", "1", "--minutes",
                    "0.05", "--jobs", "1", "--out", str(out)])  # fmt: skip
     assert status == 1
-    assert (out / "firmware.elf").read_bytes() == talking_image.read_bytes()  # what ran is kept
+    assert (out / "firmware.elf").read_bytes() == talking_image.read_bytes()  # the folder keeps the firmware
     trial = read_trial(out / "trial-0001.parquet")
     assert trial.times[-1] == pytest.approx(3.0, abs=0.01)
     assert [fault[0] for fault in trial.about["faults"]] == [0, 1]
@@ -184,7 +184,7 @@ def test_a_robot_whose_firmware_traps_stops_and_the_trial_goes_on(
 def test_emulated_trials_are_the_same_for_one_and_two_workers(
     image: str, seconds: float, tmp_path: Path, request: pytest.FixtureRequest
 ) -> None:
-    """Issue "Must show" 5, with firmware: files of one worker, of two, and of a second run."""
+    """Files of one worker, of two, and of a second run are equal."""
     for name, jobs in (("1", 1), ("2", 2), ("again", 1)):
         main(["run", "clustering", "--brain", str(request.getfixturevalue(image)), "--robots", "2", "--trials", "2",
               "--minutes", str(seconds / 60), "--jobs", str(jobs), "--out", str(tmp_path / name)])  # fmt: skip
@@ -193,8 +193,8 @@ def test_emulated_trials_are_the_same_for_one_and_two_workers(
     assert files[0] == files[1] == files[2]
 
 
-def test_the_scenes_light_reaches_the_camera(talking_image: Path, alone: Scene) -> None:
-    """Half the light, half the values, before the sensor's automatic exposure has followed (epuck.md §7.6)."""
+def test_the_light_of_the_scene_scales_the_picture(talking_image: Path, alone: Scene) -> None:
+    """Half the light gives half the values, before the automatic exposure has adapted (epuck.md §7.6)."""
     pictures = []
     for brightness in (1.0, 0.5):
         firmware = FirmwareController(alone.with_values(light__brightness=brightness), 1, 0, talking_image)
@@ -226,10 +226,10 @@ def test_reaction_finds_the_latency_and_no_missed_frame(clustering_image: Path) 
     assert found["min_us"] - 6 <= min(waits) <= max(waits) <= found["max_us"] + 6
 
 
-def test_firmware_without_the_word_or_without_wheels_is_refused(
+def test_reaction_refuses_firmware_without_the_word_or_without_wheels(
     talking_image: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Exit status 2: which word, or that the firmware stopped."""
+    """Exit status 2; the message names the word, or reports that the firmware stopped."""
     assert main(["reaction", "--brain", str(talking_image)]) == 2
     assert "--word names the word" in capsys.readouterr().err
     assert main(["reaction", "--brain", str(talking_image), "--word", "nothing"]) == 2
@@ -239,8 +239,8 @@ def test_firmware_without_the_word_or_without_wheels_is_refused(
 
 
 @pytest.mark.parametrize("end", [1 << 10, 294_912, 3 << 30])
-def test_moments_of_probes_are_those_the_generator_would_draw(clustering_image: Path, alone: Scene, end: int) -> None:
-    """Also where a third of what is drawn is refused."""
+def test_probe_times_equal_the_draws_of_the_generator(clustering_image: Path, alone: Scene, end: int) -> None:
+    """Also for a bound for which the method rejects a third of the draws."""
     firmware = FirmwareController(alone, 1, 0, clustering_image)
     twin = np.random.default_rng()
     twin.bit_generator.state = firmware._rng.bit_generator.state

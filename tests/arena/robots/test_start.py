@@ -1,4 +1,4 @@
-"""How robots come to life, and how one is noticed that does nothing more: events in record and exit status."""
+"""Power-on and inputs of robots, and reports of robots that are stuck or silent."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ Assembled = Callable[[str], Path]
 
 
 def run(image: Path, out: Path, *words: object, seconds: float = 1.5) -> tuple[int, Trial]:
-    """Exit status and record of one trial of two robots."""
+    """Return exit status and record of one trial of two robots."""
     command = ["run", "clustering", "--brain", str(image), "--robots", "2", "--objects", "0", "--trials", "1",
                "--minutes", str(seconds / 60), "--out", str(out), *map(str, words)]  # fmt: skip
     status = main(command)
@@ -37,10 +37,10 @@ def run(image: Path, out: Path, *words: object, seconds: float = 1.5) -> tuple[i
         ("__MathError", "mov #1, w2\n mov #0, w3\n repeat #17\n div.u w2, w3"),
     ],
 )
-def test_firmware_that_sits_in_its_own_trap_handler_is_noticed(
+def test_firmware_that_stays_in_its_own_trap_handler_is_reported(
     assembled: Assembled, handler: str, cause: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The handler is the firmware's own, so nothing stops the emulator: it turns round for ever."""
+    """The handler is part of the firmware and loops for ever, so the emulator does not stop."""
     image = assembled(f"{BEGIN}\n {cause}\n1: bra 1b\n .global {handler}\n{handler}: bra {handler}\n")
     status, trial = run(image, tmp_path)
     assert status == 1
@@ -52,8 +52,8 @@ def test_firmware_that_sits_in_its_own_trap_handler_is_noticed(
     assert capsys.readouterr().err.count("sits in the handler") == 2
 
 
-def test_a_handler_that_comes_back_is_none(assembled: Assembled, tmp_path: Path) -> None:
-    """It mends what was wrong 2,000 times a second and lets the firmware go on."""
+def test_a_trap_handler_that_returns_is_not_reported(assembled: Assembled, tmp_path: Path) -> None:
+    """It fixes the cause 2,000 times a second, and the firmware continues."""
     image = assembled(f"""{BEGIN}
 1:      mov     #1, w2
         mov     #0, w3
@@ -73,8 +73,8 @@ __MathError: bclr INTCON1, #4
     assert (status, trial.about["faults"]) == (0, [])
 
 
-def test_a_kernel_that_stopped_itself_is_noticed(tmp_path: Path) -> None:
-    """A failed assertion ends in hal_stop(), asleep with every interrupt off, whether or not something is still due."""
+def test_a_kernel_that_stopped_itself_is_reported(tmp_path: Path) -> None:
+    """A failed assertion ends in hal_stop(): asleep with all interrupts disabled, even if an event is pending."""
     source = tmp_path / "apps" / "wrong" / "main.c"
     source.parent.mkdir(parents=True)
     source.write_text("#include <openswarm.h>\nint main(void) { Sys_Init_Kernel(); SYS_ASSERT(0); return 0; }\n")
@@ -90,8 +90,8 @@ def test_a_kernel_that_stopped_itself_is_noticed(tmp_path: Path) -> None:
     assert any("main.c:2" in line["text"] for row in trial.columns["log"] for line in row)
 
 
-def test_a_silent_robot_is_noticed_after_the_stated_time(assembled: Assembled, tmp_path: Path) -> None:
-    """Firmware that never starts looks like this: neither wheels, nor LEDs, nor a byte."""
+def test_a_silent_robot_is_reported_after_the_time_of_the_scene(assembled: Assembled, tmp_path: Path) -> None:
+    """Firmware that never starts moves no wheels, changes no LEDs and sends no byte."""
     image = assembled(f"{BEGIN}\n1: bra 1b\n")
     quiet = ["--set", "start.silent_s=1"]
     status, trial = run(image, tmp_path / "a", *quiet)
@@ -109,7 +109,7 @@ def test_a_silent_robot_is_noticed_after_the_stated_time(assembled: Assembled, t
 
 
 def test_the_remote_control_repeats_its_frame_while_the_key_is_held(talking_image: Path) -> None:
-    """Every 113.8 ms (epuck.md §6): a robot that misses the first has others."""
+    """Every 113.8 ms (epuck.md §6), so a robot that misses the first frame receives later ones."""
     scene = load_scene("clustering").with_values(robots__count=1, objects__count=0, start__remote_held_s=0.5)
     controller = FirmwareController(scene, 1, 0, talking_image)
     edges: list[int] = []
@@ -124,8 +124,8 @@ def test_the_remote_control_repeats_its_frame_while_the_key_is_held(talking_imag
     assert gaps == pytest.approx([0.1138] * 4, abs=1e-5)
 
 
-def test_a_robot_switched_on_while_the_key_is_held_gets_the_frames_that_are_left(talking_image: Path) -> None:
-    """No half frame, and none of the past."""
+def test_a_robot_powered_on_while_the_key_is_held_receives_the_remaining_frames(talking_image: Path) -> None:
+    """No partial frame, and no frame from before power-on."""
     values = {"robots__count": 1, "objects__count": 0, "start__remote_at_s": 0.0, "start__spread_tcy": 4 * 1_600_000}
     scene = load_scene("clustering").with_values(**values)
     for seed in range(1, 6):
@@ -143,7 +143,7 @@ def test_a_robot_switched_on_while_the_key_is_held_gets_the_frames_that_are_left
 
 @pytest.mark.parametrize("position", [0, 7, 11, 15])
 def test_the_switch_has_sixteen_positions(assembled: Assembled, position: int, tmp_path: Path) -> None:
-    """The firmware says which it reads on RG6 to RG9 (epuck.md §2)."""
+    """The firmware reports the position it reads on RG6 to RG9 (epuck.md §2)."""
     image = assembled(f"""{BEGIN}
         mov     PORTG, w0
         lsr     w0, #6, w0
@@ -160,7 +160,7 @@ def test_the_switch_has_sixteen_positions(assembled: Assembled, position: int, t
     assert said == [chr(ord("A") + position)] * 2
 
 
-def test_robots_are_told_things_by_uart_at_times_of_the_trial(assembled: Assembled, tmp_path: Path) -> None:
+def test_a_stimulus_arrives_at_times_of_the_trial(assembled: Assembled, tmp_path: Path) -> None:
     """The stimulus reaches both robots at the same time of the trial, though their power-on times differ. The record is
     the same to the byte for one and two threads."""
     script = '0.5s uart1 "go 7\\n"'
@@ -184,10 +184,10 @@ def test_robots_are_told_things_by_uart_at_times_of_the_trial(assembled: Assembl
         ("start.silent_s=0", "start.silent_s is 0.0; expected 0.1 to inf"),
     ],
 )
-def test_wrong_start_conditions_are_named(
+def test_invalid_start_values_are_refused(
     setting: str, message: str, talking_image: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Status 2, no trial is begun."""
+    """Exit status 2 before a trial starts."""
     assert (
         main(
             [

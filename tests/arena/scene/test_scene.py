@@ -1,4 +1,4 @@
-"""Scenes with several kinds of things: read with line numbers, built, seen and felt."""
+"""Scenes with several kinds of bodies: loading, errors with line numbers, placement, cameras and sensors."""
 
 from __future__ import annotations
 
@@ -103,14 +103,14 @@ counts = 2000
 
 @pytest.fixture
 def yard(tmp_path: Path) -> Scene:
-    """The scene above."""
+    """The scene FULL, loaded from a file."""
     path = tmp_path / "yard.toml"
     path.write_text(FULL)
     return load_scene(str(path))
 
 
 def test_a_scene_of_several_kinds_is_read(yard: Scene) -> None:
-    """Groups in order, each with its own; a record's metadata gives the same scene back."""
+    """Groups keep their order and values. The metadata of a record restores the same scene."""
     assert (yard.robots.count, yard.objects.count) == (4, 6)
     assert (yard.arena.width_cm, yard.arena.height_cm) == (300, 240)
     assert [yard.id_of(robot) for robot in range(4)] == [10, 11, 12, 0]
@@ -120,8 +120,8 @@ def test_a_scene_of_several_kinds_is_read(yard: Scene) -> None:
     assert repr(scene_of(plan.key()["scene"])) == repr(yard)  # nan is not equal to itself
 
 
-def test_a_scene_that_writes_its_robots_down_has_only_the_objects_it_names(tmp_path: Path) -> None:
-    """And those that come along have what their files say."""
+def test_a_scene_with_robot_groups_has_only_the_objects_it_lists(tmp_path: Path) -> None:
+    """The included scenes have the objects of their files."""
     path = tmp_path / "few.toml"
     path.write_text('name = "few"\n[[robots]]\ncount = 2\n')
     assert load_scene(str(path)).objects.count == 0
@@ -130,8 +130,8 @@ def test_a_scene_that_writes_its_robots_down_has_only_the_objects_it_names(tmp_p
     assert (load_scene(str(path)).robots.count, load_scene(str(path)).objects.count) == (5, 20)
 
 
-def test_everything_stands_where_it_may(yard: Scene) -> None:
-    """Inside the room, touching nothing, within what the groups say; the same for the same seed."""
+def test_bodies_are_placed_without_contacts_where_the_groups_say(yard: Scene) -> None:
+    """The same seed gives the same positions."""
     for seed in range(20):
         poses = World(yard, seed).poses
         assert poses.robots == World(yard, seed).poses.robots
@@ -149,8 +149,8 @@ def test_everything_stands_where_it_may(yard: Scene) -> None:
 
 
 @pytest.mark.parametrize("pitch", [0.0, -4.0])
-def test_two_ways_to_see_a_furnished_scene_agree(yard: Scene, pitch: float) -> None:
-    """Whole rows at once and column by column, from anywhere: obstacles, heights, patches, a room with a corner."""
+def test_renderer_and_reference_camera_agree_in_a_furnished_scene(yard: Scene, pitch: float) -> None:
+    """From random viewpoints, with obstacles, heights, patches and a room with an inner corner."""
     scene = yard.with_values(camera__pitch_deg=pitch)
     rng = np.random.default_rng(8)
     columns = np.arange(0, 640, 13)
@@ -170,8 +170,8 @@ def test_two_ways_to_see_a_furnished_scene_agree(yard: Scene, pitch: float) -> N
     assert kinds >= {OBJECT, WALL, FLOOR} | set(range(6, len(appearance_of(scene).colours)))
 
 
-def test_colours_and_heights_are_seen(yard: Scene) -> None:
-    """A low block hides the floor behind it but not the wall; a patch is seen where it lies."""
+def test_the_camera_shows_colours_and_heights(yard: Scene) -> None:
+    """A low block hides the floor behind it but not the wall; a patch is visible at its position."""
     colours = [tuple(one) for one in colours_of(yard).tolist()]
     yellow, blue = colours.index(NAMED["yellow"]), colours.index(NAMED["blue"])
     camera = ReferenceCamera(yard, Poses([(100.0, 35.0, 0.0)] * 4, [(300.0, 300.0)] * 6), 0)
@@ -180,11 +180,11 @@ def test_colours_and_heights_are_seen(yard: Scene) -> None:
     assert appearance.floor_at(240, 60) == colours.index((0x20, 0x40, 0x60))
     assert appearance.floor_at(20, 20) == colours.index(NAMED["white"])
     assert appearance.floor_at(100, 100) == FLOOR
-    assert appearance.sensor_classes[blue] == 0  # the clustering sensor knows red and green only
+    assert appearance.sensor_classes[blue] == 0  # the line-of-sight sensor detects red and green only
 
 
-def test_what_stands_fast_stops_a_robot(yard: Scene) -> None:
-    """Block, pillar and the room's inner corner, each driven against."""
+def test_obstacles_stop_a_robot(yard: Scene) -> None:
+    """The robot drives against a block, a pillar and the inner corner of the room."""
     for start, end in (((110, 35, 0.0), (150, 35)), ((60, 110, math.pi / 2), (60, 142)), ((120, 180, 0.0), (180, 180))):
         world = World.of(yard, 1, [start, *[(20.0 + 20 * n, 20.0, 0.0) for n in range(3)]],
                          [(250.0, 10 + 15 * n) for n in range(6)])  # fmt: skip
@@ -194,11 +194,11 @@ def test_what_stands_fast_stops_a_robot(yard: Scene) -> None:
         assert math.hypot(x - end[0], y - end[1]) == pytest.approx(dimensions.ROBOT_RADIUS, abs=0.1)
 
 
-def test_infrared_feels_what_stands_fast_and_all_lamps(yard: Scene) -> None:
-    """Distance and reflection of a block, a black pillar and a wall that is no side of the outer rectangle."""
+def test_infrared_sensors_detect_obstacles_and_all_lamps(yard: Scene) -> None:
+    """Distance and reflection of a block, a black pillar and a wall of the polygon."""
     far = [(300.0, 300.0)] * 6
     for pose, gap, share in (
-        ((150 - 3.7 - 4, 35.0, math.radians(18)), 40, 1.0),  # sensor 0, 18 degrees to the right, looks along x
+        ((150 - 3.7 - 4, 35.0, math.radians(18)), 40, 1.0),  # sensor 0, 18 degrees to the right, faces along x
         ((60 - 8 - 3.7 - 5, 150.0, math.radians(18)), 50, 0.2),
         ((180 - 3.7 - 6, 200.0, math.radians(18)), 60, 1.0),
     ):
@@ -238,10 +238,10 @@ def test_infrared_feels_what_stands_fast_and_all_lamps(yard: Scene) -> None:
         (("[300, 0]", "[-300, 0]"), 5, "arena.polygon"),
     ],
 )
-def test_mistakes_are_named_with_their_line(
+def test_errors_name_file_line_and_key(
     change: tuple[str, str], line: int, words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """File, line, key, expectation; status 2."""
+    """The message has file, line, key and expected values; exit status 2."""
     assert change[0] in FULL
     path = tmp_path / "my.toml"
     path.write_text(FULL.replace(*change, 1))
@@ -263,7 +263,7 @@ def test_mistakes_are_named_with_their_line(
     ],
 )
 def test_scenes_without_room_are_refused(change: tuple[str, str], words: str, tmp_path: Path) -> None:
-    """What stands where, and what is in the way."""
+    """The message names the body, its position and what obstructs it."""
     path = tmp_path / "my.toml"
     path.write_text(FULL.replace(*change, 1))
     with pytest.raises(SceneError, match="no room") as caught:
@@ -272,7 +272,7 @@ def test_scenes_without_room_are_refused(change: tuple[str, str], words: str, tm
 
 
 def test_five_hundred_mutated_scenes_are_read_or_refused_in_one_line(tmp_path: Path) -> None:
-    """Words, lines and letters exchanged, dropped and doubled: never anything but a SceneError that names the file."""
+    """Words, lines and letters are exchanged, dropped and doubled. The only exception is a SceneError with the file."""
     path = tmp_path / "my.toml"
     pieces = [
         "-1",
@@ -322,7 +322,7 @@ def test_five_hundred_mutated_scenes_are_read_or_refused_in_one_line(tmp_path: P
 
 
 def _refusal(path: Path) -> str:
-    """Why a scene is refused; empty if a world could be built."""
+    """Return why a scene is refused, or an empty text if its world can be built."""
     try:
         World(load_scene(str(path)), 1)
     except SceneError as error:
@@ -381,17 +381,17 @@ SPEAKER = f"""{BEGIN}
 {REPEATING}"""
 
 
-# -- robots that differ -----------------------------------------------------------------------------------------------
+# -- deviations of robots ---------------------------------------------------------------------------------------------
 
 
-def test_robots_without_spread_are_all_alike() -> None:
-    """To the bit."""
+def test_robots_without_spread_are_equal() -> None:
+    """Their traits are equal to the bit."""
     scene = load_scene("clustering")
     assert {traits_of(scene, seed, robot) for seed in range(9) for robot in range(5)} == {(0.0, 0.0, (1.0, 1.0))}
 
 
-def test_robots_differ_by_what_the_scene_says() -> None:
-    """Standard deviations of 2,000 robots; another trial has other robots, the same seed the same."""
+def test_robots_differ_by_the_standard_deviations_of_the_scene() -> None:
+    """Standard deviations of 2,000 robots. The same seed gives the same robots, another seed others."""
     scene = load_scene("clustering").with_values(
         robots__camera_yaw_sd_deg=2.0, robots__camera_pitch_sd_deg=1.5, robots__wheel_bias_sd=0.02
     )
@@ -404,8 +404,8 @@ def test_robots_differ_by_what_the_scene_says() -> None:
     assert traits_of(scene, 3, 1) == traits_of(scene, 3, 1)
 
 
-def test_a_turned_camera_sees_to_the_side_and_a_biased_wheel_turns_the_robot() -> None:
-    """What was drawn is what happens."""
+def test_camera_yaw_and_wheel_bias_take_effect() -> None:
+    """The picture is shifted by the yaw, and the robot turns by the bias."""
     scene = load_scene("clustering").with_values(robots__count=1, objects__count=1, robots__wheel_noise=0.0)
     turned = scene.with_values(robots__camera_yaw_sd_deg=5.0, robots__camera_pitch_sd_deg=2.0)
     traits = traits_of(turned, 4, 0)
@@ -423,7 +423,7 @@ def test_a_turned_camera_sees_to_the_side_and_a_biased_wheel_turns_the_robot() -
 
 
 def test_a_scripted_trial_runs_in_a_furnished_scene(tmp_path: Path) -> None:
-    """End to end, with page and figures; the record says what was where."""
+    """From `arena run` to page and figures; the record has the poses of all bodies."""
     path = tmp_path / "yard.toml"
     path.write_text(FULL)
     out = tmp_path / "out"

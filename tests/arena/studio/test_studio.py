@@ -197,7 +197,8 @@ def test_older_checkpoints_have_larger_distances() -> None:
         pool.add(checkpoints.Checkpoint(ten * 1000, 10.0 * ten, here))
     assert len(pool) == checkpoints.MAX_CHECKPOINTS
     assert sum(end.fileno() >= 0 for end in ends) == checkpoints.MAX_CHECKPOINTS
-    times = [moment.seconds for moment in (pool.latest_before(tick) for tick in range(0, 60001, 500)) if moment is not None]
+    found = [pool.latest_before(tick) for tick in range(0, 60001, 500)]
+    times = [checkpoint.seconds for checkpoint in found if checkpoint is not None]
     ages = sorted({600.0 - one for one in times})
     assert ages[:3] == [0.0, 10.0, 20.0]
     assert all(far - near <= max(far * 0.6, 10.0) for near, far in pairwise(ages)), ages

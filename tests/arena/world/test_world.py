@@ -86,8 +86,8 @@ def test_a_pushed_object_slides_as_friction_allows(empty: Scene, quantum_ms: flo
     assert slid == pytest.approx(12.8**2 / (2 * dimensions.FLOOR_FRICTION * dimensions.GRAVITY) + half_a_step, abs=0.02)
 
 
-def test_walls_hold_a_pushing_robot(empty: Scene) -> None:
-    """A robot at a wall stays inside, its wheels slip."""
+def test_a_wall_stops_a_robot(empty: Scene) -> None:
+    """The robot stays inside; its wheels slip."""
     world = World.of(empty, 1, [(390, 150, 0.0)], [])
     drive(world, (12.8, 12.8), 3)
     assert world.poses.robots[0][0] == pytest.approx(400 - dimensions.ROBOT_RADIUS, abs=0.05)
@@ -105,10 +105,10 @@ def test_without_slip_limit_the_drive_is_enkis(empty: Scene) -> None:
 
 
 @pytest.mark.parametrize(("quantum_ms", "thrust_n"), [(1.0, 1.0), (10.0, 1.0), (10.0, math.inf)])
-def test_objects_whose_joints_are_out_of_the_solver_are_where_they_were_to_the_bit(
+def test_objects_at_rest_out_of_the_solver_change_no_position(
     quantum_ms: float, thrust_n: float
 ) -> None:
-    """Robots that push crowded objects about; a hand that puts one thing among others now and then."""
+    """Robots push crowded objects, and bodies are moved by hand now and then. Equal to the bit."""
     scene = load_scene("clustering").with_values(
         arena__width_cm=100.0, arena__height_cm=80.0, robots__count=4, robots__thrust_n=thrust_n, objects__count=14,
         clock__quantum_ms=quantum_ms,
@@ -126,7 +126,7 @@ def test_objects_whose_joints_are_out_of_the_solver_are_where_they_were_to_the_b
                 world.move((world.robots if body[0] == "r" else world.objects)[int(body[1])], *to)
         for _ in range(round(0.4 / quick.dt)):
             quick.step(wheels)
-            plain._world.steps = 0  # it never looks for what may rest
+            plain._world.steps = 0  # never a multiple of the rest period: no object rests
             plain.step(wheels)
             assert quick.poses.values.tobytes() == plain.poses.values.tobytes()
             now = [disc.is_resting for disc in quick._discs]
@@ -155,8 +155,8 @@ def test_wheel_noise_stays_within_its_share() -> None:
     assert len({round(speed, 6) for speed in speeds}) <= 31
 
 
-def test_two_copies_live_the_same_life_to_the_bit() -> None:
-    """engines.md §7: seeded, repeatable."""
+def test_two_runs_of_a_trial_are_equal_to_the_bit() -> None:
+    """engines.md §7: a seed determines all random numbers."""
     scene = load_scene("clustering").with_values(clock__quantum_ms=10.0)
     rows = [run_trial(scene, 5, [ScriptedController(scene, 5, i, "A") for i in range(5)], 20).rows for _ in range(2)]
     other = run_trial(scene, 6, [ScriptedController(scene, 6, i, "A") for i in range(5)], 20).rows
@@ -164,7 +164,7 @@ def test_two_copies_live_the_same_life_to_the_bit() -> None:
     assert rows[0].columns["r0_x"] != other.columns["r0_x"]
 
 
-def test_nothing_overlaps_at_the_start_and_everything_is_on_a_mark() -> None:
+def test_bodies_start_on_marks_without_overlap() -> None:
     """epuck.md §8: 165 marks every 25 cm."""
     poses = World(load_scene("clustering"), 1).poses
     places = [pose[:2] for pose in poses.robots] + poses.objects
@@ -184,15 +184,15 @@ def test_nothing_overlaps_at_the_start_and_everything_is_on_a_mark() -> None:
     ],
 )
 def test_impossible_scenes_are_refused_with_the_reason(values: dict[str, object], message: str) -> None:
-    """Bad input: what, where, what was expected."""
+    """The message names the value and the expectation."""
     with pytest.raises(SceneError, match=message):
         World(load_scene("clustering").with_values(**values), 1)
 
 
 @pytest.mark.parametrize("quantum_ms", [1.0, 10.0])
 @pytest.mark.parametrize("thrust_n", [1.0, 0.5])
-def test_a_robot_cannot_push_another_that_stands_still(quantum_ms: float, thrust_n: float) -> None:
-    """epuck.md §3: to slip it takes 0.7 m g = 1.04 N, more than the 1.0 N that drive. Both come to rest."""
+def test_a_robot_cannot_push_another_one_at_rest(quantum_ms: float, thrust_n: float) -> None:
+    """epuck.md §3: slipping takes 0.7 m g = 1.04 N, more than the drive of 1.0 N. Both come to rest."""
     values = {"clock__quantum_ms": quantum_ms, "robots__wheel_noise": 0.0, "robots__thrust_n": thrust_n}
     scene = load_scene("clustering").with_values(robots__count=2, objects__count=0, **values)
     world = World.of(scene, 1, [(100, 150, 0.0), (120, 150, 1.0)], [])
@@ -206,8 +206,8 @@ def test_a_robot_cannot_push_another_that_stands_still(quantum_ms: float, thrust
     assert places[-1] - places[-2] == pytest.approx(0, abs=1e-3)
 
 
-def test_a_stronger_drive_pushes_a_standing_robot() -> None:
-    """ARGoS' 1.5 N are more than what holds it."""
+def test_a_stronger_drive_pushes_a_robot_at_rest() -> None:
+    """The 1.5 N of ARGoS are more than its grip."""
     scene = load_scene("clustering").with_values(robots__wheel_noise=0.0, robots__thrust_n=1.5, robots__count=2,
                                                  objects__count=0)  # fmt: skip
     world = World.of(scene, 1, [(100, 150, 0.0), (120, 150, 1.0)], [])
@@ -216,8 +216,8 @@ def test_a_stronger_drive_pushes_a_standing_robot() -> None:
     assert world.poses.robots[1][0] > 150
 
 
-def test_speeds_are_those_of_the_last_quanta_together() -> None:
-    """Against the plain text of it: steps of ten quanta of 1 ms over their time; asked for in pieces of any length."""
+def test_speeds_are_means_over_the_last_quanta() -> None:
+    """Compared with a reference in Python: steps of ten quanta of 1 ms over their time, added in random pieces."""
     rng = random.Random(7)
     quantum = 14_746
     wheels, counts = Wheels(quantum), deque([(0, 0)], maxlen=11)
@@ -238,8 +238,8 @@ def test_speeds_are_those_of_the_last_quanta_together() -> None:
 
 
 @pytest.mark.parametrize("again", [copy.copy, copy.deepcopy, lambda poses: pickle.loads(pickle.dumps(poses))])
-def test_copied_poses_are_where_their_numbers_are(again) -> None:
-    """Compiled code reads them by address: that of the copy, not of what it was made of."""
+def test_copied_poses_have_the_address_of_the_copy(again) -> None:
+    """Native code reads poses by address, which must be that of the copy, not of the original."""
     poses = World(load_scene("clustering"), 1).poses
     copied = again(poses)
     assert (copied.robots, copied.objects, copied.counts) == (poses.robots, poses.objects, poses.counts)
@@ -247,15 +247,15 @@ def test_copied_poses_are_where_their_numbers_are(again) -> None:
 
 
 @pytest.mark.parametrize(("robots", "objects"), [(3, 0), (0, 3), (3, 3)])
-def test_a_camera_has_room_for_its_scene_alone(robots: int, objects: int) -> None:
-    """Each of both is counted: the light of a robot's LEDs is found by its number."""
+def test_a_camera_refuses_more_bodies_than_its_scene_has(robots: int, objects: int) -> None:
+    """Too many robots, too many objects, or both."""
     renderer = Renderer(load_scene("clustering").with_values(robots__count=2, objects__count=2), 0)
     with pytest.raises(ValueError, match=f"{robots} robots and {objects} objects are more than the scene has"):
         renderer.set_viewpoint(Poses([(9.0 * n, 9.0, 0.0) for n in range(robots)], [(50.0, 50.0)] * objects))
 
 
-def test_quanta_in_a_row_are_quanta_one_by_one() -> None:
-    """Same speeds, same poses, also across the moments at which the wheels' noise is drawn."""
+def test_quanta_in_a_row_equal_single_quanta() -> None:
+    """The same speeds give the same poses, also across the draws of the wheel noise."""
     scene = load_scene("clustering").with_values(robots__count=2, objects__count=5, robots__wheel_noise=0.02)
     rows, one = World(scene, 3), World(scene, 3)
     wheels = [Wheels(scene.clock.quantum_tcy) for _ in range(2)]
