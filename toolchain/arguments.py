@@ -1,4 +1,4 @@
-"""What a word of a command line can be besides text: numbers and definitions, for argparse."""
+"""Types of command line arguments: numbers and definitions."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from toolchain.errors import ToolError
 
 
 def integer(text: str) -> int:
-    """A number in C notation, for argparse."""
+    """Parse a number in C notation; raises the error of argparse for other text."""
     try:
         return int(text, 0)
     except ValueError:
@@ -16,7 +16,7 @@ def integer(text: str) -> int:
 
 
 def definition(text: str) -> tuple[str, int]:
-    """NAME=VALUE of --defsym; raises `ToolError`."""
+    """Parse NAME=VALUE of --defsym; raises `ToolError`."""
     name, equals, value = text.partition("=")
     try:
         return name, int(value, 0) if equals else 1

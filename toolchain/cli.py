@@ -1,6 +1,6 @@
-"""`python -m toolchain COMMAND`: finds the command and turns bad input into messages and exit status 2.
+"""`python -m toolchain COMMAND`: runs a command and reports bad input as messages with exit status 2.
 
-A command is a module with `main(arguments) -> exit status`, imported only when it is asked for.
+A command is a module with `main(arguments) -> exit status`, which is imported when the command runs.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "bounds": ("toolchain.commands.bounds", "worst-case time, stack and interrupt response"),
     "prove": ("toolchain.commands.prove", "prove that machine code does what the IR says"),
     "stack": ("toolchain.commands.stack", "worst-case stack use from the call graph"),
-    "completion": ("toolchain.commands.completion", "print what makes a shell complete these commands"),
+    "completion": ("toolchain.commands.completion", "print a completion script for the shell"),
 }
 
 USAGE = """usage: python -m toolchain COMMAND [options]
@@ -35,8 +35,8 @@ USAGE = """usage: python -m toolchain COMMAND [options]
 {commands}
 
 example: python -m toolchain cc -Os main.c -o firmware.elf
-`python -m toolchain COMMAND --help` explains a command; `--version` tells the version. Installed, the first eight
-are also programs of their own in the manner of gcc and binutils: dspic-cc, dspic-as, dspic-ld, dspic-ar ..."""
+`python -m toolchain COMMAND --help` explains a command; `--version` prints the version. The first eight commands
+are also installed as programs: dspic-cc, dspic-as, dspic-ld, dspic-ar ..."""
 
 
 def _usage() -> str:
@@ -67,9 +67,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 @ignore_unread_output
 def by_name() -> int:
-    """Run the command that the program is called after: `dspic-ar rcs x.a y.o`, as build systems want their tools.
+    """Run the command in the name of the program, such as `dspic-ar rcs x.a y.o`.
 
-    `dspic-ranlib` is `ar s`. `--version` begins like that of the tool it stands for, as configure scripts expect.
+    `dspic-ranlib` is `ar s`. The output of `--version` starts like that of the GNU tool, as configure scripts expect.
     """
     name = Path(sys.argv[0]).stem.removeprefix("dspic-")
     words = sys.argv[1:]

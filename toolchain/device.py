@@ -1,4 +1,4 @@
-"""The device a program is for, as command lines name it: `30F6014A`, `dsPIC30F4013`, in any case."""
+"""Device names of command lines: `30F6014A`, `dsPIC30F4013`, in upper or lower case."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ DEFAULT: Final = DEVICES[0]
 
 
 def device(name: str) -> Chip:
-    """The chip of that name. Raises `ToolError` for one that there are no tables of."""
+    """The chip of a name. Raises `ToolError` if there are no tables for it."""
     try:
         return chip_named(name)
     except ValueError:

@@ -1,7 +1,7 @@
-"""Writes `include/dspic30f6014a.h` and its kin from the chips' register tables: `python -m toolchain.device_header`.
+"""Generator of the device headers, such as `include/dspic30f6014a.h`: `python -m toolchain.device_header`.
 
-Enters: `emu.chips`. Leaves: a C header each that both this compiler and XC16 accept. A test compares the committed
-files with the generator's output.
+It writes one C header per chip from the register tables of `emu.chips`. This compiler and XC16 accept the headers. A
+test compares the committed files with the output.
 """
 
 from __future__ import annotations
@@ -32,14 +32,14 @@ ALTERNATIVES: dict[str, dict[str, str]] = {
     r"U\dTXREG": {"UTXREG8": "UTX8"},
     r"U\dRXREG": {"URXREG8": "URX8"},
 }  # fmt: skip
-"""Registers by name -> bits that XC16's headers call by a second name too: the data sheet's name -> that one."""
+"""Registers (pattern) -> bits with a second name in XC16's headers: name of the data sheet -> second name."""
 C_TYPES = {1: "unsigned char", 2: "unsigned int"}
 
 
 def bit_fields(fields: Mapping[str, tuple[int, int]], only_bits: bool = False) -> Iterator[str]:
-    """Members of one bit-field struct, low bit first; gaps are unnamed fields.
+    """Members of a bit-field struct, low bit first; gaps are unnamed fields.
 
-    With `only_bits` each bit of a wide field is a member of its own (TCKPS -> TCKPS0, TCKPS1), as in XC16's headers.
+    With `only_bits`, each bit of a wide field is a member (TCKPS -> TCKPS0, TCKPS1), as in XC16's headers.
     """
     position = 0
     for name, (lsb, width) in sorted(fields.items(), key=lambda item: item[1]):
@@ -55,7 +55,7 @@ def bit_fields(fields: Mapping[str, tuple[int, int]], only_bits: bool = False) -
 
 
 def second_names(sfr: Sfr) -> dict[str, tuple[int, int]]:
-    """Second names of a register's fields, those it has: name -> (lowest bit, width)."""
+    """Second name of a field of the register -> (lowest bit, width)."""
     for pattern, names in ALTERNATIVES.items():
         if re.fullmatch(pattern, sfr.name):
             return {new: sfr.fields[old] for old, new in names.items() if old in sfr.fields and new not in sfr.fields}
@@ -63,7 +63,7 @@ def second_names(sfr: Sfr) -> dict[str, tuple[int, int]]:
 
 
 def struct_type(sfr: Sfr) -> str:
-    """The `typedef` of one register's bit-field struct or union."""
+    """The `typedef` of a register's bit-field struct or union."""
     views = [bit_fields(sfr.fields), bit_fields(sfr.fields, only_bits=True), bit_fields(second_names(sfr))]
     structs = [f"struct {{ {text} }}" for text in map(" ".join, views) if text]
     name = f"{sfr.name}BITS"
@@ -73,7 +73,7 @@ def struct_type(sfr: Sfr) -> str:
 
 
 def declarations(sfr: Sfr) -> Iterator[str]:
-    """Everything the header says about one register."""
+    """Declarations of one register."""
     yield f"extern volatile {C_TYPES[sfr.size]} {sfr.name} DSPIC_SFR; /* 0x{sfr.address:04X} */"
     if sfr.fields:
         yield struct_type(sfr)
@@ -81,7 +81,7 @@ def declarations(sfr: Sfr) -> Iterator[str]:
 
 
 def bit_macros(chip: Chip) -> Iterator[str]:
-    """`_T1IF` for `IFS0bits.T1IF`: one per field name that belongs to one register only."""
+    """Macros such as `_T1IF` for `IFS0bits.T1IF`, for field names that are unique on the chip."""
     names = {sfr.name: [*sfr.fields, *second_names(sfr)] for sfr in chip.sfrs.values()}
     uses = Counter(field for fields in names.values() for field in fields)
     for sfr in chip.sfrs.values():
@@ -91,7 +91,7 @@ def bit_macros(chip: Chip) -> Iterator[str]:
 
 
 def header(chip: Chip) -> str:
-    """The whole header as text."""
+    """Text of the header of a chip."""
     lines = [
         "/* SPDX-License-Identifier: MIT */",
         f"/* Registers of the {chip.name}.",
@@ -118,7 +118,7 @@ def header(chip: Chip) -> str:
 
 
 def path_of(chip: Chip) -> Path:
-    """Where a chip's header is committed."""
+    """Path of the committed header of a chip."""
     return INCLUDE / f"{chip.name.lower()}.h"
 
 

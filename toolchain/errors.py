@@ -1,4 +1,4 @@
-"""Errors every tool reports the same way: place, message, and how to go on collecting after the first."""
+"""Errors of all tools: source location, message, and collections of several errors."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class SourceLocation:
-    """Where a message belongs: a file and, when known, a line (1-based)."""
+    """Location of a message: a file and, if known, a line (from 1)."""
 
     file: str
     line: int = 0
@@ -17,7 +17,7 @@ class SourceLocation:
 
 
 class ToolError(Exception):
-    """Bad input to a tool.  Carries every finding; the command line prints them and exits with status 2."""
+    """Bad input to a tool, with all findings; the command line prints them and exits with status 2."""
 
     def __init__(self, message: str, place: SourceLocation | None = None) -> None:
         super().__init__(message)

@@ -1,4 +1,4 @@
-"""Reading inputs and writing outputs: a failed tool never leaves a half-written file behind."""
+"""Input and output files; a tool that fails leaves no incomplete output file."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def read_bytes(path: str | Path) -> bytes:
 
 
 def read_text(path: str | Path) -> str:
-    """Return `path` as text.  Bytes that are not UTF-8 are read as Latin-1: old sources carry both."""
+    """Return `path` as text; a file that is not UTF-8 is read as Latin-1, which old sources use."""
     data = read_bytes(path)
     try:
         return data.decode("utf-8")
@@ -27,10 +27,10 @@ def read_text(path: str | Path) -> str:
 
 
 def write_outputs(outputs: Iterable[tuple[str | Path, bytes]]) -> None:
-    """Write all files or none: each goes to a temporary beside its target, then all are renamed. Standard output,
-    devices and pipes are written last, as they are.
+    """Write all files or none: write temporaries beside the targets, then rename them.
 
-    Raises `ToolError` when a target cannot be written; temporaries are removed in every case.
+    Standard output, devices and pipes are written directly, after the files. Raises `ToolError` if a target cannot be
+    written; temporaries are removed in every case.
     """
     pending: list[tuple[Path, str | Path]] = []
     opened: list[tuple[str | Path, bytes]] = []

@@ -1,6 +1,7 @@
-"""Compile C programs with our driver and run them on the emulator, all in this process.
+"""Compile C programs with the driver and run them on the emulator, in this process.
 
-A program's verdict is the status it leaves when it sleeps after `main` or `exit`; other ends are faults with a reason.
+The result of a program is its exit status, which it leaves when it sleeps after `main` or `exit`. Any other end is a
+failure with a reason.
 """
 
 from __future__ import annotations
@@ -20,21 +21,21 @@ INTCON1_TRAPS = {1: "oscillator", 2: "stack error", 3: "address error", 4: "math
 
 @dataclass(frozen=True)
 class Built:
-    """Exit status of the driver and what it said on stderr."""
+    """Exit status and stderr of the driver."""
 
     status: int
     messages: str
 
     @property
     def first_error(self) -> str:
-        """The first line that is an error, for reports."""
+        """The first line with an error."""
         lines = [line for line in self.messages.splitlines() if "error" in line]
         return lines[0] if lines else self.messages.strip().splitlines()[0] if self.messages.strip() else "no message"
 
 
 @dataclass(frozen=True)
 class Ran:
-    """How a run ended: `status` is W0 after a normal end, None otherwise; `why` says what happened then."""
+    """Result of a run: `status` is W0 after a normal end, otherwise None; `why` is the reason of another end."""
 
     status: int | None
     why: str
@@ -43,17 +44,17 @@ class Ran:
 
 
 class FrontEndOnce:
-    """The front end for one program that is built in several ways: what it gave is kept.
+    """Front end that caches the IR of a program, for tests that build it in several ways.
 
-    Its answer depends on sources, level and options of C, not on what comes behind it (-fno-lto, the output's name).
-    Sources must not change meanwhile; what the front end says is told once.
+    The IR depends on the sources, the level and the C options, but not on -fno-lto or the name of the output. The
+    sources must not change meanwhile. Diagnostics are printed once.
     """
 
     def __init__(self) -> None:
         self._made: dict[str, dict[Input, bytes]] = {}
 
     def __call__(self, options: CcOptions, scratch: Path) -> dict[Input, bytes]:
-        """As `driver.front_end`."""
+        """Replacement of `driver.front_end`."""
         assert not options.dependency, "a dependency file names the output"
         key = repr(replace(options, lto=None, output=None))
         if key not in self._made:
@@ -62,7 +63,7 @@ class FrontEndOnce:
 
 
 def build(sources: list[Path], output: Path, *options: str, front: driver.FrontEnd | None = None) -> Built:
-    """`python -m toolchain cc options sources -o output` without starting a process; `front` as for `driver.main`."""
+    """Run `python -m toolchain cc options sources -o output` in this process; `front` as for `driver.main`."""
     said = io.StringIO()
     with contextlib.redirect_stderr(said), contextlib.redirect_stdout(said):
         status = driver.main([*options, *map(str, sources), "-o", str(output)], front=front)
@@ -70,7 +71,7 @@ def build(sources: list[Path], output: Path, *options: str, front: driver.FrontE
 
 
 def run(image: Path, cycles: int = 30_000_000, engine: str = "auto", native_after: int | None = None) -> Ran:
-    """Run an image for at most `cycles` Tcy; what is not over after `native_after` of them goes on in native code."""
+    """Run an image for at most `cycles` Tcy; after `native_after` Tcy it continues as native code."""
     machine = emu.load(image, engine=engine)
     said = bytearray()
     machine.uart[1].on_byte = lambda byte, cycle: said.append(byte)
@@ -93,7 +94,7 @@ def run(image: Path, cycles: int = 30_000_000, engine: str = "auto", native_afte
 
 
 def run_both(folder: Path, level: str, c_text: str, s_text: str) -> int:
-    """Status of a program of one C and one assembly file."""
+    """Exit status of a program of one C and one assembly file."""
     (folder / "a.c").write_text(c_text)
     (folder / "b.s").write_text("        .section .text,code\n" + s_text)
     built = build([folder / "a.c", folder / "b.s"], folder / "a.elf", level, "-std=gnu11", "-Wall")

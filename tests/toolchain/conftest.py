@@ -1,4 +1,4 @@
-"""Shared by the toolchain's tests: sources in, objects and images out, with their words easy to read."""
+"""Fixtures of the toolchain tests: assemble and link sources, and read the words of the result."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def vectors() -> Path:
 
 
 class Assembled:
-    """An object with questions tests ask."""
+    """An object file with accessors for tests."""
 
     def __init__(self, obj: ObjectFile, messages: list[str]) -> None:
         self.object = obj
@@ -61,7 +61,7 @@ def asm() -> Callable[..., Assembled]:
 
 
 class Image:
-    """A linked image with questions tests ask."""
+    """A linked image with accessors for tests."""
 
     def __init__(self, linked: Linked) -> None:
         self.linked = linked

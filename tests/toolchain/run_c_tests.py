@@ -108,7 +108,7 @@ MEMORY = re.compile(r"does not fit|no room for the stack|overflow|largest symbol
 
 @dataclass(frozen=True)
 class Verdict:
-    """What became of one test at one level: `kind` is passed, failed or skipped."""
+    """Result of one test at one level: `kind` is passed, failed or skipped."""
 
     test: str
     level: str
@@ -117,7 +117,7 @@ class Verdict:
 
 
 def directive_skip(source: str) -> str | None:
-    """What a dg- directive says against this test on a 16-bit machine, or None."""
+    """Reason why a dg- directive excludes this test on a 16-bit machine, or None."""
     for name in re.findall(r"dg-require-effective-target\s+([\w-]+)", source):
         reason = ABSENT_TARGETS.get(name)
         if reason:
@@ -134,8 +134,7 @@ def directive_skip(source: str) -> str | None:
 
 
 def options_of(path: Path, source: str) -> list[str]:
-    """Options from dg- directives and from a .x file beside it that mean something here; GCC's optimiser switches do
-    not."""
+    """Options of dg- directives and of a .x file beside the test, without GCC's optimiser switches."""
     words = ["-fno-lto"] if "externally_visible" in source else []
     beside = path.with_suffix(".x")
     if beside.exists():
@@ -147,13 +146,13 @@ def options_of(path: Path, source: str) -> list[str]:
 
 
 def sources_of(path: Path) -> list[Path]:
-    """The file, and in GCC's `builtins` folder its own versions of library functions and the common main."""
+    """The file, and in GCC's `builtins` folder also its library functions and the common main."""
     main = path.parent / "lib" / "main.c"
     return [path, path.with_name(f"{path.stem}-lib.c"), main] if main.exists() else [path]
 
 
 def is_test(path: Path) -> bool:
-    """False for files that are only parts of another test."""
+    """Whether a file is a test and not a part of another one."""
     return not path.stem.endswith("-lib") and path.parent.name != "lib"
 
 
@@ -182,20 +181,20 @@ def judge(path: Path, level: str, cycles: int) -> Verdict:
 
 
 def compile_test(path: Path, source: str, image: Path, level: str, *more: str) -> Built:
-    """Build with the options the test asks for."""
+    """Build one test with its options."""
     files = sources_of(path)
     folding = ["-U__OPTIMIZE__"] if len(files) > 1 or FOLDING.search(source) else []
     return build(files, image, level, *FLAGS, *folding, *options_of(path, source), *heap_of(source), *more)
 
 
 def run_test(image: Path, cycles: int) -> Ran:
-    """Short runs in the interpreter, long ones as native code."""
+    """Run one test: in the interpreter first, then as native code."""
     result = run(image, SHORT, engine="auto")
     return run(image, cycles) if result.why.startswith("limit") and cycles > SHORT else result
 
 
 def refusal(built: Built) -> tuple[str, str]:
-    """Kind and reason when there is no program."""
+    """Kind and reason of a test that does not compile."""
     if built.status == 1:
         for pattern, why in SKIP_RULES:
             if re.search(pattern, built.first_error):
@@ -208,7 +207,7 @@ def refusal(built: Built) -> tuple[str, str]:
 
 
 def excuse(path: Path, source: str, result: Ran, image: Path) -> str | None:
-    """What proves that a program which did not exit with 0 need not: it is undefined here, or expects GCC's ways."""
+    """Reason to skip a test that did not exit with 0: undefined behaviour, or an expectation of GCC's behaviour."""
     if path.stem in EXPECTATIONS:
         return EXPECTATIONS[path.stem]
     if result.why == "trap: stack error":
@@ -243,7 +242,7 @@ def _judge(work: tuple[Path, str, int]) -> Verdict:
 
 
 def main() -> int:
-    """Command line."""
+    """Run the command line."""
     parser = argparse.ArgumentParser(
         description=__doc__,
         formatter_class=argparse.RawDescriptionHelpFormatter,

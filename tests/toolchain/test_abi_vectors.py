@@ -29,7 +29,7 @@ STUB = "\n".join([" .text", " .global _arrived,_sentinel", "{labels}", "_arrived
 
 @dataclass(frozen=True)
 class Vector:
-    """One signature: types, sizes and places of the arguments, unnamed ones from `named` on, and of the result."""
+    """One signature: types, sizes and locations of the arguments and the result; unnamed arguments start at `named`."""
 
     number: int
     types: list[str]
@@ -78,7 +78,7 @@ def _parameters(v: Vector) -> str:
 
 
 def caller_source(v: Vector) -> str:
-    """Objects for the arguments and the result, and the function that makes the call."""
+    """C text: objects for the arguments and the result, and the function with the call."""
     objects = [f"{_type(v, k)} a{v.number}_{k};" for k in range(len(v.types))]
     call = f"f{v.number}({', '.join(f'a{v.number}_{k}' for k in range(len(v.types)))})"
     if v.result != "void":
@@ -90,7 +90,7 @@ def caller_source(v: Vector) -> str:
 
 
 def callee_source(v: Vector) -> str:
-    """The function that copies its arguments out and returns an object."""
+    """C text: the function that copies its arguments out and returns an object."""
     lines = [f"{_type(v, k)} b{v.number}_{k};" for k in range(len(v.types))]
     body = [f"b{v.number}_{k} = p{k};" for k in range(len(v.types) if v.named is None else v.named)]
     if v.named is not None:

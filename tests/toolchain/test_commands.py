@@ -1,4 +1,4 @@
-"""`python -m toolchain`: commands, exit statuses, messages, and that failures leave no files (engines.md §10)."""
+"""`python -m toolchain`: commands, exit statuses, messages; failures leave no files (engines.md §10)."""
 
 import json
 import subprocess
@@ -38,7 +38,7 @@ def files(tmp_path, monkeypatch):
 
 
 def test_assemble_link_and_convert(files, capsys):
-    """as, ld with map and HEX, hex, size, nm, objdump in one go."""
+    """as, ld with map and HEX, hex, size, nm and objdump in sequence."""
     assert main(["as", "-g", "hello.s"]) == 0
     assert main(["ld", "hello.o", "-o", "hello.elf", "-Map", "hello.map", "--hex", "both.hex", "--report-mem"]) == 0
     assert main(["hex", "hello.elf"]) == 0
@@ -63,7 +63,7 @@ def test_assemble_link_and_convert(files, capsys):
 
 
 def test_size_counts_flash_and_ram_only(files, capsys):
-    """Three bytes per instruction word; configuration words are no flash, EEPROM is counted apart."""
+    """Three bytes per instruction word, without configuration words; EEPROM is counted separately."""
     text = HELLO + " .section __FOSC.sec,code\n .pword 1\n .section .eedata,eedata\n .word 1\n"
     (files / "c.s").write_text(text)
     assert main(["as", "c.s"]) == 0
@@ -72,8 +72,8 @@ def test_size_counts_flash_and_ram_only(files, capsys):
     assert row == {"code": 5 * 3, "const": 6, "eeprom": 2, "data": 0, "bss": 2}
 
 
-def test_ld_writes_hex_when_the_output_is_called_so(files):
-    """A robot's boot loader takes HEX."""
+def test_ld_writes_hex_for_outputs_with_that_suffix(files):
+    """The suffix .hex selects Intel HEX."""
     assert main(["as", "hello.s", "-o", "h.o"]) == 0
     assert main(["ld", "h.o", "-o", "out.hex"]) == 0
     assert (files / "out.hex").read_text().startswith(":020000040000fa\n")
@@ -123,7 +123,7 @@ def test_libraries(files, capsys):
     ],
 )
 def test_bad_input_is_one_clear_message_and_status_2(files, capsys, arguments, message):
-    """engines.md §10: exit 2, no traceback, no output file."""
+    """engines.md §10: exit status 2, no traceback, no output file."""
     (files / "bad.s").write_text(" nop\n frob\n")
     (files / "u.s").write_text(".global __reset\n__reset: call _nowhere\n")
     assert main(["as", "u.s", "-o", "undefined.o"]) == 0

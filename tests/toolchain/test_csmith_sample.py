@@ -1,4 +1,4 @@
-"""A few programs of the csmith campaign (`tests/fuzz/compiler/fuzz_csmith.py`); each commit tries new ones there."""
+"""A sample of the csmith campaign (`tests/fuzz/compiler/fuzz_csmith.py`), with new programs for each commit."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ SEEDS = [seed for seed in range(9000, 9014) if seed not in (9001, 9012)]
 @pytest.mark.skipif(not available(), reason="csmith is not installed (Debian package csmith)")
 @pytest.mark.parametrize("seed", SEEDS)
 def test_random_program_gives_one_checksum_at_every_level(seed: int) -> None:
-    """-O0 agrees with another level, and with avr-gcc on simavr where installed."""
+    """The checksum at -O0 equals that at another level, and that of avr-gcc on simavr if installed."""
     verdict = examine(seed, shapes=(SHAPES[0], SHAPES[1 + seed % (len(SHAPES) - 1)]))
     if verdict.kind == "skipped":
         pytest.skip(verdict.reason)

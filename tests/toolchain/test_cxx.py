@@ -1,4 +1,4 @@
-"""Freestanding C++17: language, libc++'s headers, and what is refused."""
+"""Freestanding C++17: language, libc++'s headers, and refused features."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def compiled(source: Path, folder: Path, *options: str) -> int:
 @pytest.mark.parametrize(("level", "lto"), MODES)
 @pytest.mark.parametrize("program", sorted(path.name for path in PROGRAMS.glob("*.cpp")))
 def test_program(program: str, level: str, lto: str, tmp_path: Path) -> None:
-    """Each returns 0, or the number of its first check that fails."""
+    """Each program returns 0, or the number of its first failing check."""
     assert compiled(PROGRAMS / program, tmp_path, level, lto, "-Wall", "-Werror", "-Wl,--heap=256") == 0
     assert run(tmp_path / "a.elf").status == 0
 
@@ -65,7 +65,7 @@ def test_what_is_not_there_is_refused(source: str, tmp_path: Path, capfd: pytest
 
 
 def test_new_without_room_ends_the_program(tmp_path: Path) -> None:
-    """Nothing can be thrown; nothrow new returns null."""
+    """A failing new ends the program, because there are no exceptions; nothrow new returns null."""
     source = """
     #include <new>
     int main()

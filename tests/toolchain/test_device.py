@@ -1,4 +1,4 @@
-"""-mcpu=: another part's memory, registers, header and configuration words, from C to the running image."""
+"""-mcpu=: memory, registers, header and configuration words of another device, from C to the running image."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def build(tmp_path: Path, text: str, *words: str) -> Path:
 
 
 def test_a_program_for_another_part_runs_on_it(tmp_path: Path) -> None:
-    """The image says which part it is for; RA11 exists there alone; stack, data and vectors lie in its memory."""
+    """The image names the device, uses its pin RA11, and has stack, data and vectors in its memory."""
     image = build(tmp_path, PROGRAM)
     machine = emu.load(image, board=None)
     assert machine.chip.name == CHIP.name
@@ -54,8 +54,8 @@ def test_a_program_for_another_part_runs_on_it(tmp_path: Path) -> None:
     assert machine.program.setting("FGS") == 0xFFFD
 
 
-def test_what_does_not_fit_its_memory_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """2 KB of RAM: what the 30F6014A has room for is too much."""
+def test_a_program_larger_than_its_memory_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A program that fits the RAM of the 30F6014A does not fit the 2 KB of the 30F4013."""
     source = tmp_path / "a.c"
     source.write_text("static char big[3000]; int main(void) { return (int)(unsigned)&big; }")
     assert cli.main(["cc", "-Os", "-mcpu=30F4013", str(source), "-o", str(tmp_path / "a.elf")]) == 2
@@ -63,7 +63,7 @@ def test_what_does_not_fit_its_memory_is_refused(tmp_path: Path, capsys: pytest.
     assert cli.main(["cc", "-Os", str(source), "-o", str(tmp_path / "a.elf")]) == 0
 
 
-def test_a_part_without_tables_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """One line, status 2."""
+def test_an_unknown_device_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """An unknown device is one message and status 2."""
     assert cli.main(["cc", "-mcpu=30F2010", "a.c"]) == 2
     assert "device '30F2010' is not supported (expected 30F6014A or 30F4013)" in capsys.readouterr().err

@@ -1,4 +1,4 @@
-"""The compiler driver from the outside: options, outputs, dependency files, bad input (issue B, "Must show" 6)."""
+"""The compiler driver: options, outputs, dependency files, bad input."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def test_predefined_macros_are_those_of_the_device(capsys: pytest.CaptureFixture
 
 
 def test_compile_link_and_run(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    """Two C files and one assembly file to one image; the status of main arrives."""
+    """Two C files and one assembly file form one image, which returns the status of main."""
     a = write(tmp_path, "a.c", "int b(int); extern int c(void); int main(void) { return b(20) + c(); }\n")
     b = write(tmp_path, "b.c", "int b(int x) { return 2 * x; }\n")
     s = write(tmp_path, "c.s", "\t.section .text,code\n\t.global _c\n_c: mov #2,w0\n\treturn\n")
@@ -62,7 +62,7 @@ def test_compile_link_and_run(capsys: pytest.CaptureFixture[str], tmp_path: Path
 
 @pytest.mark.parametrize("flags", [(), ("-flto",), ("-g",)])
 def test_separate_compilation(capsys: pytest.CaptureFixture[str], tmp_path: Path, flags: tuple[str, ...]) -> None:
-    """-c, then linking the objects; with -flto they are bitcode and still optimised as one program."""
+    """-c and linking of the objects; with -flto the objects are bitcode, and the program is optimised as a whole."""
     a = write(tmp_path, "a.c", "int b(int); static int k = 3; int main(void) { return b(20) + k; }\n")
     b = write(tmp_path, "b.c", "static int k = 1; int b(int x) { return 2 * x + k; }\n")
     for source in (a, b):
@@ -87,7 +87,7 @@ def test_whole_program_and_separate_linking_agree(capsys: pytest.CaptureFixture[
 
 
 def test_hex_output_equals_the_elf(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    """-o x.hex writes what `toolchain hex` makes of the ELF (abi-elf.md §6.8)."""
+    """-o x.hex equals the output of `toolchain hex` for the ELF (abi-elf.md §6.8)."""
     source = write(tmp_path, "a.c", "const int t[3] = {1, 2, 3}; volatile int i = 2; int main(void) { return t[i]; }\n")
     assert cc(capsys, "-Os", source, "-o", tmp_path / "x.hex") == (0, "")
     assert cc(capsys, "-Os", source, "-o", tmp_path / "x.elf") == (0, "")
@@ -110,7 +110,7 @@ def test_dependency_file_names_headers_and_output(capsys: pytest.CaptureFixture[
 
 
 def test_diagnostics_carry_the_users_file_and_line(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    """All clang diagnostics pass through; a warning does not fail the run."""
+    """All diagnostics of clang are printed; a warning does not fail the run."""
     source = write(tmp_path, "warn.c", "int main(void)\n{\n    int unused = 3;\n    return 0;\n}\n")
     status, said = cc(capsys, "-Wall", source, "-o", tmp_path / "x.elf")
     assert status == 0
@@ -153,7 +153,7 @@ int main(void)
 
 
 def test_xc16_attributes(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    """abi-elf.md §1.4 and §2.5: Microchip's attributes as its users spell them, and the section each gives."""
+    """abi-elf.md §1.4 and §2.5: section of each of Microchip's attributes, in its spelling."""
     source = write(tmp_path, "a.c", XC16_ATTRIBUTES)
     assert cc(capsys, "-Os", "-Wall", "-S", source, "-o", tmp_path / "a.s") == (0, "")
     said = (tmp_path / "a.s").read_text()
@@ -180,10 +180,10 @@ def test_xc16_attributes(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> 
     ("int n __attribute__((space(dma)));", "space(dma)"),
     ("int n __attribute__((aligned(4), __space__(extern_memory)));", "space(extern_memory)"),
 ])  # fmt: skip
-def test_an_attribute_that_would_move_something_is_not_ignored(
+def test_unsupported_attributes_of_location_are_errors(
     line: str, attribute: str, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
-    """A variable at an address of its own or in memory that is not there is no variable anywhere."""
+    """Attributes that clang does not support and that change the location of a variable are errors."""
     source = write(tmp_path, "a.c", f"\n{line}\n")
     code, said = cc(capsys, "-c", source, "-o", tmp_path / "a.o")
     assert code == 1
@@ -192,7 +192,7 @@ def test_an_attribute_that_would_move_something_is_not_ignored(
 
 
 def test_xc16_register_names_in_inline_assembly(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    """Clobbers and register variables named w0-w15; other strings of that spelling stay, and so do diagnostics."""
+    """Clobbers and register variables named w0-w15; equal strings elsewhere and diagnostics are unchanged."""
     source = write(
         tmp_path,
         "a.c",
@@ -213,8 +213,8 @@ int main(void) { int unused; const char *s = "w4"; return f(4) == 5 && g() == 8 
 
 
 @pytest.mark.parametrize("cycles", [13, 14, 15, 16, 17, 100, 1001, 70000])
-def test_delays_last_as_long_as_asked(capsys: pytest.CaptureFixture[str], tmp_path: Path, cycles: int) -> None:
-    """libpic30.h: __delay32 counts its call and return; timer 1 measures."""
+def test_delays_have_the_requested_length(capsys: pytest.CaptureFixture[str], tmp_path: Path, cycles: int) -> None:
+    """libpic30.h: __delay32 includes its call and return, measured by timer 1."""
     source = write(
         tmp_path,
         "a.c",
@@ -249,7 +249,7 @@ def test_configuration_words_are_program_words(capsys: pytest.CaptureFixture[str
 
 
 def test_calls_of_large_programs(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    """abi-elf.md §1.4: -mlarge-code makes two-word calls; without it RCALL."""
+    """abi-elf.md §1.4: -mlarge-code emits two-word calls, otherwise RCALL."""
     text = "extern void f(void), g(void); int main(void) { f(); g(); return 0; }\n"
     source = write(tmp_path, "a.c", text)
     for option, call in (("-mlarge-code", "\tcall _f\n"), ("-msmall-code", "\trcall _f\n")):
@@ -258,7 +258,7 @@ def test_calls_of_large_programs(capsys: pytest.CaptureFixture[str], tmp_path: P
 
 
 def test_a_program_replaces_library_functions(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    """Library functions are archive members and weak: the program's own memcpy and __putchar win."""
+    """Library functions are weak archive members: the program's memcpy and __putchar override them."""
     source = write(tmp_path, "a.c", """
 #include <stdio.h>
 #include <string.h>
@@ -287,7 +287,7 @@ int main(void)
 
 
 def test_only_what_is_used_is_linked(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    """An empty main: start-up code, vectors and nothing else of the library."""
+    """An empty main contains start-up code, vectors and no other part of the library."""
     source = write(tmp_path, "a.c", "int main(void) { return 0; }\n")
     assert cc(capsys, "-Os", source, "-o", tmp_path / "x.elf") == (0, "")
     from toolchain.elf.read import read_executable
@@ -321,7 +321,7 @@ BAD_COMMAND_LINES = [
 def test_bad_command_lines_say_what_is_wrong(
     words: list[str], message: str, capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Exit status 2, one clear message, no output file."""
+    """Exit status 2, one message, no output file."""
     monkeypatch.chdir(tmp_path)
     for name in ("a.c", "b.c"):
         write(tmp_path, name, "int main(void) { return 0; }\n" if name == "a.c" else "")
@@ -365,7 +365,7 @@ BAD_PROGRAMS = {
 def test_bad_programs_leave_a_message_and_no_output(
     files: dict[str, str], status: int, message: str, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
-    """Issue B, "Must show" 6: 1 for C errors, 2 for everything else, no output file, no traceback."""
+    """Exit status 1 for C errors and 2 for all others, no output file, no traceback."""
     paths = [write(tmp_path, name, text) for name, text in files.items()]
     before = sorted(os.listdir(tmp_path))
     got, said = cc(capsys, "-Os", *paths, "-o", tmp_path / "x.elf")
@@ -376,7 +376,7 @@ def test_bad_programs_leave_a_message_and_no_output(
 
 
 def test_errors_of_all_files_are_reported(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    """The parallel front end finishes every file before it gives up, and reports in command-line order."""
+    """The parallel front end compiles every file before it fails, and reports in command line order."""
     paths = [write(tmp_path, f"{n}.c", f"int f{n} = x{n};\n") for n in range(4)]
     status, said = cc(capsys, "-j", 2, *paths, "-o", tmp_path / "x.elf")
     assert status == 1
@@ -385,7 +385,7 @@ def test_errors_of_all_files_are_reported(capsys: pytest.CaptureFixture[str], tm
 
 
 def test_options_reach_their_stage() -> None:
-    """The split of the command line between front end, back end and linker."""
+    """Options are passed to the front end, the back end or the linker."""
     words = ["-O2", "-DX=1", "-I", "inc", "-Wall", "-Wl,--heap=64,--gc-sections", "-fstack-check", "-g"]
     options = parse([*words, "-x", "c", __file__])
     assert options.level == "2"
@@ -396,7 +396,7 @@ def test_options_reach_their_stage() -> None:
 
 
 def test_response_files_nest(tmp_path: Path) -> None:
-    """@file, with quoting; an endless nest is refused."""
+    """@file with quoting; endless nesting is refused."""
     write(tmp_path, "a.c", "")
     inner = write(tmp_path, "inner", f"-DNAME='a b' {tmp_path / 'a.c'}")
     outer = write(tmp_path, "outer", f"-O1 @{inner}")
@@ -409,13 +409,13 @@ def test_response_files_nest(tmp_path: Path) -> None:
 
 
 def test_help_shows_an_example(capsys: pytest.CaptureFixture[str]) -> None:
-    """Every command has --help with an example."""
+    """--help contains an example."""
     assert driver.main(["--help"]) == 0
     assert "example: python -m toolchain cc" in capsys.readouterr().out
 
 
-def test_messages_need_none_of_the_heavy_parts() -> None:
-    """Design: warm start below a second; a usage error imports neither llvmlite nor the back end."""
+def test_usage_errors_import_neither_llvmlite_nor_the_back_end() -> None:
+    """A usage error imports neither llvmlite nor the back end, so that messages are fast."""
     code = (
         "import sys\nfrom toolchain.cli import main\nmain(['cc', '--nonsense'])\n"
         "print([name for name in sys.modules if 'llvmlite' in name])"
@@ -425,7 +425,7 @@ def test_messages_need_none_of_the_heavy_parts() -> None:
 
 
 def test_archives_and_preprocessed_assembly(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    """-L and -l, members pulled by symbol; .S files see the preprocessor and the device header."""
+    """-L and -l, members linked by symbol; .S files are preprocessed with the device header."""
     from toolchain.elf.archive import Member, archive_bytes
 
     f = write(tmp_path, "f.c", "int f(int x) { return x + 2; }\n")
@@ -441,7 +441,7 @@ def test_archives_and_preprocessed_assembly(capsys: pytest.CaptureFixture[str], 
 
 
 def test_linker_options_pass_through(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    """-Wl,--heap gives malloc its memory; the map names the library's members."""
+    """-Wl,--heap gives malloc its memory; the map contains the library's members."""
     source = write(tmp_path, "a.c", "#include <stdlib.h>\nint main(void) { char *p = malloc(100), *q = malloc(100); "
                    "free(p); return p && q && malloc(90) == p ? 0 : 1; }\n")  # fmt: skip
     words = [

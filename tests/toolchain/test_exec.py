@@ -1,7 +1,7 @@
 """Every case of `exec/*.c` on the emulator at four optimisation levels, whole program and file by file.
 
-One image per file and level: a generated main calls the cases in order and reports each over UART1 as `name line`, with
-line 0 for a pass. A case that traps or hangs shows as such, and those after it as not run.
+There is one image per file and level. A generated main calls the cases in order and reports each over UART1 as
+`name line`, with line 0 for a pass. A case that traps or hangs is reported as such, and those after it as not run.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ def cases_of(path: Path) -> list[str]:
 
 @cache
 def results(path: Path, level: str, folder: Path) -> dict[str, str]:
-    """What became of each case: "ok", or what went wrong."""
+    """Result of each case: "ok", or a description of the failure."""
     names = cases_of(path)
     main = folder / f"{path.stem}_main.c"
     main.write_text(
@@ -92,12 +92,12 @@ def test_c_program_does_what_the_standard_says(path: Path, level: str, name: str
 
 
 def test_there_are_at_least_300_cases() -> None:
-    """Execution cases per level; the goal counts small C tests, not levels."""
+    """The suite contains at least 300 cases, not counting levels."""
     assert sum(len(cases_of(path)) for path in FOLDER.glob("*.c")) >= 300
 
 
 def test_a_failing_case_is_reported_as_failing(tmp_path: Path) -> None:
-    """The frame itself: a wrong check, a trap and the case after it must not pass."""
+    """A wrong check, a trap and the case after the trap do not pass."""
     source = tmp_path / "broken.c"
     source.write_text(
         '#include "exec.h"\n'

@@ -1,4 +1,4 @@
-"""Campaigns build a program in several ways from one run of the front end: with the same images to the byte."""
+"""Builds that share one run of the front end (`c_programs.FrontEndOnce`)."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ TWO = "extern int values[3];\nint other(int x) { return x * values[2] + ADDED; }
 
 
 def test_images_are_those_of_builds_on_their_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """At every level, merged and file by file; the front end runs once a level and set of options."""
+    """Images equal those of separate builds, at every level, merged and file by file."""
     runs: list[str] = []
     original = driver.front_end
     monkeypatch.setattr(driver, "front_end", lambda o, scratch: runs.append(o.level) or original(o, scratch))

@@ -1,4 +1,4 @@
-"""What the compiler makes of interrupt functions (abi-elf.md §2.5)."""
+"""Code of interrupt functions (abi-elf.md §2.5)."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from tests.toolchain.c_programs import build
 
 
 def assembly_of(folder: Path, c_text: str, level: str = "-Os") -> str:
-    """Our compiler's output for one file."""
+    """Assembly of one C file."""
     (folder / "x.c").write_text("#include <dspic30f6014a.h>\n" + c_text)
     built = build([folder / "x.c"], folder / "x.s", level, "-S")
     assert built.status == 0, built.messages
@@ -19,14 +19,14 @@ def assembly_of(folder: Path, c_text: str, level: str = "-Os") -> str:
 
 
 def body_of(text: str, name: str) -> list[str]:
-    """Instructions of one function, labels and directives left out."""
+    """Instructions of one function, without labels and directives."""
     part = text.split(f"\n{name}:", 1)[1].split(".size", 1)[0]
     lines = [line.strip() for line in part.splitlines() if line.startswith("\t")]
     return [line for line in lines if line and not line.startswith(".")]
 
 
 def test_minimal_handler_is_two_words(tmp_path: Path) -> None:
-    """abi-elf.md §2.5: one INC f and RETFIE, nothing saved."""
+    """abi-elf.md §2.5: INC f and RETFIE, no saved registers."""
     text = assembly_of(tmp_path, "volatile int n; OS_ISR(_T1Interrupt) { n++; }")
     assert body_of(text, "__T1Interrupt") == ["inc _n", "retfie"]
 
@@ -91,8 +91,8 @@ int main(void)
 
 
 @pytest.mark.parametrize("level", ["-O1", "-Os", "-O2"])
-def test_no_bit_of_a_handler_is_lost_wherever_it_comes(level: str, tmp_path: Path) -> None:
-    """isa.md §5.4: the program writes single bits of words in which the handler sets others; T1 asks in every cycle."""
+def test_single_bit_writes_of_a_handler_are_not_lost(level: str, tmp_path: Path) -> None:
+    """isa.md §5.4: program and handler write bits of the same words; T1 interrupts in every cycle."""
     (tmp_path / "x.c").write_text(f"#include <dspic30f6014a.h>\n{SHARED}")
     built = build([tmp_path / "x.c"], tmp_path / "x.elf", level)
     assert built.status == 0, built.messages

@@ -1,4 +1,4 @@
-"""The headers: the generated device header is current, and layouts and limits are XC16's (abi-elf.md §1)."""
+"""Headers: the generated device header is current; layouts and limits equal XC16's (abi-elf.md §1)."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ INCLUDE = Path(__file__).resolve().parents[2] / "toolchain" / "include"
 
 @pytest.mark.parametrize("name", NAMES)
 def test_the_committed_device_header_is_what_the_generator_writes(name: str) -> None:
-    """Refresh with `python -m toolchain.device_header`."""
+    """The committed header equals the output of `python -m toolchain.device_header`."""
     chip = chip_named(name)
     assert path_of(chip).read_text() == header(chip)
 
 
 def test_every_register_has_the_address_of_the_chip_table(tmp_path: Path) -> None:
-    """dspic30f6014a.md §1: all registers at once, words, bytes and bit-field structs, through the linker.
+    """dspic30f6014a.md §1: words, bytes and bit-field structs of all registers, after linking.
 
-    Compared at run time: the compiler takes for granted that no object has the address of WREG0.
+    The comparison runs on the target, because the compiler assumes that no object has the address of WREG0.
     """
     names = list(DSPIC30F6014A.sfrs.values())
     rows = ", ".join(f"{{(unsigned)&{sfr.name}, sizeof {sfr.name}, {sfr.address}, {sfr.size}}}" for sfr in names)
@@ -67,8 +67,8 @@ def test_bit_fields_are_where_the_chip_table_says(tmp_path: Path) -> None:
     assert run(tmp_path / "a.elf", engine="auto").status == 0
 
 
-def test_second_names_of_bits_are_the_same_bits(tmp_path: Path) -> None:
-    """XC16's headers name bits of CAN, I2C and UARTs by the data sheet's word and by the reference manual's."""
+def test_second_names_of_bits_denote_the_same_bits(tmp_path: Path) -> None:
+    """XC16's headers name bits of CAN, I2C and UARTs as the data sheet and as the reference manual do."""
     same = [
         ("C1INTF", "RXB0IF", "RX0IF"), ("C2INTF", "TXB2IF", "TX2IF"), ("C1INTF", "IRXIF", "IVRIF"),
         ("C2INTF", "RXB0OVFL", "RX0OVR"), ("C1INTF", "TXBP", "TXEP"), ("C2INTE", "IRXIE", "IVRIE"),
@@ -90,7 +90,7 @@ def test_second_names_of_bits_are_the_same_bits(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("path", sorted(INCLUDE.glob("*.h")), ids=lambda p: p.name)
 def test_header_stands_alone_and_twice(path: Path, tmp_path: Path) -> None:
-    """Each header includes what it needs, and may be included again."""
+    """Each header includes its dependencies and may be included twice."""
     line = f"#include <{path.name}>\n"
     (tmp_path / "a.c").write_text(line + line + "int main(void) { return 0; }\n")
     part = re.fullmatch(r"(?:p|dspic)(30f\d+[a-z]?)", path.stem, re.IGNORECASE)
@@ -100,7 +100,7 @@ def test_header_stands_alone_and_twice(path: Path, tmp_path: Path) -> None:
 
 
 def test_configuration_words_reach_the_image(tmp_path: Path) -> None:
-    """_FOSC(CSW_FSCM_OFF & XT_PLL8) and its relatives; dspic30f6014a.md §2, abi-elf.md §6.6."""
+    """_FOSC(CSW_FSCM_OFF & XT_PLL8) and the other macros; dspic30f6014a.md §2, abi-elf.md §6.6."""
     (tmp_path / "a.c").write_text(
         "#include <p30F6014A.h>\n_FOSC(CSW_FSCM_OFF & XT_PLL8);\n_FWDT(WDT_OFF);\n"
         "_FBORPOR(PBOR_OFF & MCLR_EN & PWRT_64);\n"

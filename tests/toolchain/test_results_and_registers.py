@@ -13,7 +13,7 @@ LEVELS = ("-O0", "-Os", "-O2")
 
 @pytest.mark.parametrize("level", LEVELS)
 def test_results_come_in_w0_to_w3(level: str, tmp_path: Path) -> None:
-    """abi-elf.md §2.3: 8, 16, 32, 64 bits, float, double; the upper byte of an 8-bit result is noise."""
+    """abi-elf.md §2.3: 8, 16, 32, 64 bits, float, double; the upper byte of an 8-bit result is undefined."""
     c_text = """
 signed char r8(void); unsigned char u8(void); int r16(void); long r32(void); long long r64(void);
 float rf(void); double rd(void); int check(void);
@@ -166,7 +166,7 @@ _check: mov #room,w0
 
 @pytest.mark.parametrize("level", LEVELS)
 def test_c_functions_preserve_w8_to_w14_and_balance_w15(level: str, tmp_path: Path) -> None:
-    """abi-elf.md §2.1: a C function with much to keep, called from assembly."""
+    """abi-elf.md §2.1: a C function with many live values, called from assembly."""
     c_text = """
 volatile int sink;
 extern int check(void);
@@ -200,7 +200,7 @@ int main(void) { return check(); }
 
 @pytest.mark.parametrize("level", LEVELS)
 def test_c_expects_calls_to_change_w0_to_w7_and_rcount(level: str, tmp_path: Path) -> None:
-    """abi-elf.md §2.1: a callee that ruins everything it may."""
+    """abi-elf.md §2.1: a callee that changes all registers that it may change."""
     c_text = """
 extern void ruin(void);
 int main(void)

@@ -1,4 +1,4 @@
-"""The runner of foreign C tests reports what passed, failed and was skipped, with reasons."""
+"""The runner of foreign C tests reports passed, failed and skipped tests with reasons."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def test_everything_else_fails_with_its_reason(tmp_path: Path) -> None:
 
 
 def test_skips_follow_rules(tmp_path: Path) -> None:
-    """dg- directives, GNU features clang lacks, memory, what is undefined where int has 16 bits."""
+    """dg- directives, GNU features that clang lacks, memory, undefined behaviour with 16-bit int."""
     skips = {
         "int32": "/* { dg-require-effective-target int32plus } */\nint main(void) { return 1; }",
         "avr": '/* { dg-skip-if "too big" { avr-*-* } } */\nint main(void) { return 1; }',

@@ -1,4 +1,4 @@
-"""What the driver does with a whole program: functions before main, loops that wait, functions nobody wrote."""
+"""Whole programs: functions before main, loops that wait, library functions introduced by the middle end."""
 
 from __future__ import annotations
 
@@ -75,13 +75,13 @@ int main(void) {
 
 @pytest.mark.parametrize("alone", ALONE)
 @pytest.mark.parametrize("level", LEVELS)
-def test_loops_like_library_functions_link_and_work(level: str, alone: str, tmp_path: Path) -> None:
-    """The middle end names functions for loops and calls it recognises; none may be one the library lacks."""
+def test_loops_replaced_by_library_functions_link_and_work(level: str, alone: str, tmp_path: Path) -> None:
+    """The middle end replaces loops and calls by library functions, but only by those that the library contains."""
     assert status(IDIOMS, tmp_path, level, "-std=gnu11", "-w", "-Wl,--heap=64", *alone.split()) == 7
 
 
-def test_an_unknown_library_function_is_not_made_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The driver asks the library, not a list: with an empty list the program links all the same."""
+def test_the_middle_end_introduces_no_missing_library_function(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The driver uses the symbols of the library: with an empty list of functions the program links, too."""
     from toolchain.frontend import clang
 
     monkeypatch.setattr(clang, "ABSENT_FUNCTIONS", [])
@@ -104,8 +104,8 @@ int main(void) { wait(); waiting(); called(); wide(); careful(); bounded(); retu
 
 
 @pytest.mark.parametrize("level", LEVELS)
-def test_plain_variables_that_a_loop_waits_for_are_named(level: str, tmp_path: Path) -> None:
-    """Loops with an end that nothing but the interrupt can bring about."""
+def test_polled_flags_that_are_not_volatile_cause_a_warning(level: str, tmp_path: Path) -> None:
+    """The warning names loops that only an interrupt can end."""
     source = tmp_path / "polls.c"
     source.write_text(POLLS)
     built = build([source], tmp_path / "polls.elf", level, "-g")
@@ -117,8 +117,8 @@ def test_plain_variables_that_a_loop_waits_for_are_named(level: str, tmp_path: P
 
 
 @pytest.mark.parametrize("level", LEVELS)
-def test_a_loop_that_only_waits_is_not_deleted(level: str, tmp_path: Path) -> None:
-    """XC16's programs have such loops; C11 6.8.5p6 would allow to drop them."""
+def test_delay_loops_are_not_deleted(level: str, tmp_path: Path) -> None:
+    """Delay loops remain, although C11 6.8.5p6 allows to remove them."""
     source = tmp_path / "wait.c"
     source.write_text("int flag; int main(void) { while (!flag) ; return 0; }")
     image = tmp_path / "wait.elf"

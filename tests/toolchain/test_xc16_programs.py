@@ -1,4 +1,4 @@
-"""Programs and command lines written for XC16, as they are: each of these was refused or meant something else once."""
+"""Programs and command lines written for XC16 compile unchanged and have the same meaning."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ LEVELS = ("-O0", "-O1", "-O2", "-Os")
 
 
 def status_of(folder: Path, source: str, *options: str) -> int:
-    """Exit status of a program on the emulator; compiling must be silent."""
+    """Exit status of a program on the emulator; compiling prints nothing."""
     (folder / "main.c").write_text(source)
     image = folder / "main.elf"
     assert driver.main([*options, str(folder / "main.c"), "-o", str(image)]) == 0
@@ -33,7 +33,7 @@ def refusal(capsys: pytest.CaptureFixture[str], *words: object) -> str:
 
 @pytest.mark.parametrize("level", LEVELS)
 def test_plain_inline_defines_the_function(level: str, tmp_path: Path) -> None:
-    """XC16's default language is gnu89; C99 wants another definition somewhere."""
+    """XC16's default language is gnu89; in C99 another file would have to define the function."""
     source = """
     inline int two(int x) { return x + 2; }
     int (*volatile f)(int) = two;
@@ -43,8 +43,8 @@ def test_plain_inline_defines_the_function(level: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("level", LEVELS)
-def test_operands_that_may_be_anything_are_registers(level: str, tmp_path: Path) -> None:
-    """GCC's reload prefers a register for "rm" and "g", and most instructions of this chip take nothing else."""
+def test_operands_with_register_and_memory_constraints_are_registers(level: str, tmp_path: Path) -> None:
+    """GCC's reload prefers a register for "rm" and "g", and most instructions of this CPU require one."""
     source = """
     volatile unsigned kept; unsigned char small;
     int main(void)
@@ -86,8 +86,8 @@ def test_every_header_is_accepted_in_every_dialect(options: tuple[str, ...], tmp
     assert status_of(tmp_path, source, "-Wall", "-Werror", *options) == 3
 
 
-def test_names_of_headers_in_another_case(tmp_path: Path) -> None:
-    """Sources from Windows; the file that stands beside the source, in an -I folder, and the device's own."""
+def test_header_names_are_not_case_sensitive(tmp_path: Path) -> None:
+    """Headers beside the source, in an -I folder, and of the device, spelt in another case."""
     (tmp_path / "Library").mkdir()
     (tmp_path / "Library" / "e_motors.h").write_text("#define ONE 1\n")
     (tmp_path / "Own.h").write_text("#define TWO 2\n")
@@ -103,7 +103,7 @@ def test_a_header_that_is_nowhere_stays_an_error(tmp_path: Path, capfd: pytest.C
 
 
 def test_configuration_pragmas_make_configuration_words(tmp_path: Path) -> None:
-    """What MPLAB X's code generator writes for this device (dspic30f6014a.md §2)."""
+    """Pragmas of MPLAB X's code generator for this device (dspic30f6014a.md §2)."""
     source = """
     #pragma config FOSFPR = XT_PLL8, FCKSMEN = CSW_FSCM_OFF
     #pragma config FWPSB = WDTB_16
@@ -123,7 +123,7 @@ def test_configuration_pragmas_make_configuration_words(tmp_path: Path) -> None:
 
 
 def test_protection_of_segments_by_pragmas_and_macros(tmp_path: Path) -> None:
-    """Every setting that MPLAB X lists for this device, with its names of values (DS70138, section 20)."""
+    """Every setting of MPLAB X for this device, with its names of values (DS70138, section 20)."""
     (tmp_path / "main.c").write_text("""
     #pragma config BODENV = NONE
     #pragma config BWRP = WR_PROTECT_BOOT_OFF, BSS = NO_BOOT_CODE, EBS = SMALL_BOOT_EEPROM, RBS = MED_BOOT_RAM
@@ -163,7 +163,7 @@ def test_a_wrong_configuration_pragma_names_its_line(tmp_path: Path, capfd: pyte
 def test_a_setting_made_twice_is_refused_unless_it_is_the_same(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Which of the two counts would depend on their order."""
+    """Two different values of a setting are an error, because the result would depend on their order."""
     main = tmp_path / "main.c"
     twice = "#pragma config WDT = WDT_OFF\n#pragma config WDT = {}, GWRP = GWRP_OFF\nint main(void) {{ return 0; }}\n"
     main.write_text(twice.format("WDT_ON"))
@@ -175,7 +175,7 @@ def test_a_setting_made_twice_is_refused_unless_it_is_the_same(
 
 
 def test_every_value_macro_of_the_header_changes_one_word() -> None:
-    """A mask has zeros only inside one setting's bits of some word, else a pragma could not use it."""
+    """A mask has zeros only inside one setting of one word."""
     masks = [mask for _, mask in config_pragma.settings(chip_named()).values()]
     for name, value in config_pragma.values().items():
         assert any((value | mask) & 0xFFFF == 0xFFFF for mask in [*masks, 0xC71F, 0x803F]), name
@@ -212,7 +212,7 @@ def test_what_means_nothing_here_is_refused_with_a_sentence(tmp_path: Path, caps
 @pytest.mark.parametrize("options", [(), ("-mlarge-data",)])
 @pytest.mark.parametrize("level", LEVELS)
 def test_variables_beyond_near_memory(level: str, options: tuple[str, ...], tmp_path: Path) -> None:
-    """An address says it all; -mlarge-data leaves everything else out of near memory as well."""
+    """An address determines the access; with -mlarge-data all other variables are far, too."""
     source = """
     int big __attribute__((address(0x2100))) = 3;
     unsigned char small __attribute__((address(0x2200)));
@@ -253,7 +253,7 @@ NAMES = ["__printf_cdnopuxX", "__dprintf_cdnopuxX", "__dprintf_acdeEfFgGnopsuxX"
 
 @pytest.mark.parametrize("name", NAMES)
 def test_names_of_smart_io_link(name: str, tmp_path: Path) -> None:
-    """abi-elf.md §2.8: what an object of XC16 calls printf's relatives."""
+    """abi-elf.md §2.8: XC16's objects call variants of printf by other names."""
     (tmp_path / "call.s").write_text(
         "\t.section .text,code\n\t.global _main\n_main: mov #42,w1\n\tmov w1,[w15++]\n\tmov #text,w1\n"
         f"\tmov w1,[w15++]\n\tcall {name}\n\tsub w15,#4,w15\n\tclr w0\n\treturn\n"
@@ -330,7 +330,7 @@ SCANNED = """\
 
 @pytest.mark.parametrize("level", ["-O0", "-Os"])
 def test_scanf_reads_what_c_says(level: str, tmp_path: Path) -> None:
-    """C11 7.21.6.2; the expected text is what a hosted C library prints for the same program."""
+    """C11 7.21.6.2; the expected text is the output of a hosted C library for the same program."""
     (tmp_path / "main.c").write_text(SCANF.replace("\\\\", "\\"))
     image = tmp_path / "main.elf"
     assert driver.main([level, str(tmp_path / "main.c"), "-o", str(image)]) == 0
@@ -368,8 +368,10 @@ int main(void)
 
 @pytest.mark.parametrize("level", LEVELS)
 def test_arguments_of_the_interrupt_attribute(level: str, tmp_path: Path) -> None:
-    """irq(N) binds a handler of any name, save() keeps variables, preprologue() runs before anything is saved;
-    variables that only these name are kept."""
+    """irq(N) binds a handler of any name, save() saves variables, preprologue() runs first.
+
+    Variables that only these arguments name are linked.
+    """
     assert status_of(tmp_path, HANDLERS, level) == 11
 
 
@@ -383,8 +385,8 @@ def test_an_interrupt_number_that_is_none(tmp_path: Path, capsys: pytest.Capture
 
 @pytest.mark.parametrize("alone", ["", "-fno-lto"], ids=["whole program", "file by file"])
 @pytest.mark.parametrize("level", LEVELS)
-def test_what_start_up_leaves_alone_has_no_known_first_value(level: str, alone: str, tmp_path: Path) -> None:
-    """`persistent` and `noload` variables begin with what RAM holds, though a program only sets them to one value."""
+def test_persistent_and_noload_variables_have_no_known_initial_value(level: str, alone: str, tmp_path: Path) -> None:
+    """`persistent` and `noload` variables start with the content of RAM, even if all stores are of one value."""
     (tmp_path / "main.c").write_text("""
     static int __attribute__((persistent)) magic, boots;
     static unsigned __attribute__((noload)) kept;
@@ -412,7 +414,7 @@ def test_what_start_up_leaves_alone_has_no_known_first_value(level: str, alone: 
 
 @pytest.mark.parametrize("level", LEVELS)
 def test_attributes_of_place_stand_on_variables_constants_and_functions_of_one_file(level: str, tmp_path: Path) -> None:
-    """The front end takes them for sections, and one section holds only one kind."""
+    """Clang implements the attributes by sections, and one section contains one kind of definition only."""
     source = """
     extern int __attribute__((far)) one;
     int __attribute__((far)) one = 1;
@@ -436,7 +438,7 @@ def test_attributes_of_place_stand_on_variables_constants_and_functions_of_one_f
 
 
 def test_a_macro_called_like_a_configuration_word(tmp_path: Path) -> None:
-    """Programs give the crystal's rate such names; the word is none of them (`#define FOSC 7372800`)."""
+    """A macro of the program may have the name of a configuration word (`#define FOSC 7372800`)."""
     source = """
     #include <p30F6014A.h>
     #define FOSC 7.3728e6
@@ -472,8 +474,8 @@ int later(int a, int b) { return a * b; }
 
 
 @pytest.mark.parametrize("options", [(), ("-std=gnu89",), ("-ansi",), ("-std=c99",), ("-std=gnu99",)])
-def test_what_gcc_4_only_warns_of(options: tuple[str, ...], tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    """Calls of what nothing declares, `main()`, pointers of another kind: in programs of 2006 as a matter of course."""
+def test_errors_of_clang_that_gcc_4_warns_of_are_warnings(options: tuple[str, ...], tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    """Calls of undeclared functions, `main()` and incompatible pointers are warnings, as in GCC 4."""
     assert status_of(tmp_path, OLD_C, *options) == 15
     assert "warning: incompatible function pointer types passing" in capfd.readouterr().err
     assert driver.main(["-Werror", *options, str(tmp_path / "main.c"), "-o", str(tmp_path / "not.elf")]) == 1
@@ -481,8 +483,8 @@ def test_what_gcc_4_only_warns_of(options: tuple[str, ...], tmp_path: Path, capf
 
 
 @pytest.mark.parametrize("level", LEVELS)
-def test_places_by_the_device_header_s_macros(level: str, tmp_path: Path) -> None:
-    """`_XBSS(64)` and its like, which DSP programs put before their buffers."""
+def test_section_macros_of_the_device_header(level: str, tmp_path: Path) -> None:
+    """Macros such as `_XBSS(64)`, which DSP programs use for their buffers."""
     source = """
     #include <p30F6014A.h>
     _FBS(0xFFFF) _FSS(0xFFFE);

@@ -1,7 +1,7 @@
 """`python -m toolchain cc`: C, assembly and objects in; object, ELF or Intel HEX out, used like gcc.
 
 Stages: front end (clang, in parallel) → merge and optimise (whole program) → `pipeline.compile_module` → assembler →
-linker. Heavy parts are imported when their stage runs, so that `-E` and error messages come at once.
+linker. Modules with a long import time are imported by their stage, so that `-E` and error messages are fast.
 """
 
 from __future__ import annotations
@@ -26,14 +26,14 @@ if TYPE_CHECKING:
 FrontEnd = Callable[[CcOptions, Path], dict[Input, bytes]]
 IR_SOURCES = {"c", "cpp-output", "c++", "c++-cpp-output"}
 CXX_OF = {"c": "c++", "cpp-output": "c++-cpp-output"}
-MAX_INVENTIONS = 4  # runs of the middle end; each forbids what the one before made up
+MAX_MIDDLE_END_RUNS = 4  # each run forbids the library functions that the previous one introduced
 
 
 def main(argv: list[str], cxx: bool = False, front: FrontEnd | None = None) -> int:
-    """Run the compiler driver on `argv` (without program name); return the exit status, never raise on bad input.
+    """Run the compiler driver on `argv` (without program name) and return the exit status; bad input raises nothing.
 
-    With `cxx` C sources are compiled as C++. `front` stands for `front_end` where files are compiled and linked at
-    once: who builds the same sources in several ways can keep what it gave.
+    With `cxx`, C sources are compiled as C++. `front` replaces `front_end` when files are compiled and linked together;
+    a caller that builds the same sources several times can use it to cache the IR.
     """
     from toolchain.frontend.clang import CompileError
 
@@ -50,7 +50,7 @@ def main(argv: list[str], cxx: bool = False, front: FrontEnd | None = None) -> i
                 try:
                     _run(options, Path(scratch), front or front_end)
                 except ToolError as error:
-                    raise _explained(options, error, Path(scratch)) from error
+                    raise _with_source_positions(options, error, Path(scratch)) from error
     except CompileError:
         return FAULT
     except RecursionError:
@@ -63,9 +63,9 @@ def main(argv: list[str], cxx: bool = False, front: FrontEnd | None = None) -> i
     return DONE
 
 
-def _explained(options: CcOptions, error: ToolError, scratch: Path) -> ToolError:
-    """`error` with source lines, found by compiling once more with debug information where it helps."""
-    from toolchain.driver.source_places import concerns_generated_code, with_places
+def _with_source_positions(options: CcOptions, error: ToolError, scratch: Path) -> ToolError:
+    """`error` with source positions; compiles again with debug information if they are missing."""
+    from toolchain.driver.source_positions import concerns_generated_code, with_positions
 
     if not concerns_generated_code(error) or not any(item.language in IR_SOURCES for item in options.inputs):
         return error
@@ -75,7 +75,7 @@ def _explained(options: CcOptions, error: ToolError, scratch: Path) -> ToolError
             _run(replace(again, output=scratch / "again.elf", save_temps=False), scratch, front_end)
         except ToolError as found:
             error = found
-    return with_places(error, lambda: (ir.decode() for ir in front_end(again, scratch).values()))
+    return with_positions(error, lambda: (ir.decode() for ir in front_end(again, scratch).values()))
 
 
 def _print_version() -> None:
@@ -112,11 +112,11 @@ def _preprocess(options: CcOptions) -> None:
 
 
 def front_end(options: CcOptions, scratch: Path) -> dict[Input, bytes]:
-    """Unoptimised IR of every input that has any; all C files are compiled before an error ends the run."""
+    """Unoptimised IR of every input except assembly and objects. All C files are compiled before an error is raised."""
     from toolchain.abi.struct_alignment import mark
     from toolchain.driver.whole_program import is_bitcode
-    from toolchain.frontend.clang import ir_job, repaired, run_jobs
-    from toolchain.frontend.uninitialised import marked
+    from toolchain.frontend.clang import ir_job, run_jobs, with_i32_levels
+    from toolchain.frontend.externally_initialised import mark_externally_initialised
 
     sources = [item for item in options.inputs if item.language in IR_SOURCES]
     targets = {item: scratch / f"{number}.front.ll" for number, item in enumerate(sources)}
@@ -126,7 +126,7 @@ def front_end(options: CcOptions, scratch: Path) -> dict[Input, bytes]:
     for item in options.inputs:
         if item in targets:
             layouts = targets[item].with_suffix(".layouts").read_text(errors="replace")
-            modules[item] = mark(marked(repaired(targets[item].read_bytes())), layouts)
+            modules[item] = mark(mark_externally_initialised(with_i32_levels(targets[item].read_bytes())), layouts)
         elif item.language in ("ir", "object"):
             content = read_bytes(item.path)
             if item.language == "ir" or is_bitcode(content):
@@ -135,27 +135,27 @@ def front_end(options: CcOptions, scratch: Path) -> dict[Input, bytes]:
 
 
 def optimise(options: CcOptions, ir: bytes, scratch: Path) -> str:
-    """Clang's middle end over a module (text or bitcode).
+    """Run clang's middle end on a module (text or bitcode) and return the optimised IR text.
 
-    It may recognise a loop as a library function. When the run-time library has no such function, it must not, and
-    runs once more.
+    The middle end may replace a loop by a library function. If the run-time library does not contain the function, the
+    middle end runs again without it.
     """
     from toolchain.driver.whole_program import functions_declared, without_builtins
     from toolchain.frontend.clang import optimise_job, run_jobs
 
-    for _ in range(MAX_INVENTIONS):
+    for _ in range(MAX_MIDDLE_END_RUNS):
         handle, before = tempfile.mkstemp(suffix=".ll", dir=scratch)
         os.write(handle, ir)
         os.close(handle)
         after = Path(before).with_suffix(".opt.ll")
         run_jobs([optimise_job(options, Path(before), after)], 1, options.verbose)
         text = after.read_text()
-        invented = functions_declared(text) - functions_declared(ir.decode(errors="replace"))
-        if not options.runtime or not invented:
+        introduced = functions_declared(text) - functions_declared(ir.decode(errors="replace"))
+        if not options.runtime or not introduced:
             break
         from toolchain.driver.runtime_archive import defined_names, library
 
-        absent = invented - {name[1:] for name in defined_names(library(object_of, options.jobs))}
+        absent = introduced - {name[1:] for name in defined_names(library(object_of, options.jobs))}
         if not absent:
             break
         ir = without_builtins(ir, absent)
@@ -175,7 +175,7 @@ def _to_assembly(options: CcOptions, ir_text: str) -> str:
 
 
 def assembler_options(options: CcOptions, compiled: bool) -> AssemblerOptions:
-    """What the assembler gets. Branch shortening only for compiled code, as XC16's driver does (abi-elf.md §5)."""
+    """Options of the assembler. Only branches of compiled code are shortened, as in XC16 (abi-elf.md §5)."""
     from toolchain.asm.state import Options
 
     folders = [word[2:] for word in options.clang if word.startswith("-I") and len(word) > 2]
@@ -185,7 +185,7 @@ def assembler_options(options: CcOptions, compiled: bool) -> AssemblerOptions:
 
 
 def _assemble(options: CcOptions, text: str, name: str, compiled: bool) -> bytes:
-    """Object bytes."""
+    """Assemble a text; returns the object file."""
     from toolchain.asm.assemble import assemble
     from toolchain.elf.write import object_bytes
 
@@ -196,7 +196,7 @@ def _assemble(options: CcOptions, text: str, name: str, compiled: bool) -> bytes
 
 
 def _assembly_text(options: CcOptions, item: Input, scratch: Path) -> str:
-    """Text of an assembly input, preprocessed when it is one of the `.S` kind."""
+    """Text of an assembly input; `.S` files are preprocessed."""
     if item.language == "assembler":
         return read_text(item.path)
     from toolchain.frontend.clang import preprocess_job, run_jobs
@@ -207,7 +207,7 @@ def _assembly_text(options: CcOptions, item: Input, scratch: Path) -> str:
 
 
 def object_of(options: CcOptions, item: Input, scratch: Path) -> bytes:
-    """Native object of one C, IR or assembly input."""
+    """Object file of one C, IR or assembly input."""
     modules = front_end(replace(options, inputs=[item]), scratch)
     return _object(options, item, modules, scratch)
 
@@ -222,9 +222,9 @@ def _object(options: CcOptions, item: Input, modules: dict[Input, bytes], scratc
 
 
 def _translate(options: CcOptions, item: Input, modules: dict[Input, bytes], scratch: Path) -> tuple[Path, bytes]:
-    """Output file of one input for -c and -S."""
+    """Path and content of the output of one input for -c and -S."""
     if item.language in ("object", "archive"):
-        raise ToolError(f"{item.path}: nothing to compile here (-c and -S take sources)")
+        raise ToolError(f"{item.path}: nothing to compile: -c and -S take sources")
     if options.stage == "assemble" and options.lto and item in modules:
         from toolchain.driver.whole_program import read_module
 
@@ -244,7 +244,7 @@ def _output(options: CcOptions, item: Input, suffix: str) -> Path:
 
 
 def _compile_program(options: CcOptions, scratch: Path, front: FrontEnd) -> Program:
-    """Everything the linker needs: native objects in command-line order, merged C code last, archives."""
+    """Input of the linker: objects in command line order, the object of the merged C files last, and archives."""
     from toolchain.driver.link_stage import Program, find_library, output_path
     from toolchain.driver.runtime_archive import library
     from toolchain.frontend import polled_flags
@@ -273,7 +273,7 @@ def _compile_program(options: CcOptions, scratch: Path, front: FrontEnd) -> Prog
 
 
 def _merge(modules: dict[Input, bytes], program: Program) -> bytes:
-    """One module of all C inputs, with everything internal that assembly, archives and the library do not name."""
+    """Merge all C inputs; symbols that assembly, archives and the library do not name become internal."""
     from toolchain.driver.runtime_archive import defined_names
     from toolchain.driver.whole_program import internalise, merge, names_used, read_module
     from toolchain.elf.archive import open_archive

@@ -1,4 +1,4 @@
-"""The link stage of the compiler driver: native objects and archives in; ELF or HEX, and a map, out."""
+"""Link stage of the compiler driver: objects and archives to ELF or Intel HEX and a link map."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ from toolchain.link.smartio import plain_name
 
 RUNTIME_NAME = "run-time library"
 BUILT_IN_LIBRARIES = {"c", "m", "gcc", "pic30", "dsp"}
-"""Names other toolchains use for what our run-time library holds; linking them is a no-op here."""
+"""Libraries of other toolchains whose content is part of the run-time library; -l with them has no effect."""
 
-# Conversions whose code is linked only when a format string mentions them (runtime/format.h, runtime/scan.h).
+# Conversions whose code is linked only if a format string contains them (runtime/format.h, runtime/scan.h).
 _FLAGS = rb"%[-+ #0]*(?:\d+|\*)?(?:\.(?:\d+|\*)?)?"
 _WIDTH = rb"%\*?\d*"
 FORMAT_PARTS = {
@@ -41,7 +41,7 @@ FORMAT_PARTS = {
 
 @dataclass
 class Program:
-    """What the compile stages hand to the linker: the library's bytes, native objects in order, archives."""
+    """Input of the linker: run-time library, objects in order, archives."""
 
     runtime: bytes
     objects: list[tuple[str, bytes]] = field(default_factory=list)
@@ -49,12 +49,12 @@ class Program:
 
 
 def output_path(options: CcOptions) -> Path:
-    """Where the linked image goes."""
+    """Path of the linked image."""
     return options.output or Path("a.elf")
 
 
 def find_library(options: CcOptions, name: str) -> tuple[str, bytes] | None:
-    """Archive named by -l, or None for one whose content is part of the run-time library."""
+    """Archive for -lNAME; None if its content is part of the run-time library. Raises ToolError if there is none."""
     for folder in options.library_dirs:
         path = folder / f"lib{name}.a"
         if path.is_file():
@@ -66,7 +66,7 @@ def find_library(options: CcOptions, name: str) -> tuple[str, bytes] | None:
 
 
 def link_program(options: CcOptions, program: Program) -> None:
-    """Link and write the outputs, all or none. Raises ToolError listing everything that is wrong."""
+    """Link and write all outputs or none. Raises ToolError that lists all errors."""
     objects = [read_object(content, name) for name, content in program.objects]
     archives = [open_archive(content, name) for name, content in program.archives]
     if program.runtime:
@@ -81,7 +81,7 @@ def link_program(options: CcOptions, program: Program) -> None:
 
 
 def link_options(options: CcOptions, objects: list[ObjectFile]) -> LinkOptions:
-    """Linker settings from -Wl and -Xlinker words, which are those of `ld`; unused sections are left out by default."""
+    """Linker settings from the words of -Wl and -Xlinker; unused sections are removed by default."""
     result = link_settings(parse_link_words(["--gc-sections", *options.linker]))
     result.undefined += format_parts(objects)
     result.chip = options.chip
@@ -89,7 +89,7 @@ def link_options(options: CcOptions, objects: list[ObjectFile]) -> LinkOptions:
 
 
 def format_parts(objects: list[ObjectFile]) -> list[str]:
-    """Symbols of the parts of printf and scanf that the program's constant strings ask for."""
+    """Symbols of the optional parts of printf and scanf that the program's constant strings need."""
     names = {plain_name(symbol.name, obj.name) for obj in objects for symbol in obj.symbols}
     strings = b"\0".join(bytes(s.data[::2]) for obj in objects for s in obj.sections if s.is_psv or s.is_ram)
     return [

@@ -1,7 +1,7 @@
-"""The run-time library as an archive, built from `runtime/` on first use and kept in the user's cache folder.
+"""The run-time library as an archive, built from `runtime/` on first use and cached in the user's cache folder.
 
-Enters: assembly and C sources. Leaves: archive bytes. The cache file's name is a hash of everything the archive depends
-on, and it appears by rename, so two builds at once are harmless.
+The name of the cached file is a hash of all dependencies of the archive. The file is created by a rename, so concurrent
+builds are safe.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from toolchain.frontend.options import CcOptions, Input
 
 RUNTIME_DIR = Path(__file__).parents[1] / "runtime"
 PACKAGE_DIRS = ("toolchain", "emu/dspic30f/isa", "emu/chips")
-"""What the compiled library depends on, relative to the folder that holds `toolchain`."""
+"""Dependencies of the compiled library, relative to the parent folder of `toolchain`."""
 UNRELATED = ("toolchain/link", "toolchain/cli.py", "toolchain/README.md")
 SUFFIXES = (".py", ".c", ".cpp", ".h", ".s", ".inc", ".csv")
 LEVEL = "s"
@@ -29,13 +29,13 @@ LANGUAGES = {".c": "c", ".cpp": "c++", ".s": "assembler"}
 
 
 Dependency = tuple[tuple[str, ...], int, int]
-"""Parts of a file's path below the folder that holds `toolchain`, its size in bytes, when it was changed (ns)."""
+"""Parts of a file's path below the parent folder of `toolchain`, size in bytes, time of modification (ns)."""
 Compile = Callable[[CcOptions, Input, Path], bytes]
-"""Makes an object of one source with a scratch folder: the driver, which itself needs this library."""
+"""Compiles one source with a scratch folder; passed as an argument because the driver needs this library."""
 
 
 def library(compile_one: Compile, jobs: int = 0) -> bytes:
-    """The archive's bytes. Builds it (seconds, once) when the cache has none for these sources and this compiler."""
+    """The archive; it is built, which takes seconds, if the cache has none for these sources and this compiler."""
     key = fingerprint()
     cached = runtime_libraries() / f"libdspic-{key}.a"
     try:
@@ -43,19 +43,19 @@ def library(compile_one: Compile, jobs: int = 0) -> bytes:
     except OSError:
         pass
     content = build(compile_one, jobs)
-    if fingerprint() == key:  # nobody edited the compiler meanwhile
+    if fingerprint() == key:  # the compiler has not been edited meanwhile
         _store(cached, content)
     return content
 
 
 def fingerprint() -> str:
-    """Hash of the library's sources, the headers, the compiler's code and the packages it runs on."""
+    """Hash of the sources of the library, the headers, the compiler and the versions of its packages."""
     return _hash_of(tuple(sorted(_dependencies(str(Path(__file__).parents[2])))))
 
 
 @cache
 def _hash_of(dependencies: tuple[Dependency, ...]) -> str:
-    """The files are read again when one has another size or time of change: a process may link many programs."""
+    """Hash of the content of files; cached for equal sizes and times of modification, as a process may link often."""
     digest = hashlib.sha256(f"{version('ziglang')} {version('llvmlite')} {sys.version_info[:2]}".encode())
     root = Path(__file__).parents[2]
     for parts, _, _ in dependencies:
@@ -65,18 +65,19 @@ def _hash_of(dependencies: tuple[Dependency, ...]) -> str:
 
 
 def _dependencies(root: str) -> Iterator[Dependency]:
+    """All files that the library depends on."""
     for package in PACKAGE_DIRS:
         for folder, _, names in os.walk(os.path.join(root, package)):
-            place = os.path.relpath(folder, root).replace(os.sep, "/")
+            relative = os.path.relpath(folder, root).replace(os.sep, "/")
             for name in names:
-                path = f"{place}/{name}"
+                path = f"{relative}/{name}"
                 if name.endswith(SUFFIXES) and not path.startswith(UNRELATED):
                     status = os.stat(os.path.join(folder, name))
                     yield tuple(path.split("/")), status.st_size, status.st_mtime_ns
 
 
 def build(compile_one: Compile, jobs: int = 0) -> bytes:
-    """Compile and assemble every file of `runtime/`, one archive member each."""
+    """Compile and assemble every file of `runtime/` into an archive."""
     from toolchain.elf.archive import Member, archive_bytes
 
     sources = sorted(path for path in RUNTIME_DIR.iterdir() if path.suffix in LANGUAGES)
@@ -92,7 +93,7 @@ def _member(compile_one: Compile, source: Path) -> bytes:
         inputs=[item],
         stage="assemble",
         level=LEVEL,
-        stack_check=True,  # a program's own checks are worth nothing if the functions it calls have none
+        stack_check=True,  # checks of a program need checks in the functions that it calls
         runtime=False,
         clang=["-std=c11" if item.language == "c" else "-std=c++17", "-ffreestanding", "-Wall"],
     )
@@ -101,7 +102,7 @@ def _member(compile_one: Compile, source: Path) -> bytes:
 
 
 def _weakened(content: bytes, name: str) -> bytes:
-    """The object with every global definition made weak: a program may replace any library function by its own."""
+    """The object with weak global definitions, so that a program may replace any library function."""
     from toolchain.elf.model import Bind, Home
     from toolchain.elf.read import read_object
     from toolchain.elf.write import object_bytes
@@ -114,7 +115,7 @@ def _weakened(content: bytes, name: str) -> bytes:
 
 
 def _store(path: Path, content: bytes) -> None:
-    """Keep the archive for the next run; a cache folder that cannot be written only costs time."""
+    """Store the archive in the cache; errors are ignored, as the next run can build it again."""
     try:
         path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
         handle, temporary = tempfile.mkstemp(prefix=".libdspic.", dir=path.parent)
@@ -128,7 +129,7 @@ def _store(path: Path, content: bytes) -> None:
 
 
 def defined_names(content: bytes) -> set[str]:
-    """Assembler names the library defines: a program's own versions of them must stay visible to it."""
+    """Assembler names that the library defines."""
     from toolchain.elf.archive import open_archive
 
     return set(open_archive(content, "run-time library").index)

@@ -1,7 +1,7 @@
-"""Merge LLVM modules and make internal every symbol that nothing outside the merged module can name.
+"""Whole-program optimisation: merge LLVM modules, and make symbols internal that no other object can name.
 
-Enters: IR (text or bitcode) per C file and the set of assembler names used by native objects. Leaves: one module.
-IR travels as text: writing bitcode makes clang assemble file-scope asm, which it would read as MSP430 code.
+Input: IR (text or bitcode) of every C file, and the assembler names that objects use. Output: one module. Modules are
+passed as text, because clang would assemble file-scope asm as MSP430 code when it writes bitcode.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ VISIBLE_LINKAGES = {llvm.Linkage.external, llvm.Linkage.weak_any, llvm.Linkage.w
 BITCODE_MAGIC = b"BC\xc0\xde"
 DECLARED = re.compile(r"^declare [^@\n]*@([\w$.]+)\(", re.MULTILINE)
 ATTRIBUTES = re.compile(rb"^attributes #\d+ = \{", re.MULTILINE)
-OF_ASSEMBLY = re.compile(r' asm | c"preprologue:| c"save:')
+NAMES_SYMBOLS = re.compile(r' asm | c"preprologue:| c"save:')
 USED_TABLES = ("llvm.used", "llvm.compiler.used")
 GLOBAL_NAME = re.compile(r"ptr @([\w$.]+)")
 C_NAME = re.compile(r"\b([A-Za-z_]\w*)")
@@ -38,17 +38,17 @@ def read_module(source: Path, content: bytes) -> llvm.ModuleRef:
 
 
 def is_bitcode(content: bytes) -> bool:
-    """True for LLVM bitcode, which is what `-flto -c` writes."""
+    """Whether content is LLVM bitcode, which `-flto -c` writes."""
     return content.startswith(BITCODE_MAGIC)
 
 
 def functions_declared(text: str) -> set[str]:
-    """Functions a module's text declares and does not define, without LLVM's own."""
+    """Functions that a module declares without defining them, except LLVM intrinsics."""
     return {name for name in DECLARED.findall(text) if not name.startswith("llvm.")}
 
 
 def without_builtins(ir: bytes, names: Iterable[str]) -> bytes:
-    """IR text in which no function knows the library functions `names` by what they do."""
+    """IR text in which the middle end must not introduce calls of the library functions `names`."""
     if is_bitcode(ir):
         ir = str(llvm.parse_bitcode(ir)).encode()
     words = " ".join(f'"no-builtin-{name}"' for name in sorted(names)).encode()
@@ -56,10 +56,10 @@ def without_builtins(ir: bytes, names: Iterable[str]) -> bytes:
 
 
 def merge(modules: list[tuple[Path, llvm.ModuleRef]]) -> llvm.ModuleRef:
-    """Link modules in order; the first one receives the others. Raises ToolError listing every clashing definition."""
-    clashes = _duplicate_definitions(modules)
-    if clashes:
-        raise ToolError.of(clashes)
+    """Link the modules into the first one. Raises ToolError that lists every symbol defined more than once."""
+    duplicates = _duplicate_definitions(modules)
+    if duplicates:
+        raise ToolError.of(duplicates)
     merged = modules[0][1]
     for source, module in modules[1:]:
         try:
@@ -70,9 +70,9 @@ def merge(modules: list[tuple[Path, llvm.ModuleRef]]) -> llvm.ModuleRef:
 
 
 def names_used(objects: Iterable[tuple[str, bytes]]) -> set[str]:
-    """Names that native objects, given as (name, content), want from elsewhere or define themselves.
+    """Global names that objects, given as (name, content), reference or define.
 
-    A definition on both sides must reach the linker, which reports it.
+    Definitions are included, so that the linker can report a symbol defined by an object and a C file.
     """
     from toolchain.elf.model import Bind
     from toolchain.elf.read import is_object, read_object
@@ -85,11 +85,10 @@ def names_used(objects: Iterable[tuple[str, bytes]]) -> set[str]:
 
 
 def names_in_inline_assembly(text: str) -> set[str]:
-    """C names that inline assembly anywhere in the module's text, or a `preprologue`, refers to as `_name`, and those
-    that `save` lists."""
+    """C names that inline assembly and `preprologue` annotations of a module use as `_name`, and those in `save`."""
     names: set[str] = set()
     for line in text.splitlines():
-        found = OF_ASSEMBLY.search(line)
+        found = NAMES_SYMBOLS.search(line)
         if found:
             quoted = re.sub(r"\\[0-9A-Fa-f]{2}", " ", line[found.start() :])
             names.update((C_NAME if found[0].endswith("save:") else ASSEMBLER_NAME).findall(quoted))
@@ -97,10 +96,10 @@ def names_in_inline_assembly(text: str) -> set[str]:
 
 
 def internalise(module: llvm.ModuleRef, assembler_names: Iterable[str]) -> None:
-    """Give `internal` linkage to every definition except `main`, vectors, `used` ones and the names given.
+    """Make every definition internal except `main`, interrupt handlers, `used` definitions and the given names.
 
-    `assembler_names` are object-file names, with the leading underscore of C names (abi-elf.md §2.6). They include what
-    the run-time library defines: generated code may call its functions without any call in the IR.
+    `assembler_names` have the leading underscore of C names (abi-elf.md §2.6). They include the names that the run-time
+    library defines, because generated code may call its functions without a call in the IR.
     """
     keep = {name[1:] for name in assembler_names if name.startswith("_")} | {"main"}
     keep |= names_in_inline_assembly(str(module))
@@ -115,7 +114,7 @@ def internalise(module: llvm.ModuleRef, assembler_names: Iterable[str]) -> None:
 
 
 def _duplicate_definitions(modules: list[tuple[Path, llvm.ModuleRef]]) -> list[str]:
-    """One line per strong symbol that more than one module defines, naming all of them."""
+    """One message per strong symbol that more than one module defines, with their files."""
     owners: dict[str, list[Path]] = {}
     for source, module in modules:
         for value in [*module.functions, *module.global_variables]:

@@ -1,1 +1,1 @@
-"""The C front end around clang: options, XC16's dialect, checks of the generated LLVM IR."""
+"""C front end: command line options, clang, XC16's dialect, checks of the generated LLVM IR."""

@@ -1,9 +1,8 @@
 """XC16's accumulator variables, `register int a asm("A")`, and its DSP builtins, one instruction each.
 
-The front end has no register of 40 bits. So the variable is taken out of preprocessed C, and each
-`a = __builtin_mac(...)` becomes an asm statement that works on the accumulator the variable stands for. Operands travel
-in W4 and W5, X pointers in W8, Y pointers in W10, the other accumulator's write-back in W13 (abi-elf.md §2.9). Enters:
-preprocessed C with line markers. Leaves: C.
+Clang has no registers of 40 bits. `rewrite` therefore removes the variables from preprocessed C, and replaces each
+`a = __builtin_mac(...)` by an asm statement on the accumulator. Operands are in W4 and W5, X pointers in W8, Y pointers
+in W10, the write-back of the other accumulator in W13 (abi-elf.md §2.9). The input is preprocessed C with line markers.
 """
 
 from __future__ import annotations
@@ -15,7 +14,7 @@ from dataclasses import dataclass
 from toolchain.errors import ToolError
 
 REFUSED = re.compile(rb"unknown register name '[ABab]' in asm")
-"""What clang says about a source that needs this."""
+"""Error message of clang for a source that needs the rewrite."""
 
 _TOKEN = re.compile(
     r'(?P<marker>^#[^\n]*)|(?P<text>"(?:[^"\\\n]|\\.)*"|\'(?:[^\'\\\n]|\\.)*\')|(?P<name>[A-Za-z_]\w*)'
@@ -36,19 +35,21 @@ class _Token:
 
 @dataclass
 class _Prefetch:
-    """One pointer that MAC moves on, and where its element goes."""
+    """Prefetch of MAC: pointer variable, variable for the element, step in bytes."""
 
     pointer: str
     value: str
     step: int
 
 
-def applied(text: str) -> str:
-    """`text` without accumulator variables. Raises ToolError naming the line of what cannot be said so."""
+def rewrite(text: str) -> str:
+    """`text` without accumulator variables. Raises ToolError that names the line of an unsupported use."""
     return _Rewriter(text).run()
 
 
 class _Rewriter:
+    """State of one rewrite: tokens, scopes with the accumulator of each variable, output so far."""
+
     def __init__(self, text: str) -> None:
         self.text = text
         self.tokens = [
@@ -65,7 +66,7 @@ class _Rewriter:
         return "".join([*self.out, self.text[self.copied :]])
 
     def step(self, i: int) -> int:
-        """Handle the token at `i`; returns the next one to look at."""
+        """Handle the token at `i`; returns the number of the next one."""
         token = self.tokens[i]
         if token.text == "{":
             self.scopes.append({})
@@ -87,7 +88,7 @@ class _Rewriter:
         return before.endswith((".", "->"))
 
     def end_of(self, i: int, closers: str) -> int:
-        """Index of the first token in `closers` outside parentheses, from `i` on."""
+        """Index of the first token in `closers` outside of parentheses, from `i` on."""
         depth = 0
         while i < len(self.tokens):
             text = self.tokens[i].text
@@ -98,12 +99,12 @@ class _Rewriter:
         raise self.error(len(self.tokens) - 1, "the source ends inside a statement")
 
     def declares(self, i: int) -> bool:
-        """Whether the declaration with `register` at `i` names an accumulator."""
+        """Whether the declaration with `register` at `i` declares an accumulator variable."""
         words = [t.text for t in self.tokens[i : self.end_of(i, ";)")]]
         return any(a in _ASM and t.lower() in ('"a"', '"b"') for a, t in zip(words, words[2:], strict=False))
 
     def declaration(self, i: int) -> int:
-        """Take the declaration out; initialisers become assignments behind it."""
+        """Remove the declaration; initialisers become assignments."""
         end = self.end_of(i, ";")
         start = i
         while start and self.tokens[start - 1].text in ("volatile", "extern", "static", "int", "short", "const"):
@@ -121,7 +122,7 @@ class _Rewriter:
                 self.assignment(i + at - 1, skip=3 + 1)
                 self.out.append(";")
             i = stop + 1
-        self.copied = self.tokens[end].at  # the semicolon stays, an empty statement
+        self.copied = self.tokens[end].at  # the semicolon remains as an empty statement
         return end
 
     def copy_to(self, at: int) -> None:
@@ -129,7 +130,7 @@ class _Rewriter:
         self.copied = at
 
     def assignment(self, i: int, skip: int = 0) -> int:
-        """`a = __builtin_...(...)`, the only thing that can be done with an accumulator by its name."""
+        """Rewrite `a = __builtin_...(...)`, the only use of an accumulator outside of arguments."""
         target = self.accumulator(self.tokens[i].text)
         follows = i + 1 + skip
         if self.tokens[follows].text != "=":
@@ -142,7 +143,7 @@ class _Rewriter:
         return self.call(at, target, i)
 
     def call(self, at: int, target: str, start: int) -> int:
-        """Replace the tokens from `start` to the end of the call of the builtin at `at`."""
+        """Replace the tokens from `start` to the end of the builtin call at `at`."""
         name = self.tokens[at].text.removeprefix("__builtin_")
         end = self.end_of(at + 2, ")")
         arguments: list[str] = []
@@ -175,12 +176,12 @@ class _Rewriter:
 
 COUNTS = {"add": 3, "addab": 2, "subab": 2, "clr": 0, "clr_prefetch": 8, "ed": 6, "edac": 7, "lac": 2, "mac": 11,
           "msc": 11, "mpy": 8, "mpyn": 8, "movsac": 8, "sac": 2, "sacr": 2, "sftac": 2}  # fmt: skip
-"""Arguments of each builtin."""
+"""Number of arguments of each builtin."""
 
 
 @dataclass
 class _Builtin:
-    """One call: `arguments` as written, `target` the accumulator it works on or "" for those that give a value."""
+    """One builtin call; `target` is the accumulator that it changes, or "" for builtins that return a value."""
 
     name: str
     target: str
@@ -189,7 +190,7 @@ class _Builtin:
     accumulator: Callable[[str], str | None]
 
     def text(self) -> str:
-        """The statement expression that does it."""
+        """The statement expression that replaces the call."""
         a, name = self.arguments, self.name
         if name in ("sac", "sacr"):
             instruction = f"{name.replace('sacr', 'sac.r')} {self.own(a[0])},#{self.literal(a[1], -8, 7)},%0"
@@ -222,7 +223,7 @@ class _Builtin:
         return self.engine(f"{name.replace('mpyn', 'mpy.n')} w4*w5,{self.target}", a[0:2], a[2:8], a[8:10])
 
     def own(self, argument: str) -> str:
-        """The accumulator an argument names."""
+        """The accumulator of an argument. Raises ToolError for other arguments."""
         found = self.accumulator(argument.strip("() "))
         if found is None:
             raise self.error(f"'{argument}' is not an accumulator variable")
@@ -250,7 +251,7 @@ class _Builtin:
         return _Prefetch(pointer, value, number)
 
     def engine(self, instruction: str, factors: list[str], moved: list[str], back: list[str]) -> str:
-        """MAC and its like: two factors, prefetches from X and Y, write-back of the other accumulator."""
+        """MAC-class instruction: two factors, prefetches from X and Y, write-back of the other accumulator."""
         before, outputs, inputs, after = [], [], [], []
         for number, factor in enumerate(factors):
             before.append(f'register int __f{number} __asm__("r{4 + number}") = ({factor});')
@@ -277,7 +278,7 @@ class _Builtin:
         return _statement(before, instruction, outputs, inputs, after)
 
     def distance(self, a: list[str]) -> str:
-        """ED and EDAC: the square of W4, and the difference of two elements for the next one."""
+        """ED and EDAC: the square of W4, and the difference of two elements for the next instruction."""
         x, y = self.prefetch(a[1], a[5], a[2]), self.prefetch(a[3], a[5], a[4])
         if x is None or y is None:
             raise self.error(f"__builtin_{self.name} needs both pointers")

@@ -1,8 +1,7 @@
-"""XC16's register letters in inline assembly (`"=a"(x)`): registers by number, which the front end does not know.
+"""XC16's register classes as constraint letters in inline assembly (`"=a"(x)`), which clang does not know.
 
-The front end refuses the letters, so in preprocessed C they become `r`, and a mark at the beginning of the template
-says which operand had which. `lower.asm_inline` takes the mark off and gives each such operand a register of its class.
-Enters: preprocessed C. Leaves: the same with those strings respelt.
+`respell` replaces the letters in preprocessed C by `r` and adds a mark with the letter of each operand to the start of
+the template. `select.asm_inline` removes the mark and assigns registers of the classes.
 """
 
 from __future__ import annotations
@@ -14,10 +13,10 @@ CLASSES = {
     "v": (13,), "x": (8, 9), "y": (10, 11), "z": (4, 5, 6, 7),
 }  # fmt: skip
 """Letter -> registers (XC16 User's Guide, register letters): WREG, divide, multiply, general, not for divide,
-write-back of accumulators, X and Y prefetch, MAC factors. Of W1-W14 and W2-W14 those a function need not save."""
+write-back of accumulators, X and Y prefetch, MAC factors. Classes W1-W14 and W2-W14 have the caller-saved ones only."""
 
 REFUSED = re.compile(rb"invalid (?:in|out)put constraint '[=+&%]*[abcdevxyz]' in asm")
-"""What clang says about a source that needs this."""
+"""Error message of clang for a source that needs `respell`."""
 
 MARK = re.compile(r"\x01((?:\d+[a-z] )+)\x01")
 
@@ -28,15 +27,15 @@ _TOKEN = re.compile(
 
 
 def respell(text: str) -> str:
-    """Replace the letters in the operands of asm statements."""
+    """Replace the constraint letters of asm statements by `r` and marks."""
     out: list[str] = []
     at = depth = part = operand = start = 0
-    found: list[tuple[int, int, str, str]] = []  # begin and end of a constraint, what replaces it, its mark
+    found: list[tuple[int, int, str, str]] = []  # begin and end of a constraint, its replacement, its mark
     for token in _TOKEN.finditer(text):
         sign = token[0]
         if token["asm"]:
             if depth == 0:
-                depth, part = -1, 0  # waits for the parenthesis
+                depth, part = -1, 0  # before the parenthesis
         elif sign in "([" and depth:
             if depth < 0:
                 depth, operand, start, found = 0, 0, token.end(), []

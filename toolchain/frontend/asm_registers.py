@@ -1,7 +1,7 @@
 """XC16's register names in inline assembly: `"w0"` as a clobber and `asm("w4")` of a register variable.
 
-The front end knows the registers of the machine whose data layout it borrows, r0-r15 for W0-W15, and refuses others;
-the text of the instructions is ours and stays. Enters: preprocessed C. Leaves: the same with those strings respelt.
+Clang knows the register names of the MSP430, r0-r15 for W0-W15, and refuses others. `respell` replaces the names in
+preprocessed C; templates of instructions are not changed.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 
 REFUSED = re.compile(rb"unknown register name 'w\d+' in asm")
-"""What clang says about a source that needs this."""
+"""Error message of clang for a source that needs `respell`."""
 
 _TOKEN = re.compile(
     r'(?P<asm>\b(?:asm|__asm|__asm__)\b)|"(?P<register>[wW](?:1[0-5]|\d))"'

@@ -1,7 +1,7 @@
-"""The C front end: runs the clang inside the `ziglang` wheel. C in; LLVM IR text, preprocessed text, dependencies out.
+"""Runs clang, which the `ziglang` package contains: C to LLVM IR text, preprocessed text and dependency files.
 
-The MSP430 target is borrowed for its data layout, which is XC16's (abi-elf.md §1.1); nothing of its code generator is
-used. This is the only module that starts clang.
+The front end uses clang's MSP430 target for its data layout, which equals XC16's (abi-elf.md §1.1), but not its code
+generator. This is the only module that starts clang.
 """
 
 from __future__ import annotations
@@ -33,28 +33,29 @@ TARGET_FLAGS = [
     "-fno-unwind-tables",
     "-fno-asynchronous-unwind-tables",
     "-fno-stack-protector",
-    "-fno-finite-loops",  # a loop that only waits is not deleted; XC16's programs have such loops
+    "-fno-finite-loops",  # delay loops without effect are not deleted; XC16 programs contain them
     "-fno-vectorize",
     "-fno-slp-vectorize",
 ]
-# Plain char is signed (abi-elf.md §1.1; MSP430 says unsigned), wchar_t is unsigned short.
-# A pragma that nobody understands must not pass in silence; the warning also tells that there is a `#pragma config`.
-# `space(ymemory), far` are two section names to clang; it keeps the first. Notes about our macros are of no use.
+# Plain char is signed (abi-elf.md §1.1), unlike on the MSP430; wchar_t is unsigned short.
+# Unknown pragmas cause a warning, which also reveals `#pragma config`.
+# `space(ymemory), far` are two section names for clang, which uses the first. Notes about our macros are suppressed.
 LANGUAGE_FLAGS = ["-nostdinc", "-fsigned-char", "-fshort-wchar", "-fno-ident", "-Wunknown-pragmas", "-Wno-section",
                   "-Wno-atomic-alignment",
                   "-fmacro-backtrace-limit=1"]  # fmt: skip
-# What GCC 4, and so XC16, warns of in every dialect of C, and clang refuses: calls of what nothing declares, `main()`,
-# pointers of another kind, `return` with or without a value. -Werror makes errors of them there, too.
+# Errors of clang that are warnings in GCC 4, and so in XC16, in every dialect of C: calls of undeclared functions,
+# `main()`, incompatible pointers, `return` with or without a value. With -Werror they are errors there, too.
 WARNINGS_OF_C = ["implicit-function-declaration", "implicit-int", "int-conversion", "incompatible-pointer-types",
                  "incompatible-function-pointer-types", "return-mismatch"]  # fmt: skip
-# Library functions that clang knows and may introduce by itself, but which the run-time library does not have.
+# Library functions that clang may introduce, but that the run-time library does not contain.
 ABSENT_FUNCTIONS = ["stpcpy", "stpncpy", "bcmp", "exp10", "ldexp",
                     "ldexpf", "memccpy", "strndup", "cabs", "iprintf", "siprintf", "wcslen"]  # fmt: skip
-# abi-elf.md §2.9 predefined macros; __XC16__ and __C30__ stay undefined, they select Microchip's attribute spellings.
-PREDEFINED = ["__dsPIC30F__", "__dsPIC30__", "__HAS_DSP__", "__HAS_EEDATA__", "__HAS_5VOLTS__"]  # beside the part's own
-# Freestanding C++: no exceptions, no run-time types, no threads that could meet in a guard, nothing to do at the end.
+# Predefined macros besides that of the chip (abi-elf.md §2.9). __XC16__ and __C30__ are undefined, because they select
+# Microchip's spellings of attributes.
+PREDEFINED = ["__dsPIC30F__", "__dsPIC30__", "__HAS_DSP__", "__HAS_EEDATA__", "__HAS_5VOLTS__"]
+# Freestanding C++: no exceptions, no run-time types, no thread-safe statics, no destructors of statics.
 CXX_FLAGS = ["-fno-exceptions", "-fno-rtti", "-fno-threadsafe-statics", "-fno-c++-static-destructors", "-nostdinc++"]
-# libc++ is told by macros what there is.
+# Configuration macros of libc++.
 LIBCXX_SETTINGS = {"ABI_VERSION": "1", "ABI_NAMESPACE": "__1", "HARDENING_MODE_DEFAULT": "_LIBCPP_HARDENING_MODE_NONE",
                    "ASSERTION_SEMANTIC_DEFAULT": "_LIBCPP_ASSERTION_SEMANTIC_IGNORE",
                    "DISABLE_VISIBILITY_ANNOTATIONS": "1", "PSTL_BACKEND_SERIAL": "1", **dict.fromkeys(
@@ -73,16 +74,16 @@ class CompileError(Exception):
 
 @dataclass(frozen=True)
 class Job:
-    """One clang run: `arguments` without the program, and the input it is about."""
+    """One clang run: its arguments and its input file."""
 
     arguments: list[str]
     source: Path
-    printed: Path | None = None  # file for what it says on stdout
+    printed: Path | None = None  # file for its standard output
     chip: Chip = field(default_factory=chip_named)
 
 
 def clang_program() -> list[str]:
-    """Command prefix that runs clang. Raises ToolError when the `ziglang` package is missing."""
+    """Command prefix that runs clang. Raises ToolError if the `ziglang` package is missing."""
     spec = importlib.util.find_spec("ziglang")
     if spec is None or spec.origin is None:
         raise ToolError("the C front end is missing: install the Python package 'ziglang' (pip install ziglang)")
@@ -91,17 +92,17 @@ def clang_program() -> list[str]:
 
 
 def builtin_include_dir() -> Path:
-    """clang's own headers (stdatomic.h, iso646.h, ...), searched after ours."""
+    """Folder of clang's headers (stdatomic.h, iso646.h, ...), searched after ours."""
     return Path(clang_program()[0]).parent / "lib" / "include"
 
 
 def library_include_dir() -> Path:
-    """libc++'s headers, of which C++ sources can use what needs no library behind it."""
+    """Folder of libc++'s headers, of which C++ sources can use the header-only part."""
     return Path(clang_program()[0]).parent / "lib" / "libcxx" / "include"
 
 
 def front_end_flags(options: CcOptions, language: str = "c") -> list[str]:
-    """Flags that give C or C++ source the meaning it has on this target, followed by the user's own."""
+    """Flags of the target and language, followed by the user's flags."""
     flags = [*TARGET_FLAGS, *LANGUAGE_FLAGS, CLANG_LEVEL[options.level]]
     flags += [f"-U{name}" for name in FOREIGN_MACROS]
     guard = ["__HAS_CODEGUARD__"] if "FBS" in options.chip.config else []
@@ -111,7 +112,7 @@ def front_end_flags(options: CcOptions, language: str = "c") -> list[str]:
     if options.single_constants:
         flags += ["-Xclang", "-cl-single-precision-constant"]
     if options.debug:
-        # Where this package and clang are installed is nothing an image should depend on.
+        # Images must not depend on the folders in which this package and clang are installed.
         own = ((INCLUDE_DIR, "toolchain/include"), (builtin_include_dir(), "clang/include"))
         flags += ["-g", "-gdwarf-2", *(f"-fdebug-prefix-map={path}={name}" for path, name in own)]
     if any(word.startswith("-fsanitize=") for word in options.clang):
@@ -123,7 +124,7 @@ def front_end_flags(options: CcOptions, language: str = "c") -> list[str]:
         folders = (library_include_dir(), INCLUDE_DIR, builtin_include_dir())
         return [*flags, *(word for folder in folders for word in ("-isystem", str(folder)))]
     if not named:
-        flags.append("-fgnu89-inline")  # XC16 takes C for gnu89, where plain `inline` defines the function
+        flags.append("-fgnu89-inline")  # XC16's default is gnu89, where plain `inline` defines the function
     if not {"-Werror", "-pedantic-errors"} & set(options.clang):
         flags += [f"-Wno-error={name}" for name in WARNINGS_OF_C]
     flags += options.clang
@@ -136,7 +137,7 @@ def is_cxx(language: str) -> bool:
 
 
 def _dependency_flags(options: CcOptions, item: Input) -> list[str]:
-    """The -MD family: `-MF` defaults to a .d file beside the output, the target to the file the driver writes."""
+    """Flags of dependency files: -MF defaults to a .d file beside the output, the target to the output file."""
     flags = list(options.dependency)
     if not {"-MD", "-MMD"} & set(flags):
         return flags
@@ -150,22 +151,22 @@ def _dependency_flags(options: CcOptions, item: Input) -> list[str]:
 
 
 def ir_job(options: CcOptions, item: Input, output: Path) -> Job:
-    """Job that turns one C file into unoptimised IR text carrying the level's attributes."""
+    """Job that compiles one C file to unoptimised IR text with the attributes of the level."""
     arguments = [*front_end_flags(options, item.language), *_dependency_flags(options, item)]
     arguments += [*LAYOUT_FLAGS, "-Xclang", "-disable-llvm-passes", "-emit-llvm", "-S"]
     arguments += ["-x", item.language, str(item.path)]
     return Job([*arguments, "-o", str(output)], item.path, output.with_suffix(".layouts"), options.chip)
 
 
-def repaired(ir: bytes) -> bytes:
-    """IR as the middle end accepts it: clang gives these calls an `int`, which has 16 bits here, and they take i32."""
+def with_i32_levels(ir: bytes) -> bytes:
+    """IR with i32 arguments of two intrinsics; clang passes an `int`, which has 16 bits on this target."""
     for name in (b"returnaddress", b"frameaddress.p0"):
         ir = ir.replace(b"@llvm.%s(i16 " % name, b"@llvm.%s(i32 " % name)
     return ir
 
 
 def preprocess_job(options: CcOptions, item: Input, output: Path | None) -> Job:
-    """Job for -E, -M and -fsyntax-only; output None is stdout."""
+    """Job for -E, -M and -fsyntax-only; output None is standard output."""
     arguments = [*front_end_flags(options, item.language), *_dependency_flags(options, item)]
     if item.language == "assembler-with-cpp":
         arguments.append("-D__ASSEMBLER__=1")
@@ -176,9 +177,9 @@ def preprocess_job(options: CcOptions, item: Input, output: Path | None) -> Job:
 
 
 def optimise_job(options: CcOptions, module: Path, output: Path) -> Job:
-    """Job that runs clang's middle end once over IR."""
+    """Job that runs clang's middle end on a module."""
     passed = [flag for flag in options.clang if flag.startswith(("-funroll", "-fno-unroll", "-ffast", "-fno-inline"))]
-    if options.level != "2":  # a table of 256 words for a loop of eight turns is not what these levels are for
+    if options.level != "2":  # it replaces a loop of eight iterations by a table of 256 words
         passed += ["-mllvm", "-disable-loop-idiom-hashrecognize"]
     arguments = [*TARGET_FLAGS, CLANG_LEVEL[options.level], *passed, "-Wno-override-module", "-x", "ir"]
     return Job([*arguments, "-S", "-emit-llvm", str(module), "-o", str(output)], module)
@@ -187,7 +188,7 @@ def optimise_job(options: CcOptions, module: Path, output: Path) -> Job:
 def _run_changed(
     program: list[str], arguments: list[str], change: Callable[[str], str]
 ) -> subprocess.CompletedProcess[bytes]:
-    """Once more, by way of preprocessed text that `change` puts into the front end's words."""
+    """Compile again with `change` applied to the preprocessed text."""
     *options, _, language, source, _, output = arguments  # ... -x LANGUAGE SOURCE -o OUTPUT
     text = Path(output).with_suffix(".changed.i")
     emit = {"-emit-llvm", "-S"}
@@ -204,7 +205,7 @@ def _run_changed(
 
 
 def _run_job(program: list[str], arguments: list[str], chip: Chip) -> subprocess.CompletedProcess[bytes]:
-    """One clang run, and another for a source that says what XC16 knows and the front end does not."""
+    """Run clang, and again with changed text if the source uses an XC16 feature that clang does not support."""
     result = subprocess.run([*program, *arguments], capture_output=True, check=False)
     if result.returncode and header_case.MISSING.search(result.stderr) and "-ivfsoverlay" not in arguments:
         with tempfile.TemporaryDirectory(prefix="dspic-names-") as folder:
@@ -213,20 +214,20 @@ def _run_job(program: list[str], arguments: list[str], chip: Chip) -> subprocess
             return _run_job(program, ["-ivfsoverlay", str(overlay), *arguments], chip)
     changes: list[Callable[[str], str]] = []
     if "-emit-llvm" in arguments and config_pragma.PRESENT in result.stderr:
-        changes.append(lambda text: config_pragma.applied(text, chip))
+        changes.append(lambda text: config_pragma.rewrite(text, chip))
     if result.returncode and REFUSED.search(result.stderr):
         changes.append(respell)
     if result.returncode and asm_constraints.REFUSED.search(result.stderr):
         changes += [respell, asm_constraints.respell]
     if result.returncode and accumulators.REFUSED.search(result.stderr):
-        changes += [respell, accumulators.applied]
+        changes += [respell, accumulators.rewrite]
     if changes:
         return _run_changed(program, arguments, lambda text: reduce(lambda t, change: change(t), changes, text))
     return result
 
 
 def without_preprocessing(options: list[str]) -> list[str]:
-    """Options of a clang run whose input is preprocessed already: no forced includes, no dependency files."""
+    """Options of a clang run for preprocessed input: without forced includes and dependency files."""
     out: list[str] = []
     words = iter(options)
     for word in words:
@@ -238,10 +239,9 @@ def without_preprocessing(options: list[str]) -> list[str]:
 
 
 def run_jobs(jobs: list[Job], parallel: int, show: bool = False) -> None:
-    """Run `jobs`, at most `parallel` at once (0: one per core); diagnostics appear in the order of the jobs.
+    """Run jobs, at most `parallel` at once (0: one per core); diagnostics appear in the order of the jobs.
 
-    With `show` the commands are printed first.
-    Raises CompileError after the last job when any of them failed.
+    With `show`, the commands are printed first. Raises CompileError after the last job if any of them failed.
     """
     program = clang_program()
     colour = ["-fdiagnostics-color=always"] if os.isatty(2) and not os.environ.get("NO_COLOR") else []

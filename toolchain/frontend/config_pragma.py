@@ -1,8 +1,8 @@
-"""XC16's `#pragma config SETTING = VALUE, ...`: settings in preprocessed C become definitions of configuration words.
+"""XC16's `#pragma config SETTING = VALUE, ...`: settings become definitions of configuration words.
 
-Fields, positions and words come from the chip; the names of the values are those of the device header, whose macros are
-16-bit masks with ones outside the field they set (dspic30f6014a.md §2). Enters: preprocessed C with line markers.
-Leaves: the same text without the pragmas, definitions of the words behind it.
+The chip's tables define fields, positions and words. The device header defines the names of values as macros: 16-bit
+masks with ones outside of their field (dspic30f6014a.md §2). The input is preprocessed C with line markers; the output
+has definitions of the words at its end instead of the pragmas.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from emu.chips.chip import Chip
 from toolchain.errors import ToolError
 
 PRESENT = b"#pragma config"
-"""What clang shows of a source that needs this, in its warning about unknown pragmas."""
+"""Part of clang's warning about unknown pragmas for a source that needs `rewrite`."""
 
 _PRAGMA = re.compile(r"^[ \t]*#[ \t]*pragma[ \t]+config\b(.*)$", re.MULTILINE)
 _MARKER = re.compile(r'^# (\d+) "((?:[^"\\]|\\.)*)".*$', re.MULTILINE)
@@ -24,7 +24,7 @@ _HEADER = Path(__file__).parents[1] / "include" / "dspic_compiler.h"
 _MACRO = re.compile(r"^#define (\w+) 0x([0-9A-F]{4})$", re.MULTILINE)
 _PRAGMA_VALUES = {"NONE": 0xFFFF}  # XC16's name of the reserved brown-out voltage; too common a word for a macro
 _SETTING = re.compile(r"\s*(\w+)\s*=\s*(\w+)\s*")
-# What MPLAB X writes, where it differs from the field's own name: setting -> word and fields it may change.
+# Names of MPLAB X that differ from the name of the field: setting -> word, fields.
 _SETTINGS = {
     "FOSFPR": ("FOSC", ("FOS", "FPR")), "FCKSMEN": ("FOSC", ("FCKSM",)), "WDT": ("FWDT", ("FWDTEN",)),
     "BODENV": ("FBORPOR", ("BORV",)), "MCLRE": ("FBORPOR", ("MCLREN",)), "GCP": ("FGS", ("GSS",)),
@@ -32,7 +32,7 @@ _SETTINGS = {
 
 
 def settings(chip: Chip) -> dict[str, tuple[str, int]]:
-    """Name of a setting -> name of its word, mask of the bits it may change."""
+    """Name of a setting -> name of its word, mask of its bits."""
     known = {}
     for word in chip.config.values():
         for field, (lsb, width) in word.fields.items():
@@ -44,22 +44,22 @@ def settings(chip: Chip) -> dict[str, tuple[str, int]]:
 
 
 def values() -> dict[str, int]:
-    """Names of values, those of the device header among them: name -> mask with zeros where the setting clears bits."""
+    """Name of a value -> mask with zeros for the bits that it clears, from the device header and XC16."""
     return _PRAGMA_VALUES | {name: int(number, 16) for name, number in _MACRO.findall(_HEADER.read_text())}
 
 
-def applied(text: str, chip: Chip) -> str:
-    """`text` with its configuration pragmas made definitions. Raises `ToolError` listing every wrong one by line."""
+def rewrite(text: str, chip: Chip) -> str:
+    """`text` with definitions instead of configuration pragmas. Raises ToolError that lists all wrong settings."""
     known, codes = settings(chip), values()
     words: dict[str, int] = {}
     findings: list[str] = []
     given: dict[str, tuple[str, str]] = {}
     for pragma in _PRAGMA.finditer(text):
         for setting in pragma[1].split(","):
-            place = _place(text, pragma.start())
-            finding = _apply(setting, known, codes, words) or _contradicted(setting, place, given)
+            position = _source_position(text, pragma.start())
+            finding = _apply(setting, known, codes, words) or _contradiction(setting, position, given)
             if finding:
-                findings.append(f"{place}: error: {finding}")
+                findings.append(f"{position}: error: {finding}")
     if findings:
         raise ToolError.of(findings)
     definitions = [
@@ -71,7 +71,7 @@ def applied(text: str, chip: Chip) -> str:
 
 
 def _apply(setting: str, known: dict[str, tuple[str, int]], codes: dict[str, int], words: dict[str, int]) -> str:
-    """Enter one setting; returns what is wrong with it."""
+    """Apply one setting to `words`; returns an error message or ""."""
     found = _SETTING.fullmatch(setting)
     if found is None:
         return f"#pragma config expects SETTING = VALUE, found '{setting.strip()}'"
@@ -91,11 +91,11 @@ def _apply(setting: str, known: dict[str, tuple[str, int]], codes: dict[str, int
     return ""
 
 
-def _contradicted(setting: str, place: str, given: dict[str, tuple[str, str]]) -> str:
-    """Enter a setting and where it was made; returns what is wrong if it was made otherwise before."""
+def _contradiction(setting: str, position: str, given: dict[str, tuple[str, str]]) -> str:
+    """Record a setting; returns an error message if an earlier one has another value, else ""."""
     name, _, value = (word.strip() for word in setting.partition("="))
-    before, there = given.setdefault(name, (value, place))
-    return "" if before == value else f"#pragma config {name} = {value}, but {name} = {before} at {there}"
+    before, earlier = given.setdefault(name, (value, position))
+    return "" if before == value else f"#pragma config {name} = {value}, but {name} = {before} at {earlier}"
 
 
 def _hint(word: str, candidates: Iterable[str]) -> str:
@@ -103,8 +103,8 @@ def _hint(word: str, candidates: Iterable[str]) -> str:
     return f" (did you mean {', '.join(close)}?)" if close else ""
 
 
-def _place(text: str, at: int) -> str:
-    """FILE:LINE of a position, by the last line marker before it."""
+def _source_position(text: str, at: int) -> str:
+    """FILE:LINE of an offset, from the last line marker before it."""
     markers = list(_MARKER.finditer(text, 0, at))
     if not markers:
         return f"<source>:{text.count(chr(10), 0, at) + 1}"

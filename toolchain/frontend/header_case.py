@@ -1,7 +1,6 @@
-"""Headers whose names are spelt in another case than the file's, as sources written on Windows do.
+"""Case-insensitive header names, as in sources written on Windows.
 
-Only after the front end has not found a header: a case-insensitive view of the folders that it looks into, for one more
-run. Enters: the arguments of the run. Leaves: the text of an overlay for `-ivfsoverlay`.
+If clang does not find a header, it runs again with a case-insensitive overlay of its include folders (`-ivfsoverlay`).
 """
 
 from __future__ import annotations
@@ -12,17 +11,17 @@ from collections.abc import Iterator
 from pathlib import Path
 
 MISSING = re.compile(rb"fatal error: .*'[^'\n]+\.[hH]' file not found")
-"""What clang says when it might help to look again."""
+"""Error message of clang for a missing header."""
 
 FOLDER_OPTIONS = ("-I", "-iquote", "-isystem", "-idirafter")
-MOST_FILES = 20_000  # a folder that holds more is no project's include folder; what lies beyond keeps its case
+MAX_FILES = 20_000  # the names of further files remain case-sensitive
 
 
 def overlay(arguments: list[str]) -> str:
-    """Overlay text (JSON is YAML) with every file at or below the folders of a run's options and its source."""
+    """Text of an overlay (JSON is YAML) with all files below the include folders and the folder of the source."""
     files: dict[Path, list[Path]] = {}
     for count, path in enumerate(file for folder in _folders(arguments) for file in sorted(folder.rglob("*"))):
-        if count > MOST_FILES:
+        if count > MAX_FILES:
             break
         if path.is_file():
             files.setdefault(path.parent, []).append(path)
@@ -38,7 +37,7 @@ def overlay(arguments: list[str]) -> str:
 
 
 def _folders(arguments: list[str]) -> Iterator[Path]:
-    """Folders that `#include` looks into, the source's own first, without those of clang."""
+    """Folders that `#include` searches, that of the source first, without those of clang."""
     words = iter(arguments)
     named: list[str] = []
     for word in words:

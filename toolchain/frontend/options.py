@@ -1,7 +1,7 @@
-"""Command line of `python -m toolchain cc`: argument list in, one CcOptions record out.
+"""Command line of `python -m toolchain cc`: parses an argument list to CcOptions.
 
-Knows which option is ours, which goes to clang, and which is accepted for compatibility with gcc and XC16 drivers and
-has no effect here. Starts nothing and reads no file except @response files.
+Options are handled by the driver, passed to clang, or accepted without effect for compatibility with gcc and XC16. The
+parser reads no files except @response files.
 """
 
 from __future__ import annotations
@@ -83,8 +83,8 @@ IGNORED_FLAGS = {
     "-mdfp", "-legacy-libc", "-no-legacy-libc", "-static", "-fuse-linker-plugin", "-fno-plt", "-mconst-in-code",
     "-fxc16-attributes",
 }  # fmt: skip
-# Smart I/O links only what a format string needs; ours does so by itself. Errata are those of other silicon, and
-# warnings about SFR accesses are of no use where every register is `volatile`.
+# Smart I/O is always active here (`link_stage.FORMAT_PARTS`). Errata options concern other chips. Warnings about SFR
+# accesses are unnecessary, because all registers are `volatile`.
 IGNORED_PREFIXES = ("-msmart-io=", "-msfr-warn=", "-merrata=", "-mreserve=")
 LARGE_DATA = {"-mlarge-data", "-mlarge-scalar", "-mlarge-aggregate"}
 SMALL_DATA = {"-msmall-data", "-msmall-scalar", "-msmall-aggregate"}
@@ -110,7 +110,7 @@ SUFFIX_LANGUAGE = {
 
 @dataclass(frozen=True)
 class Input:
-    """One file of the command line. `language` is a value of SUFFIX_LANGUAGE or one given by -x."""
+    """One input file. `language` is a value of SUFFIX_LANGUAGE or of -x."""
 
     path: Path
     language: str
@@ -148,19 +148,19 @@ class CcOptions:
 
     @property
     def prefix_map(self) -> list[tuple[str, str]]:
-        """What debug information has instead of the beginning of paths: (old, new), the last that fits counts."""
+        """Replacements (old, new) of path prefixes in debug information; the last matching one applies."""
         maps = ("-ffile-prefix-map=", "-fdebug-prefix-map=")
         pairs = [word.partition("=")[2].partition("=") for word in self.clang if word.startswith(maps)]
         return [(old, new) for old, _, new in pairs]
 
     @property
     def whole_program(self) -> bool:
-        """True when C inputs are merged into one module (linking without -fno-lto)."""
+        """Whether C inputs are merged into one module: when linking without -fno-lto."""
         return self.stage == "link" and self.lto is not False
 
 
-class _Words:
-    """The argument list with a cursor, so that options can take the word after them."""
+class _ArgumentCursor:
+    """Argument list with a cursor, so that options can take the following word."""
 
     def __init__(self, words: list[str]) -> None:
         self.words = words
@@ -201,17 +201,17 @@ def _expand_response_files(argv: list[str], depth: int = 0) -> list[str]:
     return words
 
 
-def _joined(word: str, option: str, words: _Words) -> str | None:
-    """Value of an option written '-Lx' or '-L x'; None when `word` is another option."""
+def _joined(word: str, option: str, words: _ArgumentCursor) -> str | None:
+    """Value of an option written '-Lx' or '-L x'; None if `word` is another option."""
     if word == option:
         return words.value(option)
     return word[len(option) :] if word.startswith(option) else None
 
 
 def parse(argv: list[str]) -> CcOptions:
-    """Parse `argv` (without the program name). Raises ToolError naming the offending word."""
+    """Parse `argv` (without the program name). Raises ToolError that names the wrong word."""
     options = CcOptions()
-    words = _Words(_expand_response_files(argv))
+    words = _ArgumentCursor(_expand_response_files(argv))
     language = "none"
     while words:
         word = words.take()
@@ -293,7 +293,7 @@ def _code_generation(options: CcOptions, word: str) -> bool:
     return True
 
 
-def _linking(options: CcOptions, word: str, words: _Words) -> bool:
+def _linking(options: CcOptions, word: str, words: _ArgumentCursor) -> bool:
     if word in ("-Map", "--Map"):
         options.map_file = Path(words.value(word))
     elif word.startswith("-Wl,"):
@@ -320,7 +320,7 @@ def _linking(options: CcOptions, word: str, words: _Words) -> bool:
 
 
 def _linker_words(options: CcOptions, parts: list[str]) -> None:
-    """Options after -Wl, and -Xlinker; -Map is ours because the driver writes every output atomically."""
+    """Options of -Wl and -Xlinker; -Map is handled by the driver, which writes all outputs atomically."""
     rest = iter(parts)
     for part in rest:
         if part.startswith(("-Map=", "--Map=")):
@@ -331,7 +331,7 @@ def _linker_words(options: CcOptions, parts: list[str]) -> None:
             options.linker.append(part)
 
 
-def _front_end(options: CcOptions, word: str, words: _Words) -> bool:
+def _front_end(options: CcOptions, word: str, words: _ArgumentCursor) -> bool:
     if word in DEPENDENCY_VALUE_FLAGS:
         options.dependency += [word, words.value(word)]
     elif word in DEPENDENCY_FLAGS:
@@ -345,7 +345,7 @@ def _front_end(options: CcOptions, word: str, words: _Words) -> bool:
     return True
 
 
-def _session(options: CcOptions, word: str, words: _Words) -> bool:
+def _session(options: CcOptions, word: str, words: _ArgumentCursor) -> bool:
     if (path := _joined(word, "-o", words)) is not None:
         options.output = Path(path)
     elif (jobs := _joined(word, "-j", words)) is not None:

@@ -1,7 +1,8 @@
-"""Warns of plain variables that an interrupt function writes and a loop waits for: the loop may read them only once.
+"""Warning about polled flags: non-volatile variables that an interrupt function writes and a loop waits for.
 
-Enters: IR text of the whole program before optimisation. Leaves: one sentence per variable and loop. A loop waits when
-such variables alone decide one of its ends, and it does not write them, calls nothing and writes through no pointer.
+The optimiser may read such a variable only once. The input is unoptimised IR text of the whole program. A loop waits
+for variables if they alone decide one of its exits, and it neither writes them, nor calls functions, nor writes through
+pointers.
 """
 
 from __future__ import annotations
@@ -27,8 +28,8 @@ LINE_REFERENCE = re.compile(r"!dbg !(\d+)")
 
 
 @dataclass
-class _Code:
-    """One function: lines by block, where blocks go, definitions of values."""
+class _FunctionText:
+    """One function: lines and successors of blocks, definitions of values."""
 
     blocks: dict[str, list[str]] = field(default_factory=dict)
     succs: dict[str, list[str]] = field(default_factory=dict)
@@ -36,7 +37,7 @@ class _Code:
 
 
 def findings(text: str) -> list[str]:
-    """Sentences for the user, in the order of the program."""
+    """Warnings for the user, in the order of the program."""
     bodies = {name.strip('"'): body for name, body in FUNCTION.findall(text)}
     interrupts = _closure({name for name in bodies if name in VECTOR_FUNCTIONS}, bodies)
     written = {place for name in interrupts for place in STORE.findall(bodies[name]) if place.startswith("@")}
@@ -47,15 +48,15 @@ def findings(text: str) -> list[str]:
         if name in interrupts or not any(place in body for place in written):
             continue
         out += [
-            f"warning: {where}'{place[1:]}' is written by an interrupt function and waited for in a loop of '{name}', "
+            f"warning: {where}'{flag[1:]}' is written by an interrupt function and waited for in a loop of '{name}', "
             "which may read it only once: declare it volatile"
-            for place, where in _polled(_read(body), written, text)
+            for flag, where in _polled(_parse(body), written, text)
         ]
     return out
 
 
 def _closure(names: set[str], bodies: dict[str, str]) -> set[str]:
-    """The functions and all they call."""
+    """The functions and all functions that they call, directly or indirectly."""
     work, seen = list(names), set(names)
     while work:
         for callee in CALL.findall(bodies[work.pop()]):
@@ -65,8 +66,9 @@ def _closure(names: set[str], bodies: dict[str, str]) -> set[str]:
     return seen
 
 
-def _read(body: str) -> _Code:
-    code = _Code()
+def _parse(body: str) -> _FunctionText:
+    """Split the body of a function into blocks."""
+    code = _FunctionText()
     name = ""
     for line in body.split("\n"):
         label = LABEL.match(line)
@@ -83,8 +85,8 @@ def _read(body: str) -> _Code:
     return code
 
 
-def _polled(code: _Code, written: set[str], text: str) -> list[tuple[str, str]]:
-    """(variable, position in the source or "") of loops that wait."""
+def _polled(code: _FunctionText, written: set[str], text: str) -> list[tuple[str, str]]:
+    """(variable, line of the source or "") of loops that wait for a variable."""
     out = []
     for body in natural_loops(code.succs, next(iter(code.blocks))).values():
         lines = [line for name in body for line in code.blocks[name]]
@@ -110,8 +112,8 @@ def _line_number(reference: str, text: str) -> str:
     return found[1] if found is not None else "?"
 
 
-def _read_by(line: str, code: _Code) -> set[str]:
-    """Places whose loads decide a branch."""
+def _read_by(line: str, code: _FunctionText) -> set[str]:
+    """Variables whose loads decide a branch."""
     found: set[str] = set()
     work, seen = OPERAND.findall(line.partition(",")[0]), set[str]()
     while work:

@@ -1,1 +1,1 @@
-"""LLVM IR as Python objects: reader, model, dump, rules of well-formedness."""
+"""LLVM IR as Python objects: parser, model, builder, control-flow graph, dump, rules of well-formedness."""

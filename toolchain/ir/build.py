@@ -1,4 +1,4 @@
-"""Instruction builder with local folding: the one place where IR passes create instructions."""
+"""Instruction builder with local constant folding, which IR passes use to create instructions."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def const(t: Type, value: int) -> ConstInt:
 
 
 def evaluate(op: str, a: ConstInt, b: ConstInt) -> int | None:
-    """Value of a binary operation on constants, None where the result is undefined (LLVM LangRef)."""
+    """Value of a binary operation on constants; None if it is undefined (LLVM LangRef) or not folded."""
     x, y, bits = a.value, b.value, a.type.bits
     match op:
         case "add":
@@ -58,7 +58,7 @@ def evaluate(op: str, a: ConstInt, b: ConstInt) -> int | None:
 
 
 def compare(pred: str, a: ConstInt, b: ConstInt) -> bool:
-    """icmp on constants."""
+    """Value of icmp on constants."""
     x, y = (a.signed, b.signed) if pred[0] == "s" else (a.value, b.value)
     match pred[-2:]:
         case "eq":
@@ -76,7 +76,7 @@ def compare(pred: str, a: ConstInt, b: ConstInt) -> bool:
 
 
 class Builder:
-    """Appends instructions to one block. Every method returns the value it stands for."""
+    """Appends instructions to one block. Methods return the value of the operation."""
 
     def __init__(self, block: Block) -> None:
         self.block = block
@@ -92,7 +92,7 @@ class Builder:
         return i
 
     def binary(self, op: str, a: Value, b: Value) -> Value:
-        """Binary integer operation, folded where an operand allows."""
+        """Binary integer operation; folded if an operand is a suitable constant."""
         if op in COMMUTATIVE and isinstance(a, ConstInt | GlobalRef) and not isinstance(b, ConstInt):
             a, b = b, a
         if isinstance(b, ConstInt):
@@ -133,7 +133,7 @@ class Builder:
         return None
 
     def cast(self, op: str, a: Value, t: Type) -> Value:
-        """trunc, zext or sext; the same width is no operation."""
+        """trunc, zext or sext; `a` itself for the same width."""
         if a.type.bits == t.bits:
             return a
         if isinstance(a, ConstInt):
@@ -151,7 +151,7 @@ class Builder:
         return self.emit(op, t, [a])
 
     def icmp(self, pred: str, a: Value, b: Value) -> Value:
-        """Comparison giving i1."""
+        """Comparison, an i1."""
         if isinstance(a, ConstInt):
             if isinstance(b, ConstInt):
                 return const(I1, compare(pred, a, b))
@@ -159,7 +159,7 @@ class Builder:
         return self.emit("icmp", I1, [a, b], pred=pred)
 
     def select(self, c: Value, a: Value, b: Value) -> Value:
-        """c ? a : b."""
+        """The value c ? a : b."""
         if isinstance(c, ConstInt):
             return a if c.value else b
         if a is b:
@@ -169,15 +169,15 @@ class Builder:
         return self.emit("select", a.type, [c, a, b])
 
     def logical_not(self, a: Value) -> Value:
-        """!a for i1."""
+        """The negation of an i1."""
         return self.binary("xor", a, const(I1, 1))
 
     def add(self, a: Value, offset: int) -> Value:
-        """a + constant."""
+        """The sum of a value and a constant."""
         return self.binary("add", a, const(a.type, offset))
 
     def shift(self, op: str, a: Value, n: int) -> Value:
-        """Shift by a constant."""
+        """Shift by a constant (`shl`, `lshr` or `ashr`)."""
         return self.binary(op, a, const(a.type, n))
 
     def load(self, t: Type, p: Value, volatile: bool = False) -> Value:
@@ -191,7 +191,7 @@ class Builder:
         self.emit("store", VOID, [v, p]).volatile = volatile
 
     def call(self, name: str, t: Type, args: list[Value]) -> Instr:
-        """Call of a run-time function by its C name (abi-elf.md §2.8)."""
+        """Call of a run-time library function by its C name (abi-elf.md §2.8)."""
         i = self.emit("call", t, [*args, GlobalRef(name)], attrs=[{} for _ in args], vararg=False)
         return i
 

@@ -1,4 +1,4 @@
-"""Control-flow passes over legal IR: unreachable blocks, short-circuit branches, critical edges, loop depths."""
+"""Control-flow graph: predecessors, loops, unreachable blocks, short-circuit branches, critical edges, dead code."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ def predecessors(f: Function) -> dict[str, list[str]]:
 
 
 def new_branch(target: str) -> Instr:
-    """Unconditional branch."""
+    """A new unconditional branch."""
     i = Instr("br", VOID, [])
     i.blocks = [target]
     return i
 
 
 def retarget_phis(block: Block, old: str, new: list[str]) -> None:
-    """The edges from `old` into `block` now come from the blocks `new`."""
+    """Replace the predecessor `old` in the phis of `block` by the blocks `new`."""
     for phi in block.phis():
         pairs: list[tuple[Value, str]] = []
         for v, n in zip(phi.args, phi.blocks, strict=True):
@@ -34,7 +34,7 @@ def retarget_phis(block: Block, old: str, new: list[str]) -> None:
 
 
 def remove_unreachable(f: Function) -> None:
-    """Drop blocks control cannot reach, and their phi entries."""
+    """Remove unreachable blocks and their phi operands."""
     blocks = {b.name: b for b in f.blocks}
     seen = {f.blocks[0].name}
     work = [f.blocks[0]]
@@ -52,7 +52,7 @@ def remove_unreachable(f: Function) -> None:
 
 
 def reverse_postorder(f: Function) -> list[Block]:
-    """Reachable blocks, every one after a predecessor of it, and after its dominators."""
+    """Reachable blocks in reverse postorder: every block follows its dominators."""
     blocks = {b.name: b for b in f.blocks}
     order: list[Block] = []
     seen = {f.blocks[0].name}
@@ -72,7 +72,7 @@ def reverse_postorder(f: Function) -> list[Block]:
 
 
 def use_counts(f: Function) -> dict[int, int]:
-    """id(value) -> number of operand positions that mention it."""
+    """id(value) -> number of operands that are the value."""
     counts: dict[int, int] = {}
     for b in f.blocks:
         for i in b.instrs:
@@ -82,10 +82,10 @@ def use_counts(f: Function) -> dict[int, int]:
 
 
 def split_logical_branches(f: Function) -> None:
-    """br (a && b) -> two branches, so that no truth value is made.
+    """Replace br (a && b) and br (a || b) by two branches, so that no truth value is computed.
 
-    Ensures: a branch condition is a select of i1 only when that select has other uses. Selects keep C's order of
-    evaluation, and their operands are already computed, so evaluating the second test later changes nothing.
+    Ensures: a branch condition is a select of i1 only if that select has other uses. Both operands of a select have
+    been computed before it, so the order of the two branches does not matter.
     """
     counts = use_counts(f)
     serial = 0
@@ -134,7 +134,7 @@ def _logical_parts(c: Value) -> tuple[str, Value, Value] | None:
 
 
 def _sink_compare(block: Block, rest: Block, second: Value, c: Value, counts: dict[int, int]) -> None:
-    """Move the second comparison next to its branch (it has no other use), and drop the select."""
+    """Remove the select, and move the second comparison to its branch if it has no other use."""
     if c in block.instrs:
         block.instrs.remove(c)
     if not isinstance(second, Instr) or second.op not in ("icmp", "select", "and", "or"):
@@ -145,10 +145,10 @@ def _sink_compare(block: Block, rest: Block, second: Value, c: Value, counts: di
 
 
 def split_critical_edges(f: Function) -> None:
-    """Give every phi's incoming edge a block of its own end, where copies can go.
+    """Split critical edges, so that the copies of phis have a block.
 
-    Ensures: a block with several successors reaches no block with phis, except from indirectbr, whose edges cannot be
-    split; the selector copies twice there.
+    Ensures: no successor of a block with several successors has phis, except behind indirectbr, whose edges cannot be
+    split. There the selector copies values twice.
     """
     blocks = {b.name: b for b in f.blocks}
     k = 0
@@ -176,7 +176,7 @@ def split_critical_edges(f: Function) -> None:
 
 
 def loop_depths(f: Function) -> dict[str, int]:
-    """Nesting depth of every block."""
+    """Block name -> loop nesting depth."""
     depth = {b.name: 0 for b in f.blocks}
     for body in natural_loops({b.name: b.succs for b in f.blocks}, f.blocks[0].name).values():
         for n in body:
@@ -185,9 +185,9 @@ def loop_depths(f: Function) -> dict[str, int]:
 
 
 def natural_loops(succs: dict[str, list[str]], entry: str) -> dict[str, set[str]]:
-    """Header -> blocks of its loop, from the back edges of a depth-first search.
+    """Header -> blocks of its natural loop, from the back edges of a depth-first search.
 
-    Cycles that can be entered elsewhere than at the header are left out: walking back from their tail reaches `entry`.
+    Irreducible cycles, which have several entries, are omitted: a backward walk from their tail reaches `entry`.
     """
     state = {entry: 1}
     back: list[tuple[str, str]] = []
@@ -221,12 +221,12 @@ def natural_loops(succs: dict[str, list[str]], entry: str) -> dict[str, set[str]
 
 
 def dead_code(f: Function) -> None:
-    """Remove pure instructions whose value nobody uses."""
+    """Remove instructions without side effects whose value is not used."""
     counts = use_counts(f)
     for b in reversed(f.blocks):
         kept = []
         for i in reversed(b.instrs):
-            if i.op in PURE and not counts.get(id(i), 0) and not i.volatile:
+            if i.op in NO_SIDE_EFFECTS and not counts.get(id(i), 0) and not i.volatile:
                 for a in i.args:
                     counts[id(a)] -= 1
             else:
@@ -235,7 +235,7 @@ def dead_code(f: Function) -> None:
         b.instrs = kept
 
 
-PURE = frozenset((
+NO_SIDE_EFFECTS = frozenset((
     "add", "sub", "mul", "and", "or", "xor", "shl", "lshr", "ashr", "udiv", "sdiv", "urem", "srem", "zext",
     "sext", "trunc",
     "icmp", "select", "phi", "load", "slot", "bits", "ff1l", "ff1r", "swap", "getsp", "vastart", "divother",
@@ -246,7 +246,7 @@ PURE = frozenset((
 
 
 def sink_compares(f: Function) -> None:
-    """Repeat a comparison of another block just before the branch or select that uses it, where it folds."""
+    """Copy comparisons of other blocks before the branch or select that uses them, so that they fold into it."""
     home: dict[int, str] = {id(i): b.name for b in f.blocks for i in b.instrs}
     for b in f.blocks:
         at = 0

@@ -1,12 +1,10 @@
-"""Tokens of LLVM IR text and the cursor that walks one logical line."""
+"""Lexer of LLVM IR text: tokens, and a cursor over the tokens of one logical line."""
 
 from __future__ import annotations
 
 import re
 
-from .model import (
-    UnsupportedError,
-)
+from .model import UnsupportedError
 
 TOKEN = re.compile(
     r"""c"[^"]*"|[%@]"[^"]*"|[%@][-\w.$]+|![\w.]+|"[^"]*"|0x[KLMHR]?[0-9A-Fa-f]+|[-+]?\d+\.\d*(?:[eE][-+]?\d+)?"""
@@ -21,8 +19,8 @@ IGNORED_WORDS = {
     "dso_local", "dso_preemptable", "default", "hidden", "protected", "unnamed_addr", "local_unnamed_addr",
     "externally_initialized", "thread_local", "dllimport", "dllexport", "ccc", "fastcc", "coldcc",
 }  # fmt: skip
-FAST_FLAGS = {"nuw", "nsw", "exact", "disjoint", "nneg", "inbounds", "nusw", "samesign", "fast", "nnan", "ninf", "nsz",
-              "arcp", "contract", "afn", "reassoc"}  # fmt: skip
+OPERATION_FLAGS = {"nuw", "nsw", "exact", "disjoint", "nneg", "inbounds", "nusw", "samesign", "fast", "nnan", "ninf",
+                   "nsz", "arcp", "contract", "afn", "reassoc"}  # fmt: skip
 BINARY = {
     "add", "sub", "mul", "udiv", "sdiv", "urem", "srem", "and", "or", "xor", "shl", "lshr", "ashr", "fadd", "fsub",
     "fmul", "fdiv", "frem",
@@ -38,7 +36,7 @@ PAREN_ATTRS = {"dereferenceable", "dereferenceable_or_null", "captures", "initia
 
 
 def unquote(text: str) -> bytes:
-    """Bytes of an LLVM string body, in which \\XX is a byte and everything else itself."""
+    """Bytes of an LLVM string body; \\XX is the byte with that hexadecimal value."""
     return re.sub(
         rb"\\([0-9A-Fa-f]{2}|\\)", lambda m: b"\\" if m[1] == b"\\" else bytes([int(m[1], 16)]), text.encode()
     )
@@ -53,7 +51,7 @@ def strip_comment(line: str) -> str:
 
 
 class Cursor:
-    """Token stream of one logical line."""
+    """Cursor over the tokens of one logical line."""
 
     __slots__ = ("at", "line", "tokens")
 
@@ -96,7 +94,7 @@ class Cursor:
 
 
 def name_of(token: str) -> str:
-    """Identifier of a %x, @x, %"x" token."""
+    """Identifier of a token %x, @x or %"x"."""
     body = token[1:]
     return unquote(body[1:-1]).decode("latin-1") if body.startswith('"') else body
 

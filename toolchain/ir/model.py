@@ -1,7 +1,7 @@
-"""Typed SSA form of one LLVM module, as plain Python objects.
+"""Typed SSA form of one LLVM module, as Python objects.
 
-Enters: nothing. Leaves: the classes every other module of `ir` and `lower` speaks in. The layout rules are those of
-the front end's data layout, which equals XC16's (abi-elf.md §1.1, §1.2): nothing is aligned to more than 2 bytes.
+All passes over IR use these classes. The layout rules are those of the front end's data layout, which equals XC16's
+(abi-elf.md §1.1, §1.2): no type is aligned to more than 2 bytes.
 """
 
 from __future__ import annotations
@@ -12,13 +12,13 @@ from typing import TypedDict
 
 
 class UnsupportedError(Exception):
-    """A construct this compiler refuses. `where` is "file:line" or a function name when known."""
+    """A construct that the compiler does not support. `where` is "file:line" or a function name, if known."""
 
     def __init__(self, what: str, where: str = "") -> None:
         super().__init__(f"{where}: {what}" if where else what)
         self.what = what
         self.where = where
-        self.line: str | None = None  # !dbg reference of the construct, where the raiser knows it
+        self.line: str | None = None  # !dbg reference of the construct, if known
 
 
 # ---------------------------------------------------------------------------------------------------------------------
@@ -62,7 +62,7 @@ VOID = Type("void")
 PTR = Type("ptr", 16)
 LABEL = Type("label")
 META = Type("meta")
-MAX_INT_BITS = 128  # of the input; checked products need twice that inside
+MAX_INT_BITS = 128  # of input; products with overflow check have twice as many
 _INTS = {n: Type("int", n) for n in range(1, 2 * MAX_INT_BITS + 17)}
 I1, I8, I16, I32, I64 = (_INTS[n] for n in (1, 8, 16, 32, 64))
 
@@ -89,12 +89,12 @@ def align_of(t: Type) -> int:
 
 
 def store_size(t: Type) -> int:
-    """Bytes a load or store of the type touches."""
+    """Bytes that a load or store of the type accesses."""
     return (t.bits + 7) // 8 if t.kind in ("int", "float", "ptr") else size_of(t)
 
 
 def size_of(t: Type) -> int:
-    """Bytes from one array element of the type to the next."""
+    """Size of the type in bytes, including padding at its end."""
     match t.kind:
         case "int" | "float" | "ptr":
             n, a = (t.bits + 7) // 8, align_of(t)
@@ -112,7 +112,7 @@ def size_of(t: Type) -> int:
 
 
 def struct_offsets(t: Type) -> list[int]:
-    """Byte offset of every field, then the end of the last one (abi-elf.md §1.2)."""
+    """Byte offset of every member, then the end of the last one (abi-elf.md §1.2)."""
     at, out = 0, []
     for e in t.elems:
         a = 1 if t.packed else align_of(e)
@@ -127,7 +127,7 @@ def struct_offsets(t: Type) -> list[int]:
 
 
 class Value:
-    """Anything an operand can be."""
+    """Base class of all operands."""
 
     __slots__ = ("type",)
 
@@ -136,7 +136,7 @@ class Value:
 
 
 class Const(Value):
-    """A value known at link time."""
+    """Constant: a value known at link time."""
 
     __slots__ = ()
 
@@ -160,7 +160,7 @@ class ConstInt(Const):
 
 
 class Undef(Const):
-    """undef or poison: any bit pattern will do."""
+    """undef or poison: any bit pattern is correct."""
 
     __slots__ = ()
 
@@ -217,7 +217,7 @@ class BlockAddress(Const):
 
 
 class ConstExpr(Const):
-    """A constant operation the reader did not fold."""
+    """Constant expression that the parser did not fold."""
 
     __slots__ = ("args", "op")
 
@@ -263,7 +263,7 @@ class Arg(Value):
 
 
 class InlineAsm(Value):
-    """Callee of a call that is inline assembly."""
+    """Inline assembly, the callee of a call."""
 
     __slots__ = ("constraints", "sideeffect", "text")
 
@@ -307,12 +307,12 @@ class InstrExtra(TypedDict, total=False):
 
 
 class Instr(Value):
-    """One instruction; itself the value it defines.
+    """One instruction, which is also the value that it defines.
 
-    op      LLVM opcode, or `add`-like spelling after legalisation
+    op      LLVM opcode, or an operation of legal IR
     args    operands; for phi the incoming values, in the order of `blocks`
-    blocks  successor names (br, switch, indirectbr) or incoming block names (phi)
-    Everything rarer sits in `extra` (predicate, source element type, call attributes, switch cases...).
+    blocks  names of successors (br, switch, indirectbr) or of incoming blocks (phi)
+    extra   fields of some operations only
     """
 
     __slots__ = ("args", "blocks", "extra", "line", "name", "op", "volatile")
@@ -345,7 +345,7 @@ class Block:
 
     @property
     def succs(self) -> list[str]:
-        """Names of the successors, each once, in order of first mention."""
+        """Names of the successors, each once, in the order of the terminator."""
         return list(dict.fromkeys(self.instrs[-1].blocks))
 
     def phis(self) -> Iterator[Instr]:
@@ -370,16 +370,15 @@ class Function:
     blocks: list[Block] = field(default_factory=list)
     dbg: str | None = None
     align: int = 0
-    text: str = ""  # the IR as read: key of the code cache
     dbg_records: list[DbgRecord] = field(default_factory=list)
 
 
 @dataclass(slots=True)
 class DbgRecord:
-    """#dbg_value / #dbg_declare / #dbg_assign: where a source variable lives from here on.
+    """Debug record (#dbg_value, #dbg_declare, #dbg_assign): location of a source variable from its position on.
 
-    `value` is None where nobody can tell. Of an assignment, `address` is the memory it went to, `link` the name that
-    the stores share which do it. `location` leads to the scope, and to the call where the code was inlined.
+    `value` is None if it is unknown. Of an assignment, `address` is the memory written and `link` the DIAssignID of its
+    stores. `location` refers to the scope and to the call at which the code was inlined.
     """
 
     kind: str
@@ -392,7 +391,7 @@ class DbgRecord:
     address: Value | None = None
     link: str = ""
     words: tuple[Value | None, ...] = ()
-    """Of a struct that arrived in registers: where its words are, None for those nobody reads."""
+    """Of a struct parameter in registers: its words, None for words that are not read."""
 
 
 @dataclass(slots=True)
@@ -412,7 +411,7 @@ class GlobalVar:
 
 @dataclass(slots=True)
 class Module:
-    """Everything in one .ll file."""
+    """Content of one .ll file."""
 
     source: str = ""
     globals: dict[str, GlobalVar] = field(default_factory=dict)
@@ -421,5 +420,5 @@ class Module:
     metadata: dict[str, str] = field(default_factory=dict)
     named_metadata: dict[str, str] = field(default_factory=dict)
     module_asm: list[str] = field(default_factory=list)
-    large_data: bool = False  # -mlarge-data: only what says so is near
+    large_data: bool = False  # -mlarge-data: only variables with attribute near are near
     far: frozenset[str] = frozenset()  # variables with an address beyond near memory

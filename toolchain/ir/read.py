@@ -1,7 +1,7 @@
-"""LLVM IR text -> `model.Module`.
+"""Parser of LLVM IR text.
 
-One pass over the lines; a function body line is one instruction (a switch runs to its closing bracket). Anything
-outside the grammar that clang 22 prints for C raises `UnsupportedError` with the line number of the .ll text.
+It reads the module line by line. A line of a function body is one instruction; a switch extends to its closing bracket.
+Text outside the grammar that clang 22 prints for C raises `UnsupportedError` with the line number of the IR text.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from .read_instr import InstrReader
 
 
 class Reader(InstrReader):
-    """Parser state of one module."""
+    """Parser of one module."""
 
     def __init__(self, text: str) -> None:
         super().__init__()
@@ -39,7 +39,7 @@ class Reader(InstrReader):
     # -- module level -------------------------------------------------------------------------------------------------
 
     def read(self) -> Module:
-        """Parse every line of the module."""
+        """Parse the whole module."""
         self._named_types()
         while self.at < len(self.lines):
             line = self.lines[self.at]
@@ -56,7 +56,7 @@ class Reader(InstrReader):
         return self.module
 
     def _named_types(self) -> None:
-        """Named struct types may refer to later ones: resolve them by need, inner first."""
+        """Parse the named struct types, inner types first, because a type may refer to a later one."""
         bodies = {}
         for n, line in enumerate(self.lines):
             if line.startswith("%") and " = type " in line:
@@ -194,7 +194,7 @@ class Reader(InstrReader):
         return f, groups
 
     def type_no_func(self, c: Cursor) -> Type:
-        """A result type: a following parenthesis belongs to the function."""
+        """Parse a result type; a parenthesis behind it starts the parameters of the function."""
         return self._type1(c)
 
     # -- function bodies ----------------------------------------------------------------------------------------------
@@ -202,7 +202,6 @@ class Reader(InstrReader):
     def _define(self, line: str) -> None:
         c = Cursor(strip_comment(line), self.at)
         f, _ = self._signature(c)
-        start = self.at
         self.locals = {a.name: a for a in f.args}
         self.forward = {}
         block: Block | None = None
@@ -221,13 +220,12 @@ class Reader(InstrReader):
                 self._dbg(f, block, text)
             else:
                 self._line(block, text)
-        f.text = "\n".join(self.lines[start : self.at])
         self.at += 1
         self._resolve(f)
         self.module.functions[f.name] = f
 
     def _entry_name(self, f: Function) -> str:
-        """The unlabelled entry block takes the next number after the unnamed parameters."""
+        """Name of an unlabelled entry block: the number after those of the unnamed parameters."""
         return str(sum(1 for a in f.args if a.name.isdigit()))
 
     def _line(self, block: Block, text: str) -> None:
@@ -267,7 +265,7 @@ class Reader(InstrReader):
         block.instrs.append(instr)
 
     def _resolve(self, f: Function) -> None:
-        """Replace the placeholders of values used before their definition."""
+        """Replace the placeholders of values that are used before their definition."""
         if not self.forward:
             return
         for block in f.blocks:
@@ -305,7 +303,7 @@ class Reader(InstrReader):
         f.dbg_records.append(record)
 
     def _debug_value(self, c: Cursor) -> Value | None:
-        """A value; None for lists of values and for what is gone."""
+        """Parse the value of a debug record; None for lists of values and for removed values."""
         if c.peek().startswith("!"):
             c.next()
             if c.peek() == "(":

@@ -1,10 +1,10 @@
-"""One instruction per line: a handler per opcode, collected in INSTRS."""
+"""Parser of instructions: one handler per opcode, in the table INSTRS."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
-from .lex import BINARY, CASTS, FAST_FLAGS, IGNORED_WORDS, Cursor, name_of
+from .lex import BINARY, CASTS, IGNORED_WORDS, OPERATION_FLAGS, Cursor, name_of
 from .model import (
     I1,
     PTR,
@@ -21,7 +21,7 @@ from .read_values import ValueReader
 
 
 class InstrReader(ValueReader):
-    """Parser of instructions."""
+    """Parser of one instruction per line."""
 
     def _instr(self, c: Cursor) -> Instr:
         op = c.next()
@@ -50,7 +50,7 @@ class InstrReader(ValueReader):
 
     def _flags(self, c: Cursor) -> set[str]:
         out = set()
-        while c.peek() in FAST_FLAGS:
+        while c.peek() in OPERATION_FLAGS:
             out.add(c.next())
         return out
 
@@ -189,7 +189,7 @@ class InstrReader(ValueReader):
         return Instr(op, a.type, [a])
 
     def _operands(self, c: Cursor) -> list[Value]:
-        """`type value, type value...` up to the attachments."""
+        """Parse `type value, type value...` up to the attachments."""
         args = [self.typed(c)]
         while c.peek() == "," and not c.tokens[c.at + 1].startswith("!"):
             c.next()
@@ -311,7 +311,7 @@ class InstrReader(ValueReader):
         return i
 
     def _assumption(self, c: Cursor, callee: Value) -> None:
-        """Operand bundles of llvm.assume, such as `"align"(ptr %p, i16 8)`, are hints; no others are known."""
+        """Skip an operand bundle of llvm.assume, such as `"align"(ptr %p, i16 8)`; others raise UnsupportedError."""
         if not (isinstance(callee, GlobalRef) and callee.name == "llvm.assume"):
             raise c.error("operand bundle on a call")
         while not c.accept("]"):

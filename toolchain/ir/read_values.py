@@ -1,4 +1,4 @@
-"""Types, values and constants of LLVM IR; constant expressions are folded where they are numbers or addresses."""
+"""Parser of types, values and constants; constant expressions of numbers and addresses are folded."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import struct
 from .lex import (
     BINARY,
     CASTS,
-    FAST_FLAGS,
+    OPERATION_FLAGS,
     PARAM_WORDS,
     PAREN_ATTRS,
     TYPED_ATTRS,
@@ -44,7 +44,7 @@ from .model import (
 
 
 class ValueReader:
-    """Parser of types and values; knows the named types and the local values seen so far."""
+    """Parser of types and values, with the named types and local values parsed so far."""
 
     def __init__(self) -> None:
         self.types: dict[str, Type] = {}
@@ -215,7 +215,7 @@ class ValueReader:
     def _const_expr(self, c: Cursor, op: str, t: Type) -> Value:
         if op not in BINARY | CASTS | {"getelementptr"}:
             raise c.error(f"constant expression '{op}'")
-        while c.peek() in FAST_FLAGS:
+        while c.peek() in OPERATION_FLAGS:
             c.next()
         if c.accept("inrange"):
             c.skip_parens()
@@ -249,7 +249,7 @@ class ValueReader:
         return found
 
     def _attrs(self, c: Cursor) -> ParameterAttributes:
-        """Parameter or result attributes at the cursor."""
+        """Parse parameter or result attributes."""
         attrs: ParameterAttributes = {}
         while True:
             word = c.peek()
@@ -281,15 +281,15 @@ class ValueReader:
 
 
 def _narrow(bits64: int) -> int:
-    """Bits of the float whose value the 64-bit pattern holds exactly (LLVM prints floats as doubles)."""
+    """Bits of the float with the value of a 64-bit pattern (LLVM prints floats as doubles)."""
     value = struct.unpack("<d", bits64.to_bytes(8, "little"))[0]
-    if value != value:  # NaN: keep sign and the top of the payload
+    if value != value:  # NaN: sign and upper bits of the payload
         return (bits64 >> 63) << 31 | 0x7F800000 | ((bits64 >> 29) & 0x7FFFFF)
     return int.from_bytes(struct.pack("<f", value), "little")
 
 
 def _fold_gep(c: Cursor, source: Type, args: list[Value]) -> Value:
-    """Constant getelementptr: base plus a number of bytes."""
+    """Fold a constant getelementptr to base plus offset."""
     base, offset, t = args[0], 0, source
     symbolic: list[Value] = []
     for k, index in enumerate(args[1:]):

@@ -1,4 +1,4 @@
-"""What a well-formed function is. `check` returns every violation; passes are tested by calling it between them."""
+"""Rules of well-formed functions. `check` returns all violations; tests call it after every pass."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from .model import Arg, Block, Const, Function, InlineAsm, Instr, MetaRef, Value
 
 TERMINATORS = frozenset(("ret", "br", "switch", "brtable", "indirectbr", "unreachable"))
 LEGAL_WIDTHS = frozenset((1, 8, *range(16, 272, 16)))
-GONE_WHEN_LEGAL = frozenset((
+NOT_LEGAL = frozenset((
     "getelementptr", "alloca", "fadd", "fsub", "fmul", "fdiv", "frem", "fneg", "fcmp", "fptosi", "fptoui",
     "sitofp", "uitofp",
     "fpext", "fptrunc", "extractvalue", "insertvalue", "freeze", "bitcast", "ptrtoint", "inttoptr", "va_arg",
@@ -16,7 +16,7 @@ GONE_WHEN_LEGAL = frozenset((
 
 
 def check(f: Function, legal: bool = False) -> list[str]:
-    """Violations as sentences; empty when the function is well formed. `legal` adds the rules after legalisation."""
+    """Violations as sentences, none if the function is well-formed; `legal` adds the rules of legal IR."""
     found: list[str] = []
     names = [b.name for b in f.blocks]
     if len(set(names)) != len(names):
@@ -34,17 +34,17 @@ def check(f: Function, legal: bool = False) -> list[str]:
 def _check_block(b: Block, known: set[str]) -> list[str]:
     if not b.instrs or b.instrs[-1].op not in TERMINATORS:
         return [f"block {b.name} does not end in a terminator"]
-    found = [f"{i!r} stands before the end of block {b.name}" for i in b.instrs[:-1] if i.op in TERMINATORS]
+    found = [f"{i!r} precedes the end of block {b.name}" for i in b.instrs[:-1] if i.op in TERMINATORS]
     body = False
     for i in b.instrs:
         if i.op == "phi" and body:
-            found.append(f"phi {i!r} stands behind other instructions of block {b.name}")
+            found.append(f"phi {i!r} follows other instructions of block {b.name}")
         body |= i.op != "phi"
     return found + [f"block {b.name} branches to unknown {s}" for s in b.succs if s not in known]
 
 
 def _check_values(f: Function) -> list[str]:
-    """Every operand is defined on every path to its use, by forward data flow over sets of defined values."""
+    """Check that operands are defined on every path to their uses, by forward data flow."""
     preds: dict[str, list[str]] = {b.name: [] for b in f.blocks}
     for b in f.blocks:
         for s in b.succs:
@@ -99,8 +99,8 @@ def _check_legal(f: Function) -> list[str]:
     found = []
     for b in f.blocks:
         for i in b.instrs:
-            if i.op in GONE_WHEN_LEGAL:
-                found.append(f"{i.op} is left in block {b.name}")
+            if i.op in NOT_LEGAL:
+                found.append(f"{i.op} remains in block {b.name}")
             for v in [i, *i.args]:
                 if v.type.kind in ("float", "struct", "array") or (
                     v.type.kind == "int" and v.type.bits not in LEGAL_WIDTHS

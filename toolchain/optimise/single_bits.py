@@ -114,7 +114,7 @@ def _change(v: Value, p: Value) -> BitChange | None:
 
 
 def _one_bit(load: Instr, kept: int, flipped: int, steps: list[Instr]) -> BitChange | None:
-    """The change of one bit that `steps` make of load & kept ^ flipped; None if they change another number of bits."""
+    """The change of one bit that `steps` make of load & kept ^ flipped; None for another number of bits."""
     ones = (1 << load.type.bits) - 1
     for step in steps:
         k = _constant(step)

@@ -1,7 +1,7 @@
-"""Places in the C source for errors that the assembler and the linker find, which see neither lines nor functions.
+"""Source positions for errors of the assembler and the linker, which know neither lines nor functions.
 
-Only after such an error: the sources go through the front end once more, with debug information. Enters: the error and
-what the driver can do. Leaves: the error with "file.c:12" in front of what it says.
+After such an error, the driver compiles the sources again with debug information, and `with_positions` adds "file.c:12"
+to the messages.
 """
 
 from __future__ import annotations
@@ -17,42 +17,41 @@ _HANDLER = re.compile(r"error: (interrupt )?function '")
 _FUNCTION = re.compile(r'^define .*?@("[^"]+"|[\w$.]+)\(')
 _NAME = re.compile(r'@("[^"]+"|[\w$.]+)')
 _LOCATION = re.compile(r"!dbg (!\d+)")
-MOST_PLACES = 3  # shown of one symbol
+MAX_POSITIONS = 3  # shown per symbol
 
 
 def concerns_generated_code(error: ToolError) -> bool:
-    """Whether debug information could tell more: an assembler's message, a symbol that nobody defines, what the back
-    end does not do, or a handler's wrong name."""
+    """Whether debug information can add positions to an error of assembler, back end, linker or handler names."""
     return any(
         re.match(r"[^:\n]+: error: ", line) or _UNDEFINED.search(line) or _REFUSED.search(line) or _HANDLER.match(line)
         for line in error.findings
     )
 
 
-def with_places(error: ToolError, modules: Callable[[], Iterable[str]]) -> ToolError:
-    """`error` with the source lines that use its undefined symbols; `modules` gives IR text with debug information."""
+def with_positions(error: ToolError, modules: Callable[[], Iterable[str]]) -> ToolError:
+    """`error` with the source lines that use undefined symbols; `modules` returns IR text with debug information."""
     if not any(_UNDEFINED.search(line) for line in error.findings):
         return error
     uses: dict[str, list[str]] = {}
     for text in modules():
-        for symbol, place in _uses(text):
-            places = uses.setdefault(symbol, [])
-            if place not in places:
-                places.append(place)
+        for symbol, position in _uses(text):
+            positions = uses.setdefault(symbol, [])
+            if position not in positions:
+                positions.append(position)
     findings: list[str] = []
     for line in error.findings:
         found = _UNDEFINED.search(line)
-        places = uses.get(found[1], []) if found else []
-        if found is None or not places:
+        positions = uses.get(found[1], []) if found else []
+        if found is None or not positions:
             findings.append(line)
             continue
-        findings += [f"{place.split(' ')[0]}: error: undefined symbol {found[1]}, {place.split(' ', 1)[1]}"
-                     for place in places[:MOST_PLACES]]  # fmt: skip
+        findings += [f"{position.split(' ')[0]}: error: undefined symbol {found[1]}, {position.split(' ', 1)[1]}"
+                     for position in positions[:MAX_POSITIONS]]  # fmt: skip
     return ToolError.of(findings)
 
 
 def _uses(text: str) -> Iterable[tuple[str, str]]:
-    """(assembler name, "file:line used in function 'f'") of every reference in the code of one module."""
+    """(assembler name, "file:line used in function 'f'") of every reference in the code of a module."""
     from toolchain.debuginfo.metadata import DebugInfo
     from toolchain.ir.read import read_module
 

@@ -1,8 +1,8 @@
-"""Tells the middle end which variables do not start with the value that their definition gives.
+"""Marks variables that the start-up code does not initialise as `externally_initialized` in unoptimised IR.
 
-Start-up leaves `persistent` and `noload` variables alone: they begin with what RAM held. Enters: unoptimised IR text.
-Leaves: it with `externally_initialized` on their definitions, without which a variable that is only ever compared with
-and set to one constant becomes a byte that is 0 or 1, and a store in a `user_init` function an initial value.
+`persistent` and `noload` variables start with the previous content of RAM. Without the mark, the middle end assumes the
+value of the definition: it turns a variable that is compared with and set to one constant only into a boolean, and a
+store in a `user_init` function into an initial value.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ ANNOTATIONS = re.compile(rb"^@llvm\.global\.annotations = .*$", re.MULTILINE)
 ENTRY = re.compile(rb'\{ ptr @("[^"]+"|[\w$.]+), ptr (@[\w$.]+), ')
 
 
-def marked(ir: bytes) -> bytes:
-    """The module with its untouched variables marked."""
+def mark_externally_initialised(ir: bytes) -> bytes:
+    """The IR text with the attribute on all such variables."""
     texts = set(NOLOAD_TEXT.findall(ir))
     noted = ANNOTATIONS.search(ir)
     names = {name for name, text in ENTRY.findall(noted[0]) if text in texts} if texts and noted is not None else set()

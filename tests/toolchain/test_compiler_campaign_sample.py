@@ -1,0 +1,38 @@
+"""A sample of the compiler campaign (tests/fuzz/compiler/fuzz_compiler.py); its programs have defined behaviour."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from tests.fuzz.compiler.fuzz_compiler import SOURCES, examine
+from tests.fuzz.programs.c_shapes import Program
+
+
+@pytest.mark.parametrize("seed", range(1, 3))
+def test_a_program_does_the_same_at_every_level_and_on_the_host(seed: int) -> None:
+    """One checksum, one sequence of register accesses."""
+    verdict = examine(seed)
+    assert verdict.kind in ("agreed", "skipped"), verdict.reason
+
+
+def test_sanitizers_find_no_fault_in_the_programs(tmp_path: Path) -> None:
+    """The programs have no undefined behaviour, for which compilers may differ."""
+    if shutil.which("gcc") is None:
+        pytest.skip("gcc is not installed (Debian package gcc)")
+    for seed in range(100, 105):
+        for name, text in Program(seed).files.items():
+            (tmp_path / name).write_text(text)
+        command = ["gcc", "-DHOST", "-O1", "-w", "-std=gnu11", "-fsanitize=address,undefined"]
+        command += ["-fno-sanitize-recover=all", *(str(tmp_path / name) for name in SOURCES)]
+        subprocess.run([*command, "-o", str(tmp_path / "model")], check=True)
+        subprocess.run([str(tmp_path / "model")], check=True, stdout=subprocess.DEVNULL, timeout=20)
+
+
+def test_the_same_seed_gives_the_same_program() -> None:
+    """A seed determines the program, so that it suffices to report a failure."""
+    assert Program(77).files == Program(77).files
+    assert Program(77).files != Program(78).files
