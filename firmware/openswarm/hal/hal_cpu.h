@@ -39,15 +39,16 @@ typedef sys_pcb *(*hal_pick)(void); /* kernel stack, slice level; returns the th
  *   void hal_unlock(hal_lock_state before);   restores the level, never below `before`; pending interrupts are taken
  *   bool hal_in_thread(void);                 level is below slice: a thread outside critical sections
  *   bool hal_in_isr(void);                    level is device or above
- *   void hal_slice_restart(uint16_t spent);   starts a slice with `spent` already used; withdraws a pending interrupt of
- *                                             the previous slice, but not a forced one
+ *   void hal_slice_restart(uint16_t spent);   starts a slice with `spent` already used; withdraws a pending interrupt
+ *                                             of the previous slice, but not a forced one
  *   uint16_t hal_slice_spent(void);           used part of the slice, in units of the port's choice
  *   bool hal_slice_is_over(void);             whether the slice has expired since it was restarted
- *   void hal_slice_force(void);               requests the slice interrupt as soon as the level allows, before the slice
- *                                             expires; any context. A superfluous request is harmless
+ *   void hal_slice_force(void);               requests the slice interrupt as soon as the level allows, before the
+ *                                             slice expires; any context. A superfluous request is harmless
  *   void hal_slice_unforce(void);             withdraws a forced interrupt that has not been taken yet
- *   void hal_guard_kernel_stack(void);        with HAL_STACK_TRAPS: kernel stack, slice level; sets the stack limit to the
- *                                             kernel stack's until a thread is resumed. ISRs on that stack set and restore it
+ *   void hal_guard_kernel_stack(void);        with HAL_STACK_TRAPS: kernel stack, slice level; sets the stack limit to
+ *                                             the kernel stack's until a thread is resumed. ISRs on that stack set and
+ *                                             restore it
  */
 
 #if !HAL_STACK_TRAPS /* the kernel checks the paint at the end of its stack after every round of handlers */

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Limits of the kernel, in bytes unless said otherwise. Each may be overridden with -D. */
+/* Limits of the kernel, in bytes unless stated otherwise. Each may be overridden with -D. */
 #ifndef OPENSWARM_CONFIG_H
 #define OPENSWARM_CONFIG_H
 
@@ -21,28 +21,28 @@
 #define SYS_MAXIMUM_PAYLOAD 1024 /* of one message */
 #endif
 #ifndef SYS_LOSS_COUNTERS
-#define SYS_LOSS_COUNTERS 4 /* events with a loss counter of their own; losses of further ones are summed under id 0 */
+#define SYS_LOSS_COUNTERS 4 /* events with their own loss counter; losses of further events are summed under id 0 */
 #endif
 #ifndef SYS_REPORTS
-#define SYS_REPORTS 1 /* 0: a trap or a failed assertion stops the system without words, whose flash is saved */
+#define SYS_REPORTS 1 /* 0: no fault reports: a trap or a failed assertion only stops the system; saves flash */
 #endif
 #ifndef SYS_UARTS
 #define SYS_UARTS 2 /* of the robot */
 #endif
 #ifndef SYS_UART_TX
-#define SYS_UART_TX (SYS_HEAP / 3) /* of the heap, for what one UART still has to send */
+#define SYS_UART_TX (SYS_HEAP / 3) /* heap bytes for the transmit queue of one UART */
 #endif
 #ifndef SYS_UART_RX
 #define SYS_UART_RX 16 /* largest received chunk passed on as one event */
 #endif
 #ifndef SYS_1PXSENSOR
-#define SYS_1PXSENSOR 0 /* 1: the system registers SYS_IO_1PXSENSOR, and starts the camera if the board has one */
+#define SYS_1PXSENSOR 0 /* 1: the system registers SYS_IO_1PXSENSOR and starts the camera if the board has one */
 #endif
 
 #ifndef SYS_SMALL_PAYLOAD
-#define SYS_SMALL_PAYLOAD (17u * HEAP_STEP) /* the largest an ISR may send */
+#define SYS_SMALL_PAYLOAD (17u * HEAP_STEP) /* maximum from an ISR */
 #endif
 
-#define HEAP_STEP sizeof(void *) /* memory is handed out in multiples of this */
+#define HEAP_STEP sizeof(void *) /* granularity of allocations */
 
 #endif

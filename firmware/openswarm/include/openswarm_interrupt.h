@@ -1,20 +1,21 @@
 /* SPDX-License-Identifier: MIT */
-/* Interrupts of the application's own: a function in C at a chosen level, without assembly.
+/* Application interrupts: a C function as interrupt service routine at a chosen level, without assembly.
  *
  *     static void on_button(void) { Sys_Send_IntEvent(PRESSED, 1); }
  *     SYS_INTERRUPT(INT1, 4, on_button)             at file scope; vectors are named as in the CPU's data sheet
  *     ...
- *     Sys_Enable_Interrupt(INT1);                   in main, behind Sys_Init_Kernel, or later
+ *         Sys_Enable_Interrupt(INT1);                   in main after Sys_Init_Kernel, or later
  *
- * The function runs on the kernel stack, its flag cleared before it. Levels: 4 may call what the contracts of openswarm.h
- * mark I, and waits for other ISRs and for short locks of the kernel. 5 and 6 are delayed by nothing of the kernel, except
- * that 5 waits for the frame of a thread switch, and may not call the kernel or a device: they raise an interrupt of level
- * 4 that nothing else uses (Sys_Raise_Interrupt) and leave the rest to it. Each takes 4 bytes more of the interrupted
- * thread's stack than HAL_MINIMUM_STACK allows for. Level 6 belongs to the camera's capture where that is linked.
+ * The function runs on the kernel stack; its flag is cleared first.
+ *   Level 4        may make the calls marked I in openswarm.h. It waits for other ISRs and for short locks of the kernel.
+ *   Levels 5 and 6 must not call the kernel or a device. They raise an otherwise unused interrupt of level 4
+ *                  (Sys_Raise_Interrupt) that does the rest. The kernel does not delay them, except that 5 waits for
+ *                  the frame of a thread switch. Each needs 4 bytes of the interrupted thread's stack beyond
+ *                  HAL_MINIMUM_STACK. Level 6 belongs to the camera's capture where that is linked.
  *
- * Enforced: levels and vectors that do not exist, by the compiler; a vector that has its function already, be it the
- * kernel's, a driver's or another of these, by the linker; what levels 5 and 6 may not do, by firmware/tools/interrupts.py
- * when make has linked the image.
+ * Checks: the compiler refuses levels and vectors that do not exist. The linker refuses a vector that already has a
+ * function (of the kernel, a driver or another application interrupt). firmware/tools/interrupts.py, run by make after
+ * linking, refuses calls that levels 5 and 6 must not make.
  */
 #ifndef OPENSWARM_INTERRUPT_H
 #define OPENSWARM_INTERRUPT_H
@@ -45,16 +46,17 @@ extern "C" {
     }                                                                                                                 \
     HAL_INTERRUPT_ENTRY(vector, level, sys_isr_##vector)
 
-/* MTHI | no | 10 | 4 | none.  Sets the level, forgets what came before, enables. From any file. */
+/* MTHI | no | 10 | 4 | none.  Sets the level, clears the flag and enables the interrupt. From any file. */
 #define Sys_Enable_Interrupt(vector)                                                                                  \
     do {                                                                                                              \
         extern void sys_enable_##vector(void);                                                                        \
         sys_enable_##vector();                                                                                        \
     } while (0)
-/* Any context | no | 2 | 0 | none.  One that is due in this very moment may still come; one raised later is forgotten by
- * the next Enable. */
+/* Any context | no | 2 | 0 | none.  An interrupt raised at this instant may still be taken; the next Enable discards
+ * one raised later. */
 #define Sys_Disable_Interrupt(vector) HAL_INTERRUPT_DISABLE(vector)
-/* Any context, also levels 5 and 6 | no | 1 | 0 | none.  It comes as soon as its level allows, once however often raised. */
+/* Any context, also levels 5 and 6 | no | 1 | 0 | none.  It is taken once as soon as its level allows, however often
+ * raised. */
 #define Sys_Raise_Interrupt(vector) HAL_INTERRUPT_RAISE(vector)
 
 #ifdef __cplusplus

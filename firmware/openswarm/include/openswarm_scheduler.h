@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* How to write a scheduler: one function that picks from the ring of ready threads. */
+/* Interface of schedulers: one function that picks from the ring of ready threads. */
 #ifndef OPENSWARM_SCHEDULER_H
 #define OPENSWARM_SCHEDULER_H
 
@@ -11,14 +11,14 @@ extern "C" {
 
 typedef struct sys_pcb sys_pcb;
 
-/* Kernel stack, slice locked. first is the ready thread whose turn it is by round robin; the ring through Sys_Next_Ready
- * comes back to it. Returns the thread to run, which must be on the ring. */
+/* Returns the thread to run, which must be on the ring. first is the next ready thread by round robin; Sys_Next_Ready
+ * iterates over the ring back to it. Kernel stack, slice locked. */
 typedef sys_pcb *(*sys_pick)(sys_pcb *first);
 
 struct sys_scheduler {
     sys_pick pick; /* NULL = round robin */
-    bool eager; /* asked also when something becomes due within a slice. Who was running is first then, and keeps the
-                 * rest of its slice if it is not picked */
+    bool eager; /* pick is also called within a slice when a thread wakes or a message arrives; first is then the
+                 * running thread, which keeps the rest of its slice if it is not picked */
 };
 
 sys_pcb *Sys_Next_Ready(const sys_pcb *process);

@@ -12,8 +12,8 @@ typedef struct {
     uint16 size, owner;
 } bus;
 
-/* T.  A block of size bytes, and with it the bus. NULL: refused, with SYS_ERROR_CONTEXT, _BUSY or _MEMORY. silence()
- * ends all interrupts of the bus; it is called before a block is freed or given out. */
+/* T.  Takes the bus and returns a block of size bytes. NULL: refused, with SYS_ERROR_CONTEXT, _BUSY or _MEMORY.
+ * silence() disables all interrupts of the bus; it is called before a block is freed or returned. */
 void *bus_take(bus *wanted, uint16 size, void (*silence)(void));
 void bus_give(bus *used, void (*silence)(void)); /* releases the bus; by the thread that took it */
 
