@@ -19,8 +19,8 @@ from toolchain.files import write_outputs
 if TYPE_CHECKING:
     from toolchain.proof.prove import Verdict
 
-DESCRIPTION = """Proves for each function of a C file, for all inputs, that its machine code implements the optimised LLVM
-IR: same volatile accesses and calls in the same order, same result, same memory, W8-W15 and the return address
+DESCRIPTION = """Proves for each function of a C file, for all inputs, that its machine code implements the optimised
+LLVM IR: same volatile accesses and calls in the same order, same result, same memory, W8-W15 and the return address
 preserved. The instruction table defines the meaning of the code; z3 searches for an input with a difference.
 
 Per function: proved; refuted, with an input for which both differ (--keep writes an image that starts with it, for

@@ -1,4 +1,4 @@
-"""Programs with interrupts, timed as they run: how late a handler begins, and what is then on the stack."""
+"""Measured responses of interrupts, and stack depth, of programs on the emulator."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ CHIP = chip_named()
 
 @dataclass
 class Handled:
-    """One handler: its longest time from the first cycle of a request, not counted while it serves the one before."""
+    """One handler: longest time from a request to its first instruction, while it does not serve an earlier request."""
 
     late: int = 0
     times: int = 0
@@ -24,12 +24,12 @@ class Handled:
 
 @dataclass
 class Watched:
-    """A run, or the worst of several: handlers by C name without `_`, and bytes of stack above main's."""
+    """Observations of one run, or the maxima of several: handlers by C name without `_`, and stack above main's."""
 
     handlers: dict[str, Handled]
     stack: int = 0
     nested: int = 0
-    """Handlers under way at once."""
+    """Greatest number of nested handlers."""
 
     def add(self, other: Watched) -> None:
         """Keep the worst of both."""
@@ -40,7 +40,7 @@ class Watched:
 
 
 def watched(image: Path, names: Iterable[str], phases: Iterable[Mapping[str, int]], cycles: int) -> Watched:
-    """The worst of runs of `cycles` Tcy from main, each with the values of one phase in the variables it names."""
+    """Return the maxima over runs of `cycles` Tcy from main, each with the variables of one phase set."""
     machine = emu.load(image, engine="plain")
     assert machine.image is not None
     vectors = {vector.name: vector for vector in CHIP.vectors}
@@ -72,7 +72,7 @@ def _run(machine: emu.Machine, entries: dict[int, list[tuple[str, int]]], cycles
     while machine.cycle < limit:
         stop = machine.service_boundary(NEVER)
         if stop is not None and stop.reason == "halt":
-            break  # it stands still, and nothing comes any more
+            break  # the machine has stopped
         assert stop is None, stop
         for name, since in entries.get(machine.pc, []):
             if len(entries[machine.pc]) > 1 and machine.peek("INTTREG") & 0x3F != _slot(name):

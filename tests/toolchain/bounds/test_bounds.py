@@ -1,4 +1,4 @@
-"""Bounds of finished images: never below what the emulator takes, exact where nothing is unknown."""
+"""Bounds of linked images: never below a measurement on the emulator, exact where every value is known."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from toolchain.cli import main
 from toolchain.elf.read import read_executable
 from toolchain.stack.annotations import Annotations
 
-COUNTED = """
+COUNTDOWN_CONDITION = """
 int a[20];
 __attribute__((noinline)) int sum(int n) { int s = 0; for (int i = 0; i < n; i++) s += a[i]; return s; }
 __attribute__((noinline)) int fib(int n) { return n < 2 ? n : fib(n - 1) + fib(n - 2); }
@@ -118,7 +118,7 @@ def built(folder: Path, text: str, *options: str) -> Path:
 
 
 def report(capsys: pytest.CaptureFixture[str], image: Path, *options: str) -> dict:
-    """What --json says of main, as one row."""
+    """Return the row of main in the --json report."""
     assert main(["bounds", str(image), "--json", *options]) == 0
     row: dict = json.loads(capsys.readouterr().out)["calls"][0]
     return row
@@ -126,8 +126,8 @@ def report(capsys: pytest.CaptureFixture[str], image: Path, *options: str) -> di
 
 @pytest.mark.parametrize("level", ["-O0", "-Os", "-O2"])
 def test_counted_loops_recursion_and_division_are_bounded_closely(tmp_path, capsys, level: str) -> None:
-    """At least what was measured, at most a twentieth more."""
-    image = built(tmp_path, COUNTED, level)
+    """The bound is at least the measured time, and at most 5 % above it."""
+    image = built(tmp_path, COUNTDOWN_CONDITION, level)
     seen = measure(image)
     assert isinstance(seen, dict)
     row = report(capsys, image)
@@ -146,7 +146,7 @@ def test_random_programs_stay_within_their_bounds(tmp_path: Path, seed: int) -> 
 
 
 def test_a_loop_over_a_list_is_named_with_its_line(tmp_path, capsys) -> None:
-    """Its length is data."""
+    """The length of the list depends on data."""
     image = built(tmp_path, LIST.replace("NOTE", ""))
     row = report(capsys, image)
     assert row["cycles"] is None
@@ -156,8 +156,8 @@ def test_a_loop_over_a_list_is_named_with_its_line(tmp_path, capsys) -> None:
     assert "program.c:8 " in capsys.readouterr().out
 
 
-def test_an_annotated_loop_is_bounded_by_its_note(tmp_path, capsys) -> None:
-    """Eight rounds here; each round more that the annotation allows costs the same."""
+def test_an_annotated_loop_is_bounded_by_its_annotation(tmp_path, capsys) -> None:
+    """The loop has eight iterations; each further iteration that the annotation allows costs the same."""
     image = built(tmp_path, LIST.replace("NOTE", "LOOP_BOUND(n + 1);"))
     seen = measure(image)
     assert isinstance(seen, dict)
@@ -169,22 +169,22 @@ def test_an_annotated_loop_is_bounded_by_its_note(tmp_path, capsys) -> None:
 
 
 @pytest.mark.parametrize("level", ["-Os", "-O1", "-O2"])
-def test_the_note_of_a_loop_within_says_nothing_about_the_outer_one(tmp_path, capsys, level: str) -> None:
-    """Although the line of the inner one also leaves both."""
+def test_the_annotation_of_an_inner_loop_does_not_apply_to_the_outer_one(tmp_path, capsys, level: str) -> None:
+    """The line of the inner loop also has an exit of both loops."""
     row = report(capsys, built(tmp_path, NESTED, level))
     assert row["cycles"] is None
     assert [place for place in row["open"] if "program.c:6 " in place or "program.c:8 " in place]
 
 
 def test_one_loop_of_the_source_that_became_two_shares_its_rounds(tmp_path, capsys) -> None:
-    """Ten rounds more cost ten times one, not the square of it; visit alone takes over 100 cycles."""
+    """Ten more iterations cost ten times one, not its square; visit() alone takes over 100 cycles."""
     image = built(tmp_path, SPLIT)
     few, many = (report(capsys, image, "--let", f"n={n}")["cycles"] for n in (10, 20))
     assert 1_000 < many - few < 2_000
 
 
 def test_rounds_of_all_entries_together_are_counted_once(tmp_path, capsys) -> None:
-    """Eight lists of up to eight, eight items in all: not 64 visits of over 100 cycles."""
+    """Eight lists of up to eight items have eight items in total: 8 visits of over 100 cycles, not 64."""
     image = built(tmp_path, TABLE)
     seen = measure(image)
     assert isinstance(seen, dict)
@@ -198,13 +198,13 @@ def test_rounds_of_all_entries_together_are_counted_once(tmp_path, capsys) -> No
 
 
 def test_a_bounded_argument_bounds_a_copy(tmp_path, capsys) -> None:
-    """memcpy counts down from the argument, in bytes where an address is odd, and asks the sign of what is left."""
+    """memcpy counts down from its argument, in bytes for odd addresses, and tests the sign of the remaining count."""
     row = report(capsys, built(tmp_path, COPY), "--function", "copy")
     assert 20 < row["cycles"] < 80
 
 
-def test_paths_that_call_a_function_can_be_left_out(tmp_path, capsys) -> None:
-    """Without the division, main is cheaper; without main's own callee there is no way through it."""
+def test_paths_that_call_a_function_can_be_excluded(tmp_path, capsys) -> None:
+    """Without the division main is cheaper; without main's own callee it has no path to its return."""
     text = '__attribute__((noinline)) int rare(int x) { __asm__ volatile("repeat #99\\n nop"); return x; }\n'
     text += "volatile int v; int main(void) { int x = v; return x == 7 ? rare(x) : x; }"
     image = built(tmp_path, text)
@@ -215,7 +215,7 @@ def test_paths_that_call_a_function_can_be_left_out(tmp_path, capsys) -> None:
 
 
 def test_a_call_is_bounded_inside_of_sections_too(tmp_path, capsys) -> None:
-    """Where a PRIVATE_VALUE is not what threads enter with: the way out of a section runs only there."""
+    """Within a section a PRIVATE_VALUE does not hold; the code that leaves a section runs only there."""
     text = "#include <bounds.h>\nint depth; PRIVATE_VALUE(depth, 0);\n__attribute__((noinline)) void leave(void)\n"
     text += '{ if (depth) { depth--; __asm__ volatile("repeat #99\\n nop" ::: "memory"); } }\n'
     text += "int main(void) { depth = 1; leave(); return depth; }"
@@ -223,14 +223,14 @@ def test_a_call_is_bounded_inside_of_sections_too(tmp_path, capsys) -> None:
 
 
 def test_a_branch_on_a_shift_is_followed(tmp_path, capsys) -> None:
-    """Shifts by a number set Z and N and have no byte form."""
+    """Shifts by a literal set Z and N and have no byte form."""
     shift = '__asm__("lsr %1,#3,%0\\n\\tbra z,1f\\n\\tnop\\n1:" : "=r"(r) : "r"(v));'
     text = "volatile int v; int main(void) { int r; " + shift + " return r; }"
     assert report(capsys, built(tmp_path, text))["cycles"] > 5
 
 
-def test_a_note_costs_neither_code_nor_memory(tmp_path: Path) -> None:
-    """bounds.h promises it."""
+def test_an_annotation_costs_neither_code_nor_memory(tmp_path: Path) -> None:
+    """An image with annotations equals one without in code and data."""
     (tmp_path / "a").mkdir()
     (tmp_path / "b").mkdir()
     without = read_executable(built(tmp_path / "a", LIST.replace("NOTE", "")).read_bytes(), "a")
@@ -242,8 +242,8 @@ def test_a_note_costs_neither_code_nor_memory(tmp_path: Path) -> None:
     ]
 
 
-def test_the_longest_masked_stretch_is_told(tmp_path, capsys) -> None:
-    """REPEAT #29, NOP: 1 + 30 cycles at level 5, and the instructions that write SR."""
+def test_the_longest_masked_time_is_reported(tmp_path, capsys) -> None:
+    """REPEAT #29, NOP takes 1 + 30 cycles at level 5, and the instructions that write SR come on top."""
     row = report(capsys, built(tmp_path, MASKS))
     cycles, place = row["masked"]["5"]
     assert 31 < cycles <= 40
@@ -252,8 +252,8 @@ def test_the_longest_masked_stretch_is_told(tmp_path, capsys) -> None:
 
 
 def test_a_limit_that_can_be_exceeded_fails(tmp_path, capsys) -> None:
-    """So does one that cannot be compared."""
-    image = built(tmp_path, COUNTED)
+    """A limit on a function without a bound fails as well."""
+    image = built(tmp_path, COUNTDOWN_CONDITION)
     cycles = report(capsys, image)["cycles"]
     assert main(["bounds", str(image), "--limit", f"main={cycles}"]) == 0
     assert main(["bounds", str(image), "--limit", f"main={cycles - 1}"]) == 1
@@ -269,9 +269,9 @@ def test_a_limit_that_can_be_exceeded_fails(tmp_path, capsys) -> None:
         (["--limit", "nothing=3"], "no function that was looked at is called nothing"),
     ],
 )
-def test_bad_arguments_are_told(tmp_path, capsys, options: list[str], message: str) -> None:
-    """Status 2 and a sentence."""
-    assert main(["bounds", str(built(tmp_path, COUNTED)), *options]) == 2
+def test_bad_arguments_are_refused(tmp_path, capsys, options: list[str], message: str) -> None:
+    """The exit status is 2, and the message names the argument."""
+    assert main(["bounds", str(built(tmp_path, COUNTDOWN_CONDITION)), *options]) == 2
     assert message in capsys.readouterr().err
 
 
@@ -311,7 +311,7 @@ int main(void) { u = 9; CALLED(); return 0; }
 @pytest.mark.parametrize("called", ["sized", "any", "some"])
 @pytest.mark.parametrize("level", ["-O0", "-O2"])
 def test_room_of_unknown_length_is_no_other_stack(level: str, called: str, tmp_path: Path) -> None:
-    """Behind `alloca` a call comes back: no bound rather than one below what is measured."""
+    """A function with `alloca` has no stack bound, rather than one below the measurement."""
     (tmp_path / "a.c").write_text(ROOM.replace("CALLED", called))
     assert build([tmp_path / "a.c"], tmp_path / "a.elf", level, "-w", "-fno-lto").status == 0
     seen = measure(tmp_path / "a.elf")
@@ -330,8 +330,8 @@ def test_room_of_unknown_length_is_no_other_stack(level: str, called: str, tmp_p
 
 
 @pytest.mark.parametrize("level", ["-O0", "-Os"])
-def test_notes_are_no_variables_of_the_program(tmp_path: Path, level: str) -> None:
-    """What DWARF knows stands in data memory: an annotation's place in its section is no address there."""
+def test_annotations_are_no_variables_of_the_program(tmp_path: Path, level: str) -> None:
+    """DWARF describes no annotation as a variable: its section is not in data memory."""
     image = load_image(str(built(tmp_path, LIST.replace("NOTE", "LOOP_BOUND(8);"), level)))
     assert set(image.lines.files) <= {symbol.address for symbol in image.symbols.all if symbol.space == "data"}
     head = image.symbols.find("_head")

@@ -92,8 +92,8 @@ def cycles(image: Path) -> int:
 
 
 @pytest.mark.parametrize("level", ["-Os", "-O2"])
-def test_a_note_of_one_call_says_nothing_about_the_next_line(tmp_path: Path, capsys, level: str) -> None:
-    """Both lines call mend(); it is only the first that is made once."""
+def test_the_annotation_of_a_call_does_not_apply_to_the_next_line(tmp_path: Path, capsys, level: str) -> None:
+    """Both lines call mend(); only the first is limited to one call."""
     text = TWICE.format(slow=SLOW.format("", 999), annotation="CALL_SHARE(mend, work, 1);")
     image = built(tmp_path, text, level)
     assert cycles(image) <= report(capsys, image)["cycles"] <= 1.1 * cycles(image)
@@ -104,28 +104,28 @@ def test_a_note_of_one_call_says_nothing_about_the_next_line(tmp_path: Path, cap
 @pytest.mark.parametrize(
     ("annotation", "message"),
     [
-        ("CALL_SHARE(work, work, 1);", "program.c:9: no call of work stands in line 9"),
-        ("CALL_IF(other, 0);", "program.c:9: no call of other stands in line 9"),
+        ("CALL_SHARE(work, work, 1);", "program.c:9: line 9 contains no call of work"),
+        ("CALL_IF(other, 0);", "program.c:9: line 9 contains no call of other"),
         ("CALL_SHARE(mend, work, );", "program.c:9: expected 3 arguments, got 'mend work'"),
     ],
 )
-def test_a_note_of_no_call_is_refused(tmp_path: Path, capsys, annotation: str, message: str) -> None:
-    """With its place."""
+def test_an_annotation_without_its_call_is_refused(tmp_path: Path, capsys, annotation: str, message: str) -> None:
+    """The message has file and line of the annotation."""
     image = built(tmp_path, TWICE.format(slow=SLOW.format("", 9), annotation=annotation))
     assert main(["bounds", str(image)]) == 2
     assert message in capsys.readouterr().err
 
 
-def test_a_note_behind_all_code_is_refused(tmp_path: Path, capsys) -> None:
-    """Nothing could come of it."""
+def test_an_annotation_after_all_code_is_refused(tmp_path: Path, capsys) -> None:
+    """It could apply to nothing."""
     text = "#include <bounds.h>\nvolatile int a;\nint main(void)\n{\n    a = 2;\n    return 0;\n    LOOP_BOUND(3);\n}\n"
     assert main(["bounds", str(built(tmp_path, text))]) == 2
     assert "program.c:7: main has no code after this annotation" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("lto", [[], ["-fno-lto"]])
-def test_static_functions_of_one_name_are_told_apart(tmp_path: Path, capsys, lto: list[str]) -> None:
-    """In files and folders of one name, with annotations of the same line: 40 items in one list, 5 in the other."""
+def test_static_functions_with_equal_names_are_distinguished(tmp_path: Path, capsys, lto: list[str]) -> None:
+    """Files and folders have equal names, annotations equal lines: 40 items in one list, 5 in the other."""
     sources = []
     for name, count, annotation in (("one", 40, "LOOP_BOUND(40);"), ("two", 5, "LOOP_BOUND(5);")):
         (tmp_path / name / "part").mkdir(parents=True)
@@ -147,12 +147,12 @@ def test_static_functions_of_one_name_are_told_apart(tmp_path: Path, capsys, lto
     sources[0].write_text(sources[0].read_text().replace("LOOPS_OF(length", "LOOPS_OF(list.c/length"))
     assert build([tmp_path / "main.c", *sources], tmp_path / "a.elf", "-Os", "-g", *lto).status == 0
     assert main(["bounds", str(tmp_path / "a.elf")]) == 2
-    assert "list.c/length is several: say " in capsys.readouterr().err
+    assert "list.c/length is ambiguous: write " in capsys.readouterr().err
     assert main(["bounds", str(tmp_path / "a.elf"), "--function", "length"]) == 2
 
 
 def test_a_static_function_of_another_file_is_named_with_it(tmp_path: Path, capsys) -> None:
-    """`list.c/length` from main.c, however it is spaced; without its file it is none that main.c can see."""
+    """main.c writes `list.c/length`, with or without blanks; plain `length` is not visible there."""
     (tmp_path / "list.c").write_text(PART.format(name="one", count=8, annotation=""))
     for name in ("list.c/length", "list.c / length", "length"):
         (tmp_path / "main.c").write_text(
@@ -163,11 +163,11 @@ def test_a_static_function_of_another_file_is_named_with_it(tmp_path: Path, caps
         if "/" in name:
             assert report(capsys, tmp_path / "a.elf")["cycles"] is not None
     assert main(["bounds", str(tmp_path / "a.elf")]) == 2
-    assert "main.c:2: no length can be seen from there; there is " in capsys.readouterr().err
+    assert "main.c:2: length is not visible in this file; candidates: " in capsys.readouterr().err
 
 
-def test_several_ways_back_are_one_loop_only_where_a_note_says_so(tmp_path: Path, capsys) -> None:
-    """What `continue` leads back to could as well be the condition of a loop within."""
+def test_several_back_edges_are_one_loop_only_with_an_annotation(tmp_path: Path, capsys) -> None:
+    """The target of `continue` could as well be the condition of an inner loop."""
     image = built(tmp_path, WAYS_BACK.format(annotation="LOOP_BOUND(8);"), "-Os")
     row = report(capsys, image)
     assert row["cycles"] is None
@@ -176,15 +176,15 @@ def test_several_ways_back_are_one_loop_only_where_a_note_says_so(tmp_path: Path
     assert cycles(image) <= report(capsys, image)["cycles"] <= 1.3 * cycles(image)
 
 
-def test_the_note_of_an_unrolled_loop_says_nothing_about_the_one_around_it(tmp_path: Path, capsys) -> None:
-    """At -O2 nothing is left of the inner loop but its line."""
+def test_the_annotation_of_an_unrolled_loop_does_not_apply_to_the_enclosing_loop(tmp_path: Path, capsys) -> None:
+    """At -O2 the inner loop is unrolled; only its line is left."""
     row = report(capsys, built(tmp_path, UNROLLED, "-O2"))
     assert row["cycles"] is None
     assert "this loop has no known bound" in row["open"].values()
 
 
-def test_a_loop_that_is_followed_no_further_is_told_so(tmp_path: Path, capsys) -> None:
-    """It has a bound, but its rounds are too many to follow."""
+def test_a_loop_with_too_many_iterations_is_reported(tmp_path: Path, capsys) -> None:
+    """The loop has a bound, but above the limit of the analysis."""
     text = "volatile unsigned n; int main(void) { for (unsigned i = 0; i < 6000; i++) n = i; return 0; }"
     row = report(capsys, built(tmp_path, text, "-Os"))
     assert row["cycles"] is None
@@ -192,7 +192,7 @@ def test_a_loop_that_is_followed_no_further_is_told_so(tmp_path: Path, capsys) -
 
 
 @pytest.mark.parametrize("seed", [4, 7, 10])
-def test_programs_with_true_notes_of_every_kind_stay_within_their_bounds(tmp_path: Path, seed: int) -> None:
-    """A sample of the third of tests/fuzz/compiler/fuzz_bounds.py that tests/fuzz/programs/c_notes.py makes."""
+def test_programs_with_correct_annotations_of_every_kind_stay_within_their_bounds(tmp_path: Path, seed: int) -> None:
+    """A sample of tests/fuzz/compiler/fuzz_bounds.py with programs of tests/fuzz/programs/c_notes.py."""
     outcome, _ = examine(seed, tmp_path)
     assert outcome == "bounded"

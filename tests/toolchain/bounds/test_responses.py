@@ -1,4 +1,4 @@
-"""Programs made to be interrupted late, and deeply: neither responses nor stacks are above what is said, or refused."""
+"""Programs with late responses and deep nesting: no response and no stack exceeds its bound, or it has none."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.fuzz.programs import c_interrupts
 from tests.fuzz.compiler.fuzz_bounds import ENOUGH, INTERRUPTED, Held
+from tests.fuzz.programs import c_interrupts
 from tests.toolchain.bounds.responses import Watched, watched
 from tests.toolchain.c_programs import build
 from toolchain.bounds.annotations.reader import read_annotation_section
@@ -75,29 +75,29 @@ PROGRAMS = {
     "Idle": (
         "1: bset 0x42,#7\n repeat #50\n nop\n pwrsav #1\n repeat #60\n nop\n bclr 0x42,#7\n bra 1b\n" + T1 + T2, 4, 2),
 }  # fmt: skip
-"""What is late or deep -> main behind `begin` and handlers, the levels of T1 and T2."""
+"""By name: main after `begin` and handlers, and the levels of T1 and T2."""
 PHASES = [{"first": 160 + k, "second": 60_000 if k % 2 else 150 + k * 11 % 600} for k in range(0, 420, 3)]
 PHASES += [{"first": 425 + k, "second": 400 + k} for k in range(0, 60, 2)]
 CYCLES = 1_200
 
 
-def images(folder: Path, text: str, told: tuple[int, int], given: tuple[int, int]) -> Path:
-    """A program whose interrupts have levels that are told, and given."""
+def images(folder: Path, text: str, annotated: tuple[int, int], actual: tuple[int, int]) -> Path:
+    """Build a program with annotated and actual levels of its two interrupts."""
     (folder / "p.s").write_text(HEAD + text)
-    (folder / "c.c").write_text(DEVICES % (*told, *given))
+    (folder / "c.c").write_text(DEVICES % (*annotated, *actual))
     built = build([folder / "p.s", folder / "c.c"], folder / "p.elf", "-Os", "-g", "-fno-lto")
     assert built.status == 0, built.messages
     return folder / "p.elf"
 
 
 def said_of(image: Path, function: str = "main") -> Report:
-    """Everything about an image."""
+    """Return the report of an image."""
     executable = read_executable(image.read_bytes(), str(image))
     return report_of(Program(executable, Annotations(), read_annotation_section(executable, {})), [function])
 
 
 def compare(seen: Watched, report: Report) -> None:
-    """Nothing that was seen is above what is said, and every interrupt was seen."""
+    """Assert that no observation exceeds its bound, and that every interrupt occurred."""
     said = {one.name.removeprefix("_"): one for one in report.responses}
     for name, one in seen.handlers.items():
         assert one.times
@@ -111,7 +111,7 @@ def compare(seen: Watched, report: Report) -> None:
 
 @pytest.mark.parametrize("name", PROGRAMS)
 def test_no_response_and_no_stack_is_above_its_bound(tmp_path: Path, name: str) -> None:
-    """With both interrupts at many phases, and the higher one close to its bound."""
+    """Both interrupts occur at many phases; the response of the higher one comes close to its bound."""
     text, *levels = PROGRAMS[name]
     image = images(tmp_path, text, (levels[0], levels[1]), (levels[0], levels[1]))
     seen, report = watched(image, ["T1Interrupt", "T2Interrupt"], PHASES, CYCLES), said_of(image)
@@ -131,13 +131,13 @@ def test_what_holds_interrupts_back_for_ever_leaves_no_response(tmp_path: Path, 
 
 
 def test_a_round_of_an_endless_loop_that_may_stay_masked(tmp_path: Path) -> None:
-    """Unmasked only where a variable says so: there may be no such round."""
+    """A variable decides whether an iteration unmasks: possibly none does."""
     text = "1: bset 0x42,#7\n btss _out,#0\n bra 1b\n bclr 0x42,#7\n bra 1b\n"
     assert [one.cycles for one in said_of(images(tmp_path, text + T1 + T2, (4, 4), (4, 4))).responses] == [None, None]
 
 
 def test_sleep_leaves_no_response(tmp_path: Path, capsys) -> None:
-    """The oscillator takes a time to start that is not known."""
+    """The start-up time of the oscillator is unknown."""
     image = images(tmp_path, "1: pwrsav #0\n bra 1b\n" + T1 + T2, (4, 4), (4, 4))
     assert [one.cycles for one in said_of(image).responses] == [None, None]
     assert main(["bounds", str(image)]) == 0
@@ -145,15 +145,15 @@ def test_sleep_leaves_no_response(tmp_path: Path, capsys) -> None:
 
 
 def test_a_stopped_machine_holds_nothing_back(tmp_path: Path) -> None:
-    """Where no interrupt is enabled none is requested."""
+    """Without an enabled interrupt there is no request to delay."""
     text = (
         "btsc _out,#0\n bra 2f\n" + LOOP + "2: bset 0x42,#7\n clr 0x8c\n clr 0x8e\n clr 0x90\n3: pwrsav #1\n bra 3b\n"
     )
     assert None not in [one.cycles for one in said_of(images(tmp_path, text + T1 + T2, (4, 4), (4, 4))).responses]
 
 
-def test_a_level_other_than_told_is_named(tmp_path: Path) -> None:
-    """T2 is said to have 2 and gets 5: it holds T1 back, which has 4."""
+def test_a_level_that_contradicts_its_annotation_is_reported(tmp_path: Path) -> None:
+    """T2 is annotated with level 2 and gets 5, so that it delays T1, which has 4."""
     image = images(tmp_path, LOOP + T1 + SLOW, (4, 2), (4, 5))
     seen = watched(image, ["T1Interrupt"], PHASES, CYCLES)
     assert seen.handlers["T1Interrupt"].late > 200
@@ -166,7 +166,7 @@ def test_a_level_other_than_told_is_named(tmp_path: Path) -> None:
 
 
 def test_main_counts_whatever_is_asked_for(tmp_path: Path) -> None:
-    """What holds an interrupt back is not only in the function that is looked at."""
+    """Code outside the analysed function can delay an interrupt."""
     text = "1: bset 0x42,#7\n repeat #300\n nop\n bclr 0x42,#7\n bra 1b\n"
     image = images(tmp_path, text + T1 + T2, (4, 2), (4, 2))
     compare(watched(image, ["T1Interrupt", "T2Interrupt"], PHASES, CYCLES), said_of(image, "nothing"))
@@ -174,14 +174,14 @@ def test_main_counts_whatever_is_asked_for(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("seed", [3, 15])
 def test_random_programs_answer_within_their_bounds(tmp_path: Path, seed: int) -> None:
-    """A sample of the sixth of tests/fuzz/compiler/fuzz_bounds.py that tests/fuzz/programs/c_interrupts.py makes."""
+    """A sample of tests/fuzz/compiler/fuzz_bounds.py with programs of tests/fuzz/programs/c_interrupts.py."""
     held = Held(Counter())
     assert held.examine(seed, tmp_path) == "responses"
     assert held.nested > 1
 
 
 def test_random_programs_hold_interrupts_back_in_every_way() -> None:
-    """As many as make a campaign long enough, and none is missing; of nothing everything is."""
+    """A long campaign contains every shape; an empty one lacks all of them."""
     made: Counter[str] = Counter()
     for seed in range(INTERRUPTED, 6 * ENOUGH, 6):
         made += c_interrupts.Program(seed).kinds

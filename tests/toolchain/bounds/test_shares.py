@@ -1,4 +1,4 @@
-"""Rounds and calls that are counted together, constants behind the PSV window, returns from elsewhere."""
+"""Shared iterations and calls, constants in the PSV window, and longjmp."""
 
 from __future__ import annotations
 
@@ -114,7 +114,7 @@ def test_rounds_of_two_calls_are_shared_in_the_function_that_makes_them(tmp_path
 
 
 def test_a_call_is_made_only_so_often(tmp_path: Path, capsys) -> None:
-    """Once in ten rounds, or never."""
+    """The call is made in one of ten iterations, or never."""
     image = built(tmp_path, RARE.replace("NOTE", "CALL_SHARE(mend, work, 1);"))
     assert measured(image) <= report(capsys, image)["cycles"] <= 1.1 * measured(image)
     image = built(tmp_path, RARE.replace("NOTE", "CALL_IF(mend, x);"))
@@ -123,26 +123,26 @@ def test_a_call_is_made_only_so_often(tmp_path: Path, capsys) -> None:
 
 @pytest.mark.parametrize("level", ["-O0", "-Os", "-O2"])
 def test_constants_behind_the_window_have_both_their_bytes(tmp_path: Path, capsys, level: str) -> None:
-    """A loop that goes round as often as one of them says."""
+    """The iteration count of a loop is a constant in the window."""
     image = built(tmp_path, CONSTANTS, level)
     assert measured(image) <= report(capsys, image)["cycles"] <= 1.1 * measured(image)
 
 
 def test_an_address_that_is_moved_still_leads_to_ram(tmp_path: Path, capsys) -> None:
-    """Such as that of a link within what was loaded: following it takes no cycle of the window."""
+    """The address of a link in a loaded object costs no PSV cycle to follow."""
     image = built(tmp_path, LINKS)
     assert measured(image) <= report(capsys, image)["cycles"] <= 1.03 * measured(image)
 
 
 @pytest.mark.parametrize("level", ["-O0", "-Os", "-O2"])
 def test_an_index_that_is_loaded_may_lead_into_the_window(tmp_path: Path, capsys, level: str) -> None:
-    """It is no pointer, although it comes from where pointers lead to RAM."""
+    """The index is no pointer, although it comes from a file whose pointers point to RAM."""
     image = built(tmp_path, INDEXED, level)
     assert measured(image) <= report(capsys, image)["cycles"]
 
 
 def test_a_long_jump_leaves_no_bound(tmp_path: Path, capsys) -> None:
-    """And is named as the reason."""
+    """The report names longjmp as the reason."""
     row = report(capsys, built(tmp_path, LONG_JUMP))
     assert row["cycles"] is None
     assert any("longjmp" in reason for reason in row["open"].values())

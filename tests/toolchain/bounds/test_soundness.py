@@ -1,4 +1,4 @@
-"""Programs made to get past their bounds: each is bounded by no less than its worst, or its line is named."""
+"""Adversarial programs: the bound is at least the longest run, or the report names the line without a bound."""
 
 from __future__ import annotations
 
@@ -96,7 +96,7 @@ PROGRAMS = {
 """What gets past -> the code behind `mov _in,w0`, how many inputs there are, and the reason and line of what is
 refused (None: it is bounded)."""
 LOOSE = {"half a word of the stack": 11}
-"""How far a bound may lie above the worst where it is not 1.1: here a byte is any."""
+"""Greatest ratio of bound and longest run where it is not 1.1: a byte of the program is unknown."""
 NINTH = """
 __attribute__((noinline)) void set(int a, int b, int c, int d, int e, int f, int g, int h, unsigned *p)
 {
@@ -111,11 +111,11 @@ int main(void)
     return 0;
 }
 """
-"""A variable that only a pointer among the arguments on the stack leads to, in more contexts than are kept apart."""
+"""Only a pointer among the stack arguments points to the variable; it has more contexts than the analysis separates."""
 
 
 def bound_of(image: Path) -> Bound:
-    """What is said of main."""
+    """Return the bound of main."""
     executable = read_executable(image.read_bytes(), str(image))
     program = Program(executable, Annotations(), read_annotation_section(executable, {}))
     address = program.address("_main")
@@ -124,7 +124,7 @@ def bound_of(image: Path) -> Bound:
 
 
 def worst(image: Path, inputs: int) -> int:
-    """Cycles of main's longest run, of those with 0 and upwards in `in`."""
+    """Return the cycles of main's longest run with the values 0..inputs-1 in `in`."""
     longest = 0
     for value in range(inputs):
         machine = emu.load(image, engine="plain")
@@ -140,7 +140,7 @@ def worst(image: Path, inputs: int) -> int:
 
 @pytest.mark.parametrize("name", PROGRAMS)
 def test_assembly_stays_within_its_bound_or_is_refused_by_its_line(tmp_path: Path, name: str) -> None:
-    """Whatever it does with loops, registers in memory, tables and addressing."""
+    """The programs use DO loops, registers through memory, jump tables and addressing modes in unusual ways."""
     text, inputs, refused = PROGRAMS[name]
     most = LOOSE.get(name, 1.1)
     (tmp_path / "p.s").write_text(HEAD + text)
@@ -161,7 +161,7 @@ def test_assembly_stays_within_its_bound_or_is_refused_by_its_line(tmp_path: Pat
 
 
 def test_a_pointer_to_the_stack_among_arguments_on_the_stack(tmp_path: Path) -> None:
-    """What is called may store there."""
+    """The callee may store through the pointer."""
     calls = " ".join(f"n = {k}; set({k}, 2, 3, 4, 5, 6, 7, 8, &n);" for k in range(14))
     (tmp_path / "p.c").write_text(DATA + NINTH.replace("CALLS", calls))
     built = build([tmp_path / "p.c"], tmp_path / "p.elf", "-O0", "-g")
@@ -172,7 +172,7 @@ def test_a_pointer_to_the_stack_among_arguments_on_the_stack(tmp_path: Path) -> 
 
 @pytest.mark.parametrize("level", ["-O0", "-Os", "-O2"])
 def test_the_table_of_a_switch_has_an_end_the_compiler_asks_for(tmp_path: Path, level: str) -> None:
-    """No jump into one is refused, although seven cases are no power of two."""
+    """No jump into the table is refused, although the number of cases, seven, is no power of two."""
     cases = " ".join(f"case {k}: out += {k * k + 1}; break;" for k in range(3, 10))
     (tmp_path / "p.c").write_text(DATA + f"int main(void) {{ switch (in) {{ {cases} }} return 0; }}\n")
     built = build([tmp_path / "p.c"], tmp_path / "p.elf", level, "-g", "-fno-lto")
