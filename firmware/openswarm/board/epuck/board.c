@@ -39,7 +39,7 @@ void board_init(void)
     hal_led_init();
     selector_init();
 #if SYS_1PXSENSOR
-    (void)Sys_Start_Camera(); /* without a camera the event is registered, and never comes */
+    (void)Sys_Start_Camera(); /* without a camera the event is registered but never sent */
 #endif
 }
 

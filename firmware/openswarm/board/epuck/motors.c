@@ -14,8 +14,8 @@ INTERRUPT_LEVEL(T3, 5);
 /* Low nibble: phases A-D of the coils now; right rotation by a nibble = next index (epuck.md §3). */
 enum { PHASES = 0x956A };
 
-/* Shared with stepper.S, which relies on the order of the fields. A tick between two stores of a change does no harm, so
- * that nothing here holds the stepper back. */
+/* Shared with stepper.S, which relies on the order of the fields. A tick between two stores of a change does no
+ * harm, so that nothing here holds the stepper back. */
 typedef struct {
     volatile sint16 rate; /* sixths of a thousandth: 5 v; positive turns to the next index */
     sint16 fraction;      /* 0..6191 */

@@ -16,8 +16,8 @@ static bool wait_for(uint32_t flag)
     return false;
 }
 
-/* 24 MHz crystal, / 24 * 336 / 2 = 168 MHz; APB1 42 MHz, its timers 84. QEMU runs at 168 MHz by itself and models neither
- * crystal nor PLL: their flags never come, so the wait is bounded. */
+/* 24 MHz crystal, / 24 * 336 / 2 = 168 MHz; APB1 42 MHz, its timers 84. QEMU runs at 168 MHz by itself and models
+ * neither crystal nor PLL: their flags never come, so the wait is bounded. */
 HAL_USED void board_clock(void)
 {
     RCC_CR |= RCC_CR_HSEON;

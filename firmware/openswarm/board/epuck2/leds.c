@@ -1,11 +1,12 @@
 /* SPDX-License-Identifier: MIT */
-/* LEDs and selector of the e-puck2. LEDs 1, 3, 5, 7 of the ring are coloured and belong to the radio's CPU: dark here. */
+/* LEDs and selector of the e-puck2. LEDs 1, 3, 5, 7 of the ring are coloured and belong to the radio's CPU: dark
+ * here. */
 #include "io.h"
 #include "pins.h"
 #include "stm32f407.h"
 
 static const uint8 ring_pins[4] = {5, 6, 10, 11};
-static uint16 lit; /* what was asked for: the simulated ports do not read back */
+static uint16 lit; /* requested state: the simulated ports cannot be read back */
 
 static void put(uint32_t port, uint32_t pin, bool high)
 {

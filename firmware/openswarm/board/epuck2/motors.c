@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /* Stepper motors of the e-puck2 in half-steps, from TIM4 at 9,600 Hz, above level device: it never calls the kernel.
  *
- * As on the e-puck 1000 steps are a turn of the wheel and 129 mm/s are 1000 steps/s, that is 2000 half-steps: each tick
- * adds 10 v to a fraction of 6192, and a half-step is due whenever it leaves 0..6191. No rounding. The order of the coils
- * is UNVERIFIED on a robot. */
+ * As on the e-puck 1000 steps are a turn of the wheel and 129 mm/s are 1000 steps/s, that is 2000 half-steps: each
+ * tick adds 10 v to a fraction of 6192, and a half-step is due whenever it leaves 0..6191. No rounding. The order of
+ * the coils is UNVERIFIED on a robot. */
 #include "io.h"
 #include "kernel.h"
 #include "pins.h"

@@ -27,7 +27,7 @@ void hal_uart_start(uint8_t uart)
     NVIC_ISER(IRQ_USART3) = NVIC_BIT(IRQ_USART3);
 }
 
-/* The interrupt is pended by hand: QEMU's UART raises none when it is ready to send. */
+/* Sets the interrupt pending, because QEMU's UART raises none when it is ready to send. */
 void hal_uart_transmit(uint8_t uart)
 {
     (void)uart;

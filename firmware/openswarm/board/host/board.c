@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The e-puck's devices on a host: UART1 is standard output, motors and LEDs remember what they were told
- * (host_board.h). Works with every port that runs on a host. */
+/* The e-puck's devices on a host: UART1 is standard output; motors and LEDs store their last commands (board.h).
+ * Works with every port that runs on a host. */
 #include "board.h"
 
 #include "hal_board.h"
@@ -68,7 +68,7 @@ void hal_uart_start(uint8_t uart)
     (void)uart;
 }
 
-/* The host's line is infinitely fast: everything leaves at once, unless a test holds it back. */
+/* The host's line is infinitely fast: every byte leaves at once, unless a test holds the line. */
 static bool line_held;
 
 static void drain(uint8 uart)

@@ -9,7 +9,7 @@
 
 void board_init(void)
 {
-    ACSR = 1 << ACD; /* the comparator hears infrared pulses: off until a driver for them wants it */
+    ACSR = 1 << ACD; /* the comparator that detects infrared pulses is off until the link's driver enables it */
     hal_led_init();
     motors_init();
     uart_init(SYS_UART1);

@@ -5,18 +5,19 @@
 #include <avr/interrupt.h>
 #include <avr/sleep.h>
 
-/* T1 runs freely at F_CPU / 8, and the clock moves its compare register B on: compare A and capture stay free. T0 counts a
- * slice in steps of 1024 cycles, at 8 MHz 128 us: 9.86 to 9.98 ms, for the prescaler is never restarted. */
+/* T1 runs freely at F_CPU / 8. The clock advances its compare register B; compare A and capture remain free. T0
+ * counts a slice in steps of 1024 cycles, at 8 MHz 128 us: 9.86 to 9.98 ms, because the prescaler is never
+ * restarted. */
 enum { CLOCK_COUNTS = F_CPU / 8 / 1000, SLICE_COUNTS = F_CPU / 1024 / 100 };
 
-/* What switch.S assumes. */
+/* Assumptions of switch.S. */
 #define ASSUME(name, condition) typedef char name[(condition) ? 1 : -1]
 ASSUME(pcb_begins_so, offsetof(sys_pcb, sp) == 0 && offsetof(sys_pcb, limit) == 2 && offsetof(sys_pcb, status) == 8);
 ASSUME(ready_is_bit_0, SYS_READY == 1);
 ASSUME(kernel_stack_is_the_ports, SYS_KERNEL_STACK == HAL_KERNEL_STACK);
 
 extern void os_thread_start(void);
-extern uint8 _end; /* first byte behind the variables; the stack of main comes down towards it */
+extern uint8 _end; /* first byte after the variables; the stack of main grows down towards it */
 
 HAL_USED void cpu_clock_isr(void)
 {
@@ -29,7 +30,7 @@ HAL_USED void cpu_clock_isr(void)
 HAL_USED void cpu_overflow(void) /* kernel stack */
 {
     cli();
-    os_trap(OS_STACK, 0, 0); /* no program counter is to blame */
+    os_trap(OS_STACK, 0, 0); /* the faulting program counter is unknown */
 }
 
 void hal_init(sys_pcb *process)
@@ -76,7 +77,7 @@ bool hal_stack_init(sys_pcb *process, uint8_t *stack, uint16_t bytes, void (*ent
 
 HAL_OUTLINE void hal_stop(void)
 {
-    cli(); /* nothing wakes the CPU again: the robot rests, a simulated run ends */
+    cli(); /* no interrupt wakes the CPU again: the robot stops, a simulated run ends */
     SMCR = 1 << SM1 | 1 << SE;
     for (;;) {
         sleep_cpu();

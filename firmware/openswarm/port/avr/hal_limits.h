@@ -9,6 +9,6 @@
 #define HAL_HEAP 1216          /* seven threads of 128 bytes and the devices' events */
 #define HAL_DEFAULT_STACK 128
 #define HAL_MINIMUM_STACK 80   /* preempted 37, a device interrupt in between 8, and a kernel call */
-#define HAL_STACK_GUARD 1      /* the lowest byte: not the paint any more at a switch = the stack has overflown */
+#define HAL_STACK_GUARD 1      /* the lowest byte: if its paint is overwritten at a switch, the stack has overflowed */
 
 #endif

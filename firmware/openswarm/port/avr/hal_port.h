@@ -1,8 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* AVR: the level is two bits. "Open", in GPIOR0: threads may be switched; the slice interrupt and device interrupts test it
- * when they would switch, and note that in "due" if it is clear; "over" says that the slice's time is. I, in SREG: clear =
- * level device.
- * GPIOR0 is changed by SBI and CBI, one instruction each, so no bit of it needs a lock. */
+/* AVR: the level is two bits. "Open", in GPIOR0, permits thread switches. The slice interrupt and device interrupts
+ * test it before a switch and set "due" if it is clear; "over" means that the slice has expired. I, in SREG: clear =
+ * level device. SBI and CBI change GPIOR0 in one instruction each, so its bits need no lock. */
 #ifndef HAL_PORT_H
 #define HAL_PORT_H
 
@@ -10,21 +9,21 @@
 
 #undef HAL_INLINE
 #undef HAL_OUTLINE
-#define HAL_INLINE inline /* flash is scarcer than cycles: the compiler decides */
+#define HAL_INLINE inline /* flash is scarcer than cycles, so the compiler decides */
 #define HAL_OUTLINE
 #undef HAL_ZEROS
-#define HAL_ZEROS const /* whoever reads it is compiled for zeros, and no object is left */
+#define HAL_ZEROS const /* the compiler folds the zeros into the readers and removes the object */
 #define HAL_STACK_GROWS_DOWN
 #define HAL_WORD_IS_ONE_ACT 0
 
-/* SREG, and in the high byte "open": a slice lock that the matching unlock ends. The compiler knows that the high byte of
- * a device lock is 0, and keeps none. */
+/* SREG; the high byte is "open" for a slice lock that the matching unlock ends. The compiler knows that the high
+ * byte of a device lock is 0, and omits it. */
 typedef uint16_t hal_lock_state;
 typedef uint8_t *hal_limit;     /* lowest byte of the stack */
 
 enum { CPU_WAS_OPEN = 1 << 8, CPU_OPEN = 1 << 0, CPU_DUE = 1 << 1, CPU_OVER = 1 << 3, CPU_FORCED = 1 << 4, CPU_I = 1 << SREG_I }; /* switch.S has the numbers */
 
-void cpu_open(void); /* level slice ends: takes a slice end that became due meanwhile */
+void cpu_open(void); /* leaves level slice; takes a slice end that became due meanwhile */
 
 static inline __attribute__((always_inline)) hal_lock_state hal_lock_slice(void)
 {
@@ -44,7 +43,7 @@ static inline __attribute__((always_inline)) hal_lock_state hal_lock_devices(voi
 static inline __attribute__((always_inline)) void hal_unlock(hal_lock_state before)
 {
     hal_barrier();
-    if (before & CPU_WAS_OPEN) { /* never behind hal_lock_devices(): the compiler leaves it out there */
+    if (before & CPU_WAS_OPEN) { /* never true after hal_lock_devices(), where the compiler omits it */
         cpu_open();
     } else {
         SREG = (uint8_t)before;
@@ -72,7 +71,7 @@ static inline __attribute__((always_inline)) void hal_slice_restart(uint16_t spe
     }
 }
 
-/* Not up to the last: a compare match right behind a store of TCNT0 would be missed. */
+/* Not up to the last count: a compare match right after a store of TCNT0 would be missed. */
 static inline __attribute__((always_inline)) uint16_t hal_slice_spent(void)
 {
     uint8_t spent = TCNT0, most = (uint8_t)(OCR0A - 2u);

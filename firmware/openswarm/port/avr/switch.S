@@ -54,7 +54,7 @@ preempt:                                ; level thread, I = 0, all registers the
         rjmp    preempt
         reti
 
-later:  sbi     GPIOR0, DUE             ; whoever opens again sees it
+later:  sbi     GPIOR0, DUE             ; cpu_open() sees it
         reti
 
 ; ---- void hal_block(void): thread stack, level slice ------------------------------------------------------------

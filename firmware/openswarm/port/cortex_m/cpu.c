@@ -2,14 +2,14 @@
 /* Cortex-M port of hal_cpu.h: clock, first frames, faults. The switch is in switch.S, the levels in hal_port.h. */
 #include "kernel.h"
 
-/* What switch.S assumes. */
+/* Assumptions of switch.S. */
 #define ASSUME(name, condition) typedef char name[(condition) ? 1 : -1]
 ASSUME(pcb_begins_so, offsetof(sys_pcb, sp) == 0 && offsetof(sys_pcb, limit) == 4);
 ASSUME(kernel_stack_is_the_ports, SYS_KERNEL_STACK == HAL_KERNEL_STACK && HAL_KERNEL_STACK % 32 == 0);
 
 enum { GUARD = 32, THUMB = 0x01000000, KERNEL_GUARD_REGION = 0x11 /* MPU_RBAR: VALID, region 1 */ };
 
-typedef struct { /* what PendSV restores, and behind it the hardware */
+typedef struct { /* registers restored by PendSV, then those restored by the hardware */
     uint32_t r4_r11[8], exc_return;
     uint32_t r0, r1, r2, r3, r12, lr, pc, xpsr;
 } frame;
@@ -82,7 +82,7 @@ bool hal_stack_init(sys_pcb *process, uint8_t *stack, uint16_t bytes, void (*ent
     return true;
 }
 
-/* The guard may still be in force, in PendSV behind the thread; the heap is about to write there. */
+/* Disables the guard, which may still be in force in PendSV after the thread, before the heap writes there. */
 void hal_stack_release(sys_pcb *process)
 {
     if (process->limit == UINT32_MAX || (MPU_RBAR ^ process->limit) < GUARD) {
@@ -95,7 +95,7 @@ static void pend_and_open(hal_pick pick)
     cpu_pick = pick;
     SCB_ICSR = SCB_ICSR_PENDSVSET;
     hal_unlock(0);
-    __asm__ volatile("dsb\n\tisb" ::: "memory"); /* the switch is here */
+    __asm__ volatile("dsb\n\tisb" ::: "memory"); /* the switch happens here */
 }
 
 static sys_pcb *turn(void)
@@ -139,8 +139,8 @@ HAL_OUTLINE void hal_stop(void)
 
 /* ---- Faults ------------------------------------------------------------------------------------------------------ */
 
-/* A thread wrote into its guard, or an interrupt could not store its registers there. PendSV is the next exception,
- * whatever the thread had locked, and buries it: no stack pointer lies above this limit. */
+/* Handles a thread that wrote into its guard, or an interrupt that could not store its registers there. PendSV is
+ * the next exception, whatever the thread has locked, and ends the thread: no stack pointer is above this limit. */
 HAL_USED void cpu_guard_hit(void)
 {
     SCB_CFSR = SCB_CFSR_MEMMANAGE;
@@ -162,7 +162,7 @@ HAL_USED HAL_NORETURN void cpu_fault(const uint32_t *stacked)
     } else if ((SCB_CFSR & SCB_CFSR_MEMMANAGE) && ((uint32_t)stacked < kernel_guard + 2 * GUARD)) {
         cause = OS_STACK;
     }
-    MPU_CTRL = 0; /* the last words need every byte */
+    MPU_CTRL = 0; /* the fault report may use the guard's bytes */
     if (cause != OS_STACK) {
         pc = stacked[PC];
     }

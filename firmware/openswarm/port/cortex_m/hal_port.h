@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
-/* Cortex-M: the level is BASEPRI or the running exception. Threads run on the process stack; PendSV, the lowest exception,
- * is level slice and runs scheduler and handlers on the main stack; interrupts from DEVICE to below PendSV may call
- * the kernel, those above never. Only priorities with a low nibble of 0 exist on chips with four bits. */
+/* Cortex-M: the level is BASEPRI or the running exception. Threads run on the process stack. PendSV, the lowest
+ * exception, is level slice and runs scheduler and handlers on the main stack. Interrupts from DEVICE to below
+ * PendSV may call the kernel, those above must not. Chips with four priority bits have only priorities with a low
+ * nibble of 0. */
 #ifndef HAL_PORT_H
 #define HAL_PORT_H
 
@@ -16,7 +17,7 @@ typedef uint32_t hal_limit;      /* MPU_RBAR of the guard: its address, CPU_GUAR
 
 enum { CPU_PRIORITY_DEVICE = 0x50, CPU_PRIORITY_SLICE = 0xF0, CPU_SLICE_MS = 10, CPU_PENDSV = 14 };
 
-extern volatile uint8_t cpu_slice_ms; /* left of the slice */
+extern volatile uint8_t cpu_slice_ms; /* ms left of the slice */
 extern volatile bool cpu_forced;      /* PendSV is pending for another reason */
 
 /* BASEPRI_MAX only raises, and takes effect with the next instruction. */

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Registers every Cortex-M4 has (ARMv7-M architecture reference manual, B3). Also read by switch.S. */
+/* Registers of every Cortex-M4 (ARMv7-M architecture reference manual, B3). Also read by switch.S. */
 #ifndef REGISTERS_H
 #define REGISTERS_H
 
@@ -30,7 +30,7 @@
 #define SCB_CCR_DIV_0_TRP (1u << 4)
 #define SCB_SHPR(exception) REGISTER8(0xE000ED14 + (exception)) /* 4-15 */
 #define SCB_SHCSR REGISTER(0xE000ED24)
-#define SCB_SHCSR_FAULTS (7u << 16) /* MemManage, BusFault, UsageFault have handlers of their own */
+#define SCB_SHCSR_FAULTS (7u << 16) /* MemManage, BusFault and UsageFault have their own handlers */
 #define SCB_CFSR REGISTER(SCB_CFSR_ADDRESS)
 #define SCB_CFSR_DIVBYZERO (1u << 25)
 #define SCB_CFSR_MEMMANAGE 0xFFu

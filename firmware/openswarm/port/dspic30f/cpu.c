@@ -6,7 +6,7 @@
 #define PR(period) ((period) - 1u)
 enum { SLICE_PERIOD = 18432 /* counts of 8 Tcy: 10 ms */ };
 
-/* What switch.S assumes. */
+/* Assumptions of switch.S. */
 HAL_ASSUME(pcb_begins_so, offsetof(sys_pcb, sp) == 0 && offsetof(sys_pcb, limit) == 2 && offsetof(sys_pcb, status) == 8);
 HAL_ASSUME(sizes_and_bits, sizeof(sys_pcb) == 18 && SYS_DSP == 1 << 4 && SYS_READY == 1);
 HAL_ASSUME(kernel_stack_is_the_ports, SYS_KERNEL_STACK == HAL_KERNEL_STACK);
@@ -23,7 +23,7 @@ INTERRUPT_LEVEL(T2, 1);
 INTERRUPT_LEVEL(C2, 1);
 LINKS_IN_RAM(switch.S);
 OUTSIDE_ONLY(T2, C2); /* the kernel runs at their level */
-static volatile sint16 clock_phase; /* fifths of a cycle by which the clock is late */
+static volatile sint16 clock_phase; /* delay of the clock in fifths of a cycle */
 
 HAL_USED void cpu_clock_isr(void)
 {
@@ -54,7 +54,7 @@ void hal_start(void)
     IEC0bits.T1IE = 1;
     IEC0bits.T2IE = 1;
     IEC2bits.C2IE = 1;
-    CPU_SRL = 0; /* level thread; a slice end that was forced before comes now, another thread may go first */
+    CPU_SRL = 0; /* level thread; a slice end forced before is taken now, and another thread may run first */
 }
 
 /* Frame of a yielded thread (switch.S) that returns into os_thread_start with W8 = entry, W9 = argument. */
@@ -69,13 +69,13 @@ bool hal_stack_init(sys_pcb *process, uint8_t *stack, uint16_t bytes, void (*ent
     frame += 5; /* W10-W14 */
     *frame++ = (uint16)os_resume_yielded;
     process->sp = frame;
-    process->limit = (uint16)process - HAL_STACK_GUARD - 2u; /* the last word that may be written */
+    process->limit = (uint16)process - HAL_STACK_GUARD - 2u; /* last writable word */
     return true;
 }
 
 HAL_OUTLINE void hal_stop(void)
 {
-    IEC0 = IEC1 = IEC2 = INTCON1 = 0; /* nothing wakes the CPU again: the robot rests, an emulated run ends */
+    IEC0 = IEC1 = IEC2 = INTCON1 = 0; /* no interrupt wakes the CPU again: the robot stops, an emulated run ends */
     for (;;) {
         __asm__ volatile("pwrsav #1");
     }

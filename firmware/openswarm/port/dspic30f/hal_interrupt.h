@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: MIT */
-/* dsPIC30F: what openswarm_interrupt.h is made of. */
+/* dsPIC30F: implementation of openswarm_interrupt.h. */
 #ifndef HAL_INTERRUPT_H
 #define HAL_INTERRUPT_H
 
 #include "hal_port.h"
 
-/* The one vector whose name differs from its bits'. */
+/* The only vector whose name differs from that of its bits. */
 #define _ADCIF _ADIF
 #define _ADCIE _ADIE
 #define _ADCIP _ADIP
@@ -15,7 +15,7 @@
 #define HAL_INTERRUPT_DISABLE(vector) (_##vector##IE = 0, hal_barrier())
 #define HAL_INTERRUPT_ENABLE(vector, level) (_##vector##IP = (level), _##vector##IF = 0, _##vector##IE = 1)
 
-/* The level is told to firmware/tools/interrupts.py. */
+/* Defines a symbol from which firmware/tools/interrupts.py reads the level. */
 #define HAL_INTERRUPT_ENTRY(vector, level, function)                                                                  \
     __asm__(".equ HAL_KERNEL_STACK, " HAL_TEXT(HAL_KERNEL_STACK) "\n\t.equ HAL_KERNEL_STACK_LIMIT, "                    \
             HAL_TEXT(HAL_KERNEL_STACK_LIMIT) "\n\t.include \"isr.inc\"\n\t.text\n\tisr __" #vector "Interrupt, _" #function \

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* dsPIC30F: the level is the CPU's interrupt priority (IPL, SR<7:5>). 0 thread, 1 slice and kernel stack, 4 devices;
- * 5 is the stepper and 6 the camera, which never call the kernel and are masked by nothing but idle (kernel level 4
- * only). */
+/* dsPIC30F: the level is the CPU's interrupt priority (IPL, SR<7:5>): 0 thread, 1 slice and kernel stack, 4 devices,
+ * 5 stepper, 6 camera. Stepper and camera never call the kernel, whose locks only raise the IPL to 4; only idle
+ * masks them. */
 #ifndef HAL_PORT_H
 #define HAL_PORT_H
 
@@ -12,7 +12,7 @@
 #define HAL_STACK_TRAPS 1
 #define HAL_WORD_IS_ONE_ACT 1 /* no instruction is interrupted (isa.md §14.2) */
 
-/* Of global variables in near data memory. */
+/* For global variables in near data memory. */
 #define HAL_ADD(object, member, amount)                                                                               \
     __asm__ volatile("mov %0, w0\n\tadd _" #object "+%1" : : "r"((uint16_t)(amount)),                                  \
                      "i"(offsetof(__typeof__(object), member)) : "w0", "cc", "memory")
@@ -28,8 +28,9 @@ static HAL_INLINE hal_lock_state hal_lock_slice(void)
 {
     hal_lock_state before = SR;
     uint16_t room;
-    /* A read above the stack limit traps (isa.md §10): too little room ends the thread here, not half-way. Device levels
-     * stay. After the IPL rises one more instruction may run at the old one (isa.md §14.3): a harmless one. */
+    /* A read above the stack limit traps (isa.md §10): a lack of stack ends the thread here, not half-way through
+     * the call. Device levels stay. One more instruction may run at the old IPL (isa.md §14.3), so it is a harmless
+     * one. */
     __asm__ volatile("mov [w15+" HAL_TEXT(HAL_CALL_DEPTH) "], %0\n\tbtss %1, #7\n\tbset _SR, #5\n\tnop"
                      : "=&r"(room) : "r"(before) : "memory");
     return before;
@@ -46,7 +47,7 @@ static HAL_INLINE hal_lock_state hal_lock_devices(void)
 static HAL_INLINE void hal_unlock(hal_lock_state before)
 {
     __asm__ volatile("" ::: "memory");
-    SR = before; /* one instruction more if it were only the low byte */
+    SR = before; /* a store of only the low byte takes one more instruction */
 }
 
 static HAL_INLINE void hal_guard_kernel_stack(void)
@@ -65,7 +66,8 @@ static HAL_INLINE bool hal_in_isr(void)
     return (CPU_SRL & CPU_IPL_DEVICE) != 0;
 }
 
-/* Forced ends have an interrupt of their own, CAN2's, whose entry forgets it: so T2IF tells that the slice is over. */
+/* Forced slice ends use another interrupt, CAN2's, whose entry clears it, so that T2IF means that the slice has
+ * expired. */
 static HAL_INLINE void hal_slice_restart(uint16_t spent)
 {
     TMR2 = spent; /* also clears the prescaler */

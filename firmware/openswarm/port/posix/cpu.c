@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* POSIX port of hal_cpu.h. Every thread, and the kernel stack, is a fiber; the level is a variable; interrupts wait in
- * pending flags and are taken when hal_unlock() or their arrival finds the level low enough. */
+/* POSIX port of hal_cpu.h. Every thread, and the kernel stack, is a fiber; the level is a variable. Interrupts set
+ * pending flags and are taken on arrival or in hal_unlock(), once the level is low enough. */
 #include "fiber.h"
 #include "host.h"
 #include "kernel.h"
@@ -17,11 +17,11 @@ typedef struct {
     fiber *fiber;
     void (*entry)(void *);
     void *arg;
-} context; /* what sys_pcb.sp points to */
+} context; /* sys_pcb.sp points to it */
 
 static volatile sig_atomic_t level;
 static volatile sig_atomic_t slice_over, slice_forced;
-static volatile sig_atomic_t slice_ms; /* of the slice are over */
+static volatile sig_atomic_t slice_ms; /* elapsed ms of the slice */
 static volatile sig_atomic_t ticks_pending;
 static void (*volatile waiting[DEVICES_WAITING])(void);
 static volatile unsigned first_waiting, last_waiting;

@@ -18,7 +18,7 @@ static void __sanitizer_finish_switch_fiber(void *save, const void **bottom, siz
 }
 #endif
 
-static fiber *left; /* where the last switch came from, for fiber_arrived */
+static fiber *left; /* fiber left by the last switch, for fiber_arrived */
 
 static void make_context(fiber *f, void (*entry)(void))
 {

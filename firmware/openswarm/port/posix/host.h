@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
-/* What the POSIX port offers to tests, benches and the host board, beside the HAL.
+/* Interface of the POSIX port for tests, benchmarks and the host board, besides the HAL.
  *
- * Two kinds of time. Real: a 1 ms interval timer raises SIGALRM. Virtual (host_use_virtual_time): the clock moves 1 ms
- * each time the kernel idles and when host_tick() is called; a slice ends when host_slice() is called. Every run is
- * then the same. */
+ * Time is real or virtual. Real: a 1 ms interval timer raises SIGALRM. Virtual (host_use_virtual_time): the clock
+ * advances 1 ms each time the kernel idles and at host_tick(); a slice ends at host_slice(). Virtual runs are
+ * deterministic. */
 #ifndef HOST_H
 #define HOST_H
 
@@ -11,7 +11,7 @@
 #include <stdint.h>
 
 void host_use_virtual_time(void);           /* before Sys_Start_Kernel */
-void host_at_idle(void (*hook)(uint32_t));  /* kernel stack, before each idle; argument: how many so far */
+void host_at_idle(void (*hook)(uint32_t));  /* called on the kernel stack before each idle; argument: their number */
 
 /* Interrupts, from any context; taken at once or when the level allows. */
 void host_tick(void);                        /* 1 ms clock */
@@ -20,10 +20,10 @@ void host_device(void (*isr)(void));         /* isr at device level; up to 8 wai
 
 /* Calls hook when the n-th unlock from now has just restored its level (1 = the next one). 0 = never. */
 void host_at_unlock(unsigned long n, void (*hook)(void));
-unsigned long host_unlocks(void); /* so far */
+unsigned long host_unlocks(void); /* number of unlocks so far */
 
 /* Makes the n-th allocation from now fail (1 = the next one); 0 = none. */
 void host_fail_allocation(unsigned long n);
-unsigned long host_allocations(void); /* asked for so far */
+unsigned long host_allocations(void); /* number of requested allocations so far */
 
 #endif

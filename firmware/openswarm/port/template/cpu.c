@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Template of a port: the smallest fulfilment of hal/hal_cpu.h, on POSIX contexts instead of a CPU.
+/* Template of a port: the smallest implementation of hal/hal_cpu.h, on POSIX contexts instead of a CPU.
  *
  * A real port replaces, in this order: levels (interrupt mask), clock and slice timer, first frame, switch, idle.
  * There is no asynchronous interrupt here: time passes when a lock is released at thread level, UNLOCKS_PER_MS of
@@ -220,7 +220,7 @@ void hal_abandon(hal_pick pick)
     abort();
 }
 
-/* Replace: mask everything, test, sleep in a way that a masked interrupt ends, unmask. */
+/* Replace: mask all interrupts, test, sleep so that a masked interrupt ends the sleep, unmask. */
 void hal_idle(const volatile uint16_t *pending)
 {
     if ((*pending & OS_WORK) == 0) {

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Copy this folder to port/<your cpu>/ and fill it in; docs/porting.md explains each step. As it stands it runs on a
- * host and passes the conformance suite, so that every function can be replaced and tested one by one. */
+/* Copy this folder to port/<your cpu>/ and adapt it; docs/porting.md explains each step. Unchanged it runs on a host
+ * and passes the conformance suite, so that functions can be replaced and tested one by one. */
 #ifndef HAL_LIMITS_H
 #define HAL_LIMITS_H
 

@@ -4,9 +4,9 @@
 #define HAL_PORT_H
 
 #define HAL_STACK_IS_TAKEN
-#define HAL_WORD_IS_ONE_ACT 0 /* right for every CPU; 1 saves locks where words are loaded and stored at once */
+#define HAL_WORD_IS_ONE_ACT 0 /* correct for every CPU; 1 saves locks where loads and stores of words are atomic */
 
-typedef int hal_lock_state; /* replace: whatever restores your interrupt mask */
+typedef int hal_lock_state; /* replace: saved interrupt mask */
 typedef void *hal_limit;    /* replace: stack limit register, or any type if there is none */
 
 hal_lock_state hal_lock_slice(void);
@@ -14,7 +14,7 @@ hal_lock_state hal_lock_devices(void);
 void hal_unlock(hal_lock_state before);
 bool hal_in_thread(void);
 bool hal_in_isr(void);
-void hal_slice_restart(uint16_t spent); /* replace: in counts of your slice timer, say */
+void hal_slice_restart(uint16_t spent); /* replace: for example in counts of your slice timer */
 uint16_t hal_slice_spent(void);
 bool hal_slice_is_over(void);
 void hal_slice_force(void);

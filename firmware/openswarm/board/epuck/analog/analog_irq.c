@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* ADC of the e-puck: AN2-4 microphones, AN5-7 accelerometer, AN8-15 proximity (epuck.md §2). Each interrupt ends a scan of
- * eight inputs, the pair of proximity sensors last. */
+/* ADC of the e-puck: AN2-4 microphones, AN5-7 accelerometer, AN8-15 proximity (epuck.md §2). Each interrupt ends a
+ * scan of eight inputs, the pair of proximity sensors last. */
 #include "hal_analog.h"
 #include "openswarm_interrupt.h"
 #include "pins.h"

@@ -44,7 +44,7 @@ __T4Interrupt:
         dec     _camera_lines_left
         bra     nz, 2f
         bclr    T4CON, #TON
-        bset    IFS2, #OC8IF            ; the frame is complete: the kernel hears of it at IPL 4
+        bset    IFS2, #OC8IF            ; the frame is complete: notifies the kernel at IPL 4
 2:      pop.s
         retfie
 

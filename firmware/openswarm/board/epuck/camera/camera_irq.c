@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The camera's interrupt into the kernel: OC8, a vector nobody else uses, at IPL 4 (kernel.md §4). */
+/* Interrupt from the camera's capture into the kernel: OC8, an otherwise unused vector, at IPL 4 (kernel.md §4). */
 #include "hal_camera.h"
 #include "i2c_master.h"
 #include "openswarm_interrupt.h"

@@ -21,8 +21,9 @@ typedef struct {
     uint8_t number, value;
 } setting;
 
-/* Window x 240..399, y 160..319, RGB565, every 4th pixel and row; one byte each 8 Tcy; exposure automatic, white balance
- * fixed, both mirrors set because the sensor is mounted upside down (openswarm-original.md §5.5, epuck.md §7.1). */
+/* Window x 240..399, y 160..319, RGB565, every 4th pixel and row; one byte each 8 Tcy; exposure automatic, white
+ * balance fixed, both mirrors set because the sensor is mounted upside down (openswarm-original.md §5.5, epuck.md
+ * §7.1). */
 static const setting po6030k[] = {
     {BANK, 1}, {0x50, 0x00}, {0x51, 0x3E},                           /* window start, in output pixels */
     {0x60, 0x00}, {0x61, 0xA4}, {0x62, 0x01}, {0x63, 0xE8},          /* VSYNC from row 164 to 488 */
@@ -38,9 +39,9 @@ static const setting po8030d[] = {
     {BANK, 1}, {0x9E, 0x28}, {0x4E, 0x30}, {0xB7, 0x03}, {0x93, 0x80}, {0x94, 0x80},
 };
 
-/* Window start one output pixel and row early: X1 = 240 + 210 - 4, Y1 = 160 + 7 - 4, VSYNC in column X1 + 2 (epuck.md §7.5;
- * the library's X1 is one less and gives it column 239); 4 Tcy a column (§7.3); quarter size; RGB565; white balance off,
- * exposure on (§7.2). */
+/* Window start one output pixel and row early: X1 = 240 + 210 - 4, Y1 = 160 + 7 - 4, VSYNC in column X1 + 2
+ * (epuck.md §7.5; the library's X1 is one less and gives it column 239); 4 Tcy a column (§7.3); quarter size;
+ * RGB565; white balance off, exposure on (§7.2). */
 static const setting po3030k[] = {
     {0x1D, 0x20}, {0x20, 0x33}, {0x4E, 0x08},
     {0x08, 0x01}, {0x09, 0xBE}, {0x0A, 0x00}, {0x0B, 0xA3}, {0x0C, 0x03}, {0x0D, 0x53}, {0x0E, 0x01}, {0x0F, 0xE8},
@@ -95,7 +96,8 @@ camera_type camera_sensor_init(void)
     }
 }
 
-/* ---- Capture: T5 waits for VSYNC, T4 counts HREF (epuck.md §7.5) --------------------------------------------------- */
+/* ---- Capture: T5 waits for VSYNC, T4 counts HREF (epuck.md §7.5)
+ * --------------------------------------------------- */
 
 extern uint8_t *camera_next_byte; /* camera_capture.S */
 extern uint16_t camera_lines_left;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Camera of the e-puck under the kernel: what the interrupt at IPL 4 calls, and the start of all of it. */
+/* Lower layer of the camera: start, and the callback of the interrupt at IPL 4. */
 #ifndef HAL_CAMERA_H
 #define HAL_CAMERA_H
 

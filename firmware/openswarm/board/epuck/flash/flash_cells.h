@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
-/* Flash of the dsPIC30F6014A by its own program: rows of 32 instructions, 64 program addresses, are erased to FFFFFF and
- * programmed whole. Each takes 2 ms (typically), in which the CPU stands and interrupts wait; none may come between the
- * key's writes, so callers hold them off. Functions are part of their callers: a boot loader has to fit into its rows. */
+/* Self-programming of the dsPIC30F6014A's flash. Rows of 32 instructions, 64 program addresses, are erased to FFFFFF
+ * and programmed whole. Each operation takes 2 ms (typically), in which the CPU stalls and interrupts wait. Callers
+ * disable interrupts, because none may occur between the writes of the key. Functions are inlined, so that a boot
+ * loader fits into its rows. */
 #ifndef FLASH_CELLS_H
 #define FLASH_CELLS_H
 

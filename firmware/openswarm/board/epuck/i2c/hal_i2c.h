@@ -7,7 +7,7 @@
 
 void hal_i2c_start(void);
 void hal_i2c_begin(const i2c_transfer *transfer); /* i2c_stepped() is called after each step */
-void hal_i2c_end(void);                           /* no more interrupts */
+void hal_i2c_end(void);                           /* disables the interrupt */
 bool i2c_stepped(void);                           /* ISR, io/i2c; true: the transfer is over */
 
 #endif

@@ -25,5 +25,5 @@ void hal_i2c_begin(const i2c_transfer *transfer)
 void hal_i2c_end(void)
 {
     Sys_Disable_Interrupt(MI2C);
-    __asm__ volatile("nop"); /* one more interrupt may slip in behind the write (isa.md §14.3) */
+    __asm__ volatile("nop"); /* one more interrupt may be taken after the write (isa.md §14.3) */
 }

@@ -20,7 +20,7 @@ enum {
     PIN_SCL = 0x0004, /* RG2 */
     PIN_SDA = 0x0008, /* RG3 */
     HALF_BIT_LOOPS = 20, /* over 75 Tcy each */
-    CLOCKS = 9,       /* a slave lets go of SDA after at most a byte and its acknowledge */
+    CLOCKS = 9,       /* a slave releases SDA after at most a byte and its acknowledge */
     PATIENCE = 20000  /* polls of some 15 Tcy: 20 ms; one byte takes 0.2 ms */
 };
 
@@ -31,7 +31,7 @@ static step at;
 static uint8_t position;
 static i2c_result outcome;
 
-/* ---- Lines by hand --------------------------------------------------------------------------------------------- */
+/* ---- Bit-banged lines ------------------------------------------------------------------------------------------ */
 
 static void half_bit(void)
 {
@@ -49,7 +49,7 @@ bool i2c_recover(void)
 {
     I2CCON = 0;
     LATG &= (uint16_t)~PIN_I2C;
-    TRISG |= PIN_I2C; /* a line is low as an output and high as an input */
+    TRISG |= PIN_I2C; /* open drain: a line is low as an output and high as an input */
     half_bit();
     for (uint8_t i = 0; i < CLOCKS && !(PORTG & PIN_SDA); i++) {
         TRISG &= (uint16_t)~PIN_SCL;

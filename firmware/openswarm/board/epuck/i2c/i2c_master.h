@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* I2C master of the e-puck, steered by its interrupt flag; knows no kernel. RG3 is SDA, RG2 is SCL (epuck.md §2). */
+/* I2C master of the e-puck, stepped by its interrupt flag; independent of the kernel. RG3 is SDA, RG2 is SCL
+ * (epuck.md §2). */
 #ifndef I2C_MASTER_H
 #define I2C_MASTER_H
 
@@ -8,9 +9,9 @@
 
 typedef enum {
     I2C_DONE,
-    I2C_BUSY,      /* still on its way */
-    I2C_NO_ACK,    /* nobody has this address, or the byte was refused */
-    I2C_COLLISION, /* somebody else held the bus */
+    I2C_BUSY,      /* transfer in progress */
+    I2C_NO_ACK,    /* no slave has this address, or the byte was refused */
+    I2C_COLLISION, /* another master held the bus */
     I2C_TIMEOUT,   /* the clock was stretched for too long */
     I2C_STUCK      /* SDA or SCL stays low, also after recovery */
 } i2c_result;
@@ -25,8 +26,8 @@ typedef struct {
 
 void i2c_init(void);                         /* pins and module; frees a stuck bus */
 bool i2c_bus_is_free(void);                  /* both lines are high */
-bool i2c_recover(void);                      /* clocks a slave that holds SDA until it lets go; false: still stuck */
-void i2c_begin(const i2c_transfer *transfer); /* the bus is free and nothing else is on its way */
+bool i2c_recover(void);                      /* clocks a slave that holds SDA until it releases it; false: still stuck */
+void i2c_begin(const i2c_transfer *transfer); /* requires a free bus */
 i2c_result i2c_advance(void);                /* after each MI2CIF: the next step */
 
 /* A whole transfer by polling: while no interrupt is enabled, or without a kernel. Recovers the bus before and after a

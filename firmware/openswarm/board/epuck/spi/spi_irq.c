@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* SPI2 of the e-puck at 921.6 kHz for a turret: SCK2 RG6, SDI2 RG7, SDO2 RG8, and RG9 as select (dspic30f6014a.md §12). The
- * selector has the same pins (epuck.md §2) and reads whatever the bus leaves on them. */
+/* SPI2 of the e-puck at 921.6 kHz for a turret: SCK2 RG6, SDI2 RG7, SDO2 RG8, and RG9 as select (dspic30f6014a.md
+ * §12). The selector has the same pins (epuck.md §2) and reads the levels that the bus leaves on them. */
 #include "hal_spi.h"
 #include "openswarm_interrupt.h"
 #include "pins.h"
@@ -41,7 +41,7 @@ void hal_spi_begin(uint8_t first)
 void hal_spi_end(void)
 {
     Sys_Disable_Interrupt(SPI2);
-    __asm__ volatile("nop"); /* one more interrupt may slip in behind the write (isa.md §14.3) */
+    __asm__ volatile("nop"); /* one more interrupt may be taken after the write (isa.md §14.3) */
     SPI2STAT = 0;
     LATG |= SELECT;
 }

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The jump table through which programs that come as updates call the kernel, wherever it lies in this image. */
+/* Jump table through which programs that arrive as updates call the kernel of any image. */
 #include "update_slots.h"
 
     .macro offered name

@@ -22,8 +22,8 @@ static uint16_t find_row(uint8_t slot, uint8_t row)
     return (uint16_t)(base + row * (uint16_t)FLASH_ROW_UNITS);
 }
 
-/* With what the table writes before it have named and latched. Flash stalls the CPU meanwhile, EEPROM does not. No interrupt,
- * of whatever level, may come between the writes of the key. */
+/* With what the table writes before it have named and latched. Flash stalls the CPU meanwhile, EEPROM does not. No
+ * interrupt, of whatever level, may come between the writes of the key. */
 static void __attribute__((noinline)) operate(uint16_t operation)
 {
     uint16_t level = SR & ALL_LEVELS;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Keeps an image out of the slots and of the RAM of programs: the linker puts everything beside them, and says so when there
- * is no room. Nothing of this is loaded, so what is in flash stays. */
+/* Reserves the slots and the RAM of programs: the linker places the image around them and reports a lack of room. The
+ * sections are not loaded, so that the contents of flash stay. */
 #include "update_slots.h"
 
     .section .update_run, code, address(UPDATE_RUN), noload, keep

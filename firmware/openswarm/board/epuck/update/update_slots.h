@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Where updates run and are kept. For C and assembly; openswarm/flashing/program.py knows the slot too. */
+/* Addresses of the run slot and the stores. For C and assembly; openswarm/flashing/program.py repeats the run slot. */
 #ifndef UPDATE_SLOTS_H
 #define UPDATE_SLOTS_H
 

@@ -1,5 +1,5 @@
-# The Kilobot has one receiver of pulses, not eight of light: these files of io/infrared it has its own for.
+# The Kilobot has one pulse receiver instead of eight light receivers: files here replace these of io/infrared.
 REPLACED += $(addprefix $(OS)/io/infrared/,link.c detector.c reflections.c range.c)
-# What a frame starts runs in its interrupt, on top of any handler: 153 bytes were seen. The heap gets what is left of 2 kB.
+# Reception runs in its interrupt, on top of any handler: 153 bytes were seen. The heap has the rest of 2 kB.
 override DEFINES += $(if $(findstring HAL_KERNEL_STACK,$(DEFINES)),,-DHAL_KERNEL_STACK=208) \
     $(if $(findstring SYS_HEAP,$(DEFINES)),,-DSYS_HEAP=960)

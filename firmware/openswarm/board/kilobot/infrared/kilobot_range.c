@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Distance by strength, by the tables that calibration leaves in a Kilobot's EEPROM: 14 counts of each gain, high bytes
- * first, at 33, 38, ... 98 mm between the robots' middles (kilolib's estimate_distance). */
+/* Distance from strength, by the calibration tables in a Kilobot's EEPROM: 14 counts of each gain, high bytes first,
+ * at 33, 38, ... 98 mm between the robots' centres (kilolib's estimate_distance). */
 #include "infrared_parts.h"
 #include "pulses.h"
 
@@ -24,7 +24,7 @@ uint16 Sys_Estimate_Range(uint16 strength)
         strength = (uint16)(strength - PULSES_LOW_GAIN);
     }
     uint16 nearer = counts_at(table, 0);
-    if (nearer > MOST_COUNTS) { /* erased: nobody has calibrated this robot */
+    if (nearer > MOST_COUNTS) { /* erased EEPROM: this robot is not calibrated */
         return 0;
     }
     if (strength >= nearer) {

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: MIT */
-/* Who may light up when, and what pulses mean. A byte is a pulse, a pause, eight bits of which the ones are pulses, and
- * another pulse. A frame begins with a byte 0 whose last pulse waits for others that begin as well, as kilolib's does;
- * then come the bytes of frame.c.
+/* Medium access and pulse coding. A byte is a pulse, a pause, eight bits of which the ones are pulses, and another
+ * pulse. A frame begins with a byte 0, whose last pulse reveals other robots that begin as well (as in kilolib); the
+ * bytes of frame.c follow.
  *
- * Within a byte pulses may follow each other in 34 us, and the kernel's clock alone takes longer than that. So both
- * sides do a byte in one interrupt, and the pause behind its first pulse is for whatever delays the receiver's. */
+ * Pulses of a byte may be 34 us apart, less than the kernel's clock interrupt takes. Sender and receiver therefore
+ * process a byte within one interrupt. The pause after the first pulse covers delays of the receiver's interrupt. */
 #include "infrared_parts.h"
 #include "kernel.h"
 #include "pulses.h"
@@ -19,7 +19,7 @@ enum {
     STOP_SLOT = FIRST_SLOT + 8,
     LONGEST = 505, /* counts from the first pulse to the last; four slots late, if another interrupt delayed it */
     WINDOW = 370,  /* counts: STOP_SLOT of the first byte */
-    PAUSE = 100,   /* counts between bytes: for everybody else on this CPU */
+    PAUSE = 100,   /* counts between bytes: time for all other code on this CPU */
     ECHO = 8,    /* counts behind the own light in which a pulse may be its reflection: UNVERIFIED, docs/accuracy.md */
     TICK = 977,  /* counts */
     SILENCE = 2, /* ticks without a pulse: no byte of a frame is so far from the next */

@@ -1,6 +1,6 @@
 ; SPDX-License-Identifier: MIT
-; The first words of a program that comes as an update; it is called here at each start of the firmware. Linked by
-; `openswarm program`.
+; First words of a program that arrives as an update; the firmware calls it here at each start. Linked by `openswarm
+; program`.
 #include "update_slots.h"
 
     .macro offered name
@@ -23,7 +23,7 @@ __update_start:
     mov     #(0xFF - calls), w1
     cp      w0, w1
     bra     leu, 1f
-    reset                               ; another firmware: three tries later it goes on without this
+    reset                               ; another firmware: after three tries it runs without this program
 1:  mov     #__dinit_tbloffset, w0      ; abi-elf.md §3.2, of which --no-pack-data leaves two kinds
 2:  tblrdl  [w0++], w2                  ; where; 0 ends
     cp0     w2
