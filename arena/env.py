@@ -181,6 +181,7 @@ class ArenaEnv(ParallelEnv):  # type: ignore[misc]
         return self.experiment.series(moment).last(self.experiment.curves[0].name)
 
     def _observed(self) -> dict[str, Vector]:
+        """Return the observation of each agent."""
         poses = self._world.poses
         found = {}
         for robot, agent in enumerate(self.agents):

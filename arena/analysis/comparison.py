@@ -82,4 +82,5 @@ def mean_load(trials: list[Trial]) -> float | None:
 
 
 def _spread(values: Values) -> dict[str, float]:
+    """Return mean and standard deviation (ddof = 1)."""
     return {"mean": float(values.mean()), "sd": float(values.std(ddof=1))}

@@ -70,6 +70,7 @@ def _runs_table(group: Mapping[str, list[Trial]], host_s: Mapping[str, float], a
 
 
 def _spread(values: list[float]) -> str:
+    """Return mean and standard deviation as text."""
     digits = 3 if max(values) <= 1 else 0
     deviation = float(np.std(values, ddof=1)) if len(values) > 1 else 0.0
     return f"{np.mean(values):.{digits}f} ± {deviation:.{digits}f}"
@@ -108,6 +109,7 @@ def _equivalence_tables(group: Mapping[str, list[Trial]], at: float) -> list[str
 
 
 def _faults(group: Mapping[str, list[Trial]]) -> list[str]:
+    """Return a line per fault of a robot."""
     lines: list[str] = []
     for name, trials in group.items():
         faults: list[Any] = [(trial.path.stem, fault) for trial in trials for fault in trial.about["faults"]]

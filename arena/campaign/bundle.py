@@ -200,6 +200,7 @@ def verify(bundle: Path, chosen: Callable[[list[int]], list[int]]) -> Iterator[C
 
 
 def _compare(run: str, number: int, expected: Digest, actual: Digest) -> Check:
+    """Compare the digests of a recorded and a repeated trial."""
     if expected.sha256 == actual.sha256:
         return Check(run, number, True, (), ())
     now, then = actual.versions, expected.versions

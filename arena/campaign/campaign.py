@@ -94,6 +94,7 @@ def _plain(value: Any) -> Any:
 
 
 def _digest(path: Path | None) -> str | None:
+    """Return the SHA-256 of a file; None without a file."""
     return hashlib.sha256(path.read_bytes()).hexdigest() if path is not None else None
 
 
@@ -120,6 +121,7 @@ def make_controllers(plan: Plan, seed: int, robots: Sequence[int], channel: Opti
 def _controller(
     plan: Plan, own: dict[str, Path | None], seed: int, robot: int, channel: OpticalChannel | None
 ) -> Controller:
+    """Return the controller of one robot, by the firmware and controller of its group."""
     group = plan.scene.group_of(robot)
     image = own[group.image] if group.image else plan.image
     controller = group.controller or plan.controller
@@ -244,6 +246,7 @@ def run_all(
 
 
 def _init_worker(queue: Any) -> None:
+    """Prepare a worker process: store the queue of progress reports, and watch the parent process."""
     global _queue
     _queue = queue
     Thread(target=_end_with_parent, daemon=True).start()
@@ -258,4 +261,5 @@ def _end_with_parent() -> None:
 
 
 def _run_in_worker(plan: Plan, number: int, folder: Path, threads: int) -> FinishedTrial:
+    """Run one trial in a worker process and report progress through the queue."""
     return run_one(plan, number, folder, lambda trial, seconds: _queue.put((trial, seconds)), threads=threads)

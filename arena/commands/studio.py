@@ -143,6 +143,7 @@ class _StudioHandler(RequestHandler):
         return True
 
     def _body(self) -> Any:
+        """Return the request's body as a JSON value. Raises CommandRefusedError."""
         length = _parse_count(self.headers.get("Content-Length"))
         if length > LIMIT:
             raise CommandRefusedError(f"request of {length} bytes; expected at most {LIMIT}")
@@ -153,6 +154,7 @@ class _StudioHandler(RequestHandler):
 
 
 def _parse_count(text: str | None) -> int:
+    """Parse a whole number of 0 or more. Raises CommandRefusedError."""
     if text is None or not text.isascii() or not text.isdecimal() or len(text) > 15:
         raise CommandRefusedError(f"{text!r}: expected a whole number")
     return int(text)

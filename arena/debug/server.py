@@ -109,6 +109,7 @@ class CheckpointedRobot(ControlledRobot):
         return self.is_recorded and not server.terminate_debuggee
 
     def _launch(self, arguments: dict[str, Any]) -> Machine:
+        """Return the machine of the robot as response to `launch`. Raises ValueError for an argument of `emu debug`."""
         for name in SINGLE_ROBOT_ARGUMENTS:
             if name in arguments:
                 raise ValueError(f"`{name}` is for a robot alone; in a swarm the scene says it: --set KEY=VALUE")
@@ -177,6 +178,7 @@ class CheckpointedRobot(ControlledRobot):
                 other.drop()
 
     def _fork(self) -> tuple[PipeEnd | None, bool]:
+        """Fork this process; return the pipe to the other process, and whether this is the fork."""
         try:
             return self._forker.fork()
         except OSError:

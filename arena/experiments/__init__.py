@@ -167,6 +167,7 @@ def experiment_file(name: str, folder: Path) -> Path | None:
 
 @cache
 def _load_by_name(name: str) -> Experiment:
+    """Load a built-in or installed experiment."""
     if re.fullmatch("[a-z][a-z_]*", name) and (FOLDER / f"{name}.py").is_file():
         return _experiment_from(name, importlib.import_module(f"arena.experiments.builtin.{name}"), "")
     for point in entry_points(group="openswarm.experiments"):
@@ -179,6 +180,7 @@ def _load_by_name(name: str) -> Experiment:
 
 @cache
 def _load_file(path: Path) -> Experiment:
+    """Load a user's experiment from its file."""
     spec = importlib.util.spec_from_file_location(f"arena_experiment_{_module_name(path)}", path)
     if spec is None or spec.loader is None or not path.is_file():
         raise SceneError(f"{path}: no such experiment file")
@@ -211,6 +213,7 @@ def _line_in(path: Path, error: BaseException) -> int | None:
 
 
 def _experiment_from(name: str, module: ModuleType, digest: str) -> Experiment:
+    """Return the experiment that a module defines. Raises SceneError if a definition is missing."""
     metrics: Any = getattr(module, "metrics", None)
     whole = getattr(module, "all_curves", None)
     if whole is None and not callable(metrics):

@@ -115,6 +115,7 @@ class SupervisorHooks:
         return bool(self._call("done", self._experiment.done))
 
     def _call(self, name: str, hook: Callable[[Supervisor], T]) -> T:
+        """Call a function of the experiment; report an exception in it as SceneError."""
         try:
             return hook(self.supervisor)
         except SceneError:
@@ -126,6 +127,7 @@ class SupervisorHooks:
 
 
 def _last_line(error: BaseException) -> str:
+    """Return file and line at which an exception was raised."""
     trace = error.__traceback__
     if trace is None:
         return ""

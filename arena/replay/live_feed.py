@@ -100,6 +100,7 @@ class Follower:
         return found | {"state": state}
 
     def _catch_up(self) -> str:
+        """Read the new rows; return the state: `running`, `done` or `aborted`."""
         if self._finished is not None:
             return "done"
         try:
@@ -143,4 +144,5 @@ class Follower:
 
 
 def _decoded(row: dict[str, Any]) -> dict[str, Any]:
+    """Return a row with its camera strips as bytes."""
     return {name: base64.b64decode(value) if name.endswith("_strip") else value for name, value in row.items()}

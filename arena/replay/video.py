@@ -73,6 +73,7 @@ def frames(trial: Trial, times: list[float]) -> Iterator[Image.Image]:
 
 
 def _frame(scene: Scene, data: dict[str, Any], sample: int, caption: str) -> Image.Image:
+    """Draw one frame: the arena from above, `caption`, and the camera strips."""
     width, height = round(scene.arena.width_cm * SCALE), round(scene.arena.height_cm * SCALE)
     rows = len(data["robots"])
     total = height + _LINE * (rows + 1) + 4
@@ -122,6 +123,7 @@ def _palette() -> list[tuple[int, int, int]]:
 
 
 def _gif(pictures: Iterator[Image.Image], part: Path) -> None:
+    """Write the frames as a GIF."""
     palette = Image.new("P", (1, 1))
     palette.putpalette([value for colour in _palette() for value in colour])
     coloured = (picture.quantize(palette=palette, dither=Image.Dither.NONE) for picture in pictures)
@@ -130,6 +132,7 @@ def _gif(pictures: Iterator[Image.Image], part: Path) -> None:
 
 
 def _mp4(pictures: Iterator[Image.Image], part: Path) -> None:
+    """Write the frames as an MP4 with ffmpeg. Raises RecordError if ffmpeg fails."""
     first = next(pictures)
     size = f"{first.width}x{first.height}"
     command = [_ffmpeg(), "-y", "-loglevel", "error", "-f", "rawvideo", "-pix_fmt", "rgb24", "-s", size, "-r",
@@ -148,6 +151,7 @@ def _mp4(pictures: Iterator[Image.Image], part: Path) -> None:
 
 
 def _ffmpeg() -> str:
+    """Return the path of ffmpeg. Raises ValueError if there is none."""
     found = shutil.which("ffmpeg")
     if found is None:
         with suppress(ImportError):

@@ -411,6 +411,7 @@ class TrialSession:
         self._replay = deque(action for action in self._replay if action.tick <= tick)
 
     def _replay_due_actions(self) -> None:
+        """Apply the actions of the replay that are due at the present quantum."""
         while self._replay and self._replay[0].tick <= self._running.world.ticks:
             self._replay.popleft().apply(self._running)
 
@@ -425,29 +426,35 @@ class TrialSession:
         return False
 
     def _require_target(self, tick: int) -> None:
+        """Raise CommandRefusedError unless the trial can go to quantum `tick` now."""
         self._require_between_quanta()
         if not 0 <= tick <= self._running.quanta:
             raise CommandRefusedError(f"quantum {tick}: expected 0 to {self._running.quanta}")
 
     def _require_between_quanta(self) -> None:
+        """Raise CommandRefusedError while a robot is at a breakpoint or in a debugger."""
         if self._hit:
             raise CommandRefusedError(f"{self._hit}; run the trial first")
         self._require_no_debugger()
 
     def _require_no_debugger(self) -> None:
+        """Raise CommandRefusedError while a robot is in a debugger."""
         if self._attached is not None:
             raise CommandRefusedError(f"robot {self._attached.robot} is in a debugger; detach the debugger first")
 
     def _require_no_failure(self) -> None:
+        """Raise CommandRefusedError after an exception has stopped the trial."""
         if self._failure:
             raise CommandRefusedError(f"the trial has failed ({self._failure}); rewind first")
 
     def _controller(self, robot: int) -> Any:
+        """Return the controller of a robot. Raises CommandRefusedError if it does not exist."""
         if not 0 <= robot < len(self._running.controllers):
             raise CommandRefusedError(f"there is no robot {robot}")
         return self._running.controllers[robot]
 
     def _firmware_controller(self, robot: int) -> FirmwareController:
+        """Return the controller of a robot with firmware. Raises CommandRefusedError for another robot."""
         controller = self._controller(robot)
         if not isinstance(controller, FirmwareController):
             raise CommandRefusedError(f"robot {robot} is scripted: it has no firmware")
