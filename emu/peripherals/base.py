@@ -52,13 +52,13 @@ class CpuSignals:
 class StateCell:
     """One scalar in the machine's record."""
 
-    __slots__ = ("_view", "index", "place")
+    __slots__ = ("_view", "index", "cell")
 
     def __init__(self, record: Record, name: str, kind: str, initial: int = 0) -> None:
         self.index: Final = record.reserve(name, kind).index
         self._view: Final = {"B": record.u8, "H": record.u16, "I": record.u32, "Q": record.u64, "q": record.s64}[kind]
         self._view[self.index] = initial
-        self.place: Final = cell_of(record, name)
+        self.cell: Final = cell_of(record, name)
         """Operand for rules."""
 
     @property

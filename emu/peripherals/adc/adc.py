@@ -97,7 +97,7 @@ class Adc(Peripheral):
         """Record words and masks on which the conversion settings depend."""
         self._settings_cache: Final[dict[tuple[int, ...], ConversionSettings]] = {}
         for register in (*self._buffers, self.con2):
-            register.set_rule(Rule(StableRegister(register.place, self._stands.place), read_stable))
+            register.set_rule(Rule(StableRegister(register.cell, self._stands.cell), read_stable))
         places = self._places()
         self.con1.set_rule(Rule(places, read_stable, write_con1))
         self.cssl.set_rule(Rule(places, None, write_scan))
@@ -109,19 +109,19 @@ class Adc(Peripheral):
         cells = ("native", "frozen", "sampling", "conversion", "results", "halves", "length", "state", "mark", "half",
                  "scan", "use_b", "next", "count", "held", "channels", "level_from")  # fmt: skip
         return AdcOperands(
-            register=self.con1.place,
-            until=self._stands.place,
-            con2=self.con2.place,
+            register=self.con1.cell,
+            until=self._stands.cell,
+            con2=self.con2.cell,
             writable=sfrs["ADCON1"].writable,
             clear_only=sfrs["ADCON1"].clear_only,
             adon=adon,
             samp=samp,
             bufs=1 << sfrs["ADCON2"].fields["BUFS"][0],
-            cssl=self.cssl.place,
+            cssl=self.cssl.cell,
             scannable=sfrs["ADCSSL"].writable,
             cscna=1 << sfrs["ADCON2"].fields["CSCNA"][0],
             done=done,
-            buffer=self._buffers[0].place,
+            buffer=self._buffers[0].cell,
             level=cell_of(record, "adc.input"),
             step=event_slot(record, self._step),
             native_source=self.source.native_source,

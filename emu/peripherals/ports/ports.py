@@ -42,9 +42,9 @@ class Port(Peripheral):
         places = PortOperands(
             number=self.index,
             implemented=self.context.chip.sfrs[self.lat.name].writable,
-            lat=self.lat.place,
-            port=self.port.place,
-            owned=self._owned.place,
+            lat=self.lat.cell,
+            port=self.port.cell,
+            owned=self._owned.cell,
             ring=cell_of(record, "pins.ring"),
             ring_size=record.fields["pins.ring"].count,
             ring_count=cell_of(record, "pins.ring_count"),

@@ -71,9 +71,9 @@ class Spi(Peripheral):
         fields = {**sfrs[self.stat.name].fields, **sfrs[self.con.name].fields}
         cells = {name: name for name in ("waiting", "shift", "received", "busy", "start", "has_device")}
         return SpiOperands(
-            stat=self.stat.place,
-            con=self.con.place,
-            buf=self.buf.place,
+            stat=self.stat.cell,
+            con=self.con.cell,
+            buf=self.buf.cell,
             bit={name: ((1 << width) - 1) << lsb for name, (lsb, width) in fields.items()},
             spre=fields["SPRE"][0],
             level=cell_of(self.record, "pins.level", port),

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Final
 
 from emu.peripherals.base import ChipContext, Peripheral
-from emu.system.bus import Access
+from emu.system.bus import RegisterWiring
 
 _PREFIXES: Final = {
     "ADC": ("ADCBUF", "ADCON", "ADCHS", "ADCSSL"),
@@ -19,7 +19,7 @@ def _zero() -> int:
     return 0
 
 
-_OFF: Final = Access(0, 0, _zero, None, None, None)
+_OFF: Final = RegisterWiring(0, 0, _zero, None, None, None)
 
 
 class ModuleDisable(Peripheral):
@@ -28,7 +28,7 @@ class ModuleDisable(Peripheral):
     def __init__(self, context: ChipContext, modules: dict[str, Peripheral]) -> None:
         super().__init__("pmd", context)
         self._modules: Final = modules
-        self._off: Final[dict[int, Access]] = {}
+        self._off: Final[dict[int, RegisterWiring]] = {}
         self._bits: Final[list[tuple[Callable[[], int], str]]] = []
         self._words: Final[dict[str, list[int]]] = {}
         """Word indices of each module's registers."""

@@ -53,7 +53,7 @@ class Watchdog(Peripheral):
         context.power_mode = lambda: self._mode.value
         fields = context.chip.sfrs["RCON"].fields
         self._swdten, self._sleep = (1 << fields[name][0] for name in ("SWDTEN", "SLEEP"))
-        self._places: Final = power_operands(self.bus.record, context.chip, self._timeout, self._mode.place)
+        self._places: Final = power_operands(self.bus.record, context.chip, self._timeout, self._mode.cell)
         self.clearing: Final = Rule(self._places, fires=clear_watchdog)
         self.idling: Final = Rule(self._places, fires=idle)
 

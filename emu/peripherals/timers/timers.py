@@ -78,10 +78,10 @@ class Timer(Counter):
         match, line = event_slot(self.record, self._match), self.line.line
         pair = self.con if self.site.kind != "C" else self.register(f"T{self.site.partner}CON")
         return TimerOperands(
-            tmr=self.tmr.place,
-            pr=self.pr.place,
-            source=self._source.place,
-            pair=pair.place,
+            tmr=self.tmr.cell,
+            pr=self.pr.cell,
+            source=self._source.cell,
+            pair=pair.cell,
             t32=1 << self.context.chip.sfrs[pair.name].fields["T32"][0] if self.site.kind != "A" else 0,
             match=match,
             line=line,
@@ -93,7 +93,7 @@ class Timer(Counter):
         ton, tcs = (1 << con.fields[name][0] for name in ("TON", "TCS"))
         return MatchOperands(
             timer=places,
-            con=self.con.place,
+            con=self.con.cell,
             writable=con.writable,
             ton=ton,
             tcs=tcs,

@@ -126,10 +126,10 @@ class Uart(Peripheral):
                  "at_once", "sent", "sent_count")  # fmt: skip
         fields = {**sfrs[self.mode.name].fields, **sfrs[self.sta.name].fields}
         return UartOperands(
-            mode=self.mode.place,
-            sta=self.sta.place,
-            brg=self.brg.place,
-            txreg=self.txreg.place,
+            mode=self.mode.cell,
+            sta=self.sta.cell,
+            brg=self.brg.cell,
+            txreg=self.txreg.cell,
             bit={name: ((1 << width) - 1) << lsb for name, (lsb, width) in fields.items()},
             urxisel=fields["URXISEL"][0],
             writable=sfrs[self.txreg.name].writable,

@@ -88,7 +88,7 @@ def test_screenshot_without_buffer_shows_what_the_sensor_sees(program, scene, tm
         (["screenshot", "IMAGE", "--size", "20"], "WIDTHxHEIGHT"),
         (["screenshot", "IMAGE", "--seconds", "0"], "expected seconds above 0"),
         (["screenshot", "IMAGE", "--board", "none"], "no sensor"),
-        (["screenshot", "IMAGE", "--buffer", "0x800", "--size", "3x1", "--format", "yuv"], "no whole number"),
+        (["screenshot", "IMAGE", "--buffer", "0x800", "--size", "3x1", "--format", "yuv"], "not a whole number"),
     ],
 )
 def test_bad_input_is_refused_in_one_line(program, tmp_path, capfd, arguments, message):

@@ -11,7 +11,7 @@ import pytest
 from emu.boards.epuck.camera.pixels import Gains, decode, encode
 from emu.boards.epuck.camera.scan import HREF, PCLK, VSYNC, per_frame
 from emu.boards.epuck.camera.sensors import SENSORS
-from emu.peripherals.timers.rules import switch
+from emu.peripherals.timers.rules import write_ton
 
 from .conftest import Robot
 
@@ -547,12 +547,12 @@ def test_timers_on_sync_lines_are_switched_alike_with_and_without_the_rule(seed)
     robots = [Robot(), Robot()]
     bus, events = robots[0].machine.bus, [robot.events for robot in robots]
     hooks = robots[1].machine.bus
-    hooks.rules[:] = [None if rule and rule.writes is switch else rule for rule in hooks.rules]
+    hooks.rules[:] = [None if rule and rule.writes is write_ton else rule for rule in hooks.rules]
     followed, write = [], bus.integers.write
 
     def counted(rule, value, lanes):
         done = write(rule, value, lanes)
-        followed.extend([done] * (rule.writes is switch))
+        followed.extend([done] * (rule.writes is write_ton))
         return done
 
     bus.integers.write = counted

@@ -72,7 +72,7 @@ def test_a_still_picture_is_seen_as_any_other(sensor: str, monkeypatch: pytest.M
     still.board.camera.show(pixels)
     other.board.camera.sample(lambda y, columns, _cycle: pixels[y, columns])
     at_once = 0
-    paint = Camera._sent_at_once
+    paint = Camera._render_natively
 
     def counted(*line: Any) -> bool:
         nonlocal at_once
@@ -80,7 +80,7 @@ def test_a_still_picture_is_seen_as_any_other(sensor: str, monkeypatch: pytest.M
         at_once += done
         return done
 
-    monkeypatch.setattr(Camera, "_sent_at_once", counted)
+    monkeypatch.setattr(Camera, "_render_natively", counted)
     settings = [po6030(), po6030(scale=2, form="yuv")] if sensor == "PO6030K" else [po3030(), po3030(form="yuv") + DARK]
     for _ in range(12):
         writes, lamp, is_plugged = draw.choice(settings), draw.choice([1.0, 1.0, 1.0, 1.0, 0.5]), draw.random() < 0.9

@@ -104,7 +104,7 @@ def test_steps_by_the_ends_of_quanta_are_those_of_who_looks_at_each(blinks):
             looked += plain.board.motors.steps()
     assert made == looked
     assert max(looked) > 5
-    assert quick.machine.pins._told.tolist() == plain.machine.pins._told.tolist()
+    assert quick.machine.pins._reported.tolist() == plain.machine.pins._reported.tolist()
     assert bool(lit) == blinks
 
 

@@ -81,7 +81,7 @@ def test_csv_sets_pins_and_says_bytes(tmp_path, capsys):
         ("a.csv", "time,RB8\n0.1,1,1\n", 2, "expected 2 cells, found 3"),
         ("a.csv", "time,uart1\n0.1,256\n", 2, "uart1: expected a byte"),
         ("a.vcd", "hello\n", 1, "expected a VCD file"),
-        ("a.vcd", "$timescale 1 ns $end\n$var wire 1 ! clk $end\n$enddefinitions $end\n#0\n1!\n", 1, "names of pins"),
+        ("a.vcd", "$timescale 1 ns $end\n$var wire 1 ! clk $end\n$enddefinitions $end\n#0\n1!\n", 1, "named after pins"),
     ],
 )
 def test_mistakes_are_told_with_their_line(tmp_path, name, text, line, expected):

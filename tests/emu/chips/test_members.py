@@ -75,7 +75,7 @@ def test_a_program_runs_in_every_engine(chip: Chip) -> None:
         machine.run_until(1000)
         assert machine.peek(0x900) > 10
         states.append(machine.snapshot())
-    assert states[0] == states[1] == states[2]
+    assert states[0] == states[1]
 
 
 def test_chips_are_found_by_name_and_by_processor_id() -> None:

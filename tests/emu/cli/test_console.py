@@ -106,8 +106,8 @@ def test_stamps_come_back_as_they_were_written(tmp_path):
         ("\n1 1 4\n", "line 2: expected `CYCLE UART HEX`"),
         ("x 1 41\n", "line 1: expected"),
         ("1 3 41\n", "line 1: there is no UART3"),
-        ("5 1 41\n4 1 41\n", "line 2: cycle 4 lies before"),
-        ("-5 1 41\n", "line 1: cycle -5 lies before"),
+        ("5 1 41\n4 1 41\n", "line 2: cycle 4 is lower"),
+        ("-5 1 41\n", "line 1: cycle -5 is lower"),
     ],
 )
 def test_a_damaged_record_is_refused_with_its_line(tmp_path, text, expected):

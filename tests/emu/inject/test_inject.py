@@ -79,7 +79,7 @@ def judged(trials, monkeypatch, place: str, bit: int, cycle: int = 60_000):
     """What becomes of one bit of a variable."""
     address = load_image(trials._image.path).symbols.find(f"_{place}").address
     fault = Fault(0, "ram", cycle, address, bit)
-    monkeypatch.setattr("emu.inject.trial.choose", lambda *_: fault)
+    monkeypatch.setattr("emu.inject.trial.choose_fault", lambda *_: fault)
     return trials.run(0)
 
 
@@ -93,13 +93,13 @@ def test_outcomes_are_told_apart(trials, monkeypatch):
     assert silent.outcome == "silent"
     assert silent.why.startswith("uart1 from byte")
     machine = trials._machine
-    monkeypatch.setattr("emu.inject.trial.do", lambda _fault, _machine: machine.poke("mode", 7) or "mode")
+    monkeypatch.setattr("emu.inject.trial.inject_fault", lambda _fault, _machine: machine.poke("mode", 7) or "mode")
     assert one("mode", 0).outcome == "hang"
-    monkeypatch.setattr("emu.inject.trial.do", lambda _fault, _machine: machine.poke("mode", 8) or "mode")
+    monkeypatch.setattr("emu.inject.trial.inject_fault", lambda _fault, _machine: machine.poke("mode", 8) or "mode")
     trap = one("mode", 0)
     assert trap.outcome == "trap"
     assert "writing 2 bytes at 0x3001" in trap.why
-    monkeypatch.setattr("emu.inject.trial.do", lambda _fault, _machine: "nothing")
+    monkeypatch.setattr("emu.inject.trial.inject_fault", lambda _fault, _machine: "nothing")
     assert (one("mode", 0).outcome, one("mode", 0).latent) == ("masked", False)
 
 

@@ -169,9 +169,9 @@ class Scan:
 
     def nth_rise_rule(self, m: RuleBuilder, mask: int, after: Number, count: Number) -> Number:
         """Return `nth_rise` as a rule expression."""
-        timing = FrameTiming(*(m.get(cell.place) for cell in self._cells.values()))
-        start = (m.get(self._start.place) ^ _SIGN) - _SIGN
-        begun = (start, m.get(self._running.place))
+        timing = FrameTiming(*(m.get(cell.cell) for cell in self._cells.values()))
+        start = (m.get(self._start.cell) ^ _SIGN) - _SIGN
+        begun = (start, m.get(self._running.cell))
         return edge_cycle(m, mask, timing, begun, edges(m, mask, timing, begun, after) + count)
 
 
