@@ -96,5 +96,5 @@ def test_used_functions_are_not_specialised(tmp_path: Path) -> None:
     text = (tmp_path / "a.s").read_text()
     assert ".global _twice" in text
     body = text.split("_twice:\n", 1)[1].split(".size", 1)[0]
-    assert "_told" in body
+    assert "_factor" in body
     assert "add w0,w0,w0" in body or "sl w0,w0" in body

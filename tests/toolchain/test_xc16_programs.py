@@ -474,7 +474,9 @@ int later(int a, int b) { return a * b; }
 
 
 @pytest.mark.parametrize("options", [(), ("-std=gnu89",), ("-ansi",), ("-std=c99",), ("-std=gnu99",)])
-def test_errors_of_clang_that_gcc_4_warns_of_are_warnings(options: tuple[str, ...], tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+def test_errors_of_clang_that_gcc_4_warns_of_are_warnings(
+    options: tuple[str, ...], tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
     """Calls of undeclared functions, `main()` and incompatible pointers are warnings, as in GCC 4."""
     assert status_of(tmp_path, OLD_C, *options) == 15
     assert "warning: incompatible function pointer types passing" in capfd.readouterr().err
