@@ -1,8 +1,8 @@
-"""Data space as devices see it: which SFR bits exist, and who is told when one is read or written.
+"""The bus: SFR bits that exist, and dispatch of register reads and writes to the hooks and rules of devices.
 
-What enters: masks and reset values of a chip (data), hooks of devices. What leaves: `read`/`write` of SFR words for
-the engines, `peek`/`poke` for tools. Plain memory is not handled here: engines go to the record directly.
-The CPU's own registers are hooked by the CPU like any device's.
+Input: masks and reset values of a chip, and hooks of devices. Output: `read` and `write` of SFR words for the engines,
+`peek` and `poke` for tools. Engines access plain memory directly in the record. The CPU hooks its own registers like
+any device.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from emu.system.rules import Rule, RuleInterpreter
 
 ReadHook = Callable[[], int]
 WriteHook = Callable[[int, int, int], None]
-"""Called as hook(old, new, lanes) after the new word is in the record; lanes = 0xFFFF, 0x00FF or 0xFF00."""
+"""hook(old, new, lanes), called after the new word is in the record; `lanes` is 0xFFFF, 0x00FF or 0xFF00."""
 
 
 @dataclass(frozen=True, slots=True)
-class Access:
-    """How a register word is wired on the bus; the parts are those of `Bus`."""
+class RegisterWiring:
+    """Wiring of a register on the bus: its entries in the tables of `Bus`."""
 
     writable: int
     clear_only: int
@@ -33,19 +33,19 @@ class Access:
 
 
 class Tap:
-    """Somebody outside listens to every access of instructions to one register; see `tap`."""
+    """Observers of all accesses of instructions to one register; see `tap`."""
 
-    def __init__(self, remove: Callable[[], None], under: Access) -> None:
+    def __init__(self, remove: Callable[[], None], wiring: RegisterWiring) -> None:
         self.hooks: tuple[Callable[[bool, int], object], ...] = ()
         self.remove: Final = remove
-        self.under = under
-        """What the register itself does."""
+        self.wiring = wiring
+        """Wiring of the register without the tap."""
 
     def __bool__(self) -> bool:
         return bool(self.hooks)
 
     def add(self, hook: Callable[[bool, int], object]) -> Callable[[], None]:
-        """Call hook(is_write, word) after each access. Returns how to remove it."""
+        """Call hook(is_write, word) after each access. Return a function that removes the hook."""
         self.hooks = (*self.hooks, hook)
         removed = False
 
@@ -53,55 +53,56 @@ class Tap:
             nonlocal removed
             if not removed:
                 removed = True
-                place = self.hooks.index(hook)
-                self.hooks = self.hooks[:place] + self.hooks[place + 1 :]
+                index = self.hooks.index(hook)
+                self.hooks = self.hooks[:index] + self.hooks[index + 1 :]
 
         return forget
 
 
 class Bus:
-    """SFR space, below `end`. Word index = address >> 1. Unimplemented bits read 0 and ignore writes."""
+    """SFR space, below the address `end`. The tables are indexed by address >> 1. Unimplemented bits read 0 and ignore
+    writes."""
 
     def __init__(self, record: Record, events: Events, end: int) -> None:
         self.record: Final = record
         self.events: Final = events
         self.end: Final = end
-        """First data address behind the SFRs (isa.md §1.2)."""
+        """First data address after the SFRs (isa.md §1.2)."""
         words = end // 2
         self.writable: Final = [0] * words
-        """Bits software can change freely."""
+        """Bits that software can set and clear."""
         self.clear_only: Final = [0] * words
-        """Bits software can clear but not set."""
+        """Bits that software can only clear."""
         self.reset_value: Final = [0] * words
         self.name: Final = [""] * words
         self.compute: Final[list[ReadHook | None]] = [None] * words
-        """Registers that are a function of the cycle and device state; no side effects."""
+        """Read hooks of registers that are a function of the cycle and of device state, without side effects."""
         self.refresh: Final[dict[int, Callable[[int], bool]]] = {}
-        """By register: refresh(cycle) has what its rule reads in the record brought up to date, if that is what native
-        code waits for in `cycle`; False if not."""
+        """By register: refresh(cycle) updates the cells that its rule reads, if native code waits for them in `cycle`;
+        it returns False if not."""
         self.on_read: Final[list[ReadHook | None]] = [None] * words
-        """Registers whose read changes something; returns the word read."""
+        """Read hooks of registers whose read changes the state of a device; they return the word."""
         self.on_write: Final[list[WriteHook | None]] = [None] * words
         self.rules: Final[list[Rule | None]] = [None] * words
-        """What accesses do in the common case; the hooks answer where a rule does not."""
+        """Rules of registers; the hooks handle the accesses that a rule does not cover."""
         self.integers: Final = RuleInterpreter(record, events)
         self.modelled: Final = [False] * words
-        """Set for registers a device or the CPU stands behind; others are reported once when touched."""
+        """Whether a device or the CPU implements a register. Other registers are reported at their first access."""
         self.off: frozenset[int] = frozenset()
-        """Registers of modules that are switched off: they read 0 and ignore writes."""
+        """Registers of disabled modules: they read 0 and ignore writes."""
         self.taps: Final[dict[int, Tap]] = {}
-        """Who listens, by register; see `tap`."""
+        """Taps by register; see `tap`."""
         self.watched: Final[set[int]] = set()
-        """Registers every access of which somebody outside wants to see."""
+        """Registers with a tap: all their accesses go through Python."""
         self.report: Callable[[int, bool], None] | None = None
-        """Called as report(address, is_write) at the first touch of a register nobody models."""
+        """report(address, is_write), called at the first access to a register that is not modelled."""
         self._reported: set[int] = set()
         self.note: Callable[[str], None] | None = None
-        """Called as note(what) the first time firmware asks a device for something that has no model."""
+        """note(what), called the first time that firmware uses a function without a model."""
         self._noted: set[str] = set()
 
     def read(self, address: int) -> int:
-        """The word at even SFR `address` (below `end`) as an instruction reads it, side effects included."""
+        """Return the word at the even SFR `address` as an instruction reads it, with side effects."""
         word = address >> 1
         rule = self.rules[word]
         if rule is not None and (shown := self.integers.read(rule)) is not None:
@@ -114,7 +115,7 @@ class Bus:
         return self.record.u16[word]
 
     def write(self, address: int, value: int, lanes: int = 0xFFFF) -> None:
-        """Store `value` at even SFR `address`; only bits in `lanes` (byte writes) are touched."""
+        """Write the bits `lanes` of `value` to the even SFR `address`, as an instruction does."""
         word = address >> 1
         rule = self.rules[word]
         if rule is not None and self.integers.write(rule, value, lanes):
@@ -134,33 +135,33 @@ class Bus:
             self._first_touch(word, True)
 
     def peek(self, address: int) -> int:
-        """The word at even SFR `address`, without side effects."""
+        """Return the word at the even SFR `address`, without side effects."""
         hook = self.compute[address >> 1]
         return hook() if hook is not None else self.record.u16[address >> 1]
 
     def poke(self, address: int, value: int) -> None:
-        """Set the stored word at even SFR `address`, telling nobody."""
+        """Set the stored word at the even SFR `address`, without calling hooks."""
         self.record.u16[address >> 1] = value & 0xFFFF
 
-    def access(self, word: int) -> Access:
-        """How the register with index `word` is wired, whoever listens to it."""
-        under = self.taps[word].under if word in self.taps else None
-        return under or Access(
+    def access(self, word: int) -> RegisterWiring:
+        """Return the wiring of the register with index `word`, without its tap."""
+        wiring = self.taps[word].wiring if word in self.taps else None
+        return wiring or RegisterWiring(
             self.writable[word], self.clear_only[word], self.compute[word], self.on_read[word], self.on_write[word],
             self.rules[word],
         )  # fmt: skip
 
-    def rewire(self, word: int, access: Access) -> None:
-        """Wire it anew; who listens goes on listening."""
+    def rewire(self, word: int, wiring: RegisterWiring) -> None:
+        """Replace the wiring of the register with index `word`; its tap stays."""
         self.writable[word], self.clear_only[word], self.compute[word] = (
-            access.writable, access.clear_only, access.compute)  # fmt: skip
+            wiring.writable, wiring.clear_only, wiring.compute)  # fmt: skip
         if word in self.taps:
-            self.taps[word].under = access
+            self.taps[word].wiring = wiring
         else:
-            self.on_read[word], self.on_write[word], self.rules[word] = access.on_read, access.on_write, access.rule
+            self.on_read[word], self.on_write[word], self.rules[word] = wiring.on_read, wiring.on_write, wiring.rule
 
     def lacks(self, what: str) -> None:
-        """Firmware has asked for `what` (register, field, and what happens instead), which has no model: told once."""
+        """Report once that firmware uses `what`, which has no model: register, field and the behaviour instead."""
         if what not in self._noted and not self.events.quiet:
             self._noted.add(what)
             if self.note is not None:
@@ -173,34 +174,34 @@ class Bus:
 
 
 def tap(bus: Bus, word: int) -> Tap:
-    """Put a `Tap` between the instructions and the register with index `word`, until its `remove` is called."""
+    """Insert a `Tap` between instructions and the register with index `word`, until its `remove` is called."""
     u16, events = bus.record.u16, bus.events
 
     def remove() -> None:
-        under = bus.access(word)
+        wiring = bus.access(word)
         del bus.taps[word]
-        bus.rewire(word, under)
+        bus.rewire(word, wiring)
         bus.watched.discard(word)
 
-    heard = Tap(remove, bus.access(word))
+    inserted = Tap(remove, bus.access(word))
 
     def tapped_read() -> int:
-        read = heard.under.on_read or heard.under.compute
+        read = inserted.wiring.on_read or inserted.wiring.compute
         value = read() if read is not None else u16[word]
         if not events.quiet:
-            for hook in heard.hooks:
+            for hook in inserted.hooks:
                 hook(False, value)
         return value
 
     def tapped_write(old: int, new: int, lanes: int) -> None:
-        written = heard.under.on_write
+        written = inserted.wiring.on_write
         if written is not None:
             written(old, new, lanes)
         if not events.quiet:
-            for hook in heard.hooks:
+            for hook in inserted.hooks:
                 hook(True, u16[word])
 
     bus.on_read[word], bus.on_write[word], bus.rules[word] = tapped_read, tapped_write, None
-    bus.taps[word] = heard
+    bus.taps[word] = inserted
     bus.watched.add(word)
-    return heard
+    return inserted

@@ -1,8 +1,7 @@
-"""What every peripheral is made of: registers (by name, from the chip's data), interrupt lines, event slots.
+"""Device base: what every peripheral is built from, namely registers, interrupt lines and event slots.
 
-A device never ticks: it computes on access, posts the cycle of its next event, and raises interrupt flags.
-It knows neither the CPU nor another device; `emu.machine.machine` joins them by handing over registers,
-lines and signals.
+A device never ticks. It computes its state on access, posts the cycle of its next event, and raises interrupt flags.
+It knows neither the CPU nor other devices; `emu.machine.machine` connects them by registers, lines and signals.
 """
 
 from __future__ import annotations
@@ -17,7 +16,7 @@ from emu.system.rules import Cell, InterruptLine, Rule, cell_of
 
 
 class Register:
-    """One SFR as its device sees it: the word lives in the record at the register's own address."""
+    """One SFR of a device. Its word lies in the record at the address of the register."""
 
     __slots__ = ("_fields", "_u16", "_word", "address", "bus", "name")
 
@@ -32,7 +31,7 @@ class Register:
 
     @property
     def value(self) -> int:
-        """The stored word, 0..0xFFFF."""
+        """Return the stored word, 0..0xFFFF."""
         return self._u16[self._word]
 
     @value.setter
@@ -40,7 +39,7 @@ class Register:
         self._u16[self._word] = word & 0xFFFF
 
     def __getitem__(self, field: str) -> int:
-        """The named field, right-aligned. Raises KeyError for a field the register does not have."""
+        """Return the named field, right-aligned. Raises KeyError for an unknown field."""
         lsb, ones = self._fields[field]
         return self._u16[self._word] >> lsb & ones
 
@@ -49,44 +48,44 @@ class Register:
         self._u16[self._word] = self._u16[self._word] & ~(ones << lsb) & 0xFFFF | (number & ones) << lsb
 
     def set_rule(self, rule: Rule) -> None:
-        """Accesses follow `rule` where it can say what they do."""
+        """Use `rule` for the accesses that it covers."""
         self.bus.rules[self._word] = rule
 
     @property
-    def place(self) -> Cell:
-        """Where the word is, for rules."""
+    def cell(self) -> Cell:
+        """Return the cell of the word, for rules."""
         return Cell(self.address, 16)
 
     def computed(self, hook: ReadHook) -> None:
-        """Reads return `hook()`, a function of the cycle and of device state without side effects."""
+        """Let reads return `hook()`, a function of the cycle and of device state without side effects."""
         self.bus.compute[self._word] = hook
 
     def read_by(self, hook: ReadHook) -> None:
-        """Reads by instructions return `hook()`, which may change device state."""
+        """Let reads by instructions return `hook()`, which may change device state."""
         self.bus.on_read[self._word] = hook
 
     def written_by(self, hook: WriteHook) -> None:
-        """After a write by an instruction `hook(old, new, lanes)` is called."""
+        """Call `hook(old, new, lanes)` after each write by an instruction."""
         self.bus.on_write[self._word] = hook
 
 
 FLAG_WORDS: Final = 4
-"""The flag registers of a chip are consecutive and at most this many."""
+"""Most flag registers of a chip; they are consecutive."""
 
 
 def flag_row(flag_address: int) -> int:
-    """Place of an interrupt flag register's bit 0 in `irq.since`."""
+    """Return the index in `irq.since` of bit 0 of an interrupt flag register."""
     return (flag_address >> 1) % FLAG_WORDS * 16
 
 
 def flag_since(record: Record, flag_address: int, flag_bit: int) -> int:
-    """Index in `record.u64` of the cycle in which an interrupt flag was first 1: c of isa.md §14.3."""
+    """Return the index in `record.u64` of the cycle in which an interrupt flag was first 1: c of isa.md §14.3."""
     table = record.fields.get("irq.since") or record.reserve("irq.since", "Q", 16 * FLAG_WORDS)
     return table.index + flag_row(flag_address) + flag_bit
 
 
 class Irq:
-    """One interrupt request line: setting it sets the IFS bit and makes the engine look."""
+    """One interrupt request line. A request sets the IFS bit and makes the engine check for interrupts."""
 
     __slots__ = ("_bit", "_events", "_since", "_u16", "_u64", "_word", "line")
 
@@ -100,12 +99,12 @@ class Irq:
         self.line: Final = InterruptLine(
             Cell(flag_address, 16), self._bit, Cell(8 * self._since, 64), cell_of(record, "events.deadline")
         )
-        """For rules."""
+        """Cells of the line, for rules."""
 
     def request(self) -> None:
-        """Set the interrupt flag: it first reads 1 in the cycle of the event that calls this.
+        """Set the interrupt flag. Called by an event, the flag first reads 1 in the cycle of the event.
 
-        Called from an access hook instead, it counts as raised one cycle after that access (engines.md §4.2).
+        Called by the hook of an access, the flag first reads 1 one cycle after the access (engines.md §4.2).
         """
         if not self._u16[self._word] & self._bit:
             self._u16[self._word] |= self._bit
@@ -114,12 +113,12 @@ class Irq:
 
     @property
     def pending(self) -> bool:
-        """Whether the flag is set."""
+        """Return whether the flag is set."""
         return bool(self._u16[self._word] & self._bit)
 
 
 class Device:
-    """Base of all peripherals: remembers the record, the clock and its own name; resets are explicit."""
+    """Base class of all peripherals. It holds the record, the event schedule and the name of the device."""
 
     def __init__(self, name: str, bus: Bus) -> None:
         self.name: Final = name
@@ -129,8 +128,8 @@ class Device:
 
     @property
     def now(self) -> int:
-        """Cycle of the access or event being handled, in Tcy."""
+        """Return the cycle of the access or event that is being handled, in Tcy."""
         return self.events.now
 
     def reset(self, power_on: bool) -> None:
-        """Bring hidden state to its reset value. SFRs have been reset already; event slots are idle."""
+        """Set hidden state to its reset value. SFRs have been reset already, and event slots are idle."""

@@ -1,6 +1,7 @@
-"""`Native`: a machine as other compiled code runs it, without Python: `struct native` of arena/lockstep/lockstep.c.
+"""C ABI of a machine: the handle `Native`, by which other compiled code runs a machine without Python.
 
-In: nothing. Out: addresses of the host, valid as long as the machine is.
+Its C twin is `struct native` in arena/lockstep/lockstep.c. The handle holds host addresses. They are valid as long as
+the machine exists.
 """
 
 from __future__ import annotations
@@ -10,33 +11,33 @@ from ctypes import Structure, c_int64, c_void_p
 from typing import Final
 
 Call = Callable[[int, int], int]
-"""call(record, env): native code run from where the machine stands; what it came back for."""
+"""call(record, env): runs native code from the current state of the machine and returns the exit reason."""
 Run = Callable[[Call, int, int], int]
-"""run(call, record, env): as `call`, which it may call, by whatever means."""
+"""run(call, record, env): replaces `call`. It may call `call` itself."""
 
 FRESH_ROOM: Final = 8
-"""Instructions that are remembered as waiting for a device, and a 0."""
+"""Capacity of `Native.fresh`, including the terminating 0."""
 
 
 class Native(Structure):
-    """Fields of a struct, all 64 bits wide. Code is called as int64 entry(record, env)."""
+    """Handle of a machine: a struct of 64-bit fields. Native code is called as int64 entry(record, env)."""
 
     _fields_ = [
         *((name, c_void_p) for name in (
             "entry", "record", "env",
-            "begins",  # uint64: whether to begin with the boundary before PC
-            "limit", "last",  # uint64, cycles: where native code comes back; `Engine.pass_limits`
-            "noted", "notes",  # uint64: how many limits have been passed, and where (`Engine.passed`)
-            "fresh",  # uint64 [FRESH_ROOM]: instructions that read what a device brings up to date, 0 behind the last:
+            "begins",  # uint64: whether a call begins with the boundary before PC
+            "limit", "last",  # uint64: cycles at which native code returns (`Engine.pass_limits`)
+            "noted", "notes",  # uint64: number and cycles of the limits that were passed (`Engine.passed`)
+            "fresh",  # uint64 [FRESH_ROOM]: instructions that read a register that a device refreshes, then 0:
                       # PC + (index of the register << 32)
-            "cycle", "now", "deadline",  # uint64: of the CPU, of the devices, of whatever is due first
+            "cycle", "now", "deadline",  # uint64: cycle of the CPU, of the devices, of the earliest event
             "pc",  # uint32
-            "mode", "corcon", "ie0", "ie1", "ie2",  # uint16: mode of the CPU, and registers
+            "mode", "corcon", "ie0", "ie1", "ie2",  # uint16: mode of the CPU, and SFRs
         )),
         *((name, c_int64) for name in (
-            "room",  # notes that are kept
-            "interpret", "service",  # results: an instruction that needs Python; an event that does, or the limit
-            "awake",  # the mode in which the CPU runs
-            "trap",  # the bit of CORCON that is 1 while a trap is handled
+            "room",  # capacity of `notes`
+            "interpret", "service",  # exit reasons: an instruction needs Python; a boundary does, or limit reached
+            "awake",  # value of `mode` while the CPU runs
+            "trap",  # bit of CORCON that is 1 while a trap is handled
         )),
     ]  # fmt: skip

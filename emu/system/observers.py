@@ -1,7 +1,7 @@
-"""Who is told when something happens: any number of listeners, each of which can be removed.
+"""Observer lists: callbacks that can be added and removed.
 
-Parts of a board always hear. People and tools do not while a stretch of time that has been told is run again
-(`Events.quiet`): they heard it the first time. Who only collects is *lazy*: it may hear some time later, in order.
+Parts of a board are always called. Tools are not called while a recorded span is replayed (`Events.quiet`), because
+they were called for it before. A *lazy* listener only collects: its calls may come later, in order.
 """
 
 from __future__ import annotations
@@ -14,15 +14,15 @@ from emu.system.events import Events
 What = ParamSpec("What")
 
 
-def _nobody(_urgent: bool) -> None:
-    """Nobody asks whether listeners are lazy."""
+def _ignore(_urgent: bool) -> None:
+    """Ignore whether a listener is urgent."""
 
 
 class Listeners(Generic[What]):
-    """Call it to tell everyone, in the order of `add`."""
+    """List of listeners. Calling it calls all listeners, in the order of `add`."""
 
-    def __init__(self, events: Events, urgency: Callable[[bool], object] = _nobody) -> None:
-        """urgency(urgent): called when a listener has come or gone, with whether one of all must hear at once."""
+    def __init__(self, events: Events, urgency: Callable[[bool], object] = _ignore) -> None:
+        """`urgency(urgent)` is called after each change with the value of `self.urgent`."""
         self._events: Final = events
         self._urgency: Final = urgency
         self._urgent = 0
@@ -36,7 +36,7 @@ class Listeners(Generic[What]):
 
     @property
     def urgent(self) -> bool:
-        """Whether some of them must hear at once."""
+        """Return whether any listener must be called at once."""
         return self._urgent > 0
 
     def _count(self, change: int) -> None:
@@ -44,7 +44,7 @@ class Listeners(Generic[What]):
         self._urgency(self._urgent > 0)
 
     def add(self, listener: Callable[What, object], *, part: bool = False, lazy: bool = False) -> Callable[[], None]:
-        """Tell `listener` from now on; a `part` of the board hears even what is run again. Returns how to remove it."""
+        """Add a listener and return a function that removes it. A `part` of the board is called during replay too."""
         self._count(not lazy)
         self._all = (*self._all, listener)
         if part:
@@ -63,7 +63,7 @@ class Listeners(Generic[What]):
 
     @property
     def assigned(self) -> Callable[What, object] | None:
-        """The one listener that an assignment replaces; those of `add` stay."""
+        """Return the listener set by assignment. A new assignment replaces it; listeners of `add` stay."""
         return self._assigned
 
     @assigned.setter
@@ -80,6 +80,6 @@ class Listeners(Generic[What]):
 def _without(
     listeners: tuple[Callable[What, object], ...], one: Callable[What, object]
 ) -> tuple[Callable[What, object], ...]:
-    """The first of what equals `one` left out."""
-    place = listeners.index(one)
-    return listeners[:place] + listeners[place + 1 :]
+    """Return the listeners without the first that equals `one`."""
+    index = listeners.index(one)
+    return listeners[:index] + listeners[index + 1 :]

@@ -1,7 +1,7 @@
-"""Program memory: flash, data EEPROM, unit and configuration words, and the latches table writes go to.
+"""Program memory: flash, data EEPROM, unit and configuration words, and the latches of table writes.
 
-What enters: words from a loader, table writes of the CPU, programming by the NVM device. What leaves: 24-bit words.
-Addresses are PC units: even, two per 24-bit word (isa.md §1.1). All storage is in the state record.
+Input: words of a loader, table writes of the CPU, programming by the NVM device. Output: 24-bit words. Addresses are PC
+units: even, two per 24-bit word (isa.md §1.1). All storage lies in the state record.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ EEPROM_LATCHES: Final = 16
 
 
 class ProgramMemory:
-    """All of program space. `flash` is a view of the record that native code may read as well."""
+    """All of program space. `flash` is a view of the record; native code reads the same memory."""
 
     def __init__(self, record: Record, chip: Chip) -> None:
         regions = chip.program
@@ -48,20 +48,20 @@ class ProgramMemory:
         self.flash_latch, _ = words("program.flash_latch", "I", FLASH_LATCHES)
         self.eeprom_latch, _ = words("program.eeprom_latch", "H", EEPROM_LATCHES)
         self.changed: Final[list[Callable[[int, int], None]]] = []
-        """Called as fn(start, end) after flash words in [start, end) changed: decoded or translated code is stale."""
+        """Listeners fn(start, end), called after flash words in [start, end) changed: their translations are stale."""
         self._u16: Final = record.u16
         self.captured_in: tuple[int, int] | None = None
-        """Data addresses of the registers that catch the address of each table write, low word and upper byte
+        """Data addresses of the registers that capture the address of each table write, low word and upper byte
         (dspic30f6014a.md §16)."""
         self.erase()
 
     @property
     def eeprom_range(self) -> tuple[int, int]:
-        """First address of data EEPROM, and the one behind it."""
+        """Return the first address of data EEPROM and the first one after it."""
         return self._eeprom.start, self._eeprom.end
 
     def erase(self) -> None:
-        """Everything as from the factory: all ones, EEPROM and latches too."""
+        """Set all program memory and latches to ones, the state of a new chip."""
         for words, erased in (
             (self.flash, ERASED_WORD), (self.eeprom, ERASED_HALF), (self.config, ERASED_HALF), (self.unit, ERASED_WORD)
         ):  # fmt: skip
@@ -70,14 +70,14 @@ class ProgramMemory:
         self._announce(0, self._flash_end)
 
     def clear_latches(self) -> None:
-        """All latches to ones, as after a programming operation (dspic30f6014a.md §16)."""
+        """Set all latches to ones, their state after a programming operation (dspic30f6014a.md §16)."""
         for word in range(FLASH_LATCHES):
             self.flash_latch[word] = ERASED_WORD
         for word in range(EEPROM_LATCHES):
             self.eeprom_latch[word] = ERASED_HALF
 
     def word(self, address: int) -> int:
-        """The 24-bit word at the even `address`; 0 where nothing is implemented (isa.md §1.1)."""
+        """Return the 24-bit word at the even `address`; 0 where nothing is implemented (isa.md §1.1)."""
         if address < self._flash_end:
             return self.flash[address >> 1]
         if address in self._eeprom:
@@ -91,11 +91,11 @@ class ProgramMemory:
         return 0
 
     def setting(self, name: str) -> int:
-        """The configuration word called `name`, as stored. Raises KeyError if the chip has none."""
+        """Return the stored configuration word called `name`. Raises KeyError if the chip has none of that name."""
         return self.word(self._words[name].address)
 
     def executable(self, address: int) -> bool:
-        """Whether fetching an instruction at `address` is no address error (isa.md §14.4, causes 4 and 5)."""
+        """Return whether an instruction can be fetched at `address` (isa.md §14.4, causes 4 and 5)."""
         start, end = self._vectors
         return address < start or end <= address < self._flash_end
 
@@ -114,7 +114,7 @@ class ProgramMemory:
             raise ValueError(f"no program memory at {address:#08x}")
 
     def put_flash(self, address: int, words: list[int]) -> None:
-        """Set consecutive flash words from the even `address`; listeners are told once."""
+        """Set consecutive flash words from the even `address` on. Listeners are called once."""
         first = address >> 1
         for index, value in enumerate(words):
             self.flash[first + index] = value & ERASED_WORD
@@ -138,7 +138,7 @@ class ProgramMemory:
             self._u16[low >> 1], self._u16[upper >> 1] = address & 0xFFFF, address >> 16 & 0xFF
 
     def announce_all(self) -> None:
-        """Tell the listeners that any flash word may have changed (a snapshot was put back)."""
+        """Call the listeners for all of flash, after a snapshot was restored."""
         self._announce(0, self._flash_end)
 
     def _announce(self, start: int, end: int) -> None:

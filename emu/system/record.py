@@ -1,9 +1,8 @@
-"""The one flat record that holds every bit of a machine's state (design: one buffer, two engines).
+"""The state record: one flat buffer that holds every bit of a machine's state.
 
-What enters: names, element kinds and counts, reserved once while a machine is wired together.
-What leaves: byte offsets for native code and typed views for Python. Byte offset 0 is data address 0, so the
-working registers, the SFRs and RAM lie in the record at their own data addresses (isa.md §1.2).
-Snapshot, restore and comparison of two machines are one copy and one comparison.
+Input: names, element kinds and counts, reserved once while a machine is built. Output: byte offsets for native code and
+typed views for Python. Byte offset 0 is data address 0: working registers, SFRs and RAM lie in the record at their own
+data addresses (isa.md §1.2). A snapshot is one copy, and two machines are compared with one comparison.
 """
 
 from __future__ import annotations
@@ -13,16 +12,16 @@ from dataclasses import dataclass
 from typing import Final
 
 CAPACITY: Final = 0x80000
-"""Bytes set aside for one record; `Record.used` says how many are taken."""
+"""Size of a record in bytes; `Record.used` of them are reserved."""
 HOSTS: Final = 0x1000
-"""Bytes at its end for addresses in the host's memory."""
+"""Bytes at the end of a record for host addresses."""
 
 SIZES: Final = {"B": 1, "H": 2, "I": 4, "Q": 8, "q": 8}
 
 
 @dataclass(frozen=True, slots=True)
 class Field:
-    """A named run of elements in the record: byte `offset`, element `kind` (struct letter), `count`."""
+    """A named array in the record: byte `offset`, element `kind` (struct letter) and `count`."""
 
     name: str
     offset: int
@@ -31,16 +30,16 @@ class Field:
 
     @property
     def index(self) -> int:
-        """Index of the first element in the view of this field's kind."""
+        """Return the index of the first element in the view of this kind."""
         return self.offset // SIZES[self.kind]
 
 
 class Record:
-    """Flat little-endian buffer with views of 8, 16, 32 and 64 bits and a directory of named fields."""
+    """Little-endian buffer with views of 8, 16, 32 and 64 bits and a directory of named fields."""
 
     def __init__(self, data_end: int) -> None:
         self.data_end: Final = data_end
-        """First data address behind SFRs and RAM (isa.md §1.2)."""
+        """First data address after SFRs and RAM (isa.md §1.2)."""
         self._memory = (ctypes.c_uint8 * CAPACITY)()
         self.address: Final = ctypes.addressof(self._memory)
         self.bytes: Final = memoryview(self._memory).cast("B")
@@ -54,9 +53,9 @@ class Record:
         self._hosts = CAPACITY
 
     def reserve(self, name: str, kind: str, count: int = 1) -> Field:
-        """Set aside `count` elements of `kind` ("B", "H", "I", "Q" unsigned, "q" signed) under `name`, zeroed.
+        """Reserve `count` elements of `kind` ("B", "H", "I", "Q" unsigned, "q" signed) under `name`, zeroed.
 
-        Raises ValueError when the name is taken or the record is full.
+        Raises ValueError if the name is reserved already or the record is full.
         """
         if name in self.fields:
             raise ValueError(f"record field {name!r} is reserved already")
@@ -70,25 +69,26 @@ class Record:
         return field
 
     def reserve_addresses(self, count: int) -> int:
-        """Set aside `count` 64-bit words for addresses in the host's memory, zeroed: the first one's byte offset.
-        They are no state: snapshots are without them. Raises ValueError when there is no room."""
+        """Reserve `count` zeroed 64-bit words for host addresses and return the byte offset of the first.
+
+        They are not part of the state, so snapshots exclude them. Raises ValueError if the record is full."""
         if self._hosts - 8 * count < CAPACITY - HOSTS:
             raise ValueError(f"no room for {count} addresses")
         self._hosts -= 8 * count
         return self._hosts
 
     def snapshot(self) -> bytes:
-        """A copy of the whole state."""
+        """Return a copy of the whole state."""
         return bytes(self.bytes[: self.used])
 
     def restore(self, state: bytes) -> None:
-        """Put a copy made by `snapshot` of an equally wired machine back. Raises ValueError if the size differs."""
+        """Restore a `snapshot` of an equally built machine. Raises ValueError if the size differs."""
         if len(state) != self.used:
             raise ValueError(f"snapshot has {len(state)} bytes, this machine's record {self.used}")
         self.bytes[: self.used] = state
 
     def field_at(self, offset: int) -> str:
-        """Name of what lies at a byte offset, for reports of differences between two records."""
+        """Return the name of the field at a byte offset, for reports of differences between two records."""
         if offset < self.data_end:
             return f"data {offset:#06x}"
         for field in self.fields.values():

@@ -1,9 +1,10 @@
-"""Device rules as text that several readers run: integers in every engine, LLVM values in native code.
+"""Rule language: device rules as straight-line functions that are interpreted on ints or compiled to native code.
 
-A `Rule` says what an access to one register or an event does, in a straight line: it gets places of the record,
-computes, says what it needs, then puts places. Nothing is put before the last `require`. Where a need does not hold
-nothing has been done, and the device's own hooks answer instead, in every engine alike. So engines cannot disagree on a
-rule, and what is rare stays in Python. Entering an exception is such a text too (dspic30f/exceptions.py).
+A `Rule` describes one access to a register, or one event. It is written against a `RuleBuilder`: it gets cells of the
+record, computes, states its requirements, then puts cells. Nothing is put before the last `require`. If a requirement
+does not hold, the rule has had no effect, and the hooks of the device handle the access in every engine alike. So
+engines cannot disagree on a rule, and rare cases stay in Python. Entering an exception is such a function too
+(dspic30f/exceptions/exceptions.py).
 """
 
 from __future__ import annotations
@@ -16,17 +17,17 @@ from emu.system.events import Events
 from emu.system.record import SIZES, Record
 
 Number = Any
-"""An int, or what a reader computes with. Rules use + - * & | ^ << >> and comparisons (signed, 64 bits), never `if`."""
+"""An int, or the value type of a builder. Rules use + - * & | ^ << >> and signed 64-bit comparisons, never `if`."""
 
 
 @dataclass(frozen=True, slots=True)
 class Cell:
-    """An unsigned number in the record: byte offset and bits (8, 16, 32, 64)."""
+    """An unsigned number in the record: its byte offset and its width (8, 16, 32 or 64 bits)."""
 
     offset: int
     bits: int
     index: int = field(init=False, repr=False)
-    """In the record's view of that width."""
+    """Index in the view of the record with that width."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "index", self.offset * 8 // self.bits)
@@ -34,27 +35,28 @@ class Cell:
 
 @dataclass(frozen=True, slots=True)
 class EventSlot:
-    """An event slot: its due cycle, and the deadline of all slots."""
+    """Cells of an event slot: its due cycle, and the deadline of all slots."""
 
     due: Cell
     deadline: Cell
 
 
 def cell_of(record: Record, name: str, index: int = 0) -> Cell:
-    """Element `index` of a reserved field."""
+    """Return the cell of element `index` of a reserved field."""
     reserved = record.fields[name]
     size = SIZES[reserved.kind]
     return Cell(reserved.offset + size * index, 8 * size)
 
 
 def event_slot(record: Record, number: int) -> EventSlot:
-    """The event slot with that number."""
+    """Return the cells of the event slot with that number."""
     return EventSlot(cell_of(record, "events.due", number), cell_of(record, "events.deadline"))
 
 
 @dataclass(frozen=True, slots=True)
 class InterruptLine:
-    """An interrupt request line: its flag, the cycle in which that was first 1, and the deadline of all slots."""
+    """Cells of an interrupt request line: its flag, the cycle in which the flag was first 1, and the deadline of all
+    slots."""
 
     flags: Cell
     bit: int
@@ -63,7 +65,8 @@ class InterruptLine:
 
 
 def request(m: RuleBuilder, line: InterruptLine, cycle: Number, when: Number = True) -> None:
-    """`when` that holds, the flag is 1 from `cycle` on, if it is not already, and the engine looks."""
+    """If `when` holds, set the interrupt flag from `cycle` on unless it is set already, and request a boundary
+    check."""
     word = m.get(line.flags)
     m.put(line.since, m.select(((word & line.bit) == 0) & when, cycle, m.get(line.since)))
     m.put(line.flags, m.select(when, word | line.bit, word))
@@ -71,72 +74,73 @@ def request(m: RuleBuilder, line: InterruptLine, cycle: Number, when: Number = T
 
 
 class RuleBuilder(Protocol):
-    """What a rule may do."""
+    """Operations that a rule may use. Each engine implements them."""
 
     @property
     def now(self) -> Number:
-        """Cycle of the access or event."""
+        """Return the cycle of the access or event."""
 
-    def get(self, place: Cell, index: Number = 0) -> Number:
-        """The number at a place, or `index` places behind it."""
+    def get(self, cell: Cell, index: Number = 0) -> Number:
+        """Return the number in a cell, or in the cell `index` cells behind it."""
 
-    def put(self, place: Cell, value: Number, index: Number = 0) -> None:
-        """Store the low bits of a number, once the whole rule has been read."""
+    def put(self, cell: Cell, value: Number, index: Number = 0) -> None:
+        """Store the low bits of a number, after the whole rule has been evaluated."""
 
     def require(self, condition: Number) -> None:
-        """Leave the access to the device's hooks unless this holds."""
+        """Leave the access to the hooks of the device unless `condition` holds."""
 
     def select(self, condition: Number, a: Number, b: Number) -> Number:
-        """`a` if `condition` else `b`."""
+        """Return `a` if `condition`, else `b`."""
 
     def below(self, a: Number, b: Number) -> Number:
-        """a < b, unsigned: NEVER is above every cycle."""
+        """Return a < b as unsigned numbers, so that NEVER is above every cycle."""
 
     def div(self, a: Number, b: Number) -> Number:
-        """Unsigned quotient; b is not 0."""
+        """Return the unsigned quotient; b is not 0."""
 
     def mod(self, a: Number, b: Number) -> Number:
-        """Unsigned remainder; b is not 0."""
+        """Return the unsigned remainder; b is not 0."""
 
     def table(self, values: tuple[int, ...], index: Number) -> Number:
-        """values[index], of a table that never changes."""
+        """Return values[index] of a constant table."""
 
     def can_call(self, code: Number) -> Number:
-        """Whether `code`, an address of host code that the record names (`Record.reserve_addresses`), can be asked: it
-        is not 0, and whoever reads is native code. The others leave it to the device's hooks."""
+        """Return whether `code`, the address of host code in the record (`Record.reserve_addresses`), can be called: it
+        is not 0, and the rule runs in native code. Other engines leave the access to the hooks of the device."""
 
     def call(self, code: Number, data: Number, *numbers: Number) -> Number:
-        """What host code answers: int64 code(record, data, numbers...). It changes nothing that a rule sees."""
+        """Call host code: int64 code(record, data, numbers...). It changes nothing that a rule reads."""
 
     def lazy_select(
         self, condition: Number, costly: Callable[[], tuple[Number, ...]], *others: Number
     ) -> tuple[Number, ...]:
-        """costly() if `condition`, else `others`; it is computed only then, and puts and needs nothing."""
+        """Return costly() if `condition`, else `others`. costly() is evaluated only if needed; it neither puts nor
+        requires."""
 
     def loop(self, count: Number, body: Callable[..., tuple[Number, ...]], *carried: Number) -> tuple[Number, ...]:
-        """`count` times, at least once: carried = body(number of the turn, *carried). What is left in the end."""
+        """Repeat `carried = body(iteration, *carried)` `count` times, at least once. Return the last `carried`."""
 
     def scan(self, bits: Number, body: Callable[..., tuple[Number, ...]], *carried: Number) -> tuple[Number, ...]:
-        """For every bit set, from bit 0 up: carried = body(number of the bit, *carried). What is left in the end."""
+        """Repeat `carried = body(bit number, *carried)` for every set bit, from bit 0 up. Return the last `carried`."""
 
     def post(self, slot: EventSlot, due: Number) -> None:
-        """Let an event slot fire at cycle `due`."""
+        """Post an event slot for the cycle `due`."""
 
 
 @dataclass(frozen=True)
 class Rule:
-    """What accesses to one register do, or an event slot that falls due; None: that has no rule."""
+    """Rule of the accesses to one register, or of an event slot. None: that kind of access has no rule."""
 
     operands: Any
     reads: Callable[[Any, Any], Number] | None = None
-    """reads(reader, places): the word an instruction reads."""
+    """reads(builder, operands) returns the word that an instruction reads."""
     writes: Callable[[Any, Any, Number, int], bool] | None = None
-    """writes(reader, places, value, lanes): the register written; False: no rule for these lanes. `lanes` = 0xFFFF,
-    0x00FF or 0xFF00 is known when the rule is read, the value need not be."""
+    """writes(builder, operands, value, lanes) writes the register. It returns False if it has no rule for these lanes.
+    `lanes` is 0xFFFF, 0x00FF or 0xFF00 and is constant; the value need not be."""
     fires: Callable[[Any, Any], None] | None = None
-    """fires(reader, places): the slot is idle already; the rule may post it again."""
+    """fires(builder, operands) handles the event. The slot is idle already; the rule may post it again."""
     reads_with_effect: Callable[[Any, Any], Number] | None = None
-    """takes(reader, places): as `reads`, and the device changes by it."""
+    """As `reads`, for a read that changes the state of the device."""
 
     def __repr__(self) -> str:
         functions = (self.reads, self.reads_with_effect, self.writes, self.fires)
@@ -145,11 +149,11 @@ class Rule:
 
 
 class RuleNotApplicable(Exception):
-    """A need does not hold."""
+    """A requirement of a rule does not hold."""
 
 
 class IntegerOperations:
-    """What a reader on ints computes with, no machine behind it."""
+    """The computing operations of a builder on ints; they need no machine."""
 
     def select(self, condition: Number, a: Number, b: Number) -> Number:
         return a if condition else b
@@ -176,8 +180,8 @@ class IntegerOperations:
         return costly() if condition else others
 
     def loop(self, count: int, body: Callable[..., tuple[int, ...]], *carried: int) -> tuple[int, ...]:
-        for turn in range(count):
-            carried = body(turn, *carried)
+        for iteration in range(count):
+            carried = body(iteration, *carried)
         return carried
 
     def scan(self, bits: int, body: Callable[..., tuple[int, ...]], *carried: int) -> tuple[int, ...]:
@@ -191,15 +195,15 @@ INTEGER_OPERATIONS: Final[Any] = IntegerOperations()
 
 
 class RuleInterpreter(IntegerOperations):
-    """The reader on ints: runs rules on the record itself."""
+    """The builder on ints: runs rules on the record of a machine."""
 
     def __init__(self, record: Record, events: Events) -> None:
         self._events: Final = events
         self._views: Final = {8: record.u8, 16: record.u16, 32: record.u32, 64: record.u64}
-        self._tops: Final = {bits: (1 << bits) - 1 for bits in self._views}
+        self._masks: Final = {bits: (1 << bits) - 1 for bits in self._views}
 
     def read(self, rule: Rule) -> int | None:
-        """The word read now, or None where the hooks answer."""
+        """Return the word that a read by `rule` gives, or None if the hooks must handle it."""
         reads = rule.reads or rule.reads_with_effect
         if reads is None:
             return None
@@ -209,7 +213,7 @@ class RuleInterpreter(IntegerOperations):
             return None
 
     def write(self, rule: Rule, value: int, lanes: int) -> bool:
-        """Whether the rule did it."""
+        """Write by `rule`. Return False if the hooks must handle the write."""
         if rule.writes is None:
             return False
         try:
@@ -218,7 +222,7 @@ class RuleInterpreter(IntegerOperations):
             return False
 
     def fire(self, rule: Rule) -> bool:
-        """Whether the rule did it."""
+        """Handle an event by `rule`. Return False if the hooks must handle it."""
         if rule.fires is None:
             return False
         try:
@@ -231,11 +235,11 @@ class RuleInterpreter(IntegerOperations):
     def now(self) -> int:
         return self._events.now
 
-    def get(self, place: Cell, index: int = 0) -> int:
-        return self._views[place.bits][place.index + index]
+    def get(self, cell: Cell, index: int = 0) -> int:
+        return self._views[cell.bits][cell.index + index]
 
-    def put(self, place: Cell, value: int, index: int = 0) -> None:
-        self._views[place.bits][place.index + index] = value & self._tops[place.bits]
+    def put(self, cell: Cell, value: int, index: int = 0) -> None:
+        self._views[cell.bits][cell.index + index] = value & self._masks[cell.bits]
 
     def require(self, condition: Number) -> None:
         if not condition:
