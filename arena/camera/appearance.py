@@ -82,6 +82,7 @@ def appearance_of(scene: Scene) -> Appearance:
 
 
 def _appearance(scene: Scene) -> Appearance:
+    """Compute the appearance of a furnished scene."""
     colours = [tuple(map(int, one)) for one in COLOURS]
 
     def class_of(name: str) -> int:

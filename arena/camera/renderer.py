@@ -87,6 +87,7 @@ class _Rays(Structure):
 
 @cache
 def _code() -> dict[str, Callable[..., Any]]:
+    """Return the functions of renderer.c."""
     return functions(Path(__file__).with_name("renderer.c"), {
         "set_viewpoint": (None, (ADDRESS, ADDRESS, ADDRESS, DOUBLE)),
         "classify_rays": (None, (ADDRESS, ADDRESS)),

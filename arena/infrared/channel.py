@@ -118,8 +118,8 @@ class OpticalChannel:
 
     robots: int
     quantum: int
-    slowest: int = 1 << 62
-    """Cycle of the trial that the slowest robot has reached; no robot asks for light more than four quanta older."""
+    horizon: int = 1 << 62
+    """Cycle of the trial that all robots have reached. Light more than four quanta older is not needed."""
     tau: float = TAU_SECONDS * FCY
     """Time constant of the receivers in Tcy."""
     _emitters: list[EmitterHistory] = field(init=False)
@@ -146,7 +146,7 @@ class OpticalChannel:
 
     def switch(self, robot: int, cycle: int, line: int, lit: bool) -> None:
         """Switch a pulse line of a robot, or from number `LINES` on one of its LEDs."""
-        needed_from = min(cycle, self.slowest) - 4 * self.quantum - 2 * int(self.receivers.settled)
+        needed_from = min(cycle, self.horizon) - 4 * self.quantum - 2 * int(self.receivers.settled)
         if line < LINES:
             self._emitters[robot].add(cycle, line, lit, needed_from)
             return

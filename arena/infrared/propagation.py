@@ -112,6 +112,7 @@ class _Poses(Structure):
 
 @cache
 def _code() -> dict[str, Callable[..., Any]]:
+    """Return the functions of propagation.c."""
     return functions(Path(__file__).with_name("propagation.c"), {
         "signal": (INT, (ADDRESS, ADDRESS, INT, INT, ADDRESS)),
         "surfaces": (None, (ADDRESS, ADDRESS, INT, ADDRESS)),

@@ -67,7 +67,7 @@ class LockStep:
         self._world: Final = world
         self._robots: Final = robots
         self._channel: Final = channel or OpticalChannel.of(world.scene)
-        self._channel.slowest = 0
+        self._channel.horizon = 0
         self._known_poses: Final[dict[int, Poses]] = {world.ticks: world.poses}
         self._blocks: list[PoseBlock] = []
         self._is_native: Final = is_native
@@ -182,4 +182,4 @@ class LockStep:
         if made:
             self._blocks += made
             self._known_poses[world.ticks] = world.poses
-        self._channel.slowest = world.ticks * self._channel.quantum
+        self._channel.horizon = world.ticks * self._channel.quantum

@@ -118,6 +118,7 @@ def _new_lock() -> int:
 
 @cache
 def _code() -> dict[str, Callable[..., Any]]:
+    """Return the functions of lockstep.c."""
     return functions(Path(__file__).with_name("lockstep.c"), {
         "run_all": (INT, (ADDRESS, INT)), "worker_main": (None, (ADDRESS, ADDRESS)),
         "stop_workers": (None, (ADDRESS,)),

@@ -1,1 +1,1 @@
-"""Robots as the world runs them: the controller interface, firmware and scripted controllers, Bluetooth links."""
+"""Robots: the controller interface, firmware and scripted controllers, Bluetooth links."""

@@ -21,7 +21,7 @@ def json_text(value: Any, **options: Any) -> str:
     return json.dumps(finite(value), allow_nan=False, **options)
 
 
-def misfit(value: Any, shape: Any, name: str = "it") -> str:
+def mismatch(value: Any, shape: Any, name: str = "it") -> str:
     """Return the first mismatch between the JSON value and `shape`, or an empty text.
 
     A shape is one of:
@@ -36,7 +36,7 @@ def misfit(value: Any, shape: Any, name: str = "it") -> str:
             return f"{name} is {value!r:.40}; expected a table"
         for key, inner in shape.items():
             here = value.get(key.rstrip("?"))
-            wrong = "" if here is None and key.endswith("?") else misfit(here, inner, key.rstrip("?"))
+            wrong = "" if here is None and key.endswith("?") else mismatch(here, inner, key.rstrip("?"))
             if wrong:
                 return wrong
         return ""
@@ -45,7 +45,7 @@ def misfit(value: Any, shape: Any, name: str = "it") -> str:
     if isinstance(shape, tuple):
         if not isinstance(value, list) or len(value) != len(shape):
             return f"{name} is {value!r:.40}; expected a list" + (f" of {len(shape)}" if shape else "")
-        found = (misfit(value[place], inner, f"{name}[{place}]") for place, inner in enumerate(shape))
+        found = (mismatch(value[place], inner, f"{name}[{place}]") for place, inner in enumerate(shape))
         return next(filter(None, found), "")
     kinds = (int, float) if shape is float else shape
     if not isinstance(value, kinds) or isinstance(value, bool):

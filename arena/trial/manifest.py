@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 from typing import Any, Final
 
-from arena.trial.json_numbers import misfit
+from arena.trial.json_numbers import mismatch
 from arena.trial.record import FAULT, RecordError, write_json
 
 MANIFEST: Final = "manifest.json"
@@ -24,7 +24,7 @@ def read_manifest(folder: Path) -> dict[str, Any]:
         value: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError) as error:
         raise RecordError(f"{path}: {error}") from None
-    if wrong := misfit(value, _SHAPE):
+    if wrong := mismatch(value, _SHAPE):
         raise RecordError(f"{path}: is not the manifest of a run: {wrong}")
     return value
 

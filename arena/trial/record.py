@@ -19,7 +19,7 @@ from arena.camera.appearance import NOTHING, OBJECT, ROBOT
 from arena.experiments import Experiment, TrialSamples, UartLine, experiment_of
 from arena.metrics import MetricSeries
 from arena.scene.loader import FCY, Scene, scene_of
-from arena.trial.json_numbers import misfit
+from arena.trial.json_numbers import mismatch
 from arena.trial.trial import Rows
 from emu.host.files import atomic_file, is_standard, read_file
 
@@ -114,6 +114,7 @@ class Trial:
         return TrialSamples(self.times, robots, self.objects, self.scene, noted, heard)
 
     def _places(self, letter: str, count: int) -> NDArray[np.float64]:
+        """Return the positions of the bodies whose columns begin with a letter."""
         if not count:
             return np.zeros((len(self.times), 0, 2))
         names = [f"{letter}{i}" for i in range(count)]
@@ -174,7 +175,7 @@ def read_trial(path: Path) -> Trial:
 
 def checked(path: Path, about: Any) -> dict[str, Any]:
     """Return the metadata of a record. Raises RecordError if a value is missing or of the wrong type."""
-    if wrong := misfit(about, _HEAD):
+    if wrong := mismatch(about, _HEAD):
         raise RecordError(f"{path}: is not a complete trial: {wrong}")
     return dict(about)
 

@@ -1,1 +1,1 @@
-"""The physical world: walls, discs and robots in pymunk, and the wheels that the firmware's steppers turn."""
+"""The physical world: walls, discs and robots in pymunk, and wheel speeds from motor steps."""

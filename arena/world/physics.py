@@ -70,6 +70,7 @@ class Poses:
         self._begin(values, len(robots), values.ctypes.data)
 
     def _begin(self, values: NDArray[np.float64], robots: int, address: int) -> None:
+        """Set the values; poses as lists are created on demand."""
         self.values = values
         """The numbers of the robots, then those of the objects."""
         self.counts = robots, (len(values) - 3 * robots) // 2
@@ -172,6 +173,7 @@ class NativeWorld(Structure):
 
 @cache
 def _code() -> dict[str, Callable[..., Any]]:
+    """Return the functions of physics.c."""
     return functions(Path(__file__).with_name("physics.c"), {
         "run_quantum": (None, (ADDRESS, ADDRESS)), "read_poses": (None, (ADDRESS, ADDRESS)),
         "run_quanta": (None, (ADDRESS, ADDRESS, INT, INT, INT, ADDRESS, ADDRESS, INT)),
@@ -266,6 +268,7 @@ class World:
     # -- building ----------------------------------------------------------------------------------------------------
 
     def _add_walls(self) -> None:
+        """Add the four walls of the arena."""
         width, height, half = self.scene.arena.width_cm, self.scene.arena.height_cm, WALL_THICKNESS
         corners = [(-half, -half), (width + half, -half), (width + half, height + half), (-half, height + half)]
         for one, other in zip(corners, corners[1:] + corners[:1], strict=True):
@@ -286,6 +289,7 @@ class World:
             self.space.add(shape)
 
     def _disc(self, mass: float, radius: float, x: float, y: float) -> pymunk.Body:
+        """Add a disc that can be pushed."""
         body = pymunk.Body(mass, dimensions.disc_moment(mass, radius))
         body.position = x, y
         shape = pymunk.Circle(body, radius)
@@ -294,6 +298,7 @@ class World:
         return body
 
     def _add_robot(self, x: float, y: float, heading: float) -> pymunk.Body:
+        """Add the body of a robot."""
         body = self._disc(dimensions.ROBOT_MASS, dimensions.ROBOT_RADIUS, x, y)
         body.angle = heading
         return body
@@ -350,7 +355,7 @@ class World:
         made = []
         while count:
             self._draw_noise()
-            row = self._room()
+            row = self._free_row()
             more = min(count, self._noise_ticks - self.ticks % self._noise_ticks, ROWS - row)
             at = self._sheet_at + row * self._row_bytes
             self._run_quanta(self._at, speeds, room, self.ticks, more, self._wheels_at, at, self._width)
@@ -367,7 +372,7 @@ class World:
 
         `now` are the current poses, `before` those one quantum earlier.
         """
-        native, row = self.native, self._room()
+        native, row = self.native, self._free_row()
         noisy = self.ticks % self._noise_ticks
         can_run = is_enabled and (noisy or not self.scene.robots.wheel_noise)
         more = min(self._noise_ticks - noisy, ROWS - row) if can_run else 0
@@ -390,7 +395,7 @@ class World:
         row = tick - block.first
         return Poses.of(block.sheet[block.row + row], len(self.robots), block.address + row * self._row_bytes)
 
-    def _room(self) -> int:
+    def _free_row(self) -> int:
         """Return a free row for poses. Rows are never written twice, because `Poses` are immutable."""
         if self._row == len(self._sheet):
             self._sheet, self._row = np.empty((ROWS, self._width)), 0
@@ -415,7 +420,7 @@ class World:
 
     def _read(self) -> Poses:
         """Return the current poses."""
-        row = self._room()
+        row = self._free_row()
         self._row += 1
         at = self._sheet_at + row * self._row_bytes
         self._read_poses(self._at, at)

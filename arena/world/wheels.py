@@ -32,6 +32,7 @@ class _Drive(Structure):
 
 @cache
 def _add_steps() -> Callable[..., Any]:
+    """Return `add_steps` of wheels.c."""
     arguments = (ADDRESS, INT, INT, ADDRESS)
     return functions(Path(__file__).with_name("wheels.c"), {"add_steps": (None, arguments)})["add_steps"]
 

@@ -13,12 +13,12 @@ from typing import Final
 from tests.arena.images import BEGIN
 
 LONG: Final = ("mov     PORTD, w0",)
-"""Ways to read the picture that native code has by itself: thousands of times."""
+"""Reads of the picture that native code executes without Python; they are repeated thousands of times."""
 Chance = random.Random
 
 
 def _looks(chance: Chance, n: int) -> str:
-    """At the picture, some pixels in a row, by address or by pointer."""
+    """Read some pixels in a row, by address or by pointer."""
     how = chance.choice((*LONG, *LONG, "mov     [w8], w0", "mov.b   PORTD+1, wreg", "mov     [w8], [w9++]"))
     return f"""
         mov     #PORTD, w8
@@ -31,7 +31,7 @@ l{n}:   {how}
 
 
 def _awaits_line(_chance: Chance, n: int) -> str:
-    """Until HREF falls and rises, but not long or often: PCLK is on the same port, so each look at it is Python's."""
+    """Wait for a falling and a rising edge of HREF, seldom and briefly: with PCLK on the same port each read is slow."""
     return f"""
         mov     _turns, w0
         and     w0, #15, w0
@@ -53,6 +53,7 @@ l{n}:   dec     w1, w1
 
 
 def _waits(chance: Chance, n: int) -> str:
+    """Count down a random number."""
     return f"""
         mov     #{chance.randrange(1, 1 << chance.randrange(2, 16))}, w1
 l{n}:   dec     w1, w1
@@ -60,16 +61,17 @@ l{n}:   dec     w1, w1
 
 
 def _idles(chance: Chance, _n: int) -> str:
+    """Enter Idle mode one to three times."""
     return "\n        pwrsav  #1" * chance.randrange(1, 4)
 
 
 def _sleeps(_chance: Chance, _n: int) -> str:
-    """The watchdog ends it, unless nothing does."""
+    """Enter Sleep mode with the watchdog on, which ends it in most cases."""
     return "\n        bset    RCON, #5\n        pwrsav  #0"
 
 
 def _turns(chance: Chance, _n: int) -> str:
-    """Both motors by four steps, forwards or backwards, or anyhow."""
+    """Turn both motors by four steps, forwards, backwards or in a random sequence."""
     phases = [0x55, 0x66, 0xAA, 0x99][:: chance.choice((1, 1, -1))]
     if chance.random() < 0.2:
         phases = chance.sample((0x55, 0x66, 0xAA, 0x99, 0x00, 0xA5), 3)
@@ -85,10 +87,12 @@ def _turns(chance: Chance, _n: int) -> str:
 
 
 def _blinks(chance: Chance, _n: int) -> str:
+    """Toggle some LEDs."""
     return f"\n        btg     LATA, #{chance.choice((6, 7, 9, 12))}\n        btg     LATC, #{chance.choice((1, 2))}"
 
 
 def _talks(_chance: Chance, n: int) -> str:
+    """Send a letter and a line end on UART1."""
     return f"""
         mov     #0x1FFF, w1
         and     w2, #15, w0
@@ -100,6 +104,7 @@ l{n}:   btss    U1STA, #9
 
 
 def _hears(_chance: Chance, n: int) -> str:
+    """Read up to four bytes from UART1."""
     return f"""
         btsc    U1STA, #1
         bclr    U1STA, #1
@@ -114,7 +119,7 @@ l{n}:   btss    U1STA, #0
 
 
 def _senses(chance: Chance, _n: int) -> str:
-    """One of the sensors, its emitter lit or not."""
+    """Convert one infrared sensor, with or without a lit emitter."""
     lit = chance.choice(("bset    LATF, #7", "bset    LATF, #8", "bset    LATG, #0", "bset    LATG, #1", "nop"))
     return f"""
         {lit}
@@ -133,7 +138,7 @@ def _senses(chance: Chance, _n: int) -> str:
 
 
 def _sets_camera(chance: Chance, _n: int) -> str:
-    """A register of the camera gets another value, by I2C; every third time one that only changes the brightness."""
+    """Set a register of the camera by I2C; in 30 % of the cases one that only changes the brightness."""
     if chance.random() < 0.3:
         return _written(0xD4, chance.randrange(256))
     return _written(
@@ -150,6 +155,7 @@ def _sets_camera(chance: Chance, _n: int) -> str:
 
 
 def _written(register: int, value: int) -> str:
+    """Write a register of the camera by I2C."""
     steps = "".join(
         f"""
         mov     #{byte:#x}, w0
@@ -168,7 +174,7 @@ def _written(register: int, value: int) -> str:
 
 
 def _guards(chance: Chance, _n: int) -> str:
-    """The CPU's priority rises for a while, or interrupts wait."""
+    """Raise the CPU priority for a while, or disable interrupts."""
     if chance.random() < 0.5:
         return f"\n        disi    #{chance.randrange(1, 3000)}\n        repeat  #{chance.randrange(200)}\n        nop"
     ipl = chance.randrange(1, 8) << 5
@@ -182,14 +188,14 @@ def _guards(chance: Chance, _n: int) -> str:
 
 
 def _traps(chance: Chance, _n: int) -> str:
-    """An address error or a division by zero, now and then: exceptions of that kind are Python's."""
+    """Cause an address error or a division by zero in some rounds; Python handles these exceptions."""
     odd, zero = "\n        mov     #1, w0\n        mov     [w0], w0", "\n        mov     #0, w4\n        mov     #7, w5"
     trap = chance.choice((odd, f"{zero}\n        repeat  #17\n        div.u   w5, w4"))
     return f"\n        mov     _turns, w0\n        and     w0, #31, w0\n        bra     nz, 6f{trap}\n6:      nop"
 
 
 def _asks(chance: Chance, _n: int) -> str:
-    """An interrupt by software, another priority."""
+    """Request an interrupt by software, or change a priority."""
     return chance.choice(
         (
             f"\n        mov     #{chance.randrange(8) << 12 | 0x444:#x}, w0\n        mov     w0, IPC0",
@@ -201,7 +207,7 @@ def _asks(chance: Chance, _n: int) -> str:
 
 
 def _ends(chance: Chance, _n: int) -> str:
-    """For good, or not: after some turns."""
+    """Reset or stop for good after some rounds."""
     what = chance.choice(
         (
             "reset",
@@ -223,11 +229,11 @@ PIECES: Final = ((_looks, 8), (_awaits_line, 1), (_waits, 3), (_idles, 2), (_sle
 
 
 FAST: Final = {"PO3030K": ((0x4E, 0x0C), (0x1D, 0x00), (0x20, 0x33))}
-"""Registers that make pictures come fast, where they do not from power-on."""
+"""Registers that raise the frame rate of cameras that are slow after power-on."""
 
 
 def program(chance: Chance, sensor: str) -> str:
-    """A program that goes through some pieces again and again, for a robot with a camera of this kind."""
+    """Return a program that repeats random pieces, for a robot with a camera of this kind."""
     makers = [maker for maker, _ in PIECES]
     numbers = iter(range(1000))
 

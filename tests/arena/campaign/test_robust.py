@@ -21,7 +21,7 @@ from arena.replay.live_feed import Follower, LiveFile, live_path
 from arena.replay.page import page
 from arena.scene.loader import load_scene, scripted
 from arena.trial import versions
-from arena.trial.json_numbers import misfit
+from arena.trial.json_numbers import mismatch
 from arena.trial.record import RecordError, read_trial
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -298,7 +298,7 @@ def test_a_scheduler_that_dies_is_one_line_and_what_is_finished_stays(tmp_path: 
 )
 def test_the_first_thing_that_is_wrong_with_a_json_text(value: object, wrong: str) -> None:
     """The first wrong value in the metadata of a record is named."""
-    assert misfit(value, {"seed": int, "faults": [(int, float, str)], "note?": str}) == wrong
+    assert mismatch(value, {"seed": int, "faults": [(int, float, str)], "note?": str}) == wrong
 
 
 @pytest.mark.parametrize(

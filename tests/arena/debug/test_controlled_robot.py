@@ -197,9 +197,7 @@ def test_an_unknown_robot_is_refused(capsys: pytest.CaptureFixture[str]) -> None
     assert "no firmware" in capsys.readouterr().err
 
 
-def test_logged_inputs_reproduce_the_past_to_the_bit(
-    tmp_path: Path, tmp_path_factory: pytest.TempPathFactory
-) -> None:
+def test_logged_inputs_reproduce_the_past_to_the_bit(tmp_path: Path, tmp_path_factory: pytest.TempPathFactory) -> None:
     """The past of a robot runs again from logged inputs: levels of infrared sensors and the stored light."""
     image = built_once(tmp_path_factory, "avoidance")
     plan = Plan(load_scene("avoidance"), "avoidance", "A", None, 1, 1.0, 3, None, (("avoidance", image),))

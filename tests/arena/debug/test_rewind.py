@@ -131,9 +131,7 @@ def test_without_checkpoints_a_trial_runs_again(tmp_path: Path, image_of: Callab
 
 
 @needs_fork
-def test_changes_are_repeated_after_a_checkpoint(
-    tmp_path: Path, image_of: Callable[[str], Path]
-) -> None:
+def test_changes_are_repeated_after_a_checkpoint(tmp_path: Path, image_of: Callable[[str], Path]) -> None:
     """Changes before and after a checkpoint are repeated; a rewind to before a change discards it."""
     with session_of(plan_of(FEW, 7, image_of), tmp_path, every_s=0.1) as (session, debugger):
         plain = debugger.to(4_000_000)

@@ -331,7 +331,7 @@ def test_receivers_are_first_order_low_passes_for_any_order_of_queries() -> None
         truth[cycle] = lit + (share - lit) * math.exp(-(cycle - now) / tau)
     for shuffled in (False, True):
         channel = OpticalChannel(1, quantum, tau=tau)
-        channel.slowest = switches[-600]
+        channel.horizon = switches[-600]
         for number, cycle in enumerate(switches):
             channel.switch(0, cycle, 3, lit=number % 2 == 0)
         order = rng.sample(asked, len(asked)) if shuffled else asked
@@ -406,7 +406,7 @@ def lit_of_frames(scene: Scene, seed: int, share: float) -> list[list[int]]:
     scan, frame = FCY // 4096, "111111" + "".join("0" * dark + "1" for dark in (1, 4, 9, 15, 20, 4, 5, 12))
     found = []
     for start in range(FCY // 10, FCY // 10 * 31, FCY // 10):
-        channel.slowest = start
+        channel.horizon = start
         channel.switch(1, start - 12 * scan, 2, True)
         channel.switch(1, start - 9 * scan, 2, False)
         for place, (bit, before) in enumerate(zip(frame + "0", "0" + frame, strict=True)):
@@ -477,7 +477,7 @@ def test_native_light_equals_the_reference_to_the_bit(scene: Scene) -> None:
                 cycles.append(at)
                 lit.append(lit[-1] ^ 1 << line)
         last = max(cycles[-1] for cycles, _ in tracks.values())
-        channel.slowest = last - 200_000
+        channel.horizon = last - 200_000
         board.ir.events.now = now = last - 100_000
         ring.begin_quantum(poses)
         board.ir._level(0, now - 4000)

@@ -231,7 +231,7 @@ def test_reaction_refuses_firmware_without_the_word_or_without_wheels(
 ) -> None:
     """Exit status 2; the message names the word, or reports that the firmware stopped."""
     assert main(["reaction", "--brain", str(talking_image)]) == 2
-    assert "--word names the word" in capsys.readouterr().err
+    assert "name the word that holds" in capsys.readouterr().err
     assert main(["reaction", "--brain", str(talking_image), "--word", "nothing"]) == 2
     assert "no word 'nothing' to watch" in capsys.readouterr().err
     assert main(["reaction", "--brain", str(talking_image), "--word", "PORTD"]) == 2

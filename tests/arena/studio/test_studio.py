@@ -146,9 +146,7 @@ def test_commands_during_a_rewind_discard_later_actions() -> None:
 
 
 @pytest.mark.skipif(not checkpoints.CAN_FORK, reason="checkpoints exist on Linux only")
-def test_a_checkpoint_restores_the_state_to_the_byte(
-    clustering_image: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_checkpoint_restores_the_state_to_the_byte(clustering_image: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A checkpoint continues as the first pass did, with an object moved after each checkpoint.
 
     A rewind discards later checkpoints and actions, and keeps breakpoints. All processes end with the studio."""

@@ -105,9 +105,7 @@ def test_without_slip_limit_the_drive_is_enkis(empty: Scene) -> None:
 
 
 @pytest.mark.parametrize(("quantum_ms", "thrust_n"), [(1.0, 1.0), (10.0, 1.0), (10.0, math.inf)])
-def test_objects_at_rest_out_of_the_solver_change_no_position(
-    quantum_ms: float, thrust_n: float
-) -> None:
+def test_objects_at_rest_out_of_the_solver_change_no_position(quantum_ms: float, thrust_n: float) -> None:
     """Robots push crowded objects, and bodies are moved by hand now and then. Equal to the bit."""
     scene = load_scene("clustering").with_values(
         arena__width_cm=100.0, arena__height_cm=80.0, robots__count=4, robots__thrust_n=thrust_n, objects__count=14,
