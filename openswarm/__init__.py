@@ -1,2 +1,5 @@
-"""The command `openswarm`: sets up projects, tells what is installed, says where things lie. The wheel's copy of the
-kernel (`firmware/`), CMake's toolchain file (`cmake/`) and the files of a new project (`template/`) are beside it."""
+"""The command `openswarm`: project set-up, diagnosis of the installation, flashing, paths for build files.
+
+The folder also has CMake's toolchain file (`cmake/`), the files of a new project (`template/`) and, in a wheel, a copy
+of the kernel (`firmware/`).
+"""

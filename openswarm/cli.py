@@ -1,5 +1,7 @@
-"""The command line `openswarm`. A command is a module of `commands/` with `parser()` and `run(options) -> exit status`,
-imported only when it is asked for."""
+"""The command line `openswarm`: finds the command's module, parses its options and runs it.
+
+A command is a module of `commands/` with `parser()` and `run(options) -> exit status`, imported only when it is used.
+"""
 
 from __future__ import annotations
 
@@ -14,12 +16,12 @@ from emu.host.exit_status import BAD_INPUT, DONE, INTERRUPTED, ignore_unread_out
 
 COMMANDS: Final = {
     "new": "set up a project: Makefile, CMake, main.c, a test, settings for VS Code",
-    "doctor": "tell what is installed, what is missing and what that disables",
-    "program": "build a program that robots take while they run",
+    "doctor": "list what is installed, what is missing and what that disables",
+    "program": "build a program that running robots can receive",
     "flash": "write an image into a robot through its boot loader",
     "clean": "empty the cache",
     "path": "print where the kernel, CMake's toolchain file, the cache or Python are",
-    "completion": "print what makes a shell complete these commands and their options",
+    "completion": "print the shell completion of these commands and their options",
 }
 _USAGE: Final = """usage: openswarm COMMAND [options]
 
@@ -28,29 +30,29 @@ _USAGE: Final = """usage: openswarm COMMAND [options]
 The others are `toolchain` (compiler, assembler, linker), `emu` (emulator) and `arena` (several robots in a world).
 
 example: openswarm new myrobot
-`openswarm COMMAND --help` explains a command; `openswarm --version` tells the version."""
+`openswarm COMMAND --help` explains a command; `openswarm --version` prints the version."""
 
 
 class Command(Protocol):
-    """What a module of `commands/` has."""
+    """Interface of a module of `commands/`."""
 
     @staticmethod
     def parser() -> ArgumentParser:
-        """Its options."""
+        """Return the parser of the command's options."""
 
     @staticmethod
     def run(options: Namespace) -> int:
-        """Do it. Raises ValueError or OSError for what the caller can mend."""
+        """Run the command. Raises ValueError or OSError for errors that the user can fix."""
 
 
 def command(name: str) -> Command:
-    """The module of a command."""
+    """Return the module of a command."""
     return cast(Command, import_module(f"openswarm.commands.{name}"))
 
 
 @ignore_unread_output
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one command; returns the exit status."""
+    """Run one command and return the exit status."""
     words = list(sys.argv[1:] if arguments is None else arguments)
     try:
         return _answer(words)

@@ -1,5 +1,5 @@
-// Starts the debugger of the Python package and shows what the protocol has no view for: registers by peripheral and bit
-// field, and the time. Everything comes from requests of the Debug Adapter Protocol; nothing is installed or fetched.
+// Starts the Python package's debugger and adds views that the protocol lacks: registers by peripheral and bit field, and
+// the simulated time. All data come from requests of the Debug Adapter Protocol; nothing is installed or downloaded.
 const { execFile } = require('child_process');
 const vscode = require('vscode');
 
@@ -102,7 +102,7 @@ class Registers {
         try {
             return (await this.session.customRequest('sfrs')).groups;
         } catch {
-            return []; // it runs
+            return []; // the program is running
         }
     }
 
@@ -164,7 +164,7 @@ function activate(context) {
                     if (message.type === 'event' && message.event === 'stopped') {
                         stands(session).catch(gone);
                     } else if (message.type === 'event' && message.event === 'invalidated') {
-                        tick(session).catch(gone); // the robot stands where it stood, which is the present now
+                        tick(session).catch(gone); // the robot did not move; its time is the present time now
                     }
                 },
                 onWillStopSession: gone,

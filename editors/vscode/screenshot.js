@@ -1,6 +1,6 @@
-// The picture of docs/debugging.md, from a real VS Code in headless Chromium: node screenshot.js URL FILE.png
-// URL is code-server's (npm; its native modules want `npm rebuild`) with ?folder= of a project in which main.c is
-// tests/emu/dap/program.c, built with -g -O0 to build/firmware.elf; the .vsix is installed there. Needs playwright-core.
+// Makes the picture of docs/debugging.md with VS Code in headless Chromium: node screenshot.js URL FILE.png
+// URL is that of code-server (npm; its native modules need `npm rebuild`) with ?folder= of a project whose main.c is
+// tests/emu/dap/program.c, built with -g -O0 to build/firmware.elf; the .vsix is installed in it. Needs playwright-core.
 const { chromium } = require('playwright-core');
 
 const [url, file] = process.argv.slice(2);

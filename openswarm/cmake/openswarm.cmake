@@ -17,10 +17,10 @@ find_program(CMAKE_OBJDUMP dspic-objdump REQUIRED)
 find_program(OPENSWARM_HEX dspic-hex REQUIRED)
 find_program(OPENSWARM_COMMAND openswarm REQUIRED)
 set(CMAKE_ASM_COMPILER ${CMAKE_C_COMPILER})
-set(CMAKE_ASM_COMPILER_ID_RUN TRUE)  # CMake does not know how to ask; it would try every assembler it knows
+set(CMAKE_ASM_COMPILER_ID_RUN TRUE)  # skips CMake's identification, which does not know this assembler
 set(CMAKE_ASM_COMPILER_ID Clang)
 
-# without start-up code's main nothing links, so CMake's trials only compile
+# CMake's trials only compile, because they could not link without main
 set(CMAKE_TRY_COMPILE_TARGET_TYPE STATIC_LIBRARY)
 set(CMAKE_EXECUTABLE_SUFFIX_C .elf)
 set(CMAKE_EXECUTABLE_SUFFIX_ASM .elf)

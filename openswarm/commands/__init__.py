@@ -1,4 +1,4 @@
-"""One module per command of `openswarm`; see `openswarm.cli` for what a command module must have."""
+"""Commands of `openswarm`, one module each; `openswarm.cli.Command` is their interface."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import argparse
 
 
 def made_parser(command: str, description: str, example: str) -> argparse.ArgumentParser:
-    """An empty parser for a command, with its description kept as written and an example."""
+    """Return a parser without options that prints the description verbatim and an example."""
     return argparse.ArgumentParser(
         prog=f"openswarm {command}",
         description=description,

@@ -1,4 +1,4 @@
-"""`openswarm clean`: empties the cache. Only what these tools have put there themselves goes."""
+"""`openswarm clean`: empties the cache. It removes only files that these tools have put there."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ KINDS: Final = {
 }
 DESCRIPTION: Final = """\
 Empty the cache: native code the emulator has made, the compiler's run-time library, images that `arena` has built.
-All of it is made again when it is needed. The cache is $OPENSWARM_CACHE, else `openswarm` in the user's cache folder
+The tools rebuild each file on demand. The cache is $OPENSWARM_CACHE, else `openswarm` in the user's cache folder
 ($XDG_CACHE_HOME or ~/.cache); other files in that folder stay.
 
 Exit status: 0 done, 2 a file could not be removed."""
 
 
 def parser() -> argparse.ArgumentParser:
-    """The options of the command."""
+    """Return the parser of the command's options."""
     made = made_parser("clean", DESCRIPTION, "openswarm clean --dry-run")
     made.add_argument("--cache", type=Path, metavar="DIR", help="empty this cache instead")
     made.add_argument("--dry-run", action="store_true", help="only tell what would go")
@@ -36,7 +36,7 @@ def parser() -> argparse.ArgumentParser:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Exit status as DESCRIPTION says. Raises OSError for what cannot be removed."""
+    """Empty the cache; return the exit status. Raises OSError for a file that cannot be removed."""
     root: Path = options.cache if options.cache is not None else paths.cache()
     told = {}
     for kind, where in KINDS.items():

@@ -1,4 +1,4 @@
-"""`openswarm completion`: what makes a shell complete the commands and their options."""
+"""`openswarm completion`: prints the shell completion of the commands and their options."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from openswarm.commands import made_parser
 
 
 def parser() -> argparse.ArgumentParser:
-    """The options of the command."""
+    """Return the parser of the command's options."""
     made = made_parser("completion", description("openswarm"), "openswarm completion bash")
     made.add_argument("shell", choices=SHELLS, help="which shell")
     return made
 
 
 def run(options: argparse.Namespace) -> int:
-    """Exit status 0."""
+    """Print the completion script; return exit status 0."""
     from openswarm.cli import COMMANDS, command
 
     print(script("openswarm", {name: (command(name).parser(), text) for name, text in COMMANDS.items()}, options.shell))

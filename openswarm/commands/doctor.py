@@ -1,4 +1,4 @@
-"""`openswarm doctor`: what is installed, what is missing and what that disables."""
+"""`openswarm doctor`: lists what is installed, what is missing and what that disables."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ from emu.host.exit_status import DONE, FAULT
 from openswarm.commands import made_parser
 
 DESCRIPTION: Final = """\
-Tell what is installed, what is missing and what that disables. With --try also compile a program and run it.
+List what is installed, what is missing and what that disables. With --try also compile a program and run it.
 
-Exit status: 0 what every project needs is there, 1 it is not."""
+Exit status: 0 everything that every project needs is installed, 1 something is missing."""
 
 EXTRAS: Final = {
     "arena": "`arena`: several robots in one world, experiments, figures",
@@ -34,12 +34,12 @@ EXTRAS: Final = {
     "test": "this project's own tests",
     "docs": "this project's documentation site",
 }
-"""What stops working without an extra."""
+"""Features that need an extra."""
 
 
 @dataclass(frozen=True, slots=True)
 class Program:
-    """A program of the system: its names, the Debian package it is in, and what needs it."""
+    """An external program: its names, its Debian package, and the feature that needs it."""
 
     names: tuple[str, ...]
     package: str
@@ -68,14 +68,14 @@ class Finding:
     kind: str
     name: str
     found: str
-    """Version or place; empty if it is missing."""
+    """Version or path; empty if it is missing."""
     purpose: str
     remedy: str
     is_needed: bool
 
 
 def parser() -> argparse.ArgumentParser:
-    """The options of the command."""
+    """Return the parser of the command's options."""
     made = made_parser("doctor", DESCRIPTION, "openswarm doctor --json")
     made.add_argument("--try", dest="tries", action="store_true", help="compile and run a program (some seconds)")
     made.add_argument("--json", action="store_true", help="the findings as data")
@@ -83,7 +83,7 @@ def parser() -> argparse.ArgumentParser:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Exit status as DESCRIPTION says."""
+    """Print the findings; return the exit status."""
     findings = [*packages(), *programs(), cache()]
     if options.tries:
         findings.append(trial())
@@ -101,12 +101,12 @@ def run(options: argparse.Namespace) -> int:
         where = "a checkout" if paths.in_checkout() else "an installed package"
         print(f"openswarm {version('openswarm')} from {where}, Python {platform.python_version()}")
         for one in findings:
-            print(told(one))
+            print(formatted(one))
     return DONE if is_whole else FAULT
 
 
-def told(one: Finding) -> str:
-    """A finding as one or two lines."""
+def formatted(one: Finding) -> str:
+    """Return a finding as one or two lines of text."""
     if one.found:
         return f"  ok       {one.name:18} {one.found}"
     lost = f"needed for {one.purpose}" if one.is_needed else f"not without it: {one.purpose}"
@@ -115,7 +115,7 @@ def told(one: Finding) -> str:
 
 
 def packages() -> Iterator[Finding]:
-    """The packages of Python: each that is needed, and each extra as a whole."""
+    """Yield a finding for each required Python package and for each extra as a whole."""
     wanted: dict[str, list[str]] = {}
     for line in requires("openswarm") or ():
         name = re.match(r"[\w.-]+", line)
@@ -140,7 +140,7 @@ def _version(package: str) -> str:
 
 
 def programs() -> Iterator[Finding]:
-    """Programs of the system."""
+    """Yield a finding for each external program."""
     for one in PROGRAMS:
         found = next((place for name in one.names if (place := shutil.which(name))), "")
         remedy = f"Debian package {one.package}" if one.package else ""
@@ -148,7 +148,7 @@ def programs() -> Iterator[Finding]:
 
 
 def cache() -> Finding:
-    """Whether the cache can be written; without it everything works, slower."""
+    """Return whether the cache is writable; without it everything works, but more slowly."""
     folder = paths.cache()
     there = next(one for one in (folder, *folder.parents) if one.exists())
     is_open = there.is_dir() and os.access(there, os.W_OK | os.X_OK)
@@ -157,7 +157,7 @@ def cache() -> Finding:
 
 
 def trial() -> Finding:
-    """One program through compiler, linker and emulator."""
+    """Compile, link and run one program."""
     with tempfile.TemporaryDirectory(prefix="openswarm-doctor-") as name:
         source, image = Path(name) / "main.c", Path(name) / "main.elf"
         source.write_text('#include <stdio.h>\nint main(void) { printf("%d", 6 * 7); return 3; }\n')

@@ -1,4 +1,4 @@
-"""`openswarm flash`: an image into a robot, by its boot loader and a serial port; or a program into one that runs."""
+"""`openswarm flash`: writes an image into a robot through its boot loader, or sends a program to a running robot."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from emu.host.exit_status import DONE, FAULT
 from emu.image.loader import load_image
 from emu.image.model import Image
 from openswarm.commands import made_parser
+from openswarm.flashing.boot_session import BootSession, RobotError
 from openswarm.flashing.loaders import BAUD, LOADERS
 from openswarm.flashing.program import Program, is_program, program_of
-from openswarm.flashing.rows import checked, left_out, rows
+from openswarm.flashing.rows import checked, rows, unwritten_parts
 from openswarm.flashing.serial import SerialPort
-from openswarm.flashing.spreading import Neighbour
-from openswarm.flashing.talk import RobotError, Talk
+from openswarm.flashing.spreading import HostNeighbour
 
 WAIT_SECONDS: Final = 30.0
 _NAMES: Final = " or ".join(one.name for one in LOADERS.values())
@@ -27,26 +27,26 @@ DESCRIPTION: Final = f"""\
 Write an image into a robot's flash through its boot loader ({_NAMES}), over Bluetooth or a cable at
 {BAUD:,} baud, and start it. Press the robot's reset button when it says so.
 
-The loader's own rows are never written, and neither are configuration words and data EEPROM. What was cut off in the
-middle leaves the robot waiting in its boot loader: run the command again.
+The command never writes the loader's own rows, configuration words and data EEPROM. After an interrupted transfer the
+robot waits in its boot loader: run the command again.
 
-A program that `openswarm program` has built goes to a robot that runs firmware with `DEVICES := update`, which checks
-and activates it, and passes it on to its neighbours (docs/programs.md): no reset.
+A program built by `openswarm program` needs no reset: the command sends it to a robot whose running firmware has
+`DEVICES := update`. The robot checks and activates it and passes it on to its neighbours (docs/programs.md).
 
 Exit status: 0 written, every row acknowledged, 1 the robot does not answer or refuses it, 2 bad image or port."""
 
 
 def parser() -> argparse.ArgumentParser:
-    """The options of the command."""
+    """Return the parser of the command's options."""
     made = made_parser("flash", DESCRIPTION, "openswarm flash build/firmware.hex --port /dev/rfcomm0")
     made.add_argument("image", metavar="IMAGE", help="ELF executable or Intel HEX file, or a program")
     made.add_argument("--port", required=True, metavar="DEVICE", help="serial port: /dev/rfcomm0, /dev/ttyUSB0, a pty")
     made.add_argument(
         "--wait", type=_seconds, default=WAIT_SECONDS, metavar="S",
-        help=f"how long to wait for the boot loader to answer, or the robot that runs (default {WAIT_SECONDS:g})",
+        help=f"time to wait for an answer of the boot loader or of the running robot (default {WAIT_SECONDS:g})",
     )  # fmt: skip
-    made.add_argument("--store", action="store_true", help="of a program: do not activate it")
-    made.add_argument("--json", action="store_true", help="what was done as data, for scripts")
+    made.add_argument("--store", action="store_true", help="programs only: store without activation")
+    made.add_argument("--json", action="store_true", help="print the result as JSON")
     return made
 
 
@@ -61,40 +61,40 @@ def _seconds(text: str) -> float:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Exit status as DESCRIPTION says. Raises ValueError or OSError for a bad image or port."""
+    """Flash the image; return the exit status. Raises ValueError or OSError for a bad image or port."""
     image = load_image(options.image)
     if is_program(image):
         return _with_robot(options, _Spreading(options, program_of(image)))
     if options.store:
         raise ValueError(f"{image.path}: --store is for programs that `openswarm program` has built")
     checked(image)
-    for what in left_out(image):
+    for what in unwritten_parts(image):
         print(f"openswarm flash: note: {what} of the image are not written; a programmer does that", file=sys.stderr)
     return _with_robot(options, _Loading(options, image))
 
 
 class _Job(Protocol):
-    """A way for an image into a robot."""
+    """One transfer of an image into a robot."""
 
     wanted: str
-    """What is looked for at the port."""
+    """The expected peer at the port, for messages."""
     hint: str
-    """And what the user may do that it is found."""
+    """What the user can do to make the peer answer."""
     keeps: str
-    """What becomes of rows when the rest does not come."""
+    """State of the robot after an interrupted transfer."""
 
     def converse(self, line: SerialPort, progress: Callable[[int, int], None]) -> None:
-        """Until the robot has it. Raises RobotError, or OSError of the port."""
+        """Transfer the image. Raises RobotError, or OSError of the port."""
 
     def facts(self) -> dict[str, object]:
-        """What was done, for scripts."""
+        """Return the result as data."""
 
-    def told(self, seconds: float) -> str:
-        """The same in words."""
+    def summary(self, seconds: float) -> str:
+        """Return the result as text."""
 
 
 class _Loading:
-    """Firmware, through a boot loader."""
+    """Transfer of firmware through a boot loader."""
 
     wanted = "a boot loader"
     hint = ": press reset"
@@ -105,23 +105,23 @@ class _Loading:
         self._image: Final = image
 
     def converse(self, line: SerialPort, progress: Callable[[int, int], None]) -> None:
-        self._talk = Talk(line, self._options.wait)
-        self._rows = rows(self._image, self._talk.loader)
-        self._talk.write(self._rows, progress)
-        self._talk.start()
+        self._session = BootSession(line, self._options.wait)
+        self._rows = rows(self._image, self._session.loader)
+        self._session.write(self._rows, progress)
+        self._session.start()
 
     def facts(self) -> dict[str, object]:
-        loader = asdict(self._talk.loader)
-        return {"image": self._image.path, "loader": loader, "rows": len(self._rows), **asdict(self._talk.counts)}
+        loader = asdict(self._session.loader)
+        return {"image": self._image.path, "loader": loader, "rows": len(self._rows), **asdict(self._session.counts)}
 
-    def told(self, seconds: float) -> str:
-        again = self._talk.counts.blocks - len(self._rows)
+    def summary(self, seconds: float) -> str:
+        again = self._session.counts.blocks - len(self._rows)
         return (f"{self._image.path} is in the robot: {len(self._rows)} rows, {again} sent again, {seconds:.1f} s;"
-                f" boot loader {self._talk.loader.name}")  # fmt: skip
+                f" boot loader {self._session.loader.name}")  # fmt: skip
 
 
 class _Spreading:
-    """A program, to firmware that runs."""
+    """Transfer of a program to running firmware."""
 
     wanted = "a robot that takes programs"
     hint = ""
@@ -133,7 +133,7 @@ class _Spreading:
         self._is_active = False
 
     def converse(self, line: SerialPort, progress: Callable[[int, int], None]) -> None:
-        self._neighbour = Neighbour(line, self._program, self._options.wait)
+        self._neighbour = HostNeighbour(line, self._program, self._options.wait)
         self._is_active = self._neighbour.give(progress)
         if not self._is_active and not self._options.store:
             self._neighbour.activate()
@@ -144,7 +144,7 @@ class _Spreading:
         facts = {"program": self._options.image, "version": made.version, "rows": len(made.rows), "crc": made.crc}
         return {**facts, "active": self._is_active, **asdict(self._neighbour.counts)}
 
-    def told(self, seconds: float) -> str:
+    def summary(self, seconds: float) -> str:
         made = self._program
         what = "in the robot and activated" if self._is_active else "in the robot"
         return (f"{self._options.image} is {what}: version {made.version}, {len(made.rows)} rows, CRC {made.crc:08X} as"
@@ -173,12 +173,12 @@ def _with_robot(options: argparse.Namespace, job: _Job) -> int:
     if options.json:
         print(json.dumps({**job.facts(), "port": options.port, "seconds": round(seconds, 3)}))
     else:
-        print(job.told(seconds))
+        print(job.summary(seconds))
     return DONE
 
 
 class _Progress:
-    """Hears how many rows of how many are done: one line that is written over on a terminal, nothing elsewhere."""
+    """Progress display: one line that is overwritten on a terminal, no output elsewhere."""
 
     def __init__(self) -> None:
         self._done = self._total = 0
@@ -190,12 +190,12 @@ class _Progress:
             print(f"\r{done} of {total} rows", end="\n" if done == total else "", file=sys.stderr, flush=True)
 
     def end(self) -> None:
-        """What follows has a line of its own."""
+        """End the progress line."""
         if self._shows and self._done != self._total:
             print(file=sys.stderr)
 
     def reached(self, keeps: str) -> str:
-        """What the robot has when the rest does not come."""
+        """Return the state of the robot after an interrupted transfer."""
         if not self._done:
             return "no row is written"
         if self._done == self._total:

@@ -15,7 +15,7 @@ from openswarm.commands import made_parser
 
 TEMPLATE: Final = Path(__file__).resolve().parents[1] / "template"
 HIDDEN: Final = {"vscode": ".vscode", "gitignore": ".gitignore"}
-"""Names of the template that begin with a point in a project: build tools leave hidden files out of packages."""
+"""Template files whose project name begins with a dot: build tools omit hidden files from packages."""
 NAME: Final = "@PROJECT@"
 DESCRIPTION: Final = """\
 Set up a project in a new folder: an application of OpenSwarm in src/, a Makefile, CMakeLists.txt, a test that runs the
@@ -26,14 +26,14 @@ Exit status: 0 done, 2 the folder exists or cannot be made."""
 
 
 def parser() -> argparse.ArgumentParser:
-    """The options of the command."""
+    """Return the parser of the command's options."""
     made = made_parser("new", DESCRIPTION, "openswarm new myrobot")
     made.add_argument("folder", type=Path, help="where; its last part is the project's name (a-z, 0-9, - and _)")
     return made
 
 
 def run(options: argparse.Namespace) -> int:
-    """Exit status 0. Raises ValueError for a name that cannot be one, OSError if the folder cannot be made."""
+    """Create the project; return exit status 0. Raises ValueError for an invalid name, OSError for the folder."""
     folder: Path = options.folder
     name = folder.resolve().name
     if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_-]*", name):
@@ -48,7 +48,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def create(folder: Path, name: str) -> None:
-    """All files of the template with the project's name in them, or nothing."""
+    """Copy the template with the project's name into a folder, completely or not at all."""
     folder.parent.mkdir(parents=True, exist_ok=True)
     scratch = Path(tempfile.mkdtemp(prefix=f".{name}.", dir=folder.parent))
     try:

@@ -1,4 +1,4 @@
-"""`openswarm program`: C into a program that reaches robots while they run, linked for its slot."""
+"""`openswarm program`: builds a program that running robots can receive, linked for the run slot."""
 
 from __future__ import annotations
 
@@ -18,27 +18,27 @@ from openswarm.flashing.loaders import ROW_BYTES
 from openswarm.flashing.program import LAST_VERSION, RAM, ROWS, SLOT, VERSION_SYMBOL, Program, program_of
 
 DESCRIPTION: Final = f"""\
-Build a program for firmware with `DEVICES := update`: up to {ROWS} rows of 32 instructions that robots take while they
-run, keep without power and pass on to each other. Its `main` is called at each start of the firmware and returns;
-handlers and threads that it has started go on. It has {RAM.size} bytes of RAM for its variables and constants, calls
-the kernel by the jump table of the firmware (board/epuck/update/update_calls.inc), and has no interrupts of its own.
+Build a program for firmware with `DEVICES := update`: up to {ROWS} rows of 32 instructions that robots receive while
+they run, store in flash and pass on to each other. The firmware calls its `main` at each start; `main` returns, and the
+handlers and threads that it has started continue. The program has {RAM.size} bytes of RAM for variables and constants,
+calls the kernel through the firmware's jump table (board/epuck/update/update_calls.inc), and has no interrupts.
 
     #include <openswarm_io.h>
     int main(void) {{ return Sys_Set_LED(SYS_LED_BODY, true); }}
 
-docs/programs.md tells the rest.
+See docs/programs.md.
 
 Exit status: 0 built, 1 errors in the C source, 2 anything else, as what is too large for the slot."""
 _FOLDERS: Final = ("include", "hal", "kernel", "io", "port/dspic30f", "board/epuck", "board/epuck/update")
 
 
 def parser() -> argparse.ArgumentParser:
-    """The options of the command."""
+    """Return the parser of the command's options."""
     made = made_parser("program", DESCRIPTION, "openswarm program lamp.c --version 2 -o lamp.elf")
     made.add_argument("sources", nargs="+", metavar="FILE", help="C, C++ and assembly, objects and libraries")
     made.add_argument(
         "--version", type=_version, required=True, metavar="N",
-        help=f"robots take it if it is above what they have (1 to {LAST_VERSION}, behind which there is none)",
+        help=f"1 to {LAST_VERSION}; robots accept only versions greater than the one they have",
     )  # fmt: skip
     made.add_argument("-o", "--output", type=Path, default=Path("program.elf"), metavar="FILE",
                       help="ELF (default program.elf)")  # fmt: skip
@@ -57,7 +57,7 @@ def _version(text: str) -> int:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Exit status as DESCRIPTION says. Raises ValueError or OSError for files that cannot be used."""
+    """Build the program; return the exit status. Raises ValueError or OSError for unusable files."""
     from toolchain.driver.driver import main as cc
 
     output: Path = options.output
@@ -95,7 +95,7 @@ def _tell(options: argparse.Namespace, image: Image, made: Program) -> None:
 
 
 def header(name: str, source: str, made: Program) -> str:
-    """C that an application includes which brings the program along."""
+    """Return C source with the program's rows, for an application that contains the program."""
     array = re.sub(r"\W", "_", name)
     rows = ",\n".join(f"    {{{', '.join(f'0x{byte:02X}' for byte in row)}}}" for row in made.rows)
     declared = f"static const uint8 {array}[][{ROW_BYTES}]"

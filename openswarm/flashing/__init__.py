@@ -1,1 +1,1 @@
-"""How an image gets into a robot by its boot loader: which rows, in which order, over which line."""
+"""Transfer of images to robots: rows and their order, serial port, boot loader session, update messages."""

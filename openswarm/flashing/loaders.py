@@ -1,8 +1,8 @@
-"""Boot loaders of tinybld's kind, and the blocks that they take. A leaf beside the chip's numbers.
+"""Boot loaders of the tinybld family and their block format.
 
-The host says 0xC1, the robot its type and 'K'. A block is four bytes, the data of a row, and a byte that makes the sum
-of all of them 0 (mod 256); the robot answers 'K' when the row is written and 'N' when the sum was wrong. This is how
-tinybld's published source for the dsPIC (C. Chiculita) and the e-puck's variant of it read; no robot was asked.
+The host sends 0xC1; the robot answers with its type and 'K'. A block has four bytes, the data of a row, and a byte that
+makes the sum of all bytes 0 (mod 256). The robot answers 'K' when the row is written and 'N' if the sum is wrong.
+Sources: tinybld's published code for the dsPIC (C. Chiculita) and the e-puck's variant of it; unverified on a robot.
 """
 
 from __future__ import annotations
@@ -17,44 +17,46 @@ ROW_WORDS: Final = 32
 ROW_UNITS: Final = 2 * ROW_WORDS
 """PC units of a row."""
 ROW_BYTES: Final = 3 * ROW_WORDS
-"""Of a row on its way: three for each word, the lowest first."""
+"""Bytes of a row in a block: three for each word, the lowest first."""
 BAUD: Final = 115_200
 PATIENCE_SECONDS: Final = 1.4
-"""A loader that hears nothing for so long gives up and starts the program: 1 s by its comments, up to 1.4 s by the
-instructions of its loop."""
+"""Time without a byte after which a loader starts the program: 1 s by its comments, up to 1.4 s by its instructions."""
 
 ADDRESS_ORDER: Final = "little"
-"""UNVERIFIED on a robot: lowest byte first, as tinybld's source says (its block is L, H, U, count). To a loader that
-read the other way the lowest byte, a multiple of 0x40, would be the page: never page 1, where loaders lie. It could
-not be harmed, and the program would not start."""
+"""UNVERIFIED on a robot: lowest byte first, by tinybld's source (its block is L, H, U, count). A loader with the
+opposite order would take the lowest byte, a multiple of 0x40, as the page. That is never page 1, where loaders are. The
+loader would stay intact, and the program would not start."""
 _DATA_COMMAND: Final = ROW_BYTES
-"""Fourth byte of a block with data. tinybld wants the number of bytes there, the e-puck's variant only looks for
+"""Fourth byte of a block with data. tinybld expects the number of bytes; the e-puck's variant checks only for
 `_END_COMMAND`."""
 _END_COMMAND: Final = 0xFF
 _END_ADDRESS: Final = 1
-"""The e-puck's loader shows an LED for some 13 ms times the low half of this before it starts the program, and for ever
-if that is 0."""
+"""The e-puck's loader lights an LED for some 13 ms times the low half of this value before it starts the program, and
+for ever if the low half is 0."""
 
 
 @dataclass(frozen=True, slots=True)
 class Loader:
-    """A boot loader that lies in flash from `start` to the end. Word 0 leads to it, and it starts the program with a
-    jump to `start` - 8, where the host has put the program's own GOTO."""
+    """A boot loader in flash from `start` to the end.
+
+    Word 0 jumps to the loader. It starts the program by a jump to `start` - 8, where the host has put the program's
+    GOTO.
+    """
 
     type: int
-    """What it answers to HELLO."""
+    """Its answer to HELLO."""
     name: str
     start: int
     """Program address of its first row."""
 
     @property
     def entry(self) -> int:
-        """Where the program's GOTO belongs: two words, and two that are not used."""
+        """Address of the program's GOTO: two words, followed by two unused ones."""
         return self.start - 8
 
     @property
     def entry_row(self) -> int:
-        """The row of the entry. Before the loader, and the image may fill the rest of it."""
+        """Address of the row with the entry. It precedes the loader; the image may use the rest of it."""
         return self.entry // ROW_UNITS * ROW_UNITS
 
 
@@ -68,12 +70,12 @@ LOADERS: Final = {
 
 
 def block(address: int, words: list[int]) -> bytes:
-    """A row of `ROW_WORDS` program words for the row at `address`."""
+    """Return the block that writes `ROW_WORDS` program words to the row at `address`."""
     body = address.to_bytes(3, ADDRESS_ORDER) + bytes([_DATA_COMMAND])
     body += b"".join(word.to_bytes(3, "little") for word in words)
     return body + bytes([-sum(body) & 0xFF])
 
 
 def end() -> bytes:
-    """Start the program. There is no answer."""
+    """Return the block that starts the program. The loader does not answer it."""
     return _END_ADDRESS.to_bytes(3, ADDRESS_ORDER) + bytes([_END_COMMAND])

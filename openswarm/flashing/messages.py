@@ -1,8 +1,7 @@
-"""What robots and host say to each other about programs: messages of eight bytes, and their frames on a serial line.
+"""Codec of update messages (eight bytes) and of their frames on a serial line.
 
-What enters: facts, parts of a program, bytes. What leaves: the same in the other form; nothing for what is damaged. The
-other end is firmware/openswarm/io/update/spread.c, and io/framing.c for frames: COBS with a CRC-16/CCITT-FALSE, here
-between zeros. tests/firmware/update/test_update.py compares both.
+The peer is firmware/openswarm/io/update/spread.c, with io/framing.c for frames: COBS with a CRC-16/CCITT-FALSE, here
+between zeros. Damaged frames decode to nothing. tests/firmware/update/test_update.py compares both sides.
 """
 
 from __future__ import annotations
@@ -20,15 +19,15 @@ _ADVERTISEMENT, _REQUEST, _DATA = 0x80, 0xA0, 0xC0
 _IDENTITY: Final = 0x07FF
 _PART: Final = 5
 PARTS: Final = -(-ROW_BYTES // _PART)
-"""Of a row; the last one is a byte."""
+"""Parts of a row; the last one has one byte."""
 LONGEST_FRAME: Final = 255
-"""Of what may be a frame; a line of text without an end is not kept."""
+"""Maximum bytes of a frame. Longer input, such as a line of text without an end, is discarded."""
 _CRC_START: Final = 0xFFFF
 
 
 @dataclass(frozen=True, slots=True)
 class Advertisement:
-    """What a robot says it has; version 0: nothing."""
+    """The program that a robot advertises; version 0: none."""
 
     version: int
     rows: int
@@ -36,14 +35,14 @@ class Advertisement:
     is_active: bool
 
     def packed(self) -> bytes:
-        """As a message."""
+        """Return the encoded message."""
         head = bytes([_ADVERTISEMENT | self.is_active]) + self.version.to_bytes(2, "little") + bytes([self.rows])
         return head + self.crc.to_bytes(4, "little")
 
 
 @dataclass(frozen=True, slots=True)
 class Request:
-    """The parts of a row that a robot lacks: bit n is part n."""
+    """A robot's request for the missing parts of a row: bit n is part n."""
 
     version: int
     row: int
@@ -52,7 +51,7 @@ class Request:
 
 
 def read(message: bytes) -> Advertisement | Request | None:
-    """What a message says; None for those that a host has no use for."""
+    """Decode a message; return None for messages that a host ignores."""
     kind, row = message[0] & _KINDS, message[0] & _ROW
     version = int.from_bytes(message[1:3], "little")
     if kind == _ADVERTISEMENT:
@@ -64,29 +63,30 @@ def read(message: bytes) -> Advertisement | Request | None:
 
 
 NOTHING: Final = Advertisement(0, 0, 0xFFFFFFFF, False)
-"""Older than what any robot has, so each says what that is, and not the same as having nothing."""
+"""Advertisement of version 0, older than that of any robot, so that each robot answers with its own. It differs from
+that of a robot without a program."""
 
 
 def identity(crc: int) -> int:
-    """By which requests and data tell programs of one version from each other."""
+    """Return the bits of the CRC by which requests and data distinguish programs of one version."""
     return crc & _IDENTITY
 
 
 def data(program: Program, row: int, part: int) -> bytes:
-    """A part of a row as a message."""
+    """Return the message with one part of a row."""
     own = identity(program.crc)
     head = bytes([_DATA | row, part << 3 | own >> 8, own & 0xFF])
     return head + program.rows[row][part * _PART : (part + 1) * _PART].ljust(_PART, b"\0")
 
 
 def framed(message: bytes) -> bytes:
-    """A message between zeros."""
+    """Return the frame of a message, between zeros."""
     rest = message + binascii.crc_hqx(message, _CRC_START).to_bytes(2, "big")
     return b"\0" + b"".join(bytes([len(run) + 1]) + run for run in rest.split(b"\0")) + b"\0"
 
 
 def unframed(frame: bytes) -> bytes:
-    """The message of a frame without its zeros; empty for what is none, or damaged."""
+    """Return the message of a frame without its zeros; empty if it is no frame, or damaged."""
     out, at = b"", 0
     while at < len(frame):
         run = frame[at + 1 : at + frame[at]]

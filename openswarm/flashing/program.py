@@ -1,4 +1,4 @@
-"""Programs that come as updates (firmware/openswarm/io/update): what an image of one has to be, its rows, its CRC."""
+"""Programs for running robots (firmware/openswarm/io/update): checks of the image, its rows and CRC."""
 
 from __future__ import annotations
 
@@ -11,22 +11,22 @@ from emu.image.model import ERASED, Image
 from openswarm.flashing.loaders import ROW_BYTES, ROW_UNITS, ROW_WORDS
 
 SLOT: Final = Region("slot of programs", 0x00F800, 0x010000)
-"""Where they run, in PC units: board/epuck/update/update_slots.h."""
+"""Run slot in PC units: board/epuck/update/update_slots.h."""
 RAM: Final = Region("RAM of programs", 0x0800, 0x0A00)
-"""In bytes: the same file."""
+"""RAM of the program in bytes: the same file."""
 ROWS: Final = SLOT.size // ROW_UNITS
 VERSION_SYMBOL: Final = "__update_version"
-"""Absolute symbol of such an image."""
+"""Absolute symbol of a program's image: its version."""
 LAST_VERSION: Final = 0xFFFF
 
 
 @dataclass(frozen=True, slots=True)
 class Program:
-    """What robots pass on to each other."""
+    """A program as robots pass it on."""
 
     version: int
     rows: tuple[bytes, ...]
-    """Of ROW_BYTES each."""
+    """Rows of ROW_BYTES each."""
 
     @property
     def crc(self) -> int:
@@ -35,12 +35,12 @@ class Program:
 
 
 def is_program(image: Image) -> bool:
-    """Whether an image is a program for the slot: it has words there, and no firmware at the reset vector."""
+    """Whether an image is a program: it has words in the run slot and none at the reset vector."""
     return image.word(0) is None and image.used(SLOT) > 0
 
 
 def program_of(image: Image) -> Program:
-    """Raises ValueError for what cannot be taken as an update."""
+    """Return the program of an image. Raises ValueError for an image that robots cannot receive."""
     version = image.symbols.find(VERSION_SYMBOL)
     if version is None:
         raise ValueError(f"{image.path}: has no {VERSION_SYMBOL}: expected the ELF file that `openswarm program` made")

@@ -1,4 +1,4 @@
-"""Which rows of flash an image needs beside a boot loader, and in which order they keep the robot reachable."""
+"""Rows of flash to write for an image, in an order that keeps the boot loader reachable."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from emu.image.model import ERASED, Image
 from openswarm.flashing.loaders import LOADERS, ROW_UNITS, ROW_WORDS, Loader
 
 _GOTO: Final = 0x04
-"""Upper byte of GOTO's first word; its second has the upper bits of the target in 0x0000HH (dspic30f6014a.md)."""
+"""Upper byte of the first word of GOTO; the second word has the target's upper bits in 0x0000HH (dspic30f6014a.md)."""
 _ENTRY_WORDS: Final = 4
 
 Row = tuple[int, list[int]]
@@ -18,12 +18,12 @@ Row = tuple[int, list[int]]
 
 
 def goto(target: int) -> list[int]:
-    """The two words of GOTO."""
+    """Return the two words of GOTO."""
     return [_GOTO << 16 | target & 0xFFFE, target >> 16]
 
 
 def checked(image: Image) -> None:
-    """Raise ValueError for an image that no boot loader can start, or for a chip without one."""
+    """Raise ValueError for an image that no boot loader can start, or for a chip without a known loader."""
     if not all(loader.start in image.chip.program["flash"] for loader in LOADERS.values()):
         raise ValueError(f"{image.path}: is for the {image.chip.name}, for which no boot loader is known")
     first, second = image.word(0), image.word(2)
@@ -37,7 +37,7 @@ def checked(image: Image) -> None:
 
 
 def rows(image: Image, loader: Loader) -> list[Row]:
-    """The rows to write, in order. Raises ValueError if the image wants words that are the loader's.
+    """Return the rows to write, in order. Raises ValueError if the image has words where the loader is.
 
     First the entry's row without the GOTO: its four erased words are NOPs that lead into the loader, so that a robot
     which is cut off in the middle waits in its loader at every start. Then all others, the reset vector with a GOTO to
@@ -66,8 +66,8 @@ def rows(image: Image, loader: Loader) -> list[Row]:
     return [*order, row(loader.entry_row)]
 
 
-def left_out(image: Image) -> Iterator[str]:
-    """What the image has that a boot loader does not write, in words."""
+def unwritten_parts(image: Image) -> Iterator[str]:
+    """Yield descriptions of the parts of an image that a boot loader does not write."""
     for name, text in (("config", "configuration words"), ("eedata", "words of data EEPROM"), ("unitid", "ID words")):
         count = image.used(image.chip.program[name])
         if count:

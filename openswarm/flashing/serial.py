@@ -16,30 +16,30 @@ from types import TracebackType
 from typing import Final, Protocol
 
 _STUCK_SECONDS: Final = 10.0
-"""A port that takes no byte for so long takes none: a block is on the wire for 9 ms."""
+"""Time after which a port that accepts no byte counts as dead: a block takes 9 ms on the wire."""
 
 
 class Line(Protocol):
-    """Bytes both ways, and a clock."""
+    """Byte stream in both directions, with a clock."""
 
     def write(self, data: bytes) -> None:
-        """Send all of it."""
+        """Send all bytes."""
 
     def read(self, seconds: float) -> bytes:
-        """The next byte, waited for at most so long; empty if none came."""
+        """Return the next byte, or nothing after `seconds`."""
 
     def drop(self) -> None:
-        """Forget what has arrived."""
+        """Discard received bytes."""
 
     def now(self) -> float:
-        """Seconds since some moment."""
+        """Return the time in seconds from an arbitrary origin."""
 
 
 class SerialPort:
     """The device of a serial port, 8N1 without flow control; use it in `with`."""
 
     def __init__(self, device: str, baud: int) -> None:
-        """Raises OSError if it cannot be opened, ValueError if it is no serial port or the terminal of this process."""
+        """Open the port. Raises OSError, or ValueError for no serial port or the terminal of this process."""
         self.device: Final = device
         self._file: Final = os.open(device, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
         try:
@@ -75,7 +75,7 @@ class SerialPort:
 
     @contextlib.contextmanager
     def _named(self) -> Iterator[None]:
-        """An error of the system says which port it was."""
+        """Add the port's name to an error of the operating system."""
         try:
             yield
         except BlockingIOError:
@@ -84,7 +84,7 @@ class SerialPort:
             raise OSError(f"{self.device} is gone: {error.strerror}") from None
 
     def write(self, data: bytes) -> None:
-        """Send all of it. Raises OSError when the port is gone or takes nothing."""
+        """Send all bytes. Raises OSError if the port is closed or accepts no bytes."""
         while data:
             if not select.select([], [self._file], [], _STUCK_SECONDS)[1]:
                 raise OSError(f"{self.device} takes no bytes: its other end does not read, or the radio is gone")
@@ -92,7 +92,7 @@ class SerialPort:
                 data = data[os.write(self._file, data) :]
 
     def read(self, seconds: float) -> bytes:
-        """The next byte, waited for at most so long. Raises OSError when the port is gone."""
+        """Return the next byte, or nothing after `seconds`. Raises OSError if the port is closed."""
         if not select.select([self._file], [], [], max(seconds, 0.0))[0]:
             return b""
         try:
@@ -105,10 +105,10 @@ class SerialPort:
         return byte
 
     def drop(self) -> None:
-        """Forget what has arrived. A port that is gone is told by what is written next."""
+        """Discard received bytes. The next write reports a closed port."""
         with contextlib.suppress(termios.error):
             termios.tcflush(self._file, termios.TCIFLUSH)
 
     def now(self) -> float:
-        """The monotonic clock."""
+        """Return the monotonic clock."""
         return time.monotonic()

@@ -1,7 +1,7 @@
-"""A program to a robot that runs, and by it to its swarm: the host is one more neighbour, at the end of a serial line.
+"""Transfer of a program to a running robot: the host acts as a neighbour at the other end of a serial line.
 
-What enters: a line and a program. What leaves: a robot that holds it whole, which it advertises once it has checked the
-CRC; or a `RobotError` in words. What the robot says beside messages, such as text, is passed over.
+The transfer ends when the robot advertises the program, which it does after checking the CRC, or with a `RobotError`.
+Other output of the robot, such as text, is skipped.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Final
 
+from openswarm.flashing.boot_session import ECHO, RobotError
 from openswarm.flashing.messages import (
     LONGEST_FRAME,
     NOTHING,
@@ -24,44 +25,43 @@ from openswarm.flashing.messages import (
 )
 from openswarm.flashing.program import LAST_VERSION, Program
 from openswarm.flashing.serial import Line
-from openswarm.flashing.talk import ECHO, RobotError
 
 GREETING_SECONDS: Final = 2.5
-"""Between advertisements of the host. A robot's comes within 2 s of one that differs from its own; who hears its own
-said keeps quiet, so it must not be said too often."""
+"""Interval of the host's advertisements. A robot answers within 2 s an advertisement that differs from its own. It
+stays silent after one that equals its own, so the host must not advertise too often."""
 PACE_SECONDS: Final = 0.006
-"""Between parts: a robot looks at what it has received every 20 ms, and keeps less than 16."""
+"""Interval between parts: a robot processes its received messages every 20 ms and buffers fewer than 16."""
 MOST_RESETS: Final = 3
-"""That are followed: a robot that begins anew more often does so for ever."""
+"""Maximum number of restarts: a robot that restarts the transfer more often will do so for ever."""
 
 
 @dataclass(slots=True)
-class Counts:
-    """What happened on the way."""
+class TransferCounts:
+    """Statistics of a transfer."""
 
     requests: int = 0
     parts: int = 0
     resets: int = 0
-    """How often the robot began anew."""
+    """Number of times the robot restarted the transfer."""
 
 
-class Neighbour:
-    """The host, beside one robot."""
+class HostNeighbour:
+    """The host as a neighbour of one robot."""
 
     def __init__(self, line: Line, program: Program, wait: float) -> None:
-        """A robot that does not get on for `wait` seconds is given up."""
-        self.counts: Final = Counts()
+        """The transfer fails if the robot makes no progress for `wait` seconds."""
+        self.counts: Final = TransferCounts()
         self._line: Final = line
         self._program: Final = program
         self._wait: Final = wait
         self._heard = b""
         self._own: int | None = None
-        """Version that the robot has said to have."""
+        """Version that the robot has advertised."""
         self._asked: Request | None = None
-        """That it has got on with last."""
+        """The last request that showed progress."""
 
     def _messages(self, until: float) -> Iterator[Advertisement | Request]:
-        """What the robot says until then."""
+        """Yield the robot's messages until a time."""
         while (left := until - self._line.now()) > 0:
             byte = self._line.read(left)
             if byte != b"\0":
@@ -70,7 +70,7 @@ class Neighbour:
             message, self._heard = unframed(self._heard), b""
             said = read(message) if message else None
             if said == NOTHING:
-                raise RobotError(ECHO)  # and what else the host says would be taken for the robot's word
+                raise RobotError(ECHO)  # else the host would take its own messages for the robot's
             if said is not None:
                 yield said
 
@@ -97,7 +97,7 @@ class Neighbour:
         while self._line.now() < limit:
             if not asks:
                 if greets:
-                    self._greet()  # first of all, so that an echo is known before anything is believed
+                    self._greet()  # first, so that an echo is detected before any message is trusted
                 else:
                     self._advertise(False)
                 greets = not greets
@@ -114,7 +114,7 @@ class Neighbour:
                     return said.is_active
                 else:
                     self._check(said)
-                    greets = False  # it may have begun anew
+                    greets = False  # the robot may have restarted
                     break
                 if self._line.now() >= limit:
                     break
@@ -130,7 +130,7 @@ class Neighbour:
             raise RobotError(f"the robot has another program of version {said.version}: give this one a higher one")
 
     def _gets_on(self, request: Request) -> bool:
-        """Whether the robot has more than before, or begins anew, which it may do some times."""
+        """Whether the robot has more than before, or restarts the transfer within the permitted number of times."""
         before, self._asked = self._asked, request
         if before is None or request.row > before.row:
             return True
@@ -153,7 +153,7 @@ class Neighbour:
                 self._line.write(framed(data(self._program, request.row, part)))
                 self.counts.parts += 1
                 for _ in self._messages(self._line.now() + PACE_SECONDS):
-                    pass  # what it says meanwhile is said again
+                    pass  # the robot repeats messages that arrive meanwhile
 
     def _silence(self, asks: bool) -> str:
         if self._asked is not None:
@@ -166,11 +166,11 @@ class Neighbour:
                 f" firmware/apps/spreading does")  # fmt: skip
 
     def activate(self) -> None:
-        """Until the robot says that the program is activated. Raises RobotError when it does not."""
+        """Wait until the robot advertises the activated program. Raises RobotError if it does not."""
         limit = self._line.now() + self._wait
         while self._line.now() < limit:
             self._advertise(True)
-            self._greet()  # who hears its own said keeps quiet, but not towards one that has nothing
+            self._greet()  # an advertisement equal to the robot's own would silence it; version 0 does not
             for said in self._messages(self._line.now() + GREETING_SECONDS):
                 if isinstance(said, Advertisement) and self._is_it(said) and said.is_active:
                     return

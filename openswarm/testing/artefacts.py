@@ -1,8 +1,8 @@
-"""What a failed test leaves: a folder that says where the firmware stood and how it came there.
+"""Artefacts of a failed test: a folder with the state of the firmware and its recent history.
 
-report.txt     the fault, or where the robot stood: thread, call stack with source lines, last branches
-waves.vcd      pins and UART bytes of the last stretch, or since the last input, for GTKWave
-uart1.txt      all that was said, one file for each UART that said anything
+report.txt     the fault, or the state of the robot: thread, call stack with source lines, last branches
+waves.vcd      pins and UART bytes of the last STRETCH_MS, or since the last input, for GTKWave
+uart1.txt      all output, one file for each UART with output
 state.bin      the whole state, for `Machine.restore`
 """
 
@@ -17,11 +17,11 @@ from emu.instruments.vcd import WaveformRecorder
 from openswarm.testing.robot import Robot
 
 STRETCH_MS: Final = 50
-"""The waveform's length at most."""
+"""Maximum length of the waveform."""
 
 
 def write(robot: Robot, folder: Path) -> str:
-    """Write everything about `robot` into `folder`; returns the text of the report."""
+    """Write the artefacts of `robot` into `folder`; return the text of the report."""
     folder.mkdir(parents=True, exist_ok=True)
     report = str(robot.fault) if robot.fault is not None else state_report(robot.machine, "the test failed;").report()
     (folder / "report.txt").write_text(report.replace("firmware fault: the test", "the test") + "\n", encoding="utf-8")
@@ -35,7 +35,7 @@ def write(robot: Robot, folder: Path) -> str:
 
 
 def _waves(robot: Robot, stream: TextIO) -> None:
-    """The last stretch, run again aside from the last state that was kept on the way."""
+    """Record the waveform by replaying the last stretch from a checkpoint, in a sandbox."""
     machine = robot.machine
     end, began = machine.cycle, machine.checkpoints.start
     with sandboxed(machine, began):

@@ -1,12 +1,12 @@
-"""pytest plugin: builds firmware, puts it on an emulated robot, and keeps what a failure leaves.
+"""pytest plugin: builds firmware, runs it on an emulated robot, and keeps the artefacts of failures.
 
     @pytest.mark.firmware("main.c")            # or a folder with a Makefile, or an ELF file; else the ini value
     @pytest.mark.robot(selector=3)             # what is around the chip; see openswarm.testing.robot.Robot
     def test_it_answers(robot):
         robot.uart.expect("ready", within_ms=50)
 
-What leaves a failed test lies in a folder of its own below `--robot-artefacts`, named in the report and in JUnit's
-properties. Everything else is made new for every test, so tests may run in any order and in several processes.
+The artefacts of a failed test are in their own folder below `--robot-artefacts`, which the report and JUnit's
+properties name. Every test has a new robot, so tests may run in any order and in several processes.
 """
 
 from __future__ import annotations
@@ -26,15 +26,15 @@ if TYPE_CHECKING:
     from openswarm.testing.robot import Robot
 
 ROBOTS: Final = pytest.StashKey[list[Any]]()
-"""The robots of a test."""
+"""Stash key: robots of a test."""
 BUILT: Final = pytest.StashKey[dict[tuple[str, ...], Path]]()
-"""Images of this process by what they were built from."""
+"""Stash key: images of this process by their source."""
 MADE: Final = "build/firmware.elf"
-"""What a project's Makefile makes (`openswarm new`)."""
+"""Output of a project's Makefile (`openswarm new`)."""
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """Options and ini values."""
+    """Add the plugin's options and ini values."""
     group = parser.getgroup("openswarm", "firmware on an emulated robot")
     group.addoption(
         "--robot-artefacts", metavar="DIR", default="robot-artefacts",
@@ -44,7 +44,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """The marks."""
+    """Register the plugin's marks."""
     config.addinivalue_line("markers", "firmware(source, flags=...): what the fixture `firmware` is made from")
     config.addinivalue_line("markers", "robot(**around): what is around the chip of the fixture `robot`")
     config.stash[BUILT] = {}
@@ -52,7 +52,7 @@ def pytest_configure(config: pytest.Config) -> None:
 
 @pytest.fixture
 def firmware(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The ELF file of this test: of its mark `firmware`, else of the ini value."""
+    """Return the ELF file of this test: of its mark `firmware`, else of the ini value."""
     config = request.config
     mark = request.node.get_closest_marker("firmware")
     if mark is not None and mark.args:
@@ -82,7 +82,7 @@ def _built(source: Path, flags: tuple[str, ...], folders: pytest.TempPathFactory
 
 
 def _made(folder: Path) -> Path:
-    """The image of a project with a Makefile; several processes make it one after the other."""
+    """Return the image of a project with a Makefile; a lock serialises the builds of several processes."""
     from emu import BuildError
 
     with (folder / "Makefile").open(encoding="utf-8") as lock:
@@ -96,7 +96,7 @@ def _made(folder: Path) -> Path:
 
 @pytest.fixture
 def robot(request: pytest.FixtureRequest, firmware: Path) -> Robot:
-    """A robot with that firmware, just switched on; the mark `robot` says what is around its chip."""
+    """Return a robot with that firmware after power-on; the mark `robot` configures its surroundings."""
     from openswarm.testing.robot import Robot
 
     around: dict[str, Any] = {}
@@ -112,7 +112,7 @@ def robot(request: pytest.FixtureRequest, firmware: Path) -> Robot:
 
 
 def _artefacts(item: pytest.Item) -> Path:
-    """The folder for what a failure of a test leaves."""
+    """Return the folder for the artefacts of a test."""
     root: Path = item.config.rootpath / item.config.getoption("--robot-artefacts")
     return root / re.sub(r"[^\w.-]+", "_", item.nodeid).strip("_")
 
@@ -121,7 +121,7 @@ def _artefacts(item: pytest.Item) -> Path:
 def pytest_runtest_makereport(
     item: pytest.Item, call: pytest.CallInfo[None]
 ) -> Generator[None, pytest.TestReport, pytest.TestReport]:
-    """Properties for JUnit; what a failure leaves."""
+    """Add properties for JUnit, and write the artefacts of a failure."""
     report = yield
     robots = item.stash.get(ROBOTS, [])
     if report.when != "call" or not robots:

@@ -1,7 +1,6 @@
-"""A robot in a test: it runs only inside the calls below, in simulated time, so a time-out is the same everywhere.
+"""A robot in a test. It runs only inside the calls below, in simulated time, so time-outs do not depend on the host.
 
-What enters: an image, what is around the chip. What leaves: what the firmware says and does. A firmware fault fails the
-call in which it happens, with its whole report.
+A firmware fault fails the call in which it happens, with its whole report.
 """
 
 from __future__ import annotations
@@ -27,34 +26,36 @@ MILLISECONDS: Final = 1000
 
 
 class FirmwareFault(AssertionError):
-    """The firmware went wrong; the text is the report of `emu run`."""
+    """A firmware fault; the text is the report of `emu run`."""
 
 
 class Line:
-    """A UART of the robot. What was said before and not yet matched can still be expected."""
+    """A UART of the robot. `expect` also matches earlier output that no expectation has matched yet."""
 
     def __init__(self, robot: Robot, uart: Uart) -> None:
         self._robot: Final = robot
         self._uart: Final = uart
         self.said: Final = bytearray()
-        """All it has said."""
+        """All output so far."""
         uart.listen(lambda byte, _cycle: self.said.append(byte & 0xFF), lazy=True)
-        uart.expect(b"", within=0)  # hears from now on
+        uart.expect(b"", within=0)  # starts the capture of output
 
     def expect(self, pattern: Pattern, *, within_ms: float) -> Match[bytes]:
-        """Run until `pattern` is said: text and bytes as they are, compiled patterns as regular expressions. Raises
-        ExpectError after `within_ms` of simulated time, FirmwareFault."""
+        """Run until the output matches `pattern`: text or bytes literally, or a compiled regular expression.
+
+        Raises ExpectError after `within_ms` of simulated time, and FirmwareFault.
+        """
         found: Match[bytes] = self._robot.watched(partial(self._uart.expect, pattern, within=within_ms))
         return found
 
     def feed(self, data: bytes) -> None:
-        """Say something to the robot, from now on at the speed it listens with."""
+        """Send bytes to the robot, at the baud rate of its receiver."""
         self._uart.feed(data)
 
 
 @dataclass(frozen=True, slots=True)
 class Cycles:
-    """What calls of a function took, with what it calls, without interrupts, sleep and other threads; in Tcy."""
+    """Times of a function's calls in Tcy, including callees, without interrupts, sleep and other threads."""
 
     calls: int
     total: int
@@ -63,7 +64,7 @@ class Cycles:
 
 
 class Measured:
-    """What a `Robot.measured` block has run; to be read behind it."""
+    """Result of a `Robot.measured` block; read it after the block."""
 
     def __init__(self, robot: Robot, profiler: Profiler, profile: Profile) -> None:
         self._robot: Final = robot
@@ -71,8 +72,10 @@ class Measured:
         self.profile: Final = profile
 
     def cycles(self, function: str) -> Cycles:
-        """Of a function or handler by its name in C. Raises KeyError for an unknown one, ValueError if it did not run
-        to its end."""
+        """Return the times of a function or handler by its C name.
+
+        Raises KeyError for an unknown name, ValueError if no call completed.
+        """
         entry = self._robot.machine.program_address(function)
         edges = [edge for edge in self.profile.edges if edge.entry == entry and edge.most]
         if not edges:
@@ -83,8 +86,10 @@ class Measured:
         )  # fmt: skip
 
     def coverage(self, file: str) -> float:
-        """Share of the lines with code of a source file, given by the end of its name, that were run. Raises
-        ValueError if no code comes from it."""
+        """Return the share of executed lines of a source file, given by the end of its name.
+
+        Raises ValueError if the file has no code in the image.
+        """
         image, ran, all_lines = self._robot.machine.inspector.image, set(), set()
         for row in image.lines.rows:
             if row.line and Path(row.file).match(file) and self._robot.machine.inspector.is_code(row.start):
@@ -97,11 +102,12 @@ class Measured:
 
 
 class Robot:
-    """A robot that has just been switched on. `machine` is all of it (`help(emu.Machine)`)."""
+    """A robot after power-on. `machine` gives access to its whole state (`help(emu.Machine)`)."""
 
     def __init__(self, image: Path, **around: Any) -> None:
-        """`around` is what `emu.load` takes, and `selector`, `sensor` (a camera type or None), `camera` (a picture
-        file), `stimulus` (a file of events). Raises what `emu.load` does, ValueError for a bad file."""
+        """Load an image. `around` has the arguments of `emu.load`, and `selector`, `sensor` (a camera type or None),
+        `camera` (a picture file), `stimulus` (a file of events). Raises the errors of `emu.load`, ValueError for a bad
+        file."""
         from emu.boards.epuck.board import Epuck
         from emu.boards.picture import read_picture
 
@@ -124,7 +130,7 @@ class Robot:
 
     @property
     def camera(self) -> Any:
-        """The camera, `None` without one: `show(picture)` of shape (480, 640, 3)."""
+        """Camera, or None: `show(picture)` takes a picture of shape (480, 640, 3)."""
         return self.board.camera
 
     @property
@@ -133,7 +139,7 @@ class Robot:
         return self.machine.cycle
 
     def run(self, *, ms: float) -> emu.Stop:
-        """Run for so many simulated milliseconds. Raises FirmwareFault."""
+        """Run for `ms` of simulated time. Raises FirmwareFault."""
         stop: emu.Stop = self.watched(lambda: self.machine.run(seconds=ms / MILLISECONDS))
         return stop
 
@@ -144,7 +150,7 @@ class Robot:
         assert stop.reason == "until", f"{place} was not reached within {within_ms:g} ms: {stop.reason}"
 
     def watched(self, work: Any) -> Any:
-        """The result of `work`. Raises FirmwareFault if it ends in one."""
+        """Call `work` and return its result. Raises FirmwareFault if it ends in one."""
         from emu.peripherals.wait import ExpectError
 
         try:
@@ -162,11 +168,11 @@ class Robot:
         return self.fault
 
     def var(self, expression: str) -> Any:
-        """Value of a C expression."""
+        """Return the value of a C expression."""
         return self.machine.var(expression)
 
     def stack(self, thread: str) -> Thread:
-        """A thread of OpenSwarm by the name of its function: `.free` are the bytes of its stack never written. Raises
+        """Return an OpenSwarm thread by the name of its function; `.free`: stack bytes never written. Raises
         KeyError."""
         for one in self.machine.threads():
             if one.name == thread:

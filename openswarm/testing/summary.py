@@ -1,4 +1,4 @@
-"""A JUnit file as a table in Markdown, for the summary of a job: `python -m openswarm.testing.summary results.xml`.
+"""Markdown table of a JUnit file, for the summary of a CI job: `python -m openswarm.testing.summary results.xml`.
 
 Failed tests come with what the plugin said of their robot. Exit status 0, 2 for a file that is none.
 """
@@ -14,7 +14,7 @@ CLOCK_HZ = 14_745_600
 
 
 def table(root: ElementTree.Element) -> list[str]:
-    """Lines of Markdown."""
+    """Return the lines of Markdown."""
     lines = ["| test | result | simulated |", "|---|---|---|"]
     told = []
     for case in root.iter("testcase"):

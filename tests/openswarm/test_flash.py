@@ -20,10 +20,10 @@ from emu.host.exit_status import BAD_INPUT, FAULT
 from emu.image.loader import load_image
 from emu.image.model import Block, Image
 from openswarm.cli import main
+from openswarm.flashing.boot_session import TRIES, BootSession, RobotError
 from openswarm.flashing.loaders import LOADERS, Loader
 from openswarm.flashing.rows import goto, rows
 from openswarm.flashing.serial import SerialPort
-from openswarm.flashing.talk import TRIES, RobotError, Talk
 
 HELLO_HEX = Path(__file__).parents[1] / "emu" / "cli" / "hello.hex"
 TINYBLD = LOADERS[0x71]
@@ -105,8 +105,8 @@ def words_of(row: bytes) -> list[int]:
     return [int.from_bytes(row[i : i + 3], "little") for i in range(0, 96, 3)]
 
 
-def flashed(robot: Robot, what: Image) -> Talk:
-    talk = Talk(robot, 5.0)
+def flashed(robot: Robot, what: Image) -> BootSession:
+    talk = BootSession(robot, 5.0)
     talk.write(rows(what, talk.loader), lambda done, total: None)
     talk.start()
     return talk
@@ -201,14 +201,14 @@ def test_nobody_answers_or_somebody_else():
     robot = Robot()
     robot.spoil = lambda number, data: b""
     with pytest.raises(RobotError, match="no boot loader answered within 5 s: press"):
-        Talk(robot, 5.0)
+        BootSession(robot, 5.0)
     with pytest.raises(RobotError, match=r"type 0x70 answers; expected 0x71 \(tinybld\) or 0x91"):
-        Talk(Robot(0x70), 5.0)
+        BootSession(Robot(0x70), 5.0)
     talker = Robot()
     talker.spoil = lambda number, data: b""
     talker.write = lambda data: talker._say(b"hello, swarm\r\n")  # type: ignore[method-assign]
     with pytest.raises(RobotError, match="bytes of something else came"):
-        Talk(talker, 5.0)
+        BootSession(talker, 5.0)
 
 
 @pytest.mark.parametrize("loader", LOADERS.values(), ids=lambda one: one.name)
@@ -288,7 +288,7 @@ def test_a_port_that_vanishes_or_takes_nothing_is_one_error(monkeypatch):
 
 
 def test_what_ends_the_progress_has_a_line_of_its_own(monkeypatch, capsys):
-    class Vanishing(Talk):
+    class Vanishing(BootSession):
         def __init__(self, line: object, wait: float) -> None:
             self.loader = TINYBLD  # type: ignore[misc]
 
@@ -296,7 +296,7 @@ def test_what_ends_the_progress_has_a_line_of_its_own(monkeypatch, capsys):
             progress(3, 5)
             raise OSError("/dev/x is gone")
 
-    monkeypatch.setattr("openswarm.commands.flash.Talk", Vanishing)
+    monkeypatch.setattr("openswarm.commands.flash.BootSession", Vanishing)
     monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
     master, slave = pty.openpty()
     assert main(["flash", str(HELLO_HEX), "--port", os.ttyname(slave)]) == BAD_INPUT

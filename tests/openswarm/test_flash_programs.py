@@ -21,6 +21,7 @@ from emu.host.exit_status import BAD_INPUT, FAULT, INTERRUPTED
 from emu.image.model import Block, Image
 from emu.image.symbols import Symbol
 from openswarm.cli import main
+from openswarm.flashing.boot_session import RobotError
 from openswarm.flashing.loaders import ROW_BYTES, ROW_UNITS
 from openswarm.flashing.messages import (
     NOTHING,
@@ -33,8 +34,7 @@ from openswarm.flashing.messages import (
     unframed,
 )
 from openswarm.flashing.program import SLOT, VERSION_SYMBOL, Program, program_of
-from openswarm.flashing.spreading import GREETING_SECONDS, MOST_RESETS, Neighbour
-from openswarm.flashing.talk import RobotError
+from openswarm.flashing.spreading import GREETING_SECONDS, MOST_RESETS, HostNeighbour
 
 HELLO_HEX = Path(__file__).parents[1] / "emu" / "cli" / "hello.hex"
 PROGRAM = Program(7, tuple(random.Random(1).randbytes(ROW_BYTES) for _ in range(5)))
@@ -123,9 +123,9 @@ class Robot:
                 self.has, self.wants, self.asks_at, self.says_at = self.wants, None, 1e9, self.time + 0.5
 
 
-def given(robot: Any, program: Program = PROGRAM, wait: float = WAIT) -> tuple[Neighbour, list[int]]:
+def given(robot: Any, program: Program = PROGRAM, wait: float = WAIT) -> tuple[HostNeighbour, list[int]]:
     rows: list[int] = []
-    neighbour = Neighbour(robot, program, wait)
+    neighbour = HostNeighbour(robot, program, wait)
     if not neighbour.give(lambda done, total: rows.append(done)):
         neighbour.activate()
     return neighbour, rows
@@ -241,7 +241,7 @@ def test_what_is_not_newer_is_refused_with_what_would_be(version: int, says: str
 
 def test_the_last_version_is_taken():
     robot = Robot(65_534)
-    neighbour = Neighbour(robot, Program(65_535, PROGRAM.rows), WAIT)
+    neighbour = HostNeighbour(robot, Program(65_535, PROGRAM.rows), WAIT)
     assert neighbour.give(lambda done, total: None) is False
 
 

@@ -55,6 +55,7 @@ def test_the_wheel_holds_everything_and_repeats(tmp_path):
 
 def test_the_first_steps_say_what_happens(tmp_path):
     """docs/first-steps.md, played from the wheel in an empty folder with an empty HOME; nothing lands beside them."""
-    words = [sys.executable, str(ROOT / "docs" / "tools" / "first_steps.py"), "--check", "--keep", str(tmp_path / "first-steps")]
+    script = ROOT / "docs" / "tools" / "first_steps.py"
+    words = [sys.executable, str(script), "--check", "--keep", str(tmp_path / "first-steps")]
     done = subprocess.run(words, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stdout) == (0, ""), done.stderr

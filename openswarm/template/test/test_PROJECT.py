@@ -1,7 +1,7 @@
-"""What @PROJECT@ does, on the emulated robot: `make test`. The image is the one a robot is flashed with.
+"""Tests of @PROJECT@ on the emulated robot: `make test`. They run the image that is flashed into a robot.
 
-The fixture `robot` comes with OpenSwarm's pytest plugin. What a failed test leaves (thread, source line, waveform) lies
-in robot-artefacts/.
+OpenSwarm's pytest plugin provides the fixture `robot`. A failed test writes its artefacts (thread, source line, waveform)
+to robot-artefacts/.
 """
 
 import pytest

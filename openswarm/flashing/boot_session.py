@@ -1,11 +1,9 @@
-"""The conversation with a boot loader: greet, rows until each is acknowledged, start.
+"""Session with a boot loader: greeting, rows until each is acknowledged, start of the program.
 
-What enters: a line and rows. What leaves: a robot that holds them, or a `RobotError` in words.
-
-A loader cannot tell a lost byte from a pause, and a sum does not tell a block from the same bytes rotated: one that is
-sent again to a loader that is one byte behind is accepted, with its sum as part of the address. So after a refusal, as
-after no answer, the host is silent until the loader has given up, greets it again and goes on with the same row. A
-loader that gives up starts the program, but the first row has made the program's entry lead back into the loader.
+A loader cannot distinguish a lost byte from a pause, and its checksum does not detect rotated bytes. A loader that is
+one byte behind would accept a repeated block with its sum as part of the address. After a refusal or without an answer,
+the host therefore stays silent until the loader times out, greets it again and continues with the same row. A loader
+that times out starts the program, but the first row written makes the program's entry lead back into the loader.
 """
 
 from __future__ import annotations
@@ -19,46 +17,46 @@ from openswarm.flashing.rows import Row
 from openswarm.flashing.serial import Line
 
 HELLO_SECONDS: Final = 0.4
-"""Between greetings: two fall into the second in which a loader listens. Longer than an answer over Bluetooth takes (20
-to 100 ms), since a greeting too many is the first byte of a block."""
+"""Interval of greetings: two fall into the second in which a loader listens. It is longer than an answer over Bluetooth
+takes (20 to 100 ms), because the loader takes a superfluous greeting for the first byte of a block."""
 ANSWER_SECONDS: Final = 4.0
-"""For a row: 8.8 ms on the wire, 4 ms to erase and to write, the radio, and an emulated robot on a busy computer.
-Longer than a loader's patience, so that without an answer it has given up."""
+"""Time-out of a row: 8.8 ms on the wire, 4 ms to erase and to write, the radio, and an emulated robot on a busy
+computer. It is longer than the loader's time-out, so that a loader that does not answer has timed out."""
 SILENCE_SECONDS: Final = PATIENCE_SECONDS + 0.4
 RETURN_SECONDS: Final = 5.0
-"""For a loader that was left alone to be there again."""
+"""Time-out for a loader to return after a silence."""
 TRIES: Final = 5
-"""Of a row."""
+"""Attempts per row."""
 
 
 ECHO: Final = "the line sends back what is written to it: switch its echo off, or take the loop-back away"
 
 
 class RobotError(Exception):
-    """The robot does not do what a boot loader does, or firmware that takes programs."""
+    """The robot does not behave like a boot loader, or like firmware that receives programs."""
 
 
 @dataclass(slots=True)
-class Counts:
-    """What happened on the way."""
+class SessionCounts:
+    """Statistics of a session."""
 
     blocks: int = 0
     refused: int = 0
-    """Answers 'N'."""
+    """Number of answers 'N'."""
     unanswered: int = 0
 
 
-class Talk:
-    """One robot at the other end of a line."""
+class BootSession:
+    """Session with the robot at the other end of a line."""
 
     def __init__(self, line: Line, wait: float) -> None:
         """Wait at most `wait` s for the loader to answer. Raises RobotError if none does."""
-        self.counts: Final = Counts()
+        self.counts: Final = SessionCounts()
         self._line: Final = line
         self._wait: Final = wait
         self._holds_robot = False
-        """The first row is written: whatever happens, the robot comes back to its loader."""
-        self._be_silent(SILENCE_SECONDS)  # a loader that somebody left in the middle of a block gives up
+        """Write the first row, after which the robot always returns to its loader."""
+        self._be_silent(SILENCE_SECONDS)  # a loader inside an interrupted block times out
         self.loader: Final = self._greet(wait)
 
     def _greet(self, seconds: float) -> Loader:
@@ -70,7 +68,7 @@ class Talk:
             heard = self._heard(HELLO_SECONDS)
             if heard[-1:] == DONE and heard[-2:-1]:
                 loader = LOADERS.get(heard[-2])
-                if loader is not None and HELLO in heard:  # a 'K' in a row would be taken for its answer
+                if loader is not None and HELLO in heard:  # with an echo, a 'K' in a row would pass for an answer
                     raise RobotError(ECHO)
                 if loader is not None:
                     return loader
@@ -83,7 +81,7 @@ class Talk:
                 raise RobotError(f"no boot loader answered within {seconds:g} s{also}: press the robot's reset button")
 
     def _heard(self, seconds: float) -> bytes:
-        """What comes within a time, or until a type that is known and 'K' have come."""
+        """Return the bytes received within a time, or until a known type and 'K'."""
         heard = b""
         limit = self._line.now() + seconds
         while (left := limit - self._line.now()) > 0:
@@ -93,7 +91,7 @@ class Talk:
         return heard
 
     def write(self, rows: list[Row], progress: Callable[[int, int], None]) -> None:
-        """Write rows in order; `progress` hears how many of how many are done. Raises RobotError if one will not."""
+        """Write rows in order, reporting to `progress`. Raises RobotError if a row cannot be written."""
         for number, (address, words) in enumerate(rows):
             progress(number, len(rows))
             self._row(address, block(address, words))
@@ -126,7 +124,7 @@ class Talk:
         return b""
 
     def _return(self, silence: float) -> None:
-        """Let the loader give up, and greet it again."""
+        """Let the loader time out, and greet it again."""
         self._be_silent(silence)
         if self._greet(RETURN_SECONDS if self._holds_robot else self._wait) != self.loader:
             raise RobotError("another boot loader answers than before")
@@ -137,5 +135,5 @@ class Talk:
             self._line.read(left)
 
     def start(self) -> None:
-        """Let the robot start its program."""
+        """Start the robot's program."""
         self._line.write(end())
