@@ -113,7 +113,7 @@ REFUSED = [
     ("__attribute__((used)) int f(int n) { volatile char a[40000]; a[n] = 1; return a[3]; }", "(limit 16382)"),
     ("""volatile int v; __attribute__((used)) void f(void) { __asm__("" :: "r"(v), "r"(v), "r"(v), "r"(v), "r"(v),
      "r"(v) : "w0", "w1", "w2", "w3", "w4", "w5", "w6", "w7", "w8", "w9"); }""",
-     "inline assembly: its operands and clobbers want more registers than there are"),
+     "inline assembly: its operands and clobbers need more registers than the CPU has"),
 ]  # fmt: skip
 
 

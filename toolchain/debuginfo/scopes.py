@@ -84,7 +84,7 @@ class ScopeTree:
         at.variables.append(die)
 
     def _path(self, scope: str, call: str) -> list[tuple[str, str]]:
-        """ScopeTree from the function to `scope`, each with the call that it was inlined at or ""."""
+        """Scopes from the function to `scope`, each with the call that it was inlined at or ""."""
         path: list[tuple[str, str]] = []
         for _ in range(1000):
             node = self.info.node(scope)

@@ -68,7 +68,7 @@ I1, I8, I16, I32, I64 = (_INTS[n] for n in (1, 8, 16, 32, 64))
 
 
 def int_type(bits: int) -> Type:
-    """The integer type of that many bits, 1..272; the reader admits up to 128 (engines.md §5)."""
+    """The integer type of `bits` bits, 1..272; the parser accepts up to 128 (engines.md §5)."""
     found = _INTS.get(bits)
     if found is None:
         raise UnsupportedError(f"integer type i{bits}: wider than {MAX_INT_BITS} bits")

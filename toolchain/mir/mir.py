@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import copy
 from dataclasses import dataclass, field
+from typing import Literal
 
 FIRST_VIRTUAL = 16
 
@@ -32,6 +33,9 @@ class Imm:
         return f"#{self.value}"
 
 
+AddressingMode = Literal["ind", "++", "--", "+", "-", "off", "idx"]
+
+
 @dataclass(frozen=True, slots=True)
 class Mem:
     """Register-indirect operand.
@@ -39,7 +43,7 @@ class Mem:
     Modes: "ind" [W], "++" [W++], "--" [W--], "+" [++W], "-" [--W], "off" [W+off], "idx" [W+Wi] (`off` is register i).
     """
 
-    mode: str
+    mode: AddressingMode
     base: int
     off: int = 0
     volatile: int = 0

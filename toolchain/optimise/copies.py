@@ -26,7 +26,7 @@ def run(m: MFunction) -> bool:
 
 
 def _solve(m: MFunction) -> dict[str, RegisterFacts]:
-    """RegisterFacts at the start of every block. Optimistic: unvisited predecessors of a loop do not remove facts."""
+    """Facts at the start of every block. Optimistic: unvisited predecessors of a loop do not remove facts."""
     entry = m.blocks[0].name
     starts: dict[str, RegisterFacts] = {entry: {}}
     starts |= {b.name: {} for b in m.blocks if b.address_taken}

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from toolchain.abi.target import CALLEE_SAVED, FP, LIT10_BYTE_MAX, LIT10_MAX, SP
 from toolchain.mir.liveness import bits, drop_dead, live_out
-from toolchain.mir.mir import MI, SKIPS, Imm, MBlock, Mem, MFunction
+from toolchain.mir.mir import MI, SKIPS, AddressingMode, Imm, MBlock, Mem, MFunction
 from toolchain.optimise import copies
 
 AT_RETURN = bits([*CALLEE_SAVED, 15])
@@ -240,7 +240,7 @@ def _fold_before(b: MBlock, at: int, r: int, amount: int) -> bool:
     return False
 
 
-def _modify(mi: MI, r: int, amount: int, mode: str) -> bool:
+def _modify(mi: MI, r: int, amount: int, mode: AddressingMode) -> bool:
     """Make the only [r] of an instruction modify r, if the instruction does not use r otherwise (isa.md §3.4)."""
     size = 1 if mi.byte or mi.op in ("se", "ze") else 4 if mi.op == "movd" else 2
     if abs(amount) != size or mi.pred or mi.info.fixed or mi.info.memory:

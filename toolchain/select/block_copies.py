@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from toolchain.ir.model import ConstInt, Instr, Value
-from toolchain.mir.mir import Imm, Mem
+from toolchain.mir.mir import AddressingMode, Imm, Mem
 from toolchain.select.context import Handler, SelectionContext
 
 MAX_UNROLLED_UNITS = 3  # larger copies and fills use REPEAT
@@ -40,9 +40,10 @@ def _step_behind(s: SelectionContext, p: Value, size: int, block: Instr) -> Inst
     return None
 
 
-def _modes(count: int, behind: int | None) -> list[str]:
+def _modes(count: int, behind: int | None) -> list[AddressingMode]:
     """Addressing modes of `count` accesses; the last one advances the pointer only if its end is used."""
-    return ["++"] * (count - 1) + ["ind" if behind is None else "++"]
+    last: AddressingMode = "ind" if behind is None else "++"
+    return ["++"] * (count - 1) + [last]
 
 
 def select_blockcopy(s: SelectionContext, i: Instr) -> None:

@@ -13,8 +13,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Literal
 
 from toolchain.abi.target import LIT5_MAX, LIT10_BYTE_MAX, LIT10_MAX
+
+ImmediateForm = Literal["unary", "lit5", "tied", "bit"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,7 +26,7 @@ class ImmediateRule:
 
     when: Callable[[int, int], bool]
     op: str
-    form: str
+    form: ImmediateForm
     literal: Callable[[int, int], int]
 
 

@@ -30,16 +30,10 @@ from toolchain.verify.facts import BlockFacts, collect_facts, key_of
 
 __all__ = ["MachineError", "Verifier"]
 
-CHANGES_BLOCKS = {
-    "tail-merging",
-    "tail-calls",
-    "thread-jumps",
-    "block-layout",
-    "branches",
-    "returns",
-}  # passes that join, drop or move blocks
-REPLACES_FLAGS = {"peephole"}  # passes that let one instruction's flags stand for another's
-
+CHANGES_BLOCKS = {"tail-merging", "tail-calls", "thread-jumps", "block-layout", "branches", "returns"}
+"""Passes that merge, remove or move blocks."""
+REPLACES_FLAGS = {"peephole"}
+"""Passes that replace a comparison by another instruction that sets the same flags."""
 
 Layout = tuple[object, ...]
 
