@@ -1,4 +1,4 @@
-"""`python -m bench`: every measurement of this folder, one after the other. Arguments go to each script."""
+"""Run every measurement of this folder in turn: `python -m bench`. Each script receives the arguments."""
 
 from __future__ import annotations
 

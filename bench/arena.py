@@ -1,4 +1,4 @@
-"""Time per simulated second in the arena: physics, rendering, emulation, and the rest; with what a trial takes.
+"""Measure host time per simulated second in the arena by component, and the cost of a trial.
 
 In: nothing (the clustering firmware is built). Out: CPU seconds of this process; for one trial that two
 threads run, wall seconds, and the memory of all processes together (PSS: shared pages count once; Linux only).
@@ -30,7 +30,7 @@ TRIAL_S = 900
 
 
 class Clock:
-    """Time spent in some functions."""
+    """Accumulated time of selected functions."""
 
     def __init__(self) -> None:
         self.seconds = 0.0
@@ -64,13 +64,13 @@ def measured(scene: Scene, make: Callable[[], list[Controller]], seconds: float,
 def measure(
     scene: Scene, controllers: list[Controller], seconds: float, warm_up: float, is_native: bool
 ) -> tuple[float, float, float]:
-    """CPU seconds per simulated second: all; physics and rendering, unless they are called in compiled code."""
+    """Return CPU seconds per simulated second: total, physics and rendering, unless compiled code calls them."""
     world = World(scene, 1)
     physics, rendering = Clock(), Clock()
     robots = [controller for controller in controllers if isinstance(controller, FirmwareController)]
     if not is_native:
         for robot in robots:
-            renderer = robot._renderer  # not `_pixels`: other robots run inside it
+            renderer = robot._renderer  # not `_pixels`, inside which other robots run
             renderer.render_line = rendering.around(renderer.render_line)  # type: ignore[method-assign]
         world.step = physics.around(world.step)  # type: ignore[method-assign]
         world.run_quanta = physics.around(world.run_quanta)  # type: ignore[method-assign]
@@ -88,12 +88,12 @@ def measure(
         for controller in controllers:
             controller.reading(), controller.take_lines(), controller.take_led_changes()
     cpu, wall = time.process_time() - start[0], time.perf_counter() - start[1]
-    share = cpu / wall / seconds  # clocks run while others have the CPU
+    share = cpu / wall / seconds  # corrects clocks that also run while other processes have the CPU
     return cpu / seconds, physics.seconds * share, rendering.seconds * share
 
 
 def with_two_threads(scene: Scene, image: Path, seconds: float, warm_up: float) -> dict[str, float]:
-    """Wall seconds per simulated second of a trial that two threads run, and megabytes of memory."""
+    """Return wall seconds per simulated second of a trial with two threads, and its memory in MB."""
     plan = Plan(scene, "openswarm", "A", image, 1, warm_up + seconds, 1)
     times: list[float] = []
     with controllers_of(plan, 1) as (controllers, channel):
@@ -106,13 +106,13 @@ def with_two_threads(scene: Scene, image: Path, seconds: float, warm_up: float) 
 
 
 def family(process: int) -> list[int]:
-    """A process and its descendants."""
+    """Return a process and its descendants."""
     children: dict[int, list[int]] = {}
     for stat in Path("/proc").glob("[0-9]*/stat"):
         try:
             parent = int(stat.read_text().rpartition(")")[2].split()[1])
         except OSError:
-            continue  # it has ended
+            continue  # the process has ended
         children.setdefault(parent, []).append(int(stat.parent.name))
     found = [process]
     for one in found:
@@ -121,7 +121,7 @@ def family(process: int) -> list[int]:
 
 
 def proportional_share(process: int) -> int:
-    """Memory of a process in kB, pages shared with others by their share."""
+    """Return the memory of a process in kB, with shared pages counted proportionally (PSS)."""
     try:
         lines = Path(f"/proc/{process}/smaps_rollup").read_text().splitlines()
     except OSError:
@@ -139,7 +139,7 @@ def main() -> int:
     quick = scripted(scene)
     image = image_for("openswarm")
     assert image is not None
-    together = with_two_threads(scene, image, options.seconds, 3.0)  # first: its memory is not to be that of the others
+    together = with_two_threads(scene, image, options.seconds, 3.0)  # first, to measure its memory alone
     results = {
         "scripted": measured(
             quick, lambda: [ScriptedController(quick, 1, i, "A") for i in robots], 20 * options.seconds, 5.0

@@ -1,4 +1,4 @@
-"""Assembler: source lines per second. Linker: seconds for an image of 32,000 words with section collection.
+"""Measure the assembler (source lines per second) and the linker (seconds for a 32,000-word image).
 
 Usage: python bench/asm_link.py [--json]
 """
@@ -24,7 +24,7 @@ MODULES, FUNCTIONS, GROUPS = 10, 40, 20
 
 
 def source(module: int, rng: random.Random) -> str:
-    """A module of small functions that call each other across modules and use near variables."""
+    """Return the source of a module of small functions with calls across modules and near variables."""
     lines: list[str] = []
     for number in range(FUNCTIONS):
         name = f"_f{module}_{number}"

@@ -1,11 +1,12 @@
-"""Bounds of our kernel's calls beside the worst that runs of its applications take: one table.
+"""Compare bounds of kernel calls with the longest observed runs: one table.
 
-`python -m bench.bounds [--image NAME] [--times X] [--json]`. Each call is bounded in the image it is measured in, with
-as many threads, events, subscriptions, messages and holes as there were at most while its longest was under way (--json
-tells them). Measured is from the first instruction to behind the return, as bounds are; a call that was interrupted, or
-in which threads were switched, is not counted; a thread that ends itself goes on into the scheduler, so of its end
-`end_thread` has a row and `Sys_Kill_Process` is that of others. "Plain" leaves out the ways on which memory is short,
-the reserve is exchanged, a handler has left something to join, or the call is refused; they count in the other column.
+`python -m bench.bounds [--image NAME] [--times X] [--json]`. Each call is bounded and measured in the same image. The
+bound assumes the maximum numbers of threads, events, subscriptions, messages and holes during the longest run of that
+call; --json lists them. A run is measured like a bound, from the first instruction to the one after the return. Runs
+with an interrupt or a thread switch do not count. A thread that ends itself continues in the scheduler. `end_thread`
+has a row for that end, and the row of `Sys_Kill_Process` is for other threads. "Plain" excludes paths on which memory
+is short, the reserve is swapped, a free run of a handler is pending, or the call is refused; the other column includes
+them.
 """
 
 from __future__ import annotations
@@ -31,17 +32,17 @@ from toolchain.elf.read import read_executable  # noqa: E402
 from toolchain.stack.annotations import Annotations, add_symbols  # noqa: E402
 
 APART = ("refuse_message", "os_fail", "os_refuse")
-"""Functions of the ways that are not plain."""
+"""Functions on paths that are not plain."""
 PLAIN = {"x": 0, "j": 0}
-"""Limits of plain ways beside those seen: no hole outgrows the reserve, nothing given back waits to be joined."""
+"""Additional limits of plain paths: no hole outgrows the reserve, and no free run is pending."""
 ITSELF = "os_thread_returned"
-"""Where a thread ends itself: on into the scheduler, a row of its own."""
+"""Path on which a thread ends itself and continues in the scheduler; it has its own row."""
 TREE = ("find_hole", "remove_hole", "insert_hole")
-"""What works on the heap's tree: in front of each it is whole."""
+"""Functions that change the heap's tree; it is consistent before each of them."""
 EXCHANGE = "swap_reserve"
-"""Pulls a hole only where it is larger than the reserve."""
+"""Function that removes a hole only if it is larger than the reserve."""
 ALSO = ("_end_thread",)
-"""Timed beside the calls."""
+"""Functions timed in addition to the calls."""
 SWITCHES = ("hal_yield", "hal_block", "hal_abandon")
 TARGET = "../tests/firmware/target"
 IMAGES = {
@@ -49,15 +50,15 @@ IMAGES = {
     "points": (TARGET, 2.0, {"i": 0, "u": 100, "d": 24, "k": 192}),
     "crowded": (TARGET, 0.15, {"i": 0, "u": 60, "d": 2, "k": 400}),
 }
-"""Images, where they are, seconds in which they do everything, and limits that are not counted (bounds --help)."""
+"""Images: folder, seconds until they have made every call, and limits that are not measured (bounds --help)."""
 ROUND, NEWEST, LAST = "numbers_are_round", "newest_pid", 0xFFFF
-"""Where an image has this function, the last number of threads has just been given; to start so many takes too long."""
+"""An image with this function starts with the last PID in use, because starting so many threads would take too long."""
 CALL_BYTES = 4
 
 
 @dataclass
 class Row:
-    """One call in one image: cycles of its longest and of its bound, None where it has none, or never came undisturbed;
+    """One call in one image: cycles of its longest run and of its bound; None if absent or always disturbed;
     the most there was of everything during the longest."""
 
     image: str
@@ -72,7 +73,7 @@ class Row:
 
 @dataclass
 class Open:
-    """A call under way: where its stack and clock stood, and whether it still counts, and as plain."""
+    """A call in progress: stack and clock at its start, whether it still counts, and whether it is plain."""
 
     name: str
     top: int
@@ -87,24 +88,24 @@ def _cycles(longest: tuple[int, dict[str, int]]) -> int:
 
 
 def _merge(into: dict[str, int], found: dict[str, int]) -> None:
-    """The larger of each."""
+    """Return the element-wise maximum."""
     for name, number in found.items():
         into[name] = max(into.get(name, 0), number)
 
 
 @dataclass
 class Meter:
-    """Times calls on a running machine, and counts the most there is of everything while each is under way."""
+    """Timer of calls on a running machine, which also records the maxima of all structures during each call."""
 
     machine: emu.Machine
     structures: Structures
     worst: dict[tuple[str, bool], tuple[int, dict[str, int]]] = field(default_factory=dict)
-    """Of a call, plain or not: cycles of its longest, and the most of everything meanwhile."""
+    """By call and plainness: cycles of the longest run, and the maxima during it."""
     under_way: list[Open] = field(default_factory=list)
     watched: set[int] = field(default_factory=set)
 
     def enter(self, name: str) -> Callable[[], bool]:
-        """What happens at the first instruction of a function."""
+        """Return the hook for the first instruction of a function."""
 
         def hook() -> bool:
             machine = self.machine
@@ -120,7 +121,7 @@ class Meter:
         return hook
 
     def leave(self) -> bool:
-        """Where some call came from."""
+        """Handle the arrival at the return address of a call."""
         top = self.machine.w[15]
         ended = [one for one in self.under_way if one.top == top]
         if ended:
@@ -134,18 +135,18 @@ class Meter:
         return False
 
     def look(self) -> None:
-        """Count everything, for all calls under way."""
+        """Record the sizes of all structures for all calls in progress."""
         found = self.structures.look()
         for one in self.under_way:
             _merge(one.most, found)
 
     def turn_round(self) -> bool:
-        """Where numbers of threads begin again."""
+        """Set the last PID as used, so that PIDs wrap around."""
         self.machine.poke(NEWEST, LAST)
         return False
 
     def tree(self, exchange: range) -> Callable[[], bool]:
-        """What happens in front of a step on the tree, and where it was called from one that is not plain."""
+        """Return the hook before a change of the tree, given the callers that are not plain."""
 
         def hook() -> bool:
             top = self.machine.w[15]
@@ -157,27 +158,27 @@ class Meter:
         return hook
 
     def disturb(self) -> bool:
-        """An interrupt, or a switch."""
+        """Discard the calls in progress: an interrupt or a thread switch disturbs them."""
         for one in self.under_way:
             one.counts = False
         return False
 
     def apart(self) -> bool:
-        """A way that is not plain."""
+        """Mark the calls in progress as not plain."""
         for one in self.under_way:
             one.plain = False
         return False
 
 
 def build(app: str, apps: str, out: Path) -> Path:
-    """The image of an application."""
+    """Build and return the image of an application."""
     words = [f"APP={app}", f"APPS={apps}", f"OUT={out}", f"PYTHON={sys.executable}"]
     subprocess.run(["make", "-s", "-C", str(ROOT / "firmware"), *words], check=True)
     return out / "firmware.elf"
 
 
 def measure(path: Path, program: Program, names: list[str], seconds: float) -> Meter:
-    """The worst of each function, plain and otherwise, and the most of everything there was meanwhile."""
+    """Return the longest run of each function, plain and not, and the maxima of all structures during it."""
     machine = emu.load(path)
     meter = Meter(machine, Structures(machine))
     for handler, _, _ in program.interrupts():
@@ -203,7 +204,7 @@ def measure(path: Path, program: Program, names: list[str], seconds: float) -> M
 
 
 def _extent(program: Program, name: str) -> range:
-    """Addresses of a function, up to the next."""
+    """Return the addresses of a function, up to the next one."""
     start = program.address(name)
     if start not in program.calls.entries or start is None:
         return range(0)
@@ -211,7 +212,7 @@ def _extent(program: Program, name: str) -> range:
 
 
 def rows_of(app: str, path: Path, values: dict[str, int], seconds: float) -> list[Row]:
-    """All calls of the kernel in one image."""
+    """Return the rows of all kernel calls in one image."""
     image = read_executable(path.read_bytes(), str(path))
     annotations = Annotations()
     add_symbols(annotations, image.symbols)
@@ -244,7 +245,7 @@ def rows_of(app: str, path: Path, values: dict[str, int], seconds: float) -> lis
 
 
 def table(rows: list[Row]) -> str:
-    """As Markdown."""
+    """Return the table as Markdown."""
 
     def ratio(bound: int | None, seen: int | None) -> str:
         return "-" if bound is None or not seen else f"{bound / seen:.2f}"
@@ -269,7 +270,7 @@ def table(rows: list[Row]) -> str:
 
 
 def main() -> int:
-    """Command line; status 1 if anything was seen above its bound."""
+    """Run the command; exit status 1 if a run exceeds its bound."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--times", type=float, default=1.0, help="run each image that many times as long (default 1)")
     parser.add_argument("--image", action="append", choices=IMAGES, help="only this one (default: all)")

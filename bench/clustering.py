@@ -1,4 +1,4 @@
-"""Speed of one robot with its camera running: `clustering` and `clustering-bare`, both wheels turning.
+"""Measure the speed of one robot with its camera running: `clustering` and `clustering-bare`, wheels turning.
 
     python bench/clustering.py [--seconds S] [--json]
 
@@ -27,13 +27,13 @@ from emu.image.loader import load_image
 
 FIRMWARE = Path(__file__).resolve().parents[1] / "firmware"
 START = 8
-"""Selector position that starts without the remote control (firmware/apps/clustering)."""
+"""Selector position at which the program starts without the remote control (firmware/apps/clustering)."""
 RED = (80, 0, 0)
 WARM_UP = 1.0
 
 
 def measure(app: str, seconds: float) -> float:
-    """Simulated seconds per CPU second."""
+    """Return simulated seconds per CPU second."""
     command = ["make", "-s", "-C", str(FIRMWARE), f"APP={app}", f"PYTHON={sys.executable}"]
     subprocess.run(command, check=True)
     image = load_image(FIRMWARE / "build" / app / "firmware.elf")
@@ -41,7 +41,7 @@ def measure(app: str, seconds: float) -> float:
     machine.load(image)
     machine.board.camera.show(np.full((480, 640, 3), RED, np.uint8))
     assert isinstance(machine.runner, JitEngine)
-    machine.runner.wait = True  # for native code: its compilation is not what is measured
+    machine.runner.wait = True  # for native code, so that compilation is not measured
     fcy = machine.board.chip.fcy
     machine.run(cycles=int(WARM_UP * fcy))
     began = time.process_time()

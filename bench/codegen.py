@@ -1,4 +1,4 @@
-"""Code quality: words and cycles of reference functions, next to XC16's where they are known.
+"""Measure code quality: words and cycles of reference functions, next to XC16's where they are known.
 
 `python -m bench.codegen [--level=-Os] [--json]`. Words are those of the function alone, its return included, without
 the run-time helpers it calls; cycles are from entry to return of one call on the emulator, helpers included.
@@ -37,7 +37,7 @@ GOAL_TOTAL, GOAL_SINGLE = 0.85, 1.0
 
 @dataclass(frozen=True)
 class Figure:
-    """One function: our words and cycles, XC16's words or None."""
+    """One function: words and cycles of this compiler, XC16's words or None."""
 
     name: str
     words: int
@@ -46,12 +46,12 @@ class Figure:
 
     @property
     def ratio(self) -> float | None:
-        """Our size by XC16's."""
+        """Size relative to XC16's."""
         return self.words / self.xc16_words if self.xc16_words else None
 
 
 def sizes(level: str, folder: Path) -> dict[str, int]:
-    """Words per function, from separately compiled objects: nothing is inlined away or specialised."""
+    """Return words per function of separately compiled objects, so that no function is inlined or specialised."""
     words: dict[str, int] = {}
     for source in ("compared.c", "programs.c"):
         target = folder / (source + ".o")
@@ -64,7 +64,7 @@ def sizes(level: str, folder: Path) -> dict[str, int]:
 
 
 def cycles(level: str, folder: Path, names: list[str]) -> dict[str, int]:
-    """Cycles from the first instruction of each function to the one after its call."""
+    """Return cycles from the first instruction of each function to the one after its call."""
     image = folder / "all.elf"
     sources = [str(SOURCES / name) for name in ("main.c", "compared.c", "programs.c")]
     if driver.main([level, "-fno-lto", *sources, "-o", str(image)]) != 0:
@@ -84,12 +84,12 @@ def cycles(level: str, folder: Path, names: list[str]) -> dict[str, int]:
 
 
 def _returned(machine: emu.Machine, depth: int) -> Callable[[], bool]:
-    """True when the stack pointer is back where it was before the call."""
+    """Return whether the stack pointer has its value from before the call."""
     return lambda: machine.w[15] == depth
 
 
 def measure(level: str) -> list[Figure]:
-    """Every function of `codegen_src`."""
+    """Return the rows of all functions of `codegen_src`."""
     with tempfile.TemporaryDirectory(prefix="codegen-") as name:
         words = sizes(level, Path(name))
         spent = cycles(level, Path(name), list(words))
@@ -98,7 +98,7 @@ def measure(level: str) -> list[Figure]:
 
 
 def main() -> int:
-    """Print the table; exit status 0."""
+    """Print the table; return exit status 0."""
     parser = argparse.ArgumentParser(description=__doc__, epilog="example: python -m bench.codegen --level=-O2")
     parser.add_argument("--level", default="-Os")
     parser.add_argument("--json", action="store_true")

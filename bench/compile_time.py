@@ -1,4 +1,4 @@
-"""Compile time: 3,000 lines of C to ELF, again after a change of one file, and the driver's own start.
+"""Measure compile time: 3,000 lines of C to ELF, again after a change of one file, and the driver's start.
 
 `python -m bench.compile_time [--lines N] [--json]`. Host seconds; goals (issue B): 15 s, 5 s, 1 s on 2 cores.
 """
@@ -16,7 +16,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 FILES = 10
 
-# One unit of generated source: functions of the kinds firmware is made of. {n} makes names unique.
+# One unit of generated source with typical firmware functions. {n} makes names unique.
 UNIT = """
 struct item{n} {{ struct item{n} *next; int key; long weight; unsigned char flags; }};
 static struct item{n} pool{n}[6];
@@ -63,7 +63,7 @@ unsigned checksum{n}(const unsigned char *p, unsigned count)
 
 
 def write_program(folder: Path, lines: int) -> tuple[list[Path], int]:
-    """FILES source files of about `lines` lines together, and a main that uses every unit."""
+    """Write FILES source files of about `lines` lines in total, and a main that uses every unit."""
     units = max(FILES, lines // UNIT.count("\n"))
     texts = ["" for _ in range(FILES)]
     calls, prototypes = [], []
@@ -83,14 +83,14 @@ def write_program(folder: Path, lines: int) -> tuple[list[Path], int]:
 
 
 def timed(*words: str) -> float:
-    """Wall seconds of one run of the driver in a process of its own."""
+    """Return wall seconds of one run of the driver in its own process."""
     started = time.perf_counter()
     subprocess.run([sys.executable, "-m", "toolchain", "cc", *words], cwd=ROOT, check=False, capture_output=True)
     return time.perf_counter() - started
 
 
 def main() -> int:
-    """Print the figures; exit status 0."""
+    """Print the figures; return exit status 0."""
     parser = argparse.ArgumentParser(description=__doc__, epilog="example: python -m bench.compile_time --lines 3000")
     parser.add_argument("--lines", type=int, default=3000)
     parser.add_argument("--json", action="store_true")

@@ -1,4 +1,4 @@
-"""Speed of firmware that talks to one device all the time, as a multiple of real time.
+"""Measure the speed of firmware that accesses one device all the time, as a multiple of real time.
 
     python bench/devices.py [--seconds S] [--repeat N] [--only NAME] [--json]
 
@@ -24,11 +24,11 @@ import emu  # noqa: E402
 from emu.dspic30f.jit.engine import JitEngine  # noqa: E402
 
 SOURCE = Path(__file__).parent / "c" / "devices.c"
-MIPS = 14_745_600  # design §4.2
+MIPS = 14_745_600  # engines.md §4.2
 WARM_UP = 5_000_000
-"""Tcy."""
+"""Simulated time in Tcy."""
 BYTES = 11_520
-"""Per second at 115200 baud: what UART2 is told."""
+"""Bytes per second that UART2 receives at 115200 baud."""
 PROGRAMS = {
     "line": "printf on UART1, 115200 baud, polled",
     "talk": "UART2 at 115200 baud, an echo by interrupt",
@@ -39,7 +39,7 @@ PROGRAMS = {
 
 
 def measure(image: Path, cycles: int, repeat: int) -> dict[str, float]:
-    """Multiple of real time, and crossings per simulated second."""
+    """Return the multiple of real time, and the exits from native code per simulated second."""
     machine = emu.load(image, engine="jit")
     assert isinstance(machine.runner, JitEngine)
     said: list[int] = []

@@ -1,4 +1,4 @@
-"""Speed of native code: C that computes, the kernel with busy threads, an interrupt storm; beside simavr and QEMU.
+"""Measure the speed of native code: C that computes, busy threads, an interrupt storm; next to simavr and QEMU.
 
     python bench/jit.py [--seconds S] [--repeat N] [--json]
 
@@ -33,7 +33,7 @@ HERE = Path(__file__).parent
 MIPS = 14_745_600  # engines.md §4.2
 WARM_UP = 100_000_000
 INTERPRETER_SHARE = 100
-"""The interpreter runs this much less."""
+"""Factor by which the interpreter runs a shorter time."""
 
 
 def build(source: Path, output: Path, *flags: str) -> None:
@@ -43,7 +43,7 @@ def build(source: Path, output: Path, *flags: str) -> None:
 
 
 def build_kernel(output: Path) -> None:
-    """The kernel with eight computing threads (firmware/apps/compute)."""
+    """Build the kernel with eight computing threads (firmware/apps/compute)."""
     subprocess.run(
         ["make", "-s", "-C", str(ROOT / "firmware"), "APP=compute", f"PYTHON={sys.executable}"],
         check=True,
@@ -53,7 +53,7 @@ def build_kernel(output: Path) -> None:
 
 
 def machine(image: Path, engine: str) -> emu.Machine:
-    """A loaded machine past its start-up; native code is complete before it is timed."""
+    """Return a machine after its start-up, with complete native code."""
     loaded = emu.load(image, engine=engine)
     if isinstance(loaded.runner, JitEngine):
         loaded.runner.wait = True
@@ -62,14 +62,14 @@ def machine(image: Path, engine: str) -> emu.Machine:
 
 
 def times_real(target: emu.Machine, cycles: int) -> float:
-    """Multiple of real time at which `target` runs `cycles`."""
+    """Return the multiple of real time at which `target` runs `cycles`."""
     start = time.process_time()
     target.run(cycles=cycles)
     return cycles / MIPS / (time.process_time() - start)
 
 
 def measure(image: Path, cycles: int, repeat: int) -> dict[str, float]:
-    """Medians of paired runs of one image under both engines."""
+    """Return medians of paired runs of one image under both engines."""
     native, plain = machine(image, "jit"), machine(image, "plain")
     pairs = [(times_real(native, cycles), times_real(plain, cycles // INTERPRETER_SHARE)) for _ in range(repeat)]
     fast = statistics.median(pair[0] for pair in pairs)
@@ -81,7 +81,7 @@ def measure(image: Path, cycles: int, repeat: int) -> dict[str, float]:
 
 
 def two_at_once(image: Path, cycles: int) -> float:
-    """Speed of two machines in two threads over one machine, in wall time: 2 is perfect on two idle cores."""
+    """Return the wall-time speed of two machines in two threads relative to one; ideal on two idle cores: 2."""
     machines = [machine(image, "jit") for _ in range(2)]
     start = time.perf_counter()
     machines[0].run(cycles=cycles)
@@ -96,7 +96,7 @@ def two_at_once(image: Path, cycles: int) -> float:
 
 
 def compile_seconds(image: Path) -> tuple[float, float]:
-    """Host seconds to the same point of a run with an empty cache and with a full one, above the second's own run."""
+    """Return host seconds of compilation with an empty and with a full cache."""
     with tempfile.TemporaryDirectory() as cache:
         os.environ["OPENSWARM_CACHE"] = cache
         spent = []
@@ -109,12 +109,12 @@ def compile_seconds(image: Path) -> tuple[float, float]:
 
 
 def cycles_per_round(image: Path, rounds: int) -> float:
-    """Tcy of one round of compute.c, from a whole run."""
+    """Return Tcy of one round of compute.c, from a whole run."""
     return emu.load(image).run().cycle / rounds
 
 
 def avr_image(folder: Path, rounds: int) -> Path:
-    """compute.c for the AVR emulators."""
+    """Build compute.c for the AVR emulators."""
     output = folder / f"avr{rounds}.elf"
     subprocess.run(
         [
@@ -133,7 +133,7 @@ def avr_image(folder: Path, rounds: int) -> Path:
 
 
 def until_done(command: list[str]) -> float:
-    """Host seconds until the emulator has printed the D of compute_avr.c."""
+    """Return host seconds until the emulator prints the D of compute_avr.c."""
     start = time.perf_counter()
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL)
     assert process.stdout is not None
@@ -154,7 +154,7 @@ EMULATORS = {
 
 
 def others(folder: Path, repeat: int) -> tuple[dict[str, float], list[str]]:
-    """Rounds of compute.c per host second in other emulators, start-up subtracted, and notes on absent ones."""
+    """Return rounds of compute.c per host second in other emulators without start-up, and notes on absent ones."""
     found: dict[str, float] = {}
     notes = []
     for name, command in EMULATORS.items():

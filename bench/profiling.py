@@ -1,4 +1,4 @@
-"""What counting costs: `emu profile` beside a plain run of the same image in native code.
+"""Measure the overhead of `emu profile` over a plain run of the same image in native code.
 
     python bench/profiling.py [--seconds S] [--repeat N] [--only WORD] [--json]
 
@@ -33,7 +33,7 @@ from emu.boards.epuck.board import Epuck  # noqa: E402
 from emu.dspic30f.jit.engine import JitEngine  # noqa: E402
 from emu.profile.cycle_shares import Profiler  # noqa: E402
 
-MIPS = 14_745_600  # design §4.2
+MIPS = 14_745_600  # engines.md §4.2
 
 
 SOURCES = {
@@ -43,13 +43,13 @@ SOURCES = {
     "interrupt every 10 us": ("storm.c", "-DPERIOD=146"),
 }
 FIRMWARE = {"kernel with busy threads": ("compute", 0), "Listing 1": ("listing1", 0), "clustering": ("clustering", 8)}
-"""Applications, and the position of the selector."""
+"""Applications and their selector positions."""
 RED = (80, 0, 0)
-"""What the camera sees: the same work for every line of every frame."""
+"""Picture in front of the camera, with the same work for every line of every frame."""
 
 
 def images(folder: Path, only: str) -> dict[str, Path]:
-    """What is run, where `only` is in its name."""
+    """Return the images to run whose name contains `only`."""
     found = {}
     for name, (source, *words) in SOURCES.items():
         for level in ("-Os", "-O0"):
@@ -67,7 +67,7 @@ def images(folder: Path, only: str) -> dict[str, Path]:
 
 
 def spent(image: Path, name: str, cycles: int, how: str) -> float:
-    """Host seconds of `cycles` behind as many that are not timed: "plain", "counted" or "timed"."""
+    """Return host seconds of `cycles` after as many untimed ones; kind: "plain", "counted" or "timed"."""
     _, selector = FIRMWARE.get(name, ("", 0))
     machine = emu.load(image, board=partial(Epuck, selector=selector))
     machine.board.camera.show(np.full((480, 640, 3), RED, np.uint8))
@@ -84,7 +84,7 @@ def spent(image: Path, name: str, cycles: int, how: str) -> float:
 
 
 def of_a_process(image: Path, name: str, seconds: float, how: str) -> float:
-    """Host seconds of `emu run` or `emu profile` from start to end."""
+    """Return host seconds of a whole `emu run` or `emu profile` process."""
     folder = image.parent
     more = {"plain": [], "counted": [], "timed": ["--speedscope", str(folder / "timeline.json")]}[how]
     words = ["run" if how == "plain" else "profile", str(image), "--seconds", f"{seconds:g}", *more]
@@ -97,7 +97,7 @@ def of_a_process(image: Path, name: str, seconds: float, how: str) -> float:
 
 
 def main() -> int:
-    """Measure and print."""
+    """Measure and print the table."""
     assert __doc__ is not None
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seconds", type=float, default=20, help="simulated time of a run (default 20)")

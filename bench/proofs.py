@@ -1,4 +1,4 @@
-"""How much of the kernel, its drivers and the run-time library is proved to do what its IR says.
+"""Count the functions of kernel, drivers and run-time library that are proved equivalent to their IR.
 
 `python -m bench.proofs [--part NAME] [--level -Os] [--jobs N] [--json]`. Every function of every C file of a part, each
 file compiled by itself: proved, refuted, undecided, those without loops and those with. Exits 1 if one is refuted.
@@ -33,13 +33,13 @@ KINDS = ("proved", "refuted", "undecided")
 
 
 def files() -> dict[str, list[Path]]:
-    """By part."""
+    """Source files by part."""
     found = {part: sorted(f for pattern in patterns for f in SYSTEM.glob(pattern)) for part, patterns in PARTS.items()}
     return found | {"library": sorted(LIBRARY.glob("*.c"))}
 
 
 def options_of(part: str, level: str) -> list[str]:
-    """How its files are compiled."""
+    """Compiler options by part."""
     if part == "library":
         return [level, "-w", "-std=c11", "-ffreestanding"]
     folders = [SYSTEM / name for name in ("include", "hal", "kernel", "io", "port/dspic30f", "board/epuck")]
@@ -48,7 +48,7 @@ def options_of(part: str, level: str) -> list[str]:
 
 
 def look(level: str, work: tuple[str, Path]) -> tuple[str, str, list[dict[str, Any]]]:
-    """Part, file and verdicts of one file; none where it cannot be compiled by itself."""
+    """Return part, file and verdicts of one file; no verdicts if it cannot be compiled separately."""
     from toolchain.errors import ToolError
     from toolchain.frontend.clang import CompileError
     from toolchain.proof.problem import compile_file
@@ -88,7 +88,7 @@ def main() -> int:
 
 
 def table(rows: list[dict[str, Any]]) -> str:
-    """Counts by part, and why there is no verdict."""
+    """Print the counts by part, and the reasons for missing verdicts."""
     lines = ["| part | loops | proved | refuted | undecided | share |", "|---|---|---|---|---|---|"]
     for part in [*dict.fromkeys(row["part"] for row in rows), "all"]:
         for loops in (False, True):

@@ -1,12 +1,11 @@
-"""A debugged swarm taken back: what the way takes, and what it takes to remember.
+"""Measure time and memory of stepping a debugged swarm backwards (Linux).
 
     python bench/rewinding.py [--minutes M] [--json]
 
-Robot 2 of `clustering` (five robots with cameras) is debugged for M simulated minutes (default 2). Then, in host
-seconds by the clock: a step back with the whole world, the first one and the fastest of the ten after it; back to the
-breakpoint before; back by a minute; forward there, as a trial that is run. And in MB, after half the time and all of
-it: the process of the trial with all moments that are kept, what they share counted once; the mean of a moment alone.
-For Linux.
+Robot 2 of `clustering` (five robots with cameras) is debugged for M simulated minutes (default 2). Then these are
+timed, in wall-clock seconds: the first step back with the whole world and the fastest of the ten after it; back to the
+previous breakpoint; back by a minute; forward again, as a plain trial. Memory in MB is measured after half the time and
+at the end: the trial's process with all checkpoints, shared pages counted once, and the mean of one checkpoint.
 """
 
 from __future__ import annotations
@@ -33,26 +32,26 @@ ROBOT = 2
 
 
 def timed(client: Client, request: str, **arguments: Any) -> float:
-    """Host seconds until it stands again."""
+    """Return host seconds until the swarm is paused again."""
     start = time.perf_counter()
     client.resume(request, threadId=1, **arguments)
     return time.perf_counter() - start
 
 
 def memory_mb(pid: int, *kinds: str) -> float:
-    """Of a process, as Linux tells it."""
+    """Return the memory of a process in MB, from Linux."""
     rows = Path(f"/proc/{pid}/smaps_rollup").read_text().splitlines()
     return sum(int(row.split()[1]) for row in rows if row.startswith(kinds)) / 1024
 
 
 def children(pid: int) -> list[int]:
-    """Of a process, those that live."""
+    """Return the live child processes of a process."""
     found = Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
     return [int(one) for one in found if Path(f"/proc/{one}/maps").read_text()]
 
 
 def measured(minutes: float) -> dict[str, float]:
-    """Everything, by what is told of it."""
+    """Return all figures by their label."""
     scene = load_scene("clustering").with_values(start__selector=8)
     plan = Plan(scene, "openswarm", "A", image_for("openswarm"), 1, 60 * minutes + 10, 1)
     found: dict[str, float] = {}
@@ -88,7 +87,7 @@ def measured(minutes: float) -> dict[str, float]:
 
 
 def main() -> int:
-    """Measure and print."""
+    """Measure and print the table."""
     assert __doc__ is not None
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--minutes", type=float, default=2, help="simulated time, at least 1 (default 2)")

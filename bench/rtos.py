@@ -1,4 +1,4 @@
-"""OpenSwarm on three CPUs beside FreeRTOS on the same emulator and beside the literature: the page docs/table2.md.
+"""Compare OpenSwarm on three CPUs with FreeRTOS on the same emulator and with the literature: docs/table2.md.
 
     python bench/rtos.py [--freertos DIR] [--page docs/table2.md] [--json]
 
@@ -39,9 +39,9 @@ PORT = Path("portable/MPLAB/PIC24_dsPIC")
 SOURCES = ("tasks.c", "list.c", "queue.c", "portable/MemMang/heap_1.c", PORT / "port.c", PORT / "portasm_dsPIC.S")
 TICK, YIELD, QUEUE = 1, 2, 3
 STACK_BYTES = 256
-"""Of a task in main.c."""
+"""Stack size of a task in main.c."""
 SETTLING = 8
-"""Windows passed over."""
+"""Measurement windows skipped at the start."""
 
 ROWS = (
     ("flash of the kernel, all calls linked", "flash"),
@@ -94,7 +94,7 @@ COLUMNS = ("dsPIC30F", "ATmega328P", "Cortex-M4", "FreeRTOS")
 
 
 def run(*words: str | Path) -> None:
-    """A command whose output matters only when it fails."""
+    """Run a command and print its output only if it fails."""
     done = subprocess.run([str(word) for word in words], cwd=ROOT, capture_output=True, text=True, check=False)
     if done.returncode != 0:
         raise SystemExit(f"rtos: {' '.join(str(word) for word in words[:6])} ...\n{done.stdout}{done.stderr}")
@@ -104,7 +104,7 @@ def run(*words: str | Path) -> None:
 
 
 def on_dspic(folder: Path) -> dict[str, Any]:
-    """Cells of the dsPIC30F; the same measures as `emu cycles` and `emu footprint`."""
+    """Return the cells of the dsPIC30F, measured as by `emu cycles` and `emu footprint`."""
     images = {}
     for app in ("latency", "footprint", "smallest"):
         run("make", "-s", "-C", "firmware", f"APP={app}", f"OUT={folder / app}", f"PYTHON={sys.executable}")
@@ -128,7 +128,7 @@ def on_dspic(folder: Path) -> dict[str, Any]:
 
 
 def on_port(robot: str, frame: int) -> dict[str, Any]:
-    """Cells of one of the simulated robots. Raises NotInstalled."""
+    """Return the cells of a simulated robot. Raises NotInstalled."""
     found = measure(robot)
     cycles, equation, sizes = found["cycles"], found["equation"], found["sizes"]
     return {
@@ -150,7 +150,7 @@ def on_port(robot: str, frame: int) -> dict[str, Any]:
 
 
 def version(checkout: Path) -> str:
-    """The version the checkout says of itself, and its commit if git knows."""
+    """Return the checkout's own version, and its commit if git has it."""
     header = (checkout / "include" / "task.h").read_text(encoding="utf-8")
     said = next(
         (line.split('"')[1] for line in header.splitlines() if "tskKERNEL_VERSION_NUMBER" in line and '"' in line), "?"
@@ -162,19 +162,19 @@ def version(checkout: Path) -> str:
 
 
 def build_freertos(checkout: Path, out: Path) -> Image:
-    """The measuring program with the official dsPIC port. Exits with a line when the folder is no such checkout."""
+    """Build the measuring program with the official dsPIC port. Exits with a message if the folder is no checkout."""
     missing = [str(source) for source in SOURCES if not (checkout / source).exists()]
     if missing:
         raise SystemExit(f"rtos: {checkout} is no checkout of FreeRTOS-Kernel: it has no {missing[0]}")
     includes = [f"-I{folder}" for folder in (GLUE, checkout / "include", checkout / PORT)]
     sources = [GLUE / "main.c", *(checkout / source for source in SOURCES)]
-    # its portmacro.h defines SIZE_MAX anew
+    # its portmacro.h redefines SIZE_MAX
     run(sys.executable, "-m", "toolchain", "cc", "-Os", "-g", "-Wno-macro-redefined", *includes, *sources, "-o", out)
     return load_image(str(out))
 
 
 def on_freertos(checkout: Path, folder: Path) -> dict[str, Any]:
-    """Cells of FreeRTOS on the emulated dsPIC30F6014A."""
+    """Return the cells of FreeRTOS on the emulated dsPIC30F6014A."""
     image = build_freertos(checkout, folder / "freertos.elf")
     target = Target(image, "rtos_begin", "auto")
     modules = totals(pieces(image), "module")
@@ -230,7 +230,7 @@ def on_freertos(checkout: Path, folder: Path) -> dict[str, Any]:
 
 
 def collect(checkout: Path | None) -> dict[str, Any]:
-    """Measure what can be, the rest from the last time; "kept" names those columns."""
+    """Measure what is installed and take the rest from the last measurement; "kept" names those columns."""
     before = json.loads(KEPT.read_text()) if KEPT.exists() else {}
     cells: dict[str, Any] = {}
     kept = []
@@ -263,7 +263,7 @@ def cell(column: dict[str, Any], key: str) -> str:
 
 
 def page(found: dict[str, Any]) -> str:
-    """docs/table2.md."""
+    """Return the text of docs/table2.md."""
     freertos = found["FreeRTOS"]["version"]
     lines = [
         INTRODUCTION,

@@ -1,8 +1,8 @@
-"""How soon the emulator says something, and what asking it to go on costs.
+"""Measure the time to the emulator's first output, and the cost of a `run_until` without work.
 
-Measures host seconds from process start to the first UART byte: of a small image and of the kernel's Listing 1 (whose
-first line comes at 250 ms), with the objects of earlier runs on disk (engines.md §9: 0.8 s) and without any (4 s); and host
-time per `Machine.run_until` of a sleeping machine that is asked to go one more cycle (engines.md §4.3: 1 µs).
+Host seconds from process start to the first UART byte are measured for a small image and for the kernel's Listing 1,
+whose first line appears at 250 ms: with cached objects of earlier runs (engines.md §9: 0.8 s) and without (4 s). Host
+time per `Machine.run_until` is that of one more cycle on a sleeping machine (engines.md §4.3: 1 µs).
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ CALLS = 200_000
 
 
 def first_byte(engine: str, image: Path = IMAGE, cache: str | None = None) -> float:
-    """Seconds from starting the process to the first byte on its standard output."""
+    """Return seconds from process start to the first byte on standard output."""
     start = time.perf_counter()
     command = [sys.executable, "-m", "emu", "run", str(image), "--engine", engine, "--seconds", "1"]
     environment = dict(os.environ) | ({"OPENSWARM_CACHE": cache} if cache is not None else {})
@@ -38,13 +38,13 @@ def first_byte(engine: str, image: Path = IMAGE, cache: str | None = None) -> fl
 
 
 def cold(engine: str, image: Path) -> float:
-    """The same with nothing kept from earlier runs."""
+    """Return the same with an empty cache."""
     with tempfile.TemporaryDirectory() as empty:
         return first_byte(engine, image, empty)
 
 
 def seconds_per_call(engine: str) -> float:
-    """Seconds per `run_until` one cycle on, of a machine that idles until a timer match far away."""
+    """Return seconds per `run_until` of one cycle, on a machine that idles until a distant timer match."""
     sys.path.insert(0, str(ROOT))
     from emu.image.loader import load_image
     from emu.machine.machine import Machine

@@ -1,4 +1,4 @@
-"""How long the kernel's lists are in a running machine, and how deep its heap's tree: the limits bounds are given."""
+"""Lengths of kernel lists and depth of the heap's tree in a running machine: the limits for bounds."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ import emu
 
 BUCKETS = 8
 MOST = 200
-"""Members of a list that is followed: more are none."""
+"""Maximum length of a list; a longer one counts as inconsistent."""
 NEXT_EVENT, SUBSCRIBERS, OWNER, NEXT_THREAD, SIDES, HOLE_SIZE = 2, 4, 6, 14, (0, 2), 4
-"""Where links stand in event, thread and hole, a subscription's thread and a hole's size (kernel.h, memory.c)."""
+"""Offsets of links in event, thread and hole, of a subscription's PID and of a hole's size (kernel.h, memory.c)."""
 HEAP_STEP = 2
-"""Bytes (kernel.h)."""
+"""Granularity of the heap in bytes (kernel.h)."""
 
 
 @dataclass
 class Structures:
-    """What there is when `look` is called.
+    """Sizes of the kernel's structures when `look` is called.
 
     n threads, m events, b events of one bucket, s subscriptions of one event, o of one thread, t of all, q queued
     messages, h holes on a path of the tree (bounds --help).
@@ -28,7 +28,7 @@ class Structures:
     machine: emu.Machine
 
     def look(self) -> dict[str, int]:
-        """Count everything; nothing where some list is being changed: an ISR's call comes there, too."""
+        """Return all sizes; nothing if a list is being changed, because an ISR may make the call at that point."""
         try:
             return self._found()
         except _Torn:
@@ -59,11 +59,11 @@ class Structures:
     def _word(self, address: int) -> int:
         try:
             return self.machine.peek(address)
-        except ValueError:  # no address of anything
+        except ValueError:  # not a valid address
             raise _Torn from None
 
     def _list(self, link: int, step: int) -> Iterator[int]:
-        """Addresses of the members of a list, from the word that points to its first."""
+        """Yield the addresses of a list's members, from the word that points to the first one."""
         for _ in range(MOST):
             member = self._word(link)
             if not member:
@@ -73,7 +73,7 @@ class Structures:
         raise _Torn
 
     def _ring(self, first: int) -> set[int]:
-        """Addresses of the threads that are ready."""
+        """Yield the addresses of the ready threads."""
         found: set[int] = set()
         while first and first not in found:
             found.add(first)
@@ -84,10 +84,10 @@ class Structures:
         if hole == self._at("_no_hole"):
             return 0
         size = self._word(hole + HOLE_SIZE)
-        if size < HOLE_SIZE + 2 or self._word(hole + size - HEAP_STEP) != size:  # a hole has its size at its end, too
+        if size < HOLE_SIZE + 2 or self._word(hole + size - HEAP_STEP) != size:  # a hole repeats its size at its end
             raise _Torn
         return 1 + max(self._depth(self._word(hole + side)) for side in SIDES)
 
 
 class _Torn(Exception):
-    """Something is being changed."""
+    """A structure is being changed."""

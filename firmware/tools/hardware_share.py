@@ -1,4 +1,4 @@
-"""Share of hardware-specific lines in the kernel: `python firmware/tools/hardware_share.py [--json]`.
+"""Compute the share of hardware-specific lines in the kernel: `python firmware/tools/hardware_share.py [--json]`.
 
 Two countings. Physical lines, comments and blanks included, as the paper counts: 489 of 2,783 lines, 17.6 %, without
 I/O device implementations (openswarm-original.md §1). Code lines: those that are left without comments and blanks.
@@ -22,29 +22,29 @@ DEVICES = {"openswarm_io.h", "hal_io.h"}
 BOARD = ("board.c", "pins.h", "vectors.S")
 PAPER_LINES, PAPER_SHARE = 489, 0.176
 LARGEST_SHARE = 0.17
-"""What neither share may reach."""
+"""Exclusive upper bound of both shares."""
 
 
 def physical(file: Path) -> int:
-    """Lines of a file."""
+    """Count the lines of a file."""
     return file.read_text().count("\n")
 
 
 def code(file: Path) -> int:
-    """Lines of a file that hold anything but comments and blanks."""
+    """Count the lines of a file with code."""
     text = re.sub(r"/\*.*?\*/", "", file.read_text(), flags=re.DOTALL)
     line_comment = r";.*" if file.suffix in {".S", ".inc"} else r"//.*"
     return sum(bool(re.sub(line_comment, "", line).strip()) for line in text.splitlines())
 
 
 def sources(*folders: str) -> list[Path]:
-    """All sources in the folders, devices left out."""
+    """Return all sources in the folders, without devices."""
     files = [file for folder in folders for file in sorted((OPENSWARM / folder).iterdir())]
     return [file for file in files if file.suffix in SOURCE and file.name not in DEVICES]
 
 
 def count() -> dict[str, dict[str, float]]:
-    """By counting: hardware and portable lines, the share of the first in their sum, and lines of board set-up."""
+    """Return by counting method: hardware and portable lines, the hardware share, and lines of board set-up."""
 
     def counted(kind: str, files: Iterable[Path]) -> int:
         return sum((physical if kind == "physical" else code)(file) for file in files)
@@ -60,7 +60,7 @@ def count() -> dict[str, dict[str, float]]:
 
 
 def main() -> int:
-    """Print the counts. Exit status 1 if one is not below the bound."""
+    """Print the counts; return exit status 1 if a share is not below the bound."""
     found = count()
     if "--json" in sys.argv[1:]:
         print(json.dumps(found))

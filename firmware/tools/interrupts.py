@@ -1,4 +1,4 @@
-"""Checks the interrupts an application brings (openswarm_interrupt.h): `python firmware/tools/interrupts.py IMAGE`.
+"""Check an application's interrupts (openswarm_interrupt.h): `python firmware/tools/interrupts.py IMAGE`.
 
 In: a linked image. Out: nothing, or a line for each call that a level above 4 may not make, with the way to it, and
 exit status 1. Level 4 may call the kernel; 5 and 6 interrupt it half-way, so they may call neither the kernel nor a
@@ -27,13 +27,13 @@ LEVEL = "os_level_of_"
 """Absolute symbols that SYS_INTERRUPT leaves in the image."""
 DEVICE = 4
 OWN = "include/openswarm_interrupt.h"
-"""The one file of the system whose text may become part of such an interrupt."""
+"""The only file of the system whose code may be inlined into such an interrupt."""
 CAPTURE = 6
 CAPTURES = "_camera_capture_next"
 
 
 def findings(image: Path) -> Iterator[str]:
-    """What is wrong with the interrupts of an image."""
+    """Yield the rule violations of an image's interrupts."""
     program = read_executable(read_bytes(str(image)), str(image))
     levels = {s.name.removeprefix(LEVEL): s.value for s in program.symbols if s.name.startswith(LEVEL)}
     if all(level <= DEVICE for level in levels.values()):
@@ -50,7 +50,7 @@ def findings(image: Path) -> Iterator[str]:
 
 
 def of_system(analysis: Analysis, lines: Lines, function: int) -> Line | None:
-    """The first line of kernel or devices in a function, the compiler's inlining included."""
+    """Return the first line of kernel or device code in a function, including inlined code."""
     end = min((entry for entry in analysis.entries if entry > function), default=function)
     for address in range(function, end, 2):
         line = lines.find(address) if address in analysis.code else None
@@ -60,7 +60,7 @@ def of_system(analysis: Analysis, lines: Lines, function: int) -> Line | None:
 
 
 def intrusions(analysis: Analysis, lines: Lines, vector: str, level: int, entry: int) -> Iterator[str]:
-    """Everything of the system that can be reached from `entry`, with the shortest way to it."""
+    """Yield all functions of the system reachable from `entry`, each with the shortest call path."""
     ways = {entry: [vector]}
     waiting = [entry]
     while waiting:
@@ -83,7 +83,7 @@ def intrusions(analysis: Analysis, lines: Lines, vector: str, level: int, entry:
 
 
 def main() -> int:
-    """Exit status 0: nothing found, 1: something was, 2: not an image."""
+    """Print the violations; return exit status 0: none, 1: some, 2: not an image."""
     if len(sys.argv) != 2 or sys.argv[1].startswith("-"):
         print(__doc__)
         return 0 if sys.argv[1:] in (["-h"], ["--help"]) else 2

@@ -22,13 +22,13 @@ from firmware.tools.simulated.machine import NotInstalled, Stopped, Symbols
 
 QEMU = "qemu-system-arm"
 PATIENCE = 60.0
-"""Seconds of the host for one run."""
+"""Host time limit of one run in seconds."""
 _PC, _LR, _XPSR = 15, 14, 25
 _IT_STATE = 0x0600FC00
 
 
 def command(image: Path, serial: str, sleep: str = "off") -> list[str]:
-    """How QEMU is started; `serial` is where the e-puck2's UART goes. Raises NotInstalled."""
+    """Return QEMU's command line; `serial` receives the e-puck2's UART. Raises NotInstalled."""
     if shutil.which(QEMU) is None:
         raise NotInstalled(f"{QEMU} is not installed; Debian package: qemu-system-arm")
     machine = [QEMU, "-M", "netduinoplus2", "-kernel", str(image), "-display", "none", "-monitor", "none"]
@@ -37,7 +37,7 @@ def command(image: Path, serial: str, sleep: str = "off") -> list[str]:
 
 
 def run_until(image: Path, text: bytes, seconds: float = 5 * PATIENCE) -> bytes:
-    """What the UART says until the regular expression `text` is in it.
+    """Return the UART's output up to a match of the regular expression `text`.
 
     Raises Stopped with what came instead, NotInstalled.
     """
@@ -62,7 +62,7 @@ def run_until(image: Path, text: bytes, seconds: float = 5 * PATIENCE) -> bytes:
 
 
 class Epuck2:
-    """A CPU that stands at its reset vector. Raises NotInstalled."""
+    """A CPU at its reset vector. Raises NotInstalled."""
 
     pointer = 4
 
@@ -82,8 +82,8 @@ class Epuck2:
             self._socket = self._connect(address)
             self._ask("QStartNoAckMode")
             self._socket.sendall(b"+")
-            self._ask("qXfer:features:read:target.xml:0,ffb")  # who has read this may write single registers
-            self._ask("Qqemu.sstep=5")  # interrupts are taken while stepping; the clock stands
+            self._ask("qXfer:features:read:target.xml:0,ffb")  # permits writes of single registers
+            self._ask("Qqemu.sstep=5")  # takes interrupts while stepping, with the clock stopped
         except BaseException:
             self.close()
             raise
@@ -104,7 +104,7 @@ class Epuck2:
                 return made
 
     def _ask(self, question: str) -> str:
-        """One packet of the remote serial protocol, and its answer."""
+        """Send one packet of the remote serial protocol and return its answer."""
         payload = question.encode()
         self._socket.sendall(b"$" + payload + b"#%02x" % (sum(payload) % 256))
         answer = b""
@@ -134,7 +134,7 @@ class Epuck2:
         self.now += 1
 
     def store(self, address: int, value: int) -> None:
-        """What the CPU's own store does, where the stub cannot write: to the registers of NVIC and SCB.
+        """Write by a store of the CPU, because the stub cannot write to the registers of NVIC and SCB.
 
         The firmware has `inject_store`, whose first instruction stores r1 at r0. It alone is executed, no interrupt
         is taken and no time passes; then the CPU stands where it stood, inside an IT block, too."""
@@ -175,7 +175,7 @@ class Epuck2:
         return self._register(_LR) & ~1
 
     def uart(self) -> bytes:
-        """All the UART sent so far."""
+        """Return all output of the UART so far."""
         return self._uart.read_bytes() if self._uart.exists() else b""
 
     def close(self) -> None:

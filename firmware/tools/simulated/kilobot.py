@@ -15,19 +15,19 @@ HERE = Path(__file__).parent
 SOURCES = (HERE / "simavr.c", HERE / "air.c")
 HZ = 8_000_000
 PATIENCE = 80_000_000
-"""Cycles: 10 s."""
+"""Cycle limit of a run: 10 s."""
 DATA = 0x800000
-"""Where ELF files put data memory."""
+"""Address of data memory in ELF files."""
 _DONE, _CRASHED, _AT_PLACE = 1, 2, 3
 
 
 @functools.cache
 def library() -> ctypes.CDLL:
-    """simavr.c and air.c, compiled once per run of Python. Raises NotInstalled."""
+    """Return the library of simavr.c and air.c, compiled once per process. Raises NotInstalled."""
     for program, package in (("gcc", "gcc"), ("pkg-config", "pkg-config")):
         if shutil.which(program) is None:
             raise NotInstalled(f"{program} is not installed; Debian package: {package}")
-    # Not --cflags: that fails where libelf, which only a static link of simavr needs, has no development package.
+    # Not --cflags, which fails without libelf's development package; only a static link of simavr needs libelf.
     asked = ["pkg-config", "--variable=includedir", "simavr"]
     found = subprocess.run(asked, capture_output=True, text=True, check=False)
     if found.returncode != 0:
@@ -40,7 +40,7 @@ def library() -> ctypes.CDLL:
         subprocess.run(command, check=True)
         made = ctypes.CDLL(str(object_))
     finally:
-        shutil.rmtree(folder, ignore_errors=True)  # what is loaded stays
+        shutil.rmtree(folder, ignore_errors=True)  # the loaded library stays usable
     handle = ctypes.c_void_p
     for name, result, arguments in (
         ("machine_open", handle, [ctypes.c_char_p, ctypes.c_uint32]),
@@ -71,11 +71,11 @@ def library() -> ctypes.CDLL:
 
 
 class Kilobot:
-    """A Kilobot's CPU that stands at its reset vector. Raises NotInstalled."""
+    """A Kilobot's CPU at its reset vector. Raises NotInstalled."""
 
     pointer = 2
     handle: int | None
-    """simavr.c's name for it; None: closed."""
+    """Handle of simavr.c; None: closed."""
 
     def __init__(self, image: Path) -> None:
         self._library = library()
@@ -102,16 +102,16 @@ class Kilobot:
         self._check(self._library.machine_step(self.handle))
 
     def steps(self, count: int) -> None:
-        """That many instructions."""
+        """Execute a number of instructions."""
         self._check(self._library.machine_steps(self.handle, count))
 
     @property
     def instructions(self) -> int:
-        """Instructions so far, each stretch of sleep counted as one."""
+        """Return executed instructions; each period of sleep counts as one."""
         return int(self._library.machine_instructions(self.handle))
 
     def run(self, cycles: int) -> None:
-        """At least that many cycles."""
+        """Run for at least a number of cycles."""
         self._check(self._library.machine_run(self.handle, None, 0, self.now + cycles))
 
     def run_to(self, *places: str | int, patience: int = PATIENCE) -> int:
@@ -132,7 +132,7 @@ class Kilobot:
 
     @property
     def sp(self) -> int:
-        """The stack pointer: the next free byte."""
+        """Return the stack pointer, which points to the next free byte."""
         return self._data[0x5D] | self._data[0x5E] << 8
 
     def return_address(self) -> int:
@@ -144,26 +144,26 @@ class Kilobot:
         self._library.machine_interrupt(self.handle, vector)
 
     def receive(self, byte: int) -> None:
-        """A byte arrives at the UART."""
+        """Send a byte to the UART's receiver."""
         self._library.machine_receive(self.handle, byte)
 
     def write_eeprom(self, offset: int, data: bytes) -> None:
-        """Data EEPROM, 1,024 bytes, erased to begin with. Raises ValueError."""
+        """Write the data EEPROM, 1,024 bytes, initially erased. Raises ValueError."""
         if self._library.machine_eeprom(self.handle, data, offset, len(data)) != 0:
             raise ValueError(f"{len(data)} bytes at {offset:#x} are not in the EEPROM")
 
     def uart(self) -> bytes:
-        """What the UART sent since the last call."""
+        """Return the UART's output since the last call."""
         room = ctypes.create_string_buffer(1 << 16)
         count = self._library.machine_uart(self.handle, room, len(room))
         return room.raw[:count]
 
     def watch_stack(self, lowest: int, highest: int) -> None:
-        """From now on note the lowest stack pointer between the two addresses."""
+        """Start to record the lowest stack pointer between the two addresses."""
         self._library.machine_watch(self.handle, lowest, highest)
 
     def lowest_sp(self) -> int:
-        """The lowest stack pointer noted."""
+        """Return the lowest recorded stack pointer."""
         return int(self._library.machine_lowest(self.handle))
 
     def close(self) -> None:

@@ -1,4 +1,4 @@
-"""Several Kilobots within sight of each other: ATmega328Ps in simavr, in lock step, that see each other's infrared.
+"""Swarm of Kilobots: ATmega328Ps in simavr, in lock step, that receive each other's infrared pulses.
 
     with Kilobots([Robot(image, x=0, number=1), Robot(image, x=50, number=2)]) as swarm:
         swarm.run(2.0)
@@ -20,10 +20,10 @@ from firmware.tools.simulated.kilobot import HZ, Kilobot, library
 from firmware.tools.simulated.machine import Stopped
 
 REACH_MM = 70.0
-"""Between two robots' middles; farther away nobody hears anything. Public descriptions of the robot say 7 cm."""
+"""Maximum range between the centres of two robots in mm. Public descriptions of the robot state 7 cm."""
 FULL_SCALE = 1023
 HIGH_GAIN_MM, LOW_GAIN_MM = 40.0, 20.0
-"""Where the two gains saturate; beyond, counts fall with the square of the distance. UNVERIFIED, docs/accuracy.md."""
+"""Distances at which the two gains saturate; beyond, counts fall with its square. UNVERIFIED, docs/accuracy.md."""
 CALIBRATED_MM = tuple(range(33, 99, 5))
 """Distances of the tables in the EEPROM (kilolib)."""
 NUMBER_AT, LOW_GAIN_AT, HIGH_GAIN_AT = 0xB0, 0x20, 0x50
@@ -32,28 +32,28 @@ PULSE_LOSS = 1 << 16
 
 
 def counts(gain_mm: float, distance_mm: float) -> int:
-    """What the converter makes of a neighbour's pulse."""
+    """Return the converter's counts for a neighbour's pulse."""
     return FULL_SCALE if distance_mm <= gain_mm else round(FULL_SCALE * (gain_mm / distance_mm) ** 2)
 
 
 @dataclass(frozen=True)
 class Robot:
-    """One robot of a swarm as it is switched on."""
+    """Configuration of one robot at power-on."""
 
     image: Path
     x: float = 0.0
-    """mm, of its middle."""
+    """Position of its centre in mm."""
     y: float = 0.0
     number: int | None = None
-    """Its UID; None: an erased EEPROM, so that it draws one."""
+    """Its UID; None: an erased EEPROM, so that the robot draws a number."""
     on_at: float = 0.0
-    """Seconds."""
+    """Power-on time in seconds."""
     calibrated: bool = True
-    """Whether the tables of strength by distance are in its EEPROM."""
+    """Whether its EEPROM has the tables of strength by distance."""
 
 
 class Kilobots:
-    """A swarm that stands still until it is told to run. Raises NotInstalled, Stopped, ValueError.
+    """A paused swarm. Raises NotInstalled, Stopped, ValueError.
 
     `loss` is the part of pulses, 0 to 1, that a receiver misses. Each robot sees its own light, too."""
 
@@ -97,16 +97,16 @@ class Kilobots:
                 self._library.air_link(self._air, *way, *seen, self._loss)
 
     def move(self, robot: int, x: float, y: float) -> None:
-        """At once, to a place in mm."""
+        """Move a robot to a position in mm, at once."""
         self.places[robot] = (x, y)
         self._look_at(robot)
 
     def flash(self, robot: int, after_us: float) -> None:
-        """One robot sees a pulse that nobody sent, so many us from now."""
+        """Inject a noise pulse into one robot after some us."""
         self._library.air_flash(self._air, robot, int(after_us * HZ / 1e6), FULL_SCALE, FULL_SCALE)
 
     def run(self, seconds: float) -> None:
-        """All of them, that long. Raises Stopped."""
+        """Run all robots for a time. Raises Stopped."""
         self.now += int(seconds * HZ)
         stopped = self._library.air_run(self._air, self.now)
         if stopped >= 0:

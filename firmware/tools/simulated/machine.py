@@ -1,4 +1,4 @@
-"""What a simulated robot does for those who measure and test, and the symbols of its image."""
+"""Interface of simulated robots for measurements and tests, and the symbols of their images."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from elftools.elf.sections import SymbolTableSection
 
 
 class NotInstalled(Exception):
-    """A program or library that this machine needs is missing; the text names its Debian package."""
+    """A required program or library is missing; the text names its Debian package."""
 
 
 class Stopped(Exception):
-    """The run ended before it came where it should: firmware stopped, crashed, or took too long."""
+    """The run ended before its target: the firmware stopped, crashed, or exceeded the time limit."""
 
 
 class Symbols:
@@ -38,17 +38,17 @@ class Symbols:
         return name in self._address
 
     def __getitem__(self, name: str) -> int:
-        """Address of a symbol. Raises KeyError."""
+        """Return the address of a symbol. Raises KeyError."""
         address = self._address[name]
         return address & ~1 if self.thumb and name in self._function else address
 
     def span(self, name: str) -> range:
-        """Addresses of a function."""
+        """Return the addresses of a function."""
         return range(self[name], self[name] + self.size[name])
 
 
 class Machine(Protocol):
-    """A robot that stands still until it is told to run."""
+    """A paused simulated robot."""
 
     symbols: Symbols
     pointer: int
@@ -63,10 +63,10 @@ class Machine(Protocol):
         """Cycles or instructions so far."""
 
     def step(self) -> None:
-        """One instruction, interrupt entry included."""
+        """Execute one instruction, including an interrupt entry."""
 
     def run_to(self, *places: str | int) -> int:
-        """At least one instruction, then until one of the places (symbols or addresses); returns where.
+        """Execute at least one instruction, then run to one of the places (symbols or addresses); return it.
 
         Raises Stopped."""
 
@@ -77,27 +77,27 @@ class Machine(Protocol):
         """Data memory."""
 
     def return_address(self) -> int:
-        """At the first instruction of a function: where it will return to."""
+        """Return the return address, at the first instruction of a function."""
 
     def close(self) -> None:
         """End the simulator."""
 
 
 def peek(machine: Machine, name: str, offset: int = 0, size: int = 2) -> int:
-    """An unsigned little-endian number at a symbol."""
+    """Read an unsigned little-endian number at a symbol."""
     return int.from_bytes(machine.peek_bytes(machine.symbols[name] + offset, size), "little")
 
 
 def pointer(machine: Machine, name: str) -> int:
-    """A pointer variable."""
+    """Read a pointer variable."""
     return peek(machine, name, size=machine.pointer)
 
 
 def poke_words(machine: Machine, name: str, values: tuple[int, ...]) -> None:
-    """16-bit words in order, from a symbol on."""
+    """Read consecutive 16-bit words from a symbol on."""
     machine.poke_bytes(machine.symbols[name], struct.pack(f"<{len(values)}H", *values))
 
 
 def peek_words(machine: Machine, name: str, count: int) -> tuple[int, ...]:
-    """16-bit words in order."""
+    """Return bytes as consecutive 16-bit words."""
     return struct.unpack(f"<{count}H", machine.peek_bytes(machine.symbols[name], 2 * count))

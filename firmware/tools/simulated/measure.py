@@ -1,4 +1,4 @@
-"""What the kernel costs on the Kilobot and the e-puck2: cycles or instructions of its operations, bytes of its objects.
+"""Measure the kernel on Kilobot and e-puck2: cycles or instructions of operations, bytes of objects.
 
     python -m firmware.tools.simulated.measure kilobot|epuck2 [--json]
 
@@ -28,11 +28,11 @@ from firmware.tools.simulated.machine import Machine, NotInstalled, Stopped, Sym
 
 FIRMWARE = Path(__file__).resolve().parents[2]
 FIELDS = ("threads", "yielders", "subscribers", "waiters", "events", "payload", "sender")
-"""Of latency_wanted, in order (apps/latency/latency.h)."""
+"""Values of latency_wanted, in order (apps/latency/latency.h)."""
 SETTLING = 6
-"""Windows passed over until every thread has run and yielded."""
+"""Measurement windows skipped until every thread has run and yielded."""
 PATIENCE = 3000
-"""Instructions within which a window ends."""
+"""Maximum length of a window in instructions."""
 ATTEMPTS = 50
 LOADS = (
     (0, 0, 0, 0, 0), (1, 0, 0, 0, 0), (2, 0, 0, 0, 0), (4, 0, 0, 0, 0), (0, 1, 0, 0, 0), (0, 5, 0, 0, 0),
@@ -44,26 +44,26 @@ LOADS = (
 
 @dataclass(frozen=True)
 class Robot:
-    """A target of `make` and how it is simulated."""
+    """A target of `make` and its simulator."""
 
     target: str
     port: str
     unit: str
-    """What its simulator counts."""
+    """Unit that its simulator counts."""
     open: Callable[[Path], Machine]
     slice_entry: Callable[[Symbols], int]
-    """Where the CPU is when it has taken the slice interrupt."""
+    """First instruction after the slice interrupt was taken."""
     nop: bytes
     loop: int
-    """Cycles or instructions of a `nop` and the jump back to the call before it."""
+    """Cycles or instructions of the measuring loop: a `nop` and the jump back to the call."""
     response: int
-    """Cycles the chip takes from a request to that place, and the simulator does not."""
+    """Cycles from a request to that instruction that the chip takes and the simulator omits."""
     defines: str = ""
-    """For `latency` and `footprint`, whose constants take RAM on an AVR."""
+    """Sizes for `latency` and `footprint`, whose constants take RAM on an AVR."""
 
 
 def limit(robot: Robot, name: str) -> int:
-    """A number of the port's hal_limits.h."""
+    """Return a number of the port's hal_limits.h."""
     header = FIRMWARE / "openswarm" / "port" / robot.port / "hal_limits.h"
     found = re.search(rf"#define {name} (\d+)", header.read_text(encoding="utf-8"))
     assert found, name
@@ -79,7 +79,7 @@ ROBOTS = {
 
 
 def build(robot: Robot, app: str, out: Path, defines: str = "") -> Path:
-    """An image of one of firmware/apps. Raises NotInstalled with make's words."""
+    """Build and return an image of one of firmware/apps. Raises NotInstalled with make's output."""
     words = [f"APP={app}", f"TARGET={robot.target}", f"OUT={out}", f"DEFINES={defines}"]
     done = subprocess.run(
         ["make", "-s", "-C", str(FIRMWARE), *words],
@@ -104,7 +104,7 @@ def _start(robot: Robot, image: Path, **scenario: int) -> Machine:
 
 
 def _follow(machine: Machine, arrived: Callable[[int], bool]) -> int:
-    """Step until the program counter is where it should be; what that took."""
+    """Step until the program counter reaches an address; return the cost."""
     begin = machine.now
     for _ in range(PATIENCE):
         machine.step()
@@ -122,18 +122,18 @@ def _code(image: Path, address: int, size: int) -> bytes:
 
 
 def _nop(robot: Robot, image: Path, symbols: Symbols, function: str) -> int:
-    """Address of the `nop` in a function."""
+    """Return the address of the `nop` in a function."""
     span = symbols.span(function)
     return span.start + _code(image, span.start, len(span)).index(robot.nop)
 
 
 def preemption(robot: Robot, image: Path, threads: int) -> int:
-    """From the slice interrupt's first instruction to the next thread's, its own registers restored."""
+    """Measure from the slice interrupt's first instruction to the next thread's, with registers restored."""
     machine = _start(robot, image, threads=threads)
     try:
         entry, span = robot.slice_entry(machine.symbols), machine.symbols.span("latency_spin")
         seen = []
-        for _ in range(SETTLING + 2 * threads):  # a thread that never ran is resumed by another way
+        for _ in range(SETTLING + 2 * threads):  # a thread that never ran is resumed by another path
             machine.run_to(entry)
             before = pointer(machine, "os_running")
             taken = _follow(machine, lambda pc: pc in span)
@@ -145,7 +145,7 @@ def preemption(robot: Robot, image: Path, threads: int) -> int:
 
 
 def yielding(robot: Robot, image: Path) -> int:
-    """From Sys_Yield's call in one thread to the instruction behind it in another."""
+    """Measure from the call of Sys_Yield in one thread to the instruction after it in another."""
     machine = _start(robot, image, yielders=2)
     try:
         nop = _nop(robot, image, machine.symbols, "latency_yield")
@@ -159,7 +159,7 @@ def yielding(robot: Robot, image: Path) -> int:
 
 
 def _settled(seen: list[int]) -> int:
-    """The window no other interrupt disturbs: the least that comes, and more than once."""
+    """Return the window that no other interrupt disturbs: the minimum, seen more than once."""
     settled = seen[SETTLING:]
     if not settled or settled.count(min(settled)) < 2:
         raise Stopped(f"no two windows are alike: {seen}")
@@ -167,7 +167,7 @@ def _settled(seen: list[int]) -> int:
 
 
 def sending(robot: Robot, image: Path, **scenario: int) -> int:
-    """From the first instruction of a function that does nothing but send to the one behind its call."""
+    """Measure from the first instruction of a function that only sends to the one after its call."""
     machine = _start(robot, image, sender=1, **scenario)
     try:
         seen = []
@@ -180,7 +180,7 @@ def sending(robot: Robot, image: Path, **scenario: int) -> int:
 
 
 def reaching(robot: Robot, image: Path, place: str, **scenario: int) -> int:
-    """From there to the first instruction of a handler or of a thread that waits."""
+    """Measure from there to the first instruction of a handler or of a waiting thread."""
     machine = _start(robot, image, **scenario)
     try:
         seen = []
@@ -193,7 +193,7 @@ def reaching(robot: Robot, image: Path, place: str, **scenario: int) -> int:
 
 
 def cycles(robot: Robot, image: Path) -> dict[str, int]:
-    """All measures, in `unit` of the machine."""
+    """Return all measures in the machine's `unit`."""
     found = {f"preemptive switch, {n} ready threads": preemption(robot, image, n) for n in (2, 4)}
     found["Sys_Yield to a yielded thread"] = yielding(robot, image)
     for subscribers in (0, 1):
@@ -209,7 +209,7 @@ def cycles(robot: Robot, image: Path) -> dict[str, int]:
 
 
 def _loaded(robot: Robot, image: Path, load: tuple[int, ...]) -> tuple[int, int]:
-    """Bytes of the heap in use without and with a load."""
+    """Return the used heap bytes without and with a load."""
     machine = robot.open(image)
     try:
         machine.run_to("footprint_begin")
@@ -229,7 +229,7 @@ def _loaded(robot: Robot, image: Path, load: tuple[int, ...]) -> tuple[int, int]
 
 
 def footprint(robot: Robot, image: Path) -> dict[str, Any]:
-    """RAM = A + B n + C m + D s + sum over messages of (E + d), exact for all LOADS, or Stopped."""
+    """Fit RAM = A + B n + C m + D s + sum over messages of (E + d) exactly to all LOADS. Raises Stopped."""
     taken = {load: _loaded(robot, image, load) for load in LOADS}
     empty = taken[LOADS[0]][0]
     cost = {load: built - before for load, (before, built) in taken.items()}
@@ -245,7 +245,7 @@ def footprint(robot: Robot, image: Path) -> dict[str, Any]:
 
 
 def sizes(image: Path) -> dict[str, int]:
-    """Bytes of flash and of RAM, heap and kernel stack included."""
+    """Return bytes of flash and of RAM, including heap and kernel stack."""
     symbols = Symbols(image)
     ram = {".data", ".bss", ".noinit"}
     flash = sum(size for name, size in symbols.sections.items() if name not in ram | {".main_stack"})
@@ -256,13 +256,13 @@ def sizes(image: Path) -> dict[str, int]:
 
 
 def kernel_ram(robot: Robot, image: Path) -> int:
-    """RAM of an image that leaves the port's sizes as they are, without the heap."""
+    """Return the RAM of an image with the port's default sizes, without the heap."""
     heap = Symbols(image).size["os_memory"] - limit(robot, "HAL_KERNEL_STACK")
     return sizes(image)["ram"] - heap
 
 
 def measure(name: str) -> dict[str, Any]:
-    """Everything about one robot. Raises NotInstalled, Stopped."""
+    """Return all measures of one robot. Raises NotInstalled, Stopped."""
     robot = ROBOTS[name]
     with tempfile.TemporaryDirectory(prefix="openswarm-measure-") as folder:
         latency, load = (build(robot, app, Path(folder) / app, robot.defines) for app in ("latency", "footprint"))
@@ -282,7 +282,7 @@ def measure(name: str) -> dict[str, Any]:
 
 
 def text(found: dict[str, Any]) -> str:
-    """The measures as lines for people."""
+    """Return the measures as text."""
     unit, equation = found["unit"], found["equation"]
     lines = [f"{found['robot']:44} {unit:>12}"]
     lines += [f"{name:44} {count:12,}" for name, count in found["cycles"].items()]
@@ -303,7 +303,7 @@ def text(found: dict[str, Any]) -> str:
 
 
 def main() -> int:
-    """Exit status 2 and one line when something is missing."""
+    """Run the command; return exit status 2 with a message if a program is missing."""
     parser = argparse.ArgumentParser(prog="python -m firmware.tools.simulated.measure", description=__doc__)
     parser.add_argument("robot", choices=sorted(ROBOTS))
     parser.add_argument("--json", action="store_true", help="print one JSON object")
