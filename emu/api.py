@@ -37,7 +37,7 @@ from emu.chips import chip_named
 from emu.chips.chip import Chip
 from emu.chips.dspic30f6014a import DSPIC30F6014A
 from emu.image.loader import load_image
-from emu.machine import machine as bare
+from emu.machine.machine import Machine as BareMachine
 from emu.machine.state_access import MemoryObserver
 from emu.machine.stops import Stop
 from emu.peripherals import Peripherals
@@ -47,7 +47,7 @@ if TYPE_CHECKING:
     from emu.debug.threads import Thread
 
 
-class Machine(bare.Machine):
+class Machine(BareMachine):
     """A machine with a debugger attached: access by names of the source, and stops that explain firmware faults.
 
     With `strict`, null pointers, uninitialised reads and stores into other threads' stacks are faults
@@ -66,7 +66,7 @@ class Machine(bare.Machine):
         board: Callable[[Peripherals], Any] | None = None,
         strict: bool = False,
     ) -> None:
-        observer: Callable[[bare.Machine], MemoryObserver] | None = None
+        observer: Callable[[BareMachine], MemoryObserver] | None = None
         if strict:
             from emu.debug.strict import StrictMode
 
@@ -195,7 +195,7 @@ class Change:
     new: int
 
 
-def watch(machine: bare.Machine, place: str | int, *, size: int = 2, cycles: int | None = None) -> Iterator[Change]:
+def watch(machine: BareMachine, place: str | int, *, size: int = 2, cycles: int | None = None) -> Iterator[Change]:
     """Run `machine` and yield every change of a variable, register or data address (`size` 1 or 2 bytes).
 
     The value is compared after every instruction, so the machine runs at the speed of single steps. The iterator ends

@@ -1,7 +1,7 @@
 """Sandboxed runs of a machine, and the replay of a run from an earlier state.
 
 Inputs: a machine, a snapshot to begin with, a last cycle. Output: the branches of the replayed run. The state is one
-record, and equal records run equally (emu/README.md), so a run needs no log.
+record, and equal records run equally (docs/reference/engines.md), so a run needs no log.
 """
 
 from __future__ import annotations

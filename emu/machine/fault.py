@@ -18,7 +18,7 @@ class TakenBranch:
     source: int
     target: int
     cycle: int
-    """Cycle in which the instruction at `source` began."""
+    """Cycle in which the instruction at `source` began; for an exception, its handler's first instruction."""
     kind: str
     """"branch" or "exception"."""
 

@@ -1,4 +1,4 @@
-// A whole session driven by the protocol's own test-support package, over standard streams or (with PORT) TCP.
+// A complete session with the test-support package of the protocol, over standard streams or, with EMU_PORT, over TCP.
 // Run by mocha from test_conformance.py: EMU_PYTHON, EMU_PROGRAM, EMU_SOURCE, EMU_LINES (JSON) and NODE_PATH are set.
 const assert = require('assert');
 const { DebugClient } = require('@vscode/debugadapter-testsupport');

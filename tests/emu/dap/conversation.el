@@ -1,7 +1,7 @@
 ;;; conversation.el --- a debugging session in Emacs, by dap-mode's own commands -*- lexical-binding: t -*-
 
 ;; Run by test_emacs.py: emacs --batch -l conversation.el, with EMU_PYTHON, EMU_PROGRAM, EMU_SOURCE and EMU_LINE in the
-;; environment. What Emacs shows at each halt is printed, one line each.
+;; environment. Prints what Emacs shows at each stop, one line each.
 
 (require 'package)
 (package-initialize)
