@@ -1,4 +1,4 @@
-"""The assembler proper: reads statements one by one and dispatches them; `finish` turns the result into an object.
+"""Main loop of the assembler: reads statements and dispatches them; `finish` creates the object.
 
 pic30-as syntax (abi-elf.md §4).
 """
@@ -89,14 +89,14 @@ def _directive(asm: Assembler, word: str, operands: str) -> None:
 
 
 def _skip(asm: Assembler, line: str) -> None:
-    """Look at a line inside a false conditional: only conditionals count."""
+    """Process a line inside a false conditional: only conditionals have an effect."""
     match = _STATEMENT.match(line)
     if match and match[1][0] == "." and match[1].lower() in CONDITIONALS:
         asm.conditionals.obey(match[1].lower(), match[2], asm.source.place, asm)
 
 
 def _call_macro(asm: Assembler, macro: Macro, operands: str) -> None:
-    """Read the expansion of `macro` next."""
+    """Continue with the expansion of `macro`."""
     lines = substitute(macro.body, bind(macro, operands), asm.serial)
     asm.serial += 1
     asm.source.expand(lines, asm.conditionals.depth, macro.name)

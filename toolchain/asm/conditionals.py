@@ -18,14 +18,14 @@ CONDITIONALS = frozenset(_COMPARISONS + _TESTS + _PARTS)
 
 
 class Context(Protocol):
-    """What a condition may ask the assembler."""
+    """The parts of the assembler that conditions read."""
 
     symbols: dict[str, AsmSymbol]
     declared: set[str]
     registers: dict[str, str]
 
     def constant(self, text: str, what: str = "expression") -> int:
-        """SymbolicValue of `text`, which must be a number now."""
+        """Return the value of `text`, which must be a number at this point."""
 
 
 @dataclass(slots=True)
@@ -43,7 +43,7 @@ _COMPARE = {
 
 
 class Conditionals:
-    """The stack of open conditionals; `active` tells whether lines are assembled now."""
+    """The stack of open conditionals; `active`: whether lines are assembled now."""
 
     def __init__(self) -> None:
         self._levels: list[_Level] = []
@@ -54,7 +54,7 @@ class Conditionals:
         return len(self._levels)
 
     def innermost(self) -> SourceLocation | None:
-        """Where the innermost open .if stands."""
+        """Return the source position of the innermost open .if."""
         return self._levels[-1].place if self._levels else None
 
     def cut(self, depth: int) -> None:
@@ -85,7 +85,7 @@ class Conditionals:
         elif not self.active:
             self._levels.append(_Level(place, False, True))
         else:
-            self._levels.append(_Level(place, False, True))  # stays off should the condition be an error
+            self._levels.append(_Level(place, False, True))  # stays inactive if the condition is an error
             truth = _condition(word, operands, context)
             self._levels[-1] = _Level(place, truth, truth)
         self._update()
@@ -106,7 +106,7 @@ def _condition(word: str, operands: str, context: Context) -> bool:
         symbol = context.symbols.get(name)
         if name in context.registers:
             return word in (".ifdef", ".ifdecl")
-        if word.endswith("decl"):  # mentioned before, be it defined or not
+        if word.endswith("decl"):  # mentioned before, defined or not
             return (symbol is not None or name in context.declared) == (word == ".ifdecl")
         defined = symbol is not None and (symbol.place is not None or symbol.common is not None)
         return defined == (word == ".ifdef")

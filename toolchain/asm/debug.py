@@ -55,7 +55,7 @@ class _Bytes:
 
 
 def debug_sections(asm: Assembler, sections: dict[LabelledSection, Section]) -> tuple[list[Section], list[Symbol]]:
-    """Return .debug_line, .debug_info, .debug_abbrev and their symbols; nothing when there is nothing to say."""
+    """Return .debug_line, .debug_info, .debug_abbrev and their symbols; nothing without instructions."""
     if not asm.line_rows or any(name.startswith(".debug_") for name in asm.sections):
         return [], []
     starts = {s: Symbol(s.name, Home.SECTION, s, type=c.STT_SECTION) for s in sections.values()}
@@ -115,7 +115,7 @@ def _owner(label: Label) -> AsmSection:
 def _sequence(
     out: _Bytes, rows: list[tuple[Label, SourceLocation]], source: AsmSection, start: Symbol, files: dict[str, int]
 ) -> None:
-    """One run of instructions in one section: set address, a row per change of line, end behind the last one."""
+    """Write a line sequence of one section: start address, a row per instruction, end after the last one."""
     addresses = [label.frag.start + label.offset for label, _ in rows]
     out.data += bytes((0, 1 + ADDRESS_SIZE, _SET_ADDRESS))
     out.word(addresses[0], start)
@@ -136,7 +136,7 @@ def _sequence(
 
 
 def _instruction_units(source: AsmSection, label: Label) -> int:
-    """Length of the instruction at `label`, two words when the piece or the opcode says so."""
+    """Return the length of the instruction at `label` in address units."""
     from emu.dspic30f.isa import codec
 
     piece = next((p for p in source.pieces if p is label.frag), None)

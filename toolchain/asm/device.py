@@ -51,7 +51,7 @@ def _bytes(chip: Chip) -> Iterator[tuple[str, int]]:
 
 
 def include_text(chip: Chip) -> str:
-    """Return the include file.  A bit name that means different positions in two registers is left out."""
+    """Return the include file.  A bit name with different positions in two registers is omitted."""
     positions: dict[str, set[int]] = {}
     for name, bit in _bits(chip):
         positions.setdefault(name, set()).add(bit)

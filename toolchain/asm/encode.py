@@ -73,7 +73,7 @@ def _read(asm: Assembler, statement: str) -> _Known:
             return _Operand(tree, tree)
         value = asm.value_of(tree)
         if isinstance(value, int):
-            depends = True  # on a symbol that may be set anew
+            depends = True  # on a symbol that may be redefined
             return _Operand(tree, value)
         return _Operand(tree, None)
 

@@ -31,7 +31,7 @@ _REFUSED = {
 
 
 class ExprError(Exception):
-    """An expression that cannot be read or has no value; the caller adds file and line."""
+    """An expression that cannot be parsed or has no value; the caller adds file and line."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -280,7 +280,7 @@ CONSTANT_OPERATORS: dict[str, Callable[[int], int]] = {
 
 
 def distance(a: AsmSymbol, b: AsmSymbol, final: bool) -> int | None:
-    """Return a - b in address units, None while unknown: across frags only once all sizes are `final`."""
+    """Return a - b in address units, None while unknown; across fragments it is known once all sizes are `final`."""
     left, right = a.place, b.place
     if not isinstance(left, Label) or not isinstance(right, Label):
         return None
@@ -292,7 +292,7 @@ def distance(a: AsmSymbol, b: AsmSymbol, final: bool) -> int | None:
 
 
 def combine(op: str, a: ExprValue, b: ExprValue, final: bool = False) -> ExprValue:
-    """Return `a op b` as simply as it can be known; raise `ExprError` for what can never have a value."""
+    """Return `a op b`, simplified as far as possible; raise `ExprError` if it can never have a value."""
     if isinstance(a, int) and isinstance(b, int):
         return wrap(_BINARY[op](a, b))
     if op in "+-":
@@ -338,7 +338,7 @@ def apply(op: str, a: ExprValue) -> ExprValue:
 
 
 def evaluate(tree: Tree, name: Callable[[str], ExprValue], here: Callable[[], ExprValue]) -> ExprValue:
-    """Return the value of `tree` now; `name` and `here` answer for symbols and the location counter."""
+    """Return the value of `tree`; `name` returns the value of a symbol, `here` that of the location counter."""
     if isinstance(tree, int):
         return tree
     if isinstance(tree, Name):

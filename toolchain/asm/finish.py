@@ -1,7 +1,7 @@
-"""From a finished assembly to an object: relaxation, fixups to bits or relocations, the symbol table.
+"""Completion of an object: relaxation, fixups to bits or relocations, the symbol table.
 
-Before: all statements read, pieces in order, fixups with unsettled values.  After: contents final for all that does
-not depend on the link; everything that names a symbol is a relocation, local branches included (abi-elf.md §5).
+Precondition: all statements are read, fixups have unresolved values.  Result: fields that depend on no symbol are
+final; every field with a symbol has a relocation, local branches included (abi-elf.md §5).
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ from toolchain.elf import fields
 from toolchain.elf.model import Bind, Home, ObjectFile, Reloc, Section, Symbol
 
 KEEP_PREFIX = "__keep_"
-"""Local absolute symbol `__keep_<section>`: --gc-sections keeps that section.  Ours alone; others ignore it."""
+"""Prefix of the local absolute symbol that makes --gc-sections keep a section; other linkers ignore it."""
 
 _ABSOLUTE = {"PCREL_BRANCH": "BRANCH_ABSOLUTE", "PCREL_DO": "DO_ABSOLUTE"}
 _HIGH = RELOCATION_BY_NAME["PGM_ADDR_MSB"]
 
 
 def finish(asm: Assembler) -> ObjectFile:
-    """Return the object; errors are left in `asm.findings`."""
+    """Return the object; errors are in `asm.findings`."""
     for section in asm.sections.values():
         relax(section)
     return _Finisher(asm).run()
@@ -104,7 +104,7 @@ class _Finisher:
         return isinstance(symbol.place, Label) and symbol.place.frag.section is source
 
     def _distance(self, source: AsmSection, offset: int, symbol: AsmSymbol, addend: int) -> int:
-        """Branch distance in words from the word at octet `offset`."""
+        """Return the branch distance in words from the word at octet `offset`."""
         assert isinstance(symbol.place, Label)
         target = symbol.place.frag.start + symbol.place.offset + addend
         return (target - (offset // 2 + 2)) // 2
@@ -112,7 +112,7 @@ class _Finisher:
     def _local_branch(
         self, section: Section, source: AsmSection, offset: int, kind: RelocationType, symbol: AsmSymbol, addend: int
     ) -> None:
-        """`bra .+4`: the distance cannot change any more, so no relocation is needed."""
+        """Resolve a branch such as `bra .+4`: its distance is final, so it needs no relocation."""
         if addend & 1:
             raise ExprError(f"branch to an odd address (. + {addend})")
         distance = self._distance(source, offset, symbol, addend)
@@ -130,7 +130,7 @@ class _Finisher:
         section.relocs.append(Reloc(offset, number, symbol))
 
     def _check_target(self, source: AsmSection, value: SymbolicValue, kind: RelocationType) -> None:
-        """Refuse what the section of a known target makes meaningless (abi-elf.md §4.2)."""
+        """Raise `ExprError` for an operator that does not fit the section of its target (abi-elf.md §4.2)."""
         assert value.add is not None
         place = value.add.place
         if not isinstance(place, Label):
@@ -148,7 +148,7 @@ class _Finisher:
         raise ExprError(f"{value.op}() needs a program address, {value.add.name} is in data section {target.name}")
 
     def _without_addend(self, symbol: AsmSymbol, addend: int) -> AsmSymbol:
-        """CALL and GOTO cannot carry an addend into their second word (§5, 33): name the sum instead."""
+        """Return a symbol for symbol + addend: the second word of CALL and GOTO has no addend (§5, 33)."""
         if addend == 0:
             return symbol
         if not isinstance(symbol.place, Label):
@@ -180,7 +180,7 @@ class _Finisher:
     # -- symbols -------------------------------------------------------------------------------------------------
 
     def _reference(self, symbol: AsmSymbol) -> Symbol:
-        """Return the object-file symbol a relocation against `symbol` names."""
+        """Return the object-file symbol for a relocation against `symbol`."""
         return self.symbols.get(symbol) or self._emit(symbol)
 
     def _emit(self, symbol: AsmSymbol) -> Symbol:
@@ -229,7 +229,7 @@ class _Finisher:
             self.asm.error(f"symbol {symbol.name} cannot be exported: {_describe(value)} is not known in this file")
 
     def _symbol_table(self) -> list[Symbol]:
-        """Emit what the file defines or exports; .L names and local equates only when a relocation needs them."""
+        """Emit the symbols that the file defines or exports; .L names and local equates only if needed."""
         for symbol in self.asm.symbols.values():
             if symbol in self.symbols:
                 continue
@@ -252,7 +252,7 @@ _DATA_ONLY = frozenset((RELOCATION_BY_NAME["WORD"].number, RELOCATION_BY_NAME["1
 
 
 def _absolute_call(section: Section, offset: int, kind: RelocationType, value: int) -> None:
-    """CALL or GOTO to a number that became known late: both words (isa.md §7.1)."""
+    """Store the target of a CALL or GOTO to a number in both words (isa.md §7.1)."""
     if value & 1 or not 0 <= value <= 0x7FFFFE:
         raise ExprError(f"{value:#x} is no instruction address")
     fields.store(section.data, offset, kind, True, value)
@@ -269,12 +269,12 @@ def _signature() -> Section:
 
 
 def _local_name(name: str) -> str:
-    """How the source spells a local label."""
+    """Return a local label as the source spells it."""
     return f"local label {name[3:].partition('.')[0]}:" if name.startswith(".LN") else f"local label {name}"
 
 
 def _check_do(distance: int) -> None:
-    """A DO whose end makes the loop shorter than two instructions is refused (isa.md §7.6)."""
+    """Raise `ExprError` for a DO loop of fewer than two instructions (isa.md §7.6)."""
     if distance in (-2, -1, 0):
         raise ExprError("DO loop shorter than two instructions")
 

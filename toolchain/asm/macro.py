@@ -54,7 +54,7 @@ _OPERATOR_CHARACTERS = "-+*/%|&^~<>()=[]"
 
 
 def split_arguments(text: str, spaces: bool = True) -> list[str]:
-    """Split at commas outside quotes and brackets and, when `spaces`, at blanks that touch no operator."""
+    """Split at commas outside quotes and brackets and, with `spaces`, at blanks not adjacent to an operator."""
     text = text.strip()
     if not text:
         return []
@@ -75,7 +75,7 @@ def split_arguments(text: str, spaces: bool = True) -> list[str]:
 
 
 def _separates(before: str, following: str) -> bool:
-    """Whether a blank between `before` and `following` stands between two macro arguments."""
+    """Whether a blank between `before` and `following` separates two macro arguments."""
     if not before.strip() or following == ",":
         return False
     return before[-1] not in _OPERATOR_CHARACTERS and following[0] not in _OPERATOR_CHARACTERS

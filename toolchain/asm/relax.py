@@ -1,7 +1,7 @@
 """Relaxation, only with --relax: CALL -> RCALL and GOTO -> BRA within a section (abi-elf.md §5).
 
-Before: every relaxable call sits alone in its piece, in its two-word form.  After: pieces have their final start.
-All calls begin short and grow when out of reach; a call that has grown stays long, so the loop ends.
+Precondition: every relaxable call is alone in its piece, in its two-word form.  Result: pieces have their final start.
+All calls start short and become long if their target is out of reach; a long call stays long, so the loop ends.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ def _place(section: AsmSection, short: set[int]) -> None:
 
 
 def relax(section: AsmSection) -> None:
-    """Choose the form of every relaxable call and give all pieces their final place."""
+    """Choose the form of every relaxable call and set the final start of all pieces."""
     candidates = _candidates(section)
     short = {id(r.piece) for r in candidates}
     while True:

@@ -21,7 +21,7 @@ INFO_LIMIT = 1 << 24  # debug sections are not in any address space; a limit aga
 
 @dataclass(slots=True)
 class Fixup:
-    """A field whose value was not a number when it was emitted."""
+    """A field whose value is not a number yet."""
 
     frag: Frag
     offset: int  # octets (code) or bytes (elsewhere) from the frag start
@@ -77,13 +77,13 @@ class AsmSection(LabelledSection):
         self.closed_units = 0  # length of all pieces but the current one, as long as nothing is relaxed
         self.fixups: list[Fixup] = []
         self.relaxables: list[Relaxable] = []
-        self.fill_value = self.fill_upper = self.packed_fill_value = 0  # for what nothing is written into
+        self.fill_value = self.fill_upper = self.packed_fill_value = 0  # of gaps
         self._data_bytes = 0  # data bytes in the last word, 0 or 1
         self._packed_bytes = 0  # .p bytes in the last word, 0..2
         self.configure(flags, kind)
 
     def configure(self, flags: int, kind: int) -> None:
-        """Set what the attributes say: flags, ELF type, and how locations count.  Only while nothing is in it."""
+        """Set flags, ELF type and location counting; only while the section is empty."""
         self.flags, self.type = flags, kind
         self.align = 2 if flags & SectionFlag.ALLOC else 1
         self.is_code = bool(flags & SectionFlag.EXECINSTR)
@@ -95,27 +95,27 @@ class AsmSection(LabelledSection):
             self.limit = CODE_LIMIT if self.is_code else DATA_LIMIT
 
     def is_untouched(self) -> bool:
-        """Whether nothing stands in the section and no label points into it: its attributes may still change."""
+        """Whether the section has neither content nor labels, so that its attributes may change."""
         return not (self.closed_units or self.piece.data or self.labelled)
 
     def here(self) -> int:
-        """Location within the current piece, in address units."""
+        """Return the location within the current piece, in address units."""
         if not self.is_code:
             return len(self.piece.data)
         whole = len(self.piece.data) // 2
         return whole - 2 + self._data_bytes if self._data_bytes else whole
 
     def location(self) -> int:
-        """Location from the section start, before relaxation."""
+        """Return the location from the section start, before relaxation."""
         return self.closed_units + self.here()
 
     def label(self) -> Label:
-        """Return a label for the current location, in code the next program word that is free."""
+        """Return a label for the current location; in code it is the next free program word."""
         self.align_word()
         return self.dot()
 
     def dot(self) -> Label:
-        """Return what `.` means: the current location, in code that of the word being filled."""
+        """Return the value of `.`: the current location; in code it is the word being filled."""
         self.labelled = True
         if not self._data_bytes and not self._packed_bytes:
             return Label(self.piece, self.here())
@@ -130,9 +130,9 @@ class AsmSection(LabelledSection):
         return len(data) - OCTETS_PER_WORD
 
     def align_word(self, fill: int | None = None, packed: bool = False) -> None:
-        """Go to the next program word.  What is left of this one becomes `fill`, by default the section's fill value.
+        """Advance to the next program word; the rest of this one becomes `fill`, by default the section's fill value.
 
-        The upper byte of a word of data is `.fillupper`'s unless `packed` says that all three are filled.
+        The upper byte of a data word is that of `.fillupper`, unless `packed` fills all three bytes.
         """
         used = self._data_bytes or self._packed_bytes
         if not used:
@@ -187,7 +187,7 @@ class AsmSection(LabelledSection):
             raise ExprError(f"section {self.name} grows beyond {self.limit:#x} address units")
 
     def default_fill(self, packed: bool) -> int:
-        """Byte that fills when a directive names none; data sections know no fill values."""
+        """Return the fill byte of a directive without one; it is 0 in data sections."""
         return self.packed_fill_value if packed else self.fill_value
 
     def skip(self, units: int, fill: int, packed: bool = False) -> None:
@@ -201,7 +201,7 @@ class AsmSection(LabelledSection):
             self.put_bytes(bytes((fill & 0xFF,)) * units)
 
     def bytes_to(self, units: int) -> int:
-        """How many bytes `.align units` would fill, upper bytes of words of data not counted."""
+        """Return how many bytes `.align units` would fill, without the upper bytes of data words."""
         part = 3 - self._packed_bytes if self._packed_bytes else 0
         return part + -self.location() % units
 
@@ -219,7 +219,7 @@ class AsmSection(LabelledSection):
         self.skip(-self.location() % units, fill, packed)
 
     def add_fixup(self, offset: int, kind: RelocationType, value: ExprValue, place: SourceLocation) -> Fixup:
-        """Remember that the field at `offset` of the current piece is to be filled with `value`."""
+        """Record that the field at `offset` of the current piece gets `value`."""
         fixup = Fixup(self.piece, offset, kind, value, place)
         self.fixups.append(fixup)
         return fixup

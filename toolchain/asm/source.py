@@ -1,4 +1,4 @@
-"""Lines of source: comment removal, include files, macro and repeat expansions, all with their place for messages."""
+"""Source lines with their positions: comment removal, include files, macro and repeat expansions."""
 
 from __future__ import annotations
 
@@ -47,14 +47,14 @@ class Frame:
     line: int  # number of the line before the next one
     macro: str = ""  # name of the macro this is an expansion of
     fixed: bool = False  # expansions report the line that caused them
-    counted: bool = True  # lines have numbers of their own; in a compiler's output only markers say where one is from
+    counted: bool = True  # lines have numbers of their own; in compiler output only line markers set them
     index: int = 0
     conditionals: int = 0  # open conditionals when the frame began
     labels: dict[str, str] = field(default_factory=dict)
 
 
 class Source:
-    """The stack of frames; `next()` gives line after line."""
+    """The stack of frames; `next()` returns the lines in order."""
 
     def __init__(self, text: str, file: str, counted: bool = True) -> None:
         self.frames = [Frame(strip_comments(text), file, 0, counted=counted)]
@@ -85,7 +85,7 @@ class Source:
         return None
 
     def push(self, frame: Frame) -> None:
-        """Read `frame` before going on with the current one."""
+        """Read `frame` next, then continue with the current one."""
         if len(self.frames) >= MAX_DEPTH:
             raise SourceError(f"includes and macros nested deeper than {MAX_DEPTH}")
         if frame.fixed:

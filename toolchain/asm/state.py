@@ -1,4 +1,4 @@
-"""What an assembly knows while it runs: symbols, sections, location, errors.
+"""State of an assembly: symbols, sections, location, errors.
 
 Errors are collected, so that one run shows all of them; after MAX_ERRORS it stops.
 """
@@ -34,7 +34,7 @@ DEVICE_SYMBOLS = (
 
 
 def device_symbols(chip: Chip) -> tuple[str, ...]:
-    """Absolute symbols of value 1 that say what the program is for."""
+    """Return the predefined symbols of a chip, which have value 1."""
     guard = ("__HAS_CODEGUARD",) if "FBS" in chip.config else ()
     return (f"__{chip.name.removeprefix('dsPIC')}", *DEVICE_SYMBOLS, *guard)
 
@@ -46,7 +46,7 @@ _NUMERIC_LABEL = re.compile(r"(\d+)([fb])$")
 
 @dataclass(slots=True, kw_only=True)
 class Options:
-    """What the command line can choose."""
+    """Options of an assembly."""
 
     include: list[str] = field(default_factory=list)
     define: dict[str, int] = field(default_factory=dict)
@@ -57,7 +57,7 @@ class Options:
     prefix_map: list[tuple[str, str]] = field(default_factory=list)
 
     def recorded(self, path: str) -> str:
-        """A path as debug information names it: the beginning that the last fitting pair of `prefix_map` replaces."""
+        """Return a path for debug information, with its prefix replaced by the last matching pair of `prefix_map`."""
         for old, new in reversed(self.prefix_map):
             if path.startswith(old):
                 return new + path[len(old) :]
@@ -113,7 +113,7 @@ class Assembler:
             raise ToolError.of(self.findings)
 
     def warn(self, message: str) -> None:
-        """Have the caller show a warning that names the current line."""
+        """Record a warning with the current line; the caller prints it."""
         self.messages.append(f"{self.source.place}: warning: {message}")
 
     # -- symbols and expressions ---------------------------------------------------------------------------------
@@ -126,7 +126,7 @@ class Assembler:
         return found
 
     def lookup(self, name: str) -> ExprValue:
-        """SymbolicValue of a name as of now; numeric local labels become their unique name."""
+        """Return the current value of a name; numeric local labels become their unique name."""
         if name[0].isdigit():
             match = _NUMERIC_LABEL.fullmatch(name)
             if match is None:
@@ -144,29 +144,29 @@ class Assembler:
         return symbol.place
 
     def here(self) -> ExprValue:
-        """A label for the current location."""
+        """Return the current location as a value."""
         self.anonymous += 1
         return SymbolicValue(AsmSymbol(f".LH{self.anonymous}", self.section.dot()))
 
     def evaluate(self, text: str) -> ExprValue:
-        """SymbolicValue of expression `text` as far as it is known now; a `#` before it means nothing."""
+        """Return the value of expression `text`, as far as it is known; a leading `#` is ignored."""
         return self.value_of(expr.parse(text.strip().removeprefix("#")))
 
     def value_of(self, tree: expr.Tree) -> ExprValue:
-        """SymbolicValue of a parsed expression as far as it is known now."""
+        """Return the value of a parsed expression, as far as it is known."""
         if isinstance(tree, int):
             return tree
         return expr.resolve(expr.evaluate(tree, self.lookup, self.here), final=False)
 
     def constant(self, text: str, what: str = "expression") -> int:
-        """SymbolicValue of `text`, which must be a number already on this line."""
+        """Return the value of `text`, which must be a number at this point; raises `ExprError`."""
         value = self.evaluate(text)
         if not isinstance(value, int):
             raise ExprError(f"{what} {text.strip()!r} must be a constant at this point")
         return value
 
     def location(self, text: str) -> int:
-        """Location in the current section that `text` names: a number, or `.` or a label of it plus a number."""
+        """Return the location in the current section that `text` denotes: a number, or a label of it plus a number."""
         value = self.evaluate(text)
         if isinstance(value, int):
             return value
@@ -174,12 +174,12 @@ class Assembler:
             value.add.place if isinstance(value, SymbolicValue) and value.add and not (value.sub or value.op) else None
         )
         if not isinstance(place, Label) or place.frag.section is not self.section:
-            raise ExprError(f"location {text.strip()!r} must be a number, or a place in this section plus a number")
+            raise ExprError(f"location {text.strip()!r} must be a number, or a label of this section plus a number")
         assert isinstance(value, SymbolicValue)
         return place.frag.start + place.offset + value.offset
 
     def define_label(self, name: str) -> None:
-        """SourceLocation label `name` at the current location."""
+        """Place label `name` at the current location."""
         if name.isdigit():
             self.numeric[name] = self.numeric.get(name, 0) + 1
             name = f".LN{name}.{self.numeric[name]}"
@@ -209,7 +209,7 @@ class Assembler:
         symbol.place = value
 
     def with_registers(self, operands: str) -> str:
-        """`operands` with working registers in place of the names that equates gave them."""
+        """Return `operands` with the register names that equates define replaced by the registers."""
         if not self.registers:
             return operands
         return _WORD.sub(lambda word: self.registers.get(word[0], word[0]), operands)
@@ -217,7 +217,7 @@ class Assembler:
     def find_file(self, name: str) -> str:
         """Return the path of an included file: beside the including file, then the current folder, then each -I.
 
-        Where no file is called `name`, its backslashes part folders, as on the systems pic30-as comes from.
+        If no file has that name, backslashes in it separate folders.
         """
         beside = os.path.dirname(self.source.place.file)
         for spelling in dict.fromkeys((name, name.replace("\\", "/"))):

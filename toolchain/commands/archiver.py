@@ -12,12 +12,12 @@ from toolchain.files import read_bytes, write_outputs
 
 
 def options_of() -> argparse.ArgumentParser:
-    """The options of the command."""
+    """Return the argument parser of the command."""
     p = parser(
         "ar",
         "Make, list and extract static libraries.  Operations: r replace or add, q append, d delete,\n"
-        "t list, x extract, s alone: write the index anew.  Letters c, s, u, v, D are accepted and need\n"
-        "nothing: an index is always written, dates and owners never.",
+        "t list, x extract, s alone: rewrite the index.  Letters c, s, u, v, D are accepted without effect:\n"
+        "an index is always written, dates and owners never.",
         "python -m toolchain ar rcs libswarm.a wheel.o camera.o",
     )
     p.add_argument("operation", help="r, q, d, t, x or s, with modifiers")
@@ -27,7 +27,7 @@ def options_of() -> argparse.ArgumentParser:
 
 
 def main(arguments: list[str]) -> int:
-    """Run one operation (first letter of the key, as in GNU ar); returns 0."""
+    """Run one operation (first letter of the key, as in GNU ar); return 0."""
     options = options_of().parse_args(arguments)
     letters = options.operation.lstrip("-")
     action = [letter for letter in letters if letter in "rqdtx"] or (["s"] if "s" in letters else [])
@@ -54,7 +54,7 @@ def main(arguments: list[str]) -> int:
 
 
 def _replace(members: list[Member], files: list[str]) -> list[Member]:
-    """Return members with `files` put in place of those of the same name, new ones at the end."""
+    """Return the members with those of the same name replaced by `files`, new ones at the end."""
     fresh = {Path(name).name: Member(Path(name).name, read_bytes(name)) for name in files}
     result = [fresh.pop(m.name, m) for m in members]
     return result + list(fresh.values())

@@ -18,7 +18,7 @@ from toolchain.files import read_text, write_outputs
 
 
 def options_of() -> argparse.ArgumentParser:
-    """The options of the command."""
+    """Return the argument parser of the command."""
     p = parser(
         "as", "Assemble a source in pic30-as syntax to an ELF object.", "python -m toolchain as start.s -o start.o"
     )

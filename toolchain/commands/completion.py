@@ -1,4 +1,4 @@
-"""`completion`: what makes a shell complete the commands and their options."""
+"""`completion`: shell completion scripts for the commands and their options."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from toolchain.commands.parser import parser
 
 
 def options_of() -> argparse.ArgumentParser:
-    """The options of the command."""
+    """Return the argument parser of the command."""
     p = parser("completion", description("toolchain"), "python -m toolchain completion bash")
     p.add_argument("shell", choices=SHELLS, help="which shell")
     return p
@@ -30,7 +30,7 @@ def main(arguments: list[str]) -> int:
 
 
 def _compiler() -> argparse.ArgumentParser:
-    """The compiler's options by name, as its help has them: it parses them itself, in gcc's manner."""
+    """Return a parser with the compiler's options from its help text; the compiler itself parses them as gcc does."""
     from toolchain.frontend.options import HELP
 
     made = argparse.ArgumentParser(add_help=False)

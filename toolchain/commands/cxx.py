@@ -1,4 +1,4 @@
-"""`c++`: the driver, for which .c and .h files are C++ as well."""
+"""`c++`: the driver with .c and .h files compiled as C++."""
 
 from __future__ import annotations
 
@@ -6,5 +6,5 @@ from toolchain.driver import driver
 
 
 def main(arguments: list[str]) -> int:
-    """Exit status as for `cc`. Raises ToolError as `cc` does."""
+    """Run the driver; return its exit status.  Raises ToolError."""
     return driver.main(arguments, cxx=True)

@@ -12,7 +12,7 @@ from toolchain.link.hexfile import hex_text
 
 
 def options_of() -> argparse.ArgumentParser:
-    """The options of the command."""
+    """Return the argument parser of the command."""
     p = parser(
         "hex", "Convert an ELF executable, ours or XC16's, to Intel HEX.", "python -m toolchain hex firmware.elf"
     )

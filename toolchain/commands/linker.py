@@ -22,7 +22,7 @@ def find_library(name: str, folders: list[str]) -> Path:
 
 
 def options_of() -> argparse.ArgumentParser:
-    """The options of the command."""
+    """Return the argument parser of the command."""
     example = "python -m toolchain ld start.o main.o -L lib -lc -o firmware.elf -Map firmware.map"
     p = parser("ld", "Link ELF objects and archives for the dsPIC30F6014A.", example)
     p.add_argument("inputs", nargs="*", metavar="FILE", help="objects (.o) and archives (.a)")

@@ -35,7 +35,7 @@ def letter(symbol: Symbol) -> str:
 
 
 def options_of() -> argparse.ArgumentParser:
-    """The options of the command."""
+    """Return the argument parser of the command."""
     p = parser(
         "nm", "List symbols: address, size in address units, class, name.", "python -m toolchain nm -S firmware.elf"
     )

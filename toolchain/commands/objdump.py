@@ -1,4 +1,4 @@
-"""`objdump`: what is in an object or executable."""
+"""`objdump`: contents of an object or executable."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _FLAG_WORDS = (
 
 
 def options_of() -> argparse.ArgumentParser:
-    """The options of the command."""
+    """Return the argument parser of the command."""
     p = parser(
         "objdump",
         "Show parts of an object or executable.",
@@ -44,7 +44,7 @@ def options_of() -> argparse.ArgumentParser:
 
 
 def main(arguments: list[str]) -> int:
-    """Print what was asked for; returns 0."""
+    """Print the selected parts; return 0."""
     options = options_of().parse_args(arguments)
     if not (options.disassemble or options.source or options.headers or options.syms or options.reloc):
         raise ToolError("nothing to show: give -d, -S, -h, -t or -r")
@@ -83,7 +83,7 @@ def _symbols(image: ObjectFile | Executable) -> None:
 
 
 def _relocation_text(section: Section, low: int, high: int) -> list[str]:
-    """Describe the relocations whose field starts in octets low..high-1."""
+    """Return a line for each relocation whose field starts in octets low..high-1."""
     found = []
     for r in section.relocs:
         if low <= r.offset < high:

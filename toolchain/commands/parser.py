@@ -1,4 +1,4 @@
-"""argparse as every sub-command wants it: description kept as written, an example, usage errors with status 2."""
+"""Argument parser of the sub-commands: description as written, an example, usage errors with status 2."""
 
 from __future__ import annotations
 

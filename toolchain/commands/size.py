@@ -14,7 +14,7 @@ from toolchain.files import read_bytes
 from toolchain.link import memory
 
 CONFIG_SECTIONS = {name for word in memory.CONFIG_SECTIONS for name in (word, word.removesuffix(".sec"))}
-"""Configuration words have code flags but are no flash (abi-elf.md §6.6)."""
+"""Sections of configuration words, which have code flags but take no flash (abi-elf.md §6.6)."""
 
 
 def totals(sections: list[Section]) -> dict[str, int]:
@@ -34,7 +34,7 @@ def totals(sections: list[Section]) -> dict[str, int]:
 
 
 def options_of() -> argparse.ArgumentParser:
-    """The options of the command."""
+    """Return the argument parser of the command."""
     p = parser(
         "size", "Show flash bytes (three per instruction word) and RAM bytes.", "python -m toolchain size firmware.elf"
     )

@@ -15,7 +15,7 @@ from toolchain.stack.annotations import Annotations, add_symbols, read_annotatio
 
 DESCRIPTION = """Worst-case stack use, in bytes, per function and per entry (reset, interrupt, thread, by pointer),
 found by following every instruction path of the image.  Recursion, calls through pointers and unknown changes of
-W15 are named; an annotation file bounds them:
+W15 are listed; an annotation file bounds them:
 
     calls FUNCTION: TARGET, TARGET     what pointer calls inside FUNCTION reach, * = any with its address taken
     depth FUNCTION BYTES               FUNCTION with all it calls uses at most BYTES
@@ -23,12 +23,12 @@ W15 are named; an annotation file bounds them:
     thread FUNCTION                    FUNCTION is the entry of a thread
 
 or absolute symbols __stack_depth_of_F, __stack_recursion_of_F, __stack_thread_F in the firmware.
-A + behind a number marks a lower bound: something on that path is not known.  A handler that moves W15 to a stack
-of its own shows how much it leaves on the interrupted one."""
+A + after a number marks a lower bound: part of that path is unknown.  For a handler that switches to a stack of its
+own, the bytes on the interrupted stack are shown too."""
 
 
 def options_of() -> argparse.ArgumentParser:
-    """The options of the command."""
+    """Return the argument parser of the command."""
     p = parser("stack", DESCRIPTION, "python -m toolchain stack firmware.elf --thread blinker --limit blinker=128")
     p.add_argument("image")
     p.add_argument("-a", "--annotations", metavar="FILE")
@@ -94,9 +94,9 @@ def _as_text(report: Report, functions: bool) -> str:
         lines += ["", f"{'own':>6} {'total':>6}  function"]
         for usage in sorted(report.functions, key=lambda u: (-u.total, u.name)):
             lines.append(f"{usage.frame:6} {usage.total:6}{'+' if usage.unknown else ' '} {usage.name}")
-    unknown = list(dict.fromkeys(note for usage in report.functions for note in usage.unknown))
+    unknown = list(dict.fromkeys(reason for usage in report.functions for reason in usage.unknown))
     if unknown:
-        lines += ["", "not known (bound it with an annotation):", *(f"  {note}" for note in unknown)]
+        lines += ["", "unknown (bound it with an annotation):", *(f"  {reason}" for reason in unknown)]
     return "\n".join(lines)
 
 
@@ -105,7 +105,7 @@ def _total(entry: Entry) -> int:
 
 
 def _check(report: Report, limits: list[str]) -> int:
-    """Compare with the --limit options; an entry's own figure counts before a function's."""
+    """Compare with the --limit options; the total of an entry takes precedence over that of a function."""
     status = DONE
     for limit in limits:
         name, equals, value = limit.partition("=")

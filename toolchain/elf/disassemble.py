@@ -1,4 +1,4 @@
-"""Sections as instructions: what stands at each address, with the names symbols give.
+"""Disassembly of sections, with symbol names.
 
 Reads `emu.dspic30f.isa`; used by `objdump` and by the stack analysis.
 """
@@ -22,7 +22,7 @@ NO_INSTRUCTIONS = frozenset((".ivt", ".aivt", ".dinit"))
 
 @dataclass(frozen=True, slots=True)
 class Item:
-    """One or two words at `address`; `insn` is None for what is no instruction."""
+    """One or two words at `address`; `insn` is None for a word that is no instruction."""
 
     address: int
     words: tuple[int, ...]
@@ -62,7 +62,7 @@ class Names:
         return symbol, distance
 
     def operand(self, address: int, space: str) -> str | None:
-        """Spelling of an address in an operand: `0x10c <_main+0x4>`; None leaves the plain number."""
+        """Return an address as operand text, `0x10c <_main+0x4>`; None without a symbol."""
         found = self.find(address, space)
         if found is None:
             return None
@@ -76,7 +76,7 @@ def _better(new: Symbol, old: Symbol) -> bool:
 
 
 def items(section: Section) -> Iterator[Item]:
-    """Yield everything in a code section in order."""
+    """Yield the items of a code section in order."""
     words = [int.from_bytes(section.data[i : i + 3], "little") for i in range(0, len(section.data), OCTETS_PER_WORD)]
     index = 0
     plain = section.name in NO_INSTRUCTIONS

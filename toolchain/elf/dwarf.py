@@ -16,13 +16,13 @@ def lines_of(image: Executable) -> LineTable:
 
 
 class SourceText:
-    """Source files by the names DWARF gives them; a file that is gone shows only its line numbers."""
+    """Lines of source files, by their DWARF names; of a missing file only line numbers are shown."""
 
     def __init__(self) -> None:
         self._files: dict[str, list[str] | None] = {}
 
     def line(self, file: str, number: int) -> str | None:
-        """Return the text of a line, None when the file or the line is not there."""
+        """Return the text of a line, None if the file or the line does not exist."""
         if file not in self._files:
             try:
                 self._files[file] = Path(file).read_text("utf-8", "replace").splitlines()

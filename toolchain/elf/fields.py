@@ -1,4 +1,4 @@
-"""Reading and writing relocated fields in section octets: one place for assembler and linker (abi-elf.md §5)."""
+"""Reading and writing of relocated fields in section octets, for assembler and linker (abi-elf.md §5)."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
-"""What an object file or an executable consists of, independent of bytes on disk.
+"""Model of object files and executables.
 
-Contents are kept exactly as they stand in the file (abi-elf.md §6.2): four octets per program word in code,
+Contents are stored as in the file (abi-elf.md §6.2): four octets per program word in code,
 every byte followed by a phantom octet elsewhere.  Addresses and sizes are in address units.
 """
 
@@ -24,7 +24,7 @@ class Bind(Enum):
 
 
 class Home(Enum):
-    """Where a symbol lives when it lives in no section."""
+    """Where a symbol is defined: in a section, or one of ELF's special section indices."""
 
     SECTION = "section"
     UNDEFINED = "undefined"
@@ -48,7 +48,7 @@ class Symbol:
 
 @dataclass(slots=True)
 class Reloc:
-    """A field to fill: `offset` in octets from the section start (abi-elf.md §5), `type` a number of elffacts."""
+    """A relocation: `offset` in octets from the section start (abi-elf.md §5), `type` a number of elf_facts."""
 
     offset: int
     type: int

@@ -1,7 +1,6 @@
 """ELF32 reader for dsPIC30F objects and executables, ours and Microchip's (abi-elf.md §6).
 
-Objects are read whole at every link, so this is a small table reader; DWARF, where a general library pays, goes
-through pyelftools in `toolchain.elf.dwarf`.
+Every link reads whole objects, so the reader is small and fast.  DWARF is read with pyelftools (`emu.image.lines`).
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Questions about symbol tables that several tools ask."""
+"""Queries on symbol tables, for several tools."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ _COMPILER_LABELS = (".L", "L0", "___PA___", "___BP___")  # abi-elf.md §6.5: tho
 
 
 def is_named(symbol: Symbol) -> bool:
-    """Whether the symbol names something a person knows, rather than a compiler's label."""
+    """Whether a symbol is a name of the source rather than a label of the compiler."""
     return (
         bool(symbol.name)
         and symbol.type not in (c.STT_SECTION, c.STT_FILE)
@@ -22,8 +22,8 @@ def is_named(symbol: Symbol) -> bool:
 def symbol_sizes(symbols: Iterable[Symbol], relative: bool = True) -> list[tuple[Symbol, int]]:
     """Return (symbol, size in address units) for named symbols in sections, by section and value.
 
-    Where no size is recorded, as for library assembly (abi-elf.md §6.5), a symbol reaches to the next one or to the
-    end of its section.  `relative`: values count from the section start, as in objects.
+    A symbol without a recorded size, as in library assembly (abi-elf.md §6.5), extends to the next symbol or to the end
+    of its section.  `relative`: values count from the section start, as in objects.
     """
     by_section: dict[Section, list[Symbol]] = {}
     for symbol in symbols:

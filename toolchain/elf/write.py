@@ -25,7 +25,7 @@ class _Strings:
 
 
 class _Writer:
-    """Lays the file out as Microchip's tools do: headers, contents, names, section table, symbols (§6.4)."""
+    """Writer with the file layout of Microchip's tools: headers, contents, names, section table, symbols (§6.4)."""
 
     def __init__(self, kind: int, processor: int, entry: int, program_headers: int) -> None:
         self.kind, self.processor, self.entry = kind, processor, entry

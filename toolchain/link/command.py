@@ -1,4 +1,4 @@
-"""What `ld` and the compiler driver share: linker options, inputs by content, output files."""
+"""Link step of `ld` and the compiler driver: linker options, inputs by content, output files."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ IGNORED_WORDS = (
     "--force-link", "--no-force-link", "--warn-common", "--cref", "--select-objects", "--no-select-objects",
     "--warn-section-align", "--no-warn-section-align",
 )  # fmt: skip
-"""Words of Microchip's linker that change nothing here."""
+"""Options of Microchip's linker that are accepted without effect."""
 DEVICE_SCRIPT = re.compile(r"p(30f\d{4}a?)\w*\.gld", re.IGNORECASE)
 _NUMBERS = {"heap": 0xFFFF, "stack": 0xFFFF, "stackguard": 0xFFFF, "fill_upper": 0xFF}
 
@@ -118,14 +118,14 @@ def _part(text: str, chip: Chip) -> PartRegions:
 
 
 class _Words(argparse.ArgumentParser):
-    """argparse whose findings are errors of the caller's command line."""
+    """Argument parser that raises `ToolError`."""
 
     def error(self, message: str) -> NoReturn:
         raise ToolError(f"linker option: {message} (see `python -m toolchain ld --help`)")
 
 
 def parse_link_words(words: Sequence[str]) -> argparse.Namespace:
-    """Linker options that came through -Wl, and -Xlinker. Raises `ToolError` for a word that means nothing."""
+    """Parse linker options of -Wl, and -Xlinker; raises `ToolError` for an unknown option."""
     p = _Words(prog="cc -Wl", allow_abbrev=False, add_help=False)
     add_options(p)
     return p.parse_args(list(words))

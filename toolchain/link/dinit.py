@@ -1,7 +1,7 @@
-"""The `.dinit` table that crt0 reads to clear and fill RAM (abi-elf.md §3.2).
+"""The `.dinit` table, from which crt0 initialises RAM (abi-elf.md §3.2).
 
-Records of sections that follow each other in RAM and are treated alike are joined: the format allows it and every
-record saved is three program words.  Initialised sections that hold only zeros are cleared, not copied.
+Adjacent sections of equal treatment share a record: the format allows it, and each record takes three program words.
+Initialised sections that contain only zeros are cleared, not copied.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ def plan(layout: Layout, pack: bool) -> list[Record]:
 
 
 def empty_section(records: list[Record]) -> Section:
-    """Return `.dinit` with its final length and no content yet; the end mark is one word."""
+    """Return `.dinit` with its final length and without content; the end mark is one word."""
     words = sum(record.words for record in records) + 1
     return Section(".dinit", CODE, data=bytearray(words * OCTETS_PER_WORD))
 
@@ -89,6 +89,6 @@ def fill(section: Section, records: list[Record], contents: dict[Section, bytear
 
 
 def _plain(octets: bytearray) -> bytes:
-    """Data bytes of a section, without phantoms, padded to even length."""
+    """Return the data bytes of a section without phantoms, padded to even length."""
     data = bytes(octets[::2])
     return data + b"\0" * (len(data) & 1)

@@ -18,7 +18,7 @@ def _record(kind: int, address: int, data: bytes) -> str:
 
 
 def loadable(sections: Iterable[Section]) -> list[Section]:
-    """Sections with program memory content, by load address; RAM never appears in a HEX file (§6.8)."""
+    """Return the sections with program memory content, by load address; a HEX file has no RAM contents (§6.8)."""
     program = SectionFlag.EXECINSTR | SectionFlag.PSV | SectionFlag.EEDATA
     found = [
         s

@@ -1,4 +1,4 @@
-"""From placed and relocated input sections to the sections and symbols of the executable (abi-elf.md §6)."""
+"""Output sections and symbols of the executable, from placed and relocated input sections (abi-elf.md §6)."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _KEPT = (
     F.WRITE | F.ALLOC | F.EXECINSTR | F.NOLOAD | F.NEAR | F.PERSIST | F.XMEM | F.YMEM | F.PSV | F.EEDATA | F.ABSOLUTE
 )
 _OWN_NAME = (".reset", ".ivt", ".aivt", ".handle", ".dinit")
-"""`.handle` keeps its name so that tools can tell whose address is taken; in Microchip's images it is part of .text."""
+"""Sections that keep their name.  `.handle` lists functions whose address is taken; Microchip puts it in .text."""
 
 
 @dataclass(slots=True)
@@ -29,7 +29,7 @@ class Output:
 
 
 def _name(section: Section) -> str:
-    """Output name of an input section; the classes of abi-elf.md §1.4, fixed sections keep their own name."""
+    """Return the output name of an input section: its class (abi-elf.md §1.4), or its own name if fixed."""
     if space_of(section) == "config":
         return section.name.removesuffix(".sec")
     if section.flags & F.ABSOLUTE or section.name in _OWN_NAME or not section.flags & F.ALLOC:
@@ -51,14 +51,16 @@ def _name(section: Section) -> str:
 def _flags(section: Section) -> int:
     flags = section.flags & _KEPT
     if section.is_ram and section.type != c.SHT_NOBITS:
-        flags |= F.NOLOAD  # its real image is in .dinit; without this bin2hex writes it over the program (§7 item 4)
+        flags |= (
+            F.NOLOAD
+        )  # the contents are in .dinit; without the flag bin2hex writes them over the program (§7 item 4)
     if section.is_psv or section.is_eedata:
         flags &= ~(F.EXECINSTR | F.ABSOLUTE)
     return flags
 
 
 def _content(section: Section, octets: bytearray, size: int, fill_upper: int) -> bytearray:
-    """Octets of an input section in the executable's layout, padded to `size` address units (abi-elf.md §6.2)."""
+    """Return the octets of an input section in the executable's layout, padded to `size` units (abi-elf.md §6.2)."""
     if section.type == c.SHT_NOBITS:
         return bytearray()
     padded = octets + bytes(size * 2 - len(octets))
@@ -75,10 +77,10 @@ def _content(section: Section, octets: bytearray, size: int, fill_upper: int) ->
 def build_outputs(
     layout: Layout, contents: dict[Section, bytearray], fill_upper: int, debug_phantoms: bool
 ) -> list[Output]:
-    """Join neighbouring input sections of one kind; order: program, constants, data, debug.
+    """Join adjacent input sections of one kind; order: program, constants, data, debug.
 
-    Debug sections leave their phantoms behind, so that any DWARF reader understands the image; `debug_phantoms` keeps
-    them, as XC16's images do.
+    Debug sections lose their phantom octets, so that any DWARF reader can read the image; `debug_phantoms` keeps
+    them as in XC16's images.
     """
     rank = {"program": 0, "config": 1, "eeprom": 2, "data": 3, "info": 4}
 
@@ -114,7 +116,7 @@ def build_outputs(
 def build_executable(
     resolution: Resolution, outputs: list[Output], relocator: Relocator, entry: int, processor: int
 ) -> Executable:
-    """Return the executable with its symbol table: what has a name in objects, and the linker symbols in use."""
+    """Return the executable with its symbols: named symbols of the objects, and linker symbols in use."""
     home = {section: output.section for output in outputs for section in output.inputs}
     symbols: list[Symbol] = []
     for obj in resolution.objects:

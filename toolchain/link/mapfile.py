@@ -1,4 +1,4 @@
-"""The link map: memory use, every section and symbol with place and size, what was left out, the .dinit records."""
+"""The link map: memory use, sections and symbols with address and size, discarded sections, .dinit records."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def memory_report(linked: Linked) -> str:
 
 
 def memory_summary(linked: Linked, image: str) -> str:
-    """The same as XML, for MPLAB X's memory gauges (`--memorysummary`)."""
+    """Return memory use as XML, for MPLAB X's memory gauges (`--memorysummary`)."""
     used, place = memory_use(linked), linked.layout.memory
     flash = place.flash.size // OCTETS_PER_UNIT * 3
     rows = (("program", used["flash"], flash), ("data", used["data"], place.ram.size))
@@ -64,12 +64,12 @@ def map_text(linked: Linked) -> str:
                 )
     lines += ["", "Data initialisation (.dinit): address, bytes, how"]
     lines += [f"  {r.address:#06x} {r.size:6}  {r.format.name.lower()}" for r in linked.records]
-    left_out = [
+    discarded = [
         f"  {section.name:18} {memory_bytes(section, section.units):6} bytes  {obj.name}"
         for obj in linked.resolution.objects
         for section in obj.sections
         if section not in linked.live and section.units and space_of(section) != "info"
     ]
-    if left_out:
-        lines += ["", "Left out by --gc-sections", *left_out]
+    if discarded:
+        lines += ["", "Discarded by --gc-sections", *discarded]
     return "\n".join(lines) + "\n"

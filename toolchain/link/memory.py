@@ -1,4 +1,4 @@
-"""The linker's view of the chip: where sections may go, which names it provides.  All numbers come from `emu.chips`."""
+"""Memories of the chip and symbols of its linker script, from `emu.chips`; free intervals of a memory."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ UNIT_ID_WORDS = 4  # FUID0..3, abi-elf.md §3.3
 
 
 class Memory:
-    """One chip, or a part of it, as a linker sees it."""
+    """Memory regions of a chip, or of the part of it that `--part` selects."""
 
     def __init__(self, chip: Chip, part: PartRegions | None = None) -> None:
         self.chip: Final = chip
@@ -59,13 +59,13 @@ class Memory:
 
 
 def _common(region: Region, other: Region) -> Region:
-    """What lies in both."""
+    """Return the intersection of two regions."""
     start = max(region.start, other.start)
     return Region(region.name, start, max(start, min(region.end, other.end)))
 
 
 CONFIG_SECTIONS: Final = frozenset(name for chip in map(chip_named, NAMES) for name in Memory(chip).config_sections)
-"""Names of the sections that hold configuration words, of any chip."""
+"""Names of the sections with configuration words, of all chips."""
 
 
 @dataclass(slots=True)
@@ -80,7 +80,7 @@ class Pool:
         self.free = [(self.start, self.end)]
 
     def reserve(self, start: int, size: int) -> bool:
-        """Take exactly [start, start + size); False when part of it is taken or outside."""
+        """Allocate exactly [start, start + size); return False if part of it is allocated or outside."""
         for index, (low, high) in enumerate(self.free):
             if low <= start and start + size <= high:
                 self._cut(index, start, size)
@@ -88,7 +88,7 @@ class Pool:
         return size == 0 and self.start <= start <= self.end
 
     def allocate(self, size: int, align: int, low: int, high: int, window: int = 0) -> int | None:
-        """Take `size` units from the lowest fitting place in [low, high); with `window`, not across its multiples."""
+        """Allocate `size` units at the lowest fitting address in [low, high), not across multiples of `window`."""
         for index, (begin, end) in enumerate(self.free):
             at = self._fit(max(begin, low), min(end, high), size, align, window)
             if at is not None:
@@ -97,7 +97,7 @@ class Pool:
         return None
 
     def allocate_top(self, size: int, align: int, low: int, high: int, reverse: bool = False) -> int | None:
-        """As `allocate`, from the highest place down; `reverse` aligns the end instead of the start."""
+        """Allocate at the highest fitting address; `reverse` aligns the end instead of the start."""
         for index in range(len(self.free) - 1, -1, -1):
             begin, end = max(self.free[index][0], low), min(self.free[index][1], high)
             at = end // align * align - size if reverse else (end - size) // align * align
@@ -121,9 +121,9 @@ class Pool:
             insort(self.free, (start + size, high))
 
     def room(self, low: int, high: int) -> int:
-        """Free units within [low, high)."""
+        """Return the free units within [low, high)."""
         return sum(max(0, min(e, high) - max(b, low)) for b, e in self.free)
 
     def largest(self) -> tuple[int, int]:
-        """The largest free interval, (0, 0) when nothing is free."""
+        """Return the largest free interval, (0, 0) if nothing is free."""
         return max(self.free, key=lambda piece: piece[1] - piece[0], default=(0, 0))

@@ -1,4 +1,4 @@
-"""What a link can be told; names and defaults follow Microchip's linker (abi-elf.md §3.3)."""
+"""Options of a link; names and defaults follow Microchip's linker (abi-elf.md §3.3)."""
 
 from __future__ import annotations
 
@@ -13,8 +13,11 @@ MINIMUM_STACK = 16  # --stack default
 
 @dataclass(frozen=True, slots=True)
 class PartRegions:
-    """What a program may use that another image calls: a range of program memory and one of RAM. It has no vectors, no
-    reset and no stack, and its constants lie in its RAM, since the PSV window shows those of the other image."""
+    """Memory of a program that another image calls: a range of program memory and one of RAM.
+
+    Such a program has no vectors, reset and stack.  Its constants are in its RAM, because the PSV window shows the
+    constants of the other image.
+    """
 
     program: Region
     data: Region

@@ -1,7 +1,4 @@
-"""A program that another image calls (`--part`): what it may not have, and constants in its RAM.
-
-Before: the resolution of any program. After `adapt`: its constants are initialised data.
-"""
+"""Programs that another image calls (`--part`): constants in RAM, and checks of what they cannot have."""
 
 from __future__ import annotations
 
@@ -14,7 +11,7 @@ from toolchain.link.resolve import Resolution
 
 
 def adapt(resolution: Resolution) -> None:
-    """Constants become initialised data: the only PSV window shows what the image that calls has set up."""
+    """Turn constants into initialised data, because the PSV window shows the constants of the calling image."""
     for section in resolution.owner:
         if section.is_psv and not section.flags & SectionFlag.EEDATA:
             kept = section.flags & ~(SectionFlag.PSV | SectionFlag.EXECINSTR)
@@ -22,7 +19,7 @@ def adapt(resolution: Resolution) -> None:
 
 
 def check(resolution: Resolution, live: set[Section]) -> None:
-    """Raise `ToolError` for what would be without effect: handlers of interrupts, configuration words, EEPROM."""
+    """Raise `ToolError` for interrupt handlers, configuration words and EEPROM contents, which would have no effect."""
     findings = [
         f"{resolution.defined_in[name].name}: error: {name} is a handler of interrupts; the vectors are those of the"
         f" image that calls this program"

@@ -1,7 +1,7 @@
 """Placement: every live input section gets an address and a load address (abi-elf.md §3.3, "Allocation").
 
-Before: sections with their sizes.  After: `Placed` for each, no overlaps, all rules of psv windows, near, X, Y,
-`address()`, alignment kept, or a `ToolError` that says by how many bytes what does not fit.
+In: sections with their sizes.  Out: a `Placed` for each, without overlaps, within the rules of PSV windows, near, X, Y,
+`address()` and alignment; or a `ToolError` with the number of missing bytes.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from toolchain.link.memory import CONFIG_SECTIONS, HANDLE_LIMIT, Memory, Pool
 from toolchain.link.resolve import Resolution
 
 _FIRST_CODE = (".init", ".user_init", ".handle", ".isr", ".libc", ".libm", ".libdsp", ".lib")
-"""Order of what opens the program region (abi-elf.md §3.3)."""
+"""Order of the first sections of the program region (abi-elf.md §3.3)."""
 
 
 @dataclass(frozen=True, slots=True)
 class Placed:
-    """Where a section ended up, in address units; `size` is even."""
+    """Address of a section, in address units; `size` is even."""
 
     address: int
     load: int
@@ -31,7 +31,7 @@ class Placed:
 
 @dataclass(slots=True)
 class Layout:
-    """The result: places by section, and what is left of the memories."""
+    """Addresses by section, and the free intervals of the memories."""
 
     memory: Memory
     placed: dict[Section, Placed] = field(default_factory=dict)
@@ -47,12 +47,12 @@ class Layout:
 
 
 def even(units: int) -> int:
-    """Sections are padded to whole words (abi-elf.md §3.2)."""
+    """Round up to whole words, to which sections are padded (abi-elf.md §3.2)."""
     return (units + 1) // 2 * 2
 
 
 def space_of(section: Section) -> str:
-    """Return "data", "program", "eeprom", "config", or "info" for what is in no memory."""
+    """Return "data", "program", "eeprom", "config", or "info" for a section outside all memories."""
     if section.name in CONFIG_SECTIONS:
         return "config"
     if section.flags & SectionFlag.EEDATA:
@@ -81,7 +81,7 @@ class Placer:
     # -- data ----------------------------------------------------------------------------------------------------
 
     def place_data(self) -> None:
-        """RAM: fixed addresses, X and Y memory, near from the bottom, then the rest (abi-elf.md §3.3)."""
+        """Place RAM sections: fixed addresses, X and Y memory, near from the bottom, the rest (abi-elf.md §3.3)."""
         sections = [s for s in self.by_space.get("data", []) if not s.extended & ExtendedAttribute.STACK]
         fixed = [s for s in sections if s.flags & SectionFlag.ABSOLUTE]
         free = [s for s in sections if not s.flags & SectionFlag.ABSOLUTE]
@@ -119,7 +119,7 @@ class Placer:
     # -- program -------------------------------------------------------------------------------------------------
 
     def place_fixed_program(self) -> None:
-        """Reset, vector tables, `address()` code and constants, configuration words."""
+        """Place reset, vector tables, code and constants with `address()`, and configuration words."""
         starts = {".reset": self.memory.reset, ".ivt": self.memory.ivt, ".aivt": self.memory.aivt}
         for section in self.by_space.get("program", []):
             if section.name in starts:
@@ -148,7 +148,7 @@ class Placer:
             self._record(section, address)
 
     def place_program(self) -> None:
-        """Start-up and library code first, then .const in one window, other psv sections, the remaining code."""
+        """Place start-up and library code, .const in one PSV window, other PSV sections, and the remaining code."""
         free = [s for s in self.by_space.get("program", []) if s not in self.layout.placed]
         code = [s for s in free if not s.is_psv]
         const = [s for s in free if s.is_psv and is_const(s)]
@@ -172,7 +172,7 @@ class Placer:
         self._record(section, psv_address(at) if section.is_psv else at, at)
 
     def _const_group(self, const: list[Section], everything: list[Section]) -> None:
-        """All of .const shares one PSV page, so that one PSVPAG value serves every object (abi-elf.md §1.4)."""
+        """Place all of .const in one PSV page, so that one PSVPAG value serves every object (abi-elf.md §1.4)."""
         if not const:
             return
         align = max(2, *(s.align for s in const))
@@ -194,7 +194,7 @@ class Placer:
             self._record(section, psv_address(at + offset), at + offset)
 
     def place_eeprom(self) -> None:
-        """EEPROM contents; the address seen by code is the low half, 0xF000.. (abi-elf.md §6.4)."""
+        """Place EEPROM contents; code sees the low half of the address, 0xF000.. (abi-elf.md §6.4)."""
         members = self.by_space.get("eeprom", [])
         for section in members:
             if section.flags & SectionFlag.ABSOLUTE:
@@ -208,7 +208,7 @@ class Placer:
                 self._record(section, psv_address(at), at)
 
     def place_info(self) -> None:
-        """Debug sections: offsets within the joined section of the same name, not addresses."""
+        """Place debug sections at offsets within the joined section of their name."""
         ends: dict[str, int] = {}
         for section in self.by_space.get("info", []):
             start = ends.get(section.name, 0)
@@ -226,7 +226,7 @@ class Placer:
         failed: Section,
         rivals: list[Section] | None = None,
     ) -> ToolError:
-        """Say by how much `group` exceeds what `pool` has left; `rivals` are all who took from it."""
+        """Return the error for a group that exceeds its memory; `rivals` are all sections in that memory."""
         waiting = sum(even(s.units) for s in group if s not in self.layout.placed)
         missing = waiting - pool.room(low, high)
         program = space_of(failed) == "program"
@@ -243,7 +243,7 @@ class Placer:
         return ToolError(f"{self._name(failed)} does not fit: {reason}{self._reserved(failed, low, high)}{largest}")
 
     def _reserved(self, failed: Section, low: int, high: int) -> str:
-        """What has taken part of the same memory because it wants to lie there."""
+        """Return a list of the sections with fixed addresses in the same memory, for the message."""
         found = []
         for section, at in self.layout.placed.items():
             is_rival = section.flags & SectionFlag.ABSOLUTE and space_of(section) == space_of(failed)
@@ -260,7 +260,7 @@ def _is_near(section: Section) -> bool:
 
 
 def _data_order(section: Section) -> tuple[int, int]:
-    """Largest alignment first, to lose no gaps; then zeroed, initialised, never initialised: short .dinit tables."""
+    """Sort key: large alignments first to avoid gaps; then by kind, for a short .dinit table."""
     kind = 2 if section.flags & (SectionFlag.PERSIST | SectionFlag.NOLOAD) else 0 if section.nobits_units else 1
     return -section.align if section.align > 2 else 0, kind
 
@@ -271,22 +271,22 @@ def _first_rank(section: Section) -> int:
 
 
 def memory_bytes(section: Section, units: int) -> int:
-    """Bytes of memory that `units` address units take: three per instruction word in code, else one each."""
+    """Return the bytes of memory of `units` address units: three per instruction word in code, else one each."""
     return (units + 1) // 2 * 3 if section.is_code else units
 
 
 def is_const(section: Section) -> bool:
-    """Whether a psv section belongs to the constants every object shares."""
+    """Whether a PSV section belongs to .const, which is in the page of PSVPAG's default value."""
     return section.name == ".const" or section.name.startswith(".const.")
 
 
 def psv_address(load: int) -> int:
-    """Address under which data sees a program location (abi-elf.md §6.4)."""
+    """Return the data address of a program location in the PSV window (abi-elf.md §6.4)."""
     return PSV_WINDOW | load & (PSV_PAGE_UNITS - 1)
 
 
 def largest_symbols(resolution: Resolution, group: Iterable[Section]) -> str:
-    """The five largest symbols, with their bytes, of the sections that compete for the space."""
+    """Return the five largest symbols of a group of sections, with their bytes, for the message."""
     members = set(group)
     sizes: list[tuple[int, str]] = []
     for obj in resolution.objects:

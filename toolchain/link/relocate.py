@@ -22,7 +22,7 @@ _LISTS = frozenset((".debug_loc", ".debug_ranges"))
 
 @dataclass(frozen=True, slots=True)
 class Target:
-    """What a symbol is worth: address, load address, and the space it is in ("" for numbers)."""
+    """Value of a symbol: address, load address, and its memory space ("" for numbers)."""
 
     address: int
     load: int
@@ -30,7 +30,7 @@ class Target:
 
 
 class Relocator:
-    """Applies relocations; findings are collected so that one link shows all of them."""
+    """Applies relocations and collects all errors of a link."""
 
     def __init__(
         self,
@@ -46,7 +46,7 @@ class Relocator:
         self._targets: dict[Symbol, Target] = {}
 
     def target(self, symbol: Symbol) -> Target:
-        """Return the final place of a symbol, after resolution."""
+        """Return the value of the definition of a symbol."""
         known = self._targets.get(symbol)
         if known is None:
             known = self._targets[symbol] = self._find(self.resolution.lookup(symbol))
@@ -56,7 +56,7 @@ class Relocator:
         if symbol.home is Home.SECTION and symbol.section is not None:
             placed = self.layout.placed.get(symbol.section)
             if placed is None:
-                return Target(0, 0, "")  # in a discarded section: only debug information still mentions it
+                return Target(0, 0, "")  # in a discarded section: only debug information refers to it
             space = space_of(symbol.section)
             return Target(placed.address + symbol.value, placed.load + symbol.value, space)
         if symbol.home is Home.UNDEFINED:
@@ -92,7 +92,7 @@ class Relocator:
         target = self.target(reloc.symbol)
         formula = kind.formula
         if section.name in _LISTS and self._is_discarded(reloc.symbol):
-            return 1  # a pair of zeros would end the list
+            return 1  # a pair of zeros ends a list
         if formula is Formula.ADDRESS:
             if (
                 target.space == "program"
@@ -132,7 +132,7 @@ class Relocator:
         return home is not None and home not in self.layout.placed
 
     def _address(self, kind: RelocationType, target: Target, field: int) -> int:
-        """S+A; the addend is read as signed first, then as unsigned, as GNU's bit-field check does."""
+        """Return S+A; the addend is signed, or unsigned if the signed sum is out of range, as GNU ld does it."""
         signed = target.address + _signed(field, kind.width)
         value = signed if kind.low <= signed <= kind.high else target.address + field
         if kind.number in _NEAR_FORMS and not kind.low <= value <= kind.high:
@@ -143,7 +143,7 @@ class Relocator:
         return fields.checked(kind, value)
 
     def _program_value(self, symbol: Symbol, kind: RelocationType, target: Target, load: int) -> int:
-        """Operators of abi-elf.md §4.2 on the load address."""
+        """Return the value of an operator of abi-elf.md §4.2 on the load address."""
         formula = kind.formula
         if target.space == "data" and formula in _PROGRAM_ONLY:
             raise FieldError(f"{formula.name.lower()}() needs a program address, this symbol is data")
@@ -168,14 +168,14 @@ class Relocator:
         return fields.checked(kind, value)
 
     def _handle(self, symbol: Symbol, load: int) -> int:
-        """A function's own address below 0x10000, else its GOTO slot (abi-elf.md §1.5)."""
+        """Return a function's own address below 0x10000, else that of its GOTO slot (abi-elf.md §1.5)."""
         target = self.resolution.lookup(symbol)
         if target.home is Home.UNDEFINED and target.bind is Bind.WEAK:
             return 0
         if load < HANDLE_LIMIT:
             return load
         if target not in self.slots:
-            raise FieldError("its address does not fit a function pointer and --no-handles leaves it without a slot")
+            raise FieldError("its address does not fit a function pointer, and --no-handles allows no GOTO slot")
         return self.layout.placed[self.handle].address + self.slots[target]
 
     def _complain(self, section: Section, reloc: Reloc, kind: RelocationType | None, message: str) -> None:
@@ -185,7 +185,7 @@ class Relocator:
         self.findings.append(f"{owner}:({section.name}+{reloc.offset // 2:#x}): error: {name}: {message}{what}")
 
     def check(self) -> None:
-        """Raise `ToolError` when any relocation failed."""
+        """Raise `ToolError` if any relocation has failed."""
         if self.findings:
             raise ToolError.of(self.findings)
 

@@ -1,6 +1,6 @@
-"""Symbol resolution: which definition each name means, which archive members are needed.
+"""Symbol resolution: the definition of each name, and the archive members that are needed.
 
-After: every global name has one definition, or all undefined and duplicate ones are reported together.
+Every global name has one definition afterwards, or all undefined and duplicate names are reported together.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ class Resolution:
     duplicates: dict[str, list[str]] = field(default_factory=dict)
 
     def add(self, obj: ObjectFile) -> None:
-        """Enter an object: its sections, definitions and references."""
+        """Add an object with its sections, definitions and references."""
         self.objects.append(obj)
         for section in obj.sections:
             self.owner[section] = obj
@@ -55,7 +55,7 @@ class Resolution:
             known.value = max(known.value, symbol.value)
 
     def lookup(self, symbol: Symbol) -> Symbol:
-        """Return the definition `symbol` stands for: itself when local, else the global one, else itself."""
+        """Return the definition of `symbol`: the global one if it is not local and there is one, else itself."""
         if symbol.bind is Bind.LOCAL:
             return symbol
         return self.globals.get(symbol.name, symbol)
@@ -65,7 +65,7 @@ _STRONG = 3
 
 
 def _rank(symbol: Symbol) -> int:
-    """Strong definitions win over common ones, those over weak ones."""
+    """Return the rank of a definition: strong over common, common over weak."""
     if symbol.home is Home.COMMON:
         return 2
     return 1 if symbol.bind is Bind.WEAK else _STRONG
@@ -74,11 +74,10 @@ def _rank(symbol: Symbol) -> int:
 def resolve(
     objects: list[ObjectFile], archives: list[Archive], roots: list[str], instead: dict[int, Member] | None = None
 ) -> Resolution:
-    """Enter all `objects`, then archive members as long as one defines a wanted name (one group, abi-elf.md §2.8).
+    """Add all `objects`, then archive members as long as one defines a wanted name (one group, abi-elf.md §2.8).
 
-    `roots` begins with the start symbol. A member that brings another start-up code along than the one that the start
-    symbol has found (the library's `atexit` does) takes its place: `instead` is such a member by the id of what it
-    replaces.
+    `roots` begins with the start symbol.  If a needed member defines the start symbol too, as the library's `atexit`
+    does, resolution is repeated with that member as start-up code: `instead` maps the id of the replaced member to it.
     """
     result = Resolution()
     for obj in objects:
@@ -111,7 +110,7 @@ def resolve(
 
 
 def _place(obj: ObjectFile, section: Section, offset: int) -> str:
-    """Where a reference stands: object, section and the function or object around it."""
+    """Return object, section and enclosing symbol of a reference, for the message."""
     around = [s for s in obj.symbols if s.section is section and s.value <= offset and is_named(s)]
     name = max(around, key=lambda s: s.value).name if around else ""
     return f"{obj.name}:({section.name}+{offset:#x}{f' in {name}' if name else ''})"

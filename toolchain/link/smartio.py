@@ -1,7 +1,7 @@
-"""Names that XC16's compiler gives calls of formatted input and output (abi-elf.md §2.8, "Smart-io").
+"""Symbols of XC16 for formatted input and output (abi-elf.md §2.8, "Smart-io").
 
-`__dsnprintf_cdnopuxX` is snprintf called with a literal format that holds such conversions, from a file whose `double`
-has 64 bits; without the `d`, 32 bits. Our functions know every conversion, so all of them mean the plain function.
+`__dsnprintf_cdnopuxX` is snprintf called with a literal format with these conversions, from a file with 64-bit
+`double`; without the `d`, 32 bits.  The library's functions support all conversions, so each is the plain function.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ _FLOATING = frozenset("aAeEfFgG")
 
 
 def plain_name(name: str, where: str) -> str:
-    """The function's own symbol for one of these names, else `name`; `where` names the object in errors.
+    """Return the plain function's symbol for such a name, else `name`; `where` is the object for errors.
 
-    Raises ToolError for a call that passes 32-bit doubles, which the library does not take.
+    Raises ToolError for a call with 32-bit doubles, which the library does not support.
     """
     found = _NAME.fullmatch(name)
     if found is None:

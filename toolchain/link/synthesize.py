@@ -1,6 +1,6 @@
-"""Sections the linker makes itself: reset, vector tables, default handler, handles, RETURN of .user_init, .dinit.
+"""Sections that the linker generates: reset, vector tables, default handler, handles, RETURN of .user_init.
 
-Each is an ordinary section with ordinary relocations, so that placing and relocating know no special cases.
+They have ordinary relocations, so that placement and relocation need no special cases.
 """
 
 from __future__ import annotations
@@ -40,14 +40,14 @@ def wanted(name: str) -> Symbol:
 
 
 def reset_section(entry: str) -> Section:
-    """GOTO entry, at address 0 (abi-elf.md §3.1)."""
+    """Return the reset section, a GOTO to `entry` at address 0 (abi-elf.md §3.1)."""
     section = Section(".reset", CODE)
     _goto(section, wanted(entry))
     return section
 
 
 def default_interrupt(obj: ObjectFile) -> None:
-    """`__DefaultInterrupt` where the program has none: breakpoint word, RESET (abi-elf.md §3.3)."""
+    """Add a `__DefaultInterrupt` to `obj`: breakpoint word, RESET (abi-elf.md §3.3)."""
     section = Section(".isr", CODE, data=bytearray(words_octets(HALT) + code_words("reset")))
     obj.sections.append(section)
     obj.symbols.append(Symbol("__DefaultInterrupt", Home.SECTION, section, 0, section.units, Bind.GLOBAL))
@@ -85,5 +85,5 @@ def handle_section(resolution: Resolution, live: set[Section]) -> tuple[Section,
 
 
 def user_init_return() -> Section:
-    """RETURN that ends the collected .user_init calls (abi-elf.md §3.3)."""
+    """Return the RETURN that ends the .user_init calls (abi-elf.md §3.3)."""
     return Section(".user_init", CODE, data=bytearray(code_words("return")))

@@ -1,4 +1,4 @@
-"""The call graph and its worst case: per function, and per entry that starts with a stack of its own."""
+"""The call graph, and the worst-case stack per function and per entry."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ ANY = "*"  # annotation for "any function whose address is taken"
 
 @dataclass(slots=True)
 class Entry:
-    """A start of execution: "reset", "interrupt", "thread" or "pointer" (never called directly)."""
+    """An entry: "reset", "interrupt", "thread" or "pointer" (never called directly)."""
 
     kind: str
     usage: Usage
@@ -35,7 +35,7 @@ class Entry:
 
     @property
     def before_switch(self) -> int | None:
-        """Bytes on the interrupted stack when the handler moves to a stack of its own, None when it does not."""
+        """Bytes on the interrupted stack if the handler switches to a stack of its own, None if it does not."""
         return None if self.usage.switch is None else self.usage.switch + self.extra
 
 
@@ -46,7 +46,7 @@ class Report:
 
 
 class Analysis:
-    """Facts of one image; `report()` is the result."""
+    """Stack analysis of one image; `report()` returns the result."""
 
     def __init__(self, image: Executable, annotations: Annotations) -> None:
         self.image, self.annotations = image, annotations
@@ -64,7 +64,7 @@ class Analysis:
     # -- entries -------------------------------------------------------------------------------------------------
 
     def _vectors(self) -> dict[int, str]:
-        """Handler address -> vector names, from the vector tables of the image."""
+        """Return vector names by handler address, from the vector tables of the image."""
         words: dict[int, int] = {}
         for section in self.image.sections:
             if section.is_code and section.address < AIVT.end:
@@ -78,7 +78,7 @@ class Analysis:
         return {handler: " ".join(names) for handler, names in found.items() if names}
 
     def _entries(self) -> set[int]:
-        """Function starts: FUNC symbols, call targets, vectors, the program's entry, annotated names."""
+        """Return function starts: FUNC symbols, call targets, vectors, the program's entry, annotated names."""
         found = {self.image.entry, *self.vectors, *self.handles}
         found |= {self._named(name) for name in self.annotations.threads}
         for symbol in self.image.symbols:
@@ -96,7 +96,7 @@ class Analysis:
         return {entry: walker.walk(entry) for entry in sorted(self.entries)}
 
     def name(self, address: int) -> str:
-        """Name people know an address by."""
+        """Return the symbol of an address, with its distance."""
         found = self.names.find(address, "code")
         if found is None:
             return f"{address:#x}"
@@ -104,21 +104,21 @@ class Analysis:
         return f"{symbol.name}+{distance:#x}" if distance else symbol.name
 
     def _named(self, name: str) -> int:
-        """Address of a function named in C or assembly spelling; raises `ToolError`."""
+        """Return the address of a function named in C or assembly spelling; raises `ToolError`."""
         for symbol in self.image.symbols:
             if symbol.name in (name, "_" + name) and symbol.section is not None and symbol.section.is_code:
                 return symbol.value
         raise ToolError(f"no function is called {name}")
 
     def annotation(self, table: dict[str, int], entry: int) -> int | None:
-        """Number an annotation gives for the function at `entry`, None when it says nothing."""
+        """Return the annotated number of the function at `entry`, None without one."""
         name = self.name(entry)
         return table.get(name, table.get(name.removeprefix("_")))
 
     # -- calls ---------------------------------------------------------------------------------------------------
 
     def targets(self, call: Call) -> list[int]:
-        """Functions a call site may reach: its own target, or what annotations say about a pointer call."""
+        """Return the functions that a call site may reach: its target, or the annotated targets of a pointer call."""
         if call.target is not None:
             return [call.target] if call.target else []  # 0: a weak function that is not linked
         owner = self.name(call.address).partition("+")[0]
@@ -128,9 +128,9 @@ class Analysis:
         return [a for name in names for a in (self._handles() if name == ANY else [self._named(name)])]
 
     def _handles(self) -> list[int]:
-        """Functions whose address is taken: the targets of `.handle` (abi-elf.md §1.5); raises `ToolError`."""
+        """Return the functions whose address is taken, by `.handle` (abi-elf.md §1.5); raises `ToolError`."""
         if not any(s.name == ".handle" for s in self.image.sections):
-            raise ToolError("the image has no .handle section that tells whose address is taken")
+            raise ToolError("the image has no .handle section, which lists functions whose address is taken")
         return sorted(self.handles & self.entries)
 
     def _handle_targets(self) -> set[int]:
@@ -139,7 +139,7 @@ class Analysis:
         return {jump.target for jump in jumps if jump.flow is Flow.JUMP}
 
     def report(self) -> Report:
-        """Return all functions, and the entries: reset, interrupts, threads, and what is only reached by pointer."""
+        """Return all functions, and the entries: reset, interrupts, threads, and functions reached only by pointer."""
         usages = totals(self)
         called = {t for f in self.functions.values() for call in f.calls for t in self.targets(call)}
         threads = [self._named(name) for name in self.annotations.threads]

@@ -1,14 +1,14 @@
-"""What the instructions cannot tell: targets of pointer calls, bounds of recursion, thread entries.
+"""Annotations: targets of pointer calls, recursion bounds, thread entries.
 
 A text file, one statement per line, `#` starts a comment:
 
-    calls FUNCTION: TARGET, TARGET ...   pointer calls inside FUNCTION reach one of these; * stands for every
+    calls FUNCTION: TARGET, TARGET ...   pointer calls inside FUNCTION reach one of these; * is every
                                          function whose address the program takes
     depth FUNCTION BYTES                 FUNCTION and all it calls use at most BYTES
     recursion FUNCTION COUNT             at most COUNT activations of FUNCTION exist at once
     thread FUNCTION                      FUNCTION is the entry of a thread
 
-The same facts may stand in the firmware as absolute global symbols: `__stack_depth_of_FUNCTION`,
+The firmware may contain the same facts as absolute global symbols: `__stack_depth_of_FUNCTION`,
 `__stack_recursion_of_FUNCTION` (their value is the number) and `__stack_thread_FUNCTION`.
 Names are as in C or as in assembly.
 """
@@ -28,7 +28,7 @@ _SYMBOL = re.compile(r"__stack_(depth_of|recursion_of|thread)_(.+)")
 
 @dataclass(slots=True)
 class Annotations:
-    """By function name as written."""
+    """Annotations by function name as written."""
 
     calls: dict[str, list[str]] = field(default_factory=dict)
     depth: dict[str, int] = field(default_factory=dict)
@@ -38,7 +38,7 @@ class Annotations:
 
 
 def read_annotations(text: str, file: str) -> Annotations:
-    """Return the annotations in `text`; raise `ToolError` with file and line for what cannot be read."""
+    """Return the annotations in `text`; raise `ToolError` with file and line for a line that cannot be parsed."""
     result = Annotations()
     for number, raw in enumerate(text.splitlines(), 1):
         line = raw.partition("#")[0].strip()
@@ -64,7 +64,7 @@ def read_annotations(text: str, file: str) -> Annotations:
 
 
 def add_symbols(result: Annotations, symbols: Iterable[Symbol]) -> None:
-    """Add what the image says about itself by absolute symbols; the file wins."""
+    """Add the annotations in absolute symbols of the image; those of the file take precedence."""
     for symbol in symbols:
         match = _SYMBOL.fullmatch(symbol.name) if symbol.home is Home.ABSOLUTE else None
         if match is None:

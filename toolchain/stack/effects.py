@@ -1,7 +1,7 @@
-"""What one instruction does to the stack pointer and to the flow of control.
+"""Effect of one instruction on the stack pointer and on control flow.
 
-Stack depth counts bytes above the value of W15 at function entry, behind the return address; the stack grows upward
-(isa.md §3.5).  Rows are told apart by mnemonic and operand fields only.
+Stack depth counts bytes above the value of W15 at function entry, above the return address; the stack grows upward
+(isa.md §3.5).  Instructions are distinguished by mnemonic and operand fields only.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ _READS_F = frozenset(("CP", "CPB", "CP0", "BTST", "BTSS", "BTSC", "MUL"))
 
 
 class Flow(Enum):
-    """Where control goes next."""
+    """Successors of an instruction."""
 
     NEXT = "next"
     BRANCH = "branch or next"
@@ -48,8 +48,13 @@ class Pointer(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Effect:
-    """`delta` in bytes; `target` is a program address for BRANCH, JUMP and CALL; `register` what W15 is copied to or
-    from for SAVED and RESTORED; `pushed` and `popped` are registers that go to the stack and come from it whole."""
+    """Effect of one instruction.
+
+    delta           change of W15 in bytes
+    target          program address for BRANCH, JUMP and CALL
+    register        register that W15 is copied to or from, for SAVED and RESTORED
+    pushed, popped  register of a word push or pop
+    """
 
     flow: Flow
     pointer: Pointer = Pointer.MOVED
@@ -70,7 +75,7 @@ def effect_of(insn: Insn, address: int) -> Effect:
 
 
 def _passed(insn: Insn) -> tuple[int | None, int | None]:
-    """`mov wn, [w15++]`, `mov [--w15], wn`."""
+    """Return the register of `mov wn, [w15++]` and of `mov [--w15], wn`."""
     x = insn.x
     if insn.row.mnemonic != "MOV" or "g" not in insn.row.fields or x.B:
         return None, None
@@ -115,7 +120,7 @@ def _pointer(insn: Insn) -> tuple[Pointer, int]:
 
 
 def _register_effect(insn: Insn) -> tuple[Pointer, int]:
-    """Push and pop by addressing mode, arithmetic on W15, copies into it."""
+    """Return the effect of addressing modes with W15, arithmetic on it, and copies."""
     x, fields = insn.x, insn.row.fields
     size = 4 if insn.row.mnemonic == "MOV.D" else 1 if getattr(x, "B", 0) else 2
     delta = 0
@@ -130,7 +135,7 @@ def _register_effect(insn: Insn) -> tuple[Pointer, int]:
 
 
 def _writes_sp(insn: Insn) -> bool:
-    """Whether W15 is the direct destination."""
+    """Whether W15 is the destination register."""
     x, fields = insn.x, insn.row.fields
     if "d" not in fields or ("o" in fields and "[Wd" in insn.row.syntax):
         return False
@@ -140,7 +145,7 @@ def _writes_sp(insn: Insn) -> bool:
 
 
 def _arithmetic(insn: Insn) -> tuple[Pointer, int]:
-    """`add #n, w15`, `sub w15, #n, w15`, `inc2 w15, w15`, `mov w14, w15`; everything else is unknown."""
+    """Return the effect of `add #n, w15`, `sub w15, #n, w15`, `inc2 w15, w15`, `mov w14, w15`; others are unknown."""
     name, x, fields = insn.row.mnemonic, insn.x, insn.row.fields
     sign = {"ADD": 1, "SUB": -1}.get(name)
     if sign and "k" in fields and ("w" not in fields or x.w == SP):

@@ -1,8 +1,7 @@
-"""Adding up: worst case of every function from its own frame and its calls, callees first.
+"""Worst-case stack of every function from its own frame and its calls, callees first.
 
-Functions that call each other in a circle form one component.  Within it every activation is counted at its deepest
-call, as often as annotations allow (once where they say nothing): an upper bound for bounded recursion, found without
-trying all orders.
+Mutually recursive functions form a component.  Within it every activation counts at its deepest call, as often as
+annotations allow, once without an annotation.  This bounds recursion without trying all orders.
 """
 
 from __future__ import annotations
@@ -17,7 +16,7 @@ from toolchain.stack.walk import Call, Function
 
 @dataclass(slots=True)
 class Usage:
-    """Stack of one function: own frame, worst total in bytes, the path that reaches it, what is not known."""
+    """Stack of one function: own frame, worst total in bytes, the path that reaches it, and what is unknown."""
 
     name: str
     entry: int
@@ -59,7 +58,7 @@ def totals(program: Program) -> dict[int, Usage]:
 
 
 def _outside(program: Program, entry: int, members: set[int], done: dict[int, Usage]) -> Usage:
-    """Worst case of one function over calls that leave its component."""
+    """Return the worst case of one function over calls that leave its component."""
     function, name = program.functions[entry], program.name(entry)
     result = Usage(name, entry, function.frame, function.frame, function.switch, [name])
     bound = program.annotation(program.annotations.depth, entry)
@@ -87,7 +86,7 @@ def _outside(program: Program, entry: int, members: set[int], done: dict[int, Us
 
 
 def _close(program: Program, component: list[int], members: set[int], done: dict[int, Usage]) -> None:
-    """Add what the circle itself costs: each activation but the last stands at its deepest call within the circle."""
+    """Add the stack of the recursion: each activation but the last is at its deepest call within the component."""
     steps: dict[int, int] = {}
     notes: list[str] = []
     activations = 0

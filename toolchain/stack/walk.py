@@ -1,4 +1,4 @@
-"""One function at a time: follow every path from its entry and keep the deepest stack at each instruction."""
+"""Stack of single functions: follows every path from the entry and keeps the deepest stack at each instruction."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ class Call:
 
 @dataclass(slots=True)
 class Function:
-    """What a walk found; `frame` is the deepest own use in bytes, without return address and callees.
+    """Result for one function; `frame` is its greatest own use in bytes, without return address and callees.
 
-    `switch` is the depth at which the function moves to a stack of its own, None when it never does; a path that
-    stays, because the stack pointer is on that stack already, counts in `frame` like any other.
+    `switch` is the depth at which the function switches to another stack, None if it never does.  A path without the
+    switch, because W15 is on that stack already, counts in `frame` like any other.
     """
 
     entry: int
@@ -43,9 +43,14 @@ class Function:
 
 @dataclass(frozen=True, slots=True)
 class _State:
-    """One point of a path: `depth` of the stack in use, `frame` where W14 points, `outer` the depth left behind on the
-    stack that was in use before, `saved` where a copy of W15 is and what it is worth: (register, depth, outer);
-    `shelved` the same of one that was pushed: depth and outer of its place, and what it is worth."""
+    """One point of a path.
+
+    depth    bytes of the current stack
+    frame    depth that W14 points to
+    outer    depth of the stack before the switch, None without one
+    saved    a register with a copy of W15: (register, depth, outer) of the copy
+    shelved  a pushed copy of W15: depth and outer of its location, depth and outer of the copy
+    """
 
     pc: int
     depth: int = 0
@@ -57,13 +62,13 @@ class _State:
 
 
 class Walker:
-    """Walks functions of one image; `code` maps addresses to instructions, `entries` are function starts."""
+    """Analyses functions of one image; `code` maps addresses to instructions, `entries` are function starts."""
 
     def __init__(self, code: Mapping[int, Item], entries: set[int]) -> None:
         self.code, self.entries = code, entries
 
     def walk(self, entry: int) -> Function:
-        """Return the facts of the function that starts at `entry`."""
+        """Return the result for the function at `entry`."""
         result = Function(entry)
         seen: dict[tuple[int, bool], tuple[int, int]] = {}  # place, switched or not -> deepest yet, visits
         work = [_State(entry)]
@@ -80,7 +85,7 @@ class Walker:
             seen[key] = (state.depth, visits + 1)
             item = self.code.get(state.pc)
             if item is None:
-                self._note(result, f"runs out of known code at {state.pc:#x}")
+                self._note(result, f"continues at {state.pc:#x}, where no code is")
             elif item.insn is not None:
                 work += self._step(result, calls, item, state)
         result.calls = [calls[a] for a in sorted(calls)]
@@ -124,11 +129,13 @@ class Walker:
 
     @staticmethod
     def _kept(insn: Insn, effect: Effect, state: _State) -> _State:
-        """The state without a copy of W15 that the instruction computes with, or a callee may overwrite: what is put
-        into W15 then is not what it was (alloca)."""
+        """Return the state without copies of W15 that the instruction changes or a callee may overwrite.
+
+        W15 restored from such a copy (alloca) is unknown.
+        """
         shelved = state.shelved
         if shelved is not None and shelved[1] == state.outer and state.depth <= shelved[0]:
-            state, shelved = replace(state, shelved=None), None  # its place has been given back
+            state, shelved = replace(state, shelved=None), None  # its location has been popped
         if effect.popped is not None and shelved is not None and shelved[:2] == (state.depth - 2, state.outer):
             return replace(state, saved=(effect.popped, *shelved[2:]))
         if state.saved is None:
@@ -170,21 +177,21 @@ class Walker:
         return state
 
     def _repeated(self, result: Function, item: Item, state: _State) -> _State:
-        """Go on behind a repeated instruction that moves W15: its effect counts once per iteration."""
+        """Continue after a repeated instruction that changes W15: its effect counts once per iteration."""
         target = self.code.get(state.pc)
         assert item.insn is not None
         delta = effect_of(target.insn, state.pc).delta if target is not None and target.insn is not None else 0
         if not delta:
             return state
         if "k" not in item.insn.row.fields:
-            self._note(result, f"repeated push or pop with a count not known at {item.address:#x}")
+            self._note(result, f"repeated push or pop with an unknown count at {item.address:#x}")
             return state
         depth = state.depth + delta * (item.insn.x.k + 1)
         result.frame = max(result.frame, depth)
         return replace(state, pc=state.pc + 2, depth=depth)
 
     def _table(self, result: Function, address: int) -> list[int]:
-        """Entries of a jump table behind BRA Wn: a run of BRA and RETLW (abi-elf.md §8.1)."""
+        """Return the entries of a jump table after BRA Wn: a sequence of BRA and RETLW (abi-elf.md §8.1)."""
         targets: list[int] = []
         while (item := self.code.get(address)) is not None and item.insn is not None:
             name, branch = item.insn.row.mnemonic, effect_of(item.insn, address).flow is Flow.JUMP

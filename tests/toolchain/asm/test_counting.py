@@ -135,8 +135,8 @@ def test_bss_only_counts(asm):
     ("text", "message"),
     [
         (".byte 256", "outside -128..255"), (".word 65536", "outside"), (".data\n .pword 1", "code section"),
-        (" .org nowhere", "place in this section"), (".data\nx:\n .text\n . = x", "place in this section"),
-        (".space -1", "cannot advance"), (".align 3", "power of two"), (".org 4\n .org 2", "behind"),
+        (" .org nowhere", "label of this section"), (".data\nx:\n .text\n . = x", "label of this section"),
+        (".space -1", "cannot advance"), (".align 3", "power of two"), (".org 4\n .org 2", "before the current"),
         (".data\n nop", "not a code section"), (".space 0x7fffffff", "grows beyond"), (".fixed 1.0", "1.15"),
         (".uleb128 -1", "negative"), (".single x", "real number"), ('.ascii abc', "double quotes"),
         (".data\n .space 200000", "grows beyond"), (".fill 99999999999, 8, 1", "address space"),

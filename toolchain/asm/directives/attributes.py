@@ -29,7 +29,7 @@ _MODIFIERS: dict[str, SectionFlag] = {
     "noload": _F.NOLOAD,
 }
 OMITTED = _F.NEAR | _F.XMEM | _F.YMEM | _F.NOLOAD | _F.ABSOLUTE | _F.REVERSE
-"""What the first `.section` of a name says for all later ones, which may leave it out."""
+"""Attributes that later `.section` directives of a name inherit from the first if they omit them."""
 _RESERVED: dict[str, str] = {
     ".text": "code",
     ".data": "data",
@@ -51,7 +51,7 @@ _OTHER_PARTS = frozenset(("eds", "dma", "boot", "secure", "auxflash", "packedfla
 
 @dataclass(slots=True)
 class Attributes:
-    """What the attribute list of a `.section` says."""
+    """The parsed attribute list of a `.section`."""
 
     flags: int
     type: int
@@ -62,7 +62,7 @@ class Attributes:
 
 
 def implied(name: str) -> str:
-    """Attributes a section has when none are written; data unless the name is reserved (§4.3)."""
+    """Return the default attributes of a section name: data unless the name is reserved (§4.3)."""
     return _RESERVED.get(name, "info" if name.startswith(".debug_") else "data")
 
 
@@ -75,9 +75,9 @@ def _from_quoted(flags: str) -> str:
 
 
 def parse(text: str, name: str = "") -> Attributes:
-    """Read `code, address(0x1000), near ...`; raise `ExprError` for unknown or contradictory attributes.
+    """Parse `code, address(0x1000), near ...`; raise `ExprError` for unknown or contradictory attributes.
 
-    Without a type among them it is the one that the section's `name` implies: `.section .bss, near`.
+    Without a type attribute the type is that of the section's `name`: `.section .bss, near`.
     """
     result = Attributes(0, c.SHT_PROGBITS, ExtendedAttribute(0))
     kind, info = "", False
@@ -143,7 +143,7 @@ def _apply_type(result: Attributes, kind: str) -> None:
 
 
 def _make_info(result: Attributes, kind: str) -> None:
-    """`info` (also written `info, data`): bytes for tools, in no memory."""
+    """Apply `info` (also written `info, data`): the section has no memory, its bytes are for tools."""
     if kind != "data" or result.flags != _DATA:
         raise ExprError("an info section has no place in memory and takes no other attributes")
     result.flags, result.type = 0, c.SHT_NOTE

@@ -1,4 +1,4 @@
-"""Directives that read more than their own line: macros, repeats, include files (abi-elf.md §4.3)."""
+"""Directives that read further lines: macros, repeats, include files (abi-elf.md §4.3)."""
 
 from __future__ import annotations
 

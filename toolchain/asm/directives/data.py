@@ -37,7 +37,7 @@ _PACKED_KINDS: dict[int, dict[str, str]] = {
 
 
 def operator_of(value: ExprValue) -> str:
-    """Return the operator a value stands under, "" for none."""
+    """Return the operator that is applied to a value, "" for none."""
     if isinstance(value, SymbolicValue):
         return value.op
     if isinstance(value, PendingOperation) and value.op[0] == "f":
@@ -46,7 +46,7 @@ def operator_of(value: ExprValue) -> str:
 
 
 def file_argument(text: str, directive: str) -> str:
-    """Return the file that the quoted string in `text` names, where a backslash parts folders and escapes nothing."""
+    """Return the file name in the quoted string in `text`; a backslash separates folders and is no escape."""
     match = re.fullmatch(r'\s*"([^"]*)"\s*', text)
     if match is None:
         raise ExprError(f"{directive} expects a file name in double quotes")
@@ -62,7 +62,7 @@ def string_argument(text: str, directive: str) -> str:
 
 
 def _no_content(asm: Assembler) -> ExprError:
-    """Something other than zero is to be stored into a section of kind bss."""
+    """Return the error for a nonzero value in a section of kind bss."""
     label = f" at {asm.label}" if asm.label else ""
     return ExprError(f"section {asm.section.name} has no content: only zero may be stored into it{label}")
 
@@ -135,7 +135,7 @@ def _real(text: str, form: str) -> float:
 
 
 def _fixed(asm: Assembler, text: str) -> None:
-    """1.15 fractions, -1 <= x < 1."""
+    """Store 1.15 fractions, -1 <= x < 1."""
     for part in split_arguments(text, spaces=False):
         value = _real(part, "<d")
         if not -1.0 <= value < 1.0:
@@ -235,14 +235,14 @@ def _org(packed: bool) -> Handler:
         section.align_word(fill & 0xFF, packed)
         gap = target - section.location()
         if gap < 0:
-            raise ExprError(f".org {target:#x} is behind the current location {section.location():#x}")
+            raise ExprError(f".org {target:#x} is before the current location {section.location():#x}")
         section.skip(gap, fill, packed)
 
     return emit
 
 
 move_location: Handler = _org(packed=False)
-"""What an assignment to `.` does; the operands of `.org`."""
+"""Effect of an assignment to `.`; operands as of `.org`."""
 
 
 def _include_binary(packed: bool) -> Handler:

@@ -42,7 +42,7 @@ def _section(asm: Assembler, text: str) -> None:
         name = name[1:-1]
     if not name or re.search(r"[\s\"'()\[\]]", name):
         raise ExprError(f"bad section name {name!r}")
-    if name == "*":  # a private section: the name is made up and unique within the object (§1.4)
+    if name == "*":  # a private section with a generated name, unique within the object (§1.4)
         name = f"*_{len(asm.sections):08x}"
     existing = asm.sections.get(name)
     if existing is None:
@@ -111,7 +111,7 @@ def _binder(bind: Bind) -> Handler:
 
 
 def _declare(asm: Assembler, text: str) -> None:
-    """Nothing but `.ifdecl` sees an `.extern`: what is used and not defined is external anyway."""
+    """Record `.extern` for `.ifdecl`; it has no other effect, because every undefined symbol is external."""
     asm.declared.update(symbol_names(text))
 
 
@@ -160,7 +160,7 @@ def _local_common(asm: Assembler, text: str) -> None:
 
 
 def _bss(asm: Assembler, text: str) -> None:
-    """Section .bss; with operands room in it, as .lcomm makes."""
+    """Enter section .bss, or with operands reserve bytes in it as .lcomm does."""
     if text:
         _local_common(asm, text)
     else:
@@ -216,7 +216,7 @@ def _print(asm: Assembler, text: str) -> None:
 
 
 def _ignore(asm: Assembler, text: str) -> None:
-    """Listing and note directives have no effect on the object."""
+    """Do nothing: listing and note directives have no effect on the object."""
 
 
 def _file(asm: Assembler, text: str) -> None:
@@ -242,7 +242,7 @@ def _fill_setter(attribute: str) -> Handler:
         if asm.section.is_code:
             setattr(asm.section, attribute, value)
         else:
-            asm.warn(f"fill values are of code sections: section {asm.section.name} is none, this line has no effect")
+            asm.warn(f"fill values apply to code sections only: in section {asm.section.name} this line has no effect")
 
     return set_fill
 
@@ -327,7 +327,7 @@ REJECTED: dict[str, str] = {  # abi-elf.md §4.3: refused by pic30-as, so refuse
 
 
 def rejection(word: str) -> str | None:
-    """What to do instead of a directive that pic30-as refuses; None for others."""
+    """Return what to use instead of a directive that pic30-as refuses, None for other directives."""
     if word.startswith(".cfi_"):
-        return "leave it out, who called assembly is found by its instructions"
+        return "omit it, callers of assembly are found from its instructions"
     return REJECTED.get(word)
