@@ -20,9 +20,9 @@ from emu.kernel_metrics.baseline import Number, save, short
 DESCRIPTION = """\
 Print ROM and RAM use of an image (bytes; 3 per program word), by part, source file and symbol.
 
-For the application `footprint`, also the memory of threads, events, subscriptions and messages: the command runs it with
-60 loads, reads the heap from the running image, and fits the memory equation RAM = A + B n + C m + D s + sum (E + d).
-For the application `options`, the memory of each kernel option; --check then compares these numbers only."""
+For the application `footprint`, also the memory of threads, events, subscriptions and messages: it is run with 60
+loads, the heap is read from the running image, and the memory equation RAM = A + B n + C m + D s + sum (E + d) is
+fitted. For the application `options`, the memory of each kernel option; --check then compares these numbers only."""
 
 
 def parser() -> Parser:

@@ -42,9 +42,9 @@ def report(chip: Chip, bus: Bus) -> str:
     lines = [
         f"# Registers of the {chip.name}: which are modelled, which are plain",
         "",
-        "This is `emu.peripherals.system.plain_registers.report(machine.chip, machine.bus)`, checked by",
-        "`tests/emu/peripherals/test_plain.py`. Section numbers are those of the chip reference. A plain register",
-        "stores what its mask allows; the first access to it is reported once.",
+        "This page is the output of `emu.peripherals.system.plain_registers.report(machine.chip, machine.bus)`, checked by",
+        "`tests/emu/peripherals/test_plain.py`. Section numbers are those of the chip reference. A plain register stores",
+        "the bits of its mask; the first access is reported.",
         "",
         "| plain register | address | reason |",
         "|---|---|---|",

@@ -1,4 +1,4 @@
-"""A robot whose registers are accessed at chosen cycles, without running a program."""
+"""A robot without a program: the test accesses registers at chosen cycles."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def program(tmp_path_factory) -> Callable[..., Path]:
 
 
 class Robot:
-    """Time only moves by `at`; everything else happens in the current cycle."""
+    """Test rig for a robot. Only `at` advances time; all other methods act in the current cycle."""
 
     def __init__(self, **options) -> None:
         self.machine = Machine(engine="plain")

@@ -31,8 +31,8 @@ def test_run_gives_the_program_its_selector_and_camera(program, capsys):
     assert facts["uart1"].endswith('type "H" for help\r\n')
 
 
-def test_watch_tells_what_happens_on_the_robot(program, tmp_path, capsys):
-    """Part E: --watch prints what a person at the robot would see, with simulated time."""
+def test_watch_reports_the_robots_outputs(program, tmp_path, capsys):
+    """Part E: --watch reports LEDs, motors and UARTs with simulated time."""
     arguments = ["run", str(program("steps.c")), "--seconds", "0.35", "--watch", "motors,leds", "--engine", "plain"]
     assert main(arguments) == 0
     lines = [line.split("  ")[-1] for line in capsys.readouterr().err.splitlines()]
@@ -92,7 +92,7 @@ def test_screenshot_without_buffer_shows_what_the_sensor_sees(program, scene, tm
     ],
 )
 def test_bad_input_is_refused_in_one_line(program, tmp_path, capfd, arguments, message):
-    """engines.md §10: status 2, what is wrong, no traceback."""
+    """engines.md §10: status 2, a message, no traceback."""
     script = tmp_path / "events.txt"
     script.write_text("# nothing yet\n1s dance\n")
     names = {"IMAGE": str(program("startup.c")), "SCRIPT": str(script)}

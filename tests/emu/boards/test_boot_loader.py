@@ -41,8 +41,8 @@ def talk(machine: Machine, data: bytes, cycles: int = 300_000) -> bytes:
     return bytes(heard)
 
 
-def test_rows_sent_are_run_instead_of_the_old_ones(machine):
-    """§16: 2 ms to erase and 2 ms to program, in which the CPU stands; code made from the old row is not run again."""
+def test_programmed_rows_replace_compiled_code(machine):
+    """§16: erase and program take 2 ms each, during which the CPU stalls; native code of the old row is discarded."""
     machine.run(cycles=2_500_000)
     assert machine.peek("answer") == 7
     for number, value in enumerate((1234, 0, 0xBEEF), start=1):

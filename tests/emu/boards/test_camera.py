@@ -55,7 +55,7 @@ def po3030(x=240, y=160, scale=4, form="rgb565"):
 
 
 def scene():
-    """A picture in which every pixel tells its own place, as far as RGB565 can."""
+    """A picture whose pixels encode their own position, within the precision of RGB565."""
     y, x = np.mgrid[0:480, 0:640]
     return np.stack([(x // 3) & 0xF8, (y // 2) & 0xFC, (x * 7 + y * 13) & 0xF8], axis=2).astype(np.uint8)
 
@@ -335,7 +335,7 @@ def test_lines_of_a_moving_scene_are_seen_when_they_are_read_out(robot):
 
 
 def test_snapshot_restores_registers_and_timing(robot):
-    """State is in the record; what is derived from it follows."""
+    """The state is in the record; derived state is rebuilt."""
     robot.configure(po6030())
     state = robot.machine.snapshot()
     frame = robot.board.camera.scan.timing.frame_tcy
@@ -428,8 +428,8 @@ def test_po3030k_manual_exposure_and_gain():
     assert list(capture(robot, 1, 2)[0]) == list(rgb565(np.array([192, 128, 128])))
 
 
-def test_only_the_pixels_of_lines_that_are_read_are_asked_for(robot):
-    """A renderer works for columns of the window and for lines somebody reads."""
+def test_pixel_sources_are_called_for_read_lines_only(robot):
+    """The source is called with the window's columns, and only for lines that are read."""
     asked = []
 
     def pixels(y, columns, cycle):
@@ -458,7 +458,7 @@ def test_frame_is_the_picture_the_sensor_sends(robot):
 
 @pytest.mark.parametrize(("sensor", "writes"), [("PO6030K", po6030(form="yuv")), ("PO3030K", po3030(236, form="yuv"))])
 def test_a_line_of_an_odd_number_of_pixels_in_yuv_is_shown_whole(sensor, writes):
-    """§7.4: the last pixel shares its colour with none behind it; its brightness is sent, and so is its blue."""
+    """§7.4: the last pixel has no partner; its luma and blue difference are sent."""
     robot = Robot(camera=sensor)
     robot.board.camera.show(np.repeat(scene()[:, :, :1], 3, axis=2))
     robot.configure(writes)
@@ -484,8 +484,8 @@ def test_decoding_gives_back_what_the_format_keeps(form):
         assert np.abs(there_and_back(red) - red).max() <= 4
 
 
-def test_a_source_with_other_than_the_pixels_it_was_asked_for_is_refused(robot):
-    """Nothing is written behind the line in the record."""
+def test_a_source_with_a_wrong_number_of_pixels_is_refused(robot):
+    """The record after the line is unchanged."""
     robot.configure(po6030())
     robot.board.camera.sample(lambda _y, columns, _cycle: np.zeros((len(columns) + 1, 3), np.uint8))
     with pytest.raises(ValueError, match="expected 101 pixels"):
@@ -506,7 +506,7 @@ def test_turned_sensors_see_a_turned_picture(robot):
 
 
 def test_plug_is_part_of_a_snapshot(robot):
-    """A camera that was there at the time of the snapshot answers and ticks again."""
+    """A camera that was plugged in at the snapshot answers and sends edges again."""
     state = robot.machine.snapshot()
     robot.board.camera.unplug()
     robot.machine.restore(state)
@@ -530,7 +530,7 @@ def test_an_edge_can_be_put_on_any_cycle(robot, line):
 
 
 def test_unplugging_in_the_middle_of_a_line_ends_it_at_once(robot):
-    """Fault input: what was rendered is no longer on the bus, for every reader of the record."""
+    """Fault input: the rendered line is no longer on the bus, for Python and for rules."""
     robot.board.camera.show(np.full((480, 640), 255, np.uint8))
     robot.configure(po6030())
     camera = robot.board.camera

@@ -1,4 +1,4 @@
-"""The analog converter under native code: the same record as in the interpreter, in any setting and at any stop."""
+"""The ADC in native code: the same record as in the interpreter, for any setting and any stop."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def machine_with(image, engine: str, settings: dict[str, int]) -> Machine:
 
 
 def random_settings(generator: random.Random) -> dict[str, int]:
-    """Mostly plain scans as programs use them, sometimes anything at all."""
+    """Return random settings: mostly plain scans, sometimes arbitrary values."""
     if generator.random() < 0.25:
         con1, con2 = generator.randrange(0x10000) & 0x03E6, generator.randrange(0x10000) & 0xE43F
     else:
@@ -46,8 +46,8 @@ def random_settings(generator: random.Random) -> dict[str, int]:
 def test_engines_agree_in_any_setting(program, seed):
     """Engines agree (engines.md §4.3) for any converter setting.
 
-    Cases: odd half Tcy, scan sequences that do not divide the results per interrupt, settling emitters, levels that change
-    between runs, ADCON1 read during conversions, Idle.
+    Cases: odd half Tcy, scan sequences that do not divide the results per interrupt, settling emitters, levels that
+    change between runs, ADCON1 read during conversions, Idle.
     """
     generator = random.Random(seed)
     image, settings = load_image(program("convert.c")), random_settings(generator)
@@ -78,7 +78,7 @@ def test_a_scan_at_the_vendors_rate_needs_no_python(program):
 
 @pytest.mark.parametrize("engine", ["plain", "jit"])
 def test_one_late_interrupt_does_not_shift_the_channels_for_good(program, engine):
-    """dspic30f6014a.md §13: the scan starts again behind every interrupt. Interrupt 5 comes when a round of five has
+    """dspic30f6014a.md §13: the scan restarts after every interrupt. Interrupt 5 comes when a round of five has
     three results; the round after the next has its own channels again."""
     image = load_image(program("late.c"))
     machine = Machine(image.chip, engine=engine)

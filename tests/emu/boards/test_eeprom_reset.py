@@ -41,7 +41,7 @@ def test_an_undisturbed_write_takes_two_times_two_milliseconds(machine):
 
 @pytest.mark.parametrize(("pin", "left"), [("RA6", 0xFFFF), ("RA7", 0xFFFF)])
 @pytest.mark.parametrize("cause", ["EXTR", "WDTO"])
-def test_a_reset_in_the_middle_is_told_by_wrerr_and_hangs_nothing(machine, pin, left, cause):
+def test_a_reset_during_a_write_sets_wrerr_and_the_next_write_works(machine, pin, left, cause):
     """§16: WRERR = 1 if an operation is cut by reset. A word cut while erased or programmed reads as erased; the
     program starts over and the next write works."""
     machine.program.put(LAST_WORD, 7)

@@ -1,4 +1,4 @@
-"""The robot as arrays, for worlds that step."""
+"""The robot's inputs and outputs as arrays, for simulated worlds."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import pytest
 from .test_parts import convert, drive
 
 
-def test_outputs_tell_steps_lights_and_emitters(robot):
+def test_outputs_contain_steps_lights_and_emitters(robot):
     """epuck.md §2, §3."""
     outputs = robot.board.outputs
     steps = outputs.steps
@@ -56,8 +56,8 @@ def test_inputs_reach_the_pins_when_applied(robot):
     assert 3800 - convert(robot, 9) == pytest.approx(857 / 2, abs=1)
 
 
-def test_samples_taken_before_a_change_keep_the_old_world(robot):
-    """What the ADC sampled up to now is done before the world moves."""
+def test_samples_before_a_change_use_the_old_inputs(robot):
+    """Conversions that sampled before `apply` are complete before the inputs change."""
     robot.write("ADPCFG", 0)
     robot.write("ADCHS", 13)
     robot.write("ADCON3", 0x0102)

@@ -1,4 +1,4 @@
-"""Compiled code that paints lines instead of Python (`line.c`): the same record, line by line, in every setting."""
+"""Native rendering of camera lines (`line.c`): the same record as Python's, line by line, in every setting."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ DARK = [(0, 0xD4, 0x2C)]
 
 
 def rendered(robot: Robot, camera: Camera, cycle: int, pixels: np.ndarray) -> tuple[bool, bool]:
-    """Whether Python and compiled code put a line into the record in a cycle; if both do, it is the same record."""
+    """Return whether Python and native code render a line in a cycle; if both do, the records must be equal."""
     record, href = robot.machine.record, c_int64()
     before = record.snapshot()
     by_python = camera._refresh(cycle)
@@ -42,8 +42,8 @@ def rendered(robot: Robot, camera: Camera, cycle: int, pixels: np.ndarray) -> tu
     ("PO3030K", po3030()), ("PO3030K", po3030(scale=1, form="grey") + DARK), ("PO3030K", po3030(form="yuv") + DARK),
 ])  # fmt: skip
 @pytest.mark.parametrize("lamp", [1.0, 0.37])
-def test_a_line_is_painted_alike_whoever_is_asked(sensor: str, writes: list[tuple[int, int, int]], lamp: float) -> None:
-    """Only a camera whose automatic exposure is not what it was made with leaves all lines to Python."""
+def test_native_and_python_lines_are_equal(sensor: str, writes: list[tuple[int, int, int]], lamp: float) -> None:
+    """Python must render all lines only while automatic exposure differs from its initial value."""
     robot, pixels, draw = Robot(camera=sensor), scene(), random.Random(repr((sensor, writes)))
     robot.configure(writes)
     camera = robot.board.camera
@@ -65,8 +65,8 @@ def test_a_line_is_painted_alike_whoever_is_asked(sensor: str, writes: list[tupl
 
 
 @pytest.mark.parametrize("sensor", ["PO6030K", "PO3030K"])
-def test_a_still_picture_is_seen_as_any_other(sensor: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Settings, light and the connector change on the way; compiled code paints what it has been told."""
+def test_a_still_picture_is_rendered_like_a_callback(sensor: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Settings, lamp and connector change during the test; native code uses the published settings."""
     pixels, draw = scene(), random.Random(sensor)
     still, other = Robot(camera=sensor), Robot(camera=sensor)
     still.board.camera.show(pixels)
@@ -98,8 +98,8 @@ def test_a_still_picture_is_seen_as_any_other(sensor: str, monkeypatch: pytest.M
     assert at_once > 100
 
 
-def test_python_is_asked_first_in_every_new_setting() -> None:
-    """Registers, sources and snapshots change what lines are made of."""
+def test_python_renders_first_after_every_change() -> None:
+    """Changes of registers, sources and snapshots invalidate the published settings."""
     robot, pixels = Robot(), scene()
     robot.configure(po6030())
     camera, href = robot.board.camera, c_int64()

@@ -47,7 +47,7 @@ CHECKSUM = f"""
 
 
 class Number:
-    """What the assembly parser wants to know of an operand; "." is the instruction itself."""
+    """Operand value for the assembly parser; "." is the address of the instruction."""
 
     def __init__(self, text: str, here: int) -> None:
         self.value: int | None = here + int(text[1:]) if text[0] == "." else int(text, 0)
@@ -69,7 +69,7 @@ def packet(kind: str, address: int, data: bytes = b"") -> bytes:
 
 
 class Host:
-    """The computer at the other end of UART `port`."""
+    """Host computer connected to UART `port`."""
 
     def __init__(self, machine: Machine, port: int) -> None:
         self.machine, self.port = machine, port
@@ -77,7 +77,7 @@ class Host:
         machine.uart[port].on_byte = lambda byte, _cycle: self.heard.append(byte)
 
     def ask(self, data: bytes) -> str:
-        """Send a packet; the loader's answer."""
+        """Send a packet and return the loader's answer."""
         self.heard.clear()
         self.machine.uart[self.port].feed(data)
         limit = self.machine.cycle + PATIENCE

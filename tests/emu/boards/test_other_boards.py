@@ -1,4 +1,4 @@
-"""What a board brings from outside the CPU package: crystal, configuration words, parts on the pins."""
+"""Board-specific settings: crystal, configuration words, parts on the pins."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ WATCHDOG_ON = 0xFFFF
 
 
 class Bench(BoardPart):
-    """A slow crystal, the watchdog on, a lamp on RD0."""
+    """A board with a slow crystal, an enabled watchdog and a lamp on RD0."""
 
     def __init__(self, chip: Peripherals) -> None:
         super().__init__("bench", chip)
@@ -58,8 +58,8 @@ def test_bare_pins_have_the_watchdog_off_and_nothing_of_a_robot() -> None:
     assert {machine.program.setting(name) for name in machine.chip.config} == {0x7FFF, 0xFFFF}
 
 
-def test_an_epuck_refuses_a_chip_it_does_not_carry() -> None:
-    """Its parts are soldered to pins the other does not have."""
+def test_an_epuck_refuses_another_chip() -> None:
+    """Its parts use pins that the other chip lacks."""
     with pytest.raises(ValueError, match="an e-puck has a dsPIC30F6014A, not a dsPIC30F4013"):
         Machine(chip_named("30F4013"), engine="plain", board=Epuck)
 

@@ -1,4 +1,4 @@
-"""The parts of the e-puck but for its camera (epuck.md; sections cited)."""
+"""The parts of the e-puck except the camera (epuck.md; sections cited)."""
 
 from __future__ import annotations
 
@@ -70,8 +70,8 @@ def test_right_motor_goes_forward_with_rising_and_left_with_falling_phases(robot
 
 
 @pytest.mark.parametrize("blinks", [False, True])
-def test_steps_by_the_ends_of_quanta_are_those_of_who_looks_at_each(blinks):
-    """Native code leaves changes in the ring, of the LEDs' port too; nobody else misses one of them."""
+def test_step_history_equals_reads_at_each_quantum(blinks):
+    """The ring also holds changes of the LEDs' port; their watchers receive all of them."""
     quick, plain = Robot(), Robot()
     draw = random.Random(7)
     index, cycle, lit, entries, ends = 0, 100, [], [], list(range(1_000, 41_000, 1_000))
@@ -120,7 +120,7 @@ def test_jump_by_two_phases_loses_the_step(robot):
     assert (robot.board.motors.right.steps, robot.board.motors.right.lost) == (1, 1)
 
 
-def test_standing_pattern_that_is_no_phase_is_counted_as_illegal(robot):
+def test_a_constant_pattern_that_is_not_a_phase_counts_as_illegal(robot):
     """§3: all four patterns have two coils on."""
     robot.write("TRISD", 0xFF00)
     robot.write("LATD", 0x0F)
@@ -128,8 +128,8 @@ def test_standing_pattern_that_is_no_phase_is_counted_as_illegal(robot):
     assert robot.at(16).board.motors.left.illegal == 1
 
 
-def test_who_looks_at_the_motors_leaves_no_trace(robot):
-    """A pattern counts late, when somebody looks: a copy of the whole state is the same whether somebody has."""
+def test_reading_the_motors_does_not_change_the_record(robot):
+    """Steps are evaluated lazily; snapshots are equal with and without earlier reads."""
     other = Robot()
     for one in (robot, other):
         one.write("TRISD", 0xFF00)
@@ -287,7 +287,7 @@ def test_codec_takes_words_only_out_of_reset(robot):
     assert robot.read("RXBUF0") == 0
 
 
-def test_codec_control_words_follow_samples_that_ask_for_them(robot):
+def test_codec_control_words_follow_samples_with_bit_0_set(robot):
     """§6: LSB = 1 of the primary word requests a secondary frame; DAC volume 0x5F into register 7."""
     heard = []
     robot.board.codec.on_sample = lambda sample, _cycle: heard.append(sample)
@@ -301,7 +301,7 @@ def test_codec_control_words_follow_samples_that_ask_for_them(robot):
     assert robot.board.codec.registers[7] == 0
 
 
-def test_noise_is_off_repeatable_and_as_strong_as_asked(robot):
+def test_noise_is_off_by_default_repeatable_and_scaled(robot):
     """§5: sigma = max(5, 3 %); §6: microphones +-20."""
     ir, microphones = robot.board.ir, robot.board.microphones
     assert {ir._level(0, cycle) >> 4 for cycle in range(100)} == {3800}
@@ -335,7 +335,7 @@ def test_bluetooth_passes_bytes_both_ways(robot):
     assert [robot.read("U1RXREG") for _ in range(2)] == [0x68, 0x69]
 
 
-def test_bluetooth_drop_outs_swallow_bytes(robot):
+def test_bluetooth_dropouts_lose_bytes(robot):
     """Nothing passes in the given windows."""
     heard = []
     robot.board.bluetooth.on_byte = lambda byte, start: heard.append(byte)

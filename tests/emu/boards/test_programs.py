@@ -1,4 +1,4 @@
-"""Real programs on the whole robot: drivers as the reference describes them, compiled and run (programs/)."""
+"""Compiled driver programs (programs/) on the complete robot."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def start(path: Path, engine: str = "auto", **options) -> Machine:
 
 
 def picture() -> np.ndarray:
-    """A picture in which no two pixels of the captured grid are alike."""
+    """A picture in which all pixels of the captured grid differ."""
     y, x = np.mgrid[0:480, 0:640]
     return np.stack([(x - 240) * 3 // 2, (y - 160) * 3 // 2, (x * 7 + y * 13)], axis=2).astype(np.uint8)
 
@@ -38,7 +38,7 @@ def captured(machine: Machine) -> np.ndarray:
 
 
 def shown() -> np.ndarray:
-    """What 160 x 160 centred with zoom 8 leaves of the picture in RGB565."""
+    """Return the expected capture: 160 x 160 centred, zoom 8, in RGB565."""
     return picture()[160:320:8, 240:400:8] & np.array([0xF8, 0xFC, 0xF8], np.uint8)
 
 
@@ -128,7 +128,7 @@ def test_snapshot_in_the_middle_of_a_line_continues_alike(program):
     assert np.array_equal(captured(other), shown())
 
 
-def test_unplugged_camera_reads_as_nothing_and_hangs_nothing(program):
+def test_unplugged_camera_does_not_hang_the_program(program):
     """epuck.md §7.1: an absent device reads 0xFF; no frame ever comes."""
     machine = start(program("startup.c"), camera=None)
     assert machine.run(cycles=20_000_000).reason == "halt"
@@ -182,7 +182,7 @@ def test_polled_proximity_driver_measures_the_reference_curve(program):
 
 
 def test_start_up_program_finds_the_robot_the_reference_describes(program):
-    """epuck.md §2, §6, §7.1; chip reference §4: POR is cleared and RESET executed once, SWR tells; nobody at 0x3C."""
+    """epuck.md §2, §6, §7.1; chip reference §4: POR is cleared, RESET executed once, SWR set; no device at 0x3C."""
     machine = start(program("startup.c"), selector=13)
     machine.program.put(0x7FFFFE, 0xFFF7)
     said = bytearray()
@@ -203,7 +203,7 @@ def test_start_up_program_finds_the_robot_the_reference_describes(program):
 
 
 @pytest.mark.parametrize(("sensor", "identity"), [("PO3030K", 0x3030), ("PO8030D", 0x8030)])
-def test_other_cameras_are_told_by_their_identity(program, sensor, identity):
+def test_cameras_are_identified_by_their_registers(program, sensor, identity):
     """epuck.md §7.1."""
     machine = start(program("startup.c"), camera=sensor)
     assert machine.run(cycles=20_000_000).reason == "halt"
@@ -247,7 +247,7 @@ def test_framing_errors_and_overruns_reach_the_program(program):
 
 
 def test_stuck_data_line_ends_the_probe_with_collisions_not_in_a_hang(program):
-    """Chip reference §11: a start with SDA low is a collision; the polled driver gives up and goes on."""
+    """Chip reference §11: a start with SDA low is a collision; the polled driver gives up and continues."""
     machine = start(program("startup.c"))
     machine.board.stimulus.play(parse(machine.board, "2000 i2c sda 0"))
     assert machine.run(cycles=40_000_000).reason == "halt"

@@ -1,4 +1,4 @@
-"""The closed forms of the camera's signals against a sensor that ticks, and registers full of nonsense."""
+"""Closed forms of the camera's signals against a cycle-by-cycle model, and arbitrary register values."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def ticking(course, cycles):
 
 @settings(max_examples=150, deadline=None)
 @given(courses(), st.integers(0, 100))
-def test_closed_forms_equal_a_sensor_that_ticks(course, start):
+def test_closed_forms_equal_a_cycle_by_cycle_model(course, start):
     """epuck.md §7.4: levels, edge counts, next edges and bytes, in every cycle of three frames."""
     scan = Scan(Record(0))
     scan.begin(course, start, running=True)

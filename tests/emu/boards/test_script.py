@@ -1,4 +1,4 @@
-"""Stimulus files and the watch."""
+"""Stimulus files and the observer."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ def test_mistakes_are_reported_with_file_and_line(robot, line, message):
 
 
 def test_script_position_is_part_of_a_snapshot(robot):
-    """After a restore the same steps come again."""
+    """After a restore the same steps are repeated."""
     robot.board.stimulus.play(parse(robot.board, "1000 selector 1\n3000 selector 2"))
     robot.at(2000)
     state = robot.machine.snapshot()
@@ -95,7 +95,7 @@ def test_script_position_is_part_of_a_snapshot(robot):
     assert robot.board.selector.position == 2
 
 
-def test_watch_tells_what_a_person_would_see(robot):
+def test_observer_reports_visible_outputs(robot):
     """LEDs, motors and text lines, each with its time."""
     lines = []
     RobotObserver(robot.board, ["leds", "motors", "uart1"], lines.append)
@@ -127,8 +127,8 @@ def test_unknown_topics_are_refused(robot):
         RobotObserver(robot.board, ["smell"], print)
 
 
-def test_a_script_may_press_more_often_than_frames_fit(robot):
-    """64 frames wait, the rest is lost, nothing fails."""
+def test_key_presses_beyond_the_queue_are_dropped(robot):
+    """64 frames are queued, further ones are lost without an error."""
     robot.board.stimulus.play(parse(robot.board, "1000 remote ok\n" * 100))
     robot.at(2000)
     assert robot.read("PORTF") & 0x40

@@ -65,7 +65,7 @@ def test_codec_gets_its_settings_and_the_samples(start):
 
 
 def test_serial_protocol_by_interrupt_answers_text_and_binary(start):
-    """epuck.md §6: several binary commands in a row, ended by 0; banner; RESET told by RCON."""
+    """epuck.md §6: several binary commands in a row, ended by 0; banner; RCON shows the RESET."""
     machine = start("sercom.c", selector=9)
     heard = bytearray()
     machine.uart[1].on_byte = lambda byte, _cycle: heard.append(byte)

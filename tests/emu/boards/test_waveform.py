@@ -1,4 +1,4 @@
-"""Waveforms as stimulus: our own VCD read back gives the same edges, CSV does what its cells say."""
+"""Waveforms as stimulus: a VCD file of `emu run` gives the same edges; CSV cells set pins and send bytes."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def edges(path, pin: str):
 
 
 def test_our_own_waveform_read_back_gives_the_same_edges(tmp_path, capsys):
-    """One robot's pins into another whose own are inputs: every edge to the picosecond."""
+    """One robot's pins drive another's inputs: every edge is equal to the picosecond."""
     first, second = tmp_path / "first.vcd", tmp_path / "second.vcd"
     idle = compiled(tmp_path, "idle", "#include <p30F6014A.h>\nint main(void) { ADPCFG = 0xFFFF; for (;;) {} }")
     pulses = compiled(tmp_path, "pulses", PULSES)
@@ -81,16 +81,21 @@ def test_csv_sets_pins_and_says_bytes(tmp_path, capsys):
         ("a.csv", "time,RB8\n0.1,1,1\n", 2, "expected 2 cells, found 3"),
         ("a.csv", "time,uart1\n0.1,256\n", 2, "uart1: expected a byte"),
         ("a.vcd", "hello\n", 1, "expected a VCD file"),
-        ("a.vcd", "$timescale 1 ns $end\n$var wire 1 ! clk $end\n$enddefinitions $end\n#0\n1!\n", 1, "named after pins"),
+        (
+            "a.vcd",
+            "$timescale 1 ns $end\n$var wire 1 ! clk $end\n$enddefinitions $end\n#0\n1!\n",
+            1,
+            "named after pins",
+        ),
     ],
 )
-def test_mistakes_are_told_with_their_line(tmp_path, name, text, line, expected):
+def test_errors_are_reported_with_their_line(tmp_path, name, text, line, expected):
     path = tmp_path / name
     path.write_text(text)
-    with pytest.raises(StimulusError) as told:
+    with pytest.raises(StimulusError) as raised:
         load_waveform(BOARD, path)
-    assert str(told.value).startswith(f"{path}:{line}: ")
-    assert expected in str(told.value)
+    assert str(raised.value).startswith(f"{path}:{line}: ")
+    assert expected in str(raised.value)
 
 
 class Chip:

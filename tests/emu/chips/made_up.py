@@ -1,4 +1,4 @@
-"""A chip nobody makes: what engines and devices must take from `Chip` alone is different here.
+"""A fictitious chip: it differs in everything that engines and devices must take from `Chip`.
 
 Its SFRs end later, RAM is neither as large nor a power of two, Y RAM is smaller than X RAM, flash ends earlier, half of
 the devices are missing, and every interrupt has another number, another flag and another priority field.

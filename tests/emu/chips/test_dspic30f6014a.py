@@ -1,4 +1,4 @@
-"""The chip's tables against each other."""
+"""Consistency of the chip's tables."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Engines take the chip from `Chip`: memory edges, vectors, interrupt numbers. Shown on a chip nobody makes."""
+"""Engines take memory limits, vectors and interrupt numbers from `Chip`, shown with a fictitious chip."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ NO_WATCHDOG = 0x7FFF
 
 
 def machine_with(engine: str, text: str, **registers: int) -> Machine:
-    """A made-up chip at the first instruction of `text`, whose code the engine makes before it runs it."""
+    """Return a machine with the fictitious chip at the first instruction of `text`."""
     machine = Machine(MADE_UP, engine=engine)
     if isinstance(machine.runner, JitEngine):
         machine.runner.threshold, machine.runner.wait, machine.runner.compiler = 1, True, QuickCompiler(0)
@@ -103,7 +103,7 @@ def test_reset_puts_the_stack_at_the_start_of_ram_and_fetches_end_with_flash(eng
     assert machine.peek("INTTREG") & 0x3F == 2
 
 
-def test_a_chip_whose_memory_does_not_fit_together_is_refused() -> None:
+def test_an_inconsistent_memory_map_is_refused() -> None:
     """Y RAM is the upper part of RAM, RAM follows the SFRs: engines rely on it."""
     with pytest.raises(ValueError, match="do not follow each other"):
         replace(DSPIC30F6014A, data=dict(DSPIC30F6014A.data) | {"yram": Region("yram", 0x1A00, 0x2800)})

@@ -1,4 +1,4 @@
-"""Every chip there are tables of: they fit together, and a machine can be made of them."""
+"""Every supported chip: its tables are consistent, and a machine can be constructed."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ CHIPS = [chip_named(name) for name in NAMES]
 
 
 def pins_of(chip: Chip) -> set[str]:
-    """Every pin the tables name."""
+    """Return every pin in the tables."""
     sites = (*chip.uarts, *chip.spis, *chip.captures, *chip.compares, *chip.cans, chip.i2c, chip.dci)
     named = {getattr(site, field) for site in sites if site is not None
              for field in site.__dataclass_fields__ if field.endswith("pin")}  # fmt: skip
@@ -23,7 +23,7 @@ def pins_of(chip: Chip) -> set[str]:
 
 @pytest.mark.parametrize("chip", CHIPS, ids=NAMES)
 def test_registers_do_not_overlap_and_fields_lie_in_their_masks(chip: Chip) -> None:
-    """A word has one owner; byte rows name halves of words; what a field names is implemented."""
+    """A word belongs to one register; byte rows name halves of words; fields lie in implemented bits."""
     words = [sfr.address for sfr in chip.sfrs.values() if sfr.size == 2]
     assert len(set(words)) == len(words)
     for sfr in chip.sfrs.values():

@@ -8,7 +8,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "loader"))
 
-from elf_samples import ElfSample, Name, Part, words
+from elf_samples import ElfSample, Name, SampleSection, words
 
 from emu.chips.dspic30f6014a import SFRS
 from emu.dspic30f.isa.text import parse
@@ -50,11 +50,11 @@ def executable(source: str, vectors: dict[str, str] | None = None) -> bytes:
     table = [handlers.get(vector.name, default) for vector in VECTORS]
     return ElfSample(
         parts=[
-            Part(".reset", 0, words(0x040000 | START, 0)),
-            Part(".ivt", VECTORS[0].ivt, words(*table)),
-            Part(".text", START, words(*code)),
-            Part(".isr", default, words(DEBUG_WORD, 0xFE0000)),
-            Part(".nbss", 0x800, b"", 0x01000003, 8, size=8),
+            SampleSection(".reset", 0, words(0x040000 | START, 0)),
+            SampleSection(".ivt", VECTORS[0].ivt, words(*table)),
+            SampleSection(".text", START, words(*code)),
+            SampleSection(".isr", default, words(DEBUG_WORD, 0xFE0000)),
+            SampleSection(".nbss", 0x800, b"", 0x01000003, 8, size=8),
         ],
         names=[
             *(Name("_" + label, address, 2) for label, address in labels.items()),

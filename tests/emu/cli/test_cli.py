@@ -51,7 +51,7 @@ def test_a_trace_to_standard_output(spin, tmp_path):
 
 
 @pytest.mark.parametrize("other", [["--uart1", "-"], ["--uart2", "-"], ["--json"], ["--record", "-"]])
-def test_standard_output_is_for_one(spin, other):
+def test_only_one_output_can_use_standard_output(spin, other):
     done = emu("run", spin, "--cycles", "4", "--trace", "-", *other)
     assert done.returncode == 2
     assert "standard output" in done.stderr
@@ -74,8 +74,8 @@ def test_completion_knows_commands_options_and_choices():
     assert completed("run", "--board", "") == ["epuck", "none"]
 
 
-def test_nothing_is_coloured_even_on_a_terminal(spin):
-    """So NO_COLOR is honoured; the compiler's messages are the only coloured ones and ask it."""
+def test_output_is_never_coloured(spin):
+    """NO_COLOR therefore holds; only the compiler's messages are coloured, and they check it."""
     import pty
 
     leader, follower = pty.openpty()

@@ -1,4 +1,4 @@
-"""Coverage is what a full trace says, and other people's tools read it."""
+"""Coverage equals a full trace, and third-party tools read the reports."""
 
 from __future__ import annotations
 

@@ -32,7 +32,7 @@ def test_the_code_of_a_place_shows_guest_addresses(spin: str, place: str, capsys
 
 
 def test_a_function_is_all_of_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """It was begun once, before there was native code, and is in its loop since."""
+    """The function is entered once, before native code exists, and stays in its loop."""
     path = tmp_path / "loop.elf"
     path.write_bytes(executable("""
 work:
@@ -47,8 +47,8 @@ work:
     assert re.search(r"# %b102\b", host)
 
 
-def test_what_is_nowhere_is_said_before_the_run(spin: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Which has no end here."""
+def test_an_unknown_symbol_is_refused_before_the_run(spin: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The run itself would not end."""
     monkeypatch.setattr("emu.run.session.Session.run", lambda _session: pytest.fail("it ran"))
     assert main(["run", spin, "--dump-native", "_nobody"]) == 2
 
@@ -61,7 +61,7 @@ def test_what_is_nowhere_is_said_before_the_run(spin: str, monkeypatch: pytest.M
         (["--dump-native", "_spin", "--engine", "plain"], "plain compiles no native code"),
     ],
 )
-def test_what_cannot_be_shown_is_said(
+def test_code_that_cannot_be_shown_is_reported(
     spin: str, arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """One line, status 2."""

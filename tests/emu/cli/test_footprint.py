@@ -62,7 +62,7 @@ def test_source_files_come_from_the_line_table(image):
     assert set(table) == {"src/main.c", UNKNOWN}
 
 
-def test_start_up_vectors_and_printf_are_told_apart(image):
+def test_start_up_vectors_and_printf_are_distinguished(image):
     table = totals(pieces(image), "group")
     assert table["vectors"] == (186, 0)
     assert table["start-up"] == (6 + 6, 0)

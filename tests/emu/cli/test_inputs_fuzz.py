@@ -1,4 +1,4 @@
-"""A sample of the fuzz campaign `tests/fuzz/emulator/fuzz_inputs.py`, with the inputs that made it fail before."""
+"""A sample of the fuzz campaign `tests/fuzz/emulator/fuzz_inputs.py`, with inputs that once made it fail."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def test_a_request_out_of_order_or_shape_is_answered(asked: tuple[str, object]) 
 
 
 def test_a_message_nested_too_deeply_ends_the_session() -> None:
-    """json gives up with RecursionError; the thread that reads must say that there is nothing more."""
+    """json raises RecursionError; the reading thread must report the end of input."""
     assert converse(b'{"arguments": ' + b"[" * 100_000) == "answered"
 
 
@@ -54,7 +54,7 @@ def test_a_message_nested_too_deeply_ends_the_session() -> None:
     ("command", "key"), [("disassemble", "instructionCount"), ("readMemory", "count")]
 )  # fmt: skip
 def test_a_request_for_more_than_there_is_is_refused(command: str, key: str) -> None:
-    """10^20 rows ate all memory."""
+    """A request for 10^20 rows must not exhaust the memory."""
     many = {"memoryReference": "0", key: 10**20}
     asked = requests(("launch", {"program": str(HELLO), "board": "none", "stopOnEntry": True}), (command, many))
     code = (

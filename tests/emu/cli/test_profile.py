@@ -1,4 +1,4 @@
-"""`emu profile`: every cycle is counted once, and the files say the same as the machine stepped by hand."""
+"""`emu profile`: every cycle is counted once, and the files agree with a single-stepped machine."""
 
 from __future__ import annotations
 
@@ -110,15 +110,15 @@ def nested(tmp_path_factory):
 
 
 def stepped(image, until: int):
-    """Cycles by function and by level, asleep, and calls by function, of a run that is looked at step by step."""
+    """Return cycles by function and level, cycles in sleep, and calls by function, from single steps."""
     machine = Machine(image.chip, engine="plain")
     machine.load(image)
     functions, levels, idle, calls = Counter(), Counter(), 0, Counter()
     while machine.cycle < until:
-        cycle, pc, asleep = machine.cycle, machine.pc, machine.is_asleep
+        cycle, pc, was_asleep = machine.cycle, machine.pc, machine.is_asleep
         machine.service_boundary(until)
         entry = machine.cycle - cycle
-        if asleep:
+        if was_asleep:
             entry = min(entry, 3) if machine.pc != pc else 0  # from the first cycle awake to the handler
             idle += machine.cycle - cycle - entry
         before, pc, level = machine.cycle, machine.pc, machine.state.ipl
@@ -142,7 +142,7 @@ def counted(image, engine: str, until: int, timed: bool = False):
     return Profiler(machine, image, timed).run(until)
 
 
-def test_native_code_counts_as_the_machine_stepped_by_hand(nested):
+def test_native_counts_equal_single_stepping(nested):
     """Functions, levels, sleep and calls of 200,000 cycles with two nested interrupts, to the cycle. Where both are
     entered at one boundary a look from outside cannot tell whose cycles are whose, so theirs are compared as a sum."""
     functions, levels, idle, calls = stepped(nested, 200_000)
@@ -185,7 +185,7 @@ def test_inclusive_cycles_leave_out_interrupts_and_count_recursion_once(nested):
 
 
 class Callgrind:
-    """Reads a file in Callgrind's format (version 1) and refuses what the specification does not have."""
+    """Reader of Callgrind's format (version 1) that rejects anything outside the specification."""
 
     COST = re.compile(r"(0x[0-9a-f]+) (\d+) (\d+)")
 

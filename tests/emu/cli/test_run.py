@@ -59,7 +59,7 @@ def test_json_is_one_object_with_the_uart_text(build, capfd):
     assert (facts["pc"], facts["symbol"], facts["cycles"], facts["status"]) == (0x11E, "_forever", 5253, 0)
 
 
-def test_exit_code_hands_over_the_status_start_up_code_left(build):
+def test_exit_code_is_the_status_stored_by_start_up_code(build):
     assert emu("run", build(HELLO), "--exit-code").returncode == 5
 
 
@@ -117,7 +117,7 @@ def test_a_trap_with_a_handler_is_no_fault(build, capfd):
     assert "halt" in capfd.readouterr().err
 
 
-def test_a_firmware_that_sleeps_inside_a_trap_has_given_up(build, capfd):
+def test_a_firmware_that_sleeps_in_a_trap_handler_is_a_fault(build, capfd):
     path = build(
         "main:\nmov #0x801, w1\nmov [w1], w2\nnop\nhandler:\nbclr {INTCON1}, #3\npwrsav #1\nforever:\nbra @forever\n",
         {"AddressError": "handler"},
@@ -179,7 +179,7 @@ def test_a_trace_shows_exceptions_and_sleep(build, tmp_path, capfd):
     assert capfd.readouterr().out == "I"
 
 
-def test_a_trace_changes_nothing(build, tmp_path, capfd):
+def test_a_trace_does_not_affect_the_run(build, tmp_path, capfd):
     path = build(HELLO)
     main(["run", path, "--json"])
     plain = json.loads(capfd.readouterr().out)
@@ -197,7 +197,7 @@ def test_standard_input_reaches_uart1_and_its_end_ends_a_sleeping_firmware(build
 
 
 def test_an_open_input_keeps_a_sleeping_firmware_alive_until_it_is_closed(build):
-    """engines.md §10: sleeping with an input still open is not the end; end of file makes it one."""
+    """engines.md §10: a sleeping firmware with open input continues; end of file ends the run."""
     process = subprocess.Popen(
         [sys.executable, "-m", "emu", "run", build(ECHO, {"U1RXInterrupt": "receive"})],
         stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, cwd=ROOT,
@@ -259,7 +259,7 @@ def test_ctrl_c_ends_a_run_cleanly(build, tmp_path):
     assert "inc.w w0, w0" in trace.read_text()
 
 
-def test_a_reader_that_goes_away_is_no_error(build):
+def test_a_closed_output_pipe_is_not_an_error(build):
     reader, writer = os.pipe()
     os.close(reader)
     done = subprocess.run(
@@ -368,7 +368,7 @@ def test_bad_limits_are_usage_mistakes(build, capfd, arguments, expected):
     assert err.count("\n") == 1
 
 
-def test_nothing_is_left_of_a_trace_that_cannot_be_finished(build, tmp_path, capfd):
+def test_an_incomplete_trace_file_is_removed(build, tmp_path, capfd):
     target = tmp_path / "out"
     target.mkdir()
     assert main(["run", build(HELLO), "--uart1", str(target), "--trace", str(tmp_path / "trace")]) == 2

@@ -1,4 +1,4 @@
-"""Sessions: slices change nothing, stamps bring the same run back, the Python examples run."""
+"""Sessions: slices have no effect, timestamped input reproduces a run, the Python examples run."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ def machine_with(source, vectors=None, engine="plain"):
 
 @pytest.mark.parametrize("engine", ["plain", "jit"])
 @pytest.mark.parametrize("length", [1, 7, 1280, 1_000_000])
-def test_slices_change_nothing(monkeypatch, length, engine):
-    """The same input, stamped at the same cycles, ends in the same state however the run is cut."""
+def test_slices_do_not_affect_the_run(monkeypatch, length, engine):
+    """The same input at the same cycles gives the same final state for any slicing."""
     stamps = [TimestampedInput(100, 1, b"hello"), TimestampedInput(9_000, 1, b"x"), TimestampedInput(40_000, 1, b"yz")]
 
     def ended(slice_cycles, name):
@@ -48,7 +48,7 @@ def test_slices_change_nothing(monkeypatch, length, engine):
 
 
 def test_a_paced_run_takes_as_long_as_the_robot(monkeypatch):
-    """The host's clock is replaced: a run sleeps for what simulated time is ahead of it."""
+    """The host's clock is replaced: the run sleeps for the time by which simulated time is ahead."""
     now = [0.0]
     waited = []
 
@@ -106,8 +106,8 @@ def test_the_documented_example_runs(monkeypatch):
     assert result.failed == 0
 
 
-def test_names_load_lazily():
-    """engines.md §2: tools that need only the table or the chip's data pay for nothing else."""
+def test_modules_are_imported_lazily():
+    """engines.md §2: tools that need only the instruction table or chip data import nothing else."""
     code = (
         "import sys, emu.chips.dspic30f6014a, emu.image.elf_facts\n"
         "print({'emu.machine.machine', 'numpy'} & set(sys.modules))"

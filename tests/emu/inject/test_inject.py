@@ -1,4 +1,4 @@
-"""`emu inject`: every kind of fault does what it says, outcomes are told apart, and bytes do not depend on the jobs."""
+"""`emu inject`: effect of every kind of fault, classification of outcomes, output independent of --jobs."""
 
 from __future__ import annotations
 
@@ -76,15 +76,15 @@ def trials(firmware):
 
 
 def judged(trials, monkeypatch, place: str, bit: int, cycle: int = 60_000):
-    """What becomes of one bit of a variable."""
+    """Return the outcome of a flipped bit of a variable."""
     address = load_image(trials._image.path).symbols.find(f"_{place}").address
     fault = Fault(0, "ram", cycle, address, bit)
     monkeypatch.setattr("emu.inject.trial.choose_fault", lambda *_: fault)
     return trials.run(0)
 
 
-def test_outcomes_are_told_apart(trials, monkeypatch):
-    """By the meaning of the program's variables: a total with its copy, a mode that hangs or traps, RAM nobody uses."""
+def test_outcomes_are_classified(trials, monkeypatch):
+    """Faults in variables with known effect: a total with its copy, a mode that hangs or traps, unused RAM."""
     one = partial(judged, trials, monkeypatch)
     assert (one("unused", 0).outcome, one("unused", 0).latent) == ("masked", True)
     assert one("total", 1).outcome == "detected"
@@ -103,7 +103,7 @@ def test_outcomes_are_told_apart(trials, monkeypatch):
     assert (one("mode", 0).outcome, one("mode", 0).latent) == ("masked", False)
 
 
-def test_every_fault_does_what_it_says(firmware):
+def test_every_fault_has_its_documented_effect(firmware):
     image = load_image(firmware / "main.elf")
     machine = Machine(image.chip)
     machine.load(image)
@@ -133,8 +133,8 @@ def test_every_fault_does_what_it_says(firmware):
     assert (machine.pc, machine.resets[-1][1]) == (0, "BOR")
 
 
-def test_the_same_campaign_gives_the_same_bytes_whatever_the_jobs(firmware, capsys):
-    """Also when it goes on from half of its state file."""
+def test_output_does_not_depend_on_the_number_of_jobs(firmware, capsys):
+    """The same holds when the campaign continues from half of its state file."""
     written = []
     for name, jobs in (("one", 1), ("two", 2)):
         words = ["--campaign", firmware / "campaign.toml", "--jobs", jobs, "--out", firmware / f"{name}.csv"]
@@ -188,13 +188,13 @@ def test_intervals_are_wilson_s():
         ("flash = 2", "flash = ", 13, "Invalid value"),
     ],
 )
-def test_mistakes_are_told_with_their_line(tmp_path, old, new, line, expected):
+def test_errors_are_reported_with_their_line(tmp_path, old, new, line, expected):
     path = tmp_path / "campaign.toml"
     path.write_text(CAMPAIGN.replace(old, new))
-    with pytest.raises(CampaignError) as told:
+    with pytest.raises(CampaignError) as raised:
         read(path)
-    assert str(told.value).startswith(f"{path}:{line}: ")
-    assert expected in str(told.value)
+    assert str(raised.value).startswith(f"{path}:{line}: ")
+    assert expected in str(raised.value)
 
 
 def test_the_campaign_of_the_documents_is_one():

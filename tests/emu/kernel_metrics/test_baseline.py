@@ -1,4 +1,4 @@
-"""Exact numbers against a baseline: what fails a check, and what is said about it."""
+"""Comparison of exact numbers with a baseline: which changes fail a check, and the printed table."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def test_only_growth_and_loss_are_worse():
     }  # fmt: skip
 
 
-def test_the_places_that_grew_are_named_largest_first():
+def test_lines_that_grew_are_named_largest_first():
     old = {"send": Number(10, {"a.c: x;": 6, "a.c: y;": 4})}
     new = {"send": Number(15, {"a.c: x;": 7, "a.c: y;": 3, "a.c: new();": 5})}
     rows = compare(old, new)
@@ -40,7 +40,7 @@ def test_the_places_that_grew_are_named_largest_first():
     assert "+5 a.c: new();" in table(rows, "cycles")
 
 
-def test_places_are_named_by_the_text_of_their_line_so_that_lines_may_move(tmp_path):
+def test_lines_are_named_by_their_code(tmp_path):
     source = tmp_path / "firmware" / "openswarm" / "kernel" / "sample.c"
     source.parent.mkdir(parents=True)
     source.write_text("one\n    return   m;\n")

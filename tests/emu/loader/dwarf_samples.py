@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import struct
 
-from elf_samples import NOTE, Part, doubled
+from elf_samples import NOTE, SampleSection, doubled
 
 ROWS = ((0x104, 10), (0x106, 12), (0x10A, 0))
 """(address, line) of the sample's line program; the last one ends the sequence."""
@@ -24,13 +24,13 @@ def _line_program() -> bytes:
     return struct.pack("<I", len(body)) + body
 
 
-def debug_sections() -> list[Part]:
+def debug_sections() -> list[SampleSection]:
     """`.debug_info`, `.debug_abbrev` and `.debug_line`, ready to be added to a sample."""
     abbrev = bytes((1, 0x11, 0, 0x10, 6, 0x11, 1, 0x12, 1, 0, 0, 0))
     die = b"\x01" + struct.pack("<III", 0, ROWS[0][0], ROWS[-1][0])
     unit = struct.pack("<HIB", 2, 0, 4) + die
     info = struct.pack("<I", len(unit)) + unit
     return [
-        Part(name, 0, doubled(content), 0, NOTE)
+        SampleSection(name, 0, doubled(content), 0, NOTE)
         for name, content in ((".debug_info", info), (".debug_abbrev", abbrev), (".debug_line", _line_program()))
     ]

@@ -26,7 +26,7 @@ def doubled(data: bytes) -> bytes:
 
 
 @dataclass
-class Part:
+class SampleSection:
     """A section to write. `load_address` makes a program header of its own, as psv and EEPROM need."""
 
     name: str
@@ -54,7 +54,7 @@ class Name:
 class ElfSample:
     """An executable of `parts` and `names`; fields of the header can be overridden for negative tests."""
 
-    parts: list[Part] = field(default_factory=list)
+    parts: list[SampleSection] = field(default_factory=list)
     names: list[Name] = field(default_factory=list)
     machine: int = EM_DSPIC30F
     type: int = 2
@@ -108,15 +108,15 @@ def xc16_like() -> ElfSample:
     """One of everything a real XC16 executable holds (abi-elf.md §6.3): several sections share a name."""
     return ElfSample(
         parts=[
-            Part(".reset", 0x000000, words(0x040100, 0x000000)),
-            Part(".ivt", 0x000004, words(*[0x000108] * 62)),
-            Part(".text", 0x000100, words(0x200010, 0x200021, 0xDA4000, 0xFE0000, 0x060000)),
-            Part(".text", 0x000200, words(0x060000, 0x37FFFF)),
-            Part(".const", 0x8180, words(0x00BBAA, 0x00DDCC), PSV, load_address=0x10180),
-            Part(".ndata", 0x0800, doubled(b"\x12\x34"), DATA_COPY),
-            Part(".nbss", 0x0802, b"", BSS, NOBITS, size=8),
-            Part(".eedata", 0xF000, words(0x001234), EEDATA, load_address=0x7FF000),
-            Part("__FOSC.sec", 0xF80000, words(0x00C706)),
+            SampleSection(".reset", 0x000000, words(0x040100, 0x000000)),
+            SampleSection(".ivt", 0x000004, words(*[0x000108] * 62)),
+            SampleSection(".text", 0x000100, words(0x200010, 0x200021, 0xDA4000, 0xFE0000, 0x060000)),
+            SampleSection(".text", 0x000200, words(0x060000, 0x37FFFF)),
+            SampleSection(".const", 0x8180, words(0x00BBAA, 0x00DDCC), PSV, load_address=0x10180),
+            SampleSection(".ndata", 0x0800, doubled(b"\x12\x34"), DATA_COPY),
+            SampleSection(".nbss", 0x0802, b"", BSS, NOBITS, size=8),
+            SampleSection(".eedata", 0xF000, words(0x001234), EEDATA, load_address=0x7FF000),
+            SampleSection("__FOSC.sec", 0xF80000, words(0x00C706)),
         ],
         names=[
             Name("__reset", 0x100, 2),

@@ -44,7 +44,7 @@ def test_one_value_in_a_phantom_does_not_stop_the_un_doubling():
 
 
 def test_plain_lists_of_small_addresses_are_not_taken_for_doubled_ones():
-    """What says how all are stored is the sections with text in them."""
+    """Only the sections with text decide how all are stored."""
     sections = {".debug_info": b"\1main.c\0main\0", ".debug_ranges": bytes([2, 0, 4, 0, 0, 0, 0, 0])}
     assert remove_phantom_octets(sections) == sections
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import struct
 
 import pytest
-from elf_samples import CODE, DATA_COPY, PSV, ElfSample, Name, Part, words, xc16_like
+from elf_samples import CODE, DATA_COPY, PSV, ElfSample, Name, SampleSection, words, xc16_like
 
 from emu.image.loader import load_image, parse_image
 from emu.image.model import LoadError
@@ -45,7 +45,7 @@ def test_data_sections_marked_noload_define_no_program_words():
     assert [section.kind for section in image.sections if section.name == ".ndata"] == ["data"]
 
 
-def test_flash_is_erased_where_no_section_says_anything():
+def test_flash_is_erased_where_no_section_defines_it():
     """abi-elf.md §6.8 step 6."""
     flash = parsed(xc16_like()).flash()
     assert len(flash) == 0xC000
@@ -96,7 +96,7 @@ def test_an_unusual_processor_id_is_a_warning():
 
 
 def test_a_phantom_octet_that_is_not_zero_is_a_warning_and_ignored():
-    image = parsed(ElfSample([Part(".text", 0x100, struct.pack("<I", 0x12040506))]))
+    image = parsed(ElfSample([SampleSection(".text", 0x100, struct.pack("<I", 0x12040506))]))
     assert image.word(0x100) == 0x040506
     assert "0x000100" in image.warnings[0]
 
@@ -104,7 +104,7 @@ def test_a_phantom_octet_that_is_not_zero_is_a_warning_and_ignored():
 def test_ram_data_without_noload_is_a_warning_and_not_loaded():
     """abi-elf.md §6.8 step 2: it appears only in objects."""
     sample = xc16_like()
-    sample.parts.append(Part(".data", 0x900, words(1), DATA_COPY & ~0x0080_0000))
+    sample.parts.append(SampleSection(".data", 0x900, words(1), DATA_COPY & ~0x0080_0000))
     assert any("RAM" in warning for warning in parsed(sample).warnings)
 
 
@@ -126,7 +126,7 @@ def test_a_file_for_something_else_is_refused_by_name(change, expected):
 
 
 def test_every_truncation_is_refused_and_says_so():
-    """The section header table stands last, so any missing octet is noticed."""
+    """The section header table is last, so any missing octet is detected."""
     whole = xc16_like().build()
     for length in range(4, len(whole), 97):
         assert "truncated" in refusal(whole[:length])
@@ -134,22 +134,22 @@ def test_every_truncation_is_refused_and_says_so():
 
 def test_overlapping_sections_are_refused_with_both_names():
     sample = xc16_like()
-    sample.parts.append(Part(".late", 0x104, words(0)))
+    sample.parts.append(SampleSection(".late", 0x104, words(0)))
     text = refusal(sample.build())
     assert "'.text' and section '.late' overlap at 0x000104" in text
 
 
 @pytest.mark.parametrize("address", [0x17FFE, 0x18000, 0x7FEFFE, 0x900000])
 def test_words_outside_program_memory_are_refused(address):
-    assert "no program memory" in refusal(ElfSample([Part(".text", address, words(1, 2))]).build())
+    assert "no program memory" in refusal(ElfSample([SampleSection(".text", address, words(1, 2))]).build())
 
 
 def test_an_odd_program_address_is_refused():
-    assert "odd address 0x101" in refusal(ElfSample([Part(".text", 0x101, words(1))]).build())
+    assert "odd address 0x101" in refusal(ElfSample([SampleSection(".text", 0x101, words(1))]).build())
 
 
 def test_a_psv_section_without_program_header_is_refused():
-    sample = ElfSample([Part(".text", 0x100, words(1)), Part(".const", 0x8200, words(1), PSV)])
+    sample = ElfSample([SampleSection(".text", 0x100, words(1)), SampleSection(".const", 0x8200, words(1), PSV)])
     data = bytearray(sample.build())
     struct.pack_into("<H", data, 44, 1)
     assert "no program header gives its load address" in refusal(bytes(data))
@@ -162,11 +162,11 @@ def test_a_stripped_file_is_refused_with_the_reason():
 
 
 def test_a_file_without_code_is_refused():
-    assert "holds no program words" in refusal(ElfSample([Part(".bss", 0x800, b"", CODE, 8, size=4)]).build())
+    assert "holds no program words" in refusal(ElfSample([SampleSection(".bss", 0x800, b"", CODE, 8, size=4)]).build())
 
 
-def test_symbols_with_broken_names_are_left_out():
-    sample = ElfSample([Part(".text", 0x100, words(1))], [Name("_good", 0x100)])
+def test_symbols_with_broken_names_are_omitted():
+    sample = ElfSample([SampleSection(".text", 0x100, words(1))], [Name("_good", 0x100)])
     data = sample.build()
     broken = data.replace(
         struct.pack("<IIIBBH", 1, 0x100, 0, 0x10, 0, 1), struct.pack("<IIIBBH", 9999, 0x100, 0, 0x10, 0, 1)

@@ -1,4 +1,4 @@
-"""Counts which register was read or written how, where instructions really do it: on the plain engine."""
+"""Counts register accesses by kind, as executed by the plain engine."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ cycle in which an event is due."""
 
 
 class Census:
-    """Accesses of one plain machine's instructions to SFRs while `open`, by (address, is write, size, ways)."""
+    """Accesses of one plain machine's instructions to SFRs while `open`, by (address, is write, size, modes)."""
 
     def __init__(self, machine: Machine) -> None:
         self.counts: Final[Counter[tuple[int, bool, int, int]]] = Counter()
@@ -52,19 +52,19 @@ class Census:
     def _count(self, ea: int, is_write: bool, size: int) -> None:
         state, builder = self._state, self._sequencer.builder
         step = self._sequencer._steps.get(builder.pc)
-        ways = 1 if step is not None and "f" in step.insn.row.fields else 2
-        ways |= 4 * bool(state.sr & RA or state.repeat != NOT_REPEATING)
-        ways |= 8 * bool(state.sr & DA)
-        ways |= 16 * (builder.pc in self.handlers)
-        ways |= 32 * (self._due == self._events.now)
-        self.counts[ea & ~1, is_write, size, ways] += 1
+        modes = 1 if step is not None and "f" in step.insn.row.fields else 2
+        modes |= 4 * bool(state.sr & RA or state.repeat != NOT_REPEATING)
+        modes |= 8 * bool(state.sr & DA)
+        modes |= 16 * (builder.pc in self.handlers)
+        modes |= 32 * (self._due == self._events.now)
+        self.counts[ea & ~1, is_write, size, modes] += 1
 
 
-def ways_of(accesses: Counter[tuple[str, int, bool, int, int]]) -> Counter[tuple[str, int, bool, int, str]]:
-    """Counts by chip, address of the word, is write, size and each way by name: an access may go several ways."""
+def modes_of(accesses: Counter[tuple[str, int, bool, int, int]]) -> Counter[tuple[str, int, bool, int, str]]:
+    """Counts by chip, address of the word, is write, size and each way by name: an access may go several modes."""
     found: Counter[tuple[str, int, bool, int, str]] = Counter()
-    for (chip, ea, is_write, size, ways), count in accesses.items():
+    for (chip, ea, is_write, size, modes), count in accesses.items():
         for bit, name in enumerate(WAYS):
-            if ways >> bit & 1:
+            if modes >> bit & 1:
                 found[chip, ea, is_write, size, name] += count
     return found

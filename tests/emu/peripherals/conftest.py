@@ -1,4 +1,4 @@
-"""A rig to run devices without a CPU: register accesses at chosen cycles on a real bus and clock."""
+"""Test rig for devices without a CPU: register accesses at chosen cycles on a real bus and clock."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ XT_PLL8 = 0xFFE6
 
 
 class Rig:
-    """Time only moves by `at`; everything else happens in the current cycle."""
+    """Devices on a bus. Only `at` advances time; all other methods act in the current cycle."""
 
     def __init__(self, fosc: int = XT_PLL8, fwdt: int = 0x7FFF) -> None:
         self.record = Record(DSPIC30F6014A.data["ram"].end)
@@ -66,7 +66,7 @@ class Rig:
             self.write(word, 0)
 
     def first_cycle(self, condition: Callable[[], object], start: int, end: int) -> int:
-        """First cycle in start..end in which `condition()` holds."""
+        """Return the first cycle in start..end in which `condition()` holds."""
         for cycle in range(start, end + 1):
             self.at(cycle)
             if condition():

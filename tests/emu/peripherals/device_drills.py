@@ -38,11 +38,11 @@ ROW: Final = 64
 MODES: Final = ("CORCON", "MODCON", "XBREV", "SPLIM", "INTCON1", "SR", "DOSTARTL", "DOENDL")
 """Drawn less often: every value makes native code of its own."""
 CONTROL: Final = ("OSCCON", "RCON", "NVMCON", "PMD1", "PMD2", "PMD3")
-"""Drawn less often: they stop, reset or switch off everything else."""
+"""Registers drawn less often, because they stop, reset or disable all other devices."""
 _FLOWS: Final = ("BRA", "CALL", "GOTO", "RCALL", "DO", "REPEAT", "RETURN", "RETFIE", "RETLW", "RESET", "PWRSAV", "LNK",
                  "ULNK", "DISI", "CPSEQ", "CPSNE", "CPSGT", "CPSLT")  # fmt: skip
 MEMORY: Final = [row for row in table.ROWS if row.mnemonic not in _FLOWS and set("pqghofi") & set(row.fields)]
-"""Rows that can access data memory and go on with the next instruction or skip it."""
+"""Rows that can access data memory and continue with the next instruction or skip it."""
 BY_ADDRESS: Final = [row for row in MEMORY if "f" in row.fields]
 BY_POINTER: Final = [row for row in MEMORY if "f" not in row.fields and "i" not in row.fields]
 PREFETCHING: Final = [row for row in MEMORY if "i" in row.fields]
@@ -53,7 +53,7 @@ _REGISTERS_FIRST: Final = 0x20
 
 @cache
 def registers_of(chip: str) -> list[Any]:
-    """Every register of one of CHIPS, those of the CPU too, the W registers left out."""
+    """Return every register of a chip, CPU registers included, W registers excluded."""
     return [sfr for sfr in CHIPS[chip].sfrs.values() if sfr.size == 2 and sfr.address >= _REGISTERS_FIRST]
 
 
@@ -71,7 +71,7 @@ class Image:
     """Program addresses of the interrupt handlers."""
     end: int = 0
     row: int = 0
-    """A row of flash with code that drills program anew and call."""
+    """A row of flash with code that drills reprogram and call."""
     scenes: list[Scene] = field(default_factory=list)
     """Devices at work, one scene or several to a base state."""
     pool: list[Any] = field(default_factory=list)

@@ -45,7 +45,7 @@ REGIONS = 40
 """Compiled pieces after which a program is left: it goes through processor modes, each of which has code of its own."""
 BUFFER = 0x1000
 _CONTROL = ("OSCCON", "RCON", "NVMCON", "PMD1", "PMD2", "PMD3")
-"""Drawn less often: they stop, reset or switch off everything else."""
+"""Registers drawn less often, because they stop, reset or disable all other devices."""
 _FAMILIES = ({"TMR", "PR", "T"}, {"PORT", "LAT", "TRIS", "CNEN", "CNPU"}, {"IFS", "IEC", "IPC", "INTCON"},
              {"ADCON", "ADCBUF", "ADCHS", "ADCSSL", "ADPCFG"}, {"NVMCON", "NVMADR", "NVMADRU", "NVMKEY"},
              {"DCICON", "DCISTAT", "TSCON", "RSCON", "RXBUF", "TXBUF"})  # fmt: skip
@@ -54,7 +54,7 @@ HOT = 14
 """Registers a program is about."""
 CORE = ("DCOUNT", "DCOUNT", "DCOUNT", "RCOUNT", "RCOUNT", "SR", "SR", "CORCON", "DOSTARTL", "DOENDL", "DOENDH",
         "PSVPAG", "TBLPAG")  # fmt: skip
-"""Registers of the CPU that say how a program goes on; the more often the more there is to say about them."""
+"""CPU registers that control execution, repeated according to their weight."""
 _INPUTS = ("RD4", "RF6", "RC3", "RC14", "RA12", "RA13", "RD8", "RD9", "RF2", "RF3", "RG2", "RG3", "RC1", "RC2", "RF0",
            "RG13", "RF7", "RB5", "RB12")  # fmt: skip
 
@@ -142,7 +142,10 @@ class Writer:
         return [f"mov #{sfr.address + start:#x}, {p}", f"mov #{target:#x}, {q}", draw.choice(forms)]
 
     def core(self, place: str) -> str:
-        """One one-word instruction with a register of the CPU. Counts mostly fall: a program is to go on."""
+        """One one-word instruction with a register of the CPU.
+
+        Counts mostly decrease, so that the program continues.
+        """
         draw, name, w = self.draw, self.draw.choice(CORE), self.data()
         word = self.note(self.chip.sfrs[name], f"{place} core")
         forms = [f"mov {w}, {word}", f"mov {word}, {w}", f"clr {word}", f"lsr {word}", f"clr.b {word}",
@@ -216,7 +219,7 @@ class Writer:
         return [f"add {self.data()}, {self.data()}, {self.data()}"]
 
     def nap(self) -> list[str]:
-        """Idle until timer 1 matches; rarely Sleep until somebody outside pulls INT0."""
+        """Idle until timer 1 matches; rarely Sleep until an external INT0 edge."""
         wake = [f"mov #{self.draw.choice((3, 20, 60, 150))}, w0", f"mov w0, {self.at('PR1')}",
                 f"bclr {self.at('PMD1')}, #11", "mov #0x8000, w0", f"mov w0, {self.at('T1CON')}"]  # fmt: skip
         sources = {source.name: source for source in self.chip.interrupts.values()}
@@ -239,7 +242,7 @@ class Writer:
         return self.written(SCENES[self.draw.choice(sorted(SCENES))](self.draw))
 
     def written(self, settings: list[tuple[str, int]]) -> list[str]:
-        """Registers and values in order; those the chip does not have are left out."""
+        """Write registers and values in order; registers that the chip lacks are omitted."""
         lines = []
         for name, value in settings:
             if name in self.chip.sfrs:
@@ -275,7 +278,7 @@ def family(name: str) -> frozenset[str]:
 
 
 def program(seed: int, chip: Chip = DSPIC30F6014A) -> tuple[str, Writer]:
-    """Assembly text, and who has written it: some devices at work, and their registers accessed again and again."""
+    """Return assembly text and its writer: several active devices whose registers are accessed repeatedly."""
     draw = random.Random(seed)
     writer, words, stack = Writer(draw, chip, []), words_of(chip.name), stack_of(chip)
     lines = [f"mov #{stack:#x}, w15", "clr 0x42"]
@@ -318,7 +321,7 @@ class Subject:
 
 @dataclass
 class Scribe(I2cDevice):
-    """A device on the bus that acknowledges some bytes and tells of all."""
+    """An I2C device that acknowledges some bytes and records all."""
 
     subject: Subject
 
@@ -392,15 +395,15 @@ def subject(seed: int, engine: str, stretches: dict[int, list[int]], chip: Chip 
 
 
 def invalidate(draw: random.Random, subject: Subject) -> None:
-    """Something happens outside, now or soon."""
+    """Apply a random external input, now or soon."""
     machine = subject.machine
     kind, cycle, board = draw.randrange(14), machine.cycle, machine.board
     if machine.is_asleep:
         for level in (0, 1, 0):
             machine.pins.set("RF6", level, cycle)
     if kind == 0:
-        told = bytes(draw.randrange(256) for _ in range(3))
-        machine.uart[draw.choice(sorted(machine.uart))].feed(told, cycle + draw.randrange(99))
+        data = bytes(draw.randrange(256) for _ in range(3))
+        machine.uart[draw.choice(sorted(machine.uart))].feed(data, cycle + draw.randrange(99))
     elif kind == 1:
         for name in draw.sample(_INPUTS, 3):
             machine.pins.set(name, draw.randrange(2), cycle)
@@ -433,7 +436,7 @@ def invalidate(draw: random.Random, subject: Subject) -> None:
 
 
 def run(machine: Machine, cycles: int, cuts: random.Random | None) -> Stop:
-    """As `Machine.run`, in pieces if there is somebody to draw them: where a run is cut must not show."""
+    """Run like `Machine.run`, in random pieces if `draw` is given; the cuts must have no effect."""
     limit = machine.cycle + cycles
     stop = machine.run(cycles if cuts is None else min(cycles, cuts.randrange(1, 400)))
     while cuts is not None and stop.reason == "limit" and machine.cycle < limit:

@@ -1,4 +1,4 @@
-"""Settings under which devices are at work, for random programs: register values in the order they are written."""
+"""Device settings for random programs: register values in the order of the writes."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import random
 
 Scene = list[tuple[str, int]]
 _STANDS = (0, 0x2000, 0x2000)
-"""xSIDL of every control register: the device's clock stands in Idle."""
+"""xSIDL of every control register: the device's clock stops in Idle."""
 
 
 def _timer(draw: random.Random) -> Scene:

@@ -93,18 +93,18 @@ class Crew:
                 machine.program.put_flash(address, words)
 
     def keep(self) -> list[Kept]:
-        """All machines as they are now."""
+        """Keep the current state of all machines."""
         return [(machine.snapshot(), machine.save_host_state()) for machine in self.machines]
 
     def back(self, kept: list[Kept]) -> None:
-        """All machines as they were."""
+        """Restore all machines to the kept state."""
         for machine, heard, (state, put_back) in zip(self.machines, self.heard, kept, strict=True):
             machine.restore_record(state)
             put_back()
             heard.clear()
 
     def compare(self) -> str:
-        """What differs from the first machine, empty if nothing does."""
+        """Return the difference of a machine from the first one, empty if there is none."""
         first, *others = self.machines
         state = first.snapshot()
         for machine, name, heard in zip(others, self.engines[1:], self.heard[1:], strict=True):
@@ -113,8 +113,10 @@ class Crew:
                 names = {sfr.address: sfr.name for sfr in sfrs_of(self.chip.name)}
                 places = [i for i, (a, b) in enumerate(zip(state, other, strict=True)) if a != b]
                 field_at = first.record.field_at
-                told = [f"{field_at(i)} {names.get(i & ~1, '')} {state[i]:02x} {other[i]:02x}" for i in places[:12]]
-                return f"{name} differs in {', '.join(told)}"
+                bytes_shown = [
+                    f"{field_at(i)} {names.get(i & ~1, '')} {state[i]:02x} {other[i]:02x}" for i in places[:12]
+                ]
+                return f"{name} differs in {', '.join(bytes_shown)}"
             if heard != self.heard[0]:
                 return f"{name} sends {heard[-3:]} instead of {self.heard[0][-3:]}"
         return ""
@@ -190,7 +192,7 @@ def modes(draw: random.Random, machine: Machine, image: Image) -> None:
 
 
 def outside(draw: random.Random, machine: Machine) -> None:
-    """Something happens outside."""
+    """Apply a random external input."""
     kind = draw.randrange(4)
     if kind == 0:
         machine.uart[draw.choice(sorted(machine.uart))].feed(draw.randbytes(3), machine.cycle + draw.randrange(99))
@@ -339,8 +341,8 @@ def check(
                 crew.census.open = False
             found = crew.compare()
             if found or any(end != ends[0] for end in ends):
-                told = f"{found} {ends}" if found else str(ends)
-                return f"drill {drill} ({kind}), round {number}: {told}\n{listing(image, start)}"
+                finding = f"{found} {ends}" if found else str(ends)
+                return f"drill {drill} ({kind}), round {number}: {finding}\n{listing(image, start)}"
             tally.runs += 1
             tally.cycles += cycles
             tally.kinds[kind] += 1
@@ -356,7 +358,7 @@ def check(
 
 
 def listing(image: Image, start: int) -> str:
-    """The instructions of a drill, for whoever looks at a difference."""
+    """Return the instructions of a drill, for the report of a difference."""
     lines = []
     at = start
     while at in image.words and image.words[at] != words_of("BRA Expr", n=-1)[0]:

@@ -1,7 +1,7 @@
-"""The converter (§13) in steps of half a Tcy, as plain as can be, beside the one that catches up when it is looked at.
+"""Reference model of the ADC (§13) in steps of half a Tcy, compared with the model that computes on access.
 
-`difference` lets both do the same: registers written by word and by byte, levels and references changed, INT0, Idle,
-Sleep; now and then it looks at the registers, which must not matter either.
+`difference` applies the same inputs to both: register writes by word and byte, levels, references, INT0, Idle and
+Sleep. Occasional register reads must have no effect.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ class Plain:
     def __init__(self, level: Callable[[int, int], int]) -> None:
         self.word = dict.fromkeys(("ADCON1", "ADCON2", "ADCON3", "ADCHS", "ADCSSL"), 0)
         self.buffer = [0] * 16
-        self.flag = self.stands = False
+        self.flag = self.is_stopped = False
         self.references = 0, 0x10000
         self._level = level
         self._state, self._age, self._half, self._free_from = OFF, 0, 0, 0
@@ -81,10 +81,10 @@ class Plain:
 
     def live(self, cycle: int, int0: bool) -> None:
         """On to a cycle, which is the next one; `int0`: its edge is seen in it, before a conversion ends."""
-        is_triggered = int0 and (SAMPLING in (self._state, self._begins)) and not self.stands
+        is_triggered = int0 and (SAMPLING in (self._state, self._begins)) and not self.is_stopped
         while self._half < 2 * cycle:
             self._half += 1
-            if self._state > WAITING and not self.stands:
+            if self._state > WAITING and not self.is_stopped:
                 self._age += 1
                 self._end_states()
         if self._begins == SAMPLING:
@@ -165,14 +165,14 @@ def difference(seed: int) -> str | None:
         edge, kind = False, draw.random()
         if cycle == wakes:
             rig.dev.wake(cycle)
-            plain.stands = False
+            plain.is_stopped = False
             log.append(f"{cycle}: awake")
         if not wakes > cycle and draw.random() < looks:
             seen = [rig.read(name) for name in ("ADCON1", "ADCON2", *(f"ADCBUF{n:X}" for n in range(16)))]
             wanted = [plain.word["ADCON1"], plain.word["ADCON2"], *plain.buffer]
             if seen != wanted or bool(rig.flag("ADIF")) != plain.flag:
-                told = [[f"{one:#06x}" for one in values] for values in (wanted, seen)]
-                return f"cycle {cycle}: {told[0]}, flag {plain.flag}; seen {told[1]}; after {log[-8:]}"
+                texts = [[f"{one:#06x}" for one in values] for values in (wanted, seen)]
+                return f"cycle {cycle}: {texts[0]}, flag {plain.flag}; seen {texts[1]}; after {log[-8:]}"
             if plain.flag and draw.random() < 0.5:
                 rig.clear_flags()
                 plain.flag = False
@@ -198,6 +198,6 @@ def difference(seed: int) -> str | None:
         elif wakes <= cycle and kind < 0.13:
             mode, wakes = draw.choice((1, 2)), cycle + draw.randrange(1, 200)
             rig.dev.sleep(mode, cycle)
-            plain.stands = not plain.word["ADCON3"] & ADRC if mode == 2 else bool(plain.word["ADCON1"] & ADSIDL)
+            plain.is_stopped = not plain.word["ADCON3"] & ADRC if mode == 2 else bool(plain.word["ADCON1"] & ADSIDL)
             log.append(f"{cycle}: asleep in mode {mode}")
     return None

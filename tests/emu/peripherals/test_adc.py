@@ -220,8 +220,8 @@ def test_idle_with_adsidl_waits(rig):
 
 
 @pytest.mark.parametrize("seed", range(10))
-def test_looking_at_the_converter_does_not_change_what_it_does(seed):
-    """Conversions are caught up on access: a rig that polls every cycle agrees with one that never looks."""
+def test_reads_do_not_change_conversions(seed):
+    """Conversions are computed on access: polling every cycle and never polling give the same results."""
     outcomes = []
     for polls in (False, True):
         draw, rig, seen = random.Random(seed), Rig(), []
@@ -264,7 +264,7 @@ def test_the_scan_starts_again_behind_every_interrupt(rig):
 
 
 @pytest.mark.parametrize("mode", [1, 2])
-def test_levels_may_change_while_the_converter_stands(rig, mode):
+def test_levels_may_change_while_the_converter_is_stopped(rig, mode):
     """§17: neither Idle with ADSIDL nor Sleep converts anything, whatever happens outside: two results of 15 TAD."""
     rig.write("ADCON2", 4)
     rig.write("ADCON3", 0x0109)
@@ -328,6 +328,6 @@ def test_own_oscillator_at_slow_clocks(fosc, post):
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_the_converter_is_the_plain_one(seed):
-    """Half Tcy by half Tcy, in any setting, changed at any time, asleep or not, and looked at often or seldom."""
+def test_the_converter_equals_the_reference_model(seed):
+    """Both agree in every half Tcy, for any setting changed at any time, in Sleep or not, read often or rarely."""
     assert difference(seed) is None

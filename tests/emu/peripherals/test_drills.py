@@ -8,7 +8,7 @@ import pytest
 
 from emu.machine.machine import Machine
 
-from .access_census import WAYS, ways_of
+from .access_census import WAYS, modes_of
 from .device_drills import registers_of
 from .device_programs import CHIPS
 from .drill_runs import Tally, check, crew_of
@@ -30,7 +30,7 @@ def made() -> Counter[tuple[str, int, bool, int, str]]:
     tally = Tally()
     for seed in range(100, 116):
         assert check(seed, CHIPS[REAL], tally, engines=("plain",), rounds=8) is None
-    return ways_of(tally.accesses)
+    return modes_of(tally.accesses)
 
 
 FLOORS = {"address": 0.37, "pointer": 0.90, "REPEAT": 0.52, "DO": 0.50, "handler": 0.78, "event": 0.62}

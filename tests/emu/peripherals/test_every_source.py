@@ -1,4 +1,4 @@
-"""Every interrupt source of the chip, caused by its own device, at its own place (dspic30f6014a.md §5.2, §6.1).
+"""Every interrupt source of the chip, raised by its own device on its own pins (dspic30f6014a.md §5.2, §6.1).
 
 The other files test one device of a kind thoroughly; here every copy shows that it has its own pins, registers, flag.
 """
@@ -200,7 +200,7 @@ def test_every_source_of_the_chip_is_here():
 
 @pytest.mark.parametrize("name", sorted(SOURCES, key=SOURCES.__getitem__))
 def test_device_raises_its_own_flag_and_no_other(rig, name):
-    """§5.2; T2 and T3 may be running as somebody's time base, but match nothing here."""
+    """§5.2; T2 and T3 may run as time bases, but have no match here."""
     rig.dev.pins.set("RF2", 1)
     rig.dev.pins.set("RF4", 1)
     for pin in EXTERNAL.values():

@@ -47,10 +47,10 @@ def owners(rig: Rig) -> dict[int, int]:
 
 
 def contradictions(rig: Rig) -> list[str]:
-    """What two devices, or a register and what is posted, do not agree about."""
+    """Return contradictions between devices, or between a register and posted events."""
     dev, now, due = rig.dev, rig.events.now, rig.events.due
     pins = owners(rig)
-    found = [f"{port.name}: {port._owned.value & ~pins[index]:#x} owned by nobody"
+    found = [f"{port.name}: {port._owned.value & ~pins[index]:#x} without an owner"
              for index, port in dev.ports.items() if port._owned.value & ~pins[index]]  # fmt: skip
     oscillator = dev.oscillator
     if bool(oscillator.con["OSWEN"]) != (due(oscillator._switch) != NEVER):

@@ -217,7 +217,7 @@ def test_stretched_clock_delays_the_byte(bus):
     assert send(bus, 0x01) == begun + 1 + 5000 + 1359
 
 
-def test_clock_held_low_stalls_until_it_is_let_go(bus):
+def test_clock_held_low_stalls_until_it_is_released(bus):
     """§11."""
     step(bus, SEN)
     bus.dev.i2c.wire.hold(scl=True)
@@ -355,7 +355,7 @@ def test_slave_ignores_other_addresses(slave):
     assert result.acknowledged == [False, False]
 
 
-def test_slave_refuses_what_it_has_no_room_for(slave):
+def test_slave_refuses_a_byte_while_its_register_is_full(slave):
     """§11 I2COV: nothing was read."""
     master = ExternalMaster(slave.dev.i2c.slave, slave.events)
     result = master.transfer([0x84, 0x11])
@@ -383,7 +383,7 @@ def test_slave_sends_and_stretches_until_it_is_ready(slave):
     assert result.done
 
 
-def test_slave_answers_the_general_call_only_if_asked_to(slave):
+def test_slave_answers_the_general_call_only_with_gcen(slave):
     """§11 GCEN, GCSTAT."""
     master = ExternalMaster(slave.dev.i2c.slave, slave.events)
     assert not any(master.transfer([0x00]).acknowledged)
@@ -452,7 +452,7 @@ def test_a_logic_analyser_decodes_the_transaction_from_the_pins(bus):
 
 
 def test_a_logic_analyser_sees_the_missing_acknowledge(bus):
-    """§11: nobody answers at 0x3C."""
+    """§11: no device acknowledges at 0x3C."""
     bus.pending = [("I2CTRN", 0x3C), ("I2CCON", BASE | PEN)]
     bus.write("I2CCON", BASE | SEN)
     assert sniff(bus, 5_000) == ["S", (0x3C, False), "P"]

@@ -27,7 +27,7 @@ def test_table_write_captures_its_address(rig):
     assert rig.read("NVMADRU") == 0x01
 
 
-def test_flash_row_is_erased_and_programmed_while_the_cpu_stands(rig):
+def test_flash_row_is_erased_and_programmed_while_the_cpu_stalls(rig):
     """§16: 32 words; 2 ms = 29491 Tcy; NVMIF at the end."""
     stalls, changes = [], []
     rig.cpu_signals.stall_until = stalls.append
@@ -148,7 +148,7 @@ def test_rows_outside_the_array_are_ignored(rig):
 
 
 @pytest.mark.parametrize(("address", "value"), [(0xF80002, 0x7FFF), (0xF80006, 0x310F), (0xF8000C, 0x4003)])
-def test_a_configuration_word_gets_what_a_table_write_left(rig, address, value):
+def test_a_configuration_word_is_programmed_from_the_latch(rig, address, value):
     """§16 NVMCON 0x4008: the latch of its address, in which 0xFFFF would switch the watchdog on (§2)."""
     latch(rig, address, value)
     begun = start(rig, 100, 0x4008)

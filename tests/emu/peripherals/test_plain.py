@@ -32,6 +32,6 @@ def test_plain_registers_are_reported_once_and_store_their_bits():
 
 
 def test_printed_list_is_up_to_date():
-    """docs/plain-registers.md is what the code says."""
+    """docs/plain-registers.md equals the generated report."""
     machine = Machine(engine="plain")
     assert LIST.read_text() == report(machine.chip, machine.bus)

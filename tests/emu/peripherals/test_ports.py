@@ -129,7 +129,7 @@ def test_external_interrupt_takes_the_edge_intcon2_chooses(rig, number, pin):
     assert rig.at(41).flag(name)
 
 
-def test_external_interrupt_hears_the_chip_drive_its_own_pin(rig):
+def test_external_interrupt_detects_edges_driven_by_the_chip(rig):
     """§5.5: detection works on the pin whatever drives it."""
     rig.write("TRISA", 0)
     rig.at(10).write("LATA", 1 << 12)
@@ -150,7 +150,7 @@ def test_uart_owns_its_pins_while_enabled(rig):
 
 
 def native_latch_write(rig, letter, value):
-    """README: what native code does for a LATx write, from record fields alone. False: it would call Python."""
+    """Model of a native LATx write, from record fields alone. Return False if native code would call Python."""
     index = "ABCDEFG".index(letter)
     record, fields = rig.record, rig.record.fields
     view = {"H": record.u16, "Q": record.u64, "B": record.u8}
@@ -188,7 +188,7 @@ def native_latch_write(rig, letter, value):
     return True
 
 
-def test_native_latch_writes_leave_the_same_state_and_tell_the_same_edges():
+def test_native_latch_writes_give_the_same_state_and_edges():
     """README: native and Python paths agree for any sequence of latch writes, TRIS in between."""
     rigs, seen = [Rig(), Rig()], [[], []]
     for rig, edges in zip(rigs, seen, strict=True):

@@ -1,4 +1,4 @@
-"""Rules of devices: a rule and the hooks behind it give the same record, so it does not matter which one answers."""
+"""Rules of devices: a rule and the register's hooks give the same record."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def test_every_device_with_rules_has_them_on_the_bus(rig: Rig) -> None:
 
 @pytest.mark.parametrize("seed", range(4))
 def test_hooks_alone_give_the_same_record_as_rules(seed: int) -> None:
-    """The same random accesses with the rules on the bus and without. Pins that changed natively are told first."""
+    """The same random accesses with and without rules on the bus. Native pin changes are flushed first."""
     rigs = [Rig(), Rig()]
     rigs[1].bus.rules[:] = [None] * len(rigs[1].bus.rules)
     hot = [sfr for sfr in WORDS if sfr.name.startswith(RULED)]
@@ -38,7 +38,7 @@ def test_hooks_alone_give_the_same_record_as_rules(seed: int) -> None:
             else:
                 act(rig, draw)
             rig.dev.pins.flush()
-            rig.dev.tell()
+            rig.dev.deliver_uart_output()
             rig.record.u64[rig.events.deadline_index] = 0  # derived
         one, other = (rig.record.snapshot() for rig in rigs)
         assert one == other, (step, _places(rigs[0], one, other))
@@ -48,8 +48,8 @@ def _places(rig: Rig, one: bytes, other: bytes) -> set[str]:
     return {rig.record.field_at(i) for i, (a, b) in enumerate(zip(one, other, strict=True)) if a != b}
 
 
-def test_a_need_that_does_not_hold_leaves_everything_as_it_was(rig: Rig) -> None:
-    """And the register's hooks are asked."""
+def test_a_failed_condition_leaves_the_record_unchanged(rig: Rig) -> None:
+    """The register's hooks then handle the access."""
 
     def writes(m, place, value, lanes):
         m.require(value < 10)

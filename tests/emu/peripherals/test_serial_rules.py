@@ -1,4 +1,4 @@
-"""UART and SPI under programs that never leave them alone: the same state, and the same told, in every engine."""
+"""UART and SPI under programs that use them continuously: the same state and output in every engine."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ def machine(engine: str, text: str, **settings: object) -> Rig:
 
 
 def history(rig: Rig, seed: int, lazy: bool) -> list[object]:
-    """Snapshots at drawn stops, with input at drawn times, and at the end what was heard of UART1."""
+    """Return snapshots at random stops, with input at random times, and the output of UART1."""
     draw = random.Random(seed)
     made, heard = rig.machine, []
     no_longer = made.uart[1].listen(lambda byte, start: heard.append((byte, start)), lazy=lazy)
@@ -104,22 +104,22 @@ def test_engines_agree_on_a_uart_that_sends_and_receives(seed: int) -> None:
         "pause": draw.choice((2, 5, 30)),
         "RX": int(A["U1RXREG"], 16),
     }
-    told = [history(machine(engine, UART, **settings), seed, True) for engine in ("plain", "jit")]
-    assert len(told[0][-1]) > 5
-    assert told[1] == told[0]
-    assert told[2] == told[0]
+    results = [history(machine(engine, UART, **settings), seed, True) for engine in ("plain", "jit")]
+    assert len(results[0][-1]) > 5
+    assert results[1] == results[0]
+    assert results[2] == results[0]
 
 
 @pytest.mark.parametrize("seed", range(4))
 def test_engines_agree_on_an_spi_master(seed: int) -> None:
-    """Every clock, 8 and 16 bits, both buffers full; SDI moves, and for a while a device is asked for its words."""
+    """All clocks, 8 and 16 bits, both buffers full; SDI changes, and a device is connected for a while."""
     draw = random.Random(f"spi {seed}")
     settings = {
         "con": 0x20 | draw.randrange(0x20) | draw.choice((1, 2, 3)) | draw.choice((0, 0x400, 0x400)),
         "pause": draw.choice((2, 5, 30)),
         "BUF": int(A["SPI1BUF"], 16),
     }
-    told = []
+    results = []
     for engine in ("plain", "jit"):
         rig, states, outside = machine(engine, SPI, **settings), [], random.Random(seed)
         for turn in range(12):
@@ -127,13 +127,13 @@ def test_engines_agree_on_an_spi_master(seed: int) -> None:
             rig.machine.peripherals.spi[1].exchange = (lambda word, _bits: word * 3) if turn in (4, 5) else None
             rig.machine.run(cycles=outside.randrange(1, 3000))
             states.append(rig.machine.snapshot())
-        told.append(states)
-    assert told[1] == told[0]
-    assert told[2] == told[0]
+        results.append(states)
+    assert results[1] == results[0]
+    assert results[2] == results[0]
 
 
-def test_who_is_lazy_hears_what_the_others_hear() -> None:
-    """In the same order, before the run ends; who is not hears in the cycle in which the stop bit has ended."""
+def test_lazy_listeners_receive_the_same_bytes_as_eager_ones() -> None:
+    """Lazy listeners are called in order before the run ends, eager ones in the cycle of the stop bit's end."""
     settings = {"brg": 1, "mode": 0x8000, "status": 0x0400, "pause": 2, "RX": int(A["U1RXREG"], 16)}
     rig = machine("jit", UART, **settings)
     lazy, prompt = [], []

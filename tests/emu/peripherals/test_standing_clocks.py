@@ -1,4 +1,4 @@
-"""Devices of which one stands in Idle or Sleep and another goes on; times in seconds while the Tcy changes."""
+"""Devices stopped in Idle or Sleep while others run; delays in seconds while the Tcy changes."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def unlock(rig: Rig, start: int, byte: int, lanes: int) -> None:
 
 
 def nap(rig: Rig, start: int, end: int, mode: int = 1) -> None:
-    """PWRSAV so that clocks stand from `start` to `end`."""
+    """Execute PWRSAV so that clocks are stopped from `start` to `end`."""
     rig.at(start).dev.sleep(mode, start)
     rig.at(end).dev.wake(end)
 
@@ -25,8 +25,8 @@ def nap(rig: Rig, start: int, end: int, mode: int = 1) -> None:
 # -- timers and those that live by them --------------------------------------------------------------------------------
 
 
-def test_an_output_compare_waits_for_a_timer_that_stands():
-    """§7, §9: TSIDL stops the time base in Idle: no match, no edge; TMR2 = 19 when it goes on in cycle 200."""
+def test_an_output_compare_waits_for_a_stopped_timer():
+    """§7, §9: TSIDL stops the time base in Idle: no match, no edge; TMR2 = 19 when it resumes in cycle 200."""
     rig = Rig()
     for name, value in (("PR2", 99), ("OC1R", 50), ("OC1CON", 3), ("T2CON", 0xA000)):
         rig.write(name, value)
@@ -37,8 +37,8 @@ def test_an_output_compare_waits_for_a_timer_that_stands():
     assert rig.first_cycle(lambda: rig.dev.pins.get("RD0"), 200, 400) == 200 + 50 - 19 + 1
 
 
-def test_an_output_compare_that_stands_follows_its_timer_when_it_goes_on():
-    """§9: OCSIDL stops the channel only: it goes on with the match of the timer that went on without it."""
+def test_a_stopped_output_compare_follows_its_timer_after_resuming():
+    """§9: OCSIDL stops the channel only: it resumes with the next match of the running timer."""
     rig = Rig()
     for name, value in (("PR2", 99), ("OC1R", 50), ("OC1CON", 0x2003), ("T2CON", 0x8000)):
         rig.write(name, value)
@@ -60,11 +60,11 @@ def test_a_match_of_the_cycle_in_which_both_stop_still_moves_the_pin(mode, late)
 
 
 @pytest.mark.parametrize("start", [110, 129, 130, 131, 199, 200, 201])
-@pytest.mark.parametrize("stands", [0, 0x2000])
-def test_pwm_stands_with_its_timer(start, stands):
-    """§9: neither edge of a PWM comes while the time base stands."""
+@pytest.mark.parametrize("tsidl", [0, 0x2000])
+def test_pwm_stops_with_its_timer(start, tsidl):
+    """§9: a PWM has no edges while the time base is stopped."""
     rig = Rig()
-    for name, value in (("PR2", 99), ("OC1R", 30), ("OC1RS", 30), ("OC1CON", 6 | stands), ("T2CON", 0xA000)):
+    for name, value in (("PR2", 99), ("OC1R", 30), ("OC1RS", 30), ("OC1CON", 6 | tsidl), ("T2CON", 0xA000)):
         rig.write(name, value)
     level, count = rig.at(start).dev.pins.get("RD0"), rig.read("TMR2")
     rig.dev.sleep(1, start)
@@ -74,7 +74,7 @@ def test_pwm_stands_with_its_timer(start, stands):
         assert rig.at(cycle).dev.pins.get("RD0") == ((cycle - 500 + count) % 100 < 30), cycle
 
 
-def test_a_capture_takes_the_count_of_a_timer_that_stands():
+def test_a_capture_takes_the_count_of_a_stopped_timer():
     """§8: the count at which TSIDL stopped timer 2."""
     rig = Rig()
     rig.write("IC1CON", 0x83)
@@ -86,8 +86,8 @@ def test_a_capture_takes_the_count_of_a_timer_that_stands():
 
 
 @pytest.mark.parametrize("start", [20, 63, 64, 65, 100])
-def test_a_prescaler_keeps_what_it_has_counted_while_the_timer_stands(start):
-    """§7: 64 Tcy of running make a count, whatever time the timer stood in between."""
+def test_a_prescaler_keeps_its_count_while_the_timer_is_stopped(start):
+    """§7: 64 Tcy of running time make a count, however long the timer was stopped in between."""
     rig = Rig()
     rig.write("T3CON", 0xA020)
     nap(rig, start, 1000)
@@ -97,7 +97,7 @@ def test_a_prescaler_keeps_what_it_has_counted_while_the_timer_stands(start):
 
 
 @pytest.mark.parametrize(("before", "after"), [(1, 0), (0, 1)])
-def test_a_gate_that_moved_while_the_timer_stood(before, after):
+def test_a_gate_change_while_the_timer_was_stopped(before, after):
     """§7: a gated timer counts while its gate is high, whatever the gate did in between."""
     rig = Rig()
     rig.dev.pins.set("RC1", before)
@@ -130,7 +130,7 @@ def test_timer_three_is_on_its_own_when_its_partner_is_switched_off():
     assert rig.at(150).read("TMR3") == first + 50
 
 
-def test_an_output_compare_stands_when_its_timer_is_switched_off():
+def test_an_output_compare_has_no_match_when_its_timer_is_disabled():
     """§17: a timer that is off reaches no match."""
     rig = Rig()
     for name, value in (("PR2", 99), ("OC1R", 50), ("OC1CON", 3), ("T2CON", 0x8000)):
@@ -163,7 +163,7 @@ def test_programming_takes_its_seconds_when_the_tcy_changes():
     assert rig.dev.seconds(cycle) == pytest.approx(2e-3, rel=1e-2)
 
 
-def test_the_cpu_stands_until_flash_is_programmed_whatever_the_tcy_becomes():
+def test_the_cpu_stalls_until_flash_is_programmed_when_the_tcy_changes():
     """§16, §3: a switch to the crystal ends while a row is erased: the rest takes an eighth of the Tcy."""
     rig, held = switching(), []
     rig.cpu_signals.stall_until = held.append
@@ -210,7 +210,7 @@ def test_a_watchdog_that_software_switched_on_ends_with_a_reset():
 
 
 def switching(fosc: int = 0x7FE6) -> Rig:
-    """A switch from the PLL to the crystal alone has been asked for in cycle 22."""
+    """Request a switch from the PLL to the crystal in cycle 22."""
     rig = Rig(fosc=fosc)
     unlock(rig, 10, 0x03, HIGH)
     unlock(rig, 20, 0x01, LOW)
@@ -240,7 +240,7 @@ def test_a_clock_failure_abandons_a_pending_switch():
     assert rig.at(10_000).read("OSCCON") == 0x1308
 
 
-def test_a_switch_to_the_clock_in_force_ends_at_once():
+def test_a_switch_to_the_current_clock_ends_at_once():
     """§3: nothing has to start."""
     rig = Rig(fosc=0x7FE6)
     unlock(rig, 10, 0x01, LOW)
@@ -248,7 +248,7 @@ def test_a_switch_to_the_clock_in_force_ends_at_once():
 
 
 def test_a_brown_out_takes_the_clock_of_the_configuration():
-    """§3, §4: as a power-on does; the seconds go on."""
+    """§3, §4: as after power-on; elapsed seconds continue."""
     rig = Rig(fosc=0x7FE6)
     unlock(rig, 10, 0x01, HIGH)
     unlock(rig, 20, 0x81, LOW)
@@ -278,7 +278,7 @@ def test_sleep_cuts_a_reception_off():
 
 
 @pytest.mark.parametrize("freed", [200, 400])
-def test_an_i2c_clock_that_comes_free_while_the_module_stands(freed):
+def test_an_i2c_clock_released_while_the_module_is_stopped(freed):
     """§11: the Start that waits for SCL begins when the module runs again, in the cycle behind the later of both."""
     rig = Rig()
     rig.write("I2CBRG", 150)
@@ -296,8 +296,8 @@ def test_an_i2c_clock_that_comes_free_while_the_module_stands(freed):
     assert rig.first_cycle(lambda: rig.flag("MI2CIF"), 9001, 12_000) == 9001 + 9 * 151
 
 
-def test_a_master_does_not_go_on_with_a_word_that_sleep_cut_off():
-    """§12: the word under way is lost, the one that waits in TXB is sent afterwards."""
+def test_a_master_does_not_resume_a_word_aborted_by_sleep():
+    """§12: the word being sent is lost, the one in TXB is sent afterwards."""
     rig = Rig()
     sent = []
     rig.dev.spi[1].exchange = lambda word, _bits: sent.append(word) or 0
@@ -338,7 +338,7 @@ class Square:
 
 
 @pytest.mark.parametrize("start", [350, 299, 300, 301, 302])
-def test_a_counter_that_stands_misses_edges_of_a_waveform(start):
+def test_a_stopped_counter_misses_edges_of_a_waveform(start):
     """§7: edges between PWRSAV and the wake-up are not counted; the match comes with the fourth counted edge."""
     rig = Rig()
     rig.dev.pins.attach(2, 8, Square())

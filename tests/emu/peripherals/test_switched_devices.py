@@ -1,4 +1,4 @@
-"""Devices switched off and on, set up in another order than usual, or cut off in the middle (§9-§17)."""
+"""Devices disabled and enabled, configured in an unusual order, or interrupted during operation (§9-§17)."""
 
 from __future__ import annotations
 
@@ -125,7 +125,7 @@ def test_nothing_is_lost_in_loopback_when_the_rate_rises_in_the_middle():
 
 
 class Notes(I2cDevice):
-    """Writes down what it hears."""
+    """An I2C device that records what it receives."""
 
     def __init__(self) -> None:
         self.bytes: list[int] = []
@@ -207,28 +207,28 @@ def test_a_threshold_above_the_supply_is_noticed(rig):
         ([("SPI2CON", 0x0020), ("U2MODE", 0xFFFF), ("DCICON1", 0x8001), ("C1INTE", 0x00BF)], None),
     ],
 )
-def test_settings_without_a_model_are_told_once(rig, settings, what):
-    """Who sets a device up for what the emulator does not do hears of it."""
-    told = []
-    rig.bus.note = told.append
+def test_settings_without_a_model_are_reported_once(rig, settings, what):
+    """A setting that requests an unmodelled function is reported."""
+    notes = []
+    rig.bus.note = notes.append
     for name, value in settings:
         rig.at(rig.events.now + 5).write(name, value)
-    assert [text.split(",")[0] for text in told] == ([what] if what else [])
+    assert [text.split(":")[0] for text in notes] == ([what] if what else [])
 
 
-def test_the_crystal_of_timer_one_is_told(rig):
+def test_the_crystal_of_timer_one_is_reported(rig):
     """§3: LPOSCEN, behind its key."""
-    told = []
-    rig.bus.note = told.append
+    notes = []
+    rig.bus.note = notes.append
     for byte in (0x46, 0x57, 0x02):
         rig.at(rig.events.now + 1).write("OSCCON", byte, 0x00FF)
-    assert len(told) == 1
-    assert told[0].startswith("OSCCON.LPOSCEN")
+    assert len(notes) == 1
+    assert notes[0].startswith("OSCCON.LPOSCEN")
 
 
 @pytest.mark.parametrize(("begin", "end"), [(0, 1), (1, 2), (0, 2), (1, 3), (2, 3)])
 def test_a_listener_and_a_switch_do_not_lose_each_other(begin, end):
-    """§17: who listens to a register comes and goes while PMD1 switches timer 1 off (step 1) and on (step 2)."""
+    """§17: a register listener is added and removed while PMD1 disables (step 1) and enables (step 2) timer 1."""
     machine = Machine(engine="plain")
     machine.reset("POR")
     bus, at = machine.bus, machine.chip.sfrs
@@ -242,8 +242,8 @@ def test_a_listener_and_a_switch_do_not_lose_each_other(begin, end):
         count = len(heard)
         bus.write(at["T1CON"].address, 0x8000)
         assert bus.read(at["T1CON"].address) == (0 if off else 0x8000)
-        told = [(True, 0 if off else 0x8000), (False, 0 if off else 0x8000)] if begin <= step < end else []
-        assert heard[count:] == told
+        expected = [(True, 0 if off else 0x8000), (False, 0 if off else 0x8000)] if begin <= step < end else []
+        assert heard[count:] == expected
         machine.events.now += 50
         assert bus.read(at["TMR1"].address) == (0 if off else 49)
         bus.write(at["T1CON"].address, 0)

@@ -245,7 +245,7 @@ def test_odd_control_register_is_ignored_in_wide_mode(rig):
     assert rig.at(101).read("TMR2") == 100
 
 
-def test_timer_with_tsidl_stands_in_idle_and_the_others_do_not(rig):
+def test_timer_with_tsidl_stops_in_idle_and_the_others_do_not(rig):
     """§7 Idle: T1 loses the cycles from 100 to 600, T2 does not."""
     rig.write("PR1", 149)
     rig.write("T1CON", TON | TSIDL)
@@ -288,7 +288,7 @@ def test_native_description_reproduces_the_count(rig):
 
 
 class Pulse:
-    """A described clock: a rising edge in every cycle that is a multiple of `every`."""
+    """A waveform clock: a rising edge in every cycle that is a multiple of `every`."""
 
     def __init__(self, every):
         self.every = every
@@ -315,8 +315,8 @@ def test_described_clock_is_counted_without_an_event_per_edge(rig):
     assert rig.at(801).read("TMR4") == 0
 
 
-def test_described_clock_can_change_its_course(rig):
-    """A waveform that announces a change keeps what was counted before it."""
+def test_a_waveform_clock_can_change(rig):
+    """Edges before an announced change of the waveform stay counted."""
     wave = Pulse(100)
     rig.dev.pins.attach(2, 1 << 3, wave)
     rig.write("PR4", 7)
@@ -371,7 +371,7 @@ def test_only_plain_16_bit_matches_are_offered_to_native_code(rig):
 
 
 class Ticking:
-    """A timer that does tick: one step per Tcy, written from the rules of §7 alone."""
+    """Reference model of a timer: one step per Tcy, written from the rules of §7."""
 
     def __init__(self):
         self.count = self.prescaler = 0

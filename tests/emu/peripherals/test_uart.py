@@ -148,7 +148,7 @@ def test_break_holds_the_line_low(rig):
 
 
 def test_drain_delivers_what_the_stopped_program_left_in_the_transmitter(rig):
-    """README: the pins outlive the program."""
+    """The UART keeps sending after the program has stopped."""
     enable(rig)
     sent = collect(rig)
     for value in (1, 2, 3):
@@ -313,8 +313,8 @@ def test_loopback_receives_its_own_frames_and_not_the_pin(rig):
     assert sent == [(0x42, 257)]
 
 
-def test_closed_receiver_loses_timed_bytes_and_patient_senders_wait(rig):
-    """The line does not care about UARTEN; `feed` without a cycle does."""
+def test_disabled_receiver_loses_timed_bytes_and_untimed_ones_wait(rig):
+    """Timed frames do not wait for UARTEN; `feed` without a cycle does."""
     rig.dev.uart[1].feed(b"a", cycle=100)
     rig.at(5000)
     rig.dev.uart[1].feed(b"b")
@@ -378,8 +378,8 @@ def test_snapshot_in_the_middle_of_a_frame_continues_identically(rig):
     assert (sent, rig.record.snapshot()) == first
 
 
-def test_whoever_looks_at_a_character_with_errors_sees_its_data(rig):
-    """FERR is in UxSTA, not in UxRXREG; looking takes nothing out of the FIFO."""
+def test_reading_a_character_with_errors_returns_its_data(rig):
+    """FERR is in UxSTA, not in UxRXREG; a debugger's read removes nothing from the FIFO."""
     enable(rig)
     rig.dev.uart[1].feed(b"A", 100, errors=FRAMING_ERROR)
     rig.at(3000)

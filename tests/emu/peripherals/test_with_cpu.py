@@ -1,4 +1,4 @@
-"""Devices under a running program, on every engine: what consecutive instructions, sleep and interrupts do to them.
+"""Devices under a running program, on every engine: consecutive instructions, sleep and interrupts.
 
 Sections without a file name are those of the chip reference.
 """
@@ -189,7 +189,7 @@ def test_polling_the_converter_takes_the_time_of_the_conversion(engine):
 
 
 def test_an_input_that_changes_in_the_cycle_of_its_interrupt_does_not_take_it(engine):
-    """§13, §17: whoever sets levels between two runs of a CPU in Idle, at any cycle, gets every interrupt in time."""
+    """§13, §17: levels set between two runs of a CPU in Idle, at any cycle, do not delay an interrupt."""
     program = """
         mov #0x001C, w0
         mov w0, {ADCSSL}
@@ -285,7 +285,7 @@ def test_watchdog_wakes_from_idle_and_the_program_goes_on(engine):
 
 
 def test_sleep_stops_timers_and_idle_does_not(engine):
-    """§17: T2 loses the time asleep."""
+    """§17: T2 does not count during Sleep."""
     counts = []
     for mode in (0, 1):
         rig = Rig(
@@ -449,6 +449,9 @@ def test_i2c_polled_write_takes_the_bus_time(engine):
 
 @pytest.mark.parametrize(("seed", "chip"), [*((seed, "dsPIC30F6014A") for seed in range(6)), (100, "dsPIC30F0000")])
 @pytest.mark.parametrize("other", ENGINES[1:])
-def test_engines_agree_on_programs_that_live_on_device_registers(seed, chip, other):
-    """engines.md §4: same seed, same bytes, same cycle in every engine; `tests/fuzz/emulator/fuzz_devices.py` runs more."""
+def test_engines_agree_on_programs_that_access_device_registers(seed, chip, other):
+    """engines.md §4: same seed, same bytes, same cycle in every engine.
+
+    `tests/fuzz/emulator/fuzz_devices.py` runs more seeds.
+    """
     assert difference(seed, other, chip=CHIPS[chip]) is None

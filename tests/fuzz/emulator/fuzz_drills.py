@@ -16,7 +16,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[3]
 sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "emu")]
 
-from peripherals.access_census import WAYS, ways_of  # noqa: E402
+from peripherals.access_census import WAYS, modes_of  # noqa: E402
 from peripherals.device_drills import registers_of  # noqa: E402
 from peripherals.device_programs import CHIPS  # noqa: E402
 from peripherals.drill_runs import Tally, check  # noqa: E402
@@ -54,7 +54,7 @@ def results(campaign: Campaign, chip: str | None, jobs: int) -> Iterator[tuple[s
 
 def never(tally: Tally, chip: str) -> dict[tuple[str, int, str], list[str]]:
     """Registers of a chip without an access, by read or write, size and way."""
-    made = ways_of(tally.accesses)
+    made = modes_of(tally.accesses)
     return {
         (kind, size, way): [sfr.name for sfr in registers_of(chip) if not made[chip, sfr.address, write, size, way]]
         for kind, write in (("read", False), ("write", True))
