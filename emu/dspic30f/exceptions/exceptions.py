@@ -1,9 +1,9 @@
-"""Which interrupt is accepted at an instruction boundary, and entering an exception (isa.md §14): one text for every
-engine (contract: emu/system/rules.py).
+"""Rules of exceptions (isa.md §14): which interrupt is accepted at an instruction boundary, and the entry of a handler.
 
-The rule of time is isa.md §14.3: with c the cycle in which the request was first visible and e the last cycle of the
-instruction before the boundary (c <= e), the handler's first instruction executes in cycle max(c + 4, e + 3). The words
-are pushed in the two cycles before it. Traps are `interrupts.py`'s until they are entered.
+All engines use these functions (contract: emu/system/rules.py). The rule of time is isa.md §14.3. Let c be the cycle in
+which the request was first visible and e the last cycle of the instruction before the boundary (c <= e). Then the first
+instruction of the handler executes in cycle max(c + 4, e + 3). The words are pushed in the two cycles before it. Until
+they are entered, traps are handled in `interrupts.py`.
 """
 
 from __future__ import annotations
@@ -22,44 +22,47 @@ ALTIVT: Final = 1 << 15
 UNMASKABLE: Final = 7
 """User interrupt priority that DISI does not block (isa.md §12)."""
 NO_REQUEST: Final = -1
-"""Instead of a request's number."""
+"""Number that stands for no request."""
 _IPL_SHIFT: Final = 5
 
 
 class BoundaryBuilder(RuleBuilder, Protocol):
-    """What a reader can do between two instructions."""
+    """Operations of a rule that runs between two instructions."""
 
     def push(self, low: Number, high: Number, cycle: Number) -> None:
-        """Two words at [W15++], in `cycle` and the next, with the checks of every stack access (isa.md §10)."""
+        """Push two words at [W15++], in `cycle` and the next one, with the checks of every stack access (isa.md
+        §10)."""
 
     def handler(self, vector: Number) -> Number:
-        """The program word of a vector."""
+        """Return the program word of a vector."""
 
 
 @dataclass(frozen=True, slots=True)
 class ExceptionOperands:
-    """Registers and cells of acceptance and entry. A request's number: 16 x place of its flag register + its bit."""
+    """Registers and cells of acceptance and entry. The number of a request is 16 x index of its flag register + bit."""
 
     words: tuple[tuple[Cell, Cell], ...]
-    """Flags and enables."""
+    """Flag registers, each with its enable register."""
     implemented: int
-    """Numbers there are, as bits."""
+    """Numbers of the implemented requests, as bits."""
     priority: tuple[int, ...]
-    """By number: index of the register with its priority, the shift there, index of the cycle it rose in, and vectors:
-    addresses in both tables, number."""
+    """Index of the register with its priority, by number. `shift` is the position of the priority in that register,
+    `since` the index of the request's cycle. `ivt` and `aivt` are the addresses of its vectors, `slot` is its vector
+    number."""
     shift: tuple[int, ...]
     since: tuple[int, ...]
     ivt: tuple[int, ...]
     aivt: tuple[int, ...]
     slot: tuple[int, ...]
     first_word: Cell
-    """Data address 0, to which `priority` counts."""
-    first_rise: Cell
-    look: EventSlot
-    """Makes the engine look again."""
+    """Data address 0, the base of `priority`."""
+    first_request: Cell
+    """Base of `since`."""
+    recheck: EventSlot
+    """Event that makes the engine check for interrupts again."""
     slip_cycle: Cell
     slip_words: Cell
-    """With `ipl_slip`: the cycle behind the last write, and SR and enables from before it."""
+    """With `ipl_slip`: SR and enables before the last write; `slip_cycle` is the cycle after it."""
     sr: Cell
     corcon: Cell
     intcon1: Cell
@@ -73,8 +76,8 @@ class ExceptionOperands:
     stall: Cell
 
 
-def operands_of(state: State, chip: Chip, look: int) -> ExceptionOperands:
-    """From a chip's data, once the cells of `Exceptions` are reserved; `look` is its event slot."""
+def operands_of(state: State, chip: Chip, recheck: int) -> ExceptionOperands:
+    """Return the operands for a chip, after the cells of `Exceptions` are reserved; `recheck` is its event slot."""
     record, sfrs = state.record, chip.sfrs
     names = sorted({(sfrs[s.flag[0]].address, sfrs[s.enable[0]].address) for s in chip.interrupts.values()})
     order = {flags: number for number, (flags, _enables) in enumerate(names)}
@@ -98,14 +101,14 @@ def operands_of(state: State, chip: Chip, look: int) -> ExceptionOperands:
         words=tuple((Cell(flags, 16), Cell(enables, 16)) for flags, enables in names),
         implemented=implemented,
         first_word=Cell(0, 16),
-        first_rise=cell_of(record, "irq.since"),
-        look=event_slot(record, look),
+        first_request=cell_of(record, "irq.since"),
+        recheck=event_slot(record, recheck),
         **rest,
     )
 
 
 def requested(m: RuleBuilder, p: ExceptionOperands, slip: Number | None = None) -> Number:
-    """Numbers of the enabled requests as bits. `slip`, if interrupts may slip through: the cycle that comes next."""
+    """Return the numbers of the enabled requests as bits. `slip` is the next cycle if interrupts may slip through."""
     bits: Number = 0
     for number, (flags, enables) in enumerate(p.words):
         enabled = m.get(enables)
@@ -116,7 +119,7 @@ def requested(m: RuleBuilder, p: ExceptionOperands, slip: Number | None = None) 
 
 
 def ipl(m: RuleBuilder, p: ExceptionOperands, slip: Number | None = None) -> Number:
-    """CPU priority that an exception must beat, 0..15. `slip` as for `requested`."""
+    """Return the CPU priority that an exception must exceed, 0..15. `slip` is as for `requested`."""
     priority = m.get(p.sr) & IPL_MASK
     if slip is not None:
         before = m.get(p.slip_words) & IPL_MASK
@@ -125,34 +128,35 @@ def ipl(m: RuleBuilder, p: ExceptionOperands, slip: Number | None = None) -> Num
 
 
 def level_of(m: RuleBuilder, p: ExceptionOperands, number: Number) -> Number:
-    """Priority of a request, 0..7."""
+    """Return the priority of a request, 0..7."""
     return m.get(p.first_word, m.table(p.priority, number)) >> m.table(p.shift, number) & 7
 
 
 def accepted(
     m: RuleBuilder, p: ExceptionOperands, bits: Number, last: Number, slip: Number | None = None
 ) -> tuple[Number, Number]:
-    """Number and level of the request among `bits` that wins behind cycle `last`, or NOBODY. What time alone makes
-    acceptable later is noted: the engine will look again then."""
+    """Return number and level of the request among `bits` that is accepted after cycle `last`, or NO_REQUEST.
+
+    A request that becomes acceptable later by time alone posts the recheck event."""
     disi_end = m.get(p.disi_end)
 
-    def better(number: Number, level: Number, winner: Number, look: Number) -> tuple[Number, ...]:
-        mine, since = level_of(m, p, number), request_cycle(m, p, number)
-        held = (mine < UNMASKABLE) & (last < disi_end)
-        until, higher = m.select(held, disi_end, since), mine > level
+    def better(number: Number, level: Number, winner: Number, check: Number) -> tuple[Number, ...]:
+        own, since = level_of(m, p, number), request_cycle(m, p, number)
+        held = (own < UNMASKABLE) & (last < disi_end)
+        until, higher = m.select(held, disi_end, since), own > level
         waits = higher & (held | (last < since))
         wins = higher & (last >= since) & (held == 0)
-        return m.select(wins, mine, level), m.select(wins, number, winner), m.select(
-            waits & m.below(until, look), until, look)  # fmt: skip
+        return m.select(wins, own, level), m.select(wins, number, winner), m.select(
+            waits & m.below(until, check), until, check)  # fmt: skip
 
-    level, winner, look = m.scan(bits, better, ipl(m, p, slip), NO_REQUEST, m.get(p.look.due))
-    m.post(p.look, look)
+    level, winner, check = m.scan(bits, better, ipl(m, p, slip), NO_REQUEST, m.get(p.recheck.due))
+    m.post(p.recheck, check)
     return winner, level
 
 
 def waking(m: RuleBuilder, p: ExceptionOperands, bits: Number) -> Number:
-    """The first request among `bits` that ends Idle or Sleep: of priority 1 or more, whatever the CPU priority (isa.md
-    §11); or NOBODY."""
+    """Return the first request among `bits` that ends Idle or Sleep, or NO_REQUEST. Its priority is 1 or more; the CPU
+    priority does not matter (isa.md §11)."""
 
     def first(number: Number, found: Number) -> tuple[Number, ...]:
         return (m.select((found == NO_REQUEST) & (level_of(m, p, number) != 0), number, found),)
@@ -161,15 +165,15 @@ def waking(m: RuleBuilder, p: ExceptionOperands, bits: Number) -> Number:
 
 
 def request_cycle(m: RuleBuilder, p: ExceptionOperands, number: Number) -> Number:
-    """The cycle in which a request was first visible: c of isa.md §14.3."""
-    return m.get(p.first_rise, m.table(p.since, number))
+    """Return the cycle in which a request was first visible: c of isa.md §14.3."""
+    return m.get(p.first_request, m.table(p.since, number))
 
 
 def enter(
     m: BoundaryBuilder, p: ExceptionOperands, level: Number, since: Number, last: Number, vectors: tuple[Number, ...]
 ) -> None:
-    """Push PC, SRL and IPL3, and continue at the handler (isa.md §14.2). `vectors`: its address in the vector table and
-    in the alternate one, and its number."""
+    """Push PC, SRL and IPL3, and continue at the handler (isa.md §14.2). `vectors` holds the addresses of its vector in
+    the vector table and in the alternate one, and its number."""
     ivt, aivt, slot = vectors
     soonest, earliest = since + 4, last + 3
     start = m.select(soonest < earliest, earliest, soonest)
@@ -180,7 +184,7 @@ def enter(
     m.put(p.sr, (m.get(p.sr) & (0xFFFF & ~(IPL_MASK | RA))) | (raised & 7) << _IPL_SHIFT)
     m.put(p.corcon, (m.get(p.corcon) & (0xFFFF & ~IPL3)) | (raised & IPL3))
     m.put(p.pc, m.handler(m.select((m.get(p.intcon2) & ALTIVT) == 0, ivt, aivt)) & PC_MASK)
-    for place, value in ((p.mode, RUN), (p.repeat, NOT_REPEATING), (p.stall, 0), (p.cycle, start)):
-        m.put(place, value)
+    for cell, value in ((p.mode, RUN), (p.repeat, NOT_REPEATING), (p.stall, 0), (p.cycle, start)):
+        m.put(cell, value)
     m.put(p.inttreg, level << 8 | slot)
-    m.put(p.look.deadline, 0)
+    m.put(p.recheck.deadline, 0)

@@ -1,15 +1,15 @@
-"""What ends a run from inside the core: resets the core causes, and debugger words."""
+"""Exceptions that end a run from inside the core: resets that the core causes, and debugger words."""
 
 from __future__ import annotations
 
 from typing import Final
 
 RESTART: Final = "the program went to address 0 without a reset"
-"""Not for the core but for whoever watches it: a null function pointer ends there."""
+"""Message of debuggers, not of the core: a call through a null function pointer ends at address 0."""
 
 
 class DeviceReset(Exception):
-    """The device resets; `cause` is the RCON bit (isa.md §14.6), the text says why. A `fault` is the program's."""
+    """The device resets. `cause` is the RCON bit (isa.md §14.6). `fault` says whether the program is at fault."""
 
     def __init__(self, cause: str, detail: str, fault: bool) -> None:
         super().__init__(detail)
@@ -19,14 +19,14 @@ class DeviceReset(Exception):
 
 
 class IllegalOpcode(DeviceReset):
-    """The word at PC is no instruction (isa.md §4.1)."""
+    """The word at PC is not an instruction (isa.md §4.1)."""
 
     def __init__(self, word: int) -> None:
         super().__init__("IOPUWR", f"illegal opcode {word:06X}", fault=True)
 
 
 class UninitialisedPointer(DeviceReset):
-    """A W register that was never written is used as an address pointer (isa.md §2.2)."""
+    """An instruction uses an uninitialised W register as an address pointer (isa.md §2.2)."""
 
     def __init__(self, number: int) -> None:
         super().__init__("IOPUWR", f"W{number} is used as an address pointer before it was written", fault=True)
@@ -40,7 +40,7 @@ class TrapConflict(DeviceReset):
 
 
 class Violation(Exception):
-    """The instruction at `pc` has done what strict runs do not allow; the text says what."""
+    """The instruction at `pc` violates a rule of strict runs, which the message names."""
 
     def __init__(self, detail: str, pc: int) -> None:
         super().__init__(detail)
@@ -48,4 +48,4 @@ class Violation(Exception):
 
 
 class Breakpoint(Exception):
-    """A debugger word was executed: the run stops behind it (isa.md §4.1)."""
+    """A debugger word was executed; the run stops after it (isa.md §4.1)."""

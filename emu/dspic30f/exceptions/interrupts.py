@@ -1,8 +1,8 @@
-"""Interrupts and traps: what changes which of them is accepted, and the machine side of exceptions.py.
+"""Interrupts and traps: hooks of the registers that decide acceptance, and the machine side of exceptions.py.
 
-What the writing instruction itself changes (IPL, IEC, IPC, DISICNT) counts at the boundary right after it; with
-`ipl_slip` = 1 that boundary still accepts by the IPL and IEC from before the write. UNVERIFIED which silicon does
-(isa.md §14.3). A flag set by software in cycle e is first 1 in e + 1, so one more instruction executes.
+A change by the writing instruction (IPL, IEC, IPC, DISICNT) counts at the boundary right after it. With `ipl_slip` = 1,
+that boundary still accepts by IPL and IEC from before the write. UNVERIFIED which of the two silicon does (isa.md
+§14.3). A flag that software sets in cycle e is first 1 in e + 1, so one more instruction executes.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ from emu.system.rules import Rule, RuleInterpreter
 
 @dataclass(frozen=True, slots=True)
 class Accepted:
-    """An exception that wins at a boundary: the CPU priority it brings, its vector and c of isa.md §14.3."""
+    """An exception that is accepted at a boundary: its CPU priority, its vector, and c of isa.md §14.3."""
 
     level: int
     vector: Vector
@@ -44,7 +44,7 @@ class Accepted:
 
 
 class Exceptions(RuleInterpreter):
-    """Acceptance and entry. One event slot makes the engine look again when time alone can change the answer."""
+    """Acceptance and entry of exceptions. The recheck event covers requests that become acceptable by time alone."""
 
     def __init__(
         self, state: State, events: Events, bus: Bus, data: DataSpace, program: ProgramMemory, traps: Traps, chip: Chip
@@ -59,24 +59,25 @@ class Exceptions(RuleInterpreter):
         self._ram_start: Final = chip.data["ram"].start
         self._inttreg: Final = state.at["INTTREG"]
         self._names: Final = [vector.name for vector in chip.vectors]
-        self._look: Final = events.slot("cpu.look", lambda _due: None)
+        self._recheck: Final = events.slot("cpu.look", lambda _due: None)
         self.on_trap: Callable[[Vector], None] | None = None
-        """Called before a trap is entered: the machine stands where it happened."""
+        """Called before a trap is entered, with the machine in the state of the fault."""
         self.ipl_slip = 0
         self._slip_cycle: Final = state.record.reserve("cpu.slip_cycle", "Q").index
         self._slip_words: Final = state.record.reserve("cpu.slip_words", "H", 1 + FLAG_WORDS).index
-        self.operands: Final = operands_of(state, chip, self._look)
+        self.operands: Final = operands_of(state, chip, self._recheck)
         self._words: Final = [(flags.index, enables.index) for flags, enables in self.operands.words]
         self._vectors: Final = {vector.slot: vector for vector in chip.vectors}
         self._hook(bus)
-        events.set_rule(self._look, Rule(self.operands.look, fires=lambda m, look: m.put(look.deadline, 0)), self.fire)
+        recheck = Rule(self.operands.recheck, fires=lambda m, slot: m.put(slot.deadline, 0))
+        events.set_rule(self._recheck, recheck, self.fire)
 
     def _hook(self, bus: Bus) -> None:
-        """Hear of every write that can change the answer of `acceptable`."""
-        rises, priorities = iter(self.operands.since), iter(self.operands.priority)
+        """Hook all registers whose writes can change the result of `acceptable`."""
+        indices, priorities = iter(self.operands.since), iter(self.operands.priority)
         for flags, enables in self._words:
             bus.modelled[flags] = bus.modelled[enables] = True
-            bus.on_write[flags] = partial(self._flags_written, [next(rises) for _ in range(16)])
+            bus.on_write[flags] = partial(self._flags_written, [next(indices) for _ in range(16)])
             bus.on_write[enables] = partial(self._enables_written, enables)
         for priority in priorities:
             if priority:
@@ -108,16 +109,16 @@ class Exceptions(RuleInterpreter):
         stored = self._state.intcon2 & ~0x4000
         return stored | 0x4000 if self._state.disi_end > self._events.now else stored
 
-    def _flags_written(self, rises: list[int], old: int, new: int, _lanes: int) -> None:
-        """Flags set by software are first 1 in the next cycle."""
+    def _flags_written(self, since: list[int], old: int, new: int, _lanes: int) -> None:
+        """Record the cycle of flags that software sets: they are first 1 in the next cycle."""
         set_now = new & ~old
-        for bit, place in enumerate(rises):
+        for bit, index in enumerate(since):
             if set_now >> bit & 1:
-                self._u64[self.operands.first_rise.index + place] = self._events.now + 1
+                self._u64[self.operands.first_request.index + index] = self._events.now + 1
         self._events.kick()
 
     def _remember(self, word: int, old: int) -> None:
-        """For `ipl_slip`: SR and the enables as they were before the first write of this cycle."""
+        """Save SR and the enables from before the first write of this cycle, for `ipl_slip`."""
         if self.ipl_slip:
             now = self._events.now
             if self._u64[self._slip_cycle] != now + 1:
@@ -127,13 +128,13 @@ class Exceptions(RuleInterpreter):
         self._events.kick()
 
     def forget(self) -> None:
-        """Nothing is awaited any more: after a reset, or because the engine looks at the next boundary anyway."""
-        self._events.cancel(self._look)
+        """Cancel the recheck event, after a reset or because the next boundary checks in any case."""
+        self._events.cancel(self._recheck)
 
     def acceptable(self, last: int) -> Accepted | None:
-        """The exception to enter at the boundary after cycle `last`, None if there is none.
+        """Return the exception to enter at the boundary after cycle `last`, or None.
 
-        Requests that time alone makes acceptable later are noted: the engine will look again then.
+        A request that becomes acceptable later by time alone posts the recheck event.
         """
         pending = self._state.intcon1 & self.traps.flags
         slip = last + 1 if self.ipl_slip else None
@@ -144,7 +145,7 @@ class Exceptions(RuleInterpreter):
                     return Accepted(trap.vector.level, trap.vector, self._u64[trap.since])
         u16 = self._u16
         if slip is None and not any(u16[flags] & u16[enables] for flags, enables in self._words):
-            return None  # most often, and told more quickly
+            return None  # the most frequent case
         bits = requested(self, self.operands, slip)
         number, level = accepted(self, self.operands, bits, last, slip)
         if number == NO_REQUEST:
@@ -154,13 +155,13 @@ class Exceptions(RuleInterpreter):
     def _visible(self, since: int, last: int) -> bool:
         if self._u64[since] <= last:
             return True
-        if self._u64[since] < self._events.due(self._look):
-            self._events.set(self._look, self._u64[since])
+        if self._u64[since] < self._events.due(self._recheck):
+            self._events.set(self._recheck, self._u64[since])
         return False
 
     def waking(self) -> int | None:
-        """Cycle of a request that ends Idle or Sleep, None if there is none: a trap, or an enabled interrupt of
-        priority 1 or more, whatever the CPU priority (isa.md §11)."""
+        """Return the cycle of a request that ends Idle or Sleep, None if there is none. Such a request is a trap, or an
+        enabled interrupt of priority 1 or more; the CPU priority does not matter (isa.md §11)."""
         for trap in self.traps.all:
             if self._state.intcon1 & trap.flag:
                 return self._u64[trap.since]
@@ -168,19 +169,19 @@ class Exceptions(RuleInterpreter):
         return None if number == NO_REQUEST else request_cycle(self, self.operands, number)
 
     def armed(self) -> bool:
-        """Whether any interrupt of priority 1 or more is enabled."""
+        """Return whether any interrupt of priority 1 or more is enabled."""
         bits = sum(self.get(enables) << 16 * number for number, (_flags, enables) in enumerate(self.operands.words))
         return bool(waking(self, self.operands, bits & self.operands.implemented) != NO_REQUEST)
 
     def enter(self, chosen: Accepted, last: int) -> None:
-        """Continue at the handler."""
+        """Enter the handler of an accepted exception."""
         vector = chosen.vector
         if chosen.level > UNMASKABLE and self.on_trap is not None:
             self.on_trap(vector)
         enter(self, self.operands, chosen.level, chosen.since, last, (vector.ivt, vector.aivt, vector.slot))
 
     def latest(self) -> str:
-        """The exception entered last, as INTTREG and the stack tell it, for messages; empty if there was none."""
+        """Return the exception entered last, read from INTTREG and the stack, for messages; empty if there was none."""
         slot, top = self._u16[self._inttreg] & 0x3F, self._u16[STACK_POINTER]
         if not slot or slot >= len(self._names) or self._data.faulty(top - 4 & 0xFFFF, 2):
             return ""
@@ -188,7 +189,8 @@ class Exceptions(RuleInterpreter):
         return f"{self._names[slot]} at {(high & 0x7F) << 16 | low:06X}"
 
     def push(self, low: int, high: int, cycle: int) -> None:
-        """Two words at [W15++], in `cycle` and the next, with the checks of every stack access (isa.md §10)."""
+        """Push two words at [W15++], in `cycle` and the next one, with the checks of every stack access (isa.md
+        §10)."""
         for later, value in enumerate((low, high)):
             ea = self._u16[STACK_POINTER]
             self._events.arrive(cycle + later)
@@ -201,9 +203,9 @@ class Exceptions(RuleInterpreter):
             self._state.set_w(STACK_POINTER, ea + 2)
 
     def handler(self, vector: int) -> int:
-        """The program word of a vector."""
+        """Return the program word of a vector."""
         return self._program.word(vector)
 
     def beyond_stack(self, ea: int) -> bool:
-        """Whether a W15 address is out of bounds (isa.md §10.1, §10.2)."""
+        """Return whether a W15 address is out of bounds (isa.md §10.1, §10.2)."""
         return ea < self._ram_start or (bool(self._state.limit_armed) and ea > self._state.splim)

@@ -1,4 +1,4 @@
-"""Idle and Sleep: how time passes while the CPU stands, and what ends that (isa.md §11)."""
+"""Idle and Sleep: how time passes while the CPU is stopped, and what wakes it (isa.md §11)."""
 
 from __future__ import annotations
 
@@ -14,11 +14,12 @@ from emu.system.rules import Rule
 
 NO_RULE: Final = Rule(None)
 DRAIN_CYCLES: Final = 1_000_000
-"""Tcy for which devices still run when the CPU sleeps with nothing enabled that could wake it: transmitters drain."""
+"""Cycles for which devices run on after the CPU stops with no enabled wake-up source, so that transmitters drain."""
 
 
 class Sleeping(Enum):
-    """How letting time pass has ended: the CPU runs, the limit was reached, or nothing will ever wake the CPU."""
+    """Result of `PowerSaving.pass_time`. ENDED: the CPU runs. GOES_ON: the CPU still sleeps at the limit. FOR_EVER: no
+    source can wake the CPU."""
 
     ENDED = auto()
     GOES_ON = auto()
@@ -27,24 +28,24 @@ class Sleeping(Enum):
 
 @dataclass(slots=True)
 class PowerSignals:
-    """Lines from the core to whoever wired it."""
+    """Signals between the core and the rest of the machine; the machine connects them."""
 
     clear_watchdog: Callable[[], None] = lambda: None
     power: Callable[[int, int], None] = lambda mode, cycle: None
     """power(mode, cycle): the CPU stops (IDLE, SLEEP) or runs again (RUN) from `cycle`."""
     idle_rule: Rule = NO_RULE
     clrwdt_rule: Rule = NO_RULE
-    """What PWRSAV #1 and CLRWDT do in the common case, as text for every engine."""
+    """Rule of CLRWDT. `idle_rule` is the rule of PWRSAV #1."""
     can_wake: Callable[[], bool] = lambda: False
-    """Whether something other than an interrupt or trap can wake a sleeping CPU (the watchdog)."""
+    """Whether the watchdog can wake a sleeping CPU."""
     restart: Callable[[], int] = lambda: 0
-    """Tcy the oscillator needs to start after Sleep."""
+    """Start-up time of the oscillator after Sleep, in Tcy."""
     interrupted: Callable[[], bool] = lambda: False
-    """Somebody wants the run to end now, even if the CPU sleeps."""
+    """Whether the run must end now, even if the CPU sleeps."""
 
 
 class PowerSaving:
-    """PWRSAV and what follows."""
+    """Idle and Sleep of one CPU."""
 
     def __init__(self, state: State, events: Events, exceptions: Exceptions) -> None:
         self._state: Final = state
@@ -54,7 +55,7 @@ class PowerSaving:
         self.signals: Final = PowerSignals()
 
     def stop(self, mode: int, cycle: int) -> None:
-        """PWRSAV executed in `cycle`; `mode` is IDLE or SLEEP."""
+        """Stop the CPU: PWRSAV has executed in `cycle`. `mode` is IDLE or SLEEP."""
         self._events.arrive(cycle)
         self._state.mode = mode
         self._state.record.u64[self._slept] = cycle
@@ -62,7 +63,7 @@ class PowerSaving:
         self._events.kick()
 
     def wake(self) -> None:
-        """Leave Idle, or Sleep once the oscillator runs: execution goes on."""
+        """Leave Idle, or Sleep after the oscillator has started, and continue execution."""
         if self._state.mode != RUN:
             if self._state.mode == SLEEP:
                 self._state.cycle += self.signals.restart()
@@ -71,7 +72,7 @@ class PowerSaving:
             self._events.kick()
 
     def pass_time(self, limit: int) -> Sleeping:
-        """Let time pass until something wakes the CPU, at most to `limit`.
+        """Let time pass until a request wakes the CPU, at most to `limit`.
 
         The cycle in which the waking flag is first 1 counts as that of an instruction: UNVERIFIED.
         """
@@ -99,5 +100,5 @@ class PowerSaving:
             state.cycle = max(state.cycle, due)
 
     def _is_final(self) -> bool:
-        """Nothing is enabled that could wake the CPU, whatever the devices still do."""
+        """Return whether no enabled source can wake the CPU any more."""
         return not self._exceptions.armed() and not self.signals.can_wake()

@@ -1,6 +1,6 @@
-"""Trap requests: flags of INTCON1, the cycle each rose in, and the trap conflict (isa.md §14.4).
+"""Trap requests: flags of INTCON1, the cycle of each request, and the trap conflict (isa.md §14.4).
 
-A request is data: the flag stays until software clears it, and acceptance is decided with the interrupts.
+A request is data: the flag stays set until software clears it. Acceptance is decided together with the interrupts.
 """
 
 from __future__ import annotations
@@ -14,12 +14,12 @@ from emu.dspic30f.state.state import OA, OB, State
 from emu.system.events import Events
 
 HARD_LEVEL: Final = 13
-"""Traps of this level and above are hard: nothing runs between the faulting instruction and the handler."""
+"""Lowest level of hard traps: no instruction runs between the faulting instruction and their handler."""
 
 
 @dataclass(frozen=True, slots=True)
 class Trap:
-    """One trap: its flag in INTCON1, its vector, and where the cycle of its request is kept."""
+    """One trap: its flag in INTCON1, its vector, and the index of the cycle of its request."""
 
     flag: int
     vector: Vector
@@ -27,7 +27,7 @@ class Trap:
 
 
 class Traps:
-    """The four traps of the core, highest level first in `all`."""
+    """The four traps of the core. `all` lists them from the highest level down."""
 
     def __init__(self, state: State, events: Events, chip: Chip) -> None:
         self._state: Final = state
@@ -65,14 +65,15 @@ class Traps:
         self._events.kick()
 
     def request_flag(self, flag: str) -> None:
-        """A device requests the trap whose INTCON1 flag has this name; visible as `Irq.request` says.
+        """Request the trap whose INTCON1 flag has this name, for a device. It is visible as `Irq.request` describes.
 
         Raises TrapConflict, KeyError for an unknown flag.
         """
         self.request(self._by_flag[flag], self._events.now + (not self._events.firing))
 
     def written(self, old: int, new: int) -> None:
-        """Software wrote INTCON1: flags it set are requests; an accumulator overflow that lasts asks again."""
+        """Handle a write of INTCON1: flags that it sets are requests, and a lasting accumulator overflow requests
+        again."""
         for enable, overflow in self._overflow:
             if new & enable and self._state.sr & overflow:
                 new |= self.math.flag

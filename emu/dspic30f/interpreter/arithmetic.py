@@ -1,10 +1,10 @@
-"""Integer operations that Python's operators do not give, for the builders that compute on Python ints."""
+"""Integer operations that Python's operators lack, for the interpreter and the folding of constants."""
 
 from __future__ import annotations
 
 
 def div_trunc(a: int, b: int) -> int:
-    """Quotient towards zero, 0 for b = 0."""
+    """Return the quotient rounded towards zero, 0 for b = 0."""
     if b == 0:
         return 0
     quotient = abs(a) // abs(b)
@@ -12,15 +12,15 @@ def div_trunc(a: int, b: int) -> int:
 
 
 def rem_trunc(a: int, b: int) -> int:
-    """Remainder with the sign of a, 0 for b = 0."""
+    """Return the remainder, which has the sign of a; 0 for b = 0."""
     return 0 if b == 0 else a - div_trunc(a, b) * b
 
 
 def clz16(v: int) -> int:
-    """Leading zeros of a 16-bit value, 16 for 0."""
+    """Return the number of leading zeros of a 16-bit value, 16 for 0."""
     return 16 - int(v).bit_length()
 
 
 def ctz16(v: int) -> int:
-    """Trailing zeros of a 16-bit value, 16 for 0."""
+    """Return the number of trailing zeros of a 16-bit value, 16 for 0."""
     return (v & -v).bit_length() - 1 if v else 16

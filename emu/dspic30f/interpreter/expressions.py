@@ -1,7 +1,8 @@
-"""Integer expressions as Python source text, with the interval they lie in.
+"""Integer expressions as Python source text, each with the interval of its values.
 
-Rows compute with plain operators, so an `Expr` overloads them. Python ints stay ints: what is known when the text is
-written is folded. The interval removes masks that change nothing. Operands are atoms or parenthesised text.
+Flow rules compute with plain operators, which `Expr` overloads. Values that are known when the text is written stay
+Python ints and are folded. The interval allows masks to be dropped that have no effect. Operands are atoms or
+parenthesised text.
 """
 
 from __future__ import annotations
@@ -9,13 +10,13 @@ from __future__ import annotations
 from typing import Any, Final, TypeAlias
 
 LIMIT: Final = 1 << 62
-"""Rows stay below this magnitude (engine contract); wider intervals are cut to it."""
+"""Bound of the magnitude of all values (engine contract); wider intervals are cut to it."""
 
 Number: TypeAlias = "Expr | int"
 
 
 class Expr:
-    """Source text of an int in `low`..`high`. `atom`: the text is a name or a literal."""
+    """Source text of an int in `low`..`high`. `atom` says that the text is a name or a literal."""
 
     __slots__ = ("atom", "high", "low", "text")
 
@@ -138,16 +139,16 @@ class Expr:
     __hash__ = None  # type: ignore[assignment]
 
     def __bool__(self) -> bool:
-        raise TypeError(f"a row decides on a value that is not static: {self.text}")
+        raise TypeError(f"a rule branches on a value that is not static: {self.text}")
 
 
 def interval(value: Number) -> tuple[int, int]:
-    """Smallest and largest value."""
+    """Return the smallest and the largest value."""
     return (value.low, value.high) if isinstance(value, Expr) else (int(value), int(value))
 
 
 def choose(condition: Number, yes: Number, no: Number) -> Number:
-    """`yes` if `condition`, else `no`."""
+    """Return the expression `yes` if `condition` else `no`."""
     if not isinstance(condition, Expr):
         return yes if condition else no
     bounds = (*interval(yes), *interval(no))

@@ -1,9 +1,9 @@
-"""The plain interpreter's builder: rows run directly on Python ints and the state record.
+"""The builder of the interpreter: rows run directly on Python ints and the state record.
 
-Slow and obviously right: the yardstick for the specialised interpreter and for native code. One `Interpreter` serves
-one CPU; the sequencer prepares it for each instruction with `begin` and lets the stores happen with `commit`.
-Stores are kept back until the row is done, because an address error anywhere inhibits all of them (isa.md §14.4), and
-because a data write wins over what the same instruction does to the register (isa.md §2.2, §2.3).
+It is slow and simple, the reference for native code. One `Interpreter` serves one CPU. The sequencer prepares it for
+each instruction with `begin` and commits the stores with `commit`. Stores are deferred until the row is done, because
+an address error inhibits all of them (isa.md §14.4), and because a data write overrides what the same instruction does
+to the register (isa.md §2.2, §2.3).
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ from emu.system.program import ProgramMemory
 
 ACC_SIGN: Final = 1 << 39
 OVERFLOW_FLAGS: Final = frozenset(("OA", "OB", "SA", "SB"))
-"""Flags that OAB and SAB follow."""
+"""Flags that determine OAB and SAB."""
 
 
 class Interpreter:
-    """The builder on ints; see isa/builder.py for what each method means."""
+    """The builder on ints; isa/builder.py defines its methods."""
 
     def __init__(
         self, state: State, events: Events, data: DataSpace, program: ProgramMemory, exceptions: Exceptions
@@ -46,15 +46,15 @@ class Interpreter:
         self.context = Context()
         self.pc = 0
         self.last = 0
-        """Last cycle of the instruction as far as known: PSV reads move it."""
+        """Last cycle of the instruction; a PSV read moves it."""
         self.window = False
-        """The instruction has read the PSV window."""
+        """Whether the instruction has read the PSV window."""
         self.faulted = False
-        """The instruction has made an address error."""
+        """Whether the instruction has made an address error."""
         self.math = False
-        """The instruction asks for a math error trap."""
+        """Whether the instruction requests a math error trap."""
         self.stack_error = False
-        """The instruction has used a W15 address out of bounds."""
+        """Whether the instruction has used a W15 address out of bounds."""
         self._window_extra = 0
         self._loads_ahead = 0
         self._stores: list[tuple[int, int, Size]] = []
@@ -72,7 +72,7 @@ class Interpreter:
         self._state.stall = 0
 
     def commit(self) -> None:
-        """Let the stores happen, unless one of them or a load was an address error. Raises TrapConflict."""
+        """Make the stores, unless a store or a load is an address error. Raises TrapConflict."""
         data = self._data
         if not self.faulted and any(data.faulty(ea, size) for ea, _value, size in self._stores):
             self.faulted = True
@@ -87,7 +87,8 @@ class Interpreter:
             self._exceptions.traps.request(self._exceptions.traps.address, self.last)
 
     def request_soft_traps(self, last: int) -> None:
-        """Request what the instruction that ended in cycle `last` asks for: visible one cycle later (isa.md §14.4)."""
+        """Request the soft traps of the instruction that ended in cycle `last`; visible one cycle later (isa.md
+        §14.4)."""
         traps = self._exceptions.traps
         if self.stack_error:
             traps.request(traps.stack, last + 1)

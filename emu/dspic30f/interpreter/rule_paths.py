@@ -1,7 +1,7 @@
-"""Code written from rules that have an `if` (flowrules.py): a rule is read once for each way through it.
+"""Code generation from flow rules with branches (flow_rules.py): a rule is evaluated once for each path through it.
 
-At a condition that is only known when the code runs the reading is given up; both branches are opened, and in each the
-rule is read anew up to the next such condition. What a rule puts is written at the end of a way.
+At a condition that is known only at run time, the evaluation stops and both branches are opened. In each branch the
+rule is evaluated again, up to the next such condition. The values that a rule puts are written at the end of a path.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ from emu.system.rules import Cell
 R = TypeVar("R")
 
 
-class _Parts(Exception):
-    """Ways part here."""
+class _Fork(Exception):
+    """The path forks at a condition that is known only at run time."""
 
     def __init__(self, condition: Any) -> None:
         super().__init__()
@@ -28,118 +28,113 @@ class _Parts(Exception):
 
 
 class RulePaths(ABC):
-    """Reads rules way by way; subclasses write the code. `known`: what stands at places already."""
+    """Evaluates a rule path by path; subclasses emit the code. `known` holds cells whose values are known already."""
 
     def __init__(self, known: Mapping[Cell, Any]) -> None:
         self._known: dict[Cell, Any] = dict(known)
         self._puts: Final[dict[Cell, Any]] = {}
-        self._turns: Iterator[bool] = iter(())
+        self._decisions: Iterator[bool] = iter(())
 
-    def each(self, rule: Callable[[Any], R], end: Callable[[R], None], turns: tuple[bool, ...] = ()) -> None:
-        """Write `rule(reader)`; end(what it returned) writes what follows on each way."""
+    def each(self, rule: Callable[[Any], R], end: Callable[[R], None], decisions: tuple[bool, ...] = ()) -> None:
+        """Emit `rule(self)` for each path. `end(result)` emits the code that follows on that path."""
         self._puts.clear()
-        self._turns = iter(turns)
+        self._decisions = iter(decisions)
         try:
             result = rule(self)
-        except _Parts as parts:
+        except _Fork as fork:
             known = self._known
-            for turn in self.branches(parts.condition):
+            for decision in self.branches(fork.condition):
                 self._known = dict(known)
-                self.each(rule, end, (*turns, turn))
+                self.each(rule, end, (*decisions, decision))
             return
-        for place, value in self._puts.items():
-            self.store(place, value)
+        for cell, value in self._puts.items():
+            self.store(cell, value)
         end(result)
 
     def all(self, rule: Callable[[Any], object]) -> None:
-        """Write a rule that has no ways."""
+        """Emit a rule without branches."""
         self.each(rule, lambda _result: None)
 
-    def get(self, place: Cell) -> Any:
-        """Loaded once on each way."""
-        if place not in self._known:
-            self._known[place] = self.load(place)
-        return self._known[place]
+    def get(self, cell: Cell) -> Any:
+        """Return the value of a cell, which is loaded once on each path."""
+        if cell not in self._known:
+            self._known[cell] = self.load(cell)
+        return self._known[cell]
 
-    def put(self, place: Cell, value: Any) -> None:
-        """At the end of the way."""
-        self._puts[place] = value
+    def put(self, cell: Cell, value: Any) -> None:
+        """Store a value at the end of the path."""
+        self._puts[cell] = value
 
     def is_true(self, condition: Any) -> bool:
-        """Which way this is."""
+        """Return the decision of the current path at this condition."""
         if isinstance(condition, int):
             return bool(condition)
-        for turn in self._turns:
-            return turn
-        raise _Parts(condition)
+        for decision in self._decisions:
+            return decision
+        raise _Fork(condition)
 
     @abstractmethod
-    def load(self, place: Cell) -> Any:
-        """The number at a place."""
+    def load(self, cell: Cell) -> Any:
+        """Emit a load of a cell."""
 
     @abstractmethod
-    def store(self, place: Cell, value: Any) -> None:
-        """Write it."""
+    def store(self, cell: Cell, value: Any) -> None:
+        """Emit a store to a cell."""
 
     @abstractmethod
     def branches(self, condition: Any) -> Iterator[bool]:
-        """Open the branch for True, then that for False."""
+        """Open the branch for True, then the branch for False."""
 
 
 class PythonRulePaths(RulePaths):
-    """Writes Python on the record's views `u16`, `u64`, ... `emit` takes a line."""
+    """Emits Python statements on the record's views `u16`, `u64`, ... `emit` takes a line."""
 
-    def __init__(
-        self, emit: Callable[[str], None], known: Mapping[Cell, Number], kept: tuple[Cell, Expr] | None = None
-    ) -> None:
-        """`kept`: a name that holds what a place does, before and behind the rule."""
-        super().__init__(known if kept is None else {**known, kept[0]: kept[1]})
+    def __init__(self, emit: Callable[[str], None]) -> None:
+        super().__init__({})
         self._emit: Final = emit
-        self._kept: Final = kept
         self._indent = ""
 
     def line(self, text: str) -> None:
-        """One statement on the present way."""
+        """Emit one statement on the current path."""
         self._emit(self._indent + text)
 
-    def load(self, place: Cell) -> Expr:
-        """Under a name of its own."""
-        name = f"p{place.offset:x}"
-        self.line(f"{name} = u{place.bits}[{place.index}]")
-        return Expr(name, 0, (1 << place.bits) - 1, atom=True)
+    def load(self, cell: Cell) -> Expr:
+        """Emit a load into a variable."""
+        name = f"p{cell.offset:x}"
+        self.line(f"{name} = u{cell.bits}[{cell.index}]")
+        return Expr(name, 0, (1 << cell.bits) - 1, atom=True)
 
-    def store(self, place: Cell, value: Number) -> None:
-        """An assignment."""
-        name = f"{self._kept[1]} = " if self._kept is not None and self._kept[0] == place else ""
-        self.line(f"{name}u{place.bits}[{place.index}] = {value & (1 << place.bits) - 1}")
+    def store(self, cell: Cell, value: Number) -> None:
+        """Emit an assignment."""
+        self.line(f"u{cell.bits}[{cell.index}] = {value & (1 << cell.bits) - 1}")
 
     def select(self, condition: Number, a: Number, b: Number) -> Number:
-        """Choice."""
+        """Return a conditional expression."""
         return choose(condition, a, b)
 
     def branches(self, condition: Number) -> Iterator[bool]:
-        """if and else."""
+        """Emit `if` and `else`."""
         outer = self._indent
-        for head, turn in ((f"if {condition}:", True), ("else:", False)):
+        for head, decision in ((f"if {condition}:", True), ("else:", False)):
             self._indent = outer
             self.line(head)
             self._indent = outer + "    "
-            yield turn
+            yield decision
         self._indent = outer
 
 
 @lru_cache(maxsize=4096)
 def compiled(text: str) -> CodeType:
-    """The code of one function's text, shared by all machines of the process."""
-    return compile(text, "<specialised>", "exec")
+    """Return the compiled text of a function; all machines of the process share it."""
+    return compile(text, "<flow rule>", "exec")
 
 
 def function_of(record: Record, rule: Callable[..., R], operands: Any, *parameters: str) -> Callable[..., R]:
-    """rule(reader, places, *parameters) as a Python function of its parameters, ints from 0 on, on `record`."""
+    """Return rule(builder, operands, *parameters) as a Python function of its parameters, which are ints >= 0."""
     views = {"u16": record.u16, "u64": record.u64}
     lines = [f"def run({', '.join(parameters + tuple(f'{name}={name}' for name in views))}):"]
     values = [Expr(name, 0, LIMIT, atom=True) for name in parameters]
-    ways = PythonRulePaths(lambda line: lines.append("    " + line), {})
+    ways = PythonRulePaths(lambda line: lines.append("    " + line))
     ways.each(lambda m: rule(m, operands, *values), lambda result: ways.line(f"return {result}"))
     namespace: dict[str, Any] = dict(views)
     exec(compiled("\n".join(lines)), namespace)

@@ -1,21 +1,22 @@
-"""The rules of order and time of the dsPIC30F core, once. Every engine behaves as this module says.
+"""The sequencer: the rules of order and time of the dsPIC30F core. Every engine behaves as this module defines.
 
 Time. An instruction that starts in cycle s occupies s..e: a RAW stall first (isa.md §13.2), then its base cycles
-(§13.1), then PSV cycles (§13.3); a taken branch or a skip adds cycles behind its data access. Data accesses fall in e
-(of two, the first in e - 1); devices are brought up to the cycle of an access before it is made, and a write in cycle t
+(§13.1), then PSV cycles (§13.3). A taken branch or a skip adds cycles after its data access. Data accesses fall in e
+(of two, the first in e - 1). Devices are advanced to the cycle of an access before it is made. A write in cycle t
 affects them from t + 1 (engines.md §4.2; UNVERIFIED on silicon).
 
-Boundaries. Between two instructions, after last cycle e, the engine looks if something is due by e or somebody kicked
-(`Events.deadline` <= e): events fire, then an acceptable exception is entered, handler first in max(c + 4, e + 3)
-(isa.md §14.3, interrupts.py). Entering one is itself followed by a boundary, so a higher one can win at once.
-RETURN, RETLW and RETFIE look one cycle early: they take 2 cycles instead of 3 if an exception is acceptable then.
+Boundaries. Between two instructions, after last cycle e, the engine handles the boundary if an event is due by e or
+`kick` was called (`Events.deadline` <= e). Events fire, then an acceptable exception is entered, with its handler
+starting in max(c + 4, e + 3) (isa.md §14.3, interrupts.py). The entry is followed by another boundary, so an exception
+of higher priority can be entered at once. RETURN, RETLW and RETFIE check one cycle early: they take 2 cycles instead of
+3 if an exception is acceptable then.
 
-Within REPEAT the target stays at PC; every iteration is followed by a boundary. RA is 0 during the last iteration
-(isa.md §7.5, UNVERIFIED). At the end of the instruction at DOEND, if it falls through, the loop goes on or ends (§7.6).
-What REPEAT, DO, RETFIE and DISI do to registers, and what skips and stalls cost, is the text of flowrules.py. A flow
-change out of a REPEAT target or out of the last instruction of a DO loop simply happens (undefined on silicon).
+Loops. Within REPEAT, PC stays at the target, and every iteration is followed by a boundary. RA is 0 during the last
+iteration (isa.md §7.5, UNVERIFIED). If the instruction at DOEND falls through, the loop continues or ends (§7.6). The
+rules in flow_rules.py define what REPEAT, DO, RETFIE and DISI do to registers, and the cost of skips and stalls. A flow
+change out of a REPEAT target or out of the last instruction of a DO loop is executed (undefined on silicon).
 
-Faults. An address error inhibits the stores of its instruction, which otherwise completes; stack and math errors are
+Faults. An address error inhibits the stores of its instruction, which otherwise completes. Stack and math errors are
 visible from e + 1, hard traps from e. An illegal opcode, an uninitialised pointer and a trap conflict reset the device.
 """
 
@@ -55,7 +56,7 @@ from emu.system.program import ProgramMemory
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """An instruction as the sequencer needs it, by address."""
+    """A decoded instruction, its facts and the address after it."""
 
     insn: Insn
     facts: Facts
@@ -63,7 +64,7 @@ class Step:
 
 
 class Sequencer:
-    """Fetches, decodes and runs instructions one at a time; the plain engine, and the last resort of the others."""
+    """Fetches, decodes and runs instructions one at a time: the plain engine, and the fallback of native code."""
 
     def __init__(
         self,
@@ -91,19 +92,19 @@ class Sequencer:
         self._disi: Final = function_of(record, flow_rules.disi, operands, "count", "after")
 
     def _forget(self, start: int, end: int) -> None:
-        """Flash words in [start, end) changed."""
+        """Discard decoded instructions: flash words in [start, end) have changed."""
         for pc in [pc for pc in self._steps if start - 2 <= pc < end]:
             del self._steps[pc]
 
     def hold_until(self, cycle: int) -> None:
-        """Let no instruction start before `cycle`: flash is being programmed (dspic30f6014a.md §16)."""
+        """Stall the CPU until `cycle`, while flash is programmed (dspic30f6014a.md §16)."""
         self.state.record.u64[self._hold] = cycle
         self.events.kick()
 
     # Boundaries
 
     def boundary(self, limit: int) -> bool:
-        """Do what is to be done between two instructions. False: the CPU sleeps and nothing will ever wake it.
+        """Handle the boundary between two instructions. Return False if the CPU sleeps and no source can wake it.
 
         While the CPU sleeps, time passes up to `limit`.
         """
@@ -130,7 +131,7 @@ class Sequencer:
     # Instructions
 
     def fetch(self, pc: int) -> Step:
-        """The instruction at `pc`. Raises IllegalOpcode, or Breakpoint if it is a debugger word."""
+        """Return the instruction at `pc`. Raises IllegalOpcode, or Breakpoint if it is a debugger word."""
         step = self._steps.get(pc)
         if step is None:
             word1 = self.program.word(pc)
@@ -145,7 +146,7 @@ class Sequencer:
     def execute(self) -> None:
         """Run the instruction at PC, from its stall to its last cycle.
 
-        Raises DeviceReset (PC still at the culprit) and Breakpoint (PC and cycle behind the word).
+        Raises DeviceReset, with PC at the faulting instruction, and Breakpoint, with PC and cycle after the word.
         """
         state = self.state
         pc = state.pc
@@ -183,10 +184,10 @@ class Sequencer:
         state.cycle = last + 1
 
     def _fetch_error(self) -> None:
-        """PC points where no instruction may be fetched: a hard trap at this boundary (isa.md §14.4, causes 4, 5).
+        """Request a hard trap at this boundary: no instruction can be fetched at PC (isa.md §14.4, causes 4 and 5).
 
-        UNVERIFIED: with an equal or higher trap in progress the device resets, as it could not go on. No boundary comes
-        before cycle 0: a fetch that fails there takes it.
+        UNVERIFIED: with a trap of an equal or higher level in progress, the device resets. No boundary precedes cycle
+        0, so a fetch error in cycle 0 counts from cycle 1.
         """
         state = self.state
         state.cycle = max(state.cycle, 1)
@@ -200,7 +201,7 @@ class Sequencer:
     # Flow
 
     def _follow(self, flow: Flow, pc: int, last: int) -> int:
-        """Change PC and the loop registers as a row asks; returns the last cycle of the instruction."""
+        """Apply the flow of a row to PC and the loop registers. Return the last cycle of the instruction."""
         state = self.state
         match flow:
             case Branch(cond, target):
@@ -233,7 +234,7 @@ class Sequencer:
         return last
 
     def _skip(self) -> int:
-        """Step over the next instruction."""
+        """Skip the next instruction. Return the additional cycles."""
         pc = self.state.pc
         insn = decode_for_execution(self.program.word(pc), self.program.word(pc + 2 & PC_MASK))
         words = flow_rules.words_skipped(insn)
@@ -241,7 +242,8 @@ class Sequencer:
         return words
 
     def _return(self, flow: Return, second: int) -> int:
-        """RETURN, RETLW, RETFIE, whose second cycle is `second`: ends there if an exception can be entered."""
+        """Execute RETURN, RETLW or RETFIE. Return its last cycle: `second` if an exception can be entered then, else
+        the next one."""
         if flow.kind == "retfie":
             self._resume(flow.srl, flow.ipl3)
             self.events.kick()
@@ -249,12 +251,12 @@ class Sequencer:
         return second if self._exception_at(second) else second + 1
 
     def after_retfie(self) -> None:
-        """A RETFIE was run elsewhere up to its second cycle: add the third unless an exception is entered instead."""
+        """Complete a RETFIE that native code has run for two cycles: add the third unless an exception is entered."""
         if not self._exception_at(self.state.cycle - 1):
             self.state.cycle += 1
 
     def _exception_at(self, last: int) -> bool:
-        """Whether an exception could be entered after cycle `last`; if so the boundary there will look."""
+        """Return whether an exception can be entered after cycle `last`. If so, the boundary there will check again."""
         if self.events.deadline > last:
             return False
         self.events.settle(last)
@@ -264,7 +266,7 @@ class Sequencer:
         return True
 
     def _after_target(self, step: Step, flow: Flow, pc: int, last: int) -> int:
-        """Count an iteration of a REPEAT target; returns its last cycle, which PSV may move (isa.md §13.3)."""
+        """Count an iteration of a REPEAT target. Return its last cycle, which a PSV read may move (isa.md §13.3)."""
         state = self.state
         if isinstance(flow, Repeat | Return) or state.pc != step.next_pc:
             return last

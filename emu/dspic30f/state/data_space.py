@@ -1,8 +1,7 @@
-"""Data space as an instruction sees it: W registers, SFRs, RAM and the PSV window (isa.md §1.2, §7.8).
+"""Data space of an instruction: W registers, SFRs, RAM and the PSV window (isa.md §1.2, §7.8).
 
-Reads and writes here are complete and never refuse: whether an access is an address error is asked first, with
-`faulty`, because a faulting instruction writes nothing (isa.md §14.4). The caller has brought the devices to the
-cycle of the access (`Events.arrive`).
+Reads and writes never refuse. The caller first checks for an address error with `faulty`, because a faulting
+instruction writes nothing (isa.md §14.4), and advances the devices to the cycle of the access (`Events.arrive`).
 """
 
 from __future__ import annotations
@@ -15,13 +14,13 @@ from emu.system.bus import Bus
 from emu.system.program import ProgramMemory
 
 W_END: Final = 0x20
-"""First data address behind the memory-mapped W registers (isa.md §1.2)."""
+"""First data address after the memory-mapped W registers (isa.md §1.2)."""
 WINDOW: Final = 0x8000
 """First address of the PSV window (isa.md §7.8)."""
 
 
 class DataSpace:
-    """The 64 KB of data addresses of one CPU."""
+    """Data space of one CPU: 64 KB of addresses."""
 
     def __init__(self, state: State, bus: Bus, program: ProgramMemory, chip: Chip) -> None:
         self._state: Final = state
@@ -36,17 +35,17 @@ class DataSpace:
         self._y: Final = chip.data["yram"]
 
     def in_window(self, ea: int) -> bool:
-        """Whether a read at `ea` comes from program memory."""
+        """Return whether a read at `ea` comes from program memory."""
         return ea >= WINDOW and bool(self._u16[self._corcon] & PSV)
 
     def faulty(self, ea: int, size: int) -> bool:
-        """Whether an access of `size` bytes at `ea` is an address error: odd word or nothing there (isa.md §14.4)."""
+        """Return whether an access of `size` bytes at `ea` is an address error: misaligned or unimplemented (§14.4)."""
         if size == 2 and ea & 1:
             return True
         return ea >= self._ram_end and not self.in_window(ea)
 
     def read(self, ea: int, size: int) -> int:
-        """The byte or (aligned) word at `ea`; 0 where nothing is implemented."""
+        """Return the byte or aligned word at `ea`; 0 where nothing is implemented."""
         if ea < self.sfr_end:
             word = self._u16[ea >> 1] if ea < W_END else self._bus.read(ea & ~1)
         elif ea < self._ram_end:
@@ -60,15 +59,15 @@ class DataSpace:
         return word >> 8 if ea & 1 else word & 0xFF
 
     def read_x(self, ea: int) -> int:
-        """A word as the X prefetch of MAC-class instructions sees it: Y RAM reads 0 (isa.md §1.2)."""
+        """Return a word as the X prefetch of MAC-class instructions reads it: 0 from Y RAM (isa.md §1.2)."""
         return 0 if ea in self._y else self.read(ea, 2)
 
     def read_y(self, ea: int) -> int:
-        """A word as the Y prefetch sees it: everything but Y RAM reads 0 (isa.md §1.2)."""
+        """Return a word as the Y prefetch reads it: 0 outside Y RAM (isa.md §1.2)."""
         return self._u16[ea >> 1] if ea in self._y else 0
 
     def write(self, ea: int, value: int, size: int) -> None:
-        """Store the low byte or word of `value` at `ea`; lost where nothing can be written (isa.md §7.8)."""
+        """Store the low byte or word of `value` at `ea`. A write where nothing can be written is lost (isa.md §7.8)."""
         if ea < W_END:
             self._write_w(ea, value, size)
         elif ea < self.sfr_end:
@@ -85,7 +84,7 @@ class DataSpace:
                 self._u8[ea] = value & 0xFF
 
     def _write_w(self, ea: int, value: int, size: int) -> None:
-        """A memory-mapped W register: a stall source (isa.md §13.2); a word write initialises it (§2.2)."""
+        """Write a memory-mapped W register. It causes a stall (isa.md §13.2); a word write initialises it (§2.2)."""
         number = ea >> 1
         if size == 2:
             self._state.set_w(number, value)

@@ -1,6 +1,6 @@
-"""Processor modes: the registers that decide what an instruction means, so which translation of it is valid.
+"""Processor modes: the registers that decide the meaning of an instruction, and so which translation of it is valid.
 
-Every engine that translates keeps its code by `Modes.key`, and leaves it behind a write to one of REGISTERS.
+Every engine that translates keeps its code by `Modes.key`, and leaves it after a write to one of REGISTERS.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ TRAP_ENABLES: Final = 7 << 8
 
 
 class Key(NamedTuple):
-    """The modes in force, packed as they are stored."""
+    """The current modes, packed as they are stored."""
 
     corcon: int
     modcon: int
@@ -30,16 +30,16 @@ class Key(NamedTuple):
     limit_armed: int
     initialised: int
     loop: tuple[int, int] | None
-    """First and last instruction of the DO loop that is active."""
+    """First and last instruction of the active DO loop; None if there is none."""
 
     @property
     def context(self) -> Context:
-        """What an instruction's row may rely on."""
+        """Return the modes that a row may depend on."""
         return context_of(self.corcon, self.modcon, self.reverses, self.trap_enables)
 
 
 class Modes:
-    """Reads the modes of one CPU."""
+    """Reader of the modes of one CPU."""
 
     def __init__(self, state: State) -> None:
         self._state: Final = state
@@ -47,7 +47,7 @@ class Modes:
         self._at: Final = tuple(state.at[name] for name in names)
 
     def key(self) -> Key:
-        """The modes now."""
+        """Return the current modes."""
         state = self._state
         u16 = state.u16
         corcon, modcon, xbrev, intcon1, armed, initialised, sr = self._at
@@ -57,7 +57,7 @@ class Modes:
 
     @property
     def context(self) -> Context:
-        """What the row of the instruction that comes next may rely on."""
+        """Return the modes that the row of the next instruction may depend on."""
         u16 = self._state.u16
         corcon, modcon, xbrev, intcon1 = self._at[:4]
         return context_of(u16[corcon] & CORCON_MODES, u16[modcon], u16[xbrev] >> 15, u16[intcon1] & TRAP_ENABLES)
@@ -65,7 +65,7 @@ class Modes:
 
 @lru_cache(maxsize=4096)
 def context_of(corcon: int, modcon: int, bren: int, intcon1: int) -> Context:
-    """The modes a translation may rely on, from the stored registers (isa.md §2.4, §2.5, §14.4)."""
+    """Return the modes that a translation may depend on, from the stored registers (isa.md §2.4, §2.5, §14.4)."""
     return Context(
         us=corcon >> 12 & 1,
         if_=corcon & 1,

@@ -1,7 +1,7 @@
-"""Core registers that are more than storage: what reading or writing them does (isa.md §2).
+"""Core registers with side effects: what reading or writing them does (isa.md §2).
 
-They are hooked on the bus like any device's registers. Context registers (CORCON, MODCON, XBREV) need no hook for
-being read by the engines: those look at the stored words.
+They are hooked on the bus like the registers of a device. Engines read the stored words of CORCON, MODCON and XBREV
+directly, so these need no read hooks.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ GUARD_SIGN: Final = 0x80
 
 
 class CoreRegisters:
-    """Hooks of SR, CORCON, SPLIM, ACCxU, PCL/PCH, DISICNT and the modulo end registers."""
+    """Bus hooks of SR, CORCON, SPLIM, ACCxU, PCL/PCH, DISICNT and the modulo end registers."""
 
     def __init__(self, state: State, bus: Bus, events: Events) -> None:
         self._state: Final = state
@@ -42,11 +42,11 @@ class CoreRegisters:
             bus.on_write[state.at[name]] = partial(self._made_odd, state.at[name])
 
     def disicnt(self) -> int:
-        """Cycles for which DISI still blocks, as read in the current cycle (isa.md §12)."""
+        """Return the cycles for which DISI still blocks, as read in the current cycle (isa.md §12)."""
         return max(0, self._state.disi_end - self._events.now)
 
     def _disicnt_written(self, _old: int, new: int, lanes: int) -> None:
-        """A written 0 ends the block at once: the next boundary accepts (isa.md §12)."""
+        """Handle a write of DISICNT. A 0 ends the block at once: the next boundary accepts (isa.md §12)."""
         state = self._state
         count = (self.disicnt() & ~lanes | new & lanes) & 0x3FFF
         now = self._events.now
@@ -55,7 +55,7 @@ class CoreRegisters:
         self._events.kick()
 
     def _sr_written(self, old: int, new: int, _lanes: int) -> None:
-        """IPL is read-only under NSTDIS; clearing SAB clears SA and SB (isa.md §2.3)."""
+        """Handle a write of SR. IPL is read-only under NSTDIS; clearing SAB clears SA and SB (isa.md §2.3)."""
         if self._state.intcon1 & NSTDIS:
             new = new & ~IPL_MASK | old & IPL_MASK
         if old & SAB and not new & SAB:
@@ -64,7 +64,7 @@ class CoreRegisters:
         self._events.kick()
 
     def _corcon_written(self, _old: int, new: int, _lanes: int) -> None:
-        """EDT is remembered, not stored: it reads 0 (isa.md §2.4). IPL3 may have been cleared."""
+        """Handle a write of CORCON. EDT goes to hidden state and reads 0 (isa.md §2.4). IPL3 may have been cleared."""
         if new & EDT:
             self._state.corcon = new & ~EDT
             if self._state.sr & DA and not self._state.edt:
@@ -72,14 +72,14 @@ class CoreRegisters:
         self._events.kick()
 
     def _limit_written(self, _old: int, _new: int, lanes: int) -> None:
-        """The first word write arms the stack limit (isa.md §10.2)."""
+        """Arm the stack limit at the first word write of SPLIM (isa.md §10.2)."""
         if lanes == 0xFFFF:
             self._state.limit_armed = 1
 
     def _sign_extended(self, index: int) -> int:
-        """ACCxU reads with bit 39 copied up (isa.md §2.1)."""
+        """Return ACCxU with bit 39 copied into its upper bits (isa.md §2.1)."""
         return (self._u16[index] & 0xFF ^ GUARD_SIGN) - GUARD_SIGN & 0xFFFF
 
     def _made_odd(self, index: int, _old: int, _new: int, _lanes: int) -> None:
-        """XMODEND and YMODEND always read odd (isa.md §2.1)."""
+        """Set bit 0 of XMODEND or YMODEND, which always reads 1 (isa.md §2.1)."""
         self._u16[index] |= 1

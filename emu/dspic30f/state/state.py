@@ -1,7 +1,7 @@
-"""Everything the CPU remembers, as named places in the state record.
+"""CPU state: everything the CPU remembers, as named fields of the state record.
 
-Registers with a data address (W0..W15, SR, CORCON, RCOUNT, ...) live at that address (isa.md §2.1); their addresses
-come from the chip's table. The rest, which no instruction can address, is reserved behind the data space.
+Registers with a data address (W0..W15, SR, CORCON, RCOUNT, ...) lie at that address (isa.md §2.1), which comes from the
+table of the chip. Hidden state, which no instruction can address, is reserved after the data space.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ RUN, IDLE, SLEEP = range(3)
 """Values of `State.mode`."""
 
 NOT_REPEATING, FIRST, MIDDLE, LAST = range(4)
-"""Values of `State.repeat`: which iteration of a REPEAT target comes next (isa.md §13.3 needs to know)."""
+"""Values of `State.repeat`: the next iteration of a REPEAT target, on which PSV cycles depend (isa.md §13.3)."""
 
 STACK_POINTER: Final = 15
 W15_INITIALISED: Final = 1 << STACK_POINTER
@@ -37,7 +37,7 @@ PC_MASK: Final = 0x7FFFFE
 
 
 class _Register:
-    """A 16-bit register at a data address, as an attribute holding an int."""
+    """Descriptor of a 16-bit register at a data address."""
 
     def __init__(self, name: str) -> None:
         self.name: Final = name
@@ -50,7 +50,7 @@ class _Register:
 
 
 class _Hidden:
-    """A reserved scalar of the record, as an attribute holding an int."""
+    """Descriptor of a reserved scalar of the record."""
 
     def __init__(self, name: str, kind: str) -> None:
         self.name: Final = name
@@ -64,7 +64,7 @@ class _Hidden:
 
 
 class State:
-    """Attribute access to the CPU's part of a record. `at` maps names to indices for generated and native code."""
+    """CPU part of a record, with attributes for registers and hidden state. `at` maps their names to indices."""
 
     sr = _Register("SR")
     corcon = _Register("CORCON")
@@ -79,16 +79,16 @@ class State:
     pc = _Hidden("cpu.pc", "I")
     mode = _Hidden("cpu.mode", "H")
     initialised = _Hidden("cpu.initialised", "H")
-    """Bit n: Wn has had a word write since reset (isa.md §2.2)."""
+    """Bit n is set if Wn has had a word write since reset (isa.md §2.2)."""
     stall = _Hidden("cpu.stall", "H")
-    """Bit n: the last instruction wrote Wn on its destination side (isa.md §13.2)."""
+    """Bit n is set if the last instruction wrote Wn on its destination side (isa.md §13.2)."""
     limit_armed = _Hidden("cpu.limit_armed", "H")
-    """SPLIM has been written since reset (isa.md §10.2)."""
+    """1 if SPLIM has been written since reset (isa.md §10.2), else 0."""
     repeat = _Hidden("cpu.repeat", "H")
     edt = _Hidden("cpu.edt", "H")
     """0, or 1 + instructions completed since CORCON.EDT was written, at most 3 (isa.md §7.6)."""
     disi_end = _Hidden("cpu.disi_end", "Q")
-    """First cycle in which DISI blocks no longer; DISICNT is a function of it (isa.md §12)."""
+    """First cycle in which DISI does not block; DISICNT is computed from it (isa.md §12)."""
 
     def __init__(self, record: Record, chip: Chip) -> None:
         self.record: Final = record
@@ -114,11 +114,12 @@ class State:
             self.at[name] = self.at["cpu.shadow"] + number
         self._reset_stack: Final = chip.data["ram"].start
         self.check_pointers = True
-        """Whether a reset leaves W0..W14 uninitialised, so that using one as a pointer resets again (isa.md §2.2)."""
+        """Whether a reset leaves W0..W14 uninitialised, so that their use as pointers resets the device (isa.md
+        §2.2)."""
 
     @property
     def ipl(self) -> int:
-        """CPU priority 0..15: CORCON.IPL3 and SR.IPL<2:0>."""
+        """Return the CPU priority 0..15: CORCON.IPL3 and SR.IPL<2:0>."""
         return (self.corcon & IPL3) | (self.sr & IPL_MASK) >> 5
 
     @ipl.setter
@@ -127,21 +128,21 @@ class State:
         self.sr = self.sr & ~IPL_MASK | (level & 7) << 5
 
     def pair(self, low: str) -> int:
-        """A program address kept in two registers, `low` and the word behind it (DOSTART, DOEND)."""
+        """Return a program address that is stored in two registers, `low` and the next one (DOSTART, DOEND)."""
         index = self.at[low]
         return self.u16[index] | self.u16[index + 1] << 16
 
     def set_w(self, number: int, value: int) -> None:
-        """Word write of a W register by an instruction: bit 0 of W15 stays 0, the register counts as initialised."""
+        """Write a W register as an instruction does: bit 0 of W15 stays 0, and the register counts as initialised."""
         self.u16[number] = value & (0xFFFE if number == STACK_POINTER else 0xFFFF)
         self.initialised |= 1 << number
 
     def set_w_low(self, number: int, value: int) -> None:
-        """Byte write of a W register; it does not initialise (isa.md §2.2)."""
+        """Write the low byte of a W register, which does not initialise it (isa.md §2.2)."""
         self.u8[2 * number] = value & (0xFE if number == STACK_POINTER else 0xFF)
 
     def reset(self) -> None:
-        """Core state after any reset that is not an SFR's reset value (isa.md §9)."""
+        """Reset W registers and hidden state, after any cause of reset (isa.md §9)."""
         for number in range(STACK_POINTER):
             self.u16[number] = 0
         self.u16[STACK_POINTER] = self._reset_stack  # isa.md §2.1
