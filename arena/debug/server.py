@@ -142,7 +142,7 @@ class CheckpointedRobot(ControlledRobot):
         return super().rewind(cycle, session_state)
 
     def _checkpoint(self) -> None:
-        """Fork a checkpoint. The checkpoint blocks until it is resumed; then it raises WokenError."""
+        """Fork a checkpoint. The checkpoint blocks until it is resumed; then it raises CheckpointResumedError."""
         pipe, is_fork = self._fork()
         if not is_fork:
             if pipe is not None:

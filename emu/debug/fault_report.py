@@ -228,7 +228,7 @@ def _locate(machine: Machine, inspector: Inspector, case: _Case, trace: Executio
 
 @contextmanager
 def _state_at_fault(machine: Machine, case: _Case, replay_cycle: int | None) -> Iterator[None]:
-    """Inside the block the machine is in the state at the fault, as far as that state is known."""
+    """Run a block with the machine in its state at the fault, as far as that state is known."""
     if replay_cycle is not None and case.start is not None:
         with sandboxed(machine, case.start):
             machine.run_until(replay_cycle)

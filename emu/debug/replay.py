@@ -44,7 +44,7 @@ class ExecutionTrace:
 
 @contextmanager
 def sandboxed(machine: Machine, state: bytes | None = None) -> Iterator[None]:
-    """Inside the block the machine may be run and changed, from the snapshot `state` if one is given.
+    """Run a block in which the machine may be run and changed, from the snapshot `state` if one is given.
 
     No observer and no hook is called. Afterwards the machine has its previous state, to the bit.
     """
