@@ -304,12 +304,12 @@ def test_the_first_thing_that_is_wrong_with_a_json_text(value: object, wrong: st
 @pytest.mark.parametrize(
     ("column", "values", "message"),
     [
-        ("r0_x", ["left"] * 2, "not of double"),
-        ("r0_x", [1.0, None], "not whole"),
-        ("r0_x", [1.0, float("nan")], "not of numbers below 1e+07"),
-        ("r0_x", [1.0, 1e308], "not of numbers below 1e+07"),
-        ("r0_seen", pyarrow.array([0, 7], pyarrow.int16()), "not of -1 to 2"),
-        ("log", [[], [{"robot": 0, "cycle": None, "text": "x"}]], "not of list<"),
+        ("r0_x", ["left"] * 2, "has gaps or is not of type double"),
+        ("r0_x", [1.0, None], "has gaps or is not of type double"),
+        ("r0_x", [1.0, float("nan")], "expected numbers below 1e+07"),
+        ("r0_x", [1.0, 1e308], "expected numbers below 1e+07"),
+        ("r0_seen", pyarrow.array([0, 7], pyarrow.int16()), "expected -1 to 2"),
+        ("log", [[], [{"robot": 0, "cycle": None, "text": "x"}]], "has gaps or is not of type list<"),
     ],
 )
 def test_a_record_with_a_damaged_column_is_refused(column: str, values: list[object], message: str,
@@ -320,6 +320,6 @@ def test_a_record_with_a_damaged_column_is_refused(column: str, values: list[obj
     table = parquet.read_table(path).slice(0, 2)
     place = table.column_names.index(column)
     parquet.write_table(table.set_column(place, column, pyarrow.array(values)), path)
-    with pytest.raises(RecordError, match=f"column {column} is not") as refused:
+    with pytest.raises(RecordError, match=f"column {column}") as refused:
         read_trial(path)
     assert message in str(refused.value)
