@@ -42,8 +42,10 @@ def _step_behind(s: SelectionContext, p: Value, size: int, block: Instr) -> Inst
 
 def _modes(count: int, behind: int | None) -> list[AddressingMode]:
     """Addressing modes of `count` accesses; the last one advances the pointer only if its end is used."""
-    last: AddressingMode = "ind" if behind is None else "++"
-    return ["++"] * (count - 1) + [last]
+    modes: list[AddressingMode] = ["++"] * count
+    if behind is None:
+        modes[-1] = "ind"
+    return modes
 
 
 def select_blockcopy(s: SelectionContext, i: Instr) -> None:

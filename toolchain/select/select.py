@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from toolchain.ir.cfg import loop_depths, predecessors
-from toolchain.ir.model import ConstInt, DbgRecord, Instr, Undef, UnsupportedError, Value
+from toolchain.ir.model import Block, ConstInt, DbgRecord, Instr, Undef, UnsupportedError, Value
 from toolchain.mir.mir import CONSTANT_WORD, MI, OPTIMISED_OUT, MBlock, MFunction
 from toolchain.select import arith, block_copies, calls, compare, conditional, memory, multiply, shifts
 from toolchain.select.context import SelectionContext
@@ -24,53 +24,65 @@ class Selector(SelectionContext):
 
     def run(self) -> MFunction:
         """Return the machine form of the function."""
-        f = self.f
-        depths = loop_depths(f)
-        preds = predecessors(f)
-        ends = {b.name: b.instrs[-1].op for b in f.blocks}
-        for b in f.blocks:
-            if any(ends[p] == "indirectbr" for p in preds[b.name]):
-                self.two_stage.add(b.name)
+        self._find_two_stage_blocks()
         calls.incoming(self)
-        bodies: dict[str, list[list[MI]]] = {}
-        for block in f.blocks:
-            self.block = block
-            chunks: list[list[MI]] = []
-            for i in reversed(block.instrs):
-                self.out = []
-                self.line = i.line
-                try:
-                    self.instruction(i)
-                except UnsupportedError as e:
-                    e.line = i.line
-                    raise
-                if self.out:
-                    chunks.append(self.out)
-            bodies[block.name] = chunks
-        for block in f.blocks:
+        code = {block.name: self._select_block(block) for block in self.f.blocks}
+        depths = loop_depths(self.f)
+        for block in self.f.blocks:
             mb = MBlock(block.name, [], block.succs, depths[block.name], block.name in self.taken)
-            if block is f.blocks[0]:
-                self.out = []
-                self.line = None
-                calls.receive(self)
-                mb.insts += self.out
-            if block.name in self.two_stage:
-                self.out = []
-                for phi in block.phis():
-                    if id(phi) in self.needed:
-                        for source, dest in zip(self.phi_input(phi), self.value_regs(phi), strict=True):
-                            self.copy(source, dest)
-                mb.insts += self.out
-            for chunk in reversed(bodies[block.name]):
-                mb.insts += chunk
+            mb.insts = [*self._entry_code(block), *code[block.name]]
             self.m.blocks.append(mb)
         self.m.slot_of = dict(self.slots)
+        self._bind_variables()
+        return self.m
+
+    def _find_two_stage_blocks(self) -> None:
+        """Find the successors of indirectbr, whose phis are copied twice because the edges cannot be split."""
+        preds = predecessors(self.f)
+        ends = {b.name: b.instrs[-1].op for b in self.f.blocks}
+        for b in self.f.blocks:
+            if any(ends[p] == "indirectbr" for p in preds[b.name]):
+                self.two_stage.add(b.name)
+
+    def _select_block(self, block: Block) -> list[MI]:
+        """Select the instructions of a block from the last to the first; returns their code in order."""
+        self.block = block
+        chunks: list[list[MI]] = []
+        for i in reversed(block.instrs):
+            self.out = []
+            self.line = i.line
+            try:
+                self.instruction(i)
+            except UnsupportedError as e:
+                e.line = i.line
+                raise
+            chunks.append(self.out)
+        return [mi for chunk in reversed(chunks) for mi in chunk]
+
+    def _entry_code(self, block: Block) -> list[MI]:
+        """Code at the start of a block: parameters in the first one, copies of phis behind an indirectbr."""
+        code: list[MI] = []
+        if block is self.f.blocks[0]:
+            self.out = []
+            self.line = None
+            calls.receive(self)
+            code += self.out
+        if block.name in self.two_stage:
+            self.out = []
+            for phi in block.phis():
+                if id(phi) in self.needed:
+                    for source, dest in zip(self.phi_input(phi), self.value_regs(phi), strict=True):
+                        self.copy(source, dest)
+            code += self.out
+        return code
+
+    def _bind_variables(self) -> None:
+        """Record the locations of source variables for every debug record."""
         for k, record in enumerate(self.f.dbg_records):
             slot = self.slots.get(id(record.value)) if record.kind == "memory" else None
             found = (-1 - slot,) if slot is not None else self._words_of(record)
             if found:
                 self.m.bindings[k] = (record.variable, found)
-        return self.m
 
     def _words_of(self, record: DbgRecord) -> tuple[int, ...]:
         """Words of a variable (`mir.VariableLocation`); empty if its location is unknown."""
