@@ -56,9 +56,9 @@ ROWS = (
     ("send until the waiting thread runs", "wake"),
 )
 INTRODUCTION = """\
-# The kernel beside others
+# OpenSwarm and other kernels
 
-The comparison of the paper's Table II with a figure in each cell. This page is written by
+For readers who compare kernels: the paper's Table II with a figure in each cell. This command writes the page:
 
 ```
 python bench/rtos.py --freertos DIR --page docs/table2.md
@@ -66,27 +66,27 @@ python bench/rtos.py --freertos DIR --page docs/table2.md
 
 ## Measured
 
-Bytes, and cycles of the CPU; of the Cortex-M4 *instructions*: QEMU counts no cycles, and an exception costs the chip 12
-more each way.
+Bytes and CPU cycles; for the Cortex-M4 *instructions*, because QEMU counts no cycles. An exception costs the chip 12 more
+cycles each way.
 """
 NOTES = """
-- Both kernels on the dsPIC30F6014A: the same emulator, the same compiler at -Os. The ATmega328P is simavr's, with the 4
-  cycles of interrupt response added that it leaves out; the Cortex-M4 is QEMU's netduinoplus2.
+- dsPIC30F6014A: the same emulator and the same compiler at -Os for both kernels. ATmega328P: simavr, with the 4 cycles of
+  interrupt response added that it omits. Cortex-M4: QEMU's netduinoplus2.
 - Switch at the end of a slice: from the timer's request (Cortex-M4: from PendSV's first instruction) to the first
-  instruction of the next thread. OpenSwarm's slice is 10 ms and its clock another interrupt; FreeRTOS's tick of 1 ms
-  counts time and switches in one.
+  instruction of the next thread. OpenSwarm has a slice of 10 ms and a separate clock interrupt; FreeRTOS's tick of 1 ms
+  counts time and switches.
 - Send until the waiting thread runs: OpenSwarm from the call in one thread, through delivery at its next yield, to the
   first instruction of the application in the other; FreeRTOS from xQueueSend to a waiting task of higher priority.
 - Flash of the kernel: on the dsPIC30F the kernel alone; on the others the whole image of the application `footprint`,
-  with drivers, C library and the program itself. FreeRTOS: what tasks.c, list.c, queue.c, heap_1.c and the port
-  contribute to a program with the corresponding calls; an allocator that frees (heap_4.c) is not in it.
-- RAM of the kernel: on ATmega328P and Cortex-M4 all variables and the kernel stack of `hello`, devices included;
-  FreeRTOS runs its interrupts on the tasks' stacks, which must have room for them; its idle task (a control block and
+  with drivers, C library and the program itself. FreeRTOS: the share of tasks.c, list.c, queue.c, heap_1.c and the
+  port in a program with the corresponding calls, without an allocator that frees (heap_4.c).
+- RAM of the kernel: on ATmega328P and Cortex-M4 all variables and the kernel stack of `hello`, including devices.
+  FreeRTOS runs its interrupts on the tasks' stacks, which must have room for them. Its idle task (a control block and
   210 bytes of stack) is not counted.
 
 ## Literature
 
-Figures as published or as told by others, **not measured here**.
+Published figures, and figures cited by others; **not measured here**.
 
 | kernel | CPU, condition | RAM per thread | RAM of the kernel | ROM | switch | source |
 |---|---|---|---|---|---|---|"""
