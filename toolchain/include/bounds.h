@@ -1,61 +1,61 @@
 /* SPDX-License-Identifier: MIT */
-/* What `python -m toolchain bounds` cannot find out by itself, told beside the code.  Each is a declaration: no instruction
- * and no byte of memory comes of it; in the image it is a line of the section .note.bounds.
+/* Annotations for `python -m toolchain bounds`.  Each is a declaration without code and data: it becomes a line of the
+ * section .note.bounds of the image.
  *
- * Numbers are expressions of integers, names, + - * / and min(...); a name gets its value on the command line (--let n=4).
- * In min(...) what has no value does not count.
+ * Numbers are expressions of integers, names, + - * / and min(...).  A name gets its value on the command line (--let n=4).
+ * Arguments of min(...) without a value are ignored.
  */
 #ifndef _BOUNDS_H_
 #define _BOUNDS_H_
 
-/* A note "in front of" something is of one line: its own, if code stands there, else the next of its function that has
- * code. Functions and variables are those that its file can see; `file.c/name` is a static one of another file, without
- * which naming that is an error.
+/* An annotation before a statement applies to one line: its own if it has code, else the next line of the function that
+ * has code.  Names of functions and variables are resolved in the scope of the file; `file.c/name` is a static name of
+ * another file.
  *
- * In front of a loop, or of the `while` that ends one: it goes round at most `rounds` times. It counts for the innermost
- * loop of the machine code with an instruction of that line. Where one loop of the source has become two, one within the
- * other, SAME_LOOP in front of a line of the inner one says so: they share their rounds. Where several ways lead back to
- * the beginning of a loop of the machine code, it may be two of the source in one, and has no bound until ONE_LOOP beside
- * the note says that it is one. */
+ * LOOP_BOUND: before a loop, or before the `while` that ends one. The loop has at most `rounds` iterations per entry.  The
+ * annotation applies to the innermost loop of the machine code with an instruction of that line.
+ * SAME_LOOP: before a line of an inner loop of the machine code that is the same loop of the source as the enclosing one.
+ * ONE_LOOP: a loop of the machine code with several back edges is one loop of the source.  Without it such a loop has no
+ * bound, because it may be two loops of the source. */
 #define LOOP_BOUND(rounds) _BOUNDS_NOTE("loop", rounds)
 #define SAME_LOOP() _BOUNDS_NOTE("same", .)
 #define ONE_LOOP() _BOUNDS_NOTE("one", .)
-/* On the line of a LOOP_BOUND, or alone: in one call of whatever is looked at, all rounds of the loop together, however often
- * it is entered, are at most `rounds`. Of the two ways to count, the one that gives less is taken. */
+/* On the line of a LOOP_BOUND, or alone: the loop has at most `rounds` iterations over all its entries in one call of the
+ * analysed function.  If both are given, the smaller result is the bound. */
 #define LOOP_TOTAL(rounds) _BOUNDS_NOTE("total", rounds)
-/* On the line of a LOOP_BOUND, once for each function: in one call of that function, this loop and all others that say the
- * same go round at most `rounds` times together. Of functions that are under way at once the outermost counts. */
+/* On the line of a LOOP_BOUND, once for each function: in one call of `function`, this loop and all others with an equal
+ * annotation have at most `rounds` iterations together.  If several such functions are active, the outermost counts. */
 #define LOOP_SHARE(function, rounds) _BOUNDS_NOTE("share", function rounds)
-/* Anywhere: the loops of this function, which may be assembly, go round at most `rounds` times. */
+/* Anywhere: the loops of this function, which may be assembly, have at most `rounds` iterations. */
 #define LOOPS_OF(function, rounds) _BOUNDS_NOTE("loops", function rounds)
-/* In front of a call through a pointer: its targets are the functions named, of a type named all whose address is taken,
- * without those behind a minus. */
+/* Before a call through a pointer: its targets are the listed functions; a listed type stands for all its functions whose
+ * address is taken; a minus excludes a function. */
 #define CALL_TARGETS(...) _BOUNDS_NOTE("calls", __VA_ARGS__)
-/* In front of a call of `callee`, which is no inlined one: in one call of `function` it is made at most so often, all its
- * copies and all calls of `callee` in that line together. */
+/* Before a call of `callee` that is not inlined: one call of `function` makes it at most `times` times, counting all copies
+ * of the call and all calls of `callee` in that line. */
 #define CALL_SHARE(callee, function, times) _BOUNDS_NOTE("often", callee function times)
-/* In front of a call of `callee`: it is made only where this is not 0. */
+/* Before a call of `callee`: it is made only if `expression` is not 0. */
 #define CALL_IF(callee, expression) _BOUNDS_NOTE("if", callee expression)
-/* Anywhere: looked at by itself, the function finds in register Wn at most `most`. */
+/* Anywhere: if the function is analysed as an entry, register Wn is at most `most`. */
 #define ARGUMENT_BOUND(function, n, most) _BOUNDS_NOTE("argument", function n most)
-/* Anywhere: the function leaves its stack to another, and comes back to its caller at this interrupt level. */
+/* Anywhere: the function switches to another stack, and returns to its caller at this CPU priority. */
 #define COMES_BACK(function, level) _BOUNDS_NOTE("back", function level)
-/* Anywhere: where code goes on that has just moved to a stack of somebody else, each at most once. */
+/* Anywhere: functions in which execution continues after a switch to the stack of another thread, each at most once. */
 #define RESUMED_BY(...) _BOUNDS_NOTE("resumed", __VA_ARGS__)
-/* Anywhere: the first bytes of this variable are the stack that interrupts and the kernel move to. */
+/* Anywhere: the first `bytes` of this variable are the second stack, which interrupts and the kernel switch to. */
 #define STACK_AREA(variable, bytes) _BOUNDS_NOTE("stack", variable bytes)
-/* Anywhere: functions of these types whose address is taken are entries of threads. */
+/* Anywhere: functions of these types whose address is taken are thread entries. */
 #define THREADS(...) _BOUNDS_NOTE("threads", __VA_ARGS__)
-/* Anywhere: the priority this interrupt is given, where it is not that after a reset, 4. */
+/* Anywhere: the priority of this interrupt, if it is not the reset value 4. */
 #define INTERRUPT_LEVEL(vector, level) _BOUNDS_NOTE("level", vector level)
-/* In a file: what a call keeps in this variable it finds again; threads enter with this value. */
+/* In a file: only the analysed code changes this variable; threads start with this value. */
 #define PRIVATE_VALUE(variable, value) _BOUNDS_NOTE("private", variable value)
-/* Anywhere: these interrupts come only where PRIVATE_VALUEs are what threads enter with. */
+/* Anywhere: these interrupts occur only while PRIVATE_VALUEs have their value. */
 #define OUTSIDE_ONLY(...) _BOUNDS_NOTE("outside", __VA_ARGS__)
-/* Anywhere: this variable or register has this value whenever anything looked at is entered. */
+/* Anywhere: this variable or register has this value at every entry. */
 #define KNOWN_VALUE(variable, value) _BOUNDS_NOTE("known", variable value)
-/* In a file: its pointers that are kept in memory lead to RAM, so that following them never takes the cycles of a constant.
- * With a name, said of that file of the same folder, which may be assembly. */
+/* In a file: pointers that its code loads from memory point to RAM, so that following them costs no PSV cycles.
+ * With a name it applies to that file of the same folder, which may be assembly. */
 #define LINKS_IN_RAM(...) _BOUNDS_NOTE("ram", . __VA_ARGS__)
 
 #define _BOUNDS_NOTE(kind, ...) _BOUNDS_LINE(__COUNTER__, __LINE__, kind, __VA_ARGS__)

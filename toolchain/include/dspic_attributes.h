@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* XC16's attributes (abi-elf.md §1.4, §2.5) in clang's words. Inside `__attribute__((...))` only, so that a program may
  * use `space` or `interrupt` as names: each attribute is looked up as a macro __dspic_a_NAME; those that have none stay as
- * they are. What only a definition says becomes an annotation; what declarations repeat, a section. toolchain/emit/data.py and
+ * they are. Attributes of definitions become annotations, those of declarations sections. toolchain/emit/data.py and
  * isr.py read them. Constants, variables and functions cannot share a section, hence the counters. */
 #ifndef DSPIC_ATTRIBUTES_H
 #define DSPIC_ATTRIBUTES_H
@@ -54,7 +54,7 @@
 #define __dspic_a_reverse(number) ~, (__annotate__("reverse(" __dspic_text(number) ")"))
 #define __dspic_a_user_init ~, (__constructor__)
 #define __dspic_a_unordered ~, () /* where a variable lies within its section, which is the linker's choice anyway */
-/* What XC16 has for other parts, or does not do here, would change where things are: an error, not a warning. */
+/* Attributes for other parts, or without support here, would change the placement: an error, not a warning. */
 #define __dspic_refused(text) __aligned__(sizeof(struct { int i; _Static_assert(0, text " is not supported"); }))
 #define __unused__(...) __unused__ /* takes what follows in parentheses, as `__used__` does above */
 #define __dspic_a_sfr ~, (__dspic_refused("attribute sfr"), __unused__)

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What a C compiler for the dsPIC30F must be told outside ISO C, in one spelling for this toolchain and for XC16:
+/* Extensions to ISO C for the dsPIC30F, in one spelling for this toolchain and for XC16:
  * interrupt functions, special function registers, inline-assembly clobbers, configuration words. */
 #ifndef DSPIC_COMPILER_H
 #define DSPIC_COMPILER_H
@@ -74,7 +74,7 @@
 #define _ISRFAST __attribute__((__interrupt__, __no_auto_psv__, __shadow__))
 #endif
 
-/* Where a variable lies, as in Microchip's device headers; N: alignment in bytes. */
+/* Placement of a variable, as in Microchip's device headers; N: alignment in bytes. */
 #ifndef _XBSS
 #define _PERSISTENT __attribute__((persistent))
 #define _NEAR __attribute__((near))

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Delays of Microchip's libpic30 by their names. FCY, instruction cycles per second, is the program's to define. */
+/* Delays of Microchip's libpic30 by their names. The program defines FCY, the instruction cycles per second. */
 #ifndef LIBPIC30_H
 #define LIBPIC30_H
 

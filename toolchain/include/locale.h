@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* C11 7.11: the locale is "C" and remains it. */
+/* C11 7.11: the locale is always "C". */
 #ifndef LOCALE_H
 #define LOCALE_H
 

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* C11 7.14: signals that the program raises itself; the hardware's traps are interrupt functions (README.md). What nobody
- * handles ends the program with status 128 + number. */
+/* C11 7.14: signals that the program raises itself; the hardware's traps are interrupt functions (README.md). A signal
+ * without a handler ends the program with status 128 + number. */
 #ifndef SIGNAL_H
 #define SIGNAL_H
 

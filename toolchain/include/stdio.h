@@ -31,11 +31,11 @@ typedef struct __stream FILE;
 #define stdin ((FILE *)3)
 typedef long fpos_t;
 
-/* Where printf, puts and putchar send characters. The library's own sends to UART1, which it enables if need be;
+/* Hook that printf, puts and putchar send characters to. The library's own sends to UART1, which it enables if need be;
  * a program that defines this function replaces it. Returns the character. */
 int __putchar(int character);
 
-/* Where getchar, gets and scanf receive characters. The library's own waits for one of UART1, which it enables if need be
+/* Hook that getchar, gets and scanf receive from. The library's own waits for one of UART1, which it enables if need be
  * (UNVERIFIED: that XC16's library does the same); a program that defines this function replaces it. Returns the character,
  * or EOF, which is stdin's end until clearerr. */
 int __getchar(void);
@@ -72,7 +72,7 @@ int snprintf(char *__restrict to, size_t size, const char *__restrict format, ..
 int vsnprintf(char *__restrict to, size_t size, const char *__restrict format, va_list arguments)
     __attribute__((__format__(__printf__, 3, 0)));
 
-/* There are no files: these fail, and what is not there can be closed. */
+/* There are no files: these functions fail, except closing. */
 int remove(const char *name);
 int rename(const char *from, const char *to);
 FILE *fopen(const char *__restrict name, const char *__restrict mode);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* C11 7.22: conversions, division, random numbers, sorting, end of program. The heap is as large
- * as the linker is told (-Wl,--heap=BYTES); there is no environment, and multibyte characters are single bytes. */
+ * as the linker option -Wl,--heap=BYTES sets it; there is no environment, and multibyte characters are single bytes. */
 #ifndef STDLIB_H
 #define STDLIB_H
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Calendar time (C11 7.27). The chip has no calendar: time() and clock() answer "not available" (-1) until a program
+/* Calendar time (C11 7.27). The chip has no calendar: time() and clock() return -1 (not available) until a program
  * defines functions of these names. Local time is UTC. */
 #ifndef TIME_H
 #define TIME_H

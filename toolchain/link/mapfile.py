@@ -71,5 +71,5 @@ def map_text(linked: Linked) -> str:
         if section not in linked.live and section.units and space_of(section) != "info"
     ]
     if discarded:
-        lines += ["", "Discarded by --gc-sections", *discarded]
+        lines += ["", "Left out by --gc-sections", *discarded]
     return "\n".join(lines) + "\n"

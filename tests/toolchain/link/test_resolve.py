@@ -178,7 +178,7 @@ def test_the_map_lists_symbols_with_sizes_and_what_was_left_out(image):
     text = map_text(out.linked)
     rows = {line.split()[-1]: line.split() for line in text.splitlines() if line.split()}
     assert rows["next"][1:3] == ["0x2", "3"]
-    assert "un" in text.split("Discarded by --gc-sections")[1]
+    assert "un" in text.split("Left out by --gc-sections")[1]
     assert "stack gets 0x800..0x27f0" in text
 
 
