@@ -1,6 +1,6 @@
 """Effective addresses and pointer updates: indirect modes, modulo, bit-reversed, the stack (isa.md §3).
 
-Every address and pointer value handed to the builder is already modulo 2**16.
+All addresses and pointer values passed to the builder are reduced modulo 2**16.
 """
 
 from __future__ import annotations
@@ -14,18 +14,19 @@ STACK_POINTER = 15
 
 
 def signed16(m: Builder, v: Value) -> Value:
-    """A 16-bit value read as two's complement."""
+    """Return a 16-bit value as a signed number."""
     return m.let((v ^ 0x8000) - 0x8000)
 
 
 def advance(m: Builder, n: int, value: Value, delta: Value, side: Side) -> Value:
-    """The pointer ``value`` of Wn moved by ``delta`` bytes, with modulo addressing if Wn is selected (isa.md §3.6)."""
+    """Return the pointer ``value`` of Wn moved by ``delta`` bytes, modulo the buffer if Wn is selected (isa.md
+    §3.6)."""
     c = m.context
     moved = value + delta
     if side == "y":
         enabled, first, last = bool(c.ymod and c.ywm == n), "YMODSRT", "YMODEND"
     else:
-        reversed_writes = bool(side == "dst" and c.brev and c.bwm == n)  # they win over modulo, isa.md §3.7
+        reversed_writes = bool(side == "dst" and c.brev and c.bwm == n)  # before modulo, isa.md §3.7
         enabled, first, last = bool(c.xmod and c.xwm == n and not reversed_writes), "XMODSRT", "XMODEND"
     if enabled:
         start, end = m.reg(first), m.reg(last)
@@ -38,13 +39,13 @@ def advance(m: Builder, n: int, value: Value, delta: Value, side: Side) -> Value
 
 
 def reverse_carry(m: Builder, value: Value, modifier: Value) -> Value:
-    """``value``<15:1> + ``modifier``<14:0> with the carry running downwards; bit 0 is kept (isa.md §3.7)."""
+    """Return ``value``<15:1> + ``modifier``<14:0> with reversed carry; bit 0 is kept (isa.md §3.7)."""
     total = bit_reverse16(m, value & 0xFFFE) + bit_reverse16(m, (modifier << 1) & 0xFFFE)
     return m.let(bit_reverse16(m, total & 0x7FFF) | (value & 1))
 
 
 def bit_reverse16(m: Builder, v: Value) -> Value:
-    """Bit i to bit 15 - i of a 16-bit value."""
+    """Return a 16-bit value with its bits in reversed order."""
     for width, mask in ((1, 0x5555), (2, 0x3333), (4, 0x0F0F), (8, 0x00FF)):
         v = m.let((v >> width) & mask | (v & mask) << width)
     return v
@@ -53,7 +54,7 @@ def bit_reverse16(m: Builder, v: Value) -> Value:
 def indirect(
     m: Builder, n: int, mode: int, step: int, side: Side, index: int | None = None, reversible: bool = False
 ) -> tuple[Value, Value | None]:
-    """EA of Wn in an indirect ``mode``, and what the pointer becomes; None if it stays.
+    """Return the EA of Wn in an indirect ``mode`` and the new pointer, None if the pointer does not change.
 
     ``step`` is the access size in bytes, ``index`` the register of [Wn+Wb], ``reversible`` marks a word write, the only
     access to which bit-reversed addressing applies.
@@ -73,12 +74,13 @@ def indirect(
 
 
 def offset_address(m: Builder, n: int, offset: int, side: Side) -> Value:
-    """EA of [Wn+lit]. UNVERIFIED: modulo addressing is not applied to literal offsets (isa.md §3.6 names [Wn+Wb])."""
+    """Return the EA of [Wn+lit]. UNVERIFIED: modulo addressing is not applied to literal offsets (isa.md §3.6 names
+    [Wn+Wb])."""
     return m.let((m.ptr(n, side) + offset) & 0xFFFF)
 
 
 def truncated(v: Value, size: Size) -> Value:
-    """The low ``size`` bytes."""
+    """Return the low ``size`` bytes."""
     return v & (0xFF if size == 1 else 0xFFFF)
 
 
@@ -91,12 +93,12 @@ def set_register(m: Builder, n: int, v: Value, size: Size) -> None:
 
 
 def size_of(x: Operands) -> Size:
-    """Access size chosen by the B field."""
+    """Return the access size that the B field selects."""
     return 1 if x.B else 2
 
 
 class Location:
-    """An operand whose address is formed: ``read`` and ``write`` it in the later phases of a row.
+    """Location of an operand whose address is formed. Later phases of a row ``read`` and ``write`` it.
 
     A direct register is read at once, before any pointer moves: the data operand is the old value (isa.md §3.4).
     The update of a destination pointer waits until the write, behind all reads.
@@ -115,7 +117,7 @@ class Location:
         self.held: Value = None
 
     def read(self) -> Value:
-        """The operand, zero-extended."""
+        """Return the operand, zero-extended."""
         return self.held if self.ea is None else self.m.load(self.ea, self.size, ptr=self.register)
 
     def write(self, v: Value) -> None:
@@ -127,13 +129,13 @@ class Location:
         self.m.store(self.ea, v, self.size, ptr=self.register)
 
     def move_pointer(self) -> None:
-        """What ++ and -- of a destination do; of a source they are done."""
+        """Apply ++ or -- of a destination; those of a source have been applied."""
         if self.moved is not None:
             self.m.set_ptr(self.register, self.moved, "dst")
 
 
 def source(m: Builder, x: Operands, size: Size, mode: int | None = None) -> Location:
-    """Ws in mode ``p``, or in ``mode`` of the 8-mode set with Wb as index. Its pointer moves at once.
+    """Ws in mode ``p``, or in ``mode`` of the 8-mode set with Wb as index. Its pointer is updated at once.
 
     UNVERIFIED: where it points to its own place in data memory, the new value is read.
     """
@@ -149,7 +151,8 @@ def source(m: Builder, x: Operands, size: Size, mode: int | None = None) -> Loca
 
 
 def destination(m: Builder, x: Operands, size: Size, mode: int | None = None) -> Location:
-    """Wd in mode ``q``, or in ``mode`` of the 8-mode set; only written. Follows ``source``, whose update it sees."""
+    """Wd in mode ``q``, or in ``mode`` of the 8-mode set; write only. It is formed after ``source``, whose pointer
+    update it sees."""
     mode = x.q if mode is None else mode
     if mode == 0:
         return Location(m, x.d, size)
@@ -166,7 +169,7 @@ def push(m: Builder, *values: Value) -> None:
 
 
 def pop_addresses(m: Builder, count: int) -> list[Value]:
-    """Lower W15 by ``count`` words; the addresses of the popped words, lowest first."""
+    """Lower W15 by ``count`` words. Return the addresses of the popped words, lowest first."""
     top = m.ptr(STACK_POINTER, "src")
     m.set_ptr(STACK_POINTER, (top - 2 * count) & 0xFFFF, "src")
     return [(top - 2 * (count - i)) & 0xFFFF for i in range(count)]

@@ -1,4 +1,4 @@
-"""ALU operations on 8 or 16 bits: result and flags, once (isa.md §6).
+"""ALU operations on 8 or 16 bits: results and flags (isa.md §6).
 
 An operation takes the builder, the size and zero-extended operands, sets its flags and returns the result, truncated.
 """
@@ -16,12 +16,12 @@ Binary: TypeAlias = Callable[[Builder, Size, Value, Value], Value]
 
 
 def ones(size: Size) -> int:
-    """All bits of an operand."""
+    """Return a mask of all bits of an operand."""
     return 0xFF if size == 1 else 0xFFFF
 
 
 def adder(m: Builder, size: Size, a: Value, b: Value, carry: Value, sticky: bool = False) -> Value:
-    """a + b + carry and all five flags; ``sticky`` Z can only be cleared (isa.md §6.1)."""
+    """Return a + b + carry and set all five flags; ``sticky`` Z can only be cleared (isa.md §6.1)."""
     bits, half = 8 * size, 4 * size
     total = m.let(a + b + carry)
     apart = a ^ b  # a sum without its carries
@@ -62,7 +62,7 @@ def subbr(m: Builder, size: Size, a: Value, b: Value) -> Value:
 
 
 def set_nz(m: Builder, size: Size, result: Value) -> Value:
-    """N and Z by result; returns it."""
+    """Set N and Z by the result and return it."""
     m.set_flags(N=result >> 8 * size - 1, Z=result == 0)
     return result
 
@@ -80,7 +80,7 @@ def ior(m: Builder, size: Size, a: Value, b: Value) -> Value:
 
 
 def test(m: Builder, size: Size, a: Value) -> Value:
-    """The operand itself, N and Z: MOV f."""
+    """Return the operand and set N and Z: MOV f."""
     return set_nz(m, size, a)
 
 
@@ -105,7 +105,7 @@ def neg(m: Builder, size: Size, a: Value) -> Value:
 
 
 def compare0(m: Builder, size: Size, a: Value) -> Value:
-    """a - 0: C and DC become 1, OV 0 (isa.md §6.1)."""
+    """Subtract 0: C and DC become 1, OV 0 (isa.md §6.1)."""
     return sub(m, size, a, 0)
 
 

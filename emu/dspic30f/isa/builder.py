@@ -1,10 +1,10 @@
-"""The contract between a row's ``does`` and whoever gives it values: plain ints, Python source, LLVM.
+"""The builder contract: operations that the function ``does`` of a row may use, on plain ints or LLVM values.
 
 A value is an exact integer, |v| < 2**62. Rows use + - * & | ^ ~ << >> (arithmetic) and the comparisons, which yield
 0 or 1; never ``if``, ``and``, ``not`` on a value. Operand fields and ``context`` are static: ints at translation time.
 Phases of a row: read register operands; form every effective address (source pointers move here); load; compute; move
-destination pointers, store, write registers. So a builder may probe all addresses before anything but source pointers
-is committed, and reads see registers as they were before the destination side acts.
+destination pointers, store, write registers. So a builder may check all addresses before it commits any effect but
+source pointers, and reads see registers as they were before the destination side acts.
 """
 
 from __future__ import annotations
@@ -43,13 +43,13 @@ class Context:
 
 
 class Builder(Protocol):
-    """What a row may do. See README.md of this folder for the rules on order."""
+    """Operations of a row. README.md of this folder defines their order."""
 
     context: Context
     pc: int  # program address of this instruction
 
     def select(self, c: Value, a: Value, b: Value) -> Value:
-        """``a`` if ``c`` else ``b``; both are computed."""
+        """Return ``a`` if ``c`` else ``b``; both are computed."""
 
     def div_trunc(self, a: Value, b: Value) -> Value:
         """Quotient towards zero; 0 if ``b`` is 0."""
@@ -64,7 +64,7 @@ class Builder(Protocol):
         """Trailing zeros of a 16-bit value; 16 for 0."""
 
     def let(self, v: Value) -> Value:
-        """Name a value used more than once."""
+        """Return a value that may be used more than once without being computed again."""
 
     def w(self, n: int) -> Value:
         """Wn as data, 0..65535."""
@@ -82,7 +82,8 @@ class Builder(Protocol):
         """Pointer update, low 16 bits of ``v``; a RAW stall source on the ``dst`` side only."""
 
     def load(self, ea: Value, size: Size, side: Side = "src", ptr: int | None = None) -> Value:
-        """Data read of 1 or 2 bytes. ``ptr``: the W register the address came from. A static int is a file address."""
+        """Data read of 1 or 2 bytes. ``ptr`` is the W register that holds the address. A static int is a file
+        address."""
 
     def store(self, ea: Value, v: Value, size: Size, ptr: int | None = None) -> None:
         """Data write of the low 8 or 16 bits of ``v``."""
@@ -103,7 +104,7 @@ class Builder(Protocol):
         """An SR bit, 0 or 1: C Z OV N DC OA OB SA SB."""
 
     def set_flags(self, **flags: Value) -> None:
-        """Change the named SR bits; OAB and SAB follow by themselves."""
+        """Change the named SR bits; OAB and SAB are updated accordingly."""
 
     def reg(self, name: str) -> Value:
         """A core register by name: RCOUNT TBLPAG XMODSRT XMODEND YMODSRT YMODEND XBREV, and the PUSH.S shadows
@@ -119,7 +120,7 @@ class Builder(Protocol):
         """Write a signed 40-bit value to an accumulator."""
 
     def when(self, c: Value, fn: Callable[[], None]) -> None:
-        """Run ``fn`` only if ``c``."""
+        """Run ``fn`` only if ``c`` is not 0."""
 
     def trap_math(self, c: Value) -> None:
         """Request a math error trap if ``c`` (isa.md §14.4)."""

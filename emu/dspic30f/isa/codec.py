@@ -1,7 +1,7 @@
-"""Words to instructions and back.
+"""Codec: decodes program words to instructions and encodes instructions to words.
 
 ``decode`` accepts exactly the 11,165,253 legal first words of isa.md §4. ``decode_loosely`` also names words that break
-a rule of their row, for disassembly; ``decode_for_execution`` is what the CPU obeys.
+a rule of their row, for disassembly; ``decode_for_execution`` decodes as the CPU does.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ RUNS_ANYWAY = frozenset(("B=0: f even", "k>=-16", "k<=16", "g<=6", "h<=6", "z=0"
 
 
 class EncodeError(ValueError):
-    """Field values that do not fit the row: a rule of it is broken, or field ``letter`` cannot hold ``value``."""
+    """Field values do not fit the row: they break a rule of it, or field ``letter`` cannot hold ``value``."""
 
     def __init__(self, row: Row, letter: str, value: int, clause: Clause | None, text: str) -> None:
         super().__init__(f"{row.syntax}: {text}")
@@ -39,7 +39,7 @@ def _operands(row: Row, word1: int, word2: int) -> Operands:
 
 
 def _candidates(word1: int, word2: int) -> list[tuple[int, Insn]]:
-    """Rows whose fixed bits match, with the number of rules broken."""
+    """Return the rows whose fixed bits match, each with the number of broken rules."""
     found = []
     for row in BY_BYTE[word1 >> 16]:
         mask, value = row.pattern.mask, row.pattern.value
@@ -51,7 +51,7 @@ def _candidates(word1: int, word2: int) -> list[tuple[int, Insn]]:
 
 @lru_cache(CACHE_WORDS)
 def decode(word1: int, word2: int = 0) -> Insn | None:
-    """The instruction in one or two 24-bit words; None if illegal. ``word2`` is ignored by one-word instructions."""
+    """Return the instruction in one or two 24-bit words, or None if illegal. One-word instructions ignore ``word2``."""
     for broken, insn in _candidates(word1, word2):
         if not broken:
             return insn
@@ -60,7 +60,7 @@ def decode(word1: int, word2: int = 0) -> Insn | None:
 
 @lru_cache(CACHE_WORDS)
 def decode_loosely(word1: int, word2: int = 0) -> Insn | None:
-    """As ``decode``, but a word that only breaks rules on field values goes to the row whose rules it breaks least.
+    """As ``decode``, but decode a word that only breaks rules on field values by the row with the fewest broken rules.
 
     Ties are resolved as binutils prints them: CLR first, then by row number.
     """
@@ -72,7 +72,7 @@ def decode_loosely(word1: int, word2: int = 0) -> Insn | None:
 
 @lru_cache(CACHE_WORDS)
 def decode_for_execution(word1: int, word2: int = 0) -> Insn | None:
-    """As ``decode``, plus instructions that run although no assembler writes them: RUNS_ANYWAY."""
+    """As ``decode``, plus instructions that the CPU executes although assemblers refuse them: RUNS_ANYWAY."""
     insn = decode(word1, word2)
     if insn is None:
         loose = decode_loosely(word1, word2)
@@ -84,7 +84,7 @@ def decode_for_execution(word1: int, word2: int = 0) -> Insn | None:
 def encode(
     row: Row, operands: Operands | Mapping[str, int], tolerate: Sequence[tuple[str, int]] = ()
 ) -> tuple[int, ...]:
-    """The words of an instruction from field values; fields of a mapping that are not given are 0.
+    """Return the words of an instruction with these field values; fields absent from a mapping are 0.
 
     EncodeError if they break a rule; ``tolerate`` lists (rule, value) pairs to let pass.
     """

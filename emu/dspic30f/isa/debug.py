@@ -1,4 +1,4 @@
-"""Words that mean something to a debugger only and are no instructions (isa.md §4.1)."""
+"""Debugger words: program words that are not instructions and stop a debugger (isa.md §4.1)."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ HOST_IO: Final = 0xDAC000
 """Emitted by the vendor library's file input and output stubs."""
 
 FAILED_CHECK: Final = 0xDA4100
-"""Plus a number below 256: our compiler puts it behind HALT and a RESET where a check of its sanitizer fails, so that
-the stop can be told from an ordinary one. It is never executed."""
+"""Base of the words 0..255 that the compiler places after HALT and RESET where a check of its sanitizer fails. They
+distinguish this stop from an ordinary one and are never executed."""
 PLAIN_TRAP: Final = 0xFF
-"""The number for __builtin_trap(); the others are clang's."""
+"""Number of __builtin_trap(); the other numbers are those of clang."""
 
 
 def is_debug_word(word: int) -> bool:
-    """Whether the emulator stops behind `word` instead of resetting."""
+    """Return whether the emulator stops after `word` instead of resetting the device."""
     return word in (HALT, HOST_IO)

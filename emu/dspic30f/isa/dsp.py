@@ -40,17 +40,17 @@ def negate(acc: Value, v: Value) -> Value:
 
 
 def signed40(m: Builder, v: Value) -> Value:
-    """The low 40 bits as two's complement."""
+    """Return the low 40 bits as a signed number."""
     return m.let((v + GUARD & 2 * GUARD - 1) - GUARD)
 
 
 def outside(v: Value, limit: int) -> Value:
-    """1 if v is not in -limit .. limit - 1."""
+    """Return 1 if v is not in -limit .. limit - 1, else 0."""
     return (v < -limit) | (v >= limit)
 
 
 def clamp(m: Builder, v: Value, limit: int) -> Value:
-    """v limited to -limit .. limit - 1."""
+    """Return v limited to -limit .. limit - 1."""
     return m.select(v < -limit, -limit, m.select(v >= limit, limit - 1, v))
 
 
@@ -82,19 +82,19 @@ def accumulate(m: Builder, a: int, exact: Value, keep: Value = 0) -> None:
 
 
 def product(m: Builder, a: Value, b: Value) -> Value:
-    """Multiplier result of two 16-bit values under CORCON.US and CORCON.IF, exact."""
+    """Return the exact multiplier result of two 16-bit values under CORCON.US and CORCON.IF."""
     if not m.context.us:
         a, b = signed16(m, a), signed16(m, b)
     return a * b if m.context.if_ else a * b * 2
 
 
 def shifted(m: Builder, v: Value, right: int) -> Value:
-    """v >> right; negative shifts left, exactly."""
+    """Return v >> right; a negative count shifts left."""
     return v >> right if right >= 0 else v << -right
 
 
 def rounded_word(m: Builder, v: Value, rounding: bool) -> Value:
-    """What SAC (SAC.R with ``rounding``) and the write-back store of the 40-bit value v, 0..65535 (isa.md §8.4)."""
+    """Return the word that SAC, or SAC.R with ``rounding``, and the write-back store for the 40-bit value v (§8.4)."""
     if rounding and m.context.rnd:
         v = v + 0x8000
     elif rounding:  # convergent: halves go to the even word
@@ -154,12 +154,12 @@ def literal_count(m: Builder, x: Operands) -> Value:
 
 
 def register_count(m: Builder, x: Operands) -> Value:
-    """Wb<5:0>, signed."""
+    """Return Wb<5:0> as a signed number."""
     return ((m.w(x.s) & 0x3F) ^ 0x20) - 0x20
 
 
 class Prefetch:
-    """The X and Y reads of a MAC-class instruction: addresses first, data last (isa.md §8.1, §8.2)."""
+    """Make the X and Y reads of a MAC-class instruction: addresses first, data last (isa.md §8.1, §8.2)."""
 
     __slots__ = ("m", "x_ea", "x_pointer", "y_ea", "y_pointer")
 

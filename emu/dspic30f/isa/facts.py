@@ -1,6 +1,6 @@
-"""Static facts about one decoded instruction, found by running its row against a builder that only takes notes.
+"""Static facts about one decoded instruction, found by running its row against a recording builder.
 
-They are what the sequencer needs before and between instructions: which W registers form source addresses, which are
+The sequencer needs them before and between instructions: which W registers form source addresses, which are
 written on the destination side (RAW stalls, isa.md §13.2), and how many data accesses there are.
 """
 
@@ -18,26 +18,26 @@ from emu.dspic30f.isa.row import Insn
 
 @dataclass(frozen=True, slots=True)
 class Facts:
-    """What an instruction does, whatever the values are. Masks: bit n stands for Wn."""
+    """Facts of an instruction that hold for all operand values. In masks, bit n stands for Wn."""
 
     source_pointers: int
-    """Registers that form a source EA: a write of one of them just before stalls (isa.md §13.2)."""
+    """Registers that form a source EA: a write of one by the preceding instruction causes a stall (isa.md §13.2)."""
     writes: int
-    """Registers written directly or through a modified destination pointer: sources of stalls."""
+    """Registers written directly or as a modified destination pointer: they may stall the next instruction."""
     loads: int
     reads: tuple[int, ...]
-    """Data addresses read that are written in the instruction itself."""
+    """Data addresses that the instruction reads and encodes itself."""
     stores: int
     access: int
     """Cycle of the only or last data access, counted from the instruction's first one (engines.md §4.2)."""
     window_cycles: int
-    """What a read of the PSV window adds outside of REPEAT (isa.md §13.3)."""
+    """Additional cycles of a read of the PSV window outside of REPEAT (isa.md §13.3)."""
     flow: type | None
-    """Class of the Flow returned, None for "next"."""
+    """Class of the Flow that the row returns, None if the next word follows."""
 
 
 class _Unknown:
-    """A value nobody computes: every operation on it is unknown too."""
+    """An unknown value: the result of every operation on it is unknown too."""
 
     def _same(self, *_operands: object) -> _Unknown:
         return self
@@ -53,7 +53,7 @@ _UNKNOWN = _Unknown()
 
 
 class _Notes:
-    """The builder that takes notes."""
+    """Builder that records accesses and computes nothing."""
 
     def __init__(self, pc: int) -> None:
         self.context = Context()
@@ -70,7 +70,7 @@ class _Notes:
     select = div_trunc = rem_trunc = clz16 = ctz16 = let = w = prog = flag = reg = acc = _value
 
     def _nothing(self, *_arguments: object, **_flags: object) -> None:
-        """Neither a stall nor a data access."""
+        """Ignore an operation that is neither a stall nor a data access."""
 
     table_write = set_flags = set_reg = set_acc = trap_math = _nothing
 
@@ -108,7 +108,7 @@ class _Notes:
 
 @lru_cache(maxsize=65536)
 def facts_of(insn: Insn) -> Facts:
-    """The facts of a decoded instruction; they do not depend on where it stands."""
+    """Return the facts of a decoded instruction; they do not depend on its address."""
     notes: Any = _Notes(0)
     flow: Flow = insn.row.does(notes, insn.x)
     kind = None if flow is None else type(flow)
@@ -120,6 +120,6 @@ def facts_of(insn: Insn) -> Facts:
 
 
 def flow_of(insn: Insn, pc: int) -> Flow:
-    """The flow a decoded instruction at `pc` asks for, with its static targets; what is computed stays unknown."""
+    """Return the flow of a decoded instruction at `pc`, with its static targets; computed values are unknown."""
     notes: Any = _Notes(pc)
     return insn.row.does(notes, insn.x)

@@ -1,10 +1,10 @@
-"""Bit fields: how a 24-bit pattern is written, and what each letter in it stands for.
+"""Bit fields: the notation of 24-bit patterns and the meaning of each letter in them.
 
 A pattern is 24 characters, spaces ignored: ``0``/``1`` must match, ``-`` is ignored by the CPU, a letter is a field.
-Letters follow isa.md §4.2 with three differences, for one meaning per letter: ``o`` is the signed offset of
+Letters follow isa.md §4.2 with three differences, so that each letter has one meaning: ``o`` is the signed offset of
 ``[Wn+Slit10]``, ``z`` is to be 0, and the f-bit forms show the 13-bit byte address ``f`` and the bit 0..7 ``b`` that
 the hardware uses.
-A field's *value* is what the instruction means by it: signed, and scaled to a byte address or register number.
+A field's *value* is its operand: signed, and scaled to a byte address or register number.
 """
 
 from __future__ import annotations
@@ -83,7 +83,7 @@ class Operands:
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """A contiguous piece of a field: ``mask`` bits at ``shift`` of word ``word``, worth ``mask << weight``."""
+    """Contiguous part of a field: bits ``mask`` at ``shift`` in word ``word``, with the weight 2**``weight``."""
 
     word: int
     shift: int
@@ -93,7 +93,7 @@ class Run:
 
 @dataclass(frozen=True, slots=True)
 class Field:
-    """One letter of a pattern: where its bits are and how they are read as a number."""
+    """One letter of a pattern: the position of its bits and their interpretation as a number."""
 
     letter: str
     width: int
@@ -102,7 +102,7 @@ class Field:
     scale: int
 
     def get(self, word1: Any, word2: Any = 0) -> Any:
-        """The value in the instruction; also works on numpy arrays of words."""
+        """Return the value of the field in instruction words, which may be numpy arrays."""
         words = (word1, word2)
         raw = 0
         for run in self.runs:
@@ -113,7 +113,7 @@ class Field:
         return raw * self.scale
 
     def put(self, value: int) -> tuple[int, int]:
-        """The bits to OR into both words. ValueError if ``value`` is out of range or not a multiple of the scale."""
+        """Return the bits to OR into both words. Raises ValueError if ``value`` is out of range or not a multiple."""
         low, high = self.limits
         if not low <= value <= high or value % self.scale:
             step = f" in steps of {self.scale}" if self.scale > 1 else ""
@@ -126,7 +126,7 @@ class Field:
 
     @property
     def limits(self) -> tuple[int, int]:
-        """Smallest and largest value."""
+        """Return the smallest and the largest value."""
         span = 1 << self.width
         low, high = (-span // 2, span // 2 - 1) if self.signed else (0, span - 1)
         return low * self.scale, high * self.scale
@@ -186,7 +186,7 @@ class Clause:
     number: int
 
     def holds(self, get: Callable[[str], Any]) -> Any:
-        """Truth of the rule; ``get(letter)`` gives an int or a numpy array."""
+        """Return whether the rule holds; ``get(letter)`` returns an int or a numpy array."""
         value = get(self.letter)
         if self.relation == "even":
             good = value % 2 == 0
@@ -196,7 +196,7 @@ class Clause:
 
 
 def rules_of(pattern: Pattern) -> tuple[Clause, ...]:
-    """The clauses that the fields of a pattern bring with them."""
+    """Return the clauses that the fields of a pattern imply."""
     widths = {field.letter: field.width for field in pattern.fields}
     texts = [
         text

@@ -1,7 +1,7 @@
-"""What an instruction may ask of the sequencer instead of "go on with the next word".
+"""Flows: requests of an instruction to the sequencer, other than to continue with the next word.
 
-Every row's ``does`` returns one of these, or None. Addresses are program addresses (23 bit, even); a target or count
-may be a static int or a builder value. The sequencer alone changes PC, REPEAT and DO state (isa.md §7).
+The function ``does`` of a row returns one of these, or None. Addresses are program addresses (23 bit, even); a target
+or count may be a static int or a builder value. The sequencer alone changes PC, REPEAT and DO state (isa.md §7).
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Literal, TypeAlias
 
-Value: TypeAlias = Any  # a builder's idea of an integer: int, source expression or LLVM value
+Value: TypeAlias = Any  # integer type of a builder: int, source expression or LLVM value
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,6 +1,6 @@
-"""Operand forms: each turns an operation into the ``does`` of a row, in the phase order of builder.py.
+"""Operand forms: functions that turn an operation into the ``does`` of a row, in the phase order of builder.py.
 
-Named by what they read and where the result goes, as in the syntax column of the table.
+Their names give the operands and the destination, as in the syntax column of the table.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ def f_and_wreg_to_wreg(op: Binary) -> Does:
 
 
 def f_with_wreg(op: Binary) -> Does:
-    """Flags of f op WREG."""
+    """Set the flags of f op WREG."""
 
     def does(m: Builder, x: Operands) -> None:
         size = size_of(x)
@@ -68,7 +68,7 @@ def f_to_wreg(op: Unary) -> Does:
 
 
 def f_flags(op: Unary) -> Does:
-    """Flags of op f."""
+    """Set the flags of op f."""
 
     def does(m: Builder, x: Operands) -> None:
         size = size_of(x)
@@ -124,7 +124,7 @@ def source_to_destination(op: Unary) -> Does:
 
 
 def wb_with_literal(op: Binary) -> Does:
-    """Flags of Wb op lit5."""
+    """Set the flags of Wb op lit5."""
 
     def does(m: Builder, x: Operands) -> None:
         size = size_of(x)
@@ -134,7 +134,7 @@ def wb_with_literal(op: Binary) -> Does:
 
 
 def wb_with_source(op: Binary) -> Does:
-    """Flags of Wb op Ws."""
+    """Set the flags of Wb op Ws."""
 
     def does(m: Builder, x: Operands) -> None:
         size = size_of(x)
@@ -145,7 +145,7 @@ def wb_with_source(op: Binary) -> Does:
 
 
 def source_flags(op: Unary) -> Does:
-    """Flags of op Ws."""
+    """Set the flags of op Ws."""
 
     def does(m: Builder, x: Operands) -> None:
         size = size_of(x)

@@ -1,4 +1,4 @@
-"""Operand kinds: how each word of a row's syntax is written, and which fields it fills.
+"""Operand kinds: the text of each operand in the syntax of a row, and the fields that it fills.
 
 A kind reads tokens of a statement into a ``Part`` (known fields and open slots), turns numbers into fields, and writes
 fields as text in the spelling of binutils. Fields are found by letter, so one kind serves every row that has them.
@@ -19,12 +19,12 @@ SymbolOf: TypeAlias = Callable[[int, str], str | None]  # address, "code" or "da
 
 
 class OperandError(ValueError):
-    """An operand of the right shape with a value that cannot be encoded."""
+    """The operand has the right shape but a value that cannot be encoded."""
 
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """What a kind made of some tokens: fields already known, and expressions still to be parsed.
+    """Result of a kind for some tokens: fields that are known, and expressions still to be parsed.
 
     Nothing is parsed before the whole statement fits a form, so that trying a form has no effect on the caller.
     """
@@ -37,7 +37,7 @@ class Part:
 
 @dataclass(frozen=True, slots=True)
 class Site:
-    """Where an instruction stands and which size its mnemonic asked for; what kinds need besides the row."""
+    """Address of an instruction and access size of its mnemonic, which kinds need besides the row."""
 
     row: Row
     pc: int = 0
@@ -53,7 +53,7 @@ MODE_TEXT = {mode: f"[{before}w{{}}{after}]" for (before, after), mode in MODES.
 
 
 def register_number(token: str) -> int | None:
-    """0..15 of a W register's name."""
+    """Return the number 0..15 of a W register's name."""
     match = REGISTER.fullmatch(token)
     return int(match[1]) if match else None
 
@@ -63,24 +63,25 @@ class Kind:
 
     @abstractmethod
     def read(self, tokens: Sequence[str], at: Site) -> Part | None:
-        """Take tokens from the front; None if their shape does not fit."""
+        """Consume tokens from the front. Return None if their shape does not fit."""
 
     @abstractmethod
     def write(self, x: Operands, at: Site, symbol: SymbolOf | None, source: bool) -> list[str]:
-        """The operand's tokens."""
+        """Return the tokens of the operand."""
 
     def number(self, value: int, at: Site) -> dict[str, int]:
-        """Fields of a numeric operand. OperandError if out of range; TypeError if the operand is none."""
+        """Return the fields of a numeric operand. Raises OperandError if out of range, TypeError if it is not
+        numeric."""
         raise TypeError(f"{type(self).__name__} is not a numeric operand")
 
     def relocation(self, at: Site) -> str:
-        """Relocation of a numeric operand that is a plain symbol; "" if it must be a number."""
+        """Return the relocation of a numeric operand that is a plain symbol; "" if it must be a number."""
         raise TypeError(f"{type(self).__name__} is not a numeric operand")
 
 
 @dataclass(frozen=True)
 class Fixed(Kind):
-    """A word that must stand there: WREG, a branch condition."""
+    """A fixed word: WREG, or a branch condition."""
 
     word: str
 
@@ -93,7 +94,7 @@ class Fixed(Kind):
 
 @dataclass(frozen=True)
 class Register(Kind):
-    """A W register; ``letters``: the field, or fields in order of preference."""
+    """A W register. ``letters`` names its field, or its possible fields in order of preference."""
 
     letters: str
 
@@ -244,7 +245,7 @@ class Bit(Kind):
 
 
 def is_expression(token: str) -> bool:
-    """Not a register, literal or indirect operand."""
+    """Return whether a token is neither a register, a literal nor an indirect operand."""
     return not token.startswith(("#", "[")) and register_number(token) is None and token.upper() != "WREG"
 
 
@@ -282,7 +283,7 @@ class FileBit(Kind):
         return Part(2, text=tokens[0], bit=tokens[1][1:].strip())
 
     def bit(self, number: int | None, at: Site) -> tuple[int, int]:
-        """Field b, and what to add to the address."""
+        """Return field b, and the offset to add to the address."""
         high = 7 if at.byte else 15
         if number is None or not 0 <= number <= high:
             raise OperandError(f"bit number must be a number in 0..{high}")

@@ -90,7 +90,7 @@ class Prefetch(Kind):
         return tokens
 
     def _shows_idle_register(self, x: Operands, row: Row) -> bool:
-        """Whether binutils prints the data register of a prefetch that does not happen, if its field is not 0."""
+        """Return whether binutils prints the data register of a prefetch that is absent, if its field is not 0."""
         hidden = self.pointer == "i" and x.j != NO_PREFETCH and not ("m" in row.fields and row.fields["m"].width == 2)
         return getattr(x, self.data) != 0 and not hidden
 

@@ -1,4 +1,4 @@
-"""Row: one instruction form. Insn: one decoded instruction, a row and its field values."""
+"""Rows, each an instruction form, and instructions, each a row with its field values."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Does = Callable[[Builder, Operands], Flow]
 
 @dataclass(frozen=True, eq=False)
 class Row:
-    """One instruction form, as it stands in the table.
+    """One instruction form: a line of the table.
 
     id           row number of reference isa.csv
     syntax       operands in assembly order; ``{.B}``: byte form by field B; ``{.W}``: suffix printed, optional to write
@@ -43,41 +43,41 @@ class Row:
 
     @property
     def source(self) -> str:
-        """Where the row comes from."""
+        """Return the source of the row."""
         return f"PRM {self.mnemonic}; isa.csv {self.id}"
 
     @cached_property
     def mnemonic(self) -> str:
-        """Upper case, without optional suffix: ADD, BTST.C, DIV.S."""
+        """Return the mnemonic in upper case, without optional suffix: ADD, BTST.C, DIV.S."""
         return re.split(r"[ {]", self.syntax)[0]
 
     @cached_property
     def words(self) -> int:
-        """Length in instruction words."""
+        """Return the length in instruction words."""
         return 2 if self.word2 else 1
 
     @cached_property
     def pattern(self) -> Pattern:
-        """Fixed bits and fields of both words."""
+        """Return the fixed bits and fields of both words."""
         return parse_pattern(self.bits, self.word2) if self.word2 else parse_pattern(self.bits)
 
     @cached_property
     def fields(self) -> Mapping[str, Field]:
-        """Fields by letter."""
+        """Return the fields by letter."""
         return {f.letter: f for f in self.pattern.fields}
 
     @cached_property
     def clauses(self) -> tuple[Clause, ...]:
-        """The rules of its fields and its own constraints, parsed."""
+        """Return the parsed rules of its fields and its own constraints."""
         return rules_of(self.pattern) + parse_constraints(self.constraints)
 
     def broken(self, x: Operands) -> tuple[Clause, ...]:
-        """The clauses that these field values violate; empty for a legal instruction."""
+        """Return the clauses that the field values violate; empty for a legal instruction."""
         return tuple(c for c in self.clauses if not c.holds(lambda letter: getattr(x, letter)))
 
 
 class Insn:
-    """One instruction: ``row``, field values ``x`` and the words it came from. Equal if row and values are equal."""
+    """One instruction: its row, field values ``x`` and words. Two are equal if rows and values are equal."""
 
     __slots__ = ("_key", "row", "word1", "word2", "x")
 
@@ -90,7 +90,7 @@ class Insn:
 
     @property
     def words(self) -> int:
-        """Length in instruction words, 1 or 2."""
+        """Return the length in instruction words, 1 or 2."""
         return self.row.words
 
     def __eq__(self, other: object) -> bool:

@@ -1,4 +1,4 @@
-"""From the syntax column of the table to operand kinds, spellings of mnemonics, and aliases (isa.md §16)."""
+"""Assembly syntax of rows: operand kinds, spellings of mnemonics, and aliases (isa.md §16)."""
 
 from __future__ import annotations
 
@@ -59,14 +59,14 @@ CONDITIONS = frozenset((
 
 @lru_cache(None)
 def kinds_of(syntax: str) -> tuple[Kind, ...]:
-    """The operand kinds of a row's or alias's syntax, in order."""
+    """Return the operand kinds of the syntax of a row or alias, in order."""
     _, _, operands = syntax.partition(" ")
     names = [name.strip(" ,") for name in re.findall(r"\{,.*?\}|f, #bit4|[^{,]+", operands)]
     return tuple(Fixed(name) if name in CONDITIONS else KINDS[name] for name in names if name)
 
 
 def spellings(syntax: str) -> Mapping[str, bool]:
-    """Accepted mnemonics in lower case, and whether each asks for the byte form."""
+    """Return the accepted mnemonics in lower case, each with whether it selects the byte form."""
     head, _, suffix = syntax.split(" ")[0].lower().partition("{")
     match suffix:
         case ".b}":
@@ -78,7 +78,7 @@ def spellings(syntax: str) -> Mapping[str, bool]:
 
 @lru_cache(None)
 def printed_mnemonic(row: Row, byte: int) -> str:
-    """The spelling of binutils for a row with B = ``byte``."""
+    """Return the spelling of binutils for a row with B = ``byte``."""
     head, _, suffix = row.syntax.split(" ")[0].lower().partition("{")
     if suffix == ".b}":
         return head + (".b" if byte or "B" not in row.fields else ".w")
@@ -87,7 +87,7 @@ def printed_mnemonic(row: Row, byte: int) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Form:
-    """One way to write a row: its own syntax, or an alias that sets ``fixed`` fields."""
+    """One spelling of a row: its own syntax, or an alias that sets ``fixed`` fields."""
 
     syntax: str
     row: Row
@@ -123,7 +123,7 @@ ALIASES = (
 
 
 def _forms_by_name() -> Mapping[str, tuple[tuple[Form, bool], ...]]:
-    """Forms by mnemonic. Those with accumulators come first: A and B are no file addresses there."""
+    """Return the forms by mnemonic. Forms with accumulators come first, since A and B are not file addresses there."""
     found: dict[str, list[tuple[Form, bool]]] = {}
     forms = [Form(row.syntax, row) for row in ROWS] + list(ALIASES)
     for form in sorted(forms, key=lambda form: "Acc" not in form.syntax):

@@ -1,4 +1,4 @@
-"""The table: all rows, found by opcode byte or by mnemonic."""
+"""The instruction table: all rows, by opcode byte and by mnemonic."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ BY_ID: Final[Mapping[int, Row]] = {row.id: row for row in ROWS}
 
 
 def _by_opcode_byte() -> tuple[tuple[Row, ...], ...]:
-    """For each value of bits 23:16, the rows whose pattern allows it."""
+    """Return, for each value of bits 23:16, the rows whose pattern allows it."""
     buckets: list[list[Row]] = [[] for _ in range(256)]
     for row in ROWS:
         mask, value = row.pattern.mask[0] >> 16, row.pattern.value[0] >> 16

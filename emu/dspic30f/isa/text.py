@@ -12,7 +12,7 @@ from .operands import FileBit, Kind, OperandError, Part, Site, SymbolOf
 from .row import Insn, Row
 from .syntax import FORMS, Form, kinds_of, printed_mnemonic
 
-# Broken rules in words; a rule not listed is shown as it stands in the table.
+# Descriptions of broken rules; a rule that is not listed is shown as in the table.
 EXPLANATION = {
     "d!=14": "the product cannot go to w14",
     "s>=2": "the divisor cannot be w0",
@@ -26,7 +26,7 @@ TOLERATED = (("s>=2", 1),)
 
 
 class Expression(Protocol):
-    """What the caller's expression parser returns: a number now, or ``value`` None and known later."""
+    """Result of the caller's expression parser: a number, or ``value`` None if it is known only later."""
 
     @property
     def value(self) -> int | None: ...
@@ -36,7 +36,7 @@ Expr: TypeAlias = Callable[[str], Expression]
 
 
 class StatementError(ValueError):
-    """A statement that is no instruction; the text says what was expected."""
+    """The statement is not an instruction; the message says what was expected."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +55,7 @@ class Slot:
 
 @dataclass(frozen=True, slots=True)
 class Parsed:
-    """A statement read: the row, the fields already known, and the numeric operands."""
+    """A parsed statement: the row, the fields that are known, and the numeric operands."""
 
     row: Row
     fields: Mapping[str, int]
@@ -65,11 +65,11 @@ class Parsed:
 
     @property
     def words(self) -> int:
-        """Length in instruction words, 1 or 2; does not depend on values."""
+        """Return the length in instruction words, 1 or 2; it does not depend on values."""
         return self.row.words
 
     def encode(self, pc: int, values: Mapping[int, int | None] | None = None) -> tuple[int, ...]:
-        """The words at program address ``pc``.
+        """Return the words at program address ``pc``.
 
         ``values`` gives numbers for slots by position and overrides the expressions' own; a slot without any number
         leaves its field 0, for a relocation to fill. Raises StatementError if a value or combination is not encodable.
@@ -101,7 +101,7 @@ def _reason(error: EncodeError) -> str:
 
 
 def format(insn: Insn, pc: int = 0, symbol: SymbolOf | None = None, source: bool = False) -> str:
-    """Assembly text of an instruction at program address ``pc``, as binutils prints it.
+    """Return the assembly text of an instruction at program address ``pc``, as binutils prints it.
 
     ``symbol(address, space)`` may name an address, ``space`` being "code" or "data". With ``source`` the text is fit
     for ``parse``: negative literals and wrapped targets are printed as such, ignored register fields are left out.
@@ -114,13 +114,13 @@ def format(insn: Insn, pc: int = 0, symbol: SymbolOf | None = None, source: bool
 
 @dataclass(frozen=True, slots=True)
 class Number:
-    """The expression parser used when none is given: integers with C prefixes."""
+    """Default expression parser: integers with C prefixes."""
 
     value: int
 
     @classmethod
     def read(cls, text: str) -> Number:
-        """StatementError if ``text`` is not a number."""
+        """Parse a number. Raises StatementError if ``text`` is not one."""
         try:
             return cls(int(re.sub(r"\s", "", text), 0))
         except ValueError:
@@ -128,7 +128,7 @@ class Number:
 
 
 def parse(statement: str, expr: Expr = Number.read) -> Parsed:
-    """Read one instruction, without label and comment.
+    """Parse one instruction, without label and comment.
 
     ``expr`` parses the expressions inside operands and may raise its own errors; what it returns needs a ``value``, an
     int or None. Raises StatementError for unknown mnemonics and operands that fit no form.
@@ -152,7 +152,7 @@ def parse(statement: str, expr: Expr = Number.read) -> Parsed:
 
 
 def is_mnemonic(name: str) -> bool:
-    """Whether ``name`` is an instruction, in any case."""
+    """Return whether ``name`` is a mnemonic, in upper or lower case."""
     return name.lower() in FORMS
 
 
@@ -177,7 +177,7 @@ def split_operands(text: str) -> list[str]:
 
 
 def _match(form: Form, site: Site, tokens: Sequence[str]) -> list[tuple[Kind, Part]] | None:
-    """The operands by kind, if the tokens have the shape of the form."""
+    """Return the operands by kind if the tokens have the shape of the form."""
     parts, rest = [], list(tokens)
     for kind in kinds_of(form.syntax):
         part = kind.read(rest, site)

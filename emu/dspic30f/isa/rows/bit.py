@@ -88,7 +88,7 @@ def test_bit_wb(report: Report) -> Does:
 
 
 def test_and_set_bit(report: Report) -> Does:
-    """As ``test_bit``, then the bit is set; written even if it was 1."""
+    """As ``test_bit``, then set the bit; it is written even if it was 1."""
 
     def does(m: Builder, x: Operands) -> None:
         place = source(m, x, 2)

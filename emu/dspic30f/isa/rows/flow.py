@@ -1,4 +1,4 @@
-"""Branches, calls, returns, skips, REPEAT and DO (isa.md §5.7, §7). Everything here is refused after REPEAT.
+"""Branches, calls, returns, skips, REPEAT and DO (isa.md §5.7, §7). None of them may follow REPEAT.
 
 Cycles are those of the branch not taken and of the skip not made; the sequencer adds the rest (isa.md §13.1).
 """
@@ -57,7 +57,7 @@ def skip_bit(wanted: int) -> Does:
 
 
 def bit(name: str) -> Condition:
-    """An SR bit as condition."""
+    """Return a condition that is an SR bit."""
     return lambda m: m.flag(name)
 
 
@@ -104,7 +104,7 @@ def goto_register(m: Builder, x: Operands) -> Goto:
 
 
 def push_return(m: Builder, words: int) -> None:
-    """Push the address behind this instruction of ``words`` words (isa.md §7.4)."""
+    """Push the address after this instruction of ``words`` words (isa.md §7.4)."""
     after = (m.pc + 2 * words) & PC_MASK
     push(m, after & 0xFFFF, after >> 16)
 
@@ -132,7 +132,7 @@ def relative_call_register(m: Builder, x: Operands) -> Call:
 
 
 def pop_return(m: Builder) -> tuple[Value, Value]:
-    """Popped program address, and the whole upper word."""
+    """Pop a program address. Return it and the whole upper word."""
     low, high = pop_addresses(m, 2)
     upper, lower = m.let(m.load(high, 2, ptr=15)), m.load(low, 2, ptr=15)
     return m.let((upper & 0x7F) << 16 | lower & 0xFFFE), upper

@@ -112,15 +112,16 @@ def zero_extend(m: Builder, x: Operands) -> None:
 
 
 def table_address(m: Builder, ea: Value) -> Value:
-    """Even program address. UNVERIFIED: word mode ignores EA<0> (isa.md §7.7)."""
+    """Return an even program address. UNVERIFIED: word mode ignores EA<0> (isa.md §7.7)."""
     return m.reg("TBLPAG") << 16 | ea & 0xFFFE
 
 
-def table_pointer(place: Location) -> Value:
-    """The address a table instruction takes from a place; as a destination it moves now, behind all reads."""
-    assert place.ea is not None, "a table pointer is never register direct"
-    place.move_pointer()
-    return place.ea
+def table_pointer(location: Location) -> Value:
+    """Return the address of a table instruction from its operand location. A destination pointer moves after all
+    reads."""
+    assert location.ea is not None, "a table pointer is never register direct"
+    location.move_pointer()
+    return location.ea
 
 
 def table_read(low: int) -> Does:

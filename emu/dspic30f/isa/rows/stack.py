@@ -26,7 +26,7 @@ def pop_f(m: Builder, x: Operands) -> None:
 
 
 def link(m: Builder, x: Operands) -> None:
-    """Push W14, make it point behind the pushed word, reserve k bytes; W15 ends as a plain sum (isa.md §10.4)."""
+    """Push W14, set it to the address after the pushed word, and reserve k bytes by a plain sum (isa.md §10.4)."""
     top = m.ptr(STACK_POINTER, "dst")
     old = m.w(FRAME_POINTER)
     m.set_ptr(STACK_POINTER, (top + 2 + x.k) & 0xFFFF, "dst")
