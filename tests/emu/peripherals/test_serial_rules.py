@@ -81,7 +81,7 @@ def history(rig: Rig, seed: int, lazy: bool) -> list[object]:
     """Return snapshots at random stops, with input at random times, and the output of UART1."""
     draw = random.Random(seed)
     made, heard = rig.machine, []
-    no_longer = made.uart[1].listen(lambda byte, start: heard.append((byte, start)), lazy=lazy)
+    remove = made.uart[1].listen(lambda byte, start: heard.append((byte, start)), lazy=lazy)
     states: list[object] = []
     for _ in range(12):
         if draw.random() < 0.7:
@@ -89,7 +89,7 @@ def history(rig: Rig, seed: int, lazy: bool) -> list[object]:
             made.uart[1].feed(some, made.cycle + draw.randrange(2000), errors=draw.choice((0, 0, 0, 0x200, 0x400)))
         made.run(cycles=draw.randrange(1, 3000))
         states.append(made.snapshot())
-    no_longer()
+    remove()
     return [*states, heard]
 
 
@@ -107,7 +107,6 @@ def test_engines_agree_on_a_uart_that_sends_and_receives(seed: int) -> None:
     results = [history(machine(engine, UART, **settings), seed, True) for engine in ("plain", "jit")]
     assert len(results[0][-1]) > 5
     assert results[1] == results[0]
-    assert results[2] == results[0]
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -129,7 +128,6 @@ def test_engines_agree_on_an_spi_master(seed: int) -> None:
             states.append(rig.machine.snapshot())
         results.append(states)
     assert results[1] == results[0]
-    assert results[2] == results[0]
 
 
 def test_lazy_listeners_receive_the_same_bytes_as_eager_ones() -> None:
@@ -140,10 +138,10 @@ def test_lazy_listeners_receive_the_same_bytes_as_eager_ones() -> None:
     uart = rig.machine.uart[1]
     uart.listen(lambda byte, start: lazy.append((byte, start)), lazy=True)
     rig.machine.run(cycles=20_000)
-    no_longer = uart.listen(lambda byte, start: prompt.append((byte, start, rig.machine.events.now)))
+    remove = uart.listen(lambda byte, start: prompt.append((byte, start, rig.machine.events.now)))
     first = len(lazy)
     rig.machine.run(cycles=20_000)
-    no_longer()
+    remove()
     assert first > 40
     assert prompt == [(byte, start, start + 320) for byte, start in lazy[first:]]
     rig.machine.run(cycles=20_000)

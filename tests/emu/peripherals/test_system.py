@@ -165,7 +165,7 @@ def test_reset_stops_every_device(rig):
 
 def test_unknown_reset_cause_is_refused(rig):
     """§4."""
-    with pytest.raises(ValueError, match="no reset cause"):
+    with pytest.raises(ValueError, match="not a reset cause"):
         rig.dev.reset("NAP")
 
 
