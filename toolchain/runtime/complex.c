@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Products and quotients of complex numbers, which compilers call by these names. Infinities and NaN follow the plain
+/* Products and quotients of complex numbers, under the names that compilers call. Infinities and NaN follow the plain
  * formulas, not annex G of C11. */
 #include <float.h>
 #include <math.h>
@@ -24,7 +24,7 @@
         type divisor = c + d * ratio;                                                                            \
         return (a + (ratio >= smallest || ratio <= -smallest ? b * ratio : d * (b / c))) / divisor;              \
     }                                                                                                            \
-    /* Power of two that brings two numbers away from overflow and subnormals; 0 for most. */                    \
+    /* Power of two that scales two numbers away from overflow and subnormals; 0 for most. */                    \
     static int part##_shift(type x, type y)                                                                      \
     {                                                                                                            \
         x = x < 0 ? -x : x;                                                                                      \

@@ -32,7 +32,7 @@ _exit:
 .endif
 __Exit:
         mov     w0,__exit_status
-        bset    _SR,#7                  ; IPL 7: nothing but a trap runs from here on (isa.md §2.3)
+        bset    _SR,#7                  ; IPL 7: only traps run from here on (isa.md §2.3)
         bset    _SR,#6
         bset    _SR,#5
 2:      btss    _U1STA,#8               ; sleeping stops the UARTs: let their last characters out (TRMT)

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* What C++ code calls by itself (Itanium C++ ABI, 3.3 and 5.1.5): new and delete on the C heap, which is there when the
- * linker is told one (--heap=BYTES). Nothing can be thrown, so plain `new` that finds no room ends the program. */
+/* Functions that C++ code calls implicitly (Itanium C++ ABI, 3.3 and 5.1.5): new and delete on the C heap, which the linker
+ * option --heap=BYTES creates. There are no exceptions, so plain `new` without memory ends the program. */
 #include <stdlib.h>
 
 void *_Znwj(size_t size)
@@ -49,13 +49,13 @@ void _ZdaPvj(void *p, size_t size)
     free(p);
 }
 
-/* The table of an object under construction, or destroyed: a call of a function that nobody has defined. */
+/* Called through the vtable of an object under construction or destruction: a pure virtual function. */
 void __cxa_pure_virtual(void)
 {
     abort();
 }
 
-/* libc++: a check that has failed where it would throw, std::__libcpp_verbose_abort(char const *, ...). */
+/* libc++: a failed check that would throw, std::__libcpp_verbose_abort(char const *, ...). */
 void _ZNSt3__122__libcpp_verbose_abortEPKcz(const char *format, ...)
 {
     (void)format;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* dsp.h: what is computed in floating point. Formulas of windows: F. J. Harris, Proc. IEEE 66 (1978) 51-83. */
+/* dsp.h: functions that compute in floating point. Formulas of windows: F. J. Harris, Proc. IEEE 66 (1978) 51-83. */
 #include <dsp.h>
 #include <math.h>
 #include <stddef.h>

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What C's hosted library says about a system that has no files, no environment, one locale and no signals from outside
+/* Functions of the hosted library for a system without files, environment and external signals, and with one locale
  * (C11 7.11, 7.14, 7.21, 7.22.4). */
 #include <limits.h>
 #include <locale.h>
@@ -60,7 +60,7 @@ int raise(int number)
     if (handler == SIG_IGN)
         return 0;
     if (handler == SIG_DFL)
-        _Exit(128 + number); /* as a shell reports it */
+        _Exit(128 + number); /* the status that a shell reports */
     handlers[number] = SIG_DFL;
     handler(number);
     return 0;

@@ -1,6 +1,6 @@
 ; SPDX-License-Identifier: MIT
 ; atexit (C11 7.22.4.2) and a start-up code whose exit calls the functions registered, the last one first. A program without
-; atexit has crt0.s, which knows nothing of them: the linker takes this one in its place (link/resolve.py).
+; atexit has crt0.s, which calls no handlers: the linker replaces it by this one (link/resolve.py).
 
         .equ    EXIT_HANDLERS,1
         .include "crt0.s"

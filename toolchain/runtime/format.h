@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: MIT */
-/* Inside of the printf family. */
+/* Internal declarations of the printf family. */
 #ifndef FORMAT_H
 #define FORMAT_H
 
 #include <stdarg.h>
 #include <stddef.h>
 
-/* Where characters go. `put` stores one; `count` is what printf will return. */
+/* Destination of characters. `put` stores one; `count` is the return value of printf. */
 typedef struct sink {
     void (*put)(struct sink *sink, char character);
     char *at, *end;

@@ -1,5 +1,5 @@
 ; SPDX-License-Identifier: MIT
-; The heart of the printf family (C11 7.21.6.1): int __format(sink_t *sink, const char *format, va_list arguments).
+; The core of the printf family (C11 7.21.6.1): int __format(sink_t *sink, const char *format, va_list arguments).
 ; In assembly for its stack: a call of snprintf with integer, string and character conversions takes 50 bytes, return
 ; address included. 64-bit and floating conversions are C functions (format.h), linked when a format string needs them.
 ;
@@ -134,7 +134,7 @@ length: add     #0x20,w1
 4:      rcall   fetch
         bra     length
 
-number: clr     w2                      ; decimal number from W1 on; W1 ends behind it
+number: clr     w2                      ; decimal number from W1 on; W1 ends after it
 1:      sub     w1,#'0'-0x20,w3
         cp      w3,#10
         bra     geu,2f
@@ -185,10 +185,10 @@ conversion:
         mov     #'n',w2
         cp      w1,w2
         bra     z,count
-        rcall   put                     ; anything else stands for itself
+        rcall   put                     ; any other character is printed
         bra     next
 
-count:  dec2    w10,w10                 ; how many characters so far, in as many words as the length says
+count:  dec2    w10,w10                 ; number of characters so far, in the size of the length modifier
         mov     [w10],w3
         mov     [w8+6],w0
         btsc    w13,#BYTE
@@ -403,7 +403,7 @@ wide_signed:
 floating:
         rcall   argument64
         mov     #handle(___format_double),w3
-large:  cp0     w3                      ; not linked: the program hides its formats from the driver
+large:  cp0     w3                      ; not linked: the program builds its formats at run time
         bra     z,next
         mov     w13,[w15++]             ; a spec_t
         mov     w11,[w15++]

@@ -2,8 +2,8 @@
 /* %f %e %g (C11 7.21.6.1): a double as decimal digits, each of them exact, rounded to nearest, ties to even.
  *
  * Every double is an integer of 16-bit limbs plus a fraction of such limbs. The integer is divided into groups of four
- * decimal digits, the fraction gives the next group when it is multiplied by 10^4. Both live on the stack and are as long as
- * the number's exponent asks: 30 bytes below 2^64, 300 for 1e308. */
+ * decimal digits, the fraction gives the next group when it is multiplied by 10^4. Both are on the stack, with a length
+  * that depends on the exponent: 30 bytes below 2^64, 300 for 1e308. */
 #include "format.h"
 #include "softfloat.h"
 #include "stack_room.h"
@@ -23,10 +23,10 @@ typedef struct {
     const uint16_t *groups; /* of the integer, lowest first */
     uint16_t *fraction;     /* limbs, lowest first */
     int left, low, limbs;   /* groups to come; limbs below `low` are zero */
-    uint16_t group, power;  /* rest of the group that is given out, weight of its next digit or 0 */
+    uint16_t group, power;  /* rest of the current group, weight of its next digit or 0 */
 } digits_t;
 
-/* fraction *= 10^4; returns what goes over into the integer. */
+/* fraction *= 10^4; returns the carry into the integer. */
 static uint16_t next_group(digits_t *d)
 {
     uint16_t carry = 0;
@@ -68,11 +68,11 @@ static void place(uint16_t *limbs, uint64_t significand, int shift)
     uint64_t rest = significand << shift;
     for (int i = 0; i < 4; i++, rest >>= LIMB)
         *at++ = (uint16_t)rest;
-    if (shift) /* what went out of the 64 bits */
+    if (shift) /* bits shifted out of the 64 bits */
         *at = (uint16_t)(significand >> (64 - shift));
 }
 
-/* Divides the integer of `count` limbs into groups of four digits; returns how many there are. */
+/* Divides the integer of `count` limbs into groups of four digits; returns their number. */
 static int into_groups(uint16_t *integer, int count, uint16_t *groups)
 {
     int made = 0;
@@ -91,7 +91,7 @@ static int into_groups(uint16_t *integer, int count, uint16_t *groups)
     }
 }
 
-/* Rounds `count` digits by those that follow. Returns 1 when a 1 must stand in front of them, all 0 now. */
+/* Rounds `count` digits by those that follow. Returns 1 if all are 0 now and a 1 must precede them. */
 static int round_off(char *digits, int count, digits_t *rest)
 {
     char next = next_digit(rest);
@@ -120,7 +120,7 @@ static int put_exponent(char *to, int exponent, char letter)
     return length;
 }
 
-/* `padding` characters stand before the sign, between sign and number as zeros, or behind. */
+/* `padding` characters precede the sign, are zeros between sign and number, or follow the number. */
 static void put_sign(sink_t *sink, unsigned char flags, char sign, int padding)
 {
     if (!(flags & (LEFT | ZERO)))
@@ -220,7 +220,7 @@ void __format_double(sink_t *sink, const spec_t *spec, double value)
         digits[0] = first;
         for (int i = 1; i < kept; i++)
             digits[i] = next_digit(&source);
-    } else { /* the first digit is the one that rounding looks at */
+    } else { /* the first digit decides rounding */
         source.group += first * (source.power ? source.power * 10 : 1);
         source.power = source.power ? source.power * 10 : 1;
     }

@@ -11,7 +11,7 @@ int __getchar(void)
         U1STAbits.UTXEN = 1;
     }
     while (!U1STAbits.URXDA) {
-        if (U1STAbits.OERR) /* too many came while nobody read: the receiver stands still until told to go on */
+        if (U1STAbits.OERR) /* receive buffer overrun: the receiver stops until the flag is cleared */
             U1STAbits.OERR = 0;
     }
     return U1RXREG & 0xFF;

@@ -68,12 +68,12 @@ void *calloc(size_t count, size_t size)
     return memory ? memset(memory, 0, (size_t)bytes) : NULL;
 }
 
-/* The part in front of the first aligned place that leaves room for a block becomes one, and is free. */
+/* The part before the first aligned address that has room for a block becomes a free block. */
 void *aligned_alloc(size_t alignment, size_t size)
 {
     if (!alignment || alignment & (alignment - 1) || alignment > LARGEST / 2 || size > LARGEST / 2)
         return NULL;
-    if (alignment <= HEADER) /* what every block is */
+    if (alignment <= HEADER) /* alignment of every block */
         return malloc(size);
     char *memory = malloc(size + alignment + 2 * HEADER);
     if (!memory || !((uintptr_t)memory & (alignment - 1)))

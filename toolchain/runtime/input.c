@@ -4,7 +4,7 @@
 #include <stdio.h>
 #include <string.h>
 
-static int pushed; /* what ungetc gave back, plus 1 */
+static int pushed; /* the character that ungetc pushed back, plus 1 */
 static unsigned char ended;
 
 int getchar(void)

@@ -254,7 +254,7 @@ double log2(double x)
     return twos + logarithm_of(m, &tail) * ONE_OVER_LN2; /* the whole part is exact */
 }
 
-/* 1 + x loses low bits of x; what log makes of the rest is right in proportion to it. */
+/* 1 + x loses low bits of x; the result is scaled by the exact ratio. */
 double log1p(double x)
 {
     volatile double sum = 1 + x;
@@ -300,7 +300,7 @@ double pow(double x, double y)
                    (y - y_high) * (high - log_high);
     double power = exponential_of(product, error + y * tail);
     if (y > 0 && power < 9007199254740992.0 && trunc(x) == x && trunc(y) == y)
-        power = round(power); /* an integer to an integer's power is one, and it is representable */
+        power = round(power); /* an integer to the power of an integer is an integer, and it is representable */
     return copysign(power, sign);
 }
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The rest of math.h that is exact or correctly rounded: rounding to integers as the processor would, scaling,
+/* Further functions of math.h that are exact or correctly rounded: rounding to integers in the current mode, scaling,
  * neighbours, remainders, fused products (C11 7.12.6, 7.12.9-7.12.13), in both precisions. The one rounding direction
  * is to nearest. */
 #include "softfloat.h"
@@ -8,7 +8,7 @@
 #include <limits.h>
 #include <math.h>
 
-/* The lowest double and float without a fraction from which on there are only such. */
+/* The lowest double and float from which on all are integers. */
 #define WHOLE 4503599627370496.0
 #define WHOLE_F 8388608.0f
 
@@ -19,7 +19,7 @@ double rint(double x)
     double size = fabs(x);
     if (!(size < WHOLE))
         return x;
-    volatile double rounded = size + WHOLE; /* the addition is what rounds */
+    volatile double rounded = size + WHOLE; /* the addition rounds */
     return copysign(rounded - WHOLE, x);
 }
 

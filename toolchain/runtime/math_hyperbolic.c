@@ -98,7 +98,7 @@ double cbrt(double x)
     double m = frexp(fabs(x), &exponent);
     for (; exponent % 3; exponent++)
         m *= 0.5;
-    /* m is in [1/8, 1); a line, and then steps that each treble the right digits (Halley) */
+    /* m is in [1/8, 1); a linear estimate, then steps that each triple the correct digits (Halley) */
     double root = 0.4 + 0.61 * m;
     for (int i = 0; i < 2; i++) {
         double cube = root * root * root;

@@ -4,7 +4,7 @@
 
         .section .text._memcpy,code
         .global _memcpy
-        .global ___memcpy_upwards       ; for memmove, whatever memcpy a program brings
+        .global ___memcpy_upwards       ; for memmove, even if the program has a memcpy of its own
 _memcpy:
 ___memcpy_upwards:
         mov     w0,w3

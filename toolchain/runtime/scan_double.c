@@ -9,7 +9,7 @@
 
 static const char decimal[] = "0123456789";
 
-/* How many characters are those of a number or of the beginning of one (C11 7.21.6.2p9). */
+/* Length of the longest prefix of a number (C11 7.21.6.2p9). */
 static unsigned longest(const char *text)
 {
     static const char *const words[] = {"infinity", "nan"};
@@ -58,5 +58,5 @@ const char *__scan_double(const char *at, const char *stop, double *value)
     char *end;
     *value = strtod(text, &end);
     length = longest(text);
-    return end == text || end != text + length ? NULL : at + length; /* "1e" is no 1: its exponent does not come */
+    return end == text || end != text + length ? NULL : at + length; /* "1e" is not 1: its exponent is missing */
 }

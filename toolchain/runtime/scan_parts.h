@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What sscanf and scanf have in common: lengths, sets, numbers. */
+/* Common parts of sscanf and scanf: lengths, sets, numbers. */
 #ifndef SCAN_PARTS_H
 #define SCAN_PARTS_H
 
@@ -11,7 +11,7 @@
 
 static SCAN_INTEGER(scan_long, unsigned long)
 
-/* Size of what a conversion stores into, in units that name themselves. */
+/* Size of the object that a conversion stores into. */
 enum { INT, CHAR, SHORT, LONG, WIDE };
 
 static const char *read_length(const char *format, int *length)
@@ -48,7 +48,7 @@ static void store(void *to, int length, unsigned long value)
         *(unsigned short *)to = (unsigned short)value;
 }
 
-/* %n: how many characters have been read. */
+/* %n: the number of characters read. */
 static void store_count(void *to, int length, unsigned count)
 {
     if (!to)
@@ -58,7 +58,7 @@ static void store_count(void *to, int length, unsigned count)
     store(to, length, count);
 }
 
-/* Whether the set behind `%[` holds the character; *end becomes the place behind its `]`. */
+/* Whether the set after `%[` contains the character; *end becomes the position after its `]`. */
 static int in_set(const char *set, char character, const char **end)
 {
     int inverted = *set == '^', found = 0;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* scanf, fscanf and relatives: sscanf's conversions on characters that come one by one, of which one can be given back. */
+/* scanf, fscanf and relatives: sscanf's conversions on a stream with one character of push-back. */
 #include "scan_parts.h"
 
 #include <stdarg.h>
@@ -9,10 +9,10 @@
 
 typedef struct {
     unsigned count; /* characters read */
-    unsigned width; /* characters that the field may still have */
+    unsigned width; /* characters left in the field */
 } input_t;
 
-/* The next character without taking it; EOF at the end of the input or of the field. */
+/* The next character, not consumed; EOF at the end of the input or of the field. */
 static int peek(const input_t *in)
 {
     if (!in->width)
@@ -37,7 +37,7 @@ static void skip_space(input_t *in)
         take(in);
 }
 
-/* Takes the next character into the field if `characters` has it; returns whether. */
+/* Consumes the next character if `characters` contains it; returns whether it does. */
 static int accept(input_t *in, char *field, unsigned *length, const char *characters)
 {
     int next = peek(in);
@@ -54,7 +54,7 @@ static void accept_all(input_t *in, char *field, unsigned *length, const char *c
     }
 }
 
-/* The longest beginning of an integer (C11 7.21.6.2p9). */
+/* The longest prefix of an integer (C11 7.21.6.2p9). */
 static unsigned integer_field(input_t *in, char *field, char conversion)
 {
     static const char digits[] = "0123456789abcdefABCDEF";
@@ -75,7 +75,7 @@ static unsigned integer_field(input_t *in, char *field, char conversion)
     return length;
 }
 
-/* The longest beginning of a floating number. */
+/* The longest prefix of a floating-point number. */
 static unsigned floating_field(input_t *in, char *field)
 {
     static const char *const words[] = {"infinity", "nan"};

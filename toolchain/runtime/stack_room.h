@@ -1,14 +1,14 @@
 /* SPDX-License-Identifier: MIT */
-/* Arrays of variable length on a stack with a limit: -fstack-check looks at a frame before it is entered, but cannot know
- * their sizes. */
+/* Arrays of variable length on a stack with a limit: -fstack-check tests a frame before it is entered, without their
+ * sizes. */
 #ifndef STACK_ROOM_H
 #define STACK_ROOM_H
 
 #include <stdint.h>
 
 #ifdef __dsPIC30F__
-/* Traps here, with W15 still inside, if the stack has no room for so many bytes. The two instructions that may still run
- * behind the read are harmless ones. */
+/* Traps here, with W15 still within the limit, if the stack has no room for so many bytes. The two instructions that may
+ * run after the read are harmless. */
 #define STACK_ROOM(bytes)                                                                         \
     do {                                                                                          \
         uint16_t room_ = (uint16_t)(((bytes) + 1u) & ~1u);                                        \

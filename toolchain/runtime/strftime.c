@@ -7,7 +7,7 @@ static const char days[] = "Sunday\0Monday\0Tuesday\0Wednesday\0Thursday\0Friday
 static const char months[] = "January\0February\0March\0April\0May\0June\0July\0August\0September\0October\0November\0December\0";
 
 typedef struct {
-    char *at, *end; /* end: where the last character but the 0 may not go */
+    char *at, *end; /* end: limit of characters, which leaves room for the 0 */
     const struct tm *calendar;
 } writer_t;
 
@@ -16,7 +16,7 @@ static void put(writer_t *w, char character)
     if (w->at != w->end)
         *w->at++ = character;
     else
-        w->end = w->at = NULL; /* too long; whatever follows is lost too */
+        w->end = w->at = NULL; /* too long; the rest is discarded too */
 }
 
 static void text(writer_t *w, const char *names, int index, int length)

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The string functions that are not worth assembly (C11 7.24). */
+/* String functions in C (C11 7.24); string.s and memory.s have those in assembly. */
 #include <string.h>
 
 void *memchr(const void *in, int value, size_t count)

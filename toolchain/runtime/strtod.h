@@ -3,8 +3,8 @@
  * including file describes the format: NUMBER and BITS_T are its type and an integer of its size, the rest constants.
  *
  * Few digits and small powers of ten are one exact multiplication or division. Any other number is compared, as an
- * exact integer, with the middle between a guess and its neighbour, until the guess is right. The integers live on the stack
- * and are as long as the number asks. */
+ * exact integer, with the midpoint between a guess and its neighbour, until the guess is right. The integers are on the
+  * stack, with a length that depends on the number. */
 #include "stack_room.h"
 
 #include <ctype.h>
@@ -62,7 +62,7 @@ static int compare(const integer_t *a, const integer_t *b)
     return 0;
 }
 
-/* Sign of digits * 10^power - (middle between the number of these bits and the next larger one). */
+/* Sign of digits * 10^power - (midpoint between the number of these bits and the next larger one). */
 static int against_middle(const char *digits, int count, int power, int more, BITS_T bits)
 {
     int exponent = (int)(bits >> (PRECISION - 1));
@@ -123,7 +123,7 @@ static NUMBER nearest(const char *digits, int count, int power, int more)
     memcpy(&bits, &guess, sizeof bits);
     if (!isfinite(guess))
         bits--; /* the largest number */
-    for (;;) { /* down while the number lies below the middle under the guess, up while above that over it */
+    for (;;) { /* down while the number is below the lower midpoint of the guess, up while it is above the upper one */
         int over = against_middle(digits, count, power, more, bits);
         if (over > 0 || (over == 0 && bits & 1)) {
             bits++;
@@ -201,7 +201,7 @@ static const char *read_hexadecimal(const char *at, NUMBER *value)
     int bits = WIDTH - 1;
     while (bits && !(significand >> (bits - 1)))
         bits--;
-    int lost = bits + below < LOWEST_POWER + PRECISION ? LOWEST_POWER - below : bits - PRECISION; /* bits without a place */
+    int lost = bits + below < LOWEST_POWER + PRECISION ? LOWEST_POWER - below : bits - PRECISION; /* bits beyond the significand */
     if (lost > bits) {
         significand = 0;
     } else if (lost > 0) { /* a significand has WIDTH - 2 bits at most */
@@ -229,7 +229,7 @@ static const char *read_decimal(const char *at, NUMBER *value)
     long power = 0;
     int count = 0, more = 0, any = 0, point = 0;
     const char *first = at;
-    for (;; at++) { /* how many digits there are from the first that is not 0 */
+    for (;; at++) { /* number of digits from the first that is not 0 */
         if (*at == '.' && !point) {
             point = 1;
             continue;
@@ -290,7 +290,7 @@ NUMBER STRING_TO_NUMBER(const char *restrict text, char **restrict end)
     } else if (same_word(at, "nan")) {
         value = (NUMBER)NAN;
         after = at + 3;
-        if (*after == '(') { /* n-char-sequence, which says nothing here */
+        if (*after == '(') { /* n-char-sequence, which is ignored */
             const char *inside = after + 1;
             while (isalnum((unsigned char)*inside) || *inside == '_')
                 inside++;

@@ -14,7 +14,7 @@ static unsigned digit_value(char character)
     return isalpha(character) ? (unsigned)(tolower(character) - 'a' + 10) : 99;
 }
 
-/* Magnitude of the number at `text`; *negative tells the sign, *overflow that it does not fit. */
+/* Magnitude of the number at `text`; *negative is its sign, *overflow whether it does not fit. */
 #define TEXT_INTEGER(TYPE, MOST)                                                                                  \
     static TYPE magnitude(const char *text, char **end, int base, int *negative, int *overflow)                   \
     {                                                                                                             \

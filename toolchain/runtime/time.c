@@ -9,7 +9,7 @@
 static struct tm broken_down;
 static char text[26];
 
-/* The program replaces these where there is something to read. */
+/* The program replaces these if it has a clock. */
 clock_t clock(void)
 {
     return -1;
