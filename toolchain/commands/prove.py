@@ -44,13 +44,13 @@ def main(arguments: list[str]) -> int:
     options, rest = options_of().parse_known_args(arguments)
     if find_spec("z3") is None:
         raise ToolError("prove needs z3: python -m pip install z3-solver")
-    from toolchain.frontend.clang import CompileError
+    from toolchain.frontend.clang import ClangError
     from toolchain.proof.problem import compile_file
     from toolchain.proof.prove import verdicts
 
     try:
         made = compile_file([options.file, *rest])
-    except CompileError:
+    except ClangError:
         return FAULT
     if options.function is not None and options.function not in made.module.functions:
         raise ToolError(f"{options.file}: no function {options.function}")

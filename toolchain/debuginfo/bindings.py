@@ -6,7 +6,7 @@ line. If two paths into a block disagree, the variable has no record there.
 
 from __future__ import annotations
 
-from toolchain.debuginfo.metadata import DebugInfo
+from toolchain.debuginfo.metadata import DebugMetadata
 from toolchain.ir.cfg import predecessors
 from toolchain.ir.model import Arg, Block, ConstInt, DbgRecord, Function, Instr, Type, size_of
 
@@ -22,7 +22,7 @@ class BoundLine(str):
     records: tuple[int, ...] = ()
 
 
-def bind(f: Function, info: DebugInfo) -> None:
+def bind(f: Function, info: DebugMetadata) -> None:
     """Bind the lines of `f` to records. Assignment records become values, or memory if that contains the value."""
     for k, home in in_memory(f, info).items():
         f.dbg_records[k].kind, f.dbg_records[k].value = "memory", home
@@ -112,7 +112,7 @@ class _RecordFlow:
                 i.line = made[key]
 
 
-def name_of(record: DbgRecord, info: DebugInfo) -> str:
+def name_of(record: DbgRecord, info: DebugMetadata) -> str:
     """Reference of the variable, followed by that of the call at which its function was inlined."""
     call = info.node(record.location).get("inlinedAt", "") if record.location else ""
     return f"{record.variable}{call}"
@@ -126,7 +126,7 @@ def _meet(incoming: list[ValidRecords]) -> ValidRecords:
     return {name: k for name, k in first.items() if all(other.get(name) == k for other in incoming[1:])}
 
 
-def in_memory(f: Function, info: DebugInfo) -> dict[int, Instr]:
+def in_memory(f: Function, info: DebugMetadata) -> dict[int, Instr]:
     """Index of every assignment record behind which the whole variable is in memory -> its alloca.
 
     The store linked to the record precedes it, or the object has not been written yet. Variables with a part in
@@ -153,7 +153,7 @@ def in_memory(f: Function, info: DebugInfo) -> dict[int, Instr]:
     return {k: home for k, home in found.items() if name_of(f.dbg_records[k], info) not in split}
 
 
-def _is_whole(home: Instr, record: DbgRecord, info: DebugInfo) -> bool:
+def _is_whole(home: Instr, record: DbgRecord, info: DebugMetadata) -> bool:
     """Whether an object has the size of the variable, so that it is not a part of a split one."""
     t = home.extra.get("type")
     return isinstance(t, Type) and 8 * size_of(t) == info.bits(info.node(record.variable).get("type", ""))

@@ -32,7 +32,7 @@ ASM_STACK = re.compile(r"(?:(push|pop)|mov)(\.d)? (?:([^,\[]+)|([^,\[]+),\[w15\+
 
 
 @dataclass(frozen=True, slots=True)
-class FrameState:
+class CallFrameState:
     """State of the frame in front of an instruction. All numbers are bytes above the CFA."""
 
     depth: int = RETURN_BYTES
@@ -44,11 +44,11 @@ class FrameState:
     saved: tuple[tuple[int, int | None], ...] = ()
     """Register -> offset of the caller's value; None if it is not in memory."""
 
-    def with_saved(self, changes: dict[int, int | None]) -> FrameState:
+    def with_saved(self, changes: dict[int, int | None]) -> CallFrameState:
         """The state with more registers saved; an earlier location of a register has precedence."""
         return replace(self, saved=tuple(sorted((changes | dict(self.saved)).items())))
 
-    def without(self, gone: set[int]) -> FrameState:
+    def without(self, gone: set[int]) -> CallFrameState:
         """The state in which the registers `gone` contain the caller's values again."""
         return replace(self, saved=tuple(one for one in self.saved if one[0] not in gone))
 
@@ -59,9 +59,9 @@ class CallFrames:
 
     prefix: str
     interrupt: bool
-    states: dict[int, FrameState]  # id(instruction) -> state in front of it
-    rows: list[tuple[str, FrameState]] = field(default_factory=list)  # label, state from there on
-    now: FrameState = FrameState()
+    states: dict[int, CallFrameState]  # id(instruction) -> state in front of it
+    rows: list[tuple[str, CallFrameState]] = field(default_factory=list)  # label, state from there on
+    now: CallFrameState = CallFrameState()
 
     def at(self, mi: MI) -> str:
         """Label line to write in front of an instruction if the state changes, else ""."""
@@ -76,7 +76,7 @@ class CallFrames:
         """Label line to write between REPEAT #count and its push of a word, or ""."""
         return self._change(replace(self.now, repeats=count)) if self.now.frame is None else ""
 
-    def _change(self, state: FrameState) -> str:
+    def _change(self, state: CallFrameState) -> str:
         if state == self.now:
             return ""
         self.now = state
@@ -89,8 +89,8 @@ def follow(m: MFunction, prefix: str) -> CallFrames:
     """Frame states of a finished function, by data flow over its blocks."""
     interrupt = bool(m.interrupt)
     blocks = m.block_map()
-    at_start = {m.blocks[0].name: FrameState()}
-    found: dict[int, FrameState] = {}
+    at_start = {m.blocks[0].name: CallFrameState()}
+    found: dict[int, CallFrameState] = {}
     work = [m.blocks[0].name]
     while work:
         b = blocks[work.pop()]
@@ -105,7 +105,7 @@ def follow(m: MFunction, prefix: str) -> CallFrames:
     return CallFrames(prefix, interrupt, found)
 
 
-def _after(state: FrameState, mi: MI, interrupt: bool) -> FrameState:
+def _after(state: CallFrameState, mi: MI, interrupt: bool) -> CallFrameState:
     text = str(mi.args[0]) if mi.op == "text" else ""
     if text.startswith("lnk "):
         below = state.depth + 2
@@ -136,7 +136,7 @@ def _by(mi: MI) -> int:
     return stack_change(mi)
 
 
-def _asm_after(state: FrameState, line: str, interrupt: bool) -> FrameState:
+def _asm_after(state: CallFrameState, line: str, interrupt: bool) -> CallFrameState:
     """State behind a line of inline assembly, which may push and pop registers."""
     change, registers = _asm_change(line)
     if change > 0:
@@ -163,7 +163,7 @@ def _pushes_saved(mi: MI) -> bool:
     return mi.line is None and _by(mi) > 0
 
 
-def _pushed(state: FrameState, mi: MI, interrupt: bool) -> FrameState:
+def _pushed(state: CallFrameState, mi: MI, interrupt: bool) -> CallFrameState:
     registers = _registers(mi, "push", 0)
     kept = {r: state.depth + 2 * k for k, r in enumerate(registers) if interrupt or r not in SCRATCH}
     return replace(state.with_saved(dict(kept)), depth=state.depth + _by(mi))
@@ -225,7 +225,7 @@ class FrameSection:
     def _entry(self, name: str, end: str, frames: CallFrames) -> list[str]:
         lines = [f"\t.4byte .Ldbg_cie{int(frames.interrupt)}", f"\t.4byte {name},{end}-{name}"]
         size = 12
-        before, place = FrameState(), name
+        before, place = CallFrameState(), name
         for label, state in frames.rows:
             data = _difference(before, state)
             if data:
@@ -236,7 +236,7 @@ class FrameSection:
         return _record(f".Ldbg_fde_{name}", lines, size)
 
 
-def _difference(before: FrameState, after: FrameState) -> list[str]:
+def _difference(before: CallFrameState, after: CallFrameState) -> list[str]:
     """Call frame instructions from one state to the next."""
     data: list[str] = []
     (register, offset), (old_register, old_offset) = _base(after), _base(before)
@@ -260,7 +260,7 @@ def _difference(before: FrameState, after: FrameState) -> list[str]:
     return data
 
 
-def _base(state: FrameState) -> tuple[int, int]:
+def _base(state: CallFrameState) -> tuple[int, int]:
     return (SP, state.depth) if state.frame is None else (FP, state.frame)
 
 

@@ -12,7 +12,7 @@ from toolchain.abi.names import symbol
 from toolchain.debuginfo.call_frames import CallFrames, FrameSection
 from toolchain.debuginfo.entries import CompileUnit
 from toolchain.debuginfo.leb128 import sleb, uleb
-from toolchain.debuginfo.metadata import DebugInfo
+from toolchain.debuginfo.metadata import DebugMetadata
 from toolchain.debuginfo.scopes import DebugEntry, FunctionInfo
 from toolchain.ir.model import Module
 
@@ -49,7 +49,7 @@ class DwarfWriter:
 
     def __init__(self, module: Module) -> None:
         self.module = module
-        self.info = DebugInfo(module)
+        self.info = DebugMetadata(module)
         self.units: dict[str, CompileUnit] = {}
         self.abbreviations: dict[tuple[object, ...], int] = {}
         self.frames = FrameSection()

@@ -7,7 +7,7 @@ location lists. A variable without a location is reported as optimised out by de
 from __future__ import annotations
 
 from toolchain.debuginfo.leb128 import sleb, uleb
-from toolchain.debuginfo.metadata import DebugInfo
+from toolchain.debuginfo.metadata import DebugMetadata
 from toolchain.debuginfo.scopes import DebugEntry, FunctionInfo, LexicalScope, ScopeTree, split_name
 from toolchain.ir.model import Module
 from toolchain.mir.mir import CONSTANT_WORD, OPTIMISED_OUT
@@ -55,7 +55,7 @@ def _constant(value: bytes) -> tuple[str, str, str | int | list[str]]:
 class CompileUnit:
     """Builds the entries of one compile unit."""
 
-    def __init__(self, info: DebugInfo, module: Module, ref: str, number: int) -> None:
+    def __init__(self, info: DebugMetadata, module: Module, ref: str, number: int) -> None:
         self.info = info
         self.module = module
         self.ref = ref

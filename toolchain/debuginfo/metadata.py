@@ -12,7 +12,7 @@ LIST = re.compile(r"!\d+|null")
 MAX_DEPTH = 64
 
 
-class DebugInfo:
+class DebugMetadata:
     """Metadata nodes of one module, each parsed once."""
 
     def __init__(self, module: Module) -> None:

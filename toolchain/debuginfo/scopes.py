@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass, field
 
-from toolchain.debuginfo.metadata import DebugInfo
+from toolchain.debuginfo.metadata import DebugMetadata
 
 REFERENCE = re.compile(r"!\d+")
 
@@ -60,7 +60,7 @@ def split_name(name: str) -> tuple[str, str]:
 class ScopeTree:
     """The scopes of one function."""
 
-    def __init__(self, info: DebugInfo, f: FunctionInfo) -> None:
+    def __init__(self, info: DebugMetadata, f: FunctionInfo) -> None:
         self.info = info
         self.top = LexicalScope(f.subprogram)
         ends = [label for label, _, _ in f.rows[1:]] + [f.end_label]

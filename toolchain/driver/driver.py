@@ -21,7 +21,7 @@ from toolchain.frontend.options import HELP, CcOptions, Input, parse
 
 if TYPE_CHECKING:
     from toolchain.asm.state import Options as AssemblerOptions
-    from toolchain.driver.link_stage import Program
+    from toolchain.driver.link_stage import LinkInput
 
 FrontEnd = Callable[[CcOptions, Path], dict[Input, bytes]]
 IR_SOURCES = {"c", "cpp-output", "c++", "c++-cpp-output"}
@@ -35,7 +35,7 @@ def main(argv: list[str], cxx: bool = False, front: FrontEnd | None = None) -> i
     With `cxx`, C sources are compiled as C++. `front` replaces `front_end` when files are compiled and linked together;
     a caller that builds the same sources several times can use it to cache the IR.
     """
-    from toolchain.frontend.clang import CompileError
+    from toolchain.frontend.clang import ClangError
 
     try:
         options = parse(argv)
@@ -51,7 +51,7 @@ def main(argv: list[str], cxx: bool = False, front: FrontEnd | None = None) -> i
                     _run(options, Path(scratch), front or front_end)
                 except ToolError as error:
                     raise _with_source_positions(options, error, Path(scratch)) from error
-    except CompileError:
+    except ClangError:
         return FAULT
     except RecursionError:
         print("error: types or expressions are nested too deeply", file=sys.stderr)
@@ -243,14 +243,14 @@ def _output(options: CcOptions, item: Input, suffix: str) -> Path:
     return options.output or Path(item.path.stem + suffix)
 
 
-def _compile_program(options: CcOptions, scratch: Path, front: FrontEnd) -> Program:
+def _compile_program(options: CcOptions, scratch: Path, front: FrontEnd) -> LinkInput:
     """Input of the linker: objects in command line order, the object of the merged C files last, and archives."""
-    from toolchain.driver.link_stage import Program, find_library, output_path
+    from toolchain.driver.link_stage import LinkInput, find_library, output_path
     from toolchain.driver.runtime_archive import library
     from toolchain.frontend import polled_flags
 
     modules = front(options, scratch)
-    program = Program(runtime=library(object_of, options.jobs) if options.runtime or options.startup else b"")
+    program = LinkInput(runtime=library(object_of, options.jobs) if options.runtime or options.startup else b"")
     for item in options.inputs:
         if item.language == "archive":
             program.archives.append((str(item.path), read_bytes(item.path)))
@@ -272,7 +272,7 @@ def _compile_program(options: CcOptions, scratch: Path, front: FrontEnd) -> Prog
     return program
 
 
-def _merge(modules: dict[Input, bytes], program: Program) -> bytes:
+def _merge(modules: dict[Input, bytes], program: LinkInput) -> bytes:
     """Merge all C inputs; symbols that assembly, archives and the library do not name become internal."""
     from toolchain.driver.runtime_archive import defined_names
     from toolchain.driver.whole_program import internalise, merge, names_used, read_module

@@ -40,7 +40,7 @@ FORMAT_PARTS = {
 
 
 @dataclass
-class Program:
+class LinkInput:
     """Input of the linker: run-time library, objects in order, archives."""
 
     runtime: bytes
@@ -65,7 +65,7 @@ def find_library(options: CcOptions, name: str) -> tuple[str, bytes] | None:
     raise ToolError(f"cannot find lib{name}.a ({searched})")
 
 
-def link_program(options: CcOptions, program: Program) -> None:
+def link_program(options: CcOptions, program: LinkInput) -> None:
     """Link and write all outputs or none. Raises ToolError that lists all errors."""
     objects = [read_object(content, name) for name, content in program.objects]
     archives = [open_archive(content, name) for name, content in program.archives]

@@ -15,7 +15,7 @@ from toolchain.abi import sections
 from toolchain.abi.names import block_label, symbol
 from toolchain.debuginfo import bindings, call_frames
 from toolchain.debuginfo.dwarf import DwarfWriter
-from toolchain.debuginfo.metadata import DebugInfo
+from toolchain.debuginfo.metadata import DebugMetadata
 from toolchain.debuginfo.scopes import FunctionInfo
 from toolchain.debuginfo.variables import LocationLists
 from toolchain.emit import atomic_sections, constructors, data, isr, used
@@ -72,7 +72,7 @@ class FunctionContext:
     """One function in the pipeline: its IR, its machine form and the facts that passes need."""
 
     module: Module
-    info: DebugInfo
+    info: DebugMetadata
     function: Function
     options: CompileOptions
     interrupt: str
@@ -120,7 +120,7 @@ def _legalize(c: FunctionContext) -> None:
 
 
 def _select(c: FunctionContext) -> None:
-    c.machine = select.Selector(c.module, c.function, c.for_size, c.taken).run()
+    c.machine = select.FunctionSelector(c.module, c.function, c.for_size, c.taken).run()
     c.machine.interrupt = c.interrupt
     c.machine.preserved, c.machine.preprologue = isr.preserved(c.notes), isr.preprologue(c.notes)
     if c.interrupt:
@@ -184,7 +184,7 @@ def check_order(passes: list[Pass]) -> None:
 check_order(FUNCTION_PASSES)
 
 
-def source_position(info: DebugInfo, f: Function, line: str | None) -> str:
+def source_position(info: DebugMetadata, f: Function, line: str | None) -> str:
     """ "file:line" of a !dbg reference or of the function; the function's name without debug information."""
     found = info.position(line) or info.position(f.dbg)
     return f"{found[0]}:{found[1]}" if found is not None else f"in function '{f.name}'"
@@ -209,7 +209,7 @@ def address_taken_blocks(module: Module) -> dict[str, set[str]]:
 class LineTableRows:
     """Line table rows of one function, collected while its text is written."""
 
-    def __init__(self, info: DebugInfo, f: Function, name: str) -> None:
+    def __init__(self, info: DebugMetadata, f: Function, name: str) -> None:
         self.info = info
         self.name = name
         self.last: tuple[str, int, str, str] | None = None
@@ -344,7 +344,7 @@ class ModuleCompiler:
         name = symbol(self.module, f.name)
         rows = LineTableRows(self.dwarf.info, f, name) if self.options.debug and f.dbg is not None else None
         ranges = LocationLists(str(self.serial))
-        emitter = emit.Emitter(c.m, str(self.serial), self.options.large_code, self.dwarf.info.position)
+        emitter = emit.FunctionEmitter(c.m, str(self.serial), self.options.large_code, self.dwarf.info.position)
         frames = call_frames.follow(c.m, str(self.serial)) if self.options.debug else None
         self.lines += emitter.text(rows.mark if rows is not None else no_rows, ranges, frames)
         removed = c.taken - {b.name for b in c.m.blocks}  # no code jumps to them, but their addresses are still values
@@ -407,5 +407,5 @@ def compile_module(ll_text: str, options: CompileOptions) -> str:
 
 def position_in(ll_text: str, ref: str | None) -> str:
     """ "file:line" of a !dbg reference in IR text that has not been parsed, or ""."""
-    found = DebugInfo(Module(metadata=dict(METADATA.findall(ll_text)))).position(ref)
+    found = DebugMetadata(Module(metadata=dict(METADATA.findall(ll_text)))).position(ref)
     return f"{found[0]}:{found[1]}" if found is not None else ""

@@ -52,10 +52,10 @@ def with_positions(error: ToolError, modules: Callable[[], Iterable[str]]) -> To
 
 def _uses(text: str) -> Iterable[tuple[str, str]]:
     """(assembler name, "file:line used in function 'f'") of every reference in the code of a module."""
-    from toolchain.debuginfo.metadata import DebugInfo
+    from toolchain.debuginfo.metadata import DebugMetadata
     from toolchain.ir.read import read_module
 
-    info = DebugInfo(read_module(text))
+    info = DebugMetadata(read_module(text))
     function = ""
     for line in text.splitlines():
         if start := _FUNCTION.match(line):

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from toolchain.abi.names import block_label, symbol
 from toolchain.abi.sections import SECTION_ATTRIBUTES, attribute_section, is_near
 from toolchain.abi.target import NEAR_END
-from toolchain.debuginfo.metadata import DebugInfo
+from toolchain.debuginfo.metadata import DebugMetadata
 from toolchain.emit.isr import numbers, section_modifiers
 from toolchain.emit.used import KEEP
 from toolchain.ir.model import (
@@ -53,7 +53,7 @@ def far_objects(notes: dict[str, set[str]], locate: Callable[[str], str]) -> fro
 class DataEmitter:
     """Writes all variables of a module."""
 
-    def __init__(self, module: Module, notes: dict[str, set[str]], used: frozenset[str], info: DebugInfo) -> None:
+    def __init__(self, module: Module, notes: dict[str, set[str]], used: frozenset[str], info: DebugMetadata) -> None:
         self.module = module
         self.info = info
         self.notes = notes
@@ -255,6 +255,6 @@ def _is_label(v: Value) -> bool:
     return isinstance(v, BlockAddress)
 
 
-def emit_data(module: Module, notes: dict[str, set[str]], used: frozenset[str], info: DebugInfo) -> list[str]:
+def emit_data(module: Module, notes: dict[str, set[str]], used: frozenset[str], info: DebugMetadata) -> list[str]:
     """Assembly lines of all variables; `notes` are their annotations, `used` those that the linker must keep."""
     return DataEmitter(module, notes, used, info).run()

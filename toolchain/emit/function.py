@@ -54,7 +54,7 @@ def operand_text(a: Operand) -> str:
             return str(a)
 
 
-class Emitter:
+class FunctionEmitter:
     """Writes one function."""
 
     def __init__(
@@ -260,30 +260,30 @@ class Emitter:
         self._out(str(mi.args[0]))
 
 
-SPECIAL: dict[str, Callable[[Emitter, MI], None]] = {
-    "bra": Emitter._bra,
-    "jump": Emitter._jump,
-    "jumpr": Emitter._jumpr,
-    "brtable": Emitter._brtable,
-    "call": Emitter._call,
-    "callr": Emitter._callr,
-    "tailcall": Emitter._tailcall,
-    "ret": Emitter._ret,
-    "div.s": Emitter._divide,
-    "div.u": Emitter._divide,
-    "div.sd": Emitter._divide,
-    "div.ud": Emitter._divide,
-    "repmov": Emitter._repeat,
-    "repclr": Emitter._repeat,
-    "repfill": Emitter._repeat,
-    "shiftloop": Emitter._shiftloop,
-    "asm": Emitter._asm,
-    "borrow": Emitter._borrow,
-    "clrd": Emitter._clear_pair,
-    "begin_atomic": Emitter._begin_atomic,
-    "end_atomic": Emitter._end_atomic,
-    "text": Emitter._plain_text,
-    "movlow": Emitter._low_move,
-    "iorlow": Emitter._low_logic,
-    "xorlow": Emitter._low_logic,
+SPECIAL: dict[str, Callable[[FunctionEmitter, MI], None]] = {
+    "bra": FunctionEmitter._bra,
+    "jump": FunctionEmitter._jump,
+    "jumpr": FunctionEmitter._jumpr,
+    "brtable": FunctionEmitter._brtable,
+    "call": FunctionEmitter._call,
+    "callr": FunctionEmitter._callr,
+    "tailcall": FunctionEmitter._tailcall,
+    "ret": FunctionEmitter._ret,
+    "div.s": FunctionEmitter._divide,
+    "div.u": FunctionEmitter._divide,
+    "div.sd": FunctionEmitter._divide,
+    "div.ud": FunctionEmitter._divide,
+    "repmov": FunctionEmitter._repeat,
+    "repclr": FunctionEmitter._repeat,
+    "repfill": FunctionEmitter._repeat,
+    "shiftloop": FunctionEmitter._shiftloop,
+    "asm": FunctionEmitter._asm,
+    "borrow": FunctionEmitter._borrow,
+    "clrd": FunctionEmitter._clear_pair,
+    "begin_atomic": FunctionEmitter._begin_atomic,
+    "end_atomic": FunctionEmitter._end_atomic,
+    "text": FunctionEmitter._plain_text,
+    "movlow": FunctionEmitter._low_move,
+    "iorlow": FunctionEmitter._low_logic,
+    "xorlow": FunctionEmitter._low_logic,
 }

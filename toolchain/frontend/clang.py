@@ -68,7 +68,7 @@ FOREIGN_MACROS = ["MSP430", "__MSP430__"]
 CLANG_LEVEL = {"0": "-O0", "1": "-O1", "2": "-O2", "s": "-Oz"}
 
 
-class CompileError(Exception):
+class ClangError(Exception):
     """clang reported errors, which are already on stderr; the driver exits with status 1."""
 
 
@@ -241,7 +241,7 @@ def without_preprocessing(options: list[str]) -> list[str]:
 def run_jobs(jobs: list[Job], parallel: int, show: bool = False) -> None:
     """Run jobs, at most `parallel` at once (0: one per core); diagnostics appear in the order of the jobs.
 
-    With `show`, the commands are printed first. Raises CompileError after the last job if any of them failed.
+    With `show`, the commands are printed first. Raises ClangError after the last job if any of them failed.
     """
     program = clang_program()
     colour = ["-fdiagnostics-color=always"] if os.isatty(2) and not os.environ.get("NO_COLOR") else []
@@ -262,4 +262,4 @@ def run_jobs(jobs: list[Job], parallel: int, show: bool = False) -> None:
         else:
             job.printed.write_bytes(result.stdout)
     if any(result.returncode != 0 for result in results):
-        raise CompileError
+        raise ClangError

@@ -75,7 +75,7 @@ def compare(pred: str, a: ConstInt, b: ConstInt) -> bool:
             return x >= y
 
 
-class Builder:
+class IrBuilder:
     """Appends instructions to one block. Methods return the value of the operation."""
 
     def __init__(self, block: Block) -> None:

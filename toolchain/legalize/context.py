@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from toolchain.ir.build import Builder, const, legal_type
+from toolchain.ir.build import IrBuilder, const, legal_type
 from toolchain.ir.model import (
     I1,
     I16,
@@ -48,7 +48,7 @@ class LegalizationContext:
         self.blocks: list[Block] = []
         self.last_block: dict[str, str] = {}  # old block name -> name of the new block that holds its terminator
         self.pending_phis: list[tuple[Instr, list[Value], int | None]] = []  # phi, old operands, leaf of an aggregate
-        self.b = Builder(Block(""))  # appends to the current block
+        self.b = IrBuilder(Block(""))  # appends to the current block
         self.alive: list[object] = []  # keeps ids in `values` unique while the map lives
 
     def begin(self, name: str) -> Block:

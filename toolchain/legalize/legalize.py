@@ -11,7 +11,7 @@ from collections.abc import Callable
 from typing import Unpack
 
 from toolchain.abi.target import ARGUMENT_REGISTERS
-from toolchain.ir.build import Builder, const, legal_type
+from toolchain.ir.build import IrBuilder, const, legal_type
 from toolchain.ir.cfg import reverse_postorder
 from toolchain.ir.model import (
     I1,
@@ -58,7 +58,7 @@ class Legalizer(MemoryLegalizer):
         self._legalize_parameters(parameters)
         order = reverse_postorder(f)  # definitions before uses, whatever the textual order
         for block in order:
-            self.b = Builder(self.begin(block.name))
+            self.b = IrBuilder(self.begin(block.name))
             if block is order[0]:
                 self._normalise_parameters(parameters)
             self._translate_block(block)

@@ -7,7 +7,7 @@ speed only: 17 words and cycles instead of a library call of 3 words and 50 cycl
 
 from __future__ import annotations
 
-from toolchain.ir.build import Builder, const
+from toolchain.ir.build import IrBuilder, const
 from toolchain.ir.model import I16, I32, Block, ConstInt, Function, Instr, Value
 
 OPERATIONS = frozenset(("udiv", "sdiv", "urem", "srem"))
@@ -71,7 +71,7 @@ def _rewrite(block: Block, i: Instr, quotients: dict[tuple[str, int, int], Value
     """Append the first steps of the computation to the block, and turn `i` into the last step."""
     x, d = i.args
     assert isinstance(d, ConstInt)
-    b = Builder(block)
+    b = IrBuilder(block)
     b.line = i.line
     key = (i.op[0], id(x), d.value)
     quotient = quotients.get(key)
@@ -104,7 +104,7 @@ def signed_factor(d: int, bits: int = 16) -> tuple[int, int]:
     raise AssertionError(d)
 
 
-def _high(b: Builder, x: Value, m: int, extend: str) -> Value:
+def _high(b: IrBuilder, x: Value, m: int, extend: str) -> Value:
     """Upper half of x * m for 0 <= m < 2^bits, x extended by `extend`."""
     if x.type is I32:
         return b.emit("mulhigh", I32, [x, const(I32, m)], signed=extend == "sext")
@@ -113,7 +113,7 @@ def _high(b: Builder, x: Value, m: int, extend: str) -> Value:
     return b.binary("add", high, x) if extend == "sext" and m >= 1 << 15 else high
 
 
-def _unsigned(b: Builder, x: Value, d: int) -> Value:
+def _unsigned(b: IrBuilder, x: Value, d: int) -> Value:
     bits = x.type.bits
     m, s = unsigned_factor(d, bits)
     if m < 1 << bits:
@@ -123,7 +123,7 @@ def _unsigned(b: Builder, x: Value, d: int) -> Value:
     return b.shift("lshr", b.binary("add", half, high), s - 1)
 
 
-def _signed(b: Builder, x: Value, d: int) -> Value:
+def _signed(b: IrBuilder, x: Value, d: int) -> Value:
     bits = x.type.bits
     if d < 0:
         return b.binary("sub", const(x.type, 0), _signed(b, x, -d))

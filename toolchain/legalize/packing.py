@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from toolchain.ir.build import Builder, const, legal_type
+from toolchain.ir.build import IrBuilder, const, legal_type
 from toolchain.ir.model import Type, UnsupportedError, Value, int_type
 
 MAX_PACKED_BITS = 128
@@ -16,18 +16,18 @@ def packed_type(t: Type) -> Type:
     return legal_type(int_type(bits))
 
 
-def pack(b: Builder, lanes: list[Value], t: Type) -> Value:
+def pack(b: IrBuilder, lanes: list[Value], t: Type) -> Value:
     """Build the integer that holds the lanes of a vector of type `t`."""
     return _concatenate(b, lanes, t.elems[0].bits, packed_type(t))
 
 
-def unpack(b: Builder, whole: Value, t: Type) -> list[Value]:
+def unpack(b: IrBuilder, whole: Value, t: Type) -> list[Value]:
     """Build the lanes of a vector of type `t` from the integer that holds them."""
     lane = t.elems[0]
     return [b.cast("trunc", b.shift("lshr", whole, k * lane.bits), legal_type(lane)) for k in range(t.count)]
 
 
-def regroup(b: Builder, lanes: list[Value], old: Type, new: Type) -> list[Value]:
+def regroup(b: IrBuilder, lanes: list[Value], old: Type, new: Type) -> list[Value]:
     """Build the lanes of vector type `new` from the same bits as the lanes of vector type `old`."""
     old_bits, new_bits = old.elems[0].bits, new.elems[0].bits
     lane = legal_type(new.elems[0])
@@ -41,7 +41,7 @@ def regroup(b: Builder, lanes: list[Value], old: Type, new: Type) -> list[Value]
     return [_concatenate(b, lanes[k : k + step], old_bits, lane) for k in range(0, len(lanes), step)]
 
 
-def _concatenate(b: Builder, parts: list[Value], bits: int, t: Type) -> Value:
+def _concatenate(b: IrBuilder, parts: list[Value], bits: int, t: Type) -> Value:
     """Build an integer of type `t` from parts of `bits` bits each."""
     whole: Value = const(t, 0)
     for k, part in enumerate(parts):

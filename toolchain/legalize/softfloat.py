@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from toolchain.ir.build import Builder, const
+from toolchain.ir.build import IrBuilder, const
 from toolchain.ir.model import I16, I32, I64, Type, UnsupportedError, Value, int_type
 
 MODE = {32: "sf", 64: "df"}
@@ -17,7 +17,7 @@ COMPARISONS = {
 }  # fmt: skip
 
 
-def binary(b: Builder, op: str, bits: int, x: Value, y: Value) -> Value:
+def binary(b: IrBuilder, op: str, bits: int, x: Value, y: Value) -> Value:
     """Build fadd, fsub, fmul, fdiv or frem."""
     t = int_type(bits)
     if op == "frem":
@@ -25,7 +25,7 @@ def binary(b: Builder, op: str, bits: int, x: Value, y: Value) -> Value:
     return b.call(ARITHMETIC[op].format(MODE[bits]), t, [x, y])
 
 
-def compare(b: Builder, pred: str, bits: int, x: Value, y: Value) -> Value:
+def compare(b: IrBuilder, pred: str, bits: int, x: Value, y: Value) -> Value:
     """Build fcmp, as an i1."""
     from toolchain.ir.model import I1
 
@@ -41,7 +41,7 @@ def compare(b: Builder, pred: str, bits: int, x: Value, y: Value) -> Value:
     return b.icmp(test, result, const(I16, 0))
 
 
-def from_int(b: Builder, x: Value, signed: bool, bits: int) -> Value:
+def from_int(b: IrBuilder, x: Value, signed: bool, bits: int) -> Value:
     """Build the conversion of an integer of legal width to floating point."""
     width = 32 if x.type.bits < 32 or (x.type.bits == 32) else 64
     if x.type.bits > 64:
@@ -51,7 +51,7 @@ def from_int(b: Builder, x: Value, signed: bool, bits: int) -> Value:
     return b.call(f"__float{unsigned}{INT_MODE[width]}{MODE[bits]}", int_type(bits), [wide])
 
 
-def to_int(b: Builder, x: Value, signed: bool, t: Type) -> Value:
+def to_int(b: IrBuilder, x: Value, signed: bool, t: Type) -> Value:
     """Build the conversion to an integer; narrow ones are the low bits of a 32-bit one (abi-elf.md §2.8 `(int)f`)."""
     wide = I32 if t.bits <= 32 else I64
     if t.bits > 64:

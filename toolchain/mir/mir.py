@@ -50,7 +50,7 @@ class Mem:
 
 
 @dataclass(frozen=True, slots=True)
-class Slot:
+class FrameSlot:
     """Operand in the stack frame: number of the frame object and byte offset in it."""
 
     index: int
@@ -67,8 +67,8 @@ class FileRegister:
     volatile: int = 0
 
 
-Operand = int | Imm | Mem | Slot | FileRegister | str
-MEMORY = (Mem, Slot, FileRegister)
+Operand = int | Imm | Mem | FrameSlot | FileRegister | str
+MEMORY = (Mem, FrameSlot, FileRegister)
 STEPPING = ("++", "--", "+", "-")
 
 
@@ -277,10 +277,10 @@ class MI:
         assert isinstance(a.value, int)
         return a.value
 
-    def slot(self, k: int) -> Slot:
+    def slot(self, k: int) -> FrameSlot:
         """Operand `k`, which lies in the frame."""
         a = self.args[k]
-        assert isinstance(a, Slot)
+        assert isinstance(a, FrameSlot)
         return a
 
     @property

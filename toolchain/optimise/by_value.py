@@ -7,7 +7,7 @@ Needs: legal IR.
 
 from __future__ import annotations
 
-from toolchain.ir.build import Builder
+from toolchain.ir.build import IrBuilder
 from toolchain.ir.model import I8, I16, Arg, ConstInt, Function, Instr, Value, int_type
 from toolchain.select.calls import is_struct, parameter_locations
 
@@ -61,7 +61,7 @@ def _read_words(f: Function, a: Arg, loads: list[tuple[Instr, int]]) -> None:
     values: dict[int, Value] = {}
     for b in f.blocks:
         old, b.instrs = b.instrs, []
-        build = Builder(b)
+        build = IrBuilder(b)
         for i in old:
             if id(i) in offset_of:
                 build.line = i.line
@@ -79,7 +79,7 @@ def _read_words(f: Function, a: Arg, loads: list[tuple[Instr, int]]) -> None:
     f.blocks[0].instrs[:0] = words.values()
 
 
-def _value(b: Builder, words: dict[int, Instr], at: int, bits: int) -> Value:
+def _value(b: IrBuilder, words: dict[int, Instr], at: int, bits: int) -> Value:
     """Build the value that a load of `bits` bits at byte offset `at` reads."""
     if bits == 8:
         return b.cast("trunc", b.shift("lshr", words[at // 2], 8) if at % 2 else words[at // 2], I8)

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from toolchain.ir.build import Builder, const
+from toolchain.ir.build import IrBuilder, const
 from toolchain.ir.cfg import dead_code, natural_loops, predecessors
 from toolchain.ir.model import I16, Block, ConstInt, Function, Instr, Value
 
@@ -165,7 +165,7 @@ def _make_pointer(
     """Add a pointer phi to the loop, and replace the addresses `sums` by it."""
     base = sums[0][1]
     last = loop.entry.instrs.pop()
-    b = Builder(loop.entry)
+    b = IrBuilder(loop.entry)
     b.line = last.line
     start = b.binary("add", base, b.binary("mul", counter.start, const(I16, scale)))
     loop.entry.instrs.append(last)
@@ -278,7 +278,7 @@ def _count_down(loop: CountedLoop, counter: InductionVariable) -> None:
     if not loop.invariant(limit) or limit.type is not I16:
         return
     last = loop.entry.instrs.pop()
-    b = Builder(loop.entry)
+    b = IrBuilder(loop.entry)
     b.line = last.line
     distance = b.binary("sub", limit, counter.start)
     loop.entry.instrs.append(last)

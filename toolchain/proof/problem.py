@@ -95,7 +95,7 @@ class CompiledFile:
 
 
 def compile_file(arguments: list[str], edit: Callable[[str], str] = str) -> CompiledFile:
-    """Compile one file with the driver's options. Raises ToolError, CompileError.
+    """Compile one file with the driver's options. Raises ToolError, ClangError.
 
     `edit` maps the compiler's assembly text to the text that is assembled.
     """

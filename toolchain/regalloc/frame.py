@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from toolchain.abi.target import CALLEE_SAVED, CALLER_SAVED, FP, LIT5_MAX, LIT10_MAX, LNK_MAX, SP, WORD_OFFSET
 from toolchain.ir.model import UnsupportedError
-from toolchain.mir.mir import MI, Imm, Mem, MFunction, Operand, Slot
+from toolchain.mir.mir import MI, FrameSlot, Imm, Mem, MFunction, Operand
 
 FRAME_POINTER_BYTES = 900  # locals above this use LNK: ADD #lit10 reaches 1023
 PROBE_REACH = 1022  # largest word offset of [Wn+lit] (isa.md §3)
@@ -51,7 +51,7 @@ class FrameBuilder:
 
     def _layout(self) -> int:
         """Assign offsets to the objects in use; returns the bytes of locals."""
-        used = {a.index for b in self.m.blocks for mi in b.insts for a in mi.args if isinstance(a, Slot)}
+        used = {a.index for b in self.m.blocks for mi in b.insts for a in mi.args if isinstance(a, FrameSlot)}
         free = [(k, o) for k, o in enumerate(self.m.frame) if o.fixed is None and k in used]
         free.sort(key=lambda e: (e[1].spill, -e[1].size), reverse=self.m.uses_fp)
         at = 0
@@ -64,7 +64,7 @@ class FrameBuilder:
 
     # -- addresses ----------------------------------------------------------------------------------------------------
 
-    def _locate(self, slot: Slot, pushed: int) -> tuple[int, int]:
+    def _locate(self, slot: FrameSlot, pushed: int) -> tuple[int, int]:
         """(base register, offset) of a slot while `pushed` bytes lie above the frame."""
         o = self.m.frame[slot.index]
         if self.m.uses_fp:
@@ -122,13 +122,13 @@ class FrameBuilder:
             return [MI("mov", mi.register(0), SP, line=mi.line)]
         if mi.op == "spadd":
             return _adjust(mi.number(0), mi.line)
-        if not any(isinstance(a, Slot) for a in mi.args):
+        if not any(isinstance(a, FrameSlot) for a in mi.args):
             return [mi]
         return self._slot_operand(mi, pushed)
 
     def _slot_operand(self, mi: MI, pushed: int) -> list[MI]:
         """MOV with a frame operand. A load beyond the offset range computes the address in its destination."""
-        k = next(n for n, a in enumerate(mi.args) if isinstance(a, Slot))
+        k = next(n for n, a in enumerate(mi.args) if isinstance(a, FrameSlot))
         slot = mi.slot(k)
         base, offset = self._locate(slot, pushed)
         low, high = (-512, 511) if mi.byte else WORD_OFFSET
@@ -301,5 +301,5 @@ def _pop_registers(registers: list[int], line: str | None) -> list[MI]:
 
 
 def build_frame(m: MFunction, stack_check: bool) -> None:
-    """Build the frame. Needs: real registers, `uses_fp` set. Ensures: no Slot, lea, spadd or setsp remains."""
+    """Build the frame. Needs: real registers, `uses_fp` set. Ensures: no FrameSlot, lea, spadd or setsp remains."""
     FrameBuilder(m, stack_check).run()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Set
 
-from toolchain.mir.mir import MI, FrameObject, Imm, MFunction, Slot, covered_count
+from toolchain.mir.mir import MI, FrameObject, FrameSlot, Imm, MFunction, covered_count
 
 REMATERIALISABLE = {"clr", "setm", "lea"}
 UNIT_REGISTERS = 12  # most registers that the instructions under one skip may use; others are live across the skip
@@ -49,7 +49,7 @@ def _cheap(m: MFunction, mi: MI) -> bool:
     if mi.op != "mov" or mi.byte:
         return False
     a = mi.args[0]
-    if isinstance(a, Slot):
+    if isinstance(a, FrameSlot):
         return not a.volatile and m.frame[a.index].fixed is not None and not _slot_written(m, a.index)
     return isinstance(a, Imm)
 
@@ -58,7 +58,7 @@ def _slot_written(m: MFunction, index: int) -> bool:
     for b in m.blocks:
         for mi in b.insts:
             for role, a in zip(mi.info.roles, mi.args, strict=False):
-                if isinstance(a, Slot) and a.index == index and (role in "db" or mi.op == "lea"):
+                if isinstance(a, FrameSlot) and a.index == index and (role in "db" or mi.op == "lea"):
                     return True
     return False
 
@@ -128,9 +128,9 @@ def _direct_move(mi: MI, slot_of: dict[int, int], rematerialised: dict[int, MI])
         return None
     source, dest = mi.register(0), mi.register(1)
     if source in slot_of and dest not in slot_of:
-        return MI("mov", Slot(slot_of[source]), dest, line=mi.line)
+        return MI("mov", FrameSlot(slot_of[source]), dest, line=mi.line)
     if dest in slot_of and source not in slot_of:
-        return MI("mov", source, Slot(slot_of[dest]), line=mi.line)
+        return MI("mov", source, FrameSlot(slot_of[dest]), line=mi.line)
     return None
 
 
@@ -164,17 +164,17 @@ def _rewrite_one(
 def _transfer(m: MFunction, r: int, slot: int, t: int, load: bool, line: str | None) -> list[MI]:
     """Load or store of one register; pairs are transferred word by word."""
     if r not in m.pairs:
-        return [MI("mov", Slot(slot), t, line=line) if load else MI("mov", t, Slot(slot), line=line)]
+        return [MI("mov", FrameSlot(slot), t, line=line) if load else MI("mov", t, FrameSlot(slot), line=line)]
     low, high = m.new_register(), m.new_register()
     m.temps |= {low, high}
     if load:
         return [
-            MI("mov", Slot(slot), low, line=line),
-            MI("mov", Slot(slot, 2), high, line=line),
+            MI("mov", FrameSlot(slot), low, line=line),
+            MI("mov", FrameSlot(slot, 2), high, line=line),
             MI("join", t, low, high, line=line),
         ]
     return [
         MI("split", low, high, t, line=line),
-        MI("mov", low, Slot(slot), line=line),
-        MI("mov", high, Slot(slot, 2), line=line),
+        MI("mov", low, FrameSlot(slot), line=line),
+        MI("mov", high, FrameSlot(slot, 2), line=line),
     ]

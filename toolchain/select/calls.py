@@ -18,7 +18,7 @@ from toolchain.ir.model import (
     align_of,
     size_of,
 )
-from toolchain.mir.mir import Imm, Mem, Slot
+from toolchain.mir.mir import FrameSlot, Imm, Mem
 from toolchain.select import asm_inline, builtins
 from toolchain.select.context import Handler, SelectionContext
 
@@ -75,7 +75,7 @@ def receive(s: SelectionContext) -> None:
             continue
         if id(a) in s.slots:
             for k in range(location.words):
-                s.emit("mov", location.register + k, Slot(s.slots[id(a)], 2 * k))
+                s.emit("mov", location.register + k, FrameSlot(s.slots[id(a)], 2 * k))
         elif is_struct(a):
             for word in s.f.blocks[0].instrs:
                 if word.op == "argword" and word.extra["argument"] is a and id(word) in s.needed:
@@ -86,7 +86,7 @@ def receive(s: SelectionContext) -> None:
     for a, location in late:
         if location.stack and id(a) not in s.slots and id(a) in s.needed:
             for k, r in enumerate(s.value_regs(a)):
-                s.emit("mov", Slot(s.arg_slots[id(a)], 2 * k), r)
+                s.emit("mov", FrameSlot(s.arg_slots[id(a)], 2 * k), r)
 
 
 # ---------------------------------------------------------------------------------------------------------------------
@@ -246,7 +246,7 @@ def select_ret(s: SelectionContext, i: Instr) -> None:
 def select_entryword(s: SelectionContext, i: Instr) -> None:
     """Load the first word of the return address, or the frame address, of this function."""
     slot = s.new_slot(2, -RETURN_ADDRESS_BYTES)
-    s.emit("lea" if i.extra["address"] else "mov", Slot(slot), s.value_regs(i)[0])
+    s.emit("lea" if i.extra["address"] else "mov", FrameSlot(slot), s.value_regs(i)[0])
 
 
 def select_argword(s: SelectionContext, i: Instr) -> None:

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from toolchain.abi.sections import is_near
 from toolchain.abi.target import BYTE_OFFSET, WORD_OFFSET
 from toolchain.ir.model import ConstInt, GlobalRef, Instr, Value
-from toolchain.mir.mir import FileRegister, Imm, Mem, Operand, Slot
+from toolchain.mir.mir import FileRegister, FrameSlot, Imm, Mem, Operand
 from toolchain.select.state import SelectionState
 
 
@@ -72,9 +72,9 @@ class SelectionContext(SelectionState):
             return Mem("ind", r, 0, volatile)
         if id(base) in self.slots:
             if not self.far_frame:
-                return Slot(self.slots[id(base)], offset, volatile)
+                return FrameSlot(self.slots[id(base)], offset, volatile)
             r = self.temp()
-            self.emit("lea", Slot(self.slots[id(base)], offset), r)
+            self.emit("lea", FrameSlot(self.slots[id(base)], offset), r)
             return Mem("ind", r, 0, volatile)
         if isinstance(base, Instr) and count == 1 and offset == 0 and self._is_index_sum(base):
             return Mem("idx", self.reg(base.args[0]), self.reg(base.args[1]), volatile)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from toolchain.ir.model import ConstInt, Instr, Value
-from toolchain.mir.mir import FileRegister, Imm, Mem, Operand, Slot
+from toolchain.mir.mir import FileRegister, FrameSlot, Imm, Mem, Operand
 from toolchain.select.context import Handler, SelectionContext
 from toolchain.select.rules import COMMUTES, FILE_BINARY, FILE_CARRY, FILE_UNARY, REGISTER_OP, immediate_rule
 from toolchain.select.state import words_of
@@ -63,8 +63,8 @@ def _run(s: SelectionContext, p: Value, count: int, number: int) -> list[Operand
             offsets = [start + 2 * k for k in range(count)]
             return [Mem("off" if at else "ind", first.base, at, number) for at in offsets]
         return [first, *(s.offset_operand(first.base, start + 2 * k, False, number) for k in range(1, count))]
-    if isinstance(first, Slot):
-        return [Slot(first.index, first.off + 2 * k, number) for k in range(count)]
+    if isinstance(first, FrameSlot):
+        return [FrameSlot(first.index, first.off + 2 * k, number) for k in range(count)]
     assert isinstance(first, FileRegister)
     return [first, *(s.address(p, False, 2 * k, count, number) for k in range(1, count))]
 
@@ -323,7 +323,7 @@ def select_setsp(s: SelectionContext, i: Instr) -> None:
 
 def select_vastart(s: SelectionContext, i: Instr) -> None:
     """Address of the last named argument (abi-elf.md §2.4)."""
-    s.emit("lea", Slot(s.variadic_anchor), s.value_regs(i)[0])
+    s.emit("lea", FrameSlot(s.variadic_anchor), s.value_regs(i)[0])
 
 
 HANDLERS: dict[str, Handler] = {

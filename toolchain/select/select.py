@@ -17,7 +17,7 @@ from toolchain.select import arith, block_copies, calls, compare, conditional, m
 from toolchain.select.context import SelectionContext
 
 
-class Selector(SelectionContext):
+class FunctionSelector(SelectionContext):
     """Selects one function; handles terminators and phis."""
 
     # -- function -----------------------------------------------------------------------------------------------------
@@ -148,7 +148,7 @@ class Selector(SelectionContext):
                 self.load_leaf(s[0], s[1], d)
 
 
-def select_br(s: Selector, i: Instr) -> None:
+def select_br(s: FunctionSelector, i: Instr) -> None:
     """Unconditional branch, or comparison and conditional branch."""
     if not i.args:
         s.parallel_copy(s.phi_copies(i.blocks))
@@ -159,34 +159,34 @@ def select_br(s: Selector, i: Instr) -> None:
     s.emit("jump", i.blocks[1])
 
 
-def select_brtable(s: Selector, i: Instr) -> None:
+def select_brtable(s: FunctionSelector, i: Instr) -> None:
     """BRA Wn into a table of BRA instructions (isa.md §7.1: the offset counts instruction words)."""
     s.m.tables.append((s.block.name, list(i.blocks)))
     s.emit("brtable", s.reg(i.args[0]), str(len(s.m.tables) - 1))
 
 
-def select_indirectbr(s: Selector, i: Instr) -> None:
+def select_indirectbr(s: FunctionSelector, i: Instr) -> None:
     """GNU computed goto, through a handle."""
     r = s.reg(i.args[0])
     s.parallel_copy(s.phi_copies(list(dict.fromkeys(i.blocks))))
     s.emit("jumpr", r)
 
 
-def select_unreachable(s: Selector, i: Instr) -> None:
+def select_unreachable(s: FunctionSelector, i: Instr) -> None:
     """RESET: the block is never executed, but an empty function needs an instruction."""
     s.emit("text", "reset")
 
 
-def select_phi(s: Selector, i: Instr) -> None:
+def select_phi(s: FunctionSelector, i: Instr) -> None:
     """No code: predecessors copy into the registers of phis."""
     s.value_regs(i)
 
 
-def select_nothing(s: Selector, i: Instr) -> None:
+def select_nothing(s: FunctionSelector, i: Instr) -> None:
     """No code: slots are addressed by their users."""
 
 
-def select_cast_alias(s: Selector, i: Instr) -> None:
+def select_cast_alias(s: FunctionSelector, i: Instr) -> None:
     """trunc and bits: the registers of the operand's low words, or a leaf loaded into new registers."""
     if s.is_leaf(i.args[0]):
         for k, r in enumerate(s.value_regs(i)):
@@ -199,7 +199,7 @@ SIDE_EFFECTS = frozenset((
     "store", "loadpair", "storepair", "call", "asm", "builtin", "blockcopy", "blockfill", "setsp", "dynalloca", "br",
     "brtable", "indirectbr", "ret", "unreachable",
 ))  # fmt: skip
-HANDLERS: dict[str, Callable[[Selector, Instr], None]] = {
+HANDLERS: dict[str, Callable[[FunctionSelector, Instr], None]] = {
     "br": select_br,
     "brtable": select_brtable,
     "indirectbr": select_indirectbr,

@@ -18,7 +18,7 @@ from toolchain.ir.model import (
     UnsupportedError,
     Value,
 )
-from toolchain.mir.mir import MI, FrameObject, Imm, MFunction, Operand, Slot
+from toolchain.mir.mir import MI, FrameObject, FrameSlot, Imm, MFunction, Operand
 
 FAR_FRAME_BYTES = 380  # with more bytes of locals, their addresses are computed (offset limits, isa.md §3.2)
 
@@ -193,7 +193,7 @@ class SelectionState:
         elif isinstance(v, Undef):
             self.emit("clr", r)
         elif id(v) in self.slots:
-            self.emit("lea", Slot(self.slots[id(v)]), r)
+            self.emit("lea", FrameSlot(self.slots[id(v)]), r)
         elif isinstance(v, GlobalRef | BlockAddress):
             self.emit("mov", Imm(self.address_expr(v)), r)
         else:

@@ -6,7 +6,7 @@ per value of its range (abi-elf.md §8.1).
 
 from __future__ import annotations
 
-from toolchain.ir.build import Builder, const
+from toolchain.ir.build import IrBuilder, const
 from toolchain.ir.cfg import new_branch, retarget_phis
 from toolchain.ir.model import I16, VOID, Block, Function, Instr, Value
 
@@ -46,7 +46,7 @@ class SwitchLowering:
         base, top = pairs[0][0], pairs[-1][0]
         if top - base > 0xFFFF or len(pairs) < 3:
             return pairs
-        b = Builder(self.block)
+        b = IrBuilder(self.block)
         b.line = self.switch.line
         shifted = b.binary("sub", self.value, const(self.value.type, base))
         inside = b.icmp("ule", shifted, const(shifted.type, top - base))
@@ -93,7 +93,7 @@ class SwitchLowering:
             middle = len(ranges) // 2
             pivot = ranges[middle][0]
             left, right = self._block(), self._block()
-            b = Builder(block)
+            b = IrBuilder(block)
             b.line = self.switch.line
             self._branch(block, b.icmp("ult", self.value, const(self.value.type, pivot)), left.name, right.name)
             self._search(left, ranges[:middle], low, pivot - 1)
@@ -107,7 +107,7 @@ class SwitchLowering:
     def _chain(self, block: Block, ranges: list[CaseRange], low: int, high: int) -> None:
         t = self.value.type
         for k, (first, last, target) in enumerate(ranges):
-            b = Builder(block)
+            b = IrBuilder(block)
             b.line = self.switch.line
             if first <= low and last >= high:
                 self._jump(block, target)
@@ -126,7 +126,7 @@ class SwitchLowering:
 
     def _table(self, block: Block, ranges: list[CaseRange], low: int, high: int) -> None:
         base, top = ranges[0][0], ranges[-1][1]
-        b = Builder(block)
+        b = IrBuilder(block)
         b.line = self.switch.line
         index = b.cast("zext", self.value, I16) if self.value.type.bits < 16 else self.value
         if 0 < base <= 2 and low == 0 and top - base > 3:

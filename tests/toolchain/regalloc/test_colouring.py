@@ -7,7 +7,7 @@ import random
 import pytest
 
 from toolchain.abi.target import ALLOCATABLE, CALLER_SAVED
-from toolchain.mir.mir import FIRST_VIRTUAL, MI, FileRegister, Imm, MBlock, MFunction, Slot
+from toolchain.mir.mir import FIRST_VIRTUAL, MI, FileRegister, FrameSlot, Imm, MBlock, MFunction
 from toolchain.regalloc.colouring import allocate
 
 WORD = 0xFFFF
@@ -30,7 +30,7 @@ class MirMachine:
         if isinstance(a, Imm):
             assert isinstance(a.value, int)
             return a.value & WORD
-        if isinstance(a, Slot):
+        if isinstance(a, FrameSlot):
             return self.slots[a.index, a.off]
         assert isinstance(a, int)
         return self.w[a]
@@ -61,7 +61,7 @@ class MirMachine:
         match mi.op, mi.args:
             case "mov", [source, FileRegister()]:
                 self.stored.append(self.value(source))
-            case "mov", [source, Slot() as slot]:
+            case "mov", [source, FrameSlot() as slot]:
                 self.slots[slot.index, slot.off] = self.value(source)
             case "mov", [source, int() as d]:
                 self.w[d] = self.value(source)
