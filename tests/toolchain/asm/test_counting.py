@@ -32,7 +32,7 @@ def test_packed_bytes_fill_all_three(asm):
 
 
 def test_labels_instructions_and_data_of_the_other_kind_begin_a_word(asm):
-    """pic30-as: program memory is aligned implicitly at each of them; what is left of the word is filled."""
+    """pic30-as: program memory is aligned implicitly at each of them; the rest of the word is filled."""
     out = asm('.byte 1\na: .byte 2\n .pbyte 3\n .byte 4\nb:\nc: nop\n .pasciz "abc"\nd: .pbyte 5\n')
     assert [out.symbols[n].value for n in "abcd"] == [2, 8, 8, 14]
     assert out.words() == [1, 2, 3, 4, 0, 0x636261, 0, 5]
@@ -77,7 +77,7 @@ def test_fill_values_reach_every_byte_that_nothing_is_written_into(asm, text, wo
 
 
 def test_fill_values_are_of_their_section_and_of_code(asm):
-    """pic30-as: RAM is no part of what `.fillvalue` in .text fills."""
+    """pic30-as: `.fillvalue` in .text has no effect on RAM."""
     out = asm(
         ".fillvalue 0xFF\n .data\n .space 2\n .fill 2\n .bss\n .space 2\n .section b,code\n .fill 2\n .text\n .fill 2\n"
     )

@@ -61,7 +61,7 @@ def test_bad_expressions_say_what_is_wrong(text, message):
 
 
 def test_labels_in_one_section_have_a_distance_before_the_end_of_the_file(asm):
-    """A difference of labels is a number; forward ones are filled in at the end."""
+    """A difference of labels is a number; differences with forward labels are resolved at the end."""
     out = asm(".data\na: .word b - a, (b - a) / 2, . - a\n .space 4\nb:\n")
     assert out.bytes(".data")[:6] == bytes([10, 0, 5, 0, 4, 0])
 

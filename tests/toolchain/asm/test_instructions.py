@@ -81,7 +81,7 @@ def test_a_number_known_late_is_checked_like_one_known_early(asm):
 
 
 def test_equates_may_name_working_registers(asm):
-    """pic30-as: registers are symbols, and DSP sources name what they keep there."""
+    """pic30-as: registers are symbols, and DSP sources give them names."""
     named = asm(
         ".equ xW, w10\n .set yW, w11\nsumW = W4\n .equ facW, W5\n .equiv sameW, sumW\n .ifdef sumW\n nop\n .endif\n"
         " mov [xW++], sumW\n mov.b [xW+sumW], [yW+sumW]\n mac sumW*facW, A, [w8]+=2, sumW, [yW]+=2, facW\n"

@@ -54,7 +54,7 @@ def test_offsets_count_file_octets(asm):
     ],
 )  # fmt: skip
 def test_the_addend_stands_in_the_field(asm, line, word):
-    """abi-elf.md §5: branches in PC units (unscaled), MOV f in words, a word bit above 7 in the byte behind."""
+    """abi-elf.md §5: branches in PC units (unscaled), MOV f in words, a word bit above 7 in the next byte."""
     assert asm(line + "\n").words() == [word]
 
 

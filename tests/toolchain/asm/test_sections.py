@@ -128,13 +128,13 @@ def test_keep_protects_from_section_collection(image):
 
 
 def test_alignment_behind_a_relaxable_call_is_refused(asm):
-    """Its size is not known yet."""
+    """The size of the call is unknown until relaxation."""
     with pytest.raises(ToolError, match="--relax may shorten"):
         asm("f: call f\n .align 16\n nop\n", relax=True)
 
 
 def test_every_object_carries_the_signature_microchips_linker_looks_for(asm):
-    """abi-elf.md §6.7, §7 item 8: info section of three words 1, 0, 0; an own one is kept."""
+    """abi-elf.md §6.7, §7 item 8: info section of three words 1, 0, 0; one of the source is kept."""
     assert asm("").bytes("__c30_signature") == bytes([1, 0, 0, 0, 0, 0])
     out = asm(".section __c30_signature, info, data\n .word 1, 2, 3\n")
     assert out.bytes("__c30_signature") == bytes([1, 0, 2, 0, 3, 0])
@@ -150,7 +150,7 @@ def test_modifiers_alone_keep_the_type_the_name_implies(asm):
 
 
 def test_a_section_named_again_needs_only_its_type(asm):
-    """pic30-as: address, alignment and kind of memory stay what the first mention says."""
+    """pic30-as: address, alignment and memory are those of the first `.section` of the name."""
     out = asm(
         ".section boot,code,address(0x1100)\n nop\n .section fast,bss,xmemory,near\n .space 2\n .text\n"
         " .section boot,code\n nop\n .section fast,bss\n .space 2\n"

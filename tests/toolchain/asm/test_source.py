@@ -82,7 +82,7 @@ def test_conditions(asm, condition, taken):
 
 
 def test_conditionals_nest_and_skip_everything_inside(asm):
-    """Skipped text is only looked at for conditionals."""
+    """In skipped text only conditionals have an effect."""
     text = (
         ".if 0\n .if 1\n rubbish ! here\n .else\n more\n .endif\n .elseif 1\n nop\n .elseif 1\n"
         " mov #3, w0\n .else\n bad\n .endif\n"
@@ -162,7 +162,7 @@ def test_structural_mistakes_have_a_clear_message(asm, text, message):
 
 
 def test_the_device_include_is_there_without_a_file(asm):
-    """Bits by name, numbered where a field is wide, settings, and `config`; the registers are the linker's."""
+    """It defines bits (numbered in wide fields), settings and `config`; the linker defines the registers."""
     out = asm(
         ' .equ __30F6014A, 1\n .include "p30f6014A.INC"\n config __FOSC, CSW_FSCM_OFF & XT_PLL8\n'
         " bclr IFS0, #U1RXIF\n bset IPC10, #DCIIP2\n bra N, 1f\n1: pwrsav #IDLE_MODE\n"
@@ -174,14 +174,14 @@ def test_the_device_include_is_there_without_a_file(asm):
 
 
 def test_a_device_include_of_the_users_own_comes_first(tmp_path):
-    """Microchip's file is used where a user has it."""
+    """Microchip's file takes precedence if the user has it."""
     (tmp_path / "p30f6014A.inc").write_text(" .equ MINE, 7\n")
     obj, _ = assemble(' .include "p30f6014A.inc"\n mov #MINE, w0\n', str(tmp_path / "x.s"))
     assert bytes(obj.sections[0].data) == bytes([0x70, 0, 0x20, 0])
 
 
-def test_a_macro_may_be_defined_anew(asm):
-    """pic30-as warns and takes the last definition, as an include file read twice needs."""
+def test_a_macro_may_be_redefined(asm):
+    """pic30-as warns and uses the last definition, so that an include file may be read twice."""
     out = asm(".macro m\n .word 1\n .endm\n m\n .macro m a\n .word \\a\n .endm\n m 5\n")
     assert out.words() == [1, 5]
     assert out.messages == ["test.s:5: warning: macro m has been defined before: this definition replaces that one"]
@@ -224,12 +224,12 @@ def test_bss_with_operands_reserves_room(asm):
 
 
 def test_the_device_include_names_bytes_of_registers(asm):
-    """Microchip's include files: `bset.b CORCONL, #PSV`; names that registers have stay theirs."""
+    """Microchip's include files: `bset.b CORCONL, #PSV`; names of registers keep their meaning."""
     named = asm('.include "xc.inc"\n bset.b CORCONL, #PSV\n mov.b SRH, WREG\n mov #OSCCONL, w1\n clr.b MODCONH\n')
     plain = asm(" bset.b 0x44, #2\n mov.b 0x43, WREG\n mov #OSCCONL, w1\n clr.b 0x47\n")
     assert (named.words(), named.relocs()) == (plain.words(), plain.relocs())
 
 
 def test_a_number_sign_before_a_value_means_nothing(asm):
-    """pic30-as takes it in every expression."""
+    """pic30-as accepts it in every expression."""
     assert asm(".equ rate, #0x70\n .word #rate, # 5\n mov #rate, w0\n").words() == [0x70, 5, 0x200700]

@@ -1,4 +1,4 @@
-"""ELF files: what we write, what others read in it, what damage does (abi-elf.md §6, §7)."""
+"""ELF files: written contents, as independent readers see them, and damaged files (abi-elf.md §6, §7)."""
 
 import io
 import shutil
@@ -153,7 +153,7 @@ def test_damage_anywhere_in_an_object_is_an_error_or_harmless():
     ],
 )  # fmt: skip
 def test_foreign_files_are_refused_by_what_they_are(change, message):
-    """File and offset are named."""
+    """The message has file and offset."""
     data = bytearray(object_bytes(assemble("nop\n", "x.s")[0]))
     data[change[0] : change[0] + len(change[1])] = change[1]
     with pytest.raises(ToolError, match=message) as error:

@@ -50,7 +50,7 @@ NEVER = [line for line, _ in CASES if "(" not in line and not line.startswith(".
 
 @pytest.mark.parametrize("line", NEVER)
 def test_a_value_that_never_fits_is_refused_at_each_time(line):
-    """Nothing is cut off, whoever finds out."""
+    """Assembler and linker report the value instead of truncating it."""
     body = f" .global __reset\n .section code,code,address(0x1000)\n__reset: {line}\n nop\n"
     for sources in ((f"v = 0x7654320\n{body}",), (f"{body}\nv = 0x7654320\n",), (body, " .global v\nv = 0x7654320\n")):
         with pytest.raises(ToolError):
@@ -58,7 +58,7 @@ def test_a_value_that_never_fits_is_refused_at_each_time(line):
 
 
 def test_the_cases_cover_the_relocations_of_instructions():
-    """Every relocation an instruction can ask for, but for branches (tested with targets) and other operators."""
+    """The cases have every relocation of instructions except branches, which have targets, and other operators."""
     seen = set()
     for line, _ in CASES:
         seen |= {r.type for s in assemble(f" .section c,code\n {line}\n nop\n", "x.s")[0].sections for r in s.relocs}

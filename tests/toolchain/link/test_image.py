@@ -1,4 +1,4 @@
-"""What a linked image contains: start, vectors, data initialisation, constants, handles, config words, EEPROM."""
+"""Contents of a linked image: start, vectors, data initialisation, constants, handles, config words, EEPROM."""
 
 import pytest
 
@@ -46,7 +46,7 @@ def test_a_handler_no_vector_takes_is_refused_with_the_name_meant(image):
 
 
 def decode_dinit(out):
-    """(address, bytes or length of zeros) by the format of abi-elf.md §3.2, read as crt0 reads it."""
+    """Return (address, bytes or length of zeros) of each record, in the format of abi-elf.md §3.2."""
     at = out.symbols["__dinit_tbloffset"] | out.symbols["__dinit_tblpage"] << 16
     records = []
     while address := out.flash[at] & 0xFFFF:
@@ -123,7 +123,7 @@ def test_all_constants_share_one_window_even_behind_much_code(image):
 
 
 def test_too_many_constants_name_the_largest(image):
-    """Overflow tells by how many bytes, and the five largest symbols."""
+    """The message has the missing bytes and the five largest symbols."""
     text = (
         ".section .const,psv,page\n" + "".join(f"t{n}: .space {0x1000 * n}\n" for n in range(1, 6)) + "last: .space 2\n"
     )
@@ -155,7 +155,7 @@ def test_handles_are_own_addresses_low_and_slots_high(image):
 
 
 def test_pointers_that_reach_every_function_cost_no_flash(image):
-    """abi-elf.md §1.5: slots exist to be jumped through; .handle then only tells tools whose address is taken."""
+    """abi-elf.md §1.5: without slots, .handle only lists the functions whose address is taken."""
     out = image(".text\n near: nop\n user: mov #handle(near), w0\n")
     (handle,) = out.sections(".handle")
     assert not handle.is_code
@@ -241,6 +241,6 @@ def test_linker_and_device_symbols(image):
 
 
 def test_an_object_may_define_a_device_symbol_itself(image):
-    """Definitions of the program win over those of the device."""
+    """Definitions of the program take precedence over those of the device."""
     out = image(".global PORTD\nPORTD = 0x900\nu: mov PORTD, w0\n")
     assert out.words("u", 1) == [0x800000 | 0x900 << 3]

@@ -105,7 +105,7 @@ def test_a_linked_program_starts_and_finds_everything(tmp_path, objects, form, p
 
 
 def test_an_assembly_program_talks_on_uart1_from_the_timer_interrupt(tmp_path):
-    """By command line: as, ld, emu run; 115,200 baud at 14.7456 MIPS is BRG 7, one character every 1500 Tcy."""
+    """Built and run by as, ld and emu run; 115,200 baud at 14.7456 MIPS is BRG 7, one character every 1500 Tcy."""
     here = Path(__file__).parent
 
     def run(*words):

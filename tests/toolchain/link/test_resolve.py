@@ -1,4 +1,4 @@
-"""Symbols across objects and libraries, section collection, and what is said when names are missing."""
+"""Symbol resolution across objects and libraries, section collection, and messages about missing names."""
 
 import shutil
 import subprocess
@@ -19,7 +19,7 @@ def member(name: str, text: str) -> Member:
 
 
 def test_all_undefined_and_duplicate_symbols_are_listed_with_their_objects(image):
-    """One link shows everything that is missing, with the place of the reference."""
+    """One link reports every missing name with the position of the reference."""
     with pytest.raises(ToolError) as error:
         image("f: call one\n mov two, w0\n .global twice\ntwice: nop\n", " call one\n", ".global twice\ntwice: nop\n")
     lines = str(error.value).splitlines()
@@ -89,7 +89,7 @@ def test_gnu_ar_and_ours_read_each_others_archives(tmp_path):
 
 
 def test_an_archive_without_index_is_searched_too():
-    """Members tell what they define."""
+    """The index is derived from the symbol tables of the members."""
     data = archive_bytes([member("x.o", ".global x\nx: nop\n")])
     size = int(data[8 + 48 : 8 + 58])
     bare = data[:8] + data[8 + 60 + size + (size & 1) :]
@@ -150,7 +150,7 @@ def test_collection_keeps_sections_whose_limits_are_asked_for(image):
 
 
 def test_undefined_names_in_discarded_sections_do_not_matter(image):
-    """Only what is linked must be complete."""
+    """Discarded sections may refer to undefined names."""
     text = ".global __reset\n__reset: nop\n .section x,code\n call missing\n"
     image(text, gc_sections=True)
     with pytest.raises(ToolError, match="missing"):

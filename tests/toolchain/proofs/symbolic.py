@@ -1,6 +1,6 @@
-"""A function's code on symbolic inputs by itself: `toolchain.proof`'s reader of the instruction table along every path.
+"""Symbolic execution of a function's code alone, with the symbolic machine of `toolchain.proof`.
 
-`results(words)` runs loop-free code from its first word to RETURN. Registers start as free 16-bit values but W15.
+`results(words)` runs loop-free code from its first word to RETURN. All registers but W15 start as free 16-bit values.
 """
 
 from __future__ import annotations
@@ -25,8 +25,9 @@ bounds: dict[str, tuple[Any, Any]] | None = None
 
 @contextmanager
 def unknown_products() -> Iterator[dict[str, tuple[Any, Any]]]:
-    """Inside, a product is any number within the bounds of its factors: what holds for those holds for products, and
-    the solver need not look into multipliers."""
+    """Within the context, a product is an arbitrary number within the bounds of its factors.
+
+    A property of all such numbers holds for products, and the solver need not expand multipliers."""
     global bounds
     bounds, exact = {}, Number.__mul__
 
@@ -42,7 +43,7 @@ def unknown_products() -> Iterator[dict[str, tuple[Any, Any]]]:
 
 
 def times(a: Any, b: Any) -> Any:
-    """a * b as the table has it."""
+    """Return a * b as the instruction table computes it."""
     if bounds is None:
         return a * b
     a, b = sorted((z3.simplify(a), z3.simplify(b)), key=lambda term: (z3.is_bv_value(term), str(term)))
@@ -57,7 +58,7 @@ def times(a: Any, b: Any) -> Any:
 
 
 class Free(SymbolicMachine):
-    """Every pointer leads to memory, and words to even addresses: nobody says what the function may rely on."""
+    """A machine without a source: every pointer addresses memory, and words are at even addresses."""
 
     def load(self, ea: Any, size: int, side: str = "src", ptr: int | None = None) -> Any:
         if isinstance(ea, int):
@@ -66,13 +67,13 @@ class Free(SymbolicMachine):
 
 
 def start() -> MachineState:
-    """Every register, flag and byte is free."""
+    """Return a state in which every register, flag and byte is free."""
     w = [z3.BitVec(f"w{n}", 16) for n in range(15)]
     return MachineState([*w, STACK], Memory(z3.Array("memory", z3.BitVecSort(16), z3.BitVecSort(8))), 0)
 
 
 def results(words: list[int]) -> Iterator[MachineState]:
-    """States at RETURN on every path that some input takes. AssertionError for code that is not loop-free."""
+    """Return the states at RETURN of every feasible path; AssertionError for code with a loop."""
     page = vector(0, 16)
     machine = Free(Frame(), [], [], page, page)
     work, steps = [start()], 0

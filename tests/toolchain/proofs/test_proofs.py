@@ -1,6 +1,6 @@
-"""What the back end makes of a rule is right for all inputs: compiled, run symbolically, proved by z3.
+"""The code of each rewrite rule is correct for all inputs: compiled, executed symbolically, proved by z3.
 
-A case is a C function, and what it returns as a z3 term over its parameters. To add one: a line in CASES.
+A case is a C function, and its result as a z3 term over its parameters. To add one: a line in CASES.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ def smaller(a: Term, b: Term) -> Term:
 
 
 def crc_step(c: Term, polynomial: int) -> Term:
-    """One bit of a CRC that goes right."""
+    """One bit of a right-shifting CRC."""
     return choose(z3.Extract(0, 0, c) == 1, z3.LShR(c, 1) ^ polynomial, z3.LShR(c, 1))
 
 
@@ -52,12 +52,12 @@ def quotient(a: Term, d: int) -> Term:
 
 
 def remainder(a: Term, d: int) -> Term:
-    """What is left of it."""
+    """Remainder of the signed division."""
     return a - quotient(a, d) * d
 
 
 def word_at(address: Term) -> Term:
-    """A word of memory as it is at entry."""
+    """A word of memory at entry."""
     memory = start().memory.array
     return z3.Concat(z3.Select(memory, address + 1), z3.Select(memory, address))
 
@@ -68,15 +68,16 @@ def low_byte(a: Term, signed: bool) -> Term:
 
 
 def long_by_word(a: Term, b: Term) -> Term:
-    """a * b for a long and a signed word, as h * 2^16 * b + l * b for the halves of a, whose low word is l * b: laws of
-    every ring, which the solver need not find again in bits."""
+    """a * b for a long and a signed word, as h * 2^16 * b + l * b for the halves of a.
+
+    The identity holds in every ring, so the solver need not prove it in bits."""
     low, high = z3.Extract(15, 0, a), z3.Extract(31, 16, a)
     product = z3.SignExt(16, b) * z3.ZeroExt(16, low)
     return z3.Concat(z3.Extract(31, 16, product) + high * b, low * b)
 
 
 def high_half(a: Term, m: int, signed: bool) -> Term:
-    """The upper two words of a * m from four products of words, added as `test_upper_half` proves that one may."""
+    """The upper two words of a * m from four products of words, in the sum that `test_upper_half` proves."""
     extend = z3.SignExt if signed else z3.ZeroExt
     low, high = z3.ZeroExt(32, z3.Extract(15, 0, a)), extend(32, z3.Extract(31, 16, a))
     m_low, m_high = z3.BitVecVal(m & 0xFFFF, 48), z3.BitVecVal(m >> 16, 48)
@@ -99,7 +100,7 @@ def signed_quotient32(a: Term, d: int) -> Term:
 
 
 def branches() -> dict[str, tuple[str, str, str, Callable[..., Term]]]:
-    """Comparisons with constants of all sizes at a branch that is no choice, which an inline NOP sees to."""
+    """Comparisons with constants of all sizes at a branch; an inline NOP prevents a conditional expression."""
     kinds: dict[str, tuple[str, str, Callable[[Term], Term], bool]] = {
         "int": ("i", "a", lambda a: a, True),
         "word": ("u", "a", lambda a: a, False),
@@ -227,7 +228,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def arguments(types: str) -> list[Term]:
-    """Parameters as terms over the registers they travel in (abi-elf.md §2.2)."""
+    """Parameters as terms over their registers (abi-elf.md §2.2)."""
     w, free, out = start().w, list(range(8)), []
     for t in types:
         if t in "iu":
@@ -247,7 +248,7 @@ PROOFS = [(name, level) for name in CASES
 
 @pytest.mark.parametrize(("name", "level"), PROOFS)
 def test_a_rule_holds_for_all_inputs(name: str, level: str, folder: Path) -> None:
-    """No input makes the code and the C expression differ, and the registers of the caller come back."""
+    """Code and C expression agree for every input, and callee-saved registers are preserved."""
     if level == "-Os" and name in DIVIDES:
         pytest.skip("DIV under REPEAT, which is not loop-free")
     result, types, _, meaning = CASES[name]
@@ -265,7 +266,7 @@ def test_a_rule_holds_for_all_inputs(name: str, level: str, folder: Path) -> Non
 
 
 def floor_product(x: Term, m: int, bits: int) -> Term:
-    """floor(x * m / 2^bits) of integers without end."""
+    """floor(x * m / 2^bits) of unbounded integers."""
     return x * m / z3.IntVal(1 << bits)
 
 
@@ -298,7 +299,7 @@ def test_products_divide(d: int, bits: int) -> None:
 
 
 def test_a_factor_that_is_too_small_is_refuted() -> None:
-    """One less: z3 names a dividend, and it is one."""
+    """With a factor that is 1 too small, z3 finds a dividend with a wrong quotient."""
     x, (m, s) = z3.Int("x"), unsigned_factor(10, 32)
     solver = z3.Solver()
     solver.add(x >= 0, x < 1 << 32, floor_product(x, m - 1, 32 + s) != x / z3.IntVal(10))
@@ -320,7 +321,7 @@ WRONG: dict[str, tuple[str, Callable[..., Term]]] = {
 
 @pytest.mark.parametrize("name", WRONG)
 def test_a_wrong_rule_is_refuted(name: str, folder: Path) -> None:
-    """A meaning that is not the code's: z3 names an input."""
+    """For a meaning that differs from the code, z3 finds an input."""
     types, meaning = WRONG[name]
     wrong = []
     for state in results(compiled("-O2" if name in FAST else "-Os", folder)[name]):

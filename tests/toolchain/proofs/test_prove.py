@@ -1,4 +1,4 @@
-"""`toolchain prove`: right code is proved, and a fault in it is found, of whatever kind."""
+"""`toolchain prove`: correct code is proved, and planted faults of every kind are found."""
 
 from __future__ import annotations
 
@@ -131,7 +131,7 @@ LATE = {
 
 
 def planted(kind: str) -> Verdict:
-    """The verdict on a function with a fault."""
+    """Return the verdict on a function with a planted fault."""
     function, right, wrong = (PLANTED | LATE)[kind]
 
     def edit(text: str) -> str:
@@ -161,12 +161,12 @@ def test_a_planted_fault_is_refuted(kind: str) -> None:
 
 @pytest.mark.parametrize("kind", LATE)
 def test_a_fault_of_many_rounds_is_not_proved(kind: str) -> None:
-    """An induction that does not succeed refutes nothing."""
+    """A failed induction refutes nothing."""
     assert planted(kind).kind != "proved"
 
 
 def test_the_input_of_a_refutation_shows_it_on_the_emulator(tmp_path: Path) -> None:
-    """The larger of two, which gives the smaller: the emulator runs it on what the solver found."""
+    """A maximum that returns the minimum: the emulator runs it with the counterexample."""
     made = compile_file([str(SAMPLE), "-Os", "-w"], lambda text: text.replace("cpsgt w0,w1", "cpslt w0,w1"))
     (verdict,) = verdicts(made, "larger")
     assert verdict.counterexample is not None
@@ -179,7 +179,7 @@ def test_the_input_of_a_refutation_shows_it_on_the_emulator(tmp_path: Path) -> N
 
 
 def test_memory_of_a_refutation_is_in_the_image(tmp_path: Path) -> None:
-    """A byte of a table is read from the wrong place."""
+    """A byte of a table is read from the wrong address."""
     made = compile_file(
         [str(SAMPLE), "-Os", "-w"], lambda text: text.replace("mov.b [w0+1],w7\n\tse", "mov.b [w0+2],w7\n\tse")
     )
@@ -195,7 +195,7 @@ def test_memory_of_a_refutation_is_in_the_image(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("file", ["clock.c", "error.c", "fault.c", "init.c"])
 def test_nothing_of_the_kernel_is_refuted(file: str) -> None:
-    """And what has no loop is proved."""
+    """Functions without loops are proved."""
     made = compile_file([str(KERNEL / file), "-Os", "-w", "-std=gnu99", *(f"-I{SYSTEM / name}" for name in FOLDERS)])
     found = list(verdicts(made))
     assert not [v for v in found if v.kind == "refuted"]

@@ -1,5 +1,5 @@
-"""What the DSP library computes, bit by bit: the accumulator of isa.md §2.7 in Python's integers, each function as its
-difference equation says it. Fractions are integers -32768 to 32767, an accumulator counts units of 2^-31."""
+"""Bit-exact model of the DSP library: the accumulator of isa.md §2.7 as a Python integer, each function by its
+difference equation.  Fractions are integers -32768 to 32767, an accumulator counts units of 2^-31."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def truncated(a: int) -> int:
 
 
 def rounded(a: int, left: int = 0) -> int:
-    """SAC.R: to the nearest, halves to the even one."""
+    """SAC.R: round to nearest, ties to even."""
     a <<= left
     whole, rest = a >> 16, a & 0xFFFF
     return fraction(whole + (rest > 0x8000 or (rest == 0x8000 and bool(whole & 1))))
@@ -49,7 +49,7 @@ def dot(a: Sequence[int], b: Sequence[int]) -> int:
 
 
 def fir(x: Sequence[int], h: Sequence[int], past: list[int]) -> list[int]:
-    """`past` is what came before, newest first, as long as `h` or longer; it is brought up to date."""
+    """`past` has the earlier samples, newest first, at least as many as `h`; it is updated."""
     out = []
     for sample in x:
         past.insert(0, sample)

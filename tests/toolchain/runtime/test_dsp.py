@@ -74,7 +74,7 @@ def test_sums_of_products(places: str, target: Target, rng: random.Random) -> No
 
 
 def test_nothing_is_read_behind_the_end_of_memory(target: Target, rng: random.Random) -> None:
-    """Behind Y RAM is no memory: a prefetch too many there is an address error."""
+    """Above Y RAM is no memory: an additional prefetch there is an address error."""
     y_end = target.machine.chip.data["yram"].end
     for n in (1, 2, 8):
         a, b = vector(rng, n), vector(rng, n)

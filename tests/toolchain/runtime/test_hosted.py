@@ -54,7 +54,7 @@ void unused(void) { never(); }
      ("_Exit(3);", 3, ""), ("abort();", 134, "")],
 )  # fmt: skip
 def test_exit_calls_what_atexit_has_registered(way: str, status: int, said: str, tmp_path: Path) -> None:
-    """C11 7.22.4.2, 7.22.4.4: the last one first, one that registers another too; not from _Exit and abort."""
+    """C11 7.22.4.2, 7.22.4.4: last registered first, also those that a handler registers; not for _Exit, abort."""
     (tmp_path / "a.c").write_text(EXIT_PROGRAM.replace("WAY", way))
     assert build([tmp_path / "a.c"], tmp_path / "a.elf", "-Os").status == 0
     ran = run(tmp_path / "a.elf")
@@ -94,8 +94,8 @@ int main(void)
 """
 
 
-def test_what_the_chip_has_not_says_so(tmp_path: Path) -> None:
-    """C11 7.6, 7.11, 7.14, 7.22.4: no files, no environment, one locale; what is not handled ends the program."""
+def test_missing_features_of_the_chip_report_failure(tmp_path: Path) -> None:
+    """C11 7.6, 7.11, 7.14, 7.22.4: no files, no environment, one locale; an unhandled signal ends the program."""
     (tmp_path / "a.c").write_text(SIGNAL_PROGRAM)
     built = build([tmp_path / "a.c"], tmp_path / "a.elf", "-Os", "-Wall")
     assert (built.status, built.messages) == (0, "")

@@ -104,7 +104,7 @@ def test_integers_in_every_form(tmp_path: Path) -> None:
 
 
 def _python_integer(form: str, value: int) -> str:
-    """Python's % with two differences of C taken back: precision 0 prints 0 as nothing, # leaves 0 alone."""
+    """Python's % with C's two differences: precision 0 prints 0 as nothing, # does not change 0."""
     if value == 0:
         form = form.replace("#", "")
         if ".0" in form and not re.search(r"\.0\d", form):
@@ -183,7 +183,7 @@ int main(void)
 
 
 def test_characters_are_counted(tmp_path: Path) -> None:
-    """C11 7.21.6.1p8: %n stores as many bytes as its length says, and counts what did not fit, too."""
+    """C11 7.21.6.1p8: %n stores as many bytes as its length modifier says, and counts truncated characters too."""
     (tmp_path / "a.c").write_text(COUNT_PROGRAM)
     assert build([tmp_path / "a.c"], tmp_path / "a.elf", "-Os", "-Wall").status == 0
     assert run(tmp_path / "a.elf", engine="auto").status == 0

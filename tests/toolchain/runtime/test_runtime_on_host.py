@@ -53,7 +53,7 @@ def test_soft_float_equals_the_hardware(tmp_path: Path) -> None:
 
 
 def test_the_comparison_notices_a_wrong_rounding(tmp_path: Path) -> None:
-    """The test above can fail: ties away from even must be found."""
+    """The test above detects ties rounded away from even."""
     for source in soft_float_sources():
         text = source.read_text().replace("+ 0x3F +", "+ 0x40 +").replace("+ 0x1FF +", "+ 0x200 +")
         (tmp_path / source.name).write_text(text)
@@ -81,7 +81,7 @@ def test_math_functions_stay_within_their_error_bounds(tmp_path: Path) -> None:
 
 
 def digits_program(folder: Path, printing: Path = RUNTIME / "format_double.c") -> Path:
-    """The comparison of printing and reading doubles with the host's."""
+    """Build the program that compares printing and reading of doubles with the host's."""
     objects = []
     reading = ["-Dstrtod=rt_strtod", "-Datof=rt_atof", "-Dstrtold=rt_strtold", "-Dstrtof=rt_strtof"]
     for source, words in ((printing, []), (RUNTIME / "strtod.c", reading), (RUNTIME / "strtof.c", reading)):

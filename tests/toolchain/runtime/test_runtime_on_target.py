@@ -231,7 +231,7 @@ int main(void)
 @pytest.mark.parametrize("own", [1, 2, 3])
 @pytest.mark.parametrize("level", ["-O0", "-Os", "-O2"])
 def test_a_program_may_divide_with_its_own_functions(level: str, own: int, tmp_path: Path) -> None:
-    """They take the library's place, which leans on none of them; and a call of one is a call."""
+    """They replace the library's functions, on which no other library function depends."""
     (tmp_path / "a.c").write_text(OWN_DIVISION)
     built = build([tmp_path / "a.c"], tmp_path / "a.elf", level, f"-DOWN={own}")
     assert built.status == 0, built.messages

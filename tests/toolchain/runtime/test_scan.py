@@ -196,7 +196,7 @@ def test_sscanf_stores_what_the_hosts_does(level: str, tmp_path: Path) -> None:
 
 
 def test_scanf_reads_from_its_stream_what_sscanf_reads_from_a_text(tmp_path: Path) -> None:
-    """The same conversions on characters that come one by one, incomplete numbers too."""
+    """The same conversions on a stream, incomplete numbers too."""
     rng = random.Random("stream")
     cases = [random_case(rng) for _ in range(CASES)]
     for form, text in INCOMPLETE:
@@ -207,7 +207,7 @@ def test_scanf_reads_from_its_stream_what_sscanf_reads_from_a_text(tmp_path: Pat
     assert differing == []
 
 
-def test_the_beginning_of_a_number_is_no_number(tmp_path: Path) -> None:
+def test_an_incomplete_number_is_no_number(tmp_path: Path) -> None:
     """C11 7.21.6.2p10 and its example: "100ergs" holds no %f, because "100e" is not one."""
     cases = [
         Case(form, form, text, [("float", -1) if form.endswith("f") else ("char", 24)]) for form, text in INCOMPLETE

@@ -129,8 +129,8 @@ def test_mutual_recursion_is_named_once_per_call(image):
     assert found["_main"].total >= 10
 
 
-def test_pointer_calls_are_named_and_can_be_told_their_targets(image):
-    """`calls` in the annotation file; `depth` closes the question for good."""
+def test_pointer_calls_are_reported_and_can_be_annotated(image):
+    """`calls` in the annotation file lists their targets; `depth` replaces the analysis of a function."""
     free = analyse(image, POINTER)
     assert any("call through a pointer" in note for note in free["_main"].unknown)
     told = analyse(image, POINTER, "# comment\ncalls main: big, _small\n")
@@ -153,8 +153,8 @@ def test_unknown_stack_pointers_and_unbalanced_returns_are_named(image):
     assert "grows in a loop" in found["_loop"].unknown[0]
 
 
-def test_a_handler_that_moves_to_its_own_stack_tells_what_it_leaves_behind(image):
-    """Conditional move as in a nestable handler: 4 bytes by hardware, 4 pushed, the rest on the handler's own stack."""
+def test_a_handler_that_switches_stacks_reports_bytes_on_the_interrupted_one(image):
+    """Conditional switch as in a nestable handler: 4 bytes by hardware, 4 pushed, the rest on the handler's stack."""
     text = func(
         "__T1Interrupt",
         *["push.d w0", "mov w15, w1", "mov #0x1000, w0", "cpslt w15, w0", "mov #0x900, w15", "push w1", "push.d w2"],
@@ -167,8 +167,8 @@ def test_a_handler_that_moves_to_its_own_stack_tells_what_it_leaves_behind(image
     assert entry.total == 4 + 4 + 2 + 4 + 4 + 52
 
 
-def test_a_saved_stack_pointer_brings_the_depth_back(image):
-    """Variable length arrays keep the base in a register (abi-elf.md §2.4); what they add is not known."""
+def test_a_saved_stack_pointer_restores_the_depth(image):
+    """Variable-length arrays keep the base in a register (abi-elf.md §2.4); their length is unknown."""
     lines = ["mov w15, w8", "push.d w0", "push.d w2", "mov w8, w15", "return"]
     found = analyse(image, func("_main", *lines))["_main"]
     assert (found.frame, found.unknown) == (8, [])
@@ -187,7 +187,7 @@ def test_a_saved_stack_pointer_brings_the_depth_back(image):
     ],
 )
 def test_only_an_unchanged_copy_of_the_stack_pointer_is_known(image, lines, known):
-    """alloca and arrays of computed length put another value back, callees overwrite W0 to W7."""
+    """alloca and arrays of computed length restore another value, callees overwrite W0 to W7."""
     found = analyse(image, func("_main", *lines) + func("_leaf", "return"))
     assert any("unknown value" in note for note in found["_main"].unknown) != known
 
@@ -196,13 +196,13 @@ def test_only_an_unchanged_copy_of_the_stack_pointer_is_known(image, lines, know
     ("text", "message"), [("frob x 1\n", "notes:1"), ("\ndepth f x\n", "notes:2"), ("calls\n", "expected")]
 )
 def test_annotation_mistakes_name_file_and_line(text, message):
-    """Clear messages."""
+    """The message has file and line of the annotation."""
     with pytest.raises(ToolError, match=message):
         read_annotations(text, "notes")
 
 
 def test_annotations_for_unknown_functions_are_refused(image):
-    """A typo must not silently bound nothing."""
+    """A misspelt name is an error."""
     with pytest.raises(ToolError, match="no function is called nobody"):
         Analysis(
             image(".global __reset\n__reset: call w0\n return\n").linked.image, Annotations(threads=["nobody"])
