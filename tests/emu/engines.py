@@ -20,7 +20,7 @@ MASK40 = (1 << 40) - 1
 
 
 class Engine(Protocol):
-    """Runner of vectors, one after the other."""
+    """Runner of vectors."""
 
     name: str
 
@@ -28,7 +28,7 @@ class Engine(Protocol):
         """Load program, registers and memory; everything not listed is 0, unlisted program words are NOP."""
 
     def step(self) -> None:
-        """One instruction, or one iteration of a REPEAT target."""
+        """Run one instruction, or one iteration of a REPEAT target."""
 
     @property
     def pc(self) -> int: ...
@@ -36,23 +36,23 @@ class Engine(Protocol):
     def w(self, n: int) -> int: ...
 
     def register(self, name: str) -> int:
-        """SR or CORCON."""
+        """Return SR or CORCON."""
 
     def accumulator(self, name: str) -> int:
-        """ACCA or ACCB, unsigned 40 bits."""
+        """Return ACCA or ACCB as 40 unsigned bits."""
 
     def ram(self) -> bytes:
-        """Data addresses 0x0800-0x27FF."""
+        """Return the bytes of data addresses 0x0800-0x27FF."""
 
 
 def program_of(vector: dict[str, Any]) -> dict[int, int]:
-    """Program words by address."""
+    """Return the program words by address."""
     words = {vector["pc"] + 2 * i: int(word, 16) for i, word in enumerate(vector["op"])}
     return words | {int(address, 16): int(word, 16) for address, word in vector["in"].get("prog", {}).items()}
 
 
 class Rows:
-    """The table alone."""
+    """The instruction table without a machine."""
 
     name = "rows"
 

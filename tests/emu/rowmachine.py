@@ -1,4 +1,4 @@
-"""The smallest machine that can run rows: ints, a bytearray and a program dictionary.
+"""Minimal machine that runs rows of the instruction table: ints, a bytearray and a program dictionary.
 
 No devices, traps, stalls, cycles or stack checks: it tests what ``does`` says, not what the CPU adds. The engines of
 ``emu`` run the same vectors through ``Machine``.
@@ -33,7 +33,7 @@ PC_MASK = 0x7FFFFE
 
 
 class RowMachine:
-    """A builder of ints and the sequencer's bare bones: PC, skips, REPEAT, DO."""
+    """Builder on ints with a minimal sequencer: PC, skips, REPEAT, DO."""
 
     def __init__(self, program: Mapping[int, int]) -> None:
         self.data = bytearray(0x10000)
@@ -52,7 +52,7 @@ class RowMachine:
         return insn
 
     def step(self) -> None:
-        """One instruction, or one iteration of a REPEAT target."""
+        """Run one instruction, or one iteration of a REPEAT target."""
         at = self.pc
         insn = self.decode(at)
         after = (at + 2 * insn.words) & PC_MASK

@@ -18,9 +18,9 @@ from emu.dspic30f.isa.table import ROWS
 
 PC = 0x1000
 MODES = {"p": range(6), "q": range(6), "g": range(7), "h": range(7), "i": range(16), "j": range(16), "a": range(3)}
-"""Fields that choose how a pointer is used, and what they may say."""
+"""Fields that select the use of a pointer, with their values."""
 FIXED = {"s": 2, "d": 6, "w": 9, "x": 2, "y": 3}
-"""Registers that keep out of each other's way: W2 to W6, W7, offset W9; prefetched W6 and W7."""
+"""Registers that do not overlap: W2 to W6, W7, offset W9; prefetched W6 and W7."""
 POINTERS = [0x900 + 0x40 * n for n in range(10)] + [0x1A00, 0x1A40, 4, 0xC40, 0, 0x800]
 """W10 and W11 point into Y memory, W12 is the offset of prefetches."""
 STEPS = 3
@@ -34,7 +34,7 @@ PREFETCH = re.compile(r"\[w(\d+)\]([+-])=(\d)")
 
 
 def instructions() -> list[Insn]:
-    """Every mode of every operand of every row, word and byte; several operands take turns together."""
+    """Yield every mode of every operand of every row, word and byte; modes of several operands change together."""
     found: dict[tuple[int, ...], Insn] = {}
     for row in ROWS:
         modes = [letter for letter in MODES if letter in row.fields]
@@ -61,7 +61,7 @@ def _encoded(row: Row, chosen: dict[str, int]) -> Insn | None:
 
 
 def moves(insn: Insn) -> dict[int, int]:
-    """By how much each register moves when the instruction runs once, as its text says."""
+    """Return the change of each pointer register by one run of the instruction, according to its text."""
     said = text.format(insn, PC)
     mnemonic = said.split()[0]
     size = 4 if mnemonic == "mov.d" else 1 if mnemonic.endswith(".b") or mnemonic in BYTES else 2
@@ -75,7 +75,7 @@ def moves(insn: Insn) -> dict[int, int]:
 
 
 def run(engine: Any, words: list[int], instructions_run: int) -> None:
-    """Run a program from PC, a branch to itself behind it."""
+    """Run a program from PC, followed by a branch to itself."""
     data = {"W": POINTERS, "SR": 0, "CORCON": 0x20, "mem": {}}
     engine.prepare({"pc": PC, "op": [f"{word:06x}" for word in (*words, BRA_SELF)], "in": data})
     if isinstance(engine, OnMachine):
@@ -87,12 +87,12 @@ def run(engine: Any, words: list[int], instructions_run: int) -> None:
 
 @pytest.fixture(params=sorted(ENGINES), scope="module")
 def engine(request: pytest.FixtureRequest) -> Any:
-    """Each engine, and the table alone."""
+    """Every engine, and the table without a machine, move the pointers."""
     return ENGINES[request.param]()
 
 
 def test_pointers_move_by_the_size_of_the_access(engine: Any) -> None:
-    """Once, and then three times under REPEAT."""
+    """The pointers move once, and three times under REPEAT."""
     (again,) = codec.encode(next(row for row in ROWS if row.syntax == "REPEAT #lit14"), {"k": STEPS - 1})
     wrong = []
     for insn in instructions():
@@ -110,7 +110,7 @@ def test_pointers_move_by_the_size_of_the_access(engine: Any) -> None:
 
 
 def test_the_instructions_of_the_test_are_all_there_are() -> None:
-    """Every row with a pointer is there, with every way to move it."""
+    """The cases include every row with a pointer and every pointer mode."""
     met = {(insn.row.id, letter, getattr(insn.x, letter)) for insn in instructions() for letter in MODES
            if letter in insn.row.fields}  # fmt: skip
     for row in ROWS:

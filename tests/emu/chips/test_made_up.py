@@ -12,8 +12,8 @@ sys.path[:0] = [str(Path(__file__).parents[1] / folder) for folder in ("chips", 
 
 from cpu_rig import assemble  # noqa: E402
 from engine_fuzz import check_pairs, check_programs  # noqa: E402
+from engine_pair import QuickCompiler, check_wild  # noqa: E402
 from made_up import FLASH_END, MADE_UP, RAM_END, SFR_END, Y_START  # noqa: E402
-from twins import QuickCompiler, check_wild  # noqa: E402
 
 from emu.chips.chip import Region  # noqa: E402
 from emu.chips.dspic30f6014a import DSPIC30F6014A  # noqa: E402

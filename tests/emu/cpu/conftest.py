@@ -1,4 +1,4 @@
-"""Every test of the CPU runs on every engine; those that compare engines take the plain one and each `other`."""
+"""Engines of the CPU tests: `engine` is each of them, `other` each one that is compared with the plain engine."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A machine with a small assembly program in flash, and the ways the CPU's tests look at time.
+"""A machine with a small assembly program in flash, and measurements of its cycles.
 
 Programs are assembled with the instruction table itself: one statement per line, `label:` in front, `.word` for a raw
 program word. They start at START in cycle 0; SPLIM is not armed, all W registers count as initialised.
@@ -26,7 +26,7 @@ class _Expression:
 
 
 def assemble(text: str, start: int = START) -> tuple[dict[int, int], dict[str, int]]:
-    """Program words by address, and labels."""
+    """Return the program words by address, and the labels."""
     statements, labels, pc = [], {}, start
 
     def value(token: str) -> _Expression:
@@ -55,7 +55,7 @@ def assemble(text: str, start: int = START) -> tuple[dict[int, int], dict[str, i
 
 
 class Rig:
-    """A machine about to run a program."""
+    """A machine with a program at START."""
 
     def __init__(self, text: str, engine: str = "plain", ipl_slip: int = 0, **w: int) -> None:
         self.machine = Machine(engine=engine, ipl_slip=ipl_slip)
@@ -77,14 +77,14 @@ class Rig:
         self.machine.program.put(address, self.labels[label])
 
     def window(self, *words: int, page: int = 1) -> None:
-        """CallEvent PSV on with `words` at the start of the window: program page 1 begins at 0x8000 (isa.md §7.8)."""
+        """Switch PSV on with `words` at the start of the window: program page 1 begins at 0x8000 (isa.md §7.8)."""
         for index, word in enumerate(words):
             self.machine.program.put(page << 15 | 2 * index, word)
         self.machine.poke("PSVPAG", page)
         self.machine.poke("CORCON", 0x0024)
 
     def at(self, cycle: int, action) -> None:
-        """Do something as a device event in `cycle`."""
+        """Call `action` as a device event in `cycle`."""
         slot = self.machine.events.slot(f"test {cycle}", lambda due: action())
         self.machine.events.set(slot, cycle)
 
@@ -107,7 +107,7 @@ class Rig:
         machine.poke(group, machine.peek(group) & ~(7 << lsb) | priority << lsb)
 
     def note(self, label: str, stop: bool = False) -> None:
-        """Remember every cycle in which the instruction at `label` starts; with `stop`, end the run there."""
+        """Record every cycle in which the instruction at `label` starts; with `stop`, end the run there."""
 
         def arrived() -> bool:
             self.arrivals.append((label, self.machine.cycle))
@@ -116,16 +116,16 @@ class Rig:
         self.machine.hook_pc(self.labels[label], arrived)
 
     def run(self, cycles: int = 2000) -> Stop:
-        """Run until something stops the machine."""
+        """Run until the machine stops, at most for `cycles`."""
         return self.machine.run(cycles)
 
     def cycles_to(self, label: str = "end") -> int:
-        """Cycle in which the instruction at `label` starts for the first time."""
+        """Return the cycle in which the instruction at `label` starts for the first time."""
         self.note(label, stop=True)
         stop = self.run()
         assert stop.reason == "breakpoint", stop
         return stop.cycle
 
     def first(self, label: str) -> int:
-        """Cycle of the first arrival at a noted label."""
+        """Return the cycle of the first arrival at a label of `note`."""
         return next(cycle for name, cycle in self.arrivals if name == label)

@@ -13,7 +13,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "jit"))
 
-from twins import QuickCompiler
+from engine_pair import QuickCompiler
 
 from emu.chips.chip import Chip
 from emu.chips.dspic30f6014a import DSPIC30F6014A
@@ -39,7 +39,7 @@ class Difference(Exception):
 
 
 def random_insn(rng: random.Random, row: Row, ram: int = DSPIC30F6014A.data["ram"].start) -> Insn:
-    """A legal instruction of a row; addresses of file operands are mostly behind `ram`."""
+    """Return a legal instruction of a row; addresses of file operands are mostly above `ram`."""
     while True:
         fields = {}
         for letter, field in row.fields.items():
@@ -68,7 +68,7 @@ def machines(engine: str, chip: Chip = DSPIC30F6014A) -> tuple[Machine, Machine]
 
 
 def difference(plain: Machine, other: Machine) -> str:
-    """The first places where two records differ, empty if they are equal."""
+    """Return the first differences between two states, empty if they are equal."""
     a, b = plain.snapshot(), other.snapshot()
     if a == b:
         return ""
@@ -78,7 +78,7 @@ def difference(plain: Machine, other: Machine) -> str:
 
 
 class Contexts:
-    """Random processor states, written straight into a record."""
+    """Generator of random processor states, which it writes into a record."""
 
     def __init__(self, rng: random.Random, chip: Chip = DSPIC30F6014A) -> None:
         self._rng = rng
@@ -86,7 +86,7 @@ class Contexts:
         self._memory = rng.randbytes(4 * self._ram.size)
 
     def modes(self, machine: Machine) -> None:
-        """CORCON, MODCON, XBREV, stack limit, traps: what translations depend on."""
+        """Set the state on which translations depend: CORCON, MODCON, XBREV, stack limit, traps."""
         rng = self._rng
         machine.poke(
             "CORCON", rng.choice((0x0020, 0x0000, rng.randrange(0x10000) & 0x10F3, rng.randrange(0x10000) & 0x10F7))
@@ -106,7 +106,7 @@ class Contexts:
         machine.state.initialised = 0xFFFF if rng.random() < 0.8 else rng.randrange(0x10000) | 0x8000
 
     def data(self, machine: Machine) -> None:
-        """Registers, flags, memory."""
+        """Set registers, flags and memory."""
         rng = self._rng
         ram = self._ram
         offset = rng.randrange(3 * ram.size)
@@ -126,7 +126,7 @@ class Contexts:
         machine.state.pc = PC
 
     def word(self) -> int:
-        """A register value: an address in RAM, an edge, or anything."""
+        """Return a register value: an address in RAM, a boundary value, or a random one."""
         rng = self._rng
         kind = rng.random()
         if kind < 0.6:
@@ -137,7 +137,7 @@ class Contexts:
 
 
 def check_pairs(seed: int, instructions: int, contexts: int, engine: str = "jit", chip: Chip = DSPIC30F6014A) -> int:
-    """Run `instructions` random instructions, each in `contexts` contexts of the same modes. Returns the pairs run.
+    """Run `instructions` random instructions, each in `contexts` contexts of the same modes. Return the pairs run.
 
     Rows take turns, so each row is tested equally often. Raises Difference.
     """
@@ -187,7 +187,7 @@ SKIPS = tuple(row for row in ROWS if row.mnemonic in ("BTSS", "BTSC", "CPSEQ", "
 
 
 CORE = ("DCOUNT", "DCOUNT", "RCOUNT", "SR", "CORCON", "DOSTARTL", "DOENDL", "DOENDH", "PSVPAG", "TBLPAG")
-"""Registers of the CPU that say how a program goes on."""
+"""Registers of the CPU that control flow."""
 
 
 class Program:
@@ -234,7 +234,7 @@ class Program:
             self._one()
 
     def _branch(self) -> None:
-        """Forward, over a few instructions."""
+        """Emit a forward branch over a few instructions."""
         inner = self._nested(4)
         self.words += encode(self._rng.choice(CONDITIONS), {"n": len(inner)})
         self.words += inner
@@ -254,7 +254,7 @@ class Program:
             self._one(tuple(row for row in PLAIN_ROWS if row.repeat_ok))
 
     def _core(self) -> None:
-        """One instruction with a register that says how the program goes on. Counts mostly fall, so that it does."""
+        """Emit an access to a register that controls flow. Counts mostly fall, so that loops end."""
         rng = self._rng
         f, byte = DSPIC30F6014A.sfrs[rng.choice(CORE)].address, int(rng.random() < 0.3)
         way = rng.random()
@@ -298,7 +298,7 @@ class Program:
         self._add("PWRSAV #lit1", k=1)
 
     def _status(self) -> None:
-        """A critical section the way kernels write it: IPL by SR, or an enable bit."""
+        """Emit a critical section as in kernels: by the IPL in SR, or by an enable bit."""
         if self._rng.random() < 0.5:
             self._add("MOV{.B} WREG, f", f=0x42, B=1)
         else:
@@ -315,7 +315,7 @@ def _subroutine() -> list[int]:
 
 
 def _handler(bits: list[tuple[int, int]]) -> list[int]:
-    """Clear flags (byte address, bit) and return."""
+    """Return a handler that clears flags (byte address, bit)."""
     words = [*encode(BY_TEXT["PUSH.S"], {})]
     for address, bit in bits:
         words += encode(BY_TEXT["BCLR{.B} f, #bit4"], {"f": address + bit // 8, "b": bit % 8, "B": 1})
@@ -323,7 +323,7 @@ def _handler(bits: list[tuple[int, int]]) -> list[int]:
 
 
 def prepare(rng: random.Random, start: bytes, plain: Machine, other: Machine) -> list[int]:
-    """Load one random program and context into both machines; returns the cycles to compare at."""
+    """Load one random program and context into both machines. Return the cycles at which to compare."""
     program = Program(rng, rng.randrange(10, 80))
     slip = rng.randrange(2)
     chip = plain.chip
@@ -367,7 +367,7 @@ def prepare(rng: random.Random, start: bytes, plain: Machine, other: Machine) ->
 
 
 def check_programs(seed: int, count: int, engine: str = "jit", chip: Chip = DSPIC30F6014A) -> int:
-    """Run `count` random programs; returns the cycles simulated on each engine. Raises Difference."""
+    """Run `count` random programs. Return the cycles simulated on each engine. Raises Difference."""
     rng = random.Random(seed)
     plain, other = machines(engine, chip=chip)
     start = plain.snapshot()

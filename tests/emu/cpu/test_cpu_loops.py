@@ -181,7 +181,7 @@ def test_repeat_inside_do(engine: str) -> None:
 
 
 def test_the_last_instruction_may_move_the_loops_own_start(engine: str) -> None:
-    """isa.md §7.6: the loop goes on where DOSTARTL points then. 2 + 3, then four times the part from `from` on."""
+    """isa.md §7.6: the loop continues at the new DOSTARTL. 2 + 3, then four times the part from `from` on."""
     start = "mov #from, w2\ndo #4, last\ninc w0, w0\nfrom: inc w1, w1\nlast: mov w2, 0x3A\nend: nop"
     rig = Rig(start, engine, w0=0, w1=0)
     assert rig.cycles_to() == 1 + 2 + 3 + 4 * 2
@@ -189,14 +189,14 @@ def test_the_last_instruction_may_move_the_loops_own_start(engine: str) -> None:
 
 
 def test_the_last_instruction_may_change_the_count(engine: str) -> None:
-    """isa.md §7.6: DCOUNT is looked at behind it."""
+    """isa.md §7.6: DCOUNT is read after the instruction."""
     rig = Rig("do #5, last\ninc w0, w0\nlast: lsr 0x38\nend: nop", engine, w0=0)
     rig.cycles_to()
     assert rig.machine.w[0] == 2  # 5 becomes 2, counted down to 1, that becomes 0
 
 
 def test_an_instruction_may_move_the_loops_end_to_itself(engine: str) -> None:
-    """isa.md §7.6: DOEND is looked at behind the instruction that writes it: two instructions, three times."""
+    """isa.md §7.6: DOEND is read after the instruction that writes it: two instructions, three times."""
     text = "mov #here, w2\ndo #2, last\ninc w0, w0\nhere: mov w2, 0x3E\ninc w1, w1\nlast: nop\nend: nop"
     rig = Rig(text, engine, w0=0, w1=0)
     assert rig.cycles_to() == 1 + 2 + 3 * 2 + 2

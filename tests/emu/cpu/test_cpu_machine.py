@@ -175,7 +175,7 @@ def test_peek_and_poke_have_no_side_effects(engine: str) -> None:
 
 
 def test_a_run_in_pieces_is_the_run_in_one_go(engine: str) -> None:
-    """engine contract: what a run that stopped looked at, here a request that DISI holds back, is not in a snapshot."""
+    """engine contract: a snapshot does not contain the recheck event of a request that DISI blocks."""
     text = "loop: disi #29\nnop\nnop\nrepeat #11\nnop\nbra loop\nisr: bclr 0x84, #3\nretfie"
     whole, pieces = Rig(text, engine), Rig(text, engine)
     for rig in whole, pieces:

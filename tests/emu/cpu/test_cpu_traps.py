@@ -199,7 +199,7 @@ def test_an_oscillator_failure_enters_after_the_current_instruction(engine: str)
 
 
 def test_an_address_error_below_an_oscillator_failure_resets(engine: str) -> None:
-    """isa.md §14.4, §14.6: trap conflict, RCON.TRAPR; the run stops and names the culprit."""
+    """isa.md §14.4, §14.6: trap conflict, RCON.TRAPR; the run stops and names the faulting address."""
     rig = Rig("nop\n" * 10 + "osc: nop\nculprit: mov [w1], w2\nnop", engine, w1=RAM + 1)
     rig.vector(OSCILLATOR, "osc")
     rig.at(2, lambda: rig.machine.core.traps.request_flag("OSCFAIL"))
@@ -211,7 +211,7 @@ def test_an_address_error_below_an_oscillator_failure_resets(engine: str) -> Non
 
 @pytest.mark.parametrize("word", [0x3F0000, 0xDB1234, 0x0A0000, 0xF40000])
 def test_an_illegal_opcode_resets(engine: str, word: int) -> None:
-    """isa.md §4.1, §14.6: RCON.IOPUWR; the run stops with the culprit."""
+    """isa.md §4.1, §14.6: RCON.IOPUWR; the run stops at the faulting address."""
     rig = Rig(f"nop\nbad: .word {word}\nnop", engine)
     stop = rig.run()
     assert (stop.reason, stop.pc, stop.cycle) == ("fault", rig.labels["bad"], 2)

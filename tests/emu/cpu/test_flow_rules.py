@@ -1,4 +1,4 @@
-"""The rules of flow: their two forms agree, and code written from them does what they say when read on numbers."""
+"""Flow rules: the generated code has the effect of the rules evaluated on numbers."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from emu.system.rules import INTEGER_OPERATIONS, Cell
 
 
 class OnNumbers:
-    """Reads rules on the record, one step at a time; what they put is stored behind them."""
+    """Builder that evaluates rules on the record and stores their results at the end."""
 
     select = INTEGER_OPERATIONS.select
 
@@ -100,7 +100,7 @@ def eager(text: str, engine: str, **w: int) -> Rig:
 
 @pytest.mark.parametrize(("last", "iterations"), [("clr 0x38", 1), ("dec 0x38", 3), ("mov w5, 0x38", 2)])
 def test_the_last_instruction_of_a_loop_may_write_its_counter(engine: str, last: str, iterations: int) -> None:
-    """isa.md §7.6: DCOUNT is looked at behind the instruction at DOEND."""
+    """isa.md §7.6: DCOUNT is read after the instruction at DOEND."""
     again = "btsc w0, #1\nclr w5\n"  # the second iteration writes 0
     rig = eager(f"do #5, last\ninc w0, w0\n{again}last: {last}\nend: nop", engine, w0=0, w5=3)
     rig.cycles_to()
@@ -131,7 +131,7 @@ def test_an_interrupt_that_the_last_instruction_of_a_loop_enables_comes_behind_i
 
 
 def test_an_event_that_the_last_instruction_of_a_loop_brings_nearer_is_in_time(engine: str) -> None:
-    """engines.md §4.2: the timer's period is 30 from the first write on, and its interrupt comes when it always does."""
+    """engines.md §4.2: the timer's period is 30 from the first write on; its interrupt is on time."""
     text = """mov #0x8000, w3
         mov w3, 0x104
         again: mov #1000, w1

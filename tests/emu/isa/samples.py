@@ -10,7 +10,7 @@ from emu.dspic30f.isa.row import Insn, Row
 
 
 def random_insn(row: Row, generator: random.Random) -> Insn:
-    """A legal instruction of ``row``, its ignored bits random too."""
+    """Return a legal instruction of ``row`` with random ignored bits."""
     for _ in range(10_000):
         words = [
             value | generator.getrandbits(24) & ~mask & 0xFFFFFF
@@ -30,7 +30,7 @@ def random_insn(row: Row, generator: random.Random) -> Insn:
 
 
 def idle_fields(insn: Insn) -> dict[str, int]:
-    """Fields that this instruction does not use, with the value an assembler gives them (isa.md §5, §8.1)."""
+    """Return the unused fields of an instruction, with the values that an assembler writes (isa.md §5, §8.1)."""
     fields, x = insn.row.fields, insn.x
     idle = {}
     if "w" in fields and ("g" in fields or "h" in fields) and 6 not in (getattr(x, "g", 0), getattr(x, "h", 0)):

@@ -34,7 +34,7 @@ ROW_CLASSES = (
 
 
 def theirs(word1: int, word2: int = 0) -> str | None:
-    """SLEIGH's text of an instruction at PC; None if it does not decode."""
+    """Return SLEIGH's text of an instruction at PC, or None if it does not decode."""
     octets = word1.to_bytes(4, "little") + word2.to_bytes(4, "little")
     try:
         found = CONTEXT.disassemble(octets, base_address=2 * PC, max_instructions=1).instructions
@@ -44,7 +44,7 @@ def theirs(word1: int, word2: int = 0) -> str | None:
 
 
 def plain(assembly: str) -> str:
-    """A text without differences of notation; numbers modulo 2**23."""
+    """Return a text in a common notation, with numbers modulo 2**23."""
     assembly = re.sub(r"\bacc([ab])\b", r"\1", assembly.lower()).replace("+-", "-")
     assembly = NUMBER.sub(lambda m: f",{int(m[1] + m[2], 0) % (1 << 23):x}", assembly)
     mnemonic, _, operands = assembly.partition(" ")
@@ -52,7 +52,7 @@ def plain(assembly: str) -> str:
 
 
 def disagreement(word1: int, word2: int = 0) -> str | None:
-    """Name of the class of disagreement; None if both agree."""
+    """Return the name of the class of disagreement, or None if both agree."""
     ours, other = codec.decode(word1, word2), theirs(word1, word2)
     if ours is None and other is None:
         return None

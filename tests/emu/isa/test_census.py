@@ -19,7 +19,7 @@ REFERENCE = Path(__file__).resolve().parents[2] / "vectors"
 
 
 def claimed(row: Row, words: np.ndarray) -> np.ndarray:
-    """Which of the words belong to the row: fixed bits and every rule."""
+    """Return which words belong to the row: fixed bits and rules match."""
     mine = (words & row.pattern.mask[0]) == row.pattern.value[0]
     for clause in row.clauses:
         mine &= clause.holds(lambda letter: row.fields[letter].get(words))
@@ -28,7 +28,7 @@ def claimed(row: Row, words: np.ndarray) -> np.ndarray:
 
 @cache
 def census() -> tuple[np.ndarray, dict[int, int]]:
-    """Rows per first word, and words per row."""
+    """Return the rows per first word, and the words per row."""
     rows_per_word = np.zeros(1 << 24, dtype=np.uint8)
     words_per_row: Counter[int] = Counter()
     for byte, bucket in enumerate(BY_BYTE):
@@ -52,13 +52,13 @@ def test_no_word_is_claimed_by_two_rows() -> None:
 
 
 def test_every_row_claims_words() -> None:
-    """A row without words would be a row that can never run."""
+    """Every row has at least one word."""
     assert set(census()[1]) == set(BY_ID)
     assert all(census()[1].values())
 
 
 def test_decode_agrees_with_the_census() -> None:
-    """``decode`` goes through operands and rules one word at a time; the census through arrays."""
+    """``decode``, which handles one word at a time, agrees with the census, which uses arrays."""
     generator = np.random.default_rng(20)
     for word in map(int, generator.integers(0, 1 << 24, 20_000)):
         assert (codec.decode.__wrapped__(word) is not None) == bool(census()[0][word]), f"{word:06x}"
@@ -78,7 +78,7 @@ def test_legal_words_per_opcode_byte_are_those_of_the_reference() -> None:
 
 @cache
 def reference_rows() -> dict[int, dict[str, str]]:
-    """Base rows of isa.csv by number."""
+    """Return the base rows of isa.csv by number."""
     with open(REFERENCE / "isa.csv", newline="") as lines:
         return {int(row["id"]): row for row in csv.DictReader(lines) if row["status"] == "base"}
 

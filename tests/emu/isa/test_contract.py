@@ -1,4 +1,4 @@
-"""What every ``does`` must keep to, whoever gives it values (isa/builder.py)."""
+"""The builder contract (isa/builder.py), which every ``does`` must keep with any builder."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ READ_OPERANDS, FORM_ADDRESSES, LOAD, WRITE = range(4)
 
 
 class Opaque:
-    """A value nobody may look at."""
+    """An opaque value: rows must not inspect it."""
 
     def _same(self, *_: object) -> Opaque:
         return self
@@ -41,7 +41,7 @@ class Opaque:
 
 
 class Watcher:
-    """A builder of opaque values that checks the order of phases and notes the flags."""
+    """Builder of opaque values that checks the order of phases and records the flags."""
 
     def __init__(self, context: Context) -> None:
         self.context = context
@@ -95,7 +95,7 @@ class Watcher:
         self.flags |= flags.keys()
 
     def nothing(self, *_: object) -> None:
-        """Not ordered."""
+        """Accept the operation in any phase."""
 
     table_write = set_reg = set_acc = trap_math = nothing
 
@@ -105,7 +105,7 @@ EDGES = (0, 1, 2, 0x7FFF, 0x8000, 0x8001, 0xFFFE, 0xFFFF, 0x1000, 0x1800, 0x27FE
 
 
 class Anything(RowMachine):
-    """A machine in a random state, where traps may be asked for."""
+    """A machine in a random state that accepts trap requests."""
 
     def __init__(self, insn: Insn, generator: random.Random) -> None:
         super().__init__({})

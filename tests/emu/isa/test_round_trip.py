@@ -18,7 +18,7 @@ SAMPLES = 60
 
 
 def tidied(insn: Insn) -> Insn:
-    """The same instruction with the fields nobody reads as an assembler leaves them."""
+    """Return the same instruction with unused fields as an assembler writes them."""
     values = {letter: getattr(insn.x, letter) for letter in insn.row.fields} | idle_fields(insn)
     again = codec.decode(*codec.encode(insn.row, values))
     assert again is not None
@@ -38,7 +38,7 @@ def check_words(insn: Insn) -> None:
 
 
 def check_text(insn: Insn, pc: int) -> None:
-    """parse∘format gives the instruction back, format∘parse the text."""
+    """parse∘format is the identity on instructions, format∘parse on texts."""
     plain = tidied(insn)
     written = text.format(plain, pc, source=True)
     words = text.parse(written).encode(pc)
@@ -73,7 +73,7 @@ def test_any_legal_word_survives_both_round_trips(word1: int, word2: int, slot: 
 @settings(max_examples=500, deadline=None)
 @given(st.sampled_from(ROWS), st.data())
 def test_encode_refuses_values_that_do_not_fit_their_field(row: Row, data: st.DataObject) -> None:
-    """A field is never silently truncated."""
+    """Encoding raises an error for a value that does not fit."""
     if not row.fields:
         return
     field = row.fields[data.draw(st.sampled_from(sorted(row.fields)))]

@@ -18,7 +18,7 @@ GOLDEN = Path(__file__).resolve().parents[2] / "vectors" / "golden.csv"
 
 
 class Traps(RowMachine):
-    """Notes trap requests instead of refusing them."""
+    """Row machine that records trap requests."""
 
     def __init__(self, *statements: str) -> None:
         words = [word for i, statement in enumerate(statements) for word in text.parse(statement).encode(2 * i)]
@@ -31,7 +31,7 @@ class Traps(RowMachine):
 
 
 def after(statement: str, w: dict[int, int], mem: dict[int, int] | None = None, **registers: int) -> Traps:
-    """The machine after one instruction."""
+    """Return the machine after one instruction."""
     m = Traps(statement)
     for n, value in w.items():
         m.set_w(n, value)
@@ -239,7 +239,7 @@ def golden() -> list[dict[str, str]]:
 
 
 def assignments(cell: str) -> dict[str, int]:
-    """Register values by name."""
+    """Return the register values by name."""
     return {name: int(value, 16) for name, value in re.findall(r"(W\d+|ACC[AB])=([0-9A-F]+)", cell)}
 
 
@@ -270,5 +270,5 @@ def test_golden_vectors_of_the_reference(row: dict[str, str]) -> None:
 
 
 def test_every_row_says_where_it_comes_from() -> None:
-    """A row without source could not be checked against the manual."""
+    """Every row names its source in the manual."""
     assert BY_ID[5].source == "PRM ADD; isa.csv 5"

@@ -22,7 +22,7 @@ PER_ROW = 40
 
 
 def explained() -> set[str]:
-    """Classes in the table of docs/census.md."""
+    """Return the classes in the table of docs/census.md."""
     return set(re.findall(r"^\| ([^|]+?) \| [\d,]+ \|", PAGE.read_text(), re.MULTILINE))
 
 
@@ -37,7 +37,7 @@ def test_random_words_disagree_only_as_the_page_explains() -> None:
 
 @pytest.mark.parametrize("row", ROWS, ids=lambda row: f"{row.id}-{row.mnemonic}")
 def test_instructions_of_each_row_disagree_only_as_the_page_explains(row: Row) -> None:
-    """Both words of two-word instructions take part."""
+    """Both words of two-word instructions are compared."""
     generator = random.Random(row.id)
     known = explained()
     for _ in range(PER_ROW):
@@ -47,5 +47,5 @@ def test_instructions_of_each_row_disagree_only_as_the_page_explains(row: Row) -
 
 
 def test_no_word_is_legal_here_and_unknown_there() -> None:
-    """The page's first claim: SLEIGH decodes every legal word."""
+    """docs/census.md: SLEIGH decodes every legal word."""
     assert "not decoded by SLEIGH" not in explained()

@@ -1,4 +1,4 @@
-"""Statements as people write them, and what is said when they are wrong."""
+"""Parsing of assembly statements, and messages for wrong ones."""
 
 from __future__ import annotations
 
@@ -129,7 +129,7 @@ def test_wrong_statements_are_refused_with_the_reason(statement: str, complaint:
 
 @dataclass
 class Later:
-    """An expression whose value only the linker knows."""
+    """An expression whose value is known only at link time."""
 
     name: str
     value: int | None = None
@@ -168,7 +168,7 @@ def test_open_operands_become_slots_with_their_relocation(statement: str, reloca
 
 
 def test_a_slot_takes_its_value_later() -> None:
-    """The value is what is written: a target address, not an offset."""
+    """The value of a slot is the target address, not an offset."""
     parsed = text.parse("bra Z, there", Later)
     assert parsed.encode(0x1000) == (0x320000,)
     assert parsed.encode(0x1000, {0: 0x1006}) == (0x320002,)
@@ -177,7 +177,7 @@ def test_a_slot_takes_its_value_later() -> None:
 
 
 def test_a_word_bit_above_7_adds_one_to_the_symbol() -> None:
-    """isa.md §16: BSET f, #8..15 is a bit of the byte behind f."""
+    """isa.md §16: BSET f, #8..15 is a bit of the byte after f."""
 
     def expr(source: str) -> Later:
         return Later(source, None if source == "PORTB" else int(source))
@@ -188,7 +188,7 @@ def test_a_word_bit_above_7_adds_one_to_the_symbol() -> None:
 
 
 def test_no_expression_is_parsed_for_a_form_that_does_not_fit() -> None:
-    """Trying forms must not create symbols."""
+    """Forms that are tried and rejected create no symbols."""
     asked: list[str] = []
 
     def expr(source: str) -> Later:

@@ -17,9 +17,9 @@ from dataclasses import dataclass, field
 from functools import cache
 from typing import Any, Final
 
+from engine_pair import QuickCompiler
 from random_firmware import difference, words_of
 from rowmachine import SR, RowMachine
-from twins import QuickCompiler
 
 from emu.dspic30f.isa import codec
 from emu.dspic30f.isa.fields import Operands
@@ -31,7 +31,7 @@ from emu.machine.machine import Machine
 ENGINES: Final = ("plain", "jit")
 FLAGS: Final = ("C", "Z", "OV", "N", "DC")
 DRILLS: Final = 24
-"""Of one image."""
+"""Number of drills of one image."""
 FIRST, ROOM = 0x400, 0x40
 """Program address of the first drill, and bytes of program memory for each."""
 HANDLER, TRAP = 0x200, 0x280
@@ -39,17 +39,17 @@ IFS0, TMR1, PORTD = 0x84, 0x100, 0x2D2
 NO_WATCHDOG: Final = 0x7FFF
 VALUES: Final = (0, 1, 0x0F, 0x10, 0x7F, 0x80, 0x99, 0xFF, 0x100, 0x7FFF, 0x8000, 0x80FF, 0xFF00, 0xFFFF)
 DATA, POINTERS, ELSEWHERE = range(8), range(8, 13), 13
-"""Registers by what they hold: numbers, addresses in RAM, an address that may be anything."""
+"""Registers by their contents: numbers, addresses in RAM, a random address."""
 LEFT_OUT: Final = ("RETFIE", "RETURN", "RETLW", "RESET", "PWRSAV", "DO", "CALL", "RCALL", "GOTO", "LNK", "ULNK")
 
 BY_NUMBER: Final = {row.id: row for row in ROWS}
 
 Kind = tuple[int, int]
-"""A row's number, and 1 for its byte form."""
+"""Number of a row, and 1 for its byte form."""
 
 
 class _Noting(RowMachine):
-    """Notes which flags an instruction asks for."""
+    """Builder that records the flags that an instruction reads."""
 
     def __init__(self, word: int) -> None:
         super().__init__({0x1000: word})
@@ -66,7 +66,7 @@ class _Noting(RowMachine):
 
 
 def asked(insn: Insn) -> frozenset[str]:
-    """The flags an instruction reads, by themselves or in SR by its address."""
+    """Return the flags that an instruction reads, as bits or through the address of SR."""
     machine = _Noting(insn.word1)
     machine.pc = 0x1000
     insn.row.does(machine, insn.x)  # type: ignore[arg-type]
@@ -74,12 +74,12 @@ def asked(insn: Insn) -> frozenset[str]:
 
 
 def written(insn: Insn) -> frozenset[str]:
-    """The flags an instruction changes."""
+    """Return the flags that an instruction changes."""
     return frozenset(name.partition("=")[0] for name in insn.row.flags.split()) & frozenset(FLAGS)
 
 
 def kind(insn: Insn) -> Kind:
-    """What of an instruction makes a difference to flags."""
+    """Return the fields of an instruction that affect flags."""
     return insn.row.id, getattr(insn.x, "B", 0)
 
 
@@ -118,7 +118,7 @@ def instruction(draw: random.Random, row: Row, size: int | None = None) -> Insn:
 
 @cache
 def rows() -> tuple[list[Row], list[Row], list[Row]]:
-    """Rows that write one of the flags; that read one without reading SR; all others that go on behind themselves."""
+    """Return the rows that write a flag, those that read one without SR, and the other rows without flow."""
     writers, readers, others = [], [], []
     draw = random.Random(0)
     for row in ROWS:
@@ -148,18 +148,18 @@ def away(draw: random.Random) -> list[int]:
 
 @dataclass
 class Tally:
-    """What was run and found equal."""
+    """Counts of what was run and found equal."""
 
     runs: int = 0
     pairs: Counter[tuple[Kind, str, Kind]] = field(default_factory=Counter)
     """Drills by writer, flag and reader."""
     python: int = 0
-    """Instructions that the native machine gave to Python."""
+    """Instructions of the native machine that Python ran."""
     executed: int = 0
     """Instructions of the plain machine."""
 
     def add(self, other: Tally) -> None:
-        """Take over what another tally counted."""
+        """Add the counts of another tally."""
         self.runs += other.runs
         self.pairs.update(other.pairs)
         self.python += other.python
@@ -184,7 +184,7 @@ def all_pairs() -> tuple[tuple[Kind, str, Kind], ...]:
 
 
 def drill(draw: random.Random, turn: int) -> tuple[list[int], list[Insn]]:
-    """The words of a drill, which ends by itself, and its instructions; it has the pairs of a turn."""
+    """Return the words and the instructions of a drill, which ends by itself and holds the pairs of one turn."""
     among = all_pairs()
     words: list[int] = []
     for writer, _, reader in (among[2 * turn % len(among)], among[(2 * turn + 1) % len(among)]):
@@ -199,7 +199,7 @@ def drill(draw: random.Random, turn: int) -> tuple[list[int], list[Insn]]:
 
 
 def pairs_of(insns: list[Insn]) -> Iterator[tuple[Kind, str, Kind]]:
-    """Who writes a flag that somebody behind reads, with no other writer between."""
+    """Return the pairs of an instruction that writes a flag and the next instruction that reads it."""
     last: dict[str, Kind] = {}
     for insn in insns:
         for name in asked(insn):
@@ -210,7 +210,7 @@ def pairs_of(insns: list[Insn]) -> Iterator[tuple[Kind, str, Kind]]:
 
 
 def image(seed: int) -> tuple[dict[int, int], list[tuple[int, list[Insn]]]]:
-    """Program words by address; where drills begin, and what is in them."""
+    """Return program words by address, and the start address and instructions of each drill."""
     draw = random.Random(seed)
     flash: dict[int, int] = {}
 
@@ -235,7 +235,7 @@ def image(seed: int) -> tuple[dict[int, int], list[tuple[int, list[Insn]]]]:
 
 
 def _prepare(draw: random.Random, machine: Machine, start: int) -> None:
-    """Registers, flags, memory, a timer that interrupts or not; the drill is to be run."""
+    """Prepare a machine for a drill: registers, flags, memory, and a timer with or without interrupt."""
     for number in DATA:
         machine.w[number] = draw.choice(VALUES) if draw.random() < 0.6 else draw.randrange(0x10000)
     for number in POINTERS:
@@ -256,7 +256,7 @@ def _prepare(draw: random.Random, machine: Machine, start: int) -> None:
 
 
 def check(seed: int, tally: Tally, rounds: int = 16) -> str | None:
-    """Run the drills of one image; what differs first, None if nothing does."""
+    """Run the drills of one image. Return the first difference, or None."""
     flash, drills = image(seed)
     draw = random.Random(f"{seed} runs")
     machines = [Machine(engine=name, ipl_slip=seed & 1) for name in ENGINES]
@@ -289,8 +289,8 @@ def check(seed: int, tally: Tally, rounds: int = 16) -> str | None:
                 ended.append(machine.run(cut + 1))
             found = [difference(machines[0], machine) for machine in machines[1:]]
             if any(found) or ended.count(ended[0]) < len(ended) or arrivals.count(arrivals[0]) < len(arrivals):
-                told = "; ".join(f"{insn.row.syntax} {insn.x}" for insn in insns)
-                return f"drill {number}, {cut + 1} cycles: {ended} {found} {[a[-2:] for a in arrivals]}\n{told}"
+                listing = "; ".join(f"{insn.row.syntax} {insn.x}" for insn in insns)
+                return f"drill {number}, {cut + 1} cycles: {ended} {found} {[a[-2:] for a in arrivals]}\n{listing}"
             tally.runs += 1
         tally.pairs.update(pairs_of(insns))
     tally.python += native.counts.interpreted

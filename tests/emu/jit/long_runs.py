@@ -10,10 +10,10 @@ import ctypes
 import random
 from typing import Any, Final
 
+from engine_pair import NO_WATCHDOG, Difference, QuickCompiler, Tally, advance
 from random_firmware import difference, load
 from straight_body import Shape
 from straight_firmware import straight_firmware
-from twins import NO_WATCHDOG, Difference, QuickCompiler, Tally, advance
 
 from emu.dspic30f.jit import engine as jit_engine
 from emu.dspic30f.jit.engine import JitEngine
@@ -41,7 +41,7 @@ class CountedInterpreter:
 
 
 class CountingTranslator(Translator):
-    """Exact code that counts instructions: `advance` is translated once for each."""
+    """Translator of exact code that counts instructions: it calls `advance` once for each."""
 
     def advance(self, cycles: Number, mask: int) -> None:
         super().advance(cycles, mask)
@@ -53,7 +53,7 @@ class CountingTranslator(Translator):
 
 
 class CountedExact:
-    """Makes a native machine run exact code alone, with a count of instructions."""
+    """Makes a native machine run only exact code, and counts its instructions."""
 
     def __init__(self, machine: Machine) -> None:
         runner = machine.runner
@@ -84,12 +84,12 @@ class CountedExact:
 
     @property
     def executed(self) -> int:
-        """Instructions so far."""
+        """Return the number of instructions so far."""
         return self.python + int(self._runner._env[EXECUTED])
 
 
 def native_machine(ipl_slip: int) -> Machine:
-    """Native code from the second arrival on, compiled at once."""
+    """Return a machine that compiles an address at the second arrival, before it runs it."""
     machine = Machine(engine="jit", ipl_slip=ipl_slip)
     runner = machine.runner
     assert isinstance(runner, JitEngine)
@@ -98,7 +98,7 @@ def native_machine(ipl_slip: int) -> Machine:
 
 
 def check_long(seed: int, instructions: int, share: float = 0.003) -> Tally:
-    """A program with loops for about `instructions`, `share` of them beside the interpreter. Raises Difference."""
+    """Check a program with loops for about `instructions`, of which the interpreter runs `share`. Raises Difference."""
     shape = Shape(instructions=300, periods=(1500, 9000), loops=(20, 300), calm=True)
     firmware = straight_firmware(seed, shape)
     generator = random.Random(seed)
@@ -133,7 +133,7 @@ def beside(
     count: CountedExact,
     cycles: int,
 ) -> None:
-    """The interpreter goes on from the native machines' snapshot, and they with it. Raises Difference."""
+    """Run the interpreter and the native machines from one snapshot and compare them. Raises Difference."""
     interpreted.restore(blocks.snapshot())
     before = interpreter.executed, count.executed
     stops = [machine.run(cycles) for machine in (interpreted, blocks, exact)]

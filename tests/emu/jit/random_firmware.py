@@ -19,51 +19,51 @@ CODE, ISR, HANDLER, LEAF = 0x200, 0x1000, 0x1100, 0x1180
 """Program addresses of the body, the interrupt handlers, the trap handler and a callee."""
 BODY_WORDS = 60
 STACK = 0x2000
-"""Where RAM reaches that far."""
+"""Data addresses, on chips whose RAM includes them."""
 TRAP_COUNT = 0x1FF0
-"""Word in RAM: after 32 traps the trap handler begins anew instead of returning, in case PC got lost."""
+"""Word in RAM: after 32 traps the trap handler restarts the program instead of returning, in case PC is wrong."""
 
 FLOWS = ("BRA", "CALL", "GOTO", "RCALL", "DO", "REPEAT", "RETURN", "RETFIE", "RETLW")
 LEFT_OUT = ("RESET", "PWRSAV")
-"""They end the run or only wait; their own tests check them."""
+"""Rows that end the run or only wait; they have tests of their own."""
 
 DEVICE_REGISTERS = (
     "TMR1", "TMR2", "TMR3", "PR1", "PR2", "PR3", "LATA", "LATD", "LATF", "PORTA", "PORTB", "PORTD", "TRISD",
 )  # fmt: skip
-"""Registers with native accesses, and one that changes what they do."""
+"""Registers with native accesses, and one that changes their meaning."""
 
 ROWS = [row for row in table.ROWS if row.mnemonic not in LEFT_OUT]
 BY_SYNTAX = {row.syntax: row for row in table.ROWS}
 
 
 def words_of(syntax: str, **fields: int) -> list[int]:
-    """Encoding of one instruction by the syntax of its row."""
+    """Return the words of one instruction, given the syntax of its row."""
     return list(codec.encode(BY_SYNTAX[syntax], Operands(**fields)))
 
 
 def literal(value: int, register: int) -> list[int]:
-    """MOV #value,Wn."""
+    """Return MOV #value,Wn."""
     return words_of("MOV{.W} #lit16, Wnd", k=value, d=register)
 
 
 def to_sfr(name: str, value: int, chip: Chip = DSPIC30F6014A) -> list[int]:
-    """Write a register through W0."""
+    """Return code that writes a register through W0."""
     return literal(value, 0) + words_of("MOV{.W} Wns, f", s=0, f=chip.sfrs[name].address)
 
 
 @dataclass
 class Firmware:
-    """Program words by address, and what was used to make them."""
+    """Program words by address, and the seed that generated them."""
 
     seed: int
     flash: dict[int, int] = field(default_factory=dict)
     end: int = -1
-    """Where a pass through the program ends; -1: nowhere in particular."""
+    """Address at which a pass through the program ends; -1 if there is none."""
     ram: dict[int, int] = field(default_factory=dict)
     """Words of RAM that are not random at the beginning."""
 
     def put(self, address: int, words: list[int]) -> int:
-        """Place words; returns the address behind them."""
+        """Place words. Return the address after them."""
         for word in words:
             self.flash[address] = word
             address += 2
@@ -71,7 +71,7 @@ class Firmware:
 
 
 def random_words(row: Row, generator: random.Random, at: int, end: int, ram: range) -> list[int] | None:
-    """A legal instruction of `row` at address `at`, whose static targets lie in the body; None if it fits badly."""
+    """Return a legal instruction of `row` at address `at` with static targets in the body, or None."""
     mask, value = row.pattern.mask, row.pattern.value
     words = [v | generator.getrandbits(24) & ~m & 0xFFFFFF for m, v in zip(mask, value, strict=True)]
     x = Operands(**{f.letter: f.get(*words) for f in row.pattern.fields})
@@ -106,7 +106,7 @@ def timer_bits(chip: Chip, kind: str) -> list[tuple[int, int]]:
 
 
 def interrupt_words(generator: random.Random, chip: Chip = DSPIC30F6014A) -> list[int]:
-    """An instruction that changes what is acceptable: IPL, flags or enables."""
+    """Return an instruction that changes IPL, interrupt flags or enables."""
     status = [(chip.sfrs["SR"].address, bit) for bit in (5, 6, 7)]
     address, bit = generator.choice(generator.choice((status, timer_bits(chip, "flag"), timer_bits(chip, "enable"))))
     syntax = generator.choice(("BSET{.B} f, #bit4", "BCLR{.B} f, #bit4", "BTG{.B} f, #bit4"))
@@ -114,7 +114,7 @@ def interrupt_words(generator: random.Random, chip: Chip = DSPIC30F6014A) -> lis
 
 
 def device_words(generator: random.Random, chip: Chip = DSPIC30F6014A) -> list[int]:
-    """An access to a timer or port that native code makes by itself."""
+    """Return an access to a timer or port that is native."""
     name = generator.choice(DEVICE_REGISTERS)
     address = chip.sfrs[name].address
     if generator.random() < 0.4:
@@ -126,7 +126,7 @@ def device_words(generator: random.Random, chip: Chip = DSPIC30F6014A) -> list[i
 
 
 def mode_words(generator: random.Random, chip: Chip = DSPIC30F6014A) -> list[int]:
-    """A write to a register that decides which native code is valid, or to the state of a DO loop."""
+    """Return a write to a mode register, or to the state of a DO loop."""
     name = generator.choice(("CORCON", "MODCON", "XBREV", "DOENDL", "DOSTARTL", "DCOUNT", "PSVPAG", "SPLIM"))
     values = {
         "DOENDL": CODE + generator.randrange(0, 2 * BODY_WORDS, 2),
@@ -140,7 +140,7 @@ def mode_words(generator: random.Random, chip: Chip = DSPIC30F6014A) -> list[int
 
 
 def core_words(generator: random.Random, chip: Chip = DSPIC30F6014A) -> list[int]:
-    """A register that says how the program goes on, at the end of a DO loop, under REPEAT or anywhere."""
+    """Return an access to a register that controls flow, at the end of a DO loop, under REPEAT or elsewhere."""
     name = generator.choice(("DCOUNT", "DCOUNT", "RCOUNT", "SR", "CORCON", "DOSTARTL", "DOENDL"))
     address = chip.sfrs[name].address
     one = generator.choice((
@@ -154,7 +154,7 @@ def core_words(generator: random.Random, chip: Chip = DSPIC30F6014A) -> list[int
 
 
 def _enabled(chip: Chip, generator: random.Random) -> list[tuple[str, int]]:
-    """Registers and values that let timers 1 to 3 interrupt, at any priorities."""
+    """Return register values that enable interrupts of timers 1 to 3, at random priorities."""
     sources = [chip.interrupts[timer.irq] for timer in chip.timers[:3]]
     groups = sorted({source.priority[0] for source in sources})
     enables: dict[str, int] = {}
@@ -164,7 +164,7 @@ def _enabled(chip: Chip, generator: random.Random) -> list[tuple[str, int]]:
 
 
 def random_firmware(seed: int, chip: Chip = DSPIC30F6014A) -> Firmware:
-    """A program that never ends by itself, except through a reset for a fault."""
+    """Return a program that ends only through a reset by a fault."""
     generator = random.Random(seed)
     firmware = Firmware(seed)
     whole, y = chip.data["ram"], chip.data["yram"].start
@@ -236,7 +236,7 @@ def random_firmware(seed: int, chip: Chip = DSPIC30F6014A) -> Firmware:
 
 
 def load(machine: Machine, firmware: Firmware) -> None:
-    """Put the program and random data into a machine and reset it."""
+    """Load the program and random data into a machine and reset it."""
     start, words = 0, []
     for address, word in sorted(firmware.flash.items()):
         if address != start + 2 * len(words):
@@ -253,7 +253,7 @@ def load(machine: Machine, firmware: Firmware) -> None:
 
 
 def difference(one: Machine, other: Machine) -> str:
-    """What differs between the states of two machines; empty if nothing."""
+    """Return the differences between the states of two machines; empty if there are none."""
     a, b = one.snapshot(), other.snapshot()
     if a == b:
         return ""

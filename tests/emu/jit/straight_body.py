@@ -31,7 +31,7 @@ BODY, BODY_END = 0x2000, 0xE000
 LEAVES, LEAF_WORDS, LEAF_COUNT = 0x1200, 8, 16
 """Callees: a few instructions and RETURN or RETLW."""
 PROGRESS = 0x27FC
-"""Word in RAM: where to go on after a reset, the stretch behind the present one."""
+"""Word in RAM: address at which the program continues after a reset, the section after the current one."""
 MODE_CORCON = 0x10F7
 """CORCON bits that programs change: all but IPL3, the DO level and EDT (isa.md §2.4)."""
 
@@ -50,34 +50,34 @@ SEPARATE = (
     "PWRSAV",
     "DISI",
 )
-"""Mnemonics with an arrangement of their own, besides the flows."""
+"""Mnemonics, besides flows, that need surrounding code."""
 ORDINARY = [row for row in table.ROWS if row.mnemonic not in FLOWS + SEPARATE]
 PLAIN = [row for row in ORDINARY if not row.mnemonic.startswith(("CPS", "BTSS", "BTSC"))]
-"""Rows that always go on with the next instruction."""
+"""Rows without flow."""
 COMPUTING = [row for row in PLAIN if not set("pqghofi") & set(row.fields)]
-"""Rows that touch nothing but registers, for the most part."""
+"""Rows that mostly access only registers."""
 DIVIDES = [row for row in table.ROWS if row.mnemonic.startswith("DIV")]
 BRANCHES = [row for row in table.ROWS if row.mnemonic == "BRA" and "n" in row.fields]
 BYTE_POINTERS = ("SE", "ZE")
-"""Mnemonics whose pointers step by one byte without saying so in a field."""
+"""Mnemonics whose pointers move by one byte without a size field."""
 
 
 @dataclass(frozen=True)
 class Shape:
-    """What a program is like."""
+    """Parameters of a random program."""
 
     instructions: int = 5000
-    """Length of a pass, about."""
+    """Approximate number of instructions of a pass."""
     periods: tuple[int, int] = (25, 150)
     """Tcy between the matches of one timer."""
     loops: tuple[int, int] = (0, 5)
     """Repetitions of DO loops, fewest and most."""
     calm: bool = False
-    """Nothing that Python does by design, except DO: for long runs."""
+    """Whether the program avoids work of Python, except DO, for long runs."""
 
 
 class BodyWriter:
-    """Writes the body of one program."""
+    """Generator of the body of one program."""
 
     def __init__(self, firmware: Firmware, generator: random.Random, shape: Shape, corcon: int) -> None:
         self.firmware, self.generator, self.shape = firmware, generator, shape
@@ -91,7 +91,7 @@ class BodyWriter:
         self.at = self.firmware.put(self.at, words)
 
     def split(self) -> None:
-        """A new stretch: which registers are pointers, which one an index, which data."""
+        """Begin a new section: choose registers as pointers, index and data."""
         registers = list(range(15))
         self.generator.shuffle(registers)
         if self.generator.random() < 0.6:
@@ -107,7 +107,7 @@ class BodyWriter:
         self.good &= sum(1 << n for n in self.pointers)
 
     def point(self, n: int) -> None:
-        """Let Wn point into RAM; W10 and W11 into Y RAM (isa.md §8.1)."""
+        """Make Wn point into RAM; W10 and W11 into Y RAM (isa.md §8.1)."""
         low, high = (0x1880, 0x1F80) if n in (10, 11) else (0x0900, 0x1780) if n in (8, 9) else (0x0900, 0x1F80)
         if n not in (10, 11) and self.generator.random() < 0.3:
             low, high = 0x2080, 0x2600
@@ -115,7 +115,7 @@ class BodyWriter:
         self.good |= 1 << n
 
     def file(self, scale: int) -> int:
-        """An address for a file operand: mostly RAM, also W registers and anything."""
+        """Return an address for a file operand: mostly RAM, also W registers and random ones."""
         chance = self.generator.random()
         if chance < 0.9 or self.shape.calm:
             return self.generator.randrange(0x800, 0x1F00) & -scale
@@ -124,7 +124,7 @@ class BodyWriter:
         return self.generator.randrange(0x20, 0x800) & -scale
 
     def operands(self, row: Row) -> Operands | None:
-        """Random fields of `row` that suit the present stretch; None if they turn out illegal."""
+        """Return random fields of `row` for the current section, or None if they are illegal."""
         generator = self.generator
         words = [generator.getrandbits(24) for _ in row.pattern.mask]
         x = Operands(**{f.letter: f.get(*words) for f in row.pattern.fields})
@@ -177,7 +177,7 @@ class BodyWriter:
             self.put(literal(self.generator.randrange(0, 64, 2), self.index))
 
     def one(self, rows: list[Row], after: tuple[str, ...] = ()) -> None:
-        """One instruction of one of `rows`."""
+        """Emit one instruction of one of `rows`."""
         while True:
             row = self.generator.choice(rows)
             if row.mnemonic in after:
@@ -194,7 +194,7 @@ class BodyWriter:
         self.note(row, x, words)
 
     def _needed(self, row: Row, x: Operands) -> list[int]:
-        """Pointers that should be good for it."""
+        """Return the registers that must hold valid pointers for the instruction."""
         found = []
         for mode, register in (("p", "s"), ("g", "s"), ("q", "d"), ("h", "d")):
             if mode in row.fields and getattr(x, mode) and getattr(x, register) != self.window:
@@ -212,14 +212,14 @@ class BodyWriter:
             self.one(PLAIN)
 
     def gone_round(self, count: int) -> None:
-        """What a branch or skip goes round: often registers alone, which native code keeps in one block."""
+        """Emit the instructions that a branch or skip skips: often on registers only, which stay in one block."""
         rows = COMPUTING if self.generator.random() < 0.5 else PLAIN
         for _ in range(count):
             self.one(rows)
 
     # -- arrangements -----------------------------------------------------------------------------------------------
     def branch(self) -> None:
-        """Forward over some of the instructions that follow."""
+        """Emit a forward branch over some of the following instructions."""
         row = self.generator.choice(BRANCHES)
         start = self.at
         self.put([0])
@@ -236,7 +236,7 @@ class BodyWriter:
         self.good &= good
 
     def call(self, kinds: int = 4) -> None:
-        """CALL, RCALL; by address or, of all 4 kinds, by register."""
+        """Emit a call: CALL or RCALL, by address or by register."""
         leaf = LEAVES + 2 * LEAF_WORDS * self.generator.randrange(LEAF_COUNT)
         n = self.generator.choice(self.data)
         kind = self.generator.randrange(kinds)
@@ -251,7 +251,7 @@ class BodyWriter:
         self.good &= ~0xFF  # RETLW writes one of W0..W7
 
     def jump(self) -> None:
-        """GOTO, BRA Wn or GOTO Wn to a little further on."""
+        """Emit GOTO, BRA Wn or GOTO Wn to an address nearby."""
         n, gap = self.generator.choice(self.data), self.generator.randrange(3)
         kind = self.generator.randrange(3)
         if kind == 0:
@@ -302,7 +302,7 @@ class BodyWriter:
         self.put(words_of("ULNK"))
 
     def loop(self, depth: int = 0) -> None:
-        """DO with a body without ways out; its last instruction is an ordinary one."""
+        """Emit DO with a body without exits; its last instruction has no flow."""
         fewest, most = self.shape.loops
         count = self.generator.randrange(fewest, most + 1)
         start, by_register = self.at, self.generator.random() < 0.5
@@ -329,7 +329,7 @@ class BodyWriter:
         self.leap()
 
     def end_early(self) -> None:
-        """Have the loop end by EDT, or another number of times."""
+        """Emit a change of EDT or of the count of the loop."""
         corcon = DSPIC30F6014A.sfrs["CORCON"]
         edt = words_of("BSET{.B} f, #bit4", f=corcon.address + 1, b=corcon.fields["EDT"][0] - 8)
         other = to_sfr("DCOUNT", self.generator.randrange(3)) if self.generator.random() < 0.2 else edt
@@ -339,12 +339,12 @@ class BodyWriter:
             self.good &= ~1
 
     def leap(self) -> None:
-        """A computed jump to the next instruction: what is translated together in other modes ends here."""
+        """Emit a computed jump to the next instruction, which ends the region."""
         n = self.generator.choice(self.data)
         self.put(literal(self.at + 4, n) + words_of("GOTO Wn", s=n))
 
     def modes(self) -> None:
-        """Other processor modes from here on."""
+        """Emit a change of processor modes."""
         generator = self.generator
         name = generator.choice(("CORCON", "CORCON", "MODCON", "XBREV", "INTCON1", "PSVPAG"))
         value = generator.getrandbits(16)
@@ -360,7 +360,7 @@ class BodyWriter:
         self.leap()
 
     def extra(self) -> None:
-        """What Python does by design, and what changes interrupts."""
+        """Emit an instruction that Python runs, or that changes interrupts."""
         kind = self.generator.randrange(4)
         if kind == 0:
             self.put(words_of("DISI #lit14", k=self.generator.randrange(12)))
@@ -374,7 +374,7 @@ class BodyWriter:
         self.good &= ~0x81
 
     def clock(self) -> None:
-        """Another period of a timer, and interrupts as they should be."""
+        """Emit a new period of a timer, and restore the interrupt registers."""
         timer = self.generator.choice("123")
         self.put(to_sfr(f"PR{timer}", self.generator.randrange(*self.shape.periods)) + to_sfr(f"T{timer}CON", 0x8000))
         self.put(to_sfr("IEC0", 0x00C8) + to_sfr("SR", 0))

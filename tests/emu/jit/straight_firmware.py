@@ -29,7 +29,7 @@ TRAP_HANDLERS = {"StackError": STACK_TRAP, "MathError": MATH_TRAP}
 
 
 def straight_firmware(seed: int, shape: Shape | None = None) -> Firmware:
-    """A program that passes through its body for ever. The last GOTO or RESET of a pass stands at `Firmware.end`."""
+    """Return a program that repeats its body for ever. The last GOTO or RESET of a pass is at `Firmware.end`."""
     shape = shape or Shape()
     generator = random.Random(seed)
     firmware = Firmware(seed)
@@ -51,7 +51,7 @@ def straight_firmware(seed: int, shape: Shape | None = None) -> Firmware:
 
 
 def _start(firmware: Firmware, generator: random.Random, shape: Shape, corcon: int) -> None:
-    """From reset to the body: timers at 0x100, everything that passes spoil at CODE."""
+    """Emit the start-up code: timers at 0x100, and at CODE the state that each pass destroys."""
     low, high = shape.periods
     at = 0x100
     for n in range(15):

@@ -1,4 +1,4 @@
-"""A sample of tests/fuzz/emulator/fuzz_jit.py: straight, wild and long programs; its counts and comparisons are true."""
+"""A sample of tests/fuzz/emulator/fuzz_jit.py: straight, wild and long programs, and their counts."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
 
+from engine_pair import Difference, InstructionObserver, Tally, advance, check_straight, check_wild, engine_pair
 from long_runs import check_long
 from straight_body import Shape
 from straight_firmware import straight_firmware
-from twins import Difference, RobotObserver, Tally, advance, check_straight, check_wild, twins
 
 SHORT = Shape(instructions=250)
 
@@ -28,7 +28,7 @@ def test_straight_programs_run_equally_in_blocks_and_in_exact_code(seed: int) ->
 
 @pytest.mark.parametrize("seed", range(4))
 def test_wild_programs_run_equally(seed: int) -> None:
-    """engines.md §4.3, with jumps, traps and mode changes at odd places."""
+    """engines.md §4.3, with jumps, traps and mode changes at random places."""
     assert check_wild(seed, stops=8).stops == 8
 
 
@@ -41,7 +41,7 @@ def test_long_runs_end_equally_and_with_equal_counts_of_instructions(seed: int) 
 
 
 def test_interrupts_hit_repeats_loops_and_stalls() -> None:
-    """Exceptions are counted by the kind of place they hit."""
+    """The tally counts exceptions by the kind of place that they interrupt."""
     tally = Tally()
     for seed in (37, 39):
         tally.add(check_straight(seed, SHORT))
@@ -50,9 +50,9 @@ def test_interrupts_hit_repeats_loops_and_stalls() -> None:
 
 
 def test_a_difference_is_found_and_what_python_ran_does_not_count_as_native() -> None:
-    """The checks can fail."""
-    plain, native = twins(straight_firmware(1, SHORT), 0, 0)
-    watch = RobotObserver(plain, native)
+    """The comparison finds a wrong bit."""
+    plain, native = engine_pair(straight_firmware(1, SHORT), 0, 0)
+    watch = InstructionObserver(plain, native)
     advance(plain, native, 500, Tally())
     assert watch.native_now() < set(watch.ran)
     assert all(watch.python[key] <= watch.ran[key] for key in watch.ran)
@@ -62,7 +62,7 @@ def test_a_difference_is_found_and_what_python_ran_does_not_count_as_native() ->
 
 
 def test_tallies_survive_being_packed() -> None:
-    """What is kept between two runs of the campaign is all of it."""
+    """A packed tally restores all counts."""
     tally, other = check_wild(1, stops=3), Tally()
     other.unpack(tally.as_json(), tally.packed())
     assert other == tally

@@ -1,4 +1,4 @@
-"""A compile process that dies costs speed and nothing else; objects on disk and in memory stay within their bounds."""
+"""Deaths of the compile process, and bounds of the objects on disk and in memory."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ import time
 from pathlib import Path
 
 import pytest
+from engine_pair import load
 from random_firmware import difference
 from straight_body import Shape
 from straight_firmware import straight_firmware
-from twins import load
 
 from emu.dspic30f.jit import compiler as compiler_module
 from emu.dspic30f.jit.cache import SHELVES, ObjectCache
@@ -28,12 +28,12 @@ IR = "define i64 @entry(ptr %rec, ptr %env) {{\n  ret i64 {}\n}}\n"
 
 @pytest.fixture
 def compiler(tmp_path: Path) -> Compiler:
-    """One with a cache of its own."""
+    """Return a compiler with a cache of its own."""
     return Compiler(ObjectCache(tmp_path))
 
 
 def collect(compiler: Compiler, count: int) -> dict[object, LoadedCode]:
-    """What arrives within ten seconds, until there are `count`."""
+    """Collect objects until there are `count`, for at most ten seconds."""
     found: dict[object, LoadedCode] = {}
     end = time.monotonic() + 30
     while len(found) < count and time.monotonic() < end:
@@ -43,13 +43,13 @@ def collect(compiler: Compiler, count: int) -> dict[object, LoadedCode]:
 
 
 def ask(compiler: Compiler, count: int) -> None:
-    """Request pieces named 0 .. count - 1."""
+    """Request objects named 0 .. count - 1."""
     for number in range(count):
         compiler.request(IR.format(number), 0, compiler.key(0, b"%d" % number), (number,), number)
 
 
 def test_a_process_that_is_killed_is_replaced(compiler: Compiler, capfd: pytest.CaptureFixture[str]) -> None:
-    """With a piece in it, and idle; every piece arrives."""
+    """The process dies while it compiles and while it is idle; all objects arrive."""
     ask(compiler, 6)
     assert compiler._process is not None
     os.kill(compiler._process.pid, signal.SIGKILL)
@@ -89,7 +89,7 @@ assert os.waitpid(child, 0)[1] == 0
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="this system copies no processes")
 def test_a_copy_of_the_process_has_a_compile_process_of_its_own(tmp_path: Path) -> None:
-    """Forked with pieces under way, both get all of them, each from its own."""
+    """After a fork with requests in flight, both processes get all objects, each from its own compile process."""
     words = [sys.executable, "-c", COPIED, str(tmp_path)]
     done = subprocess.run(words, capture_output=True, text=True, timeout=120, check=False)
     assert (done.returncode, done.stderr) == (0, "")
@@ -124,7 +124,7 @@ def test_without_any_process_the_run_goes_on_interpreted_with_one_warning(
 
 
 def test_a_piece_wanted_by_many_is_compiled_once_and_is_in_memory_as_long_as_one_holds_it(compiler: Compiler) -> None:
-    """Robots of a swarm run the same image; a process that loads images for ever does not run out of mappings."""
+    """Machines share loaded objects, and objects that no machine uses are unloaded."""
     for tag in ("first", "second"):
         compiler.request(IR.format(1), 0, compiler.key(0, b"piece"), (4,), tag)
     found = collect(compiler, 2)
@@ -145,7 +145,7 @@ def test_a_piece_wanted_by_many_is_compiled_once_and_is_in_memory_as_long_as_one
 
 
 def test_the_code_of_a_machine_goes_with_it(compiler: Compiler) -> None:
-    """Two machines share it; hooks make all of it anew."""
+    """Two machines share code; a change of hooks translates it again."""
     machines = []
     for _ in range(2):
         machines.append(Machine(engine="jit"))
@@ -168,7 +168,7 @@ def test_the_code_of_a_machine_goes_with_it(compiler: Compiler) -> None:
 
 
 def test_code_arrives_while_no_address_is_missed(compiler: Compiler) -> None:
-    """Exact code of a loop is there first, and has no gaps: what makes it fast must not wait for one."""
+    """Exact code of a loop arrives before its block code, and covers all of its instructions."""
     machine = Machine(engine="jit")
     runner = machine.runner
     assert isinstance(runner, JitEngine)
@@ -213,7 +213,7 @@ print([scaled(2.0, number) for number in range(4)])
 
 @pytest.mark.skipif(sys.platform != "linux", reason="builds its address space with Linux's mmap")
 def test_a_fragmented_process_can_load_native_code(tmp_path: Path) -> None:
-    """Code and its constants come to lie together."""
+    """The linker places code and its constants together."""
     source = tmp_path / "scaled.c"
     source.write_text("""
 static const double factors[] = {1.5, 2.5, 3.5, 4.5};
@@ -242,7 +242,7 @@ def test_the_folder_keeps_what_was_used_last(tmp_path: Path) -> None:
 
 
 def test_an_object_larger_than_a_shelf_is_kept_alone(tmp_path: Path) -> None:
-    """It was wanted just now."""
+    """An object that was read recently is not evicted."""
     cache = ObjectCache(tmp_path, limit=10)
     for key in ("00a", "00b"):
         cache.put(key, bytes(5_000))

@@ -1,4 +1,4 @@
-"""Flags in native code: a sample of tests/fuzz/emulator/fuzz_flags.py, and writes to SR by instructions that set flags."""
+"""Flags in native code: a sample of tests/fuzz/emulator/fuzz_flags.py, and writes to SR by other instructions."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
 
+from engine_pair import engine_pair
 from flag_drills import FLAGS, Tally, all_pairs, asked, check, kind, pairs_of, rows, written
 from random_firmware import BY_SYNTAX, Firmware, difference, words_of
 from rowmachine import SR
-from twins import twins
 
 from emu.dspic30f.isa import codec
 from emu.dspic30f.isa.fields import Operands
@@ -33,7 +33,7 @@ def test_drills_end_equally_in_every_cycle(seed: int) -> None:
 
 
 def test_readers_and_writers_of_flags_are_told_from_the_table() -> None:
-    """isa.md §5, §6: some that everybody knows."""
+    """isa.md §5, §6: well-known examples."""
     writers, readers, others = ({row.mnemonic for row in some} for some in rows())
     assert {"ADD", "RLC", "CP0", "DAW.B", "FBCL", "DIV.S", "BTST.C", "BTSTS", "POP.S", "ZE"} <= writers
     assert {"ADDC", "SUBBR", "CPB", "RRC", "BSW.Z", "BRA", "DAW.B", "PUSH.S"} <= readers
@@ -41,14 +41,14 @@ def test_readers_and_writers_of_flags_are_told_from_the_table() -> None:
 
 
 def of(syntax: str, **fields: int) -> Insn:
-    """An instruction by the syntax of its row."""
+    """Return an instruction by the syntax of its row."""
     insn = codec.decode(*codec.encode(BY_SYNTAX[syntax], Operands(**fields)))
     assert insn is not None
     return insn
 
 
 def test_a_pair_is_a_flag_that_is_written_and_read_with_no_other_writer_between() -> None:
-    """What the campaign counts."""
+    """The campaign counts pairs of writer and reader."""
     add, shift = of("ADD{.B} #lit10, Wn", B=0, k=1, d=1), of("SL{.B} Ws, Wd", B=1, s=1, p=0, d=1, q=0)
     borrow, status = of("SUBB{.B} #lit10, Wn", B=0, k=1, d=1), of("MOV{.W} f, Wnd", f=SR, d=2)
     assert written(shift) == {"C", "Z", "N"}
@@ -64,13 +64,13 @@ STORING = [row for row in rows()[0] if row.syntax.endswith("{.B} f") and not row
 
 @pytest.mark.parametrize("row", STORING, ids=lambda row: row.mnemonic)
 def test_an_instruction_that_sets_flags_may_write_sr_or_a_byte_of_it(row: object) -> None:
-    """Where the data write does not reach, the flags are the result's: N and Z of COM.B SRH (isa.md §2.3)."""
+    """Flags outside of the data write come from the result: N and Z of COM.B SRH (isa.md §2.3)."""
     for size, address in ((0, SR), (1, SR), (1, SR + 1)):
         firmware = Firmware(2)
         firmware.put(0, words_of("GOTO Expr", n=0x100))
         at = firmware.put(0x100, list(codec.encode(row, Operands(B=size, f=address))[:1]))  # type: ignore[arg-type]
         firmware.put(at, words_of("BRA Expr", n=-1))
-        plain, native = twins(firmware, 0, 0)
+        plain, native = engine_pair(firmware, 0, 0)
         for value, status in itertools.product((0, 0x7F, 0x80, 0xFFFF), (0, 0x10F, 0x00A, 0x105)):
             for machine in (plain, native):
                 machine.w[0] = value

@@ -7,8 +7,8 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
 
+from engine_pair import engine_pair
 from random_firmware import Firmware, difference, literal, load, to_sfr, words_of
-from twins import twins
 
 
 def test_a_hooked_repeat_that_never_fits_before_the_next_event_goes_on() -> None:
@@ -25,7 +25,7 @@ def test_a_hooked_repeat_that_never_fits_before_the_next_event_goes_on() -> None
     repeat = at
     at = firmware.put(at, words_of("REPEAT Wn", s=1) + words_of("INC{.B} Ws, Wd", B=0, s=2, p=0, d=2, q=0))
     firmware.put(at, words_of("BRA Expr", n=-3))
-    plain, native = twins(firmware, 0, 2)
+    plain, native = engine_pair(firmware, 0, 2)
     arrivals: list[list[int]] = []
     for machine in (plain, native):
         seen: list[int] = []
@@ -39,13 +39,13 @@ def test_a_hooked_repeat_that_never_fits_before_the_next_event_goes_on() -> None
 
 
 def test_each_iteration_of_a_hooked_target_is_an_arrival() -> None:
-    """As a boundary is (isa.md §7.5), in every engine."""
+    """Every iteration is a boundary (isa.md §7.5), so the hook is called in each."""
     firmware = Firmware(0)
     firmware.put(0, words_of("GOTO Expr", n=0x100))
     at = firmware.put(0x100, literal(0, 2) + words_of("REPEAT #lit14", k=5))
     firmware.put(at, words_of("INC{.B} Ws, Wd", B=0, s=2, p=0, d=2, q=0) + words_of("BRA Expr", n=-1))
     arrivals: list[list[int]] = []
-    for machine in twins(firmware, 0, 2):
+    for machine in engine_pair(firmware, 0, 2):
         seen: list[int] = []
         load(machine, firmware)
         machine.hook_pc(at, lambda m=machine, s=seen: s.append(m.cycle))  # type: ignore[misc]

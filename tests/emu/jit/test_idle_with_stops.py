@@ -1,4 +1,4 @@
-"""Idle under native code while a device stops in it."""
+"""Idle in native code with a device that stops during Idle."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
 
+from engine_pair import engine_pair
 from random_firmware import Firmware, difference, literal, load, to_sfr, words_of
-from twins import twins
 
 
 def test_a_timer_that_stops_in_idle_goes_on_behind_it() -> None:
@@ -24,7 +24,7 @@ def test_a_timer_that_stops_in_idle_goes_on_behind_it() -> None:
         at = firmware.put(at, to_sfr(sfr, value))
     idle = words_of("PWRSAV #lit1", k=1)
     firmware.put(at, words_of("NOP") + idle + words_of("NOP") * 9 + words_of("BRA Expr", n=-12))
-    plain, native = twins(firmware, 0, 2)
+    plain, native = engine_pair(firmware, 0, 2)
     counts = []
     for machine in (plain, native):
         load(machine, firmware)

@@ -1,4 +1,4 @@
-"""Registers that are reached by a pointer: native like direct accesses, and left to Python where those are."""
+"""Indirect SFR access: native where a direct access is, and left to Python elsewhere."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ NATIVE = {
     "enables": ("IEC2", ["mov w1, [w8]", "btg [w8], #5", "mov.b [w8+1], w2"]),
     "results": ("ADCBUF0", ["mov [w8++], w2", "mov [w8++], [w9++]", "mov.b [w8], w3", "mov.d [w8], w4"]),
 }  # fmt: skip
-"""Where W8 points, and what is done there. W9 points to RAM."""
+"""Targets of W8 and the accesses through it. W9 points to RAM."""
 PYTHONS = {
     "the settings of a timer": ("T2CON", "mov w7, [w8]"),
     "a wrong address": ("TMR2", "mov [w8+w3], w2"),
@@ -40,7 +40,8 @@ PYTHONS = {
 
 
 def machines(lines: list[str], corcon: str) -> tuple[Machine, Machine]:
-    """Both engines about to run `lines` in a loop, with a timer that matches every 187 Tcy, and the ADC."""
+    """Return machines with both engines that will run `lines` in a loop, with a timer that matches every 187 Tcy, and
+    the ADC."""
     head = [f"mov #{corcon}, w0", "mov w0, 0x44", "mov #0x900, w15", "mov #0x8001, w7", f"mov w7, {AT['T1CON']}"]
     for name, value in (("PR1", 186), ("PR2", 0xFFFF), ("T2CON", 0x8000), ("ADCSSL", 0x30), ("ADCON2", 0x404),
                         ("ADCON3", 0x1F3F), ("ADCON1", 0x80E4)):  # fmt: skip
@@ -57,7 +58,7 @@ def machines(lines: list[str], corcon: str) -> tuple[Machine, Machine]:
 
 
 def compare(plain: Machine, native: Machine) -> int:
-    """Run both to odd stops; how many instructions were Python's in the end, per thousand Tcy."""
+    """Run both machines to random stops. Return the instructions that Python ran at the end, per thousand Tcy."""
     assert isinstance(native.runner, JitEngine)
     for length in (*range(1, 30), 997):
         assert plain.run(length) == native.run(length)
@@ -94,7 +95,7 @@ def test_what_a_direct_access_leaves_to_python_a_pointer_leaves_too(name: str, a
 
 
 def test_a_loop_that_waits_for_the_time_by_pointer_is_not_skipped() -> None:
-    """Nor is its instruction native: it might be RAM, whose iterations are skipped."""
+    """A loop that polls through a pointer is not empty, since the pointer may lead to an SFR."""
     lines = [f"mov #{AT['TMR2']}, w8", "mov #7, w2", "wait: mov [w8], w3", "cp w3, w2", "bra nz, wait"]
     plain, native = machines(lines, "0x20")
     assert compare(plain, native) > 20

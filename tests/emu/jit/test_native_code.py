@@ -20,12 +20,12 @@ from emu.machine.machine import Machine
 
 @pytest.fixture(autouse=True)
 def own_cache(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Tests neither trust nor fill the user's cache."""
+    """Use an empty cache instead of the user's."""
     monkeypatch.setenv("OPENSWARM_CACHE", str(tmp_path_factory.getbasetemp() / "objects"))
 
 
 def eager(engine: str = "jit", ipl_slip: int = 0) -> Machine:
-    """A machine that compiles every address it reaches before it runs it."""
+    """Return a machine that compiles each address before it runs it."""
     machine = Machine(engine=engine, ipl_slip=ipl_slip)
     if isinstance(machine.runner, JitEngine):
         machine.runner.threshold = 1
@@ -34,7 +34,7 @@ def eager(engine: str = "jit", ipl_slip: int = 0) -> Machine:
 
 
 def pair(firmware: Firmware, ipl_slip: int = 0) -> Iterator[Machine]:
-    """The same firmware under both engines."""
+    """Return two machines with the same firmware, one per engine."""
     for engine in ("plain", "jit"):
         machine = eager(engine, ipl_slip)
         load(machine, firmware)
@@ -56,7 +56,7 @@ def test_random_firmware_gives_equal_records_at_random_stops(seed: int) -> None:
 
 
 def test_a_snapshot_of_one_engine_goes_on_in_the_other() -> None:
-    """Engines share the record; nothing of it is private to one."""
+    """A snapshot of one engine continues in the other: all state is in the record."""
     plain, native = pair(random_firmware(3))
     native.run(700)
     plain.restore(native.snapshot())
@@ -134,7 +134,7 @@ def test_flags_that_software_sets_are_native(bit: int) -> None:
 
 @pytest.mark.parametrize("watchdog", [False, True])
 def test_clearing_the_watchdog_blocking_and_table_writes_are_native(watchdog: bool) -> None:
-    """A boot loader's loop stays in native code while the watchdog is off; latches and NVMADR come out right."""
+    """A boot loader's loop stays in native code while the watchdog is off; latches and NVMADR have the right values."""
     firmware = counting_firmware()
     at = next(a for a in range(0x100, 0x400, 2) if firmware.flash.get(a) == words_of("BRA Expr", n=-2)[0])
     loop = [*words_of("CLRWDT"), *words_of("DISI #lit14", k=3), *to_sfr("TBLPAG", 0x7F), *literal(0xF000, 4)]
@@ -156,7 +156,7 @@ def test_clearing_the_watchdog_blocking_and_table_writes_are_native(watchdog: bo
 
 @pytest.mark.parametrize("seed", range(6))
 def test_hooks_are_called_at_each_arrival_and_the_code_around_them_is_native(seed: int) -> None:
-    """Regions are translated with the hooks in them: same calls in the same cycles, same records."""
+    """Translated regions call the same hooks in the same cycles and leave the same records."""
     firmware = random_firmware(seed)
     generator = random.Random(seed)
     hooked = generator.sample(sorted(firmware.flash), 40)
@@ -190,7 +190,7 @@ def test_a_hook_in_a_loop_leaves_its_instruction_native() -> None:
 
 
 def test_reprogrammed_flash_is_translated_anew() -> None:
-    """RTSP invalidates native code."""
+    """Self-programming discards native code."""
     plain, native = pair(counting_firmware())
     for machine in (plain, native):
         machine.run(3_000)
@@ -201,7 +201,7 @@ def test_reprogrammed_flash_is_translated_anew() -> None:
 
 
 def test_a_damaged_object_on_disk_counts_as_absent(tmp_path: Path) -> None:
-    """The checksum guards what is loaded."""
+    """A damaged object fails its checksum and is compiled again."""
     cache = ObjectCache(tmp_path)
     key = cache.key(b"one")
     cache.put(key, b"some code")
@@ -215,7 +215,7 @@ def test_a_damaged_object_on_disk_counts_as_absent(tmp_path: Path) -> None:
 
 
 def test_a_folder_that_cannot_be_written_only_costs_the_cache(tmp_path: Path) -> None:
-    """Nothing fails, nothing is kept."""
+    """A cache that cannot be written stores nothing and raises no error."""
     blocked = tmp_path / "file"
     blocked.write_text("in the way")
     cache = ObjectCache(blocked)
@@ -294,7 +294,7 @@ def test_registers_of_a_module_that_goes_off_and_on_are_its_own_again() -> None:
 
 
 def test_machines_with_one_program_share_what_was_translated() -> None:
-    """What one of a swarm has met costs the others nothing; one that programs itself has code of its own."""
+    """Machines share translations; a machine that programs its flash gets translations of its own."""
     first, second, third = eager(), eager(), eager()
     for machine in (first, second, third):
         load(machine, counting_firmware())

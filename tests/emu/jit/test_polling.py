@@ -1,4 +1,4 @@
-"""Polling loops whose iterations are skipped: found where they are empty, and equal to those that are run."""
+"""Polling loops: only empty loops are skipped, and the state equals that of loops that run."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ START = 0x200
 
 
 def polling_firmware(loop: list[int]) -> Firmware:
-    """T1 matches every 97 Tcy; its handler changes FLAG from 0 to 1 and back. Behind the loop W1 counts."""
+    """T1 matches every 97 Tcy; its handler changes FLAG from 0 to 1 and back. After the loop, W1 counts."""
     firmware = Firmware(0)
     firmware.put(0, words_of("GOTO Expr", n=0x100))
     firmware.put(0x1A, [0x1000])
@@ -66,7 +66,7 @@ def polling_firmware(loop: list[int]) -> Firmware:
 
 
 def loops_of(words: list[int]) -> int:
-    """How many empty loops a program of these words has."""
+    """Return the number of empty loops in a program of these words."""
     machine = Machine(engine="plain")
     load(machine, polling_firmware(words))
 
@@ -87,13 +87,13 @@ def test_a_loop_that_only_waits_is_empty(words: list[int]) -> None:
 
 @pytest.mark.parametrize("words", BUSY.values(), ids=BUSY)
 def test_a_loop_that_does_something_is_not(words: list[int]) -> None:
-    """The same from the other side."""
+    """Loops that break one of the conditions are not empty."""
     assert loops_of(words) == 0
 
 
 @pytest.mark.parametrize("words", (EMPTY | BUSY).values(), ids=EMPTY | BUSY)
 def test_skipped_iterations_leave_what_run_ones_leave(words: list[int]) -> None:
-    """The whole record at stops in every phase of the loop and of the interrupt."""
+    """The whole records are equal at stops in every phase of the loop and of the interrupt."""
     plain, native = pair(polling_firmware(words))
     for length in (*range(1, 120), 997, 5003):
         assert plain.run(length) == native.run(length)
@@ -101,6 +101,6 @@ def test_skipped_iterations_leave_what_run_ones_leave(words: list[int]) -> None:
 
 
 def test_a_loop_that_is_entered_behind_its_head_is_run() -> None:
-    """What stands in registers then is not what an iteration leaves."""
+    """A loop that is entered in the middle runs once before iterations are skipped: its registers may differ."""
     skip_in = words_of("BRA Expr", n=1)  # enters at the comparison
     assert loops_of(skip_in + EMPTY["wait for a variable"]) == 0

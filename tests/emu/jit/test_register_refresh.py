@@ -1,4 +1,4 @@
-"""What native code lets a device bring up to date, and what it must not ask it for."""
+"""Registers that a device refreshes for native code, and accesses that must not refresh them."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ CYCLES = 400_000
 
 
 class Number:
-    """What the assembly parser wants to know of an operand."""
+    """Operand of the assembly parser."""
 
     def __init__(self, text: str) -> None:
         self.value: int | None = int(text, 0)
 
 
 def machine(engine: str, program: str, lines: list[int]) -> Machine:
-    """A robot whose camera notes the rows it renders, about to run `program` for ever."""
+    """Return a robot whose camera records the rows it renders, and which will run `program` for ever."""
 
     def row(y: int, columns: np.ndarray, _cycle: int) -> np.ndarray:
         lines.append(y)

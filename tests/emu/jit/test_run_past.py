@@ -1,4 +1,4 @@
-"""`Machine.run_past`: where runs to each limit would have ended, and the same machine, in every engine."""
+"""`Machine.run_past` gives the stops and the state of runs to each limit, in every engine."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def machine(engine: str, seed: int) -> Machine:
 @pytest.mark.parametrize("engine", ["plain", "jit"])
 @pytest.mark.parametrize("seed", range(3))
 def test_cuts_are_where_runs_would_have_ended(engine: str, seed: int) -> None:
-    """Random firmware with interrupts, sleep and faults: cut by cut, and in one go."""
+    """Random firmware with interrupts, sleep and faults: in many runs, and in one."""
     stepwise, once = machine(engine, seed), machine(engine, seed)
     first, period, last = 700, 311, 9_000
     ended, cuts = [], []
@@ -70,13 +70,13 @@ compare: bclr IFS0, #2
 retfie
 trap: retfie
 """
-"""Python sets the flag of OC1, while timer 1 is native code's: some COMPAREs set it while that is being entered."""
+"""Python sets the flag of OC1; native code handles timer 1. Some values of COMPARE set the flag during its entry."""
 
 
 @pytest.mark.parametrize("engine", ["plain", "jit"])
 @pytest.mark.parametrize("compare", range(30, 38))
 def test_a_limit_among_exceptions_counts_behind_the_last(engine: str, compare: int) -> None:
-    """Entering an exception is itself followed by a boundary: together they are one, wherever the limit falls."""
+    """The entry of an exception is followed by a boundary: both count as one, wherever the limit lies."""
     text = ONE_UPON_ANOTHER.replace("COMPARE", str(compare))
     for name in ("OC1R", "IPC0", "IEC0", "PR1", "OC1CON", "T2CON", "T1CON", "IFS0"):
         text = text.replace(name, f"{DSPIC30F6014A.sfrs[name].address:#x}")

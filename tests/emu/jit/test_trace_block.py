@@ -1,4 +1,4 @@
-"""Blocks that go on past a branch round a few register instructions: which they are, and that nothing else changes."""
+"""Trace blocks: which branches stay within a block, and that states and cycles do not change."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ BODIES = {
 
 
 def firmware_of(body: list[int], corcon: int = 0) -> Firmware:
-    """`body` for ever; T1 matches every 97 Tcy, its handler changes what the body computes with."""
+    """Return a program that repeats `body`. T1 matches every 97 Tcy; its handler changes the operands of the body."""
     firmware = Firmware(0)
     firmware.put(0, words_of("GOTO Expr", n=0x100))
     firmware.put(0x1A, [0x1000])
@@ -82,28 +82,30 @@ def firmware_of(body: list[int], corcon: int = 0) -> Firmware:
 
 
 def region_of(body: list[int]) -> Region:
-    """What is translated from the body's start."""
+    """Return the region that begins at the body."""
     flash = firmware_of(body).flash
     return discover(START, lambda pc: decode_for_execution(flash.get(pc, 0), flash.get(pc + 2, 0)))
 
 
 def arms(body: list[int], barriers: set[int] | None = None, last: int = -1) -> list[int]:
-    """Lengths of what branches go round in the first block."""
+    """Return the number of instructions that each branch of the first block skips."""
     region = region_of(body)
-    return [len(part.skipped) for part in trace_block(region, START, region.leaders, barriers or set(), last) if part.skipped]
+    items = trace_block(region, START, region.leaders, barriers or set(), last)
+    return [len(item.skipped) for item in items if item.skipped]
 
 
 @pytest.mark.parametrize(("name", "lengths"), [
-    ("a branch round one", [1]), ("round two", [2]), ("as many as may be", [MAX_SKIPPED]), ("one more", []), ("a skip", [1]),
+    ("a branch round one", [1]), ("round two", [2]), ("as many as may be", [MAX_SKIPPED]), ("one more", []),
+    ("a skip", [1]),
     ("round a load", []), ("round a store", []), ("one behind the other", [1] * MAX_BRANCHES), ("before a call", [1]),
 ])  # fmt: skip
 def test_a_block_goes_past_what_only_computes(name: str, lengths: list[int]) -> None:
-    """Up to so many instructions, so many times."""
+    """A block has at most MAX_BRANCHES branches over at most MAX_SKIPPED instructions."""
     assert arms(BODIES[name]) == lengths
 
 
 def test_a_block_ends_where_something_is_looked_at() -> None:
-    """A hook among what is gone round, or behind it; the end of a DO loop."""
+    """Hooks within or behind the skipped instructions, and the end of a DO loop, end a block."""
     skipped, behind = START + 4, START + 6
     body = BODIES["a branch round one"]
     assert arms(body) == [1]
@@ -112,7 +114,7 @@ def test_a_block_ends_where_something_is_looked_at() -> None:
 
 @pytest.mark.parametrize("body", BODIES.values(), ids=BODIES)
 def test_whole_records_are_equal_wherever_a_run_stops(body: list[int]) -> None:
-    """Stops in every phase of the loop and of the interrupt."""
+    """States are equal at stops in every phase of the loop and of the interrupt."""
     plain, native = pair(firmware_of(body))
     for length in (*range(1, 130), 997, 5003):
         assert plain.run(length) == native.run(length)
@@ -121,7 +123,7 @@ def test_whole_records_are_equal_wherever_a_run_stops(body: list[int]) -> None:
 
 @pytest.mark.parametrize("at", range(START, START + 2 * len(BODIES["one behind the other"]), 2))
 def test_hooks_are_met_as_often(at: int) -> None:
-    """On a branch, on what it goes round, and behind."""
+    """Hooks on a branch, on the skipped instructions and behind them are called."""
     arrivals: list[list[int]] = []
     machines = list(pair(firmware_of(BODIES["one behind the other"])))
     for machine in machines:
@@ -136,7 +138,7 @@ def test_hooks_are_met_as_often(at: int) -> None:
 
 @pytest.mark.parametrize("name", ["one behind the other", "round what changes SR"])
 def test_cycles_are_counted_on_both_ways(name: str) -> None:
-    """`emu profile`: the same by address, native and interpreted."""
+    """Cycle accounting gives equal cycles by address in both engines."""
     counted = []
     for machine in pair(firmware_of(BODIES[name])):
         accounting = CycleAccounting(machine.core, lambda _at, _count: None)

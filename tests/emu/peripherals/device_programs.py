@@ -23,8 +23,8 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "chips"))
 
 import numpy as np
 from cpu_rig import START, assemble
+from engine_pair import QuickCompiler
 from made_up import CHIPS
-from twins import QuickCompiler
 
 from emu.boards.epuck.board import Epuck
 from emu.chips.chip import Chip

@@ -18,8 +18,8 @@ from typing import Final
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "jit"))
 
+from engine_pair import QuickCompiler
 from random_firmware import words_of
-from twins import QuickCompiler
 
 from emu.boards.epuck.board import Epuck
 from emu.chips.chip import Chip

@@ -1,4 +1,4 @@
-"""Two machines with different engines in step: native code against an interpreter, and what that has covered.
+"""Two machines with different engines in lockstep: native code against the plain interpreter, with coverage counts.
 
 `Tally` counts only what was compared afterwards without a difference. Native execution is not assumed: instructions
 that the native machine gave to Python are counted there and subtracted.
@@ -34,9 +34,9 @@ MODE_BITS = 0x10F7
 NO_WATCHDOG = 0x7FFF
 """FWDT with FWDTEN clear (dspic30f6014a.md §17)."""
 LOST = 6000
-"""Tcy without a new address after which a straight program is sent on by a reset pin."""
+"""Cycles without a new address after which a straight program is reset by its pin."""
 FRUITLESS = 30
-"""Resets in a row without a new address after which a pass is given up: its data may lead it round for ever."""
+"""Consecutive resets without a new address after which a pass is abandoned: its data may make it loop for ever."""
 
 
 class Difference(Exception):
@@ -45,34 +45,34 @@ class Difference(Exception):
 
 @dataclass
 class Tally:
-    """What was executed and found equal."""
+    """Counts of what was executed and found equal."""
 
     programs: Counter[str] = field(default_factory=Counter)
     instructions: Counter[str] = field(default_factory=Counter)
-    """By campaign."""
+    """Number of programs by campaign."""
     stops: int = 0
     exchanges: int = 0
-    """Stops at which each machine went on from the other's snapshot."""
+    """Stops at which each machine continued from the snapshot of the other."""
     hooks: int = 0
     """Arrivals at hooked addresses."""
     entries: Counter[str] = field(default_factory=Counter)
     """Exceptions entered, by campaign."""
     places: Counter[str] = field(default_factory=Counter)
-    """Exceptions entered in one step, by the kinds of place they hit; one may hit several."""
+    """Exceptions entered in one step, by the kinds of place that they interrupted; one may count for several kinds."""
     rows: Counter[str] = field(default_factory=Counter)
     native_rows: Counter[str] = field(default_factory=Counter)
     seen: set[int] = field(default_factory=set)
     native: set[int] = field(default_factory=set)
-    """(word, modes) pairs: executed at all, and executed by native code."""
+    """(word, modes) pairs that were executed; `native`: that native code executed."""
     both: set[int] = field(default_factory=set)
     """Pairs executed by block code or exact code, and again by exact code alone."""
 
     def executed(self) -> int:
-        """Instructions of all campaigns."""
+        """Return the number of instructions of all campaigns."""
         return sum(self.instructions[kind] for kind in self.programs)
 
     def as_json(self) -> dict[str, Any]:
-        """Counts by name."""
+        """Return the counts by name."""
         names = ("programs", "instructions", "entries", "places", "rows", "native_rows")
         return {name: dict(getattr(self, name)) for name in names} | {
             "executed": self.executed(),
@@ -85,7 +85,7 @@ class Tally:
         }
 
     def add(self, other: Tally) -> None:
-        """Take over what another tally counted."""
+        """Add the counts of another tally."""
         for name in ("programs", "instructions", "entries", "places", "rows", "native_rows"):
             getattr(self, name).update(getattr(other, name))
         self.stops += other.stops
@@ -95,7 +95,7 @@ class Tally:
             getattr(self, name).update(getattr(other, name))
 
     def packed(self) -> dict[str, bytes]:
-        """The sets as 64-bit words."""
+        """Return the sets as arrays of 64-bit words."""
         return {name: array("Q", getattr(self, name)).tobytes() for name in ("seen", "native", "both")}
 
     def unpack(self, counts: dict[str, Any], sets: dict[str, bytes]) -> None:
@@ -110,7 +110,7 @@ class Tally:
 
 
 class _NoCache:
-    """Objects are kept nowhere: no two programs share code."""
+    """Cache that stores nothing, so that no two programs share code."""
 
     stores = hits = 0
 
@@ -128,7 +128,7 @@ class _NoCache:
 
 
 class QuickCompiler(Compiler):
-    """Compiles in this process, block code with the LLVM effort it is told; forgets its objects with itself."""
+    """Compiler that works in this process and compiles block code at a given LLVM level. It shares no objects."""
 
     backend: ClassVar[Backend] = Backend()
     dispatchers: ClassVar[dict[str, bytes]] = {}
@@ -146,8 +146,8 @@ class QuickCompiler(Compiler):
         return super().compile_now(text, min(level, self._block_level), key, entries)
 
 
-class RobotObserver:
-    """Counts every instruction of a plain machine, and those of its native twin that Python runs."""
+class InstructionObserver:
+    """Counts the instructions of a plain machine, and the instructions of the native machine that Python runs."""
 
     def __init__(self, plain: Machine, native: Machine) -> None:
         self.plain = plain
@@ -227,12 +227,12 @@ class RobotObserver:
             return None
 
     def native_now(self) -> set[int]:
-        """What has run natively at least once so far, as keys of `ran`."""
+        """Return the keys of `ran` that have run natively at least once."""
         python = self.python
         return {key for key, count in self.ran.items() if count > python[key]}
 
     def close(self, campaign: str) -> Tally:
-        """Everything this watch has seen; call it when nothing differed."""
+        """Return all counts of this observer. Call it when no difference was found."""
         tally, steps = self.tally, {}
         tally.programs[campaign] += 1
         tally.instructions[campaign] += self.instructions
@@ -254,12 +254,12 @@ class RobotObserver:
         return tally
 
     def pair(self, key: int) -> int:
-        """(program word, modes) for (PC, modes)."""
+        """Return (program word, modes) for (PC, modes)."""
         return self.plain.program.word(key >> 33) << 33 | key & (1 << 33) - 1
 
 
 class Hooks:
-    """Hooks at some of the addresses in two machines, and the arrivals there."""
+    """Hooks at random addresses in two machines, with their arrivals."""
 
     def __init__(self, machines: tuple[Machine, Machine], addresses: range, generator: random.Random) -> None:
         self._arrivals: tuple[list[Any], list[Any]] = ([], [])
@@ -268,7 +268,7 @@ class Hooks:
                 machine.hook_pc(address, lambda m=machine, s=seen: s.append((m.pc, m.cycle)))  # type: ignore[misc]
 
     def compare(self, tally: Tally) -> None:
-        """Same addresses in the same cycles since the last time? Raises Difference."""
+        """Compare the arrivals since the last call: same addresses in the same cycles. Raises Difference."""
         one, other = self._arrivals
         if one != other:
             raise Difference(f"arrivals at hooks {one[-3:]} {other[-3:]}")
@@ -277,22 +277,24 @@ class Hooks:
         other.clear()
 
 
-def twins(firmware: Firmware, ipl_slip: int, block_level: int, chip: Chip = DSPIC30F6014A) -> tuple[Machine, Machine]:
-    """A plain machine, and a native one that compiles every address before it runs it."""
+def engine_pair(
+    firmware: Firmware, ipl_slip: int, block_level: int, chip: Chip = DSPIC30F6014A
+) -> tuple[Machine, Machine]:
+    """Return a plain machine, and a native one that compiles each address before it runs it."""
     plain, native = (Machine(chip, engine=engine, ipl_slip=ipl_slip) for engine in ("plain", "jit"))
     runner = native.runner
     assert isinstance(runner, JitEngine)
     runner.threshold, runner.wait, runner.compiler = 1, True, QuickCompiler(block_level)
     for machine in (plain, native):
         machine.stop_on_fault = False
-        if firmware.seed & 2:  # otherwise the watchdog runs, and Idle is Python's
+        if firmware.seed & 2:  # otherwise the watchdog runs, and Python handles Idle
             machine.program.put(machine.chip.config["FWDT"].address, NO_WATCHDOG)
         load(machine, firmware)
     return plain, native
 
 
 def advance(one: Machine, other: Machine, cycles: int, tally: Tally, exchange: bool = False) -> None:
-    """Run both and compare everything. Raises Difference."""
+    """Run both machines and compare their whole state. Raises Difference."""
     a, b = one.run(cycles), other.run(cycles)
     found = difference(one, other)
     if a != b or found:
@@ -306,11 +308,11 @@ def advance(one: Machine, other: Machine, cycles: int, tally: Tally, exchange: b
 
 
 def check_straight(seed: int, shape: Shape | None = None) -> Tally:
-    """A long straight program: once as the engine likes it, once in exact code alone, once more in both."""
+    """Check a long straight program in block code and exact code, then in exact code alone."""
     firmware = straight_firmware(seed, shape)
     generator = random.Random(seed)
-    plain, native = twins(firmware, seed & 1, 2 if seed % 32 == 5 else 0)
-    watch, runner = RobotObserver(plain, native), native.runner
+    plain, native = engine_pair(firmware, seed & 1, 2 if seed % 32 == 5 else 0)
+    watch, runner = InstructionObserver(plain, native), native.runner
     assert isinstance(runner, JitEngine)
     hooks = Hooks((plain, native), range(BODY, firmware.end, 2), generator) if seed % 3 == 0 else None
     runner.share_group = object()
@@ -340,10 +342,10 @@ def check_straight(seed: int, shape: Shape | None = None) -> Tally:
 
 
 def check_wild(seed: int, stops: int = 20, chip: Chip = DSPIC30F6014A) -> Tally:
-    """A short wild program with jumps, traps and mode changes at odd places; every third one with hooks."""
+    """Check a short program with jumps, traps and mode changes at random places; every third one has hooks."""
     generator = random.Random(seed)
-    plain, native = twins(random_firmware(seed, chip), seed & 1, 2 if seed % 4 == 1 else 0, chip)
-    watch = RobotObserver(plain, native)
+    plain, native = engine_pair(random_firmware(seed, chip), seed & 1, 2 if seed % 4 == 1 else 0, chip)
+    watch = InstructionObserver(plain, native)
     hooks = Hooks((plain, native), range(CODE, CODE + 2 * BODY_WORDS, 2), generator) if seed % 3 == 0 else None
     for _ in range(stops):
         advance(plain, native, generator.randrange(1, 600), watch.tally, generator.random() < 0.1)
