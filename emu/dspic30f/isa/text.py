@@ -103,8 +103,8 @@ def _reason(error: EncodeError) -> str:
 def format(insn: Insn, pc: int = 0, symbol: SymbolOf | None = None, source: bool = False) -> str:
     """Return the assembly text of an instruction at program address ``pc``, as binutils prints it.
 
-    ``symbol(address, space)`` may name an address, ``space`` being "code" or "data". With ``source`` the text is fit
-    for ``parse``: negative literals and wrapped targets are printed as such, ignored register fields are left out.
+    ``symbol(address, space)`` may name an address, ``space`` being "code" or "data". With ``source`` ``parse``
+    accepts the text: it keeps negative literals and wrapped targets, and omits ignored register fields.
     """
     site = Site(insn.row, pc)
     tokens = [t for kind in kinds_of(insn.row.syntax) for t in kind.write(insn.x, site, symbol, source)]

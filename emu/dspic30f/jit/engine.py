@@ -434,7 +434,7 @@ class JitEngine:
             self._wiring = core.bus.rules[:], wiring_hash(layout)
         identity = translation_hash(key.context, layout, self._wiring[1])
         program = hashlib.sha256(core.program.flash).digest()
-        counted = 0 if self._accounting is None else self._env_address  # code that counts names its own ledger
+        counted = 0 if self._accounting is None else self._env_address  # accounting code depends on its own cells
         switches = core.bus.off, frozenset(core.bus.watched), self.wait, counted, self.share_group
         shared = identity, program, layout.hooks, *switches
         code = _shared.get(shared)

@@ -168,8 +168,8 @@ class Tally:
 
 @cache
 def all_pairs() -> tuple[tuple[Kind, str, Kind], ...]:
-    """Every pair of a row that writes a flag and one that reads it, on words and bytes, SR by its address left out; in
-    an order that mixes them."""
+    """Return every pair of a row that writes a flag and a row that reads it, on words and bytes, in mixed order. Reads
+    of SR by its address are excluded."""
     draw = random.Random(0)
     ends: dict[bool, set[tuple[str, Kind]]] = {True: set(), False: set()}
     for is_writer, among in zip((True, False), rows()[:2], strict=True):

@@ -102,7 +102,7 @@ def test_a_loop_that_waits_for_the_time_by_pointer_is_not_skipped() -> None:
 
 
 def test_the_converter_restarts_and_changes_its_channels_natively() -> None:
-    """A handler that switches it off by a whole word, scans others and goes on, as drivers do."""
+    """Drivers restart the ADC like this: switch it off by a word write, select other channels, switch it on."""
     lines = ["mov #0x00E4, w2", f"mov w2, {AT['ADCON1']}", "and w1, #3, w3", "bset w3, #4",
              f"mov w3, {AT['ADCSSL']}", "mov #0x80E4, w2", f"mov w2, {AT['ADCON1']}", "repeat #400", "nop"]  # fmt: skip
     plain, native = machines(lines, "0x20")

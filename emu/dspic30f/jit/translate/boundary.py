@@ -81,7 +81,7 @@ done:
 stop:
   ret i64 {PYTHON}
 again:
-  %within = phi i1 [ false, %first ], [ false, %jump ], [ false, %asleep ], [ true, %rouse ], [ true, %entered.one ]
+  %within = phi i1 [ false, %first ], [ false, %jump ], [ false, %sleeping ], [ true, %rouse ], [ true, %entered.one ]
   %half = select i1 %within, i64 {UNFINISHED}, i64 {PYTHON}
   store i64 %half, ptr %left
   %cycle = load i64, ptr %p.cycle
@@ -169,8 +169,8 @@ choose:
   %least.all = shufflevector {lanes} %least.0, {lanes} poison, <{LANES} x i32> zeroinitializer
 {newline.join(hits)}
   %hit = call i128 @llvm.cttz.i128(i128 %hits{groups[-1]}, i1 true)
-  %who = trunc i128 %hit to i64
-  switch i64 %who, label %python [ {" ".join(f"i64 {slot}, label %t{slot}" for slot in core.events.rules)} ]"""
+  %slot = trunc i128 %hit to i64
+  switch i64 %slot, label %python [ {" ".join(f"i64 {slot}, label %t{slot}" for slot in core.events.rules)} ]"""
 
 
 def _fire(core: Core, m: BoundaryEmitter) -> None:
@@ -193,12 +193,12 @@ def _accept(core: Core, m: BoundaryEmitter, counter: BoundaryCounter) -> None:
     e.end("br i1 %awake, label %running.on, label %wake")
     e.start("wake")
     bits = exceptions.requested(m, p)
-    e.end(f"br i1 {truth(bits)}, label %seek, label %asleep")
-    e.start("asleep")
+    e.end(f"br i1 {truth(bits)}, label %seek, label %sleeping")
+    e.start("sleeping")
     e.end("br label %again")
     e.start("seek")
     found = exceptions.waking(m, p, bits)
-    e.end(f"br i1 {truth(found == exceptions.NO_REQUEST)}, label %asleep, label %rouse")
+    e.end(f"br i1 {truth(found == exceptions.NO_REQUEST)}, label %sleeping, label %rouse")
     e.start("rouse")
     risen = exceptions.request_cycle(
 m, p, found) + 1
