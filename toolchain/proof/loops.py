@@ -294,10 +294,10 @@ class Induction:
         machine = code.machine
         code.convention.check_loop_head(state)
         values = self._values(code.path.values)
-        claims = [c.holds(_contents(state, c.place), values) for c in head.invariants] + [
+        goals = [c.holds(_contents(state, c.place), values) for c in head.invariants] + [
             o.holds(values) for o in head.orders
         ]
-        true = _implied(machine.conditions, claims)
+        true = _implied(machine.conditions, goals)
         invariants = [c for c, one in zip(head.invariants, true, strict=False) if one]
         ordered = [o for o, one in zip(head.orders, true[len(head.invariants) :], strict=True) if one]
         written = {at for at in state.frame if at < head.top}
@@ -306,9 +306,9 @@ class Induction:
         return True
 
 
-def _implied(given: list[Term], claims: list[Term]) -> list[bool]:
-    """Return which of the claims follow from the conditions `given`."""
-    left = {n: claim for n, claim in enumerate(claims) if not z3.is_true(z3.simplify(claim))}
+def _implied(given: list[Term], goals: list[Term]) -> list[bool]:
+    """Return which of the goals follow from the conditions `given`."""
+    left = {n: goal for n, goal in enumerate(goals) if not z3.is_true(z3.simplify(goal))}
     gone: set[int] = set()
     while left:
         found, solver = check([*given, z3.Not(z3.And(*left.values()))])
@@ -317,11 +317,11 @@ def _implied(given: list[Term], claims: list[Term]) -> list[bool]:
         model = solver.model() if found == z3.sat else None
         wrong = {n for n, c in left.items() if model is not None and z3.is_false(model.eval(c, model_completion=True))}
         if not wrong:
-            gone |= {n for n, claim in left.items() if check([*given, z3.Not(claim)])[0] != z3.unsat}
+            gone |= {n for n, goal in left.items() if check([*given, z3.Not(goal)])[0] != z3.unsat}
             break
         gone |= wrong
-        left = {n: claim for n, claim in left.items() if n not in wrong}
-    return [n not in gone for n in range(len(claims))]
+        left = {n: goal for n, goal in left.items() if n not in wrong}
+    return [n not in gone for n in range(len(goals))]
 
 
 def _contents(state: MachineState, place: int) -> Term:

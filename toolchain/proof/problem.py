@@ -134,9 +134,9 @@ def link_alone(module: Module, made: ObjectFile, frame_offsets: dict[str, dict[s
             for at in range(0, len(section.data) - step + 1, step):
                 word = int.from_bytes(section.data[at : at + step], "little")
                 code[section.address + at // OCTETS_PER_UNIT] = word & 0xFFFFFF
-    notes = annotations_of(module)
-    saving = {name for name, found in notes.items() if preserved(found)}
-    kinds = {name: interrupt_kind(notes.get(name, set()), name) for name in module.functions}
+    annotations = annotations_of(module)
+    saving = {name for name, found in annotations.items() if preserved(found)}
+    kinds = {name: interrupt_kind(annotations.get(name, set()), name) for name in module.functions}
     handlers = {name: kind.partition(",")[0] for name, kind in kinds.items() if kind}
     return CompiledFile(module, symbols, ends, code, frame_offsets, handlers, saving, {}, made, options)
 

@@ -68,11 +68,11 @@ def feasible(conditions: Sequence[Term]) -> bool:
     return bool(check(conditions)[0] != z3.unsat)
 
 
-def require(claim: Term, given: Sequence[Term], what: str) -> None:
-    """Check that `claim` follows from `given`; raises Refuted if it does not, Undecided if the solver gives up."""
-    if z3.is_true(z3.simplify(claim)):
+def require(goal: Term, given: Sequence[Term], what: str) -> None:
+    """Check that `goal` follows from `given`; raises Refuted if it does not, Undecided if the solver gives up."""
+    if z3.is_true(z3.simplify(goal)):
         return
-    conditions = [*given, z3.Not(claim)]
+    conditions = [*given, z3.Not(goal)]
     found, _ = check(conditions)
     if found == z3.sat:
         raise Refuted(what, conditions)

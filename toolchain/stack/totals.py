@@ -65,7 +65,7 @@ def _outside(program: Program, entry: int, members: set[int], done: dict[int, Us
     if bound is not None:
         result.total = bound
         return result
-    result.unknown = [f"{name}: {note}" for note in function.notes]
+    result.unknown = [f"{name}: {reason}" for reason in function.unknown]
     for call in function.calls:
         base = call.depth + (0 if call.tail else CALL_BYTES)
         targets = program.targets(call)
@@ -79,7 +79,7 @@ def _outside(program: Program, entry: int, members: set[int], done: dict[int, Us
                 if target not in program.functions:
                     result.unknown.append(f"{name}: call to {target:#x}, where no code is, at {call.address:#x}")
                 continue
-            result.unknown += [note for note in callee.unknown if note not in result.unknown]
+            result.unknown += [reason for reason in callee.unknown if reason not in result.unknown]
             if base + callee.total > result.total or (base + callee.total == result.total and len(result.path) == 1):
                 result.total, result.path = base + callee.total, [name, *callee.path]
     return result
@@ -88,7 +88,7 @@ def _outside(program: Program, entry: int, members: set[int], done: dict[int, Us
 def _close(program: Program, component: list[int], members: set[int], done: dict[int, Usage]) -> None:
     """Add the stack of the recursion: each activation but the last is at its deepest call within the component."""
     steps: dict[int, int] = {}
-    notes: list[str] = []
+    reasons: list[str] = []
     activations = 0
     for entry in component:
         inner = [c for c in program.functions[entry].calls if not members.isdisjoint(program.targets(c))]
@@ -98,16 +98,16 @@ def _close(program: Program, component: list[int], members: set[int], done: dict
         if count is None:
             for call in inner:
                 circle = ", ".join(program.name(t) for t in program.targets(call) if t in members)
-                notes.append(f"{program.name(entry)}: recursion to {circle} at {call.address:#x}")
+                reasons.append(f"{program.name(entry)}: recursion to {circle} at {call.address:#x}")
     deepest = max((done[entry] for entry in component), key=lambda usage: usage.total)
-    unknown = list(dict.fromkeys(note for entry in component for note in done[entry].unknown))
+    unknown = list(dict.fromkeys(reason for entry in component for reason in done[entry].unknown))
     extra = activations - min(steps.values())
     for entry in component:
         usage = done[entry]
         usage.total = extra + deepest.total
         usage.path = [usage.name] if usage is deepest else [usage.name, "..."]
         usage.path += deepest.path[1:] if usage is deepest else deepest.path
-        usage.unknown = unknown + notes
+        usage.unknown = unknown + reasons
 
 
 def components(graph: dict[int, list[int]]) -> list[list[int]]:

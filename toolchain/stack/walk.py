@@ -38,7 +38,7 @@ class Function:
     frame: int = 0
     switch: int | None = None
     calls: list[Call] = field(default_factory=list)
-    notes: list[str] = field(default_factory=list)
+    unknown: list[str] = field(default_factory=list)
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,12 +80,12 @@ class Walker:
             if deepest >= state.depth:
                 continue
             if visits >= MAX_VISITS:
-                self._note(result, f"stack grows in a loop at {state.pc:#x}")
+                self._record_unknown(result, f"stack grows in a loop at {state.pc:#x}")
                 continue
             seen[key] = (state.depth, visits + 1)
             item = self.code.get(state.pc)
             if item is None:
-                self._note(result, f"continues at {state.pc:#x}, where no code is")
+                self._record_unknown(result, f"continues at {state.pc:#x}, where no code is")
             elif item.insn is not None:
                 work += self._step(result, calls, item, state)
         result.calls = [calls[a] for a in sorted(calls)]
@@ -123,8 +123,8 @@ class Walker:
                 return [replace(after, pc=target) for target in self._table(result, following)]
         if after.depth and not after.lost and item.insn.row.mnemonic != "RESET":
             where = f"returns at {item.address:#x} "
-            if not any(note.startswith(where) for note in result.notes):
-                self._note(result, f"{where}with {after.depth} bytes still on the stack")
+            if not any(reason.startswith(where) for reason in result.unknown):
+                self._record_unknown(result, f"{where}with {after.depth} bytes still on the stack")
         return []
 
     @staticmethod
@@ -160,7 +160,7 @@ class Walker:
                     return replace(state, depth=state.frame - 2, frame=None)
                 return replace(state, depth=state.frame)
             case Pointer.UNLINK | Pointer.FROM_FRAME:
-                self._note(result, f"W15 restored from an unknown W14 at {item.address:#x}")
+                self._record_unknown(result, f"W15 restored from an unknown W14 at {item.address:#x}")
             case Pointer.SAVED:
                 return replace(state, saved=(effect.register, state.depth, state.outer))
             case Pointer.RESTORED if state.saved is not None and state.saved[0] == effect.register:
@@ -170,7 +170,7 @@ class Walker:
                     result.switch = max(result.switch or 0, state.depth)
                 return replace(state, depth=0, outer=state.depth)
             case Pointer.UNKNOWN | Pointer.RESTORED | Pointer.FRESH:
-                self._note(result, f"W{SP} is set to an unknown value at {item.address:#x}")
+                self._record_unknown(result, f"W{SP} is set to an unknown value at {item.address:#x}")
                 return replace(state, lost=True)
             case Pointer.MOVED:
                 return replace(state, depth=state.depth + effect.delta)
@@ -184,7 +184,7 @@ class Walker:
         if not delta:
             return state
         if "k" not in item.insn.row.fields:
-            self._note(result, f"repeated push or pop with an unknown count at {item.address:#x}")
+            self._record_unknown(result, f"repeated push or pop with an unknown count at {item.address:#x}")
             return state
         depth = state.depth + delta * (item.insn.x.k + 1)
         result.frame = max(result.frame, depth)
@@ -200,7 +200,7 @@ class Walker:
             targets.append(address)
             address += 2
         if not targets:
-            self._note(result, f"computed branch without a table at {address - 2:#x}")
+            self._record_unknown(result, f"computed branch without a table at {address - 2:#x}")
         return targets
 
     @staticmethod
@@ -210,6 +210,6 @@ class Walker:
             calls[address] = Call(address, depth, target, tail)
 
     @staticmethod
-    def _note(result: Function, text: str) -> None:
-        if text not in result.notes:
-            result.notes.append(text)
+    def _record_unknown(result: Function, text: str) -> None:
+        if text not in result.unknown:
+            result.unknown.append(text)

@@ -11,7 +11,7 @@ from tests.toolchain.bounds.test_bounds import built, report
 from tests.toolchain.c_programs import build
 from toolchain.cli import main
 
-SLOW = '__attribute__((noinline)) {} void mend(void) {{ __asm__ volatile("repeat #{}\\n nop"); }}\n'
+SLOW = '__attribute__((noinline)) {} void repair(void) {{ __asm__ volatile("repeat #{}\\n nop"); }}\n'
 TWICE = """
 #include <bounds.h>
 volatile int wanted = 2;
@@ -19,9 +19,9 @@ volatile int wanted = 2;
 __attribute__((noinline)) void work(void)
 {{
     for (int i = 0; i < 10; i++) {{
-        if (wanted == i) {{ {annotation} mend();
+        if (wanted == i) {{ {annotation} repair();
         }}
-        mend();
+        repair();
     }}
 }}
 int main(void) {{ work(); return 0; }}
@@ -93,11 +93,11 @@ def cycles(image: Path) -> int:
 
 @pytest.mark.parametrize("level", ["-Os", "-O2"])
 def test_the_annotation_of_a_call_does_not_apply_to_the_next_line(tmp_path: Path, capsys, level: str) -> None:
-    """Both lines call mend(); only the first is limited to one call."""
-    text = TWICE.format(slow=SLOW.format("", 999), annotation="CALL_SHARE(mend, work, 1);")
+    """Both lines call repair(); only the first is limited to one call."""
+    text = TWICE.format(slow=SLOW.format("", 999), annotation="CALL_SHARE(repair, work, 1);")
     image = built(tmp_path, text, level)
     assert cycles(image) <= report(capsys, image)["cycles"] <= 1.1 * cycles(image)
-    image = built(tmp_path, text.replace("CALL_SHARE(mend, work, 1)", "CALL_IF(mend, 0)"), level)
+    image = built(tmp_path, text.replace("CALL_SHARE(repair, work, 1)", "CALL_IF(repair, 0)"), level)
     assert 10_000 < report(capsys, image)["cycles"] < cycles(image)  # ten calls instead of eleven
 
 
@@ -106,7 +106,7 @@ def test_the_annotation_of_a_call_does_not_apply_to_the_next_line(tmp_path: Path
     [
         ("CALL_SHARE(work, work, 1);", "program.c:9: line 9 contains no call of work"),
         ("CALL_IF(other, 0);", "program.c:9: line 9 contains no call of other"),
-        ("CALL_SHARE(mend, work, );", "program.c:9: expected 3 arguments, got 'mend work'"),
+        ("CALL_SHARE(repair, work, );", "program.c:9: expected 3 arguments, got 'repair work'"),
     ],
 )
 def test_an_annotation_without_its_call_is_refused(tmp_path: Path, capsys, annotation: str, message: str) -> None:

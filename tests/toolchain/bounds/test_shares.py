@@ -35,12 +35,12 @@ int main(void)
 RARE = """
 #include <bounds.h>
 volatile int wanted = 2;
-__attribute__((noinline)) void mend(void) { __asm__ volatile("repeat #999\\n nop"); }
+__attribute__((noinline)) void repair(void) { __asm__ volatile("repeat #999\\n nop"); }
 __attribute__((noinline)) void work(void)
 {
     for (int i = 0; i < 10; i++) {
         NOTE
-        if (wanted == i) mend();
+        if (wanted == i) repair();
     }
 }
 int main(void) { work(); return 0; }
@@ -115,9 +115,9 @@ def test_rounds_of_two_calls_are_shared_in_the_function_that_makes_them(tmp_path
 
 def test_a_call_is_made_only_so_often(tmp_path: Path, capsys) -> None:
     """The call is made in one of ten iterations, or never."""
-    image = built(tmp_path, RARE.replace("NOTE", "CALL_SHARE(mend, work, 1);"))
+    image = built(tmp_path, RARE.replace("NOTE", "CALL_SHARE(repair, work, 1);"))
     assert measured(image) <= report(capsys, image)["cycles"] <= 1.1 * measured(image)
-    image = built(tmp_path, RARE.replace("NOTE", "CALL_IF(mend, x);"))
+    image = built(tmp_path, RARE.replace("NOTE", "CALL_IF(repair, x);"))
     assert report(capsys, image, "--let", "x=0")["cycles"] < 1000 < report(capsys, image, "--let", "x=1")["cycles"]
 
 

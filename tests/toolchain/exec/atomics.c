@@ -46,7 +46,7 @@ TEST(fetch_operations, "7.17.7.5")
     CHECK(atomic_fetch_xor(&wide, 0xF000000FUL) == 0xFFUL && atomic_fetch_sub(&wide, 1UL) == 0xF00000F0UL);
     CHECK(wide == 0xF00000EFUL);
 }
-TEST(a_section_of_the_program_is_not_shortened, "isa.md 12: DISI loads DISICNT anew")
+TEST(a_section_of_the_program_is_not_shortened, "isa.md 12: DISI reloads DISICNT")
 {
     __builtin_disi(2000);
     wide += 1;

@@ -99,7 +99,7 @@ def test_psv_symbols_are_worth_their_window_address():
 
 def test_undefined_weak_symbols_are_zero():
     """abi-elf.md §5."""
-    weak = Symbol("nobody", Home.UNDEFINED, bind=Bind.WEAK)
+    weak = Symbol("missing", Home.UNDEFINED, bind=Bind.WEAK)
     assert linked("WORD", 0x2FFFF0, weak)[0] == 0x2FFFF0
     assert linked("WORD_HANDLE", 0x200000, weak)[0] == 0x200000
 

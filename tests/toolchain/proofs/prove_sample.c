@@ -48,9 +48,9 @@ int below(float a, float b) { return a < b; }
 void guarded(void) { words[0] = 1; __asm__ volatile("" ::: "memory"); first_port = 1; words[1] = 2; }
 void barrier(void) { __asm__ volatile("disi #5"); first_port = 1; }
 unsigned long wide(void) { return wide_port; }
-extern int lend(int *);
-int lent(int a) { return lend(&a); }
-int lent_and_read(int a) { int b = a; return lend(&b) + b; }
+extern int use(int *);
+int by_reference(int a) { return use(&a); }
+int by_reference_and_read(int a) { int b = a; return use(&b) + b; }
 extern void *memcpy(void *, const void *, unsigned);
 int filled(char *from, unsigned count)
 {

@@ -20,7 +20,7 @@ from toolchain.proof.terms import BITS, Number, holds, narrow, vector, wide
 MOST_STEPS = 4000
 
 bounds: dict[str, tuple[Any, Any]] | None = None
-"""None: products are computed in bits. Else by their factors: the unknown that stands for one, what is known of it."""
+"""Unknowns that replace products, and their bounds, by factors; None: products are computed in bits."""
 
 
 @contextmanager

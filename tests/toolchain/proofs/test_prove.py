@@ -86,8 +86,9 @@ PLANTED = {
                            "mov.b _first_port+1,WREG\n\tsl w0,#8,w7"
                            "\n\tmov.b _first_port,WREG\n\tze w0,w0\n\tior w0,w7,w0"),
     "restored from above W15": ("kept", "mov [--w15],w8", "sub w15,#2,w15\n\tmov [w15],w8"),
-    "variable above W15 at a call": ("lent", "rcall _lend\n\tsub w15,#2,w15\n\treturn", "sub w15,#2,w15\n\tbra _lend"),
-    "variable read above W15": ("lent_and_read", "mov [w15-2],w7\n\tadd w0,w7,w0\n\tsub w15,#2,w15",
+    "variable above W15 at a call": ("by_reference", "rcall _use\n\tsub w15,#2,w15\n\treturn",
+                                     "sub w15,#2,w15\n\tbra _use"),
+    "variable read above W15": ("by_reference_and_read", "mov [w15-2],w7\n\tadd w0,w7,w0\n\tsub w15,#2,w15",
                                 "sub w15,#2,w15\n\tmov [w15],w7\n\tadd w0,w7,w0"),
     "copy of the library forgotten": ("filled", "mov.b [w15-3],w7", "mov #7,w7"),
     "not set before the library copies": ("filled", "mov w7,[w15-4]", "nop"),

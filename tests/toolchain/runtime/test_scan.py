@@ -45,7 +45,7 @@ NUMBERS = [
     "nan",
 ]
 SETS = ["[a-z]", "[^a-z]", "[]x]", "[^]x]", "[abc-]", "[0-9a]", "[%-]", "[^ ]", "[-a]", "[^^]", "[x^]"]
-INCOMPLETE = {  # (format, input): what C11 7.21.6.2p10 makes of it
+INCOMPLETE = {  # (format, input): the result by C11 7.21.6.2p10
     ("%f", "100ergs"): 0, ("%f", "1e+"): 0, ("%f", "0x1.8p "): 0, ("%f", "infi"): 0, ("%f", "nan(1"): 0,
     ("%f", "nan(12)"): 1,
     ("%f", "0x"): 0,

@@ -89,7 +89,7 @@ def test_interrupts_threads_and_pointer_only_functions_are_entries(image, tmp_pa
     assert entries[("pointer", "_callback")] == 2
     assert main(["stack", "x.elf", "--limit", "blinker=32"]) == 0
     assert main(["stack", "x.elf", "--limit", "blinker=31"]) == 1
-    assert main(["stack", "x.elf", "--limit", "nobody=3"]) == 2
+    assert main(["stack", "x.elf", "--limit", "missing=3"]) == 2
     assert main(["stack", "x.elf", "--functions"]) == 0
     assert "_blinker" in capsys.readouterr().out
 
@@ -133,8 +133,8 @@ def test_pointer_calls_are_reported_and_can_be_annotated(image):
     """`calls` in the annotation file lists their targets; `depth` replaces the analysis of a function."""
     free = analyse(image, POINTER)
     assert any("call through a pointer" in note for note in free["_main"].unknown)
-    told = analyse(image, POINTER, "# comment\ncalls main: big, _small\n")
-    assert (told["_main"].total, told["_main"].unknown) == (4 + 42, [])
+    usage = analyse(image, POINTER, "# comment\ncalls main: big, _small\n")
+    assert (usage["_main"].total, usage["_main"].unknown) == (4 + 42, [])
     assert analyse(image, POINTER, "depth main 100")["_main"].total == 100
     anything = analyse(image, POINTER, "calls main: *\n")
     assert (anything["_main"].total, anything["_main"].unknown) == (4 + 42, [])
@@ -203,7 +203,7 @@ def test_annotation_mistakes_name_file_and_line(text, message):
 
 def test_annotations_for_unknown_functions_are_refused(image):
     """A misspelt name is an error."""
-    with pytest.raises(ToolError, match="no function is called nobody"):
+    with pytest.raises(ToolError, match="no function is called missing"):
         Analysis(
-            image(".global __reset\n__reset: call w0\n return\n").linked.image, Annotations(threads=["nobody"])
+            image(".global __reset\n__reset: call w0\n return\n").linked.image, Annotations(threads=["missing"])
         ).report()

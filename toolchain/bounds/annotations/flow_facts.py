@@ -18,9 +18,7 @@ BUDGET_EXCEEDED: Final = "too many paths: the analysis stopped; bound its loops"
 CALLS_TOO_DEEP: Final = "calls are nested more than 480 deep"
 DO_LOOP_CUT_SHORT: Final = "ends a DO loop early (CORCON.EDT) that begins elsewhere"
 DO_REGISTER_WRITTEN: Final = "writes a register of the DO loop it is in (DCOUNT, DOSTART, DOEND)"
-STACK_POINTER_OVERWRITTEN: Final = (
-    "may store to W15, by an address that is not known: where the stack goes on is not followed"
-)
+STACK_POINTER_OVERWRITTEN: Final = "may store to W15 through an unknown address, after which the stack is unknown"
 JUMP_PAST_TABLE: Final = "this jump may lead past the end of its table of BRA or RETLW"
 WAITS_FOR_INTERRUPT: Final = "waits for an interrupt (PWRSAV) for an unknown time"
 CLOCK_STOPPED: Final = "stops the clock (PWRSAV #0): the waiting time and the oscillator start-up time are unknown"

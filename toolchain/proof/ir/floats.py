@@ -42,9 +42,9 @@ def compared(pred: str, a: Term, b: Term) -> Term:
         raise Undecided(f"the comparison {pred}")
     name = ORDERED[pred]
     result, zero = opaque(f"__{name}{mode}2", 16)(a, b), vector(0, 16)
-    invariants = {"eq": result == zero, "ne": result != zero, "lt": result < zero, "le": result <= zero,
+    relations = {"eq": result == zero, "ne": result != zero, "lt": result < zero, "le": result <= zero,
               "gt": result > zero, "ge": result >= zero}  # fmt: skip
-    return one_bit(invariants[name])
+    return one_bit(relations[name])
 
 
 def converted(op: str, a: Term, bits: int) -> Term:
