@@ -1,6 +1,6 @@
 """Measure compile time: 3,000 lines of C to ELF, again after a change of one file, and the driver's start.
 
-`python -m bench.compile_time [--lines N] [--json]`. Host seconds; goals (issue B): 15 s, 5 s, 1 s on 2 cores.
+`python -m bench.compile_time [--lines N] [--json]`. Host seconds; goals: 15 s, 5 s, 1 s on 2 cores.
 """
 
 from __future__ import annotations

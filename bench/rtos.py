@@ -66,12 +66,12 @@ python bench/rtos.py --freertos DIR --page docs/table2.md
 
 ## Measured
 
-Bytes and CPU cycles; for the Cortex-M4 *instructions*, because QEMU counts no cycles. An exception costs the chip 12 more
-cycles each way.
+Bytes and CPU cycles; for the Cortex-M4 *instructions*, because QEMU counts no cycles. An exception costs the chip 12
+more cycles each way.
 """
 NOTES = """
-- dsPIC30F6014A: the same emulator and the same compiler at -Os for both kernels. ATmega328P: simavr, with the 4 cycles of
-  interrupt response added that it omits. Cortex-M4: QEMU's netduinoplus2.
+- dsPIC30F6014A: the same emulator and the same compiler at -Os for both kernels. ATmega328P: simavr, with the 4 cycles
+  of interrupt response added that it omits. Cortex-M4: QEMU's netduinoplus2.
 - Switch at the end of a slice: from the timer's request (Cortex-M4: from PendSV's first instruction) to the first
   instruction of the next thread. OpenSwarm has a slice of 10 ms and a separate clock interrupt; FreeRTOS's tick of 1 ms
   counts time and switches.

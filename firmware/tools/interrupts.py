@@ -2,7 +2,7 @@
 
 In: a linked image. Out: nothing, or a line for each call that a level above 4 may not make, with the way to it, and
 exit status 1. Level 4 may call the kernel; 5 and 6 interrupt it half-way, so they may call neither the kernel nor a
-device, nor anything through a pointer, because nobody knows where that leads. Level 6 belongs to the camera's capture
+device, nor anything through a pointer, because its target is unknown. Level 6 belongs to the camera's capture
 where that is linked.
 """
 

@@ -1,8 +1,8 @@
 """Interrupts at every instruction of every kernel call, and every allocation failing, on the emulated robot.
 
 What enters: the firmware of target/calls, whose scenes leave everything as they found it. What leaves: nothing, or an
-AssertionError with scene, boundary and way of injection, which reproduce it. tests/firmware/kernel/test_every_instruction.py
-takes a sample, tests/fuzz/kernel/fuzz_kernel.py all.
+AssertionError with scene, boundary and way of injection, which reproduce it.
+tests/firmware/kernel/test_every_instruction.py takes a sample, tests/fuzz/kernel/fuzz_kernel.py all.
 """
 
 from __future__ import annotations
@@ -84,7 +84,7 @@ class Base:
 
 
 class Stage:
-    """A machine that stands at the begin of a scene, as often as wanted."""
+    """A machine that can be restored to the start of a scene any number of times."""
 
     def __init__(self, path: Path, ipl_slip: int = 0, patch: dict[int, int] | None = None) -> None:
         self.machine = load(path, ipl_slip)
@@ -305,7 +305,7 @@ def _inject(stage: Stage, base: Base, later: int, calls: int) -> None:
             assert now == saved, f"registers {saved} became {now}"
             seen.compared += 1
             machine.service_boundary(NEVER)
-            is_first = machine.pc != saved[0]  # another interrupt is next; otherwise the code goes on
+            is_first = machine.pc != saved[0]  # another interrupt is next; otherwise the code continues
     assert machine.peek("leaf") == leaf + 1
     if step:
         late, dsp = stage.stepper_at - at, stage.switches_dsp
@@ -367,7 +367,7 @@ def _subscriptions(machine: Machine) -> Counter[int]:
 
 
 def _unused_stack(machine: Machine) -> int:
-    """Painted bytes of the checker's stack, guard left out."""
+    """Return the painted bytes of the checker's stack without the guard."""
     pid = machine.peek("checker_pid")
     pcb = next(p for p in thread_list(machine) if machine.peek(p + 16) == pid)
     unused = 0

@@ -22,7 +22,7 @@ from tests.firmware.kernel.test_kernel_on_target import place, thread_list
 INT1IF, T2IF = 1 << 0, 1 << 6
 PATIENCE = 3_000_000
 """Cycles in which the keeper has checked everything: transfers time out after 25 ms."""
-SCENES = ("I2C read", "I2C to nobody", "SPI", "UART", "UART in frames", "motors, LEDs", "setters and getters")
+SCENES = ("I2C read", "I2C without slave", "SPI", "UART", "UART in frames", "motors, LEDs", "setters and getters")
 PAUSES = (0, 4)
 """Milliseconds between the kill and the keeper's calls: at once, or when an abandoned transfer has run out."""
 PCB = 18
@@ -51,7 +51,7 @@ class Seen:
 
 
 class Stage:
-    """A machine with the firmware, and what a round of it looks like when nobody is killed."""
+    """A machine with the firmware, and the trace of a round without a kill."""
 
     def __init__(self, path: Path, ipl_slip: int = 0) -> None:
         image = load_image(path)
@@ -72,7 +72,7 @@ class Stage:
         """after_kill(machine, address of the dead thread's memory): for tests that spoil something."""
 
     def run_to(self, name: str) -> str:
-        """On to the place, or to `checked`; the name of where it stands."""
+        """Run to the place, or to `checked`; return the name of the function reached."""
         machine, end = self.machine, self.machine.cycle + PATIENCE
         while True:
             stop = machine.run(cycles=max(end - machine.cycle, 1))

@@ -1,4 +1,4 @@
-"""The camera's HREF on every cycle of a round of kernel calls (issue 6, Must show 1; kernel.md §4).
+"""The camera's HREF on every cycle of a round of kernel calls (kernel.md §4).
 
 A round of tests/firmware/target/sights makes every call of the kernel and its devices while tick, slices, stepper,
 UARTs, converter, I2C and remote control interrupt. `sweep` goes through it instruction by instruction and, from a copy
@@ -20,7 +20,7 @@ from emu.image.loader import load_image
 
 FCY = 14_745_600
 AHEAD = 12
-"""Tcy from the state that is copied to the first edge: the camera is told of edges to come only."""
+"""Tcy from the copied state to the first edge: only future edges can be set in the camera."""
 LINE = 40
 LINE_BYTES = 40
 LINE_TCY = AHEAD + 760

@@ -1,4 +1,4 @@
-"""Steps against speeds (issue 6, Must show 2): v mm/s are v * 1000 / 129 steps/s; beyond +-129 they are clamped."""
+"""Steps against speeds: v mm/s are v * 1000 / 129 steps/s; beyond +-129 they are clamped."""
 
 from __future__ import annotations
 

@@ -38,7 +38,7 @@ def matched(configuration: dict[str, Any]) -> None:
 
 
 def plain(body: Any) -> Any:
-    """A snippet's body as it stands once it is inserted."""
+    """Return a snippet's body as inserted."""
     text = re.sub(r"\$\{\d:([^}]*)\}", r"\1", json.dumps(body))
     return json.loads(re.sub(r'"\^\\"(.*?)\\""', r'"\1"', text).replace("\\\\$", "$"))
 

@@ -1,4 +1,4 @@
-/* Aggregation without computation (README.md): one bit, whether another robot stands ahead, chooses between two pairs
+/* Aggregation without computation (README.md): one bit, whether another robot is ahead, chooses between two pairs
  * of wheel speeds. The remote control's OK starts, STANDBY and SLEEP stop. */
 #include <camera.h>
 #include <openswarm.h>

@@ -1,5 +1,6 @@
-/* The mean of a number that each robot has, by gossip (README.md). A message carries the sender's number and those of two
- * others, with how long ago each of them spoke; each robot keeps a table and takes the mean of those who have of late. */
+/* The mean of a number that each robot has, by gossip (README.md). A message carries the sender's number and those
+ * of two others, with how long ago each of them spoke; each robot keeps a table and takes the mean of those who have
+ * of late. */
 #include "rove.h"
 
 #include <openswarm.h>
@@ -27,9 +28,9 @@ enum { WHO_LOW, WHO_HIGH, AGE, ITEM_BYTES };
 enum { MESSAGE_BYTES = OWN_BYTES + TOLD * ITEM_BYTES };
 
 typedef struct {
-    uint16 number; /* 0: nobody */
+    uint16 number; /* 0: free entry */
     uint8 value;
-    bool counts;  /* among those of whom the mean is */
+    bool counts;  /* included in the mean */
     uint16 alive; /* tick of the last sign of life that is known of */
     uint16 heard; /* tick of its last message that came here */
     bool is_near; /* `heard` is no older than NEAR */
@@ -57,8 +58,8 @@ static entry *place_of(uint16 number)
     return best;
 }
 
-/* A sign of life, so many ticks ago, told by the robot itself or by another: ages only ever grow on their way, so none of a
- * robot that is gone is younger than itself. */
+/* A sign of life, so many ticks ago, told by the robot itself or by another: ages only ever grow on their way, so
+ * none of a robot that is gone is younger than itself. */
 static entry *learn(uint16 number, uint8 value, uint16 age, uint16 now)
 {
     uint16 alive = (uint16)(now - age);

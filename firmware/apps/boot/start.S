@@ -1,4 +1,4 @@
-; Reset leads here. Sets up the stack and goes on in C, which has the address behind these words.
+; Reset entry. Sets up the stack and continues in C code, which is at the address after these words.
 #include "boot.h"
 
     .section .boot, code, address(BOOT_START), keep

@@ -1,5 +1,6 @@
-/* Clocks that agree by gossip (README.md): the swarm's time is that of the robot that has been on for longest. A message
- * carries it as it is when the message leaves, so who hears the end of the message knows it, less what light takes. */
+/* Clocks that agree by gossip (README.md): the swarm's time is that of the robot that has been on for longest. A
+ * message carries it as it is when the message leaves, so who hears the end of the message knows it, less what light
+ * takes. */
 #include "rove.h"
 
 #include <openswarm.h>
@@ -23,7 +24,7 @@ static void tell(uint8 *payload, uint8 size)
     memcpy(payload, &time, size);
 }
 
-/* ISR: a message has just ended. Nobody is told a later time than there is, so the latest is right. */
+/* ISR: a message has just ended. Received times are never ahead of the true time, so the latest is right. */
 static bool hear(sys_neighbour_message *m)
 {
     uint32 time;

@@ -1,4 +1,4 @@
-/* Object clustering without computation (README.md): each colour of the line-of-sight sensor stands for a pair of wheel
+/* Object clustering without computation (README.md): each colour of the line-of-sight sensor selects a pair of wheel
  * speeds. The remote control's OK starts, STANDBY and SLEEP stop. */
 #include <camera.h>
 #include <openswarm.h>

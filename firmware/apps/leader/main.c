@@ -1,5 +1,6 @@
-/* Electing a leader, and another when it dies (README.md): the robot of the highest rank that is heard of. The leader counts;
- * followers pass its counts on, so a new count from anybody is its sign of life, and an old one is none. */
+/* Electing a leader, and another when it dies (README.md): the robot of the highest rank that is heard of. The
+ * leader counts; followers pass its counts on, so a new count from anybody is its sign of life, and an old one is
+ * none. */
 #include "rove.h"
 
 #include <openswarm.h>
@@ -48,7 +49,8 @@ static bool is_newer(uint8 count, uint8 than)
     return (sint8)(count - than) > 0;
 }
 
-/* Who was missed says nothing by what others still pass on. After some time it may have begun anew. */
+/* Whether a value is an old one of a lost leader that others still forward. After PATIENCE_MS that leader may have
+ * restarted. */
 static bool is_stale(const word *w, uint16 now)
 {
     return w->rank == given_up.rank && !is_newer(w->count, given_up.count) && (uint16)(now - given_up_at) < PATIENCE_MS;
@@ -115,7 +117,7 @@ static void say(const char *what, uint16 who)
     Sys_Send_Event(SYS_SEND_UART1, line, (uint16)strlen(line));
 }
 
-/* The robot's number was drawn, or anew, or somebody has turned the selector. */
+/* The robot's number was drawn or drawn again, or a user has turned the selector. */
 static void stand_anew(void)
 {
     mine = rank();

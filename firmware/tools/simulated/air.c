@@ -1,7 +1,7 @@
 /* The infrared between several Kilobots (kilobots.py): what one's emitter does comes to the others' comparators and
  * converters, and all of them run in lock step.
  *
- * Time is counted from when the first was switched on. A robot runs only as far as nobody else can have lit anything
+ * Time is counted from when the first was switched on. A robot runs only as far as no other robot can have sent light
  * before: so a pulse is never late, and every run is the same. Light takes DELAY from pin to comparator; it also keeps
  * a pulse in the future of a receiver that is an instruction ahead.
  *
@@ -165,13 +165,13 @@ air *air_open(uint32_t seed)
     return a;
 }
 
-/* The machines are whoever's opened them. */
+/* The caller that opened the machines owns them. */
 void air_close(air *a)
 {
     free(a);
 }
 
-/* A robot that is switched on at a time; its index, or -1: full. Nobody hears anybody yet. */
+/* Adds a robot with a power-on time; returns its index, or -1: full. It is not in reach of any robot yet. */
 int air_join(air *a, machine *m, uint64_t since)
 {
     if (a->count == ROBOTS) {

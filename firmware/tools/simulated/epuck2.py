@@ -137,7 +137,7 @@ class Epuck2:
         """Write by a store of the CPU, because the stub cannot write to the registers of NVIC and SCB.
 
         The firmware has `inject_store`, whose first instruction stores r1 at r0. It alone is executed, no interrupt
-        is taken and no time passes; then the CPU stands where it stood, inside an IT block, too."""
+        is taken and no time passes; then the CPU is at its previous address, also inside an IT block."""
         before = {number: self._ask(f"p{number:x}") for number in (0, 1, _PC, _XPSR)}
         flags = int.from_bytes(bytes.fromhex(before[_XPSR]), "little") & ~_IT_STATE
         wanted = {0: address, 1: value, _PC: self.symbols["inject_store"], _XPSR: flags}

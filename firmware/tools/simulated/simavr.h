@@ -1,4 +1,4 @@
-/* An ATmega328P that stands still until it is told to run: what simavr.c and air.c share. */
+/* A paused ATmega328P: interface shared by simavr.c and air.c. */
 #ifndef SIMAVR_H
 #define SIMAVR_H
 

@@ -1,5 +1,5 @@
-/* Two robots of apps/average that tell each other of a third, while it lives, when it is gone, and when they meet late. Their
- * messages wait for up to a second, and handlers come late. Any failure ends with status 1. */
+/* Two robots of apps/average that tell each other of a third, while it lives, when it is gone, and when they meet
+ * late. Their messages wait for up to a second, and handlers come late. Any failure ends with status 1. */
 #define main application
 #include "apps/average/main.c"
 #undef main
@@ -122,7 +122,7 @@ int main(void)
         begin(moments[i]);
         hear_third(0);
         pass(6000, false);
-        check(count(0) == 2 && count(1) == 1, "one has met the third, and nobody else");
+        check(count(0) == 2 && count(1) == 1, "one robot has met the third, no other has");
         pass(4000, true);
         check(count(0) == 3 && count(1) == 3, "who meets that one later hears of it");
         uint32 gone = now - 10000u + (FORGET << TICK_SHIFT);
@@ -130,7 +130,7 @@ int main(void)
             pass(STEP, true);
         }
         for (int step = 0; step < 1000; step++) {
-            check(count(0) == 2 && count(1) == 2, "whoever tells of it, one that is gone is forgotten, and does not come back");
+            check(count(0) == 2 && count(1) == 2, "a failed robot expires whichever robot forwards it, and does not return");
             pass(100, true);
         }
         for (int step = 0; step < 30; step++) {

@@ -19,7 +19,7 @@ from tests.firmware.kernel.test_kernel_on_target import FCY, load
 
 
 def test_hello_says_hello_every_second(image: Build) -> None:
-    """firmware/apps/hello/README.md."""
+    """`hello` prints its greeting (firmware/apps/hello/README.md)."""
     machine = load(image("hello"))
     said = bytearray()
     machine.uart[1].on_byte = lambda byte, _: said.append(byte)
@@ -31,13 +31,13 @@ def test_hello_says_hello_every_second(image: Build) -> None:
 
 
 def cobs(message: bytes) -> bytes:
-    """COBS frame of a message and its CRC-16/CCITT-FALSE, end mark included; messages below 253 bytes."""
+    """Return the COBS frame of a message with its CRC-16/CCITT-FALSE and end mark; messages below 253 bytes."""
     body = message + binascii.crc_hqx(message, 0xFFFF).to_bytes(2, "big")
     return b"".join(bytes([len(run) + 1]) + run for run in body.split(b"\0")) + b"\0"
 
 
 def uncobs(frame: bytes) -> bytes:
-    """The message of a frame without end mark; fails on a damaged one."""
+    """Return the message of a frame without end mark; fail on a damaged frame."""
     body = b""
     while frame:
         run, frame = frame[1 : frame[0]], frame[frame[0] :]
@@ -47,7 +47,7 @@ def uncobs(frame: bytes) -> bytes:
 
 
 def test_processors_are_swapped_under_traffic_without_loss(image: Build) -> None:
-    """Issue 4: virtual actuator, safety post-processor, COBS + CRC-16 as Rx/Tx pair; the paper."""
+    """Virtual actuator, safety post-processor, COBS + CRC-16 as Rx/Tx pair; the paper."""
     machine = load(image("processors"))
     said = bytearray()
     machine.uart[1].on_byte = lambda byte, _: said.append(byte)
@@ -77,7 +77,7 @@ def test_processors_are_swapped_under_traffic_without_loss(image: Build) -> None
 
 
 def test_stress_neither_leaks_nor_traps(image: Build) -> None:
-    """Issue 4, Must show 8, for four seconds: every 200 actions the application asserts that the heap is as it was."""
+    """Every 200 actions the application asserts that the heap is as it was."""
     machine = load(image("stress"))
     said = bytearray()
     machine.uart[1].on_byte = lambda byte, _: said.append(byte)
@@ -98,12 +98,12 @@ def test_stress_neither_leaks_nor_traps(image: Build) -> None:
 SETS_UP = re.compile(
     r"^\s*(?:\(void\))?(?:Sys_Subscribe_to_Event|Sys_Start_Process(?:With)?|Sys_Connect_Motors)\(", re.MULTILINE
 )
-"""A statement that drops the result."""
+"""Matches a statement that ignores a result."""
 
 
 @pytest.mark.parametrize("app", ["clustering", "hello", "listing1", "processors", "selftest", "spi"])
 def test_no_application_drops_the_result_of_a_call_that_sets_it_up(app: str) -> None:
-    """A subscription that failed unnoticed left a robot that reacts to nothing."""
+    """Every application checks its subscriptions: an unnoticed failure would leave a robot without reactions."""
     for source in (FIRMWARE / "apps" / app).glob("*.c"):
         assert not SETS_UP.findall(source.read_text()), source
 
@@ -112,7 +112,7 @@ def test_no_application_drops_the_result_of_a_call_that_sets_it_up(app: str) -> 
 
 
 def test_a_failed_assertion_is_a_firmware_fault(image: Build, tmp_path: Path, capfd) -> None:
-    """Issue 4, assertions with file and line: UART1 says where, `emu run` ends with status 1."""
+    """UART1 says where, `emu run` ends with status 1."""
     (tmp_path / "wrong").mkdir()
     (tmp_path / "wrong" / "main.c").write_text("""#include <openswarm.h>
 int main(void) {
@@ -140,7 +140,7 @@ def host(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.mark.parametrize("app", ["listing1", "processors", "stress", "footprint", "latency", "hello"])
 def test_every_application_builds_for_a_host(host: Path, app: str) -> None:
-    """Issue 4: the same kernel and applications on Linux, without warnings."""
+    """The same kernel and applications on Linux, without warnings."""
     run_make(FIRMWARE, f"APP={app}", "TARGET=posix", f"OUT={host / app}")
 
 
@@ -180,14 +180,14 @@ int main(void) {
 
 
 def on_both_engines(folder: Path, ask: Callable[[emu.Machine], str]) -> str:
-    """What `ask` gets from a program, the same from the interpreter and from native code."""
+    """Return the output of a program for `ask`; interpreter and native code must agree."""
     first, second = (ask(emu.load(folder, engine=engine)) for engine in ("plain", "jit"))
     assert first == second
     return first
 
 
 def sines(*tones: tuple[int, int]) -> Callable[[int], float]:
-    """Sum of (Hz, counts)."""
+    """Return a sum of sines of (Hz, counts)."""
     return lambda cycle: sum(a * math.sin(2 * math.pi * hz * cycle / FCY) for hz, a in tones)
 
 
@@ -208,7 +208,7 @@ def test_tone_hears_what_its_filter_lets_through(image: Build) -> None:
 
 
 def test_commands_are_read_with_sscanf(image: Build) -> None:
-    """firmware/apps/commands/README.md."""
+    """`commands` answers its commands (firmware/apps/commands/README.md)."""
 
     def ask(machine: emu.Machine) -> str:
         said = bytearray()

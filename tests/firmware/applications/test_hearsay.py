@@ -1,4 +1,4 @@
-"""What robots of apps/average tell each other of a third: by the application's own functions, on a host."""
+"""Indirect information in apps/average: the application's own functions on a host."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ FIRMWARE = HERE.parents[2] / "firmware"
 
 
 def test_who_is_gone_is_forgotten_and_who_is_hidden_is_not(tmp_path):
-    """Under sanitizers: word of a robot reaches who has not met it, as late as six seconds after, and however often it
-    is told on, with messages that wait for a second, it is forgotten in time and does not come back."""
+    """Under sanitizers: a number reaches robots that never met its owner, up to six seconds later. However often it
+    is forwarded, with messages that wait for a second, it expires in time and does not return."""
     if shutil.which("gcc") is None:
         pytest.skip("the host test is built with gcc, which is not installed (Debian package gcc)")
     folders = [FIRMWARE, *(FIRMWARE / "openswarm" / one for one in ("include", "hal", "kernel", "io", "port/posix"))]

@@ -27,7 +27,7 @@ MISSING = """#include <openswarm_compat.h>
 #define NOTHING_SPEED_L 70
 #define NOTHING_SPEED_R 127
 """
-"""What the listing takes for granted."""
+"""Declarations that the listing assumes."""
 
 PRINTED = r"""
 void loggingThread();
@@ -81,13 +81,13 @@ bool reactiveController(uint16 pid, uint16 eventID, sys_event_data *data)
     }
 }
 """
-"""The listing in its order and with its names and other misprints, as far as they are known here."""
+"""The listing with its order, names and known misprints."""
 
 ALONE = load_scene("clustering").with_values(robots__count=1, robots__wheel_noise=0.0)
 
 
 def test_the_listing_with_two_corrections_compiles(image: Build, tmp_path: Path) -> None:
-    """Everything else the compiler takes, with warnings; the headers have every name the listing uses."""
+    """The compiler accepts all else, with warnings; the headers declare every name of the listing."""
     app = tmp_path / "printed"
     app.mkdir()
     (app / "main.c").write_text(MISSING + PRINTED)
@@ -106,7 +106,7 @@ def test_the_listing_with_two_corrections_compiles(image: Build, tmp_path: Path)
 
 
 def test_the_system_registers_the_one_pixel_sensor(image: Build) -> None:
-    """Also where no camera answers; what does not ask for it does not pay for it."""
+    """The event is registered even without a camera; applications that do not use it do not link the driver."""
     for app, registered in (("listing1", True), ("hello", False)):
         machine = load(image(app))
         machine.run(cycles=FCY // 20)
@@ -132,7 +132,7 @@ def test_the_controller_drives_as_its_table_says(image: Build, scene: str, speed
 
 @pytest.mark.parametrize(("objects", "turn"), [([], 1), ([(240.0, 150.0)], -1)], ids=["nothing", "object"])
 def test_in_the_arena_its_robot_turns_at_an_object(image: Build, objects: list[tuple[float, float]], turn: int) -> None:
-    """It drives a curve to the left; with an object ahead it turns to the right instead (paper §IV)."""
+    """The robot drives a curve to the left; with an object ahead it turns to the right (paper §IV)."""
     scene = ALONE.with_values(objects__count=len(objects))
     controller = FirmwareController(scene, 1, 0, image("listing1"), 0)
     world = World.of(scene, 1, [(200.0, 150.0, 0.0)], objects)

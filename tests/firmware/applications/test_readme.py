@@ -1,4 +1,4 @@
-"""The README of the project and its tour say what works."""
+"""Examples, commands and paths in the project's README and tour work."""
 
 from __future__ import annotations
 

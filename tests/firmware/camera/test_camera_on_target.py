@@ -1,4 +1,4 @@
-"""The camera under the kernel: every pixel right wherever its lines fall, and what the line-of-sight sensor tells."""
+"""Camera under the kernel: correct pixels for every line timing, and the line-of-sight sensor's classification."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ def noise(seed: int = 1) -> np.ndarray:
 
 @pytest.mark.parametrize(("ipl_slip", "phase"), [(0, 0), (1, 60)])
 def test_lines_are_right_wherever_href_falls_in_a_kernel_call(image: Build, ipl_slip: int, phase: int) -> None:
-    """Issue 6, Must show 1; kernel.md §4: every 199th cycle of a round of all calls; fuzz_camera.py takes all."""
+    """kernel.md §4: every 199th cycle of a round of all calls; fuzz_camera.py takes all."""
     machine = start(image("sights", TARGET_APPS), noise(), ipl_slip)
     assert sweep(machine, noise(), stride=199, phase=phase) > 130
 
 
 def test_a_capture_that_comes_late_spoils_the_line(image: Build) -> None:
-    """What the sweep would notice: the byte stands for 8 Tcy, the read comes 16-18 behind HREF (epuck.md §7.5)."""
+    """Verify that the sweep can fail: the byte is valid for 8 Tcy, the read is 16-18 Tcy after HREF (epuck.md §7.5)."""
     machine = start(image("sights", TARGET_APPS), noise())
     state, expected = machine.snapshot(), expected_line(noise())
     assert np.array_equal(capture_at(machine, state, 0), expected)
@@ -35,7 +35,7 @@ def test_a_capture_that_comes_late_spoils_the_line(image: Build) -> None:
 
 
 def test_cpu_load_of_capture_and_classification_is_printed(image: Build, capsys, tmp_path) -> None:
-    """Issue 6, Must show 1: in percent, from exact cycles. A frame of 1,600,000 Tcy is 20 lines of some 658 and VSYNC's
+    """In percent, from exact cycles. A frame of 1,600,000 Tcy is 20 lines of some 658 and VSYNC's
     interrupt; the scene that costs the classifier most is the one without red: all 24 pixels are looked at."""
     white = tmp_path / "white.png"
     write_picture(str(white), plain(SCENES["nothing"]), 1)
@@ -60,7 +60,7 @@ FRAME_TCY = 1_600_000
 
 
 def sighted(machine: Machine, frames: int = 3) -> str:
-    """What the robot takes the scene for, some frames later: by its wheel speeds, which differ for all three."""
+    """Return the classification of the scene after some frames, from the wheel speeds, which differ for all three."""
     machine.run(cycles=frames * FRAME_TCY)
     before = machine.board.motors.left.steps, machine.board.motors.right.steps
     machine.run(cycles=FCY // 4)
@@ -71,7 +71,7 @@ def sighted(machine: Machine, frames: int = 3) -> str:
 
 
 def shaded(colour: tuple[int, int, int], brightness: float, deviation: float = 0.0) -> np.ndarray:
-    """A scene with the sensor's noise (sigma 2-4 of 255) and its corners 30 % darker (epuck.md §7.6)."""
+    """Return a scene with the sensor's noise (sigma 2-4 of 255) and corners 30 % darker (epuck.md §7.6)."""
     y, x = np.mgrid[0:480, 0:640]
     corner = ((x - 319.5) ** 2 + (y - 239.5) ** 2) / (319.5**2 + 239.5**2)
     light = (np.array(colour) * brightness)[None, None, :] * (1 - 0.3 * corner)[:, :, None]
@@ -82,7 +82,7 @@ def shaded(colour: tuple[int, int, int], brightness: float, deviation: float = 0
 @pytest.mark.parametrize("scene", SCENES)
 @pytest.mark.parametrize("program", PROGRAMS)
 def test_automatic_exposure_keeps_colours_apart_in_any_light(image: Build, program: str, scene: str) -> None:
-    """Issue 6, Must show 1; epuck.md §7.6: exposure converges in 5 to 10 frames, from an eighth of the light to
+    """epuck.md §7.6: exposure converges in 5 to 10 frames, from an eighth of the light to
     a hundred times as much; noise and vignetting on."""
     machine = robot(image(program), selector=START)
     machine.board.camera.show(shaded(SCENES[scene], 1.0, deviation=4.0))

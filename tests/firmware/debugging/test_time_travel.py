@@ -1,4 +1,4 @@
-"""Going back restores the whole state that the machine had on the way forward."""
+"""Stepping backwards restores the whole state of the forward run."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Waveforms, read back by somebody else's reader, show what the pins did to the cycle."""
+"""Cycle accuracy of waveforms, checked with a VCD reader from another project."""
 
 from __future__ import annotations
 

@@ -17,7 +17,7 @@ EVENTS = {"left": 2, "selector": 8, "proximity": 0x11, "motion": 0x12, "sound": 
 
 @pytest.fixture
 def talk(image: Build) -> tuple[Machine, Callable[..., list[str]]]:
-    """The self-test after its report, and ask(*lines) -> lines heard until LINE_TIME after the last one."""
+    """Return the self-test after its report, and ask(*lines) -> lines received until LINE_TIME after the last one."""
     machine = robot(image("selftest"), selector=6)
     heard = bytearray()
     machine.uart[1].on_byte = lambda byte, _cycle: heard.append(byte)
@@ -70,7 +70,7 @@ def test_commands_that_cannot_be_carried_out_are_answered_with_a_question_mark(t
 
 
 def test_events_travel_both_ways(talk) -> None:
-    """Issue 6: text protocol as events both ways. What is sent by text is an event like any other; reports name it."""
+    """Text protocol as events both ways. What is sent by text is an event like any other; reports name it."""
     machine, ask = talk
     left = EVENTS["left"]
     assert ask(f"+{left}", f"!{left},100") == ["+", "!", f"!{left},100"]

@@ -20,7 +20,7 @@ from tests.firmware.conftest import Build
 FCY = 14_745_600
 HREF = 1 << 3
 START = 8
-"""Selector bit that starts without the remote control (apps/clustering/README.md)."""
+"""Selector bit for a start without the remote control (apps/clustering/README.md)."""
 PROGRAMS = ["clustering", "clustering-bare"]
 SCENES = {"object": (80, 0, 0), "robot": (0, 40, 0), "nothing": (100, 80, 80)}
 TABLES = {
@@ -51,7 +51,7 @@ def captured(machine: Machine) -> np.ndarray:
 
 
 def window(picture: np.ndarray) -> np.ndarray:
-    """160 x 160 centred, every eighth pixel, as RGB565 keeps it (epuck.md §7.5)."""
+    """Return the centred 160 x 160 pixels, every eighth, in RGB565 precision (epuck.md §7.5)."""
     return picture[160:320:8, 240:400:8] & np.array([0xF8, 0xFC, 0xF8], np.uint8)
 
 
@@ -111,7 +111,7 @@ def test_the_bare_program_has_nothing_of_the_kernel(image: Build) -> None:
 
 @pytest.mark.parametrize("program", PROGRAMS)
 def test_without_a_camera_nothing_hangs_and_the_robot_stands(image: Build, program: str) -> None:
-    """Issue 6, Must show 8: camera unplugged."""
+    """Camera unplugged."""
     machine = robot(image(program), selector=START, camera=None)
     assert machine.run(cycles=FCY // 2).reason == "limit"
     assert steps(machine) == (0, 0)
@@ -123,7 +123,7 @@ def test_without_a_camera_nothing_hangs_and_the_robot_stands(image: Build, progr
 @pytest.mark.parametrize("sensor", ["PO6030K", "PO3030K", "PO8030D"])
 @pytest.mark.parametrize("program", PROGRAMS)
 def test_every_pixel_is_right(image: Build, program: str, sensor: str) -> None:
-    """Issue 6, Must show 1; epuck.md §7.5."""
+    """epuck.md §7.5."""
     machine = robot(image(program), selector=START, camera=sensor)
     machine.board.camera.show(noise())
     machine.run(cycles=8_000_000)
@@ -194,7 +194,7 @@ def i2c_wire(machine: Machine):
 
 
 def test_a_slave_that_holds_sda_is_clocked_free(image: Build) -> None:
-    """Issue 6, Must show 3: a slave stuck in the middle of a byte lets go after some clocks; the camera then works."""
+    """A slave stuck in the middle of a byte lets go after some clocks; the camera then works."""
     machine = robot(image("clustering"), selector=START)
     i2c_wire(machine).hold(sda=True, clocks=7)
     machine.board.camera.show(noise())
@@ -205,7 +205,7 @@ def test_a_slave_that_holds_sda_is_clocked_free(image: Build) -> None:
 
 @pytest.mark.parametrize("lines", [{"sda": True}, {"scl": True}])
 def test_a_line_that_stays_low_stops_the_camera_not_the_robot(image: Build, lines: dict[str, bool]) -> None:
-    """Issue 6, Must show 3 and 8: the kernel starts and says which device failed."""
+    """The kernel starts and says which device failed."""
     machine = robot(image("selftest"))
     i2c_wire(machine).hold(**lines)
     assert b"camera 0000 FAIL" in said(machine, FCY // 2)
@@ -221,7 +221,7 @@ def test_a_slave_may_stretch_the_clock(image: Build) -> None:
 
 
 def after_camera_line(machine: Machine, act: Callable[[], None]) -> bytes:
-    """The self-test's report when `act` happens between its camera line and its I2C transfer by interrupt."""
+    """Return the self-test's report if `act` happens between its camera line and its I2C transfer by interrupt."""
     heard = bytearray()
     machine.uart[1].on_byte = lambda byte, _cycle: heard.append(byte)
     while b"camera" not in heard or not heard.endswith(b"\n"):
@@ -232,7 +232,7 @@ def after_camera_line(machine: Machine, act: Callable[[], None]) -> bytes:
 
 
 def test_faults_of_a_running_bus_are_survived(image: Build) -> None:
-    """Issue 6, Must show 3: by interrupt, under the kernel; the report goes on behind each fault."""
+    """By interrupt, under the kernel; the report continues after each fault."""
 
     def report(act: Callable[[Machine], None]) -> bytes:
         machine = robot(image("selftest"))
@@ -252,7 +252,7 @@ def test_faults_of_a_running_bus_are_survived(image: Build) -> None:
 
 
 def test_a_bit_lasts_151_tcy(image: Build) -> None:
-    """Issue 6, Must show 3; dspic30f6014a.md §11: on the SCL pin of a running driver, I2CBRG = 150: 97.65 kHz."""
+    """dspic30f6014a.md §11: on the SCL pin of a running driver, I2CBRG = 150: 97.65 kHz."""
     machine = robot(image("clustering"))
     scl = 1 << 2
     falls: list[int] = []
@@ -279,7 +279,7 @@ def said(machine: Machine, cycles: int) -> bytes:
 
 
 def test_the_self_test_finds_every_device(image: Build) -> None:
-    """Issue 6: selftest exercises every device and reports over UART1; 1 s at 129 mm/s is 1000 steps."""
+    """Selftest exercises every device and reports over UART1; 1 s at 129 mm/s is 1000 steps."""
     machine = robot(image("selftest"), selector=5)
     machine.board.camera.show(plain(SCENES["robot"]))
     report = said(machine, 5 * FCY // 2)
@@ -291,7 +291,7 @@ def test_the_self_test_finds_every_device(image: Build) -> None:
 
 
 def test_distance_follows_the_reference_curve(image: Build) -> None:
-    """Issue 6, Must show 4; epuck.md §5, column OpenSwarm, log-linear between its points: every millimetre of 0-10 cm
+    """epuck.md §5, column OpenSwarm, log-linear between its points: every millimetre of 0-10 cm
     through emitter, converter and driver, within 1 count (the converter rounds dark and lit) and 1 mm."""
     machine = robot(image("selftest"))
     machine.run(cycles=FCY // 10)
@@ -327,7 +327,7 @@ def test_ambient_light_does_not_change_the_distance(image: Build) -> None:
 
 @pytest.mark.parametrize("program", PROGRAMS)
 def test_engines_agree_to_the_bit(image: Build, program: str) -> None:
-    """Issue 6, Must show 6: registers, memory, devices and robot after frames, a change of scene and a remote key."""
+    """Registers, memory, devices and robot after frames, a change of scene and a remote key."""
     states = []
     for engine in ("plain", "jit"):
         machine = robot(image(program), engine=engine, selector=START)

@@ -1,4 +1,4 @@
-"""Processors of all devices, exchanged while the devices run (issue 6, Kernel drivers; openswarm_io.h)."""
+"""Processors of all devices, exchanged while the devices run (openswarm_io.h)."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def test_the_camera_processor_sees_the_whole_frame(machine: Machine) -> None:
 
 
 def test_remote_control_and_selector_pass_what_their_processor_makes_of_it(machine: Machine) -> None:
-    """remote.h, openswarm_io.h."""
+    """Processors of remote control and selector change or suppress events (remote.h, openswarm_io.h)."""
     for which, key, position in ((DEFAULTS, 12, 9), (OWN, 13, 6)):
         choose(machine, which, 0.1)
         machine.board.remote.press(12)
@@ -73,7 +73,7 @@ def test_remote_control_and_selector_pass_what_their_processor_makes_of_it(machi
 
 
 def test_a_processor_may_swallow_everything(machine: Machine) -> None:
-    """False: no event."""
+    """A processor that returns false suppresses the event."""
     choose(machine, SWALLOW, 0.3)
     before = [machine.peek(name) for name in ("colours", "keys", "positions", "motions")]
     machine.board.remote.press(12)
@@ -106,7 +106,7 @@ def test_output_devices_do_what_their_processor_says(machine: Machine) -> None:
 
 
 def test_processors_change_under_load_without_harm(machine: Machine) -> None:
-    """Fifty changes while frames, keys, scans and characters come; the kernel loses nothing it should not."""
+    """Fifty exchanges while frames, keys, scans and characters arrive; no event is lost."""
     machine.board.microphones.play(1, lambda cycle: 100.0 if cycle & 0x8000 else -100.0)
     for number in range(50):
         machine.poke("wanted", number % 3)

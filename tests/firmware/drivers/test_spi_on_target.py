@@ -17,7 +17,7 @@ ARGUMENT = 5
 
 
 class Turret:
-    """Answers command 1 with a measurement and a check byte; counts what it saw while it was selected."""
+    """SPI slave that answers command 1 with a measurement and a check byte, and records the bytes while selected."""
 
     def __init__(self, machine: Machine, damage: int = 0) -> None:
         self.machine = machine
@@ -37,7 +37,7 @@ class Turret:
         return answer[(len(self.heard) - 1) % 4]
 
     def lines(self, cycles: int) -> list[str]:
-        """What UART1 said meanwhile, whole lines."""
+        """Return UART1's output meanwhile as whole lines."""
         self.said.clear()
         self.machine.run(cycles=cycles)
         return self.said.decode().split("\r\n")[:-1]
@@ -57,7 +57,7 @@ def test_bytes_go_both_ways_while_the_slave_is_selected(path: Path) -> None:
 
 
 def test_the_processor_is_exchanged_while_the_program_runs(path: Path) -> None:
-    """It sees what is sent, and what came, which it may refuse."""
+    """The processor receives the bytes to send and those received, which it may refuse."""
     turret = Turret(robot(path), damage=1)
     assert turret.lines(FCY // 4) == [str(MEASUREMENT)] * 3
     for letter, says, last in ((b"c", f"error {ARGUMENT}", 0xFF), (b"r", str(MEASUREMENT), 0)) * 2:

@@ -1,4 +1,4 @@
-"""Transmission buffered dynamically, on the emulated robot (openswarm_io.h, io/README.md)."""
+"""Dynamically buffered UART transmission on the emulated robot (openswarm_io.h, io/README.md)."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def text(size: int) -> bytes:
 
 
 def bytes_of_heap(size: int) -> int:
-    """What a message waiting for its UART takes (io/README.md)."""
+    """Heap bytes of a message waiting for its UART (io/README.md)."""
     blocks = [LARGEST] * (size // LARGEST) + [size % LARGEST] * bool(size % LARGEST)
     return sum((E + 1 + block + 1) // 2 * 2 for block in blocks)
 
@@ -87,7 +87,7 @@ def started(path: Path) -> tuple[Machine, bytearray]:
 
 @pytest.mark.parametrize("size", [1, 2, 32, 33, 34, 64, 65, 66, 67, 100, 500, 800])
 def test_a_message_of_any_size_goes_out_whole_and_takes_what_is_said(path: Path, size: int) -> None:
-    """65 bytes were refused for ever when the buffer was a ring of 64."""
+    """A message of 65 bytes is sent; a fixed buffer of 64 bytes would refuse it for ever."""
     machine, said = started(path)
     used = machine.peek("os_statistics")
     machine.poke("size", size)

@@ -14,7 +14,7 @@ SYS_ERROR_ARGUMENT = 5
 
 
 def test_every_speed_is_exact_over_a_whole_period(image: Build) -> None:
-    """Issue 6, Must show 2; openswarm-original.md §5.2: the stepper's fraction comes back to where it was after 6,192
+    """openswarm-original.md §5.2: the stepper's fraction comes back to where it was after 6,192
     ticks of 1,536 Tcy, which make 5 v steps; what holds for one period holds for any time. fuzz_wheels.py counts
     60 s of each."""
     machine = start(image("wheels", TARGET_APPS))
@@ -37,7 +37,7 @@ def fractions(machine) -> list[int]:
 
 @pytest.mark.parametrize(("left", "right"), [(129, -129), (1, -128), (64, 65)])
 def test_a_minute_is_exact_to_a_step(image: Build, left: int, right: int) -> None:
-    """Issue 6, Must show 2."""
+    """Step rates are exact at every speed."""
     errors = measure(start(image("wheels", TARGET_APPS)), left, right, 60)
     assert max(abs(error) for error in errors) <= 1
 
@@ -49,7 +49,7 @@ def handlers_error(machine: Machine) -> int:
 
 
 def test_speeds_out_of_range_are_clamped_and_reported(image: Build) -> None:
-    """Issue 6, Must show 2: 1000 steps/s is the most; the handlers' last error says that a speed was beyond, the
+    """1000 steps/s is the most; the handlers' last error says that a speed was beyond, the
     getter which one is in force."""
     machine = start(image("wheels", TARGET_APPS))
     assert max(abs(error) for error in measure(machine, 129, -129, 1)) <= 1

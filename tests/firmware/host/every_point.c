@@ -95,17 +95,17 @@ static void sweep(void (*hook)(void))
     }
 }
 
-TEST(a_preemption_at_every_unlock_changes_nothing, "Must show 3, on posix: no lost or doubled event, memory conserved")
+TEST(a_preemption_at_every_unlock_changes_nothing, "on posix: no lost or doubled event, memory conserved")
 {
     sweep(preempt);
 }
 
-TEST(an_interrupt_at_every_unlock_changes_nothing, "Must show 3, on posix: an ISR that sends, and the clock")
+TEST(an_interrupt_at_every_unlock_changes_nothing, "on posix: an ISR that sends, and the clock")
 {
     sweep(interrupt);
 }
 
-TEST(the_failure_of_any_allocation_is_reported_and_harmless, "Must show 3: the k-th allocation failing for every k")
+TEST(the_failure_of_any_allocation_is_reported_and_harmless, "the k-th allocation failing for every k")
 {
     boot();
     uint16 empty = heap_now();

@@ -1,5 +1,5 @@
-/* The air between robots, for tests of the infra-red link: the test is the lower layer, sees what is lit, and says what the
- * sensors read, scan by scan. */
+/* The air between robots, for tests of the infra-red link: the test is the lower layer, sees what is lit, and says
+ * what the sensors read, scan by scan. */
 #ifndef INFRARED_AIR_H
 #define INFRARED_AIR_H
 
@@ -18,7 +18,8 @@ void scan_with(uint8 sensor, uint16 depth); /* one in which light takes so much 
 void scans_in_the_dark(unsigned n);
 void begin_link(void);
 
-/* The light of one frame, scan by scan; how many. Proximity is left out: it is three scans long and dark before and behind. */
+/* Collects the light of one frame by scans; returns their number. Omits proximity: three scans with dark before and
+ * after. */
 typedef struct {
     bool lit[LONGEST];
     unsigned length;

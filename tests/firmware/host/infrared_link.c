@@ -434,7 +434,7 @@ TEST(proximity_goes_on_between_frames, "analog.h: mm every 50 ms; not while othe
     CHECK_EQ(distance[3], 50);
     CHECK(distance[2] == SYS_OUT_OF_RANGE && distance[4] == SYS_OUT_OF_RANGE);
     measured = 0;
-    for (int i = 0, light = 0; i < 4096; i++) { /* somebody answers each flash */
+    for (int i = 0, light = 0; i < 4096; i++) { /* another robot answers each flash */
         light = own_light ? 6 : light - (light > 0);
         scan_near(light > 0 ? 300 : 0);
     }

@@ -79,7 +79,7 @@ TEST(the_number_is_drawn_in_a_quarter_of_a_second, "openswarm_infrared.h")
     CHECK_EQ(Sys_Get_SystemTime(), 250);
 }
 
-TEST(a_robot_that_began_again_is_heard, "its sequence begins anew as well: arrivals are forgotten in time")
+TEST(a_robot_that_began_again_is_heard, "its sequence restarts as well: arrivals expire")
 {
     begin_early();
     scans_in_the_dark(2 * EARLY);

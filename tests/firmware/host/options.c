@@ -192,7 +192,8 @@ TEST(a_lock_leaves_the_wait_result, "openswarm_mutex.h: Sys_Lock_Mutex")
     CHECK_EQ(heap_now(), empty);
 }
 
-/* ---- Quotas ------------------------------------------------------------------------------------------------------- */
+/* ---- Quotas
+ * ------------------------------------------------------------------------------------------------------- */
 
 static uint16 newest;
 static bool slow_handler(uint16 pid, uint16 id, sys_event_data *data)
@@ -249,7 +250,7 @@ TEST(the_newest_value_wins, "openswarm_quota.h: Sys_Keep_Latest")
     CHECK_EQ(newest, 50);
     CHECK_EQ(deliveries, 2);
     CHECK_EQ(latest.dropped, 0);
-    CHECK(!Sys_Send_IntEvent(E1 + 16, 1)); /* the gate in front is nobody's */
+    CHECK(!Sys_Send_IntEvent(E1 + 16, 1)); /* the gate in front belongs to no event */
     CHECK(!Sys_Keep_Latest(&latest, E_NEVER));
     CHECK_EQ(Sys_Get_LastError(), SYS_ERROR_EVENT);
 }
@@ -276,7 +277,8 @@ TEST(a_quota_bounds_what_waits, "openswarm_quota.h: Sys_Limit_Event")
     CHECK_EQ(deliveries, 4);
 }
 
-/* ---- Join and zombies --------------------------------------------------------------------------------------------- */
+/* ---- Join and zombies
+ * --------------------------------------------------------------------------------------------- */
 
 static void ends_in_3_ms(void *unused)
 {
@@ -332,7 +334,8 @@ TEST(join_waits_for_any_thread, "openswarm_join.h: Sys_Join")
     CHECK_EQ(heap_now(), empty);
 }
 
-/* ---- Cleanup ------------------------------------------------------------------------------------------------------ */
+/* ---- Cleanup
+ * ------------------------------------------------------------------------------------------------------ */
 
 static void say(void *c)
 {
@@ -370,7 +373,8 @@ TEST(cleanups_run_whatever_ends_the_thread, "openswarm_cleanup.h: newest first, 
     CHECK(strcmp(trace, "3e21") == 0);
 }
 
-/* ---- Services ----------------------------------------------------------------------------------------------------- */
+/* ---- Services
+ * ----------------------------------------------------------------------------------------------------- */
 
 static uint16 starts, feedings;
 static void hangs_after_three(void *unused)

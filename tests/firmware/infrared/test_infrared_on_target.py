@@ -44,7 +44,7 @@ def test_a_number_in_the_data_eeprom_is_the_robots(image: Build) -> None:
 
 
 def test_what_touches_is_near(image: Build) -> None:
-    """openswarm_infrared.h: proximity goes on; analog.h: mm. Behind a strong reflection receivers settle late."""
+    """Proximity is measured meanwhile, in mm; receivers settle late after a strong reflection."""
     machine = robot(image("infrared", TARGET_APPS))
     at = machine.address_of("millimetres")
     for counts, millimetres in ((300, 39), (1744, 15), (3700, 3)):

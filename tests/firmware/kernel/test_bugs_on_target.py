@@ -21,7 +21,7 @@ TESTS = [
 
 @pytest.mark.parametrize("name", TESTS)
 def test_the_kernel_on_the_robot(image: Build, name: str) -> None:
-    """openswarm-original.md §7; issue 4, Must show 2: on posix and on emu."""
+    """openswarm-original.md §7: on posix and on emu."""
     defines = f"DEFINES=-DTESTS={','.join(TESTS)} -DSYS_DEFAULT_STACK=192"
     machine = load(image("bugs", TARGET_APPS, defines))
     said = bytearray()

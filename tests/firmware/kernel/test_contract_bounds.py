@@ -21,7 +21,7 @@ from toolchain.stack.annotations import Annotations
 
 LOAD = {"n": 4, "m": 4, "b": 1, "s": 1, "q": 1, "i": 0, "u": 100, "d": 2, "k": 224}
 SHORT = ("swap_reserve", "refuse_message", "first_waiter")
-"""Not called while memory is not short, the event is known and somebody has subscribed to it."""
+"""Functions that are not called if memory suffices and the event is registered and has a subscriber."""
 SWITCH = ("os_schedule", "save_dsp", "resume_dsp")
 """Not called while nothing is pending, between threads without SYS_DSP."""
 PROMISES = {
@@ -36,7 +36,7 @@ PROMISES = {
     "Sys_Get_LastError": ((), "18", 18, 1.0),
     "Sys_Send_IntEvent": (SHORT, "104, or 133 + 10 b", 133 + 10 * LOAD["b"], 1.15),
 }
-"""Calls -> ways left out, what the contract line says, its cycles under LOAD, and how far the bound may lie above.
+"""Calls -> excluded functions, text of the contract line, its cycles under LOAD, and the permitted excess of the bound.
 
 Behind a promise that was measured lie ways the bound cannot rule out: for a send, a payload among the constants and a
 scheduler that preempts."""
@@ -55,14 +55,14 @@ DEVICES_MASKED = 56
 
 @pytest.fixture(scope="module")
 def calls(image: Build) -> tuple[str, object]:
-    """The image in which every call of the kernel is made."""
+    """Return the image that makes every kernel call."""
     path = image("calls", TARGET_APPS)
     return str(path), read_executable(path.read_bytes(), str(path))
 
 
 @pytest.mark.parametrize("call", PROMISES)
 def test_a_call_takes_no_longer_than_its_contract(calls, call: str) -> None:
-    """And the contract promises no more than 1.6 times the bound: it is not just large."""
+    """The contract covers the bound, and is at most 1.6 times the bound."""
     left_out, text, cycles, slack = PROMISES[call]
     header = (HEADERS / "openswarm.h").read_text()
     lines = header[: re.search(rf"\b{call}\(", header).start()]
@@ -116,12 +116,12 @@ def test_everything_in_an_image_of_ours_is_bounded(image: Build, capsys: pytest.
 
 @pytest.fixture(scope="module")
 def crowded(image: Build) -> Path:
-    """The image that builds the worst shapes of the kernel's structures."""
+    """Return the image that builds the worst shapes of the kernel's structures."""
     return image("crowded", TARGET_APPS)
 
 
 def test_a_longer_memory_has_longer_paths(crowded: Path) -> None:
-    """Of its tree: 11 nodes in more than 4 kB, without being told how many there are."""
+    """Bound of the heap's tree without a given depth: 11 nodes in more than 4 kB."""
     executable = read_executable(crowded.read_bytes(), str(crowded))
     cycles = []
     for holes in ({"h": 10}, {"h": 11}, {}):
@@ -131,7 +131,7 @@ def test_a_longer_memory_has_longer_paths(crowded: Path) -> None:
 
 
 def test_bounds_are_close_where_structures_are_at_their_worst(crowded: Path) -> None:
-    """And nothing is above its bound. One round of the scenes, each of which does what it says."""
+    """No run exceeds its bound, in one round of the scenes, whose effects are checked."""
     _, seconds, values = IMAGES["crowded"]
     rows = {row.call: row for row in rows_of("crowded", crowded, values, seconds / 2)}
     assert all(row.seen <= row.bound for row in rows.values() if row.bound is not None)

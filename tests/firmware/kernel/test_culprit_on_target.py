@@ -1,4 +1,4 @@
-"""A fault in an OpenSwarm thread is told where it was made and in which thread, not where the kernel stops."""
+"""A fault in an OpenSwarm thread is reported with its source line and thread, not where the kernel stops."""
 
 from __future__ import annotations
 

@@ -41,7 +41,7 @@ def test_the_interrupt_makes_every_call_of_the_headers() -> None:
 
 
 def test_every_allocation_may_fail(image: Build) -> None:
-    """Issue 4, Must show 3: in every scene the k-th allocation finds no memory, for every k. Calls fail, no more."""
+    """In every scene the k-th allocation finds no memory, for every k. Calls fail, no more."""
     *_, (scenes, failures) = fail_every_allocation(image("calls", TARGET_APPS))
     assert scenes == 9
     assert failures >= 25

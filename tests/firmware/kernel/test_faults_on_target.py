@@ -1,4 +1,4 @@
-"""Faults from outside on a running robot: nothing hangs, and the report says what is wrong (issue 6, Must show 8)."""
+"""External faults on a running robot: no call hangs, and the report names the fault."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def listen(machine: Machine) -> bytearray:
 
 
 def finished(machine: Machine, heard: bytearray, seconds: float = 4.0) -> bytes:
-    """The self-test's report; fails if it does not come to its end."""
+    """Return the self-test's report; fail if it does not end."""
     end = machine.cycle + round(seconds * FCY)
     while b"end\r\n" not in heard:
         assert machine.cycle < end, bytes(heard)
@@ -45,7 +45,7 @@ def finished(machine: Machine, heard: bytearray, seconds: float = 4.0) -> bytes:
 
 @pytest.mark.parametrize("microseconds", [10, 200, 700, 1500, 3000, 6000, 8000])
 def test_a_camera_pulled_out_while_it_is_programmed_costs_only_the_camera(image: Build, microseconds: int) -> None:
-    """epuck.md §7.1: nobody acknowledges. Programming takes some 8 ms after start-up; later it is a camera without
+    """Epuck.md §7.1: no slave acknowledges. Programming takes some 8 ms after start-up; later it is a camera without
     frames."""
     machine = robot(image("selftest"))
     heard = listen(machine)
@@ -58,7 +58,7 @@ def test_a_camera_pulled_out_while_it_is_programmed_costs_only_the_camera(image:
 
 @pytest.mark.parametrize("line", range(0, 40, 7))
 def test_a_camera_pulled_out_in_the_middle_of_a_frame_stops_only_its_frames(image: Build, line: int) -> None:
-    """HREF never comes again: the capture waits, everything else goes on; the wheels keep the last speed."""
+    """HREF stops: the capture waits, everything else continues, and the wheels keep the last speed."""
     machine = robot(image("clustering"), selector=START)
     camera = machine.board.camera
     camera.show(plain(SCENES["object"]))
@@ -87,7 +87,7 @@ def test_a_camera_that_loses_contact_for_a_moment_spoils_one_frame(image: Build)
     camera.show(noise())
     machine.run(cycles=FCY // 2)
     camera.align(machine.cycle + 50_000, line=60)
-    camera.align(machine.cycle + 700_000, line=3)  # the sensor begins anew: lines 60 to 119 never came
+    camera.align(machine.cycle + 700_000, line=3)  # the sensor restarts: lines 60 to 119 are missing
     machine.run(cycles=5 * FRAME_TCY)
     assert np.array_equal(captured(machine), window(noise()))
 
@@ -109,7 +109,7 @@ def test_a_low_battery_is_reported(image: Build, volts: float, word: bytes) -> N
 
 
 def counted(machine: Machine, heard: bytearray) -> tuple[int, int, int]:
-    """What UART1 refused, lost and found damaged."""
+    """Return UART1's counts of refused, lost and damaged messages."""
     heard.clear()
     machine.board.bluetooth.feed(b"\rU\r")
     machine.run(cycles=FCY // 10)
@@ -139,7 +139,7 @@ def test_an_overrun_is_counted_and_reception_goes_on(image: Build) -> None:
     heard = listen(machine)
     finished(machine, heard)
     enabled = machine.peek("IEC0")
-    machine.write("IEC0", enabled & ~(1 << 9))  # nobody takes the characters
+    machine.write("IEC0", enabled & ~(1 << 9))  # no code reads the characters
     machine.board.bluetooth.feed(b"D,1000,1000\r")
     machine.run(cycles=FCY // 50)
     assert machine.peek("U1STA") & 1 << 1

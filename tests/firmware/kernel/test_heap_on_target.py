@@ -1,4 +1,4 @@
-"""What allocation costs in the worst case: random histories of the heap on the emulated robot, timed by the robot."""
+"""Worst-case cost of allocation: random histories of the heap on the emulated robot, timed by the robot."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ PROMISE = re.compile(r"no \| (?:\d+, or )?(\d+) \+.*?at most (\d+) more while me
 
 
 def bound(call: str) -> int:
-    """Tcy the header promises for a call at most, parameters apart."""
+    """Return the header's maximum Tcy of a call without its parameters."""
     start = HEADER.index(f" {call}(")
     base, more = PROMISE.search(HEADER[HEADER.rindex("/* MTH", 0, start) : start]).groups()
     return int(base) + int(more)
 
 
 class Histories:
-    """The application `heap`, ready to run one history after the other from the same beginning."""
+    """Runs histories of the application `heap`, each from the same initial state."""
 
     def __init__(self, path: Path) -> None:
         self.machine: Machine = emu.load(path, engine="jit")
@@ -42,10 +42,10 @@ class Histories:
         self._start = self.machine.snapshot()
         self.sends = self.starts = 0
         self.worst = dict.fromkeys(RANGES, 0)
-        """Tcy of the calls alone."""
+        """Return the Tcy of the calls alone."""
 
     def run(self, seed: int, steps: int) -> None:
-        """One history. Raises AssertionError if a call took longer than the header says."""
+        """Run one history. Raises AssertionError if a call exceeds the header's bound."""
         machine = self.machine
         machine.restore(self._start)
         machine.poke(machine.address_of("seed"), seed % 0xFFFF + 1)

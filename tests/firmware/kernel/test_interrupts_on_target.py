@@ -1,4 +1,4 @@
-"""Interrupts of an application's own, in C (openswarm_interrupt.h): they work, and the rules are enforced."""
+"""Application interrupts in C (openswarm_interrupt.h): function, and enforcement of the rules."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ ENABLE = "Sys_Enable_Interrupt(INT1); Sys_Enable_Interrupt(INT2);"
 
 
 def source(tmp_path: Path, text: str, enable: str = ENABLE, devices: str = "") -> Path:
-    """A folder with the application "own"."""
+    """Return a folder with the application "own"."""
     app = tmp_path / "own"
     app.mkdir()
     (app / "main.c").write_text(HEAD.replace("ENABLE", enable) + text)
@@ -107,7 +107,7 @@ REFUSED = {
 
 @pytest.mark.parametrize("rule", REFUSED)
 def test_a_broken_rule_breaks_the_build(image: Build, tmp_path: Path, rule: str) -> None:
-    """Named by the compiler, the linker or firmware/tools/interrupts.py."""
+    """The compiler, the linker or firmware/tools/interrupts.py reports each violation."""
     text, devices, message = REFUSED[rule]
     start = "extern bool Sys_Start_Camera(void); Sys_Start_Camera();" if "camera" in devices else ""
     with pytest.raises(AssertionError, match=message):

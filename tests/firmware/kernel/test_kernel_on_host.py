@@ -14,6 +14,6 @@ TESTS = [name for file in sorted(HOST.glob("*.c")) for name in re.findall(r"^TES
 
 @pytest.mark.parametrize("name", TESTS)
 def test_the_kernel_on_posix(host_program: Path, name: str) -> None:
-    """kernel.md §2; openswarm-original.md §7; the statement beside each TEST."""
+    """Run one TEST; its text names the requirement (kernel.md §2, openswarm-original.md §7, the headers)."""
     done = subprocess.run([host_program, name], capture_output=True, text=True, timeout=60, check=False)
     assert done.returncode == 0, done.stderr

@@ -20,7 +20,7 @@ def load(path: Path, ipl_slip: int = 0) -> Machine:
 
 
 def place(machine: Machine, symbol: str) -> int:
-    """Program address of a C function or assembly label."""
+    """Return the program address of a C function or assembly label."""
     assert machine.image is not None
     found = machine.image.symbols.find("_" + symbol) or machine.image.symbols.find(symbol)
     assert found is not None, symbol
@@ -42,7 +42,7 @@ def words(machine: Machine, name: str, count: int) -> list[int]:
 
 @pytest.fixture(scope="module")
 def listing1(image: Build) -> tuple[bytes, list[int], list[int]]:
-    """What UART1 said in 2.1 s, the cycles of the log thread's wake-ups, and of the first bit of each line."""
+    """Return UART1's output of 2.1 s, the cycles of the log thread's wake-ups, and of the first bit of each line."""
     machine = emu.load(image("listing1"), engine=ENGINE, board="none")  # the camera's lines would delay a wake-up
     said = bytearray()
     wakes: list[int] = []
@@ -60,13 +60,13 @@ def listing1(image: Build) -> tuple[bytes, list[int], list[int]]:
 
 
 def test_listing1_logs_every_250_ms(listing1: tuple[bytes, list[int], list[int]]) -> None:
-    """Paper, Listing 1: time:(left,right)."""
+    """The log has the format of the paper's Listing 1, time:(left,right)."""
     said, _, _ = listing1
     assert said.decode() == "".join(f"{250 * i + 50}:(0,0)\r\n" for i in range(9))
 
 
 def test_wake_ups_are_exactly_3686400_cycles_apart(listing1: tuple[bytes, list[int], list[int]]) -> None:
-    """Issue 4, Must show 1: 250 ms are 3,686,400 Tcy, and start bits differ by no more than the formatting does."""
+    """250 ms are 3,686,400 Tcy, and start bits differ by no more than the formatting does."""
     _, wakes, starts = listing1
     assert [b - a for a, b in itertools.pairwise(wakes)] == [3_686_400] * (len(wakes) - 1)
     bit = 128  # Tcy at 115,200 baud: a byte leaves at the next edge of the free-running baud clock
@@ -117,7 +117,7 @@ KINDS = ["push", "call chain", "large frame", "variadic call", "kernel call with
 
 @pytest.mark.parametrize("kind", range(len(KINDS)), ids=KINDS)
 def test_a_stack_overflow_ends_only_the_offender(image: Build, kind: int) -> None:
-    """Issue 4, Must show 6; kernel.md §4; bug 21 of openswarm-original.md §7."""
+    """kernel.md §4; bug 21 of openswarm-original.md §7."""
     machine = load(image("overflow", TARGET_APPS))
     run_to(machine, "begin")
     machine.poke("kind", kind)
@@ -135,7 +135,7 @@ def test_a_stack_overflow_ends_only_the_offender(image: Build, kind: int) -> Non
 
 
 def test_a_trap_stops_the_motors_and_reports(image: Build) -> None:
-    """Issue 4: traps stop the motors, then report cause, PC and thread over UART1."""
+    """Traps stop the motors, then report cause, PC and thread over UART1."""
     machine = load(image("overflow", TARGET_APPS))
     run_to(machine, "begin")
     machine.poke("kind", len(KINDS))
@@ -156,7 +156,7 @@ T2IF, T3IF, INT1IF = 1 << 6, 1 << 7, 1 << 0
 
 
 def thread_list(machine: Machine) -> list[int]:
-    """PCBs on the ring and the blocked list; fails when either is malformed."""
+    """Return the PCBs on the ring and the blocked list; fail if either is malformed."""
     ring, seen = machine.peek("os_ring"), []
     at = ring
     while at and (not seen or at != ring):
@@ -173,7 +173,7 @@ def thread_list(machine: Machine) -> list[int]:
 
 
 def test_a_thread_keeps_64_of_its_128_bytes(image: Build) -> None:
-    """Issue 4, Must show 3: what interrupts and the kernel may take, found by painting under nested interrupts."""
+    """What interrupts and the kernel may take, found by painting under nested interrupts."""
     machine = load(image("points", TARGET_APPS))
     run_to(machine, "scenario_begin")
     begin = machine.cycle

@@ -1,4 +1,4 @@
-"""The kernel stack has a limit of its own: whoever overflows it is caught there, before the heap is harmed."""
+"""The kernel stack has its own limit: an overflow traps there, before it damages the heap."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from tests.firmware.kernel.test_kernel_on_target import FCY, load, place, run_to
 KERNEL_STACK = 224
 """Bytes (port/dspic30f/hal_limits.h); the heap follows."""
 FIRST = 0x41
-"""kind of the first of KINDS (target/handlers)."""
+"""Value of `kind` for the first of KINDS (target/handlers)."""
 KINDS = {
     "formats": ("snprintf", "vsnprintf", "format", "formats"),
     "recursion": ("chain",),
@@ -23,17 +23,17 @@ KINDS = {
     "interrupt": ("chain",),
     "scheduler": ("chain",),
 }
-"""What overflows, and the functions that may be at work then; of the first any of the library."""
+"""Overflow cases and the functions that may be running then; for the first, any library function."""
 
 
 def heap(machine: Machine) -> list[int]:
-    """The first words behind the kernel stack: the first small block of the heap and what follows."""
+    """Return the first words after the kernel stack: the first small heap block and its successors."""
     first = machine.address_of("os_memory") + KERNEL_STACK
     return [machine.peek(address) for address in range(first, first + 64, 2)]
 
 
 def culprit(machine: Machine, said: bytes) -> str:
-    """The function that the report names by its address."""
+    """Return the function at the address in the report."""
     assert machine.image is not None
     found = re.search(rb"stack trap at 0x([0-9a-f]+):([0-9a-f]+) in thread \d+\r\n", said)
     assert found, said
@@ -45,7 +45,7 @@ def culprit(machine: Machine, said: bytes) -> str:
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("ipl_slip", [0, 1])
 def test_an_overflow_of_the_kernel_stack_is_caught_at_the_culprit(image: Build, kind: str, ipl_slip: int) -> None:
-    """A handler with snprintf("%f") needs more than the kernel stack has."""
+    """A handler with snprintf("%f") exceeds the kernel stack."""
     machine = load(image("handlers", TARGET_APPS), ipl_slip)
     run_to(machine, "begin")
     machine.poke("kind", FIRST + list(KINDS).index(kind))
@@ -66,7 +66,7 @@ def test_an_overflow_of_the_kernel_stack_is_caught_at_the_culprit(image: Build, 
 
 
 def test_half_a_kernel_stack_is_free_beside_an_ordinary_handler(image: Build) -> None:
-    """The limit leaves room: without an overflow the same program runs on."""
+    """Without an overflow the same program runs: the limit leaves enough room."""
     machine = load(image("handlers", TARGET_APPS))
     run_to(machine, "begin")
     machine.poke("kind", 0)

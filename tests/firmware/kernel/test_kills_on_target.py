@@ -16,14 +16,14 @@ STRIDE = 331
 def test_a_thread_killed_inside_a_driver_call_leaves_the_device_to_others(
     image: Build, scene: int, ipl_slip: int
 ) -> None:
-    """Buses go on, messages are whole, memory is as before, and no interrupt writes into memory of the dead."""
+    """Buses work, messages are whole, memory is unchanged, and no interrupt writes into memory of an ended thread."""
     *_, seen = sweep(image("kills", TARGET_APPS), ipl_slip, scene, STRIDE, 17 + 23 * ipl_slip)
     assert seen.boundaries >= len(PAUSES)
     assert seen.kills
 
 
 def test_a_write_into_a_dead_threads_memory_is_seen(image: Build) -> None:
-    """The campaign can fail: here the bus goes on into the dead thread's block."""
+    """Verify that the campaign can fail: here the bus continues in the ended thread's block."""
 
     def spoil(machine: Machine, block: int) -> None:
         job = machine.peek("transfer")
@@ -42,7 +42,7 @@ def test_a_write_into_a_dead_threads_memory_is_seen(image: Build) -> None:
 
 
 def test_the_bus_is_busy_while_its_thread_lives(image: Build) -> None:
-    """What frees the bus is the thread's death, not its time: a living thread is never robbed."""
+    """Only the end of its owner frees a bus, not a time-out: a living thread keeps it."""
     stage = Stage(image("kills", TARGET_APPS))
     machine = stage.machine
     while machine.peek("scene") != len(SCENES) - 1:

@@ -35,7 +35,7 @@ def test_a_ceiling_bounds_priority_inversion(image: Build) -> None:
 
 
 def test_the_latest_value_keeps_a_slow_handler_within_its_bounds(image: Build) -> None:
-    """openswarm_quota.h: 1.5 ms of handler for the event of every ms, and a thread every 10 ms."""
+    """A handler of 1.5 ms for an event every ms, and a thread every 10 ms (openswarm_quota.h)."""
     machine = scene(image, LATEST, 2)
     assert machine.peek("commands") >= 195
     assert machine.peek("ticks") >= 1000
@@ -47,7 +47,7 @@ def test_the_latest_value_keeps_a_slow_handler_within_its_bounds(image: Build) -
 
 
 def test_ends_are_seen_waited_for_and_cleaned_up(image: Build) -> None:
-    """openswarm_join.h, openswarm_cleanup.h, openswarm_service.h."""
+    """Each scene passes its own checks (openswarm_join.h, openswarm_cleanup.h, openswarm_service.h)."""
     machine = scene(image, ENDS, 0.6)
     assert machine.peek("done") == 1
     assert machine.peek("zombies") == 1

@@ -1,4 +1,4 @@
-"""What happens around Sys_Start_Kernel on the emulated robot."""
+"""Calls and interrupts before and during Sys_Start_Kernel, on the emulated robot."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ MOMENTS = ["never", "before the threads", "before the start", "after the start"]
 @pytest.mark.parametrize("scheduler", range(len(SCHEDULERS)), ids=SCHEDULERS)
 @pytest.mark.parametrize("ipl_slip", [0, 1])
 def test_the_start_completes_under_every_scheduler(image: Build, scheduler: int, moment: int, ipl_slip: int) -> None:
-    """An end of the slice that was forced before the start must not come before both timers run: beside a thread that
-    never yields nothing would ever switch them on."""
+    """A slice end forced before the start must not be taken before both timers run: beside a thread that
+    never yields, no code would start them."""
     machine = load(image("starts", TARGET_APPS), ipl_slip)
     run_to(machine, "begin")
     machine.poke("scheduler", scheduler)
@@ -67,7 +67,7 @@ int main(void)
 def test_calls_that_need_a_running_kernel_do_not_look_like_success(
     image: Build, tmp_path: Path, capfd: pytest.CaptureFixture[str], start: str, again: str, refused: str
 ) -> None:
-    """Blocking calls without Sys_Start_Kernel are refused; whoever runs such a program is told, by status 1 as well."""
+    """Blocking calls before Sys_Start_Kernel are refused; `emu run` reports such a program and exits with 1."""
     (tmp_path / "early").mkdir()
     (tmp_path / "early" / "main.c").write_text(NEVER_STARTED.replace("START", start).replace("AGAIN", again))
     path = image("early", tmp_path, f"DEFINES=-DCASE={len(start) + len(again)}")

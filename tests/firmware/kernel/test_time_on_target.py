@@ -17,7 +17,7 @@ SLICE = 147_456
 
 
 def test_a_thread_gets_its_whole_slice_under_a_storm(image: Build) -> None:
-    """Issue 4, Must show 7; kernel.md §3: ISR time counts, handler time does not, a handler that resends for ever
+    """kernel.md §3: ISR time counts, handler time does not, a handler that resends for ever
     starves nobody; a storm of events and a full UART line both ways. The slice is 147,456 Tcy from dispatch to the next
     T2 interrupt."""
     machine = load(image("slices", TARGET_APPS))
@@ -39,8 +39,8 @@ def test_a_thread_gets_its_whole_slice_under_a_storm(image: Build) -> None:
 
 
 def count_clock(path: Path, ticks: int) -> str:
-    """Let `ticks` clock events come under the storm of target/slices; they must take exactly 14,745.6 Tcy each. Returns
-    what was seen, with the worst jitter of the clock's interrupt in the first second."""
+    """Run `ticks` clock events under the storm of target/slices; each must take exactly 14,745.6 Tcy. Returns
+    a summary with the worst jitter of the clock's interrupt in the first second."""
     machine = emu.load(path, engine="jit")
     flag_rose = flag_since(machine.record, machine.chip.sfrs["IFS0"].address, 3)
     late: list[int] = []
@@ -50,7 +50,7 @@ def count_clock(path: Path, ticks: int) -> str:
         return False
 
     def counts() -> tuple[int, int, int]:
-        """(cycle of the last tick, ticks, clock events heard)."""
+        """Return (cycle of the last tick, ticks, clock events received)."""
         at = machine.address_of("clock_events")
         heard = machine.peek(at) + (machine.peek(at + 2) << 16)
         return machine.record.u64[flag_rose], machine.peek("now_ms") + (machine.peek("wraps") << 16), heard
@@ -78,7 +78,7 @@ def test_a_minute_of_clock_events_is_exact(image: Build) -> None:
 
 
 def masked_windows(machine: Machine, cycles: int) -> dict[int, int]:
-    """Longest run of cycles with IPL >= level, for levels 5 and 6, outside ISRs of that level; single-stepped."""
+    """Return the longest run of cycles with IPL >= level, for levels 5 and 6, outside ISRs of that level."""
     longest = {5: 0, 6: 0}
     since: dict[int, int | None] = {5: None, 6: None}
     stepper = place(machine, "_T3Interrupt")

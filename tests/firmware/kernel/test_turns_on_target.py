@@ -11,9 +11,9 @@ from tests.firmware.kernel.test_time_on_target import SLICE
 SLICES, WOKEN_FIRST, ROUND_ROBIN = 9, 10, 11
 """Scenes (target/turns/main.c)."""
 SAVING = 40
-"""Cycles that a preemption costs the thread's slice: its registers are saved, and the timer counts by 8."""
+"""Cycles that a preemption takes from the thread's slice: saved registers, and the timer's step of 8."""
 CLOCK = 300
-"""Cycles of a clock interrupt, which may hold the end of a slice back."""
+"""Cycles of a clock interrupt, which may delay the end of a slice."""
 
 
 def scene(image: Build, number: int) -> Machine:
@@ -36,7 +36,7 @@ def test_a_preempted_thread_gets_the_rest_of_its_slice(image: Build) -> None:
         resumed = machine.cycle if write else resumed
 
     def interrupted() -> bool:
-        """The better thread runs too briefly to be interrupted; so another one means that the turn has passed on."""
+        """Return whether the turn has passed on: the thread of higher priority runs too briefly to be interrupted."""
         nonlocal turn
         thread = machine.peek("os_running")
         if thread != turn and turn:
@@ -68,7 +68,7 @@ def test_a_woken_thread_runs_first(image: Build) -> None:
 
 
 def test_round_robin_lets_a_woken_thread_wait_for_all(image: Build) -> None:
-    """The bound that openswarm.h states for the default scheduler."""
+    """The default scheduler keeps the bound of openswarm.h."""
     machine = scene(image, ROUND_ROBIN)
     machine.run(cycles=FCY)
     assert 89 <= machine.peek("slept_most") <= 91

@@ -16,7 +16,7 @@ BASELINES = HERE.parents[2] / "firmware" / "baseline"
 
 @pytest.fixture(scope="module")
 def footprint(image, tmp_path_factory):
-    """What the command says about the `footprint` application."""
+    """Return the command's JSON for the application `footprint`."""
     out = tmp_path_factory.mktemp("footprint")
     return str(image("footprint")), out
 
@@ -76,7 +76,7 @@ def test_another_application_is_refused(image, capsys, command):
 
 @pytest.mark.parametrize("level", ["-O1", "-O2"])
 def test_what_cycles_are_counted_from_stands_at_higher_levels_too(image, level):
-    """The optimiser used to dissolve Sys_Yield in its callers, and `emu cycles` ended with "no symbol"."""
+    """`emu cycles` finds Sys_Yield at every level; inlining it would end the command with "no symbol"."""
     symbols = load_image(str(image("latency", None, f"OPTIMISE={level}"))).symbols
     stops = ("Sys_Yield", "Sys_Send_Event", "hal_idle", "_T1Interrupt", "_T2Interrupt", "latency_handler")
     assert [name for name in stops if symbols.find(name) is None] == []

@@ -1,4 +1,4 @@
-"""`make -C firmware`: an image is made again when, and only when, something that decides about it has changed."""
+"""`make -C firmware` rebuilds an image if and only if one of its inputs has changed."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ int main(void) { Sys_Init_Kernel(); for (uint16 i = 0; i < 100; i++) { count += 
 
 @pytest.fixture
 def make(tmp_path: Path):
-    """`make("OPTIMISE=-O2")` builds one small application in one folder; True: something was built."""
+    """Return make(*words), which builds a small application in one folder and returns whether it built anything."""
     app = tmp_path / "apps" / "small"
     app.mkdir(parents=True)
     (app / "main.c").write_text(MAIN)
@@ -54,7 +54,7 @@ def test_a_changed_option_builds_anew_and_so_does_the_way_back(make, words: list
 
 
 def test_drivers_and_files_that_come_and_go_build_anew(make) -> None:
-    """Not only a newer file: one that is gone leaves no newer file behind."""
+    """A removed source also causes a rebuild, although it leaves no newer file."""
     assert make()
     plain = make.image.read_bytes()
     (make.app / "app.mk").write_text("DEVICES := battery\n")
@@ -85,7 +85,7 @@ def test_drivers_and_files_that_come_and_go_build_anew(make) -> None:
 
 
 def test_another_toolchain_port_or_compiler_builds_anew(make, tmp_path: Path) -> None:
-    """The image of the one is not taken for that of the other. The stand-ins only say what they were called with."""
+    """Images of different compilers are kept apart. The substitute compilers only print their arguments."""
     for name in ("xc16-gcc", "xc16-bin2hex"):
         tool = tmp_path / name
         tool.write_text(

@@ -1,4 +1,4 @@
-"""The kernel is less hardware-specific than the original, however lines are counted."""
+"""The kernel is less hardware-specific than the original by each method of counting lines."""
 
 from __future__ import annotations
 

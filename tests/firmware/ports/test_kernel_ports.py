@@ -69,7 +69,7 @@ def check_conforms(said: bytes, checks: int = CHECKS) -> None:
 )
 @pytest.mark.parametrize("target", ["posix", "template"])
 def test_a_host_conforms(target: str, words: tuple[str, ...], checks: int, tmp_path: Path) -> None:
-    """docs/porting.md: the template compiles as it stands and conforms; so does the port with real signals."""
+    """The unchanged template compiles and conforms (docs/porting.md); so does the port with real signals."""
     flags = "-O1 -g -fsanitize=undefined -fno-sanitize-recover=undefined"
     run_make(FIRMWARE, f"TARGET={target}", "APPS=../tests/firmware/target", "APP=conformance", f"OUT={tmp_path}",
              f"HOST_FLAGS={flags}", *words)  # fmt: skip
@@ -215,7 +215,7 @@ def overflowing(tmp_path: Path) -> Path:
 
 
 def test_the_epuck2_buries_a_thread_that_overflows(overflowing: Path) -> None:
-    """port/cortex_m/README.md: the MPU stops it, it is told, the others go on."""
+    """The MPU stops the thread, the fault is reported, the others continue (port/cortex_m/README.md)."""
     image = make("epuck2", "overflowing", overflowing / "out", apps=overflowing)
     said = said_by_epuck2(image, rb"(on\n){3}")
     assert b"stack overflow: thread 2\r\n" in said

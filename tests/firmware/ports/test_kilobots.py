@@ -110,7 +110,7 @@ def test_every_byte_arrives(image: Path, swarm: Open) -> None:
 
 
 def test_strength_tells_the_distance(image: Path, swarm: Open) -> None:
-    """High gain, and low gain above it where that saturates; nobody is heard beyond reach."""
+    """Strength uses high gain, and low gain where that saturates; no robot is received beyond reach."""
     both = swarm(pair(image))
     seen = []
     for distance in (33.0, 38.0, 42.0, 50.0, 60.0, REACH_MM):

@@ -1,9 +1,10 @@
 """Interrupts at every instruction of every kernel call, on the ports: target/boundaries.
 
 Takes a sample. `python -m tests.firmware.ports.test_port_boundaries` visits all boundaries of the Kilobot, or with
---robot epuck2 those of the e-puck2. In simavr a boundary is an instruction of the round, and the harness sets the interrupt's
-flag. In QEMU it is an instruction's address, the first or a later time it is come to: the CPU stops there at a
-breakpoint, executes one store to the NVIC or the SCB with interrupts held back and the clock standing, and goes on.
+--robot epuck2 those of the e-puck2. In simavr a boundary is an instruction of the round, and the harness sets the
+interrupt's flag. In QEMU it is an instruction's address, the first or a later time it is come to: the CPU stops there
+at a breakpoint, executes one store to the NVIC or the SCB with interrupts held back and the clock standing, and goes
+on.
 """
 
 from __future__ import annotations
@@ -107,7 +108,7 @@ def sweep_epuck2(image: Path, way: str, stride: int, phase: int, times: int) -> 
             if way != "device":
                 machine.store(*PENDSV)
             for _ in range(number * 7 % 45 if way == "nested" else 0):
-                if machine.pc not in idle:  # WFI would not end while the clock stands
+                if machine.pc not in idle:  # WFI would not end while the clock is stopped
                     machine.step()
             if way != "slice":
                 machine.store(*EXTI0)

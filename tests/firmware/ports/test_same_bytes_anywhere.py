@@ -51,7 +51,7 @@ def test_two_checkouts_of_one_commit_build_the_same_bytes(checkouts: list[Path],
 
 
 def test_an_application_of_another_folder_does_not_bring_that_folder_along(checkouts: list[Path]) -> None:
-    """Somebody's own application, named by its absolute path as `APPS=` may be."""
+    """Build a user's application by its absolute path, which `APPS=` permits."""
     images = []
     for root in checkouts:
         source = root / "mine" / "tiny" / "main.c"

@@ -81,7 +81,7 @@ def make(stand_in: Path, app: str, out: Path) -> Path:
 
 
 def test_it_builds_and_the_measuring_commands_find_their_symbols(stand_in: Path, tmp_path: Path, capsys) -> None:
-    """Issue 4: `make -C firmware APP=... TOOLCHAIN=xc16`; such an image, compiled without stack checks, is measured."""
+    """`make -C firmware APP=... TOOLCHAIN=xc16`; such an image, compiled without stack checks, is measured."""
     image = make(stand_in, "latency", tmp_path / "latency")
     assert (tmp_path / "latency" / "firmware.hex").exists()
     assert main(["cycles", str(image)]) == 0

@@ -65,7 +65,7 @@ static void something(void)
     }
 }
 
-/* Whatever it has heard: when nobody says anything any more it says little, and after some minutes that it is there. */
+/* After any history: without messages from others it sends little, and after some minutes only its advertisement. */
 static void silence(void)
 {
     forget_kinds();

@@ -2,7 +2,7 @@
  * each. Whatever has happened, only whole programs are called, and only parts of whole programs are sent. */
 #include "histories.c"
 
-/* A promise that nobody keeps does not shut out the program that is really there, however often it is made. */
+/* An advertised program that no robot sends does not block an available one, however often it is advertised. */
 static void promise(bool is_repeated)
 {
     sys_update false_one = {65535, HAL_UPDATE_ROWS, 1};
@@ -46,7 +46,7 @@ static void namesakes(int wanted, int other)
     begin_interval(SHORTEST);
     hear_advertisement(facts, false);
     check(heard == 0, "nor has anybody said the same by naming the other");
-    for (uint8 r = 0; r < facts.rows; r++) { /* who asks for the other's rows does not get these */
+    for (uint8 r = 0; r < facts.rows; r++) { /* requests for the other program's rows get none of these */
         uint8 m[SYS_SPREAD_BYTES];
         sys_update own = want;
         want = facts, row = r, lacking = ALL_PARTS;
@@ -57,7 +57,7 @@ static void namesakes(int wanted, int other)
     }
 }
 
-/* Who asks for a row for ever, of which it has none or all, gets little, and what others ask for and what is due goes
+/* A robot that requests a row for ever, with none or all of it, gets few parts; requests of others and due messages go
  * on. */
 static void nagged(bool for_all_rows)
 {
@@ -106,7 +106,7 @@ static void nagged(bool for_all_rows)
     check(wanted_parts == ALL_PARTS, "but after an hour");
     wanted_parts = 0;
     hear_request(n, 0, 0);
-    check(wanted_parts == 0, "who asks for no parts gets none");
+    check(wanted_parts == 0, "a request for no parts gets none");
 }
 
 /* Who is behind comes first, but not for ever. */
@@ -122,7 +122,7 @@ static void pushed(void)
     for (int t = 0; t < 20 * SECOND; t++) {
         tick();
     }
-    check(kinds[REQUESTED] >= 4 && kinds[REQUESTED] <= 9, "where nobody answers it asks more and more seldom");
+    check(kinds[REQUESTED] >= 4 && kinds[REQUESTED] <= 9, "without answers it requests less and less often");
     for (int t = 0; t < MINUTE && row == 0; t++) {
         tick();
         hear_what_is_wanted(1000);
@@ -146,7 +146,7 @@ static void pushed(void)
         hear_request(n, 1, ALL_PARTS);
         tick();
     }
-    check(kinds[REQUESTED] > 1, "then it asks, whoever else is served or asks");
+    check(kinds[REQUESTED] > 1, "then it requests, whichever other robot is served or requests");
     forget_kinds();
     for (int t = 0; t < 10 * MINUTE; t++) {
         hear_request(n, 0, ALL_PARTS);
@@ -158,7 +158,7 @@ static void pushed(void)
     for (int t = 0; t < MINUTE; t++) {
         tick();
     }
-    check(kinds[REQUESTED] == 1, "until somebody says to have it");
+    check(kinds[REQUESTED] == 1, "until another robot advertises it");
 }
 
 /* Flash that holds nothing any more is not asked for, nor written, without end; the store that does is used. */
@@ -173,7 +173,7 @@ static void worn_out(void)
     worn_stores = 3;
     serve(PROGRAMS - 1, 1000);
     changes = 0;
-    check(serve(PROGRAMS - 1, 4000) == 0 && changes == 0, "who has no store that changes asks for nothing");
+    check(serve(PROGRAMS - 1, 4000) == 0 && changes == 0, "a robot without a writable store requests nothing");
     worn_stores = 0;
     check(serve(PROGRAMS - 1, 4000) == 0, "until the next start");
     boot();
@@ -216,7 +216,7 @@ static void stuck_bits(void)
     changes = 0;
     hear_advertisement(programs[THIRD].facts, true);
     check(!Sys_Activate_Update(3) && !Sys_Offer_Activation(3) && changes == 0,
-          "nor is it tried each time that somebody says so");
+          "nor is it tried at each advertisement");
     stuck_flags = 0;
     check(!Sys_Activate_Update(3) && Sys_Start_Update() == 1 && Sys_Activate_Update(3), "but at the next start");
     changes = 0;

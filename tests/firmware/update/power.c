@@ -1,5 +1,5 @@
-/* The stores of io/update on cells in RAM whose power fails at the operation that the test says: it has not happened, has
- * happened, or has changed some of its bits. Printed are figures; any failure ends with status 1. */
+/* The stores of io/update on cells in RAM whose power fails at the operation that the test says: it has not
+ * happened, has happened, or has changed some of its bits. Printed are figures; any failure ends with status 1. */
 #include "update.c"
 
 #include <setjmp.h>
@@ -137,7 +137,7 @@ static uint16 start(void)
 {
     reboot();
     uint16 version = Sys_Start_Update();
-    check(version == ran, "the version that is told is the one that was called");
+    check(version == ran, "the returned version is the one that was called");
     return version;
 }
 
@@ -163,8 +163,8 @@ static cells empty(void)
     return all;
 }
 
-/* Power fails at operation `first` of an update from `old` to `old` + 1 (0: firmware alone), then at `second` of the start.
- * How often it did: an update and a start have only so many. */
+/* Power fails at operation `first` of an update from `old` to `old` + 1 (0: firmware alone), then at `second` of the
+ * start. How often it did: an update and a start have only so many. */
 static int fails_twice(const cells *before, uint16 old, int first, int first_mode, int second, int second_mode)
 {
     volatile bool is_cut = false, is_cut_again = false;
@@ -232,7 +232,7 @@ static void roll_back(void)
     for (uint8 row = 0; row < facts.rows; row++) {
         sys_update old = facts_of(1), large = {9, HAL_UPDATE_ROWS + 1, 0};
         check(!Sys_Begin_Update(&old) && !Sys_Begin_Update(&large), "neither is taken");
-        check(Sys_Put_UpdateRow(row, images[2][row]), "what was begun goes on");
+        check(Sys_Put_UpdateRow(row, images[2][row]), "the update in progress continues");
     }
     check(Sys_End_Update(), "ended");
     check(start() == 1, "not before it is activated");

@@ -151,7 +151,7 @@ static void deliver(int number, int reach, int now, int loss)
     }
 }
 
-/* What of the rows of version 7 somebody asks for who never gets on; true: it is time to. */
+/* Request of a robot that never makes progress, for rows of version 7; true: it is due. */
 static bool nag(robot *who, int now, uint8 *m)
 {
     sys_update facts = robots[0].have;
@@ -164,7 +164,7 @@ static bool nag(robot *who, int now, uint8 *m)
     return ask(m);
 }
 
-/* A robot whose turn it is says what it has to say, unless it hears somebody. */
+/* A robot whose turn it is sends its message, unless it receives another robot. */
 static bool speak(int n, int number, int reach, int now)
 {
     bool is_busy = now < robots[n].waits_until || now < robots[n].sends_until;
@@ -187,7 +187,7 @@ static bool speak(int n, int number, int reach, int now)
     return speaks;
 }
 
-/* Who is first at the medium is chance, in each moment anew. */
+/* The first robot on the medium is drawn at each moment. */
 static void shuffle(int *order, int number)
 {
     for (int n = number - 1; n > 0; n--) {
@@ -278,7 +278,7 @@ static void trial(const scenario *s)
     }
 }
 
-/* Messages of chance: nothing breaks, and the program that works goes on. */
+/* Random messages: nothing breaks, and the program that works continues. */
 static void babble(void)
 {
     enter(1);

@@ -35,7 +35,7 @@ def test_a_program_of_all_that_c_has_runs_in_the_slot(image):
 
 
 def test_firmware_that_offers_fewer_calls_is_left_in_peace(image):
-    """It would call what is not there: three starts later the firmware goes on without it."""
+    """A program with unknown kernel calls resets; after three starts the firmware runs without it."""
     machine = emu.load(image("programs", TARGET_APPS))
     machine.program.put(CALLS, machine.program.word(CALLS) - 1)
     said = bytearray()

@@ -11,6 +11,7 @@ import tty
 from pathlib import Path
 
 import pytest
+from openswarm.flashing.talk import RobotError
 
 import emu
 from emu.image.loader import load_image
@@ -19,7 +20,6 @@ from openswarm.cli import main
 from openswarm.flashing.messages import framed, unframed
 from openswarm.flashing.program import SLOT, Program, program_of
 from openswarm.flashing.spreading import Neighbour
-from openswarm.flashing.talk import RobotError
 from tests.firmware.radio import SLICE, Line
 
 ROWS = 3
@@ -54,7 +54,7 @@ def programs(tmp_path_factory: pytest.TempPathFactory) -> dict[int, Path]:
 
 @pytest.fixture
 def robot(image) -> Machine:
-    """One that has no program, and sees nobody."""
+    """A robot without a program and without neighbours."""
     return emu.load(image("spreading"))
 
 
@@ -116,7 +116,7 @@ def test_a_robot_that_falls_silent_is_told(robot, programs):
 
 
 def test_damaged_frames_are_none():
-    """Every byte of a frame changed, and left out."""
+    """Change, and omit, every byte of a frame."""
     frame = framed(bytes([0x80, 0, 0, 3, 0, 9, 0, 0]))[1:-1]
     assert unframed(frame) == bytes([0x80, 0, 0, 3, 0, 9, 0, 0])
     for at in range(len(frame)):

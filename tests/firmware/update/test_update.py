@@ -114,7 +114,7 @@ def rows_of(version: int) -> bytes:
 
 
 class Robot:
-    """One that is told what to do through its RAM."""
+    """A robot that takes commands through its RAM."""
 
     def __init__(self, machine: Machine) -> None:
         self.machine = machine

@@ -86,7 +86,7 @@ cpu_open:
 
 ; ---- Saves the running thread, runs Z on the kernel stack, resumes the thread it returns; level slice ------------
 ; The library's own prologue and epilogue of functions (-mcall-prologues) push and pop r2-r17, r28 and r29: Z = where the first
-; goes on with Y = SP, r30 = bytes the second gives back behind Y.
+; continues with Y = SP, r30 = bytes that the second frees above Y.
 leave_thread:
         movw    r22, r30
         ldi     r26, 0

@@ -189,7 +189,7 @@ static void handlers_that_subscribe_each_other_anew(void)
     for (uint8 i = 1; i <= 3; i++) {
         CHECK(Sys_Send_IntEvent(E1, 0));
         Sys_Yield();
-        CHECK(heard == i); /* who is subscribed anew hears the next one */
+        CHECK(heard == i); /* a handler subscribed again gets the next message */
     }
     CHECK(Sys_Unregister_Event(E1));
 }

@@ -36,7 +36,7 @@ static void registration(void)
     CHECK(!Sys_IsEventRegistered(E1) && !Sys_Send_IntEvent(E1, 1) && Sys_Get_LastError() == SYS_ERROR_EVENT);
     CHECK(Sys_Register_Event(E1) && Sys_Register_Event(E1) && Sys_IsEventRegistered(E1));
     uint16 with = heap_now();
-    CHECK(Sys_Send_IntEvent(E1, 1)); /* nobody listens: nothing is stored */
+    CHECK(Sys_Send_IntEvent(E1, 1)); /* no listener: nothing is stored */
     CHECK(heap_now() == with);
     CHECK(!Sys_Subscribe_to_Event(E1, 0, NULL, NULL) && Sys_Get_LastError() == SYS_ERROR_ARGUMENT);
     CHECK(!Sys_Subscribe_to_Event(E_NEVER, 0, count, NULL) && Sys_Get_LastError() == SYS_ERROR_EVENT);

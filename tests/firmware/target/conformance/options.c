@@ -28,7 +28,7 @@ static void spin(void *unused)
 static void spend(uint16 ms)
 {
     uint32 before = Sys_Get_SystemTime();
-    for (uint16 i = 0; i < 60000 && Sys_Get_SystemTime() - before < ms; i++) { /* on some hosts it stands still in a section */
+    for (uint16 i = 0; i < 60000 && Sys_Get_SystemTime() - before < ms; i++) { /* on some hosts time stops in a section */
     }
 }
 
@@ -192,7 +192,8 @@ static void schedulers_change_under_a_mutex(void)
     }
 }
 
-/* ---- Join and cleanup ---------------------------------------------------------------------------------------------- */
+/* ---- Join and cleanup
+ * ---------------------------------------------------------------------------------------------- */
 
 static void brief(void *unused)
 {
@@ -294,7 +295,7 @@ static void push_again(void *ms)
     Sys_Sleep(*(const uint16 *)ms);
 }
 
-/* One that pushes itself anew, blocks, ends sections that are not its own, kills the thread that is dying. */
+/* Cleanups that push themselves again, block, end sections of others, kill the ending thread. */
 static void hostile_cleanups(void)
 {
     static const uint16 soon = 1, never = 60000;
@@ -356,7 +357,7 @@ static void quotas_bound_what_waits(void)
     CHECK(last == 7 && quota_too.dropped == 1 && Sys_Unregister_Event(E1));
 }
 
-/* Set twice, its event unregistered and registered anew between two others of the same bucket. */
+/* Set twice, its event unregistered and registered again between two others of the same bucket. */
 static void quotas_come_and_go(void)
 {
     uint16 heap = heap_now();
@@ -441,7 +442,7 @@ static void services_are_started_anew(void)
     begins = 0;
     CHECK(Sys_Start_Service(&storm));
     uint16 heap = heap_now();
-    Sys_Sleep(200); /* it ends and begins all the time, and others go on */
+    Sys_Sleep(200); /* it ends and restarts all the time, and others continue */
     uint16 pid = start(spin, NULL, 0);
     spins = 0;
     Sys_Sleep(50);

@@ -118,7 +118,7 @@ static void subscribe_to_gathering(uint16 k)
     expect(subscribe(GATHERING, victim_pid, handlers[k], NULL));
 }
 
-/* Where whoever measures lets the numbers of threads begin again at 0: all of those that live are taken then. */
+/* Here the measuring test lets PIDs restart at 0, where the PIDs of all living threads are in use. */
 __attribute__((noinline, used)) static void numbers_are_round(void)
 {
     __asm__ volatile("");

@@ -1,4 +1,4 @@
-/* Stores a program that was built beside it, starts it, and goes on. */
+/* Stores a program that was built beside it, starts it, and continues. */
 #include <openswarm.h>
 
 #include "talker.h"

@@ -1,4 +1,4 @@
-/* The Kilobot's infrared, told through RAM what to say; what arrives is left in variables (test_kilobots.py). */
+/* The Kilobot's infrared: the test sets messages in RAM and reads received ones from variables (test_kilobots.py). */
 #include <openswarm.h>
 #include <openswarm_infrared.h>
 #include <openswarm_remote.h>

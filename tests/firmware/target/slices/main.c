@@ -1,5 +1,5 @@
-/* Three threads that never yield, a handler that takes long, one that resends for ever, a storm of events and an echo of
- * what UART1 receives; who runs when is watched from outside. */
+/* Three threads that never yield, a handler that takes long, one that resends for ever, a storm of events and an
+ * echo of what UART1 receives; the test observes the running thread from outside. */
 #include <openswarm.h>
 #include <p30F6014A.h>
 

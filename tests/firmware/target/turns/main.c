@@ -1,4 +1,4 @@
-/* Equal threads that never yield, beside one that waits: who runs when is counted here and watched from outside. */
+/* Equal threads that never yield, beside one that waits: running threads are counted here and observed from outside. */
 #include <openswarm.h>
 
 enum { SPINNERS = 8, SLICES, SLEEPER_WOKEN_FIRST, SLEEPER_ROUND_ROBIN };

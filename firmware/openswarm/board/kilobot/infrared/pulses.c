@@ -52,7 +52,7 @@ void pulses_prepare(uint16 first_alarm)
     pulses_gain(true);
     ADCSRB = 1 << ADTS0; /* the comparator starts conversions */
     ADCSRA = 1 << ADEN | 1 << ADATE | CLOCK_OF_ADC;
-    OCR1A = first_alarm; /* T1 stands at 0 until the kernel starts it */
+    OCR1A = first_alarm; /* T1 is 0 until the kernel starts it */
     TIMSK1 |= 1 << OCIE1A;
 }
 

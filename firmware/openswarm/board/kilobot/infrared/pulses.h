@@ -19,7 +19,7 @@ void pulses_emitter(bool is_output);
 void pulses_flash(void); /* a one: 1.1 us of light */
 
 enum {
-    PULSES_SATURATED = 900, /* counts of high gain: what is more is told by low gain, above the next number */
+    PULSES_SATURATED = 900, /* counts of high gain; stronger pulses use low gain, encoded above the next number */
     PULSES_LOW_GAIN = 1024
 };
 void pulses_gain(bool is_high); /* of the pulses to come */

@@ -1,5 +1,5 @@
-/* EXTI0, which nothing on the board uses: a vector table in RAM leads it to the test. The harness pends it from outside, by
- * a CPU that stands at a boundary and executes one store. */
+/* EXTI0, which nothing on the board uses: a vector table in RAM leads it to the test. The harness pends it from
+ * outside, by a CPU paused at a boundary that executes one store. */
 #include "../boundaries.h"
 #include "registers.h"
 

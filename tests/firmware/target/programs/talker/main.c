@@ -1,5 +1,5 @@
-/* A program of all that C has: variables with values and without, constants, a table of functions, the library, a handler
- * and a thread that go on when main has returned. */
+/* A program of all that C has: variables with values and without, constants, a table of functions, the library, a
+ * handler and a thread that continue after main has returned. */
 #include <openswarm_io.h>
 #include <stdio.h>
 #include <string.h>
