@@ -52,7 +52,7 @@ class CpuSignals:
 class StateCell:
     """One scalar in the machine's record."""
 
-    __slots__ = ("_view", "index", "cell")
+    __slots__ = ("_view", "cell", "index")
 
     def __init__(self, record: Record, name: str, kind: str, initial: int = 0) -> None:
         self.index: Final = record.reserve(name, kind).index

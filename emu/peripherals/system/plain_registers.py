@@ -42,9 +42,9 @@ def report(chip: Chip, bus: Bus) -> str:
     lines = [
         f"# Registers of the {chip.name}: which are modelled, which are plain",
         "",
-        "This page is the output of `emu.peripherals.system.plain_registers.report(machine.chip, machine.bus)`, checked by",
-        "`tests/emu/peripherals/test_plain.py`. Section numbers are those of the chip reference. A plain register stores",
-        "the bits of its mask; the first access is reported.",
+        "`emu.peripherals.system.plain_registers.report(machine.chip, machine.bus)` generates this page;",
+        "`tests/emu/peripherals/test_plain.py` checks it. Section numbers are those of the chip reference. A plain",
+        "register stores the bits of its mask; the first access is reported.",
         "",
         "| plain register | address | reason |",
         "|---|---|---|",

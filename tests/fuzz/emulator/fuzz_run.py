@@ -17,7 +17,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[3]
 sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "emu" / "loader"), str(ROOT / "tests" / "emu" / "cli")]
 
-from elf_samples import ElfSample, Part, words  # noqa: E402
+from elf_samples import ElfSample, SampleSection, words  # noqa: E402
 from programs import ECHO, HELLO, SPIN, assembled  # noqa: E402
 
 from emu.api import Machine  # noqa: E402
@@ -44,7 +44,8 @@ def attempt(rng: random.Random, engine: str) -> str:
     """Run one image with registers that let it get somewhere; the reason it ended for."""
     code = random_code(rng)
     vectors = [0x100 + 2 * rng.randrange(len(code)) for _ in range(62)]
-    sample = ElfSample([Part(".reset", 0, words(0x040100, 0, *vectors)), Part(".text", 0x100, words(*code))])
+    reset = SampleSection(".reset", 0, words(0x040100, 0, *vectors))
+    sample = ElfSample([reset, SampleSection(".text", 0x100, words(*code))])
     image = parse_image(sample.build(), "fuzz")
     machine = Machine(image.chip, engine=engine, ipl_slip=rng.randrange(2))
     machine.load(image)
