@@ -1,4 +1,4 @@
-"""TransferFunctions execution of calls, jumps between functions, and returns."""
+"""Abstract execution of calls, jumps between functions, and returns."""
 
 from __future__ import annotations
 

@@ -91,7 +91,7 @@ class _FunctionExecution(CallExecution):
     def _arrive(self, target: int, state: AbstractState) -> None:
         block = self.code.blocks[target]
         if block.steps[-1].flow is Return and len(block.steps) <= MAX_RETURN_BLOCK and target not in self.code.heads:
-            self._block(block, state)  # not merge_loops, to keep return states by result
+            self._block(block, state)  # not joined, to keep return states by result
             return
         waiting = self.pending.get(target)
         if waiting is not None and self._enters_other_do_loop(target, waiting, state):
@@ -202,7 +202,7 @@ class _FunctionExecution(CallExecution):
     # -- instructions --------------------------------------------------------------------------------------------
 
     def _block(self, block: Block, state: AbstractState) -> None:
-        """Run a block and hand its state on."""
+        """Execute a block and pass the resulting states to its successors."""
         explorer = self.explorer
         explorer.steps += len(block.steps)
         if explorer.steps > MAX_STEPS:

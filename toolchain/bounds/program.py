@@ -100,7 +100,7 @@ class Program:
         found = {s.name for s in self.image.symbols if s.name.startswith(prefix) and s.value in entries}
         return sorted(found) or [name for name in ("_main",) if self.address(name) in entries]
 
-    # -- what annotations answer ---------------------------------------------------------------------------------------
+    # -- queries of FlowFacts ----------------------------------------------------------------------------------------
 
     def pointers_in_ram(self, pc: int) -> bool:
         """Whether all pointers that the code at an address loads point into RAM."""

@@ -44,7 +44,7 @@ class Bound:
     path: list[str] = field(default_factory=list)
     masked: dict[int, tuple[int, str]] = field(default_factory=dict)
     unbounded: dict[str, str] = field(default_factory=dict)
-    """FunctionGraph without a bound: source line -> reason."""
+    """Code without a bound: source line -> reason."""
     is_endless: bool = False
     masked_for_ever: dict[int, str] = field(default_factory=dict)
     """By level: the endless loop that masks it."""

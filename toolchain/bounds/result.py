@@ -23,7 +23,7 @@ class FunctionResult:
     masked_prefix: dict[int, tuple[int, int]] = field(default_factory=dict)
     """By level: longest masked time, counted from the call, that began before it, and where it ended."""
     unbounded: dict[int, str] = field(default_factory=dict)
-    """FunctionGraph without a bound: address -> reason."""
+    """Code without a bound: address -> reason."""
     endless_loops: set[int] = field(default_factory=set)
     """Heads of endless loops."""
     switch_time: int | None = None

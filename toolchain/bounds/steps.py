@@ -1,4 +1,4 @@
-"""TransferFunctions execution of single instructions: state, cycles, stack depth and masked levels."""
+"""Abstract execution of single instructions: state, cycles, stack depth and masked levels."""
 
 from __future__ import annotations
 

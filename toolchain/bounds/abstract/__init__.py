@@ -1,1 +1,1 @@
-"""TransferFunctions domain: sets of integers, abstract states, and refinement by branch conditions."""
+"""Abstract domain: sets of integers, abstract states, and refinement by branch conditions."""

@@ -25,7 +25,7 @@ _DIFFERENCES = {
     "LTU": [(-_WIDTH, -1)],
     "LEU": [(-_WIDTH, 0)],
 }
-"""Intervals of the difference for which a condition holds.  Conditions that read OV are not refine."""
+"""Intervals of the difference for which a condition holds.  Conditions that read OV are not refined."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,4 +1,4 @@
-"""TransferFunctions state at one program point: registers, stack contents, CPU priority and elapsed cycles."""
+"""Abstract state at one program point: registers, stack contents, CPU priority and elapsed cycles."""
 
 from __future__ import annotations
 

@@ -59,7 +59,7 @@ class CodeExecution:
 
         registers  W0-W14 at the function's entry
         volatile   bytes that may be accessed only where the source accesses them
-        at_end    whether the code has reached the end of the source's path, which is a loop head
+        at_end     whether the code has reached the end of the source's path, which is a loop head
         moved      whether `at_end` is also evaluated before the first instruction
         """
         self.machine.volatile = volatile

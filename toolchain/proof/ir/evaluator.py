@@ -361,7 +361,7 @@ class Evaluator(Effects):
             return self._unchanged(shape, inputs)
         event = Event("asm", plain(code.text), arguments=[(v, value, {}) for v, value in inputs], shape=shape)
         if i.type.kind != "void":
-            event.value = self.of_type(i.type, lambda t: (self.unknown("execute_statement", t.bits), None))
+            event.value = self.of_type(i.type, lambda t: (self.unknown("stated", t.bits), None))
         if shape.memory:
             event.memory = path.memory.copy()
             path.events.append(event)

@@ -55,7 +55,7 @@ def converted(op: str, a: Term, bits: int) -> Term:
     if op in ("sitofp", "uitofp"):
         width = 32 if a.size() <= 32 else 64
         wide = (z3.SignExt if signed else z3.ZeroExt)(width - a.size(), a)
-        unsigned = "" if signed or a.size() < width else "un"  # what fits is positive either run
+        unsigned = "" if signed or a.size() < width else "un"  # a narrower value is positive either way
         return opaque(f"__float{unsigned}{'si' if width == 32 else 'di'}{MODES[bits]}", bits)(wide)
     width = 32 if bits <= 32 else 64
     name = f"__fix{'' if signed else 'uns'}{MODES[a.size()]}{'si' if width == 32 else 'di'}"
