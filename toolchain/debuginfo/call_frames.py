@@ -1,7 +1,7 @@
 """Call frame information: locations of the caller's registers at each instruction of a function (DWARF 2 §6.4).
 
 The canonical frame address (CFA) is the caller's W15 before the call, which is W15-4 at entry because the stack grows
-upwards (abi-elf.md §6.7). `follow` tracks it through the finished code: pushes and pops, LNK and ULNK, arguments,
+upwards (abi-elf.md §6.7). `trace_frames` tracks it through the finished code: pushes and pops, LNK and ULNK, arguments,
 inline assembly.
 """
 
@@ -85,7 +85,7 @@ class CallFrames:
         return f"{label}:"
 
 
-def follow(m: MFunction, prefix: str) -> CallFrames:
+def trace_frames(m: MFunction, prefix: str) -> CallFrames:
     """Frame states of a finished function, by data flow over its blocks."""
     interrupt = bool(m.interrupt)
     blocks = m.block_map()

@@ -19,7 +19,7 @@ RegisterValues = dict[int, int]
 """Register -> number of the value that it contains."""
 
 
-def claim(m: MFunction, rename: Mapping[int, int], group: Mapping[int, int]) -> None:
+def attach_claims(m: MFunction, rename: Mapping[int, int], group: Mapping[int, int]) -> None:
     """Attach claims about variables to every instruction, before virtual registers are renamed.
 
     `rename` maps them to real registers, `group` maps coalesced registers to one number.

@@ -345,7 +345,7 @@ class ModuleCompiler:
         rows = LineTableRows(self.dwarf.info, f, name) if self.options.debug and f.dbg is not None else None
         ranges = LocationLists(str(self.serial))
         emitter = emit.FunctionEmitter(c.m, str(self.serial), self.options.large_code, self.dwarf.info.position)
-        frames = call_frames.follow(c.m, str(self.serial)) if self.options.debug else None
+        frames = call_frames.trace_frames(c.m, str(self.serial)) if self.options.debug else None
         self.lines += emitter.text(rows.mark if rows is not None else no_rows, ranges, frames)
         removed = c.taken - {b.name for b in c.m.blocks}  # no code jumps to them, but their addresses are still values
         self.lines += [f"{block_label(f.name, block)}:" for block in sorted(removed)]

@@ -31,26 +31,26 @@ C compiler, assembler and linker for the dsPIC30F6014A and dsPIC30F4013 (-mcpu=)
   -fsingle-precision-constant   unsuffixed floating constants are float
   -mlarge-code          two-word calls, which reach all of the flash (default -msmall-code: RCALL, +-32 K words)
   -ffile-prefix-map=OLD=NEW   paths that begin with OLD are recorded as NEW (debug information and __FILE__)
-  -mlarge-data          variables may lie anywhere in RAM; those that must be near say so (default -msmall-data:
-                        objects up to 64 bytes are near); -mlarge-scalar and -mlarge-aggregate mean the same here
+  -mlarge-data          only variables with attribute near are near (default -msmall-data: objects up to 64 bytes are
+                        near); -mlarge-scalar and -mlarge-aggregate have the same effect
   -fstack-check         functions with a frame above 8 bytes probe SPLIM on entry
   -fverify-machine      check the code after every pass of the back end (also DSPIC_VERIFY_MACHINE=1)
-  -fsanitize=undefined  undefined behaviour stops at a breakpoint (word DA4000), at the place that does it
+  -fsanitize=undefined  undefined behaviour stops at a breakpoint (word DA4000) in the code that causes it
   -finstrument-functions  call __cyg_profile_func_enter and _exit
   -I -D -U -include -isystem -iquote -std= -W... -w -pedantic   as in gcc; without -std= the language is gnu17
                         with XC16's meaning of `inline` (gnu89: it defines the function); C++ is gnu++17, freestanding
   -MD -MMD -MF -MT -MQ -MP -M -MM                               dependency files, as in gcc
   -L DIR -l NAME        libraries; the run-time library is always searched last
-  -nostdlib -nostartfiles -nodefaultlibs                        leave out run-time library, crt0
-  -Map FILE             link map;  -Wl,OPTION and -Xlinker OPTION hand options to the linker
+  -nostdlib -nostartfiles -nodefaultlibs                        omit the run-time library, crt0
+  -Map FILE             link map;  -Wl,OPTION and -Xlinker OPTION pass options to the linker
   -T FILE               accepted for the device's own linker script p30F6014A.gld, whose memory map is built in
   -Wa,OPTION            accepted for compatibility, as are -msfr-warn= -merrata= -msmart-io= -omf=elf
   -j N                  parallel front-end jobs (default: one per core)
-  -save-temps           keep PROGRAM.ll and PROGRAM.s beside the output
+  -save-temps           keep PROGRAM.ll and PROGRAM.s in the folder of the output
   -v  --version  --help
 
 example: python -m toolchain cc -Os -g -Wall main.c switch.s -o firmware.elf
-exit status: 0 done, 1 errors in the C source, 2 anything else; no output file is left behind after an error
+exit status: 0 done, 1 errors in the C source, 2 other errors; after an error there is no output file
 """
 
 VALUE_FLAGS = {"-I", "-D", "-U", "-include", "-isystem", "-iquote", "-idirafter", "-imacros"}

@@ -23,12 +23,12 @@ def expand(lz: MemoryLegalizer, i: Instr, name: str) -> LegalResult:
     return mathlib.expand(lz, i, base)
 
 
-def _nothing(lz: MemoryLegalizer, i: Instr, name: str) -> LegalResult:
+def _no_code(lz: MemoryLegalizer, i: Instr, name: str) -> LegalResult:
     """No code: hints such as lifetime, assume and prefetch."""
     return None
 
 
-def _first(lz: MemoryLegalizer, i: Instr, name: str) -> LegalResult:
+def _first_operand(lz: MemoryLegalizer, i: Instr, name: str) -> LegalResult:
     """The first operand, for intrinsics that return it."""
     return lz.legal(i.args[0])
 
@@ -355,10 +355,10 @@ def _powi(lz: MemoryLegalizer, i: Instr, name: str) -> LegalResult:
 
 
 FAMILIES: list[tuple[str, Callable[[MemoryLegalizer, Instr, str], LegalResult]]] = [
-    *((n, _nothing) for n in ("lifetime.start", "lifetime.end", "assume", "prefetch", "donothing", "va_end",
+    *((n, _no_code) for n in ("lifetime.start", "lifetime.end", "assume", "prefetch", "donothing", "va_end",
       "invariant", "clear_cache",
                               "sideeffect", "experimental.noalias.scope.decl", "pseudoprobe", "fake.use")),
-    *((n, _first) for n in ("expect", "annotation", "ptr.annotation", "launder.invariant.group", "ssa.copy",
+    *((n, _first_operand) for n in ("expect", "annotation", "ptr.annotation", "launder.invariant.group", "ssa.copy",
                             "strip.invariant.group", "threadlocal.address", "preserve.array.access.index",
                             "preserve.struct.access.index", "arithmetic.fence", "canonicalize")),
     *((n, _minmax) for n in ("smin", "smax", "umin", "umax")),

@@ -288,7 +288,7 @@ class Legalizer(MemoryLegalizer):
             self.store_aggregate(i.args[0], self.result_address, 2, False)
             self.jump("ret", [], [])
             return
-        values = [v for a in i.args for v in self.passed(a)]
+        values = [v for a in i.args for v in self.passed_values(a)]
         if sum(max(1, v.type.bits // 16) for v in values) > ARGUMENT_REGISTERS:
             raise UnsupportedError(f"returning {i.args[0].type} in registers")
         self.jump("ret", values, [])
@@ -317,7 +317,7 @@ class Legalizer(MemoryLegalizer):
         args: list[Value] = []
         attrs: list[ParameterAttributes] = []
         for a, attr in zip(i.args[:-1], i.extra["attrs"], strict=True):
-            parts = self.passed(a)
+            parts = self.passed_values(a)
             args += parts
             attrs += [attr] * len(parts)
         if vectors.is_wide(i.type):
@@ -333,7 +333,7 @@ class Legalizer(MemoryLegalizer):
             return packing.unpack(self.b, new, i.type)
         return self.clean_result(i.type, new)
 
-    def passed(self, a: Value) -> list[Value]:
+    def passed_values(self, a: Value) -> list[Value]:
         """Legal values that an argument or result is passed as."""
         if a.type.kind == "vector" and not vectors.is_wide(a.type):
             return [self.packed(a)]

@@ -7,7 +7,7 @@ from toolchain.mir.mir import MI, MBlock, MFunction
 SP_BIT = 1 << 15
 
 
-def bits(registers: list[int]) -> int:
+def mask_of(registers: list[int]) -> int:
     """The set of the given registers."""
     out = 0
     for r in registers:
@@ -15,7 +15,7 @@ def bits(registers: list[int]) -> int:
     return out
 
 
-def members(mask: int) -> list[int]:
+def registers_in(mask: int) -> list[int]:
     """The registers in a set, in ascending order."""
     out = []
     while mask:
@@ -87,12 +87,12 @@ def remove_dead(m: MFunction) -> None:
             if known.get(b.name) == out[b.name]:
                 continue
             known[b.name] = out[b.name]
-            if drop_dead(b, out[b.name]):
+            if remove_dead_in_block(b, out[b.name]):
                 changed = True
                 gen[b.name], kill[b.name] = summary(b)
 
 
-def drop_dead(b: MBlock, live: int) -> bool:
+def remove_dead_in_block(b: MBlock, live: int) -> bool:
     """Remove dead code from one block and return whether there was any; `live` are the registers live at its end.
 
     Flags are never live across blocks. A second call with the same `live` removes nothing.
@@ -102,7 +102,7 @@ def drop_dead(b: MBlock, live: int) -> bool:
     for mi in reversed(b.insts):
         u, d = mi.register_sets()
         writes = mi.flags_written_set()
-        if (d or writes) and not d & (live | SP_BIT) and not flags & writes and not mi.effect():
+        if (d or writes) and not d & (live | SP_BIT) and not flags & writes and not mi.has_effect():
             continue
         if mi.op == "skip" and not (kept and kept[-1].pred):
             continue

@@ -4,11 +4,11 @@ Registers are ints: 0..15 are W0..W15, larger ones are virtual. A virtual regist
 if `MFunction.pairs` contains it (result of MUL, dividend of DIV.SD).
 
 OPS describes every operation: the operands that it reads and writes, and its effect on flags and memory. Passes use
-`uses`, `defs`, `reads_memory`, `writes_memory` and `effect` instead of the name of the operation.
+`uses`, `defs`, `reads_memory`, `writes_memory` and `has_effect` instead of the name of the operation.
 
 Skips. A skip instruction covers the conditional instructions (`pred`) that follow it directly, up to the first other
 one. The number of covered instructions is not stored. All replacements of a conditional instruction are conditional
-(`replaced`).
+(`replacement`).
 
 Volatile accesses. A memory operand carries the number of the volatile access of the source that it belongs to, 0 for
 plain memory. All words of one access have one number; two accesses never share a number.
@@ -384,13 +384,13 @@ class MI:
         """Whether it writes memory."""
         return "w" in self.info.memory or self._memory("dDbB")
 
-    def effect(self) -> bool:
+    def has_effect(self) -> bool:
         """Whether it has other effects than on registers and flags. A modified pointer counts as an effect."""
         if self.info.fixed or self.info.memory or self.volatile or self._memory("dDbB"):
             return True
         return any(a.__class__ is Mem and a.mode in STEPPING for a in self.args)
 
-    def replaced(self, made: list[MI]) -> list[MI]:
+    def replacement(self, made: list[MI]) -> list[MI]:
         """Return its replacement `made`, conditional if the instruction is conditional."""
         for mi in made:
             mi.pred = self.pred

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 
-from toolchain.mir.liveness import bits, live_out, summary
+from toolchain.mir.liveness import live_out, mask_of, summary
 from toolchain.mir.mir import CC_INVERSE, MI, FileRegister, Imm, MBlock, Mem, MFunction, covered_count
 from toolchain.optimise import block_layout
 from toolchain.optimise.peephole import ALL, AT_RETURN
@@ -110,7 +110,7 @@ def hoist_edge_moves(m: MFunction) -> None:
             moves = edge.insts[:-1]
             if edge.insts[-1].op != "jump" or len(moves) > MAX_HOISTED or not all(_is_neutral(mi) for mi in moves):
                 continue
-            if bits([r for mi in moves for r in mi.defs()]) & live_in(blocks[other], out[other]):
+            if mask_of([r for mi in moves for r in mi.defs()]) & live_in(blocks[other], out[other]):
                 continue
             b.insts[-2:-2] = moves
             edge.insts = edge.insts[-1:]

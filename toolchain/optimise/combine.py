@@ -1,13 +1,15 @@
 """Target-specific rewrites of legal IR, which the middle end does not make.
 
-quotients    x < c becomes x / c == 0 if x / c is computed anyway, so that x need not be live behind the division
-remainders   x - x/c*c becomes x % c again; quotient and remainder of one division share one DIV (isa.md §6.7)
-conditional  x op (c ? y : 0) becomes c ? x op y : x, whose operation is covered by a skip
-selects      selects on one condition are adjacent and share the test
-increments   steps of pointers and counters move behind the last use of the old value, so that both share a register and
-             the step can become a post-increment
-block_steps  steps by the size of a block move before its copy, which advances the pointer
-countdowns   the decrement of `n-- != 0` moves to the test, which its carry decides
+reuse_quotients              x < c becomes x / c == 0 if x / c is computed anyway, so that x need not be live behind the
+                             division
+recover_remainders           x - x/c*c becomes x % c again
+pair_divisions               quotient and remainder of one division share one DIV (isa.md §6.7)
+make_operations_conditional  x op (c ? y : 0) becomes c ? x op y : x, whose operation a skip can cover
+group_selects                selects on one condition are adjacent and share the test
+sink_increments              steps of pointers and counters move behind the last use of the old value, so that both
+                             share a register and the step can become a post-increment
+hoist_block_steps            steps by the size of a block move before its copy, which advances the pointer
+move_countdowns              the decrement of `n-- != 0` moves to the test, which its carry decides
 """
 
 from __future__ import annotations
@@ -33,19 +35,19 @@ def users_of(f: Function) -> dict[int, list[Instr]]:
 
 def combine(f: Function, for_size: bool, for_speed: bool = False) -> None:
     """Apply all rewrites. Needs: legal IR."""
-    quotients(f)
-    conditional(f)
-    selects(f)
-    remainders(f, for_size)
+    reuse_quotients(f)
+    make_operations_conditional(f)
+    group_selects(f)
+    recover_remainders(f, for_size)
     magic.run(f, for_size, for_speed)
     pair_divisions(f)
     induction.run(f)
-    increments(f)
-    block_steps(f)
-    countdowns(f)
+    sink_increments(f)
+    hoist_block_steps(f)
+    move_countdowns(f)
 
 
-def quotients(f: Function) -> None:
+def reuse_quotients(f: Function) -> None:
     """Replace icmp x, c by icmp (x udiv c), 0 in blocks that contain the division."""
     for b in f.blocks:
         divided: dict[tuple[int, int], Instr] = {}
@@ -64,7 +66,7 @@ def quotients(f: Function) -> None:
 NEUTRAL_RIGHT = ("add", "sub", "or", "xor")  # x op 0 is x
 
 
-def conditional(f: Function) -> None:
+def make_operations_conditional(f: Function) -> None:
     """Replace x op select(c, y, 0) by select(c, x op y, x), and its mirror image, if the select has no other use."""
     counts = use_counts(f)
     for b in f.blocks:
@@ -98,7 +100,7 @@ def _conditional(i: Instr, counts: dict[int, int], here: set[int]) -> Instr | No
     return None
 
 
-def selects(f: Function) -> None:
+def group_selects(f: Function) -> None:
     """Move a select down to the next one on the same condition, if no instruction in between uses it."""
     for b in f.blocks:
         last: dict[int, Instr] = {}
@@ -112,7 +114,7 @@ def selects(f: Function) -> None:
                 b.instrs.insert(to - 1, b.instrs.pop(at))
 
 
-def remainders(f: Function, for_size: bool) -> None:
+def recover_remainders(f: Function, for_size: bool) -> None:
     """Replace sub x, (mul (div x, c), c) by rem x, c.
 
     For c = 2^k the product is a shift; there the remainder saves words only, because DIV computes both results."""
@@ -183,7 +185,7 @@ def _share(first: Instr, second: Instr) -> None:
     first.extra["other"] = second
 
 
-def increments(f: Function) -> None:
+def sink_increments(f: Function) -> None:
     """Move the step p + constant of a phi p behind the last use of p."""
     users = users_of(f)
     depths = loop_depths(f)
@@ -219,7 +221,7 @@ def increments(f: Function) -> None:
             _to_last_use(b, i, users)
 
 
-def block_steps(f: Function) -> None:
+def hoist_block_steps(f: Function) -> None:
     """Move p + size before the copy or fill of a block of that size at p, which leaves its pointer there."""
     for b in f.blocks:
         for block in [i for i in b.instrs if i.op in ("blockcopy", "blockfill")]:
@@ -304,7 +306,7 @@ def _named_dominates(idom: dict[str, str], a: str, b: str) -> bool:
     return True
 
 
-def countdowns(f: Function) -> None:
+def move_countdowns(f: Function) -> None:
     """Move y = x - 1 to a branch on x == 0 or x == 1, from its block or a successor that only it reaches."""
     preds = predecessors(f)
     blocks = {b.name: b for b in f.blocks}

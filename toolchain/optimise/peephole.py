@@ -7,11 +7,11 @@ Needs: frames built. No rewrite adds an instruction.
 from __future__ import annotations
 
 from toolchain.abi.target import CALLEE_SAVED, FP, LIT10_BYTE_MAX, LIT10_MAX, SP
-from toolchain.mir.liveness import bits, drop_dead, live_out
+from toolchain.mir.liveness import live_out, mask_of, remove_dead_in_block
 from toolchain.mir.mir import MI, SKIPS, AddressingMode, Imm, MBlock, Mem, MFunction
 from toolchain.optimise import copies
 
-AT_RETURN = bits([*CALLEE_SAVED, 15])
+AT_RETURN = mask_of([*CALLEE_SAVED, 15])
 ALL = 0xFFFF
 # Operations with one result, whose N and Z describe the word or byte that they write.
 SETS_NZ = {"add", "sub", "subr", "addc", "subb", "and", "ior", "xor", "addl", "subl", "andl", "iorl", "xorl",
@@ -54,7 +54,7 @@ def clear_pairs(b: MBlock) -> None:
 def local(b: MBlock, live: int) -> bool:
     """Apply every rewrite once to one block; `live` are the registers live at its end. Return whether it changed."""
     before = len(b.insts)
-    touched = drop_dead(b, live)
+    touched = remove_dead_in_block(b, live)
     touched |= drop_compares(b)
     touched |= compare_while_copying(b)
     touched |= compare_in_place(b, live)

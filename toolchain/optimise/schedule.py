@@ -7,7 +7,7 @@ pass moves an independent instruction between the two. Needs: final instructions
 from __future__ import annotations
 
 from toolchain.abi.target import SP
-from toolchain.mir.liveness import bits
+from toolchain.mir.liveness import mask_of
 from toolchain.mir.mir import MI, SKIPS, STEPPING, Mem, MFunction
 
 WINDOW = 4
@@ -25,8 +25,8 @@ def run(m: MFunction) -> None:
 
 def stalls(first: MI, second: MI) -> bool:
     """Whether `second` stalls for a register that `first` writes."""
-    written = bits(_destination_writes(first))
-    return bool(written & bits(_source_addresses(second)))
+    written = mask_of(_destination_writes(first))
+    return bool(written & mask_of(_source_addresses(second)))
 
 
 def _destination_writes(mi: MI) -> list[int]:
@@ -54,7 +54,7 @@ def _source_addresses(mi: MI) -> list[int]:
 
 def _movable(mi: MI) -> bool:
     """Whether an instruction may be moved: no effects, not covered by a skip, no use of the stack pointer."""
-    if mi.pred or mi.effect() or mi.also_defs or mi.also_uses:
+    if mi.pred or mi.has_effect() or mi.also_defs or mi.also_uses:
         return False
     return all(a != SP and not (isinstance(a, Mem) and a.base == SP) for a in mi.args)
 
@@ -65,8 +65,8 @@ def _independent(a: MI, b: MI) -> bool:
         return False
     if (a.writes_memory() and (b.reads_memory() or b.writes_memory())) or (b.writes_memory() and a.reads_memory()):
         return False
-    da, db = bits(a.defs()), bits(b.defs())
-    if da & db or da & bits(b.uses()) or db & bits(a.uses()):
+    da, db = mask_of(a.defs()), mask_of(b.defs())
+    if da & db or da & mask_of(b.uses()) or db & mask_of(a.uses()):
         return False
     wa, wb = set(a.flags_written()), set(b.flags_written())
     return not (wa & wb or wa & set(b.flags_read()) or wb & set(a.flags_read()))

@@ -20,13 +20,13 @@ import copy
 from toolchain.abi.target import ALLOCATABLE, CALLEE_SAVED, CALLER_SAVED, FP
 from toolchain.debuginfo import variables
 from toolchain.ir.model import UnsupportedError
-from toolchain.mir.liveness import bits, live_out, members, remove_dead
+from toolchain.mir.liveness import live_out, mask_of, registers_in, remove_dead
 from toolchain.mir.mir import FIRST_VIRTUAL, MI, MFunction, PairMove, pair_move
 from toolchain.regalloc.spill import rewrite_spills
 from toolchain.verify import allocation
 
-WORD_COLOURS = bits(list(ALLOCATABLE))
-PAIR_COLOURS = bits([r for r in ALLOCATABLE if r % 2 == 0 and r < 14])
+WORD_COLOURS = mask_of(list(ALLOCATABLE))
+PAIR_COLOURS = mask_of([r for r in ALLOCATABLE if r % 2 == 0 and r < 14])
 REAL = (1 << FIRST_VIRTUAL) - 1
 LOOP_WEIGHT = 8
 EXACT_SPILL_NODES = 300  # up to this many nodes, the best spill candidate is computed again at every step
@@ -43,7 +43,7 @@ class InterferenceGraph:
         self.moves: list[tuple[int, int, int]] = []  # weight, source, destination
         self.cost: dict[int, float] = {}
         self.hints: dict[int, list[tuple[int, int]]] = {}  # node -> (partner, colour offset from the partner)
-        self.pair_mask = bits(sorted(m.pairs))
+        self.pair_mask = mask_of(sorted(m.pairs))
         self._build()
 
     def of_copy(self, m: MFunction) -> InterferenceGraph:
@@ -65,7 +65,7 @@ class InterferenceGraph:
             for mi in reversed(b.insts):
                 live = self._instruction(mi, live, weight)
         for n, mask in list(adjacent.items()):
-            for t in members(mask):
+            for t in registers_in(mask):
                 adjacent[t] = adjacent.get(t, 0) | 1 << n
 
     def _instruction(self, mi: MI, live: int, weight: int) -> int:
@@ -79,7 +79,7 @@ class InterferenceGraph:
             a = mi.args[k]
             if isinstance(a, int):
                 after |= 1 << a
-        d = bits(defs)
+        d = mask_of(defs)
         for r in defs:
             adjacent[r] = adjacent.get(r, 0) | (after | d) & ~(1 << r)
             cost[r] = cost.get(r, 0) + weight
@@ -91,7 +91,7 @@ class InterferenceGraph:
             for offset, word in enumerate(move.words):
                 self.hints.setdefault(word, []).append((move.pair, offset))
                 self.hints.setdefault(move.pair, []).append((word, -offset))
-        return live & ~d | bits(uses)
+        return live & ~d | mask_of(uses)
 
     def find(self, n: int) -> int:
         """The node that a coalesced node was merged into."""
@@ -151,7 +151,7 @@ class InterferenceGraph:
         if thorough and (self._harmless(a, b) or self._harmless(b, a)):
             return True
         significant = (both & REAL).bit_count()
-        for t in members(both & ~REAL):
+        for t in registers_in(both & ~REAL):
             mask = self.adjacent[t]
             shared = mask >> a & 1 and mask >> b & 1
             if self.pressure(t, mask) - (1 if shared else 0) >= self.limit(t):
@@ -163,7 +163,7 @@ class InterferenceGraph:
         trouble = self.adjacent[b] & ~self.adjacent[a]
         if a >= FIRST_VIRTUAL and trouble & REAL:
             return False
-        return all(self.pressure(t, self.adjacent[t]) < self.limit(t) for t in members(trouble & ~REAL))
+        return all(self.pressure(t, self.adjacent[t]) < self.limit(t) for t in registers_in(trouble & ~REAL))
 
     def _merge(self, a: int, b: int) -> None:
         if b < FIRST_VIRTUAL:
@@ -172,7 +172,7 @@ class InterferenceGraph:
         mask = self.adjacent.pop(b)
         self.adjacent[a] |= mask
         bit_a, bit_b = 1 << a, 1 << b
-        for t in members(mask):
+        for t in registers_in(mask):
             self.adjacent[t] = self.adjacent[t] & ~bit_b | bit_a
         self.cost[a] = self.cost.get(a, 0) + self.cost.get(b, 0)
         if b in self.m.temps:
@@ -185,7 +185,7 @@ class InterferenceGraph:
     def simplify(self) -> list[int]:
         """Remove all virtual nodes; returns them in the order of removal."""
         remaining = {n for n in self.adjacent if n >= FIRST_VIRTUAL}
-        active = bits(sorted(remaining)) | REAL
+        active = mask_of(sorted(remaining)) | REAL
         stack: list[int] = []
         ready = [n for n in remaining if self.pressure(n, self.adjacent[n] & active) < self.limit(n)]
         queued = set(ready)
@@ -205,7 +205,7 @@ class InterferenceGraph:
             remaining.discard(n)
             active &= ~(1 << n)
             stack.append(n)
-            for t in members(self.adjacent[n] & active & ~REAL):
+            for t in registers_in(self.adjacent[n] & active & ~REAL):
                 if t not in queued and self.pressure(t, self.adjacent[t] & active) < self.limit(t):
                     queued.add(t)
                     ready.append(t)
@@ -241,11 +241,11 @@ class Colouring:
                 continue
             c = self._choose(n, allowed)
             self.colour[n] = c
-            self.used_saved |= (1 << c | (2 << c if n in self.m.pairs else 0)) & bits(list(CALLEE_SAVED))
+            self.used_saved |= (1 << c | (2 << c if n in self.m.pairs else 0)) & mask_of(list(CALLEE_SAVED))
 
     def _allowed(self, n: int) -> int:
         taken = 0
-        for t in members(self.g.adjacent[n]):
+        for t in registers_in(self.g.adjacent[n]):
             c = self.colour.get(t)
             if c is not None:
                 taken |= (3 if t in self.m.pairs else 1) << c
@@ -277,7 +277,7 @@ class Colouring:
 
     def _best(self, n: int, allowed: int) -> int:
         """The cheapest register: preferably one that need not be saved, and of the parity that the pair needs."""
-        registers = members(allowed)
+        registers = registers_in(allowed)
         if self.m.interrupt:
             return registers[0]
         partners = self.partner.get(n)
@@ -371,7 +371,7 @@ def _apply(m: MFunction, g: InterferenceGraph, colour: dict[int, int]) -> None:
     """Rename registers to their colours, expand pair moves and drop copies of a register to itself."""
     rename = {r: colour[g.find(r)] for r in [*g.adjacent, *g.alias] if g.find(r) in colour}
     if m.bindings:
-        variables.claim(m, rename, {r: g.find(r) for r in rename})
+        variables.attach_claims(m, rename, {r: g.find(r) for r in rename})
     for b in m.blocks:
         out: list[MI] = []
         dropped: dict[int, int] = {}  # values that the dropped copies would have written

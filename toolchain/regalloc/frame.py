@@ -90,7 +90,7 @@ class FrameBuilder:
             out: list[MI] = []
             for mi in b.insts:
                 pushes = _pushes(mi)
-                out += mi.replaced(self._instruction(mi, pushed))
+                out += mi.replacement(self._instruction(mi, pushed))
                 pushed += pushes
             b.insts = out
         self._prologue()

@@ -54,7 +54,7 @@ def _into_low_byte(s: SelectionContext, i: Instr) -> bool:
         if narrow is None or narrow.type.bits != 8 or s.is_leaf(narrow) or s.is_leaf(a):
             continue
         assert isinstance(b, Instr)
-        if not s.single_use(b) or id(b) in s.wanted or not s.same_block(b):
+        if not s.single_use(b) or id(b) in s.register_values or not s.same_block(b):
             continue
         d = s.value_regs(i)
         source = s.source(narrow, i)

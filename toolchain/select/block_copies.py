@@ -33,7 +33,7 @@ def _step_behind(s: SelectionContext, p: Value, size: int, block: Instr) -> Inst
         k = step.args[1] if step.op == "add" and step.args[0] is p else None
         if not isinstance(k, ConstInt) or k.signed != size or not s.same_block(step):
             continue
-        if s.position[id(step)][1] > at or id(step) not in s.wanted or id(step) in s.folded:
+        if s.position[id(step)][1] > at or id(step) not in s.register_values or id(step) in s.folded:
             continue
         if all(u.op == "phi" or not s.same_block(u) or s.position[id(u)][1] > at for u in s.users[id(step)]):
             return step

@@ -129,7 +129,7 @@ def _operation(s: SelectionContext, i: Instr, base: Value, other: Value) -> Inst
     """`other` if it is base op x or 0 - base without another user, so that a skip can cover it; else None."""
     if not isinstance(other, Instr) or other.op not in CONDITIONAL or not s.single_use(other):
         return None
-    if not s.same_block(other) or s.is_leaf(base) or id(other) in s.wanted or i.type.bits not in (8, 16, 32):
+    if not s.same_block(other) or s.is_leaf(base) or id(other) in s.register_values or i.type.bits not in (8, 16, 32):
         return None
     a, b = other.args
     if other.op == "sub" and b is base and isinstance(a, ConstInt) and not a.value:

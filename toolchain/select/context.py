@@ -108,7 +108,7 @@ class SelectionContext(SelectionState):
         """
         if not isinstance(v, Instr) or v.op != "load" or not self.single_use(v) or not self.same_block(v):
             return None
-        if id(v) in self.wanted:
+        if id(v) in self.register_values:
             return None
         if not self.same_block(user):
             return None

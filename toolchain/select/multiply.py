@@ -108,7 +108,7 @@ def _narrow_reg(s: SelectionContext, kind: str, v: Value) -> int:
 
 def _extended_load(s: SelectionContext, v: Value, i: Instr) -> Instr | None:
     """The load of an extended word without another user that may fold into the product; else None."""
-    if not isinstance(v, Instr) or not s.single_use(v) or id(v) in s.wanted or v.args[0].type.bits != 16:
+    if not isinstance(v, Instr) or not s.single_use(v) or id(v) in s.register_values or v.args[0].type.bits != 16:
         return None
     return s.foldable_load(v.args[0], i)
 
@@ -241,7 +241,7 @@ def select_divide(s: SelectionContext, i: Instr) -> None:
     other = i.extra.get("other")
     if isinstance(other, Instr) and id(other) in s.needed:
         s.copy(1 if quotient else 0, s.value_regs(other)[0])
-    if id(i) in s.wanted:
+    if id(i) in s.register_values:
         s.copy(0 if quotient else 1, s.result(i))
 
 

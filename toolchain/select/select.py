@@ -182,7 +182,7 @@ def select_phi(s: FunctionSelector, i: Instr) -> None:
     s.value_regs(i)
 
 
-def select_nothing(s: FunctionSelector, i: Instr) -> None:
+def select_no_code(s: FunctionSelector, i: Instr) -> None:
     """No code: slots are addressed by their users."""
 
 
@@ -205,7 +205,7 @@ HANDLERS: dict[str, Callable[[FunctionSelector, Instr], None]] = {
     "indirectbr": select_indirectbr,
     "unreachable": select_unreachable,
     "phi": select_phi,
-    "slot": select_nothing,
+    "slot": select_no_code,
     "trunc": select_cast_alias,
     "bits": select_cast_alias,
     **arith.HANDLERS,

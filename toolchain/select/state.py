@@ -46,7 +46,7 @@ class SelectionState:
         self.line: str | None = None
         self.registers: dict[int, tuple[int, ...]] = {}
         self.needed: set[int] = set()  # instructions whose value is used, so that they emit code
-        self.wanted: set[int] = set()  # values that are read from their registers
+        self.register_values: set[int] = set()  # values that are read from their registers
         self.users: dict[int, list[Instr]] = {}
         self.position: dict[int, tuple[str, int]] = {}
         self.epoch: dict[int, int] = {}
@@ -91,7 +91,7 @@ class SelectionState:
                         home = i.blocks[k] if i.op == "phi" else block.name
                         if a.op == "phi" or self.position[id(a)][0] != home:
                             self.needed.add(id(a))
-                            self.wanted.add(id(a))
+                            self.register_values.add(id(a))
 
     def new_slot(self, size: int, fixed: int | None = None) -> int:
         """Add an object to the frame and return its number."""
@@ -143,7 +143,7 @@ class SelectionState:
             found = self._assign(v)
             self.registers[id(v)] = found
         self.needed.add(id(v))
-        self.wanted.add(id(v))
+        self.register_values.add(id(v))
         if (isinstance(v, Instr) and v.op in ("trunc", "bits")) or self._is_bool_zext(v):
             assert isinstance(v, Instr)
             self.value_regs(v.args[0])

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from toolchain.abi.target import CALLEE_SAVED, SP
-from toolchain.mir.liveness import bits, members, solve
+from toolchain.mir.liveness import mask_of, registers_in, solve
 from toolchain.mir.mir import MI, MBlock, Mem, MFunction
 from toolchain.verify.error import MachineError
 
-KEPT = bits(list(CALLEE_SAVED))
+KEPT = mask_of(list(CALLEE_SAVED))
 
 
 def undefined_at_entry(m: MFunction, reads: dict[str, int], kill: dict[str, int]) -> int:
@@ -22,7 +22,7 @@ def undefined_at_entry(m: MFunction, reads: dict[str, int], kill: dict[str, int]
 def compare(before: int, after: int) -> None:
     """Raise MachineError if more registers are read before they are written than before the pass."""
     if after & ~before & ~KEPT:
-        names = ", ".join(f"W{r}" for r in members(after & ~before & ~KEPT))
+        names = ", ".join(f"W{r}" for r in registers_in(after & ~before & ~KEPT))
         raise MachineError(f"{names} is read before it is written")
 
 
@@ -44,14 +44,14 @@ def check_saved(m: MFunction, pushed: int, written: int) -> None:
 
     Interrupt functions preserve all registers. `pushed` and `written` are those of all blocks (`summary`).
     """
-    saved = pushed | (bits([0, 1, 2, 3]) if "shadow" in m.interrupt else 0)
+    saved = pushed | (mask_of([0, 1, 2, 3]) if "shadow" in m.interrupt else 0)
     if m.uses_fp:
         saved |= 1 << 14
     lost = written & ~saved & ~(1 << SP) & (KEPT if not m.interrupt else 0xFFFF)
     if m.interrupt and m.blocks[0].insts and any(mi.args and mi.args[0] == "pop w0" for mi in m.blocks[0].insts):
         lost &= ~1  # the prologue saves W0 around its own use
     if lost:
-        names = ", ".join(f"W{r}" for r in members(lost))
+        names = ", ".join(f"W{r}" for r in registers_in(lost))
         raise MachineError(f"{names} must be preserved, but is written and not saved")
 
 
