@@ -121,10 +121,10 @@ def test_without_checkpoints_a_trial_runs_again(tmp_path: Path, image_of: Callab
         seen = {cycle: debugger.to(cycle) for cycle in (3_000_000, 6_000_000, 9_000_000)}
         assert session.checkpoint_count == checkpoints.MAX_CHECKPOINTS
         assert debugger.to(6_000_000) == seen[6_000_000]
-        assert not [text for kind, text in debugger.events if kind == "said" and "run again" in text]
+        assert not [text for kind, text in debugger.events if kind == "said" and "replaying the trial" in text]
         session._checkpoints.discard_after(-1)
         assert debugger.to(3_000_000) == seen[3_000_000]
-        assert [text for kind, text in debugger.events if kind == "said" and "run again" in text]
+        assert [text for kind, text in debugger.events if kind == "said" and "replaying the trial" in text]
         assert session.checkpoint_count > 0, "the replay takes checkpoints"
         assert debugger.to(9_000_000) == seen[9_000_000]
         assert debugger.to(2_999_000) != debugger.to(3_000_001)
