@@ -31,7 +31,7 @@ l{n}:   {how}
 
 
 def _awaits_line(_chance: Chance, n: int) -> str:
-    """Wait for a falling and a rising edge of HREF, seldom and briefly: with PCLK on the same port each read is slow."""
+    """Wait for a falling and a rising edge of HREF, rarely and briefly: with PCLK on the same port reads are slow."""
     return f"""
         mov     _turns, w0
         and     w0, #15, w0

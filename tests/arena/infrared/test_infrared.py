@@ -536,7 +536,7 @@ def test_native_conversions_equal_those_in_python(
     found, asked = [], []
     for native in (False, True):
         if not native:
-            monkeypatch.setattr(Infrared, "answer", lambda _ir, _ready: None)
+            monkeypatch.setattr(Infrared, "set_native_ready", lambda _ir, _is_ready: None)
         else:
             monkeypatch.undo()
         channel, count = OpticalChannel.of(scene), [0]

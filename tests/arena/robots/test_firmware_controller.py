@@ -233,7 +233,7 @@ def test_reaction_refuses_firmware_without_the_word_or_without_wheels(
     assert main(["reaction", "--brain", str(talking_image)]) == 2
     assert "name the word that holds" in capsys.readouterr().err
     assert main(["reaction", "--brain", str(talking_image), "--word", "nothing"]) == 2
-    assert "no word 'nothing' to watch" in capsys.readouterr().err
+    assert "cannot read the word 'nothing'" in capsys.readouterr().err
     assert main(["reaction", "--brain", str(talking_image), "--word", "PORTD"]) == 2
     assert "the firmware stopped: fault" in capsys.readouterr().err
 
