@@ -98,12 +98,12 @@ class Adc(Peripheral):
         self._settings_cache: Final[dict[tuple[int, ...], ConversionSettings]] = {}
         for register in (*self._buffers, self.con2):
             register.set_rule(Rule(StableRegister(register.cell, self._stands.cell), read_stable))
-        places = self._places()
-        self.con1.set_rule(Rule(places, read_stable, write_con1))
-        self.cssl.set_rule(Rule(places, None, write_scan))
-        self.set_event_rule(self._step, Rule(places, fires=fire_round))
+        operands = self._operands()
+        self.con1.set_rule(Rule(operands, read_stable, write_con1))
+        self.cssl.set_rule(Rule(operands, None, write_scan))
+        self.set_event_rule(self._step, Rule(operands, fires=fire_round))
 
-    def _places(self) -> AdcOperands:
+    def _operands(self) -> AdcOperands:
         sfrs, record = self.context.chip.sfrs, self.record
         adon, samp, done = (1 << sfrs["ADCON1"].fields[name][0] for name in ("ADON", "SAMP", "DONE"))
         cells = ("native", "frozen", "sampling", "conversion", "results", "halves", "length", "state", "mark", "half",

@@ -39,7 +39,7 @@ class Port(Peripheral):
         record = self.record
         arrays = ("output", "level", "drive", "analog", "eager", "lazy", "before", "waveform_pins", "constant_levels",
                   "constant_until", "changed")  # fmt: skip
-        places = PortOperands(
+        operands = PortOperands(
             number=self.index,
             implemented=self.context.chip.sfrs[self.lat.name].writable,
             lat=self.lat.cell,
@@ -51,8 +51,8 @@ class Port(Peripheral):
             byte_stream=byte_stream,
             **{name: cell_of(record, f"pins.{name}", self.index) for name in arrays},
         )
-        self.lat.set_rule(Rule(places, None, write_latch))
-        self.port.set_rule(Rule(places, read_port, write_port))
+        self.lat.set_rule(Rule(operands, None, write_latch))
+        self.port.set_rule(Rule(operands, read_port, write_port))
 
     def attach_byte_stream(self, byte_stream: ByteStream, refresh: Callable[[int], bool]) -> None:
         """Let rules read the bytes of an attached waveform from the record; `refresh`: see `Bus.refresh`."""

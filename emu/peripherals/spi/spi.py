@@ -59,12 +59,12 @@ class Spi(Peripheral):
         self._start: Final = self.timestamp("start", NEVER)
         self._bit: Final = self.cell("bit", "I")
         self._step: Final = self.slot("step", self._due)
-        self._places: Final = self._rule_operands()
-        integers, places = self.bus.integers, self._places
-        self.buf.set_rule(Rule(places, writes=push, reads_with_effect=take))
-        self.buf.read_by(lambda: take(integers, places))
+        self._operands: Final = self._rule_operands()
+        integers, operands = self.bus.integers, self._operands
+        self.buf.set_rule(Rule(operands, writes=push, reads_with_effect=take))
+        self.buf.read_by(lambda: take(integers, operands))
         self.buf.written_by(self._push)
-        self.set_event_rule(self._step, Rule(places, fires=fire))
+        self.set_event_rule(self._step, Rule(operands, fires=fire))
 
     def _rule_operands(self) -> SpiOperands:
         sfrs, (port, pin) = self.context.chip.sfrs, self._pins["sdi"]
@@ -98,20 +98,20 @@ class Spi(Peripheral):
     @property
     def word_bits(self) -> int:
         """Word length, 8 or 16 bits (MODE16)."""
-        return int(word_bits(self.bus.integers, self._places))
+        return int(word_bits(self.bus.integers, self._operands))
 
     @property
     def bit_time(self) -> int:
         """Bit time as master in Tcy."""
-        return int(bit_time(self.bus.integers, self._places))
+        return int(bit_time(self.bus.integers, self._operands))
 
     # -- transfers ---------------------------------------------------------------------------------------------------
 
     def _push(self, _old: int, new: int, lanes: int) -> None:
-        push(self.bus.integers, self._places, new, lanes)
+        push(self.bus.integers, self._operands, new, lanes)
 
     def _due(self, due: int) -> None:
-        rules, places = self.bus.integers, self._places
+        rules, operands = self.bus.integers, self._operands
         if self._busy.value:
             out = self._shift.value
             if not self.con["MSTEN"]:
@@ -119,10 +119,10 @@ class Spi(Peripheral):
                 if self.on_slave_word is not None:
                     self.on_slave_word(out, due)
             else:
-                word = int(open_end(rules, places)) if self.exchange is None else self.exchange(out, self.word_bits)
-            finish(rules, places, word)
-        if waits_to_begin(rules, places):
-            begin(rules, places, due, self.bit_time)
+                word = int(open_end(rules, operands)) if self.exchange is None else self.exchange(out, self.word_bits)
+            finish(rules, operands, word)
+        if waits_to_begin(rules, operands):
+            begin(rules, operands, due, self.bit_time)
 
     def clock_word(self, word: int, bit_tcy: int = 16) -> bool:
         """Clock one word through this module as an external master, starting now. Return False if it cannot receive."""
@@ -131,7 +131,7 @@ class Spi(Peripheral):
         if not self.stat["SPIEN"] or self.con["MSTEN"] or self._busy.value or self.is_frozen or not selected:
             return False
         self._reply.value = word
-        begin(self.bus.integers, self._places, self.now + 1, bit_tcy)
+        begin(self.bus.integers, self._operands, self.now + 1, bit_tcy)
         return True
 
     # -- pins --------------------------------------------------------------------------------------------------------

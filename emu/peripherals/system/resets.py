@@ -53,9 +53,9 @@ class Watchdog(Peripheral):
         context.power_mode = lambda: self._mode.value
         fields = context.chip.sfrs["RCON"].fields
         self._swdten, self._sleep = (1 << fields[name][0] for name in ("SWDTEN", "SLEEP"))
-        self._places: Final = power_operands(self.bus.record, context.chip, self._timeout, self._mode.cell)
-        self.clearing: Final = Rule(self._places, fires=clear_watchdog)
-        self.idling: Final = Rule(self._places, fires=idle)
+        self._operands: Final = power_operands(self.bus.record, context.chip, self._timeout, self._mode.cell)
+        self.clearing: Final = Rule(self._operands, fires=clear_watchdog)
+        self.idling: Final = Rule(self._operands, fires=idle)
 
     def stops_in(self, mode: int) -> bool:
         """Never stops: the LPRC runs in every power mode."""
@@ -64,12 +64,12 @@ class Watchdog(Peripheral):
     @property
     def is_enabled(self) -> bool:
         """Whether the watchdog runs: FWDTEN in the configuration word, or SWDTEN."""
-        return bool(any_bit(self.bus.integers, self._places.enables))
+        return bool(any_bit(self.bus.integers, self._operands.enables))
 
     @property
     def stops_devices(self) -> bool:
         """Whether some device stops in Idle."""
-        return bool(any_bit(self.bus.integers, self._places.stops))
+        return bool(any_bit(self.bus.integers, self._operands.stops))
 
     @property
     def period(self) -> int:
@@ -82,7 +82,7 @@ class Watchdog(Peripheral):
     def clear(self, cycle: int) -> None:
         """Handle CLRWDT or PWRSAV in `cycle`: restart counter and prescalers, clear WDTO (§4)."""
         if not self.bus.integers.fire(self.clearing):
-            self._resets.rcon.value &= ~self._places.wdto
+            self._resets.rcon.value &= ~self._operands.wdto
             self._arm(cycle)
 
     def _arm(self, cycle: int) -> None:
@@ -99,7 +99,7 @@ class Watchdog(Peripheral):
         """Record the CPU's power mode: IDLE, SLEEP, or 0 for running."""
         self._mode.value = mode
         if mode:
-            self._resets.rcon.value |= self._sleep if mode == SLEEP else self._places.idle
+            self._resets.rcon.value |= self._sleep if mode == SLEEP else self._operands.idle
 
     def _expired(self, due: int) -> None:
         if self._mode.value in (IDLE, SLEEP):

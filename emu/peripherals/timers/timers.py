@@ -57,12 +57,12 @@ class Timer(Counter):
         self._on_change: Final[list[Callable[[], None]]] = []
         self._listeners: Final = self.cell("listeners", "B")
         """Number of listeners in both lists."""
-        places = self._rule_operands()
-        self.tmr.set_rule(Rule(places, read_count, write_count))
-        self.pr.set_rule(Rule(places, None, write_period))
-        self._places: Final = self._match_places(places)
-        self.con.set_rule(Rule(self._places, None, write_ton))
-        self.set_event_rule(self._match, Rule(self._places, fires=fire_match))
+        operands = self._rule_operands()
+        self.tmr.set_rule(Rule(operands, read_count, write_count))
+        self.pr.set_rule(Rule(operands, None, write_period))
+        self._operands: Final = self._match_operands(operands)
+        self.con.set_rule(Rule(self._operands, None, write_ton))
+        self.set_event_rule(self._match, Rule(self._operands, fires=fire_match))
         self.tmr.computed(self.read)
         self.tmr.written_by(self._tmr_written)
         self.pr.written_by(self._period_written)
@@ -74,7 +74,7 @@ class Timer(Counter):
     def _rule_operands(self) -> TimerOperands:
         cells = ("base", "tick", "period", "before", "phase", "clear_from", "clear_until", "clear_due", "listeners",
                  "frozen")  # fmt: skip
-        places = {name: cell_of(self.record, f"{self.name}.{name}") for name in cells}
+        operands = {name: cell_of(self.record, f"{self.name}.{name}") for name in cells}
         match, line = event_slot(self.record, self._match), self.line.line
         pair = self.con if self.site.kind != "C" else self.register(f"T{self.site.partner}CON")
         return TimerOperands(
@@ -85,14 +85,14 @@ class Timer(Counter):
             t32=1 << self.context.chip.sfrs[pair.name].fields["T32"][0] if self.site.kind != "A" else 0,
             match=match,
             line=line,
-            **places,
+            **operands,
         )
 
-    def _match_places(self, places: TimerOperands) -> MatchOperands:
+    def _match_operands(self, operands: TimerOperands) -> MatchOperands:
         con = self.context.chip.sfrs[self.con.name]
         ton, tcs = (1 << con.fields[name][0] for name in ("TON", "TCS"))
         return MatchOperands(
-            timer=places,
+            timer=operands,
             con=self.con.cell,
             writable=con.writable,
             ton=ton,
@@ -191,7 +191,7 @@ class Timer(Counter):
             self._post(due - 1)
             return
         following, *predicted = next_edges(
-            self.bus.integers, self._places, lambda after, count: waveform.nth_rise(pin, after, count))  # fmt: skip
+            self.bus.integers, self._operands, lambda after, count: waveform.nth_rise(pin, after, count))  # fmt: skip
         self.events.set(self._match, following)
         for cell, value in zip((self.clear_from, self.clear_until, self.clear_due), predicted, strict=True):
             cell.value = value

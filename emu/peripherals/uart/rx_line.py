@@ -65,8 +65,8 @@ class RxQueue:
         self._more: Final = reserve("line.more", "B")
         self._u16: Final = record.u16
         self._u8: Final = record.u8
-        places = (cell_of(record, f"{name}.line.{one.name}") for one in fields(RxQueueOperands))
-        self.places: Final = RxQueueOperands(*places)
+        operands = (cell_of(record, f"{name}.line.{one.name}") for one in fields(RxQueueOperands))
+        self.operands: Final = RxQueueOperands(*operands)
         """Operands for rules."""
         self.backlog: Final[deque[QueuedFrame]] = deque()
         """Frames that do not fit into the record yet."""

@@ -116,8 +116,8 @@ class Uart(Peripheral):
         self._line_free: Final = self.cell("line_free", "Q")
         """First cycle in which the line is free for the next frame."""
         self._line_event: Final = self.events.slot(f"{self.name}.line", self._line_due)
-        self._places: Final = self._rule_operands()
-        self._set_rules(self._places)
+        self._operands: Final = self._rule_operands()
+        self._set_rules(self._operands)
 
     def _rule_operands(self) -> UartOperands:
         sfrs = self.context.chip.sfrs
@@ -135,7 +135,7 @@ class Uart(Peripheral):
             writable=sfrs[self.txreg.name].writable,
             watched=cell_of(self.record, "pins.eager", self._tx_port.index),
             tx_pin=self._tx_pin,
-            line=self.line.places,
+            line=self.line.operands,
             send_slot=event_slot(self.record, self._tx_event),
             receive_slot=event_slot(self.record, self._rx_event),
             line_slot=event_slot(self.record, self._line_event),
@@ -144,16 +144,16 @@ class Uart(Peripheral):
             **{name: cell_of(self.record, f"{self.name}.{name}") for name in cells},
         )
 
-    def _set_rules(self, places: UartOperands) -> None:
+    def _set_rules(self, operands: UartOperands) -> None:
         """Set the rules of registers and events. The register hooks run the same functions without rules on the bus."""
         integers = self.bus.integers
-        self.txreg.set_rule(Rule(places, writes=push))
+        self.txreg.set_rule(Rule(operands, writes=push))
         self.txreg.written_by(lambda _old, new, lanes: self._push(new, lanes))
-        self.rxreg.set_rule(Rule(places, reads_with_effect=pop))
-        self.rxreg.read_by(lambda: pop(integers, places))
-        self.set_event_rule(self._tx_event, Rule(places, fires=fire_send))
-        self.set_event_rule(self._rx_event, Rule(places, fires=fire_receive))
-        self.set_event_rule(self._line_event, Rule(places, fires=fire_line))
+        self.rxreg.set_rule(Rule(operands, reads_with_effect=pop))
+        self.rxreg.read_by(lambda: pop(integers, operands))
+        self.set_event_rule(self._tx_event, Rule(operands, fires=fire_send))
+        self.set_event_rule(self._rx_event, Rule(operands, fires=fire_receive))
+        self.set_event_rule(self._line_event, Rule(operands, fires=fire_line))
 
     def listen(
         self, listener: Callable[[int, int], object], *, part: bool = False, lazy: bool = False
@@ -212,7 +212,7 @@ class Uart(Peripheral):
     @property
     def bit_time(self) -> int:
         """Bit time in Tcy: 16 (BRG + 1)."""
-        return int(bit_time(self.bus.integers, self._places))
+        return int(bit_time(self.bus.integers, self._operands))
 
     @property
     def is_enabled(self) -> bool:
@@ -227,7 +227,7 @@ class Uart(Peripheral):
     # -- transmit ----------------------------------------------------------------------------------------------------
 
     def _push(self, value: int, lanes: int) -> None:
-        push(self.bus.integers, self._places, value, lanes)
+        push(self.bus.integers, self._operands, value, lanes)
 
     def _tx_due(self, due: int) -> None:
         """Handle the end of a sent frame, or start sending a waiting character."""
@@ -238,7 +238,7 @@ class Uart(Peripheral):
             self.deliver_sent()  # loopback disconnects the receive pin only: the frame is sent on TX (§10)
             self._listeners(0 if self.sta["UTXBRK"] else self._frame.value, self._start.value)
         waits = self._tx_count.value > 0
-        send_next(self.bus.integers, self._places, due)
+        send_next(self.bus.integers, self._operands, due)
         if waits:
             start, mode = self._start.value, self.mode.value
             self._pin.log_frame(start, self._wave.value, length(mode), self.bit_time)
@@ -310,15 +310,15 @@ class Uart(Peripheral):
 
     def _receive_frame(self, start: int, data: int, bit_q8: int) -> None:
         """Sample a frame whose start bit begins in cycle `start`; `bit_q8` is the sender's bit time in Tcy/256."""
-        mode, rules, places = self.mode.value, self.bus.integers, self._places
+        mode, rules, operands = self.mode.value, self.bus.integers, self._operands
         wave, bits, stop = pack(mode, data), length(mode), first_stop(mode)
         if data & PARITY_ERROR and has_parity(mode):
             wave ^= 1 << stop - 1
         if data & (FRAMING_ERROR | BREAK):
             wave &= 0 if data & BREAK else (1 << stop) - 1
         tick = self.brg.value + 1
-        sampled = wave if not bit_q8 else sample(wave, bits, edge(rules, places, start, tick) - start, tick, bit_q8)
-        schedule_frame(rules, places, start, wave, sampled, bit_q8 or self.bit_time << 8)
+        sampled = wave if not bit_q8 else sample(wave, bits, edge(rules, operands, start, tick) - start, tick, bit_q8)
+        schedule_frame(rules, operands, start, wave, sampled, bit_q8 or self.bit_time << 8)
         self._receiving.value = COMING
         if start > self.now:
             self.events.set(self._rx_event, start)
@@ -328,16 +328,16 @@ class Uart(Peripheral):
     def _rx_due(self, due: int) -> None:
         rules = self.bus.integers
         if self._receiving.value != COMING:
-            receive(rules, self._places)
+            receive(rules, self._operands)
             return
-        begin(rules, self._places)
+        begin(rules, self._operands)
         if self.mode["ABAUD"]:
             self._edge_bit.value = 0
             self.events.set(self._edge_event, due)
 
     def _show_top(self) -> None:
         """Set URXDA, PERR and FERR for the character at the top of the FIFO (§10.2)."""
-        self.sta.value = int(shown(self._places, self.sta.value, self._rx_count.value, self._rx[0]))
+        self.sta.value = int(shown(self._operands, self.sta.value, self._rx_count.value, self._rx[0]))
 
     def _edge_due(self, due: int) -> None:
         """Pass the edges of the RX pin to the capture module (autobaud), starting with the start bit."""
