@@ -1,8 +1,8 @@
-/* The allocator against a model that knows every byte, and what a burst leaves of the heap. */
+/* The allocator compared with a model of every byte, and the heap's state after bursts. */
 #include "test.h"
 
 enum {
-    SMALLEST = 3 * sizeof(void *), /* what heap_alloc() may be asked for */
+    SMALLEST = 3 * sizeof(void *), /* minimum size of heap_alloc() */
     BLOCKS = 200,
     HISTORY = 120000
 };
@@ -59,7 +59,7 @@ static void release(held_block *b)
     b->at = NULL;
 }
 
-/* A piece of memory is found whenever the contract says so, and never otherwise. */
+/* Allocates a block; fails if and only if the contract permits it. */
 static void obtain(held_block *b, uint16 asked, bool stays, uint8 fill)
 {
     uint16 gap = largest_gap();
@@ -83,7 +83,7 @@ static uint16 model_use(void)
     return use;
 }
 
-TEST(random_histories_agree_with_a_model, "memory.c: no overlap, nothing lost, found whenever a free piece is long enough")
+TEST(random_histories_agree_with_a_model, "memory.c: no overlap, no loss, success whenever a free block is long enough")
 {
     uint16 peak = 0;
     heap_init();
@@ -111,15 +111,15 @@ TEST(random_histories_agree_with_a_model, "memory.c: no overlap, nothing lost, f
         heap_coalesce();
         unsettled = false;
         held_block all;
-        obtain(&all, SYS_HEAP, false, 0); /* every piece has grown together again */
+        obtain(&all, SYS_HEAP, false, 0); /* all free blocks are merged again */
         CHECK_EQ(all.size, SYS_HEAP);
         release(&all);
     }
     CHECK(peak > SYS_HEAP / 2);
-    exit(0); /* there is no kernel whose lists could be looked at */
+    exit(0); /* there is no kernel whose lists could be checked */
 }
 
-TEST(exhaustion_is_an_error_and_everything_can_be_had_again, "engines.md §6: bounded, deterministic allocator")
+TEST(exhaustion_is_an_error_and_all_memory_can_be_allocated_again, "engines.md §6: bounded, deterministic allocator")
 {
     static void *blocks[4096];
     boot();
@@ -143,8 +143,8 @@ TEST(exhaustion_is_an_error_and_everything_can_be_had_again, "engines.md §6: bo
     }
 }
 
-/* What a robot does for long: events and subscriptions come and stay, some of them in bursts of messages, threads come and
- * go. Then all threads and messages end. */
+/* What a robot does for long: events and subscriptions come and stay, some of them in bursts of messages, threads
+ * come and go. Then all threads and messages end. */
 enum { THREAD = 48 * HEAP_STEP, LASTING = 40, QUEUED = 120, RUNNING = 12, ROUNDS = 40 };
 
 static void a_long_day(held_block lasting[], held_block queued[], held_block running[])
@@ -183,7 +183,7 @@ static void release_all(held_block blocks[], int n)
     }
 }
 
-TEST(what_stays_gathers_low, "memory.c, heap_alloc_lasting: else events strewn over the heap leave no room for threads")
+TEST(long_lived_blocks_gather_low, "memory.c, heap_alloc_lasting: events scattered over the heap would leave no room for threads")
 {
     static held_block lasting[LASTING], queued[QUEUED], running[RUNNING];
     long room = 0, threads = 0;
@@ -225,7 +225,7 @@ static bool ignore(uint16 pid, uint16 event, sys_event_data *data)
     return true;
 }
 
-TEST(an_event_registered_in_a_burst_costs_one_thread_at_most, "once cut the capacity from 20 threads to 4")
+TEST(an_event_registered_in_a_burst_costs_one_thread_at_most, "without low placement 20 threads would become 4")
 {
     boot();
     Sys_Register_Event(E1);
@@ -235,7 +235,7 @@ TEST(an_event_registered_in_a_burst_costs_one_thread_at_most, "once cut the capa
         for (uint16 i = 0; i < burst; i++) {
             Sys_Send_IntEvent(E1, i);
         }
-        Sys_Register_Event((uint16)(E4 + burst)); /* in the midst of the messages */
+        Sys_Register_Event((uint16)(E4 + burst)); /* among the messages */
         for (uint16 i = 0; i < burst; i++) {
             Sys_Send_IntEvent(E1, i);
         }

@@ -1,4 +1,4 @@
-/* Who may make which call, and what the caller hears of a refusal (openswarm.h). */
+/* Permitted contexts of each call, and the reported errors of refused calls (openswarm.h). */
 #include "test.h"
 
 static sys_event_data *refused_wait;
@@ -124,7 +124,7 @@ static bool handler_fails(uint16 pid, uint16 id, sys_event_data *data)
     return true;
 }
 
-TEST(the_last_error_is_that_of_who_asks, "openswarm.h: Sys_Get_LastError")
+TEST(the_last_error_is_that_of_the_caller, "openswarm.h: Sys_Get_LastError")
 {
     boot();
     Sys_Register_Event(E1);

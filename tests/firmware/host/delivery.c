@@ -1,4 +1,4 @@
-/* Delivery: subscriptions that change under it, and when it happens (kernel.md §2, openswarm.h). */
+/* Delivery: subscriptions that change during a delivery, and its time (kernel.md §2, openswarm.h). */
 #include "test.h"
 
 static bool once(uint16 pid, uint16 id, sys_event_data *data)
@@ -40,7 +40,7 @@ TEST(an_event_may_be_unregistered_by_its_own_handler, "openswarm.h: messages are
     CHECK_EQ(Sys_Get_LastError(), SYS_ERROR_EVENT);
 }
 
-TEST(a_handler_that_returns_false_is_unsubscribed, "kernel.md §1: false = unsubscribe me")
+TEST(a_handler_that_returns_false_is_unsubscribed, "kernel.md §1: false unsubscribes the handler")
 {
     boot();
     Sys_Register_Event(E1);
@@ -98,7 +98,7 @@ static bool subscribe_another(uint16 pid, uint16 id, sys_event_data *data)
     return true;
 }
 
-TEST(who_subscribes_during_a_delivery_hears_the_next_message, "openswarm.h: Sys_Subscribe_to_Event")
+TEST(a_handler_subscribed_during_a_delivery_gets_the_next_message, "openswarm.h: Sys_Subscribe_to_Event")
 {
     boot();
     Sys_Register_Event(E1);
@@ -121,7 +121,7 @@ static bool register_anew(uint16 pid, uint16 id, sys_event_data *data)
     return true;
 }
 
-TEST(an_event_registered_anew_by_its_handler_begins_anew, "openswarm.h: Sys_Unregister_Event")
+TEST(an_event_registered_again_by_its_handler_is_new, "openswarm.h: Sys_Unregister_Event")
 {
     boot();
     Sys_Register_Event(E1);
@@ -141,7 +141,7 @@ static bool resubscribe_and_hold(sys_event_data *data)
     return true;
 }
 
-TEST(a_condition_that_subscribes_its_handler_anew_hears_the_next_message, "openswarm.h: Sys_Subscribe_to_Event")
+TEST(a_condition_that_subscribes_its_handler_again_gets_the_next_message, "openswarm.h: Sys_Subscribe_to_Event")
 {
     boot();
     Sys_Register_Event(E1);
@@ -152,7 +152,7 @@ TEST(a_condition_that_subscribes_its_handler_anew_hears_the_next_message, "opens
     CHECK_EQ(rounds_of_two[0], 1);
 }
 
-TEST(an_event_nobody_listens_to_allocates_nothing, "kernel.md §2")
+TEST(an_event_without_listeners_allocates_nothing, "kernel.md §2")
 {
     boot();
     Sys_Register_Event(E1);

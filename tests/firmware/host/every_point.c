@@ -1,5 +1,5 @@
-/* Sweeps: one scenario that uses every structural call, with a preemption at each unlock, with an interrupt that sends at
- * each unlock, and with the k-th allocation failing for each k. */
+/* Sweeps: one scenario that uses every structural call, with a preemption at each unlock, with an interrupt that
+ * sends at each unlock, and with the k-th allocation failing for each k. */
 #include "test.h"
 
 static int delivered, sent_extra, worker_rounds;

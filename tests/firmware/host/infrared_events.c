@@ -24,7 +24,7 @@ static void begin_sharing(uint8 hops)
     CHECK(Sys_Subscribe_to_Event(ALARM, 0, on_alarm, NULL));
 }
 
-/* What another robot sends when the event is sent there. */
+/* Records the frame of another robot on which the event is sent. */
 static void record_as(uint16 number, const char *text, recording *r)
 {
     CHECK(Sys_Set_RobotNumber(number));
@@ -88,7 +88,7 @@ TEST(events_are_passed_on_as_far_as_their_hops, "hop limit, counted down; the fi
     CHECK_EQ(Sys_Get_RemoteStatistics()->passed_on, 1);
 }
 
-TEST(who_does_not_share_passes_on_only, "the number is known to those who share it alone")
+TEST(robots_that_do_not_share_only_forward, "the number is known to those who share it alone")
 {
     recording r;
     begin_sharing(3);
@@ -109,7 +109,7 @@ TEST(a_duplicate_is_forgotten_in_the_end, "a memory of fixed size: SYS_REMOTE_ME
     }
     alarms = 0;
     for (uint16 i = 0; i <= SYS_REMOTE_MEMORY; i++) {
-        while (alarms != i + 1) { /* a robot that says something itself hears nothing */
+        while (alarms != i + 1) { /* a robot that sends cannot receive */
             hear(&all[i]);
         }
         hear(&all[i]);

@@ -165,12 +165,12 @@ TEST(the_own_proximity_costs_no_frame,
         }
         play(&r, 3, scans % 2 ? 200 : 7);
         Sys_Yield();
-        CHECK_EQ(messages + (Sys_Get_InfraredStatistics()->sent != before), scans + 1); /* it talks itself sometimes */
+        CHECK_EQ(messages + (Sys_Get_InfraredStatistics()->sent != before), scans + 1); /* the robot itself sends sometimes */
         messages = scans + 1;
     }
 }
 
-TEST(short_light_begins_nothing, "swarmcom.md 4.2: proximity of others is three scans of light")
+TEST(short_light_begins_no_frame, "swarmcom.md 4.2: proximity of others is three scans of light")
 {
     begin_link();
     for (unsigned length = 1; length <= 4; length++) {
@@ -183,7 +183,7 @@ TEST(short_light_begins_nothing, "swarmcom.md 4.2: proximity of others is three 
     CHECK(Sys_Get_InfraredStatistics()->false_starts >= 2);
 }
 
-TEST(ones_in_the_middle_of_a_frame_begin_nothing,
+TEST(ones_in_the_middle_of_a_frame_begin_no_frame,
      "a beginning is 18 scans of light; who takes eight ones for it reads on over the beginning of the next frame")
 {
     recording r;
@@ -203,7 +203,7 @@ TEST(ones_in_the_middle_of_a_frame_begin_nothing,
     CHECK_EQ(Sys_Get_InfraredStatistics()->damaged, 0);
 }
 
-TEST(light_that_stays_is_the_rooms, "swarmcom.md 8, 13: steps of the room's light, a neighbour's emitter stuck on")
+TEST(lasting_light_becomes_the_background, "swarmcom.md 8, 13: steps of the room's light, a neighbour's emitter stuck on")
 {
     recording r;
     begin_link();
@@ -246,7 +246,7 @@ TEST(the_queue_is_bounded, "fixed pool of SYS_INFRARED_QUEUE frames; openswarm_i
     CHECK_EQ(heap_now(), heap);
 }
 
-TEST(nobody_speaks_while_others_do, "carrier sense: listen before talking, back-off behind others' frames")
+TEST(robots_listen_before_they_send, "carrier sense: listen before talking, back-off behind others' frames")
 {
     recording r;
     begin_link();
@@ -370,7 +370,7 @@ TEST(neighbours_are_seen_and_lost, "a table of fixed size with ageing: the oldes
     CHECK_EQ(Sys_Get_Neighbours(near, SYS_NEIGHBOURS), 0);
 }
 
-TEST(a_number_is_drawn_again_when_somebody_else_has_it, "random numbers with conflict detection; a fixed one is kept")
+TEST(a_number_is_drawn_again_on_a_conflict, "random numbers with conflict detection; a fixed one is kept")
 {
     recording r;
     uint16 drawn;
@@ -416,13 +416,13 @@ static bool feel(uint16 pid, uint16 id, sys_event_data *data)
     return true;
 }
 
-/* A scan with something in front of sensor 3 that reflects the own light. */
+/* A scan with an object in front of sensor 3 that reflects the robot's own light. */
 static void scan_near(uint16 others)
 {
     scan_with(3, (uint16)((own_light ? 205 : 0) + others));
 }
 
-TEST(proximity_goes_on_between_frames, "analog.h: mm every 50 ms; not while others light up")
+TEST(proximity_is_measured_between_frames, "analog.h: mm every 50 ms; not while others light up")
 {
     begin_link();
     CHECK(Sys_Subscribe_to_Event(SYS_IO_PROXIMITY, 0, feel, NULL));
@@ -475,7 +475,7 @@ TEST(any_light_is_survived, "random readings for a minute: no state is left for 
     }
     scans_in_the_dark(4096);
     messages = 0;
-    for (int tries = 0; tries < 3 && messages == 0; tries++) { /* it may just be talking itself */
+    for (int tries = 0; tries < 3 && messages == 0; tries++) { /* the robot itself may be sending */
         play(&r, 2, 300);
         Sys_Yield();
     }

@@ -1,6 +1,6 @@
-/* Anything a robot may see and be asked, at random: whole frames, damaged ones, cut ones, two at once, light of the room and
- * noise, while its program calls all of openswarm_infrared.h and openswarm_remote.h. tests/fuzz/kernel/fuzz_infrared.py gives
- * seeds. */
+/* Anything a robot may see and be asked, at random: whole frames, damaged ones, cut ones, two at once, light of the
+ * room and noise, while its program calls all of openswarm_infrared.h and openswarm_remote.h.
+ * tests/fuzz/kernel/fuzz_infrared.py gives seeds. */
 #include "infrared_air.h"
 
 #include "openswarm_remote.h"
@@ -19,7 +19,8 @@ static bool one_in(uint32 n)
     return below(n) == 0;
 }
 
-/* ---- the air ------------------------------------------------------------------------------------------------------- */
+/* ---- the air
+ * ------------------------------------------------------------------------------------------------------- */
 
 static uint16 room[HAL_INFRARED_SENSORS], noise;
 
@@ -44,7 +45,8 @@ static void dark(unsigned scans)
     }
 }
 
-/* ---- frames of others ---------------------------------------------------------------------------------------------- */
+/* ---- frames of others
+ * ---------------------------------------------------------------------------------------------- */
 
 typedef struct {
     uint8 kind, size;
@@ -121,7 +123,8 @@ static void talk_at_random(void)
     dark(below(60));
 }
 
-/* ---- what arrives -------------------------------------------------------------------------------------------------- */
+/* ---- what arrives
+ * -------------------------------------------------------------------------------------------------- */
 
 static bool was_said(uint16 number, uint8 kind, const uint8 *payload, uint8 size)
 {
@@ -181,7 +184,8 @@ static void check_table(void)
     CHECK_EQ(Sys_Get_Neighbours(all, (uint8)below(SYS_NEIGHBOURS)) <= count, true);
 }
 
-/* ---- the program --------------------------------------------------------------------------------------------------- */
+/* ---- the program
+ * --------------------------------------------------------------------------------------------------- */
 
 static void call_something(void)
 {
@@ -260,7 +264,7 @@ TEST(anything_seen_and_asked_is_survived, "nothing damaged, false or stale arriv
         step();
     }
     noise = 0;
-    for (int i = 0; i < 2 + SYS_INFRARED_QUEUE; i++) { /* what waits is said, the others are forgotten */
+    for (int i = 0; i < 2 + SYS_INFRARED_QUEUE; i++) { /* queued frames are sent, the others expire */
         scans_in_the_dark(4096);
         Sys_Yield();
     }
@@ -269,7 +273,7 @@ TEST(anything_seen_and_asked_is_survived, "nothing damaged, false or stale arriv
     uint16 received = Sys_Get_InfraredStatistics()->received;
     r.length = draw(r.lit, &(text){FRAME_MESSAGE, 1, 1234, "x"}, true);
     for (int tries = 0; tries < 8 && received == Sys_Get_InfraredStatistics()->received; tries++) {
-        play(&r, 2, 300); /* it may just be talking itself */
+        play(&r, 2, 300); /* the robot itself may be sending */
     }
     CHECK(received != Sys_Get_InfraredStatistics()->received);
 }

@@ -57,7 +57,7 @@ TEST(an_event_before_the_number_is_drawn_is_its_senders, "openswarm_remote.h: ea
     Sys_Yield();
     CHECK_EQ(alarms, 2);
     record(&passed_on);
-    scans_in_the_dark(4096 * 8); /* what has arrived is forgotten */
+    scans_in_the_dark(4096 * 8); /* arrivals have expired */
     CHECK(Sys_Set_RobotNumber(OTHER));
     play(&passed_on, 2, 200);
     Sys_Yield();
@@ -108,7 +108,7 @@ TEST(arrivals_are_not_sent_back_however_long_they_wait, "their handlers held bac
     CHECK_EQ(Sys_Get_RemoteStatistics()->shared, 0);
 }
 
-TEST(an_arrival_nobody_heard_hides_no_event_for_long, "unsubscribed when it came: an own one of its contents goes out later")
+TEST(an_arrival_without_handler_hides_no_event_for_long, "unsubscribed when it came: an own one of its contents goes out later")
 {
     begin_early();
     scans_in_the_dark(2 * EARLY);
@@ -120,7 +120,7 @@ TEST(an_arrival_nobody_heard_hides_no_event_for_long, "unsubscribed when it came
     CHECK_EQ(Sys_Get_RemoteStatistics()->shared, 1);
 }
 
-TEST(what_finds_the_queue_full_is_not_shared, "openswarm_remote.h: sys_remote_statistics")
+TEST(an_event_that_finds_the_queue_full_is_not_shared, "openswarm_remote.h: sys_remote_statistics")
 {
     begin_early();
     for (uint8 i = 0; i < 3 * SYS_INFRARED_QUEUE; i++) {
@@ -130,7 +130,7 @@ TEST(what_finds_the_queue_full_is_not_shared, "openswarm_remote.h: sys_remote_st
     CHECK_EQ(Sys_Get_InfraredStatistics()->refused, 2 * SYS_INFRARED_QUEUE);
 }
 
-TEST(who_talks_sends_no_beacons_however_long, "SYS_BEACON_PERIOD; the counters saturate")
+TEST(robots_that_send_send_no_beacons, "SYS_BEACON_PERIOD; the counters saturate")
 {
     unsigned on = 0, off = BEHIND_A_FRAME, frames = 0;
     begin_link();
@@ -151,7 +151,7 @@ TEST(who_talks_sends_no_beacons_however_long, "SYS_BEACON_PERIOD; the counters s
     CHECK_EQ(frames, 10);
 }
 
-TEST(what_is_set_before_the_start_holds, "openswarm_infrared.h: main may call it")
+TEST(settings_made_before_the_start_hold, "openswarm_infrared.h: main may call it")
 {
     fixed_number = 77;
     host_use_virtual_time();
@@ -175,7 +175,7 @@ static bool hear(uint16 pid, uint16 id, sys_event_data *data)
     return true;
 }
 
-TEST(nobody_is_number_0, "openswarm_infrared.h: source, 1 to 2047")
+TEST(no_robot_has_number_0, "openswarm_infrared.h: source, 1 to 2047")
 {
     const frame f = {0, FRAME_MESSAGE, 1, (const uint8 *)"x"};
     frame_buffer b;

@@ -1,4 +1,4 @@
-/* What an application links beside the kernel: openswarm_mutex.h, _quota.h, _join.h, _cleanup.h, _service.h. */
+/* Options of the kernel: openswarm_mutex.h, _quota.h, _join.h, _cleanup.h, _service.h. */
 #include "test.h"
 
 #include "openswarm_cleanup.h"
@@ -13,7 +13,7 @@ static uint16 start(void (*entry)(void *), const void *arg, uint8 priority)
     return Sys_Start_ProcessWith(&config);
 }
 
-/* Everything runs below PID 0, which looks on from outside. */
+/* All threads run at lower priority than PID 0, which observes them. */
 static void boot_below(const sys_scheduler *scheduler)
 {
     boot();
@@ -149,7 +149,7 @@ TEST(mutexes_refuse_what_they_cannot_do, "openswarm_mutex.h: errors, ceilings of
     CHECK_EQ(Sys_Get_LastError(), SYS_ERROR_ARGUMENT);
 }
 
-TEST(the_mutex_of_a_killed_owner_goes_on_and_a_killed_waiter_is_forgotten, "openswarm_mutex.h: its owner ends")
+TEST(the_mutex_of_a_killed_owner_passes_on_and_a_killed_waiter_is_removed, "openswarm_mutex.h: its owner ends")
 {
     boot_below(&sys_fixed_priority);
     uint16 empty = heap_now();
@@ -354,7 +354,7 @@ static void cleans_up(void *unused)
 
 static void leaves_it_to_the_end(void *unused)
 {
-    static sys_cleanup only; /* the stack is not its any more when it has returned */
+    static sys_cleanup only; /* its stack no longer exists after it has returned */
     (void)unused;
     CHECK(Sys_Push_Cleanup(&only, say, "e"));
 }
@@ -397,7 +397,7 @@ static void counts_and_ends(void *unused)
     note('s');
 }
 
-TEST(a_service_that_hangs_is_started_anew, "openswarm_service.h: limit_ms, restarts")
+TEST(a_service_that_hangs_is_restarted, "openswarm_service.h: limit_ms, restarts")
 {
     static const sys_process_config config = {hangs_after_three, NULL, 0, 0, 0, 0, 0};
     static sys_service service = {.config = &config, .limit_ms = 20, .restarts = 2};
@@ -417,7 +417,7 @@ TEST(a_service_that_hangs_is_started_anew, "openswarm_service.h: limit_ms, resta
     CHECK_EQ(service.pid, 0);
 }
 
-TEST(a_service_that_ends_is_started_as_often_as_it_may, "openswarm_service.h: restarts")
+TEST(a_service_that_ends_is_restarted_up_to_its_limit, "openswarm_service.h: restarts")
 {
     static const sys_process_config config = {counts_and_ends, NULL, 0, 0, 0, 0, 0};
     static sys_service few = {.config = &config, .restarts = 3};

@@ -1,5 +1,6 @@
 /* The weaknesses of the original system, openswarm-original.md §7, one named test each. Those that only exist on the
- * chip (register save areas, DSP state, stack limits) are in tests/firmware/kernel/test_kernel_on_target.py under the same numbers. */
+ * chip (register save areas, DSP state, stack limits) are in tests/firmware/kernel/test_kernel_on_target.py under
+ * the same numbers. */
 #include "test.h"
 
 static int calls;

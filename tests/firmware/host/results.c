@@ -1,4 +1,4 @@
-/* Wait results and the deaths of those who wait (kernel.md §2). */
+/* Wait results, and ends of waiting threads (kernel.md §2). */
 #include "test.h"
 
 static sys_event_data *first_result;
@@ -63,7 +63,7 @@ static void wait_and_be_killed(void)
     note('!');
 }
 
-TEST(a_thread_may_die_while_a_delivery_stands_on_it, "kernel.md §2: also while a drain stands on them")
+TEST(a_thread_may_die_during_a_delivery_to_it, "kernel.md §2: also while a drain stands on them")
 {
     boot();
     Sys_Register_Event(E1);

@@ -74,7 +74,7 @@ static void job_without_end(void *unused)
     }
 }
 
-TEST(a_late_job_starves_nobody, "openswarm.h: sys_earliest_deadline; once it ran alone for as long as it was late")
+TEST(a_late_job_starves_no_thread, "openswarm.h: sys_earliest_deadline; once it ran alone for as long as it was late")
 {
     sys_process_config endless = {job_without_end, NULL, 0, 0, SYS_PERIODIC, 100, 50};
     boot();
@@ -162,7 +162,7 @@ static uint16 start_with(void (*entry)(void *), const char *arg, uint8 priority)
     return Sys_Start_ProcessWith(&config);
 }
 
-TEST(a_preempted_thread_goes_on_with_the_rest_of_its_slice, "hal_cpu.h: hal_slice_restart(); each tick once handed the CPU on")
+TEST(a_preempted_thread_keeps_the_rest_of_its_slice, "hal_cpu.h: hal_slice_restart(); each tick once handed the CPU on")
 {
     boot();
     Sys_Set_Scheduler(&sys_fixed_priority);

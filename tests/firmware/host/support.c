@@ -1,4 +1,4 @@
-/* What tests share, on every target. */
+/* Helpers shared by the tests on every target. */
 #include "test.h"
 
 char trace[64];

@@ -1,4 +1,5 @@
-/* A kernel test: one function, run as PID 0 of a fresh kernel. On a host each has a process of its own and virtual time:
+/* A kernel test: one function, run as PID 0 of a fresh kernel. On a host each has a process of its own and virtual
+ * time:
  *     ./kernel_tests            list        ./kernel_tests NAME [SEED]   run one; exit status 0 = passed
  * target/bugs runs the tests of original_bugs.c on the emulated robot, each from reset. */
 #ifndef TEST_H
@@ -32,9 +33,9 @@ typedef struct test {
 } test;
 
 void test_add(test *t);
-extern uint32 test_seed; /* of tests that do something at random */
+extern uint32 test_seed; /* seed of randomised tests */
 
-/* says: the statement the test checks and where it is made. */
+/* says: the requirement that the test checks, and its source. */
 #define TEST(identifier, statement)                                                  \
     static void identifier(void);                                                    \
     static test test_##identifier = {#identifier, statement, identifier, NULL};      \

@@ -13,7 +13,7 @@ static void returns_at_once(void)
 {
 }
 
-TEST(the_end_of_every_thread_is_told, "openswarm.h: SYS_EVENT_TERMINATION")
+TEST(the_end_of_every_thread_is_reported, "openswarm.h: SYS_EVENT_TERMINATION")
 {
     boot();
     Sys_Subscribe_to_Event(SYS_EVENT_TERMINATION, 0, on_termination, NULL);

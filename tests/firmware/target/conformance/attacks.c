@@ -181,7 +181,7 @@ static bool ping(uint16 pid, uint16 event, sys_event_data *data)
     return Sys_Unsubscribe_Handler(event, pid, pong) && Sys_Subscribe_to_Event(event, pid, pong, NULL);
 }
 
-static void handlers_that_subscribe_each_other_anew(void)
+static void handlers_that_subscribe_each_other_again(void)
 {
     heard = 0;
     CHECK(Sys_Register_Event(E1));
@@ -292,7 +292,7 @@ static void an_event_registered_in_a_burst(void)
 }
 
 /* Two late jobs that never end, and round robin beside them. */
-static void late_jobs_starve_nobody(void)
+static void late_jobs_starve_no_thread(void)
 {
     sys_process_config config = {spin, NULL, 0, 0, SYS_PERIODIC, 20, 3};
     Sys_Set_Scheduler(&sys_earliest_deadline);
@@ -342,11 +342,11 @@ void check_attacks(void)
     pids_go_round();
     every_event_number_is_good();
     sections_without_their_other_half();
-    handlers_that_subscribe_each_other_anew();
+    handlers_that_subscribe_each_other_again();
     a_condition_that_kills_its_owner();
     waiters_and_holders_die();
     an_event_registered_in_a_burst();
-    late_jobs_starve_nobody();
+    late_jobs_starve_no_thread();
     no_scheduler();
     long_messages();
 }

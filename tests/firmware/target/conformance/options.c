@@ -411,7 +411,7 @@ static void live_well(void *unused)
     }
 }
 
-static void services_are_started_anew(void)
+static void services_are_restarted(void)
 {
     static const sys_process_config brief_one = {end_at_once, NULL, 0, 0, 0, 0, 0};
     static const sys_process_config busy_one = {never_yield, NULL, 0, 0, 0, 0, 0};
@@ -467,5 +467,5 @@ void check_options(void)
     quotas_bound_what_waits();
     quotas_come_and_go();
     a_handler_ends_its_limited_event();
-    services_are_started_anew();
+    services_are_restarted();
 }
