@@ -426,14 +426,14 @@ def test_usage_errors_import_neither_llvmlite_nor_the_back_end() -> None:
 
 def test_archives_and_preprocessed_assembly(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     """-L and -l, members linked by symbol; .S files are preprocessed with the device header."""
-    from toolchain.elf.archive import Member, archive_bytes
+    from toolchain.elf.archive import ArchiveMember, archive_bytes
 
     f = write(tmp_path, "f.c", "int f(int x) { return x + 2; }\n")
     g = write(tmp_path, "g.S", "#include <dspic30f6014a.h>\n#define V 40\n\t.section .text,code\n\t.global _g\n"
               "_g: mov #V,w0\n\tbset _LATB,#3\n\treturn\n")  # fmt: skip
     for source in (f, g):
         assert cc(capsys, "-Os", "-c", source, "-o", source.with_suffix(".o")) == (0, "")
-    members = [Member(name, (tmp_path / name).read_bytes()) for name in ("f.o", "g.o")]
+    members = [ArchiveMember(name, (tmp_path / name).read_bytes()) for name in ("f.o", "g.o")]
     (tmp_path / "libfg.a").write_bytes(archive_bytes(members))
     main = write(tmp_path, "m.c", "int f(int), g(void); int main(void) { return f(g()); }\n")
     assert cc(capsys, "-Os", main, f"-L{tmp_path}", "-lfg", "-lm", "-o", tmp_path / "x.elf") == (0, "")

@@ -78,12 +78,12 @@ def _dependencies(root: str) -> Iterator[Dependency]:
 
 def build(compile_one: Compile, jobs: int = 0) -> bytes:
     """Compile and assemble every file of `runtime/` into an archive."""
-    from toolchain.elf.archive import Member, archive_bytes
+    from toolchain.elf.archive import ArchiveMember, archive_bytes
 
     sources = sorted(path for path in RUNTIME_DIR.iterdir() if path.suffix in LANGUAGES)
     with ProcessPoolExecutor(max_workers=jobs or os.cpu_count() or 1) as pool:
         made = pool.map(partial(_member, compile_one), sources)
-        members = [Member(path.stem + ".o", data) for path, data in zip(sources, made, strict=True)]
+        members = [ArchiveMember(path.stem + ".o", data) for path, data in zip(sources, made, strict=True)]
     return archive_bytes(members)
 
 

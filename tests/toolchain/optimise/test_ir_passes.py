@@ -131,19 +131,3 @@ def test_an_array_walk_becomes_a_pointer_walk() -> None:
     loop = next(iter(cfg.natural_loops({b.name: b.succs for b in f.blocks}, f.blocks[0].name).values()))
     cfg.dead_code(f)
     assert not any(i.op in ("shl", "mul") and i.type.bits == 16 for b in f.blocks if b.name in loop for i in b.instrs)
-
-
-def test_multiplication_divides_exactly() -> None:
-    """`magic` is exact for every dividend of small divisors, and for a sample of the others."""
-    from toolchain.legalize.magic import signed_factor, unsigned_factor
-
-    for d in [*range(3, 16), 100, 641, 1000, *range(17, 32768, 977), 32765, 32767]:
-        if d & (d - 1) == 0:
-            continue
-        (m, s), (n, t) = unsigned_factor(d), signed_factor(d)
-        assert m < 2 << 16
-        assert n < 1 << 16
-        for x in range(0, 65536, 1 if d < 16 else 13):
-            signed = x - 65536 if x & 0x8000 else x
-            assert x * m >> 16 + s == x // d
-            assert (signed * n >> 16 + t) + (signed < 0) == abs(signed) // d * (1 if signed >= 0 else -1)
