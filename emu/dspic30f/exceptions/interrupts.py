@@ -102,7 +102,7 @@ class Exceptions(RuleInterpreter):
         self._events.kick()
 
     def _intcon1_written(self, old: int, new: int, _lanes: int) -> None:
-        self.traps.written(old, new)
+        self.traps.intcon1_written(old, new)
 
     def _read_intcon2(self) -> int:
         """INTCON2<14> reads 1 while DISICNT is not 0 (isa.md §12)."""
@@ -168,7 +168,7 @@ class Exceptions(RuleInterpreter):
         number = waking(self, self.operands, requested(self, self.operands))
         return None if number == NO_REQUEST else request_cycle(self, self.operands, number)
 
-    def armed(self) -> bool:
+    def has_enabled_interrupt(self) -> bool:
         """Return whether any interrupt of priority 1 or more is enabled."""
         bits = sum(self.get(enables) << 16 * number for number, (_flags, enables) in enumerate(self.operands.words))
         return bool(waking(self, self.operands, bits & self.operands.implemented) != NO_REQUEST)
@@ -180,7 +180,7 @@ class Exceptions(RuleInterpreter):
             self.on_trap(vector)
         enter(self, self.operands, chosen.level, chosen.since, last, (vector.ivt, vector.aivt, vector.slot))
 
-    def latest(self) -> str:
+    def last_entered(self) -> str:
         """Return the exception entered last, read from INTTREG and the stack, for messages; empty if there was none."""
         slot, top = self._u16[self._inttreg] & 0x3F, self._u16[STACK_POINTER]
         if not slot or slot >= len(self._names) or self._data.faulty(top - 4 & 0xFFFF, 2):

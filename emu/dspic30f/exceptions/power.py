@@ -101,4 +101,4 @@ class PowerSaving:
 
     def _is_final(self) -> bool:
         """Return whether no enabled source can wake the CPU any more."""
-        return not self._exceptions.armed() and not self.signals.can_wake()
+        return not self._exceptions.has_enabled_interrupt() and not self.signals.can_wake()

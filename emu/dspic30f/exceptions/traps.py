@@ -71,7 +71,7 @@ class Traps:
         """
         self.request(self._by_flag[flag], self._events.now + (not self._events.firing))
 
-    def written(self, old: int, new: int) -> None:
+    def intcon1_written(self, old: int, new: int) -> None:
         """Handle a write of INTCON1: flags that it sets are requests, and a lasting accumulator overflow requests
         again."""
         for enable, overflow in self._overflow:

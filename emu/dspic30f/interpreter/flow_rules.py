@@ -85,7 +85,7 @@ def words_skipped(insn: Insn | None) -> int:
     return 1 if insn is None else insn.words
 
 
-def repeat(m: FlowBuilder, p: FlowOperands, count: Number) -> bool:
+def execute_repeat(m: FlowBuilder, p: FlowOperands, count: Number) -> bool:
     """Execute REPEAT. Return whether the next instruction is repeated; with a count of 0 it is not (isa.md §7.5)."""
     m.put(p.rcount, count)
     if not m.is_true(count):
@@ -95,7 +95,7 @@ def repeat(m: FlowBuilder, p: FlowOperands, count: Number) -> bool:
     return True
 
 
-def repeated(m: FlowBuilder, p: FlowOperands, counting: Number) -> bool:
+def end_iteration(m: FlowBuilder, p: FlowOperands, counting: Number) -> bool:
     """End an iteration of a REPEAT target that has fallen through. Return whether another iteration follows. `counting`
     is SR.RA, which is 0 in the last iteration (isa.md §7.5)."""
     left = m.get(p.rcount)
@@ -112,7 +112,7 @@ def repeated(m: FlowBuilder, p: FlowOperands, counting: Number) -> bool:
     return False
 
 
-def repeating(m: StraightLineBuilder, p: FlowOperands, count: Number, left: Number) -> None:
+def restore_repeat(m: StraightLineBuilder, p: FlowOperands, count: Number, left: Number) -> None:
     """Restore the REPEAT state before the iteration with RCOUNT = `left`, for code that counts iterations itself.
     `count` is the count of the REPEAT."""
     m.put(p.rcount, left)
@@ -120,7 +120,7 @@ def repeating(m: StraightLineBuilder, p: FlowOperands, count: Number, left: Numb
     m.put(p.sr, m.get(p.sr) & (0xFFFF & ~RA) | m.select(left == 0, 0, RA))
 
 
-def do(m: StraightLineBuilder, p: FlowOperands, count: Number, start: int, end: int) -> None:
+def execute_do(m: StraightLineBuilder, p: FlowOperands, count: Number, start: int, end: int) -> None:
     """Execute DO for the loop from `start` to the instruction at `end`. The registers of the outer loop go to the
     shadow registers (isa.md §7.6)."""
     for register, shadow in zip(p.loop, p.shadow, strict=True):
@@ -131,7 +131,7 @@ def do(m: StraightLineBuilder, p: FlowOperands, count: Number, start: int, end: 
     _nest(m, p, m.select(level < 7, level + 1, 7))
 
 
-def loop_again(m: FlowBuilder, p: FlowOperands) -> bool:
+def end_loop_iteration(m: FlowBuilder, p: FlowOperands) -> bool:
     """End the instruction at DOEND, which has fallen through. Return whether the loop continues at DOSTART (isa.md
     §7.6)."""
     left = m.get(p.dcount)
@@ -153,14 +153,14 @@ def _nest(m: StraightLineBuilder, p: FlowOperands, level: Number) -> None:
     m.put(p.sr, m.get(p.sr) & (0xFFFF & ~DA) | m.select(level == 0, 0, DA))
 
 
-def resume(m: StraightLineBuilder, p: FlowOperands, srl: Number, ipl3: Number) -> None:
+def execute_retfie(m: StraightLineBuilder, p: FlowOperands, srl: Number, ipl3: Number) -> None:
     """Execute RETFIE after SR<7:0> and IPL3 were popped (isa.md §7.4): continue an interrupted REPEAT."""
     m.put(p.sr, m.get(p.sr) & 0xFF00 | srl)
     m.put(p.corcon, m.get(p.corcon) & (0xFFFF & ~IPL3) | m.select(ipl3 != 0, IPL3, 0))
     m.put(p.repeat, m.select((srl & RA) != 0, FIRST, m.get(p.repeat)))
 
 
-def disi(m: StraightLineBuilder, p: FlowOperands, count: int, after: Number) -> None:
+def execute_disi(m: StraightLineBuilder, p: FlowOperands, count: int, after: Number) -> None:
     """Execute DISI, whose last cycle precedes `after`: that cycle and the next `count` are blocked (isa.md §12)."""
     m.put(p.disi_end, after + count)
     m.put(p.disicnt, count)

@@ -84,12 +84,12 @@ class Sequencer:
         self._steps: Final[dict[int, Step]] = {}
         program.changed.append(self._forget)
         operands, record = flow_rules.operands_of(state), state.record
-        self._repeat: Final = function_of(record, flow_rules.repeat, operands, "count")
-        self._repeated: Final = function_of(record, flow_rules.repeated, operands, "counting")
-        self._do: Final = function_of(record, flow_rules.do, operands, "count", "start", "end")
-        self._loop_again: Final = function_of(record, flow_rules.loop_again, operands)
-        self._resume: Final = function_of(record, flow_rules.resume, operands, "srl", "ipl3")
-        self._disi: Final = function_of(record, flow_rules.disi, operands, "count", "after")
+        self._repeat: Final = function_of(record, flow_rules.execute_repeat, operands, "count")
+        self._repeated: Final = function_of(record, flow_rules.end_iteration, operands, "counting")
+        self._do: Final = function_of(record, flow_rules.execute_do, operands, "count", "start", "end")
+        self._loop_again: Final = function_of(record, flow_rules.end_loop_iteration, operands)
+        self._resume: Final = function_of(record, flow_rules.execute_retfie, operands, "srl", "ipl3")
+        self._disi: Final = function_of(record, flow_rules.execute_disi, operands, "count", "after")
 
     def _forget(self, start: int, end: int) -> None:
         """Discard decoded instructions: flash words in [start, end) have changed."""
@@ -193,7 +193,7 @@ class Sequencer:
         state.cycle = max(state.cycle, 1)
         traps = self.exceptions.traps
         if state.ipl >= traps.address.vector.level:
-            entered = self.exceptions.latest()
+            entered = self.exceptions.last_entered()
             origin = f", after {entered}" if entered else ""
             raise TrapConflict(f"no instruction can be fetched at {state.pc:06X}{origin}")
         traps.request(traps.address, state.cycle - 1)

@@ -43,13 +43,13 @@ class OnNumbers:
 
 
 RULES = {
-    "repeat": (flow_rules.repeat, ("count",)),
-    "repeated": (flow_rules.repeated, ("counting",)),
-    "repeating": (flow_rules.repeating, ("count", "left")),
-    "do": (flow_rules.do, ("count", "start", "end")),
-    "loop_again": (flow_rules.loop_again, ()),
-    "resume": (flow_rules.resume, ("srl", "ipl3")),
-    "disi": (flow_rules.disi, ("count", "after")),
+    "repeat": (flow_rules.execute_repeat, ("count",)),
+    "repeated": (flow_rules.end_iteration, ("counting",)),
+    "repeating": (flow_rules.restore_repeat, ("count", "left")),
+    "do": (flow_rules.execute_do, ("count", "start", "end")),
+    "loop_again": (flow_rules.end_loop_iteration, ()),
+    "resume": (flow_rules.execute_retfie, ("srl", "ipl3")),
+    "disi": (flow_rules.execute_disi, ("count", "after")),
 }
 
 
@@ -82,11 +82,11 @@ def test_a_repeat_that_is_counted_elsewhere_leaves_the_same_state(count: int) ->
     state, closed = (Machine(engine="plain").state for _ in range(2))
     operands = flow_rules.operands_of(state)
     stepped, jumped = OnNumbers(state), OnNumbers(closed)
-    assert stepped.run(flow_rules.repeat, operands, count)
+    assert stepped.run(flow_rules.execute_repeat, operands, count)
     for left in range(count, -1, -1):
-        jumped.run(flow_rules.repeating, operands, count, left)
+        jumped.run(flow_rules.restore_repeat, operands, count, left)
         assert (state.rcount, state.repeat, state.sr) == (closed.rcount, closed.repeat, closed.sr)
-        assert stepped.run(flow_rules.repeated, operands, state.sr & RA) == (left != 0)
+        assert stepped.run(flow_rules.end_iteration, operands, state.sr & RA) == (left != 0)
     assert state.repeat == NOT_REPEATING
 
 

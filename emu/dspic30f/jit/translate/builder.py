@@ -107,7 +107,7 @@ class LlvmBuilder:
             self.before_slow()
             if self.repeating is not None and self.left_count is not None:
                 count, left = self.left_count, self.repeating
-                LlvmRulePaths(self.e).all(lambda m: flow_rules.repeating(m, self.layout.flow, count, left))
+                LlvmRulePaths(self.e).all(lambda m: flow_rules.restore_repeat(m, self.layout.flow, count, left))
             self.v.leave(self.pc, INTERPRET)
             self.e.block = current
         return self._slow

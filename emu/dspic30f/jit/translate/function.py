@@ -346,7 +346,8 @@ class Translator(FunctionFrame):
                 self.e.store(pointer(self.e, self.layout.offset["events.deadline"]), 0, 64)
             self.v.leave(step.next_pc, MODES)
 
-        LlvmRulePaths(self.e, {flow.edt: 0}, self.v.new_block).each(lambda m: flow_rules.loop_again(m, flow), end)
+        paths = LlvmRulePaths(self.e, {flow.edt: 0}, self.v.new_block)
+        paths.each(lambda m: flow_rules.end_loop_iteration(m, flow), end)
 
     # -- flow -------------------------------------------------------------------------------------------------------
     def _convert_branch(self, step: Step, flow: Branch | Skip, cycles: Number, mask: int) -> Value:
@@ -398,7 +399,7 @@ class Translator(FunctionFrame):
                 self.jump(step.next_pc)
             case Disi(count):
                 after = self.v.get("cycle")
-                LlvmRulePaths(self.e).all(lambda m: flow_rules.disi(m, self.layout.flow, count, after))
+                LlvmRulePaths(self.e).all(lambda m: flow_rules.execute_disi(m, self.layout.flow, count, after))
                 self._check_interrupts(step.next_pc)
             case Sleep():
                 self._idle(step.next_pc)
@@ -485,4 +486,4 @@ class Translator(FunctionFrame):
         plain = (flow.ipl3 == 0) & (((corcon & IPL3) | traps) == 0)
         b.guard(plain)
         self._early_exception = interrupt_requested(self.e, self.layout)
-        flow_rules.resume(AccessEmitter(b), self.layout.flow, flow.srl & 0xFF, 0)
+        flow_rules.execute_retfie(AccessEmitter(b), self.layout.flow, flow.srl & 0xFF, 0)

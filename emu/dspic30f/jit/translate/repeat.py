@@ -42,14 +42,14 @@ class RepeatTranslator:
         count, paths = flow.count, LlvmRulePaths(e, on_path=f.v.new_block)
         f.counter.settle()
         if f.exact:
-            paths.each(lambda m: flow_rules.repeat(m, f.layout.flow, count),
+            paths.each(lambda m: flow_rules.execute_repeat(m, f.layout.flow, count),
                        lambda again: self._begin(step, target, stall, again))  # fmt: skip
             return
         for some in paths.branches(count) if isinstance(count, Value) else [count != 0]:
             if some:
                 self._whole_loop(step, target, count, stall)
             else:
-                paths.all(lambda m: flow_rules.repeat(m, f.layout.flow, 0))
+                paths.all(lambda m: flow_rules.execute_repeat(m, f.layout.flow, 0))
                 f.advance(stall + 1, step.facts.writes)
                 f.jump(step.next_pc)
 
@@ -176,4 +176,4 @@ class RepeatTranslator:
             else:
                 f.jump(target.next_pc)
 
-        paths.each(lambda m: flow_rules.repeated(m, flow, counting), end)
+        paths.each(lambda m: flow_rules.end_iteration(m, flow, counting), end)
