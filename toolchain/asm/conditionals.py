@@ -17,7 +17,7 @@ _PARTS = (".else", ".elsec", ".elseif", ".endif", ".endc")
 CONDITIONALS = frozenset(_COMPARISONS + _TESTS + _PARTS)
 
 
-class Context(Protocol):
+class ConditionContext(Protocol):
     """The parts of the assembler that conditions read."""
 
     symbols: dict[str, AsmSymbol]
@@ -65,7 +65,7 @@ class Conditionals:
     def _update(self) -> None:
         self.active = all(level.active for level in self._levels[-1:])
 
-    def obey(self, word: str, operands: str, place: SourceLocation, context: Context) -> None:
+    def obey(self, word: str, operands: str, place: SourceLocation, context: ConditionContext) -> None:
         """Process one conditional directive."""
         if word in (".else", ".elsec"):
             level = self._top(word)
@@ -96,7 +96,7 @@ class Conditionals:
         return self._levels[-1]
 
 
-def _condition(word: str, operands: str, context: Context) -> bool:
+def _condition(word: str, operands: str, context: ConditionContext) -> bool:
     if word in _COMPARE:
         return bool(_COMPARE[word](context.constant(operands, "condition")))
     if word in (".ifdef", ".ifndef", ".ifnotdef", ".ifdecl", ".ifndecl"):

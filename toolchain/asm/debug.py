@@ -11,7 +11,7 @@ from itertools import groupby
 
 from emu.image.elf_facts import RELOCATION_BY_NAME
 from toolchain.asm.directives.data import leb128
-from toolchain.asm.sections import AsmSection, Piece
+from toolchain.asm.sections import AsmSection, SectionPiece
 from toolchain.asm.state import Assembler
 from toolchain.asm.symbols import Label, LabelledSection
 from toolchain.elf import constants as c
@@ -108,7 +108,7 @@ def _line_program(asm: Assembler, sections: dict[LabelledSection, Section], star
 
 
 def _owner(label: Label) -> AsmSection:
-    assert isinstance(label.frag, Piece)
+    assert isinstance(label.frag, SectionPiece)
     return label.frag.section
 
 

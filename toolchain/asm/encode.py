@@ -15,7 +15,7 @@ from toolchain.asm.directives.data import operator_of
 from toolchain.asm.expr import ExprError, combine
 from toolchain.asm.sections import Fixup, Relaxable
 from toolchain.asm.state import Assembler
-from toolchain.asm.symbols import ExprValue, SymbolicValue
+from toolchain.asm.symbols import ExprValue, SymbolValue
 from toolchain.elf.model import Bind
 
 CACHE_LIMIT = 100_000  # statements; a bound for long-lived processes
@@ -136,7 +136,7 @@ def _kind(slot: Slot, value: ExprValue) -> tuple[RelocationType, int]:
 
 def _put_relaxable(asm: Assembler, parsed: Parsed, words: tuple[int, ...], value: ExprValue) -> bool:
     """Emit CALL or GOTO in a piece of its own, ready to become RCALL or BRA; False when the target forbids it."""
-    if not isinstance(value, SymbolicValue) or value.add is None or value.offset or value.sub or value.op:
+    if not isinstance(value, SymbolValue) or value.add is None or value.offset or value.sub or value.op:
         return False
     if value.add.bind is Bind.WEAK:
         return False

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 
-from toolchain.asm.symbols import AsmSymbol, ExprValue, Label, PendingOperation, SymbolicValue
+from toolchain.asm.symbols import AsmSymbol, ExprValue, Label, PendingOperation, SymbolValue
 
 MASK64 = 0xFFFF_FFFF_FFFF_FFFF
 MAX_DEPTH = 64  # parentheses and prefixes; a limit, so that hostile input ends in a message
@@ -297,14 +297,14 @@ def combine(op: str, a: ExprValue, b: ExprValue, final: bool = False) -> ExprVal
         return wrap(_BINARY[op](a, b))
     if op in "+-":
         if isinstance(b, int) and isinstance(
-            a, SymbolicValue
+            a, SymbolValue
         ):  # also op(x)+n: a relocation has one addend, inside the operator
-            return SymbolicValue(a.add, a.sub, wrap(a.offset + b if op == "+" else a.offset - b), a.op)
-        if op == "+" and isinstance(a, int) and isinstance(b, SymbolicValue):
-            return SymbolicValue(b.add, b.sub, wrap(a + b.offset), b.op)
+            return SymbolValue(a.add, a.sub, wrap(a.offset + b if op == "+" else a.offset - b), a.op)
+        if op == "+" and isinstance(a, int) and isinstance(b, SymbolValue):
+            return SymbolValue(b.add, b.sub, wrap(a + b.offset), b.op)
     if (
-        isinstance(a, SymbolicValue)
-        and isinstance(b, SymbolicValue)
+        isinstance(a, SymbolValue)
+        and isinstance(b, SymbolValue)
         and op in _COMPARABLE
         and not (a.op or b.op or a.sub or b.sub)
     ):
@@ -330,10 +330,10 @@ def apply(op: str, a: ExprValue) -> ExprValue:
         if op not in CONSTANT_OPERATORS:
             raise ExprError(f"{op}() needs a symbol, not a number")
         return CONSTANT_OPERATORS[op](a)
-    if isinstance(a, SymbolicValue):
+    if isinstance(a, SymbolValue):
         if a.op:
             raise ExprError(f"{op}() of {a.op}() has no meaning")
-        return SymbolicValue(a.add, a.sub, a.offset, op)
+        return SymbolValue(a.add, a.sub, a.offset, op)
     return PendingOperation("f" + op, a, None)
 
 
@@ -374,5 +374,5 @@ def _resolve_symbol(symbol: AsmSymbol, final: bool, seen: tuple[AsmSymbol, ...])
     if symbol in seen:
         raise ExprError(f"symbol {symbol.name} is defined in terms of itself")
     if symbol.place is None or isinstance(symbol.place, Label):
-        return SymbolicValue(symbol)
+        return SymbolValue(symbol)
     return resolve(symbol.place, final, (*seen, symbol))

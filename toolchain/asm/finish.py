@@ -10,9 +10,9 @@ from emu.image.elf_facts import RELOCATION_BY_NAME, Formula, RelocationType
 from toolchain.asm.debug import debug_sections
 from toolchain.asm.expr import ExprError, resolve
 from toolchain.asm.relax import relax
-from toolchain.asm.sections import AsmSection, Fixup, Piece
+from toolchain.asm.sections import AsmSection, Fixup, SectionPiece
 from toolchain.asm.state import Assembler
-from toolchain.asm.symbols import AsmSymbol, ExprValue, Label, LabelledSection, PendingOperation, SymbolicValue
+from toolchain.asm.symbols import AsmSymbol, ExprValue, Label, LabelledSection, PendingOperation, SymbolValue
 from toolchain.elf import constants as c
 from toolchain.elf import fields
 from toolchain.elf.model import Bind, Home, ObjectFile, Reloc, Section, Symbol
@@ -68,11 +68,11 @@ class _Finisher:
     # -- fixups --------------------------------------------------------------------------------------------------
 
     def _fill(self, source: AsmSection, fixup: Fixup) -> None:
-        assert isinstance(fixup.frag, Piece)
+        assert isinstance(fixup.frag, SectionPiece)
         section, kind = self.sections[source], fixup.kind
         offset = source.octets(fixup.frag, fixup.offset)
         value = resolve(fixup.value, final=True)
-        if isinstance(value, PendingOperation) or (isinstance(value, SymbolicValue) and value.sub is not None):
+        if isinstance(value, PendingOperation) or (isinstance(value, SymbolValue) and value.sub is not None):
             raise ExprError(f"{_describe(value)} is neither a constant nor a symbol plus a constant")
         branch = kind.formula in (Formula.BRANCH, Formula.DO_END)
         if isinstance(value, int):
@@ -129,7 +129,7 @@ class _Finisher:
         number = RELOCATION_BY_NAME[_ABSOLUTE[kind.name.removeprefix("R_PIC30_")]].number
         section.relocs.append(Reloc(offset, number, symbol))
 
-    def _check_target(self, source: AsmSection, value: SymbolicValue, kind: RelocationType) -> None:
+    def _check_target(self, source: AsmSection, value: SymbolValue, kind: RelocationType) -> None:
         """Raise `ExprError` for an operator that does not fit the section of its target (abi-elf.md §4.2)."""
         assert value.add is not None
         place = value.add.place
@@ -216,7 +216,7 @@ class _Finisher:
         if isinstance(value, int):
             result.home, result.value = Home.ABSOLUTE, value
         elif (
-            isinstance(value, SymbolicValue)
+            isinstance(value, SymbolValue)
             and value.add
             and isinstance(value.add.place, Label)
             and not (value.op or value.sub)

@@ -32,7 +32,7 @@ class Fixup:
 
 
 @dataclass(slots=True, eq=False)
-class Piece(Frag):
+class SectionPiece(Frag):
     """A fragment with its content: octets in code, plain bytes elsewhere."""
 
     section: AsmSection
@@ -43,7 +43,7 @@ class Piece(Frag):
 class Relaxable:
     """CALL or GOTO alone in `piece`, with the one-word branch that may replace it."""
 
-    piece: Piece
+    piece: SectionPiece
     target: AsmSymbol
     short: bytes
     fixup: Fixup
@@ -72,7 +72,7 @@ class AsmSection(LabelledSection):
         self.load: int | None = None
         self.keep = False
         self.labelled = False
-        self.pieces: list[Piece] = [Piece(self)]
+        self.pieces: list[SectionPiece] = [SectionPiece(self)]
         self.piece = self.pieces[0]
         self.closed_units = 0  # length of all pieces but the current one, as long as nothing is relaxed
         self.fixups: list[Fixup] = []
@@ -224,15 +224,15 @@ class AsmSection(LabelledSection):
         self.fixups.append(fixup)
         return fixup
 
-    def close_piece(self) -> Piece:
+    def close_piece(self) -> SectionPiece:
         """End the current piece and start the next one; return the new piece."""
         self.align_word()
         self.closed_units += self.here()
-        self.piece = Piece(self, self.closed_units)
+        self.piece = SectionPiece(self, self.closed_units)
         self.pieces.append(self.piece)
         return self.piece
 
-    def octets(self, piece: Piece, offset: int) -> int:
+    def octets(self, piece: SectionPiece, offset: int) -> int:
         """File offset, in octets from the section start, of a fixup's `offset` (abi-elf.md §5)."""
         return piece.start * 2 + (offset if self.is_code else offset * 2)
 

@@ -39,7 +39,7 @@ def strip_comments(text: str) -> list[str]:
 
 
 @dataclass(slots=True)
-class Frame:
+class SourceFrame:
     """A run of lines being read: a file, or the expansion of a macro or repeat."""
 
     lines: list[str]
@@ -57,10 +57,10 @@ class Source:
     """The stack of frames; `next()` returns the lines in order."""
 
     def __init__(self, text: str, file: str, counted: bool = True) -> None:
-        self.frames = [Frame(strip_comments(text), file, 0, counted=counted)]
+        self.frames = [SourceFrame(strip_comments(text), file, 0, counted=counted)]
         self.expanded = 0
         self.place = SourceLocation(file, 0)
-        self.on_end: Callable[[Frame], None] = lambda frame: None
+        self.on_end: Callable[[SourceFrame], None] = lambda frame: None
 
     def next(self) -> str | None:
         """Return the next line, None at the end of everything; `place` then names it."""
@@ -84,7 +84,7 @@ class Source:
             return text
         return None
 
-    def push(self, frame: Frame) -> None:
+    def push(self, frame: SourceFrame) -> None:
         """Read `frame` next, then continue with the current one."""
         if len(self.frames) >= MAX_DEPTH:
             raise SourceError(f"includes and macros nested deeper than {MAX_DEPTH}")
@@ -96,11 +96,11 @@ class Source:
 
     def include(self, text: str, file: str, conditionals: int) -> None:
         """Read another file's `text` next."""
-        self.push(Frame(strip_comments(text), file, 0, conditionals=conditionals))
+        self.push(SourceFrame(strip_comments(text), file, 0, conditionals=conditionals))
 
     def expand(self, lines: list[str], conditionals: int, macro: str = "") -> None:
         """Read generated `lines` next; messages name the line being read now."""
-        self.push(Frame(lines, self.place.file, self.place.line, macro, True, conditionals=conditionals))
+        self.push(SourceFrame(lines, self.place.file, self.place.line, macro, True, conditionals=conditionals))
 
     def block(self, opening: re.Pattern[str], closing: re.Pattern[str], what: str) -> list[str]:
         """Return the lines up to the matching end, which is consumed; nested blocks stay inside."""
@@ -120,7 +120,7 @@ class Source:
         self.place = start
         raise SourceError(f"{what} is never closed")
 
-    def leave_macro(self) -> Frame | None:
+    def leave_macro(self) -> SourceFrame | None:
         """Drop everything down to and including the innermost macro expansion (.exitm); return its frame."""
         for index in range(len(self.frames) - 1, -1, -1):
             if self.frames[index].macro:

@@ -17,8 +17,8 @@ from toolchain.asm.conditionals import Conditionals
 from toolchain.asm.expr import ExprError
 from toolchain.asm.macro import Macro
 from toolchain.asm.sections import AsmSection
-from toolchain.asm.source import Frame, Source
-from toolchain.asm.symbols import AsmSymbol, ExprValue, Label, SymbolicValue
+from toolchain.asm.source import Source, SourceFrame
+from toolchain.asm.symbols import AsmSymbol, ExprValue, Label, SymbolValue
 from toolchain.elf import constants as c
 from toolchain.errors import SourceLocation, ToolError
 
@@ -140,13 +140,13 @@ class Assembler:
             symbol.used = True
             if symbol.first_use is None:
                 symbol.first_use = self.source.place
-            return SymbolicValue(symbol)
+            return SymbolValue(symbol)
         return symbol.place
 
     def here(self) -> ExprValue:
         """Return the current location as a value."""
         self.anonymous += 1
-        return SymbolicValue(AsmSymbol(f".LH{self.anonymous}", self.section.dot()))
+        return SymbolValue(AsmSymbol(f".LH{self.anonymous}", self.section.dot()))
 
     def evaluate(self, text: str) -> ExprValue:
         """Return the value of expression `text`, as far as it is known; a leading `#` is ignored."""
@@ -171,11 +171,11 @@ class Assembler:
         if isinstance(value, int):
             return value
         place = (
-            value.add.place if isinstance(value, SymbolicValue) and value.add and not (value.sub or value.op) else None
+            value.add.place if isinstance(value, SymbolValue) and value.add and not (value.sub or value.op) else None
         )
         if not isinstance(place, Label) or place.frag.section is not self.section:
             raise ExprError(f"location {text.strip()!r} must be a number, or a label of this section plus a number")
-        assert isinstance(value, SymbolicValue)
+        assert isinstance(value, SymbolValue)
         return place.frag.start + place.offset + value.offset
 
     def define_label(self, name: str) -> None:
@@ -204,7 +204,7 @@ class Assembler:
         self.registers.pop(name, None)
         symbol = self.symbol(name)
         value = self.evaluate(text)
-        if isinstance(value, SymbolicValue) and value.add is symbol:
+        if isinstance(value, SymbolValue) and value.add is symbol:
             raise ExprError(f"symbol {name} is defined in terms of itself")
         symbol.place = value
 
@@ -229,7 +229,7 @@ class Assembler:
 
     # -- frames ------------------------------------------------------------------------------------------------------
 
-    def _frame_ended(self, frame: Frame) -> None:
+    def _frame_ended(self, frame: SourceFrame) -> None:
         if self.conditionals.depth > frame.conditionals:
             opened = self.conditionals.innermost()
             self.conditionals.cut(frame.conditionals)

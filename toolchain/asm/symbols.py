@@ -1,6 +1,6 @@
 """Symbols, locations and values of expressions while a file is being assembled.
 
-The value of an expression is an `int`, a `SymbolicValue` (symbol - symbol + offset under an optional operator), or a
+The value of an expression is an `int`, a `SymbolValue` (symbol - symbol + offset under an optional operator), or a
 `PendingOperation` whose operands become numbers only when all labels have their location.
 """
 
@@ -53,7 +53,7 @@ class AsmSymbol:
 
 
 @dataclass(frozen=True, slots=True)
-class SymbolicValue:
+class SymbolValue:
     """op(add - sub + offset); `op` is "" for a plain address."""
 
     add: AsmSymbol | None = None
@@ -74,4 +74,4 @@ class PendingOperation:
     right: ExprValue | None
 
 
-ExprValue = int | SymbolicValue | PendingOperation
+ExprValue = int | SymbolValue | PendingOperation

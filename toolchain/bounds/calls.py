@@ -9,7 +9,7 @@ from emu.dspic30f.isa.flow import Branch, Skip
 from toolchain.bounds.abstract.state import INHERITED, NO_ADDRESS, AbstractState
 from toolchain.bounds.abstract.values import Value, extremes
 from toolchain.bounds.annotations.flow_facts import CALLS_TOO_DEEP, JUMP_PAST_TABLE, JUMP_WITHOUT_TABLE, UNKNOWN_RETURN
-from toolchain.bounds.graph import Block, Instruction
+from toolchain.bounds.graph import BasicBlock, Instruction
 from toolchain.bounds.result import FunctionResult
 from toolchain.bounds.steps import InstructionExecution
 from toolchain.bounds.transfer import TRAP, is_constant, priority_range
@@ -31,7 +31,7 @@ class CallExecution(InstructionExecution):
         """Continue at a block with a state."""
 
     @abstractmethod
-    def _block(self, block: Block, state: AbstractState) -> None:
+    def _block(self, block: BasicBlock, state: AbstractState) -> None:
         """Execute a block and pass the resulting states to its successors."""
 
     def _goto(self, last: Instruction, target: Value, state: AbstractState) -> None:

@@ -23,7 +23,7 @@ from toolchain.bounds.annotations.flow_facts import (
 )
 from toolchain.bounds.calls import CallExecution
 from toolchain.bounds.contexts import CallContexts
-from toolchain.bounds.graph import Block, FunctionGraph, Instruction, Loop, OrderElement
+from toolchain.bounds.graph import BasicBlock, FunctionGraph, Instruction, Loop, OrderElement
 from toolchain.bounds.result import FunctionResult, Scope
 from toolchain.bounds.transfer import is_constant
 from toolchain.stack.effects import CALL_BYTES
@@ -201,7 +201,7 @@ class _FunctionExecution(CallExecution):
 
     # -- instructions --------------------------------------------------------------------------------------------
 
-    def _block(self, block: Block, state: AbstractState) -> None:
+    def _block(self, block: BasicBlock, state: AbstractState) -> None:
         """Execute a block and pass the resulting states to its successors."""
         explorer = self.explorer
         explorer.steps += len(block.steps)
@@ -242,7 +242,7 @@ class _FunctionExecution(CallExecution):
             self._arrive(last.after, state)
 
     def _follow(
-        self, block: Block, flow: Flow, state: AbstractState, compared: tuple[FlagResult | None] | None
+        self, block: BasicBlock, flow: Flow, state: AbstractState, compared: tuple[FlagResult | None] | None
     ) -> None:
         """Pass the state after a block to its successors.
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from emu.dspic30f.isa.facts import facts_of, flow_of
 from emu.dspic30f.isa.flow import Branch, Call, Do, Flow, Goto, Reset, Return, Skip
 from emu.dspic30f.isa.row import Insn
-from toolchain.elf.disassemble import Item
+from toolchain.elf.disassemble import CodeItem
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,7 +31,7 @@ class Instruction:
 
 
 @dataclass(slots=True)
-class Block:
+class BasicBlock:
     """A basic block; `following` are the heads of its successors within the function."""
 
     steps: list[Instruction]
@@ -59,7 +59,7 @@ class FunctionGraph:
     """The control-flow graph of one function."""
 
     entry: int
-    blocks: dict[int, Block] = field(default_factory=dict)
+    blocks: dict[int, BasicBlock] = field(default_factory=dict)
     order: list[OrderElement] = field(default_factory=list)
     heads: set[int] = field(default_factory=set)
     """Heads of loops."""
@@ -73,7 +73,7 @@ class FunctionGraph:
     """Whether the function has a frame (LNK) that alloca can extend."""
 
 
-def instruction_at(item: Item) -> Instruction:
+def instruction_at(item: CodeItem) -> Instruction:
     """Return an instruction with its static facts."""
     assert item.insn is not None
     facts = facts_of(item.insn)
@@ -88,7 +88,7 @@ def instruction_at(item: Item) -> Instruction:
 class GraphBuilder:
     """Builds the control-flow graphs of functions."""
 
-    def __init__(self, items: Mapping[int, Item], entries: set[int]) -> None:
+    def __init__(self, items: Mapping[int, CodeItem], entries: set[int]) -> None:
         self.items, self.entries = items, entries
         self.steps: dict[int, Instruction] = {}
 
@@ -100,7 +100,7 @@ class GraphBuilder:
             steps = [self.steps[head]]
             while (next_pc := self._falls(steps[-1], following)) is not None and next_pc not in heads:
                 steps.append(self.steps[next_pc])
-            result.blocks[head] = Block(steps, following[steps[-1].pc])
+            result.blocks[head] = BasicBlock(steps, following[steps[-1].pc])
         result.order = weak_topological_order(entry, {head: block.following for head, block in result.blocks.items()})
         result.heads = {loop.head for loop in all_loops(result.order)}
         return result

@@ -42,7 +42,7 @@ class Response:
 
 
 @dataclass(slots=True)
-class Report:
+class BoundsReport:
     """Bounds of one image."""
 
     calls: list[Bound]
@@ -78,7 +78,7 @@ class Report:
         return rows if self.main is None or any(row is self.main for row in rows) else [self.main, *rows]
 
 
-def report_of(program: Program, functions: Iterable[str]) -> Report:
+def report_of(program: Program, functions: Iterable[str]) -> BoundsReport:
     """Return the bounds of the named functions, main, all threads and interrupts, with response times and stacks.
 
     Raises `ToolError` for a name that is no function.
@@ -102,7 +102,7 @@ def report_of(program: Program, functions: Iterable[str]) -> Report:
     main = None
     if start is not None and start in program.calls.entries:
         main = asked.get(start) or analysis.bound(START, start, "main")
-    report = Report(calls, threads, interrupts, nested, main)
+    report = BoundsReport(calls, threads, interrupts, nested, main)
     for row in (*report.rows, *nested):
         for place, which in row.priority_changes.items():
             report.contradictions[place] = f"sets an interrupt priority that contradicts INTERRUPT_LEVEL: {which}"
@@ -111,7 +111,7 @@ def report_of(program: Program, functions: Iterable[str]) -> Report:
     return report
 
 
-def _response(report: Report, one: Bound) -> Response:
+def _response(report: BoundsReport, one: Bound) -> Response:
     """Return the response of an interrupt, the sum of the delays that other entries cause.
 
     - the longest time for which code of a lower level masks the interrupt
@@ -146,7 +146,7 @@ def _response(report: Report, one: Bound) -> Response:
     return Response(one.name, level, longest if known else None, where, longest + more + latency if known else None)
 
 
-def _stacks(report: Report, analysis: BoundAnalysis) -> None:
+def _stacks(report: BoundsReport, analysis: BoundAnalysis) -> None:
     """Compute the depth of each stack under the deepest chain of nested interrupts."""
 
     def known(*parts: Bound) -> bool:

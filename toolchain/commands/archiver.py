@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 
 from toolchain.commands.parser import parser
-from toolchain.elf.archive import Member, archive_bytes, read_members
+from toolchain.elf.archive import ArchiveMember, archive_bytes, read_members
 from toolchain.errors import ToolError
 from toolchain.files import read_bytes, write_outputs
 
@@ -48,19 +48,19 @@ def main(arguments: list[str]) -> int:
         if action[0] == "r":
             kept = _replace(members, options.members)
         elif action[0] == "q":
-            kept = members + [Member(Path(name).name, read_bytes(name)) for name in options.members]
+            kept = members + [ArchiveMember(Path(name).name, read_bytes(name)) for name in options.members]
         write_outputs([(path, archive_bytes(kept))])
     return 0
 
 
-def _replace(members: list[Member], files: list[str]) -> list[Member]:
+def _replace(members: list[ArchiveMember], files: list[str]) -> list[ArchiveMember]:
     """Return the members with those of the same name replaced by `files`, new ones at the end."""
-    fresh = {Path(name).name: Member(Path(name).name, read_bytes(name)) for name in files}
+    fresh = {Path(name).name: ArchiveMember(Path(name).name, read_bytes(name)) for name in files}
     result = [fresh.pop(m.name, m) for m in members]
     return result + list(fresh.values())
 
 
-def _extract(members: list[Member], names: list[str], archive: str) -> None:
+def _extract(members: list[ArchiveMember], names: list[str], archive: str) -> None:
     wanted = [m for m in members if not names or m.name in names]
     missing = set(names) - {m.name for m in wanted}
     if missing:

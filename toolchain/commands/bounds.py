@@ -7,7 +7,7 @@ import json
 from dataclasses import asdict
 
 from toolchain.bounds.annotations.reader import AnnotationSet, read_annotation_section
-from toolchain.bounds.interference import Report, report_of
+from toolchain.bounds.interference import BoundsReport, report_of
 from toolchain.bounds.program import Program
 from toolchain.bounds.report import Bound
 from toolchain.commands.parser import parser
@@ -30,7 +30,7 @@ _JSON_KEYS = {
     "nesting_disabled_at": "unnested",
     "priority_changes": "levels",
 }
-"""Keys of --json that differ from the field names of `Report` and `Bound`; scripts depend on them."""
+"""Keys of --json that differ from the field names of `BoundsReport` and `Bound`; scripts depend on them."""
 KERNEL = "_Sys_"
 DESCRIPTION = """Bounds of a linked image: cycles, stack, longest masked time, and response of each interrupt.  Every
 function is executed on all its inputs at once.  Code without a bound is listed with the source line to annotate
@@ -81,11 +81,11 @@ def _pair(option: str, text: str) -> tuple[str, int]:
     return name, int(value)
 
 
-def _as_data(report: Report) -> dict[str, object]:
+def _as_data(report: BoundsReport) -> dict[str, object]:
     return asdict(report, dict_factory=lambda fields: {_JSON_KEYS.get(name, name): value for name, value in fields})
 
 
-def as_text(report: Report, annotations: AnnotationSet) -> str:
+def as_text(report: BoundsReport, annotations: AnnotationSet) -> str:
     """Return the report as tables."""
     rows = report.rows
     width = max((len(row.name) for row in rows), default=8)
@@ -122,7 +122,7 @@ def _number(value: int | None) -> str:
     return "?" if value is None else f"{value:,}"
 
 
-def _check(report: Report, name: str, limit: int, what: str) -> int:
+def _check(report: BoundsReport, name: str, limit: int, what: str) -> int:
     rows = [row for row in report.rows if row.name in (name, name.removeprefix("_"))]
     if not rows:
         raise ToolError(f"no analysed function is called {name}")

@@ -8,7 +8,7 @@ from emu.image.elf_facts import RELOCATIONS, SectionFlag
 from toolchain.commands.names import letter
 from toolchain.commands.parser import parser
 from toolchain.elf import constants as c
-from toolchain.elf.disassemble import Item, Names, items, text_of
+from toolchain.elf.disassemble import CodeItem, Names, items, text_of
 from toolchain.elf.dwarf import LineTable, SourceText, lines_of
 from toolchain.elf.model import Executable, Home, ObjectFile, Section
 from toolchain.elf.read import is_object, read_executable, read_object
@@ -132,7 +132,7 @@ def _range(image: ObjectFile | Executable, start: str | None) -> tuple[int, int]
 
 
 def _print_item(
-    section: Section, item: Item, names: Names, lines: LineTable, text: SourceText, previous: str, relocs: bool
+    section: Section, item: CodeItem, names: Names, lines: LineTable, text: SourceText, previous: str, relocs: bool
 ) -> str:
     """Print one item with label, source and relocations; return the source line it belongs to."""
     symbol = names.at["code"].get(item.address)

@@ -10,7 +10,7 @@ from toolchain.commands.parser import parser
 from toolchain.elf.read import read_executable
 from toolchain.errors import ToolError
 from toolchain.files import read_bytes, read_text
-from toolchain.stack.analyse import Analysis, Entry, Report
+from toolchain.stack.analyse import Analysis, Entry, StackReport
 from toolchain.stack.annotations import Annotations, add_symbols, read_annotations
 
 DESCRIPTION = """Worst-case stack use, in bytes, per function and per entry (reset, interrupt, thread, by pointer),
@@ -54,7 +54,7 @@ def main(arguments: list[str]) -> int:
     return _check(report, options.limit)
 
 
-def _as_data(report: Report) -> dict[str, list[dict[str, object]]]:
+def _as_data(report: StackReport) -> dict[str, list[dict[str, object]]]:
     return {
         "functions": [
             {
@@ -81,7 +81,7 @@ def _as_data(report: Report) -> dict[str, list[dict[str, object]]]:
     }
 
 
-def _as_text(report: Report, functions: bool) -> str:
+def _as_text(report: StackReport, functions: bool) -> str:
     lines = [f"{'entry':10} {'bytes':>6}  deepest path"]
     for entry in report.entries:
         left = entry.before_switch
@@ -104,7 +104,7 @@ def _total(entry: Entry) -> int:
     return entry.total
 
 
-def _check(report: Report, limits: list[str]) -> int:
+def _check(report: StackReport, limits: list[str]) -> int:
     """Compare with the --limit options; the total of an entry takes precedence over that of a function."""
     status = DONE
     for limit in limits:

@@ -15,7 +15,7 @@ _LONG_NAME = 15  # longer names live in the `//` member
 
 
 @dataclass(slots=True)
-class Member:
+class ArchiveMember:
     """One file of an archive."""
 
     name: str
@@ -28,15 +28,15 @@ class Archive:
     """An archive being linked: members and which member defines which global symbol."""
 
     name: str
-    members: list[Member]
-    index: dict[str, Member] = field(default_factory=dict)
+    members: list[ArchiveMember]
+    index: dict[str, ArchiveMember] = field(default_factory=dict)
 
 
-def read_members(data: bytes, name: str) -> list[Member]:
+def read_members(data: bytes, name: str) -> list[ArchiveMember]:
     """Return the members of an archive in order; raise `ToolError` when it is damaged."""
     if data[: len(MAGIC)] != MAGIC:
         raise ToolError(f"{name}: not an archive (bad magic at offset 0)")
-    members: list[Member] = []
+    members: list[ArchiveMember] = []
     long_names = b""
     offset = len(MAGIC)
     while offset < len(data):
@@ -51,7 +51,7 @@ def read_members(data: bytes, name: str) -> list[Member]:
         if raw == "//":
             long_names = body
         elif raw not in ("/", "/SYM64/"):
-            members.append(Member(_member_name(raw, long_names, name), body, offset))
+            members.append(ArchiveMember(_member_name(raw, long_names, name), body, offset))
         offset += _HEADER + size + (size & 1)
     return members
 
@@ -92,14 +92,14 @@ def _read_index(data: bytes, name: str) -> list[tuple[str, int]]:
     return [(n.decode("utf-8", "replace"), o) for n, o in zip(names, offsets, strict=False)]
 
 
-def _defined(member: Member, archive: str) -> list[str]:
+def _defined(member: ArchiveMember, archive: str) -> list[str]:
     if not is_object(member.data):
         return []
     obj = read_object(member.data, f"{archive}({member.name})")
     return [s.name for s in obj.symbols if s.bind is not Bind.LOCAL and s.home is not Home.UNDEFINED]
 
 
-def archive_bytes(members: list[Member]) -> bytes:
+def archive_bytes(members: list[ArchiveMember]) -> bytes:
     """Return an archive of `members` with a symbol index; times, owners and modes are fixed, so bytes repeat."""
     long_names = bytearray()
     labels: list[str] = []

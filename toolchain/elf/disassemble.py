@@ -21,7 +21,7 @@ NO_INSTRUCTIONS = frozenset((".ivt", ".aivt", ".dinit"))
 
 
 @dataclass(frozen=True, slots=True)
-class Item:
+class CodeItem:
     """One or two words at `address`; `insn` is None for a word that is no instruction."""
 
     address: int
@@ -75,7 +75,7 @@ def _better(new: Symbol, old: Symbol) -> bool:
     return (new.type == c.STT_FUNC, new.bind is not Bind.LOCAL) > (old.type == c.STT_FUNC, old.bind is not Bind.LOCAL)
 
 
-def items(section: Section) -> Iterator[Item]:
+def items(section: Section) -> Iterator[CodeItem]:
     """Yield the items of a code section in order."""
     words = [int.from_bytes(section.data[i : i + 3], "little") for i in range(0, len(section.data), OCTETS_PER_WORD)]
     index = 0
@@ -87,11 +87,11 @@ def items(section: Section) -> Iterator[Item]:
         length = insn.words if insn is not None else 1
         if length == 2 and following is None:
             insn, length = None, 1
-        yield Item(address, tuple(words[index : index + length]), insn)
+        yield CodeItem(address, tuple(words[index : index + length]), insn)
         index += length
 
 
-def text_of(item: Item, names: Names | None = None) -> str:
+def text_of(item: CodeItem, names: Names | None = None) -> str:
     """Return the assembly text of an item."""
     if item.insn is None:
         return f".pword {item.words[0]:#08x}"

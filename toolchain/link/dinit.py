@@ -28,7 +28,7 @@ class Format(IntEnum):
 
 
 @dataclass(slots=True)
-class Record:
+class DinitRecord:
     """One table entry: RAM address, length in bytes, how it is filled, and the sections it covers."""
 
     address: int
@@ -42,9 +42,9 @@ class Record:
         return _HEADER_WORDS + data[self.format]
 
 
-def plan(layout: Layout, pack: bool) -> list[Record]:
+def plan(layout: Layout, pack: bool) -> list[DinitRecord]:
     """Return the records for all placed RAM sections, by address."""
-    records: list[Record] = []
+    records: list[DinitRecord] = []
     for section, placed in sorted(layout.placed.items(), key=lambda item: item[1].address):
         skip = section.flags & _NEVER or section.extended & (ExtendedAttribute.HEAP | ExtendedAttribute.STACK)
         if not section.is_ram or skip or not placed.size:
@@ -56,17 +56,17 @@ def plan(layout: Layout, pack: bool) -> list[Record]:
             last.size += placed.size
             last.sections.append(section)
         else:
-            records.append(Record(placed.address, placed.size, form, [section]))
+            records.append(DinitRecord(placed.address, placed.size, form, [section]))
     return records
 
 
-def empty_section(records: list[Record]) -> Section:
+def empty_section(records: list[DinitRecord]) -> Section:
     """Return `.dinit` with its final length and without content; the end mark is one word."""
     words = sum(record.words for record in records) + 1
     return Section(".dinit", CODE, data=bytearray(words * OCTETS_PER_WORD))
 
 
-def fill(section: Section, records: list[Record], contents: dict[Section, bytearray], fill_upper: int) -> None:
+def fill(section: Section, records: list[DinitRecord], contents: dict[Section, bytearray], fill_upper: int) -> None:
     """Write the table from the relocated `contents` of the data sections."""
     out = bytearray()
 

@@ -23,7 +23,7 @@ from toolchain.errors import ToolError
 from toolchain.link import dinit, part, synthesize
 from toolchain.link.gc import SECTION_LIMIT, live_sections, vector_names
 from toolchain.link.image import Output, build_executable, build_outputs
-from toolchain.link.memory import HANDLE_LIMIT, Memory
+from toolchain.link.memory import HANDLE_LIMIT, ChipMemory
 from toolchain.link.options import LinkOptions
 from toolchain.link.place import Layout, Placer, even, is_const, largest_symbols, space_of
 from toolchain.link.relocate import Relocator
@@ -40,7 +40,7 @@ class Linked:
     resolution: Resolution
     layout: Layout
     outputs: list[Output]
-    records: list[dinit.Record]
+    records: list[dinit.DinitRecord]
     live: set[Section]
     stack: tuple[int, int]  # first address of the stack, limit (SPLIM)
     messages: list[str]
@@ -60,7 +60,7 @@ def _link(objects: list[ObjectFile], archives: list[Archive], options: LinkOptio
     """Link once; None when function pointers turn out to need GOTO slots that `with_slots` did not reserve."""
     inputs = _gather_inputs(objects, archives, options)
     handles = _handles(inputs, options, with_slots)
-    memory = Memory(options.chip, options.part)
+    memory = ChipMemory(options.chip, options.part)
     absolute = memory.script_symbols() | options.define | dict.fromkeys(_LINKER_SYMBOLS, 0)
     _check_inputs(inputs, set(absolute), options)
     placement = _place_sections(inputs, memory, options)
@@ -111,7 +111,7 @@ class _Placement:
     layout: Layout
     order: list[Section]
     table: Section | None
-    records: list[dinit.Record]
+    records: list[dinit.DinitRecord]
 
 
 def _gather_inputs(objects: list[ObjectFile], archives: list[Archive], options: LinkOptions) -> _Inputs:
@@ -154,13 +154,13 @@ def _check_inputs(inputs: _Inputs, absolute: set[str], options: LinkOptions) -> 
         part.check(inputs.resolution, inputs.live)
 
 
-def _place_sections(inputs: _Inputs, memory: Memory, options: LinkOptions) -> _Placement:
+def _place_sections(inputs: _Inputs, memory: ChipMemory, options: LinkOptions) -> _Placement:
     """Give every live section its address; data first, because the `.dinit` table depends on its placement."""
     sections = [section for obj in inputs.resolution.objects for section in obj.sections]
     order = [s for s in sections if s in inputs.live and s.name != c.SIGNATURE_SECTION]
     placer = Placer(inputs.resolution, order, memory)
     placer.place_data()
-    records: list[dinit.Record] = []
+    records: list[dinit.DinitRecord] = []
     table: Section | None = None
     if options.data_init:
         records = dinit.plan(placer.layout, options.pack_data)

@@ -18,7 +18,7 @@ HANDLE_LIMIT = 0x10000  # abi-elf.md §1.5: a function pointer is 16 bits
 UNIT_ID_WORDS = 4  # FUID0..3, abi-elf.md §3.3
 
 
-class Memory:
+class ChipMemory:
     """Memory regions of a chip, or of the part of it that `--part` selects."""
 
     def __init__(self, chip: Chip, part: PartRegions | None = None) -> None:
@@ -64,7 +64,7 @@ def _common(region: Region, other: Region) -> Region:
     return Region(region.name, start, max(start, min(region.end, other.end)))
 
 
-CONFIG_SECTIONS: Final = frozenset(name for chip in map(chip_named, NAMES) for name in Memory(chip).config_sections)
+CONFIG_SECTIONS: Final = frozenset(name for chip in map(chip_named, NAMES) for name in ChipMemory(chip).config_sections)
 """Names of the sections with configuration words, of all chips."""
 
 

@@ -1,6 +1,6 @@
 """Placement: every live input section gets an address and a load address (abi-elf.md §3.3, "Allocation").
 
-In: sections with their sizes.  Out: a `Placed` for each, without overlaps, within the rules of PSV windows, near, X, Y,
+In: sections with their sizes.  Out: a `PlacedSection` for each, without overlaps, by the rules of PSV, near, X, Y,
 `address()` and alignment; or a `ToolError` with the number of missing bytes.
 """
 
@@ -13,7 +13,7 @@ from emu.image.elf_facts import PSV_PAGE_UNITS, PSV_WINDOW, ExtendedAttribute, S
 from toolchain.elf.model import Section
 from toolchain.elf.symbols import symbol_sizes
 from toolchain.errors import ToolError
-from toolchain.link.memory import CONFIG_SECTIONS, HANDLE_LIMIT, Memory, Pool
+from toolchain.link.memory import CONFIG_SECTIONS, HANDLE_LIMIT, ChipMemory, Pool
 from toolchain.link.resolve import Resolution
 
 _FIRST_CODE = (".init", ".user_init", ".handle", ".isr", ".libc", ".libm", ".libdsp", ".lib")
@@ -21,7 +21,7 @@ _FIRST_CODE = (".init", ".user_init", ".handle", ".isr", ".libc", ".libm", ".lib
 
 
 @dataclass(frozen=True, slots=True)
-class Placed:
+class PlacedSection:
     """Address of a section, in address units; `size` is even."""
 
     address: int
@@ -33,8 +33,8 @@ class Placed:
 class Layout:
     """Addresses by section, and the free intervals of the memories."""
 
-    memory: Memory
-    placed: dict[Section, Placed] = field(default_factory=dict)
+    memory: ChipMemory
+    placed: dict[Section, PlacedSection] = field(default_factory=dict)
     data: Pool = field(init=False)
     program: Pool = field(init=False)
     eeprom: Pool = field(init=False)
@@ -65,7 +65,7 @@ def space_of(section: Section) -> str:
 class Placer:
     """Places sections space by space; largest constraints first."""
 
-    def __init__(self, resolution: Resolution, sections: list[Section], memory: Memory) -> None:
+    def __init__(self, resolution: Resolution, sections: list[Section], memory: ChipMemory) -> None:
         self.resolution, self.layout, self.memory = resolution, Layout(memory), memory
         self.ram, self.near, self.program, self.eeprom = memory.ram, memory.near, memory.program, memory.eeprom
         self.by_space: dict[str, list[Section]] = {}
@@ -73,7 +73,7 @@ class Placer:
             self.by_space.setdefault(space_of(section), []).append(section)
 
     def _record(self, section: Section, address: int, load: int | None = None) -> None:
-        self.layout.placed[section] = Placed(address, address if load is None else load, even(section.units))
+        self.layout.placed[section] = PlacedSection(address, address if load is None else load, even(section.units))
 
     def _name(self, section: Section) -> str:
         return f"{self.resolution.owner[section].name}:({section.name})"
@@ -212,7 +212,7 @@ class Placer:
         ends: dict[str, int] = {}
         for section in self.by_space.get("info", []):
             start = ends.get(section.name, 0)
-            self.layout.placed[section] = Placed(start, start, section.units)
+            self.layout.placed[section] = PlacedSection(start, start, section.units)
             ends[section.name] = start + section.units
 
     # -- errors --------------------------------------------------------------------------------------------------

@@ -21,7 +21,7 @@ _LISTS = frozenset((".debug_loc", ".debug_ranges"))
 
 
 @dataclass(frozen=True, slots=True)
-class Target:
+class SymbolTarget:
     """Value of a symbol: address, load address, and its memory space ("" for numbers)."""
 
     address: int
@@ -43,27 +43,27 @@ class Relocator:
         self.resolution, self.layout, self.absolute = resolution, layout, absolute
         self.slots, self.handle = slots, handle
         self.findings: list[str] = []
-        self._targets: dict[Symbol, Target] = {}
+        self._targets: dict[Symbol, SymbolTarget] = {}
 
-    def target(self, symbol: Symbol) -> Target:
+    def target(self, symbol: Symbol) -> SymbolTarget:
         """Return the value of the definition of a symbol."""
         known = self._targets.get(symbol)
         if known is None:
             known = self._targets[symbol] = self._find(self.resolution.lookup(symbol))
         return known
 
-    def _find(self, symbol: Symbol) -> Target:
+    def _find(self, symbol: Symbol) -> SymbolTarget:
         if symbol.home is Home.SECTION and symbol.section is not None:
             placed = self.layout.placed.get(symbol.section)
             if placed is None:
-                return Target(0, 0, "")  # in a discarded section: only debug information refers to it
+                return SymbolTarget(0, 0, "")  # in a discarded section: only debug information refers to it
             space = space_of(symbol.section)
-            return Target(placed.address + symbol.value, placed.load + symbol.value, space)
+            return SymbolTarget(placed.address + symbol.value, placed.load + symbol.value, space)
         if symbol.home is Home.UNDEFINED:
             value = self.absolute.get(symbol.name, 0)  # undefined weak symbols are 0 (§5)
-            return Target(value, value, "")
+            return SymbolTarget(value, value, "")
         value = symbol.value - (1 << 32) if symbol.value >= 1 << 31 else symbol.value  # st_value of a negative number
-        return Target(value, value, "")
+        return SymbolTarget(value, value, "")
 
     def apply(self, section: Section) -> bytearray:
         """Return a copy of the section's octets with all fields filled."""
@@ -131,7 +131,7 @@ class Relocator:
         home = self.resolution.lookup(symbol).section
         return home is not None and home not in self.layout.placed
 
-    def _address(self, kind: RelocationType, target: Target, field: int) -> int:
+    def _address(self, kind: RelocationType, target: SymbolTarget, field: int) -> int:
         """Return S+A; the addend is signed, or unsigned if the signed sum is out of range, as GNU ld does it."""
         signed = target.address + _signed(field, kind.width)
         value = signed if kind.low <= signed <= kind.high else target.address + field
@@ -142,7 +142,7 @@ class Relocator:
             )
         return fields.checked(kind, value)
 
-    def _program_value(self, symbol: Symbol, kind: RelocationType, target: Target, load: int) -> int:
+    def _program_value(self, symbol: Symbol, kind: RelocationType, target: SymbolTarget, load: int) -> int:
         """Return the value of an operator of abi-elf.md §4.2 on the load address."""
         formula = kind.formula
         if target.space == "data" and formula in _PROGRAM_ONLY:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from toolchain.elf.archive import Archive, Member
+from toolchain.elf.archive import Archive, ArchiveMember
 from toolchain.elf.model import Bind, Home, ObjectFile, Section, Symbol
 from toolchain.elf.read import read_object
 from toolchain.elf.symbols import is_named
@@ -72,7 +72,10 @@ def _rank(symbol: Symbol) -> int:
 
 
 def resolve(
-    objects: list[ObjectFile], archives: list[Archive], roots: list[str], instead: dict[int, Member] | None = None
+    objects: list[ObjectFile],
+    archives: list[Archive],
+    roots: list[str],
+    instead: dict[int, ArchiveMember] | None = None,
 ) -> Resolution:
     """Add all `objects`, then archive members as long as one defines a wanted name (one group, abi-elf.md §2.8).
 
@@ -85,7 +88,7 @@ def resolve(
     for name in roots:
         result.wanted[name] = True
     loaded: set[tuple[str, int]] = set()
-    starts: list[Member] = []
+    starts: list[ArchiveMember] = []
     progress = True
     while progress:
         progress = False

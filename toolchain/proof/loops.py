@@ -27,7 +27,7 @@ from toolchain.proof.code.execution import CodeExecution
 from toolchain.proof.code.machine import MachineState
 from toolchain.proof.invariants import Invariant, OrderInvariant, candidate_invariants, candidate_orders, words_of
 from toolchain.proof.ir.evaluator import Evaluator
-from toolchain.proof.memory import BYTE, Frame, Memory, bytes_of, concat
+from toolchain.proof.memory import BYTE, StackFrame, SymbolicMemory, bytes_of, concat
 from toolchain.proof.path import Path
 from toolchain.proof.problem import WORD_UNITS, CompiledFile
 from toolchain.proof.solver import Refuted, Undecided, budget, check, feasible, find_model
@@ -96,7 +96,7 @@ class Induction:
     """
 
     def __init__(
-        self, compiled: CompiledFile, f: Function, frame: Frame, start: MachineState, begin: Callable[[], Path],
+        self, compiled: CompiledFile, f: Function, frame: StackFrame, start: MachineState, begin: Callable[[], Path],
         code: Callable[[Path], CodeExecution], volatile: Set[int],
     ) -> None:  # fmt: skip
         self.compiled: Final = compiled
@@ -251,7 +251,7 @@ class Induction:
     def _path_at(self, evaluator: Evaluator, head: LoopHead) -> Path:
         """Return a path at a loop head: phis, memory, and earlier loads and call results are unknown."""
         path = self.begin()
-        path.memory = Memory(z3.Array("memory.loop", z3.BitVecSort(16), z3.BitVecSort(BYTE)))
+        path.memory = SymbolicMemory(z3.Array("memory.loop", z3.BitVecSort(16), z3.BitVecSort(BYTE)))
         path.behind_barrier = True  # conservative: no store may be moved over it
         for name, block in self.blocks.items():
             if name in self.dominators[head.name]:

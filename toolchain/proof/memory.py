@@ -19,7 +19,7 @@ BYTE = 8
 
 
 @dataclass
-class Frame:
+class StackFrame:
     """The private part of the stack.
 
     lowest   its lowest address
@@ -57,16 +57,16 @@ class Frame:
         return z3.Or(below, above, *inside)
 
 
-class Memory:
+class SymbolicMemory:
     """Bytes by address: a z3 array, overlaid with the bytes written at known addresses."""
 
     def __init__(self, array: Term, written: dict[int, Term] | None = None) -> None:
         self.array = array
         self.written = written if written is not None else {}
 
-    def copy(self) -> Memory:
+    def copy(self) -> SymbolicMemory:
         """Return an independent copy."""
-        return Memory(self.array, dict(self.written))
+        return SymbolicMemory(self.array, dict(self.written))
 
     def whole(self) -> Term:
         """Return the whole memory as one array."""

@@ -7,7 +7,7 @@ from typing import Any
 
 from toolchain.ir.model import ParameterAttributes, Value
 from toolchain.proof.asm_statements import Shape
-from toolchain.proof.memory import Memory
+from toolchain.proof.memory import SymbolicMemory
 from toolchain.proof.terms import Term
 
 
@@ -26,7 +26,7 @@ class Event:
     value: Any = None
     arguments: list[tuple[Value, Any, ParameterAttributes]] = field(default_factory=list)
     named_arguments: int | None = None
-    memory: Memory | None = None
+    memory: SymbolicMemory | None = None
     """Memory at the event, None if stores may be moved over it: calls and compiler barriers fix it."""
     movable_stores: tuple[tuple[Term, Term], ...] = ()
     """Stores, by address and value, that may be executed before or after the event."""
@@ -44,7 +44,7 @@ class Event:
 class Path:
     """A path of the source up to the current instruction."""
 
-    memory: Memory
+    memory: SymbolicMemory
     values: dict[int, Any] = field(default_factory=dict)
     branch_conditions: list[Term] = field(default_factory=list)
     """Conditions of the branches taken."""
@@ -59,7 +59,7 @@ class Path:
     """Whether the last point that stores may not be moved over was a compiler barrier."""
     pending_stores: list[tuple[Term, Term]] = field(default_factory=list)
     """Stores since that point."""
-    movable_events: list[tuple[int, Memory]] = field(default_factory=list)
+    movable_events: list[tuple[int, SymbolicMemory]] = field(default_factory=list)
     """Events since that point, by number, with the memory at each."""
     result: Any = None
     end_kind: str = ""

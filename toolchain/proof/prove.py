@@ -25,7 +25,7 @@ from toolchain.proof.counterexample import Counterexample, counterexample_of
 from toolchain.proof.ir.accesses import Accesses
 from toolchain.proof.ir.evaluator import Evaluator
 from toolchain.proof.loops import Induction
-from toolchain.proof.memory import STACK, Frame, Memory, concat
+from toolchain.proof.memory import STACK, StackFrame, SymbolicMemory, concat
 from toolchain.proof.path import Path
 from toolchain.proof.problem import CompiledFile
 from toolchain.proof.solver import Refuted, Undecided, budget, feasible, find_model
@@ -62,7 +62,7 @@ class Proof:
         self.name: Final = symbol(compiled.module, f.name)
         self.start: Final = compiled.symbols[self.name]
         self.end: Final = compiled.ends.get(self.name, self.start)
-        self.frame: Final = Frame()
+        self.frame: Final = StackFrame()
         self.registers: Final = [z3.BitVec(f"W{n}", 16) for n in range(15)]
         self.array: Final = z3.Array("memory", z3.BitVecSort(16), z3.BitVecSort(8))
         self.loops: Final = any(loop_depths(f).values())
@@ -93,7 +93,7 @@ class Proof:
             raise Undecided("a variable number of arguments")
         if self.f.name in self.compiled.handlers_saving_variables:
             raise Undecided("a handler that saves variables")
-        start = MachineState([*self.registers, STACK], Memory(self.array), self.start)
+        start = MachineState([*self.registers, STACK], SymbolicMemory(self.array), self.start)
         begin = self._begin()
         try:
             for path in Evaluator(self.f, self.frame, self.compiled.address).paths(begin):
@@ -116,7 +116,7 @@ class Proof:
         return CodeExecution(self.compiled, self.start, self.end, self.frame, path, handler)
 
     def _begin(self) -> Path:
-        path = Path(Memory(self.array))
+        path = Path(SymbolicMemory(self.array))
         self._parameters(path)
         return path
 

@@ -1,6 +1,6 @@
 """Integers of the instruction table as z3 terms, or plain ints where they are known.
 
-A table value is an exact integer.  `Number` represents it in 48 bits, enough for products of two words and a 40-bit
+A table value is an exact integer.  `SymbolicInteger` has it in 48 bits, enough for products of two words and a 40-bit
 accumulator.  Its low word is a separate term, so that 16-bit computations give the same terms as in the source.
 """
 
@@ -43,7 +43,7 @@ def one_bit(condition: Term) -> Term:
     return z3.If(condition, vector(1, 1), vector(0, 1))
 
 
-class Number:
+class SymbolicInteger:
     """A symbolic integer.
 
     wide     the integer in 48 bits
@@ -64,18 +64,20 @@ class Number:
         self.truth = truth
         self.narrow = narrow
 
-    def _with(self, make: Callable[[Term, Term], Term], other: Any, swapped: bool = False) -> Number:
+    def _with(self, make: Callable[[Term, Term], Term], other: Any, swapped: bool = False) -> SymbolicInteger:
         a, b = self, other
         if swapped:
             a, b = b, a
-        return Number(make(wide(a), wide(b)), make(word(a), word(b)))
+        return SymbolicInteger(make(wide(a), wide(b)), make(word(a), word(b)))
 
-    def _bits(self, make: Callable[[Term, Term], Term], logic: Callable[..., Term], other: Any) -> Number:
+    def _bits(self, make: Callable[[Term, Term], Term], logic: Callable[..., Term], other: Any) -> SymbolicInteger:
         if self.truth is not None and ((isinstance(other, int) and other in (0, 1)) or condition(other) is not None):
             there = z3.BoolVal(bool(other)) if isinstance(other, int) else condition(other)
             return truth_number(logic(self.truth, there))
         found = self._with(make, other)
-        inside = (isinstance(other, Number) and other.narrow) or (isinstance(other, int) and 0 <= other < 1 << WORD)
+        inside = (isinstance(other, SymbolicInteger) and other.narrow) or (
+            isinstance(other, int) and 0 <= other < 1 << WORD
+        )
         if make is _and:
             found.narrow = inside or self.narrow
             if found.narrow:
@@ -84,46 +86,46 @@ class Number:
             found.narrow = inside and self.narrow
         return found
 
-    def _compared(self, make: Callable[[Term, Term], Term], other: Any) -> Number:
+    def _compared(self, make: Callable[[Term, Term], Term], other: Any) -> SymbolicInteger:
         if make in (_equal, _unequal) and self.narrow and isinstance(other, int) and 0 <= other < 1 << WORD:
             return truth_number(make(self.word, vector(other, WORD)))
         if make in (_equal, _unequal) and self.truth is not None and isinstance(other, int) and other in (0, 1):
             return truth_number(self.truth if (other == 1) == (make is _equal) else z3.Not(self.truth))
         return truth_number(make(self.wide, wide(other)))
 
-    def __add__(self, o: Any) -> Number:
+    def __add__(self, o: Any) -> SymbolicInteger:
         return self._with(lambda a, b: a + b, o)
 
     __radd__ = __add__
 
-    def __sub__(self, o: Any) -> Number:
+    def __sub__(self, o: Any) -> SymbolicInteger:
         if self.flipped is not None and isinstance(o, int) and o == HALF:
             return signed_number(self.flipped)
         return self._with(lambda a, b: a - b, o)
 
-    def __rsub__(self, o: Any) -> Number:
+    def __rsub__(self, o: Any) -> SymbolicInteger:
         return self._with(lambda a, b: a - b, o, swapped=True)
 
-    def __mul__(self, o: Any) -> Number:
+    def __mul__(self, o: Any) -> SymbolicInteger:
         a, b = factor(self), factor(o)
         if a is None or b is None:
             return self._with(lambda x, y: x * y, o)
         extend = z3.SignExt if is_signed(self) or is_signed(o) else z3.ZeroExt
-        return Number(extend(BITS - 2 * WORD, a * b), word(self) * word(o))
+        return SymbolicInteger(extend(BITS - 2 * WORD, a * b), word(self) * word(o))
 
     __rmul__ = __mul__
 
-    def __and__(self, o: Any) -> Number:
+    def __and__(self, o: Any) -> SymbolicInteger:
         return self._bits(_and, z3.And, o)
 
     __rand__ = __and__
 
-    def __or__(self, o: Any) -> Number:
+    def __or__(self, o: Any) -> SymbolicInteger:
         return self._bits(lambda a, b: a | b, z3.Or, o)
 
     __ror__ = __or__
 
-    def __xor__(self, o: Any) -> Number:
+    def __xor__(self, o: Any) -> SymbolicInteger:
         found = self._bits(lambda a, b: a ^ b, z3.Xor, o)
         if self.narrow and isinstance(o, int) and o == HALF:
             found.flipped = self.word
@@ -131,45 +133,45 @@ class Number:
 
     __rxor__ = __xor__
 
-    def __lshift__(self, o: Any) -> Number:
+    def __lshift__(self, o: Any) -> SymbolicInteger:
         if isinstance(o, int):
-            return Number(self.wide << o, self.word << min(o, WORD))
-        return Number(self.wide << wide(o))
+            return SymbolicInteger(self.wide << o, self.word << min(o, WORD))
+        return SymbolicInteger(self.wide << wide(o))
 
-    def __rlshift__(self, o: Any) -> Number:
-        return Number(wide(o) << self.wide)
+    def __rlshift__(self, o: Any) -> SymbolicInteger:
+        return SymbolicInteger(wide(o) << self.wide)
 
-    def __rshift__(self, o: Any) -> Number:
+    def __rshift__(self, o: Any) -> SymbolicInteger:
         if isinstance(o, int) and self.narrow:
             less = z3.LShR(self.word, min(o, WORD))
-            return Number(z3.ZeroExt(BITS - WORD, less), less, narrow=True)
-        return Number(self.wide >> wide(o))
+            return SymbolicInteger(z3.ZeroExt(BITS - WORD, less), less, narrow=True)
+        return SymbolicInteger(self.wide >> wide(o))
 
-    def __rrshift__(self, o: Any) -> Number:
-        return Number(wide(o) >> self.wide)
+    def __rrshift__(self, o: Any) -> SymbolicInteger:
+        return SymbolicInteger(wide(o) >> self.wide)
 
-    def __neg__(self) -> Number:
-        return Number(-self.wide, -self.word)
+    def __neg__(self) -> SymbolicInteger:
+        return SymbolicInteger(-self.wide, -self.word)
 
-    def __invert__(self) -> Number:
-        return Number(~self.wide, ~self.word)
+    def __invert__(self) -> SymbolicInteger:
+        return SymbolicInteger(~self.wide, ~self.word)
 
-    def __lt__(self, o: Any) -> Number:
+    def __lt__(self, o: Any) -> SymbolicInteger:
         return self._compared(lambda a, b: a < b, o)
 
-    def __le__(self, o: Any) -> Number:
+    def __le__(self, o: Any) -> SymbolicInteger:
         return self._compared(lambda a, b: a <= b, o)
 
-    def __gt__(self, o: Any) -> Number:
+    def __gt__(self, o: Any) -> SymbolicInteger:
         return self._compared(lambda a, b: a > b, o)
 
-    def __ge__(self, o: Any) -> Number:
+    def __ge__(self, o: Any) -> SymbolicInteger:
         return self._compared(lambda a, b: a >= b, o)
 
-    def __eq__(self, o: object) -> Number:  # type: ignore[override]
+    def __eq__(self, o: object) -> SymbolicInteger:  # type: ignore[override]
         return self._compared(_equal, o)
 
-    def __ne__(self, o: object) -> Number:  # type: ignore[override]
+    def __ne__(self, o: object) -> SymbolicInteger:  # type: ignore[override]
         return self._compared(_unequal, o)
 
     __hash__ = None  # type: ignore[assignment]
@@ -189,45 +191,45 @@ def _unequal(a: Term, b: Term) -> Term:
 
 def wide(value: Any) -> Term:
     """Return a table value in 48 bits."""
-    return value.wide if isinstance(value, Number) else vector(int(value), BITS)
+    return value.wide if isinstance(value, SymbolicInteger) else vector(int(value), BITS)
 
 
 def word(value: Any) -> Term:
     """Return the low word of a table value."""
-    return value.word if isinstance(value, Number) else vector(int(value), WORD)
+    return value.word if isinstance(value, SymbolicInteger) else vector(int(value), WORD)
 
 
 def condition(value: Any) -> Term | None:
     """Return the condition that a table value is 1 if it is known to be 0 or 1, else None."""
-    return value.truth if isinstance(value, Number) else None
+    return value.truth if isinstance(value, SymbolicInteger) else None
 
 
 def holds(value: Any) -> Term:
     """Return the condition that a table value is not 0."""
-    if isinstance(value, Number):
+    if isinstance(value, SymbolicInteger):
         return value.truth if value.truth is not None else value.wide != 0
     return z3.BoolVal(bool(value))
 
 
-def narrow(term: Term) -> Number | int:
+def narrow(term: Term) -> SymbolicInteger | int:
     """Return a term of at most 16 bits, zero-extended, as a table value; an int if it is constant."""
     if z3.is_bv_value(term):
         return int(term.as_long())
     if term.size() < WORD:
         term = z3.ZeroExt(WORD - term.size(), term)
-    return Number(z3.ZeroExt(BITS - WORD, term), term, narrow=True)
+    return SymbolicInteger(z3.ZeroExt(BITS - WORD, term), term, narrow=True)
 
 
-def truth_number(term: Term) -> Number:
+def truth_number(term: Term) -> SymbolicInteger:
     """Return a condition as the table value 0 or 1."""
-    return Number(
+    return SymbolicInteger(
         z3.If(term, vector(1, BITS), vector(0, BITS)), z3.If(term, vector(1, WORD), vector(0, WORD)), term, True
     )
 
 
-def signed_number(term: Term) -> Number:
+def signed_number(term: Term) -> SymbolicInteger:
     """Return a word as a signed table value."""
-    found = Number(z3.SignExt(BITS - WORD, term), term)
+    found = SymbolicInteger(z3.SignExt(BITS - WORD, term), term)
     found.signed = True
     return found
 

@@ -8,14 +8,14 @@ from emu.chips import chip_named, chip_of
 from emu.chips.family import AIVT, SLOTS
 from emu.image.elf_facts import PROCESSOR_MASK
 from toolchain.elf import constants as c
-from toolchain.elf.disassemble import NO_INSTRUCTIONS, Item, Names, items
+from toolchain.elf.disassemble import NO_INSTRUCTIONS, CodeItem, Names, items
 from toolchain.elf.model import Bind, Executable
 from toolchain.elf.symbols import is_named
 from toolchain.errors import ToolError
 from toolchain.stack.annotations import Annotations
-from toolchain.stack.effects import CALL_BYTES, Flow, effect_of
+from toolchain.stack.effects import CALL_BYTES, Successor, effect_of
 from toolchain.stack.totals import Usage, totals
-from toolchain.stack.walk import Call, Function, Walker
+from toolchain.stack.walk import CallSite, FunctionStack, Walker
 
 TABLES = NO_INSTRUCTIONS | {".handle"}
 ANY = "*"  # annotation for "any function whose address is taken"
@@ -40,7 +40,7 @@ class Entry:
 
 
 @dataclass(slots=True)
-class Report:
+class StackReport:
     functions: list[Usage]
     entries: list[Entry]
 
@@ -50,7 +50,7 @@ class Analysis:
 
     def __init__(self, image: Executable, annotations: Annotations) -> None:
         self.image, self.annotations = image, annotations
-        self.code: dict[int, Item] = {}
+        self.code: dict[int, CodeItem] = {}
         chip = chip_of(image.processor & PROCESSOR_MASK) or chip_named()
         for section in image.sections:
             if section.is_code and section.name not in TABLES and section.address in chip.program["program"]:
@@ -87,11 +87,11 @@ class Analysis:
                 if typed and symbol.value in self.code and self.code[symbol.value].insn is not None:
                     found.add(symbol.value)
         for item in self.code.values():
-            if item.insn is not None and (effect := effect_of(item.insn, item.address)).flow is Flow.CALL:
+            if item.insn is not None and (effect := effect_of(item.insn, item.address)).flow is Successor.CALL:
                 found.add(effect.target)
         return found & set(self.code)
 
-    def _walk_all(self) -> dict[int, Function]:
+    def _walk_all(self) -> dict[int, FunctionStack]:
         walker = Walker(self.code, self.entries)
         return {entry: walker.walk(entry) for entry in sorted(self.entries)}
 
@@ -117,7 +117,7 @@ class Analysis:
 
     # -- calls ---------------------------------------------------------------------------------------------------
 
-    def targets(self, call: Call) -> list[int]:
+    def targets(self, call: CallSite) -> list[int]:
         """Return the functions that a call site may reach: its target, or the annotated targets of a pointer call."""
         if call.target is not None:
             return [call.target] if call.target else []  # 0: a weak function that is not linked
@@ -136,9 +136,9 @@ class Analysis:
     def _handle_targets(self) -> set[int]:
         slots = [i for s in self.image.sections if s.name == ".handle" for i in items(s)]
         jumps = [effect_of(i.insn, i.address) for i in slots if i.insn is not None]
-        return {jump.target for jump in jumps if jump.flow is Flow.JUMP}
+        return {jump.target for jump in jumps if jump.flow is Successor.JUMP}
 
-    def report(self) -> Report:
+    def report(self) -> StackReport:
         """Return all functions, and the entries: reset, interrupts, threads, and functions reached only by pointer."""
         usages = totals(self)
         called = {t for f in self.functions.values() for call in f.calls for t in self.targets(call)}
@@ -148,7 +148,7 @@ class Analysis:
         entries += [Entry("thread", usages[address]) for address in dict.fromkeys(threads)]
         listed = {entry.usage.entry for entry in entries}
         entries += [Entry("pointer", usages[address]) for address in sorted(self.entries - called - listed)]
-        return Report([usages[entry] for entry in sorted(self.functions)], entries)
+        return StackReport([usages[entry] for entry in sorted(self.functions)], entries)
 
 
-__all__ = ["Analysis", "Entry", "Report", "Usage"]
+__all__ = ["Analysis", "Entry", "StackReport", "Usage"]

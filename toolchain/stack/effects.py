@@ -19,7 +19,7 @@ _STEP = {2: -1, 3: 1, 4: -1, 5: 1}  # addressing modes [Wn--] [Wn++] [--Wn] [++W
 _READS_F = frozenset(("CP", "CPB", "CP0", "BTST", "BTSS", "BTSC", "MUL"))
 
 
-class Flow(Enum):
+class Successor(Enum):
     """Successors of an instruction."""
 
     NEXT = "next"
@@ -33,7 +33,7 @@ class Flow(Enum):
     END = "return or reset"
 
 
-class Pointer(Enum):
+class StackPointerChange(Enum):
     """How the stack pointer changes, apart from a known number of bytes."""
 
     MOVED = "moved by a number of bytes"
@@ -56,8 +56,8 @@ class Effect:
     pushed, popped  register of a word push or pop
     """
 
-    flow: Flow
-    pointer: Pointer = Pointer.MOVED
+    flow: Successor
+    pointer: StackPointerChange = StackPointerChange.MOVED
     delta: int = 0
     target: int = 0
     register: int = 0
@@ -69,7 +69,7 @@ def effect_of(insn: Insn, address: int) -> Effect:
     """Return the effect of the instruction at program address `address`."""
     flow, target = _flow(insn, address)
     pointer, delta = _pointer(insn)
-    register = {Pointer.SAVED: "d", Pointer.RESTORED: "s"}.get(pointer)
+    register = {StackPointerChange.SAVED: "d", StackPointerChange.RESTORED: "s"}.get(pointer)
     pushed, popped = _passed(insn)
     return Effect(flow, pointer, delta, target, getattr(insn.x, register) if register else 0, pushed, popped)
 
@@ -84,42 +84,44 @@ def _passed(insn: Insn) -> tuple[int | None, int | None]:
     return pushed, popped
 
 
-def _flow(insn: Insn, address: int) -> tuple[Flow, int]:
+def _flow(insn: Insn, address: int) -> tuple[Successor, int]:
     name, x = insn.row.mnemonic, insn.x
     fields = insn.row.fields
     if name in ("RETURN", "RETFIE", "RETLW", "RESET"):
-        return Flow.END, 0
+        return Successor.END, 0
     if name in ("BTSS", "BTSC") or name.startswith("CPS"):
-        return Flow.SKIP, 0
+        return Successor.SKIP, 0
     if name in ("CALL", "RCALL", "GOTO", "BRA"):
         calls = name in ("CALL", "RCALL")
         if "n" not in fields:
-            return (Flow.CALL_POINTER if calls else Flow.TABLE if name == "BRA" else Flow.JUMP_POINTER), 0
+            return (
+                Successor.CALL_POINTER if calls else Successor.TABLE if name == "BRA" else Successor.JUMP_POINTER
+            ), 0
         target = x.n if not fields["n"].signed else address + 2 + 2 * x.n & 0x7FFFFE
         if calls:
-            return Flow.CALL, target
+            return Successor.CALL, target
         conditional = name == "BRA" and "," in insn.row.syntax
-        return (Flow.BRANCH if conditional else Flow.JUMP), target
-    return Flow.NEXT, 0
+        return (Successor.BRANCH if conditional else Successor.JUMP), target
+    return Successor.NEXT, 0
 
 
-def _pointer(insn: Insn) -> tuple[Pointer, int]:
+def _pointer(insn: Insn) -> tuple[StackPointerChange, int]:
     name, x, fields = insn.row.mnemonic, insn.x, insn.row.fields
     if name == "LNK":
-        return Pointer.LINK, x.k
+        return StackPointerChange.LINK, x.k
     if name == "ULNK":
-        return Pointer.UNLINK, 0
+        return StackPointerChange.UNLINK, 0
     if name in ("PUSH", "POP") and "f" in fields:
         if name == "POP" and x.f in _SP_ADDRESSES:
-            return Pointer.UNKNOWN, 0
-        return Pointer.MOVED, 2 if name == "PUSH" else -2
+            return StackPointerChange.UNKNOWN, 0
+        return StackPointerChange.MOVED, 2 if name == "PUSH" else -2
     only_read = name in _READS_F or (name == "MOV" and "d" in fields)
     if "f" in fields and x.f in _SP_ADDRESSES and not only_read:
-        return Pointer.UNKNOWN, 0
+        return StackPointerChange.UNKNOWN, 0
     return _register_effect(insn)
 
 
-def _register_effect(insn: Insn) -> tuple[Pointer, int]:
+def _register_effect(insn: Insn) -> tuple[StackPointerChange, int]:
     """Return the effect of addressing modes with W15, arithmetic on it, and copies."""
     x, fields = insn.x, insn.row.fields
     size = 4 if insn.row.mnemonic == "MOV.D" else 1 if getattr(x, "B", 0) else 2
@@ -131,7 +133,7 @@ def _register_effect(insn: Insn) -> tuple[Pointer, int]:
     if _writes_sp(insn):
         return _arithmetic(insn)
     copied = insn.row.mnemonic == "MOV" and "g" in fields and (x.s, x.g, x.h) == (SP, 0, 0)
-    return (Pointer.SAVED if copied else Pointer.MOVED), delta
+    return (StackPointerChange.SAVED if copied else StackPointerChange.MOVED), delta
 
 
 def _writes_sp(insn: Insn) -> bool:
@@ -144,16 +146,16 @@ def _writes_sp(insn: Insn) -> bool:
     return direct and (x.d == SP or (pair and x.d == SP - 1))
 
 
-def _arithmetic(insn: Insn) -> tuple[Pointer, int]:
+def _arithmetic(insn: Insn) -> tuple[StackPointerChange, int]:
     """Return the effect of `add #n, w15`, `sub w15, #n, w15`, `inc2 w15, w15`, `mov w14, w15`; others are unknown."""
     name, x, fields = insn.row.mnemonic, insn.x, insn.row.fields
     sign = {"ADD": 1, "SUB": -1}.get(name)
     if sign and "k" in fields and ("w" not in fields or x.w == SP):
-        return Pointer.MOVED, sign * x.k
+        return StackPointerChange.MOVED, sign * x.k
     step = {"INC": 1, "INC2": 2, "DEC": -1, "DEC2": -2}.get(name)
     if step and x.s == SP and x.p == 0:
-        return Pointer.MOVED, step
+        return StackPointerChange.MOVED, step
     if name == "MOV" and "g" in fields and x.g == 0 and not x.B:
-        return (Pointer.FROM_FRAME if x.s == FRAME else Pointer.RESTORED), 0
+        return (StackPointerChange.FROM_FRAME if x.s == FRAME else StackPointerChange.RESTORED), 0
     constant = name == "MOV" and "k" in fields
-    return (Pointer.FRESH if constant else Pointer.UNKNOWN), 0
+    return (StackPointerChange.FRESH if constant else StackPointerChange.UNKNOWN), 0

@@ -11,7 +11,7 @@ from typing import Protocol
 
 from toolchain.stack.annotations import Annotations
 from toolchain.stack.effects import CALL_BYTES
-from toolchain.stack.walk import Call, Function
+from toolchain.stack.walk import CallSite, FunctionStack
 
 
 @dataclass(slots=True)
@@ -27,18 +27,18 @@ class Usage:
     unknown: list[str] = field(default_factory=list)
 
 
-class Program(Protocol):
+class CallGraph(Protocol):
     """The call graph."""
 
-    functions: dict[int, Function]
+    functions: dict[int, FunctionStack]
     annotations: Annotations
 
-    def targets(self, call: Call) -> list[int]: ...
+    def targets(self, call: CallSite) -> list[int]: ...
     def name(self, address: int) -> str: ...
     def annotation(self, table: dict[str, int], entry: int) -> int | None: ...
 
 
-def totals(program: Program) -> dict[int, Usage]:
+def totals(program: CallGraph) -> dict[int, Usage]:
     """Return the usage of every function."""
     graph = {
         entry: []
@@ -57,7 +57,7 @@ def totals(program: Program) -> dict[int, Usage]:
     return done
 
 
-def _outside(program: Program, entry: int, members: set[int], done: dict[int, Usage]) -> Usage:
+def _outside(program: CallGraph, entry: int, members: set[int], done: dict[int, Usage]) -> Usage:
     """Return the worst case of one function over calls that leave its component."""
     function, name = program.functions[entry], program.name(entry)
     result = Usage(name, entry, function.frame, function.frame, function.switch, [name])
@@ -85,7 +85,7 @@ def _outside(program: Program, entry: int, members: set[int], done: dict[int, Us
     return result
 
 
-def _close(program: Program, component: list[int], members: set[int], done: dict[int, Usage]) -> None:
+def _close(program: CallGraph, component: list[int], members: set[int], done: dict[int, Usage]) -> None:
     """Add the stack of the recursion: each activation but the last is at its deepest call within the component."""
     steps: dict[int, int] = {}
     reasons: list[str] = []

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field, replace
 
 from emu.dspic30f.isa.facts import facts_of
 from emu.dspic30f.isa.row import Insn
-from toolchain.elf.disassemble import Item
-from toolchain.stack.effects import SP, Effect, Flow, Pointer, effect_of
+from toolchain.elf.disassemble import CodeItem
+from toolchain.stack.effects import SP, Effect, StackPointerChange, Successor, effect_of
 
 CALLER_SAVED = 0x00FF
 """W0 to W7 (abi-elf.md §2.1)."""
@@ -17,7 +17,7 @@ MAX_VISITS = 12  # times one instruction may be reached with an ever deeper stac
 
 
 @dataclass(slots=True)
-class Call:
+class CallSite:
     """A call site: where, how deep the stack is there, to which address (None through a pointer), tail call or not."""
 
     address: int
@@ -27,7 +27,7 @@ class Call:
 
 
 @dataclass(slots=True)
-class Function:
+class FunctionStack:
     """Result for one function; `frame` is its greatest own use in bytes, without return address and callees.
 
     `switch` is the depth at which the function switches to another stack, None if it never does.  A path without the
@@ -37,7 +37,7 @@ class Function:
     entry: int
     frame: int = 0
     switch: int | None = None
-    calls: list[Call] = field(default_factory=list)
+    calls: list[CallSite] = field(default_factory=list)
     unknown: list[str] = field(default_factory=list)
 
 
@@ -64,15 +64,15 @@ class _State:
 class Walker:
     """Analyses functions of one image; `code` maps addresses to instructions, `entries` are function starts."""
 
-    def __init__(self, code: Mapping[int, Item], entries: set[int]) -> None:
+    def __init__(self, code: Mapping[int, CodeItem], entries: set[int]) -> None:
         self.code, self.entries = code, entries
 
-    def walk(self, entry: int) -> Function:
+    def walk(self, entry: int) -> FunctionStack:
         """Return the result for the function at `entry`."""
-        result = Function(entry)
+        result = FunctionStack(entry)
         seen: dict[tuple[int, bool], tuple[int, int]] = {}  # place, switched or not -> deepest yet, visits
         work = [_State(entry)]
-        calls: dict[int, Call] = {}
+        calls: dict[int, CallSite] = {}
         while work:
             state = work.pop()
             key = (state.pc, state.outer is None)
@@ -91,7 +91,7 @@ class Walker:
         result.calls = [calls[a] for a in sorted(calls)]
         return result
 
-    def _step(self, result: Function, calls: dict[int, Call], item: Item, state: _State) -> list[_State]:
+    def _step(self, result: FunctionStack, calls: dict[int, CallSite], item: CodeItem, state: _State) -> list[_State]:
         """Apply one instruction; return the states that follow."""
         assert item.insn is not None
         effect = effect_of(item.insn, item.address)
@@ -101,25 +101,25 @@ class Walker:
         if item.insn.row.mnemonic == "REPEAT":
             return [self._repeated(result, item, after)]
         match effect.flow:
-            case Flow.NEXT:
+            case Successor.NEXT:
                 return [after]
-            case Flow.BRANCH:
+            case Successor.BRANCH:
                 return [after, replace(after, pc=effect.target)]
-            case Flow.JUMP if effect.target in self.entries and effect.target != result.entry:
+            case Successor.JUMP if effect.target in self.entries and effect.target != result.entry:
                 self._call(calls, item.address, after.depth, effect.target, tail=True)
                 return []
-            case Flow.JUMP:
+            case Successor.JUMP:
                 return [replace(after, pc=effect.target)]
-            case Flow.CALL | Flow.CALL_POINTER:
-                self._call(calls, item.address, after.depth, effect.target if effect.flow is Flow.CALL else None)
+            case Successor.CALL | Successor.CALL_POINTER:
+                self._call(calls, item.address, after.depth, effect.target if effect.flow is Successor.CALL else None)
                 return [after]
-            case Flow.JUMP_POINTER:
+            case Successor.JUMP_POINTER:
                 self._call(calls, item.address, after.depth, None, tail=True)
                 return []
-            case Flow.SKIP:
+            case Successor.SKIP:
                 skipped = self.code.get(following)
                 return [after, replace(after, pc=following + 2 * (len(skipped.words) if skipped else 1))]
-            case Flow.TABLE:
+            case Successor.TABLE:
                 return [replace(after, pc=target) for target in self._table(result, following)]
         if after.depth and not after.lost and item.insn.row.mnemonic != "RESET":
             where = f"returns at {item.address:#x} "
@@ -145,38 +145,38 @@ class Walker:
             return replace(state, shelved=(state.depth, state.outer, depth, outer))
         facts = facts_of(insn)
         changed = facts.writes | facts.source_pointers
-        if effect.flow in (Flow.CALL, Flow.CALL_POINTER):
+        if effect.flow in (Successor.CALL, Successor.CALL_POINTER):
             changed |= CALLER_SAVED
         return replace(state, saved=None) if changed >> register & 1 else state
 
-    def _stack(self, result: Function, item: Item, effect: Effect, state: _State) -> _State:
+    def _stack(self, result: FunctionStack, item: CodeItem, effect: Effect, state: _State) -> _State:
         """Return the state with depth, frame and stack after the instruction."""
         match effect.pointer:
-            case Pointer.LINK:
+            case StackPointerChange.LINK:
                 base = state.depth + 2
                 return replace(state, depth=base + effect.delta, frame=base)
-            case Pointer.UNLINK | Pointer.FROM_FRAME if state.frame is not None:
-                if effect.pointer is Pointer.UNLINK:
+            case StackPointerChange.UNLINK | StackPointerChange.FROM_FRAME if state.frame is not None:
+                if effect.pointer is StackPointerChange.UNLINK:
                     return replace(state, depth=state.frame - 2, frame=None)
                 return replace(state, depth=state.frame)
-            case Pointer.UNLINK | Pointer.FROM_FRAME:
+            case StackPointerChange.UNLINK | StackPointerChange.FROM_FRAME:
                 self._record_unknown(result, f"W15 restored from an unknown W14 at {item.address:#x}")
-            case Pointer.SAVED:
+            case StackPointerChange.SAVED:
                 return replace(state, saved=(effect.register, state.depth, state.outer))
-            case Pointer.RESTORED if state.saved is not None and state.saved[0] == effect.register:
+            case StackPointerChange.RESTORED if state.saved is not None and state.saved[0] == effect.register:
                 return replace(state, depth=state.saved[1], outer=state.saved[2])
-            case Pointer.FRESH if state.outer is None:
+            case StackPointerChange.FRESH if state.outer is None:
                 if state.depth:
                     result.switch = max(result.switch or 0, state.depth)
                 return replace(state, depth=0, outer=state.depth)
-            case Pointer.UNKNOWN | Pointer.RESTORED | Pointer.FRESH:
+            case StackPointerChange.UNKNOWN | StackPointerChange.RESTORED | StackPointerChange.FRESH:
                 self._record_unknown(result, f"W{SP} is set to an unknown value at {item.address:#x}")
                 return replace(state, lost=True)
-            case Pointer.MOVED:
+            case StackPointerChange.MOVED:
                 return replace(state, depth=state.depth + effect.delta)
         return state
 
-    def _repeated(self, result: Function, item: Item, state: _State) -> _State:
+    def _repeated(self, result: FunctionStack, item: CodeItem, state: _State) -> _State:
         """Continue after a repeated instruction that changes W15: its effect counts once per iteration."""
         target = self.code.get(state.pc)
         assert item.insn is not None
@@ -190,11 +190,11 @@ class Walker:
         result.frame = max(result.frame, depth)
         return replace(state, pc=state.pc + 2, depth=depth)
 
-    def _table(self, result: Function, address: int) -> list[int]:
+    def _table(self, result: FunctionStack, address: int) -> list[int]:
         """Return the entries of a jump table after BRA Wn: a sequence of BRA and RETLW (abi-elf.md §8.1)."""
         targets: list[int] = []
         while (item := self.code.get(address)) is not None and item.insn is not None:
-            name, branch = item.insn.row.mnemonic, effect_of(item.insn, address).flow is Flow.JUMP
+            name, branch = item.insn.row.mnemonic, effect_of(item.insn, address).flow is Successor.JUMP
             if not (name == "BRA" and branch) and name not in ("RETLW", "RETURN"):
                 break
             targets.append(address)
@@ -204,12 +204,12 @@ class Walker:
         return targets
 
     @staticmethod
-    def _call(calls: dict[int, Call], address: int, depth: int, target: int | None, tail: bool = False) -> None:
+    def _call(calls: dict[int, CallSite], address: int, depth: int, target: int | None, tail: bool = False) -> None:
         known = calls.get(address)
         if known is None or known.depth < depth:
-            calls[address] = Call(address, depth, target, tail)
+            calls[address] = CallSite(address, depth, target, tail)
 
     @staticmethod
-    def _record_unknown(result: Function, text: str) -> None:
+    def _record_unknown(result: FunctionStack, text: str) -> None:
         if text not in result.unknown:
             result.unknown.append(text)

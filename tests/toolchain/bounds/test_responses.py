@@ -12,7 +12,7 @@ from tests.fuzz.programs import c_interrupts
 from tests.toolchain.bounds.responses import Watched, watched
 from tests.toolchain.c_programs import build
 from toolchain.bounds.annotations.reader import read_annotation_section
-from toolchain.bounds.interference import Report, report_of
+from toolchain.bounds.interference import BoundsReport, report_of
 from toolchain.bounds.program import Program
 from toolchain.cli import main
 from toolchain.elf.read import read_executable
@@ -90,13 +90,13 @@ def images(folder: Path, text: str, annotated: tuple[int, int], actual: tuple[in
     return folder / "p.elf"
 
 
-def said_of(image: Path, function: str = "main") -> Report:
+def said_of(image: Path, function: str = "main") -> BoundsReport:
     """Return the report of an image."""
     executable = read_executable(image.read_bytes(), str(image))
     return report_of(Program(executable, Annotations(), read_annotation_section(executable, {})), [function])
 
 
-def compare(seen: Watched, report: Report) -> None:
+def compare(seen: Watched, report: BoundsReport) -> None:
     """Assert that no observation exceeds its bound, and that every interrupt occurred."""
     said = {one.name.removeprefix("_"): one for one in report.responses}
     for name, one in seen.handlers.items():

@@ -6,7 +6,7 @@ import subprocess
 import pytest
 
 from toolchain.asm.assemble import assemble
-from toolchain.elf.archive import Member, archive_bytes, open_archive, read_members
+from toolchain.elf.archive import ArchiveMember, archive_bytes, open_archive, read_members
 from toolchain.elf.read import read_object
 from toolchain.elf.write import object_bytes
 from toolchain.errors import ToolError
@@ -14,8 +14,8 @@ from toolchain.link.link import link
 from toolchain.link.options import LinkOptions
 
 
-def member(name: str, text: str) -> Member:
-    return Member(name, object_bytes(assemble(text, name)[0]))
+def member(name: str, text: str) -> ArchiveMember:
+    return ArchiveMember(name, object_bytes(assemble(text, name)[0]))
 
 
 def test_all_undefined_and_duplicate_symbols_are_listed_with_their_objects(image):

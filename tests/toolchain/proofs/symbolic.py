@@ -13,9 +13,9 @@ import z3
 
 from emu.dspic30f.isa import codec, flow
 from toolchain.proof.code.machine import MachineState, SymbolicMachine
-from toolchain.proof.memory import STACK, Frame, Memory
+from toolchain.proof.memory import STACK, StackFrame, SymbolicMemory
 from toolchain.proof.solver import feasible
-from toolchain.proof.terms import BITS, Number, holds, narrow, vector, wide
+from toolchain.proof.terms import BITS, SymbolicInteger, holds, narrow, vector, wide
 
 MOST_STEPS = 4000
 
@@ -29,17 +29,17 @@ def unknown_products() -> Iterator[dict[str, tuple[Any, Any]]]:
 
     A property of all such numbers holds for products, and the solver need not expand multipliers."""
     global bounds
-    bounds, exact = {}, Number.__mul__
+    bounds, exact = {}, SymbolicInteger.__mul__
 
-    def unknown(a: Number, b: Any) -> Number:
-        return Number(times(wide(a), wide(b)))
+    def unknown(a: SymbolicInteger, b: Any) -> SymbolicInteger:
+        return SymbolicInteger(times(wide(a), wide(b)))
 
-    Number.__mul__ = Number.__rmul__ = unknown  # type: ignore[method-assign]
+    SymbolicInteger.__mul__ = SymbolicInteger.__rmul__ = unknown  # type: ignore[method-assign]
     try:
         yield bounds
     finally:
         bounds = None
-        Number.__mul__ = Number.__rmul__ = exact  # type: ignore[method-assign]
+        SymbolicInteger.__mul__ = SymbolicInteger.__rmul__ = exact  # type: ignore[method-assign]
 
 
 def times(a: Any, b: Any) -> Any:
@@ -69,13 +69,13 @@ class Free(SymbolicMachine):
 def start() -> MachineState:
     """Return a state in which every register, flag and byte is free."""
     w = [z3.BitVec(f"w{n}", 16) for n in range(15)]
-    return MachineState([*w, STACK], Memory(z3.Array("memory", z3.BitVecSort(16), z3.BitVecSort(8))), 0)
+    return MachineState([*w, STACK], SymbolicMemory(z3.Array("memory", z3.BitVecSort(16), z3.BitVecSort(8))), 0)
 
 
 def results(words: list[int]) -> Iterator[MachineState]:
     """Return the states at RETURN of every feasible path; AssertionError for code with a loop."""
     page = vector(0, 16)
-    machine = Free(Frame(), [], [], page, page)
+    machine = Free(StackFrame(), [], [], page, page)
     work, steps = [start()], 0
     while work:
         state = work.pop()

@@ -10,7 +10,7 @@ from emu.image.elf_facts import RELOCATION_BY_NAME, RelocationType
 from toolchain.asm.expr import ExprError, unescape
 from toolchain.asm.macro import split_arguments
 from toolchain.asm.state import Assembler
-from toolchain.asm.symbols import ExprValue, PendingOperation, SymbolicValue
+from toolchain.asm.symbols import ExprValue, PendingOperation, SymbolValue
 from toolchain.elf import constants as c
 from toolchain.files import read_bytes
 
@@ -38,7 +38,7 @@ _PACKED_KINDS: dict[int, dict[str, str]] = {
 
 def operator_of(value: ExprValue) -> str:
     """Return the operator that is applied to a value, "" for none."""
-    if isinstance(value, SymbolicValue):
+    if isinstance(value, SymbolValue):
         return value.op
     if isinstance(value, PendingOperation) and value.op[0] == "f":
         return value.op[1:]

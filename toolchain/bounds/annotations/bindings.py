@@ -9,9 +9,9 @@ from emu.dspic30f.isa.facts import flow_of
 from emu.dspic30f.isa.flow import Call, Goto
 from toolchain.bounds.annotations.names import NameResolver
 from toolchain.bounds.annotations.reader import Annotation, AnnotationSet
-from toolchain.bounds.annotations.source_map import SourceLine, SourceMap
+from toolchain.bounds.annotations.source_map import LineKey, SourceMap
 from toolchain.bounds.graph import FunctionGraph, Loop, all_loops
-from toolchain.elf.disassemble import Item
+from toolchain.elf.disassemble import CodeItem
 from toolchain.errors import ToolError
 
 LOOPS = ("loop", "total", "share", "same", "one")
@@ -25,10 +25,10 @@ class AnnotationBindings:
     """
 
     def __init__(
-        self, annotations: AnnotationSet, sources: SourceMap, names: NameResolver, code: dict[int, Item]
+        self, annotations: AnnotationSet, sources: SourceMap, names: NameResolver, code: dict[int, CodeItem]
     ) -> None:
         self.annotations, self.sources, self.names, self.items = annotations, sources, names, code
-        self._lines: Final[dict[tuple[str, SourceLine], list[Annotation]]] = {}
+        self._lines: Final[dict[tuple[str, LineKey], list[Annotation]]] = {}
         for kind in (*LOOPS, "calls"):
             for annotation in annotations.of(kind):
                 line = sources.target_line(annotation)
@@ -121,7 +121,7 @@ class AnnotationBindings:
             }
         return bound
 
-    def _is_loop_line(self, code: FunctionGraph, loop: Loop, line: SourceLine) -> bool:
+    def _is_loop_line(self, code: FunctionGraph, loop: Loop, line: LineKey) -> bool:
         """Whether a line can be the line of a loop.
 
         It can if all code of the function within the loop is on one side of the line, or if an exit of the loop is in
@@ -168,7 +168,7 @@ class AnnotationBindings:
             assert callee is not None
             self._calls[kind].setdefault((pc, callee), []).append(annotation)
 
-    def _calls_of(self, line: SourceLine) -> Iterator[tuple[int, int | None]]:
+    def _calls_of(self, line: LineKey) -> Iterator[tuple[int, int | None]]:
         """Yield the calls in a line: address and callee, None for a call through a pointer."""
         for start, end in self.sources.address_ranges(line):
             for pc in range(start, end, 2):

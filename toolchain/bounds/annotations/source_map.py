@@ -11,7 +11,7 @@ from emu.image.lines import LineTable, dwarf_of, file_names
 from toolchain.bounds.annotations.reader import Annotation
 from toolchain.errors import ToolError
 
-SourceLine = tuple[str, int]
+LineKey = tuple[str, int]
 
 
 class SourceMap:
@@ -31,7 +31,7 @@ class SourceMap:
         for file, number in sorted({(row.file, row.line) for row in self.lines.rows}):
             self._code.setdefault(file, []).append(number)
         self._all: Final = sorted({*self._code, *self._first_lines, *self.lines.files.values()})
-        self._targets: Final[dict[Annotation, SourceLine | None]] = {}
+        self._targets: Final[dict[Annotation, LineKey | None]] = {}
 
     def _read(self, debug: Mapping[str, bytes]) -> None:
         if not debug.get(".debug_info"):
@@ -57,7 +57,7 @@ class SourceMap:
             if begin is not None:
                 self.functions[begin.value] = names[file], name.decode()
 
-    def line_of(self, pc: int) -> SourceLine:
+    def line_of(self, pc: int) -> LineKey:
         """Return file and line of an instruction, ("", 0) if unknown."""
         found = self.lines.find(pc)
         return (found.file, found.line) if found else ("", 0)
@@ -84,7 +84,7 @@ class SourceMap:
         """Whether a file defines a function of that name, even if every call of it is inlined."""
         return function in self._first_lines.get(file, {}).values()
 
-    def target_line(self, annotation: Annotation) -> SourceLine | None:
+    def target_line(self, annotation: Annotation) -> LineKey | None:
         """Return the line that an annotation refers to: its own, or else the next line of the function with code.
 
         None if the image has no code of the function.  Raises `ToolError` if the function has no code after it.
@@ -93,7 +93,7 @@ class SourceMap:
             self._targets[annotation] = self._find_target_line(annotation)
         return self._targets[annotation]
 
-    def _find_target_line(self, annotation: Annotation) -> SourceLine | None:
+    def _find_target_line(self, annotation: Annotation) -> LineKey | None:
         file = self.file_of(annotation)
         if file is None:
             return None
@@ -110,13 +110,13 @@ class SourceMap:
             raise ToolError(f"{annotation.place}: {annotation.function} has no code after this annotation")
         return None
 
-    def function_extent(self, line: SourceLine) -> tuple[int, int]:
+    def function_extent(self, line: LineKey) -> tuple[int, int]:
         """Return the range of lines, end excluded, of the function that a line belongs to."""
         starts = sorted(self._first_lines.get(line[0], {}))
         index = bisect_right(starts, line[1])
         return starts[index - 1] if index else 0, starts[index] if index < len(starts) else 1 << 30
 
-    def address_ranges(self, line: SourceLine) -> list[tuple[int, int]]:
+    def address_ranges(self, line: LineKey) -> list[tuple[int, int]]:
         """Return the address ranges of a line."""
         return [(row.start, row.end) for row in self.lines.rows if (row.file, row.line) == line]
 
@@ -134,4 +134,4 @@ def _common_suffix(a: Iterable[str], b: Iterable[str]) -> int:
     return common if one[:common] == other[:common] else 0
 
 
-__all__ = ["SourceLine", "SourceMap"]
+__all__ = ["LineKey", "SourceMap"]

@@ -16,7 +16,7 @@ from toolchain.abi.target import CALLEE_SAVED, CALLER_SAVED, RAM_END, RETURN_ADD
 from toolchain.proof.asm_statements import Statement
 from toolchain.proof.code.machine import ACCUMULATORS, CORE, PSVPAG, MachineState, SymbolicMachine
 from toolchain.proof.helpers import HELPERS, Helper
-from toolchain.proof.memory import STACK, Frame, Memory, bytes_of, concat
+from toolchain.proof.memory import STACK, StackFrame, SymbolicMemory, bytes_of, concat
 from toolchain.proof.path import Event, Path
 from toolchain.proof.problem import CompiledFile
 from toolchain.proof.solver import Refuted, Undecided, check, require
@@ -30,7 +30,7 @@ class ConventionChecker:
     """Checks of one path of the source against a machine with given registers at entry."""
 
     def __init__(
-        self, compiled: CompiledFile, frame: Frame, registers: list[Term], path: Path, machine: SymbolicMachine
+        self, compiled: CompiledFile, frame: StackFrame, registers: list[Term], path: Path, machine: SymbolicMachine
     ) -> None:
         self.compiled: Final = compiled
         self.frame: Final = frame
@@ -258,7 +258,12 @@ class ConventionChecker:
             at += count
 
     def check_equal_memory(
-        self, state: MachineState, wanted: Memory, objects: set[str], what: str, loose: Sequence[tuple[Term, Term]] = ()
+        self,
+        state: MachineState,
+        wanted: SymbolicMemory,
+        objects: set[str],
+        what: str,
+        loose: Sequence[tuple[Term, Term]] = (),
     ) -> None:
         """Check that memory is equal outside the frame and in the given objects of the frame.
 

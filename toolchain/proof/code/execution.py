@@ -12,7 +12,7 @@ from emu.dspic30f.isa.rows.multiply import DIVIDE_COUNT
 from toolchain.abi.target import RETURN_ADDRESS_BYTES, SP
 from toolchain.proof.code.calling_convention import ConventionChecker
 from toolchain.proof.code.machine import MachineState, SymbolicMachine
-from toolchain.proof.memory import Frame
+from toolchain.proof.memory import StackFrame
 from toolchain.proof.path import Path
 from toolchain.proof.problem import PAGE, WORD_UNITS, CompiledFile
 from toolchain.proof.solver import Refuted, Undecided, check, feasible
@@ -31,7 +31,7 @@ class CodeExecution:
     """
 
     def __init__(
-        self, compiled: CompiledFile, start: int, end: int, frame: Frame, path: Path, handler: str = ""
+        self, compiled: CompiledFile, start: int, end: int, frame: StackFrame, path: Path, handler: str = ""
     ) -> None:
         self.compiled: Final = compiled
         self.start: Final = start

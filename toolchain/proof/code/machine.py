@@ -16,12 +16,12 @@ from emu.dspic30f.isa.builder import Context
 from emu.dspic30f.isa.row import Insn
 from emu.image.elf_facts import PSV_WINDOW
 from toolchain.abi.target import SFR_END, W_END, register
-from toolchain.proof.memory import STACK, Frame, Memory, bytes_of, concat
+from toolchain.proof.memory import STACK, StackFrame, SymbolicMemory, bytes_of, concat
 from toolchain.proof.path import Event
 from toolchain.proof.solver import Refuted, Undecided, check, require
 from toolchain.proof.terms import (
     BITS,
-    Number,
+    SymbolicInteger,
     Term,
     holds,
     is_narrow,
@@ -38,7 +38,7 @@ from toolchain.proof.terms import (
 CORE: Final = {register(name): name for name in ("TBLPAG", "PSVPAG", "RCOUNT")}
 """Core registers that an interrupt handler saves."""
 PSVPAG: Final = register("PSVPAG")
-ACCUMULATORS: Final = tuple(Number(z3.SignExt(BITS - 40, z3.BitVec(f"ACC{name}", 40))) for name in "AB")
+ACCUMULATORS: Final = tuple(SymbolicInteger(z3.SignExt(BITS - 40, z3.BitVec(f"ACC{name}", 40))) for name in "AB")
 """Accumulators at entry."""
 SINGLE_BIT: Final = ("BSET", "BCLR", "BTG", "BTSS", "BTSC", "BTST", "BTSTS", "BSW")
 """Instructions that access a whole device register whichever byte they name (isa.md §5.4)."""
@@ -49,7 +49,7 @@ class MachineState:
     """State of the symbolic machine on one path: registers are ints or 16-bit terms, `event` is the next event."""
 
     w: list[Any]
-    memory: Memory
+    memory: SymbolicMemory
     pc: int
     flags: dict[str, Any] = field(default_factory=dict)
     frame: dict[int, Term] = field(default_factory=dict)
@@ -81,7 +81,7 @@ class SymbolicMachine:
 
     context = Context()
 
-    def __init__(self, frame: Frame, events: list[Event], assumed: list[Term], page: Term, entry: Term) -> None:
+    def __init__(self, frame: StackFrame, events: list[Event], assumed: list[Term], page: Term, entry: Term) -> None:
         self.page: Final = page
         """Value of PSVPAG for constants."""
         self.before: Final = {at: z3.BitVec(name, 16) for at, name in CORE.items()} | {PSVPAG: entry}
@@ -127,7 +127,7 @@ class SymbolicMachine:
         chosen = holds(c)
         small = is_narrow(a) and is_narrow(b)
         low = z3.If(chosen, word(a), word(b))
-        return narrow(low) if small else Number(z3.If(chosen, wide(a), wide(b)), low)
+        return narrow(low) if small else SymbolicInteger(z3.If(chosen, wide(a), wide(b)), low)
 
     def div_trunc(self, a: Any, b: Any) -> Any:
         if isinstance(a, int) and isinstance(b, int):
@@ -136,8 +136,8 @@ class SymbolicMachine:
             return narrow(z3.If(word(b) == 0, vector(0, 16), z3.UDiv(word(a), word(b))))
         quotient = z3.If(wide(b) == 0, vector(0, BITS), wide(a) / wide(b))
         if is_short(a) and is_short(b):
-            return Number(quotient, z3.If(word(b) == 0, vector(0, 16), word(a) / word(b)))
-        return Number(quotient)
+            return SymbolicInteger(quotient, z3.If(word(b) == 0, vector(0, 16), word(a) / word(b)))
+        return SymbolicInteger(quotient)
 
     def rem_trunc(self, a: Any, b: Any) -> Any:
         if isinstance(a, int) and isinstance(b, int):
@@ -146,8 +146,8 @@ class SymbolicMachine:
             return narrow(z3.If(word(b) == 0, vector(0, 16), z3.URem(word(a), word(b))))
         rest = z3.If(wide(b) == 0, vector(0, BITS), z3.SRem(wide(a), wide(b)))
         if is_short(a) and is_short(b):
-            return Number(rest, z3.If(word(b) == 0, vector(0, 16), z3.SRem(word(a), word(b))))
-        return Number(rest)
+            return SymbolicInteger(rest, z3.If(word(b) == 0, vector(0, 16), z3.SRem(word(a), word(b))))
+        return SymbolicInteger(rest)
 
     def clz16(self, v: Any) -> Any:
         return self._zeros(word(v), range(16), lambda k: 15 - k)

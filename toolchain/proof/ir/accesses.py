@@ -10,7 +10,7 @@ from typing import TypeAlias
 
 from toolchain.ir.model import ConstInt, Function, GlobalRef, Instr, Type, Value, size_of, struct_offsets
 
-Place: TypeAlias = tuple[str, int | None]
+VariableByte: TypeAlias = tuple[str, int | None]
 
 
 class Accesses:
@@ -18,7 +18,7 @@ class Accesses:
 
     def __init__(self, f: Function) -> None:
         self._instrs = [i for b in f.blocks for i in b.instrs]
-        self._places: dict[int, Place] = {id(i): (f"%{i.name}", 0) for i in self._instrs if i.op == "alloca"}
+        self._places: dict[int, VariableByte] = {id(i): (f"%{i.name}", 0) for i in self._instrs if i.op == "alloca"}
         addresses = [i for i in self._instrs if i.op == "getelementptr"]
         found = -1
         while found != len(self._places):  # blocks are in no particular order
@@ -30,10 +30,10 @@ class Accesses:
                     whole = None if base[1] is None or offset is None else base[1] + offset
                     self._places[id(i)] = base[0], whole
 
-    def _place(self, v: Value) -> Place | None:
+    def _place(self, v: Value) -> VariableByte | None:
         return (f"@{v.name}", v.offset) if isinstance(v, GlobalRef) else self._places.get(id(v))
 
-    def _uses(self) -> Iterator[tuple[Instr, int, Place]]:
+    def _uses(self) -> Iterator[tuple[Instr, int, VariableByte]]:
         for i in self._instrs:
             for n, a in enumerate(i.args):
                 place = self._place(a)
@@ -44,9 +44,9 @@ class Accesses:
         """Return the frame variables, without `%`, whose addresses are used for more than loads and stores."""
         return {root[1:] for i, n, (root, _) in self._uses() if root[0] == "%" and not _stays(i, n)}
 
-    def volatile(self) -> set[Place]:
+    def volatile(self) -> set[VariableByte]:
         """Return the bytes that the function accesses by volatile accesses only."""
-        known: dict[bool, set[Place]] = {True: set(), False: set()}
+        known: dict[bool, set[VariableByte]] = {True: set(), False: set()}
         mixed: set[str] = set()
         for i, n, (root, at) in self._uses():
             if (i.op == "load" and n == 0) or (i.op == "store" and n == 1):

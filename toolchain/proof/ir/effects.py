@@ -9,16 +9,16 @@ import z3
 
 from toolchain.abi.target import SFR_END
 from toolchain.ir.model import ParameterAttributes, Value
-from toolchain.proof.ir.operands import Operands
-from toolchain.proof.memory import Frame
+from toolchain.proof.ir.operands import OperandValues
+from toolchain.proof.memory import StackFrame
 from toolchain.proof.path import Event, Path
 from toolchain.proof.terms import Term, known
 
 
-class Effects(Operands):
+class Effects(OperandValues):
     """Operands, memory accesses and calls on a path; `frame` has the addresses of the function's variables."""
 
-    def __init__(self, frame: Frame, address: Callable[[str], int]) -> None:
+    def __init__(self, frame: StackFrame, address: Callable[[str], int]) -> None:
         super().__init__(address)
         self.frame: Final = frame
 

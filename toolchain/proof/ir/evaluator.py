@@ -29,7 +29,7 @@ from toolchain.proof.ir import floats
 from toolchain.proof.ir.effects import Effects
 from toolchain.proof.ir.intrinsics import INTRINSICS, base_of
 from toolchain.proof.ir.operands import SUMS, Symbolic, either
-from toolchain.proof.memory import Frame
+from toolchain.proof.memory import StackFrame
 from toolchain.proof.path import Event, Path
 from toolchain.proof.solver import Undecided, feasible
 from toolchain.proof.terms import Term, known, one_bit, truth, vector
@@ -55,7 +55,7 @@ class Evaluator(Effects):
     """Symbolic execution of one function; `frame` has the addresses of its variables."""
 
     def __init__(
-        self, function: Function, frame: Frame, address: Callable[[str], int], watched: Set[str] = frozenset()
+        self, function: Function, frame: StackFrame, address: Callable[[str], int], watched: Set[str] = frozenset()
     ) -> None:
         """`watched`: blocks at whose visits paths record all values (`Path.loop_visits`)."""
         super().__init__(frame, address)

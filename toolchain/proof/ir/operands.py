@@ -35,7 +35,7 @@ SUMS: Final[dict[str, Callable[[Term, Term], Term]]] = {
 }  # fmt: skip
 
 
-class Operands:
+class OperandValues:
     """Values of operands on a path; `address` returns the address of a global."""
 
     def __init__(self, address: Callable[[str], int]) -> None:
