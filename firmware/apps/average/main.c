@@ -1,6 +1,5 @@
-/* The mean of a number that each robot has, by gossip (README.md). A message carries the sender's number and those
- * of two others, with how long ago each of them spoke; each robot keeps a table and takes the mean of those who have
- * of late. */
+/* Gossip average (README.md): a message has the sender's number and those of two other robots, with the ages of their last
+ * messages. Each robot keeps a table and computes the mean of the numbers that have not expired. */
 #include "rove.h"
 
 #include <openswarm.h>
@@ -58,8 +57,8 @@ static entry *place_of(uint16 number)
     return best;
 }
 
-/* A sign of life, so many ticks ago, told by the robot itself or by another: ages only ever grow on their way, so
- * none of a robot that is gone is younger than itself. */
+/* Records a sign of life of a certain age in ticks, received from the robot itself or from another one. Ages only grow on
+ * their way, so a failed robot's age is never too small. */
 static entry *learn(uint16 number, uint8 value, uint16 age, uint16 now)
 {
     uint16 alive = (uint16)(now - age);

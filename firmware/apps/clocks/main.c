@@ -1,6 +1,5 @@
-/* Clocks that agree by gossip (README.md): the swarm's time is that of the robot that has been on for longest. A
- * message carries it as it is when the message leaves, so who hears the end of the message knows it, less what light
- * takes. */
+/* Clocks that agree by gossip (README.md): the swarm's time is that of the robot that has been on for longest. A message
+ * contains the time of its sending, so a receiver knows it at the end of the message, less the transmission time. */
 #include "rove.h"
 
 #include <openswarm.h>

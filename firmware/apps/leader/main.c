@@ -1,6 +1,5 @@
-/* Electing a leader, and another when it dies (README.md): the robot of the highest rank that is heard of. The
- * leader counts; followers pass its counts on, so a new count from anybody is its sign of life, and an old one is
- * none. */
+/* Election of a leader, and of a successor when it fails (README.md): the robot of the highest known rank. The leader
+ * increments a counter that followers forward; a new value from any robot is its sign of life, an old one is not. */
 #include "rove.h"
 
 #include <openswarm.h>
@@ -49,8 +48,7 @@ static bool is_newer(uint8 count, uint8 than)
     return (sint8)(count - than) > 0;
 }
 
-/* Whether a value is an old one of a lost leader that others still forward. After PATIENCE_MS that leader may have
- * restarted. */
+/* Whether a value is an old one of the lost leader, which may restart after PATIENCE_MS. */
 static bool is_stale(const word *w, uint16 now)
 {
     return w->rank == given_up.rank && !is_newer(w->count, given_up.count) && (uint16)(now - given_up_at) < PATIENCE_MS;
