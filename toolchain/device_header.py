@@ -1,22 +1,29 @@
-"""Generator of the device headers, such as `include/dspic30f6014a.h`: `python -m toolchain.device_header`.
+"""Device headers such as `dspic30f6014a.h`, generated from the register tables of `emu.chips`.
 
-It writes one C header per chip from the register tables of `emu.chips`. This compiler and XC16 accept the headers. A
-test compares the committed files with the output.
+The compiler generates the header of its chip on first use and keeps it in the user's cache. This compiler and XC16
+accept the headers. `python -m toolchain.device_header CHIP` prints one.
 """
 
 from __future__ import annotations
 
+import atexit
+import hashlib
+import os
 import re
+import shutil
 import sys
+import tempfile
 from collections import Counter
 from collections.abc import Iterator, Mapping
+from functools import cache
 from pathlib import Path
 
+import emu.chips
 from emu.chips import NAMES, chip_named
 from emu.chips.chip import Chip, Sfr
-from toolchain.files import write_outputs
+from emu.host.paths import headers
 
-INCLUDE = Path(__file__).parent / "include"
+CHIPS = Path(emu.chips.__path__[0])
 ALTERNATIVES: dict[str, dict[str, str]] = {
     r"I2CSTAT": {"R_NOT_W": "R_W", "D_NOT_A": "D_A"},
     r"C\dINTF": {
@@ -117,14 +124,54 @@ def header(chip: Chip) -> str:
     return "\n".join(lines)
 
 
-def path_of(chip: Chip) -> Path:
-    """Path of the committed header of a chip."""
-    return INCLUDE / f"{chip.name.lower()}.h"
+@cache
+def folder_of(chip_name: str) -> Path:
+    """Return the folder that holds the header of a chip; the cache keeps one per version of the chips' tables.
+
+    If the cache cannot be written, the folder is a temporary one that this process removes when it ends.
+    """
+    chip = chip_named(chip_name)
+    folder = headers() / _version()
+    target = folder / f"{chip.name.lower()}.h"
+    if not target.is_file():
+        try:
+            _write(target, header(chip))
+        except OSError:
+            temporary = tempfile.mkdtemp(prefix="dspic-headers-")
+            atexit.register(shutil.rmtree, temporary, ignore_errors=True)
+            folder = Path(temporary)
+            _write(folder / target.name, header(chip))
+    return folder
+
+
+def _version() -> str:
+    """Hash of this module and the chips' tables: what the text of a header depends on."""
+    digest = hashlib.sha256(Path(__file__).read_bytes())
+    for path in sorted(CHIPS.rglob("*")):
+        if path.suffix in (".py", ".csv"):
+            digest.update(path.name.encode() + b"\0" + path.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def _write(target: Path, text: str) -> None:
+    """Write a header whole or not at all. Raises OSError."""
+    target.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+    handle, temporary = tempfile.mkstemp(prefix=".header.", dir=target.parent)
+    with os.fdopen(handle, "w", encoding="utf-8") as stream:
+        stream.write(text)
+    os.replace(temporary, target)
 
 
 def main() -> int:
-    """Rewrite the committed headers."""
-    write_outputs([(path_of(chip), header(chip).encode()) for chip in map(chip_named, NAMES)])
+    """Print the header of the chip on the command line, by default the first one, and return the exit status."""
+    if len(sys.argv) > 2 or sys.argv[1:2] == ["--help"]:
+        print(f"usage: python -m toolchain.device_header [CHIP]; CHIP is one of {', '.join(NAMES)}", file=sys.stderr)
+        return 2
+    try:
+        print(header(chip_named(*sys.argv[1:])), end="")
+    except ValueError as error:
+        print(f"toolchain.device_header: {error}", file=sys.stderr)
+        return 2
     return 0
 
 

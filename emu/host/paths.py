@@ -42,6 +42,11 @@ def runtime_libraries() -> Path:
     return cache() / "toolchain"
 
 
+def headers() -> Path:
+    """Return the cache folder of generated device headers: one folder per version of the chips' tables."""
+    return cache() / "headers"
+
+
 def images() -> Path:
     """Return the cache folder of `firmware/apps` images that `arena run` builds from an installed package."""
     return cache() / "firmware"

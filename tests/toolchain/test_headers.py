@@ -10,16 +10,29 @@ import pytest
 from emu.chips import NAMES, chip_named
 from emu.chips.dspic30f6014a import DSPIC30F6014A
 from tests.toolchain.c_programs import build, run
-from toolchain.device_header import header, path_of
+from toolchain import device_header
+from toolchain.device_header import header
 
 INCLUDE = Path(__file__).resolve().parents[2] / "toolchain" / "include"
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_the_committed_device_header_is_what_the_generator_writes(name: str) -> None:
-    """The committed header equals the output of `python -m toolchain.device_header`."""
+def test_the_device_header_is_generated_once(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The cache holds the header of each chip; a damaged cache folder makes a temporary one."""
+    monkeypatch.setenv("OPENSWARM_CACHE", str(tmp_path / "cache"))
+    device_header.folder_of.cache_clear()
     chip = chip_named(name)
-    assert path_of(chip).read_text() == header(chip)
+    folder = device_header.folder_of(name)
+    assert folder.is_relative_to(tmp_path / "cache")
+    assert (folder / f"{name.lower()}.h").read_text() == header(chip)
+    device_header.folder_of.cache_clear()
+    monkeypatch.setenv("OPENSWARM_CACHE", str(tmp_path / "file"))
+    (tmp_path / "file").write_text("")
+    elsewhere = device_header.folder_of(name)
+    assert (elsewhere / f"{name.lower()}.h").read_text() == header(chip)
+    device_header.folder_of.cache_clear()
 
 
 def test_every_register_has_the_address_of_the_chip_table(tmp_path: Path) -> None:

@@ -21,6 +21,7 @@ from pathlib import Path
 from emu.chips import chip_named
 from emu.chips.chip import Chip
 from toolchain.abi.struct_alignment import LAYOUT_FLAGS
+from toolchain.device_header import folder_of
 from toolchain.errors import ToolError
 from toolchain.frontend import accumulators, asm_constraints, config_pragma, header_case
 from toolchain.frontend.asm_registers import REFUSED, respell
@@ -113,7 +114,8 @@ def front_end_flags(options: CcOptions, language: str = "c") -> list[str]:
         flags += ["-Xclang", "-cl-single-precision-constant"]
     if options.debug:
         # Images must not depend on the folders in which this package and clang are installed.
-        own = ((INCLUDE_DIR, "toolchain/include"), (builtin_include_dir(), "clang/include"))
+        own = ((INCLUDE_DIR, "toolchain/include"), (folder_of(options.chip.name), "toolchain/include"),
+               (builtin_include_dir(), "clang/include"))  # fmt: skip
         flags += ["-g", "-gdwarf-2", *(f"-fdebug-prefix-map={path}={name}" for path, name in own)]
     if any(word.startswith("-fsanitize=") for word in options.clang):
         flags.append("-fsanitize-trap=all")  # there is no sanitizer run-time library
@@ -121,14 +123,15 @@ def front_end_flags(options: CcOptions, language: str = "c") -> list[str]:
     if is_cxx(language):
         flags += CXX_FLAGS if named else [*CXX_FLAGS, "-std=gnu++17"]
         flags += [word for word in options.clang if word not in C_ONLY]
-        folders = (library_include_dir(), INCLUDE_DIR, builtin_include_dir())
+        folders = (library_include_dir(), INCLUDE_DIR, folder_of(options.chip.name), builtin_include_dir())
         return [*flags, *(word for folder in folders for word in ("-isystem", str(folder)))]
     if not named:
         flags.append("-fgnu89-inline")  # XC16's default is gnu89, where plain `inline` defines the function
     if not {"-Werror", "-pedantic-errors"} & set(options.clang):
         flags += [f"-Wno-error={name}" for name in WARNINGS_OF_C]
     flags += options.clang
-    return [*flags, "-isystem", str(INCLUDE_DIR), "-isystem", str(builtin_include_dir())]
+    folders = (INCLUDE_DIR, folder_of(options.chip.name), builtin_include_dir())
+    return [*flags, *(word for folder in folders for word in ("-isystem", str(folder)))]
 
 
 def is_cxx(language: str) -> bool:
