@@ -1,7 +1,7 @@
 """Tests of @PROJECT@ on the emulated robot: `make test`. They run the image that is flashed into a robot.
 
-OpenSwarm's pytest plugin provides the fixture `robot`. A failed test writes its artefacts (thread, source line, waveform)
-to robot-artefacts/.
+OpenSwarm's pytest plugin provides the fixture `robot`. A failed test writes its artefacts (thread, source line,
+waveform) to robot-artefacts/.
 """
 
 import pytest

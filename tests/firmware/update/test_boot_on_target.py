@@ -16,9 +16,9 @@ from emu.image.loader import load_image
 from emu.image.model import Image
 from emu.machine.machine import Machine
 from openswarm.cli import main
+from openswarm.flashing.boot_session import BootSession
 from openswarm.flashing.loaders import LOADERS, ROW_UNITS, block
 from openswarm.flashing.rows import goto, rows
-from openswarm.flashing.talk import Talk
 from tests.firmware.radio import SLICE, Line
 
 LOADER = LOADERS[0x91]
@@ -69,7 +69,7 @@ def test_damage_and_a_cut_in_the_middle_leave_a_robot_that_can_be_reached(robot,
     rows are there. Its own rows never change."""
     own = loader_rows(robot)
     line = Line(robot)
-    talk = Talk(line, 2.0)
+    talk = BootSession(line, 2.0)
     wanted = rows(program, talk.loader)
     assert talk.loader == LOADER
     before = robot.program.word(0x100)
@@ -88,7 +88,7 @@ def test_damage_and_a_cut_in_the_middle_leave_a_robot_that_can_be_reached(robot,
     line.write(block(*wanted[4])[:50])
     robot.run(seconds=0.01)
     robot.reset()
-    again = Talk(line, 1.0)  # after more than it waits: without a program it waits again
+    again = BootSession(line, 1.0)  # after more than it waits: without a program it waits again
     again.write(wanted, lambda done, total: None)
     again.start()
     robot.run(seconds=0.02)

@@ -11,15 +11,15 @@ import tty
 from pathlib import Path
 
 import pytest
-from openswarm.flashing.talk import RobotError
 
 import emu
 from emu.image.loader import load_image
 from emu.machine.machine import Machine
 from openswarm.cli import main
+from openswarm.flashing.boot_session import RobotError
 from openswarm.flashing.messages import framed, unframed
 from openswarm.flashing.program import SLOT, Program, program_of
-from openswarm.flashing.spreading import Neighbour
+from openswarm.flashing.spreading import HostNeighbour
 from tests.firmware.radio import SLICE, Line
 
 ROWS = 3
@@ -79,7 +79,7 @@ def test_a_robot_takes_checks_and_runs_what_the_host_has(robot, programs):
         write(data if sent % 7 else data[:4] + bytes([data[4] ^ 0x40]) + data[5:])
 
     line.write = damage  # type: ignore[method-assign]
-    host = Neighbour(line, program, 20.0)
+    host = HostNeighbour(line, program, 20.0)
     rows: list[int] = []
     assert host.give(lambda done, total: rows.append(done)) is False
     assert rows == sorted(rows)
@@ -89,14 +89,14 @@ def test_a_robot_takes_checks_and_runs_what_the_host_has(robot, programs):
     robot.run(seconds=4.0)
     assert slot(robot, ROWS) == b"".join(program.rows)
     line.drop()
-    assert Neighbour(line, program, 20.0).give(lambda done, total: None) is True  # it has it already
-    newer = Neighbour(line, of(programs[5]), 20.0)
+    assert HostNeighbour(line, program, 20.0).give(lambda done, total: None) is True  # it has it already
+    newer = HostNeighbour(line, of(programs[5]), 20.0)
     assert newer.give(lambda done, total: None) is False
     with pytest.raises(RobotError, match=r"the robot has version 5, and takes only what is above it: .* --version 6"):
-        Neighbour(line, program, 20.0).give(lambda done, total: None)
+        HostNeighbour(line, program, 20.0).give(lambda done, total: None)
     other = Program(5, program.rows[:2])
     with pytest.raises(RobotError, match="the robot has another program of version 5"):
-        Neighbour(line, other, 20.0).give(lambda done, total: None)
+        HostNeighbour(line, other, 20.0).give(lambda done, total: None)
 
 
 def test_a_robot_that_falls_silent_is_told(robot, programs):
@@ -105,14 +105,14 @@ def test_a_robot_that_falls_silent_is_told(robot, programs):
     write = line.write
     line.write = lambda data: None  # type: ignore[method-assign]
     with pytest.raises(RobotError, match=r"no robot answered within 3 s|the robot has version 0 and does not ask"):
-        Neighbour(line, program, 3.0).give(lambda done, total: None)
+        HostNeighbour(line, program, 3.0).give(lambda done, total: None)
     line.write = lambda data: write(data)  # type: ignore[method-assign]
 
     def cut(done: int, total: int) -> None:
         robot.board.bluetooth.on_byte = lambda byte, _cycle: None
 
     with pytest.raises(RobotError, match=r"the robot fell silent at row 0: what it has stays there"):
-        Neighbour(line, program, 5.0).give(cut)
+        HostNeighbour(line, program, 5.0).give(cut)
 
 
 def test_damaged_frames_are_none():
