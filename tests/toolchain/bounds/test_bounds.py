@@ -266,7 +266,7 @@ def test_a_limit_that_can_be_exceeded_fails(tmp_path, capsys) -> None:
     [
         (["--let", "n"], "--let n: expected NAME=NUMBER"),
         (["--function", "nothing"], "no function is called nothing"),
-        (["--limit", "nothing=3"], "no function that was looked at is called nothing"),
+        (["--limit", "nothing=3"], "no analysed function is called nothing"),
     ],
 )
 def test_bad_arguments_are_refused(tmp_path, capsys, options: list[str], message: str) -> None:
