@@ -6,6 +6,7 @@ equal seeds give equal records.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from typing import Any, Final, TypeVar
 
@@ -14,8 +15,10 @@ from numpy.typing import NDArray
 
 from arena.experiments import Experiment
 from arena.robots.controller import Controller
+from arena.scene import dimensions
 from arena.scene.loader import Scene, SceneError
-from arena.world.physics import STREAM_EXPERIMENT, World, generator
+from arena.scene.placement import obstruction, outlines_of
+from arena.world.physics import COLLISION_SLOP, STREAM_EXPERIMENT, World, generator
 
 STEP_S: Final = 0.1
 """Simulated seconds between two calls of `step`, each at the end of the nearest quantum."""
@@ -73,23 +76,35 @@ class Supervisor:
         self.noted[name] = float(value)
 
     def move_object(self, number: int, x_cm: float, y_cm: float) -> None:
-        """Place an object at rest at a position. Raises SceneError outside the walls, IndexError for a wrong number."""
-        self._check(x_cm, y_cm)
+        """Place an object at rest at a position.
+
+        Raises SceneError if it is outside the room, in an obstacle or in another body; IndexError for a wrong number.
+        """
+        number = range(len(self._world.objects))[number]
+        self._check_free(len(self._world.robots) + number, f"object {number}", x_cm, y_cm)
         self._world.move(self._world.objects[number], x_cm, y_cm)
 
     def move_robot(self, number: int, x_cm: float, y_cm: float, heading: float | None = None) -> None:
         """Place a robot at a position, with `heading` in rad if given. Raises as `move_object`."""
-        self._check(x_cm, y_cm)
+        number = range(len(self._world.robots))[number]
+        if heading is not None and not math.isfinite(heading):
+            raise SceneError(f"robot {number}: heading {heading} rad: expected a finite number")
+        self._check_free(number, f"robot {number}", x_cm, y_cm)
         self._world.move(self._world.robots[number], x_cm, y_cm, heading)
 
     def tell(self, robot: int, text: str) -> None:
         """Send text to a robot by Bluetooth. A scripted robot ignores it."""
         self._controllers[robot].feed_uart(text.encode("latin-1"))
 
-    def _check(self, x: float, y: float) -> None:
-        arena = self.scene.arena
-        if not (0 < x < arena.width_cm and 0 < y < arena.height_cm):
-            raise SceneError(f"({x:g}, {y:g}) cm is outside the walls")
+    def _check_free(self, disc: int, name: str, x: float, y: float) -> None:
+        """Raise SceneError if a body cannot be at a position. `disc` is its index, robots first."""
+        poses = self._world.poses
+        discs = [(robot[0], robot[1], dimensions.ROBOT_RADIUS) for robot in poses.robots]
+        discs += [(place[0], place[1], self.scene.kind_of(n).radius_cm) for n, place in enumerate(poses.objects)]
+        radius = discs.pop(disc)[2] - COLLISION_SLOP
+        why = obstruction(self.scene, outlines_of(self.scene), discs, x, y, radius)
+        if why:
+            raise SceneError(f"{name} at ({x:g}, {y:g}) cm {why}; choose a free place")
 
 
 class SupervisorHooks:

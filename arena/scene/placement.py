@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from typing import Final
 
@@ -53,6 +53,39 @@ def place_all(scene: Scene, rng: np.random.Generator) -> tuple[list[tuple[float,
     return robots, chosen[scene.robots.count :]
 
 
+def outlines_of(scene: Scene) -> list[geometry.Side]:
+    """Return the sides of the room and of its obstacles, as far as they are polygons."""
+    shapes = [scene.arena.polygon, *(one.polygon for one in scene.obstacles)]
+    return [side for shape in shapes if shape for side in geometry.sides(shape)]
+
+
+def obstruction(
+    scene: Scene, outlines: Iterable[geometry.Side], taken: Iterable[tuple[float, float, float]], x: float, y: float,
+    radius: float,
+) -> str:  # fmt: skip
+    """Return what obstructs a disc at a position, or an empty text.
+
+    `outlines` are those of the scene; `taken` are other discs: x, y, radius."""
+    arena = scene.arena
+    if not (0 < x < arena.width_cm and 0 < y < arena.height_cm):
+        return "is outside the walls"
+    if min(x, y, arena.width_cm - x, arena.height_cm - y) < radius:
+        return "is in a wall"
+    if arena.polygon and not geometry.contains(arena.polygon, x, y):
+        return "is outside the walls"
+    if any(geometry.distance_to(x, y, side) < radius for side in outlines):
+        return "touches a wall or an obstacle"
+    for one in scene.obstacles:
+        if one.polygon and geometry.contains(one.polygon, x, y):
+            return f"is inside obstacle {one.name}".rstrip()
+        if one.radius_cm and math.hypot(x - one.x_cm, y - one.y_cm) < radius + one.radius_cm:
+            return f"touches obstacle {one.name}".rstrip()
+    for other_x, other_y, other in taken:
+        if math.hypot(x - other_x, y - other_y) < radius + other:
+            return f"touches what is at ({other_x:g}, {other_y:g}) cm"
+    return ""
+
+
 class _Placer:
     """Places bodies one after the other: first those with listed poses, then the others, group by group."""
 
@@ -61,9 +94,7 @@ class _Placer:
         self._rng = rng
         self._taken: list[tuple[float, float, float]] = []
         self._marks: Iterator[Place] = iter([])
-        room = [scene.arena.polygon] if scene.arena.polygon else []
-        self._sides = [side for shape in (*room, *(one.polygon for one in scene.obstacles)) if shape
-                       for side in geometry.sides(shape)]  # fmt: skip
+        self._outlines = outlines_of(scene)
 
     def place(self) -> tuple[list[tuple[float, float, float]], list[Place]]:
         """Return the poses of all robots and the positions of all objects."""
@@ -127,19 +158,4 @@ class _Placer:
 
     def _obstruction(self, x: float, y: float, radius: float) -> str:
         """Return what obstructs a disc at a position, or an empty text."""
-        arena = self._scene.arena
-        if min(x, y, arena.width_cm - x, arena.height_cm - y) < radius:
-            return "is in a wall"
-        if arena.polygon and not geometry.contains(arena.polygon, x, y):
-            return "is outside the walls"
-        if any(geometry.distance_to(x, y, side) < radius for side in self._sides):
-            return "touches a wall or an obstacle"
-        for one in self._scene.obstacles:
-            if one.polygon and geometry.contains(one.polygon, x, y):
-                return f"is inside obstacle {one.name}".rstrip()
-            if one.radius_cm and math.hypot(x - one.x_cm, y - one.y_cm) < radius + one.radius_cm:
-                return f"touches obstacle {one.name}".rstrip()
-        for other_x, other_y, other in self._taken:
-            if math.hypot(x - other_x, y - other_y) < radius + other:
-                return f"touches what is at ({other_x:g}, {other_y:g}) cm"
-        return ""
+        return obstruction(self._scene, self._outlines, self._taken, x, y, radius)

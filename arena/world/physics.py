@@ -28,6 +28,10 @@ ITERATIONS: Final = 20
 """Iterations of the constraint solver (epuck.md §4)."""
 ROWS: Final = 256
 """Poses in one sheet of memory."""
+COLLISION_SLOP: Final = 0.01
+"""Overlap in cm that the solver leaves between bodies in contact."""
+SHAPE_FRICTION: Final = math.sqrt(dimensions.CONTACT_FRICTION)
+"""Friction of every shape: pymunk multiplies the values of two shapes in contact."""
 WALL_THICKNESS: Final = 20.0
 """Half thickness of the wall segments in cm: too thick for any body to tunnel through."""
 STREAM_WORLD, STREAM_WHEELS, STREAM_SENSORS, STREAM_START, STREAM_TRAITS, STREAM_EXPERIMENT, STREAM_INFRARED = range(7)
@@ -218,7 +222,7 @@ class World:
         """Finished quanta."""
         self.space = pymunk.Space()
         self.space.iterations = ITERATIONS
-        self.space.collision_slop = 0.01
+        self.space.collision_slop = COLLISION_SLOP
         self._add_walls()
         self._add_obstacles()
         self.robots = [self._add_robot(*pose) for pose in robots]
@@ -273,7 +277,7 @@ class World:
         corners = [(-half, -half), (width + half, -half), (width + half, height + half), (-half, height + half)]
         for one, other in zip(corners, corners[1:] + corners[:1], strict=True):
             wall = pymunk.Segment(self.space.static_body, one, other, half)
-            wall.friction = dimensions.CONTACT_FRICTION
+            wall.friction = SHAPE_FRICTION
             self.space.add(wall)
 
     def _add_obstacles(self) -> None:
@@ -285,7 +289,7 @@ class World:
         found += [pymunk.Circle(fixed, one.radius_cm, (one.x_cm, one.y_cm))
                   for one in self.scene.obstacles if one.radius_cm]  # fmt: skip
         for shape in found:
-            shape.friction = dimensions.CONTACT_FRICTION
+            shape.friction = SHAPE_FRICTION
             self.space.add(shape)
 
     def _disc(self, mass: float, radius: float, x: float, y: float) -> pymunk.Body:
@@ -293,7 +297,7 @@ class World:
         body = pymunk.Body(mass, dimensions.disc_moment(mass, radius))
         body.position = x, y
         shape = pymunk.Circle(body, radius)
-        shape.friction = math.sqrt(dimensions.CONTACT_FRICTION)  # pymunk multiplies the two
+        shape.friction = SHAPE_FRICTION
         self.space.add(body, shape)
         return body
 

@@ -7,11 +7,12 @@ message when the robot touches food or reaches the nest.
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 from typing import TYPE_CHECKING
 
 from arena.experiments import Curve, Sample
 from arena.scene import dimensions
-from arena.scene.loader import Scene
+from arena.scene.loader import Scene, SceneError
 
 if TYPE_CHECKING:
     from arena.experiments.supervisor import Supervisor
@@ -64,8 +65,9 @@ def _regrow(supervisor: Supervisor, number: int) -> None:
         things = [*supervisor.robots[:, :2].tolist(), *supervisor.objects.tolist()]
         is_free = all(math.hypot(x - ox, y - oy) > 2 * CLEAR_CM for ox, oy in things)
         if is_free and math.hypot(x - x_nest, y - y_nest) > radius + CLEAR_CM:
-            supervisor.move_object(number, x, y)
-            return
+            with suppress(SceneError):  # a wall or an obstacle is there
+                supervisor.move_object(number, x, y)
+                return
 
 
 def _nest(scene: Scene) -> tuple[float, float, float]:

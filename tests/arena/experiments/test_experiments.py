@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -239,6 +240,58 @@ def test_foraging_counts_food_that_came_from_outside_to_the_nest() -> None:
     assert stage.noted == {"delivered": 1, "carrying": 0}
     assert not controllers[0].heard
     assert not controllers[2].heard
+
+
+TRIANGLE = """name = "triangle"
+[arena]
+polygon = [[0, 0], [100, 0], [0, 100]]
+[[robots]]
+place = "poses"
+poses = [[20, 20, 0], [40, 20, 0]]
+[[objects]]
+place = "poses"
+poses = [[60, 20]]
+[[obstacles]]
+name = "pillar"
+x_cm = 20
+y_cm = 60
+radius_cm = 8
+[[obstacles]]
+name = "box"
+polygon = [[5, 30], [15, 30], [15, 40], [5, 40]]
+"""
+
+
+@pytest.mark.parametrize(
+    ("place", "why"),
+    [
+        ((90, 90), "is outside the walls"),
+        ((-1, 5), "is outside the walls"),
+        ((50, 48), "touches a wall or an obstacle"),
+        ((2, 50), "is in a wall"),
+        ((20, 60), "touches obstacle pillar"),
+        ((10, 35), "is inside obstacle box"),
+        ((40, 22), "touches what is at (40, 20) cm"),
+        ((math.nan, 20), "is outside the walls"),
+    ],
+)
+def test_a_supervisor_cannot_move_a_body_into_another_one(place: tuple[float, float], why: str, tmp_path: Path) -> None:
+    """Walls of any shape, obstacles, robots and objects obstruct robots and objects; the refused body stays."""
+    (tmp_path / "triangle.toml").write_text(TRIANGLE)
+    world = World(load_scene(str(tmp_path / "triangle.toml")), 1)
+    stage = Supervisor(world, [], 1)
+    before = world.poses.values.copy()
+    for name, move in (("robot 0", stage.move_robot), ("object 0", stage.move_object)):
+        with pytest.raises(SceneError, match=re.escape(f"{name} at ({place[0]:g}, {place[1]:g}) cm {why}")):
+            move(0, *place)
+    with pytest.raises(SceneError, match="heading nan"):
+        stage.move_robot(0, 20, 20, math.nan)
+    assert (world.poses.values == before).all()
+    stage.move_robot(0, 25, 20)
+    stage.move_robot(0, 25.5, 20)  # a robot does not obstruct itself
+    stage.move_object(-1, 60, 21)
+    assert [tuple(robot[:2]) for robot in world.poses.robots] == [(25.5, 20), (40, 20)]
+    assert world.poses.objects == [(60, 21)]
 
 
 def test_aggregation_measures_robots(tmp_path: Path) -> None:

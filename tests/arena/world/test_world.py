@@ -7,8 +7,10 @@ import random
 from array import array
 from collections import deque
 from ctypes import addressof, c_void_p
+from dataclasses import replace
 
 import numpy as np
+import pymunk
 import pytest
 
 from arena.camera.appearance import NOTHING, OBJECT, ROBOT
@@ -17,6 +19,7 @@ from arena.robots.controller import ScriptedController
 from arena.robots.reactive import steps_per_second
 from arena.scene import dimensions
 from arena.scene.loader import Scene, SceneError, load_scene
+from arena.scene.schema import Arena, Obstacle
 from arena.trial.trial import run_trial
 from arena.world.physics import Poses, World
 from arena.world.wheels import ROOM, Wheels
@@ -91,6 +94,39 @@ def test_a_wall_stops_a_robot(empty: Scene) -> None:
     world = World.of(empty, 1, [(390, 150, 0.0)], [])
     drive(world, (12.8, 12.8), 3)
     assert world.poses.robots[0][0] == pytest.approx(400 - dimensions.ROBOT_RADIUS, abs=0.05)
+
+
+CORNERS = ((0.0, 0.0), (400.0, 0.0), (400.0, 300.0), (0.0, 300.0))
+PAIRS = {
+    "wall": ({}, [(396.0, 100.0, math.pi / 4)]),
+    "room": ({"arena": Arena(polygon=CORNERS)}, [(396.0, 100.0, math.pi / 4)]),
+    "polygon": ({"obstacles": (Obstacle(polygon=((200, 50), (300, 50), (300, 280), (200, 280))),)},
+                [(196.0, 100.0, math.pi / 4)]),
+    "disc": ({"obstacles": (Obstacle(x_cm=200.0, y_cm=150.0, radius_cm=90.0),)}, [(106.3, 152.0, math.pi / 4)]),
+    "robot": ({}, [(100.0, 100.0, 0.0), (107.3, 101.5, math.pi / 2)]),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("pair", PAIRS)
+def test_every_pair_of_bodies_has_the_documented_contact_friction(empty: Scene, pair: str) -> None:
+    """Tangential impulse / normal impulse of a sliding contact is `CONTACT_FRICTION`."""
+    parts, poses = PAIRS[pair]
+    scene = replace(empty.with_values(robots__count=len(poses), clock__quantum_ms=1.0), **parts)
+    world = World.of(scene, 1, poses, [])
+    wheels = [(12.8, 12.8), (-12.8, -12.8)][: len(poses)]
+    along = across = 0.0
+
+    def add(arbiter: pymunk.Arbiter) -> None:
+        nonlocal along, across
+        impulse, normal = arbiter.total_impulse, arbiter.contact_point_set.normal
+        across += abs(impulse.dot(normal))
+        along += abs(impulse.dot(normal.perpendicular()))
+
+    for _ in range(150):
+        world.step(wheels)
+        world.robots[0].each_arbiter(add)
+    assert across > 0
+    assert along / across == pytest.approx(dimensions.CONTACT_FRICTION, rel=0.02)
 
 
 def test_without_slip_limit_the_drive_is_enkis(empty: Scene) -> None:
