@@ -106,6 +106,8 @@ def front_end_flags(options: CcOptions, language: str = "c") -> list[str]:
     """Flags of the target and language, followed by the user's flags."""
     flags = [*TARGET_FLAGS, *LANGUAGE_FLAGS, CLANG_LEVEL[options.level]]
     flags += [f"-U{name}" for name in FOREIGN_MACROS]
+    own_folders = (INCLUDE_DIR, folder_of(options.chip.name), builtin_include_dir())
+    folders = [word for folder in own_folders for word in ("-isystem", str(folder))]
     guard = ["__HAS_CODEGUARD__"] if "FBS" in options.chip.config else []
     flags += [f"-D{name}=1" for name in (f"__{options.chip.name}__", *PREDEFINED, *guard)]
     flags += [f"-fno-builtin-{name}" for name in ABSENT_FUNCTIONS]
@@ -123,15 +125,13 @@ def front_end_flags(options: CcOptions, language: str = "c") -> list[str]:
     if is_cxx(language):
         flags += CXX_FLAGS if named else [*CXX_FLAGS, "-std=gnu++17"]
         flags += [word for word in options.clang if word not in C_ONLY]
-        folders = (library_include_dir(), INCLUDE_DIR, folder_of(options.chip.name), builtin_include_dir())
-        return [*flags, *(word for folder in folders for word in ("-isystem", str(folder)))]
+        return [*flags, "-isystem", str(library_include_dir()), *folders]
     if not named:
         flags.append("-fgnu89-inline")  # XC16's default is gnu89, where plain `inline` defines the function
     if not {"-Werror", "-pedantic-errors"} & set(options.clang):
         flags += [f"-Wno-error={name}" for name in WARNINGS_OF_C]
     flags += options.clang
-    folders = (INCLUDE_DIR, folder_of(options.chip.name), builtin_include_dir())
-    return [*flags, *(word for folder in folders for word in ("-isystem", str(folder)))]
+    return [*flags, *folders]
 
 
 def is_cxx(language: str) -> bool:
