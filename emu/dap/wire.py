@@ -13,7 +13,11 @@ from contextlib import contextmanager, suppress
 from queue import SimpleQueue
 from typing import Any, BinaryIO, Final, Protocol
 
-HEADER: Final = re.compile(rb"content-length:[ \t]*(\d{1,20})", re.IGNORECASE)
+LENGTH: Final = re.compile(rb"content-length:[ \t]*(\d{1,20})[ \t]*", re.IGNORECASE)
+OTHER_FIELD: Final = re.compile(rb"content-type:[ \t]*[\x21-\x7e \t]*", re.IGNORECASE)
+"""The header field that is accepted beside Content-Length and has no effect."""
+HTTP_REQUEST: Final = re.compile(rb"[A-Za-z]{1,20} [^ \r\n]{1,8000}(?: HTTP/|$)")
+MAX_HEADER_BYTES: Final = 4096
 READ_SIZE: Final = 1 << 16
 POLL_SECONDS: Final = 0.1
 """Interval at which the reader thread checks whether it must end."""
@@ -96,18 +100,14 @@ class Wire:
     def _read(self) -> Message | None:
         """Return the next message, None at the end. Raises _ProtocolError."""
         while (end := self._unread.find(b"\r\n\r\n")) < 0:
-            if len(self._unread) > MAX_MESSAGE_BYTES:
-                raise _ProtocolError(f"{MAX_MESSAGE_BYTES} bytes without the end of a message header")
+            if len(self._unread) > MAX_HEADER_BYTES:
+                _refuse_http(bytes(self._unread[:MAX_HEADER_BYTES]))
+                raise _ProtocolError(f"{MAX_HEADER_BYTES} bytes without the end of a message header")
             if not self._receive():
                 if self._unread.strip():
                     raise _ProtocolError("the input ends in a message header")
                 return None
-        header = HEADER.search(self._unread, 0, end)
-        if header is None:
-            raise _ProtocolError(f"expected `Content-Length: N` before a message, not {_excerpt(self._unread[:end])}")
-        size = int(header[1])
-        if not 0 < size <= MAX_MESSAGE_BYTES:
-            raise _ProtocolError(f"a message of {size} bytes; expected 1 to {MAX_MESSAGE_BYTES}")
+        size = _message_size(bytes(self._unread[:end]))
         while len(self._unread) < end + 4 + size:
             if not self._receive():
                 raise _ProtocolError(f"the input ends after {len(self._unread) - end - 4} of {size} bytes of a message")
@@ -120,6 +120,27 @@ class Wire:
         if not isinstance(message, dict):
             raise _ProtocolError(f"a message is no JSON object: {_excerpt(body)}")
         return message
+
+
+def _refuse_http(header: bytes) -> None:
+    """Raise _ProtocolError if a header begins with the request line of HTTP."""
+    if HTTP_REQUEST.match(header):
+        raise _ProtocolError("an HTTP request, perhaps from a web page; this port is for editors (Debug Adapter "
+                             f"Protocol) only: {_excerpt(header)}")  # fmt: skip
+
+
+def _message_size(header: bytes) -> int:
+    """Return the size of a message from its header. Raises _ProtocolError for any line that is no field of a header.
+
+    A web page can send an HTTP request to this port; a lenient parser would take its body for messages."""
+    _refuse_http(header)
+    lines = header.split(b"\r\n")
+    sizes = [int(found[1]) for found in map(LENGTH.fullmatch, lines) if found]
+    if len(sizes) != 1 or not all(LENGTH.fullmatch(line) or OTHER_FIELD.fullmatch(line) for line in lines):
+        raise _ProtocolError(f"expected `Content-Length: N` before a message, not {_excerpt(header)}")
+    if not 0 < sizes[0] <= MAX_MESSAGE_BYTES:
+        raise _ProtocolError(f"a message of {sizes[0]} bytes; expected 1 to {MAX_MESSAGE_BYTES}")
+    return sizes[0]
 
 
 def _excerpt(data: bytes | bytearray) -> str:

@@ -374,7 +374,15 @@ def framed(command: str, **arguments: Any) -> bytes:
     [
         (b"", 0, ""),
         (framed("restart") + framed("terminate"), 3, ""),  # the event "terminated"
-        (b"GET / HTTP/1.1\r\nHost: x\r\n\r\n", 0, "expected `Content-Length: N` before a message, not 'GET /"),
+        (b"GET / HTTP/1.1\r\nHost: x\r\n\r\n", 0, "an HTTP request, perhaps from a web page; this port is for editors"),
+        (b"POST /content-length:71 HTTP/1.1\r\nHost: x\r\nContent-Length: 71\r\n\r\n" + framed("initialize")[-71:],
+         0, "an HTTP request"),
+        (b"GET /" + b"x" * 9000, 0, "an HTTP request"),
+        (b"X-Content-Length: 71\r\n\r\n" + framed("initialize")[-71:], 0, "expected `Content-Length: N`"),
+        (b"Origin: http://x\r\n" + framed("initialize"), 0, "expected `Content-Length: N`"),
+        (b"Content-Length: 71\r\n" + framed("initialize"), 0, "expected `Content-Length: N`"),
+        (b"Content-Type: application/json\r\n" + framed("initialize"), 1, ""),
+        (b" " * 9000, 0, "4096 bytes without the end of a message header"),
         (framed("initialize") + b"Content-Length: 9999999999\r\n\r\n", 1, "a message of 9999999999 bytes"),
         (framed("initialize") + b"Content-Length: 0\r\n\r\n", 1, "a message of 0 bytes; expected 1 to 16777216"),
         (framed("initialize")[:-5], 0, "the input ends after 66 of 71 bytes of a message"),
@@ -383,7 +391,7 @@ def framed(command: str, **arguments: Any) -> bytes:
         (b"Content-Length: 90000\r\n\r\n" + b"[" * 90000, 0, "not valid JSON: '[[[["),
         (framed("initialize").replace(b"\r\n", b"\n"), 0, "the input ends in a message header"),
     ],
-)
+)  # fmt: skip
 def test_a_protocol_error_ends_the_server_with_a_message(sent: bytes, replies: int, words: str) -> None:
     """Valid input gives status 0 and no error text; a restart before the launch is refused."""
     done = subprocess.run([sys.executable, "-m", "emu", "debug"], input=sent, capture_output=True, timeout=60)
