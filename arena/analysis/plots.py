@@ -18,6 +18,7 @@ from matplotlib.patches import Circle, Rectangle
 from arena.analysis.comparison import series_by_seed
 from arena.analysis.statistics import bootstrap_band
 from arena.experiments import Curve
+from arena.experiments.declaration import code_needed
 from arena.scene import dimensions
 from arena.trial.record import Trial
 
@@ -94,6 +95,8 @@ def curves(runs: Runs) -> Figure:
     """Draw each metric over time: mean, standard deviation, and 95 % bootstrap band of the mean."""
     experiment = next(iter(runs.values()))[0].experiment
     count = len(experiment.curves)
+    if not count:
+        raise code_needed(experiment.name, "curves")
     figure = Figure(figsize=(5 * count, 4), layout="constrained")
     axes = figure.subplots(1, count, squeeze=False)[0]
     for number, (axis, curve) in enumerate(zip(axes, experiment.curves, strict=True)):

@@ -21,6 +21,7 @@ from typing import Any, Final
 import numpy as np
 
 from arena.campaign.campaign import Plan, run_one, trial_path
+from arena.experiments import experiment_with_digest
 from arena.robots.reactive import SPEED_TABLES
 from arena.scene.loader import scene_of
 from arena.trial.manifest import MANIFEST, read_manifest
@@ -151,23 +152,43 @@ def unpack(bundle: Path, folder: Path) -> list[Path]:
     return sorted({folder / PurePosixPath(name).parts[0] for name in hashes})
 
 
-def plan_of(folder: Path) -> Plan:
-    """Return the plan of an unpacked run from its manifest. Raises RecordError, SceneError."""
+def plan_of(folder: Path, own: Path | None = None, trust: bool = False) -> Plan:
+    """Return the plan of an unpacked run from its manifest.
+
+    The code of the run's own experiment runs only from the file `own`, or with `trust` from the copy in the run.
+    Raises RecordError, SceneError."""
     try:
         key: dict[str, Any] = read_manifest(folder)["key"]
         scene = scene_of(key["scene"])
-        own = dict.fromkeys(group.image for group in scene.groups if group.image)
+        groups = dict.fromkeys(group.image for group in scene.groups if group.image)
         firmware = {path.stem: path for path in folder.glob("firmware*")}
         hashes = key.get("images_sha256") or {}
         images = tuple((name, firmware[f"firmware-{place}"] if hashes.get(name) else None)
-                       for place, name in enumerate(own, start=1))  # fmt: skip
+                       for place, name in enumerate(groups, start=1))  # fmt: skip
         image = firmware["firmware"] if key["image_sha256"] else None
         _check_key(key)
-        experiment = folder / EXPERIMENT if key.get("experiment_sha256") else None
+        experiment = _trusted_experiment(folder, scene.experiment, key.get("experiment_sha256"), own, trust)
         return Plan(scene, key["brain"], key["controller"], image, len(_trial_numbers(folder)),
                     key["seconds"], key["seed"], experiment, images)  # fmt: skip
     except READ_ERRORS as error:
         raise RecordError(f"{folder / MANIFEST}: {type(error).__name__}: {error}") from None
+
+
+def _trusted_experiment(folder: Path, name: str, digest: str | None, own: Path | None, trust: bool) -> Path | None:
+    """Return the file of a run's own experiment; None if the run has a built-in or installed one.
+
+    Raises RecordError without permission to run its code, SceneError if the hash of the file is not the recorded one.
+    """
+    if digest is None and not name.endswith(".py"):
+        return None
+    if digest is None:
+        raise RecordError(f"{folder.name}: names the experiment file {name!r:.60} but not its hash; it cannot be run")
+    if own is None and not trust:
+        raise RecordError(f"{folder.name}: has an experiment file of its own, whose code is not run: name the file "
+                          "with --experiment FILE, or accept the copy in the bundle with --trust")  # fmt: skip
+    path = own or folder / EXPERIMENT
+    experiment_with_digest(path, digest)
+    return path
 
 
 def _check_key(key: dict[str, Any]) -> None:
@@ -181,13 +202,15 @@ def _check_key(key: dict[str, Any]) -> None:
             raise ValueError(f"{name}: invalid value {key[name]!r:.40}")
 
 
-def verify(bundle: Path, chosen: Callable[[list[int]], list[int]]) -> Iterator[Check]:
+def verify(bundle: Path, chosen: Callable[[list[int]], list[int]], own: Path | None = None,
+           trust: bool = False) -> Iterator[Check]:  # fmt: skip
     """Run trials of each run again and yield the results; `chosen` selects from the numbers of a run.
 
+    `own` and `trust` permit to run the code of a run's own experiment, as in `plan_of`.
     Raises RecordError, SceneError, emu.LoadError."""
     with tempfile.TemporaryDirectory(prefix="arena-") as name:
         for folder in unpack(bundle, Path(name)):
-            plan = plan_of(folder)
+            plan = plan_of(folder, own, trust)
             again = folder / "again"
             again.mkdir()
             numbers = _trial_numbers(folder)

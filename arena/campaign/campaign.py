@@ -13,7 +13,7 @@ import os
 import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from threading import Thread
@@ -22,13 +22,14 @@ from typing import Any
 from filelock import FileLock, Timeout
 
 from arena.experiments import Experiment, experiment_of
+from arena.experiments.declaration import CURVE_COLUMN, declaration_of
 from arena.infrared.channel import OpticalChannel
 from arena.replay.live_feed import LiveFile, live_path
 from arena.robots.controller import Controller, ScriptedController
-from arena.scene.loader import Scene
+from arena.scene.loader import Scene, SceneError
 from arena.trial.manifest import MANIFEST, read_manifest, write_manifest
-from arena.trial.record import FolderInUseError, RecordError, write_trial
-from arena.trial.trial import run_trial
+from arena.trial.record import FolderInUseError, RecordError, Trial, write_trial
+from arena.trial.trial import Rows, run_trial
 from arena.trial.versions import host, versions
 from arena.world.physics import World
 
@@ -158,6 +159,8 @@ def run_one(
     start = time.perf_counter()
     seed = plan.seed + number - 1
     about = plan.key() | {"seed": seed, "faults": []}
+    if plan.experiment is not None:
+        about["experiment"] = declaration_of(plan.loaded_experiment)
     live = LiveFile(live_path(folder, number), about) if plan.has_firmware else None
     try:
         progress = None if report is None else (lambda seconds: report(number, seconds))
@@ -169,11 +172,20 @@ def run_one(
             result = run_trial(plan.scene, seed, controllers, plan.seconds, progress, world, on_row, channel,
                                plan.loaded_experiment, threads)  # fmt: skip
         about["faults"] = [list(fault) for fault in result.faults]
+        if plan.experiment is not None:
+            _add_curves(result.rows, plan.loaded_experiment, about)
         write_trial(trial_path(folder, number), result.rows, about)
     finally:
         if live is not None:
             live.close()
     return FinishedTrial(number, time.perf_counter() - start, result.faults)
+
+
+def _add_curves(rows: Rows, experiment: Experiment, about: dict[str, Any]) -> None:
+    """Add the curves of a user's experiment as columns, which show the record without the experiment's code."""
+    with suppress(SceneError):  # failing metrics must not lose the trial; the command reports them afterwards
+        series = experiment.series(Trial(Path("trial"), rows.columns, about).samples)
+        rows.columns.update({CURVE_COLUMN + name: values.tolist() for name, values in series.curves.items()})
 
 
 @contextmanager
@@ -196,13 +208,21 @@ def open_folder(plan: Plan, folder: Path, arguments: list[str]) -> list[int]:
 
     The manifest stores the command's `arguments`. Raises RecordError if the folder holds another run.
     """
+    before = check_folder(plan, folder)
     key = plan.key() | {"seed": plan.seed}
-    before = read_manifest(folder) if (folder / MANIFEST).exists() else None
-    if before is not None and before["key"] != key:
-        raise RecordError(f"{folder}: holds another run (different {', '.join(_changed(before['key'], key))}); "
-                          "choose another --out")  # fmt: skip
     write_manifest(folder, (before or {"host": []}) | {"key": key, "made_on": host(), "command": ["arena", *arguments]})
     return [number for number in range(1, plan.trials + 1) if not trial_path(folder, number).exists()]
+
+
+def check_folder(plan: Plan, folder: Path) -> dict[str, Any] | None:
+    """Return the manifest in the folder of a run, None without one. Raises RecordError if it is that of another run."""
+    if not (folder / MANIFEST).exists():
+        return None
+    before, key = read_manifest(folder), plan.key() | {"seed": plan.seed}
+    if before["key"] != key:
+        raise RecordError(f"{folder}: holds another run (different {', '.join(_changed(before['key'], key))}); "
+                          "choose another --out")  # fmt: skip
+    return before
 
 
 def _changed(before: dict[str, Any], now: dict[str, Any]) -> list[str]:

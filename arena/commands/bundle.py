@@ -8,6 +8,7 @@ from pathlib import Path
 
 from arena.campaign import bundle
 from arena.commands.arguments import count, count_or_none, removed_processes
+from arena.commands.trust import add_trust_options
 from arena.trial.json_numbers import json_text
 
 DIFFERENT = 1
@@ -50,6 +51,7 @@ def verify_parser() -> argparse.ArgumentParser:
     command.add_argument(
         "--number", type=count, action="append", metavar="N", help="run trial N of each run again; repeatable"
     )
+    add_trust_options(command)
     command.add_argument("--strict", action="store_true", help="require equal bytes, and so equal versions")
     command.add_argument("--processes", type=removed_processes, help=argparse.SUPPRESS)
     command.add_argument("--json", action="store_true", help="print JSON")
@@ -63,7 +65,7 @@ def verify(options: argparse.Namespace) -> int:
         return [one for one in numbers if one in options.number] if options.number else numbers[: options.trials]
 
     status, checks = 0, []
-    for one in bundle.verify(options.bundle, chosen):
+    for one in bundle.verify(options.bundle, chosen, options.experiment, options.trust):
         good = one.equal and not (options.strict and one.versions)
         status = status if good else DIFFERENT
         checks.append(asdict(one))

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from arena.analysis.comparison import compare_runs
 from arena.commands.arguments import duration
+from arena.commands.trust import add_trust_options, load_trusted
 from arena.trial.json_numbers import json_text
 from arena.trial.record import trials_in
 
@@ -23,12 +24,15 @@ def parser() -> argparse.ArgumentParser:
         "--at", type=duration, default=600.0, metavar="S", help="simulated time of the measures (default 600 s)"
     )
     command.add_argument("--json", action="store_true", help="print JSON")
+    add_trust_options(command)
     return command
 
 
 def run(options: argparse.Namespace) -> int:
     """Print the comparison of all measures. Raises RecordError, ValueError."""
-    result = compare_runs(trials_in(options.first), trials_in(options.second), options.at)
+    first, second = trials_in(options.first), trials_in(options.second)
+    load_trusted([*first, *second], options)
+    result = compare_runs(first, second, options.at)
     if options.json:
         print(json_text(result))
         return 0

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from arena.analysis import plots
 from arena.commands.arguments import count_or_none
+from arena.commands.trust import add_trust_options, load_trusted
 from arena.replay import filmstrip
 from arena.trial.record import Trial, trials_in
 
@@ -22,12 +23,14 @@ def parser() -> argparse.ArgumentParser:
     command.add_argument("--film", type=count_or_none, metavar="ROBOT",
                       help="draw the filmstrip of one robot of the first trial, and print its log")  # fmt: skip
     command.add_argument("--format", default="png", choices=("png", "svg", "pdf"), help="default png")
+    add_trust_options(command)
     return command
 
 
 def run(options: argparse.Namespace) -> int:
     """Write the figures and print their paths. Raises RecordError, OSError."""
     runs = {folder.name: trials_in(folder) for folder in options.runs}
+    load_trusted((trial for trials in runs.values() for trial in trials), options)
     options.out.mkdir(parents=True, exist_ok=True)
     if options.film is not None:
         return _draw_filmstrips(runs, options)

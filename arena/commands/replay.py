@@ -10,6 +10,7 @@ from pathlib import Path
 from urllib.parse import parse_qs, urlsplit
 
 from arena.commands.arguments import count, duration, port
+from arena.commands.trust import add_trust_options, load_trusted
 from arena.replay.http import LOOPBACK, RequestHandler
 from arena.replay.live_feed import Follower
 from arena.replay.page import page
@@ -43,6 +44,7 @@ def parser() -> argparse.ArgumentParser:
     command.add_argument(
         "--seconds", type=float, metavar="S", help="simulated time that the video shows (default: the whole trial)"
     )
+    add_trust_options(command)
     command.add_argument("--live", action="store_true", help="serve a page that follows a running trial")
     command.add_argument(
         "--number", type=count, metavar="N", help="with --live: number of the trial (default: the newest)"
@@ -56,7 +58,9 @@ def parser() -> argparse.ArgumentParser:
 def run(options: argparse.Namespace) -> int:
     """Write the page or video and print its path. Raises RecordError, ValueError, OSError."""
     if options.live:
-        with server(Follower(options.trial, options.number), options.port) as serving:
+        follower = Follower(options.trial, options.number)
+        load_trusted(follower.metadata(), options)
+        with server(follower, options.port) as serving:
             print(f"http://{LOOPBACK}:{serving.server_port}/ (Ctrl-C ends)", flush=True)
             with suppress(KeyboardInterrupt):
                 serving.serve_forever()
@@ -64,6 +68,7 @@ def run(options: argparse.Namespace) -> int:
     if not is_standard(options.trial) and not options.trial.is_file():
         raise RecordError(f"{options.trial}: no such file; expected a trial-NNNN.parquet")
     trial = read_trial(options.trial)
+    load_trusted([trial], options)
     beside = options.trial if is_standard(options.trial) else options.trial.with_suffix(".html")
     out: Path = options.export or options.out or beside
     if options.export is not None:

@@ -11,6 +11,7 @@ import numpy as np
 from arena.analysis import plots
 from arena.analysis.report import by_controller, report, with_results
 from arena.commands.arguments import duration
+from arena.commands.trust import add_trust_options, load_trusted
 from arena.trial.manifest import read_manifest
 from arena.trial.record import trials_in, write_text
 
@@ -32,12 +33,14 @@ def parser() -> argparse.ArgumentParser:
     command.add_argument(
         "--figures", type=Path, metavar="FOLDER", help="draw snapshots, curves and CPU load into this folder"
     )
+    add_trust_options(command)
     return command
 
 
 def run(options: argparse.Namespace) -> int:
     """Write the report. Raises RecordError, ValueError, OSError."""
     runs = {folder.name: trials_in(folder) for folder in options.runs}
+    load_trusted((trial for trials in runs.values() for trial in trials), options)
     if len(runs) < len(options.runs):
         raise ValueError("two of the folders have the same name; the tables need distinct names")
     home = options.document.parent if options.document is not None else Path()

@@ -31,6 +31,8 @@ FOLDER: Final = Path(__file__).parent / "builtin"
 PLAIN: Final = "plain"
 """Experiment of scenes that do not name one."""
 Floats = NDArray[np.float64]
+_loaded: Final[dict[str, Experiment]] = {}
+"""Experiments that this process has loaded from files, by SHA-256."""
 
 
 @dataclass(frozen=True)
@@ -128,6 +130,10 @@ class Experiment:
     done: Callable[[Any], bool] = _never
     digest: str = field(default="", compare=False)
     """SHA-256 of the file; empty for a built-in experiment."""
+    has_default_measures: bool = field(default=False, compare=False)
+    """Whether the measures are the values of the curves at the requested time, because the file defines none."""
+    is_declaration: bool = False
+    """Whether only the declaration in a record is available, without the code."""
 
     @property
     def has_supervisor(self) -> bool:
@@ -159,6 +165,19 @@ def experiment_of(name: str, folder: Path = Path()) -> Experiment:
     return _load_by_name(name)
 
 
+def experiment_with_digest(path: Path, digest: str) -> Experiment:
+    """Load the experiment of a file whose SHA-256 is `digest`. Another file is not run. Raises SceneError."""
+    source = _read(path)
+    if hashlib.sha256(source).hexdigest() != digest:
+        raise SceneError(f"{path}: is not the recorded experiment: its SHA-256 differs from {digest}")
+    return _load_source(path.resolve(), source)
+
+
+def loaded_experiment(digest: str) -> Experiment | None:
+    """Return the experiment that this process has loaded from a file with this SHA-256; None if there is none."""
+    return _loaded.get(digest)
+
+
 def experiment_file(name: str, folder: Path) -> Path | None:
     """Return the file of a user's experiment; None for a built-in or installed one. Raises SceneError."""
     experiment_of(name, folder)
@@ -178,20 +197,31 @@ def _load_by_name(name: str) -> Experiment:
     raise SceneError(f"unknown experiment {name!r}; known: {', '.join(known)}, or the path of a .py file")
 
 
-@cache
 def _load_file(path: Path) -> Experiment:
     """Load a user's experiment from its file."""
-    spec = importlib.util.spec_from_file_location(f"arena_experiment_{_module_name(path)}", path)
-    if spec is None or spec.loader is None or not path.is_file():
+    return _load_source(path, _read(path))
+
+
+def _read(path: Path) -> bytes:
+    if not path.is_file():
         raise SceneError(f"{path}: no such experiment file")
+    return path.read_bytes()
+
+
+@cache
+def _load_source(path: Path, source: bytes) -> Experiment:
+    """Load a user's experiment from the content of its file. Cached byte code is not used: no hash covers it."""
+    spec = importlib.util.spec_from_file_location(f"arena_experiment_{_module_name(path)}", path)
+    assert spec is not None
     module = importlib.util.module_from_spec(spec)
     sys.modules[module.__name__] = module  # dataclasses look up their module here
     try:
-        spec.loader.exec_module(module)
+        exec(compile(source, str(path), "exec", dont_inherit=True), module.__dict__)
     except (Exception, SystemExit) as error:
         line = getattr(error, "lineno", None) or _line_in(path, error)
         raise SceneError(f"{path}:{line or 1}: {type(error).__name__}: {error}") from None
-    return _experiment_from(path.stem, module, _digest(path))
+    digest = hashlib.sha256(source).hexdigest()
+    return _loaded.setdefault(digest, _experiment_from(path.stem, module, digest))
 
 
 def _module_name(path: Path) -> str:
@@ -221,13 +251,14 @@ def _experiment_from(name: str, module: ModuleType, digest: str) -> Experiment:
     curves = tuple(getattr(module, "CURVES", ()))
     if not curves:
         raise SceneError(f"{module.__file__}: an experiment must define its metrics: CURVES = [Curve('name', 'label')]")
-    measures = tuple(getattr(module, "MEASURES", ())) or tuple(map(_default_measure, curves))
+    own = tuple(getattr(module, "MEASURES", ()))
+    measures = own or tuple(map(default_measure, curves))
     hooks = {hook: getattr(module, hook) for hook in ("groups", "init", "step", "done") if hasattr(module, hook)}
     return Experiment(name, curves, measures, whole or _curves_by_sample(metrics), getattr(module, "PUBLISHED", ""),
-                      digest=digest, **hooks)  # fmt: skip
+                      digest=digest, has_default_measures=not own, **hooks)  # fmt: skip
 
 
-def _default_measure(curve: Curve) -> Measure:
+def default_measure(curve: Curve) -> Measure:
     """Return the default measure of a curve: its value at the requested time."""
     return Measure(curve.name, f"{curve.label} at {{at:g}} s", lambda series, at: series.at(at, curve.name),
                    best=curve.best)  # fmt: skip

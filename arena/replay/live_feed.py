@@ -13,6 +13,7 @@ from typing import Any, BinaryIO
 
 from filelock import FileLock, Timeout
 
+from arena.experiments.declaration import CURVE_COLUMN
 from arena.replay.page import page, sample_data
 from arena.trial.record import RecordError, Trial, checked, read_trial
 
@@ -87,6 +88,11 @@ class Follower:
         self._rows: list[dict[str, Any]] = []
         self._finished: Trial | None = None
 
+    def metadata(self) -> list[Trial]:
+        """Return the trial without samples; nothing if its metadata is not written yet."""
+        self._catch_up()
+        return [Trial(self._path, {}, self._about)] if self._about else []
+
     def page(self) -> str:
         """Return a page with all samples so far, which polls for new ones."""
         self._catch_up()
@@ -136,7 +142,8 @@ class Follower:
         """Return the samples from number `first` on as a trial."""
         whole = self._finished
         if whole is not None:
-            return Trial(whole.path, {name: values[first:] for name, values in whole.columns.items()}, whole.about)
+            shown = [name for name in whole.columns if not name.startswith(CURVE_COLUMN)]  # a live page has no others
+            return Trial(whole.path, {name: whole.columns[name][first:] for name in shown}, whole.about)
         rows = self._rows[first:]
         if not rows:
             raise RecordError(f"{self._path}: no sample is recorded yet; try again in a moment")

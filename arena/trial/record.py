@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from arena.camera.appearance import NOTHING, OBJECT, ROBOT
-from arena.experiments import Experiment, TrialSamples, UartLine, experiment_of
+from arena.experiments import Experiment, TrialSamples, UartLine, experiment_of, loaded_experiment
+from arena.experiments.declaration import CURVE_COLUMN, SHAPE, declared_experiment
 from arena.metrics import MetricSeries
 from arena.scene.loader import FCY, Scene, scene_of
 from arena.trial.json_numbers import mismatch
@@ -30,10 +31,12 @@ EXPERIMENT: Final = "experiment.py"
 """Copy of the user's experiment file in the folder of a run, made when the run began."""
 FAULT: Final = (int, float, str)
 """JSON shape of a fault: robot, seconds, description."""
+FREE_COLUMNS: Final = ("n_", CURVE_COLUMN)
+"""Prefixes of the columns whose names and values come from the experiment: noted numbers and curves."""
 MAX_VALUE: Final = 1e7
 """Bound of all numbers of a record: positions in cm, times in s, speeds, shares. nan is not below it."""
 _HEAD: Final = {"scene": dict, "brain": str, "controller": str, "seed": int, "faults": [FAULT], "image_sha256?": str,
-                "images_sha256?": dict, "versions?": dict}  # fmt: skip
+                "images_sha256?": dict, "versions?": dict, "experiment_sha256?": str, "experiment?": SHAPE}  # fmt: skip
 """JSON shape of the metadata."""
 
 
@@ -91,15 +94,23 @@ class Trial:
 
     @cached_property
     def experiment(self) -> Experiment:
-        """Experiment of the trial; `clustering` if the scene in the record names none."""
+        """Experiment of the trial; `clustering` if the scene in the record names none.
+
+        A record never loads a file. A user's experiment is the one that this process has loaded from a file with the
+        recorded hash, otherwise the declaration in the record."""
         name = str(self.about["scene"].get("experiment", "clustering"))
-        beside = self.path.parent / EXPERIMENT
-        return experiment_of(str(beside.resolve()) if name.endswith(".py") and beside.exists() else name)
+        if not name.endswith(".py"):
+            return experiment_of(name)
+        loaded = loaded_experiment(self.about.get("experiment_sha256") or "")
+        return loaded or declared_experiment(Path(name).stem, self.about.get("experiment"), self.columns)
 
     @cached_property
     def series(self) -> MetricSeries:
-        """The metrics over time."""
-        return self.experiment.series(self.samples)
+        """The metrics over time; the recorded ones if the code of the experiment is not loaded."""
+        if not self.experiment.is_declaration:
+            return self.experiment.series(self.samples)
+        recorded = {one.name: self.columns[CURVE_COLUMN + one.name] for one in self.experiment.curves}
+        return MetricSeries(self.times, {name: np.asarray(values, dtype=float) for name, values in recorded.items()})
 
     @property
     def samples(self) -> TrialSamples:
@@ -154,8 +165,8 @@ def kind_of(column: str) -> pa.DataType:
     )
     kinds = {"log": said, "messages": sent, "lights": shown, "seen": pa.int16(), "leds": pa.int16(),
              "strip": pa.binary(), "infrared": pa.list_(pa.int16())}  # fmt: skip
-    is_noted = column.startswith("n_")  # the supervisor chooses these names, so they can end like any other
-    return pa.float64() if is_noted else kinds.get(column.rsplit("_", 1)[-1], pa.float64())
+    is_free = column.startswith(FREE_COLUMNS)  # the experiment chooses these names, so they can end like any other
+    return pa.float64() if is_free else kinds.get(column.rsplit("_", 1)[-1], pa.float64())
 
 
 def read_trial(path: Path) -> Trial:
@@ -192,7 +203,7 @@ def _values(path: Path, name: str, column: Any) -> Any:
     values = column.to_numpy()
     if name.endswith("_seen") and not np.isin(values, (-1, NOTHING, OBJECT, ROBOT)).all():
         raise RecordError(f"{path}: is not a complete trial: column {name}: expected -1 to {ROBOT}")
-    if not name.startswith("n_") and not (np.abs(values) < MAX_VALUE).all():
+    if not name.startswith(FREE_COLUMNS) and not (np.abs(values) < MAX_VALUE).all():
         raise RecordError(f"{path}: is not a complete trial: column {name}: expected numbers below {MAX_VALUE:g}")
     return values
 
