@@ -6,9 +6,13 @@ import argparse
 import os
 from pathlib import Path
 
+from arena.analysis.comparison import NEAR_S
+from arena.analysis.report import with_results
+from arena.campaign.campaign import check_folder
 from arena.commands import report
 from arena.commands import run as single
 from arena.commands.arguments import count, count_or_none, duration
+from arena.commands.run import DEFAULT_CONTROLLER
 from arena.robots.reactive import SPEED_TABLES
 
 EXAMPLE = "example: arena experiment clustering --document docs/experiment.md --figures docs/figures"
@@ -58,27 +62,60 @@ def parser() -> argparse.ArgumentParser:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Run all arms and the report; return the highest exit status. Raises as `run` and `report`."""
+    """Run all arms and the report; return the highest exit status. Raises as `run` and `report`.
+
+    All arguments are checked before the first trial."""
     if not options.controllers or set(options.controllers) - set(SPEED_TABLES):
         raise ValueError(f"--controllers {options.controllers}: expected some of {''.join(SPEED_TABLES)}")
     if options.trials < 2:
         raise ValueError("--trials must be 2 or more for a comparison")
-    arms = [(brain, options.trials, options.minutes) for brain in options.brains.split(",")]
-    if options.twins:
-        arms.append(("scripted", options.twins, options.twin_minutes))
-    folders = []
-    status = 0
-    for controller in options.controllers:
-        for brain, trials, minutes in arms:
-            folders.append(options.out / f"{Path(brain).stem}-{controller}")
-            arguments = [options.scene, "--brain", brain, "--controller", controller, "--trials", str(trials),
-                         "--minutes", str(minutes), "--seed", str(options.seed), "--jobs", str(options.jobs),
-                         "--out", str(folders[-1])]  # fmt: skip
-            if options.scheduler is not None:
-                arguments += ["--scheduler", options.scheduler]
-            status = max(status, single.run(single.parser().parse_args(arguments)))
-    arguments = [*map(str, folders), "--at", str(options.at)]
+    arms = _arms(options)
+    _check_report(options)
+    _check_arms(arms, options.at)
+    status = max(single.run(arm) for arm in arms)
+    arguments = [*(str(arm.out) for arm in arms), "--at", str(options.at)]
     for name in ("document", "figures"):
         if getattr(options, name) is not None:
             arguments += [f"--{name}", str(getattr(options, name))]
     return max(status, report.run(report.parser().parse_args(arguments)))
+
+
+def _arms(options: argparse.Namespace) -> list[argparse.Namespace]:
+    """Return the options of `arena run` for every arm."""
+    brains = [(brain, options.trials, options.minutes) for brain in options.brains.split(",")]
+    if options.twins:
+        brains.append(("scripted", options.twins, options.twin_minutes))
+    arms = []
+    for controller in options.controllers:
+        for brain, trials, minutes in brains:
+            arguments = [options.scene, "--brain", brain, "--trials", str(trials), "--minutes", str(minutes),
+                         "--seed", str(options.seed), "--jobs", str(options.jobs),
+                         "--out", str(options.out / f"{Path(brain).stem}-{controller}")]  # fmt: skip
+            if options.controllers != DEFAULT_CONTROLLER:  # a scene may leave no choice of the controller
+                arguments += ["--controller", controller]
+            if options.scheduler is not None:
+                arguments += ["--scheduler", options.scheduler]
+            arms.append(single.parser().parse_args(arguments))
+    return arms
+
+
+def _check_arms(arms: list[argparse.Namespace], at: float) -> None:
+    """Raise an exception if an arm cannot run or does not last until `at`. Builds the firmware of the arms."""
+    folders = [arm.out for arm in arms]
+    for folder in folders:
+        if folders.count(folder) > 1:
+            raise ValueError(f"two arms have the folder {folder}: give the brains different names and each one once, "
+                             "and leave the scripted trials out with --twins 0 if `scripted` is one of --brains"
+                             )  # fmt: skip
+    for arm in arms:
+        if 60 * arm.minutes < at - NEAR_S:
+            raise ValueError(f"the trials of {arm.out} last {60 * arm.minutes:g} s, less than --at {at:g}")
+        check_folder(single.plan_from(arm, arm.trials), arm.out)
+
+
+def _check_report(options: argparse.Namespace) -> None:
+    """Raise an exception if the report cannot be written where the options say."""
+    if options.document is not None:
+        with_results(options.document.read_text(encoding="utf-8"), "")
+    if options.figures is not None:
+        options.figures.mkdir(parents=True, exist_ok=True)

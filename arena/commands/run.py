@@ -17,11 +17,13 @@ from arena.experiments import experiment_file
 from arena.robots.images import image_for
 from arena.robots.reactive import SPEED_TABLES
 from arena.scene.loader import Scene, load_scene, scripted
+from arena.scene.schema import RobotGroup
 from arena.trial.json_numbers import json_text
 from arena.trial.manifest import note_host_time
 from arena.trial.record import EXPERIMENT, Trial, trials_in, write_bytes
 from emu.host.paths import use_cache
 
+DEFAULT_BRAIN, DEFAULT_CONTROLLER = "openswarm", "A"
 EXAMPLE = "example: arena run clustering --brain openswarm --controller A --trials 10 --jobs 2 --out results/os-A"
 
 
@@ -54,9 +56,11 @@ def add_plan(command: argparse.ArgumentParser) -> None:
     """Add the options that define a trial."""
     command.add_argument("scene", metavar="SCENE", help="name of a scene (see `arena scenes`) or TOML file")
     command.add_argument(
-        "--brain", default="openswarm", help="openswarm (default), bare, scripted, or an ELF or HEX file"
+        "--brain",
+        help="openswarm (default), bare, scripted, or an ELF or HEX file: controls the groups of robots without an "
+        "`image` in the scene, or all robots if every group has one",
     )
-    command.add_argument("--controller", default="A", choices=sorted(SPEED_TABLES), help="table of speeds (default A)")
+    command.add_argument("--controller", choices=sorted(SPEED_TABLES), help="table of speeds (default A)")
     command.add_argument(
         "--minutes", type=duration, default=15.0, metavar="M", help="simulated minutes per trial (default 15)"
     )
@@ -116,12 +120,32 @@ def plan_from(options: argparse.Namespace, trials: int) -> Plan:
     """Return the plan that the options of `add_plan` define. Raises SceneError, LoadError, ValueError."""
     scene = with_overrides(load_scene(options.scene), options.set, options.robots, options.objects)
     home = Path(options.scene).parent
-    image = image_for(options.brain) if not scene.groups or any(not one.image for one in scene.groups) else None
-    images = tuple((one, image_for(one, home)) for one in dict.fromkeys(group.image for group in scene.groups) if one)
-    name = Path(options.brain).stem
-    own = experiment_file(scene.experiment, home)
-    plan = Plan(scene, name, options.controller, image, trials, 60 * options.minutes, options.seed, own, images)
+    if options.brain is not None and all(group.image for group in scene.groups):
+        scene = replace(scene, groups=tuple(replace(group, image="") for group in scene.groups))
+    own_images = list(dict.fromkeys(group.image for group in scene.groups if group.image))
+    images = tuple((one, image_for(one, home)) for one in own_images)
+    if scene.groups and all(group.image for group in scene.groups):
+        brain, image = "+".join(dict.fromkeys(Path(one).stem for one in own_images)), None
+    else:
+        name = options.brain or DEFAULT_BRAIN
+        brain, image = Path(name).stem, image_for(name)
+    own, controller = experiment_file(scene.experiment, home), options.controller or DEFAULT_CONTROLLER
+    plan = Plan(scene, brain, controller, image, trials, 60 * options.minutes, options.seed, own, images)
+    if options.controller is not None and not has_choice_of_controller(plan):
+        raise ValueError(f"--controller {options.controller} has no effect in scene {scene.name}: every robot has its "
+                         "own; change `controller` or `selector` in [[robots]], or `selector` in [start]")  # fmt: skip
     return plan if plan.has_firmware else replace(plan, scene=scripted(scene))
+
+
+def has_choice_of_controller(plan: Plan) -> bool:
+    """Whether the controller of the run determines the speeds or the selector of any robot."""
+    images = dict(plan.images)
+    for group in plan.scene.groups or (RobotGroup(),):
+        image = images[group.image] if group.image else plan.image
+        selector = plan.scene.start.selector if group.selector < 0 else group.selector
+        if not group.controller and (image is None or selector < 0):
+            return True
+    return False
 
 
 def copy_inputs(plan: Plan, folder: Path) -> Plan:
@@ -170,7 +194,7 @@ def print_result(result: RunResult) -> None:
 def run_missing_trials(options: argparse.Namespace) -> RunResult:
     """Run the missing trials and return all. Raises as `run`."""
     plan = plan_from(options, options.trials)
-    folder = options.out or Path("results") / f"{plan.scene.name}-{plan.brain}-{options.controller}"
+    folder = options.out or Path("results") / f"{plan.scene.name}-{plan.brain}-{plan.controller}"
     with locked_folder(folder):
         missing = open_folder(plan, folder, sys.argv[1:])
         plan = copy_inputs(plan, folder)

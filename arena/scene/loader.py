@@ -125,14 +125,20 @@ class Scene:
                           share=self.infrared.object_share)  # fmt: skip
 
     def with_values(self, **values: Any) -> Scene:
-        """Return a validated copy with `section__key=value` replaced. Raises SceneError."""
+        """Return a validated copy with `section__key=value` replaced.
+
+        In a scene with one [[robots]] or [[objects]] table, `robots` and `objects` set the keys of that table. Raises
+        SceneError, also for a value that has no effect because other values of the scene replace it.
+        """
         scene = self
         for place, value in values.items():
             section, _, key = place.partition("__")
+            if _is_key_of_list(scene, section, key):
+                scene = _with_list_value(scene, section, key, value)
+                continue
             if section not in TABLES or key not in {one.name for one in fields(TABLES[section])}:
                 raise SceneError(f"there is no scene value {section}.{key}")
-            if (section, key) in (("robots", "count"), ("objects", "count")) and getattr(self, _LIST_OF[section]):
-                raise SceneError(f"{self.name}: {section}.{key} is the sum of the file's [[{section}]]")
+            _check_has_effect(scene, section, key)
             table = _table(_Errors(self.name), section, TABLES[section], {key: value}, getattr(scene, section))
             scene = replace(scene, **{section: table})
         return _checked(scene, _Errors(self.name))
@@ -149,6 +155,50 @@ def _nth(kinds: tuple[K, ...], number: int) -> K:
             return kind
         number -= kind.count
     raise IndexError(number)
+
+
+def _is_key_of_list(scene: Scene, section: str, key: str) -> bool:
+    """Whether a value belongs to the [[robots]] or [[objects]] tables of a scene, not to a value that all share."""
+    if section not in _LIST_OF or not getattr(scene, _LIST_OF[section]):
+        return False
+    is_shared = section == "robots" and key != "count" and key in {one.name for one in fields(Robots)}
+    return not is_shared and key in {one.name for one in fields(LISTS[_LIST_OF[section]])}
+
+
+def _with_list_value(scene: Scene, section: str, key: str, value: Any) -> Scene:
+    """Return the scene with a value of its only [[robots]] or [[objects]] table replaced. Raises SceneError."""
+    name, errors = _LIST_OF[section], _Errors(scene.name)
+    tables = getattr(scene, name)
+    if len(tables) > 1:
+        raise SceneError(f"{scene.name}: {section}.{key} cannot be set for {len(tables)} [[{section}]] tables at once; "
+                         f"write `{key}` into the [[{section}]] tables of the scene file")  # fmt: skip
+    if key == "count" and tables[0].place == "poses":
+        raise SceneError(f"{scene.name}: {section}.count is the number of listed poses; write all `poses` "
+                         f'into [[{section}]] of the scene file, or another `place` than "poses"')  # fmt: skip
+    changed: dict[str, Any] = {name: (_table(errors, section, LISTS[name], {key: value}, tables[0], 0),)}
+    return _counted(replace(scene, **changed))
+
+
+def _check_has_effect(scene: Scene, section: str, key: str) -> None:
+    """Raise SceneError if other values of the scene replace a value."""
+    instead = ""
+    if (section, key) == ("infrared", "object_share") and scene.kinds:
+        instead = "`share` in the [[objects]] tables"
+    elif section == "arena" and key in ("width_cm", "height_cm") and scene.arena.polygon:
+        instead = "`polygon` in [arena]"
+    elif (
+        section == "start"
+        and key in _OF_GROUP
+        and scene.groups
+        and all(getattr(group, key) != _OF_GROUP[key] for group in scene.groups)
+    ):
+        instead = f"`{key}` in the [[robots]] tables"
+    if instead:
+        raise SceneError(f"{scene.name}: {section}.{key} has no effect in this scene; change {instead}")
+
+
+_OF_GROUP: Final = {"selector": -1, "remote": INHERIT, "stimulus": INHERIT}
+"""Keys of a group that replace those of [start], and the values with which they do not."""
 
 
 def scripted(scene: Scene) -> Scene:

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from matplotlib.colors import to_rgb
+from watchdog import HANG
 
 from arena.analysis import plots
 from arena.analysis.report import BEGIN, END
@@ -294,7 +295,7 @@ def test_an_interrupted_run_keeps_finished_trials_and_leaves_no_half_ones(tmp_pa
     root = Path(__file__).resolve().parents[3]
     with subprocess.Popen([sys.executable, "-c", code], stderr=subprocess.PIPE, cwd=root) as process:
         assert process.stderr is not None
-        deadline = time.monotonic() + 60
+        deadline = time.monotonic() + HANG
         while not (tmp_path / "a" / "trial-0001.parquet").exists():
             assert time.monotonic() < deadline
             time.sleep(0.01)
@@ -326,7 +327,7 @@ def test_workers_end_with_a_killed_run(tmp_path: Path) -> None:
                                stderr=subprocess.DEVNULL)  # fmt: skip
     children = Path(f"/proc/{process.pid}/task/{process.pid}/children")
     workers: list[str] = []
-    end = time.monotonic() + 60
+    end = time.monotonic() + HANG
     while len(workers) < 3 and time.monotonic() < end:  # two, and multiprocessing's resource tracker
         time.sleep(0.1)
         workers = children.read_text().split()
@@ -369,3 +370,51 @@ def test_one_command_runs_every_arm_and_reports(tmp_path: Path, capsys: pytest.C
     assert sorted(contents(tmp_path / "scripted-B")) == ["trial-0001.parquet", "trial-0002.parquet"]
     assert main([*command, "--controllers", "X"]) == 2
     assert "expected some of AB" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["--document", "new.md"], "new.md"),
+        (["--document", "plain.md"], "has no marks for results"),
+        (["--figures", "plain.md/figures"], "plain.md/figures"),
+        (["--at", "60"], "last 3 s, less than --at 60"),
+        (["--twins", "2", "--twin-minutes", "0.01"], "two arms have the folder"),
+        (["--brains", "scripted,lost.elf"], "--brain lost.elf: no such file"),
+        (["--controllers", "AA"], "two arms have the folder"),
+    ],
+)
+def test_an_experiment_checks_every_argument_before_its_first_trial(
+    words: list[str], message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A wrong argument ends with status 2, and no trial has run."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "plain.md").write_text("# No marks\n")
+    command = ["experiment", "clustering", "--brains", "scripted", "--trials", "2", "--minutes", "0.05", "--twins", "0",
+               "--controllers", "A", "--at", "2", "--jobs", "1", "--out", "out"]  # fmt: skip
+    assert main([*command, *words]) == 2
+    assert message in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+def test_an_experiment_finds_the_folder_of_another_run_before_its_first_trial(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The folder of the last arm is checked before the first arm runs."""
+    arm = ["run", "clustering", "--brain", "scripted", "--controller", "B", "--trials", "1", "--jobs", "1"]
+    assert main([*arm, "--minutes", "0.03", "--out", str(tmp_path / "scripted-B")]) == 0
+    command = ["experiment", "clustering", "--brains", "scripted", "--trials", "2", "--minutes", "0.05", "--twins", "0",
+               "--at", "2", "--jobs", "1", "--out", str(tmp_path)]  # fmt: skip
+    capsys.readouterr()
+    assert main(command) == 2
+    assert "scripted-B: holds another run (different seconds)" in capsys.readouterr().err
+    assert not (tmp_path / "scripted-A").exists()
+
+
+def test_a_sweep_varies_the_number_of_robots_of_a_single_group(tmp_path: Path) -> None:
+    """`--vary robots.count` changes `count` of the only [[robots]] table."""
+    (tmp_path / "mine.toml").write_text('name = "mine"\n[[robots]]\nimage = "scripted"\n')
+    command = ["sweep", str(tmp_path / "mine.toml"), "--vary", "robots.count=2,3", "--trials", "1", "--minutes", "0.02"]
+    assert main([*command, "--jobs", "1", "--out", str(tmp_path / "out")]) == 0
+    counts = [read_trial(path).robots.shape[1] for path in sorted((tmp_path / "out").rglob("trial-*.parquet"))]
+    assert counts == [2, 3]

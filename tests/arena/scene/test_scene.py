@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import random
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -14,6 +15,8 @@ from arena.camera.appearance import FLOOR, OBJECT, WALL, appearance_of, colours_
 from arena.camera.renderer import Renderer
 from arena.campaign.campaign import Plan
 from arena.cli import main
+from arena.commands.run import parser as run_parser
+from arena.commands.run import plan_from
 from arena.infrared.propagation import Optics
 from arena.infrared.ring import ambient
 from arena.robots.controller import ScriptedController
@@ -420,6 +423,73 @@ def test_camera_yaw_and_wheel_bias_take_effect() -> None:
         world.step([(10.0, 10.0)])
     left, right = traits_of(biased, 2, 0).bias
     assert world.poses.robots[0][2] == pytest.approx(5 * 10 * (right - left) / 5.1, rel=0.02)
+
+
+GROUP = """name = "group"
+[[robots]]
+count = 2
+image = "aggregation"
+selector = 3
+[[objects]]
+count = 2
+"""
+
+
+def plan_of(tmp_path: Path, text: str, *words: str) -> Plan:
+    """Return the plan of `arena run` for a scene and options."""
+    (tmp_path / "group.toml").write_text(text)
+    return plan_from(run_parser().parse_args([str(tmp_path / "group.toml"), *words]), 1)
+
+
+def test_a_brain_replaces_the_images_of_a_scene_whose_groups_all_have_one(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The plan names what runs; a missing file is an error in every scene."""
+    (tmp_path / "group.toml").write_text(GROUP)
+    out = str(tmp_path / "out")
+    assert main(["run", str(tmp_path / "group.toml"), "--brain", "/lost.elf", "--out", out]) == 2
+    assert "--brain /lost.elf: no such file" in capsys.readouterr().err
+    plan = plan_of(tmp_path, GROUP, "--brain", "scripted")
+    assert (plan.brain, plan.image, plan.images, plan.has_firmware) == ("scripted", None, (), False)
+    assert plan.key()["images_sha256"] == {}
+    own = plan_of(tmp_path, GROUP.replace("aggregation", "scripted"))
+    assert (own.brain, own.image, own.images) == ("scripted", None, (("scripted", None),))
+    mixed = GROUP.replace("aggregation", "scripted") + '[[robots]]\nname = "others"\n'
+    with pytest.raises(ValueError, match=r"--brain /lost\.elf"):
+        plan_of(tmp_path, mixed, "--brain", "/lost.elf")
+    assert plan_of(tmp_path, mixed, "--brain", "scripted").images == (("scripted", None),)
+
+
+def test_options_of_a_scene_with_groups_act_or_name_the_key_to_write(tmp_path: Path) -> None:
+    """Counts and keys of a single table can be set; several tables, poses and replaced values are refused."""
+    text = GROUP.replace("aggregation", "scripted")
+    scene = plan_of(tmp_path, text, "--robots", "4", "--objects", "3", "--set", "objects.radius_cm=6").scene
+    assert (scene.robots.count, scene.groups[0].count, scene.objects.count) == (4, 4, 3)
+    assert scene.kind_of(0).radius_cm == 6
+    assert len(World(scene, 1).poses.robots) == 4
+    scene = plan_of(tmp_path, text, "--set", "robots.count=5", "--set", "robots.wheel_noise=0.2").scene
+    assert (scene.robots.count, scene.robots.wheel_noise) == (5, 0.2)
+    with pytest.raises(SceneError, match=r"robots\.count is 2000; expected 0 to 1000"):
+        plan_of(tmp_path, text, "--robots", "2000")
+    for change, words, message in (
+        (("[[objects]]", "[[robots]]\n[[objects]]"), "robots.count=4", "write `count` into the [[robots]] tables"),
+        (("count = 2\nimage", 'place = "poses"\nposes = [[20, 20]]\nimage'), "robots.count=4", "write all `poses`"),
+        (("", ""), "start.selector=1", "start.selector has no effect in this scene; change `selector`"),
+        (("", ""), "infrared.object_share=0.5", "change `share` in the [[objects]] tables"),
+        (("[[robots]]", "[arena]\npolygon = [[0, 0], [200, 0], [0, 200]]\n[[robots]]"), "arena.width_cm=90",
+         "arena.width_cm has no effect in this scene; change `polygon` in [arena]"),
+    ):  # fmt: skip
+        with pytest.raises(SceneError, match=re.escape(message)):
+            plan_of(tmp_path, text.replace(*change, 1), "--set", words)
+
+
+def test_a_controller_without_effect_is_refused(tmp_path: Path) -> None:
+    """`--controller` selects speeds of scripted robots and the selector of firmware, unless the scene does so."""
+    text = GROUP.replace("aggregation", "scripted")
+    assert plan_of(tmp_path, text, "--controller", "B").controller == "B"
+    assert plan_of(tmp_path, text).controller == "A"
+    with pytest.raises(ValueError, match=r"--controller B has no effect .* change `controller` or `selector`"):
+        plan_of(tmp_path, text.replace("selector = 3", 'controller = "A"'), "--controller", "B")
 
 
 def test_a_scripted_trial_runs_in_a_furnished_scene(tmp_path: Path) -> None:
