@@ -92,6 +92,8 @@ class _LiveHandler(RequestHandler):
 
     def do_GET(self) -> None:
         """Handle a GET request. An unknown path is status 404; a record that cannot be read is status 503."""
+        if not self.has_own_host():
+            return
         place = urlsplit(self.path)
         first = parse_qs(place.query).get("from", ["0"])[0]
         try:

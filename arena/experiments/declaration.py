@@ -1,7 +1,8 @@
 """Declarations of experiments in records: names, labels, units and scales of curves and measures, without code.
 
 A record of a user's experiment stores the declaration in its metadata, and the curves as columns `c_NAME`. Commands
-show the record without running the experiment's code. Measures that the file defines, and groups of objects, need the code.
+show the record without running the experiment's code. Measures that the file defines need the code, and so do groups
+of objects.
 """
 
 from __future__ import annotations

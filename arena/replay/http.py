@@ -15,6 +15,16 @@ LOOPBACK: Final = "127.0.0.1"
 class RequestHandler(BaseHTTPRequestHandler):
     """Base class of the handlers of HTTP requests."""
 
+    def has_own_host(self) -> bool:
+        """Whether the request names this server's own address as its host.
+
+        Otherwise send an error: a web page may have bound its own host name to the loopback address."""
+        port = self.server.server_address[1]
+        if self.headers.get("Host") in (f"{LOOPBACK}:{port}", f"localhost:{port}"):
+            return True
+        self.send_error_text(403, f"the page works at its own address only: http://{LOOPBACK}:{port}/")
+        return False
+
     def send(self, status: int, kind: str, text: str) -> None:
         """Send a response of media type `kind`; ignore that the browser has closed the connection."""
         body = text.encode()

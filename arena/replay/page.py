@@ -18,7 +18,7 @@ from arena.robots.controller import STRIP_COLUMNS, STRIP_PIXELS
 from arena.scene import dimensions
 from arena.scene.loader import Scene
 from arena.scene.schema import NAMED, Obstacle, Patch
-from arena.trial.json_numbers import json_text
+from arena.trial.json_numbers import script_json
 from arena.trial.record import Trial
 from arena.world.physics import Poses, traits_of
 
@@ -34,8 +34,7 @@ def page(trial: Trial, live: bool = False, studio: dict[str, Any] | None = None)
     With `live` the page polls its server for new samples. `studio` holds the data with which it sends commands
     (arena/commands/studio.py)."""
     data = trial_data(trial) | sample_data(trial) | {"live": live, "studio": studio}
-    text = json_text(data, separators=(",", ":")).replace("</", "<\\/")
-    return TEMPLATE.read_text(encoding="utf-8").replace(PLACE, text)
+    return TEMPLATE.read_text(encoding="utf-8").replace(PLACE, script_json(data))
 
 
 def trial_data(trial: Trial) -> dict[str, Any]:

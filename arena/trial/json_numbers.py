@@ -1,10 +1,12 @@
-"""JSON that every reader accepts: nan and infinities become null. Validation of JSON values against a shape."""
+"""JSON that every reader accepts, also in pages: nan and infinities become null. Validation against a shape."""
 
 from __future__ import annotations
 
 import json
 import math
-from typing import Any
+from typing import Any, Final
+
+_SCRIPT_ESCAPES: Final = {ord(one): f"\\u{ord(one):04x}" for one in "<>&\u2028\u2029"}
 
 
 def finite(value: Any) -> Any:
@@ -19,6 +21,13 @@ def finite(value: Any) -> Any:
 def json_text(value: Any, **options: Any) -> str:
     """Return `value` as JSON; `options` are those of `json.dumps`."""
     return json.dumps(finite(value), allow_nan=False, **options)
+
+
+def script_json(value: Any) -> str:
+    """Return `value` as JSON for a `<script>` element: no text in it can end the element or change its parsing.
+
+    The characters <, >, & and the line separators of JavaScript are written as escapes of JSON strings."""
+    return json_text(value, separators=(",", ":")).translate(_SCRIPT_ESCAPES)
 
 
 def mismatch(value: Any, shape: Any, name: str = "it") -> str:

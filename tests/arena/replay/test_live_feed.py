@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from watchdog import HANG
 
 from arena.campaign.campaign import Plan, run_one, trial_path
 from arena.cli import main
@@ -141,10 +142,14 @@ def test_the_server_answers_its_two_places_only(
     with serving(Follower(tmp_path)) as address:
         for place, status in (("/", 503), ("/etc/passwd", 404), ("/more?from=-1", 404)):
             with pytest.raises(urllib.error.HTTPError) as error:
-                urllib.request.urlopen(address + place, timeout=10)
+                urllib.request.urlopen(address + place, timeout=HANG)
             assert error.value.code == status
+        foreign = urllib.request.Request(address + "/more?from=0", headers={"Host": "example.org"})
+        with pytest.raises(urllib.error.HTTPError) as error:
+            urllib.request.urlopen(foreign, timeout=HANG)
+        assert error.value.code == 403
         live.write(rows[0])
-        with urllib.request.urlopen(address + "/more?from=0", timeout=10) as answer:
+        with urllib.request.urlopen(address + "/more?from=0", timeout=HANG) as answer:
             assert len(json.load(answer)["t"]) == 1
     live.close()
 
@@ -162,7 +167,7 @@ def test_the_command_serves_until_it_is_interrupted(
         assert process.stdout is not None
         assert process.stderr is not None
         address = process.stdout.readline().split()[0]
-        with urllib.request.urlopen(address, timeout=30) as answer:
+        with urllib.request.urlopen(address, timeout=HANG) as answer:
             assert 'id="trial"' in answer.read().decode()
         process.send_signal(signal.SIGINT)
         assert process.stderr.read() == ""
@@ -202,7 +207,7 @@ def test_the_page_grows_in_a_browser(tmp_path: Path, recorded: tuple[dict[str, A
     with serving(Going(tmp_path)) as address:
         command = [str(BROWSER), "--headless", "--no-sandbox", "--disable-gpu", "--virtual-time-budget=12000",
                    f"--user-data-dir={tmp_path / 'profile'}", "--dump-dom", address + "/"]  # fmt: skip
-        done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+        done = subprocess.run(command, capture_output=True, text=True, timeout=HANG, check=False)
     match = re.search(r'<pre id="result">(.*?)</pre>', done.stdout, re.S)
     assert match is not None, done.stderr[-2000:]
     found = json.loads(match.group(1))

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from watchdog import HANG
 
 from arena.cli import main
 from arena.replay.page import page
@@ -60,6 +61,27 @@ def test_text_from_robots_cannot_end_the_page(trial: Path) -> None:
     record = read_trial(trial)
     record.columns["log"][0] = [{"robot": 0, "cycle": 1, "text": "</script><b>"}]
     assert page(record).count("</script>") == 2
+
+
+HOSTILE = "x<!--<script>y & \u2028\u2029 </script><b>"
+
+
+def test_data_of_a_page_hold_no_markup(trial: Path) -> None:
+    """The JSON block contains no <, > or &, and its values are the record's."""
+    record = read_trial(trial)
+    record.columns["log"][0] = [{"robot": 0, "cycle": 1, "text": HOSTILE}]
+    data = re.search(r'id="trial">(.*?)</script>', page(record), re.S).group(1)  # type: ignore[union-attr]
+    assert not re.search("[<>&\u2028\u2029]", data)
+    assert json.loads(data)["log"][0][0]["text"] == HOSTILE
+
+
+@needs_browser
+def test_a_script_comment_from_a_robot_does_not_stop_the_page(trial: Path, tmp_path: Path) -> None:
+    """`<!--<script>` in a robot's text opens a state of the HTML parser in which </script> does not end a script."""
+    record = read_trial(trial)
+    record.columns["log"][0] = [{"robot": 0, "cycle": 1, "text": HOSTILE}]
+    found = browsed(page(record).replace("</html>", PROBE % SAMPLE), tmp_path)
+    assert found["samples"] == len(record.times)
 
 
 @needs_browser
@@ -175,7 +197,7 @@ def browsed(text: str, folder: Path, size: str = "1280,720") -> Any:
     path.write_text(text)
     command = [str(BROWSER), "--headless", "--no-sandbox", "--disable-gpu", f"--user-data-dir={folder / 'profile'}",
                "--virtual-time-budget=4000", f"--window-size={size}", "--dump-dom", path.as_uri()]  # fmt: skip
-    done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=HANG, check=False)
     match = re.search(r'<pre id="result">(.*?)</pre>', done.stdout, re.S)
     assert match is not None, done.stderr[-2000:]
     return json.loads(match.group(1).replace("&amp;", "&"))
