@@ -10,11 +10,12 @@ import hashlib
 import json
 import lzma
 import math
+import re
 import tempfile
 import zipfile
 import zlib
 from collections.abc import Callable, Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path, PurePosixPath
 from typing import Any, Final
 
@@ -116,13 +117,15 @@ def _trial_numbers(folder: Path) -> list[int]:
 class Check:
     """Result of one repeated trial.
 
-    `equal` means equal to the byte, or equal in all values if `versions` differ. `differs` names columns."""
+    `equal` means equal to the byte, or equal in all values if `versions` differ. `differs` names columns. `commit` is
+    the commit of the project that made the run; empty if the manifest has none."""
 
     run: str
     number: int
     equal: bool
     differs: tuple[str, ...]
     versions: tuple[str, ...]
+    commit: str = ""
 
 
 def unpack(bundle: Path, folder: Path) -> list[Path]:
@@ -191,6 +194,13 @@ def _trusted_experiment(folder: Path, name: str, digest: str | None, own: Path |
     return path
 
 
+def _commit_of(folder: Path) -> str:
+    """Return the commit that made a run, from its manifest; an empty text if it names none."""
+    made_on = read_manifest(folder).get("made_on")
+    commit = made_on.get("commit") if isinstance(made_on, dict) else None
+    return commit if isinstance(commit, str) and re.fullmatch("[0-9a-f]{7,40}(-dirty)?", commit) else ""
+
+
 def _check_key(key: dict[str, Any]) -> None:
     """Check the values of a manifest's key. Raises ValueError for values that no plan has."""
     for name, good in (
@@ -219,7 +229,7 @@ def verify(bundle: Path, chosen: Callable[[list[int]], list[int]], own: Path | N
             for number in chosen(numbers):
                 run_one(plan, number, again)
                 expected, actual = _expected_digest(folder, number), digest_of(trial_path(again, number))
-                yield _compare(folder.name, number, expected, actual)
+                yield replace(_compare(folder.name, number, expected, actual), commit=_commit_of(folder))
 
 
 def _compare(run: str, number: int, expected: Digest, actual: Digest) -> Check:

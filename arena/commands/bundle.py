@@ -7,7 +7,7 @@ from dataclasses import asdict
 from pathlib import Path
 
 from arena.campaign import bundle
-from arena.commands.arguments import count, count_or_none, removed_processes
+from arena.commands.arguments import count, removed_processes
 from arena.commands.trust import add_trust_options
 from arena.trial.json_numbers import json_text
 
@@ -43,7 +43,7 @@ def verify_parser() -> argparse.ArgumentParser:
     command.add_argument("bundle", type=Path, metavar="FILE", help="bundle to verify")
     command.add_argument(
         "--trials",
-        type=count_or_none,
+        type=count,
         default=1,
         metavar="N",
         help="run the first N trials of each run again (default 1)",
@@ -59,7 +59,9 @@ def verify_parser() -> argparse.ArgumentParser:
 
 
 def verify(options: argparse.Namespace) -> int:
-    """Print the result of each repeated trial; exit status 1 if one differs. Raises RecordError, SceneError."""
+    """Print the result of each repeated trial; exit status 1 if one differs.
+
+    Raises RecordError, SceneError, and ValueError if the options select no trial."""
 
     def chosen(numbers: list[int]) -> list[int]:
         return [one for one in numbers if one in options.number] if options.number else numbers[: options.trials]
@@ -71,10 +73,17 @@ def verify(options: argparse.Namespace) -> int:
         checks.append(asdict(one))
         if not options.json:
             print(_result_line(one))
+    if not checks:
+        numbers = " or ".join(map(str, options.number))
+        raise ValueError(f"{options.bundle}: verified nothing: no run has a trial {numbers}; choose another --number")
     if options.json:
         print(json_text({"equal": status == 0, "trials": checks}))
     else:
         print(f"{len(checks)} trials run again; all files match their hashes")
+        if status and any(one["versions"] for one in checks):
+            commits = ", ".join(sorted({one["commit"] for one in checks if one["versions"] and one["commit"]}))
+            print("the bundle was made with other versions, which may compute other values: verify it with "
+                  + (f"commit {commits}" if commits else "the versions that it names"))  # fmt: skip
     return status
 
 

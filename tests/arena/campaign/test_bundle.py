@@ -77,6 +77,45 @@ def test_another_version_is_told_and_values_are_compared(
     assert main(["verify", str(packed), "--strict"]) == 1
 
 
+def test_a_bundle_of_another_version_with_other_values_names_its_commit(
+    packed: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """`verify` says that the versions differ and which commit computes the recorded values; status 1."""
+    with zipfile.ZipFile(packed) as archive:
+        manifests = {f"{run}/manifest.json": archive.read(f"{run}/manifest.json") for run in ("script", "talk")}
+        exchanged = {"script/trial-0001.parquet": archive.read("script/trial-0002.parquet")}
+    expected = []
+    for commit in ("0123abcd", 7):
+        for name, manifest in manifests.items():
+            exchanged[name] = json.dumps(json.loads(manifest) | {"made_on": {"commit": commit}}).encode()
+        changed = rewritten(packed, tmp_path / f"{commit}.zip", listed(packed, exchanged))
+        with monkeypatch.context() as patch:
+            patch.setattr(campaign, "versions", lambda: versions.versions() | {"arena": "99"})
+            assert main(["verify", str(changed)]) == 1
+        expected.append(capsys.readouterr().out.splitlines())
+    for lines in expected:
+        assert "script, trial 1: different in" in lines[0]
+        assert "99 now" in lines[0]
+        assert lines[-1].startswith(
+            "the bundle was made with other versions, which may compute other values: verify it"
+        )
+    assert "commit 0123abcd" in expected[0][-1]
+    assert expected[1][-1].endswith("with the versions that it names")
+    assert main(["verify", str(changed)]) == 1
+    assert "other versions" not in capsys.readouterr().out
+
+
+def test_a_verification_of_no_trial_is_an_error(packed: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """No trial run again proves nothing: status 2."""
+    assert main(["verify", str(packed), "--trials", "0"]) == 2
+    assert "--trials: '0': expected" in capsys.readouterr().err
+    for words in (["--number", "9"], ["--number", "9", "--json"]):
+        assert main(["verify", str(packed), *words]) == 2
+        output, error = capsys.readouterr()
+        assert not output
+        assert "verified nothing: no run has a trial 9; choose another --number" in error
+
+
 def test_a_light_bundle_says_as_much(
     study: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
