@@ -162,7 +162,7 @@ class History:
         stored = self._states[bisect_right(self._cycles, self.machine.cycle) - 1]
         if stored.is_input and stored.cycle == self.machine.cycle:
             with self._replaying():
-                self.machine.restore_record(self._unpacked(stored))
+                self.machine.restore_state(self._unpacked(stored))
 
     def _record_progress(self, following: int) -> None:
         cycle = self.machine.cycle
@@ -261,7 +261,7 @@ class History:
                 began_asleep = False
                 self._step_once()
                 if inputs and inputs[0].cycle <= machine.cycle:  # between two steps, or while the CPU sleeps
-                    machine.restore_record(self._unpacked(inputs.pop(0)))
+                    machine.restore_state(self._unpacked(inputs.pop(0)))
 
     def earlier_steps(self) -> Iterator[list[tuple[int, int]]]:
         """Yield lists of (cycle, PC) of the steps before now, oldest first, each longer than the last.
@@ -335,7 +335,7 @@ class History:
         removals = [machine.hook_pc(place, lambda: False) for place in places]
         try:
             with self._replaying():
-                machine.restore_record(self._unpacked(begin))
+                machine.restore_state(self._unpacked(begin))
                 machine.replay_condition = arrived
                 machine.run_until(end)
         finally:
@@ -356,7 +356,7 @@ class History:
             write(ea, value, width)
 
         with self._replaying():
-            machine.restore_record(self._unpacked(begin))
+            machine.restore_state(self._unpacked(begin))
             vars(data)["write"] = noted
             try:
                 while machine.cycle < end:
@@ -377,7 +377,7 @@ class History:
     def _restore(self, cycle: int) -> int:
         """Restore the latest stored state at or before `cycle`, and return its cycle."""
         stored = self._states[max(bisect_right(self._cycles, cycle) - 1, 0)]
-        self.machine.restore_record(self._unpacked(stored))
+        self.machine.restore_state(self._unpacked(stored))
         return stored.cycle
 
     @contextmanager

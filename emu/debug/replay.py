@@ -48,15 +48,15 @@ def sandboxed(machine: Machine, state: bytes | None = None) -> Iterator[None]:
 
     No observer and no hook is called. Afterwards the machine has its previous state, to the bit.
     """
-    before = machine.record.snapshot()
+    before = machine.save_state()
     restore_host_state = machine.save_host_state()
     quiet, machine.events.quiet = machine.events.quiet, True
     try:
         if state is not None:
-            machine.restore_record(state)
+            machine.restore_state(state)
         yield
     finally:
-        machine.restore_record(before)
+        machine.restore_state(before)
         machine.events.quiet = quiet
         restore_host_state()
 

@@ -29,6 +29,9 @@ from emu.system.record import Record
 
 PcHook = Callable[[], bool | None]
 
+LENGTH_BYTES: Final = 4
+"""Size of the length of a UART's waiting input in a snapshot."""
+
 
 class _WRegisters(Protocol):
     def __getitem__(self, number: int) -> int: ...
@@ -273,7 +276,7 @@ class Machine(StateAccess):
         while self.cycle < limit:
             if self.cycle >= checkpoint:
                 checkpoint = self.cycle + CHECKPOINT_CYCLES
-                self.checkpoints.take(self.cycle, self.record.snapshot())
+                self.checkpoints.take(self.cycle, self.save_state())
             stop = self.step()
             if stop is not None:
                 return stop
@@ -284,9 +287,9 @@ class Machine(StateAccess):
     def advance(self, cycle: int) -> Stop | None:
         """Run as `run_until` does, and take checkpoints from which a fault can be diagnosed."""
         while True:
-            self.checkpoints.take(self.cycle, self.record.snapshot())
+            self.checkpoints.take(self.cycle, self.save_state())
             stop = self.run_until(min(cycle, self.cycle + CHECKPOINT_CYCLES))
-            self.checkpoints.end = self.record.snapshot()
+            self.checkpoints.end = self.save_state()
             if stop is not None or self.cycle >= cycle:
                 return stop
 
@@ -329,26 +332,34 @@ class Machine(StateAccess):
 
         Afterwards `pc` and `cycle` are those of the instruction that `step` runs. Return a stop, or None.
         """
+        stop = None
         try:
-            return None if self.core.sequencer.boundary(limit) else self.stopped("halt")
+            if not self.core.sequencer.boundary(limit):
+                stop = self.stopped("halt")
         except DeviceReset as reset:
-            return self._reset_by(reset)
+            stop = self._reset_by(reset)
+        return self._sync_devices() or stop
 
     def _sync_devices(self) -> Stop | None:
-        """Bring the peripherals to the current cycle, so that callers see their state between runs.
+        """Bring the devices to the present cycle and deliver their output. Return the stop of a reset, or None."""
+        try:
+            self._bring_devices_to_present()
+        except DeviceReset as reset:
+            return self._reset_by(reset)
+        self.peripherals.deliver_uart_output()
+        return None
 
-        Events due in the very cycle that a sleeping CPU has reached are left to the next run. Dividing a run must have
-        no visible effect, also in a cycle after which no event follows.
+    def _bring_devices_to_present(self) -> None:
+        """Fire the events due by the present cycle, so that an observer sees every device in its present state.
+
+        Every observer is called after this function: hooks, conditions, and callers between two runs. It has no
+        effect on the run: the events of the present cycle precede the accesses of the next instruction anyway, and
+        those due in the very cycle that a sleeping CPU has reached are left to the next run. Raises DeviceReset.
         """
         u64, now, _, mode = self._clock
         cycle = u64[now]
-        try:
-            self.events.arrive(cycle if self.record.u16[mode] == RUN else cycle - 1)
-        except DeviceReset as reset:
-            return self._reset_by(reset)
+        self.events.arrive(cycle if self.record.u16[mode] == RUN else cycle - 1)
         u64[self.events.now_index] = cycle
-        self.peripherals.deliver_uart_output()
-        return None
 
     def interrupt(self) -> None:
         """End the current run at its next boundary. May be called from a signal handler."""
@@ -369,7 +380,7 @@ class Machine(StateAccess):
     def _on_trap(self, vector: Vector) -> None:
         """Keep the state before a trap is entered: a handler that never returns destroys the evidence."""
         if not self.events.quiet:
-            self.checkpoints.trap = (vector, self.record.snapshot(), self.checkpoints.start)
+            self.checkpoints.trap = (vector, self.save_state(), self.checkpoints.start)
 
     def _call_hooks(self) -> Stop | None:
         """Call the hooks of the current PC. Return a `Stop` if one requests it, at most once per arrival."""
@@ -377,6 +388,7 @@ class Machine(StateAccess):
         if self._last_hook_stop == here:
             self._last_hook_stop = None
             return None
+        self._bring_devices_to_present()
         if self.events.quiet:
             return self.stopped("breakpoint") if self.replay_condition is not None and self.replay_condition() else None
         hit = False
@@ -421,7 +433,7 @@ class Machine(StateAccess):
     def _reset_by(self, reset: DeviceReset) -> Stop | None:
         """Perform a reset that the core or a peripheral requested. A fault, or a loop of resets, ends the run."""
         origin = self.pc
-        self.checkpoints.reset = self.record.snapshot() if reset.fault and not self.events.quiet else None
+        self.checkpoints.reset = self.save_state() if reset.fault and not self.events.quiet else None
         if reset.fault:
             self.state.cycle += 1
         self.reset(reset.cause)
@@ -467,38 +479,62 @@ class Machine(StateAccess):
         self.peripherals.synchronize()
         self.core.exceptions.forget()
         self.events.kick()
-        return self.record.snapshot()
+        return self.save_state()
 
     def restore(self, state: bytes) -> None:
         """Continue from a snapshot of an equally wired machine with any engine. Raises ValueError for another size."""
-        self.restore_record(state)
+        self.restore_state(state)
         self._last_hook_stop = None
         self.checkpoints.trap = None
 
-    def restore_record(self, state: bytes) -> None:
-        """Restore the record only, from a snapshot of this machine. Raises ValueError for another size.
+    def save_state(self) -> bytes:
+        """Return a copy of the record and of the UART input that does not fit into it, and change nothing.
 
-        The host-side state that `restore` clears is kept.
+        The input follows the record, for each UART its length and its packed frames; without any, nothing follows.
         """
+        backlogs = [uart.line.saved_backlog() for uart in self.uart.values()]
+        if not any(backlogs):
+            return self.record.snapshot()
+        return self.record.snapshot() + b"".join(len(one).to_bytes(LENGTH_BYTES, "little") + one for one in backlogs)
+
+    def restore_state(self, state: bytes) -> None:
+        """Restore the record and the waiting UART input, from a snapshot of an equally wired machine.
+
+        The host-side state that `restore` clears is kept. Raises ValueError for another size.
+        """
+        backlogs = self._backlogs_in(state)
         flash = self.program.flash.tobytes()
-        self.record.restore(state)
+        self.record.restore(state[: self.record.used])
+        for uart, backlog in zip(self.uart.values(), backlogs, strict=True):
+            uart.line.restore_backlog(backlog)
         if self.program.flash.tobytes() != flash:
             self.program.announce_all()
         self.peripherals.restored()
 
+    def _backlogs_in(self, state: bytes) -> list[bytes]:
+        """Return the waiting input of each UART in a snapshot. Raises ValueError for another size."""
+        at = self.record.used
+        if len(state) <= at:
+            return [b""] * len(self.uart)
+        backlogs = []
+        for _ in self.uart:
+            length = int.from_bytes(state[at : at + LENGTH_BYTES], "little")
+            backlogs.append(state[at + LENGTH_BYTES : at + LENGTH_BYTES + length])
+            at += LENGTH_BYTES + length
+        if at != len(state):
+            raise ValueError(f"snapshot has {len(state)} bytes, expected {at} for this machine and its waiting input")
+        return backlogs
+
     def save_host_state(self) -> Callable[[], None]:
-        """Save the state that is not in the record. Return a function that restores it."""
+        """Save the state that is not in a snapshot. Return a function that restores it."""
         hook_stop, last_reset, interrupt, resets = (
             self._last_hook_stop, self._last_reset, self._interrupt, list(self.resets),
         )  # fmt: skip
-        backlogs = [(uart.line.backlog, list(uart.line.backlog)) for uart in self.uart.values()]
 
         def restore() -> None:
-            self._last_hook_stop, self._last_reset, self._interrupt = hook_stop, last_reset, interrupt
+            self._last_hook_stop = hook_stop if hook_stop == (self.pc, self.cycle) else None
+            self._last_reset, self._interrupt = last_reset, interrupt
             self.resets[:] = resets
-            for backlog, frames in backlogs:
-                backlog.clear()
-                backlog.extend(frames)
 
         return restore
 

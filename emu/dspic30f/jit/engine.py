@@ -169,7 +169,7 @@ class JitEngine:
     def run(self, limit: int) -> None:
         """Run at least one instruction, natively where possible."""
         state = self._state
-        if state.edt:
+        if state.edt or self._core.events.deadline < state.cycle:  # a hook has kicked after the boundary was handled
             self._core.sequencer.execute()
             return
         if self.compiler.busy:

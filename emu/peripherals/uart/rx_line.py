@@ -1,20 +1,24 @@
 """Queue of frames for a UART's RX pin, each with its earliest start cycle.
 
-The next `CAPACITY` frames are in the record. Further frames wait in a host-side backlog, which snapshots do not
-contain.
+The next `CAPACITY` frames are in the record. Further frames wait in a host-side backlog, which `Machine.snapshot`
+appends to the copy of the record.
 """
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Iterable
 from dataclasses import dataclass, fields
+from struct import Struct
 from typing import Final
 
 from emu.system.record import Record
 from emu.system.rules import Cell, cell_of
 
 CAPACITY: Final = 1024
+_FRAME: Final = Struct("<QHI")
+"""A frame of the backlog: its fields in the order of `QueuedFrame`."""
+_COMPACTED: Final = 1 << 16
+"""Bytes of removed frames at which the backlog is compacted."""
 FRAMING_ERROR: Final = 0x200
 """The stop bit is low."""
 PARITY_ERROR: Final = 0x400
@@ -68,15 +72,25 @@ class RxQueue:
         operands = (cell_of(record, f"{name}.line.{one.name}") for one in fields(RxQueueOperands))
         self.operands: Final = RxQueueOperands(*operands)
         """Operands for rules."""
-        self.backlog: Final[deque[QueuedFrame]] = deque()
-        """Frames that do not fit into the record yet."""
+        self._backlog = bytearray()
+        """Packed frames that do not fit into the record yet, after `_first` bytes of removed frames."""
+        self._first = 0
 
     def __len__(self) -> int:
-        return self._u16[self._count] + len(self.backlog)
+        return self._u16[self._count] + (len(self._backlog) - self._first) // _FRAME.size
+
+    def saved_backlog(self) -> bytes:
+        """Return the frames that do not fit into the record, for `restore_backlog`."""
+        return bytes(memoryview(self._backlog)[self._first :])
+
+    def restore_backlog(self, saved: bytes) -> None:
+        """Replace the frames that do not fit into the record, which has been restored already."""
+        self._backlog, self._first = bytearray(saved), 0
 
     def put(self, frames: Iterable[QueuedFrame]) -> None:
         """Append frames."""
-        self.backlog.extend(frames)
+        for frame in frames:
+            self._backlog += _FRAME.pack(frame.earliest, frame.data, frame.bit)
         self._top_up()
 
     def head(self) -> QueuedFrame | None:
@@ -93,9 +107,13 @@ class RxQueue:
         self._top_up()
 
     def _top_up(self) -> None:
-        while self.backlog and self._u16[self._count] < CAPACITY:
-            frame = self.backlog.popleft()
+        while self._first < len(self._backlog) and self._u16[self._count] < CAPACITY:
             tail = (self._u16[self._head] + self._u16[self._count]) % CAPACITY
-            self._earliest[tail], self._data[tail], self._bit[tail] = frame.earliest, frame.data, frame.bit
+            frame = _FRAME.unpack_from(self._backlog, self._first)
+            self._earliest[tail], self._data[tail], self._bit[tail] = frame
             self._u16[self._count] += 1
-        self._u8[self._more] = bool(self.backlog)
+            self._first += _FRAME.size
+        if self._first == len(self._backlog) or self._first >= _COMPACTED:
+            del self._backlog[: self._first]
+            self._first = 0
+        self._u8[self._more] = bool(self._backlog)

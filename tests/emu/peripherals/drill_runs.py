@@ -99,7 +99,7 @@ class Crew:
     def back(self, kept: list[Kept]) -> None:
         """Restore all machines to the kept state."""
         for machine, heard, (state, put_back) in zip(self.machines, self.heard, kept, strict=True):
-            machine.restore_record(state)
+            machine.restore_state(state)
             put_back()
             heard.clear()
 
