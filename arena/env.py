@@ -12,7 +12,7 @@ from typing import Any, ClassVar, Final
 
 import numpy as np
 from gymnasium.spaces import Box
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from pettingzoo import ParallelEnv
 
 from arena.camera.renderer import Renderer
@@ -44,6 +44,18 @@ Vector = NDArray[np.float32]
 def serial_command(left: float, right: float) -> bytes:
     """Return the command `D,left,right` in steps/s of the robot's text protocol (epuck.md §6)."""
     return f"D,{round(1000 * left)},{round(1000 * right)}\r".encode()
+
+
+def _speeds(agent: str, action: ArrayLike) -> tuple[float, float]:
+    """Return the wheel speeds of an action, limited to -1..1. Raises ValueError."""
+    try:
+        values = np.asarray(action, dtype=float)
+    except (TypeError, ValueError):
+        values = np.empty(0)
+    if values.shape != (2,) or not np.isfinite(values).all():
+        raise ValueError(f"action of {agent}: {action!r:.80}: expected two finite numbers, the speeds of both wheels")
+    left, right = np.clip(values, -1.0, 1.0).tolist()
+    return left, right
 
 
 class ArenaEnv(ParallelEnv):  # type: ignore[misc]
@@ -127,9 +139,9 @@ class ArenaEnv(ParallelEnv):  # type: ignore[misc]
     ) -> tuple[dict[str, Vector], dict[str, float], dict[str, bool], dict[str, bool], dict[str, dict[str, Any]]]:
         """Apply the actions for `decision_s` seconds.
 
-        Return observations, rewards, terminations, truncations and infos."""
-        wanted = [np.clip(np.asarray(actions.get(agent, (0, 0)), dtype=float), -1, 1) for agent in self.agents]
-        self._speeds = [(float(left), float(right)) for left, right in wanted]
+        A robot without an action stops. Return observations, rewards, terminations, truncations and infos. Raises
+        ValueError, and changes nothing, if an action is not two finite numbers."""
+        self._speeds = [_speeds(agent, actions.get(agent, (0.0, 0.0))) for agent in self.agents]
         wheels = [(left * dimensions.WHEEL_SPEED, right * dimensions.WHEEL_SPEED) for left, right in self._speeds]
         if self._image is not None:
             for controller, speeds in zip(self._controllers, self._speeds, strict=True):

@@ -92,6 +92,28 @@ def test_food_brought_home_is_a_reward() -> None:
 
 
 def test_robots_with_firmware_are_told_by_bluetooth(assembled: Callable[[str], Path]) -> None:
+@pytest.mark.parametrize(
+    "action", [[math.nan, 0.5], [0.5, math.inf], [-math.inf, 0], [1], [1, 1, 1], 1.0, None, "up", [None, 1]]
+)
+def test_an_action_that_is_not_two_finite_numbers_is_refused(action: object) -> None:
+    """The refused step changes nothing: the episode continues as one without it."""
+    episodes = []
+    for is_disturbed in (False, True):
+        env = ArenaEnv("aggregation", seconds=1.0)
+        env.reset(seed=1)
+        env.step({agent: np.array([0.5, 0.4]) for agent in env.agents})
+        if is_disturbed:
+            with pytest.raises(ValueError, match=r"action of robot_3: .*: expected two finite numbers"):
+                env.step({"robot_0": np.array([1, 1]), "robot_3": action})  # type: ignore[dict-item]
+        observed, rewards, *_ = env.step({agent: np.array([2.0, -3.0]) for agent in env.agents})
+        episodes.append((np.stack(list(observed.values())), rewards, env.stage.robots))
+    (first, gain, poses), (second, other_gain, other_poses) = episodes
+    assert np.isfinite(first).all()
+    assert (first == second).all()
+    assert (poses == other_poses).all()
+    assert gain == other_gain
+
+
     """Firmware receives actions as commands of the robot's text protocol."""
     scene = load_scene("foraging").with_values(start__remote="")
     env = ArenaEnv(scene, seconds=1.0, decision_s=0.2, image=assembled(ECHO))
