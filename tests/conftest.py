@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -25,6 +26,8 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 def pytest_configure(config: pytest.Config) -> None:
     """Turn on the machine verifier for all tests and their child processes, and register the plugins of this folder."""
     os.environ["DSPIC_VERIFY_MACHINE"] = "1"
+    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # `make test &`: children would inherit it
+        signal.signal(signal.SIGINT, signal.default_int_handler)
     config.pluginmanager.register(WatchdogPlugin(), "watchdog")
     if not hasattr(config, "workerinput"):
         config.pluginmanager.register(Silence(config), "silence")

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import grimp
 import pytest
+from watchdog import HANG
 
 ROOT = Path(__file__).resolve().parents[1]
 LINTER = Path(sys.executable).with_name("lint-imports")
@@ -18,7 +19,7 @@ LINTER = Path(sys.executable).with_name("lint-imports")
 
 def lint(folder: Path) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
-        [str(LINTER), "--no-cache"], cwd=folder, capture_output=True, text=True, timeout=300, check=False
+        [str(LINTER), "--no-cache"], cwd=folder, capture_output=True, text=True, timeout=HANG, check=False
     )
 
 

@@ -11,6 +11,7 @@ from threading import Thread
 
 import numpy as np
 import pytest
+from watchdog import HANG
 
 from arena.trial.record import RecordError, write_bytes
 from emu.boards.picture import write_picture
@@ -129,6 +130,6 @@ HEX = Path(__file__).resolve().parent / "emu" / "cli" / "hello.hex"
 def test_a_dash_is_standard_input_or_output(line: str, given: bytes, start: bytes, tmp_path: Path) -> None:
     """In every command, for every file that is read or written whole; no file of that name comes to be."""
     done = subprocess.run([sys.executable, "-m", *line.split()], input=given, capture_output=True, cwd=tmp_path,
-                          env={**os.environ, "PYTHONPATH": str(HEX.parents[3])}, timeout=120, check=False)  # fmt: skip
+                          env={**os.environ, "PYTHONPATH": str(HEX.parents[3])}, timeout=HANG, check=False)  # fmt: skip
     assert (done.returncode, done.stdout[: len(start)]) == (0, start), done.stderr
     assert not (tmp_path / "-").exists()

@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from watchdog import HANG
 
 ROOT = Path(__file__).resolve().parents[1]
 WORDS = [
@@ -26,7 +27,7 @@ def test_a_reader_that_has_gone_is_no_failure(line: str) -> None:
     reader, writer = os.pipe()
     os.close(reader)
     done = subprocess.run([sys.executable, "-m", *line.split()], stdout=writer, stderr=subprocess.PIPE, cwd=ROOT,
-                          env=surroundings, timeout=120, check=False)  # fmt: skip
+                          env=surroundings, timeout=HANG, check=False)  # fmt: skip
     os.close(writer)
     assert (done.returncode, done.stderr) == (0, b"")
 
@@ -39,7 +40,7 @@ def test_a_full_disk_under_the_output_is_one_line(line: str) -> None:
     """Neither a traceback nor silence."""
     with Path("/dev/full").open("wb") as full:
         done = subprocess.run([sys.executable, "-m", *line.split()], stdout=full, stderr=subprocess.PIPE, cwd=ROOT,
-                              text=True, timeout=120, check=False)  # fmt: skip
+                              text=True, timeout=HANG, check=False)  # fmt: skip
     assert done.returncode == 2
     assert done.stderr.count("\n") == 1
     assert "No space left on device" in done.stderr
@@ -59,6 +60,6 @@ def test_a_full_disk_under_the_output_is_one_line(line: str) -> None:
 def test_a_stream_that_is_closed_is_empty_or_wants_nothing(line: str, closed: int, status: int, said: bytes) -> None:
     """`<&-`, `>&-` and `2>&-` of a shell, and services without any: no traceback."""
     done = subprocess.run([sys.executable, "-m", *line.split()], stderr=subprocess.PIPE, stdout=subprocess.DEVNULL,
-                          stdin=subprocess.DEVNULL, preexec_fn=lambda: os.close(closed), cwd=ROOT, timeout=120,
+                          stdin=subprocess.DEVNULL, preexec_fn=lambda: os.close(closed), cwd=ROOT, timeout=HANG,
                           check=False)  # fmt: skip
     assert (done.returncode, done.stderr) == (status, said)

@@ -9,6 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from watchdog import HANG
 
 from tests.arena.images import BEGIN
 from tests.firmware.conftest import built_once
@@ -38,7 +39,7 @@ def _assembled(folder: Path, text: str) -> Path:
     source, image = folder / "main.s", folder / "main.elf"
     source.write_text(text)
     command = [sys.executable, "-m", "toolchain", "cc", str(source), "-o", str(image)]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=120, cwd=ROOT, check=False)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=HANG, cwd=ROOT, check=False)
     assert done.returncode == 0, done.stderr
     return image
 

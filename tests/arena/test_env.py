@@ -12,6 +12,7 @@ from types import ModuleType
 
 import numpy as np
 import pytest
+from watchdog import HANG
 
 pytest.importorskip("pettingzoo", reason="PettingZoo is not installed (extra: learning)")
 
@@ -91,7 +92,6 @@ def test_food_brought_home_is_a_reward() -> None:
     assert mine.step({})[1]["robot_0"] == pytest.approx(0.1, abs=0.01)
 
 
-def test_robots_with_firmware_are_told_by_bluetooth(assembled: Callable[[str], Path]) -> None:
 @pytest.mark.parametrize(
     "action", [[math.nan, 0.5], [0.5, math.inf], [-math.inf, 0], [1], [1, 1, 1], 1.0, None, "up", [None, 1]]
 )
@@ -114,6 +114,7 @@ def test_an_action_that_is_not_two_finite_numbers_is_refused(action: object) -> 
     assert gain == other_gain
 
 
+def test_robots_with_firmware_are_told_by_bluetooth(assembled: Callable[[str], Path]) -> None:
     """Firmware receives actions as commands of the robot's text protocol."""
     scene = load_scene("foraging").with_values(start__remote="")
     env = ArenaEnv(scene, seconds=1.0, decision_s=0.2, image=assembled(ECHO))
@@ -154,5 +155,5 @@ def test_a_controller_is_evolved_and_becomes_firmware(tmp_path: Path) -> None:
     defines = f"-DALONE={best[0]},{best[1]} -DAHEAD={best[2]},{best[3]}"
     command = ["make", "-C", str(ROOT / "firmware"), "APP=aggregation", f"OUT={tmp_path}", f"DEFINES={defines}",
                f"PYTHON={sys.executable}"]  # fmt: skip
-    done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=HANG, check=False)
     assert done.returncode == 0, done.stderr

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from watchdog import HANG
 
 from arena.analysis.statistics import (
     _typical_interval,
@@ -193,7 +194,7 @@ def test_metrics_of_many_objects_need_little_memory() -> None:
     """Shares of 400 and of 100 objects over 15 minutes need less than 200 MB."""
     for objects in (100, 400):
         measured = subprocess.run([sys.executable, "-c", METER, str(objects), "1801"], capture_output=True, text=True,
-                              check=True, timeout=300, cwd=Path(__file__).parents[2])  # fmt: skip
+                              check=True, timeout=HANG, cwd=Path(__file__).parents[2])  # fmt: skip
         assert int(measured.stdout) < 200  # MB
 
 

@@ -12,6 +12,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from watchdog import HANG
 
 ROOT = Path(__file__).resolve().parents[2]
 FIRMWARE = ROOT / "firmware"
@@ -24,7 +25,7 @@ def run_make(folder: Path, *words: str) -> None:
     """One `make`; fails the test with the compiler's words."""
     command = ["make", "-s", "-C", str(folder), *words]
     environment = {**os.environ, "MAKEFLAGS": ""}
-    done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False, env=environment)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=HANG, check=False, env=environment)
     assert done.returncode == 0, done.stdout + done.stderr
 
 

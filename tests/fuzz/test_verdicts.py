@@ -11,6 +11,7 @@ from functools import partial
 from pathlib import Path
 
 import pytest
+from watchdog import HANG
 
 from tests.fuzz import verdicts
 from tests.fuzz.seeds import ROOT, Campaign, parser
@@ -88,7 +89,7 @@ def test_an_interrupted_campaign_writes_down_what_it_was_at(tmp_path: Path) -> N
         while not log.with_name("log.begun").exists():
             time.sleep(0.05)
         running.send_signal(signal.SIGINT)
-        running.communicate(timeout=60)
+        running.communicate(timeout=HANG)
     assert running.returncode == verdicts.INTERRUPTED
     done = Book(log, "made up").verdicts
     assert 1 in done
@@ -102,7 +103,7 @@ def test_workers_do_not_outlive_a_killed_campaign(tmp_path: Path) -> None:
         while not log.with_name("log.begun").exists():
             time.sleep(0.05)
         running.kill()
-        running.communicate(timeout=60)  # ends when no worker holds the other end of the pipe
+        running.communicate(timeout=HANG)  # ends when no worker holds the other end of the pipe
 
 
 def test_verdicts_on_another_compiler_or_of_another_campaign_are_refused(

@@ -12,6 +12,7 @@ from importlib.metadata import requires, version
 from pathlib import Path
 
 import pytest
+from watchdog import HANG
 
 from emu.host import exit_status, paths
 from openswarm.cli import COMMANDS, command, main
@@ -22,7 +23,7 @@ PROGRAMS = ("emu", "toolchain", "arena", "openswarm")
 
 def ran(*words: str, **environment: str) -> subprocess.CompletedProcess[str]:
     """A command line in a process of its own."""
-    return subprocess.run([sys.executable, "-m", *words], capture_output=True, text=True, timeout=120, check=False,
+    return subprocess.run([sys.executable, "-m", *words], capture_output=True, text=True, timeout=HANG, check=False,
                           cwd=ROOT, env=os.environ | environment)  # fmt: skip
 
 

@@ -16,6 +16,7 @@ from xml.etree import ElementTree
 
 import jsonschema
 import pytest
+from watchdog import HANG
 
 from arena.commands import debug as arena_debug
 from openswarm.cli import main
@@ -84,7 +85,7 @@ def test_the_command_lines_it_starts_are_understood() -> None:
         console.log(JSON.stringify([wordsOf({ program: 'a.elf' }),
             wordsOf({ scene: 'clustering', robot: 2, program: 'a.elf', arenaOptions: ['--seed', '3'] })]));
     """
-    done = subprocess.run(["node", "-e", script], cwd=FOLDER, capture_output=True, text=True, timeout=60, check=True)
+    done = subprocess.run(["node", "-e", script], cwd=FOLDER, capture_output=True, text=True, timeout=HANG, check=True)
     alone, swarm = json.loads(done.stdout)
     assert alone == ["-m", "emu", "debug"]
     assert swarm[:3] == ["-m", "arena", "debug"]
@@ -125,7 +126,7 @@ def test_the_status_bar_follows_stops_and_the_present() -> None:
             console.log(JSON.stringify(shown));
         })();
     """
-    done = subprocess.run(["node", "-e", script], cwd=FOLDER, capture_output=True, text=True, timeout=60, check=True)
+    done = subprocess.run(["node", "-e", script], cwd=FOLDER, capture_output=True, text=True, timeout=HANG, check=True)
     past = "$(watch) cycle 5, 3 before the present"
     assert json.loads(done.stdout) == [[past, 1], [past, 1], ["$(watch) cycle 5", 1]]
 
@@ -145,7 +146,7 @@ def test_a_python_without_the_debugger_is_told(tmp_path: Path) -> None:
     """
     command = ["node", "-e", script, str(tmp_path), sys.executable]
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-    done = subprocess.run(command, cwd=FOLDER, env=environment, capture_output=True, text=True, timeout=60, check=True)
+    done = subprocess.run(command, cwd=FOLDER, env=environment, capture_output=True, text=True, timeout=HANG, check=True)
     good, other, none = json.loads(done.stdout)
     assert good == "starts"
     assert "does not start the debugger" in other
@@ -167,7 +168,7 @@ def test_odd_values_of_a_configuration_are_refused_in_words() -> None:
             ...['two', -1, 1.5, '', '2'].map((robot) => swarm({ robot })),
             attach({}), ...['x', 0, 70000, '4711'].map((port) => attach({ port }))]));
     """
-    done = subprocess.run(["node", "-e", script], cwd=FOLDER, capture_output=True, text=True, timeout=60, check=True)
+    done = subprocess.run(["node", "-e", script], cwd=FOLDER, capture_output=True, text=True, timeout=HANG, check=True)
     words = 'arenaOptions must be a list of words, for example ["--seed", "3"]'
     robot, port = "robot must be a whole number from 0, not ", "port must be a whole number from 1, not "
     assert json.loads(done.stdout) == [
@@ -187,7 +188,7 @@ def test_it_is_packaged(tmp_path: Path) -> None:
     copy = shutil.copytree(FOLDER, tmp_path / "vscode", ignore=shutil.ignore_patterns("*.vsix"))
     out = tmp_path / "openswarm.vsix"
     words = [*tool, "package", "--allow-missing-repository", "--out", str(out)]
-    done = subprocess.run(words, cwd=copy, capture_output=True, text=True, timeout=400, check=False)
+    done = subprocess.run(words, cwd=copy, capture_output=True, text=True, timeout=HANG, check=False)
     if done.returncode and "npm error" in done.stderr:
         pytest.skip(f"npm cannot get {VSCE}: {done.stderr.strip().splitlines()[-1]}")
     assert done.returncode == 0, done.stdout + done.stderr

@@ -7,6 +7,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
+from watchdog import HANG
 
 from tests.fuzz.compiler.fuzz_compiler import SOURCES, examine
 from tests.fuzz.programs.c_shapes import Program
@@ -29,7 +30,7 @@ def test_sanitizers_find_no_fault_in_the_programs(tmp_path: Path) -> None:
         command = ["gcc", "-DHOST", "-O1", "-w", "-std=gnu11", "-fsanitize=address,undefined"]
         command += ["-fno-sanitize-recover=all", *(str(tmp_path / name) for name in SOURCES)]
         subprocess.run([*command, "-o", str(tmp_path / "model")], check=True)
-        subprocess.run([str(tmp_path / "model")], check=True, stdout=subprocess.DEVNULL, timeout=20)
+        subprocess.run([str(tmp_path / "model")], check=True, stdout=subprocess.DEVNULL, timeout=HANG)
 
 
 def test_the_same_seed_gives_the_same_program() -> None:

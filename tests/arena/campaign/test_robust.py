@@ -13,6 +13,7 @@ from pathlib import Path
 import pyarrow
 import pytest
 from pyarrow import parquet
+from watchdog import HANG
 
 from arena.campaign import campaign, cluster
 from arena.campaign.campaign import Plan
@@ -34,7 +35,7 @@ def started(*arguments: object) -> subprocess.Popen[str]:
     return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=ROOT)
 
 
-def wait_for(path: Path, seconds: float = 60) -> None:
+def wait_for(path: Path, seconds: float = HANG) -> None:
     end = time.monotonic() + seconds
     while not path.exists():
         assert time.monotonic() < end, f"{path} did not appear"
@@ -118,7 +119,7 @@ def test_two_runs_do_not_share_a_folder(tmp_path: Path) -> None:
     wait_for(tmp_path / "manifest.json")
     first.send_signal(signal.SIGSTOP)  # so that it is still running when the second one starts
     second = started(*SHORT, "--seed", 99, "--out", tmp_path)
-    output = second.communicate(timeout=120)[1]
+    output = second.communicate(timeout=HANG)[1]
     first.send_signal(signal.SIGCONT)
     assert second.returncode == 3
     assert output.count("\n") == 1
@@ -188,7 +189,7 @@ def test_a_trial_that_ends_takes_its_lock_away(tmp_path: Path) -> None:
 def test_progress_without_a_terminal_is_plain_lines(tmp_path: Path) -> None:
     """Without a terminal, progress is plain lines."""
     run = started(*SHORT[:-4], "--trials", 3, "--jobs", 1, "--out", tmp_path)
-    out, output = run.communicate(timeout=120)
+    out, output = run.communicate(timeout=HANG)
     assert run.returncode == 0
     lines = output.splitlines()
     assert [line.split(" done in ")[0] for line in lines] == ["trial 1", "trial 2", "trial 3"]
@@ -270,7 +271,7 @@ def test_a_scheduler_that_dies_is_one_line_and_what_is_finished_stays(tmp_path: 
         assert run is not None
         wait_for(tmp_path / "trial-0001.parquet", 120)
         scheduler.kill()
-        output = run.communicate(timeout=120)[1]
+        output = run.communicate(timeout=HANG)[1]
         assert run.returncode == 3, output
         lines = [line for line in output.splitlines() if not line.startswith("trial ")]
         assert len(lines) == 1, output

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from watchdog import HANG
 
 from arena.cli import main
 from arena.experiments import TrialSamples, experiment_of
@@ -115,7 +116,7 @@ def test_a_new_experiment_needs_a_scene_a_metric_and_some_c(tmp_path: Path, caps
     (app / "app.mk").write_text("DEVICES := analog\n")
     made = ["make", "-C", str(ROOT / "firmware"), "APP=mine", f"APPS={app.parent}", f"OUT={tmp_path / 'build'}",
             f"PYTHON={sys.executable}"]  # fmt: skip
-    done = subprocess.run(made, capture_output=True, text=True, timeout=300, check=False)
+    done = subprocess.run(made, capture_output=True, text=True, timeout=HANG, check=False)
     assert done.returncode == 0, done.stderr
     path = run(tmp_path, "--brain", str(tmp_path / "build" / "firmware.elf"), "--set", "start.remote=")
     assert "distance of the two robots" in capsys.readouterr().out

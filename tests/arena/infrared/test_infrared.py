@@ -15,6 +15,7 @@ from functools import partial
 from pathlib import Path
 
 import pytest
+from watchdog import HANG
 
 from arena.cli import main
 from arena.infrared.channel import OpticalChannel, light_code
@@ -132,7 +133,7 @@ def built(folder: Path, text: str, name: str) -> Path:
     source, image = folder / f"{name}.s", folder / f"{name}.elf"
     source.write_text(text)
     command = [sys.executable, "-m", "toolchain", "cc", str(source), "-o", str(image)]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=120, cwd=ROOT, check=False)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=HANG, cwd=ROOT, check=False)
     assert done.returncode == 0, done.stderr
     return image
 

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 from PIL import Image
+from watchdog import HANG
 
 from arena.cli import main
 from arena.replay import video
@@ -84,7 +85,7 @@ def test_an_mp4_plays_the_same_frames(trial: Path, tmp_path: Path) -> None:
     out = tmp_path / "trial.mp4"
     assert main(["replay", str(trial), "--export", str(out), "--speed", "4", "--seconds", "4"]) == 0
     command = [encoder, "-i", str(out), "-f", "rawvideo", "-pix_fmt", "rgb24", "-loglevel", "error", "-"]
-    raw = subprocess.run(command, capture_output=True, timeout=120, check=True).stdout
+    raw = subprocess.run(command, capture_output=True, timeout=HANG, check=True).stdout
     size = next(frames(read_trial(trial), [0.0])).size
     assert len(raw) == 13 * size[0] * size[1] * 3
 

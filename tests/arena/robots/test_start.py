@@ -9,6 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from watchdog import HANG
 
 from arena.cli import main
 from arena.robots.firmware_controller import FirmwareController
@@ -80,7 +81,7 @@ def test_a_kernel_that_stopped_itself_is_reported(tmp_path: Path) -> None:
     source.write_text("#include <openswarm.h>\nint main(void) { Sys_Init_Kernel(); SYS_ASSERT(0); return 0; }\n")
     made = ["make", "-C", str(ROOT / "firmware"), "APP=wrong", f"APPS={source.parents[1]}", f"OUT={tmp_path / 'out'}",
             f"PYTHON={sys.executable}"]  # fmt: skip
-    subprocess.run(made, check=True, capture_output=True, timeout=300)
+    subprocess.run(made, check=True, capture_output=True, timeout=HANG)
     for key, words in (("ok", "sleeps with every interrupt off"), ("", "stopped: ")):
         status, trial = run(tmp_path / "out" / "firmware.elf", tmp_path / f"run{key}", "--set", f"start.remote={key}")
         assert status == 1

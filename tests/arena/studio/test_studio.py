@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from watchdog import HANG
 
 from arena.campaign.campaign import Plan, controllers_of
 from arena.commands import studio as command
@@ -289,7 +290,7 @@ def asked(one: StudioServer, path: str, body: bytes | None = None, **headers: st
     given = {HEADER: one.token} | {name.replace("_", "-"): value for name, value in headers.items()}
     request = urllib.request.Request(f"http://{one.hosts[0]}{path}", body, given)
     try:
-        with urllib.request.urlopen(request, timeout=30) as answer:
+        with urllib.request.urlopen(request, timeout=HANG) as answer:
             return answer.status, answer.read().decode()
     except urllib.error.HTTPError as error:
         return error.code, error.read().decode()
@@ -351,7 +352,7 @@ def test_the_command_ends_with_ctrl_c() -> None:
     with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=ROOT) as process:
         assert process.stdout is not None
         assert process.stderr is not None
-        with urllib.request.urlopen(process.stdout.readline().split()[0], timeout=60) as answer:
+        with urllib.request.urlopen(process.stdout.readline().split()[0], timeout=HANG) as answer:
             assert 'id="studio"' in answer.read().decode()
         process.send_signal(signal.SIGINT)
         assert process.stderr.read() == ""
@@ -413,7 +414,7 @@ def browsed(one: StudioServer, probe: str, folder: Path, monkeypatch: pytest.Mon
     monkeypatch.setattr(command, "page", lambda *given, **more: plain(*given, **more).replace("</html>", probe))
     words = [str(BROWSER), "--headless", "--no-sandbox", "--disable-gpu", "--disable-background-networking",
              f"--user-data-dir={folder}", "--virtual-time-budget=60000", "--dump-dom", one.address]  # fmt: skip
-    done = subprocess.run(words, capture_output=True, text=True, timeout=120, check=False)
+    done = subprocess.run(words, capture_output=True, text=True, timeout=HANG, check=False)
     found = json.loads(html.unescape(done.stdout.split('<pre id="result">')[1].split("</pre>")[0]))
     assert "error" not in found, found
     return found

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 from programs import SPIN, executable
+from watchdog import HANG
 
 ROOT = Path(__file__).resolve().parents[3]
 EMU = [sys.executable, "-m", "emu"]
@@ -24,7 +25,7 @@ def spin(tmp_path):
 
 
 def emu(*words, **options):
-    return subprocess.run([*EMU, *words], capture_output=True, text=True, cwd=ROOT, timeout=60, check=False, **options)
+    return subprocess.run([*EMU, *words], capture_output=True, text=True, cwd=ROOT, timeout=HANG, check=False, **options)
 
 
 def test_the_version_is_that_of_the_package():
@@ -42,7 +43,7 @@ def test_every_breakpoint_holds(spin, order):
 def test_a_trace_to_standard_output(spin, tmp_path):
     done = subprocess.run(
         [*EMU, "run", spin, "--cycles", "4", "--trace", "-"],
-        capture_output=True, text=True, cwd=tmp_path, timeout=60, check=False,
+        capture_output=True, text=True, cwd=tmp_path, timeout=HANG, check=False,
         env=os.environ | {"PYTHONPATH": str(ROOT)},
     )  # fmt: skip
     assert done.returncode == 0
@@ -66,7 +67,7 @@ def test_completion_knows_commands_options_and_choices():
 
     def completed(*words: str) -> list[str]:
         text = script + "\n" + ask.format(words=" ".join(f"'{word}'" for word in words), last=len(words))
-        done = subprocess.run([bash, "-c", text], capture_output=True, text=True, timeout=60, check=False)
+        done = subprocess.run([bash, "-c", text], capture_output=True, text=True, timeout=HANG, check=False)
         return done.stdout.split()
 
     assert completed("scr") == ["screenshot"]
@@ -81,7 +82,7 @@ def test_output_is_never_coloured(spin):
     leader, follower = pty.openpty()
     done = subprocess.run(
         [*EMU, "run", spin, "--cycles", "4"], stdin=subprocess.DEVNULL, stdout=follower, stderr=follower, cwd=ROOT,
-        timeout=60, check=False,
+        timeout=HANG, check=False,
     )  # fmt: skip
     os.close(follower)
     assert done.returncode == 0

@@ -7,6 +7,7 @@ import socket
 import threading
 
 import pytest
+from watchdog import HANG
 
 from emu.run.console import open_port, wait_for_input
 from emu.run.input_log import HEADER, TimestampedInput, read_input_log
@@ -59,7 +60,7 @@ def test_a_tcp_port_waits_for_one_connection_and_ends_with_it(capsys):
     def connect() -> None:
         while not peer:
             try:
-                peer.append(socket.create_connection(("127.0.0.1", number), timeout=5))
+                peer.append(socket.create_connection(("127.0.0.1", number), timeout=HANG))
             except ConnectionRefusedError:
                 continue
 

@@ -11,6 +11,7 @@ from collections import Counter
 from xml.etree import ElementTree
 
 import pytest
+from watchdog import HANG
 
 import emu
 from emu.cli import main
@@ -120,7 +121,7 @@ def test_lines_branches_and_functions(build, tmp_path, capfd):
     genhtml = shutil.which("genhtml")
     if genhtml is not None:
         command = [genhtml, "--branch-coverage", "-o", str(tmp_path / "html"), str(info)]
-        done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+        done = subprocess.run(command, capture_output=True, text=True, timeout=HANG, check=False)
         assert done.returncode == 0, done.stderr
         assert (tmp_path / "html" / "index.html").exists()
 

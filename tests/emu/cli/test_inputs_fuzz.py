@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from watchdog import HANG
 
 from arena.trial.record import Columns, RecordError
 from emu.image.loader import load_image
@@ -63,7 +64,7 @@ def test_a_request_for_more_than_there_is_is_refused(command: str, key: str) -> 
         "from tests.fuzz.emulator.fuzz_inputs import converse\n"
         "print(converse(sys.stdin.buffer.read()))"
     )
-    ended = subprocess.run([sys.executable, "-c", code], input=asked, capture_output=True, check=False, timeout=60)
+    ended = subprocess.run([sys.executable, "-c", code], input=asked, capture_output=True, check=False, timeout=HANG)
     assert ended.stdout == b"answered\n", ended.stderr.decode()
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 from programs import SETUP, executable
+from watchdog import HANG
 
 from emu.api import load
 
@@ -59,7 +60,7 @@ def test_the_line_is_on_the_terminal(image: Path) -> None:
     """`python -m emu run` shows what UART1 sends."""
     done = subprocess.run(
         [sys.executable, "-m", "emu", "run", str(image)],
-        capture_output=True, text=True, timeout=60, check=False, stdin=subprocess.DEVNULL,
+        capture_output=True, text=True, timeout=HANG, check=False, stdin=subprocess.DEVNULL,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     assert done.stdout == LINE

@@ -14,6 +14,7 @@ from pathlib import Path
 
 import pytest
 from programs import ECHO, HELLO, SPIN, executable
+from watchdog import HANG
 
 from emu.cli import main
 
@@ -38,7 +39,7 @@ def emu(*arguments, **options):
     if "input" in options:
         del options["stdin"]
     return subprocess.run(
-        [sys.executable, "-m", "emu", *arguments], capture_output=True, cwd=ROOT, timeout=60, check=False, **options
+        [sys.executable, "-m", "emu", *arguments], capture_output=True, cwd=ROOT, timeout=HANG, check=False, **options
     )
 
 
@@ -207,7 +208,7 @@ def test_an_open_input_keeps_a_sleeping_firmware_alive_until_it_is_closed(build)
         process.stdin.flush()
         assert process.stdout.read(1) == answer
     assert process.poll() is None
-    out, err = process.communicate(timeout=30)
+    out, err = process.communicate(timeout=HANG)
     assert out == b""
     assert err.splitlines()[-1].startswith(b"halt")
     assert process.returncode == 0
@@ -234,7 +235,7 @@ def test_a_recorded_session_replays_to_the_same_bytes_at_the_same_cycles(build, 
         process.stdin.write(letters)
         process.stdin.flush()
         time.sleep(0.15)
-    live = json.loads(process.communicate(timeout=30)[0])
+    live = json.loads(process.communicate(timeout=HANG)[0])
     assert live["uart1"] == "Bifmmp{"
     assert main(["run", path, "--replay", str(record), "--json"]) == 0
     again = json.loads(capfd.readouterr().out)
@@ -247,13 +248,13 @@ def test_ctrl_c_ends_a_run_cleanly(build, tmp_path):
         [sys.executable, "-m", "emu", "run", build(SPIN), "--trace", str(trace)],
         stdin=subprocess.DEVNULL, stderr=subprocess.PIPE, cwd=ROOT,
     )  # fmt: skip
-    deadline = time.monotonic() + 60
+    deadline = time.monotonic() + HANG
     while not list(tmp_path.glob("trace.txt*")):
         assert time.monotonic() < deadline
         time.sleep(0.02)
     time.sleep(0.2)
     process.send_signal(signal.SIGINT)
-    err = process.communicate(timeout=30)[1].decode()
+    err = process.communicate(timeout=HANG)[1].decode()
     assert process.returncode == 0
     assert err.splitlines()[-1].startswith("interrupted at 0x0001")
     assert "inc.w w0, w0" in trace.read_text()
@@ -264,7 +265,7 @@ def test_a_closed_output_pipe_is_not_an_error(build):
     os.close(reader)
     done = subprocess.run(
         [sys.executable, "-m", "emu", "run", build(HELLO)],
-        stdin=subprocess.DEVNULL, stdout=writer, stderr=subprocess.PIPE, cwd=ROOT, timeout=60, check=False,
+        stdin=subprocess.DEVNULL, stdout=writer, stderr=subprocess.PIPE, cwd=ROOT, timeout=HANG, check=False,
     )  # fmt: skip
     os.close(writer)
     assert b"Traceback" not in done.stderr
@@ -285,11 +286,11 @@ def test_a_tcp_client_talks_to_the_firmware(build):
         stdin=subprocess.DEVNULL, stderr=subprocess.PIPE, cwd=ROOT,
     )  # fmt: skip
     port = int(process.stderr.readline().rsplit(b":", 1)[1])
-    with socket.create_connection(("127.0.0.1", port), timeout=30) as client:
+    with socket.create_connection(("127.0.0.1", port), timeout=HANG) as client:
         client.sendall(b"AB")
         assert client.recv(1, socket.MSG_WAITALL) == b"B"
         assert client.recv(1) == b"C"
-    assert process.communicate(timeout=30)[1].splitlines()[-1].startswith(b"halt")
+    assert process.communicate(timeout=HANG)[1].splitlines()[-1].startswith(b"halt")
 
 
 def test_a_terminal_talks_to_the_firmware(build):
@@ -304,7 +305,7 @@ def test_a_terminal_talks_to_the_firmware(build):
     assert os.read(terminal, 1) == b"B"
     os.close(terminal)
     process.send_signal(signal.SIGTERM)
-    assert process.communicate(timeout=30)[1].splitlines()[-1].startswith(b"interrupted")
+    assert process.communicate(timeout=HANG)[1].splitlines()[-1].startswith(b"interrupted")
     assert process.returncode == 0
 
 
@@ -317,7 +318,7 @@ def test_a_run_on_a_terminal_takes_typed_input(build):
     os.write(master, b"A\n")
     assert process.stdout.read(2) == b"B\x0b"
     os.write(master, b"\x04")
-    assert process.communicate(timeout=30)[1].splitlines()[-1].startswith(b"halt")
+    assert process.communicate(timeout=HANG)[1].splitlines()[-1].startswith(b"halt")
     os.close(master)
     os.close(slave)
 

@@ -11,7 +11,7 @@ from queue import Empty, Queue
 from typing import Any
 
 ROOT = Path(__file__).resolve().parents[3]
-PATIENCE = 200
+PATIENCE = 3600
 
 
 class Client:

@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from watchdog import HANG
 
 ROOT = Path(__file__).resolve().parents[3]
 PACKAGES = ("@vscode/debugadapter-testsupport@1.68", "mocha@11")
@@ -27,7 +28,7 @@ def node_modules(folder: Path) -> Path:
         pytest.skip("there is no node with npm (Debian packages nodejs, npm)")
     done = subprocess.run(
         [npm, "install", "--fetch-retries=0", "--no-audit", "--no-fund", "--prefix", str(folder), *PACKAGES],
-        capture_output=True, text=True, timeout=300, check=False,
+        capture_output=True, text=True, timeout=HANG, check=False,
     )  # fmt: skip
     if done.returncode:
         pytest.skip(f"npm cannot install {', '.join(PACKAGES)}: {done.stderr.strip().splitlines()[-1:]}")
@@ -39,7 +40,7 @@ def mocha(modules: Path, script: Path, **environment: str) -> str:
     given = {"NODE_PATH": str(modules), "EMU_PYTHON": sys.executable, "EMU_ROOT": str(ROOT), "PYTHONPATH": str(ROOT)}
     done = subprocess.run(
         ["node", str(modules / "mocha" / "bin" / "mocha.js"), str(script)],
-        capture_output=True, text=True, env=os.environ | given | environment, timeout=200, check=False,
+        capture_output=True, text=True, env=os.environ | given | environment, timeout=HANG, check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout

@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from watchdog import HANG
 
 from tests.emu.dap.node import ROOT, mocha, node_modules
 from tests.emu.dap.test_dap import SOURCE, line_of
@@ -43,5 +44,5 @@ def test_the_server_passes_the_test_support_package(modules: Path, tmp_path: Pat
     finally:
         if server is not None:
             server.terminate()
-            server.wait(timeout=30)
+            server.wait(timeout=HANG)
     assert "3 passing" in output

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from watchdog import HANG
 
 from tests.emu.dap.client import ROOT, Client
 from toolchain.driver import driver
@@ -394,7 +395,7 @@ def framed(command: str, **arguments: Any) -> bytes:
 )  # fmt: skip
 def test_a_protocol_error_ends_the_server_with_a_message(sent: bytes, replies: int, words: str) -> None:
     """Valid input gives status 0 and no error text; a restart before the launch is refused."""
-    done = subprocess.run([sys.executable, "-m", "emu", "debug"], input=sent, capture_output=True, timeout=60)
+    done = subprocess.run([sys.executable, "-m", "emu", "debug"], input=sent, capture_output=True, timeout=HANG)
     assert done.stdout.count(b"Content-Length") == replies
     assert done.returncode == (2 if words else 0), done.stderr
     errors = done.stderr.decode()
@@ -415,13 +416,13 @@ def test_after_a_lost_connection_the_port_serves_the_next_client(program: str, t
     try:
         port = int(server.stderr.readline().rsplit(":", 1)[1])
         for reset in (b"\1\0\0\0\0\0\0\0", b"\0" * 8):  # with and without discarding unread data
-            with socket.create_connection(("127.0.0.1", port), timeout=60) as gone:
+            with socket.create_connection(("127.0.0.1", port), timeout=HANG) as gone:
                 gone.sendall(framed("launch", program=str(image)) + framed("configurationDone"))
                 seen = b""
                 while seen.count(b'"stdout"') < 5:
                     seen += gone.recv(1 << 16)
                 gone.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, reset)
-        with socket.create_connection(("127.0.0.1", port), timeout=60) as last:
+        with socket.create_connection(("127.0.0.1", port), timeout=HANG) as last:
             last.sendall(framed("initialize"))
             assert b"supportsStepBack" in last.recv(1 << 16)
         assert server.poll() is None

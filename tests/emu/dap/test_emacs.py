@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from watchdog import HANG
 
 from tests.emu.dap.test_dap import SOURCE, line_of
 from toolchain.driver import driver
@@ -31,7 +32,7 @@ def test_a_session_in_emacs(tmp_path: Path) -> None:
     }  # fmt: skip
     done = subprocess.run(
         [emacs, "--batch", "-l", str(Path(__file__).with_name("conversation.el"))],
-        capture_output=True, text=True, env=environment, timeout=300, check=False,
+        capture_output=True, text=True, env=environment, timeout=HANG, check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stdout + done.stderr
     assert done.stdout.splitlines()[-9:] == [

@@ -26,7 +26,7 @@ from tests.emu.dap.test_dap import SOURCE, line_of
 from toolchain.driver import driver
 
 ROOT = Path(__file__).resolve().parents[3]
-PATIENCE = 60
+PATIENCE = 3600
 
 
 @pytest.fixture(scope="module")

@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from watchdog import HANG
 
 from tests.firmware.conftest import FIRMWARE
 
@@ -32,7 +33,7 @@ def make(tmp_path: Path):
     def build(*words: str) -> bool:
         command = ["make", "-C", str(FIRMWARE), *fixed, *words]
         environment = {**os.environ, "MAKEFLAGS": "", "LC_ALL": "C"}
-        done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False, env=environment)
+        done = subprocess.run(command, capture_output=True, text=True, timeout=HANG, check=False, env=environment)
         assert done.returncode == 0, done.stdout + done.stderr
         return "Nothing to be done" not in done.stdout
 

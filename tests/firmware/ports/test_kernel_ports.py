@@ -8,6 +8,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
+from watchdog import HANG
 
 import emu
 from firmware.tools.simulated import epuck2
@@ -73,7 +74,7 @@ def test_a_host_conforms(target: str, words: tuple[str, ...], checks: int, tmp_p
     flags = "-O1 -g -fsanitize=undefined -fno-sanitize-recover=undefined"
     run_make(FIRMWARE, f"TARGET={target}", "APPS=../tests/firmware/target", "APP=conformance", f"OUT={tmp_path}",
              f"HOST_FLAGS={flags}", *words)  # fmt: skip
-    done = subprocess.run([tmp_path / "firmware"], capture_output=True, timeout=120, check=False)
+    done = subprocess.run([tmp_path / "firmware"], capture_output=True, timeout=HANG, check=False)
     check_conforms(done.stdout, checks)
     assert done.returncode == 0
 

@@ -11,6 +11,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from watchdog import HANG
 
 from emu.cli import main
 from toolchain.driver import driver
@@ -35,7 +36,7 @@ def built(root: Path, app: str, *words: str) -> Path:
     out = root / "out" / app
     command = ["make", "-C", str(root / "firmware"), f"APP={app}", f"OUT={out}", f"PYTHON={sys.executable}", *words]
     environment = os.environ | {"XDG_CACHE_HOME": str(root / "cache")}
-    done = subprocess.run(command, capture_output=True, text=True, timeout=600, env=environment, check=False)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=HANG, env=environment, check=False)
     assert done.returncode == 0, done.stderr
     return out / "firmware.elf"
 

@@ -11,6 +11,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from watchdog import HANG
 
 import emu
 from emu.dspic30f.isa.text import parse
@@ -92,7 +93,7 @@ def on_host(program: str, folder: Path) -> str:
     command = ["gcc", "-std=gnu99", "-O1", "-g", "-Wall", "-Wextra", "-Werror", *sanitizers]
     command += [f"-I{OPENSWARM / folder}" for folder in folders]
     subprocess.run([*command, str(HERE / f"{program}.c"), "-o", str(folder / program)], check=True)
-    done = subprocess.run([folder / program], capture_output=True, text=True, check=False, timeout=120)
+    done = subprocess.run([folder / program], capture_output=True, text=True, check=False, timeout=HANG)
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
 
@@ -171,7 +172,7 @@ def test_no_image_reaches_into_the_slots(image, tmp_path):
     large.write_text(".global _main\n_main: return\n.section .large, code, keep\n.space 0xF800\n")
     slots = OPENSWARM / "board" / "epuck" / "update" / "update_slots.S"
     done = subprocess.run([sys.executable, "-m", "toolchain", "cc", slots, large, "-o", tmp_path / "large.elf"],
-                          capture_output=True, text=True, check=False, timeout=60)  # fmt: skip
+                          capture_output=True, text=True, check=False, timeout=HANG)  # fmt: skip
     assert done.returncode == 2
     assert "at fixed addresses: .update_run 0xf800..0xffff, .update_stores 0x16800..0x17fff" in done.stderr
 

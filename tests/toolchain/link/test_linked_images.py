@@ -5,6 +5,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from watchdog import HANG
 
 from emu.api import load
 from toolchain.asm.assemble import assemble
@@ -109,7 +110,7 @@ def test_an_assembly_program_talks_on_uart1_from_the_timer_interrupt(tmp_path):
     here = Path(__file__).parent
 
     def run(*words):
-        return subprocess.run([sys.executable, "-m", *map(str, words)], capture_output=True, cwd=tmp_path, timeout=60)
+        return subprocess.run([sys.executable, "-m", *map(str, words)], capture_output=True, cwd=tmp_path, timeout=HANG)
 
     assert run("toolchain", "as", "-g", here / "uart_hello.s", "-o", "hello.o").returncode == 0
     assert run("toolchain", "as", CRT0, "-o", "crt0.o").returncode == 0

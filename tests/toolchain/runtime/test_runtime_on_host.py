@@ -10,6 +10,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
+from watchdog import HANG
 
 HERE = Path(__file__).parent
 RUNTIME = HERE.parents[2] / "toolchain" / "runtime"
@@ -45,7 +46,7 @@ def test_soft_float_equals_the_hardware(tmp_path: Path) -> None:
     """IEC 60559 (C11 annex F): + - * /, comparisons, conversions, in both precisions, bit for bit."""
     program = tmp_path / "softfloat"
     compile_host(program, HERE / "softfloat_host.c", *soft_float_sources())
-    done = subprocess.run([program, str(PAIRS)], capture_output=True, text=True, check=False, timeout=300)
+    done = subprocess.run([program, str(PAIRS)], capture_output=True, text=True, check=False, timeout=HANG)
     assert done.returncode == 0, done.stdout
     lines = done.stdout.splitlines()
     assert len(lines) == 28
@@ -61,7 +62,7 @@ def test_the_comparison_notices_a_wrong_rounding(tmp_path: Path) -> None:
         shutil.copy(header, tmp_path)
     program = tmp_path / "softfloat"
     compile_host(program, HERE / "softfloat_host.c", *sorted(tmp_path.glob("f*.c")))
-    done = subprocess.run([program, "20000"], capture_output=True, text=True, check=False, timeout=100)
+    done = subprocess.run([program, "20000"], capture_output=True, text=True, check=False, timeout=HANG)
     assert done.returncode == 1
     assert "addsf3(" in done.stdout
 
@@ -76,7 +77,7 @@ def test_math_functions_stay_within_their_error_bounds(tmp_path: Path) -> None:
         )
     program = tmp_path / "math"
     compile_host(program, HERE / "math_host.c", *objects, RUNTIME / "f64_pack.c", RUNTIME / "f32_pack.c")
-    done = subprocess.run([program, str(MATH_ARGUMENTS)], capture_output=True, text=True, check=False, timeout=300)
+    done = subprocess.run([program, str(MATH_ARGUMENTS)], capture_output=True, text=True, check=False, timeout=HANG)
     assert done.returncode == 0, done.stdout
 
 
@@ -95,7 +96,7 @@ def digits_program(folder: Path, printing: Path = RUNTIME / "format_double.c") -
 def test_doubles_are_printed_and_read_exactly(tmp_path: Path) -> None:
     """C11 7.21.6.1, 7.22.1.3: every digit of printf, every number of strtod and strtof, as on the host."""
     words = [digits_program(tmp_path), "100000", "7216"]
-    done = subprocess.run(words, capture_output=True, text=True, check=False, timeout=300)
+    done = subprocess.run(words, capture_output=True, text=True, check=False, timeout=HANG)
     assert done.returncode == 0, done.stdout + done.stderr
 
 
@@ -104,7 +105,7 @@ def test_the_comparison_of_digits_notices_a_wrong_last_digit(tmp_path: Path) -> 
     assert "next == 5 && !odd" in text
     (tmp_path / "wrong.c").write_text(text.replace("next == 5 && !odd", "next == 5 && odd"))
     words = [digits_program(tmp_path, tmp_path / "wrong.c"), "20000", "1"]
-    done = subprocess.run(words, capture_output=True, text=True, check=False, timeout=100)
+    done = subprocess.run(words, capture_output=True, text=True, check=False, timeout=HANG)
     assert done.returncode == 1
     assert "host [" in done.stdout
 

@@ -1,0 +1,129 @@
+"""Folders of the cache: private at every level; folders that other users can write are not used."""
+
+from __future__ import annotations
+
+import os
+import stat
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from emu.dspic30f.jit.cache import ObjectCache
+from emu.host.paths import runtime_libraries
+from emu.host.private_folder import danger
+from toolchain import device_header
+from toolchain.driver import runtime_archive
+
+pytestmark = pytest.mark.skipif(os.name != "posix", reason="modes of POSIX")
+ARCHIVE = b"!<arch>\n" + bytes(100)
+
+
+@pytest.fixture(params=[0o022, 0o002, 0o000])
+def umask(request: pytest.FixtureRequest) -> Iterator[int]:
+    """Set the umask of this process; 002 is usual for users with a group of their own."""
+    before = os.umask(request.param)
+    yield request.param
+    os.umask(before)
+
+
+@pytest.fixture
+def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Return the missing folder of an empty cache."""
+    folder = tmp_path / "new" / "cache"
+    monkeypatch.setenv("OPENSWARM_CACHE", str(folder))
+    return folder
+
+
+def fill(cache: Path) -> ObjectCache:
+    """Write an object, a run-time library and a device header into the cache."""
+    objects = ObjectCache()
+    objects.put("00key", b"code")
+    runtime_archive._store(runtime_libraries() / "libdspic-0.a", ARCHIVE)
+    device_header.folder_of.cache_clear()
+    device_header.folder_of("dspic30f4013")
+    device_header.folder_of.cache_clear()
+    return objects
+
+
+@pytest.mark.usefixtures("umask")
+def test_all_new_folders_are_private(cache: Path) -> None:
+    """Every folder from the first missing one to the shelves of objects has mode 0700."""
+    objects = fill(cache)
+    folders = [cache.parent, cache, *(path for path in cache.rglob("*") if path.is_dir())]
+    assert {path.name for path in folders} >= {"new", "cache", "jit", "00", "toolchain", "headers"}
+    assert {stat.S_IMODE(path.stat().st_mode) for path in folders} == {0o700}
+    assert objects.get("00key") == b"code"
+
+
+@pytest.mark.parametrize("place", ["", "jit", "jit/00", "toolchain"])
+@pytest.mark.parametrize("mode", [0o770, 0o702])
+def test_a_folder_that_others_can_write_is_not_used(
+    cache: Path, place: str, mode: int, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Its content is not read, nothing is written into it, and one sentence names it."""
+    fill(cache)
+    (cache / place).chmod(mode)
+    before = sorted(cache.rglob("*"))
+    objects = ObjectCache()
+    assert (objects.get("00key") is None) == (place != "toolchain")
+    objects.put("00other", b"code")
+    archive = next((cache / "toolchain").iterdir())
+    assert (runtime_archive._stored(archive) is None) == (place in ("", "toolchain"))
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1
+    assert f"the cache {cache / place} is not used, because other users can write it (mode {mode:04o})" in said
+    if place != "toolchain":
+        assert sorted(cache.rglob("*")) == before
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root can give a folder away")
+def test_a_folder_of_another_user_is_not_used(cache: Path) -> None:
+    """The owner of a folder could replace its content at any time."""
+    objects = fill(cache)
+    os.chown(cache / "jit", 65534, -1)
+    assert danger(cache / "jit") == "it belongs to another user (uid 65534)"
+    assert objects.get("00key") is None
+
+
+def test_a_command_works_without_an_unsafe_cache(cache: Path) -> None:
+    """`toolchain cc -E` finds its headers, and reports the cache in one line."""
+    cache.mkdir(parents=True)
+    cache.chmod(0o777)
+    done = subprocess.run([sys.executable, "-m", "toolchain", "cc", "-E", "-x", "c", "-"], input="#include <xc.h>\n",
+                          capture_output=True, text=True, check=False)  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert done.stderr.count("\n") == 1
+    assert "is not used" in done.stderr
+    assert not list(cache.iterdir())
+
+
+@pytest.mark.parametrize(
+    "damaged", [(b"", 0, 80), (b"", 0, 0), (b"X", 0, None), (b"", 1, None)], ids=["half", "empty", "longer", "shifted"]
+)
+def test_a_damaged_runtime_library_counts_as_absent(cache: Path, damaged: tuple[bytes, int, int | None]) -> None:
+    """The checksum finds a truncated, empty, extended or shifted file."""
+    fill(cache)
+    (archive,) = (cache / "toolchain").iterdir()
+    assert runtime_archive._stored(archive) == ARCHIVE
+    added, first, end = damaged
+    archive.write_bytes(archive.read_bytes()[first:end] + added)
+    assert runtime_archive._stored(archive) is None
+
+
+@pytest.mark.slow
+def test_a_program_links_although_the_cached_library_is_damaged(cache: Path, tmp_path: Path) -> None:
+    """The compiler builds the library again and stores it."""
+    archive = runtime_libraries() / f"libdspic-{runtime_archive.fingerprint()}.a"
+    runtime_archive._store(archive, ARCHIVE)
+    archive.write_bytes(archive.read_bytes()[:-1])
+    source = tmp_path / "main.c"
+    source.write_text("volatile long a = 7, b = 3; int main(void) { return a / b; }\n")
+    done = subprocess.run([sys.executable, "-m", "toolchain", "cc", str(source), "-o", str(tmp_path / "main.elf")],
+                          capture_output=True, text=True, check=False)  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    stored = runtime_archive._stored(archive)
+    assert stored is not None
+    assert len(stored) > 10_000
