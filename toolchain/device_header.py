@@ -22,6 +22,7 @@ import emu.chips
 from emu.chips import NAMES, chip_named
 from emu.chips.chip import Chip, Sfr
 from emu.host.paths import headers
+from emu.host.private_folder import is_usable, make_private
 
 CHIPS = Path(emu.chips.__path__[0])
 ALTERNATIVES: dict[str, dict[str, str]] = {
@@ -128,13 +129,16 @@ def header(chip: Chip) -> str:
 def folder_of(chip_name: str) -> Path:
     """Return the folder that holds the header of a chip; the cache keeps one per version of the chips' tables.
 
-    If the cache cannot be written, the folder is a temporary one that this process removes when it ends.
+    If the cache cannot be written or is not private, the folder is a temporary one. This process removes it at its end.
     """
     chip = chip_named(chip_name)
     folder = headers() / _version()
     target = folder / f"{chip.name.lower()}.h"
-    if not target.is_file():
+    safe = is_usable(headers().parent, headers(), folder)
+    if not safe or not target.is_file():
         try:
+            if not safe:
+                raise PermissionError(folder)
             _write(target, header(chip))
         except OSError:
             temporary = tempfile.mkdtemp(prefix="dspic-headers-")
@@ -155,7 +159,7 @@ def _version() -> str:
 
 def _write(target: Path, text: str) -> None:
     """Write a header whole or not at all. Raises OSError."""
-    target.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+    make_private(target.parent)
     handle, temporary = tempfile.mkstemp(prefix=".header.", dir=target.parent)
     with os.fdopen(handle, "w", encoding="utf-8") as stream:
         stream.write(text)

@@ -10,6 +10,7 @@ from typing import Final
 
 import emu
 from emu.host import paths
+from emu.host.private_folder import danger, make_private
 
 APPLICATIONS: Final = {"openswarm": "clustering", "bare": "clustering-bare"}
 """Applications of firmware/apps with a name of their own as a brain."""
@@ -37,6 +38,11 @@ def image_for(brain: str, home: Path = Path()) -> Path | None:
     folder = paths.firmware()
     # an installed package may not be writable: images then go into the user's cache
     out = folder / "build" / application if paths.in_checkout() else paths.images() / application
+    if not paths.in_checkout():
+        make_private(out)
+        for one in (paths.cache(), paths.images(), out):
+            if why := danger(one):
+                raise ValueError(f"{one}: {why}; delete it, or set OPENSWARM_CACHE to a folder of your own")
     command = ["make", "-C", str(folder), f"APP={application}", f"OUT={out}", f"PYTHON={sys.executable}"]
     try:
         built = subprocess.run(command, capture_output=True, text=True, check=False)

@@ -88,11 +88,13 @@ def test_a_folder_of_another_user_is_not_used(cache: Path) -> None:
     assert objects.get("00key") is None
 
 
-def test_a_command_works_without_an_unsafe_cache(cache: Path) -> None:
-    """`toolchain cc -E` finds its headers, and reports the cache in one line."""
+def test_a_command_works_without_an_unsafe_cache(cache: Path, tmp_path: Path) -> None:
+    """`toolchain cc -c` finds its headers, and reports the cache in one line."""
+    source = tmp_path / "main.c"
+    source.write_text("#include <xc.h>\nint main(void) { return LATB; }\n")
     cache.mkdir(parents=True)
     cache.chmod(0o777)
-    done = subprocess.run([sys.executable, "-m", "toolchain", "cc", "-E", "-x", "c", "-"], input="#include <xc.h>\n",
+    done = subprocess.run([sys.executable, "-m", "toolchain", "cc", "-c", str(source), "-o", str(tmp_path / "main.o")],
                           capture_output=True, text=True, check=False)  # fmt: skip
     assert done.returncode == 0, done.stderr
     assert done.stderr.count("\n") == 1

@@ -1,7 +1,7 @@
 """The run-time library as an archive, built from `runtime/` on first use and cached in the user's cache folder.
 
 The name of the cached file is a hash of all dependencies of the archive. The file is created by a rename, so concurrent
-builds are safe.
+builds are safe. It is a checksum followed by the archive; a damaged file counts as absent.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 from emu.host.paths import runtime_libraries
+from emu.host.private_folder import is_usable, make_private
 from toolchain.frontend.options import CcOptions, Input
 
 RUNTIME_DIR = Path(__file__).parents[1] / "runtime"
@@ -25,6 +26,7 @@ PACKAGE_DIRS = ("toolchain", "emu/dspic30f/isa", "emu/chips")
 UNRELATED = ("toolchain/link", "toolchain/cli.py", "toolchain/README.md")
 SUFFIXES = (".py", ".c", ".cpp", ".h", ".s", ".inc", ".csv")
 LEVEL = "s"
+CHECKSUM_BYTES = 32
 LANGUAGES = {".c": "c", ".cpp": "c++", ".s": "assembler"}
 
 
@@ -38,10 +40,9 @@ def library(compile_one: Compile, jobs: int = 0) -> bytes:
     """The archive; it is built, which takes seconds, if the cache has none for these sources and this compiler."""
     key = fingerprint()
     cached = runtime_libraries() / f"libdspic-{key}.a"
-    try:
-        return cached.read_bytes()
-    except OSError:
-        pass
+    stored = _stored(cached)
+    if stored is not None:
+        return stored
     content = build(compile_one, jobs)
     if fingerprint() == key:  # the compiler has not been edited meanwhile
         _store(cached, content)
@@ -114,13 +115,25 @@ def _weakened(content: bytes, name: str) -> bytes:
     return object_bytes(obj)
 
 
+def _stored(path: Path) -> bytes | None:
+    """Return the archive of a cached file; None if it is missing, damaged, or in a folder that others can write."""
+    try:
+        blob = path.read_bytes() if is_usable(path.parent.parent, path.parent) else b""
+    except OSError:
+        return None
+    checksum, content = blob[:CHECKSUM_BYTES], blob[CHECKSUM_BYTES:]
+    return content if hashlib.sha256(content).digest() == checksum else None
+
+
 def _store(path: Path, content: bytes) -> None:
     """Store the archive in the cache; errors are ignored, as the next run can build it again."""
     try:
-        path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+        make_private(path.parent)
+        if not is_usable(path.parent.parent, path.parent):
+            return
         handle, temporary = tempfile.mkstemp(prefix=".libdspic.", dir=path.parent)
         with os.fdopen(handle, "wb") as stream:
-            stream.write(content)
+            stream.write(hashlib.sha256(content).digest() + content)
         os.replace(temporary, path)
         for old in sorted(path.parent.glob("libdspic-*.a"), key=lambda p: p.stat().st_mtime)[:-8]:
             old.unlink(missing_ok=True)

@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Final
 
 from emu.host.paths import native_code
+from emu.host.private_folder import is_usable, make_private
 
 CHECKSUM_BYTES: Final = 32
 SHELVES: Final = 256
@@ -38,7 +39,9 @@ def sources_hash() -> bytes:
 
 
 class ObjectCache:
-    """Objects on disk by key. If the folder cannot be written, objects are not stored."""
+    """Objects on disk by key. If the folder cannot be written, objects are not stored.
+
+    A folder that another user owns or can write is not used at all: an object is code that this process executes."""
 
     def __init__(self, where: Path | None = None, limit: int = LIMIT_BYTES) -> None:
         self.where: Final = where if where is not None else native_code()
@@ -57,6 +60,8 @@ class ObjectCache:
     def get(self, key: str) -> bytes | None:
         """Return the object stored under `key`, or None if there is none or its checksum is wrong."""
         path = self.where / key[:2] / key
+        if not is_usable(self.where.parent, self.where, path.parent):
+            return None
         try:
             blob = path.read_bytes()
         except OSError:
@@ -73,7 +78,9 @@ class ObjectCache:
         """Store `code` under `key`. Readers see the whole file or none."""
         try:
             parent = self.where / key[:2]
-            parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+            make_private(parent)
+            if not is_usable(self.where.parent, self.where, parent):
+                return
             handle, name = tempfile.mkstemp(dir=parent)
             with os.fdopen(handle, "wb") as file:
                 file.write(hashlib.sha256(code).digest() + code)

@@ -1,0 +1,51 @@
+"""Folders of the cache, which only their owner may write: the cache holds native code that this process loads.
+
+The module imports nothing of the project.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import stat
+import sys
+from functools import cache
+from pathlib import Path
+
+
+def make_private(folder: Path) -> None:
+    """Create a folder and its missing parents with mode 0700. Raises OSError."""
+    for one in reversed((folder, *folder.parents)):
+        if not one.exists():  # `mkdir(parents=True)` would give the parents the mode of the umask
+            one.mkdir(mode=0o700, exist_ok=True)
+
+
+def danger(folder: Path) -> str:
+    """Return why a folder must not be used as a cache: another user owns it or can write it. Empty if it is safe.
+
+    A missing folder is safe: `make_private` creates it. Windows has no such modes; there every folder is safe.
+    """
+    try:
+        status = folder.stat()
+    except OSError:
+        return ""
+    if os.name != "posix":
+        return ""
+    if status.st_uid != os.geteuid():
+        return f"it belongs to another user (uid {status.st_uid})"
+    if status.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
+        return f"other users can write it (mode {stat.S_IMODE(status.st_mode):04o})"
+    return ""
+
+
+def is_usable(*folders: Path) -> bool:
+    """Whether no folder is dangerous. A dangerous one is reported on standard error, once per process."""
+    return all(_is_usable(folder, danger(folder)) for folder in folders)
+
+
+@cache
+def _is_usable(folder: Path, why: str) -> bool:
+    if why and multiprocessing.parent_process() is None:  # the parent of a worker has reported it
+        print(f"openswarm: the cache {folder} is not used, because {why}; delete it, or set OPENSWARM_CACHE to a "
+              "folder of your own with mode 0700", file=sys.stderr, flush=True)  # fmt: skip
+    return not why
