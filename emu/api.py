@@ -215,7 +215,8 @@ def watch(machine: BareMachine, place: str | int, *, size: int = 2, cycles: int 
 
     end = None if cycles is None else machine.cycle + cycles
     while True:
-        stop: Stop = machine.run(cycles=None if end is None else end - machine.cycle, until=changed)
+        left = None if end is None else max(end - machine.cycle, 0)  # the last instruction may end after the limit
+        stop: Stop = machine.run(cycles=left, until=changed)
         yield from changes
         if stop.reason != "until":
             return

@@ -7,8 +7,10 @@ through `Machine.diagnose` and the `observer` argument.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from fractions import Fraction
+from numbers import Real
 from typing import Any, Final, Protocol
 
 from emu.chips.chip import Chip, Vector
@@ -127,7 +129,9 @@ class Machine(StateAccess):
         return self.peripherals.seconds(self.cycle)
 
     def cycles_in(self, seconds: float | Fraction) -> int:
-        """Whole cycles in `seconds` at the current clock setting, at least 1."""
+        """Whole cycles in `seconds` at the current clock setting, at least 1. Raises ValueError for a negative time."""
+        if not isinstance(seconds, Real) or not 0 <= seconds < math.inf:
+            raise ValueError(f"seconds = {seconds!r}: expected a number of 0 or more")
         return max(1, int(Fraction(seconds) * self.hz))
 
     @property
@@ -261,13 +265,15 @@ class Machine(StateAccess):
 
         `until` names a function or label, or is a program address: the run ends with reason "until" when the PC next
         reaches it. It may also be a condition, which is tested after every instruction and therefore slow. Raises
-        KeyError for an unknown name, ValueError if both limits are given.
+        KeyError for an unknown name, ValueError if both limits are given or a limit is negative or no number.
         """
         if seconds is not None:
             if cycles is not None:
                 raise ValueError("give cycles or seconds, not both")
-            cycles = self.cycles_in(seconds)
-        limit = NEVER if cycles is None else self.cycle + cycles
+            cycles = self.cycles_in(seconds) if seconds != 0 else 0
+        if cycles is not None and not (isinstance(cycles, Real) and 0 <= cycles < math.inf and cycles == int(cycles)):
+            raise ValueError(f"cycles = {cycles!r}: expected a whole number of 0 or more")
+        limit = NEVER if cycles is None else self.cycle + int(cycles)
         if until is None:
             return self.advance(limit) or self.stopped("limit")
         if not callable(until):

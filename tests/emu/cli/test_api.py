@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import pydoc
 
 import pytest
@@ -145,6 +146,30 @@ def test_times_are_seconds_or_cycles(load):
     assert machine.cycles_in(2) == 29_491_200
     with pytest.raises(ValueError, match="not both"):
         machine.run(cycles=1, seconds=1)
+
+
+@pytest.mark.parametrize(
+    "limit",
+    [{"seconds": -1}, {"seconds": math.nan}, {"seconds": math.inf}, {"seconds": "1"}, {"cycles": -5}, {"cycles": 2.5},
+     {"cycles": math.nan}, {"cycles": "10"}],
+)  # fmt: skip
+def test_limits_that_are_no_time_are_refused(load, limit):
+    """The message names the limit, and no instruction runs."""
+    machine = load(SPIN)
+    machine.run(cycles=100)
+    before = machine.cycle
+    with pytest.raises(ValueError, match=f"{next(iter(limit))} = .*: expected"):
+        machine.run(**limit)
+    assert machine.cycle == before
+
+
+def test_a_limit_of_zero_runs_no_instruction(load):
+    machine = load(SPIN)
+    for limit in ({"seconds": 0}, {"seconds": 0.0}, {"cycles": 0}):
+        assert machine.run(**limit).reason == "limit"
+        assert machine.cycle == 0
+    machine.run(seconds=1e-9)
+    assert machine.cycle > 0
 
 
 def test_the_default_board_is_that_of_the_command_line(load):
