@@ -25,7 +25,7 @@ from arena.trial.snapshot import state_view
 from arena.world.physics import World
 from emu.debug.history import History, position
 from emu.machine.machine import Machine
-from emu.machine.stops import Stop
+from emu.machine.stops import STILL_ASLEEP, Stop
 
 OVER: Final = "the trial is over"
 
@@ -64,23 +64,26 @@ class RobotHistory(History):
             stop = self._controlled.run_in_trial(lambda limit: machine.run_until(min(cycle, limit)))
         return stop
 
-    def _step_present(self) -> Stop | None:
-        """Step once in the present; a sleeping CPU sleeps on over the ends of quanta until an interrupt wakes it."""
-        machine, stepped = self.machine, False
+    def _step_present(self, limit: int) -> Stop | None:
+        """Step once in the present; a sleeping CPU sleeps on over the ends of quanta, at most to cycle `limit`."""
+        machine, stepped, last = self.machine, False, limit
         before = position(machine)
 
         def step(limit: int) -> Stop | None:
             nonlocal stepped
+            limit = min(limit, last)
             stop = machine.service_boundary(limit)
             entered = stepped = position(machine) != before
             if entered or stop is not None or machine.cycle >= limit:
                 return stop or machine.run_until(machine.cycle if entered else limit)
             stepped = True
-            return machine.step()
+            return machine.step(limit)
 
         stop = None
-        while stop is None and not stepped:
+        while stop is None and not stepped and machine.cycle < last:
             stop = self._controlled.run_in_trial(step)
+        if stop is None and not stepped:
+            return Stop("limit", machine.pc, machine.cycle, STILL_ASLEEP)
         return stop
 
     @contextmanager

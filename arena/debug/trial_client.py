@@ -12,7 +12,7 @@ from threading import Lock, Thread
 from typing import Any, Final
 
 from arena.campaign.campaign import FinishedTrial, Plan
-from arena.debug.server import serve
+from arena.debug.trial_process import serve
 from arena.scene.loader import FCY
 from arena.trial.checkpoints import EVERY_S, PATIENCE_S, Checkpoint, CheckpointPool, PipeClosedError, context, pipe
 from arena.trial.record import RecordError
@@ -65,7 +65,7 @@ class DebugSession:
             self._sent += 1
 
     def receive(self) -> tuple[Any, ...]:
-        """Process and return the next tuple from the trial's process (see `arena/debug/server.py`).
+        """Process and return the next tuple from the trial's process (see `arena/debug/trial_process.py`).
 
         Raises the exception that ended the trial, and RecordError if its process was killed."""
         try:

@@ -1,7 +1,7 @@
 """Process of a trial with a debugger on one of its robots; forks checkpoints to which the whole trial can go back.
 
-The process exchanges tagged tuples with the client's process (`arena/debug/session.py`) over a pipe. Protocol messages
-of the client arrive as they are.
+The process exchanges tagged tuples with the client's process (`arena/debug/trial_client.py`) over a pipe. Messages of
+the debug protocol pass unchanged.
 
 | sent | meaning |
 |---|---|

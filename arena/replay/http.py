@@ -6,7 +6,7 @@ from contextlib import suppress
 from http.server import BaseHTTPRequestHandler
 from typing import Any, Final
 
-from arena.trial.json_numbers import json_text
+from arena.trial.strict_json import json_text
 
 LOOPBACK: Final = "127.0.0.1"
 """The only address on which the servers listen."""

@@ -18,8 +18,8 @@ from arena.robots.controller import STRIP_COLUMNS, STRIP_PIXELS
 from arena.scene import dimensions
 from arena.scene.loader import Scene
 from arena.scene.schema import NAMED, Obstacle, Patch
-from arena.trial.json_numbers import script_json
 from arena.trial.record import Trial
+from arena.trial.strict_json import script_json
 from arena.world.physics import Poses, traits_of
 
 TEMPLATE: Final = Path(__file__).with_name("page.html")

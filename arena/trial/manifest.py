@@ -6,8 +6,8 @@ import json
 from pathlib import Path
 from typing import Any, Final
 
-from arena.trial.json_numbers import mismatch
 from arena.trial.record import FAULT, RecordError, write_json
+from arena.trial.strict_json import mismatch
 
 MANIFEST: Final = "manifest.json"
 _SHAPE: Final = {

@@ -20,7 +20,7 @@ from arena.experiments import Experiment, TrialSamples, UartLine, experiment_of,
 from arena.experiments.declaration import CURVE_COLUMN, SHAPE, declared_experiment
 from arena.metrics import MetricSeries
 from arena.scene.loader import FCY, Scene, scene_of
-from arena.trial.json_numbers import mismatch
+from arena.trial.strict_json import mismatch
 from arena.trial.trial import Rows
 from emu.host.files import atomic_file, is_standard, read_file
 

@@ -1,8 +1,10 @@
-"""Draws and counts how swarms that compute together get on, from runs of their scenes, for docs/swarm.md.
+"""Draw and summarise the convergence of cooperating swarms from the trials of their scenes, for docs/swarm.md.
 
-    python docs/tools/cooperation.py clocks results/clocks [more folders of the same] [--figure docs/figures/clocks.png]
+    python docs/tools/cooperation.py clocks results/clocks [more folders of the same] [--figure
+docs/figures/clocks.png]
 
-Per curve the median of the trials and the bands that hold 50 and 90 % of them; per trial when it settled.
+Each curve shows the median of the trials and the bands that contain 50 and 90 % of them. The summary states the time at
+which each trial reached agreement.
 """
 
 from __future__ import annotations
@@ -17,7 +19,7 @@ from arena.experiments import experiment_of
 from arena.trial.record import Trial, trials_in
 
 SETTLED = {"average": "agreed", "clocks": "agreed", "halt": "together", "leader": "elected", "search": "found"}
-"""The measure that is the time of agreement; nan: none at the end."""
+"""Measure of each experiment that is the time of agreement; it is nan if there is no agreement at the end."""
 LOG = {"apart"}
 
 

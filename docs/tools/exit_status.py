@@ -1,4 +1,4 @@
-"""Writes docs/exit-status.md from `emu/host/exit_status.py`: `python docs/tools/exit_status.py`."""
+"""Write docs/exit-status.md from `emu/host/exit_status.py`: `python docs/tools/exit_status.py`."""
 
 from __future__ import annotations
 

@@ -1,11 +1,11 @@
-"""Runs the sessions of docs/first-steps.md as a newcomer would: from the wheel, in an empty folder and HOME.
+"""Run the commands of docs/first-steps.md with the installed wheel, in an empty folder and HOME.
 
-`python docs/tools/first_steps.py` stores the present output behind each command of the page. `--check` writes nothing
-and ends with status 1 and a diff if the output differs. Numbers are not compared: baselines and bench gate them.
-`--keep FOLDER` works in FOLDER and keeps it.
+`python docs/tools/first_steps.py` replaces the output of each command on the page. With `--check` the page is not
+written; the exit status is 1, with a diff, if the output differs. Numbers are not compared, because baselines and bench
+verify them. `--keep FOLDER` runs the commands in FOLDER and keeps it.
 
-The wheel goes into an environment of its own that shares only the dependencies with the present one, so nothing is
-downloaded. Afterwards nothing may have been written beside the project and the cache.
+The wheel is installed in a virtual environment that shares only the dependencies with the current one, so nothing is
+downloaded. Files that a command writes outside its working folder and the cache are an error.
 """
 
 from __future__ import annotations
@@ -25,11 +25,12 @@ ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "docs" / "first-steps.md"
 NUMBERS = re.compile(r"0x[0-9a-f]+|\d[\d,.e+-]*| {2,}")
 EPOCH = "1767225600"
-"""2026-01-01, the date of all files in a wheel: the same sources give the same bytes whenever they are built."""
+"""2026-01-01 as Unix time: the date of all files in a wheel, which makes its bytes independent of the time of the
+build."""
 
 
 def built_wheel(folder: Path) -> Path:
-    """The wheel made from the sdist of the files git knows, outside the checkout."""
+    """Return a wheel that is built from an sdist of the tracked files, outside the checkout."""
     source = folder / "source"
     listed = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
     for name in filter(None, listed.split("\0")):
@@ -46,10 +47,11 @@ def built_wheel(folder: Path) -> Path:
 
 
 def installed(wheel: Path, folder: Path) -> dict[str, str]:
-    """The surroundings of a shell in which the wheel is installed and nothing else of this project."""
+    """Install the wheel in a new virtual environment and return the environment variables of a shell that uses it."""
     subprocess.run([sys.executable, "-m", "venv", "--without-pip", folder], check=True)
     python = folder / "bin" / "python"
-    alone = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}  # it may have this package
+    # PYTHONPATH may contain this checkout.
+    alone = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
     subprocess.run([sys.executable, "-m", "pip", "--python", python, "install", "--quiet", "--no-deps", "--no-index",
                     "--no-compile", "--disable-pip-version-check", wheel], check=True, env=alone)  # fmt: skip
     packages = next((folder / "lib").glob("python*")) / "site-packages"
@@ -64,8 +66,9 @@ def installed(wheel: Path, folder: Path) -> dict[str, str]:
     }
 
 
-def played(text: str, where: Path, environment: dict[str, str]) -> str:
-    """The page with the present output behind each command. Raises SystemExit for one that fails."""
+def run_sessions(text: str, where: Path, environment: dict[str, str]) -> str:
+    """Run the commands of a page and return the page with their current output. Raises SystemExit if a command
+    fails."""
 
     def session(found: re.Match[str]) -> str:
         nonlocal where
@@ -91,12 +94,12 @@ def played(text: str, where: Path, environment: dict[str, str]) -> str:
 
 
 def folder_of(environment: dict[str, str]) -> str:
-    """Where the environment's programs are."""
+    """Return the folder of the environment's programs."""
     return environment["PATH"].partition(":")[0]
 
 
 def listing(folder: Path) -> set[str]:
-    """Every file below a folder."""
+    """Return the relative paths of all files below a folder."""
     return {str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file()}
 
 
@@ -112,7 +115,7 @@ def main() -> int:
         before = listing(folder / "venv")
         (folder / "work").mkdir()
         old = PAGE.read_text(encoding="utf-8")
-        new = played(old, folder / "work", environment)
+        new = run_sessions(old, folder / "work", environment)
         strange = listing(folder / "venv") - before
         strange |= {
             name for name in listing(folder / "home") if not name.startswith((".cache/openswarm/", ".cache/matplotlib"))

@@ -1,6 +1,6 @@
-"""Draws the import graph of each package from the code: `python docs/tools/import_graph.py FOLDER`.
+"""Draw the import graph of each package from the code: `python docs/tools/import_graph.py FOLDER`.
 
-`docs/tools/site.py` calls `page` for the site. A circle of imports is an error, type imports included.
+`docs/tools/site.py` calls `page` for the site. A cycle of imports is an error; type imports count.
 """
 
 from __future__ import annotations
@@ -17,14 +17,14 @@ import grimp
 ROOT: Final = Path(__file__).resolve().parents[2]
 PACKAGES: Final = ("emu", "toolchain", "arena")
 STARTS: Final = frozenset({"__main__"})
-"""Modules that only call another one; they are not drawn."""
+"""Modules that are not drawn, because they only call another module."""
 
 Graph = dict[str, set[str]]
 
 LETTER, BOX, GAP, ROW, MARGIN = 7.2, 34, 14, 66, 16
-"""Of the picture, in pixels: width of a letter, height of a box, between boxes, from row to row, around."""
+"""Dimensions in pixels: width of a letter, height of a box, gap between boxes, distance of rows, outer margin."""
 WIDEST: Final = 1000
-"""Of a picture, in pixels: a longer row is broken."""
+"""Maximum width of a picture in pixels; a longer row is broken."""
 STYLE: Final = """
   .box { fill: #fff; stroke: #2b5c8a; stroke-width: 1.2 } .package { fill: #e6eff8 }
   text { font: 12px ui-monospace, Menlo, Consolas, monospace; fill: #14212e; text-anchor: middle }
@@ -46,7 +46,7 @@ def imports_of(package: str) -> Graph:
 
 
 def heights(graph: Graph) -> dict[str, int]:
-    """Return the longest path of each part down to a part without imports. Raises ValueError for a circle."""
+    """Return the longest path of each part down to a part without imports. Raises ValueError for a cycle."""
     found: dict[str, int] = {}
 
     def height(part: str, above: tuple[str, ...]) -> int:
@@ -75,7 +75,7 @@ def reduced(graph: Graph) -> Graph:
 
 
 def rows_of(graph: Graph) -> list[list[str]]:
-    """Return the rows of boxes from top to bottom; each box is near its importers, and wide rows are broken."""
+    """Return the rows of boxes from top to bottom. Each box is near its importers, and wide rows are broken."""
     level = heights(graph)
     users = {part: [one for one in sorted(graph) if part in graph[one]] for part in graph}
     place: dict[str, float] = {}
@@ -130,7 +130,7 @@ def drawn(package: str) -> str:
 
 
 def _box(package: str, part: str, left: float, top: float, width: float) -> str:
-    """Return the box of one part, with the first sentence of its docstring as tool tip."""
+    """Return the SVG box of one part, with the first sentence of its docstring as tool tip."""
     folder = ROOT / package / part
     count = len(list(folder.rglob("*.py"))) if folder.is_dir() else 0
     middle = left + width / 2
@@ -162,7 +162,7 @@ def page(folder: Path) -> str:
 
 
 def main() -> int:
-    """Write page and pictures into the folder that the command line names and return the exit status."""
+    """Write the page and its pictures into the folder on the command line, and return the exit status."""
     if len(sys.argv) != 2 or sys.argv[1].startswith("-"):
         print("usage: python docs/tools/import_graph.py FOLDER", file=sys.stderr)
         return 2

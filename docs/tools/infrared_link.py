@@ -1,10 +1,10 @@
-"""Measures messages between robots by infra-red, on the real firmware in the arena, for docs/swarm.md.
+"""Measure infrared messages between two robots with the real firmware in the arena, for docs/swarm.md.
 
     python docs/tools/infrared_link.py [--seconds 3] [--noise 2] [--jobs 2] [--data docs/results/infrared-link.csv]
 
-Two robots, of which both or one alone sends all the time, over distance and angle. The same arguments give the same
-figures. infrared_published.py draws the data beside what SwarmCom and libIrcom have published. Of more robots:
-infrared_swarm.py.
+One robot or both send continuously, at several distances and angles. The same arguments give the same figures.
+infrared_published.py draws the data together with the published values of SwarmCom and libIrcom. infrared_swarm.py
+measures larger swarms.
 """
 
 from __future__ import annotations
@@ -26,27 +26,29 @@ from arena.world.physics import Poses
 from emu.machine.machine import Machine
 
 DISTANCES = (12.0, 18.0, 22.0, 25.0, 26.5, 28.0, 30.0, 32.0, 35.0)
-"""cm between the middles; sensor 2 of one faces sensor 5 of the other."""
+"""Distances between the robots' centres in cm; sensor 2 of one robot faces sensor 5 of the other."""
 ANGLES = tuple(range(0, 360, 15))
-"""Degrees by which the listener is turned."""
+"""Angles in degrees by which the receiver is turned."""
 ANGLES_CM = 20.0
 FIELDS = ("senders", "cm", "turned_deg", "noise_counts", "seconds", "sent", "arrived", "damaged", "repaired_bits")
-"""Of the data file, one line per run."""
+"""Columns of the data file, which has one line per run."""
 SENDERS, ENTRY, WORDS, CODE = 30, "<5Hih", 9, 15
-"""Of firmware/apps/chatter: entries, one of them; words of a frame and their bits."""
+"""Constants of firmware/apps/chatter: number of entries in `senders`, format of an entry, words of a frame, bits of a
+coded word."""
 SILENT = 15
-"""Of firmware/apps/chatter: the selector of a robot that sends hardly anything, every 1.9 to 5.6 s."""
+"""Selector of firmware/apps/chatter for a robot that sends only every 1.9 to 5.6 s."""
 BEACONS = 1
-"""Frames without a message that each robot sends, before it begins to talk."""
+"""Number of frames without a message that each robot sends before its first message."""
 DAMAGED = 2
-"""Place in sys_infrared_statistics."""
+"""Index of the damaged frames in sys_infrared_statistics."""
 WARM_S = 0.5
-"""Before they begin to talk."""
+"""Seconds before the robots send their first message."""
 
 
 @dataclass(frozen=True)
 class Job:
-    """Robots `distance` cm apart, the second turned by `turned` degrees, and how many of both send."""
+    """Parameters of a run: number of senders (1 or 2), distance in cm, angle in degrees by which the second robot is
+    turned, seconds, and noise in counts."""
 
     senders: int
     distance: float
@@ -57,7 +59,8 @@ class Job:
 
 @dataclass(frozen=True)
 class Found:
-    """Messages sent, arrivals, frames that arrived damaged, bits repaired in those that arrived whole."""
+    """Result of a run: messages sent, messages received, frames received with damage, and bits repaired in intact
+    frames."""
 
     sent: int
     arrived: int
@@ -70,7 +73,7 @@ class Found:
 
     @property
     def bit_errors(self) -> float:
-        """Per bit of the frames that arrived."""
+        """Return the repaired bits per bit of the received frames."""
         return self.repaired / max(self.arrived * WORDS * CODE, 1)
 
 
@@ -112,12 +115,14 @@ def _bytes(machine: Machine, name: str, size: int) -> bytes:
 
 
 def facing(distance: float, turned: float = 0.0) -> Poses:
-    """Two robots: the first's right sensor towards the second's left one, the second turned by degrees."""
+    """Return poses of two robots: the first's right sensor faces the second's left one, and the second is turned by
+    degrees."""
     return Poses([(150.0, 150.0, math.pi / 2), (150.0 + distance, 150.0, math.pi / 2 + math.radians(turned))], [])
 
 
 def expected(distance: float, noise: float) -> tuple[float, float]:
-    """Bit error rate of three scans, weighted 1-2-1, against half the amplitude; share of frames that are left."""
+    """Return the expected bit error rate and the expected share of intact frames. A bit is decided by three scans,
+    weighted 1-2-1, against half the amplitude."""
     deviation = noise * math.sqrt(6) / 4
     wrong = math.erfc(amplitude(distance) / (2 * deviation) / math.sqrt(2)) / 2
     word = (1 - wrong) ** CODE + CODE * wrong * (1 - wrong) ** (CODE - 1)
@@ -125,7 +130,7 @@ def expected(distance: float, noise: float) -> tuple[float, float]:
 
 
 def keep(path: Path, jobs: list[Job], found: list[Found]) -> None:
-    """The data file: one line per run, under FIELDS."""
+    """Write the data file: one line per run, with the columns FIELDS."""
     with path.open("w", newline="", encoding="utf-8") as file:
         lines = csv.writer(file, lineterminator="\n")
         lines.writerow(FIELDS)
@@ -141,7 +146,7 @@ def main() -> None:
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--data", type=Path, help="CSV file to write, for infrared_published.py")
     chosen = parser.parse_args()
-    image_for("chatter")  # built once
+    image_for("chatter")  # build the image once, before the processes start
     runs = [(2, one, 0.0) for one in DISTANCES] + [(1, one, 0.0) for one in DISTANCES]
     runs += [(1, ANGLES_CM, float(one)) for one in ANGLES]
     jobs = [Job(*one, chosen.seconds, chosen.noise) for one in runs]

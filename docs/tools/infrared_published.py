@@ -1,10 +1,11 @@
-"""Draws our link by infra-red beside what SwarmCom and libIrcom have published, for docs/swarm.md.
+"""Draw our infrared link together with the published values of SwarmCom and libIrcom, for docs/swarm.md.
 
     python docs/tools/infrared_published.py [--figure docs/figures/infrared-link.png]
 
-What enters: docs/results/infrared-link.csv, which infrared_link.py measures, and docs/results/infrared-published.csv,
-every published number with its source. Their curves could not be had: of the article only the abstract was read, and
-libIrcom has published rates and a range, no errors. So numbers are drawn as numbers, dashed where UNVERIFIED.
+Input: docs/results/infrared-link.csv, which infrared_link.py measures, and docs/results/infrared-published.csv, which
+lists every published number with its source. Curves of the other systems are not available: only the abstract of the
+SwarmCom article was read, and libIrcom has published rates and a range but no errors. The figure therefore shows single
+numbers, dashed if UNVERIFIED.
 """
 
 from __future__ import annotations
@@ -19,17 +20,17 @@ from infrared_link import CODE, WORDS, Found, Job, expected
 HERE = Path(__file__).parents[1]
 MESSAGE_BITS = 64
 SCARCE = 3.0
-"""Errors in so many bits that were expected and not seen: their rate is below that with 95 %."""
+"""Rule of three: if n bits had no error, the error rate is below 3 / n with a confidence of 95 %."""
 RANGE_SHARE = 0.5
-"""Our range: where so many frames of a robot that is alone still arrive."""
+"""Share of the frames of a single sender that still arrive at our range."""
 GAPS_DEG = (116, 180, 244)
-"""Bearings between a robot's sensors, clockwise (swarmcom.md 4); UNVERIFIED by measurement."""
+"""Bearings of the gaps between a robot's sensors, in degrees clockwise (swarmcom.md 4); UNVERIFIED by measurement."""
 OURS, THEIRS, OTHERS = "tab:blue", "tab:red", "tab:green"
 UNSURE = (0, (4, 2))
 
 
 def measured(path: Path) -> list[tuple[Job, Found]]:
-    """The runs of a data file of infrared_link.py."""
+    """Return the runs in a data file of infrared_link.py."""
     with path.open(newline="", encoding="utf-8") as file:
         return [
             (
@@ -42,13 +43,13 @@ def measured(path: Path) -> list[tuple[Job, Found]]:
 
 
 def published(path: Path, system: str, what: str) -> list[float]:
-    """The values that a system has published of something."""
+    """Return the values that a system has published of a quantity."""
     with path.open(newline="", encoding="utf-8") as file:
         return [float(one["value"]) for one in csv.DictReader(file) if (one["system"], one["what"]) == (system, what)]
 
 
 def by_distance(runs: list[tuple[Job, Found]], senders: int) -> list[tuple[float, Job, Found]]:
-    """The first run of each distance with so many senders, which face each other."""
+    """Return the first run of each distance with this number of senders, for robots that face each other."""
     found = dict[float, tuple[float, Job, Found]]()
     for job, one in runs:
         if job.senders == senders and not job.turned:
@@ -57,12 +58,12 @@ def by_distance(runs: list[tuple[Job, Found]], senders: int) -> list[tuple[float
 
 
 def throughput(job: Job, one: Found) -> float:
-    """Payload that arrived, bit/s."""
+    """Return the received payload in bit/s."""
     return one.arrived * MESSAGE_BITS / job.seconds
 
 
 def our_range(runs: list[tuple[Job, Found]]) -> float:
-    """cm, on the line between the last distance at which RANGE_SHARE arrives and the next one."""
+    """Return our range in cm, interpolated between the last distance at which RANGE_SHARE arrives and the next one."""
     alone = by_distance(runs, 1)
     last = max(number for number, (_, _, one) in enumerate(alone) if one.share >= RANGE_SHARE)
     (near, _, here), (far, _, there) = alone[last], alone[last + 1]
@@ -100,7 +101,8 @@ def draw_throughput(axes: Any, runs: list[tuple[Job, Found]], data: Path, reach:
 
 
 def draw_angle(axes: Any, runs: list[tuple[Job, Found]]) -> None:
-    """By the bearing from which light comes: a robot that looks away by 90 degrees hears on its left."""
+    """Draw the share of received frames over the bearing of the light: a robot that is turned by 90 degrees receives
+    on its left."""
     cm = next(job.distance for job, _ in runs if job.turned)
     alone = [(job.turned, one.share) for job, one in runs if (job.senders, job.distance) == (1, cm)]
     found = sorted(((270 + turned) % 360, share) for turned, share in alone)

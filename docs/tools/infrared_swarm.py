@@ -1,9 +1,9 @@
-"""Measures messages by infra-red among 2, 10 and 30 robots, on the real firmware in the arena, for docs/swarm.md.
+"""Measure infrared messages among 2, 10 and 30 robots with the real firmware in the arena, for docs/swarm.md.
 
     python docs/tools/infrared_swarm.py [--seconds 5] [--noise 2] [--jobs 2]
 
-They stand on a triangular grid, 11 cm from one to the next, turned anyhow, and each sends a message of eight bytes
-every 0.75 to 2.25 s. Every run is made twice and ends with status 1 if both are not the same to the byte.
+The robots are on a triangular grid with a spacing of 11 cm and different headings. Each sends a message of eight bytes
+every 0.75 to 2.25 s. Every run is made twice; the exit status is 1 if the two results differ in any byte.
 """
 
 from __future__ import annotations
@@ -27,24 +27,28 @@ from emu.machine.machine import Machine
 SWARMS = (2, 10, 30)
 SPACING_CM = 11.0
 ROW = 6
-"""Robots beside each other, at most."""
+"""Maximum number of robots in a row of the grid."""
 REACH_COUNTS = 8.0
-"""Who gets so much of another's light on a sensor is in its reach: some 27 cm where sensor and emitter face each other,
-where of two robots alone most frames still arrive (docs/tools/infrared_link.py)."""
+"""Counts of light from another robot's emitters at which that robot is in reach. They correspond to about 27 cm between
+a sensor and an emitter that face each other. At this distance most frames of two undisturbed robots still arrive
+(docs/tools/infrared_link.py)."""
 SELECTOR = 6
-"""Of apps/chatter: a message every 0.75 to 2.25 s."""
+"""Selector of apps/chatter: a message every 0.75 to 2.25 s."""
 SENDERS, ENTRY = 30, "<5Hih"
-"""Of apps/chatter."""
+"""Constants of apps/chatter: number of entries in `senders` and format of an entry."""
 COLUMNS = ("robots", "in reach of each", "sent", "could arrive", "share delivered", "lost", "from beyond reach",
            "twice", "ms, mean", "most")  # fmt: skip
 WARM_S = 0.5
-"""Before they begin to talk."""
+"""Seconds before the robots send their first message."""
 
 
 @dataclass(frozen=True)
 class Found:
-    """Of a swarm: messages sent, how many could have arrived and have, of those in reach and of others; arrivals twice,
-    ms from queueing to the handler on average and at most, and a hash of all that the robots have counted."""
+    """Result for a swarm.
+
+    Robots, mean number of robots in reach, messages sent, possible receptions in reach, receptions in reach, receptions
+    from beyond, duplicates, mean and maximum ms from queueing to the handler, and a hash of all counters.
+    """
 
     robots: int
     reached: float
@@ -59,7 +63,7 @@ class Found:
 
 
 def grid(robots: int) -> Poses:
-    """Rows as long as each other, the next one shifted by half a place."""
+    """Return robots in rows of equal length; every second row is shifted by half the spacing."""
     columns = min(robots, ROW if robots > ROW * 2 else math.ceil(robots / 3) if robots > 2 else robots)
     places = [(number % columns, number // columns) for number in range(robots)]
     return Poses(
@@ -99,7 +103,7 @@ def measure(robots: int, seconds: float, noise: float) -> Found:
             if source not in numbers:
                 continue
             other = numbers.index(source)
-            late = (clocks[me] - clocks[other] + 0x8000) % 0x10000 - 0x8000  # how far its clock is behind
+            late = (clocks[me] - clocks[other] + 0x8000) % 0x10000 - 0x8000  # the clocks' difference in ms
             new = received - again
             arrived, beyond = (arrived + new, beyond) if other in near else (arrived, beyond + new)
             twice, total, most = twice + again, total + ms - received * late, max(most, longest - late)
@@ -110,7 +114,7 @@ def measure(robots: int, seconds: float, noise: float) -> Found:
 
 
 def word(machine: Machine, name: str) -> int:
-    """A variable of 16 bits, or the first of a structure."""
+    """Return a 16-bit variable, or the first one of a structure."""
     (value,) = struct.unpack("<H", _bytes(machine, name, 2))
     return int(value)
 
@@ -126,7 +130,7 @@ def main() -> int:
     parser.add_argument("--noise", type=float, default=2.0, metavar="COUNTS")
     parser.add_argument("--jobs", type=int, default=2)
     chosen = parser.parse_args()
-    image_for("chatter")  # built once
+    image_for("chatter")  # build the image once, before the processes start
     with ProcessPoolExecutor(chosen.jobs) as pool:
         runs = [pool.submit(measure, robots, chosen.seconds, chosen.noise) for robots in SWARMS for _ in range(2)]
     found = [one.result() for one in runs]

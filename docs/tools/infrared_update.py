@@ -1,9 +1,11 @@
-"""Measures how a swarm reprograms itself by infra-red, on the real firmware in the arena, for docs/swarm.md.
+"""Measure the time in which a swarm reprograms itself by infrared, with the real firmware in the arena, for
+docs/swarm.md.
 
     python docs/tools/infrared_update.py [--robots 10] [--rows 1] [--lost 0] [--most 120] [--noise 2]
 
-Robots of apps/spreading stand on the grid of infrared_swarm.py; the first has a program of so many rows. Printed is
-when each has it whole, and when it has restarted and calls it. Exit status 1 if one does not within `--most` seconds.
+Robots with apps/spreading are on the grid of infrared_swarm.py, and the first one has a program of `--rows` flash rows.
+The output is the time at which each robot has received the whole program, and the time at which it has restarted and
+calls it. The exit status is 1 if a robot does not call it within `--most` seconds.
 """
 
 from __future__ import annotations
@@ -32,7 +34,7 @@ from openswarm.flashing.program import ROWS, SLOT, program_of
 
 APP = "spreading"
 VERSION = 2
-"""The selector of the first robot, which is the version of its program."""
+"""Selector of the first robot, which is the version of its program."""
 LOOK_TICKS = 100
 FILLING = """\
     .section .filling, code, keep       ; words of which none is like another
@@ -45,7 +47,7 @@ FILLING = """\
 
 
 def built(folder: Path, rows: int) -> Path:
-    """The application's image, whose lamp has so many rows."""
+    """Build the application with a program of `rows` flash rows and return its image."""
     app, out = folder / APP, folder / "build"
     shutil.copytree(paths.firmware() / "apps" / APP, app)
     if rows > 1:
@@ -67,12 +69,13 @@ def built(folder: Path, rows: int) -> Path:
 
 
 def calls_it(machine: Machine) -> bool:
-    """Whether the program was put where it is called."""
+    """Whether the program is in the flash slot from which the kernel calls it."""
     return machine.program.word(SLOT.start) != ERASED
 
 
 def measure(image: Path, robots: int, lost: float, most: float, noise: float) -> tuple[list[float], list[float]]:
-    """Seconds after which each robot has the program, and calls it; in no order, less than all if some do not."""
+    """Return the seconds after which each robot has the program, and after which it calls it. Robots that do not are
+    missing in the unordered lists."""
     poses = grid(robots)
     values = {"robots__count": robots, "objects__count": 0, "infrared__noise_counts": noise,
               "infrared__lost_share": lost}  # fmt: skip

@@ -1,7 +1,7 @@
-"""Records a session of the debugger's prompt as docs/figures/swarm-session.svg.
+"""Record a session of the debugger's prompt as docs/figures/swarm-session.svg.
 
-Usage: `python docs/tools/prompt_sessions.py`. `arena debug` runs on a pseudo terminal, and each line is typed when the
-prompt appears. The terminal type is `dumb`, so that no line is drawn twice.
+Usage: `python docs/tools/prompt_sessions.py`. `arena debug` runs on a pseudo terminal, and each line is sent when the
+prompt appears. The terminal type is `dumb`, so that no line is redrawn.
 """
 
 from __future__ import annotations
@@ -25,18 +25,18 @@ LINES: Final = (
 )  # fmt: skip
 PROMPT: Final = "(emu) "
 WIDTH, ROW, LETTER, MARGIN = 120, 17, 7.25, 14
-"""Letters of a line; height of a line, width of a letter and the edge in pixels."""
+"""Characters per line; height of a line, width of a character and margin in pixels."""
 STYLE: Final = """
   rect { fill: #14212e; rx: 6 } text { font: 12px ui-monospace, Menlo, Consolas, monospace; white-space: pre }
   .typed { fill: #8fd18b } .said { fill: #d5e2ee }
 """
 
 
-def played() -> list[str]:
-    """What the terminal shows, line by line."""
+def run_session() -> list[str]:
+    """Run the session and return the lines that the terminal shows."""
     main, side = pty.openpty()
     mode = termios.tcgetattr(side)
-    mode[3] &= ~termios.ECHO  # the prompt shows what is typed
+    mode[3] &= ~termios.ECHO  # the prompt itself echoes its input
     termios.tcsetattr(side, termios.TCSANOW, mode)
     words = COMMAND.split()
     environment = os.environ | {"TERM": "dumb", "XDG_STATE_HOME": os.devnull, "PYTHONPATH": str(ROOT)}
@@ -58,7 +58,7 @@ def played() -> list[str]:
 
 
 def picture(lines: list[str]) -> str:
-    """The lines as SVG."""
+    """Return the lines as an SVG picture."""
     height, width = ROW * len(lines) + 2 * MARGIN, LETTER * max(map(len, lines)) + 2 * MARGIN
     rows = [
         f'<text class="{"typed" if line.startswith(("$", PROMPT)) else "said"}" x="{MARGIN}" '
@@ -70,4 +70,4 @@ def picture(lines: list[str]) -> str:
 
 
 if __name__ == "__main__":
-    FIGURE.write_text(picture(played()), encoding="utf-8")
+    FIGURE.write_text(picture(run_session()), encoding="utf-8")

@@ -1,8 +1,8 @@
-"""Builds the documentation site: `python docs/tools/site.py [--out build/site]`, with the extra `docs`.
+"""Build the documentation site: `python docs/tools/site.py [--out build/site]`, with the extra `docs`.
 
-The site holds every Markdown file of the repository at its own path, so links work on GitHub and here alike. Generated
-pages are added: the output of `--help`, the Python interfaces from docstrings, the import graph and the kernel's
-headers. MkDocs builds in strict mode: a warning is a failure.
+The site contains every Markdown file of the repository at its own path, so links work on GitHub and on the site.
+Generated pages are added: the output of `--help`, the Python interfaces from docstrings, the import graph and the
+kernel's headers. MkDocs builds in strict mode: a warning is a failure.
 """
 
 from __future__ import annotations
@@ -36,12 +36,12 @@ MODULES = (
     "arena.metrics",
     "arena.trial.record",
 )
-"""Public modules, documented from their docstrings."""
+"""Public modules whose reference pages are generated from docstrings."""
 LINK = re.compile(r"(\]\()([^)\s]+)(\))")
 
 
 def tracked() -> list[str]:
-    """Return every tracked file."""
+    """Return the paths of all tracked files."""
     listed = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
     return [name for name in listed.split("\0") if name and (ROOT / name).is_file()]
 
@@ -92,7 +92,7 @@ def help_of(program: str) -> str:
 
 
 def reference(source: Path) -> None:
-    """Write the generated pages."""
+    """Write the generated reference pages."""
     folder = source / "reference"
     folder.mkdir()
     for program in PROGRAMS:

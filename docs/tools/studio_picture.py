@@ -1,7 +1,7 @@
-"""Takes docs/figures/studio.png: `python docs/tools/studio_picture.py [--width 1280] [--out FILE]`; needs Chromium.
+"""Make the screenshot docs/figures/studio.png: `python docs/tools/studio_picture.py [--width 1280] [--out FILE]`.
 
-A studio runs `clustering` with the real firmware until robot 2 comes to a function after forty seconds; the picture is
-what a headless browser shows of it.
+Needs Chromium. A studio runs `clustering` with the real firmware for forty seconds and then until robot 2 reaches a
+breakpoint. A headless browser makes the picture.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ FIGURE: Final = Path(__file__).resolve().parents[1] / "figures" / "studio.png"
 WORDS: Final = ("clustering", "--seed", "3", "--minutes", "1")
 ROBOT, PLACE, QUANTA, HEIGHT = 2, "Sys_Send_Event", 40_000, 720
 SHOWN_MS: Final = 3000
-"""After which the page has asked for what is inside the robot; the browser's own time."""
+"""Virtual time of the browser in ms, in which the page fetches and shows the state of the robot."""
 
 
 def ready(studio: Studio) -> None:
-    """Forty seconds on, at a breakpoint."""
+    """Run the trial for forty seconds, then until the robot reaches the breakpoint."""
     studio.ask("step", QUANTA)
     while studio.ask("status")["state"] != "paused":
         time.sleep(0.1)
@@ -39,7 +39,7 @@ def ready(studio: Studio) -> None:
 
 
 def main() -> None:
-    """Take the picture."""
+    """Take the screenshot."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--width", type=int, default=1280, metavar="PX", help="of the window; default 1280")
     parser.add_argument("--out", type=Path, default=FIGURE, metavar="FILE")

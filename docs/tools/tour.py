@@ -1,8 +1,9 @@
-"""Runs the commands of docs/tour.md again and stores their present output on the page: `python docs/tools/tour.py`.
+"""Run the commands of docs/tour.md and store their current output on the page: `python docs/tools/tour.py`.
 
-A block that begins with `$ ` is a session: a shell in the checkout runs every line that begins so, and both output
-streams follow it. A line `...` stands for omitted lines; the page keeps as many lines before and after it as it had.
-With --check nothing is written, and the status is 1 if a command failed to run.
+A block that begins with `$ ` is a session. Each line that begins with `$ ` is a command; a shell runs it in the
+checkout, and its standard output and standard error follow it on the page. A line `...` stands for omitted lines; the page keeps
+as many lines before and after it as it had. With --check the page is not written, and the status is 1 if a command
+failed to run.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ CUT = "..."
 
 
 def output_of(command: str) -> list[str]:
-    """What a shell prints for `command`; paths of this checkout are shown relative to it."""
+    """Return the output of a shell command; paths in this checkout are made relative to it."""
     done = subprocess.run(
         ["bash", "-c", command], cwd=ROOT, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
         text=True, timeout=600, check=False,
@@ -28,8 +29,8 @@ def output_of(command: str) -> list[str]:
     return done.stdout.replace(f"{ROOT}/", "").splitlines()
 
 
-def shortened(new: list[str], old: list[str]) -> list[str]:
-    """`new`, cut where `old` was."""
+def shorten(new: list[str], old: list[str]) -> list[str]:
+    """Return the lines `new`, shortened at the position at which `old` was shortened."""
     if CUT not in old:
         return new
     before = old.index(CUT)
@@ -37,8 +38,8 @@ def shortened(new: list[str], old: list[str]) -> list[str]:
     return [*new[:before], CUT, *(new[len(new) - behind :] if behind else [])]
 
 
-def replayed(block: str) -> str:
-    """A session with fresh output."""
+def run_session(block: str) -> str:
+    """Run the commands of a session and return it with their current output."""
     parts: list[tuple[str, list[str]]] = []
     for line in block.splitlines():
         if line.startswith("$ "):
@@ -47,13 +48,13 @@ def replayed(block: str) -> str:
             parts[-1][1].append(line)
     lines: list[str] = []
     for command, old in parts:
-        lines += [command, *(line.rstrip() for line in shortened(output_of(command[2:]), old))]
+        lines += [command, *(line.rstrip() for line in shorten(output_of(command[2:]), old))]
     return "\n".join(lines) + "\n"
 
 
 def main() -> int:
     text = PAGE.read_text(encoding="utf-8")
-    fresh = re.sub(r"(?<=```\n)(\$ .*?)(?=```)", lambda found: replayed(found[1]), text, flags=re.DOTALL)
+    fresh = re.sub(r"(?<=```\n)(\$ .*?)(?=```)", lambda found: run_session(found[1]), text, flags=re.DOTALL)
     if "--check" not in sys.argv[1:]:
         PAGE.write_text(fresh, encoding="utf-8")
     return 0

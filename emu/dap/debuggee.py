@@ -19,6 +19,7 @@ from emu.dspic30f.isa.codec import decode_for_execution
 from emu.dspic30f.isa.facts import facts_of
 from emu.dspic30f.isa.flow import Call
 from emu.image.lines import SourceLine
+from emu.machine.stops import SLEEP_CYCLES, STILL_ASLEEP
 
 if TYPE_CHECKING:
     from emu.machine.machine import Machine
@@ -110,7 +111,7 @@ class Debuggee:
 
     def resume(self) -> StopEvent:
         """Run until a stop."""
-        event = self._step()
+        event = None if self.machine.is_asleep else self._step()
         if event is not None:
             return event
         return self._run() or StopEvent("pause")
@@ -155,13 +156,27 @@ class Debuggee:
         return StopEvent("pause", stop.detail or stop.reason, stop=stop)
 
     def _step(self) -> StopEvent | None:
-        """Run one instruction and ignore breakpoints."""
-        stop = self.history.step()
-        return (
-            self._event_of_stop(stop)
-            if stop is not None and not (stop.reason == "breakpoint" and not stop.detail)
-            else None
-        )
+        """Run one instruction and ignore breakpoints.
+
+        A sleeping CPU sleeps until an interrupt wakes it, at most for SLEEP_CYCLES or until the client requests a
+        pause.
+        """
+        limit = self.machine.cycle + SLEEP_CYCLES
+        while True:
+            stop = self._step_slice(limit)
+            if stop is None or stop.reason != "limit" or stop.detail != STILL_ASLEEP:
+                return self._event_of_step(stop)
+            if self.machine.cycle >= limit or self._is_stop_requested():
+                return StopEvent("pause", f"{STILL_ASLEEP}; `continue` runs on until one does", stop=stop)
+
+    def _step_slice(self, limit: int) -> Stop | None:
+        """Step once; a sleeping CPU sleeps at most for SLICE_CYCLES and to cycle `limit`."""
+        return self.history.step(min(self.machine.cycle + SLICE_CYCLES, limit))
+
+    def _event_of_step(self, stop: Stop | None) -> StopEvent | None:
+        """Return the event of a step's stop, None if the step is complete."""
+        is_complete = stop is None or (stop.reason == "breakpoint" and not stop.detail)
+        return None if stop is None or is_complete else self._event_of_stop(stop)
 
     def _run_with_data_breakpoints(self, data: list[Breakpoint]) -> StopEvent | None:
         """Single-step and check the data breakpoints."""
@@ -183,7 +198,10 @@ class Debuggee:
             for _ in range(POLL_STEPS):
                 touched.clear()
                 pc = machine.pc
-                event = self._step()
+                stop = self._step_slice(sys.maxsize if self._limit is None else self._limit)
+                if stop is not None and stop.detail == STILL_ASLEEP:
+                    return None
+                event = self._event_of_step(stop)
                 if event is not None:
                     return event
                 hit = [one for one in data if any(_is_hit(one, touch) for touch in touched)]

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 from emu.dap.breakpoint_requests import BreakpointRequests
 from emu.dap.breakpoints import Breakpoint
-from emu.dap.changes import StateChange
 from emu.dap.debuggee import Debuggee, StopEvent
+from emu.dap.state_changes import StateChange
 from emu.dap.state_requests import RequestRefusedError
 from emu.debug.history import History
 

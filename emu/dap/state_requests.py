@@ -7,11 +7,11 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from typing import Any, Final
 
-from emu.dap.changes import MemoryWrite, StateChange, assignment
 from emu.dap.completions import completions
 from emu.dap.console import console_command
 from emu.dap.debuggee import Debuggee, StopEvent
 from emu.dap.sfrs import sfr_groups
+from emu.dap.state_changes import MemoryWrite, StateChange, assignment
 from emu.dap.variables import ReferenceTable, Row, SourceFiles, disassembled
 from emu.debug.expressions.expression import evaluate
 from emu.debug.inspector import Value

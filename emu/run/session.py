@@ -13,8 +13,8 @@ from dataclasses import replace
 from types import FrameType
 from typing import TYPE_CHECKING, Any, Final, TextIO
 
-from emu.run.console import ConsolePort, wait_for_input
 from emu.run.input_log import TimestampedInput
+from emu.run.uart_backends import ConsolePort, wait_for_input
 
 if TYPE_CHECKING:
     from emu.machine.machine import Machine

@@ -146,7 +146,9 @@ def test_a_python_without_the_debugger_is_told(tmp_path: Path) -> None:
     """
     command = ["node", "-e", script, str(tmp_path), sys.executable]
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-    done = subprocess.run(command, cwd=FOLDER, env=environment, capture_output=True, text=True, timeout=HANG, check=True)
+    done = subprocess.run(
+        command, cwd=FOLDER, env=environment, capture_output=True, text=True, timeout=HANG, check=True
+    )
     good, other, none = json.loads(done.stdout)
     assert good == "starts"
     assert "does not start the debugger" in other

@@ -36,12 +36,12 @@ from typing import Final
 
 from emu.boards.epuck.hardware import EpuckHardware
 from emu.boards.epuck.remote import KEYS
-from emu.boards.epuck.waveform import WaveformError, parse_time, read_csv, read_vcd
+from emu.boards.epuck.stimulus_import import WaveformError, parse_time, read_csv, read_vcd
 from emu.boards.part import BoardPart
 from emu.boards.picture import read_picture
 from emu.host.files import read_file
 from emu.peripherals.pins import parse_pin
-from emu.peripherals.uart.rx_line import BREAK, FRAMING_ERROR, PARITY_ERROR
+from emu.peripherals.uart.rx_queue import BREAK, FRAMING_ERROR, PARITY_ERROR
 
 Action = Callable[[], None]
 
@@ -84,7 +84,7 @@ def decode_text(data: bytes, name: str) -> str:
 
 
 def _lines(path: Path) -> Iterator[tuple[int, Fraction, list[str]]]:
-    data = path.read_bytes()
+    data = read_file(path)
     return read_vcd(data) if path.suffix == ".vcd" else read_csv(decode_text(data, str(path)))
 
 

@@ -13,7 +13,7 @@ from typing import Final
 
 from emu.dspic30f.exceptions.faults import UninitialisedPointer
 from emu.dspic30f.exceptions.interrupts import Exceptions
-from emu.dspic30f.interpreter import arithmetic
+from emu.dspic30f.interpreter import int_ops
 from emu.dspic30f.isa.builder import Context, Side, Size
 from emu.dspic30f.isa.flow import Value
 from emu.dspic30f.state.data_space import W_END, DataSpace
@@ -98,10 +98,10 @@ class Interpreter:
     def select(self, c: Value, a: Value, b: Value) -> Value:
         return a if c else b
 
-    div_trunc = staticmethod(arithmetic.div_trunc)
-    rem_trunc = staticmethod(arithmetic.rem_trunc)
-    clz16 = staticmethod(arithmetic.clz16)
-    ctz16 = staticmethod(arithmetic.ctz16)
+    div_trunc = staticmethod(int_ops.div_trunc)
+    rem_trunc = staticmethod(int_ops.rem_trunc)
+    clz16 = staticmethod(int_ops.clz16)
+    ctz16 = staticmethod(int_ops.ctz16)
 
     def let(self, v: Value) -> Value:
         return v

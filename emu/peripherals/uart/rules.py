@@ -12,7 +12,7 @@ from itertools import pairwise
 from typing import Final
 
 from emu.peripherals.uart.frame import FRAMING_MARK, PARITY_MARK, data_of, first_stop, is_nine, judge, length, pack
-from emu.peripherals.uart.rx_line import CAPACITY, ERRORS, RxQueueOperands
+from emu.peripherals.uart.rx_queue import CAPACITY, ERRORS, RxQueueOperands
 from emu.system.events import NEVER
 from emu.system.rules import Cell, EventSlot, InterruptLine, Number, RuleBuilder, request
 

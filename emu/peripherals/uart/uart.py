@@ -38,7 +38,7 @@ from emu.peripherals.uart.rules import (
     send_next,
     shown,
 )
-from emu.peripherals.uart.rx_line import BREAK, FRAMING_ERROR, PARITY_ERROR, WAIT_FOR_RECEIVER, QueuedFrame, RxQueue
+from emu.peripherals.uart.rx_queue import BREAK, FRAMING_ERROR, PARITY_ERROR, WAIT_FOR_RECEIVER, QueuedFrame, RxQueue
 from emu.peripherals.uart.tx_pin import TxPin
 from emu.peripherals.wait import OutputMatcher, Pattern
 from emu.system.events import NEVER

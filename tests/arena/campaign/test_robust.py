@@ -22,8 +22,8 @@ from arena.replay.live_feed import Follower, LiveFile, live_path
 from arena.replay.page import page
 from arena.scene.loader import load_scene, scripted
 from arena.trial import versions
-from arena.trial.json_numbers import mismatch
 from arena.trial.record import RecordError, read_trial
+from arena.trial.strict_json import mismatch
 
 ROOT = Path(__file__).resolve().parents[3]
 SHORT = ["run", "clustering", "--brain", "scripted", "--minutes", "0.05", "--trials", "1", "--jobs", "1"]

@@ -16,10 +16,10 @@ import pytest
 
 from arena.campaign.campaign import Plan, trial_path
 from arena.cli import main
-from arena.debug import server
-from arena.debug import session as debugsession
+from arena.debug import trial_client as debugsession
+from arena.debug import trial_process
 from arena.debug.controlled_robot import OVER
-from arena.debug.session import DebugSession, RemoteServer
+from arena.debug.trial_client import DebugSession, RemoteServer
 from arena.replay.live_feed import live_path
 from arena.trial import checkpoints
 from emu.dap.wire import Message
@@ -180,7 +180,7 @@ def test_without_fork_the_world_goes_back_on_inspection(
     tmp_path: Path, image_of: Callable[[str], Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The robot goes back alone; the trial runs again when the world is inspected or the past changed."""
-    monkeypatch.setattr(server, "CAN_FORK", False)
+    monkeypatch.setattr(trial_process, "CAN_FORK", False)
     monkeypatch.setattr(debugsession, "context", partial(multiprocessing.get_context, "fork"))
     with session_of(plan_of(FEW, 7, image_of), tmp_path) as (session, debugger):
         first = debugger.to(3_000_000)

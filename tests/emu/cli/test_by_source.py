@@ -190,7 +190,8 @@ def test_an_assignment_changes_one_object_only(machine, expression, value):
      ("(int", "expected ')'"), ("(struct point)1", "no struct point"), ("(int)robot", "no int"),
      ("*(void *)0x800", "has no value"), ("sizeof robot.place.mode", "bit field has no size"),
      ("sizeof(void)", "size of void is not known"), ("(int)(1e308 * 10)", "inf is no whole"),
-     ("(int[0])1", "number of elements"), ("sizeof unknown", "nothing called 'unknown'"), ("(int)" * 99 + "1", "inside"),
+     ("(int[0])1", "number of elements"), ("sizeof unknown", "nothing called 'unknown'"),
+     ("(int)" * 99 + "1", "inside"),
      ("5", "names no object")],
 )  # fmt: skip
 def test_invalid_expressions_are_refused(machine, expression, words):

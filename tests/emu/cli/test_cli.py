@@ -25,7 +25,8 @@ def spin(tmp_path):
 
 
 def emu(*words, **options):
-    return subprocess.run([*EMU, *words], capture_output=True, text=True, cwd=ROOT, timeout=HANG, check=False, **options)
+    options = {"capture_output": True, "text": True, "cwd": ROOT, "timeout": HANG, "check": False} | options
+    return subprocess.run([*EMU, *words], **options)
 
 
 def test_the_version_is_that_of_the_package():

@@ -14,9 +14,9 @@ import emu
 import emu.api
 from emu.image.loader import parse_image
 from emu.run import session as sessions
-from emu.run.console import ConsolePort
 from emu.run.input_log import TimestampedInput
 from emu.run.session import Session
+from emu.run.uart_backends import ConsolePort
 
 ROOT = Path(__file__).resolve().parents[3]
 

@@ -17,7 +17,7 @@ from emu.image.loader import load_image
 from emu.inject.campaign import Campaign
 from emu.inject.faults import KINDS
 from emu.inject.trial import Trials
-from emu.peripherals.uart.rx_line import CAPACITY
+from emu.peripherals.uart.rx_queue import CAPACITY
 
 RECEIVER = """
     mov #0x8000, w0

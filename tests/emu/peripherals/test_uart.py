@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from emu.peripherals.uart.rx_line import BREAK, FRAMING_ERROR, PARITY_ERROR
+from emu.peripherals.uart.rx_queue import BREAK, FRAMING_ERROR, PARITY_ERROR
 
 UARTEN, LPBACK, WAKE, ABAUD = 0x8000, 0x40, 0x80, 0x20
 UTXISEL, UTXBRK, UTXEN, ADDEN, OERR = 0x8000, 0x800, 0x400, 0x20, 2

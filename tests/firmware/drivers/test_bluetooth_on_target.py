@@ -7,7 +7,7 @@ from collections.abc import Callable
 import pytest
 
 from emu.machine.machine import Machine
-from emu.peripherals.uart.rx_line import FRAMING_ERROR
+from emu.peripherals.uart.rx_queue import FRAMING_ERROR
 from tests.firmware.conftest import Build
 from tests.firmware.drivers.test_drivers_on_target import FCY, robot, steps
 

@@ -7,7 +7,7 @@ import pytest
 
 from emu.boards.epuck.stimulus import parse
 from emu.machine.machine import Machine
-from emu.peripherals.uart.rx_line import BREAK, FRAMING_ERROR
+from emu.peripherals.uart.rx_queue import BREAK, FRAMING_ERROR
 from tests.firmware.conftest import Build
 from tests.firmware.drivers.test_drivers_on_target import (
     FCY,
