@@ -1,7 +1,7 @@
 """Measure host time per simulated second in the arena by component, and the cost of a trial.
 
-In: nothing (the clustering firmware is built). Out: CPU seconds of this process; for one trial that two
-threads run, wall seconds, and the memory of all processes together (PSS: shared pages count once; Linux only).
+Input: none; the script builds the clustering firmware. Output: CPU seconds of this process. For one trial with two
+threads also wall seconds and the memory of all processes (PSS: shared pages are divided among their users; Linux only).
 """
 
 from __future__ import annotations
@@ -46,9 +46,11 @@ class Clock:
         return timed
 
 
-def measured(scene: Scene, make: Callable[[], list[Controller]], seconds: float, warm_up: float) -> dict[str, float]:
-    """CPU seconds per simulated second, and the shares of physics and rendering in it: of these by a second run in
-    which Python calls both, so that they come out rather too large."""
+def measure_components(
+    scene: Scene, make: Callable[[], list[Controller]], seconds: float, warm_up: float
+) -> dict[str, float]:
+    """Return CPU seconds per simulated second, and the shares of physics and rendering. A second run measures the
+    shares: there Python calls both, which makes them slightly too large."""
     cpu, _, _ = measure(scene, make(), seconds, warm_up, True)
     apart, physics, rendering = measure(scene, make(), seconds, warm_up, False)
     return {
@@ -64,13 +66,14 @@ def measured(scene: Scene, make: Callable[[], list[Controller]], seconds: float,
 def measure(
     scene: Scene, controllers: list[Controller], seconds: float, warm_up: float, is_native: bool
 ) -> tuple[float, float, float]:
-    """Return CPU seconds per simulated second: total, physics and rendering, unless compiled code calls them."""
+    """Return CPU seconds per simulated second: total, physics, rendering. If `is_native`, physics and rendering are
+    0, because compiled code calls both."""
     world = World(scene, 1)
     physics, rendering = Clock(), Clock()
     robots = [controller for controller in controllers if isinstance(controller, FirmwareController)]
     if not is_native:
         for robot in robots:
-            renderer = robot._renderer  # not `_pixels`, inside which other robots run
+            renderer = robot._renderer  # not `_pixels`: other robots run during its calls
             renderer.render_line = rendering.around(renderer.render_line)  # type: ignore[method-assign]
         world.step = physics.around(world.step)  # type: ignore[method-assign]
         world.run_quanta = physics.around(world.run_quanta)  # type: ignore[method-assign]
@@ -88,7 +91,7 @@ def measure(
         for controller in controllers:
             controller.reading(), controller.take_lines(), controller.take_led_changes()
     cpu, wall = time.process_time() - start[0], time.perf_counter() - start[1]
-    share = cpu / wall / seconds  # corrects clocks that also run while other processes have the CPU
+    share = cpu / wall / seconds  # scales wall-clock times to CPU time, because other processes share the CPU
     return cpu / seconds, physics.seconds * share, rendering.seconds * share
 
 
@@ -139,12 +142,13 @@ def main() -> int:
     quick = scripted(scene)
     image = image_for("openswarm")
     assert image is not None
-    together = with_two_threads(scene, image, options.seconds, 3.0)  # first, to measure its memory alone
+    # First, because objects of the other measurements would count as memory of this trial.
+    together = with_two_threads(scene, image, options.seconds, 3.0)
     results = {
-        "scripted": measured(
+        "scripted": measure_components(
             quick, lambda: [ScriptedController(quick, 1, i, "A") for i in robots], 20 * options.seconds, 5.0
         ),
-        "openswarm": measured(
+        "openswarm": measure_components(
             scene, lambda: [FirmwareController(scene, 1, i, image, 8) for i in robots], options.seconds, 3.0
         ),
     }

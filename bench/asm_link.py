@@ -24,7 +24,7 @@ MODULES, FUNCTIONS, GROUPS = 10, 40, 20
 
 
 def source(module: int, rng: random.Random) -> str:
-    """Return the source of a module of small functions with calls across modules and near variables."""
+    """Return the source of a module: small functions, calls to other modules, and near variables."""
     lines: list[str] = []
     for number in range(FUNCTIONS):
         name = f"_f{module}_{number}"

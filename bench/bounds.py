@@ -3,10 +3,10 @@
 `python -m bench.bounds [--image NAME] [--times X] [--json]`. Each call is bounded and measured in the same image. The
 bound assumes the maximum numbers of threads, events, subscriptions, messages and holes during the longest run of that
 call; --json lists them. A run is measured like a bound, from the first instruction to the one after the return. Runs
-with an interrupt or a thread switch do not count. A thread that ends itself continues in the scheduler. `end_thread`
-has a row for that end, and the row of `Sys_Kill_Process` is for other threads. "Plain" excludes paths on which memory
-is short, the reserve is swapped, a free run of a handler is pending, or the call is refused; the other column includes
-them.
+with an interrupt or a thread switch do not count. A thread that ends itself does not return but continues in the
+scheduler: `end_thread` has a row for that case, and the row of `Sys_Kill_Process` is for other threads. The column
+"plain" excludes paths on which memory is short, the reserve is swapped, a free run of a handler is pending, or the call
+is refused; the other column includes them.
 """
 
 from __future__ import annotations
@@ -32,17 +32,17 @@ from toolchain.elf.read import read_executable  # noqa: E402
 from toolchain.stack.annotations import Annotations, add_symbols  # noqa: E402
 
 APART = ("refuse_message", "os_fail", "os_refuse")
-"""Functions on paths that are not plain."""
+"""Functions that are called only on paths excluded from the column "plain"."""
 PLAIN = {"x": 0, "j": 0}
-"""Additional limits of plain paths: no hole outgrows the reserve, and no free run is pending."""
+"""Additional limits of plain paths: no hole is larger than the reserve, and no free run is pending."""
 ITSELF = "os_thread_returned"
-"""Path on which a thread ends itself and continues in the scheduler; it has its own row."""
+"""Function through which a thread ends itself and continues in the scheduler; this path has its own row."""
 TREE = ("find_hole", "remove_hole", "insert_hole")
-"""Functions that change the heap's tree; it is consistent before each of them."""
+"""Functions that change the heap's tree; the tree is consistent at the entry of each."""
 EXCHANGE = "swap_reserve"
 """Function that removes a hole only if it is larger than the reserve."""
 ALSO = ("_end_thread",)
-"""Functions timed in addition to the calls."""
+"""Functions that are timed although they are not kernel calls."""
 SWITCHES = ("hal_yield", "hal_block", "hal_abandon")
 TARGET = "../tests/firmware/target"
 IMAGES = {
@@ -50,16 +50,18 @@ IMAGES = {
     "points": (TARGET, 2.0, {"i": 0, "u": 100, "d": 24, "k": 192}),
     "crowded": (TARGET, 0.15, {"i": 0, "u": 60, "d": 2, "k": 400}),
 }
-"""Images: folder, seconds until they have made every call, and limits that are not measured (bounds --help)."""
+"""Folder of each image, seconds of simulated time until it has made every call, and limits that cannot be measured
+(bounds --help)."""
 ROUND, NEWEST, LAST = "numbers_are_round", "newest_pid", 0xFFFF
-"""An image with this function starts with the last PID in use, because starting so many threads would take too long."""
+"""An image with the function `numbers_are_round` starts with the last PID already assigned, because starting that
+many threads would take too long."""
 CALL_BYTES = 4
 
 
 @dataclass
 class Row:
-    """One call in one image: cycles of its longest run and of its bound; None if absent or always disturbed;
-    the most there was of everything during the longest."""
+    """One call in one image: cycles of its longest run and of its bound, and the maximum sizes of all structures
+    during that run. Values are None if the call is absent or always disturbed."""
 
     image: str
     call: str
@@ -73,7 +75,7 @@ class Row:
 
 @dataclass
 class Open:
-    """A call in progress: stack and clock at its start, whether it still counts, and whether it is plain."""
+    """A call in progress: stack pointer and cycle at its start, whether it counts, and whether its path is plain."""
 
     name: str
     top: int
@@ -88,7 +90,7 @@ def _cycles(longest: tuple[int, dict[str, int]]) -> int:
 
 
 def _merge(into: dict[str, int], found: dict[str, int]) -> None:
-    """Return the element-wise maximum."""
+    """Set each element of the first mapping to the maximum of both mappings."""
     for name, number in found.items():
         into[name] = max(into.get(name, 0), number)
 
@@ -100,7 +102,7 @@ class Meter:
     machine: emu.Machine
     structures: Structures
     worst: dict[tuple[str, bool], tuple[int, dict[str, int]]] = field(default_factory=dict)
-    """By call and plainness: cycles of the longest run, and the maxima during it."""
+    """Cycles of the longest run and the maxima during it, by (function, whether its path is plain)."""
     under_way: list[Open] = field(default_factory=list)
     watched: set[int] = field(default_factory=set)
 
@@ -112,7 +114,7 @@ class Meter:
             top = machine.w[15]
             back = machine.peek(top - 4) | (machine.peek(top - 2) & 0x7F) << 16
             self.under_way.append(Open(name, top - CALL_BYTES, machine.cycle))
-            self.look()
+            self.record_sizes()
             if back not in self.watched:
                 self.watched.add(back)
                 machine.hook_pc(back, self.leave)
@@ -121,11 +123,11 @@ class Meter:
         return hook
 
     def leave(self) -> bool:
-        """Handle the arrival at the return address of a call."""
+        """Record the duration of the calls that return to this address; hook of that address."""
         top = self.machine.w[15]
         ended = [one for one in self.under_way if one.top == top]
         if ended:
-            self.look()
+            self.record_sizes()
         for one in ended:
             self.under_way.remove(one)
             if one.counts:
@@ -134,9 +136,9 @@ class Meter:
                     self.worst[key] = cycles, one.most
         return False
 
-    def look(self) -> None:
+    def record_sizes(self) -> None:
         """Record the sizes of all structures for all calls in progress."""
-        found = self.structures.look()
+        found = self.structures.sizes()
         for one in self.under_way:
             _merge(one.most, found)
 
@@ -146,11 +148,12 @@ class Meter:
         return False
 
     def tree(self, exchange: range) -> Callable[[], bool]:
-        """Return the hook before a change of the tree, given the callers that are not plain."""
+        """Return the hook for an entry to a function that changes the tree. `exchange`: addresses of the function
+        that swaps the reserve; a call from there is not plain."""
 
         def hook() -> bool:
             top = self.machine.w[15]
-            self.look()
+            self.record_sizes()
             if (self.machine.peek(top - 4) & ~1) in exchange:
                 self.apart()
             return False

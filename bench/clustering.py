@@ -1,9 +1,9 @@
-"""Measure the speed of one robot with its camera running: `clustering` and `clustering-bare`, wheels turning.
+"""Measure the speed of one robot with its camera on and its wheels turning: `clustering` and `clustering-bare`.
 
     python bench/clustering.py [--seconds S] [--json]
 
-Prints simulated seconds per CPU second of this process under the JIT, after a warm-up of one simulated second that also
-compiles. The camera sees a red object, so every line of every frame is rendered and captured.
+Prints simulated seconds per CPU second of this process under the JIT. A warm-up of one simulated second compiles the
+native code. The camera sees a red object, so every line of every frame is rendered and captured.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ def measure(app: str, seconds: float) -> float:
     machine.load(image)
     machine.board.camera.show(np.full((480, 640, 3), RED, np.uint8))
     assert isinstance(machine.runner, JitEngine)
-    machine.runner.wait = True  # for native code, so that compilation is not measured
+    machine.runner.wait = True  # wait for native code, so that compilation is not measured
     fcy = machine.board.chip.fcy
     machine.run(cycles=int(WARM_UP * fcy))
     began = time.process_time()

@@ -1,8 +1,8 @@
-"""Measure code quality: words and cycles of reference functions, next to XC16's where they are known.
+"""Measure code quality: words and cycles of reference functions, and XC16's words where they are known.
 
-`python -m bench.codegen [--level=-Os] [--json]`. Words are those of the function alone, its return included, without
-the run-time helpers it calls; cycles are from entry to return of one call on the emulator, helpers included.
-XC16's words are from abi-elf.md §8.2 (verified output of v1.25, -Os).
+`python -m bench.codegen [--level=-Os] [--json]`. Words are those of the function with its return, without the run-time
+helpers that it calls. Cycles are from entry to return of one call on the emulator, helpers included. XC16's words are
+from abi-elf.md §8.2 (verified output of v1.25, -Os).
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ XC16_OS_WORDS = {
     "sar1": 3, "lt32": 8, "ltu32": 8, "eq32": 8, "shlv32": 6, "mul16": 2, "mulss": 2, "muluu": 2, "mul32": 10,
     "div16": 4, "mod16": 5, "divu10": 4, "div32": 1, "shl4": 6, "shr8": 5,
 }  # fmt: skip
-"""abi-elf.md §8.2, both tables, column -Os. mul32 there is 4 words and a call of ___mulsi3; its 6 words (§2.8) are
-added, because ours is complete in itself. div32 calls a helper on both sides, not counted."""
+"""Words of XC16's functions: abi-elf.md §8.2, both tables, column -Os. mul32 is 4 words plus the 6 words of ___mulsi3
+(§2.8), because our mul32 calls no helper. div32 calls a helper under both compilers, which is not counted."""
 
 GOAL_TOTAL, GOAL_SINGLE = 0.85, 1.0
 
@@ -84,7 +84,7 @@ def cycles(level: str, folder: Path, names: list[str]) -> dict[str, int]:
 
 
 def _returned(machine: emu.Machine, depth: int) -> Callable[[], bool]:
-    """Return whether the stack pointer has its value from before the call."""
+    """Whether the stack pointer has its value from before the call."""
     return lambda: machine.w[15] == depth
 
 
@@ -98,7 +98,7 @@ def measure(level: str) -> list[Figure]:
 
 
 def main() -> int:
-    """Print the table; return exit status 0."""
+    """Print the table and return exit status 0."""
     parser = argparse.ArgumentParser(description=__doc__, epilog="example: python -m bench.codegen --level=-O2")
     parser.add_argument("--level", default="-Os")
     parser.add_argument("--json", action="store_true")

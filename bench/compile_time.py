@@ -1,4 +1,4 @@
-"""Measure compile time: 3,000 lines of C to ELF, again after a change of one file, and the driver's start.
+"""Measure compile time: 3,000 lines of C to ELF, the rebuild after a change of one file, and the driver's start.
 
 `python -m bench.compile_time [--lines N] [--json]`. Host seconds; goals: 15 s, 5 s, 1 s on 2 cores.
 """
@@ -90,7 +90,7 @@ def timed(*words: str) -> float:
 
 
 def main() -> int:
-    """Print the figures; return exit status 0."""
+    """Print the figures and return exit status 0."""
     parser = argparse.ArgumentParser(description=__doc__, epilog="example: python -m bench.compile_time --lines 3000")
     parser.add_argument("--lines", type=int, default=3000)
     parser.add_argument("--json", action="store_true")

@@ -2,8 +2,8 @@
 
     python bench/devices.py [--seconds S] [--repeat N] [--only NAME] [--json]
 
-Each figure is the median of N runs and counts host CPU time; beside it, how often a simulated second leaves native
-code: instructions that the sequencer makes, and returns for any reason. The programs are in c/devices.c.
+Each figure is the median of N runs of host CPU time. Two counts per simulated second are printed beside it:
+instructions that the interpreter executes, and exits from native code for any reason. The programs are in c/devices.c.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from emu.dspic30f.jit.engine import JitEngine  # noqa: E402
 SOURCE = Path(__file__).parent / "c" / "devices.c"
 MIPS = 14_745_600  # engines.md §4.2
 WARM_UP = 5_000_000
-"""Simulated time in Tcy."""
+"""Duration of the warm-up in Tcy of simulated time."""
 BYTES = 11_520
 """Bytes per second that UART2 receives at 115200 baud."""
 PROGRAMS = {

@@ -1,11 +1,11 @@
-"""Measure the speed of native code: C that computes, busy threads, an interrupt storm; next to simavr and QEMU.
+"""Measure the speed of native code: C that computes, busy threads, an interrupt storm; compared with simavr and QEMU.
 
     python bench/jit.py [--seconds S] [--repeat N] [--json]
 
 Each figure is the median of N paired runs and counts host CPU time, as a multiple of real time (14.7456 MIPS). The
 interpreter runs the same image for a shorter time. simavr and qemu-system-avr run the same C source, compiled by
-avr-gcc -Os for an ATmega2560; the comparison is rounds of that source per host second. Absent tools are named and
-left out. Compile time is reported apart: cold fills an empty cache, warm finds it.
+avr-gcc -Os for an ATmega2560; the comparison is rounds of that source per host second. Missing tools are named and
+omitted. Compile time is reported separately, with an empty cache (cold) and with a full one (warm).
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ HERE = Path(__file__).parent
 MIPS = 14_745_600  # engines.md §4.2
 WARM_UP = 100_000_000
 INTERPRETER_SHARE = 100
-"""Factor by which the interpreter runs a shorter time."""
+"""Ratio of the simulated times of native code and the interpreter."""
 
 
 def build(source: Path, output: Path, *flags: str) -> None:
@@ -53,7 +53,7 @@ def build_kernel(output: Path) -> None:
 
 
 def machine(image: Path, engine: str) -> emu.Machine:
-    """Return a machine after its start-up, with complete native code."""
+    """Return a machine that has finished its start-up and whose native code is complete."""
     loaded = emu.load(image, engine=engine)
     if isinstance(loaded.runner, JitEngine):
         loaded.runner.wait = True
@@ -62,7 +62,7 @@ def machine(image: Path, engine: str) -> emu.Machine:
 
 
 def times_real(target: emu.Machine, cycles: int) -> float:
-    """Return the multiple of real time at which `target` runs `cycles`."""
+    """Run until cycle `target` and return the speed over `cycles` as a multiple of real time."""
     start = time.process_time()
     target.run(cycles=cycles)
     return cycles / MIPS / (time.process_time() - start)
@@ -81,7 +81,8 @@ def measure(image: Path, cycles: int, repeat: int) -> dict[str, float]:
 
 
 def two_at_once(image: Path, cycles: int) -> float:
-    """Return the wall-time speed of two machines in two threads relative to one; ideal on two idle cores: 2."""
+    """Return the speed of two machines in two threads relative to one, by wall time; the ideal on two idle cores is
+    2."""
     machines = [machine(image, "jit") for _ in range(2)]
     start = time.perf_counter()
     machines[0].run(cycles=cycles)
@@ -109,7 +110,7 @@ def compile_seconds(image: Path) -> tuple[float, float]:
 
 
 def cycles_per_round(image: Path, rounds: int) -> float:
-    """Return Tcy of one round of compute.c, from a whole run."""
+    """Return Tcy of one round of compute.c, measured over a whole run."""
     return emu.load(image).run().cycle / rounds
 
 
@@ -133,7 +134,7 @@ def avr_image(folder: Path, rounds: int) -> Path:
 
 
 def until_done(command: list[str]) -> float:
-    """Return host seconds until the emulator prints the D of compute_avr.c."""
+    """Return host seconds until the emulator prints the `D` of compute_avr.c."""
     start = time.perf_counter()
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL)
     assert process.stdout is not None
@@ -154,7 +155,8 @@ EMULATORS = {
 
 
 def others(folder: Path, repeat: int) -> tuple[dict[str, float], list[str]]:
-    """Return rounds of compute.c per host second in other emulators without start-up, and notes on absent ones."""
+    """Return rounds of compute.c per host second in other emulators, without their start-up, and notes on missing
+    ones."""
     found: dict[str, float] = {}
     notes = []
     for name, command in EMULATORS.items():

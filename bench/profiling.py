@@ -2,11 +2,11 @@
 
     python bench/profiling.py [--seconds S] [--repeat N] [--only WORD] [--json]
 
-Host CPU time of each kind is the least of N runs, which take turns; native code of both kinds is complete before it is
-timed. Images: computing C, calls and little else, and interrupts every 100 and every 10 us (bench/c), each at -Os and
-at -O0; the kernel with busy threads (firmware/apps/compute), the paper's Listing 1, and the clustering robot with its
-camera on. With --timed, what happened is also kept in order, as for --speedscope and --perfetto. With --cold each run
-is a whole process.
+The figure of each kind of run is the minimum host CPU time of N runs; the kinds alternate. All native code is compiled
+before the timing starts. Images: computing C, many calls, and interrupts every 100 and every 10 us (bench/c), each at
+-Os and at -O0; the kernel with busy threads (firmware/apps/compute), the paper's Listing 1, and the clustering robot
+with its camera on. --timed also records events in order, as for --speedscope and --perfetto. With --cold each run is a
+process of its own.
 """
 
 from __future__ import annotations
@@ -43,9 +43,9 @@ SOURCES = {
     "interrupt every 10 us": ("storm.c", "-DPERIOD=146"),
 }
 FIRMWARE = {"kernel with busy threads": ("compute", 0), "Listing 1": ("listing1", 0), "clustering": ("clustering", 8)}
-"""Applications and their selector positions."""
+"""Application and selector position of each firmware image."""
 RED = (80, 0, 0)
-"""Picture in front of the camera, with the same work for every line of every frame."""
+"""Colour before the camera; it causes the same work for every line of every frame."""
 
 
 def images(folder: Path, only: str) -> dict[str, Path]:
@@ -67,7 +67,7 @@ def images(folder: Path, only: str) -> dict[str, Path]:
 
 
 def spent(image: Path, name: str, cycles: int, how: str) -> float:
-    """Return host seconds of `cycles` after as many untimed ones; kind: "plain", "counted" or "timed"."""
+    """Return host seconds of `cycles`, after a warm-up of the same length; kind: "plain", "counted" or "timed"."""
     _, selector = FIRMWARE.get(name, ("", 0))
     machine = emu.load(image, board=partial(Epuck, selector=selector))
     machine.board.camera.show(np.full((480, 640, 3), RED, np.uint8))

@@ -1,8 +1,8 @@
 """Count the functions of kernel, drivers and run-time library that are proved equivalent to their IR.
 
-`python -m bench.proofs [--part NAME] [--level -Os] [--jobs N] [--json]`. Every function of every C file of a part, each
-file compiled by itself: proved, refuted, undecided, those without loops and those with. Exits 1 if one is refuted.
-Ctrl-C ends it with the table of the files that are done.
+`python -m bench.proofs [--part NAME] [--level -Os] [--jobs N] [--json]`. Every C file of a part is compiled separately.
+The table counts its functions: proved, refuted, undecided, without loops, with loops. Exit status 1 if one is refuted.
+Ctrl-C prints the table of the files that are done and exits.
 """
 
 from __future__ import annotations
@@ -33,13 +33,13 @@ KINDS = ("proved", "refuted", "undecided")
 
 
 def files() -> dict[str, list[Path]]:
-    """Source files by part."""
+    """Return the source files of each part."""
     found = {part: sorted(f for pattern in patterns for f in SYSTEM.glob(pattern)) for part, patterns in PARTS.items()}
     return found | {"library": sorted(LIBRARY.glob("*.c"))}
 
 
 def options_of(part: str, level: str) -> list[str]:
-    """Compiler options by part."""
+    """Return the compiler options of each part."""
     if part == "library":
         return [level, "-w", "-std=c11", "-ffreestanding"]
     folders = [SYSTEM / name for name in ("include", "hal", "kernel", "io", "port/dspic30f", "board/epuck")]
@@ -47,7 +47,7 @@ def options_of(part: str, level: str) -> list[str]:
     return [level, "-w", "-std=gnu99", *(f"-I{folder}" for folder in folders)]
 
 
-def look(level: str, work: tuple[str, Path]) -> tuple[str, str, list[dict[str, Any]]]:
+def prove_file(level: str, work: tuple[str, Path]) -> tuple[str, str, list[dict[str, Any]]]:
     """Return part, file and verdicts of one file; no verdicts if it cannot be compiled separately."""
     from toolchain.errors import ToolError
     from toolchain.frontend.clang import CompileError
@@ -73,7 +73,7 @@ def main() -> int:
     work = [(part, file) for part, list_ in files().items() if options.part in (None, part) for file in list_]
     rows: list[dict[str, Any]] = []
     with ProcessPoolExecutor(options.jobs) as pool:
-        results = pool.map(partial(look, options.level), work)
+        results = pool.map(partial(prove_file, options.level), work)
         try:
             for number, (part, name, found) in enumerate(results, 1):
                 rows += [{"part": part, "file": name, **verdict} for verdict in found]

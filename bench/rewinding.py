@@ -2,10 +2,10 @@
 
     python bench/rewinding.py [--minutes M] [--json]
 
-Robot 2 of `clustering` (five robots with cameras) is debugged for M simulated minutes (default 2). Then these are
-timed, in wall-clock seconds: the first step back with the whole world and the fastest of the ten after it; back to the
-previous breakpoint; back by a minute; forward again, as a plain trial. Memory in MB is measured after half the time and
-at the end: the trial's process with all checkpoints, shared pages counted once, and the mean of one checkpoint.
+Robot 2 of `clustering` (five robots with cameras) is debugged for M simulated minutes (default 2). Wall-clock seconds
+are measured for: the first step back with the whole world and the fastest of the next ten; a run back to the previous
+breakpoint; a rewind by a minute; and the same minute forward in a plain trial. Memory in MB is measured after half the
+time and at the end: the trial's process with all checkpoints, shared pages counted once, and the mean per checkpoint.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ sys.path.insert(0, str(ROOT))
 
 from arena.campaign.campaign import Plan  # noqa: E402
 from arena.commands.run import image_for  # noqa: E402
-from arena.debug.session import DebugSession, RemoteServer  # noqa: E402
+from arena.debug.trial_client import DebugSession, RemoteServer  # noqa: E402
 from arena.scene.loader import FCY, load_scene  # noqa: E402
 from emu.prompt.client import Client  # noqa: E402
 
@@ -39,7 +39,7 @@ def timed(client: Client, request: str, **arguments: Any) -> float:
 
 
 def memory_mb(pid: int, *kinds: str) -> float:
-    """Return the memory of a process in MB, from Linux."""
+    """Return the memory of a process in MB, as reported by Linux."""
     rows = Path(f"/proc/{pid}/smaps_rollup").read_text().splitlines()
     return sum(int(row.split()[1]) for row in rows if row.startswith(kinds)) / 1024
 
@@ -50,8 +50,8 @@ def children(pid: int) -> list[int]:
     return [int(one) for one in found if Path(f"/proc/{one}/maps").read_text()]
 
 
-def measured(minutes: float) -> dict[str, float]:
-    """Return all figures by their label."""
+def measure(minutes: float) -> dict[str, float]:
+    """Return all figures by label."""
     scene = load_scene("clustering").with_values(start__selector=8)
     plan = Plan(scene, "openswarm", "A", image_for("openswarm"), 1, 60 * minutes + 10, 1)
     found: dict[str, float] = {}
@@ -93,7 +93,7 @@ def main() -> int:
     parser.add_argument("--minutes", type=float, default=2, help="simulated time, at least 1 (default 2)")
     parser.add_argument("--json", action="store_true", help="print one JSON object")
     options = parser.parse_args()
-    found = measured(max(options.minutes, 1.0))
+    found = measure(max(options.minutes, 1.0))
     if options.json:
         print(json.dumps(found))
     else:

@@ -2,10 +2,10 @@
 
     python bench/rtos.py [--freertos DIR] [--page docs/table2.md] [--json]
 
-FreeRTOS is built from a checkout that the user has (github.com/FreeRTOS/FreeRTOS-Kernel): the official dsPIC port with
-our compiler at -Os, measured on our emulator. Without --freertos its column is what was measured last (bench/rtos.json,
-with the version). simavr counts cycles of the Kilobot, QEMU instructions of the e-puck2; what a missing Debian package
-keeps from being measured is taken from there as well, and named.
+FreeRTOS is built from the user's checkout of github.com/FreeRTOS/FreeRTOS-Kernel: the official dsPIC port, compiled
+with our compiler at -Os and measured on our emulator. Without --freertos, its column shows the last measurement
+(bench/rtos.json, which names the version). simavr counts cycles of the Kilobot, QEMU instructions of the e-puck2. If a
+Debian package is missing, the last measurement is shown as well, and the package is named.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ TICK, YIELD, QUEUE = 1, 2, 3
 STACK_BYTES = 256
 """Stack size of a task in main.c."""
 SETTLING = 8
-"""Measurement windows skipped at the start."""
+"""Number of measurement windows that are skipped at the start."""
 
 ROWS = (
     ("flash of the kernel, all calls linked", "flash"),
@@ -150,7 +150,7 @@ def on_port(robot: str, frame: int) -> dict[str, Any]:
 
 
 def version(checkout: Path) -> str:
-    """Return the checkout's own version, and its commit if git has it."""
+    """Return the version that the checkout states, and its commit if git knows it."""
     header = (checkout / "include" / "task.h").read_text(encoding="utf-8")
     said = next(
         (line.split('"')[1] for line in header.splitlines() if "tskKERNEL_VERSION_NUMBER" in line and '"' in line), "?"
@@ -230,7 +230,8 @@ def on_freertos(checkout: Path, folder: Path) -> dict[str, Any]:
 
 
 def collect(checkout: Path | None) -> dict[str, Any]:
-    """Measure what is installed and take the rest from the last measurement; "kept" names those columns."""
+    """Measure the systems whose tools are installed and take the others from the last measurement; "kept" names those
+    columns."""
     before = json.loads(KEPT.read_text()) if KEPT.exists() else {}
     cells: dict[str, Any] = {}
     kept = []

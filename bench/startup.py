@@ -2,7 +2,7 @@
 
 Host seconds from process start to the first UART byte are measured for a small image and for the kernel's Listing 1,
 whose first line appears at 250 ms: with cached objects of earlier runs (engines.md §9: 0.8 s) and without (4 s). Host
-time per `Machine.run_until` is that of one more cycle on a sleeping machine (engines.md §4.3: 1 µs).
+time per `Machine.run_until` is measured for one cycle of a sleeping machine (engines.md §4.3: 1 µs).
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ def first_byte(engine: str, image: Path = IMAGE, cache: str | None = None) -> fl
 
 
 def cold(engine: str, image: Path) -> float:
-    """Return the same with an empty cache."""
+    """Return seconds from process start to the first byte, with an empty cache."""
     with tempfile.TemporaryDirectory() as empty:
         return first_byte(engine, image, empty)
 

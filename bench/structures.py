@@ -1,4 +1,4 @@
-"""Lengths of kernel lists and depth of the heap's tree in a running machine: the limits for bounds."""
+"""Measure lengths of kernel lists and the depth of the heap's tree in a running machine, as limits for bounds."""
 
 from __future__ import annotations
 
@@ -10,25 +10,27 @@ import emu
 
 BUCKETS = 8
 MOST = 200
-"""Maximum length of a list; a longer one counts as inconsistent."""
+"""Maximum length of a list; a longer list is considered inconsistent."""
 NEXT_EVENT, SUBSCRIBERS, OWNER, NEXT_THREAD, SIDES, HOLE_SIZE = 2, 4, 6, 14, (0, 2), 4
-"""Offsets of links in event, thread and hole, of a subscription's PID and of a hole's size (kernel.h, memory.c)."""
+"""Offsets of the links in an event, thread and hole, of the PID in a subscription, and of a hole's size (kernel.h,
+memory.c)."""
 HEAP_STEP = 2
 """Granularity of the heap in bytes (kernel.h)."""
 
 
 @dataclass
 class Structures:
-    """Sizes of the kernel's structures when `look` is called.
+    """Sizes of the kernel's structures.
 
-    n threads, m events, b events of one bucket, s subscriptions of one event, o of one thread, t of all, q queued
-    messages, h holes on a path of the tree (bounds --help).
+    n: threads; m: events; b: events of one bucket; s: subscriptions of one event; o: subscriptions of one thread;
+    t: all subscriptions; q: queued messages; h: holes on a path of the tree (bounds --help).
     """
 
     machine: emu.Machine
 
-    def look(self) -> dict[str, int]:
-        """Return all sizes; nothing if a list is being changed, because an ISR may make the call at that point."""
+    def sizes(self) -> dict[str, int]:
+        """Return all sizes, or an empty dictionary if a list is being changed, because an ISR may make the measured
+        call during a change."""
         try:
             return self._found()
         except _Torn:
@@ -63,7 +65,7 @@ class Structures:
             raise _Torn from None
 
     def _list(self, link: int, step: int) -> Iterator[int]:
-        """Yield the addresses of a list's members, from the word that points to the first one."""
+        """Yield the addresses of a list's members. `word`: address of the pointer to the first member."""
         for _ in range(MOST):
             member = self._word(link)
             if not member:
@@ -90,4 +92,4 @@ class Structures:
 
 
 class _Torn(Exception):
-    """A structure is being changed."""
+    """A structure is being changed, so its links are inconsistent."""

@@ -1,4 +1,4 @@
-/* Little but calls: recursion, calls through pointers, leaves of a few instructions, a deep stack. */
+/* Benchmark of calls: recursion, calls through pointers, leaf functions of a few instructions, a deep stack. */
 #include <stdint.h>
 
 typedef uint16_t (*step)(uint16_t);

@@ -1,5 +1,5 @@
-/* compute.c on an ATmega2560: says `D` on the first UART when it is done, because emulators end differently.
- * simavr shows a line when it is complete. */
+/* compute.c on an ATmega2560: prints `D` on the first UART when it is done, because each emulator ends in its own
+ * way. simavr prints only complete lines. */
 #include <avr/interrupt.h>
 #include <avr/io.h>
 #include <avr/sleep.h>

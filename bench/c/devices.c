@@ -1,4 +1,4 @@
-/* Firmware that lives on one device: built with -DLINE, -DTALK, -DWIRE, -DBUS or -DDUTY (bench/devices.py). */
+/* Firmware that uses one device all the time: built with -DLINE, -DTALK, -DWIRE, -DBUS or -DDUTY (bench/devices.py). */
 #include <p30F6014A.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -9,7 +9,7 @@ enum { BRG_115200 = 7 };
 
 volatile uint16_t done;
 
-#if defined(LINE) /* text printed on UART1, each byte waited for */
+#if defined(LINE) /* prints text on UART1 and polls for each byte */
 int main(void)
 {
     U1BRG = BRG_115200;
@@ -21,7 +21,7 @@ int main(void)
     }
 }
 
-#elif defined(TALK) /* UART2 by interrupt in both directions: what comes in is sent back */
+#elif defined(TALK) /* echoes the input of UART2; interrupts in both directions */
 static volatile uint8_t ring[64];
 static volatile uint16_t head, tail;
 
@@ -58,7 +58,7 @@ int main(void)
     }
 }
 
-#elif defined(WIRE) /* words of 16 bits over SPI1 at 1/4 Tcy, each waited for */
+#elif defined(WIRE) /* sends 16-bit words over SPI1 at 1/4 Tcy and polls for each word */
 int main(void)
 {
     uint16_t sum = 0;
@@ -73,7 +73,7 @@ int main(void)
     }
 }
 
-#elif defined(BUS) /* a register of the camera over I2C at 100 kHz, every flag waited for */
+#elif defined(BUS) /* reads a camera register over I2C at 100 kHz, polls every flag */
 static void idle(void)
 {
     while (I2CCON & 0x1F) {
@@ -114,7 +114,7 @@ int main(void)
     }
 }
 
-#elif defined(DUTY) /* PWM of 20 kHz on OC1, a new duty in every period, by the timer's interrupt */
+#elif defined(DUTY) /* PWM of 20 kHz on OC1; the timer's interrupt sets a new duty cycle in every period */
 OS_ISR(_T2Interrupt)
 {
     IFS0bits.T2IF = 0;

@@ -1,4 +1,4 @@
-/* An interrupt every PERIOD + 1 Tcy, by default 100 us, over a computing main loop; the handler clears its flag, saves registers, calls. */
+/* Interrupt every PERIOD + 1 Tcy (default 100 us) over a computing main loop; the handler clears its flag and calls. */
 #include <p30F6014A.h>
 #include <stdint.h>
 

@@ -1,4 +1,4 @@
-/* Functions whose size under XC16 is known (abi-elf.md §8.2). Each stands alone, so that sizes compare one to one. */
+/* Functions of known size under XC16 (abi-elf.md §8.2). None uses another one, so sizes compare one to one. */
 int sat(int a, int lo, int hi) { return a < lo ? lo : a > hi ? hi : a; }
 
 unsigned crc16(const unsigned char *p, int n)

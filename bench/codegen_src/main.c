@@ -1,4 +1,4 @@
-/* Calls every measured function once with fixed arguments; volatile objects keep the calls apart. */
+/* Calls every measured function once with fixed arguments; volatile objects keep the calls separate. */
 struct node {
     struct node *next;
     int key;

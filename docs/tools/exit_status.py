@@ -16,7 +16,8 @@ page from `emu/host/exit_status.py`.
 
 With `emu run --exit-code` every other status is the firmware's own: the low eight bits of what `main` returned.
 
-`-` means standard input for a file that is read as a whole, and standard output for a written one. Exceptions: files that
+`-` means standard input for a file that is read as a whole, and standard output for a written one. Exceptions: files \
+that
 a command reads *and* writes (`--state`, `--update`, `--document`) and videos, whose format follows from the file name.
 """
 

@@ -1,9 +1,9 @@
 """Run the commands of docs/tour.md and store their current output on the page: `python docs/tools/tour.py`.
 
 A block that begins with `$ ` is a session. Each line that begins with `$ ` is a command; a shell runs it in the
-checkout, and its standard output and standard error follow it on the page. A line `...` stands for omitted lines; the page keeps
-as many lines before and after it as it had. With --check the page is not written, and the status is 1 if a command
-failed to run.
+checkout, and its standard output and standard error follow it on the page. A line `...` stands for omitted lines; the
+page keeps as many lines before and after it as it had. With --check the page is not written, and the status is 1 if a
+command failed to run.
 """
 
 from __future__ import annotations

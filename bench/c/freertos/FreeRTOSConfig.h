@@ -1,5 +1,5 @@
-/* Configuration of FreeRTOS for the comparison with OpenSwarm (bench/rtos.py): the least that has what is measured,
- * preemption with time slices, delays, deletion and queues. */
+/* Configuration of FreeRTOS for the comparison with OpenSwarm (bench/rtos.py): the minimum for the measured
+ * functions, which are preemption with time slices, delays, deletion and queues. */
 #ifndef FREERTOS_CONFIG_H
 #define FREERTOS_CONFIG_H
 
@@ -16,7 +16,7 @@
 #define configIDLE_SHOULD_YIELD 1
 #define configMAX_PRIORITIES 3
 #define configMAX_TASK_NAME_LEN 4
-#define configMINIMAL_STACK_SIZE 105 /* words, the port's own recommendation for idle */
+#define configMINIMAL_STACK_SIZE 105 /* words; the value that the port recommends for the idle task */
 #define configTOTAL_HEAP_SIZE 4096
 #define configSUPPORT_DYNAMIC_ALLOCATION 1
 #define INCLUDE_vTaskDelay 1

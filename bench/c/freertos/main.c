@@ -1,4 +1,4 @@
-/* What bench/rtos.py measures FreeRTOS with: which tasks run is written into rtos_wanted from outside. */
+/* FreeRTOS program measured by bench/rtos.py, which selects the running tasks by writing rtos_wanted. */
 #include "FreeRTOS.h"
 #include "queue.h"
 #include "task.h"
@@ -6,7 +6,7 @@
 enum { TICK = 1, YIELD, QUEUE, STACK_WORDS = 128 };
 
 volatile unsigned rtos_wanted __attribute__((used));
-volatile unsigned rtos_free[3] __attribute__((used)); /* heap left: at first, with one task more, with two */
+volatile unsigned rtos_free[3] __attribute__((used)); /* free heap: initially, with one task more, with two */
 static QueueHandle_t queue;
 
 #define NOP() __asm__ volatile("nop" ::: "memory")
@@ -66,7 +66,7 @@ static void create(TaskFunction_t task, unsigned priority)
     xTaskCreate(task, "t", STACK_WORDS, NULL, priority, NULL);
 }
 
-/* Linked, as in OpenSwarm's measuring program: the calls that correspond to those of the paper's Table I. */
+/* Functions that must be linked, as in OpenSwarm's program: the equivalents of the calls in the paper's Table I. */
 static void use_everything(void *unused)
 {
     static volatile unsigned any;
