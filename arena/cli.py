@@ -80,6 +80,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except (SceneError, RecordError, emu.LoadError, ValueError, OSError) as error:
         print(f"arena: {error}", file=sys.stderr)
         return BAD_INPUT
+    except MemoryError:
+        print("arena: out of memory: an input is too large", file=sys.stderr)
+        return BAD_INPUT
     except KeyboardInterrupt:
         print("arena: interrupted; finished trials are kept; run the same command to continue", file=sys.stderr)
         return INTERRUPTED

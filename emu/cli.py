@@ -64,6 +64,9 @@ def _call(name: str, rest: list[str]) -> int:
     except OSError as error:
         print(f"emu {name}: {f'{error.filename}: ' if error.filename else ''}{error.strerror}", file=sys.stderr)
         return bad_input
+    except MemoryError:
+        print(f"emu {name}: out of memory: an input is too large", file=sys.stderr)
+        return bad_input
     except KeyboardInterrupt:
         return DONE
     return status

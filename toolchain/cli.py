@@ -61,6 +61,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except ToolError as error:
         print(error, file=sys.stderr)
         return BAD_INPUT
+    except MemoryError:
+        print(f"toolchain {words[0]}: out of memory: an input is too large", file=sys.stderr)
+        return BAD_INPUT
     except KeyboardInterrupt:
         return INTERRUPTED
 

@@ -33,8 +33,10 @@ RECORD, DIGEST = "trial-*.parquet", "trial-*.json"
 PATTERNS: Final = (MANIFEST, EXPERIMENT, RECORD, DIGEST, "firmware*")
 LIMIT: Final = 1 << 32
 """Largest accepted size of an unpacked bundle, in bytes."""
+INDEX_LIMIT: Final = 1 << 24
+"""Largest accepted size of `bundle.json`, in bytes."""
 READ_ERRORS: Final = (OSError, zipfile.BadZipFile, zlib.error, LookupError, TypeError, ValueError, AttributeError,
-                 EOFError, RuntimeError, lzma.LZMAError)  # fmt: skip
+                 EOFError, RuntimeError, MemoryError, lzma.LZMAError)  # fmt: skip
 """Exceptions that a damaged archive or manifest can cause."""
 _DATE: Final = (1980, 1, 1, 0, 0, 0)
 
@@ -42,7 +44,8 @@ _DATE: Final = (1980, 1, 1, 0, 0, 0)
 def pack(folders: list[Path], target: Path, light: bool = False) -> str:
     """Write the runs in `folders` into one archive and return its SHA-256.
 
-    Raises RecordError for a folder without a finished trial, folders of equal names, or a failed write."""
+    Raises RecordError for a folder without a finished trial, folders of equal names, a symbolic link or folder instead
+    of a file, or a failed write."""
     names = [folder.resolve().name for folder in folders]
     if len(set(names)) < len(names):
         raise RecordError("two of the folders have the same name; a bundle needs different ones")
@@ -51,6 +54,9 @@ def pack(folders: list[Path], target: Path, light: bool = False) -> str:
         if not any(folder.glob("trial-*.parquet")) or not (folder / MANIFEST).exists():
             raise RecordError(f"{folder}: no finished run (manifest.json and trial-*.parquet) here")
         for path in sorted(path for pattern in PATTERNS for path in folder.glob(pattern)):
+            if path.is_symlink() or not path.is_file():
+                raise RecordError(f"{path}: is a link or no file, and a link may point to any file of yours; "
+                                  "replace it by a copy")  # fmt: skip
             if light and path.match(RECORD):
                 digest = json.dumps(asdict(digest_of(path)), indent=0, sort_keys=True)
                 files[f"{name}/{path.with_suffix('.json').name}"] = digest.encode()
@@ -132,10 +138,14 @@ def unpack(bundle: Path, folder: Path) -> list[Path]:
     """Unpack a bundle into `folder` and return the folders of its runs.
 
     Raises RecordError for a file that is not a bundle or was modified."""
+    if not bundle.is_file():
+        raise RecordError(f"{bundle}: not a bundle: no such file")
     try:
         with zipfile.ZipFile(bundle) as archive:
             if sum(entry.file_size for entry in archive.infolist()) > LIMIT:
                 raise RecordError(f"{bundle}: would unpack to more than {LIMIT >> 30} GB")
+            if archive.getinfo(INDEX).file_size > INDEX_LIMIT:
+                raise RecordError(f"{bundle}: {INDEX} is larger than {INDEX_LIMIT >> 20} MB")
             hashes = json.loads(archive.read(INDEX))["files"]
             if set(archive.namelist()) != {INDEX, *hashes}:
                 raise RecordError(f"{bundle}: its files differ from the list in bundle.json")
@@ -143,16 +153,24 @@ def unpack(bundle: Path, folder: Path) -> list[Path]:
                 parts = PurePosixPath(name).parts
                 if len(parts) != 2 or ".." in parts or "\\" in name or name.startswith("/"):
                     raise RecordError(f"{bundle}: {name!r} is not a file of a run")
-                data = archive.read(name)
-                if hashlib.sha256(data).hexdigest() != digest:
-                    raise RecordError(f"{bundle}: {name} was modified (its hash differs)")
                 (folder / parts[0]).mkdir(parents=True, exist_ok=True)
-                (folder / parts[0] / parts[1]).write_bytes(data)
+                if _extracted(archive, name, folder / parts[0] / parts[1]) != digest:
+                    raise RecordError(f"{bundle}: {name} was modified (its hash differs)")
     except RecordError:
         raise
     except READ_ERRORS as error:
         raise RecordError(f"{bundle}: not a bundle: {error}") from None
     return sorted({folder / PurePosixPath(name).parts[0] for name in hashes})
+
+
+def _extracted(archive: zipfile.ZipFile, name: str, target: Path) -> str:
+    """Write a member of an archive to a file, in pieces, and return its SHA-256."""
+    digest = hashlib.sha256()
+    with archive.open(name) as source, target.open("wb") as file:
+        while piece := source.read(1 << 20):
+            digest.update(piece)
+            file.write(piece)
+    return digest.hexdigest()
 
 
 def plan_of(folder: Path, own: Path | None = None, trust: bool = False) -> Plan:

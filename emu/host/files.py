@@ -14,9 +14,12 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
-from typing import Final, TextIO
+from typing import BinaryIO, Final, TextIO
 
 STANDARD: Final = "-"
+MAX_OCTETS: Final = 1 << 28
+"""Largest input that is read whole, in octets."""
+PIECE_OCTETS: Final = 1 << 20
 MAX_NAME_CHARACTERS: Final = 60
 """Characters kept of a name in a temporary name: at four octets each they fit the limit of 255 octets."""
 
@@ -37,18 +40,32 @@ def is_opened(path: str | os.PathLike[str]) -> bool:
 
 
 def read_file(path: str | os.PathLike[str], limit: int = -1) -> bytes:
-    """Read a file, at most `limit` octets if that is not negative. Raises OSError, ValueError for an invalid name."""
+    """Read a file, at most `limit` octets if that is not negative.
+
+    Raises OSError, also for more than MAX_OCTETS octets (a device may be endless), and ValueError for an invalid name.
+    """
     if is_standard(path):
         octets = _standard_input()
         return octets if limit < 0 else octets[:limit]
     with open(path, "rb") as file:
-        return file.read(limit)
+        return _contents(file, os.fspath(path)) if limit < 0 else file.read(limit)
+
+
+def _contents(stream: BinaryIO, name: str) -> bytes:
+    """Read a stream to its end, in pieces. Raises OSError for more than MAX_OCTETS octets."""
+    pieces, count = [], 0
+    while piece := stream.read(PIECE_OCTETS):
+        count += len(piece)
+        if count > MAX_OCTETS:
+            raise OSError(errno.EFBIG, f"is larger than {MAX_OCTETS >> 20} MiB", name)
+        pieces.append(piece)
+    return b"".join(pieces)
 
 
 @cache
 def _standard_input() -> bytes:
     """Read standard input once; a command may read its image twice."""
-    return sys.stdin.buffer.read()
+    return _contents(sys.stdin.buffer, STANDARD)
 
 
 def write_standard(data: bytes) -> None:
