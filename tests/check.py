@@ -1,7 +1,7 @@
-"""`make check`: lint, types of changed packages and the quick tests of every package, in at most five minutes.
+"""`make check`: lint, types of changed packages and quick tests of every package, in at most five minutes.
 
-Runs ruff over everything, mypy over the packages that differ from the main branch's last commit (all of them after a
-commit), and the tests that carry no marker `slow`. Exit status 0 if all three pass, 1 otherwise.
+Runs ruff over all files, mypy over the packages that differ from the main branch's last commit (over all packages after
+a commit), and the tests without the marker `slow`. Exit status 0 if all three pass, otherwise 1.
 
 Example: python -m tests.check --jobs 2
 """
@@ -20,7 +20,7 @@ LINTED: Final = (*TYPED, "tests", "bench", "docs", "setup.py")
 
 
 def changed_packages(listed: str) -> list[str]:
-    """Typed packages that `git status --porcelain` output names; all of them if it names none."""
+    """Return the typed packages that an output of `git status --porcelain` names; all of them if it names none."""
     named = {line[3:].split(" -> ")[-1].strip('"').split("/")[0] for line in listed.splitlines()}
     return [package for package in TYPED if package in named] or list(TYPED)
 

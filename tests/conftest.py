@@ -1,4 +1,4 @@
-"""Options of all tests: another folder of vectors, a single engine."""
+"""Options of all tests: another folder of vectors, or a single engine."""
 
 from __future__ import annotations
 
@@ -26,7 +26,8 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 def pytest_configure(config: pytest.Config) -> None:
     """Turn on the machine verifier for all tests and their child processes, and register the plugins of this folder."""
     os.environ["DSPIC_VERIFY_MACHINE"] = "1"
-    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # `make test &`: children would inherit it
+    # A shell starts `make test &` with SIGINT ignored, which child processes would inherit.
+    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
     config.pluginmanager.register(WatchdogPlugin(), "watchdog")
     if not hasattr(config, "workerinput"):
@@ -36,7 +37,7 @@ def pytest_configure(config: pytest.Config) -> None:
 
 @pytest.fixture(autouse=True)
 def own_translations() -> None:
-    """Clear the native code that machines with the same program share, so that tests do not depend on each other."""
+    """Clear the native code that machines with the same program share, so that tests are independent."""
     jit._shared.clear()
 
 

@@ -1,4 +1,4 @@
-"""pytest plugin: lists skipped tests at the end of a run with the package that would enable them.
+"""pytest plugin: after a run, list the skipped tests with the package that would enable them.
 
 With `--allowed-skips FILE` (`.ci/allowed-skips`) any other skip is a failure.
 """
@@ -13,11 +13,11 @@ from typing import Any
 import pytest
 
 REMEDY = re.compile(r"(Debian packages?:? [\w ,.+-]+|extra: \w+)")
-"""Part of a reason that names the package which would enable the test."""
+"""Part of a skip reason that names the package to install."""
 
 
 class Skips:
-    """Collects skipped tests in the main process; the workers of xdist report to it."""
+    """Collector of skipped tests in the main process; the workers of xdist report to it."""
 
     def __init__(self, allowed: Path | None) -> None:
         self.allowed = patterns(allowed) if allowed is not None else None
@@ -33,7 +33,7 @@ class Skips:
             self.found.append((report.nodeid, reason_of(report.longrepr)))
 
     def forbidden(self) -> list[tuple[str, str]]:
-        """Return skipped tests that the file of allowed skips does not name."""
+        """Return the skipped tests that the file of allowed skips does not name."""
         if self.allowed is None:
             return []
         return sorted({one for one in self.found if not any(pattern.search(one[0]) for pattern in self.allowed)})
@@ -53,12 +53,12 @@ class Skips:
 
 
 def reason_of(longrepr: Any) -> str:
-    """Return the reason of a skip."""
+    """Return the reason of a skipped test."""
     return str(longrepr[2] if isinstance(longrepr, tuple) else longrepr).removeprefix("Skipped: ")
 
 
 def lines_of(found: list[tuple[str, str]]) -> list[str]:
-    """Return one line per package: what to install, how many tests that enables, and in which files."""
+    """Return one line per package to install, with the number of tests that it enables and their files."""
     by_remedy: dict[str, set[str]] = defaultdict(set)
     for test, reason in found:
         named = REMEDY.search(reason)
@@ -71,7 +71,8 @@ def lines_of(found: list[tuple[str, str]]) -> list[str]:
 
 
 def patterns(path: Path) -> list[re.Pattern[str]]:
-    """The regular expressions of a file, one a line, before ` # ` and a reason. Raises ValueError without a reason."""
+    """Return the regular expressions of a file, one per line, each followed by ` # ` and a reason. Raises ValueError
+    if a reason is missing."""
     made = []
     for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), start=1):
         text, _, reason = (part.strip() for part in line.partition(" # "))

@@ -16,7 +16,7 @@ def sources():
 
 
 def test_every_file_with_an_unverified_choice_is_on_the_page():
-    """A new `UNVERIFIED` needs a line in docs/accuracy.md that names its file."""
+    """Every file with the mark `UNVERIFIED` is named in docs/accuracy.md."""
     missing = [
         str(path.relative_to(ROOT))
         for path in sources()
@@ -34,6 +34,6 @@ def test_every_file_the_page_names_exists():
 
 
 def test_all_open_points_of_the_core_have_a_row():
-    """isa.md §22 numbers them 1 to 28."""
+    """docs/accuracy.md has a row for each of the open points 1 to 28 of isa.md §22."""
     table = PAGE.split("## Open points of the core")[1].split("Beyond that list")[0]
     assert [int(number) for number in re.findall(r"^\| (\d+) \|", table, re.MULTILINE)] == list(range(1, 29))

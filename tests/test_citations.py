@@ -1,4 +1,4 @@
-"""Citations such as `isa.md §14.4` in code and pages lead to a heading of a page of this repository."""
+"""Citations such as `isa.md §14.4` in code and pages refer to a heading of a page in this repository."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 FOLDERS = ("docs/reference", "docs/design", "docs")
-"""Where a cited page is looked for, in this order."""
+"""Folders that are searched for a cited page, in this order."""
 SECTIONS = r"(?:§\s?[0-9]+(?:\.[0-9]+)*(?:(?:,| and|-| to)\s?(?=§))?\s?)+"
 CITATION = re.compile(rf"\b([a-z0-9][a-z0-9-]*)\.md`?,?\s+({SECTIONS})")
 NUMBER = re.compile(r"§\s?([0-9]+(?:\.[0-9]+)*)")
@@ -21,18 +21,18 @@ SUFFIXES = {".py", ".c", ".h", ".S", ".s", ".md", ".toml", ".inc", ".csv", ".htm
 
 
 def page_of(name: str) -> Path | None:
-    """The page a citation names, or None if the repository has none."""
+    """Return the page that a citation names, or None if the repository has none."""
     return next((path for folder in FOLDERS if (path := ROOT / folder / f"{name}.md").is_file()), None)
 
 
 @cache
 def sections(page: Path) -> frozenset[str]:
-    """Numbers of a page's headings: {"14", "14.4", ...}."""
+    """Return the numbers of a page's headings: {"14", "14.4", ...}."""
     return frozenset(HEADING.findall(page.read_text(encoding="utf-8")))
 
 
 def citations(text: str) -> Iterator[tuple[str, str]]:
-    """Page and section of every citation in a text; a line break or a comment sign within one does not matter."""
+    """Return page and section of every citation in a text. A citation may contain a line break or a comment sign."""
     joined = re.sub(r"\s*\n\s*(?:#|//|\*|;)?\s*", " ", text)
     for name, numbers in CITATION.findall(joined):
         for number in NUMBER.findall(numbers):
@@ -40,7 +40,7 @@ def citations(text: str) -> Iterator[tuple[str, str]]:
 
 
 def unresolved(text: str) -> list[str]:
-    """Citations in a text that lead nowhere."""
+    """Return the citations in a text that refer to no heading."""
     found = []
     for name, number in citations(text):
         page = page_of(name)
@@ -62,7 +62,7 @@ def test_every_citation_leads_to_a_heading() -> None:
         count += sum(1 for _ in citations(text))
         lost += [f"{name}: {one}" for one in unresolved(text)]
     assert not lost, "\n".join(lost)
-    assert count > 1000  # the pattern still finds them
+    assert count > 1000  # the pattern still finds citations
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""docs/glossary.md: every term has a meaning and a file that holds it."""
+"""docs/glossary.md: every term has a meaning and a file that uses it."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ LINE = re.compile(r"^\| `([^`]+)` \| ([^|]+) \| `([^`]+)` \|$", re.MULTILINE)
 
 
 def test_every_term_lives_where_the_glossary_says() -> None:
-    """The word, in any case and with blanks or underscores, occurs in the file."""
+    """Every term, in any case and with blanks or underscores, occurs in the file that the glossary names."""
     page = (ROOT / "docs" / "glossary.md").read_text(encoding="utf-8")
     terms = LINE.findall(page)
     assert len(terms) == len(re.findall(r"^\| `", page, re.MULTILINE)) >= 55

@@ -1,4 +1,4 @@
-"""Imports point one way: the contracts in pyproject.toml hold, and would be broken by what they forbid."""
+"""Imports between packages have one direction: the contracts in pyproject.toml hold, and a violation is detected."""
 
 from __future__ import annotations
 
@@ -24,20 +24,20 @@ def lint(folder: Path) -> subprocess.CompletedProcess[str]:
 
 
 def test_imports_point_one_way():
-    """engines.md §2."""
+    """engines.md §2: the import contracts in pyproject.toml hold."""
     done = lint(ROOT)
     assert done.returncode == 0, done.stdout
 
 
 def test_every_package_is_under_a_contract():
-    """engines.md §2: `emu`, `toolchain`, `arena`."""
+    """engines.md §2: `emu`, `toolchain` and `arena` are each under a contract."""
     settings = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["importlinter"]
     packages = {path.parent.name for path in ROOT.glob("*/__init__.py")} & {"emu", "toolchain", "arena"}
     assert packages <= set(settings["root_packages"])
 
 
 def test_the_instruction_table_is_a_leaf():
-    """engines.md §2: `emu.dspic30f.isa` imports nothing of ours but itself."""
+    """engines.md §2: `emu.dspic30f.isa` imports no other module of the project."""
     for path in (ROOT / "emu" / "dspic30f" / "isa").rglob("*.py"):
         for line in path.read_text().splitlines():
             if line.lstrip().startswith(("from emu", "import emu", "from ..")):
@@ -45,7 +45,7 @@ def test_the_instruction_table_is_a_leaf():
 
 
 def test_packages_have_no_circles(tmp_path: Path) -> None:
-    """Drawing the import graph fails where parts of a package import each other in a circle."""
+    """The parts of a package do not import each other in a cycle, so that its import graph can be drawn."""
     command = [sys.executable, "docs/tools/import_graph.py", str(tmp_path)]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (0, "")
@@ -55,7 +55,7 @@ def test_packages_have_no_circles(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("package", ["emu", "toolchain", "arena", "openswarm"])
 def test_no_folder_and_no_module_is_in_a_circle(package: str) -> None:
-    """Children of every folder import each other in one direction; type imports count."""
+    """The modules and subfolders of every folder import each other without cycles; type imports count."""
     graph = grimp.build_graph(package, exclude_type_checking_imports=False)
     below: dict[str, dict[str, set[str]]] = {}
     for importer in graph.modules:
@@ -74,7 +74,7 @@ def test_no_folder_and_no_module_is_in_a_circle(package: str) -> None:
 
 
 def test_a_circle_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Of parts, even where no module imports itself."""
+    """A cycle of parts is reported, even if no module is in a cycle."""
     monkeypatch.syspath_prepend(str(ROOT / "docs" / "tools"))
     architecture = import_module("import_graph")
     with pytest.raises(ValueError, match="circular imports: a > b > c > a"):

@@ -1,4 +1,4 @@
-"""What is no regular file is opened and written, never replaced by one: /dev/null stays what it is, also for root."""
+"""Output to special files: a pipe or device is opened and written, never replaced by a regular file, also for root."""
 
 from __future__ import annotations
 
@@ -55,7 +55,8 @@ def test_a_pipe_is_written_and_stays_a_pipe(kind: str, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("kind", WRITERS)
 def test_a_link_leads_on_and_permissions_stay(kind: str, tmp_path: Path) -> None:
-    """What was private does not become readable, a new file is as the mask says, and a long name may be written."""
+    """Output through a symbolic link goes to its target, whose permissions are kept; a new file has those of the
+    umask, and a name may have 250 characters."""
     write, said = WRITERS[kind]
     secret, link, new = tmp_path / "secret", tmp_path / "folder" / "link", tmp_path / ("n" * 250)
     link.parent.mkdir()
@@ -78,13 +79,14 @@ def umask() -> int:
 
 @pytest.mark.parametrize("kind", WRITERS)
 def test_what_cannot_be_written_is_named(kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """By its own name, not that of an unfinished file; and who took the right to write from a file means it."""
+    """If a file cannot be written, the message has its own name, not that of the temporary file. A file without write
+    permission is not replaced."""
     write, _ = WRITERS[kind]
     with pytest.raises((OSError, ToolError, RecordError), match=r"absent/name[':]"):
         write(tmp_path / "absent" / "name")
     kept = tmp_path / "kept"
     kept.write_bytes(b"old")
-    monkeypatch.setattr(os, "access", lambda path, mode: False)  # as it is for everybody but root
+    monkeypatch.setattr(os, "access", lambda path, mode: False)  # as for every user except root
     with pytest.raises((OSError, ToolError, RecordError), match=r"kept[':]"):
         write(kept)
     assert kept.read_bytes() == b"old"
@@ -92,7 +94,7 @@ def test_what_cannot_be_written_is_named(kind: str, tmp_path: Path, monkeypatch:
 
 
 def test_a_file_may_be_called_dash(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """As everywhere: by a folder in front of its name."""
+    """The path `./-` denotes a file with the name `-`, not a standard stream."""
     monkeypatch.chdir(tmp_path)
     write_outputs([("./-", b"object")])
     assert (tmp_path / "-").read_bytes() == b"object"
@@ -102,7 +104,8 @@ def test_a_file_may_be_called_dash(tmp_path: Path, monkeypatch: pytest.MonkeyPat
 
 
 def test_names_of_open_files_are_opened(tmp_path: Path) -> None:
-    """/dev/stdout leads to a regular file when standard output does; a symbolic link of one's own is one's own."""
+    """`is_opened` is true for devices and for paths of open files such as /dev/stdout, and false for regular files
+    and symbolic links to them."""
     plain, link = tmp_path / "plain", tmp_path / "link"
     with plain.open("w") as stream:
         assert is_opened(f"/proc/self/fd/{stream.fileno()}") == Path("/proc/self/fd").exists()
@@ -128,7 +131,8 @@ HEX = Path(__file__).resolve().parent / "emu" / "cli" / "hello.hex"
     ],
 )
 def test_a_dash_is_standard_input_or_output(line: str, given: bytes, start: bytes, tmp_path: Path) -> None:
-    """In every command, for every file that is read or written whole; no file of that name comes to be."""
+    """In every command, `-` denotes standard input or output for a file that is read or written as a whole; no file
+    `-` is created."""
     done = subprocess.run([sys.executable, "-m", *line.split()], input=given, capture_output=True, cwd=tmp_path,
                           env={**os.environ, "PYTHONPATH": str(HEX.parents[3])}, timeout=HANG, check=False)  # fmt: skip
     assert (done.returncode, done.stdout[: len(start)]) == (0, start), done.stderr

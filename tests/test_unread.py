@@ -1,4 +1,5 @@
-"""A closed pipe as standard output (`emu --help | head -0`): no traceback, no message, exit status 0."""
+"""Closed or full standard streams: with a closed pipe as output (`emu --help | head -0`), exit status 0 without a
+message."""
 
 from __future__ import annotations
 
@@ -21,8 +22,8 @@ WORDS = [
 
 @pytest.mark.parametrize("line", WORDS)
 def test_a_reader_that_has_gone_is_no_failure(line: str) -> None:
-    """Standard output is a pipe whose other end is closed already. Output is buffered, as it is for users: with
-    PYTHONUNBUFFERED in the environment, as on many servers, a flush behind `main` has nothing left to fail at."""
+    """If standard output is a pipe whose reader has closed it, a command ends with status 0 and no message.
+    PYTHONUNBUFFERED is removed, because without buffering the flush after `main` would have nothing to write."""
     surroundings = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
     reader, writer = os.pipe()
     os.close(reader)
@@ -37,7 +38,7 @@ def test_a_reader_that_has_gone_is_no_failure(line: str) -> None:
     "line", ["emu --help", "emu --version", "toolchain --version", "arena scenes", "openswarm --version"]
 )
 def test_a_full_disk_under_the_output_is_one_line(line: str) -> None:
-    """Neither a traceback nor silence."""
+    """If standard output is on a full disk, a command ends with status 2 and one line."""
     with Path("/dev/full").open("wb") as full:
         done = subprocess.run([sys.executable, "-m", *line.split()], stdout=full, stderr=subprocess.PIPE, cwd=ROOT,
                               text=True, timeout=HANG, check=False)  # fmt: skip
@@ -58,7 +59,8 @@ def test_a_full_disk_under_the_output_is_one_line(line: str) -> None:
     ],
 )
 def test_a_stream_that_is_closed_is_empty_or_wants_nothing(line: str, closed: int, status: int, said: bytes) -> None:
-    """`<&-`, `>&-` and `2>&-` of a shell, and services without any: no traceback."""
+    """A standard stream that the shell closed (`<&-`, `>&-`, `2>&-`) is empty as input and ignored as output, without
+    a traceback."""
     done = subprocess.run([sys.executable, "-m", *line.split()], stderr=subprocess.PIPE, stdout=subprocess.DEVNULL,
                           stdin=subprocess.DEVNULL, preexec_fn=lambda: os.close(closed), cwd=ROOT, timeout=HANG,
                           check=False)  # fmt: skip

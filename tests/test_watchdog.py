@@ -1,4 +1,4 @@
-"""The watchdog tells a hang from a busy machine, ends what hangs, and names silent tests."""
+"""The watchdog distinguishes a hang from a busy machine, ends a hanging test, and names silent tests."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ dog.begin("tests/test_it.py::test_hangs")
 
 
 def end_of(hang: str) -> subprocess.CompletedProcess[str]:
-    """Result of a process whose watched test executes the statement `hang`."""
+    """Return the result of a process whose watched test executes the statement `hang`."""
     environment = os.environ | {"PYTHONPATH": str(ROOT / "tests")}
     return subprocess.run([sys.executable, "-c", PROGRAM.format(hang=hang)], env=environment, capture_output=True,
                           text=True, check=False)  # fmt: skip
@@ -43,7 +43,8 @@ def test_a_test_that_waits_for_ever_is_ended() -> None:
 
 
 def test_work_of_a_child_process_counts() -> None:
-    """A test that waits for a busy child is not idle; its CPU counts to the limit, and the child is killed as well."""
+    """A test that waits for a busy child process is not idle. The child's CPU time counts towards the limit, and the
+    child is killed with the test."""
     done = end_of("subprocess.run([sys.executable, '-c', 'while True: pass'])")
     assert done.returncode == 1
     assert "s of CPU" in done.stderr

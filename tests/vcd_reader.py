@@ -1,7 +1,7 @@
-"""An independent reader of waveforms: `VCDVCD`.
+"""Independent reader of waveforms in VCD files: `VCDVCD`.
 
-Importing that package changes how the process handles broken pipes, because it is written as a script. Tests therefore
-import it only through this module, which restores the handling.
+That package is written as a script: its import changes how the process handles broken pipes. Tests therefore import it
+only through this module, which restores the handling.
 """
 
 from __future__ import annotations

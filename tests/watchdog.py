@@ -1,7 +1,7 @@
-"""pytest plugin: ends a hanging test and names tests that have been silent for long. Host time is never asserted.
+"""pytest plugin: end a hanging test, and name tests that have been silent for long. No test asserts host time.
 
 A test hangs if its process tree has used more than `CPU_LIMIT` seconds of CPU in this test (an endless loop), or if it
-has used none for `IDLE_LIMIT` seconds (a deadlock). CPU time does not grow because other programs are busy, so a loaded
+has used none for `IDLE_LIMIT` seconds (a deadlock). Other programs do not increase a test's CPU time, so a loaded
 machine cannot make a test fail. On a hang the watchdog prints the stacks of all threads and ends the process with its
 children; xdist then reports the worker's test as crashed.
 """
@@ -20,21 +20,22 @@ from typing import Final
 import pytest
 
 CPU_LIMIT: Final = 1800.0
-"""Seconds of CPU of one test; the slowest takes about 100."""
+"""Maximum CPU time of one test in seconds; the slowest test takes about 100."""
 IDLE_LIMIT: Final = 600.0
-"""Seconds without any use of CPU."""
+"""Maximum duration in seconds without any CPU use."""
 IDLE_SHARE: Final = 0.002
-"""Share of a core below which a process tree counts as idle: waking up to poll costs less."""
+"""Share of a core below which a process tree counts as idle; a process that only polls uses less."""
 SILENCE: Final = 30.0
-"""Seconds after which the names of running tests are printed."""
+"""Seconds without a result after which the names of running tests are printed."""
 HANG: Final = 3600.0
-"""Seconds for `timeout=` arguments in tests: longer than the watchdog's limits, so that no test has a deadline."""
+"""Value in seconds for `timeout=` arguments in tests. It exceeds the watchdog's limits, so that no test has a
+deadline of its own."""
 TICK: Final = 5.0
 PROC: Final = Path("/proc")
 
 
 def tree_of(root: int) -> list[int]:
-    """Process ids of `root` and all its descendants; only `root` on systems without /proc."""
+    """Return the process ids of `root` and all its descendants; only `root` on systems without /proc."""
     children: dict[int, list[int]] = {}
     for entry in PROC.glob("[0-9]*/stat"):
         try:
@@ -49,7 +50,7 @@ def tree_of(root: int) -> list[int]:
 
 
 def cpu_of(processes: list[int]) -> float:
-    """CPU seconds of the processes and of their children that have ended."""
+    """Return the CPU seconds of the processes and of their children that have ended."""
     ticks = 0
     for process in processes:
         try:
@@ -61,7 +62,7 @@ def cpu_of(processes: list[int]) -> float:
 
 
 class Watchdog:
-    """Watches the tests of one process. Limits in seconds, as the constants above."""
+    """Monitor of the tests in one process. Limits are in seconds, as the constants above."""
 
     def __init__(self, cpu_limit: float = CPU_LIMIT, idle_limit: float = IDLE_LIMIT, tick: float = TICK) -> None:
         self.cpu_limit, self.idle_limit, self.tick = cpu_limit, idle_limit, tick
@@ -75,26 +76,28 @@ class Watchdog:
         self._thread = threading.Thread(target=self._watch, name="watchdog", daemon=True)
 
     def start(self) -> None:
-        """Begin to watch."""
+        """Start the monitoring thread."""
         self._thread.start()
 
     def begin(self, test: str) -> None:
-        """A test starts: its limits count from the next tick. Costs nothing, as it is called for every test."""
+        """Begin to monitor a test, with limits that count from the next tick. Cheap, because it is called for every
+        test."""
         with self._lock:
             self.test = test
             self._cpu_at_start = None
 
     def end(self) -> None:
-        """The running test has ended."""
+        """Record that the running test has ended."""
         with self._lock:
             self.test = ""
 
     def stop(self) -> None:
-        """Stop watching."""
+        """Stop the monitoring thread."""
         self._stop.set()
 
     def verdict(self, cpu: float, now: float) -> str:
-        """Why the running test hangs, from CPU seconds of the process tree and the clock; "" if it does not."""
+        """Return why the running test hangs, or "" if it does not. Input: CPU seconds of the process tree and the
+        clock."""
         if not self.test:
             return ""
         if self._cpu_at_start is None:
@@ -112,7 +115,7 @@ class Watchdog:
         while not self._stop.wait(self.tick):
             processes = tree_of(os.getpid())
             with self._lock:
-                own = time.thread_time()  # of this thread: reading /proc is no work of the test
+                own = time.thread_time()  # CPU time of this thread, which does not belong to the test: it reads /proc
                 why = self.verdict(cpu_of(processes) - own, time.monotonic())
                 test = self.test
             if why:
@@ -128,7 +131,7 @@ class Watchdog:
 
 
 class WatchdogPlugin:
-    """Runs a watchdog in every process that runs tests."""
+    """Plugin that runs a watchdog in every process with tests."""
 
     def __init__(self) -> None:
         self.watchdog = Watchdog()
@@ -149,7 +152,7 @@ class WatchdogPlugin:
 
 
 class Silence:
-    """Prints the names of running tests after `SILENCE` seconds without a result; lives in the main process."""
+    """Plugin of the main process that prints the names of running tests after `SILENCE` seconds without a result."""
 
     def __init__(self, config: pytest.Config) -> None:
         self._config = config
@@ -174,7 +177,7 @@ class Silence:
         self._stop.set()
 
     def lines(self, now: float) -> list[str]:
-        """What to print at `now`, seconds of the monotonic clock: one line per running test, or nothing yet."""
+        """Return the lines to print at `now` (monotonic clock, seconds): one per running test, or none."""
         with self._lock:
             if now - self._last < SILENCE:
                 return []

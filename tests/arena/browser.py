@@ -1,4 +1,4 @@
-"""The browser for tests of pages: Debian's chromium, which the project's own environment cannot install."""
+"""Chromium for tests of web pages: Debian's package, because pip cannot install a browser."""
 
 from __future__ import annotations
 
@@ -9,4 +9,4 @@ import pytest
 
 BROWSER: Final = shutil.which("chromium") or shutil.which("chromium-browser")
 needs_browser = pytest.mark.skipif(BROWSER is None, reason="no chromium here (Debian package chromium)")
-"""Marker of tests that run the scripts of a page."""
+"""Marker of tests that need a browser to run the scripts of a page."""

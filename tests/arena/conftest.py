@@ -31,7 +31,7 @@ def talking_image(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="session")
 def assembled(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
-    """Return a function that assembles a text to an image."""
+    """Return a function that assembles a source text to an image file."""
     return lambda text: _assembled(tmp_path_factory.mktemp("assembled"), text)
 
 
@@ -66,7 +66,7 @@ TALKING = f"""{BEGIN}
 
 @pytest.fixture
 def full_disk() -> Path:
-    """Return a file whose writes fail with ENOSPC. Only Linux has one without mounting a file system as root."""
+    """Return a file whose writes fail with ENOSPC. Only Linux has such a file without a mount, which needs root."""
     device = Path("/dev/full")
     if not device.exists():
         pytest.skip("only Linux has /dev/full")

@@ -1,6 +1,6 @@
 """Assembly programs for robots, shared by several test files.
 
-They are texts for the fixture `assembled`.
+The fixture `assembled` turns a program into an image.
 """
 
 from __future__ import annotations

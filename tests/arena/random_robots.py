@@ -1,7 +1,7 @@
 """Random programs for robots of a swarm: camera, infrared, UART, motors, sleep, interrupts, traps and resets.
 
-Input: a random generator, the sensor of the camera. Output: assembly. `tests/fuzz/swarm/fuzz_swarm.py` runs them in all
-modes of a swarm.
+A program is generated from a random generator and the kind of camera sensor, as assembly text.
+`tests/fuzz/swarm/fuzz_swarm.py` runs the programs in all modes of a swarm.
 """
 
 from __future__ import annotations
@@ -13,7 +13,8 @@ from typing import Final
 from tests.arena.images import BEGIN
 
 LONG: Final = ("mov     PORTD, w0",)
-"""Reads of the picture that native code executes without Python; they are repeated thousands of times."""
+"""Instructions that read the picture and that native code executes without Python; programs repeat them thousands of
+times."""
 Chance = random.Random
 
 
@@ -31,7 +32,8 @@ l{n}:   {how}
 
 
 def _awaits_line(_chance: Chance, n: int) -> str:
-    """Wait for a falling and a rising edge of HREF, rarely and briefly: with PCLK on the same port reads are slow."""
+    """Wait for a falling and a rising edge of HREF. Only one round in 16 waits, and briefly, because reads of the
+    port with PCLK are slow."""
     return f"""
         mov     _turns, w0
         and     w0, #15, w0
@@ -207,7 +209,7 @@ def _asks(chance: Chance, _n: int) -> str:
 
 
 def _ends(chance: Chance, _n: int) -> str:
-    """Reset or stop for good after some rounds."""
+    """Reset the chip or stop for good after some rounds."""
     what = chance.choice(
         (
             "reset",

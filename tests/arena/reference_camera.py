@@ -30,7 +30,7 @@ from arena.scene.loader import Scene
 from arena.world.physics import Poses, Traits
 
 Disc = tuple[float, float, float, float, int]
-"""Ahead and left of the camera, radius, height, class."""
+"""Disc in the camera frame: centre ahead and left of the camera, radius, height, class."""
 
 
 class ReferenceCamera:
@@ -78,11 +78,11 @@ class ReferenceCamera:
 
     @property
     def sensor_classes(self) -> list[int] | None:
-        """For each class the one that the line-of-sight sensor takes it for; None if they are the same."""
+        """Class that the line-of-sight sensor reports for each class; None if all are reported as they are."""
         return self._appearance.sensor_classes if self._appearance is not None else None
 
     def _collect(self, places: list[tuple[float, float]], radius: float, height: float, kind: int) -> None:
-        """Keep the discs that a ray of the picture can hit within range."""
+        """Collect the discs that a ray of the picture can hit within range."""
         cos, sin, own_x, own_y = self._cos, self._sin, self._x, self._y
         limit = self._range + radius
         widest = self.lens.widest
@@ -91,7 +91,7 @@ class ReferenceCamera:
             ahead = dx * cos + dy * sin
             if -radius < ahead < limit:
                 left = dy * cos - dx * sin
-                if abs(left) - 1.2 * radius < widest * (ahead + radius):  # 1.2: the ray's slope to the rim
+                if abs(left) - 1.2 * radius < widest * (ahead + radius):  # 1.2: slope of the ray to the rim
                     self.discs.append((ahead, left, radius, height, kind))
 
     def _visible_sides(self, appearance: Appearance) -> list[tuple[float, float, float, float, float, int]]:
@@ -105,7 +105,8 @@ class ReferenceCamera:
         return found
 
     def hits(self, slope: float, discs: list[Disc] | None = None) -> list[tuple[float, float, int]]:
-        """Return (depth, height, class) of the bodies a ray hits, nearest first; slope = left per ahead."""
+        """Return (depth, height, class) of the bodies that a ray hits, nearest first. `slope`: distance to the left
+        per distance ahead."""
         found = []
         a = 1 + slope * slope
         reach = self._range / math.sqrt(a)
@@ -130,7 +131,8 @@ class ReferenceCamera:
         return found
 
     def _fixed_hits(self, slope: float) -> list[tuple[float, float, int]]:
-        """Return depth, height and class of the round obstacles a ray hits. Like walls, they have no range limit."""
+        """Return depth, height and class of the round obstacles that a ray hits. Like walls, they are visible at any
+        distance."""
         assert self._appearance is not None
         found = []
         a = 1 + slope * slope
@@ -148,7 +150,7 @@ class ReferenceCamera:
         return dx * self._cos + dy * self._sin, dy * self._cos - dx * self._sin
 
     def _floor(self, ray: float, rise: float) -> int:
-        """Return the class of the floor where a ray hits it."""
+        """Return the class of the floor at the point at which a ray hits it."""
         if self._appearance is None or not self._appearance.patches:
             return FLOOR
         depth = -dimensions.CAMERA_HEIGHT / rise
@@ -204,7 +206,7 @@ class ReferenceCamera:
         return ROBOT
 
     def within(self, right: float, left: float) -> list[Disc]:
-        """Return the discs that rays with slopes right..left can hit, and possibly some more."""
+        """Return the discs that rays with slopes `right` to `left` can hit, and possibly some others."""
         return [
             disc
             for disc in self.discs
@@ -213,7 +215,7 @@ class ReferenceCamera:
 
 
 def sensor_of(camera: ReferenceCamera) -> int:
-    """Return OBJECT, ROBOT or NOTHING by the votes of 24 pixels with ideal colours."""
+    """Return OBJECT, ROBOT or NOTHING by the votes of 24 pixels with exact colours."""
     edges = [ray for u in (WINDOW_COLUMNS[0], WINDOW_COLUMNS[-1]) for ray, _ in camera.lens.column(u, WINDOW_ROWS)]
     discs = camera.within(min(edges), max(edges))
     sensor_classes = camera.sensor_classes

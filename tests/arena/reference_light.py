@@ -1,4 +1,4 @@
-"""Reference implementation of light.c and the noise of ring.c in Python, equal to the bit."""
+"""Reference implementation in Python of light.c and of the noise in ring.c, equal to the bit."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def mixed(seed: int, channel: int, cycle: int) -> int:
 
 
 def gaussian(seed: int, channel: int, cycle: int) -> float:
-    """Return a standard normal number (Box and Muller), with tails to 6.6 deviations for rare errors."""
+    """Return a standard normal number (Box and Muller), whose tails reach 6.6 deviations so that rare errors occur."""
     x = mixed(seed, channel, cycle)
     return math.sqrt(-2 * math.log(((x >> 32) + 1) / 2**32)) * math.cos(math.tau / 2**32 * (x & 0xFFFF_FFFF))
 
@@ -32,13 +32,13 @@ def uniform(seed: int, channel: int, cycle: int) -> float:
 
 
 def settle(shares: Sequence[float], lit: int, age: int, tau: float) -> list[float]:
-    """Return the levels `shares` after `age` cycles with the lines `lit`."""
+    """Return the levels `shares` of the receivers after `age` cycles during which `lit` was the state of the lines."""
     left = math.exp(-age / tau)
     return [(lit >> line & 1) + (share - (lit >> line & 1)) * left for line, share in enumerate(shares)]
 
 
 def levels_by(cycles: Sequence[int], lit: Sequence[int], cycle: int, tau: float, settled: int) -> list[float]:
-    """Return the level of each line at a cycle; lit[0] before the first change, lit[n + 1] after change n."""
+    """Return the level of each line at a cycle. `lit`: state before the first change, then after each change."""
     index = bisect_right(cycles, cycle)
     if not index or cycle - cycles[index - 1] >= settled:
         return [float(lit[index] >> line & 1) for line in range(LINES)]
@@ -55,8 +55,8 @@ def light(
 ) -> float:  # fmt: skip
     """Return the counts by which light lowers a sensor at a cycle of the trial.
 
-    heard: robot, counts of its lines, share of the sensor, cycles and states of its lines. loss: share of lost
-    transmissions, and of a lost one the visible cycles and their period.
+    `heard`: for each robot, the counts of its lines, the share of the sensor, and cycles and states of its lines.
+    `loss`: share of lost transmissions, visible cycles of a lost transmission, and their period.
     """
     total = 0.0
     for robot, counts, share, cycles, lit in heard:

@@ -1,4 +1,4 @@
-"""Learning environment: PettingZoo's own tests, reproducibility, evolution of a controller for firmware."""
+"""Learning environment: PettingZoo's own tests, reproducibility, and evolution of a controller for firmware."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ ROOT = Path(__file__).resolve().parents[2]
 
 
 def test_pettingzoos_own_tests_pass() -> None:
-    """PettingZoo checks API and seeding."""
+    """PettingZoo's tests of API and seeding pass."""
     parallel_api_test(ArenaEnv("aggregation", seconds=2.0), num_cycles=50)
     parallel_seed_test(lambda: ArenaEnv("aggregation", seconds=1.0), num_cycles=20)
 
@@ -53,7 +53,8 @@ def test_the_same_seed_and_actions_give_the_same_numbers() -> None:
 
 
 def test_robots_sense_what_stands_before_them_and_move_as_told() -> None:
-    """Observations show robot, object, wall by infrared, light and speeds; full speed is 12.8 cm/s."""
+    """Observations contain the robot and object ahead, the wall by infrared, light and speeds; full speed is 12.8
+    cm/s."""
     scene = load_scene("foraging").with_values(robots__wheel_noise=0.0, clock__scripted_quantum_ms=10.0)
     env = ArenaEnv(scene, seconds=5.0, decision_s=0.5)
     env.reset(seed=1)
@@ -78,7 +79,7 @@ def test_robots_sense_what_stands_before_them_and_move_as_told() -> None:
 
 
 def test_food_brought_home_is_a_reward() -> None:
-    """Delivered food, the first metric of the experiment, is the reward; the supervisor acts as in a trial."""
+    """The reward is the delivered food, which is the experiment's first metric; the supervisor acts as in a trial."""
     env = ArenaEnv("foraging", seconds=5.0, decision_s=0.2)
     env.reset(seed=1)
     env.stage.move_object(0, 100, 75)
@@ -96,7 +97,8 @@ def test_food_brought_home_is_a_reward() -> None:
     "action", [[math.nan, 0.5], [0.5, math.inf], [-math.inf, 0], [1], [1, 1, 1], 1.0, None, "up", [None, 1]]
 )
 def test_an_action_that_is_not_two_finite_numbers_is_refused(action: object) -> None:
-    """The refused step changes nothing: the episode continues as one without it."""
+    """A step with an action other than two finite numbers is refused and changes nothing; the episode continues as
+    without it."""
     episodes = []
     for is_disturbed in (False, True):
         env = ArenaEnv("aggregation", seconds=1.0)
@@ -115,7 +117,7 @@ def test_an_action_that_is_not_two_finite_numbers_is_refused(action: object) -> 
 
 
 def test_robots_with_firmware_are_told_by_bluetooth(assembled: Callable[[str], Path]) -> None:
-    """Firmware receives actions as commands of the robot's text protocol."""
+    """Robots with firmware receive actions by Bluetooth, as commands of the robot's text protocol."""
     scene = load_scene("foraging").with_values(start__remote="")
     env = ArenaEnv(scene, seconds=1.0, decision_s=0.2, image=assembled(ECHO))
     env.reset(seed=1)
@@ -129,7 +131,7 @@ def test_robots_with_firmware_are_told_by_bluetooth(assembled: Callable[[str], P
 
 
 def test_what_cannot_be_is_refused() -> None:
-    """Invalid arguments raise ValueError with a message."""
+    """Invalid arguments of the environment raise ValueError with a message."""
     with pytest.raises(ValueError, match="expected a quantum or more"):
         ArenaEnv("aggregation", decision_s=0.001)
     with pytest.raises(ValueError, match="a positive number"):
@@ -146,7 +148,8 @@ def example() -> ModuleType:
 
 
 def test_a_controller_is_evolved_and_becomes_firmware(tmp_path: Path) -> None:
-    """The result improves or stays equal, depends on the seed only, and its constants compile."""
+    """The evolved controller is at least as good as the first one, depends only on the seed, and its constants
+    compile."""
     evolve = example().evolve
     best, series = evolve(4, [0], 10.0, 3)
     assert series == sorted(series, reverse=True)

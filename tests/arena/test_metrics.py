@@ -1,4 +1,4 @@
-"""Metrics of hand-made arrangements, and statistics against known values."""
+"""Metrics of constructed arrangements, and statistics compared with known values."""
 
 import itertools
 import subprocess
@@ -36,7 +36,7 @@ R = 5.0
 
 
 def test_compactness_is_equation_2() -> None:
-    """Four objects on a square of side 20: 4 * 200 / (4 * 25) = 8 (epuck.md §8)."""
+    """Equation 2 (epuck.md §8): four objects on a square of side 20 have the compactness 4 * 200 / (4 * 25) = 8."""
     square = np.array([(0, 0), (20, 0), (0, 20), (20, 20)], float)
     assert compactness(square, R) == pytest.approx(8.0)
     assert compactness(square + 100, R) == pytest.approx(8.0)
@@ -78,7 +78,7 @@ def series_of(places: np.ndarray, times: list[float]) -> MetricSeries:
 
 
 def test_a_course_follows_objects_that_meet() -> None:
-    """Share, compactness and mean over time follow objects that meet."""
+    """Share, compactness and mean over time follow objects that approach each other."""
     done = series_of(MEETING, [0.0, 1.0, 2.0])
     assert done.curves["share"].tolist() == [0.5, 0.5, 1.0]
     assert done.curves["compactness"].tolist() == [50.0, 18.0, 0.5]
@@ -95,20 +95,20 @@ def test_equal_runs_are_equivalent_and_different_ones_are_not() -> None:
     result = equivalence(base, far + rng.normal(0, 0.02, 10), 0.1)
     assert not result.equivalent
     assert result.low > 0.1
-    assert not equivalence(base, base + rng.normal(0, 0.4, 10), 0.1).equivalent  # few pairs with a large variance
+    assert not equivalence(base, base + rng.normal(0, 0.4, 10), 0.1).equivalent  # few pairs, large variance
     with pytest.raises(ValueError, match="two or more pairs"):
         equivalence(base[:1], base[:1], 0.1)
 
 
 def test_signed_ranks_are_exact_for_few_pairs() -> None:
-    """Five pairs that differ in the same direction have p = 2 / 2^5."""
+    """Wilcoxon's test of five pairs that differ in the same direction gives p = 2 / 2^5."""
     ones = np.arange(5) + np.array([0.1, 0.2, 0.3, 0.4, 0.5])
     assert signed_rank_p(ones, np.arange(5).astype(float)) == pytest.approx(2 / 32)
     assert signed_rank_p(ones, ones) == 1.0
 
 
 def test_bootstrap_bands_hold_the_mean() -> None:
-    """The band contains the mean and is reproducible."""
+    """The bootstrap band contains the mean and is reproducible."""
     values = np.random.default_rng(1).normal(0, 1, (10, 3)) + np.array([0, 5, 9])
     low, high = bootstrap_band(values)
     assert (low < values.mean(axis=0)).all()
@@ -117,7 +117,8 @@ def test_bootstrap_bands_hold_the_mean() -> None:
 
 
 def test_shares_of_all_samples_at_once_are_those_one_by_one() -> None:
-    """Shares of all samples at once equal those of single samples, for chains, scattered objects, one and none."""
+    """Shares computed for all samples at once equal those of single samples, for chains, scattered objects, one
+    object and none."""
     rng = np.random.default_rng(3)
     scattered = rng.uniform(0, 150, (200, 20, 2))
     chain = np.stack([np.column_stack([19.0 * rng.permutation(20), np.zeros(20)]) for _ in range(5)])
@@ -128,7 +129,8 @@ def test_shares_of_all_samples_at_once_are_those_one_by_one() -> None:
 
 
 def test_the_pairs_needed_are_those_of_the_plan() -> None:
-    """experiment-contract.md §5: sd 0.25 needs about 107 trials per arm, sd 0.06 seven (independent arms)."""
+    """experiment-contract.md §5: a standard deviation of 0.25 needs about 107 trials per arm, 0.06 needs seven
+    (independent arms)."""
     assert pairs_needed(0.25 * 2**0.5, 0.1) == pytest.approx(107, abs=1)
     assert pairs_needed(0.06 * 2**0.5, 0.1) == 7
     assert pairs_needed(0.0, 0.1) == 2
@@ -157,7 +159,7 @@ def test_few_and_many_objects_are_counted_alike(count: int) -> None:
 
 
 def _parts(near: np.ndarray) -> int:
-    """Return the connected components, by merging sets."""
+    """Return the connected components of a graph, computed by merging sets."""
     parts = [{i} for i in range(len(near))]
     for i, j in zip(*np.nonzero(near), strict=True):
         one, other = (next(part for part in parts if k in part) for k in (i, j))
@@ -168,7 +170,7 @@ def _parts(near: np.ndarray) -> int:
 
 
 def test_the_distance_of_the_rule_itself_is_not_near() -> None:
-    """Objects at exactly the distance of the rule are not adjacent."""
+    """Objects at exactly the limit distance do not belong to the same cluster."""
     touching = np.array([(0.0, 0.0), (20.0, 0.0), (39.9, 0.0)])
     assert clusters(touching, 20.0) == [0, 1, 1]
 
@@ -201,7 +203,7 @@ def test_metrics_of_many_objects_need_little_memory() -> None:
 # -- statistics added to the registered ones ------------------------------------------------------------------------
 
 TWO_SETS = [(-0.40, 0.05), (-0.30, -0.25, 0.05, 0.05, 0.05, 0.05)]
-"""Two sets of ten differences with the same printed values as those of controller B in docs/experiment.md."""
+"""Two sets of ten differences whose printed values equal those of controller B in docs/experiment.md."""
 
 
 def padded(differences: tuple[float, ...]) -> np.ndarray:
@@ -210,7 +212,7 @@ def padded(differences: tuple[float, ...]) -> np.ndarray:
 
 @pytest.mark.parametrize(("differences", "least"), list(zip(TWO_SETS, (0.5, 2 / 64), strict=True)))
 def test_a_p_that_cannot_be_small_is_named(differences: tuple[float, ...], least: float) -> None:
-    """With eight ties in ten pairs, the smallest possible p of Wilcoxon's test is 0.5."""
+    """With eight ties in ten pairs the smallest possible p of the test is 0.5, which the remark states."""
     x, y = padded(differences) + 0.9, np.full(10, 0.9)
     result = equivalence(x, y, 0.1)
     printed = f"{result.mean:+.3f} {result.low:+.3f} {result.high:+.3f} {signed_rank_p(x, y):.2f}"
@@ -221,7 +223,7 @@ def test_a_p_that_cannot_be_small_is_named(differences: tuple[float, ...], least
 
 
 def test_the_sign_flip_test_is_that_of_all_signs() -> None:
-    """The test equals an enumeration of all 2^n sign assignments."""
+    """The sign-flip test equals an enumeration of all 2^n sign assignments."""
     rng = np.random.default_rng(4)
     for count in (2, 3, 7, 10):
         d = rng.normal(0.3, 1, count)
@@ -232,7 +234,8 @@ def test_the_sign_flip_test_is_that_of_all_signs() -> None:
 
 
 def test_the_exact_interval_is_what_the_test_does_not_reject() -> None:
-    """A shift just inside the interval has p above 10 %, one just outside has not; few pairs exclude nothing."""
+    """A shift just inside the exact interval has p above 10 %, one just outside p below 10 %; three pairs give an
+    infinite interval."""
     d = np.random.default_rng(5).normal(1, 1, 9)
     found = sign_flip_test(d, np.zeros(9))
     for inside, outside in ((found.low + 1e-6, found.low - 1e-6), (found.high - 1e-6, found.high + 1e-6)):
@@ -243,7 +246,7 @@ def test_the_exact_interval_is_what_the_test_does_not_reject() -> None:
 
 
 def test_the_exact_interval_covers_what_it_says() -> None:
-    """The interval covers the mean in 90 % of 400 random sets of ten pairs, with many ties too."""
+    """The exact 90 % interval contains the mean in 90 % of 400 random sets of ten pairs, and of 40 sets of twenty."""
     rng = np.random.default_rng(6)
     for count, draw in ((10, lambda n: rng.normal(0, 1, n)), (10, lambda n: rng.laplace(0, 1, n)),
                         (20, lambda n: rng.normal(0, 1, n))):  # fmt: skip
@@ -256,7 +259,8 @@ def test_the_exact_interval_covers_what_it_says() -> None:
 
 
 def test_ceilings_and_runs_without_spread_are_named() -> None:
-    """Ceilings, and runs without variance, have a remark."""
+    """If most values of both runs are at the maximum, or if all pairs are equal, the remark states it; otherwise it
+    is empty."""
     x = np.array([1.0] * 9 + [0.6])
     assert (
         remark(x, x, 1.0)

@@ -1,4 +1,4 @@
-"""Structs shared by Python and C have the same layout; the compiler reports the offset of every field."""
+"""Structs shared by Python and C have the same layout; the C compiler computes the offset of every field."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ TWINS: dict[Path, dict[str, type[Structure]]] = {
     BOARD / "ring.c": {"ring": analog._Ring},
 }  # fmt: skip
 WITHIN = {"ie1", "ie2"}
-"""Fields that are later elements of an array in C."""
+"""Python fields that are in C the second and later elements of an array."""
 
 
 def fields_of(text: str, name: str) -> list[str]:
@@ -52,33 +52,34 @@ def fields_of(text: str, name: str) -> list[str]:
     assert body is not None, name
     found: list[str] = []
     for one in re.sub(r"//.*|\[[^\]]*\]", "", body[1]).split(";"):
-        called = re.match(r"[^(]*\(\*(\w+)\)\(", one)  # a pointer to a function
+        called = re.match(r"[^(]*\(\*(\w+)\)\(", one)  # field that is a pointer to a function
         found += [called[1]] if called else [part.split()[-1].lstrip("*") for part in one.split(",") if part.strip()]
     return found
 
 
 @pytest.mark.parametrize("source", TWINS, ids=lambda source: source.name)
 def test_a_struct_has_the_offsets_and_the_size_of_its_twin(source: Path, tmp_path: Path) -> None:
-    """A missing, extra or misplaced field on one side would read other memory on the other side."""
+    """Every ctypes structure has the field offsets and the size of its C struct; otherwise one side would access
+    other memory."""
     text = source.read_text()
     names = {name: fields_of(text, name) for name in TWINS[source]}
     numbers = [number for name in names for number in (
         *(f"__builtin_offsetof(struct {name}, {field})" for field in names[name]), f"sizeof(struct {name})"
     )]  # fmt: skip
-    asking = tmp_path / "asking.c"
-    asking.write_text(f'#include "{source}"\ni64 number(i64 place)\n{{\n    static const i64 numbers[] = '
+    source_file = tmp_path / "source_file.c"
+    source_file.write_text(f'#include "{source}"\ni64 number(i64 place)\n{{\n    static const i64 numbers[] = '
                       f"{{{', '.join(numbers)}}};\n    return numbers[place];\n}}\n")  # fmt: skip
-    number = functions(asking, {"number": (INT, (INT,))})["number"]
-    told = iter([number(place) for place in range(len(numbers))])
+    number = functions(source_file, {"number": (INT, (INT,))})["number"]
+    numbers_in_c = iter([number(place) for place in range(len(numbers))])
     for name, twin in TWINS[source].items():
         mine = [field[0] for field in twin._fields_ if field[0] not in WITHIN]
         offsets = [getattr(twin, field).offset for field in mine]
-        assert [next(told) for _ in names[name]] == offsets, (name, names[name], mine)
-        assert next(told) == ctypes.sizeof(twin), name
+        assert [next(numbers_in_c) for _ in names[name]] == offsets, (name, names[name], mine)
+        assert next(numbers_in_c) == ctypes.sizeof(twin), name
 
 
 def test_every_shared_struct_is_compared() -> None:
-    """A new struct needs an entry in TWINS, unless only C uses it."""
+    """Every struct that Python and C share is in TWINS; a new one needs an entry unless only C uses it."""
     own = {("renderer.c", "pixel"), ("renderer.c", "hit"), ("physics.c", "vect"),
            ("line.c", "scan"), ("motors.c", "state")}  # fmt: skip
     found = {(path.name, name) for folder in (ARENA, BOARD) for path in folder.rglob("*.c")

@@ -48,14 +48,14 @@ def scene() -> Scene:
 
 
 def facing(centimetres: float, turned_deg: float = 0.0) -> Poses:
-    """Return poses of a camera robot and a robot before its lens that faces it, turned to the left by an angle."""
+    """Return poses of a camera robot and of a second robot that faces its lens, turned to the left by `angle`."""
     there = LENS_X + centimetres + dimensions.ROBOT_RADIUS
     return Poses([CAMERA, (there, 150.0, math.pi + math.radians(turned_deg))], [])
 
 
 @pytest.mark.parametrize("led", range(8))
 def test_a_ring_led_is_visible_at_its_bearing_and_height(scene: Scene, led: int) -> None:
-    """Ring LEDs are 45 degrees apart, clockwise from the front, and 1 cm wide and high."""
+    """Ring LEDs are 45 degrees apart, clockwise from the front; each is 1 cm wide and 1 cm high in the picture."""
     red, _ = led_classes(scene)
     lens_to_edge = 20.0
     camera = ReferenceCamera(scene, facing(lens_to_edge, 45.0 * led), 0, leds=(0, 1 << led))
@@ -83,7 +83,8 @@ def test_the_body_is_lit_as_a_whole_and_a_led_behind_is_invisible(scene: Scene) 
 
 
 def test_renderer_and_reference_camera_agree_on_leds() -> None:
-    """Random robots and LEDs; rows of the renderer, columns of the reference."""
+    """The renderer, which works by rows, and the reference camera, which works by columns, agree for random robots
+    and LEDs."""
     scene = load_scene("clustering").with_values(
         robots__count=6, objects__count=6, camera__sees_leds=True, camera__pitch_deg=1.0
     )
@@ -119,8 +120,8 @@ def test_leds_are_visible_one_quantum_late() -> None:
 def test_firmware_takes_a_robot_with_a_lit_red_led_for_an_object(
     clustering_image: Path, assembled: Callable[[str], Path], scene: Scene
 ) -> None:
-    """The clustering firmware takes the robot before it for an object while that robot's LED is lit, else for a robot.
-    Without `camera.sees_leds` it never takes it for an object."""
+    """The clustering firmware takes the robot before it for an object while that robot's LED is lit, otherwise for a
+    robot. Without `camera.sees_leds` it never takes it for an object."""
     blinker = assembled(BLINKER)
     poses = facing(14.0)
     for sees, until in ((True, 1200), (False, 800)):
@@ -141,7 +142,7 @@ def test_firmware_takes_a_robot_with_a_lit_red_led_for_an_object(
 def test_records_are_the_same_for_two_threads(
     clustering_image: Path, assembled: Callable[[str], Path], tmp_path: Path
 ) -> None:
-    """LED changes reach other robots' cameras independently of the thread that runs a robot."""
+    """LED changes reach other robots' cameras at the same cycle whichever thread runs a robot."""
     blinker = assembled(BLINKER)
     text = f"""name = "leds"
 [camera]

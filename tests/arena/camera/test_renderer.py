@@ -24,13 +24,13 @@ def scene() -> Scene:
 
 
 def one_object(distance_cm: float, bearing: float = 0.0) -> Poses:
-    """Return poses of a robot and an object whose surface is `distance_cm` from the lens."""
+    """Return poses of a robot and of an object whose surface is `distance_cm` before the lens."""
     centre = distance_cm + dimensions.OBJECT_RADIUS
     return Poses([ROBOT_AT], [(LENS_X + centre * math.cos(bearing), 150 + centre * math.sin(bearing))])
 
 
 def test_rows_show_heights_by_the_pinhole_formula(scene: Scene) -> None:
-    """v = 240 + 602 (28 - z)/d in mm: an object 1 m away shows its top in row 197 and its foot in row 256."""
+    """By v = 240 + 602 (28 - z)/d in mm, an object 1 m away has its top in row 197 and its foot in row 256."""
     camera = ReferenceCamera(scene, one_object(100.0), 0)
     top = 240 + 602 * (28 - 100) / 1000
     foot = 240 + 602 * 28 / 1000
@@ -39,7 +39,7 @@ def test_rows_show_heights_by_the_pinhole_formula(scene: Scene) -> None:
 
 
 def test_columns_show_bearings_by_the_pinhole_formula(scene: Scene) -> None:
-    """u = 320 - 602 tan a, left positive: the edges of an object are where its tangents are."""
+    """By u = 320 - 602 tan a (left positive), the edges of an object are in the columns of its tangents."""
     camera = ReferenceCamera(scene, one_object(95.0), 0)
     half = math.asin(dimensions.OBJECT_RADIUS / 100.0)
     edge = 602 * math.tan(half)
@@ -48,7 +48,8 @@ def test_columns_show_bearings_by_the_pinhole_formula(scene: Scene) -> None:
 
 
 def test_pitch_lowers_the_picture_by_its_angle(scene: Scene) -> None:
-    """epuck.md §7.6: up to 3 degrees of mounting error; on the axis a degree is 602 tan 1 deg = 10.5 rows."""
+    """epuck.md §7.6: the mounting error is up to 3 degrees; on the axis one degree shifts the picture by 602 tan 1
+    deg = 10.5 rows."""
     plain, pitched = (ReferenceCamera(scene.with_values(camera__pitch_deg=a), one_object(100.0), 0) for a in (0.0, 1.0))
     rows = tuple(range(180, 280))
     first = [camera.column(320, rows).index(OBJECT) for camera in (plain, pitched)]
@@ -56,7 +57,7 @@ def test_pitch_lowers_the_picture_by_its_angle(scene: Scene) -> None:
 
 
 def test_a_mirrored_camera_exchanges_left_and_right_and_up_and_down(scene: Scene) -> None:
-    """experiment-contract.md §5: mirroring is part of the sensitivity table."""
+    """experiment-contract.md §5: a mirrored camera exchanges left and right, and top and bottom."""
     poses = one_object(60.0, bearing=0.2)
     plain, mirrored = (ReferenceCamera(scene.with_values(camera__mirrored=one), poses, 0) for one in (False, True))
     for u in range(0, 640, 40):
@@ -66,7 +67,7 @@ def test_a_mirrored_camera_exchanges_left_and_right_and_up_and_down(scene: Scene
 
 
 def test_barrel_distortion_shows_an_angle_nearer_to_the_axis(scene: Scene) -> None:
-    """lens.py: the point at r (1 + k r^2) appears at r."""
+    """lens.py: barrel distortion moves the point at radius r (1 + k r^2) to radius r."""
     bearing = 0.3
     camera = ReferenceCamera(scene.with_values(camera__distortion=0.2), one_object(95.0, bearing), 0)
     columns = [u for u in range(640) if camera.column(u, (240,))[0] == OBJECT]
@@ -77,7 +78,7 @@ def test_barrel_distortion_shows_an_angle_nearer_to_the_axis(scene: Scene) -> No
 
 
 def test_vignetting_darkens_the_corners_by_its_share(scene: Scene) -> None:
-    """epuck.md §7.6: up to 30 % in the corners, nothing on the axis."""
+    """epuck.md §7.6: vignetting darkens the corners by up to 30 % and leaves the axis unchanged."""
     bright = Lens().vignetting(240, np.array([320, 0]), 0.3)
     corner = Lens().vignetting(0, np.array([0]), 0.3)
     assert bright[0] == 1.0
@@ -86,7 +87,8 @@ def test_vignetting_darkens_the_corners_by_its_share(scene: Scene) -> None:
 
 
 def test_a_near_body_hides_a_far_one_up_to_its_height(scene: Scene) -> None:
-    """A robot of 55 mm before an object of 100 mm: the object is visible above it, the room above the wall."""
+    """A robot of 55 mm stands before an object of 100 mm: the object is visible above the robot, and the room above
+    the wall."""
     poses = Poses([ROBOT_AT, (LENS_X + 50, 150, 0.0)], [(LENS_X + 80, 150)])
     rows = (0, 190, 200, 240, 265, 400)
     assert ReferenceCamera(scene, poses, 0).column(320, rows) == [ABOVE, OBJECT, OBJECT, ROBOT, ROBOT, FLOOR]
@@ -102,7 +104,7 @@ LENSES = [
 
 @pytest.mark.parametrize("lens", LENSES)
 def test_rows_of_the_renderer_equal_columns_of_the_reference(lens: dict[str, object]) -> None:
-    """For every lens."""
+    """Rows of the renderer equal columns of the reference camera for every lens."""
     scene = load_scene("clustering").with_values(**lens)
     world = World(scene, 2)
     columns = np.arange(0, 640, 7)
@@ -118,7 +120,8 @@ def test_rows_of_the_renderer_equal_columns_of_the_reference(lens: dict[str, obj
 
 
 def test_objects_are_detected_to_150_cm(scene: Scene) -> None:
-    """experiment-contract.md §1: at least 95 % at 150 cm; by geometry to about 270 cm, where one row is left."""
+    """experiment-contract.md §1: at least 95 % of the objects at 150 cm are detected; the geometric limit is about
+    270 cm, where an object fills one row."""
     rng = np.random.default_rng(1)
     for distance, low, high in ((20, 0.95, 1), (80, 0.95, 1), (149, 0.95, 1), (240, 0.9, 1), (300, 0, 0.05)):
         bearings = rng.uniform(-1, 1, 200) * math.pi / 180
@@ -133,7 +136,8 @@ def test_the_range_ends_detection(scene: Scene) -> None:
 
 
 def test_robots_are_detected_nearer_than_objects(scene: Scene) -> None:
-    """docs/experiment.md §3: all at 1 m, less than half at 1.4 m, where a robot of 55 mm fills one row."""
+    """docs/experiment.md §3: all robots at 1 m are detected, but less than half at 1.4 m, where a robot of 55 mm
+    fills one row."""
     rng = np.random.default_rng(1)
     shares = []
     for distance in (60.0, 100.0, 140.0, 200.0):
@@ -155,7 +159,8 @@ def test_robots_are_detected_nearer_than_objects(scene: Scene) -> None:
 def test_pitch_determines_the_detection_range_of_robots(
     scene: Scene, pitch_deg: float, distance: float, low: float, high: float
 ) -> None:
-    """docs/experiment.md §3: two rows of the window to 105 cm, to 135 cm four rows lower, to 150 cm at a degree."""
+    """docs/experiment.md §3: robots are detected to 105 cm with two rows of the window, to 135 cm with the window
+    four rows lower, and to 150 cm with one degree of pitch."""
     rng = np.random.default_rng(1)
     pitched = scene.with_values(camera__pitch_deg=pitch_deg)
     centre = distance + dimensions.ROBOT_RADIUS

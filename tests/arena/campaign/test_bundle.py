@@ -17,7 +17,7 @@ from arena.trial.record import RecordError
 
 @pytest.fixture(scope="module")
 def study(tmp_path_factory: pytest.TempPathFactory, talking_image: Path) -> Path:
-    """Create runs with two scripted trials and one with firmware."""
+    """Create a run with two scripted trials and a run with one firmware trial."""
     folder = tmp_path_factory.mktemp("study")
     short = ["--minutes", "0.02", "--jobs", "1", "--robots", "2", "--objects", "3"]
     assert (
@@ -41,7 +41,7 @@ def study(tmp_path_factory: pytest.TempPathFactory, talking_image: Path) -> Path
 
 @pytest.fixture
 def packed(study: Path, tmp_path: Path) -> Path:
-    """Pack the study into a bundle."""
+    """Pack the runs into a bundle and return its path."""
     path = tmp_path / "study.zip"
     bundle.pack([study / "script", study / "talk"], path)
     return path
@@ -55,7 +55,7 @@ def test_the_same_runs_give_the_same_file(study: Path, packed: Path, tmp_path: P
 
 
 def test_a_bundle_is_computed_again_to_the_byte(packed: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """`verify` reproduces all trials, with firmware and scripted."""
+    """`verify` runs all trials of a bundle again, with firmware and scripted, and reproduces their bytes."""
     assert main(["verify", str(packed), "--trials", "9", "--strict"]) == 0
     output = capsys.readouterr().out.splitlines()
     assert output[:3] == [
@@ -69,7 +69,8 @@ def test_a_bundle_is_computed_again_to_the_byte(packed: Path, capsys: pytest.Cap
 def test_another_version_is_told_and_values_are_compared(
     packed: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """With other versions the bytes differ, because the record names them, but the values can be equal."""
+    """Records of another version differ in bytes, because each record names its version, but their values can be
+    equal."""
     changed = versions.versions() | {"pymunk": "99"}
     monkeypatch.setattr(campaign, "versions", lambda: changed)
     assert main(["verify", str(packed)]) == 0
@@ -80,7 +81,8 @@ def test_another_version_is_told_and_values_are_compared(
 def test_a_bundle_of_another_version_with_other_values_names_its_commit(
     packed: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """`verify` says that the versions differ and which commit computes the recorded values; status 1."""
+    """If versions and values differ, `verify` ends with status 1 and names the commit that computed the recorded
+    values."""
     with zipfile.ZipFile(packed) as archive:
         manifests = {f"{run}/manifest.json": archive.read(f"{run}/manifest.json") for run in ("script", "talk")}
         exchanged = {"script/trial-0001.parquet": archive.read("script/trial-0002.parquet")}
@@ -106,7 +108,7 @@ def test_a_bundle_of_another_version_with_other_values_names_its_commit(
 
 
 def test_a_verification_of_no_trial_is_an_error(packed: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """No trial run again proves nothing: status 2."""
+    """`verify` without a trial to run proves nothing and ends with status 2."""
     assert main(["verify", str(packed), "--trials", "0"]) == 2
     assert "--trials: '0': expected" in capsys.readouterr().err
     for words in (["--number", "9"], ["--number", "9", "--json"]):
@@ -119,7 +121,8 @@ def test_a_verification_of_no_trial_is_an_error(packed: Path, capsys: pytest.Cap
 def test_a_light_bundle_says_as_much(
     study: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """A light bundle distinguishes equal bytes, equal values, and the columns that differ."""
+    """A light bundle, which has hashes instead of records, distinguishes equal bytes, equal values and differing
+    columns."""
     light, whole = tmp_path / "light.zip", tmp_path / "whole.zip"
     runs = [str(study / "script"), str(study / "talk")]
     assert main(["bundle", "--light", str(light), *runs]) == main(["bundle", str(whole), *runs]) == 0
@@ -149,7 +152,8 @@ def test_a_light_bundle_says_as_much(
 def test_a_record_that_is_not_what_the_plan_gives_is_found(
     study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Two trials exchanged before packing have correct hashes, but a repeated trial differs."""
+    """If two records were exchanged before packing, all hashes match, but `verify` finds that repeated trials
+    differ."""
     run = tmp_path / "script"
     run.mkdir()
     for path in (study / "script").iterdir():
@@ -172,7 +176,7 @@ def rewritten(packed: Path, target: Path, change: dict[str, bytes]) -> Path:
 
 
 def listed(packed: Path, change: dict[str, bytes]) -> dict[str, bytes]:
-    """Return `change` together with a list of files that has the matching hashes."""
+    """Return `change` and a list of files with the hashes of the changed contents."""
     with zipfile.ZipFile(packed) as archive:
         contents = json.loads(archive.read("bundle.json"))
     contents["files"] |= {name: hashlib.sha256(data).hexdigest() for name, data in change.items()}
@@ -180,7 +184,8 @@ def listed(packed: Path, change: dict[str, bytes]) -> dict[str, bytes]:
 
 
 def test_changed_files_and_archives_that_are_none_are_refused(packed: Path, tmp_path: Path) -> None:
-    """Each is refused with a message of one line; no file is written outside the folder."""
+    """A changed file or an invalid archive is refused with a one-line message, and no file is written outside the
+    folder."""
     with zipfile.ZipFile(packed) as archive:
         contents = json.loads(archive.read("bundle.json"))
     evil = contents["files"] | {"../evil": "0" * 64}
@@ -237,7 +242,7 @@ DEEP = b"[" * 100_000 + b"]" * 100_000
 def test_nesting_encryption_and_other_compressions_are_refused(
     packed: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Exceptions of the zip and JSON readers other than ValueError are reported."""
+    """Exceptions of the zip and JSON readers other than ValueError are reported as invalid bundles."""
     rewritten(packed, tmp_path / "list.zip", {"bundle.json": DEEP})
     rewritten(packed, tmp_path / "manifest.zip", listed(packed, {"script/manifest.json": DEEP}))
     flagged = bytearray(packed.read_bytes())

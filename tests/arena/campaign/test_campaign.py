@@ -1,4 +1,5 @@
-"""Command line: equal files for any number of workers, resumed runs, bad input (docs/experiment.md)."""
+"""Command line of the arena: files do not depend on the number of workers, runs can be resumed, bad input is reported
+(docs/experiment.md)."""
 
 import json
 import signal
@@ -30,7 +31,7 @@ def contents(folder: Path) -> dict[str, bytes]:
 
 
 def test_one_worker_two_workers_and_a_second_run_write_the_same_bytes(tmp_path: Path) -> None:
-    """The number of workers does not affect a file."""
+    """Runs with one worker, with two workers and a second run write the same bytes."""
     for folder, jobs in (("one", 1), ("two", 2), ("again", 1)):
         assert run("--trials", 3, "--jobs", jobs, "--out", tmp_path / folder) == 0
     assert len(contents(tmp_path / "one")) == 3
@@ -38,7 +39,8 @@ def test_one_worker_two_workers_and_a_second_run_write_the_same_bytes(tmp_path: 
 
 
 def test_finished_trials_are_kept_and_an_unfinished_one_starts_from_its_seed(tmp_path: Path) -> None:
-    """After an interruption: one file is missing, and a partial file of the trial is beside it."""
+    """An interrupted run, with one record missing and one partial record, continues with the missing trial and keeps
+    the others."""
     run("--trials", 3, "--jobs", 1, "--out", tmp_path / "a")
     before = contents(tmp_path / "a")
     kept = tmp_path / "a" / "trial-0001.parquet"
@@ -58,7 +60,7 @@ def test_a_folder_of_another_run_is_left_alone(tmp_path: Path, capsys: pytest.Ca
 
 
 def test_a_trial_says_what_it_was_made_from(tmp_path: Path) -> None:
-    """A record holds seed, scene, brain and versions."""
+    """A record holds seed, scene, controller and versions of its trial."""
     run("--trials", 1, "--jobs", 1, "--seed", 7, "--robots", 2, "--objects", 3, "--out", tmp_path)
     (trial,) = trials_in(tmp_path)
     assert trial.about["seed"] == 7
@@ -95,7 +97,7 @@ def test_bad_input_is_explained_without_a_traceback(
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    """Bad input is exit status 2 and a message."""
+    """Invalid arguments end with exit status 2 and a message without a traceback."""
     monkeypatch.chdir(tmp_path)
     assert main(arguments) == 2
     assert message in capsys.readouterr().err
@@ -114,7 +116,7 @@ def test_bad_input_is_explained_without_a_traceback(
 def test_scene_files_with_mistakes_are_named(
     text: str, message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The message names file, key and expected value."""
+    """For an invalid scene file the message names file, key and expected value."""
     path = tmp_path / "my.toml"
     path.write_text(text)
     assert main(["run", str(path), *SHORT]) == 2
@@ -132,7 +134,7 @@ def test_a_new_scene_needs_no_code(tmp_path: Path) -> None:
 
 
 def test_a_full_disk_is_reported_and_leaves_no_file(tmp_path: Path, unwritable: set[str]) -> None:
-    """Every write fails with ENOSPC, through a link at the path of the unfinished file."""
+    """If every write of a record fails with ENOSPC, the message names the record, and no file is left."""
     unwritable.add("trial-0001.parquet")
     rows = Rows()
     rows.add({"t": 0.0, "log": []})
@@ -142,7 +144,7 @@ def test_a_full_disk_is_reported_and_leaves_no_file(tmp_path: Path, unwritable: 
 
 
 def test_compare_finds_a_run_equivalent_to_itself(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """All differences of a run to itself are 0."""
+    """`compare` of a run with itself finds only differences of 0."""
     run("--trials", 2, "--jobs", 1, "--out", tmp_path)
     capsys.readouterr()
     assert main(["compare", str(tmp_path), str(tmp_path), "--at", "5", "--json"]) == 0
@@ -153,7 +155,7 @@ def test_compare_finds_a_run_equivalent_to_itself(tmp_path: Path, capsys: pytest
 
 
 def test_compare_tells_how_far_robots_of_one_seed_are_apart(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Robots of the same run are 0 cm apart; those of a run with another quantum are not."""
+    """`compare` reports 0 cm between robots of equal runs, and a positive distance for a run with another quantum."""
     run("--trials", 2, "--jobs", 1, "--out", tmp_path / "a")
     run("--trials", 2, "--jobs", 1, "--set", "clock.scripted_quantum_ms=2", "--out", tmp_path / "b")
     apart = []
@@ -195,7 +197,7 @@ def test_report_writes_tables_and_figures_into_a_document(tmp_path: Path, capsys
 
 
 def test_sweeps_run_every_combination(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Two values of two keys make four runs."""
+    """A sweep over two values of each of two keys makes four runs."""
     vary = ["--vary", "robots.count=1,2", "--vary", "camera.range_cm=100,inf"]
     out = ["--trials", "1", "--jobs", "1", "--out", str(tmp_path)]
     assert main(["sweep", "clustering", *SHORT, *vary, *out]) == 0
@@ -208,7 +210,7 @@ def test_sweeps_run_every_combination(tmp_path: Path, capsys: pytest.CaptureFixt
 
 
 def test_plot_draws_the_figures(tmp_path: Path) -> None:
-    """Snapshots, curves and trajectories are drawn; CPU load only for firmware."""
+    """`plot` draws snapshots, curves and trajectories, and CPU load only for firmware."""
     run("--trials", 2, "--jobs", 1, "--out", tmp_path / "run")
     assert main(["plot", str(tmp_path / "run"), "--out", str(tmp_path / "figures")]) == 0
     names = {path.name for path in (tmp_path / "figures").iterdir() if path.stat().st_size > 5000}
@@ -216,7 +218,7 @@ def test_plot_draws_the_figures(tmp_path: Path) -> None:
 
 
 def test_one_command_draws_all_figures_of_a_study(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """One set of figures per controller, and one for the scripted runs."""
+    """One command draws one set of figures per controller and one for the scripted runs."""
     for controller in "AB":
         command = ["run", "clustering", "--brain", "scripted", "--minutes", "0.05", "--controller", controller]
         assert main([*command, "--trials", "2", "--jobs", "1", "--out", str(tmp_path / f"scripted-{controller}")]) == 0
@@ -232,7 +234,7 @@ def test_one_command_draws_all_figures_of_a_study(tmp_path: Path, capsys: pytest
 
 
 def test_figures_show_what_is_there(tmp_path: Path) -> None:
-    """Single objects are not filled, deviations are clipped to possible values, a scale bar is drawn."""
+    """Clusters of one object are not filled, deviations are clipped to possible values, and a scale bar is drawn."""
     run("--trials", 3, "--jobs", 1, "--out", tmp_path / "run")
     trials = trials_in(tmp_path / "run")
     picture = plots.snapshots({"run": trials})
@@ -259,7 +261,8 @@ def test_figures_show_what_is_there(tmp_path: Path) -> None:
 
 
 def test_sensitivity_prints_and_saves_a_table(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """One row per variant, one column per controller; finished trials are kept (experiment-contract.md §5)."""
+    """The sensitivity table has one row per variant and one column per controller; finished trials are kept
+    (experiment-contract.md §5)."""
     command = ["sensitivity", "clustering", "--trials", "2", "--minutes", "0.05", "--jobs", "1", "--only", "axle",
                "--only", "mirrored", "--out", str(tmp_path / "runs"), "--save", str(tmp_path / "table.md")]  # fmt: skip
     assert main(command) == 0
@@ -277,7 +280,8 @@ def test_sensitivity_prints_and_saves_a_table(tmp_path: Path, capsys: pytest.Cap
 def test_a_disk_that_fills_up_during_a_run_ends_it_and_keeps_what_is_finished(
     tmp_path: Path, unwritable: set[str], capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The second of three trials cannot be written; the same command continues once there is space."""
+    """If the disk is full at the second of three trials, the run ends; the same command continues once there is
+    space."""
     unwritable.add("trial-0002.parquet")
     assert run("--trials", 3, "--jobs", 1, "--out", tmp_path) == 2
     assert "trial-0002.parquet: cannot be written: No space left" in " ".join(capsys.readouterr().err.split())
@@ -288,7 +292,7 @@ def test_a_disk_that_fills_up_during_a_run_ends_it_and_keeps_what_is_finished(
 
 
 def test_an_interrupted_run_keeps_finished_trials_and_leaves_no_half_ones(tmp_path: Path) -> None:
-    """After SIGINT the same command continues, and the files equal those of an uninterrupted run."""
+    """After SIGINT the same command continues the run, and its files equal those of an uninterrupted run."""
     command = ["run", "clustering", "--brain", "scripted", "--trials", "8", "--minutes", "1"]
     arguments = [*command, "--jobs", "1", "--out", str(tmp_path / "a")]
     code = f"import sys; from arena.cli import main; sys.exit(main({arguments!r}))"
@@ -321,14 +325,14 @@ def alive(process: str) -> bool:
 
 @pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="only Linux's /proc tells a killed process's children")
 def test_workers_end_with_a_killed_run(tmp_path: Path) -> None:
-    """Workers end when SIGKILL has ended their run."""
+    """Worker processes end when their run is killed by SIGKILL."""
     command = [sys.executable, "-m", "arena", "run", "clustering", "--brain", "scripted", "--minutes", "600"]
     process = subprocess.Popen([*command, "--trials", "2", "--jobs", "2", "--out", str(tmp_path)],
                                stderr=subprocess.DEVNULL)  # fmt: skip
     children = Path(f"/proc/{process.pid}/task/{process.pid}/children")
     workers: list[str] = []
     end = time.monotonic() + HANG
-    while len(workers) < 3 and time.monotonic() < end:  # two, and multiprocessing's resource tracker
+    while len(workers) < 3 and time.monotonic() < end:  # two workers and multiprocessing's resource tracker
         time.sleep(0.1)
         workers = children.read_text().split()
     process.kill()
@@ -340,7 +344,7 @@ def test_workers_end_with_a_killed_run(tmp_path: Path) -> None:
 
 
 def test_a_film_of_one_robot_is_drawn_and_logged(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """The log has increasing times; a robot that does not exist is refused."""
+    """The filmstrip of a robot has increasing times in its log; a robot that does not exist is refused."""
     run("--trials", 1, "--jobs", 1, "--set", "clock.sample_s=0.1", "--out", tmp_path / "run")
     capsys.readouterr()
     assert main(["plot", str(tmp_path / "run"), "--film", "0", "--out", str(tmp_path)]) == 0
@@ -356,7 +360,7 @@ def test_a_film_of_one_robot_is_drawn_and_logged(tmp_path: Path, capsys: pytest.
 
 
 def test_one_command_runs_every_arm_and_reports(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """The same command writes the same report again without running a trial."""
+    """If `arena experiment` is repeated, it writes the same report without running a trial."""
     command = ["experiment", "clustering", "--brains", "scripted", "--trials", "2", "--minutes", "0.05", "--twins", "0",
                "--at", "2", "--jobs", "1", "--out", str(tmp_path)]  # fmt: skip
     texts = []
@@ -387,7 +391,7 @@ def test_one_command_runs_every_arm_and_reports(tmp_path: Path, capsys: pytest.C
 def test_an_experiment_checks_every_argument_before_its_first_trial(
     words: list[str], message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A wrong argument ends with status 2, and no trial has run."""
+    """`arena experiment` checks every argument first: a wrong argument ends with status 2 before a trial has run."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "plain.md").write_text("# No marks\n")
     command = ["experiment", "clustering", "--brains", "scripted", "--trials", "2", "--minutes", "0.05", "--twins", "0",
@@ -400,7 +404,7 @@ def test_an_experiment_checks_every_argument_before_its_first_trial(
 def test_an_experiment_finds_the_folder_of_another_run_before_its_first_trial(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The folder of the last arm is checked before the first arm runs."""
+    """`arena experiment` checks the folders of all arms, including the last one, before it runs the first arm."""
     arm = ["run", "clustering", "--brain", "scripted", "--controller", "B", "--trials", "1", "--jobs", "1"]
     assert main([*arm, "--minutes", "0.03", "--out", str(tmp_path / "scripted-B")]) == 0
     command = ["experiment", "clustering", "--brains", "scripted", "--trials", "2", "--minutes", "0.05", "--twins", "0",

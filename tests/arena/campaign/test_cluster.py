@@ -15,7 +15,7 @@ distributed = pytest.importorskip("distributed", reason="Dask is not installed (
 
 @pytest.fixture(scope="module")
 def address() -> Iterator[str]:
-    """Start a Dask cluster of two worker processes on this machine."""
+    """Start a Dask cluster of two worker processes on this machine and return its address."""
     with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
         yield cluster.scheduler_address
 
@@ -27,7 +27,8 @@ def contents(folder: Path) -> dict[str, bytes]:
 def test_a_sweep_on_a_cluster_writes_the_same_bytes_as_here(
     address: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Two values with two trials each; finished trials are not run again."""
+    """A sweep of two values with two trials each writes the same bytes on a cluster and locally; finished trials are
+    not run again."""
     command = ["sweep", "clustering", "--brain", "scripted", "--minutes", "0.05", "--trials", "2", "--jobs", "1",
                "--vary", "camera.range_cm=100,inf", "--json"]  # fmt: skip
     assert main([*command, "--out", str(tmp_path / "here")]) == 0
@@ -42,7 +43,7 @@ def test_a_sweep_on_a_cluster_writes_the_same_bytes_as_here(
 def test_firmware_travels_to_the_workers(
     address: str, talking_image: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The fault of a robot on a worker is reported."""
+    """Firmware is sent to the workers of a cluster, and a robot's fault on a worker is reported."""
     command = ["run", "clustering", "--brain", str(talking_image), "--robots", "1", "--trials", "1", "--minutes",
                "0.03", "--jobs", "1"]  # fmt: skip
     assert main([*command, "--out", str(tmp_path / "here")]) == 1
@@ -52,7 +53,7 @@ def test_firmware_travels_to_the_workers(
 
 
 def test_a_scheduler_that_is_not_there_is_reported(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """An invalid address, and a port without a listener, are exit status 2."""
+    """A scheduler address that is invalid, or whose port has no listener, ends with exit status 2."""
     command = ["run", "clustering", "--brain", "scripted", "--minutes", "0.05", "--trials", "1", "--out", str(tmp_path)]
     assert main([*command, "--scheduler", "nonsense://x"]) == 2
     assert "nonsense" in capsys.readouterr().err

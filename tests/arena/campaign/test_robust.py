@@ -30,7 +30,7 @@ SHORT = ["run", "clustering", "--brain", "scripted", "--minutes", "0.05", "--tri
 
 
 def started(*arguments: object) -> subprocess.Popen[str]:
-    """Start `arena` in another process."""
+    """Start `arena` in another process and return the process."""
     command = [sys.executable, "-m", "arena", *map(str, arguments)]
     return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=ROOT)
 
@@ -51,7 +51,7 @@ def wait_for(path: Path, seconds: float = HANG) -> None:
     ],
 )  # fmt: skip
 def test_numbers_that_are_none(words: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """An invalid number is named with status 2, and no folder is created."""
+    """An invalid number is named and ends with status 2; no folder is created."""
     assert main([*SHORT, *words, "--out", str(tmp_path / "out")]) == 2
     output = capsys.readouterr().err
     assert f"argument {words[0]}: {words[1]!r}: expected" in output
@@ -117,7 +117,7 @@ def test_two_runs_do_not_share_a_folder(tmp_path: Path) -> None:
     long = ["run", "clustering", "--brain", "scripted", "--minutes", "2", "--trials", "3", "--jobs", "1"]
     first = started(*long, "--out", tmp_path)
     wait_for(tmp_path / "manifest.json")
-    first.send_signal(signal.SIGSTOP)  # so that it is still running when the second one starts
+    first.send_signal(signal.SIGSTOP)  # keeps it running when the second one starts
     second = started(*SHORT, "--seed", 99, "--out", tmp_path)
     output = second.communicate(timeout=HANG)[1]
     first.send_signal(signal.SIGCONT)
@@ -131,20 +131,20 @@ def test_two_runs_do_not_share_a_folder(tmp_path: Path) -> None:
 
 
 def test_a_killed_run_leaves_the_folder_free(tmp_path: Path) -> None:
-    """The lock is released with its process."""
+    """The lock of a folder is released when its process is killed."""
     long = ["run", "clustering", "--brain", "scripted", "--minutes", "60", "--trials", "1", "--jobs", "1"]
     first = started(*long, "--out", tmp_path / "run")
     wait_for(tmp_path / "run" / "manifest.json")
     first.kill()
     first.wait()
     again = [*long[:5], "0.02", *long[6:], "--out", str(tmp_path / "run")]
-    assert main(again) == 2  # refused for another duration, not because of a lock
+    assert main(again) == 2  # refused because the duration differs, not because of a lock
     (tmp_path / "run" / "manifest.json").unlink()
     assert main(again) == 0
 
 
 def test_a_file_where_the_folder_should_be(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """A file in place of the folder is one line and status 2."""
+    """If the output path is a file instead of a folder, the run ends with one line and status 2."""
     (tmp_path / "out").write_text("mine")
     assert main([*SHORT, "--out", str(tmp_path / "out")]) == 2
     assert "is not a folder" in capsys.readouterr().err
@@ -187,7 +187,7 @@ def test_a_trial_that_ends_takes_its_lock_away(tmp_path: Path) -> None:
 
 
 def test_progress_without_a_terminal_is_plain_lines(tmp_path: Path) -> None:
-    """Without a terminal, progress is plain lines."""
+    """Without a terminal, progress is printed as plain lines."""
     run = started(*SHORT[:-4], "--trials", 3, "--jobs", 1, "--out", tmp_path)
     out, output = run.communicate(timeout=HANG)
     assert run.returncode == 0
@@ -222,7 +222,7 @@ def test_versions_do_not_mix_in_a_folder(
 
 
 def test_the_hash_of_sources_sees_code_and_not_where_it_lies(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The version hash depends on every byte of code, and not on the page."""
+    """The version hash depends on every byte of code, but not on the location of the sources or on the replay page."""
 
     def hashed(root: Path) -> str:
         monkeypatch.setattr(versions, "ROOT", root)
@@ -298,7 +298,7 @@ def test_a_scheduler_that_dies_is_one_line_and_what_is_finished_stays(tmp_path: 
     ],
 )
 def test_the_first_thing_that_is_wrong_with_a_json_text(value: object, wrong: str) -> None:
-    """The first wrong value in the metadata of a record is named."""
+    """For invalid metadata of a record, the message names the first wrong value."""
     assert mismatch(value, {"seed": int, "faults": [(int, float, str)], "note?": str}) == wrong
 
 
@@ -315,7 +315,7 @@ def test_the_first_thing_that_is_wrong_with_a_json_text(value: object, wrong: st
 )
 def test_a_record_with_a_damaged_column_is_refused(column: str, values: list[object], message: str,
                                                    tmp_path: Path) -> None:  # fmt: skip
-    """A damaged column is reported with file and column."""
+    """A record with a damaged column is refused; the message names the file and the column."""
     assert main([*SHORT, "--robots", "1", "--objects", "0", "--out", str(tmp_path)]) == 0
     path = tmp_path / "trial-0001.parquet"
     table = parquet.read_table(path).slice(0, 2)

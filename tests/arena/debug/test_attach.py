@@ -1,4 +1,5 @@
-"""Debugger on a robot of a studio trial: it starts at the present time, and the studio stays responsive."""
+"""Debugger attached to a robot of a studio trial: debugging starts at the current time, and the studio stays
+responsive."""
 
 from __future__ import annotations
 
@@ -48,7 +49,8 @@ def attached_client(studio: Studio, robot: int) -> Connected:
 
 
 def test_a_robot_can_be_debugged_from_the_present_on(clustering_image: Path) -> None:
-    """Breakpoints and steps back work, commands are refused, and the record is unaffected."""
+    """A robot can be debugged from the current time on: breakpoints and reverse steps work, invalid commands are
+    refused, and the record is unaffected."""
     plan = Plan(scene_of(2, 4), "openswarm", "A", clustering_image, 1, SECONDS, 3)
     with controllers_of(plan, 3) as (controllers, channel):
         whole = run_trial(plan.scene, 3, controllers, SECONDS, channel=channel, experiment=plan.loaded_experiment)
@@ -90,7 +92,7 @@ def test_the_debugger_is_detached_with_and_without_a_client(clustering_image: Pa
         assert do(studio, "debug", 0)["debugger"] is None
         attached_client(studio, 1)
         assert do(studio, "debug", 1)["debugger"] is None
-        attached_client(studio, 0)  # the studio is closed while a client is attached
+        attached_client(studio, 0)  # the studio is closed while this client is attached
 
 
 def test_a_scripted_robot_cannot_be_debugged() -> None:

@@ -1,4 +1,4 @@
-"""Debugger on one robot of a trial: it runs forward and back, and the record is unaffected."""
+"""Debugger on one robot of a trial: it runs forward and backward, and the record is unaffected."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ from toolchain.driver import driver
 SEED = ("--seed", "3")
 
 
-def move(client: Client, request: str, **arguments: object) -> str:
-    """Execute a request that moves the machine, and return the time at which it pauses."""
+def execute(client: Client, request: str, **arguments: object) -> str:
+    """Send a request that runs, steps or rewinds the machine, and return the time at which it pauses."""
     client.send(request, threadId=1, **arguments)
     client.event("stopped")
     return str(client.ask("evaluate", expression="/time", context="repl")["result"])
 
 
 def world(client: Client) -> str:
-    """Return the state of all robots and objects, with a hash of the whole state."""
+    """Return the state of all robots and objects, including a hash of the whole state."""
     output = str(client.ask("evaluate", expression="/world", context="repl")["result"])
     assert output.splitlines()[-1].startswith("state: ")
     return output
@@ -44,9 +44,10 @@ def world(client: Client) -> str:
 def test_a_record_is_the_same_with_a_debugger_on_a_robot(
     tmp_path: Path, clustering_image: Path, scene: str, brain: str, robot: int, place: str
 ) -> None:
-    """The record is equal to the byte after steps, steps back, and breakpoints in both directions.
+    """The record is equal to the byte after steps, reverse steps, and breakpoints in both directions.
 
-    The world and the other robots go back with the robot."""
+    A rewind restores the world and the other robots together with the debugged robot.
+    """
     trial = [scene, "--minutes", "0.02", "--brain", brain or str(clustering_image), *SEED]
     trial += ["--set", "start.selector=8"] if scene == "clustering" else []  # starts without the remote control
     client = Client("arena", "debug", *trial, "--robot", str(robot), "--out", str(tmp_path / "debugged"))
@@ -55,26 +56,26 @@ def test_a_record_is_the_same_with_a_debugger_on_a_robot(
     client.ask("setFunctionBreakpoints", breakpoints=[{"name": place}])
     client.ask("configurationDone")
     assert client.event("stopped")["reason"] == "entry"
-    first = move(client, "continue")
+    first = execute(client, "continue")
     world_there = world(client)
-    there = [move(client, "next") for _ in range(3)]
+    there = [execute(client, "next") for _ in range(3)]
     world_later = world(client)
     assert world_later != world_there
-    assert move(client, "stepBack", granularity="instruction") != there[-1]
-    assert move(client, "reverseContinue").startswith(first)
+    assert execute(client, "stepBack", granularity="instruction") != there[-1]
+    assert execute(client, "reverseContinue").startswith(first)
     assert world(client) == world_there
     assert "before the present" not in client.ask("evaluate", expression="/time", context="repl")["result"]
-    assert [move(client, "next") for _ in range(3)] == there
+    assert [execute(client, "next") for _ in range(3)] == there
     assert world(client) == world_later
     refused = client.asked("evaluate", expression="W0 = 3", context="repl")
     assert "the trial is being recorded" in refused["message"]
-    assert move(client, "continue") != first
+    assert execute(client, "continue") != first
     client.ask("setFunctionBreakpoints", breakpoints=[])
-    end = move(client, "continue")
+    end = execute(client, "continue")
     world_end = world(client)
-    assert move(client, "stepBack", granularity="instruction") != end
+    assert execute(client, "stepBack", granularity="instruction") != end
     assert world(client) != world_end
-    assert move(client, "continue") == end
+    assert execute(client, "continue") == end
     assert world(client) == world_end
     client.close()
     assert main(["run", *trial, "--trials", "1", "--jobs", "1", "--out", str(tmp_path / "alone")]) == 0
@@ -83,20 +84,20 @@ def test_a_record_is_the_same_with_a_debugger_on_a_robot(
 
 
 def test_a_change_in_the_past_becomes_the_present(clustering_image: Path) -> None:
-    """A rewind repeats earlier changes; `terminate` ends the trial."""
+    """A step back repeats a change that was made before its target; `terminate` ends the trial."""
     client = Client("arena", "debug", "clustering", "--minutes", "9", "--brain", str(clustering_image), "--robot", "0")
     client.ask("initialize", adapterID="openswarm", supportsInvalidatedEvent=True)
     client.ask("launch", stopOnEntry=True)
     client.ask("configurationDone")
     assert client.event("stopped")["reason"] == "entry"
     for _ in range(3):
-        move(client, "stepIn", granularity="instruction")
+        execute(client, "stepIn", granularity="instruction")
     assert client.ask("evaluate", expression="T1CON.TCKPS = 2", context="repl")["result"] == "2"
     for _ in range(2):
-        move(client, "stepIn", granularity="instruction")
+        execute(client, "stepIn", granularity="instruction")
     as_changed = world(client)
-    move(client, "stepIn", granularity="instruction")
-    move(client, "stepBack", granularity="instruction")
+    execute(client, "stepIn", granularity="instruction")
+    execute(client, "stepBack", granularity="instruction")
     assert world(client) == as_changed, "the world goes back with the robot"
     scopes = client.ask("scopes", frameId=client.top()["id"])["scopes"]
     lists = {one["name"]: one["variablesReference"] for one in scopes}
@@ -113,7 +114,7 @@ def test_a_change_in_the_past_becomes_the_present(clustering_image: Path) -> Non
 def test_a_client_that_disconnects_and_a_second_client(
     tmp_path: Path, clustering_image: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    """Launch arguments of `emu debug`, and a second client, are refused; the trial continues after a disconnect."""
+    """Launch arguments of `emu debug` and a second client are refused; the trial continues after a disconnect."""
     trial = ["clustering", "--minutes", "0.005", "--brain", str(clustering_image), *SEED, "--set", "start.selector=8"]
     client = Client("arena", "debug", *trial, "--robot", "1", "--out", str(tmp_path / "debugged"))
     client.ask("initialize", adapterID="openswarm")
@@ -147,7 +148,7 @@ def test_a_client_that_disconnects_and_a_second_client(
 def test_the_prompt_executes_a_script(
     tmp_path: Path, clustering_image: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """After `detach` the trial continues, without it the trial ends; a failed command sets the exit status."""
+    """After a script with `detach` the trial continues, otherwise it ends; a failed command sets the exit status."""
     trial = ["--minutes", "0.01", "--brain", str(clustering_image), *SEED, "--set", "start.selector=8"]
     command = ["debug", "clustering", *trial, "--robot", "2", "--tui"]
 
@@ -173,7 +174,7 @@ def test_the_prompt_executes_a_script(
 def test_a_rewind_from_a_fault_and_from_the_end(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """A rewind from a fault, and from the end of the trial, restores the same world."""
+    """A rewind from a fault, and one from the end of the trial, restore the same world."""
     source, image = tmp_path / "bad.c", tmp_path / "bad.elf"
     source.write_text("volatile int n;\nint main(void)\n{\n    n = 0x3001;\n    return *(volatile int *)n;\n}\n")
     assert driver.main(["-g", "-O0", str(source), "-o", str(image)]) == 0
@@ -198,7 +199,7 @@ def test_an_unknown_robot_is_refused(capsys: pytest.CaptureFixture[str]) -> None
 
 
 def test_logged_inputs_reproduce_the_past_to_the_bit(tmp_path: Path, tmp_path_factory: pytest.TempPathFactory) -> None:
-    """The past of a robot runs again from logged inputs: levels of infrared sensors and the stored light."""
+    """Logged inputs reproduce a robot's past to the bit: levels of the infrared sensors and the stored light."""
     image = built_once(tmp_path_factory, "avoidance")
     plan = Plan(load_scene("avoidance"), "avoidance", "A", None, 1, 1.0, 3, None, (("avoidance", image),))
     rng, is_equal = random.Random(4), []

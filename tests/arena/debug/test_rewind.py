@@ -1,4 +1,5 @@
-"""A debugged trial goes back as a whole, with bodies, light and random numbers: from checkpoints, or from its seed."""
+"""A rewind of a debugged trial restores the whole world, with bodies, light and random numbers: from a checkpoint or
+by running the trial again."""
 
 from __future__ import annotations
 
@@ -38,7 +39,7 @@ def image_of(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
 
 
 class Debugger(Client):
-    """Client of a debug session that stores events and output."""
+    """Client of a debug session; it stores events and output."""
 
     def __init__(self, session: DebugSession) -> None:
         self.events: list[tuple[str, Any]] = []
@@ -57,11 +58,11 @@ class Debugger(Client):
 
     @property
     def cycle(self) -> int:
-        """Cycle at which the robot is paused."""
+        """Return the cycle at which the robot is paused."""
         return int(self.evaluate("/time").removeprefix("cycle ").partition(", ")[0].replace(",", ""))
 
     def to(self, cycle: int) -> str:
-        """Go to a cycle and return the state of the world."""
+        """Run or rewind to a cycle and return the state of the world."""
         assert self.resume("evaluate", expression=f"/goto {cycle}", context="repl")["reason"] == "goto"
         return self.evaluate("/world")
 
@@ -79,7 +80,8 @@ def session_of(plan: Plan, folder: Path, **how: Any) -> Iterator[tuple[DebugSess
 def test_random_walks_restore_equal_worlds(swarm: Swarm, image_of: Callable[[str], Path]) -> None:
     """Random forward and backward runs restore equal worlds, by hash, and leave the record unaffected.
 
-    A sample of the fuzz campaign, with robots that use cameras, infrared sensors and Bluetooth."""
+    This is a sample of the fuzz campaign; its robots use cameras, infrared sensors and Bluetooth.
+    """
     tally: Counter[str] = Counter()
     walk(5, image_of, 12, tally, swarm)
     assert tally["met again"] >= 2
@@ -87,9 +89,10 @@ def test_random_walks_restore_equal_worlds(swarm: Swarm, image_of: Callable[[str
 
 
 def test_other_robots_are_restored_in_the_middle_of_a_quantum(image_of: Callable[[str], Path]) -> None:
-    """A walk that pauses in the middle of a quantum twice.
+    """Two pauses in the middle of a quantum restore the same state of the other robots.
 
-    With native code the progress of the other robots would depend on which code is compiled already."""
+    With native code their progress would otherwise depend on which code is already compiled.
+    """
     tally: Counter[str] = Counter()
     walk(249942260, image_of, 40, tally)
     assert tally["met again"] > 20
@@ -99,7 +102,8 @@ def test_other_robots_are_restored_in_the_middle_of_a_quantum(image_of: Callable
 def test_an_editor_client_moves_the_whole_world(
     tmp_path: Path, tmp_path_factory: pytest.TempPathFactory, clustering_image: Path
 ) -> None:
-    """The protocol's test-support package moves the whole world; the record equals that of an undebugged trial."""
+    """The protocol's test-support package rewinds and runs the whole world; the record equals that of an undebugged
+    trial."""
     modules = node_modules(tmp_path_factory.mktemp("npm"))
     trial = ["clustering", "--minutes", "0.02", "--brain", str(clustering_image), "--seed", "3",
              "--set", "start.selector=8"]  # fmt: skip
@@ -116,7 +120,7 @@ def test_an_editor_client_moves_the_whole_world(
 
 @needs_fork
 def test_without_checkpoints_a_trial_runs_again(tmp_path: Path, image_of: Callable[[str], Path]) -> None:
-    """The number of checkpoints is limited; without them the trial runs again from its seed to equal worlds."""
+    """If no checkpoint is left, a rewind runs the trial again from its seed and reaches an equal world."""
     with session_of(plan_of(FEW, 7, image_of), tmp_path, every_s=0.03) as (session, debugger):
         seen = {cycle: debugger.to(cycle) for cycle in (3_000_000, 6_000_000, 9_000_000)}
         assert session.checkpoint_count == checkpoints.MAX_CHECKPOINTS
@@ -132,7 +136,7 @@ def test_without_checkpoints_a_trial_runs_again(tmp_path: Path, image_of: Callab
 
 @needs_fork
 def test_changes_are_repeated_after_a_checkpoint(tmp_path: Path, image_of: Callable[[str], Path]) -> None:
-    """Changes before and after a checkpoint are repeated; a rewind to before a change discards it."""
+    """A rewind repeats changes made before and after its checkpoint; changes made after its target are discarded."""
     with session_of(plan_of(FEW, 7, image_of), tmp_path, every_s=0.1) as (session, debugger):
         plain = debugger.to(4_000_000)
         debugger.to(1_000_000)
@@ -154,7 +158,7 @@ def test_changes_are_repeated_after_a_checkpoint(tmp_path: Path, image_of: Calla
 
 @needs_fork
 def test_rows_of_a_rewound_trial_are_written_once(tmp_path: Path, image_of: Callable[[str], Path]) -> None:
-    """The live file has increasing times after each rewind."""
+    """The live file has increasing times after each rewind, so each row is written once."""
     plan = plan_of(FEW, 7, image_of)
     with session_of(plan, tmp_path, every_s=0.1) as (_, debugger):
         for cycle in (12_000_000, 5_000_000, 11_000_000, 2_000_000, 12_500_000):
@@ -165,7 +169,7 @@ def test_rows_of_a_rewound_trial_are_written_once(tmp_path: Path, image_of: Call
 
 
 def test_the_end_is_restored(tmp_path: Path, image_of: Callable[[str], Path]) -> None:
-    """A rewind restores the effects of the last sample, which reads the motor positions."""
+    """A rewind to the end restores the effects of the last sample, which reads the motor positions."""
     with session_of(plan_of(FEW, 7, image_of), tmp_path) as (_, debugger):
         halt = debugger.resume("continue", threadId=1)
         assert halt["description"] == OVER
@@ -179,7 +183,8 @@ def test_the_end_is_restored(tmp_path: Path, image_of: Callable[[str], Path]) ->
 def test_without_fork_the_world_goes_back_on_inspection(
     tmp_path: Path, image_of: Callable[[str], Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The robot goes back alone; the trial runs again when the world is inspected or the past changed."""
+    """Without fork, a rewind restores only the debugged robot; the trial runs again when the world is inspected or
+    the past is changed."""
     monkeypatch.setattr(trial_process, "CAN_FORK", False)
     monkeypatch.setattr(debugsession, "context", partial(multiprocessing.get_context, "fork"))
     with session_of(plan_of(FEW, 7, image_of), tmp_path) as (session, debugger):
@@ -202,7 +207,7 @@ def test_without_fork_the_world_goes_back_on_inspection(
 
 @needs_fork
 def test_a_rewind_can_be_paused(tmp_path: Path, image_of: Callable[[str], Path]) -> None:
-    """`pause` stops a rewind between checkpoint and target; the trial continues from there."""
+    """`pause` stops a rewind between checkpoint and target, and the trial continues from that time."""
     plan = plan_of(Swarm("clustering", 60.0, (), (), FEW.values), 7, image_of)
     with session_of(plan, tmp_path, every_s=1000.0) as (session, debugger):
         early = debugger.to(10_000_000)

@@ -22,13 +22,13 @@ NAN = math.nan
 
 
 def samples(scene: str, seconds: list[float], lines: list[UartLine]) -> TrialSamples:
-    """Return the samples of a trial in which robots rest and send `lines`."""
+    """Return the samples of a trial in which robots do not move and send `lines`."""
     places = np.zeros((len(seconds), load_scene(scene).robots.count, 3))
     return TrialSamples(np.array(seconds), places, places[:, :0, :2], load_scene(scene), {}, lines)
 
 
 def test_the_last_value_is_known_at_every_sample() -> None:
-    """A value holds from the next sample on; other words, and lines without a number, are ignored."""
+    """A reported value holds from the next sample on; other keywords, and lines without a number, are ignored."""
     lines = [
         UartLine(1, 0.2, "clock 7"),
         UartLine(1, 0.9, "clock x"),
@@ -42,7 +42,7 @@ def test_the_last_value_is_known_at_every_sample() -> None:
 
 
 def test_the_dead_do_not_count() -> None:
-    """Robots that are switched off are ignored; a robot without a report makes the range nan."""
+    """Robots that are switched off are ignored; the range is nan until every other robot has reported."""
     living = alive(samples("clocks", [0.0, 2.5, 2.75, 3.25], []))
     assert living.sum(axis=1).tolist() == [5, 5, 4, 3]
     values = np.array([[1.0, 4.0, 100.0], [1.0, 4.0, NAN]])
@@ -51,7 +51,7 @@ def test_the_dead_do_not_count() -> None:
 
 
 def test_agreement_counts_from_when_it_lasts() -> None:
-    """The time is that of the last change to true, and nan if the condition is false at the end."""
+    """The time of agreement is that of the last change to true; it is nan if the condition is false at the end."""
     series = MetricSeries(np.array([0.0, 1.0, 2.0, 3.0]), {})
     assert settled_at(series, np.array([True, False, True, True])) == 2.0
     assert settled_at(series, np.full(4, True)) == 0.0
@@ -59,7 +59,7 @@ def test_agreement_counts_from_when_it_lasts() -> None:
 
 
 def test_clocks_are_compared_with_the_arenas_time() -> None:
-    """Three robots agree at 3.3 s, and are 5 ms late against simulated time at 4 s."""
+    """Three robots whose clocks agree from 3.3 s on are 5 ms behind simulated time at 4 s."""
     lines = [UartLine(robot, 1.0, f"clock {1500 + robot}") for robot in range(3)] + [UartLine(3, 1.0, "clock 1600")]
     lines += [UartLine(4, 1.0, "clock 1500"), UartLine(3, 3.2, "clock 3700")]
     lines += [UartLine(robot, 3.6, "clock 4105") for robot in (2, 3, 4)]
@@ -70,7 +70,7 @@ def test_clocks_are_compared_with_the_arenas_time() -> None:
 
 
 def trial(tmp_path: Path, scene: str, seconds: float, *words: str) -> Trial:
-    """Run a short trial of few robots near each other, none of which is switched off."""
+    """Run a short trial of few robots near each other; no robot is switched off."""
     text = (Path(__file__).parents[3] / "arena" / "scenes" / f"{scene}.toml").read_text()
     lines = [line for line in text.splitlines() if not line.startswith("off =")]
     path = tmp_path / f"{scene}.toml"
@@ -82,7 +82,7 @@ def trial(tmp_path: Path, scene: str, seconds: float, *words: str) -> Trial:
 
 
 def test_three_clocks_come_together(tmp_path: Path) -> None:
-    """Clocks that differ by 0.12 s approach each other although a third of all messages is lost."""
+    """Three clocks that differ by 0.12 s approach each other although a third of all messages is lost."""
     made = trial(tmp_path, "clocks", 3.0, "--set", "start.spread_tcy=4423680")
     begun = [power_on_cycle(made.scene, 1, robot) / FCY for robot in range(3)]
     assert max(begun) - min(begun) > 0.1
@@ -90,7 +90,7 @@ def test_three_clocks_come_together(tmp_path: Path) -> None:
 
 
 def test_a_leader_is_one_who_lives() -> None:
-    """Followers of a robot that is off, or of an unknown rank, do not count; the last reported rank holds."""
+    """Followers of a robot that is switched off or has an unknown rank do not count; the last reported rank is used."""
     lines = [UartLine(robot, 0.2, f"rank {10 - robot}") for robot in range(5)]
     lines += [UartLine(robot, 0.4, "leader 10") for robot in range(5)]
     lines += [
@@ -114,7 +114,8 @@ def test_three_robots_elect_one(tmp_path: Path) -> None:
 
 
 def test_who_has_stopped_says_so_and_stands() -> None:
-    """Robots that are off are ignored; the difference is known once all others have stopped."""
+    """Robots that are switched off are ignored; the difference of the stopping times is known once all others have
+    stopped."""
     lines = [UartLine(robot, 3.0 + robot / 100, f"halt {robot}") for robot in (2, 3)] + [UartLine(4, 3.35, "halt 4")]
     seen = samples("halt", [0.0, 2.9, 3.1, 3.2, 3.3, 3.5], lines)
     seen.robots[:, 3, 0] = [0.0, 3.0, 4.0, 4.0, 4.0, 4.0]
@@ -125,12 +126,14 @@ def test_who_has_stopped_says_so_and_stands() -> None:
 
 
 def test_three_robots_stop_together(tmp_path: Path) -> None:
-    """One robot knows the time; the others stop by its messages (docs/swarm.md)."""
+    """One robot knows the stopping time; the two others stop at it because they receive its messages
+    (docs/swarm.md)."""
     assert trial(tmp_path, "halt", 4.5).series.last("between") < 0.1
 
 
 def test_a_mean_is_that_of_those_who_live() -> None:
-    """Means in hundredths are compared with reported values; the error is nan until all have reported."""
+    """Reported means, in hundredths, are compared with the mean of the robots that are on; the error is nan until all
+    have reported."""
     lines = [UartLine(robot, 0.5, f"value {robot}") for robot in range(5)]
     lines += [UartLine(robot, 0.6, "mean 200") for robot in range(4)] + [UartLine(4, 1.6, "mean 250")]
     lines += [UartLine(robot, 3.2, "mean 300") for robot in (2, 3)]
@@ -141,13 +144,14 @@ def test_a_mean_is_that_of_those_who_live() -> None:
 
 
 def test_robots_agree_on_a_mean(tmp_path: Path) -> None:
-    """Robots with 15, 9 and 2 agree on the mean."""
+    """Robots with the values 15, 9 and 2 agree on their mean."""
     made = trial(tmp_path, "average", 1.5, "--set", "infrared.lost_share=0")
     assert any(one.text == "mean 867" for one in made.samples.uart_lines)
 
 
 def test_who_knows_the_answer_knows_that_all_is_done() -> None:
-    """A wrong answer does not count, nor does a robot that is off."""
+    """A search is complete when a robot reports the right answer; wrong answers and robots that are off do not
+    count."""
     lines = [UartLine(robot, 0.5, "done 8") for robot in range(5)] + [
         UartLine(0, 1.1, "best 52527"),
         UartLine(0, 1.1, "done 32"),
@@ -162,7 +166,7 @@ def test_who_knows_the_answer_knows_that_all_is_done() -> None:
 
 
 def test_robots_share_a_search(tmp_path: Path) -> None:
-    """A robot learns of several parts at once from its neighbours."""
+    """A robot learns several parts of the search at once from its neighbours."""
     made = trial(tmp_path, "search", 1.5, "--set", "infrared.lost_share=0")
     lines = made.samples.uart_lines
     done = [

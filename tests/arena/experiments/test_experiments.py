@@ -1,4 +1,4 @@
-"""Experiments: built-in ones, a user's own, supervisors, and error messages."""
+"""Experiments: built-in and user-defined ones, supervisors, and error messages."""
 
 from __future__ import annotations
 
@@ -109,7 +109,7 @@ int main(void)
 
 
 def test_a_new_experiment_needs_a_scene_a_metric_and_some_c(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """A user's experiment in an empty folder is printed, drawn and replayed."""
+    """A user-defined experiment in an empty folder can be run, printed, drawn and replayed."""
     app = tmp_path / "apps" / "mine"
     app.mkdir(parents=True)
     (app / "main.c").write_text(FIRMWARE)
@@ -132,7 +132,7 @@ def test_a_new_experiment_needs_a_scene_a_metric_and_some_c(tmp_path: Path, caps
 def test_the_experiments_file_is_kept_and_belongs_to_the_run(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """A later change of the file does not affect the record; a run with the changed file is refused."""
+    """A later change of the experiment's file does not affect a record; a run with the changed file is refused."""
     path = run(tmp_path)
     before = read_trial(path).series.curves["apart"]
     (tmp_path / "mine.py").write_text(METRIC.replace("** 0.5", "** 0.5 + 1000"))
@@ -143,7 +143,7 @@ def test_the_experiments_file_is_kept_and_belongs_to_the_run(
 
 
 def test_a_supervisor_moves_things_notes_numbers_and_ends_the_trial(tmp_path: Path) -> None:
-    """The record has the supervisor's numbers as columns n_NAME, and is reproducible."""
+    """The supervisor's numbers are columns n_NAME of the record, and the record is reproducible."""
     path = run(tmp_path, metric=SUPERVISOR)
     trial = read_trial(path)
     assert trial.times[-1] == pytest.approx(2.1, abs=0.02)
@@ -176,7 +176,7 @@ def test_a_supervisor_moves_things_notes_numbers_and_ends_the_trial(tmp_path: Pa
 def test_a_wrong_experiment_is_reported_in_one_line(
     metric: str, words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """A wrong experiment is status 2 and a message of one line."""
+    """An invalid experiment ends with status 2 and a message of one line."""
     run(tmp_path, metric=metric, status=2)
     said = [line for line in capsys.readouterr().err.splitlines() if not line.startswith("trial ")]
     assert len(said) == 1
@@ -184,7 +184,7 @@ def test_a_wrong_experiment_is_reported_in_one_line(
 
 
 def test_experiments_that_are_not_there(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """An unknown name and a missing file are refused."""
+    """An unknown experiment name and a missing experiment file are refused."""
     run(tmp_path, scene=SCENE.replace("mine.py", "nothing"), status=2)
     assert "unknown experiment 'nothing'; known: aggregation, average, avoidance, clocks, " in (capsys.readouterr().err)
     run(tmp_path, scene=SCENE.replace("mine.py", "lost.py"), status=2)
@@ -196,7 +196,8 @@ def test_experiments_that_are_not_there(tmp_path: Path, capsys: pytest.CaptureFi
 
 @pytest.mark.parametrize("name", ["aggregation", "avoidance", "foraging"])
 def test_the_shipped_experiments_run_with_their_firmware(name: str, tmp_path: Path) -> None:
-    """In three seconds no robot has a fault, robots move, metrics are finite, and curves are drawn."""
+    """In three seconds of each built-in experiment no robot has a fault, robots move, metrics are finite, and curves
+    are drawn."""
     out = tmp_path / name
     assert main(["run", name, "--trials", "1", "--minutes", "0.05", "--jobs", "2", "--out", str(out)]) == 0
     trial = read_trial(out / "trial-0001.parquet")
@@ -208,7 +209,7 @@ def test_the_shipped_experiments_run_with_their_firmware(name: str, tmp_path: Pa
 
 
 class Listener:
-    """Controller that stores the text it receives."""
+    """Controller that stores the text it receives from the supervisor."""
 
     def __init__(self) -> None:
         self.heard: list[bytes] = []
@@ -218,7 +219,8 @@ class Listener:
 
 
 def test_foraging_counts_food_that_came_from_outside_to_the_nest() -> None:
-    """The robot receives one message per touch and delivery; food reappears at a free place."""
+    """In the foraging experiment a robot receives one message per touch and per delivery, and food reappears at a
+    free place."""
     scene = load_scene("foraging")
     food = [(150.0, 30.0 + 18 * n) for n in range(6)]
     world = World.of(scene, 1, [(100, 20, 0.0), (100, 60, 0.0), (100, 120, 0.0)], food)
@@ -277,7 +279,8 @@ polygon = [[5, 30], [15, 30], [15, 40], [5, 40]]
     ],
 )
 def test_a_supervisor_cannot_move_a_body_into_another_one(place: tuple[float, float], why: str, tmp_path: Path) -> None:
-    """Walls of any shape, obstacles, robots and objects obstruct robots and objects; the refused body stays."""
+    """Walls of any shape, obstacles, robots and objects obstruct a move by the supervisor; the body then stays where
+    it is."""
     (tmp_path / "triangle.toml").write_text(TRIANGLE)
     world = World(load_scene(str(tmp_path / "triangle.toml")), 1)
     stage = Supervisor(world, [], 1)
@@ -296,7 +299,8 @@ def test_a_supervisor_cannot_move_a_body_into_another_one(place: tuple[float, fl
 
 
 def test_aggregation_measures_robots(tmp_path: Path) -> None:
-    """Robots close together form one group with small dispersion; distant robots are single."""
+    """The aggregation metrics count robots close together as one group with small dispersion, and distant robots as
+    single."""
     experiment, scene = experiment_of("aggregation"), load_scene("aggregation")
     near = np.array([(20.0 * 0.37 * n, 0.0, 0.0) for n in range(8)])
     far = np.array([(30.0 * n, 0.0, 0.0) for n in range(8)])

@@ -1,4 +1,4 @@
-"""Records of a user's experiment: no command runs code that a record or a bundle names without permission."""
+"""Records of a user-defined experiment: without permission, no command runs code that a record or a bundle names."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pathlib import Path
 import pyarrow.parquet as pq
 import pytest
 
-pytestmark = pytest.mark.slow  # every command is a process of its own, which has loaded no experiment
+pytestmark = pytest.mark.slow  # every command is a separate process, which has loaded no experiment
 ROOT = Path(__file__).resolve().parents[3]
 SCENE = """name = "mine"
 experiment = "mine.py"
@@ -38,13 +38,13 @@ MEASURES = 'MEASURES = [Measure("half", "half at {at:g} s", lambda series, at: s
 
 
 def arena(*words: object) -> subprocess.CompletedProcess[str]:
-    """Run `arena` in a process of its own, which has loaded no experiment."""
+    """Run `arena` in a separate process, which has loaded no experiment."""
     command = [sys.executable, "-m", "arena", *map(str, words)]
     return subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
 
 
 class Study:
-    """A run of a user's experiment that writes the file `mark` whenever its code runs."""
+    """A run of a user-defined experiment; the code of the experiment writes the file `mark` whenever it runs."""
 
     def __init__(self, folder: Path, measures: str = "") -> None:
         self.mark = folder / "mark"
@@ -58,7 +58,7 @@ class Study:
         self.record = self.run / "trial-0001.parquet"
 
     def ran(self, *words: object, status: int = 0) -> tuple[bool, str]:
-        """Run a command; return whether the experiment's code ran, and standard error."""
+        """Run a command. Return whether the experiment's code ran, and the standard error of the command."""
         self.mark.unlink(missing_ok=True)
         done = arena(*words)
         assert done.returncode == status, done.stderr
@@ -72,7 +72,7 @@ def study(tmp_path_factory: pytest.TempPathFactory) -> Study:
 
 
 def with_metadata(record: Path, target: Path, **scene: object) -> Path:
-    """Copy a record with other values of its scene, and without a declaration and a hash of its experiment."""
+    """Copy a record, change values of its scene, and remove the declaration and the hash of its experiment."""
     table = pq.read_table(record)
     about = json.loads(table.schema.metadata[b"arena"])
     about["scene"].update(scene)
@@ -83,7 +83,7 @@ def with_metadata(record: Path, target: Path, **scene: object) -> Path:
 
 
 def test_reading_a_record_runs_no_code_and_shows_its_curves(study: Study, tmp_path: Path) -> None:
-    """Page, figures, report and comparison come from the recorded declaration and curves."""
+    """Page, figures, report and comparison use the recorded declaration and curves and run no code."""
     page = tmp_path / "page.html"
     assert study.ran("replay", study.record, "--out", page) == (False, "")
     assert "distance of the two robots" in page.read_text()
@@ -94,7 +94,7 @@ def test_reading_a_record_runs_no_code_and_shows_its_curves(study: Study, tmp_pa
 
 
 def test_trust_runs_the_recorded_copy_or_a_named_file(study: Study, tmp_path: Path) -> None:
-    """`--trust` and `--experiment` run the code; the page equals the page without it."""
+    """`--trust` and `--experiment` run the experiment's code; the page equals the one made without it."""
     pages = [tmp_path / f"{number}.html" for number in range(3)]
     assert study.ran("replay", study.record, "--trust", "--out", pages[0])[0]
     assert study.ran("replay", study.record, "--experiment", study.code, "--out", pages[1])[0]
@@ -103,7 +103,7 @@ def test_trust_runs_the_recorded_copy_or_a_named_file(study: Study, tmp_path: Pa
 
 
 def test_a_file_with_another_hash_is_not_run(study: Study, tmp_path: Path) -> None:
-    """A changed copy beside the record and another named file are refused before they run."""
+    """A changed copy beside the record and a named file with another hash are refused before they run."""
     other = tmp_path / "experiment.py"
     other.write_text(study.code.read_text() + "\n")
     record = tmp_path / "trial-0001.parquet"
@@ -140,7 +140,7 @@ def test_a_record_that_names_a_foreign_file_does_not_run_it(study: Study, tmp_pa
 
 
 def test_measures_of_the_experiment_need_its_code(tmp_path: Path) -> None:
-    """`compare` refuses them in one sentence, and computes them with `--trust`."""
+    """`compare` refuses measures of an untrusted experiment in one sentence, and computes them with `--trust`."""
     study = Study(tmp_path, MEASURES)
     ran, error = study.ran("compare", study.run, study.run, "--at", 1, status=2)
     assert not ran
@@ -150,7 +150,7 @@ def test_measures_of_the_experiment_need_its_code(tmp_path: Path) -> None:
 
 
 def test_verify_runs_the_experiment_of_a_bundle_only_with_permission(study: Study, tmp_path: Path) -> None:
-    """`verify` refuses a bundle with code in one sentence; `--trust` and `--experiment` verify it."""
+    """`verify` refuses a bundle with code in one sentence; with `--trust` or `--experiment` it verifies the bundle."""
     bundle = tmp_path / "study.zip"
     assert study.ran("bundle", bundle, study.run) == (False, "")
     ran, error = study.ran("verify", bundle, status=2)

@@ -1,4 +1,5 @@
-"""Infrared sensors in the world: reflections, room light, lamps, other robots' emitters; battery (epuck.md §5)."""
+"""Infrared sensors in the world: reflections, room light, lamps, other robots' emitters; and the battery (epuck.md
+§5)."""
 
 from __future__ import annotations
 
@@ -139,7 +140,8 @@ def built(folder: Path, text: str, name: str) -> Path:
 
 
 def test_surfaces_have_distance_and_reflection(scene: Scene) -> None:
-    """Bearings clockwise from the front, distances in mm, share by body and angle; inf beyond the response table."""
+    """Each sensor axis yields the distance of the nearest surface in mm and its reflection share; the distance is inf
+    beyond the response table. Bearings are clockwise from the front."""
     scene = scene.with_values(infrared__object_share=0.6, infrared__wall_share=0.9)
     seen = Optics(scene).surfaces(Poses([(8.7, 150.0, UP)], [(17.5, 150.0)]), 0)
     assert seen[2] == pytest.approx((10 * (8.8 - 3.7 - 5.0), 0.6))  # sensor 2 faces right, to the object
@@ -148,7 +150,8 @@ def test_surfaces_have_distance_and_reflection(scene: Scene) -> None:
 
 
 def test_a_wall_at_an_angle_reflects_by_the_cosine(scene: Scene) -> None:
-    """Sensor 2 faces 90 degrees to the right. Turned by 30 degrees, the distance is 2/sqrt(3) and the share cos 30."""
+    """For sensor 2, which faces 90 degrees to the right, and a robot turned by 30 degrees, the distance to a wall is
+    multiplied by 2/sqrt(3) and the share by cos 30."""
     optics = Optics(scene)
     straight, askew = (optics.surfaces(Poses([(8.7, 150.0, a)], []), 0)[2] for a in (-UP, -UP + math.pi / 6))
     assert straight == pytest.approx((50.0, 1.0))
@@ -157,7 +160,8 @@ def test_a_wall_at_an_angle_reflects_by_the_cosine(scene: Scene) -> None:
 
 
 def test_a_lamp_lowers_the_counts_of_facing_sensors_by_the_inverse_square(scene: Scene) -> None:
-    """Raw counts fall with light, but not below 0 (epuck.md §5)."""
+    """Raw counts of a sensor that faces a lamp decrease with the inverse square of the distance, but not below 0
+    (epuck.md §5)."""
     pose = (100.0, 150.0, 0.0)
     assert ambient(scene, pose) == [3800] * 8
     lit = ambient(scene.with_values(light__lamp_x_cm=200.0, light__lamp_y_cm=150.0, light__lamp_counts=800.0), pose)
@@ -168,13 +172,14 @@ def test_a_lamp_lowers_the_counts_of_facing_sensors_by_the_inverse_square(scene:
 
 
 def received(scene: Scene, *robots: tuple[float, float, float], objects: tuple[tuple[float, float], ...] = ()) -> float:
-    """Return the counts on the strongest sensor of robot 0 if all emitters of robot 1 are lit."""
+    """Return the counts on the strongest sensor of robot 0 while all emitters of robot 1 are lit."""
     found = Optics(scene).signals(Poses(robots, objects), 0, [1])
     return max((sum(one.counts) * max(one.shares) for one in found), default=0.0)
 
 
 def test_the_strength_of_light_equals_the_published_table(scene: Scene) -> None:
-    """swarmcom.md §3.1: the fit has a logarithmic error of 6.3 %. Only the strongest light is limited."""
+    """swarmcom.md §3.1: the fit of light strength over distance has a logarithmic error of 6.3 % and is limited only
+    at its strongest value."""
     right = (100.0, 150.0, UP)
     errors = []
     for distance, counts in PUBLISHED:
@@ -188,7 +193,7 @@ def test_the_strength_of_light_equals_the_published_table(scene: Scene) -> None:
 
 
 def test_light_falls_off_both_axes_as_powers_of_the_cosine(scene: Scene) -> None:
-    """Half at 15 degrees from an emitter's axis, at 36 from a receiver's (swarmcom.md §7)."""
+    """Light halves at 15 degrees from an emitter's axis and at 36 degrees from a receiver's axis (swarmcom.md §7)."""
     here, there = (100.0, 150.0, UP), (120.0, 150.0, UP)  # sensor 2 faces sensor 5 of the other robot
     counts = amplitude(20.0) / brightest(20.0)
     assert received(scene, here, there) == pytest.approx(counts, rel=3e-3)
@@ -213,7 +218,7 @@ def test_walls_objects_and_other_robots_block_the_light(scene: Scene) -> None:
 
 
 def meeting(x: float, y: float, east: float, north: float, side: geometry.Side) -> float:
-    """Return the distance at which a ray from a point hits a side; inf if it does not."""
+    """Return the distance at which a ray from a point hits a side, or inf if it misses."""
     x1, y1, x2, y2 = side
     ex, ey = x2 - x1, y2 - y1
     across = east * ey - north * ex
@@ -225,7 +230,8 @@ def meeting(x: float, y: float, east: float, north: float, side: geometry.Side) 
 
 
 def plain_signals(scene: Scene, poses: Poses, robot: int) -> list[tuple[int, float, list[float]]]:
-    """Return (robot, counts on a sensor that faces it, shares of the sensors) of each signal: the reference."""
+    """Return the light signals at a robot by a reference calculation: sending robot, counts on a sensor that faces
+    it, and share of each sensor."""
     x, y, heading = poses.robots[robot]
     discs = [(*place[:2], dimensions.ROBOT_RADIUS) for place in poses.robots]
     discs += [(*place, scene.kind_of(number).radius_cm) for number, place in enumerate(poses.objects)]
@@ -247,7 +253,7 @@ def plain_signals(scene: Scene, poses: Poses, robot: int) -> list[tuple[int, flo
 
 
 def plain_surfaces(scene: Scene, poses: Poses, robot: int) -> list[tuple[float, float]]:
-    """Return the surface that each sensor axis hits, as mm and share: the reference."""
+    """Return the surface that each sensor axis hits by a reference calculation: distance in mm and reflection share."""
     x, y, heading = poses.robots[robot]
     width, height = scene.arena.width_cm, scene.arena.height_cm
     corners = [(0.0, 0.0), (width, 0.0), (width, height), (0.0, height)]
@@ -280,7 +286,8 @@ def plain_surfaces(scene: Scene, poses: Poses, robot: int) -> list[tuple[float, 
 
 
 def test_native_propagation_equals_the_reference() -> None:
-    """Signals and surfaces for random robots and objects, in a yard with all kinds of obstacles."""
+    """Native propagation gives the signals and surfaces of the reference for random robots and objects in a yard with
+    all kinds of obstacles."""
     scene = load_scene("avoidance").with_values(infrared__wall_share=0.7)
     kinds = load_scene("foraging").kinds
     scene = replace(scene, kinds=kinds, objects=replace(scene.objects, count=6))
@@ -301,7 +308,7 @@ def test_native_propagation_equals_the_reference() -> None:
 
 
 def test_light_arrives_one_quantum_late_for_any_order_of_robots() -> None:
-    """A record does not depend on the order of the robots."""
+    """Light arrives one quantum late, so the record does not depend on the order in which robots run."""
     channel = OpticalChannel(2, 1000, tau=1e-3)
     channel.switch(1, 5000, 2, lit=True)
     channel.switch(1, 6500, 2, lit=False)
@@ -315,8 +322,8 @@ def test_light_arrives_one_quantum_late_for_any_order_of_robots() -> None:
 
 
 def test_receivers_are_first_order_low_passes_for_any_order_of_queries() -> None:
-    """Compared with the recursion from the start of the trial, with pulses much shorter than the time constant. The
-    order of the queries and dropped changes have no effect."""
+    """A receiver follows the first-order recursion from the start of the trial, also for pulses much shorter than its
+    time constant. Neither the order of the queries nor dropped changes affect it."""
     tau, quantum, rng = 885.0, 14_746, random.Random(5)
     at, switches = 0, []
     for number in range(2000):
@@ -343,7 +350,8 @@ def test_receivers_are_first_order_low_passes_for_any_order_of_queries() -> None
 
 
 def test_firmware_reads_reflections_and_another_robots_light(scene: Scene, tmp_path: Path) -> None:
-    """Sensor 2 converts with its emitter off and on, beside an object, then beside a blinking robot."""
+    """The firmware converts sensor 2 with its emitter off and on, beside an object, and measures the reflection;
+    beside a blinking robot it measures that robot's light."""
     listener, sender = built(tmp_path, LISTENER, "listener"), built(tmp_path, SENDER, "sender")
     channel = OpticalChannel(2, scene.clock.quantum_tcy)
     ears = FirmwareController(scene, 1, 0, listener, 0, channel)
@@ -368,7 +376,8 @@ def test_firmware_reads_reflections_and_another_robots_light(scene: Scene, tmp_p
 
 
 def test_samples_have_the_scenes_noise_ripple_and_spread(scene: Scene, tmp_path: Path) -> None:
-    """Statistics of the converted samples. The same seed gives the same samples, other robots and seeds others."""
+    """Converted samples have the noise, ripple and spread of the scene. The same seed gives the same samples; other
+    robots and seeds give others."""
     listener = built(tmp_path, LISTENER, "listener")
     poses = Poses([(100.0, 150.0, UP), (300.0, 150.0, 0.0)], [(300.0, 20.0)])
 
@@ -396,10 +405,11 @@ def test_samples_have_the_scenes_noise_ripple_and_spread(scene: Scene, tmp_path:
 
 
 def lit_of_frames(scene: Scene, seed: int, share: float) -> list[list[int]]:
-    """Return for 30 frames of another robot, 100 ms apart, in which scans of 0.25 ms a sensor detects light.
+    """Return the scans (0.25 ms each) in which a sensor detects the light of each of 30 frames, sent 100 ms apart by
+    another robot.
 
-    A proximity flash ends 2 ms before each frame. A frame is dark for up to 20 bits, with a one of 0.73 ms
-    between.
+    A proximity pulse ends 2 ms before each frame. A frame has dark intervals of up to 20 bits between ones of 0.73
+    ms.
     """
     scene, channel = scene.with_values(infrared__lost_share=share), OpticalChannel.of(scene)
     ring = InfraredRing(scene, seed, (board := Machine(DSPIC30F6014A, board=Epuck).board), channel, 0, 0)
@@ -424,8 +434,8 @@ def lit_of_frames(scene: Scene, seed: int, share: float) -> list[list[int]]:
 
 def test_a_share_of_the_frames_is_lost_as_a_whole(scene: Scene) -> None:
     """In a lost frame no receiver detects ten scans of light in a row, with which frames begin
-    (firmware/openswarm/io/infrared); in other frames it detects all. This holds for any darkness within and light
-    before a frame. The seed determines which frames are lost."""
+    (firmware/openswarm/io/infrared). In other frames it detects all light. This holds for any dark interval in a
+    frame and for light before it. The seed determines which frames are lost."""
     (whole,) = {tuple(one) for one in lit_of_frames(scene, 2, 0.0)}
     assert whole[:18] == tuple(range(18))
     half = lit_of_frames(scene, 2, 0.5)
@@ -441,7 +451,8 @@ def test_a_share_of_the_frames_is_lost_as_a_whole(scene: Scene) -> None:
 
 
 def test_a_robot_without_battery_is_at_rest_and_dark(scene: Scene, tmp_path: Path) -> None:
-    """From the second in the scene on; the record has no fault of it."""
+    """A robot whose battery is empty from a given second on stops and turns its LEDs off; the record has no fault of
+    it."""
     sender = built(tmp_path, SENDER, "sender")
     scene = scene.with_values(start__off=[[1, 0.2]], start__silent_s=0.1)
     channel = OpticalChannel.of(scene)
@@ -459,8 +470,8 @@ def test_a_robot_without_battery_is_at_rest_and_dark(scene: Scene, tmp_path: Pat
 
 
 def test_native_light_equals_the_reference_to_the_bit(scene: Scene) -> None:
-    """Three robots switch at random, some for longer than the history, with noise and a third of the transmissions
-    lost; the light at each sensor is compared."""
+    """The light at each sensor equals the reference to the bit. Three robots switch emitters at random, sometimes for
+    longer than the history, with noise and a third of the transmissions lost."""
     rng, checked = random.Random(3), 0
     scene = scene.with_values(robots__count=4, infrared__lost_share=0.3, infrared__noise_counts=2.0)
     for trial in range(6):
@@ -498,7 +509,7 @@ def test_native_light_equals_the_reference_to_the_bit(scene: Scene) -> None:
 
 
 def test_native_sensors_equal_the_reference_to_the_bit() -> None:
-    """Randomly switched emitters, surfaces, room light and noise."""
+    """Native sensor levels equal the reference for randomly switched emitters, surfaces, room light and noise."""
     rng, machine = random.Random(4), Machine(DSPIC30F6014A, board=partial(Epuck, seed=9))
     ir, noise = machine.board.ir, Noise(Record(0), 9)
     state, now, tau = dict.fromkeys(range(4), (0, 0, 0.0)), 0, ir.tau_seconds * machine.peripherals.fcy
@@ -530,8 +541,8 @@ def test_native_sensors_equal_the_reference_to_the_bit() -> None:
 def test_native_conversions_equal_those_in_python(
     scene: Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Endless conversions of eight sensors, beside an approaching robot that blinks, with noise. The whole state of the
-    machine after 150 quanta is compared: once Python computes every level, once hardly any."""
+    """Continuous conversions of eight sensors leave the same machine state after 150 quanta, whether Python computes
+    every level or almost none. A robot that blinks approaches, with noise."""
     scanner, sender = built(tmp_path, SCANNER, "scanner"), built(tmp_path, SENDER, "sender")
     scene = scene.with_values(infrared__noise_counts=2.0)
     found, asked = [], []
@@ -563,7 +574,7 @@ def test_native_conversions_equal_those_in_python(
 
 
 def test_noise_is_gaussian_with_its_tails() -> None:
-    """Shares of 300,000 draws beyond 1, 3 and 4 deviations."""
+    """The shares of 300,000 noise draws beyond 1, 3 and 4 deviations are those of the normal distribution."""
     draws = [reference_light.gaussian(7, cycle % 8, cycle) for cycle in range(300_000)]
     assert statistics.fmean(draws) == pytest.approx(0, abs=0.005)
     for limit, share in ((1, 0.31731), (3, 0.0027), (4, 6.3e-5)):
@@ -572,7 +583,7 @@ def test_noise_is_gaussian_with_its_tails() -> None:
 
 
 def test_the_channel_is_printed_and_drawn(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """One command makes the figure of the documentation."""
+    """`arena channel` prints the properties of the channel and draws the figure of the documentation."""
     path = tmp_path / "channel.svg"
     assert main(["channel", "--set", "infrared.signal_gain=0.5", "--figure", str(path), "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
@@ -584,14 +595,14 @@ def test_the_channel_is_printed_and_drawn(tmp_path: Path, capsys: pytest.Capture
 
 
 def test_the_battery_discharges_linearly_and_its_pin_falls(scene: Scene) -> None:
-    """epuck.md §1, §2: from full to low in about 3 h; BATT_LOW is 0 below 3.4 V."""
+    """epuck.md §1, §2: a full battery is low after about 3 h, and the pin BATT_LOW is 0 below 3.4 V."""
     assert volts_after(scene.battery, 0) == 4.0
     assert volts_after(scene.battery, 3600) == pytest.approx(4.0 - 0.8 / 3)
     assert volts_after(scene.battery, 1e6) == 3.0
 
 
 def test_a_low_battery_shows_on_the_pin(scene: Scene, tmp_path: Path) -> None:
-    """A battery that lasts one second reaches the low level from 3.5 V within half a second."""
+    """A battery that lasts one second and starts at 3.5 V pulls BATT_LOW down within half a second."""
     low = scene.with_values(battery__volts=3.45, battery__hours=0.01)
     controller = FirmwareController(low, 1, 0, built(tmp_path, SENDER, "sender"))
     pins = []

@@ -1,8 +1,8 @@
-// Rounds of lockstep.c between threads, for a sanitizer: robots that count their runs, without Python.
+// Test of lockstep.c for the thread sanitizer: threads run rounds of robots that only count their runs, without Python.
 //
 //     cc -fsanitize=thread -include lockstep.c race.c -lpthread
 //
-// Prints the runs by workers. Exits with 0 if every robot ran once in each round, and never in two threads at a time.
+// Prints the runs by worker. Exits with 0 if each robot ran once per round and never in two threads at the same time.
 
 extern int printf(const char *, ...);
 extern int pthread_create(unsigned long *, const void *, void *(*)(void *), void *);
@@ -73,11 +73,11 @@ int main(void)
     i64 expected[ROBOTS] = {0}, wrong = 0;
     for (i64 round = 0; round < ROUNDS; round++) {
         for (i64 i = 0; i < ROBOTS; i++)
-            if ((round * 31 + i * 17) % 5) // another choice of robots in each round
+            if ((round * 31 + i * 17) % 5) // selects different robots in each round
                 robots[i].state = RUNNABLE, expected[i]++;
         for (i64 i; (i = run_all(&scheduler, 0)) != REACHED;)
             wrong += robots[i].state != IN_PYTHON || robots[i].exit_reason != 7;
-        if (round % 1000 == 0) // time for the workers to fall asleep
+        if (round % 1000 == 0) // leaves the workers time to block
             for (i64 i = 0; i < 20000; i++)
                 sched_yield();
     }

@@ -1,4 +1,4 @@
-"""Trials that an exception ends in the middle of a quantum: all objects are freed, and no run continues."""
+"""Trials that an exception aborts in the middle of a quantum: all objects are freed, and no thread continues."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ LOOKING = f"""{BEGIN}
         bra     1b
 """
 FIRST_LINES = 3
-"""Camera lines before the exception."""
+"""Number of camera lines before the exception."""
 
 
 def interrupt(robot: FirmwareController) -> None:
@@ -42,7 +42,8 @@ def interrupt(robot: FirmwareController) -> None:
 
 @pytest.mark.parametrize("is_native", [True, False])
 def test_an_aborted_trial_is_freed(assembled: Callable[[str], Path], is_native: bool) -> None:
-    """Other robots wait for poses or are runnable. Their machines, the world and the threads are freed."""
+    """After an exception in one robot, the machines, the world and the threads are freed, although other robots wait
+    for poses or are runnable."""
     before = set(enumerate_threads())
     scene = load_scene("clustering").with_values(robots__count=3)
     robots = [FirmwareController(scene, 1, i, assembled(LOOKING), 0) for i in range(3)]

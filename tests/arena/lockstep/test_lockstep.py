@@ -1,4 +1,4 @@
-"""Demand lock-step: the record equals that of a run quantum after quantum."""
+"""Demand lock-step: the record equals that of a run that synchronises all robots after every quantum."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from tests.arena.images import BEGIN
 
 
 class Stepwise:
-    """A controller without `RunAheadRobot`: it takes the poses of every quantum."""
+    """Controller that is no `RunAheadRobot`, so it takes the poses of every quantum."""
 
     def __init__(self, controller: FirmwareController) -> None:
         self._controller = controller
@@ -64,7 +64,7 @@ def trial(scene: Scene, seed: int, image: Path, selector: int, seconds: float, a
 def test_records_equal_those_of_single_quanta(
     image: str, seed: int, selector: int, request: pytest.FixtureRequest
 ) -> None:
-    """Three robots that see each other; robots that send lines."""
+    """Records equal those of single quanta for three robots that see each other, and for robots that send lines."""
     scene = load_scene("clustering").with_values(robots__count=3, objects__count=8)
     path = request.getfixturevalue(image)
     ahead, stepwise = (trial(scene, seed, path, selector, 2.0, how) for how in (True, False))
@@ -73,7 +73,8 @@ def test_records_equal_those_of_single_quanta(
 
 
 def test_robots_run_ahead(clustering_image: Path) -> None:
-    """A robot is far ahead of the world when it first reads its camera. Otherwise the test above compares nothing."""
+    """A robot is more than 20 quanta ahead of the world when it first reads its camera; otherwise the test above
+    would compare nothing."""
     scene = load_scene("clustering").with_values(robots__count=2)
     robots = [FirmwareController(scene, 1, i, clustering_image, 8) for i in range(2)]
     world = World(scene, 1)
@@ -94,8 +95,8 @@ def test_robots_run_ahead(clustering_image: Path) -> None:
 def samples(
     image: Path, is_native: bool, seconds: float = 3.0, count: int = 3, threads: int = 1
 ) -> tuple[list[Any], int, int]:
-    """Return readings and poses twice a second, and for the last second how often Python rendered a line and
-    interpreted an instruction."""
+    """Return readings and poses twice a second; for the last second also the numbers of lines rendered and of
+    instructions interpreted by Python."""
     scene = load_scene("clustering").with_values(robots__count=count, objects__count=8)
     robots = [FirmwareController(scene, 5, i, image, 0) for i in range(count)]
     painted = interpreted = 0
@@ -124,7 +125,8 @@ def samples(
 
 
 def test_native_code_renders_and_probes_as_python_does(clustering_image: Path) -> None:
-    """Camera lines, ends of quanta and CPU probes are equal. Python runs only where a device needs it."""
+    """Camera lines, ends of quanta and CPU probes are equal with and without native code, and Python runs only if a
+    device needs it."""
     native, painted, interpreted = samples(clustering_image, True)
     plain, seen, _ = samples(clustering_image, False)
     assert native == plain
@@ -136,7 +138,7 @@ def test_native_code_renders_and_probes_as_python_does(clustering_image: Path) -
 
 
 def test_the_threads_that_run_robots_do_not_show(clustering_image: Path) -> None:
-    """Also with more threads than cores."""
+    """The number of threads, also if larger than the number of cores, does not affect the results."""
     alone, *_ = samples(clustering_image, True, 2.0, 12)
     for threads in (2, 5):
         found, painted, _ = samples(clustering_image, True, 2.0, 12, threads)
@@ -164,7 +166,7 @@ def test_threads_end_with_their_scheduler(clustering_image: Path) -> None:
 @pytest.mark.skipif(shutil.which("gcc") is None, reason="no sanitizers here (Debian package gcc)")
 @pytest.mark.parametrize("sanitizer", ["thread", "address,undefined"])
 def test_rounds_have_no_race(sanitizer: str, tmp_path: Path) -> None:
-    """Workers that come late, fall asleep, and are stopped."""
+    """The thread sanitizer finds no race in rounds with workers that start late, block, or are stopped."""
     source, program = Path(arena.__path__[0]) / "lockstep" / "lockstep.c", tmp_path / "race"
     command = ["gcc", "-g", "-O1", "-std=c11", "-Wall", "-Wextra", "-Werror", f"-fsanitize={sanitizer}", "-include"]
     command += [str(source), str(Path(__file__).with_name("race.c")), "-o", str(program), "-lpthread"]
@@ -180,7 +182,7 @@ LOOKING = f"""{BEGIN}
 
 
 def write(robot: FirmwareController, register: int, value: int) -> None:
-    """Set a register of the camera, as over I2C."""
+    """Write a camera register as the I2C bus does."""
     machine = robot.machine
     machine.board.camera.start(False, machine.cycle)
     machine.board.camera.write(register, machine.cycle)
@@ -188,7 +190,7 @@ def write(robot: FirmwareController, register: int, value: int) -> None:
 
 
 def test_the_noise_is_long_enough_for_the_widest_line(assembled: Callable[[str], Path]) -> None:
-    """A window of 1024 columns: a line can begin at any noise value, and the values last to its end."""
+    """A line of the widest window, 1024 columns, can begin at any noise value without exceeding the array of noise."""
     scene = load_scene("clustering").with_values(robots__count=1, camera__sensor="PO3030K")
     robot = FirmwareController(scene, 5, 0, assembled(LOOKING), 0)
     LockStep(World(scene, 5), [robot]).advance(200)
@@ -203,7 +205,8 @@ def test_the_noise_is_long_enough_for_the_widest_line(assembled: Callable[[str],
 def test_the_camera_of_a_robot_without_power_shows_the_current_world(
     off_s: float, assembled: Callable[[str], Path]
 ) -> None:
-    """Read from outside, like the camera of a running robot, though its own time does not advance."""
+    """The camera of a robot without power shows the current world to an observer, although the robot's own time does
+    not advance."""
     scene = load_scene("clustering").with_values(
         robots__count=1, objects__count=1, robots__wheel_noise=0.0, start__off=[[0, off_s]]
     )
@@ -222,7 +225,7 @@ def test_the_camera_of_a_robot_without_power_shows_the_current_world(
 
 
 def test_the_strip_is_the_last_line_before_the_window_changes(assembled: Callable[[str], Path]) -> None:
-    """The recorded rows are read in two frames, some of them in the third; none is in the new window."""
+    """The recorded rows are read in two frames, some of them again in the third; none of them is in the new window."""
     image = assembled(LOOKING)
     scene = load_scene("clustering").with_values(robots__count=1, camera__sensor="PO3030K")
     strips = []
@@ -232,7 +235,7 @@ def test_the_strip_is_the_last_line_before_the_window_changes(assembled: Callabl
         robot.machine.runner.wait = True
         lockstep, camera = LockStep(World(scene, 5), [robot], is_native=is_native), robot.machine.board.camera
         lockstep.advance(200)
-        write(robot, 0x1D, 0)  # the fastest clock: a row lasts 1704 Tcy, a quantum 14,746
+        write(robot, 0x1D, 0)  # fastest pixel clock: a row lasts 1704 Tcy, a quantum 14,746
         lockstep.advance(500)
         camera.align(robot.machine.cycle + 1000, line=226)
         lockstep.advance(501)
@@ -240,7 +243,7 @@ def test_the_strip_is_the_last_line_before_the_window_changes(assembled: Callabl
         lockstep.advance(700)
         camera.align(robot.machine.cycle + 1000, line=230)
         lockstep.advance(701)
-        write(robot, 0x0F, 100)  # the window's last row, its upper byte is 1
+        write(robot, 0x0F, 100)  # last row of the window, with 1 as upper byte
         write(robot, 0x0E, 0)
         lockstep.advance(900)
         strips.append(robot.reading().strip)

@@ -1,4 +1,4 @@
-"""A sample of tests/fuzz/swarm/fuzz_swarm.py: random swarms are equal in all modes of lock-step."""
+"""A sample of tests/fuzz/swarm/fuzz_swarm.py: random swarms give equal results in all modes of lock-step."""
 
 from __future__ import annotations
 
@@ -15,7 +15,8 @@ from tests.fuzz.swarm.fuzz_swarm import EXPECTED, Trial, check
 
 
 def test_random_swarms_are_equal_in_all_modes(tmp_path: Path) -> None:
-    """Quantum after quantum, in Python, and in native code. Three trials reach nearly all counters of the campaign."""
+    """Single quanta, lock-step in Python and native lock-step give equal results. Three trials reach nearly all
+    counters of the campaign."""
     tally = Counter[str]()
     for seed in (5, 104, 105):
         assert check(Trial(seed, tmp_path), tally) is None
@@ -24,7 +25,8 @@ def test_random_swarms_are_equal_in_all_modes(tmp_path: Path) -> None:
 
 
 def test_the_campaign_detects_a_difference(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Registers, bodies and records are compared. Pushing one robot in one of the modes is a difference."""
+    """The campaign reports a difference if one robot is pushed in one of the modes, because registers, bodies and
+    records are compared."""
     trial, run = Trial(104, tmp_path), Trial.run
 
     def pushed(self: Trial, way: str, tally: Counter[str]) -> list[list[object]]:

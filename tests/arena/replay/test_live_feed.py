@@ -1,4 +1,4 @@
-"""Live feed of a running trial: file of rows, HTTP server, page that polls for new samples."""
+"""Live feed of a running trial: file of rows, HTTP server, and a page that polls for new samples."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ setTimeout(() => {
 
 @pytest.fixture(scope="module")
 def recorded() -> tuple[dict[str, Any], list[dict[str, Any]]]:
-    """Return metadata and rows of a trial with two scripted robots over six seconds."""
+    """Return metadata and rows of a trial of six seconds with two scripted robots."""
     scene = scripted(load_scene("clustering").with_values(robots__count=2))
     plan = Plan(scene, "scripted", "A", None, 1, 6.0, 1)
     rows: list[dict[str, Any]] = []
@@ -72,7 +72,7 @@ def serving(follower: Follower) -> Iterator[str]:
 def test_a_follower_gets_the_samples_of_the_finished_file_piece_by_piece(
     tmp_path: Path, recorded: tuple[dict[str, Any], list[dict[str, Any]]]
 ) -> None:
-    """The state is running, then done; an incomplete line is read later."""
+    """The state is running, then done; an incomplete line is read when it is complete."""
     about, rows = recorded
     live = LiveFile(live_path(tmp_path, 1), about)
     for row in rows[:4]:
@@ -94,7 +94,7 @@ def test_a_follower_gets_the_samples_of_the_finished_file_piece_by_piece(
 
 
 def test_a_run_that_is_ended_is_told(tmp_path: Path, recorded: tuple[dict[str, Any], list[dict[str, Any]]]) -> None:
-    """The state is aborted when the live file disappears without a record."""
+    """The state is aborted when the live file disappears and there is no record."""
     about, rows = recorded
     live = LiveFile(live_path(tmp_path, 1), about)
     live.write(rows[0])
@@ -108,7 +108,7 @@ def test_a_run_that_is_ended_is_told(tmp_path: Path, recorded: tuple[dict[str, A
 def test_a_disk_too_full_for_the_rows_does_not_stop_the_trial(
     tmp_path: Path, full_disk: Path, recorded: tuple[dict[str, Any], list[dict[str, Any]]]
 ) -> None:
-    """Every write fails with ENOSPC."""
+    """If every write of the live file fails with ENOSPC, the trial continues."""
     live_path(tmp_path, 1).symlink_to(full_disk)
     about, rows = recorded
     live = LiveFile(live_path(tmp_path, 1), about)
@@ -119,7 +119,7 @@ def test_a_disk_too_full_for_the_rows_does_not_stop_the_trial(
 
 
 def test_a_trial_with_firmware_can_be_followed_while_it_runs(talking_image: Path, tmp_path: Path) -> None:
-    """The rows so far equal those of the record; the record has the fault."""
+    """The rows of a running trial equal those of its record; the record has the fault."""
     scene = load_scene("clustering").with_values(robots__count=1, objects__count=3)
     plan = Plan(scene, "talking", "A", talking_image, 1, 3.0, 1)
     seen: list[dict[str, Any]] = []
@@ -136,7 +136,7 @@ def test_a_trial_with_firmware_can_be_followed_while_it_runs(talking_image: Path
 def test_the_server_answers_its_two_places_only(
     tmp_path: Path, recorded: tuple[dict[str, Any], list[dict[str, Any]]]
 ) -> None:
-    """Unknown paths are status 404; before the first sample the page is status 503."""
+    """The server answers unknown paths with status 404, and a request before the first sample with status 503."""
     about, rows = recorded
     live = LiveFile(live_path(tmp_path, 1), about)
     with serving(Follower(tmp_path)) as address:
@@ -157,7 +157,7 @@ def test_the_server_answers_its_two_places_only(
 def test_the_command_serves_until_it_is_interrupted(
     tmp_path: Path, recorded: tuple[dict[str, Any], list[dict[str, Any]]]
 ) -> None:
-    """The command prints its address and ends without a message on Ctrl-C."""
+    """`arena live` prints its address and ends without a message on Ctrl-C."""
     about, rows = recorded
     live = LiveFile(live_path(tmp_path, 1), about)
     live.write(rows[0])
@@ -176,7 +176,7 @@ def test_the_command_serves_until_it_is_interrupted(
 
 
 def test_live_needs_a_run_that_goes_on(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """A folder without a running trial is exit status 2."""
+    """`arena live` for a folder without a running trial ends with exit status 2."""
     assert main(["replay", str(tmp_path), "--live"]) == 2
     assert "no trial is running here" in capsys.readouterr().err
 

@@ -1,4 +1,4 @@
-"""Replay page in a browser: loading from disk, scrubbing, playback, and poses of the record."""
+"""Replay page in a browser: loading from disk, seeking, playback, and poses of the record."""
 
 import json
 import re
@@ -44,7 +44,7 @@ def trial(tmp_path: Path) -> Path:
 
 
 def test_the_page_holds_the_file_and_loads_nothing_from_elsewhere(trial: Path) -> None:
-    """The page has no external addresses, and its data equal the record."""
+    """The page has no external addresses, and its data equal those of the record."""
     assert main(["replay", str(trial)]) == 0
     text = trial.with_suffix(".html").read_text()
     assert not re.search(r"https?:|src=|href=|@import", text)
@@ -67,7 +67,7 @@ HOSTILE = "x<!--<script>y & \u2028\u2029 </script><b>"
 
 
 def test_data_of_a_page_hold_no_markup(trial: Path) -> None:
-    """The JSON block contains no <, > or &, and its values are the record's."""
+    """The page's JSON block contains no <, > or &, and its values are the record's."""
     record = read_trial(trial)
     record.columns["log"][0] = [{"robot": 0, "cycle": 1, "text": HOSTILE}]
     data = re.search(r'id="trial">(.*?)</script>', page(record), re.S).group(1)  # type: ignore[union-attr]
@@ -86,7 +86,7 @@ def test_a_script_comment_from_a_robot_does_not_stop_the_page(trial: Path, tmp_p
 
 @needs_browser
 def test_the_page_loads_scrubs_and_plays_in_a_browser(trial: Path, tmp_path: Path) -> None:
-    """The page loads, scrubs and plays."""
+    """The page loads the trial, seeks to a time and plays in a browser."""
     main(["replay", str(trial)])
     found = browsed(trial.with_suffix(".html").read_text().replace("</html>", PROBE % SAMPLE), tmp_path)
     record = read_trial(trial)
@@ -116,7 +116,7 @@ document.getElementById("result").textContent = JSON.stringify({
 
 @needs_browser
 def test_the_page_shows_strips_leds_and_what_was_said(trial: Path, tmp_path: Path) -> None:
-    """The page shows a short flash of the front LED, a line of text, and a camera line in three colours."""
+    """The page shows a short pulse of the front LED, a line of text, and a camera line in three colours."""
     record = read_trial(trial)
     record.columns["log"][SAMPLE] = [{"robot": 0, "cycle": 49_152_000, "text": "hello"}]
     record.columns["lights"][SAMPLE] = [{"robot": 0, "cycle": 49_152_001, "leds": 256},
@@ -171,7 +171,7 @@ document.getElementById("result").textContent = JSON.stringify(found);
 @needs_browser
 @pytest.mark.parametrize("size", ["1280,720", "700,900"])
 def test_everything_can_be_reached_by_hand_and_key(trial: Path, tmp_path: Path, size: str) -> None:
-    """All controls and views fit on the screen; keys and clicks work; robots are interpolated between samples."""
+    """All controls and views fit on the screen, keys and clicks work, and robots are interpolated between samples."""
     found = browsed(page(read_trial(trial)).replace("</html>", LAYOUT), tmp_path, size)
     width, height = found["inner"]
     for name, (left, top, right, bottom) in found["boxes"].items():

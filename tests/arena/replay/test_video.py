@@ -26,7 +26,7 @@ def trial(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_a_gif_has_a_frame_for_every_time_it_shows(trial: Path, tmp_path: Path) -> None:
-    """8 s at 4 times real time and 12.5 frames per second are 26 frames of 80 ms."""
+    """A video of 8 s at 4 times real time and 12.5 frames per second has 26 frames of 80 ms."""
     out = tmp_path / "trial.gif"
     assert main(["replay", str(trial), "--export", str(out), "--speed", "4"]) == 0
     with Image.open(out) as film:
@@ -41,7 +41,7 @@ def test_a_gif_has_a_frame_for_every_time_it_shows(trial: Path, tmp_path: Path) 
 
 
 def test_frames_show_the_objects_where_the_record_has_them(trial: Path) -> None:
-    """A disc in the colour of the object or cluster is at its position."""
+    """In each frame a disc in the colour of its object or cluster is at the position of the object."""
     record = read_trial(trial)
     (first, last) = frames(record, [0.0, 8.0])
     for picture, sample in ((first, 0), (last, -1)):
@@ -53,7 +53,7 @@ def test_frames_show_the_objects_where_the_record_has_them(trial: Path) -> None:
 
 
 def test_an_object_of_a_kind_is_as_large_as_its_kind(trial: Path) -> None:
-    """The radius of a kind of object overrides that of `[objects]`."""
+    """The radius of a kind of objects overrides that of `[objects]`."""
     record = read_trial(trial)
     kind = record.scene.kind_of(0)
     large = replace(kind, radius_cm=3 * kind.radius_cm, count=record.scene.objects.count)
@@ -65,7 +65,7 @@ def test_an_object_of_a_kind_is_as_large_as_its_kind(trial: Path) -> None:
 
 
 def test_a_gif_keeps_the_colours_of_clusters(trial: Path, tmp_path: Path) -> None:
-    """Colours that appear only after the first frame are in the palette."""
+    """The palette of a GIF contains colours that appear only after the first frame."""
     record = read_trial(trial)
     for axis, away in (("x", 10.0), ("y", 0.0)):
         met = record.columns[f"o0_{axis}"] + away
@@ -80,7 +80,7 @@ def test_a_gif_keeps_the_colours_of_clusters(trial: Path, tmp_path: Path) -> Non
 
 
 def test_an_mp4_plays_the_same_frames(trial: Path, tmp_path: Path) -> None:
-    """The MP4, decoded by the same ffmpeg, has the expected frames and size."""
+    """An MP4, decoded by the same ffmpeg, has the expected frames and size."""
     encoder = video._ffmpeg()  # `make test` installs ffmpeg (extra: film)
     out = tmp_path / "trial.mp4"
     assert main(["replay", str(trial), "--export", str(out), "--speed", "4", "--seconds", "4"]) == 0
@@ -93,7 +93,7 @@ def test_an_mp4_plays_the_same_frames(trial: Path, tmp_path: Path) -> None:
 def test_without_ffmpeg_an_mp4_is_refused_with_what_to_install(
     trial: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Without ffmpeg an MP4 is exit status 2; a GIF is written."""
+    """Without ffmpeg, an MP4 is refused with exit status 2 and the package to install; a GIF is written."""
     monkeypatch.setattr(video.shutil, "which", lambda _name: None)
     monkeypatch.setitem(video.__dict__, "importlib", _NothingInstalled())
     assert main(["replay", str(trial), "--export", str(tmp_path / "a.mp4")]) == 2
@@ -124,7 +124,7 @@ def test_films_that_cannot_be_are_explained(
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    """Wrong options are exit status 2, and no file is left."""
+    """Invalid options of a video end with exit status 2, and no file is left."""
     monkeypatch.chdir(tmp_path)
     assert main(["replay", str(trial), *arguments]) == 2
     assert message in capsys.readouterr().err
@@ -134,7 +134,7 @@ def test_films_that_cannot_be_are_explained(
 def test_a_full_disk_is_reported_and_leaves_no_half_film(
     trial: Path, tmp_path: Path, unwritable: set[str], capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Every write fails with ENOSPC."""
+    """If every write fails with ENOSPC, the failure is reported and no partial video is left."""
     unwritable.add("film.gif")
     assert main(["replay", str(trial), "--export", str(tmp_path / "film.gif")]) == 2
     assert "film.gif: cannot be written: No space left" in capsys.readouterr().err

@@ -30,8 +30,8 @@ period_ms = 50
 """
 
 
-def played(folder: Path, image: Path, *words: str, text: str = SCENE) -> Trial:
-    """Return the record of half a second in which three robots echo their input."""
+def run_trial(folder: Path, image: Path, *words: str, text: str = SCENE) -> Trial:
+    """Run three robots that echo their input for half a second, and return the record."""
     scene = folder / "pair.toml"
     scene.write_text(text)
     command = ["run", str(scene), "--brain", str(image), "--trials", "1", "--minutes", "0.0084", "--out"]
@@ -40,8 +40,9 @@ def played(folder: Path, image: Path, *words: str, text: str = SCENE) -> Trial:
 
 
 def test_bytes_pass_from_robot_to_robot(assembled: Callable[[str], Path], tmp_path: Path) -> None:
-    """Robot 2 echoes its input at 0.2 s; its partner receives it one period later, and so on along the links."""
-    trial = played(tmp_path, assembled(ECHO))
+    """Robot 2 receives "go" at 0.2 s and echoes it; its partner receives the echo one period later, and so on along
+    the links."""
+    trial = run_trial(tmp_path, assembled(ECHO))
     messages = [one for row in trial.columns["messages"] for one in row]
     said = [(one["robot"], one["to"], round(1000 * one["cycle"] / FCY), one["text"]) for one in messages]
     assert said[:3] == [(2, 0, 250, "go"), (0, 1, 300, "go"), (0, 2, 300, "go")]
@@ -53,17 +54,17 @@ def test_bytes_pass_from_robot_to_robot(assembled: Callable[[str], Path], tmp_pa
 
 
 def test_the_record_is_the_same_for_two_threads(assembled: Callable[[str], Path], tmp_path: Path) -> None:
-    """Equal to the byte."""
+    """Records of trials with one and with two threads are equal to the byte."""
     image = assembled(ECHO)
     for name in ("one", "two"):
         (tmp_path / name).mkdir()
-    one, two = played(tmp_path / "one", image), played(tmp_path / "two", image, "--jobs", "2")
+    one, two = run_trial(tmp_path / "one", image), run_trial(tmp_path / "two", image, "--jobs", "2")
     assert one.path.read_bytes() == two.path.read_bytes()
 
 
 def test_without_links_there_is_no_column_of_messages(assembled: Callable[[str], Path], tmp_path: Path) -> None:
-    """A scene without links has a record without the column."""
-    trial = played(tmp_path, assembled(ECHO), text=SCENE[: SCENE.index("[bluetooth]")])
+    """A scene without links gives a record without the column of messages."""
+    trial = run_trial(tmp_path, assembled(ECHO), text=SCENE[: SCENE.index("[bluetooth]")])
     assert "messages" not in trial.columns
     assert sample_data(trial)["messages"] == [[] for _ in trial.times]
 
@@ -80,12 +81,12 @@ def test_without_links_there_is_no_column_of_messages(assembled: Callable[[str],
     ],
 )
 def test_invalid_links_are_refused(links: list[object], words: str) -> None:
-    """The message names the valid robot numbers."""
+    """Invalid links are refused with a message that names the valid robot numbers."""
     with pytest.raises(SceneError, match=words):
         load_scene("clustering").with_values(bluetooth__links=links)
 
 
 def test_columns_of_supervisor_numbers_are_numbers_for_any_name() -> None:
-    """Also for the names of other columns."""
+    """A supervisor's number may have any name, also that of another column; its column n_NAME holds numbers."""
     for name in ("log", "messages", "lights", "seen", "strip"):
         assert kind_of(f"n_{name}") == kind_of("t")

@@ -23,12 +23,12 @@ from emu.boards.epuck.board import Epuck
 from tests.arena.reference_camera import ReferenceCamera
 
 AT_ONCE = 8
-"""Selector bit that starts the project's firmware without the remote control."""
+"""Selector bit with which the project's firmware starts without the remote control."""
 
 
 @pytest.fixture
 def alone() -> Scene:
-    """One robot without wheel noise, no objects."""
+    """Return a scene with one robot, no wheel noise and no objects."""
     return load_scene("clustering").with_values(robots__count=1, objects__count=0, robots__wheel_noise=0.0)
 
 
@@ -36,7 +36,8 @@ def alone() -> Scene:
 def test_wheel_speeds_are_those_of_the_table_for_what_the_camera_shows(
     clustering_image: Path, alone: Scene, controller: str, wanted: tuple[int, ...]
 ) -> None:
-    """Nothing ahead, then an object; wheel speeds in mm/s (epuck.md §8)."""
+    """The wheel speeds are those of the controller's table, in mm/s, first for an empty view and then for an object
+    (epuck.md §8)."""
     scene = alone.with_values(objects__count=1, robots__thrust_n="inf")
     for place, speeds in (((20.0, 20.0), wanted[:2]), ((240.0, 150.0), wanted[2:])):
         firmware = FirmwareController(scene, 1, 0, clustering_image, SELECTOR[controller] | AT_ONCE)
@@ -56,7 +57,8 @@ def test_wheel_speeds_are_those_of_the_table_for_what_the_camera_shows(
 def test_pixels_are_the_colours_of_their_classes_with_noise(
     clustering_image: Path, alone: Scene, vignetting: float
 ) -> None:
-    """docs/experiment.md §2: normal noise of sd 3 in each channel, in rows of one class and of several."""
+    """docs/experiment.md §2: pixels are the colours of their classes plus normal noise of sd 3 in each channel, in
+    rows of one class and of several."""
     scene = alone.with_values(objects__count=1, camera__vignetting=vignetting)
     firmware = FirmwareController(scene, 1, 0, clustering_image)
     poses = World.of(scene, 1, [(200, 150, 0.0)], [(240.0, 150.0)]).poses
@@ -72,8 +74,8 @@ def test_pixels_are_the_colours_of_their_classes_with_noise(
 
 
 def test_the_scripted_sensor_has_first_frame_and_latency_of_the_firmware(clustering_image: Path, alone: Scene) -> None:
-    """docs/experiment.md §2: both are measured on the firmware: the first frame within 0.2 ms, the latency, which
-    depends on the kernel, within 0.25 ms."""
+    """docs/experiment.md §2: the scripted sensor has the times measured on the firmware: the first frame within 0.2
+    ms, the latency, which depends on the kernel, within 0.25 ms."""
     firmware = FirmwareController(alone, 1, 0, clustering_image, SELECTOR["A"] | AT_ONCE)
     world = World(alone, 1)
     rows: dict[int, int] = {}
@@ -92,13 +94,14 @@ def test_the_scripted_sensor_has_first_frame_and_latency_of_the_firmware(cluster
         assert tick < 1000
     middle = (WINDOW_ROWS[0] + WINDOW_ROWS[-1]) // 2
     assert rows[middle] == pytest.approx(FIRST_FRAME_TCY, abs=FCY // 5_000)
-    seen = firmware.machine.cycle  # within the quantum of the change
+    seen = firmware.machine.cycle  # before the end of the quantum with the change
     margin = FCY // 4_000
     assert seen - alone.clock.quantum_tcy - margin <= FIRST_FRAME_TCY + LATENCY_TCY <= seen + margin
 
 
 def test_the_remote_controls_ok_starts_all_robots_together(clustering_image: Path) -> None:
-    """experiment-contract.md §4: firmware and script decode it at the same cycle of the trial and rest before it."""
+    """experiment-contract.md §4: firmware and scripted robots decode the OK key at the same cycle of the trial and do
+    not move before it."""
     scene = load_scene("clustering").with_values(robots__count=2, objects__count=0)
     controllers = [FirmwareController(scene, 1, robot, clustering_image, SELECTOR["A"]) for robot in range(2)]
     started: list[int] = []
@@ -137,7 +140,7 @@ def test_scripted_and_emulated_robots_start_on_equal_paths(clustering_image: Pat
 
 
 def test_motor_steps_give_the_distance_travelled(clustering_image: Path, alone: Scene) -> None:
-    """epuck.md §3: 0.128 mm per step, summed over a circle, with quanta of 1 ms."""
+    """epuck.md §3: the distance equals 0.128 mm per motor step, summed over a circle in quanta of 1 ms."""
     firmware = FirmwareController(alone, 1, 0, clustering_image, AT_ONCE)
     world = World.of(alone, 1, [(200, 150, 0.0)], [])
     path = 0.0
@@ -152,7 +155,8 @@ def test_motor_steps_give_the_distance_travelled(clustering_image: Path, alone: 
 def test_a_trial_continues_after_the_firmware_of_a_robot_trapped(
     talking_image: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Exit status 1; the fault has robot, time and reason. Lines and LED changes before it are in the record."""
+    """If a robot's firmware traps, the trial continues and ends with exit status 1. The fault has robot, time and
+    reason; lines and LED changes before it are in the record."""
     out = tmp_path / "out"
     status = main(["run", "clustering", "--brain", str(talking_image), "--robots", "2", "--trials", "1", "--minutes",
                    "0.05", "--jobs", "1", "--out", str(out)])  # fmt: skip
@@ -184,7 +188,7 @@ def test_a_trial_continues_after_the_firmware_of_a_robot_trapped(
 def test_emulated_trials_are_the_same_for_one_and_two_workers(
     image: str, seconds: float, tmp_path: Path, request: pytest.FixtureRequest
 ) -> None:
-    """Files of one worker, of two, and of a second run are equal."""
+    """Files of one worker, of two workers and of a second run are equal."""
     for name, jobs in (("1", 1), ("2", 2), ("again", 1)):
         main(["run", "clustering", "--brain", str(request.getfixturevalue(image)), "--robots", "2", "--trials", "2",
               "--minutes", str(seconds / 60), "--jobs", str(jobs), "--out", str(tmp_path / name)])  # fmt: skip
@@ -206,7 +210,8 @@ def test_the_light_of_the_scene_scales_the_picture(talking_image: Path, alone: S
 
 
 def test_reaction_finds_the_latency_and_no_missed_frame(clustering_image: Path) -> None:
-    """experiment-contract.md §4: reaction times equal those of polling the wheel, within the polling period of 5 us."""
+    """experiment-contract.md §4: `arena reaction` gives the reaction times found by polling the wheels, within the
+    polling period of 5 us, and no missed frame."""
     found = reaction(clustering_image, SPEED_WORDS["openswarm"], 0, 10, 1)
     assert found["frames_missed"] == 0
     assert found["changes"] in (9, 10)
@@ -229,7 +234,8 @@ def test_reaction_finds_the_latency_and_no_missed_frame(clustering_image: Path) 
 def test_reaction_refuses_firmware_without_the_word_or_without_wheels(
     talking_image: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Exit status 2; the message names the word, or reports that the firmware stopped."""
+    """`arena reaction` ends with exit status 2 if the firmware lacks the sensor variable, which the message names, or
+    stops."""
     assert main(["reaction", "--brain", str(talking_image)]) == 2
     assert "name the word that holds" in capsys.readouterr().err
     assert main(["reaction", "--brain", str(talking_image), "--word", "nothing"]) == 2
@@ -240,7 +246,8 @@ def test_reaction_refuses_firmware_without_the_word_or_without_wheels(
 
 @pytest.mark.parametrize("end", [1 << 10, 294_912, 3 << 30])
 def test_probe_times_equal_the_draws_of_the_generator(clustering_image: Path, alone: Scene, end: int) -> None:
-    """Also for a bound for which the method rejects a third of the draws."""
+    """Native draws of probe times equal the generator's, also for a bound at which the method rejects a third of the
+    draws."""
     firmware = FirmwareController(alone, 1, 0, clustering_image)
     twin = np.random.default_rng()
     twin.bit_generator.state = firmware._rng.bit_generator.state

@@ -1,4 +1,4 @@
-"""Power-on and inputs of robots, and reports of robots that are stuck or silent."""
+"""Power-on and inputs of robots, and reports of robots that hang or send nothing."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Assembled = Callable[[str], Path]
 
 
 def run(image: Path, out: Path, *words: object, seconds: float = 1.5) -> tuple[int, Trial]:
-    """Return exit status and record of one trial of two robots."""
+    """Run one trial of two robots. Return its exit status and its record."""
     command = ["run", "clustering", "--brain", str(image), "--robots", "2", "--objects", "0", "--trials", "1",
                "--minutes", str(seconds / 60), "--out", str(out), *map(str, words)]  # fmt: skip
     status = main(command)
@@ -41,7 +41,7 @@ def run(image: Path, out: Path, *words: object, seconds: float = 1.5) -> tuple[i
 def test_firmware_that_stays_in_its_own_trap_handler_is_reported(
     assembled: Assembled, handler: str, cause: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The handler is part of the firmware and loops for ever, so the emulator does not stop."""
+    """Firmware that loops for ever in its own trap handler is reported, although the emulator does not stop."""
     image = assembled(f"{BEGIN}\n {cause}\n1: bra 1b\n .global {handler}\n{handler}: bra {handler}\n")
     status, trial = run(image, tmp_path)
     assert status == 1
@@ -54,7 +54,7 @@ def test_firmware_that_stays_in_its_own_trap_handler_is_reported(
 
 
 def test_a_trap_handler_that_returns_is_not_reported(assembled: Assembled, tmp_path: Path) -> None:
-    """It fixes the cause 2,000 times a second, and the firmware continues."""
+    """Firmware whose trap handler fixes the cause and returns, 2,000 times a second, is not reported."""
     image = assembled(f"""{BEGIN}
 1:      mov     #1, w2
         mov     #0, w3
@@ -75,7 +75,8 @@ __MathError: bclr INTCON1, #4
 
 
 def test_a_kernel_that_stopped_itself_is_reported(tmp_path: Path) -> None:
-    """A failed assertion ends in hal_stop(): asleep with all interrupts disabled, even if an event is pending."""
+    """A kernel that ended in hal_stop() after a failed assertion is reported: it sleeps with all interrupts disabled,
+    even if an event is pending."""
     source = tmp_path / "apps" / "wrong" / "main.c"
     source.parent.mkdir(parents=True)
     source.write_text("#include <openswarm.h>\nint main(void) { Sys_Init_Kernel(); SYS_ASSERT(0); return 0; }\n")
@@ -92,7 +93,7 @@ def test_a_kernel_that_stopped_itself_is_reported(tmp_path: Path) -> None:
 
 
 def test_a_silent_robot_is_reported_after_the_time_of_the_scene(assembled: Assembled, tmp_path: Path) -> None:
-    """Firmware that never starts moves no wheels, changes no LEDs and sends no byte."""
+    """Firmware that moves no wheels, changes no LEDs and sends no byte is reported after the time in the scene."""
     image = assembled(f"{BEGIN}\n1: bra 1b\n")
     quiet = ["--set", "start.silent_s=1"]
     status, trial = run(image, tmp_path / "a", *quiet)
@@ -110,7 +111,8 @@ def test_a_silent_robot_is_reported_after_the_time_of_the_scene(assembled: Assem
 
 
 def test_the_remote_control_repeats_its_frame_while_the_key_is_held(talking_image: Path) -> None:
-    """Every 113.8 ms (epuck.md §6), so a robot that misses the first frame receives later ones."""
+    """The remote control repeats its frame every 113.8 ms (epuck.md §6), so a robot that misses the first frame
+    receives a later one."""
     scene = load_scene("clustering").with_values(robots__count=1, objects__count=0, start__remote_held_s=0.5)
     controller = FirmwareController(scene, 1, 0, talking_image)
     edges: list[int] = []
@@ -126,7 +128,8 @@ def test_the_remote_control_repeats_its_frame_while_the_key_is_held(talking_imag
 
 
 def test_a_robot_powered_on_while_the_key_is_held_receives_the_remaining_frames(talking_image: Path) -> None:
-    """No partial frame, and no frame from before power-on."""
+    """A robot that is powered on while the key is held receives the remaining frames, but no partial or earlier
+    frame."""
     values = {"robots__count": 1, "objects__count": 0, "start__remote_at_s": 0.0, "start__spread_tcy": 4 * 1_600_000}
     scene = load_scene("clustering").with_values(**values)
     for seed in range(1, 6):
@@ -144,7 +147,7 @@ def test_a_robot_powered_on_while_the_key_is_held_receives_the_remaining_frames(
 
 @pytest.mark.parametrize("position", [0, 7, 11, 15])
 def test_the_switch_has_sixteen_positions(assembled: Assembled, position: int, tmp_path: Path) -> None:
-    """The firmware reports the position it reads on RG6 to RG9 (epuck.md §2)."""
+    """The firmware reports the selector position, one of sixteen, that it reads on RG6 to RG9 (epuck.md §2)."""
     image = assembled(f"""{BEGIN}
         mov     PORTG, w0
         lsr     w0, #6, w0
@@ -162,7 +165,7 @@ def test_the_switch_has_sixteen_positions(assembled: Assembled, position: int, t
 
 
 def test_a_stimulus_arrives_at_times_of_the_trial(assembled: Assembled, tmp_path: Path) -> None:
-    """The stimulus reaches both robots at the same time of the trial, though their power-on times differ. The record is
+    """A stimulus reaches both robots at the same time of the trial, though their power-on times differ. The record is
     the same to the byte for one and two threads."""
     script = '0.5s uart1 "go 7\\n"'
     image = assembled(ECHO)
@@ -188,7 +191,7 @@ def test_a_stimulus_arrives_at_times_of_the_trial(assembled: Assembled, tmp_path
 def test_invalid_start_values_are_refused(
     setting: str, message: str, talking_image: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Exit status 2 before a trial starts."""
+    """Invalid values of `[start]` end with exit status 2 before a trial starts."""
     assert (
         main(
             [

@@ -106,14 +106,14 @@ counts = 2000
 
 @pytest.fixture
 def yard(tmp_path: Path) -> Scene:
-    """The scene FULL, loaded from a file."""
+    """Return the scene FULL, loaded from a file."""
     path = tmp_path / "yard.toml"
     path.write_text(FULL)
     return load_scene(str(path))
 
 
 def test_a_scene_of_several_kinds_is_read(yard: Scene) -> None:
-    """Groups keep their order and values. The metadata of a record restores the same scene."""
+    """Groups of a scene keep their order and values, and the metadata of a record restore the same scene."""
     assert (yard.robots.count, yard.objects.count) == (4, 6)
     assert (yard.arena.width_cm, yard.arena.height_cm) == (300, 240)
     assert [yard.id_of(robot) for robot in range(4)] == [10, 11, 12, 0]
@@ -124,7 +124,7 @@ def test_a_scene_of_several_kinds_is_read(yard: Scene) -> None:
 
 
 def test_a_scene_with_robot_groups_has_only_the_objects_it_lists(tmp_path: Path) -> None:
-    """The included scenes have the objects of their files."""
+    """A scene with robot groups has only the objects it lists; the built-in scenes have the objects of their files."""
     path = tmp_path / "few.toml"
     path.write_text('name = "few"\n[[robots]]\ncount = 2\n')
     assert load_scene(str(path)).objects.count == 0
@@ -134,7 +134,7 @@ def test_a_scene_with_robot_groups_has_only_the_objects_it_lists(tmp_path: Path)
 
 
 def test_bodies_are_placed_without_contacts_where_the_groups_say(yard: Scene) -> None:
-    """The same seed gives the same positions."""
+    """Bodies are placed without contacts in the areas of their groups; the same seed gives the same positions."""
     for seed in range(20):
         poses = World(yard, seed).poses
         assert poses.robots == World(yard, seed).poses.robots
@@ -153,7 +153,8 @@ def test_bodies_are_placed_without_contacts_where_the_groups_say(yard: Scene) ->
 
 @pytest.mark.parametrize("pitch", [0.0, -4.0])
 def test_renderer_and_reference_camera_agree_in_a_furnished_scene(yard: Scene, pitch: float) -> None:
-    """From random viewpoints, with obstacles, heights, patches and a room with an inner corner."""
+    """Renderer and reference camera agree from random viewpoints in a scene with obstacles, heights, patches and a
+    room with an inner corner."""
     scene = yard.with_values(camera__pitch_deg=pitch)
     rng = np.random.default_rng(8)
     columns = np.arange(0, 640, 13)
@@ -183,11 +184,11 @@ def test_the_camera_shows_colours_and_heights(yard: Scene) -> None:
     assert appearance.floor_at(240, 60) == colours.index((0x20, 0x40, 0x60))
     assert appearance.floor_at(20, 20) == colours.index(NAMED["white"])
     assert appearance.floor_at(100, 100) == FLOOR
-    assert appearance.sensor_classes[blue] == 0  # the line-of-sight sensor detects red and green only
+    assert appearance.sensor_classes[blue] == 0  # the line-of-sight sensor detects only red and green
 
 
 def test_obstacles_stop_a_robot(yard: Scene) -> None:
-    """The robot drives against a block, a pillar and the inner corner of the room."""
+    """A robot stops at a block, at a pillar and at the inner corner of the room."""
     for start, end in (((110, 35, 0.0), (150, 35)), ((60, 110, math.pi / 2), (60, 142)), ((120, 180, 0.0), (180, 180))):
         world = World.of(yard, 1, [start, *[(20.0 + 20 * n, 20.0, 0.0) for n in range(3)]],
                          [(250.0, 10 + 15 * n) for n in range(6)])  # fmt: skip
@@ -198,10 +199,11 @@ def test_obstacles_stop_a_robot(yard: Scene) -> None:
 
 
 def test_infrared_sensors_detect_obstacles_and_all_lamps(yard: Scene) -> None:
-    """Distance and reflection of a block, a black pillar and a wall of the polygon."""
+    """Infrared sensors measure distance and reflection of a block, a black pillar and a wall of the polygon, and the
+    light of all lamps."""
     far = [(300.0, 300.0)] * 6
     for pose, gap, share in (
-        ((150 - 3.7 - 4, 35.0, math.radians(18)), 40, 1.0),  # sensor 0, 18 degrees to the right, faces along x
+        ((150 - 3.7 - 4, 35.0, math.radians(18)), 40, 1.0),  # sensor 0, which is 18 degrees to the right, faces along x
         ((60 - 8 - 3.7 - 5, 150.0, math.radians(18)), 50, 0.2),
         ((180 - 3.7 - 6, 200.0, math.radians(18)), 60, 1.0),
     ):
@@ -244,7 +246,7 @@ def test_infrared_sensors_detect_obstacles_and_all_lamps(yard: Scene) -> None:
 def test_errors_name_file_line_and_key(
     change: tuple[str, str], line: int, words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The message has file, line, key and expected values; exit status 2."""
+    """Each error in a scene ends with exit status 2 and a message with file, line, key and expected values."""
     assert change[0] in FULL
     path = tmp_path / "my.toml"
     path.write_text(FULL.replace(*change, 1))
@@ -266,7 +268,7 @@ def test_errors_name_file_line_and_key(
     ],
 )
 def test_scenes_without_room_are_refused(change: tuple[str, str], words: str, tmp_path: Path) -> None:
-    """The message names the body, its position and what obstructs it."""
+    """A scene without room for a body is refused; the message names the body, its position and the obstructing body."""
     path = tmp_path / "my.toml"
     path.write_text(FULL.replace(*change, 1))
     with pytest.raises(SceneError, match="no room") as caught:
@@ -275,7 +277,8 @@ def test_scenes_without_room_are_refused(change: tuple[str, str], words: str, tm
 
 
 def test_five_hundred_mutated_scenes_are_read_or_refused_in_one_line(tmp_path: Path) -> None:
-    """Words, lines and letters are exchanged, dropped and doubled. The only exception is a SceneError with the file."""
+    """500 scenes with exchanged, dropped and doubled words, lines and letters are read, or refused by a SceneError
+    that names the file."""
     path = tmp_path / "my.toml"
     pieces = [
         "-1",
@@ -336,7 +339,8 @@ def _refusal(path: Path) -> str:
 def test_groups_have_their_own_firmware_switch_and_number(
     assembled: Callable[[str], Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """A trial of two images and a scripted robot is the same to the byte for one and two jobs."""
+    """Each group of a trial with two images and a scripted robot has its own firmware, selector and number; the
+    record is the same to the byte for one and two jobs."""
     one = assembled(SPEAKER.format(letter="P"))
     two = assembled(SPEAKER.format(letter="Q"))
     (tmp_path / "p.elf").write_bytes(one.read_bytes())
@@ -388,13 +392,14 @@ SPEAKER = f"""{BEGIN}
 
 
 def test_robots_without_spread_are_equal() -> None:
-    """Their traits are equal to the bit."""
+    """Without spread, the traits of all robots are equal to the bit."""
     scene = load_scene("clustering")
     assert {traits_of(scene, seed, robot) for seed in range(9) for robot in range(5)} == {(0.0, 0.0, (1.0, 1.0))}
 
 
 def test_robots_differ_by_the_standard_deviations_of_the_scene() -> None:
-    """Standard deviations of 2,000 robots. The same seed gives the same robots, another seed others."""
+    """The traits of 2,000 robots have the standard deviations of the scene. The same seed gives the same robots,
+    another seed others."""
     scene = load_scene("clustering").with_values(
         robots__camera_yaw_sd_deg=2.0, robots__camera_pitch_sd_deg=1.5, robots__wheel_bias_sd=0.02
     )
@@ -408,7 +413,7 @@ def test_robots_differ_by_the_standard_deviations_of_the_scene() -> None:
 
 
 def test_camera_yaw_and_wheel_bias_take_effect() -> None:
-    """The picture is shifted by the yaw, and the robot turns by the bias."""
+    """Camera yaw shifts the picture, and wheel bias turns the robot."""
     scene = load_scene("clustering").with_values(robots__count=1, objects__count=1, robots__wheel_noise=0.0)
     turned = scene.with_values(robots__camera_yaw_sd_deg=5.0, robots__camera_pitch_sd_deg=2.0)
     traits = traits_of(turned, 4, 0)
@@ -436,7 +441,7 @@ count = 2
 
 
 def plan_of(tmp_path: Path, text: str, *words: str) -> Plan:
-    """Return the plan of `arena run` for a scene and options."""
+    """Return the plan of `arena run` for these scene and options."""
     (tmp_path / "group.toml").write_text(text)
     return plan_from(run_parser().parse_args([str(tmp_path / "group.toml"), *words]), 1)
 
@@ -444,7 +449,8 @@ def plan_of(tmp_path: Path, text: str, *words: str) -> Plan:
 def test_a_brain_replaces_the_images_of_a_scene_whose_groups_all_have_one(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The plan names what runs; a missing file is an error in every scene."""
+    """`--brain` replaces the images of all groups if each group has one; the plan names the image. A missing file is
+    an error in every scene."""
     (tmp_path / "group.toml").write_text(GROUP)
     out = str(tmp_path / "out")
     assert main(["run", str(tmp_path / "group.toml"), "--brain", "/lost.elf", "--out", out]) == 2
@@ -461,7 +467,8 @@ def test_a_brain_replaces_the_images_of_a_scene_whose_groups_all_have_one(
 
 
 def test_options_of_a_scene_with_groups_act_or_name_the_key_to_write(tmp_path: Path) -> None:
-    """Counts and keys of a single table can be set; several tables, poses and replaced values are refused."""
+    """Options can set counts and keys of a single table of groups; for several tables, poses and replaced values they
+    are refused."""
     text = GROUP.replace("aggregation", "scripted")
     scene = plan_of(tmp_path, text, "--robots", "4", "--objects", "3", "--set", "objects.radius_cm=6").scene
     assert (scene.robots.count, scene.groups[0].count, scene.objects.count) == (4, 4, 3)
@@ -484,7 +491,8 @@ def test_options_of_a_scene_with_groups_act_or_name_the_key_to_write(tmp_path: P
 
 
 def test_a_controller_without_effect_is_refused(tmp_path: Path) -> None:
-    """`--controller` selects speeds of scripted robots and the selector of firmware, unless the scene does so."""
+    """`--controller` selects the speeds of scripted robots and the selector of firmware; it is refused if the scene
+    sets both."""
     text = GROUP.replace("aggregation", "scripted")
     assert plan_of(tmp_path, text, "--controller", "B").controller == "B"
     assert plan_of(tmp_path, text).controller == "A"
@@ -493,7 +501,8 @@ def test_a_controller_without_effect_is_refused(tmp_path: Path) -> None:
 
 
 def test_a_scripted_trial_runs_in_a_furnished_scene(tmp_path: Path) -> None:
-    """From `arena run` to page and figures; the record has the poses of all bodies."""
+    """A scripted trial in a furnished scene runs from `arena run` to page and figures; the record has the poses of
+    all bodies."""
     path = tmp_path / "yard.toml"
     path.write_text(FULL)
     out = tmp_path / "out"

@@ -1,4 +1,4 @@
-"""Studio: an interactive trial that steps and rewinds to the byte, the HTTP server, and the page."""
+"""Studio: an interactive trial with exact steps and rewinds, the HTTP server, and the page."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def studio_of(plan: Plan) -> Iterator[Studio]:
 
 
 def settled(studio: Studio, state: str = "paused") -> dict[str, Any]:
-    """Return the status once the trial is in `state` or over."""
+    """Wait until the trial is in `state` or over, and return its status."""
     for _ in range(1200):
         now = studio.ask("status")
         if now["state"] in (state, "over"):
@@ -103,12 +103,12 @@ def test_a_rewind_restores_the_state_to_the_byte(clustering_image: Path) -> None
 
 
 def during_rewind(studio: Studio, goal: int, name: str, *arguments: Any) -> None:
-    """Start a rewind to `goal`, and execute a command before it has replayed an action."""
+    """Start a rewind to `goal`, and execute a command before the rewind has replayed an action."""
     studio.ask_all(Call("rewind", (goal,)), Call(name, arguments))
 
 
 def test_commands_during_a_rewind_discard_later_actions() -> None:
-    """Objects are moved at quanta 20 and 300. A pause at quantum 0 of a rewind discards both actions."""
+    """Two objects are moved at quanta 20 and 300. A pause of a rewind at quantum 0 discards both actions."""
     plan = scripted_plan()
     with studio_of(plan) as untouched:
         do(untouched, "step", 1)
@@ -148,9 +148,11 @@ def test_commands_during_a_rewind_discard_later_actions() -> None:
 
 @pytest.mark.skipif(not checkpoints.CAN_FORK, reason="checkpoints exist on Linux only")
 def test_a_checkpoint_restores_the_state_to_the_byte(clustering_image: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A checkpoint continues as the first pass did, with an object moved after each checkpoint.
+    """After a checkpoint is restored, the trial continues as in the first pass, with an object moved after each
+    checkpoint.
 
-    A rewind discards later checkpoints and actions, and keeps breakpoints. All processes end with the studio."""
+    A rewind discards later checkpoints and actions, and keeps breakpoints. All processes end with the studio.
+    """
     closed, close = [], checkpoints.PipeEnd.close
     monkeypatch.setattr(checkpoints.PipeEnd, "close", lambda end: closed.append(close(end)))
     monkeypatch.setattr(checkpoints, "EVERY_S", 1e9)
@@ -185,7 +187,7 @@ def test_a_checkpoint_restores_the_state_to_the_byte(clustering_image: Path, mon
 
 
 def test_older_checkpoints_have_larger_distances() -> None:
-    """The pool has a limit; evicted checkpoints are closed."""
+    """The pool of checkpoints has a limit; older checkpoints are farther apart, and evicted ones are closed."""
     pool, ends = checkpoints.CheckpointPool(), []
     for ten in range(1, 61):
         assert pool.is_due(10.0 * ten)
@@ -204,7 +206,7 @@ def test_older_checkpoints_have_larger_distances() -> None:
 
 
 def test_a_breakpoint_pauses_the_whole_world(clustering_image: Path) -> None:
-    """The world is paused while a robot is at a breakpoint and can be inspected; the record is unaffected."""
+    """A breakpoint of one robot pauses the whole world, which can then be inspected; the record is unaffected."""
     plan = Plan(scene_of(2, 4), "openswarm", "A", clustering_image, 1, SECONDS, 3)
     with controllers_of(plan, 3) as (controllers, channel):
         whole = run_trial(plan.scene, 3, controllers, SECONDS, channel=channel, experiment=plan.loaded_experiment)
@@ -243,7 +245,7 @@ def test_bluetooth_text_arrives(assembled: Callable[[str], Path]) -> None:
 
 
 def test_a_trial_can_be_rewound_after_its_supervisor_fails(tmp_path: Path) -> None:
-    """The failure is reported; the trial can be inspected and rewound, but not run."""
+    """After its supervisor has failed, which is reported, the trial can be inspected and rewound but not run."""
     own = tmp_path / "own.py"
     own.write_text(FAILING)
     plan = Plan(scripted(scene_of(2, 4)), "scripted", "A", None, 1, SECONDS, 3, own)
@@ -297,7 +299,7 @@ def asked(one: StudioServer, path: str, body: bytes | None = None, **headers: st
 
 
 def test_unauthorised_requests_are_refused() -> None:
-    """Requests with another origin, another host name, or without the token are status 403 and have no effect."""
+    """Requests with another origin, another host name or without the token get status 403 and have no effect."""
     step = json.dumps({"do": "step", "quanta": 5}).encode()
     with serving() as one:
         assert asked(one, "/", **{HEADER: ""})[0] == 403
@@ -336,7 +338,7 @@ def test_unauthorised_requests_are_refused() -> None:
     ],
 )
 def test_bad_requests_are_reported_in_one_line(body: bytes, said: str) -> None:
-    """A bad request is status 409, and the studio continues."""
+    """A bad request gets status 409 and one line, and the studio continues."""
     with serving() as one:
         status, text = asked(one, "/do", body)
         assert (status, text.count("\n")) == (409, 0)
@@ -347,7 +349,7 @@ def test_bad_requests_are_reported_in_one_line(body: bytes, said: str) -> None:
 
 
 def test_the_command_ends_with_ctrl_c() -> None:
-    """The command prints its address; a bad scene is one line and status 2."""
+    """`arena studio` prints its address and ends on Ctrl-C; a bad scene is one line and status 2."""
     words = [sys.executable, "-m", "arena", "studio", "clustering", "--brain", "scripted", "--port", "0"]
     with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=ROOT) as process:
         assert process.stdout is not None
@@ -394,8 +396,8 @@ const still = async () => { await rest(100); await until(() => d.studio.now.stat
 
 @needs_browser
 def test_the_page_controls_the_trial(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Step, run, pause, drag an object, rewind, inspect a robot, and show the reason of a refused command."""
-    with serving(replace(scripted_plan(), seconds=600.0)) as one:  # long enough to pause it
+    """The page can step, run, pause, drag an object, rewind, inspect a robot, and show why a command is refused."""
+    with serving(replace(scripted_plan(), seconds=600.0)) as one:  # long enough to be paused
         found = browsed(one, PROBE, tmp_path, monkeypatch)
     assert (found["first"], found["stepped"]) == (0, 1)
     assert found["ran"] > 10

@@ -27,7 +27,7 @@ from arena.world.wheels import ROOM, Wheels
 
 @pytest.fixture
 def empty() -> Scene:
-    """The arena without wheel noise, one robot, no objects, 10 ms quantum."""
+    """Return a scene with one robot, no objects, no wheel noise and a quantum of 10 ms."""
     return load_scene("clustering").with_values(
         robots__wheel_noise=0.0, robots__count=1, objects__count=0, clock__quantum_ms=10.0
     )
@@ -39,7 +39,7 @@ def drive(world: World, wheels: tuple[float, float], seconds: float) -> None:
 
 
 def test_full_speed_covers_128_mm_in_a_second(empty: Scene) -> None:
-    """epuck.md §3: 1000 steps/s of 0.128 mm."""
+    """epuck.md §3: at 1000 steps/s of 0.128 mm, a robot drives 128 mm in a second."""
     world = World.of(empty, 1, [(50, 150, 0.0)], [])
     drive(world, (12.8, 12.8), 1)
     before = world.poses.robots[0][0]
@@ -51,7 +51,8 @@ def test_full_speed_covers_128_mm_in_a_second(empty: Scene) -> None:
 @pytest.mark.parametrize("controller", ["A", "B"])
 @pytest.mark.parametrize("seen", [NOTHING, OBJECT, ROBOT])
 def test_circles_have_the_radius_of_the_kinematics(empty: Scene, controller: str, seen: int) -> None:
-    """epuck.md §8: R = axle/2 (vl + vr)/(vr - vl); A and nothing: 7.57 cm with whole mm/s."""
+    """epuck.md §8: circles have the radius R = axle/2 (vl + vr)/(vr - vl); controller A without an object drives 7.57
+    cm with speeds in whole mm/s."""
     left, right = (steps * dimensions.CM_PER_STEP for steps in steps_per_second(controller, seen))
     world = World.of(empty, 1, [(200, 150, 0.0)], [])
     places = []
@@ -66,7 +67,7 @@ def test_circles_have_the_radius_of_the_kinematics(empty: Scene, controller: str
 
 @pytest.mark.parametrize(("objects", "moves"), [(4, True), (5, True), (6, False)])
 def test_one_robot_pushes_five_objects_but_not_six(empty: Scene, objects: int, moves: bool) -> None:
-    """experiment-contract.md §1 and epuck.md §4: 1.0 N against 0.199 N per object."""
+    """experiment-contract.md §1, epuck.md §4: a drive of 1.0 N pushes five objects of 0.199 N each, but not six."""
     scene = empty.with_values(objects__count=objects)
     world = World.of(scene, 1, [(20, 150, 0.0)], [(28.71 + 10 * k, 150) for k in range(objects)])
     drive(world, (12.8, 12.8), 2)
@@ -79,7 +80,7 @@ def test_one_robot_pushes_five_objects_but_not_six(empty: Scene, objects: int, m
 
 @pytest.mark.parametrize(("quantum_ms", "half_a_step"), [(10.0, 0.064), (1.0, 0.0064)])
 def test_a_pushed_object_slides_as_friction_allows(empty: Scene, quantum_ms: float, half_a_step: float) -> None:
-    """epuck.md §4: v^2 / (2 mu g) from full speed, plus half a step of the integrator."""
+    """epuck.md §4: an object released at full speed slides by v^2 / (2 mu g), plus half a step of the integrator."""
     scene = empty.with_values(objects__count=1, clock__quantum_ms=quantum_ms)
     world = World.of(scene, 1, [(20, 150, 0.0)], [(28.71, 150)])
     drive(world, (12.8, 12.8), 2)
@@ -90,7 +91,7 @@ def test_a_pushed_object_slides_as_friction_allows(empty: Scene, quantum_ms: flo
 
 
 def test_a_wall_stops_a_robot(empty: Scene) -> None:
-    """The robot stays inside; its wheels slip."""
+    """A robot that drives against a wall stays inside, and its wheels slip."""
     world = World.of(empty, 1, [(390, 150, 0.0)], [])
     drive(world, (12.8, 12.8), 3)
     assert world.poses.robots[0][0] == pytest.approx(400 - dimensions.ROBOT_RADIUS, abs=0.05)
@@ -109,7 +110,8 @@ PAIRS = {
 
 @pytest.mark.parametrize("pair", PAIRS)
 def test_every_pair_of_bodies_has_the_documented_contact_friction(empty: Scene, pair: str) -> None:
-    """Tangential impulse / normal impulse of a sliding contact is `CONTACT_FRICTION`."""
+    """For every pair of bodies, the ratio of tangential and normal impulse of a sliding contact is
+    `CONTACT_FRICTION`."""
     parts, poses = PAIRS[pair]
     scene = replace(empty.with_values(robots__count=len(poses), clock__quantum_ms=1.0), **parts)
     world = World.of(scene, 1, poses, [])
@@ -130,7 +132,8 @@ def test_every_pair_of_bodies_has_the_documented_contact_friction(empty: Scene, 
 
 
 def test_without_slip_limit_the_drive_is_enkis(empty: Scene) -> None:
-    """epuck.md §4: the velocity override pushes what a drive of limited force does not."""
+    """epuck.md §4: without slip limit, the drive is Enki's velocity override, which pushes what a drive of limited
+    force does not."""
     reached = []
     for thrust in (1.0, "inf"):
         scene = empty.with_values(objects__count=8, robots__thrust_n=thrust)
@@ -142,7 +145,8 @@ def test_without_slip_limit_the_drive_is_enkis(empty: Scene) -> None:
 
 @pytest.mark.parametrize(("quantum_ms", "thrust_n"), [(1.0, 1.0), (10.0, 1.0), (10.0, math.inf)])
 def test_objects_at_rest_out_of_the_solver_change_no_position(quantum_ms: float, thrust_n: float) -> None:
-    """Robots push crowded objects, and bodies are moved by hand now and then. Equal to the bit."""
+    """If objects at rest are left out of the solver, all positions are equal to the bit, for robots that push crowded
+    objects and bodies moved by hand."""
     scene = load_scene("clustering").with_values(
         arena__width_cm=100.0, arena__height_cm=80.0, robots__count=4, robots__thrust_n=thrust_n, objects__count=14,
         clock__quantum_ms=quantum_ms,
@@ -160,7 +164,7 @@ def test_objects_at_rest_out_of_the_solver_change_no_position(quantum_ms: float,
                 world.move((world.robots if body[0] == "r" else world.objects)[int(body[1])], *to)
         for _ in range(round(0.4 / quick.dt)):
             quick.step(wheels)
-            plain._world.steps = 0  # never a multiple of the rest period: no object rests
+            plain._world.steps = 0  # never a multiple of the rest period, so that no object rests
             plain.step(wheels)
             assert quick.poses.values.tobytes() == plain.poses.values.tobytes()
             now = [disc.is_resting for disc in quick._discs]
@@ -174,7 +178,7 @@ def test_objects_at_rest_out_of_the_solver_change_no_position(quantum_ms: float,
 
 
 def test_wheel_noise_stays_within_its_share() -> None:
-    """epuck.md §4: uniform 5 %, a new draw per 0.1 s."""
+    """epuck.md §4: wheel noise is uniform within 5 %, with a new draw per 0.1 s."""
     scene = load_scene("clustering").with_values(
         objects__count=0, robots__count=1, robots__thrust_n="inf", clock__quantum_ms=10.0
     )
@@ -190,7 +194,7 @@ def test_wheel_noise_stays_within_its_share() -> None:
 
 
 def test_two_runs_of_a_trial_are_equal_to_the_bit() -> None:
-    """engines.md §7: a seed determines all random numbers."""
+    """engines.md §7: a seed determines all random numbers, so two runs of a trial are equal to the bit."""
     scene = load_scene("clustering").with_values(clock__quantum_ms=10.0)
     rows = [run_trial(scene, 5, [ScriptedController(scene, 5, i, "A") for i in range(5)], 20).rows for _ in range(2)]
     other = run_trial(scene, 6, [ScriptedController(scene, 6, i, "A") for i in range(5)], 20).rows
@@ -199,7 +203,7 @@ def test_two_runs_of_a_trial_are_equal_to_the_bit() -> None:
 
 
 def test_bodies_start_on_marks_without_overlap() -> None:
-    """epuck.md §8: 165 marks every 25 cm."""
+    """epuck.md §8: bodies start without overlap on 165 marks, which are 25 cm apart."""
     poses = World(load_scene("clustering"), 1).poses
     places = [pose[:2] for pose in poses.robots] + poses.objects
     assert len(set(places)) == 25
@@ -218,7 +222,7 @@ def test_bodies_start_on_marks_without_overlap() -> None:
     ],
 )
 def test_impossible_scenes_are_refused_with_the_reason(values: dict[str, object], message: str) -> None:
-    """The message names the value and the expectation."""
+    """An impossible scene is refused with a message that names the value and the expectation."""
     with pytest.raises(SceneError, match=message):
         World(load_scene("clustering").with_values(**values), 1)
 
@@ -226,7 +230,8 @@ def test_impossible_scenes_are_refused_with_the_reason(values: dict[str, object]
 @pytest.mark.parametrize("quantum_ms", [1.0, 10.0])
 @pytest.mark.parametrize("thrust_n", [1.0, 0.5])
 def test_a_robot_cannot_push_another_one_at_rest(quantum_ms: float, thrust_n: float) -> None:
-    """epuck.md §3: slipping takes 0.7 m g = 1.04 N, more than the drive of 1.0 N. Both come to rest."""
+    """epuck.md §3: a robot at rest starts to slip at 0.7 m g = 1.04 N, more than the drive of 1.0 N, so both robots
+    come to rest."""
     values = {"clock__quantum_ms": quantum_ms, "robots__wheel_noise": 0.0, "robots__thrust_n": thrust_n}
     scene = load_scene("clustering").with_values(robots__count=2, objects__count=0, **values)
     world = World.of(scene, 1, [(100, 150, 0.0), (120, 150, 1.0)], [])
@@ -241,7 +246,7 @@ def test_a_robot_cannot_push_another_one_at_rest(quantum_ms: float, thrust_n: fl
 
 
 def test_a_stronger_drive_pushes_a_robot_at_rest() -> None:
-    """The 1.5 N of ARGoS are more than its grip."""
+    """A drive of 1.5 N, as in ARGoS, pushes a robot at rest, because it exceeds the robot's grip."""
     scene = load_scene("clustering").with_values(robots__wheel_noise=0.0, robots__thrust_n=1.5, robots__count=2,
                                                  objects__count=0)  # fmt: skip
     world = World.of(scene, 1, [(100, 150, 0.0), (120, 150, 1.0)], [])
@@ -251,7 +256,8 @@ def test_a_stronger_drive_pushes_a_robot_at_rest() -> None:
 
 
 def test_speeds_are_means_over_the_last_quanta() -> None:
-    """Compared with a reference in Python: steps of ten quanta of 1 ms over their time, added in random pieces."""
+    """Measured speeds are the steps of the last ten quanta of 1 ms over their time, whatever the pieces in which
+    steps arrive."""
     rng = random.Random(7)
     quantum = 14_746
     wheels, counts = Wheels(quantum), deque([(0, 0)], maxlen=11)
@@ -273,7 +279,7 @@ def test_speeds_are_means_over_the_last_quanta() -> None:
 
 @pytest.mark.parametrize("again", [copy.copy, copy.deepcopy, lambda poses: pickle.loads(pickle.dumps(poses))])
 def test_copied_poses_have_the_address_of_the_copy(again) -> None:
-    """Native code reads poses by address, which must be that of the copy, not of the original."""
+    """A copy of the poses has its own address, because native code reads poses by address."""
     poses = World(load_scene("clustering"), 1).poses
     copied = again(poses)
     assert (copied.robots, copied.objects, copied.counts) == (poses.robots, poses.objects, poses.counts)
@@ -282,14 +288,14 @@ def test_copied_poses_have_the_address_of_the_copy(again) -> None:
 
 @pytest.mark.parametrize(("robots", "objects"), [(3, 0), (0, 3), (3, 3)])
 def test_a_camera_refuses_more_bodies_than_its_scene_has(robots: int, objects: int) -> None:
-    """Too many robots, too many objects, or both."""
+    """A camera refuses more robots or more objects than its scene has."""
     renderer = Renderer(load_scene("clustering").with_values(robots__count=2, objects__count=2), 0)
     with pytest.raises(ValueError, match=f"{robots} robots and {objects} objects are more than the scene has"):
         renderer.set_viewpoint(Poses([(9.0 * n, 9.0, 0.0) for n in range(robots)], [(50.0, 50.0)] * objects))
 
 
 def test_quanta_in_a_row_equal_single_quanta() -> None:
-    """The same speeds give the same poses, also across the draws of the wheel noise."""
+    """`run_quanta` gives the poses of single quanta at the same speeds, also across the draws of the wheel noise."""
     scene = load_scene("clustering").with_values(robots__count=2, objects__count=5, robots__wheel_noise=0.02)
     rows, one = World(scene, 3), World(scene, 3)
     wheels = [Wheels(scene.clock.quantum_tcy) for _ in range(2)]
