@@ -1,4 +1,4 @@
-"""Builds firmware for the tests, each image once per run, in a temporary folder."""
+"""Fixtures that build firmware images, each once per test run, in a temporary folder."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ Build = Callable[..., Path]
 
 
 def run_make(folder: Path, *words: str) -> None:
-    """One `make`; fails the test with the compiler's words."""
+    """Run `make` once; on failure the test fails with the compiler's messages."""
     command = ["make", "-s", "-C", str(folder), *words]
     environment = {**os.environ, "MAKEFLAGS": ""}
     done = subprocess.run(command, capture_output=True, text=True, timeout=HANG, check=False, env=environment)
@@ -30,10 +30,10 @@ def run_make(folder: Path, *words: str) -> None:
 
 
 def built_once(factory: pytest.TempPathFactory, app: str, *words: str) -> Path:
-    """An application's image for the e-puck, built once for all processes that share a run of tests."""
+    """Build an application for the e-puck once for all worker processes of a test run."""
     run = factory.getbasetemp()
     if "PYTEST_XDIST_WORKER" in os.environ:
-        run = run.parent  # a worker's own folder lies in the run's
+        run = run.parent  # a worker's folder is inside the run's folder
     out = run / f"{app}-{hashlib.sha256(repr(words).encode()).hexdigest()[:16]}"
     image = out / "firmware.elf"
     with out.with_suffix(".lock").open("w") as lock:
@@ -45,7 +45,7 @@ def built_once(factory: pytest.TempPathFactory, app: str, *words: str) -> Path:
 
 @pytest.fixture(scope="session")
 def image(tmp_path_factory: pytest.TempPathFactory) -> Build:
-    """`image("listing1")` builds an application for the e-puck; `apps=` names another folder of applications."""
+    """Function that builds an application for the e-puck: `image("listing1")`; `apps=` names another source folder."""
 
     def build(app: str, apps: Path | None = None, *words: str) -> Path:
         folder = [f"APPS={os.path.relpath(apps, FIRMWARE)}"] if apps else []
@@ -56,7 +56,7 @@ def image(tmp_path_factory: pytest.TempPathFactory) -> Build:
 
 @pytest.fixture(scope="session")
 def host_program(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The kernel's tests on the POSIX port, under sanitizers."""
+    """Build the kernel's host tests for the POSIX port with sanitizers."""
     if shutil.which("gcc") is None:
         pytest.skip("the host tests of the kernel are built with gcc, which is not installed (Debian package gcc)")
     out = tmp_path_factory.mktemp("host")

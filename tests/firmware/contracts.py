@@ -1,4 +1,4 @@
-"""Who may call what, read from the contract lines of the public headers (openswarm.h explains them)."""
+"""Permitted contexts of each call, parsed from the contract lines of the public headers (defined in openswarm.h)."""
 
 from __future__ import annotations
 
@@ -11,10 +11,12 @@ CALL = re.compile(r"^[a-z][\w \*]*?\b(Sys_\w+)\(", re.M)
 
 
 def callers(header: str) -> dict[str, str]:
-    """Function -> letters of those who may call it: M main before the start, T threads, H handlers, I interrupts.
+    """Return the permitted contexts of each function of a header.
 
-    A contract holds for the declarations behind its comment, up to the next comment with a contract or an empty line;
-    one behind a declaration on the same line holds for that alone.
+    Letters: M main before the start, T threads, H handlers, I interrupts.
+
+    A contract comment holds for the declarations that follow it, up to the next contract or an empty line. A
+    contract on the line of a declaration holds for that declaration only.
     """
     found: dict[str, str] = {}
     inherited = ""
@@ -32,11 +34,12 @@ def callers(header: str) -> dict[str, str]:
 
 
 def legal_in_interrupts() -> set[str]:
-    """Calls that an interrupt may make, of the kernel and of the standard devices."""
+    """Return the names of kernel and device calls that an interrupt may make."""
     both = callers("openswarm.h") | callers("openswarm_io.h")
     return {name for name, letters in both.items() if "I" in letters}
 
 
 def refused_in_interrupts() -> set[str]:
-    """Calls of the kernel that it refuses to an interrupt; those of main alone are made once."""
+    """Return the names of kernel calls that the kernel refuses in an interrupt, except calls that only main may
+    make."""
     return {name for name, letters in callers("openswarm.h").items() if "I" not in letters and letters != "M"}

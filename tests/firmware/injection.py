@@ -1,8 +1,9 @@
-"""Interrupts at every instruction of every kernel call, and every allocation failing, on the emulated robot.
+"""Fault injection on the emulated robot: interrupts at every instruction of kernel calls, and failing allocations.
 
-What enters: the firmware of target/calls, whose scenes leave everything as they found it. What leaves: nothing, or an
-AssertionError with scene, boundary and way of injection, which reproduce it.
-tests/firmware/kernel/test_every_instruction.py takes a sample, tests/fuzz/kernel/fuzz_kernel.py all.
+Input is the firmware target/calls, whose scenes restore everything that they change. A deviation raises AssertionError
+with scene, boundary and injection mode, which reproduce it.
+
+tests/firmware/kernel/test_every_instruction.py runs a sample, tests/fuzz/kernel/fuzz_kernel.py runs the whole sweep.
 """
 
 from __future__ import annotations
@@ -18,48 +19,52 @@ from tests.firmware.kernel.test_kernel_on_target import load, place, run_to, thr
 
 T1IF, T2IF, T3IF, INT1IF, INT2IF = 1 << 3, 1 << 6, 1 << 7, 1 << 0, 1 << 7
 CLOCK_PERIOD = 14746
-"""Tcy, or one less (kernel.md §3)."""
+"""Tcy between clock ticks; some periods are one shorter (kernel.md §3)."""
 DEVICE_PERIOD = 1475
-"""100 us in Tcy."""
+"""Tcy between interrupts of the simulated device: 100 us."""
 TICK_MARGIN = 3000
-"""Tcy around the timer's own tick in which none is added: two would fall together."""
+"""Tcy before and after the timer's tick in which no tick is injected, because the two would coincide."""
 MASKED = 40
-"""Tcy for which levels 1-5 may be masked (kernel.md §6)."""
+"""Maximum Tcy for which the kernel masks levels 1-5 (kernel.md §6)."""
 RECOGNISED = 6
-"""Tcy from a flag to the exception entry: three instructions, one of which may take four (isa.md §14.2)."""
+"""Maximum Tcy from interrupt flag to exception entry: three instructions, one of up to four Tcy (isa.md §14.2)."""
 DSP = 25
-"""Tcy more in which the frame of a SYS_DSP thread is saved or restored (port/dspic30f/README.md)."""
+"""Additional masked Tcy while the frame of a SYS_DSP thread is saved or restored (port/dspic30f/README.md)."""
 LEAF = 20
-"""Tcy of the IPL 6 interrupt, which goes first: entry, five instructions, RETFIE."""
+"""Tcy of the IPL 6 interrupt, which is served first: entry, five instructions, RETFIE."""
 LEFT, CALLS = 64, 4
-"""Bytes that interrupts and kernel leave to a thread with a stack of 128 (kernel.md §4); those of them the checker
-uses for its call."""
+"""Stack bytes that interrupts and kernel leave free in a stack of 128 (kernel.md §4), and those of the checker's
+call."""
 PATIENCE = 200_000
 MESSAGE, HEAP = 8, 3072
-"""Bytes: a message of one word or less, the whole heap."""
+"""Heap bytes of a message of at most one word, and of the whole heap."""
 HEARD, RECEIVED = 0x40, 0x09
-"""Events: the one the device sends, SYS_UART1_RECEIVED."""
+"""Event that the device sends, and event SYS_UART1_RECEIVED."""
 RETFIE = 0x064000
 COMPARED = (*(f"W{n}" for n in range(15)), "RCOUNT", "TBLPAG", "PSVPAG", "CORCON", "SPLIM")
-"""And the low byte of SR: the hardware itself stacks no more (isa.md §14.2)."""
+"""Registers compared across an interrupt, besides the low byte of SR; the hardware stacks only SR (isa.md §14.2)."""
 
 ALL = 0xFFFF
-"""Of isr_wanted: every call an interrupt may make, and every one it may not."""
+"""Value of isr_wanted: the interrupt makes every permitted and every forbidden call."""
 
 WAYS = ("together", "nested")
-"""Everything at the boundary; or the end of the slice first, the rest up to 44 instructions later."""
+"""Injection modes.
+
+together: all interrupts at the boundary. nested: the slice ends at the boundary, the others follow up to 44
+instructions later.
+"""
 
 
 @dataclass
 class Seen:
-    """What a campaign went through, and the worst it saw."""
+    """Totals and worst values of a campaign."""
 
     boundaries: int = 0
     compared: int = 0
     interrupts: Counter[str] = field(default_factory=Counter)
     stepper_late: int = 0
     behind_dsp: int = 0
-    """The same while DSP state was saved or restored."""
+    """Maximum delay of the stepper in Tcy while DSP state was saved or restored."""
     stack_left: int = 128
 
     def __str__(self) -> str:
@@ -73,7 +78,7 @@ class Seen:
 
 @dataclass(frozen=True)
 class Base:
-    """The begin of a scene, and what its end is compared with."""
+    """State at the start of a scene, and the values that the end of the scene must equal."""
 
     state: bytes
     used: int
@@ -98,18 +103,18 @@ class Stage:
         self.seen = Seen()
         self.stepper_at = 0
         self.switches_dsp = False
-        """DSP state was saved or restored since the last look."""
+        """Whether DSP state has been saved or restored since the start of the current injection."""
         run_to(self.machine, "scene_begin")
         self.bases = [self._base(scene) for scene in range(self._count())]
 
     def _next(self) -> int:
-        """To the begin of the next scene; its number."""
+        """Run to the start of the next scene and return its number."""
         self.machine.step()
         run_to(self.machine, "scene_begin")
         return self.machine.peek("scene")
 
     def _count(self) -> int:
-        """Scenes until the first comes again."""
+        """Return the number of scenes in a round, counted until the first one repeats."""
         first = self.machine.peek("scene")
         return 1 + sum(1 for _ in iter(self._next, first))
 
@@ -135,7 +140,7 @@ class Stage:
         return Base(machine.snapshot(), machine.peek("os_statistics"), _subscriptions(machine), now_ms, timer_at)
 
     def watch(self) -> None:
-        """Stop wherever the sweep wants to look; hooks are set once, because each makes the engine forget its code."""
+        """Set the breakpoints of the sweep. They are set once, because each new one discards translated code."""
         machine = self.machine
 
         def stepper() -> bool:
@@ -154,7 +159,7 @@ class Stage:
             machine.hook_pc(self._retfie(name), lambda: True)
 
     def _retfie(self, name: str) -> int:
-        """The RETFIE behind a label of switch.S."""
+        """Return the address of the RETFIE that follows a label of switch.S."""
         assert self.machine.image is not None
         address = place(self.machine, name)
         while self.machine.image.word(address) != RETFIE:
@@ -162,17 +167,19 @@ class Stage:
         return address
 
     def calls_of(self, number: int) -> int:
-        """What the device's interrupt calls at a boundary: every call of the public headers, or one group of them
-        alone, in turn, so that none hides what another did."""
+        """Return the value of isr_wanted at a boundary: all calls, or one group alone.
+
+        Groups are run separately in turn so that one group's effects do not hide those of another.
+        """
         return ALL if number % 2 else 1 + number // 2 % self.machine.peek("isr_acts")
 
     def in_stepper(self) -> bool:
-        """Whether the stepper's interrupt runs; it clears its flag last: a second one would fall together with it."""
+        """Whether the stepper's interrupt runs. It clears its flag last, so that a second request would be lost."""
         inside = self.machine.image.symbols.code(self.machine.pc) if self.machine.image else None
         return inside is not None and inside[0].name == "__T3Interrupt"
 
     def in_kernel(self) -> bool:
-        """Whether the next instruction is the kernel's, a device's or the library's."""
+        """Whether the next instruction belongs to the kernel, a device driver or the library."""
         line = self.lines.find(self.machine.pc)
         return line is None or "target/calls" not in line.file
 
@@ -186,8 +193,10 @@ def sweep(
     first: int = 0,
     patch: dict[int, int] | None = None,
 ) -> Iterator[tuple[int, Seen]]:
-    """Inject at every stride-th boundary of the kernel in every scene from `first` on; yields (scenes done, what was
-    seen). `patch`: program words to be wrong by address."""
+    """Inject at every stride-th kernel boundary of each scene from `first` on; yield (number of scenes done, totals).
+
+    `patch` maps addresses to faulty program words, which let the sweep fail.
+    """
     stage = Stage(path, ipl_slip, patch)
     stage.watch()
     machine = stage.machine
@@ -206,16 +215,16 @@ def sweep(
                         raise AssertionError(f"{where}: {error}") from error
                     machine.restore(here)
                 number += 1
-            if machine.step() is not None:  # a place the sweep stops at
+            if machine.step() is not None:  # one of the sweep's breakpoints
                 machine.step()
         _check_end(stage, base)
         yield scene + 1, stage.seen
 
 
 def fail_every_allocation(path: Path) -> Iterator[tuple[int, int]]:
-    """In every scene the k-th call of the allocator finds no memory, for every k; yields (scenes done, failures).
+    """Let the k-th allocation of each scene fail, for every k; yield (number of scenes done, number of failures).
 
-    A device that sends interrupts once; what it sends may be what fails.
+    A device requests its interrupt once, so that the failing allocation may also be that of the interrupt.
     """
     stage = Stage(path)
     machine = stage.machine
@@ -231,7 +240,7 @@ def fail_every_allocation(path: Path) -> Iterator[tuple[int, int]]:
         machine.hook_pc(place(machine, allocator), take)
     for scene, base in enumerate(stage.bases):
         wanted = 0
-        while calls >= wanted:  # the last round had a k-th call
+        while calls >= wanted:  # the previous round reached its k-th allocation
             calls, wanted = 0, wanted + 1
             machine.restore(base.state)
             machine.step()
@@ -251,7 +260,7 @@ def fail_every_allocation(path: Path) -> Iterator[tuple[int, int]]:
 
 
 def _return_null(machine: Machine) -> None:
-    """End the function that was just called with 0."""
+    """Make the function that was just called return 0."""
     machine.w[15] -= 4
     machine.w[0] = 0
     machine.pc = machine.peek(machine.w[15]) & 0xFFFE | (machine.peek(machine.w[15] + 2) & 0x7F) << 16
@@ -262,9 +271,10 @@ def _registers(machine: Machine) -> tuple[int, ...]:
 
 
 def _inject(stage: Stage, base: Base, later: int, calls: int) -> None:
-    """The end of the slice, and `later` instructions later everything else at once, the device again every 100 us.
+    """Inject the end of the slice, and all other interrupts together `later` instructions after it.
 
-    `calls`: what the device's interrupt calls beside its event, the first time (target/calls/isr_calls.h).
+    The device repeats its interrupt every 100 us. `calls` selects the calls that its first interrupt makes besides
+    sending its event (target/calls/isr_calls.h).
     """
     machine, seen = stage.machine, stage.seen
     seen.boundaries += 1
@@ -280,7 +290,7 @@ def _inject(stage: Stage, base: Base, later: int, calls: int) -> None:
     machine.poke("isr_wanted", calls)
     uart = machine.uart[1]
     uart._incoming.value = ord("x")
-    uart._rx_due(machine.cycle)  # a byte is complete in this very cycle
+    uart._rx_due(machine.cycle)  # a byte is complete in this cycle
     machine.write("IFS0", machine.peek("IFS0") | T2IF | T3IF * step | T1IF * tick)
     machine.write("IFS1", machine.peek("IFS1") | INT1IF | INT2IF)
     saved = _registers(machine)
@@ -305,7 +315,7 @@ def _inject(stage: Stage, base: Base, later: int, calls: int) -> None:
             assert now == saved, f"registers {saved} became {now}"
             seen.compared += 1
             machine.service_boundary(NEVER)
-            is_first = machine.pc != saved[0]  # another interrupt is next; otherwise the code continues
+            is_first = machine.pc != saved[0]  # unequal: another interrupt; equal: the code continues
     assert machine.peek("leaf") == leaf + 1
     if step:
         late, dsp = stage.stepper_at - at, stage.switches_dsp
@@ -321,7 +331,7 @@ def _inject(stage: Stage, base: Base, later: int, calls: int) -> None:
 
 
 def _queued(machine: Machine) -> Counter[int]:
-    """Identifiers of the messages in the queue, whose last element its end must point to."""
+    """Return the identifiers of the queued messages; assert that the queue's tail points to the last one."""
     found: Counter[int] = Counter()
     link = machine.address_of("event_queue")
     while machine.peek(link):
@@ -333,7 +343,7 @@ def _queued(machine: Machine) -> Counter[int]:
 
 
 def _free_bytes(machine: Machine) -> int:
-    """Heap that is not handed out, seen from outside (kernel/memory.c)."""
+    """Return the number of free heap bytes, computed from the allocator's data structures (kernel/memory.c)."""
     assert machine.image is not None
     free = machine.peek("reserve_end") - machine.peek("reserve_begin")
     free += machine.peek("free_run_end") - machine.peek("free_run")
@@ -358,7 +368,7 @@ def _along(machine: Machine, at: int, link: int = 0) -> list[int]:
 
 
 def _subscriptions(machine: Machine) -> Counter[int]:
-    """Subscriptions by event, every list well-formed."""
+    """Count the subscriptions of each event; assert that every list is well-formed."""
     found: Counter[int] = Counter()
     for head in words(machine, "events", 8):
         for event in _along(machine, head, 2):
@@ -367,7 +377,7 @@ def _subscriptions(machine: Machine) -> Counter[int]:
 
 
 def _unused_stack(machine: Machine) -> int:
-    """Return the painted bytes of the checker's stack without the guard."""
+    """Return the bytes of the checker's stack that still carry the fill pattern, without the guard."""
     pid = machine.peek("checker_pid")
     pcb = next(p for p in thread_list(machine) if machine.peek(p + 16) == pid)
     unused = 0
@@ -381,7 +391,8 @@ def _unused_stack(machine: Machine) -> int:
 def _check_end(
     stage: Stage, base: Base, raised: int = 0, tick: bool = False, byte: bool = False, failing: bool = False
 ) -> None:
-    """At the end of a scene: nothing lost, nothing doubled, nothing leaked, every list well-formed."""
+    """Assert at the end of a scene that no message is lost or duplicated, no memory leaks and all lists are
+    well-formed."""
     machine = stage.machine
     assert machine.peek("broken") == 0, "the checker found another value in a register"
     assert failing or machine.peek("failures") == 0, "a call gave another result"

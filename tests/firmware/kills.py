@@ -1,9 +1,11 @@
-"""Threads killed inside driver calls, at every instruction boundary, on the emulated robot.
+"""Kill campaign: threads are killed within driver calls, at every instruction boundary, on the emulated robot.
 
-What enters: the firmware of target/kills, whose victim makes one scene of driver calls after the other. What leaves:
-nothing, or an AssertionError with scene, boundary and pause, which reproduce it. From the kill on, the memory the
-victim had is watched: no interrupt may write there. Then the keeper uses every bus and line itself, and the heap must
-be as it was. tests/firmware/kernel/test_kills_on_target.py takes a sample, tests/fuzz/kernel/fuzz_kills.py all.
+Input is the firmware target/kills, whose victim thread runs scenes of driver calls. A deviation raises AssertionError
+with scene, boundary and pause, which reproduce it.
+
+After the kill no interrupt may write into the victim's memory. Then the keeper thread uses every bus and line, and
+the heap must be as before. tests/firmware/kernel/test_kills_on_target.py runs a sample,
+tests/fuzz/kernel/fuzz_kills.py all.
 """
 
 from __future__ import annotations
@@ -21,27 +23,27 @@ from tests.firmware.kernel.test_kernel_on_target import place, thread_list
 
 INT1IF, T2IF = 1 << 0, 1 << 6
 PATIENCE = 3_000_000
-"""Cycles in which the keeper has checked everything: transfers time out after 25 ms."""
+"""Maximum cycles until the keeper has checked all devices: transfers time out after 25 ms."""
 SCENES = ("I2C read", "I2C without slave", "SPI", "UART", "UART in frames", "motors, LEDs", "setters and getters")
 PAUSES = (0, 4)
-"""Milliseconds between the kill and the keeper's calls: at once, or when an abandoned transfer has run out."""
+"""Milliseconds between the kill and the keeper's calls: none, or enough for an abandoned transfer to end."""
 PCB = 18
-"""Bytes of sys_pcb, behind the stack; where it says its block begins, and its pid."""
+"""Bytes of sys_pcb, which follows the stack. BLOCK and PID are the offsets of its block address and its PID."""
 BLOCK, PID = 10, 16
 LINKS = 6
-"""Bytes at the begin of a free block that belong to the allocator: `hole` of kernel/memory.c."""
+"""Bytes at the start of a free block that the allocator uses: `hole` of kernel/memory.c."""
 
 
 @dataclass
 class Seen:
-    """What a campaign went through."""
+    """Totals of a campaign."""
 
     boundaries: int = 0
     kills: int = 0
     late: int = 0
-    """The victim had finished its call when the kill came."""
+    """Number of boundaries at which the victim had already finished its call."""
     watched: int = 0
-    """Bytes of dead threads compared."""
+    """Number of compared bytes in the memory of ended threads."""
 
     def __str__(self) -> str:
         return (
@@ -51,7 +53,7 @@ class Seen:
 
 
 class Stage:
-    """A machine with the firmware, and the trace of a round without a kill."""
+    """A machine with the firmware, and the instruction trace of one round without a kill."""
 
     def __init__(self, path: Path, ipl_slip: int = 0) -> None:
         image = load_image(path)
@@ -69,10 +71,10 @@ class Stage:
         self.used = self.machine.peek("os_statistics")
         self.seen = Seen()
         self.after_kill: Callable[[Machine, int], None] | None = None
-        """after_kill(machine, address of the dead thread's memory): for tests that spoil something."""
+        """Callback after_kill(machine, address of the ended thread's memory), with which tests provoke a failure."""
 
     def run_to(self, name: str) -> str:
-        """Run to the place, or to `checked`; return the name of the function reached."""
+        """Run to the given function or to `checked`; return the name of the function that is reached."""
         machine, end = self.machine, self.machine.cycle + PATIENCE
         while True:
             stop = machine.run(cycles=max(end - machine.cycle, 1))
@@ -83,18 +85,18 @@ class Stage:
                 return here
 
     def victim(self) -> tuple[int, int]:
-        """Address and size of the memory of the thread that is about to die."""
+        """Return address and size of the memory of the thread that is about to be killed."""
         pid = self.machine.peek("victim_pid")
         pcb = next(p for p in thread_list(self.machine) if self.machine.peek(p + PID) == pid)
         block = self.machine.peek(pcb + BLOCK)
         return block, pcb + PCB - block
 
     def is_reserve(self, block: int) -> bool:
-        """Whether interrupts may cut messages from this memory now (`low` and `high` of kernel/memory.c)."""
+        """Whether interrupts may now allocate messages from this memory (`low` and `high` of kernel/memory.c)."""
         return self.machine.peek("low") <= block < self.machine.peek("high")
 
     def kill(self, block: int, size: int, pause: int) -> None:
-        """The interrupt that kills comes here, with the end of the slice; then everything is checked."""
+        """Inject the killing interrupt and the end of the slice at this boundary, then check all devices."""
         machine, seen = self.machine, self.seen
         seen.boundaries += 1
         for heard in self.said.values():
@@ -120,7 +122,7 @@ class Stage:
         self.check()
 
     def check(self) -> None:
-        """At `checked`."""
+        """Check the results after the firmware has reached `checked`."""
         machine = self.machine
         assert machine.peek("failures") == 0, "a call of the keeper, or of a victim, gave another result"
         used = machine.peek("os_statistics")
@@ -135,9 +137,9 @@ class Stage:
 def sweep(
     path: Path, ipl_slip: int, scene: int, stride: int = 1, phase: int = 0, pauses: tuple[int, ...] = PAUSES
 ) -> Iterator[Seen]:
-    """Kill at every stride-th boundary of a scene, from the phase-th on; yields what was seen so far after each.
+    """Kill at every stride-th boundary of a scene from the phase-th on; yield the totals after each kill.
 
-    Sleeping is one boundary, and so is each instruction of the interrupts meanwhile.
+    A sleep is one boundary, as is each instruction of the interrupts that occur meanwhile.
     """
     stage = Stage(path, ipl_slip)
     machine = stage.machine
@@ -162,6 +164,6 @@ def sweep(
 
 
 def run_to_begin(machine: Machine) -> None:
-    """To the first instruction of the scene that comes next."""
+    """Run to the first instruction of the next scene."""
     stop = machine.run(cycles=PATIENCE, until=place(machine, "scene_begin"))
     assert stop.reason == "until", stop

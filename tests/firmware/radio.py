@@ -1,4 +1,4 @@
-"""An emulated robot's Bluetooth: as a line on the robot's clock, or behind a pseudo terminal."""
+"""Bluetooth connections of an emulated robot: one on the robot's clock, one through a pseudo terminal."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ import emu
 from emu.machine.machine import Machine
 
 SLICE = 4_000
-"""Tcy between looks at the line."""
+"""Tcy between two polls of the line."""
 
 
 class Line:
-    """A robot's Bluetooth as a line, on the robot's own clock: the same run every time."""
+    """A robot's Bluetooth connection on the robot's clock, which makes runs reproducible."""
 
     def __init__(self, machine: Machine) -> None:
         self.machine = machine

@@ -1,8 +1,8 @@
-"""The camera's HREF on every cycle of a round of kernel calls (kernel.md §4).
+"""HREF of the camera at every cycle of a round of kernel calls (kernel.md §4).
 
-A round of tests/firmware/target/sights makes every call of the kernel and its devices while tick, slices, stepper,
-UARTs, converter, I2C and remote control interrupt. `sweep` goes through it instruction by instruction and, from a copy
-of each state, lets HREF rise on each cycle that instruction takes; the line must come out right to the byte.
+A round of tests/firmware/target/sights makes every call of the kernel and its devices while the clock, slices,
+stepper, UARTs, converter, I2C and remote control interrupt. `sweep` executes the round by instructions. From a copy
+of each state it raises HREF at each cycle of the instruction and compares the captured line.
 """
 
 from __future__ import annotations
@@ -20,18 +20,21 @@ from emu.image.loader import load_image
 
 FCY = 14_745_600
 AHEAD = 12
-"""Tcy from the copied state to the first edge: only future edges can be set in the camera."""
+"""Tcy from the copied state to the first edge: the camera model accepts future edges only."""
 LINE = 40
 LINE_BYTES = 40
 LINE_TCY = AHEAD + 760
-"""Until the capture's interrupt is over: 10 + 20 x 32 + some 20 Tcy and its latency."""
+"""Tcy until the capture interrupt ends: 10 + 20 x 32 + about 20 Tcy and its latency."""
 LONGEST_STEP = 64
-"""A longer step is a sleep; its cycles are alike, so every IDLE_STRIDE-th is tried behind the first LONGEST_STEP."""
+"""Maximum Tcy of an instruction; a longer step is a sleep.
+
+The cycles of a sleep are alike, so that after the first LONGEST_STEP only every IDLE_STRIDE-th is tried.
+"""
 IDLE_STRIDE = 61
 
 
 def start(path: Path, picture: np.ndarray, ipl_slip: int = 0) -> Machine:
-    """The sights firmware at the beginning of a round, camera programmed."""
+    """Return the machine at the start of a round of the sights firmware, with the camera programmed."""
     image = load_image(path)
     machine = Machine(image.chip, engine="auto", ipl_slip=ipl_slip, board=partial(Epuck, selector=3))
     machine.load(image)
@@ -40,14 +43,14 @@ def start(path: Path, picture: np.ndarray, ipl_slip: int = 0) -> Machine:
     for _ in range(4):
         assert machine.run(cycles=FCY, until=begin).reason == "until"
         machine.step()
-        for timer in ("T4CON", "T5CON"):  # no more frames: the test says which line is captured; an order for the next
-            machine.write(timer, 0x0002)  # frame that is under way comes within the round that follows
+        for timer in ("T4CON", "T5CON"):  # stop the camera's own frames: the test chooses the line; an order for
+            machine.write(timer, 0x0002)  # the next frame comes within the round that follows
     assert machine.peek("failures") == 0
     return machine
 
 
 def place(machine: Machine, symbol: str) -> int:
-    """Program address of a C function."""
+    """Return the program address of a C function."""
     assert machine.image is not None
     found = machine.image.symbols.find("_" + symbol)
     assert found is not None, symbol
@@ -55,14 +58,16 @@ def place(machine: Machine, symbol: str) -> int:
 
 
 def expected_line(picture: np.ndarray) -> np.ndarray:
-    """The pixels of window line LINE: every eighth, in RGB565 (epuck.md §7.5)."""
-    row = 4 * LINE  # every fourth row of the sensor is sent
+    """Return the expected pixels of window line LINE: every eighth pixel, in RGB565 (epuck.md §7.5)."""
+    row = 4 * LINE  # the sensor sends every fourth row
     return picture[row, 240:400:8] & np.array([0xF8, 0xFC, 0xF8], np.uint8)
 
 
 def capture_at(machine: Machine, state: bytes, offset: int, masked: int = 0) -> np.ndarray:
-    """Pixels of the line whose HREF rises `AHEAD + offset` Tcy after `state`; `masked`: nothing may interrupt so long
-    behind HREF (to see that this spoils a line)."""
+    """Return the pixels of the line whose HREF rises `AHEAD + offset` Tcy after `state`.
+
+    `masked`: number of Tcy after HREF in which interrupts are masked, to prove that a late capture spoils the line.
+    """
     machine.restore(state)
     machine.board.camera.align(machine.cycle + AHEAD + offset, LINE)
     frame = machine.address_of("frame")
@@ -81,19 +86,21 @@ def capture_at(machine: Machine, state: bytes, offset: int, masked: int = 0) -> 
 
 
 def offsets(step: int) -> Iterator[int]:
-    """Cycles of an instruction, or of a sleep, to be tried."""
+    """Return the cycle offsets to be tried within an instruction or a sleep."""
     yield from range(min(step, LONGEST_STEP))
     yield from range(LONGEST_STEP, step, IDLE_STRIDE)
 
 
 def sweep(machine: Machine, picture: np.ndarray, stride: int, phase: int = 0) -> int:
-    """Try every `stride`-th cycle of a round, beginning with `phase`; returns how many. Fails with the cycle, program
-    address and pixels of the first line that is wrong."""
+    """Try every `stride`-th cycle of a round from `phase` on; return the number of tried cycles.
+
+    Raise AssertionError with cycle, program address and pixels of the first wrong line.
+    """
     expected = expected_line(picture)
     end = place(machine, "round_end")
     cycle_number = tried = 0
     while machine.pc != end:
-        chosen = -(cycle_number - phase) % stride < 2 * LONGEST_STEP  # more offsets than any step has
+        chosen = -(cycle_number - phase) % stride < 2 * LONGEST_STEP  # covers more offsets than any step has
         here, pc, before = machine.snapshot() if chosen else b"", machine.pc, machine.cycle
         machine.step()
         wanted = []

@@ -1,4 +1,4 @@
-"""Steps against speeds: v mm/s are v * 1000 / 129 steps/s; beyond +-129 they are clamped."""
+"""Motor steps compared with speeds: v mm/s are v * 1000 / 129 steps/s; speeds beyond +-129 mm/s are clamped."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ FASTEST = 129
 
 
 def start(path: Path) -> Machine:
-    """The wheels firmware, running."""
+    """Return a machine that runs the wheels firmware."""
     image = load_image(path)
     machine = Machine(image.chip, engine="auto", board=partial(Epuck))
     machine.load(image)
@@ -23,20 +23,23 @@ def start(path: Path) -> Machine:
 
 
 def exact_steps(speed: int, seconds: float) -> float:
-    """Steps that a speed in mm/s makes."""
+    """Return the exact number of steps at a speed in mm/s during some seconds; speeds beyond the limit are clamped."""
     return max(-FASTEST, min(FASTEST, speed)) * 1000 / 129 * seconds
 
 
 def partner(speed: int) -> int:
-    """A speed for the other wheel that is unrelated to this one's, one to one over -129..129."""
+    """Return an unrelated speed for the other wheel: a bijection on -129..129."""
     return (speed * 100 + 31 + FASTEST) % (2 * FASTEST + 1) - FASTEST
 
 
 def measure(machine: Machine, left: int, right: int, seconds: float) -> tuple[float, float]:
-    """Steps made in so many simulated seconds less the exact number, left and right. Fails on lost or illegal steps."""
+    """Return (counted steps - exact steps) of a number of simulated seconds, left and right.
+
+    Lost or illegal steps raise AssertionError.
+    """
     machine.poke("wanted_left", left & 0xFFFF)
     machine.poke("wanted_right", right & 0xFFFF)
-    machine.run(cycles=FCY // 50)  # the firmware looks every 10 ms
+    machine.run(cycles=FCY // 50)  # the firmware reads the speeds every 10 ms
     motors = machine.board.motors
     before, start_cycle = (motors.left.steps, motors.right.steps), machine.cycle
     machine.run(cycles=round(seconds * FCY))

@@ -1,5 +1,6 @@
-/* Two robots of apps/average that tell each other of a third, while it lives, when it is gone, and when they meet
- * late. Their messages wait for up to a second, and handlers come late. Any failure ends with status 1. */
+/* Forwarded information in apps/average: two robots tell each other of a third robot while it works, after it has
+ * failed, and when they meet late. Messages wait for up to a second, and handlers run late. A failure ends with status
+ * 1. */
 #define main application
 #include "apps/average/main.c"
 #undef main
@@ -11,7 +12,7 @@ enum { ROBOTS = 2, THIRD = 9, VALUE_OF_THIRD = 7, STEP = 5, AIR = 105, LATE_HAND
 static struct {
     entry others[OTHERS];
     uint8 message[MESSAGE_BYTES];
-    uint32 leaves_at, arrives_at; /* ms; 0: no message */
+    uint32 leaves_at, arrives_at; /* times in ms; 0: no message */
 } robots[ROBOTS];
 static uint32 now, seed = 1;
 static uint16 number;
@@ -81,7 +82,7 @@ static void speak(int n)
     robots[n].leaves_at = now + 1 + chance(MOST_WAIT);
 }
 
-/* So many ms in which they talk, if at all. */
+/* Simulates a number of ms, in which the two robots exchange messages if they meet. */
 static void pass(uint32 ms, bool they_meet)
 {
     for (uint32 end = now + ms; now < end; now += STEP) {
@@ -117,7 +118,7 @@ static void begin(uint32 at)
 
 int main(void)
 {
-    const uint32 moments[] = {1000, 60000, (0x10000u << TICK_SHIFT) - 9000u}; /* the last: ticks wrap */
+    const uint32 moments[] = {1000, 60000, (0x10000u << TICK_SHIFT) - 9000u}; /* in the last, ticks wrap */
     for (int i = 0; i < 3; i++) {
         begin(moments[i]);
         hear_third(0);

@@ -19,7 +19,7 @@ from tests.firmware.kernel.test_kernel_on_target import FCY, load
 
 
 def test_hello_says_hello_every_second(image: Build) -> None:
-    """`hello` prints its greeting (firmware/apps/hello/README.md)."""
+    """`hello` prints its greeting once a second (firmware/apps/hello/README.md)."""
     machine = load(image("hello"))
     said = bytearray()
     machine.uart[1].on_byte = lambda byte, _: said.append(byte)
@@ -31,13 +31,13 @@ def test_hello_says_hello_every_second(image: Build) -> None:
 
 
 def cobs(message: bytes) -> bytes:
-    """Return the COBS frame of a message with its CRC-16/CCITT-FALSE and end mark; messages below 253 bytes."""
+    """Return a message as a COBS frame with CRC-16/CCITT-FALSE and end mark. The message has at most 252 bytes."""
     body = message + binascii.crc_hqx(message, 0xFFFF).to_bytes(2, "big")
     return b"".join(bytes([len(run) + 1]) + run for run in body.split(b"\0")) + b"\0"
 
 
 def uncobs(frame: bytes) -> bytes:
-    """Return the message of a frame without end mark; fail on a damaged frame."""
+    """Decode a COBS frame without its end mark and return the message. A damaged frame fails the test."""
     body = b""
     while frame:
         run, frame = frame[1 : frame[0]], frame[frame[0] :]
@@ -47,7 +47,11 @@ def uncobs(frame: bytes) -> bytes:
 
 
 def test_processors_are_swapped_under_traffic_without_loss(image: Build) -> None:
-    """Virtual actuator, safety post-processor, COBS + CRC-16 as Rx/Tx pair; the paper."""
+    """Exchange three processors while traffic runs: no message may be lost.
+
+    The processors are the virtual actuator, the safety post-processor and the pair that adds and checks COBS frames
+    with CRC-16, as in the paper.
+    """
     machine = load(image("processors"))
     said = bytearray()
     machine.uart[1].on_byte = lambda byte, _: said.append(byte)
@@ -55,7 +59,7 @@ def test_processors_are_swapped_under_traffic_without_loss(image: Build) -> None
     assert said.decode().splitlines()[1:] == ["+085+115"] * 2  # v = 100 mm/s, omega = 0.6 rad/s, axle 53 mm
     machine.uart[1].feed(b"u")
     machine.run(cycles=FCY)
-    assert said.decode().splitlines()[-1] == "+057+042"  # the next command of the pilot, halved
+    assert said.decode().splitlines()[-1] == "+057+042"  # the pilot's next command, halved
     machine.uart[1].feed(b"f")
     machine.run(cycles=FCY // 100)
     plain = len(said)
@@ -77,7 +81,7 @@ def test_processors_are_swapped_under_traffic_without_loss(image: Build) -> None
 
 
 def test_stress_neither_leaks_nor_traps(image: Build) -> None:
-    """Every 200 actions the application asserts that the heap is as it was."""
+    """`stress` runs without trap or leak: after every 200 actions it asserts that the heap is as before."""
     machine = load(image("stress"))
     said = bytearray()
     machine.uart[1].on_byte = lambda byte, _: said.append(byte)
@@ -98,12 +102,13 @@ def test_stress_neither_leaks_nor_traps(image: Build) -> None:
 SETS_UP = re.compile(
     r"^\s*(?:\(void\))?(?:Sys_Subscribe_to_Event|Sys_Start_Process(?:With)?|Sys_Connect_Motors)\(", re.MULTILINE
 )
-"""Matches a statement that ignores a result."""
+"""Pattern of a statement that discards the result of a subscribing or registering call."""
 
 
 @pytest.mark.parametrize("app", ["clustering", "hello", "listing1", "processors", "selftest", "spi"])
 def test_no_application_drops_the_result_of_a_call_that_sets_it_up(app: str) -> None:
-    """Every application checks its subscriptions: an unnoticed failure would leave a robot without reactions."""
+    """Every application checks the results of its set-up calls: a failed subscription leaves a robot without
+    reaction."""
     for source in (FIRMWARE / "apps" / app).glob("*.c"):
         assert not SETS_UP.findall(source.read_text()), source
 
@@ -112,7 +117,7 @@ def test_no_application_drops_the_result_of_a_call_that_sets_it_up(app: str) -> 
 
 
 def test_a_failed_assertion_is_a_firmware_fault(image: Build, tmp_path: Path, capfd) -> None:
-    """UART1 says where, `emu run` ends with status 1."""
+    """A failed assertion is reported on UART1 with its source line, and `emu run` exits with status 1."""
     (tmp_path / "wrong").mkdir()
     (tmp_path / "wrong" / "main.c").write_text("""#include <openswarm.h>
 int main(void) {
@@ -140,12 +145,15 @@ def host(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.mark.parametrize("app", ["listing1", "processors", "stress", "footprint", "latency", "hello"])
 def test_every_application_builds_for_a_host(host: Path, app: str) -> None:
-    """The same kernel and applications on Linux, without warnings."""
+    """Every application builds for Linux with the same kernel, without compiler warnings."""
     run_make(FIRMWARE, f"APP={app}", "TARGET=posix", f"OUT={host / app}")
 
 
 def test_listing1_runs_on_a_host_in_real_time(host: Path) -> None:
-    """Preemption by signal, sanitizers on; the line of 300 ms is there, whatever the host's speed."""
+    """Listing 1 runs on Linux with preemption by signals and with sanitizers.
+
+    The log line of 300 ms is printed however slow the host is.
+    """
     flags = "HOST_FLAGS=-O1 -g -fsanitize=address,undefined -fno-sanitize-recover=undefined"
     run_make(FIRMWARE, "APP=listing1", "TARGET=posix", f"OUT={host / 'sanitized'}", flags)
     with subprocess.Popen([host / "sanitized" / "firmware"], stdout=subprocess.PIPE, stderr=subprocess.PIPE) as program:
@@ -156,7 +164,8 @@ def test_listing1_runs_on_a_host_in_real_time(host: Path) -> None:
 
 
 def test_sources_written_for_the_original_compile(host: Path) -> None:
-    """openswarm_compat.h: the repository's spellings (openswarm-original.md §2.3)."""
+    """Sources in the spelling of the original repository compile with openswarm_compat.h (openswarm-original.md
+    §2.3)."""
     source = host / "compat.c"
     source.write_text("""#include <openswarm_compat.h>
 static bool handler(uint16 pid, uint16 id, sys_event_data *data) { (void)pid; (void)id; return data->value != 0; }
@@ -180,19 +189,22 @@ int main(void) {
 
 
 def on_both_engines(folder: Path, ask: Callable[[emu.Machine], str]) -> str:
-    """Return the output of a program for `ask`; interpreter and native code must agree."""
+    """Run a program in the interpreter and in the JIT; assert equal results of `ask` and return them."""
     first, second = (ask(emu.load(folder, engine=engine)) for engine in ("plain", "jit"))
     assert first == second
     return first
 
 
 def sines(*tones: tuple[int, int]) -> Callable[[int], float]:
-    """Return a sum of sines of (Hz, counts)."""
+    """Return a sum of sine waves, each given as (frequency in Hz, amplitude in counts)."""
     return lambda cycle: sum(a * math.sin(2 * math.pi * hz * cycle / FCY) for hz, a in tones)
 
 
 def test_tone_hears_what_its_filter_lets_through(image: Build) -> None:
-    """firmware/apps/tone/README.md: 200 Hz below a cut-off at 400 Hz, and nine times louder 560 Hz."""
+    """`tone` measures 560 Hz nine times louder than 200 Hz, which its filter attenuates (cut-off 400 Hz).
+
+    Source: firmware/apps/tone/README.md.
+    """
 
     def ask(machine: emu.Machine) -> str:
         said = bytearray()
@@ -208,7 +220,7 @@ def test_tone_hears_what_its_filter_lets_through(image: Build) -> None:
 
 
 def test_commands_are_read_with_sscanf(image: Build) -> None:
-    """`commands` answers its commands (firmware/apps/commands/README.md)."""
+    """`commands` parses its text commands with sscanf and answers each (firmware/apps/commands/README.md)."""
 
     def ask(machine: emu.Machine) -> str:
         said = bytearray()
@@ -222,7 +234,7 @@ def test_commands_are_read_with_sscanf(image: Build) -> None:
 
 
 def test_patrol_runs_its_behaviours_in_turn(image: Build) -> None:
-    """firmware/apps/patrol/README.md: C++ on the kernel."""
+    """`patrol`, a C++ application, runs its behaviours one after the other (firmware/apps/patrol/README.md)."""
 
     def ask(machine: emu.Machine) -> str:
         said = bytearray()

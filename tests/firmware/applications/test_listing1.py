@@ -1,4 +1,4 @@
-"""Listing 1 of the paper: its text compiles, its robot reacts to what it sees (firmware/apps/listing1/README.md)."""
+"""Listing 1 of the paper: its text compiles, and its robot reacts to the camera (firmware/apps/listing1/README.md)."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from tests.firmware.kernel.test_kernel_on_target import load, place
 
 FCY = 14_745_600
 ONE_PIXEL = 0x04
-"""SYS_IO_1PXSENSOR."""
+"""Event identifier SYS_IO_1PXSENSOR, the one-pixel line-of-sight sensor."""
 
 MISSING = """#include <openswarm_compat.h>
 #include <stdio.h>
@@ -27,7 +27,7 @@ MISSING = """#include <openswarm_compat.h>
 #define NOTHING_SPEED_L 70
 #define NOTHING_SPEED_R 127
 """
-"""Declarations that the listing assumes."""
+"""Declarations that the listing uses without defining them."""
 
 PRINTED = r"""
 void loggingThread();
@@ -81,13 +81,13 @@ bool reactiveController(uint16 pid, uint16 eventID, sys_event_data *data)
     }
 }
 """
-"""The listing with its order, names and known misprints."""
+"""Text of the listing in its original order, with its original names and known misprints."""
 
 ALONE = load_scene("clustering").with_values(robots__count=1, robots__wheel_noise=0.0)
 
 
 def test_the_listing_with_two_corrections_compiles(image: Build, tmp_path: Path) -> None:
-    """The compiler accepts all else, with warnings; the headers declare every name of the listing."""
+    """With two corrections the listing compiles, although with warnings; the headers declare every name it uses."""
     app = tmp_path / "printed"
     app.mkdir()
     (app / "main.c").write_text(MISSING + PRINTED)
@@ -106,7 +106,10 @@ def test_the_listing_with_two_corrections_compiles(image: Build, tmp_path: Path)
 
 
 def test_the_system_registers_the_one_pixel_sensor(image: Build) -> None:
-    """The event is registered even without a camera; applications that do not use it do not link the driver."""
+    """The system registers the event of the one-pixel sensor even without a camera.
+
+    Applications that do not use the event do not link the camera driver.
+    """
     for app, registered in (("listing1", True), ("hello", False)):
         machine = load(image(app))
         machine.run(cycles=FCY // 20)
@@ -121,7 +124,10 @@ def test_the_system_registers_the_one_pixel_sensor(image: Build) -> None:
 
 @pytest.mark.parametrize(("scene", "speeds"), [("nothing", (70, 127)), ("object", (126, 64)), ("robot", (114, 68))])
 def test_the_controller_drives_as_its_table_says(image: Build, scene: str, speeds: tuple[int, int]) -> None:
-    """openswarm-original.md §8: percent of 129 mm/s, and the log tells the same."""
+    """The controller sets the wheel speeds of its table, in percent of 129 mm/s, and logs the same values.
+
+    Source: openswarm-original.md §8.
+    """
     machine = robot(image("listing1"))
     machine.board.camera.show(plain(SCENES[scene]))
     said = bytearray()
@@ -132,7 +138,7 @@ def test_the_controller_drives_as_its_table_says(image: Build, scene: str, speed
 
 @pytest.mark.parametrize(("objects", "turn"), [([], 1), ([(240.0, 150.0)], -1)], ids=["nothing", "object"])
 def test_in_the_arena_its_robot_turns_at_an_object(image: Build, objects: list[tuple[float, float]], turn: int) -> None:
-    """The robot drives a curve to the left; with an object ahead it turns to the right (paper §IV)."""
+    """The robot drives a curve to the left; if an object is ahead, it turns right (paper §IV)."""
     scene = ALONE.with_values(objects__count=len(objects))
     controller = FirmwareController(scene, 1, 0, image("listing1"), 0)
     world = World.of(scene, 1, [(200.0, 150.0, 0.0)], objects)

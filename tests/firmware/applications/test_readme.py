@@ -1,4 +1,4 @@
-"""Examples, commands and paths in the project's README and tour work."""
+"""Check that the examples, commands and paths in the project's README and in its tour work."""
 
 from __future__ import annotations
 

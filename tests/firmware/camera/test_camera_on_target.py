@@ -1,4 +1,4 @@
-"""Camera under the kernel: correct pixels for every line timing, and the line-of-sight sensor's classification."""
+"""Camera driver under the kernel: pixels are correct at every line timing, and the line-of-sight sensor classifies."""
 
 from __future__ import annotations
 
@@ -21,13 +21,19 @@ def noise(seed: int = 1) -> np.ndarray:
 
 @pytest.mark.parametrize(("ipl_slip", "phase"), [(0, 0), (1, 60)])
 def test_lines_are_right_wherever_href_falls_in_a_kernel_call(image: Build, ipl_slip: int, phase: int) -> None:
-    """kernel.md §4: every 199th cycle of a round of all calls; fuzz_camera.py takes all."""
+    """A line is captured correctly at every phase of HREF against kernel calls (kernel.md §4).
+
+    The test samples every 199th cycle of a round of all calls; fuzz_camera.py samples all cycles.
+    """
     machine = start(image("sights", TARGET_APPS), noise(), ipl_slip)
     assert sweep(machine, noise(), stride=199, phase=phase) > 130
 
 
 def test_a_capture_that_comes_late_spoils_the_line(image: Build) -> None:
-    """Verify that the sweep can fail: the byte is valid for 8 Tcy, the read is 16-18 Tcy after HREF (epuck.md §7.5)."""
+    """A capture that starts late must spoil the line: proof that the sweep detects errors.
+
+    A byte is valid for 8 Tcy, and the driver reads it 16-18 Tcy after HREF (epuck.md §7.5).
+    """
     machine = start(image("sights", TARGET_APPS), noise())
     state, expected = machine.snapshot(), expected_line(noise())
     assert np.array_equal(capture_at(machine, state, 0), expected)
@@ -35,8 +41,11 @@ def test_a_capture_that_comes_late_spoils_the_line(image: Build) -> None:
 
 
 def test_cpu_load_of_capture_and_classification_is_printed(image: Build, capsys, tmp_path) -> None:
-    """In percent, from exact cycles. A frame of 1,600,000 Tcy is 20 lines of some 658 and VSYNC's
-    interrupt; the scene that costs the classifier most is the one without red: all 24 pixels are looked at."""
+    """Print the CPU load of capture and classification in percent, from exact cycle counts.
+
+    A frame of 1,600,000 Tcy causes 20 line interrupts of about 658 Tcy and the VSYNC interrupt. Classification costs
+    most for a scene without red, because it then inspects all 24 pixels.
+    """
     white = tmp_path / "white.png"
     write_picture(str(white), plain(SCENES["nothing"]), 1)
     groups = ["--group", "capture=__T[45]Interrupt", "--group", "classification=*/line_of_sight.c"]
@@ -60,7 +69,7 @@ FRAME_TCY = 1_600_000
 
 
 def sighted(machine: Machine, frames: int = 3) -> str:
-    """Return the classification of the scene after some frames, from the wheel speeds, which differ for all three."""
+    """Return the class that the firmware assigns to the scene, derived from the wheel speeds of the three classes."""
     machine.run(cycles=frames * FRAME_TCY)
     before = machine.board.motors.left.steps, machine.board.motors.right.steps
     machine.run(cycles=FCY // 4)
@@ -71,7 +80,7 @@ def sighted(machine: Machine, frames: int = 3) -> str:
 
 
 def shaded(colour: tuple[int, int, int], brightness: float, deviation: float = 0.0) -> np.ndarray:
-    """Return a scene with the sensor's noise (sigma 2-4 of 255) and corners 30 % darker (epuck.md §7.6)."""
+    """Return a scene with the sensor's noise (sigma 2-4 of 255) and with corners darkened by 30 % (epuck.md §7.6)."""
     y, x = np.mgrid[0:480, 0:640]
     corner = ((x - 319.5) ** 2 + (y - 239.5) ** 2) / (319.5**2 + 239.5**2)
     light = (np.array(colour) * brightness)[None, None, :] * (1 - 0.3 * corner)[:, :, None]
@@ -82,8 +91,10 @@ def shaded(colour: tuple[int, int, int], brightness: float, deviation: float = 0
 @pytest.mark.parametrize("scene", SCENES)
 @pytest.mark.parametrize("program", PROGRAMS)
 def test_automatic_exposure_keeps_colours_apart_in_any_light(image: Build, program: str, scene: str) -> None:
-    """epuck.md §7.6: exposure converges in 5 to 10 frames, from an eighth of the light to
-    a hundred times as much; noise and vignetting on."""
+    """With automatic exposure, colours are classified correctly from 1/8 to 100 times the normal light (epuck.md §7.6).
+
+    Exposure converges within 5 to 10 frames. Noise and vignetting are enabled.
+    """
     machine = robot(image(program), selector=START)
     machine.board.camera.show(shaded(SCENES[scene], 1.0, deviation=4.0))
     for lamp in (1.0, 0.125, 100.0, 0.3, 5.0, 1.0):
@@ -97,8 +108,11 @@ def test_automatic_exposure_keeps_colours_apart_in_any_light(image: Build, progr
 def test_colours_stay_apart_while_exposure_has_not_followed(
     image: Build, scene: str, darkest: float, brightest: float
 ) -> None:
-    """openswarm-original.md §8: nearest of dark (an object too), green 0 40 0, red 80 0 0, white 100 80 80. By these
-    distances white holds from 0.58 and green from 0.5 of the light to the end of 8 bits, red always."""
+    """With the exposure held, red is classified at any light, green from 0.5 and white from 0.58 of the normal light.
+
+    The reference colours are dark (also objects), green 0 40 0, red 80 0 0 and white 100 80 80
+    (openswarm-original.md §8). The upper limit is the saturation of 8 bits.
+    """
     machine = robot(image("clustering"), selector=START)
     for brightness in np.geomspace(max(darkest, 0.05), brightest, 6):
         machine.board.camera.show(shaded(SCENES[scene], brightness, deviation=2.0))
@@ -106,7 +120,10 @@ def test_colours_stay_apart_while_exposure_has_not_followed(
 
 
 def test_the_light_at_which_white_and_green_are_lost_is_that_of_the_distances(image: Build) -> None:
-    """As above: darker than 0.5 green is dark; from 0.577 down to 0.25 white is nearer to green, then dark."""
+    """With the exposure held, green below 0.5 of the light is dark; white from 0.577 to 0.25 is green, below that dark.
+
+    The limits follow from the distances to the reference colours.
+    """
     machine = robot(image("clustering"), selector=START)
     for colour, seen in (
         ((0, 19, 0), "object"),

@@ -1,4 +1,4 @@
-"""Stepping backwards restores the whole state of the forward run."""
+"""Reverse stepping restores the complete state that the forward run had."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def walked(
 
 @pytest.mark.parametrize("engine", ["jit", "plain"])
 def test_every_state_is_restored_to_the_bit(image: Build, engine: str) -> None:
-    """Across preemption, interrupts, camera frames over I2C and the pixel port, and UART input."""
+    """Reverse steps restore every bit across preemption, interrupts, camera frames (I2C, pixel port) and UART input."""
     machine = emu.load(image("clustering"), engine=engine, board=partial(Epuck, selector=START))
     assert machine.board.camera is not None
     machine.board.camera.show(np.full((480, 640, 3), (200, 20, 20), np.uint8))
@@ -65,10 +65,10 @@ def test_every_state_is_restored_to_the_bit(image: Build, engine: str) -> None:
 
 @pytest.mark.parametrize("seed", [7, 10, 1006])
 def test_random_walks_back_restore_every_state(image: Build, seed: int) -> None:
-    """Three walks of the campaign (tests/fuzz/emulator/fuzz_reverse.py).
+    """Random walks of forward and reverse steps restore every state: three walks of the fuzz campaign.
 
-    In the first, a step back passes input that arrives while the CPU sleeps. In the last, a stored state lies between
-    the entry of an interrupt and its first instruction.
+    The campaign is tests/fuzz/emulator/fuzz_reverse.py. In the first walk, a reverse step crosses input that arrives
+    while the CPU sleeps. In the last, a checkpoint lies between the entry of an interrupt and its first instruction.
     """
     app = list(APPS)[seed % 5 == 0]
     tally: Counter[str] = Counter()
@@ -118,7 +118,7 @@ def test_back_to_a_breakpoint_and_to_the_last_write(image: Build) -> None:
 
 
 def test_the_entry_of_an_interrupt_is_a_step_of_its_own(image: Build) -> None:
-    """Forward from the instruction before the interrupt, and back from the first instruction of the handler."""
+    """The entry of an interrupt is one step, both forward from the instruction before it and back from the handler."""
     machine = emu.load(image("culprit", TARGET_APPS))
     machine.run(until="main")
     history = History(machine)

@@ -1,4 +1,4 @@
-"""Cycle accuracy of waveforms, checked with a VCD reader from another project."""
+"""Waveform files (VCD) are cycle-accurate; an independent VCD reader parses them."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ FCY = 14_745_600
 
 
 def picoseconds(cycle: int) -> int:
-    """instruments: a cycle is 10^10 / 147456 ps."""
+    """Convert cycles to picoseconds: a cycle is 10^10 / 147456 ps (see docs/instruments.md)."""
     return round(Fraction(cycle * 10**10, 147_456))
 
 

@@ -17,7 +17,10 @@ EVENTS = {"left": 2, "selector": 8, "proximity": 0x11, "motion": 0x12, "sound": 
 
 @pytest.fixture
 def talk(image: Build) -> tuple[Machine, Callable[..., list[str]]]:
-    """Return the self-test after its report, and ask(*lines) -> lines received until LINE_TIME after the last one."""
+    """Return the self-test after its report, and a function that sends lines and returns the answers.
+
+    The function collects answers until LINE_TIME after the last line.
+    """
     machine = robot(image("selftest"), selector=6)
     heard = bytearray()
     machine.uart[1].on_byte = lambda byte, _cycle: heard.append(byte)
@@ -35,7 +38,10 @@ def talk(image: Build) -> tuple[Machine, Callable[..., list[str]]]:
 
 
 def test_commands_drive_the_robot_and_are_answered(talk) -> None:
-    """epuck.md §6, SerCom: D E L B F C S; 500 steps/s are 64.5 mm/s, of which the driver keeps 65: 504 steps/s."""
+    """The SerCom commands D E L B F C S move the robot and are answered (epuck.md §6).
+
+    500 steps/s are 64.5 mm/s. The driver stores 65 mm/s, which are 504 steps/s.
+    """
     machine, ask = talk
     assert ask("D,500,-1000") == ["d"]
     before = steps(machine)
@@ -61,7 +67,10 @@ WRONG = "D,1 D,1,2,3 D,1001,0 D,0,-1001 D,x,1 D,1, L,10,1 L,0,3 E,1 ! !65535,1 +
 
 @pytest.mark.parametrize("line", WRONG.split())
 def test_commands_that_cannot_be_carried_out_are_answered_with_a_question_mark(talk, line: str) -> None:
-    """bluetooth.h: wrong number of arguments, out of range, unknown event; and nothing moves."""
+    """A command with a wrong argument count, range or event is answered with a question mark and moves nothing.
+
+    Source: bluetooth.h.
+    """
     machine, ask = talk
     before = steps(machine)
     assert ask(line) == ["?"]
@@ -70,7 +79,7 @@ def test_commands_that_cannot_be_carried_out_are_answered_with_a_question_mark(t
 
 
 def test_events_travel_both_ways(talk) -> None:
-    """Text protocol as events both ways. What is sent by text is an event like any other; reports name it."""
+    """Events travel both ways over the text protocol: a received one is delivered as usual, a sent one is named."""
     machine, ask = talk
     left = EVENTS["left"]
     assert ask(f"+{left}", f"!{left},100") == ["+", "!", f"!{left},100"]
@@ -88,7 +97,10 @@ def test_events_travel_both_ways(talk) -> None:
 
 
 def test_lines_no_command_matches_reach_the_application(talk) -> None:
-    """bluetooth.h: SYS_BLUETOOTH_RECEIVED; the self-test answers N and A from a thread."""
+    """A line that matches no command reaches the application as SYS_BLUETOOTH_RECEIVED (bluetooth.h).
+
+    A thread of the self-test answers the lines N and A.
+    """
     machine, ask = talk
     machine.board.ir.set_distance(2, 20)
     machine.run(cycles=FCY // 10)
@@ -100,7 +112,7 @@ def test_lines_no_command_matches_reach_the_application(talk) -> None:
 
 
 def test_damaged_and_endless_lines_cost_only_themselves(talk) -> None:
-    """bluetooth.h: 15 characters at most; a character with a framing error is lost, and so is what the link drops."""
+    """Lines above 15 characters, framing errors and dropped characters cost only the affected line (bluetooth.h)."""
     machine, ask = talk
     assert ask("D,100,100" + "9" * 200, "V") == ["v,OpenSwarm"]
     assert ask("\n\r\n", "V") == ["v,OpenSwarm"]
@@ -118,7 +130,7 @@ def test_damaged_and_endless_lines_cost_only_themselves(talk) -> None:
 
 
 def test_led_orders_pass_the_processor(talk) -> None:
-    """led.h: SYS_IO_LED [led, action]; by text the value is action * 256 + led."""
+    """LED orders pass the processor: SYS_IO_LED carries [led, action], as text action * 256 + led (led.h)."""
     machine, ask = talk
     order = EVENTS["led"]
     assert ask(f"!{order},{1 << 8 | 4}") == ["!"]
@@ -130,7 +142,7 @@ def test_led_orders_pass_the_processor(talk) -> None:
 
 
 def test_loudness_and_motion_come_as_events(talk) -> None:
-    """analog.h: every 50 ms the largest amplitude of each microphone, and the mean of the accelerometer."""
+    """Every 50 ms events report the peak amplitude of each microphone and the mean acceleration (analog.h)."""
     machine, ask = talk
     machine.board.microphones.play(0, lambda cycle: 300.0 if cycle // 40_000 % 2 else -310.0)
     machine.run(cycles=FCY // 10)

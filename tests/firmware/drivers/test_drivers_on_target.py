@@ -1,4 +1,4 @@
-"""The drivers beside the kernel, and the clustering programs, on the emulated robot."""
+"""Device drivers under the kernel, and the clustering programs, on the emulated robot."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ from tests.firmware.conftest import Build
 FCY = 14_745_600
 HREF = 1 << 3
 START = 8
-"""Selector bit for a start without the remote control (apps/clustering/README.md)."""
+"""Selector bit that starts the robot without the remote control (apps/clustering/README.md)."""
 PROGRAMS = ["clustering", "clustering-bare"]
 SCENES = {"object": (80, 0, 0), "robot": (0, 40, 0), "nothing": (100, 80, 80)}
 TABLES = {
     0: {"nothing": (50, 100), "object": (100, 50), "robot": (10, 50)},
     1: {"nothing": (55, 99), "object": (98, 50), "robot": (89, 53)},
 }
-"""Percent of 129 mm/s by selector bit 0 (epuck.md §8)."""
+"""Wheel speeds of each class, in percent of 129 mm/s, by selector bit 0 (epuck.md §8)."""
 
 
 def robot(path: Path, engine: str = "jit", **options) -> Machine:
@@ -51,7 +51,7 @@ def captured(machine: Machine) -> np.ndarray:
 
 
 def window(picture: np.ndarray) -> np.ndarray:
-    """Return the centred 160 x 160 pixels, every eighth, in RGB565 precision (epuck.md §7.5)."""
+    """Return every eighth of the centred 160 x 160 pixels, in RGB565 precision (epuck.md §7.5)."""
     return picture[160:320:8, 240:400:8] & np.array([0xF8, 0xFC, 0xF8], np.uint8)
 
 
@@ -66,11 +66,14 @@ def steps(machine: Machine) -> tuple[int, int]:
 @pytest.mark.parametrize("table", TABLES)
 @pytest.mark.parametrize("program", PROGRAMS)
 def test_every_colour_gives_the_wheel_speeds_of_the_controller(image: Build, program: str, table: int) -> None:
-    """epuck.md §8, openswarm-original.md §8: v mm/s, truncated, are v * 1000 / 129 steps/s; both within a step."""
+    """Each colour sets the controller's wheel speeds to within one step/s (epuck.md §8, openswarm-original.md §8).
+
+    A speed of v mm/s, truncated, is v * 1000 / 129 steps/s.
+    """
     machine = robot(image(program), selector=START + table)
     for scene, percent in TABLES[table].items():
         machine.board.camera.show(plain(SCENES[scene]))
-        machine.run(cycles=FCY // 2)  # the change is seen in the next frame
+        machine.run(cycles=FCY // 2)  # the next frame shows the change
         before = steps(machine)
         machine.run(cycles=FCY)
         made = [now - then for now, then in zip(steps(machine), before, strict=True)]
@@ -80,7 +83,10 @@ def test_every_colour_gives_the_wheel_speeds_of_the_controller(image: Build, pro
 
 @pytest.mark.parametrize("program", PROGRAMS)
 def test_the_remote_control_starts_and_stops(image: Build, program: str) -> None:
-    """openswarm-original.md §8: OK enables clustering, STANDBY stops; other keys and a held key change nothing."""
+    """The remote key OK starts clustering and STANDBY stops it; other keys and a held key have no effect.
+
+    Source: openswarm-original.md §8.
+    """
     machine = robot(image(program))
     machine.board.camera.show(plain(SCENES["object"]))
     machine.run(cycles=FCY // 4)
@@ -102,7 +108,7 @@ def test_the_remote_control_starts_and_stops(image: Build, program: str) -> None
 
 
 def test_the_bare_program_has_nothing_of_the_kernel(image: Build) -> None:
-    """experiment-contract.md §4: its map contains no kernel object."""
+    """The link map of the bare clustering program contains no kernel object (experiment-contract.md §4)."""
     symbols = load_image(image("clustering-bare")).symbols
     for name in ("_Sys_Init_Kernel", "_Sys_Send_Event", "_os_memory", "_os_running", "_hal_yield"):
         assert symbols.find(name) is None, name
@@ -111,7 +117,7 @@ def test_the_bare_program_has_nothing_of_the_kernel(image: Build) -> None:
 
 @pytest.mark.parametrize("program", PROGRAMS)
 def test_without_a_camera_nothing_hangs_and_the_robot_stands(image: Build, program: str) -> None:
-    """Camera unplugged."""
+    """With the camera unplugged the program continues to run and the wheels stay still."""
     machine = robot(image(program), selector=START, camera=None)
     assert machine.run(cycles=FCY // 2).reason == "limit"
     assert steps(machine) == (0, 0)
@@ -123,7 +129,7 @@ def test_without_a_camera_nothing_hangs_and_the_robot_stands(image: Build, progr
 @pytest.mark.parametrize("sensor", ["PO6030K", "PO3030K", "PO8030D"])
 @pytest.mark.parametrize("program", PROGRAMS)
 def test_every_pixel_is_right(image: Build, program: str, sensor: str) -> None:
-    """epuck.md §7.5."""
+    """All pixels of a frame are captured correctly (epuck.md §7.5)."""
     machine = robot(image(program), selector=START, camera=sensor)
     machine.board.camera.show(noise())
     machine.run(cycles=8_000_000)
@@ -132,8 +138,10 @@ def test_every_pixel_is_right(image: Build, program: str, sensor: str) -> None:
 
 @pytest.mark.parametrize("engine", ["plain", "jit"])
 def test_reads_come_16_to_18_tcy_behind_href(image: Build, engine: str) -> None:
-    """epuck.md §7.5, kernel.md §4: whatever the kernel does, with motors and 1 ms events running; 1,600,000 Tcy apart
-    frame by frame (9.216 frames/s, openswarm-original.md §5.5)."""
+    """The driver reads each pixel byte 16 to 18 Tcy after HREF during kernel calls, motor steps and 1 ms events.
+
+    Frames are 1,600,000 Tcy apart: 9.216 frames/s (epuck.md §7.5, kernel.md §4, openswarm-original.md §5.5).
+    """
     machine = robot(image("clustering"), engine=engine, selector=START)
     machine.board.camera.show(plain(SCENES["object"]))
     reads: list[int] = []
@@ -148,8 +156,11 @@ def test_reads_come_16_to_18_tcy_behind_href(image: Build, engine: str) -> None:
 
 
 def test_pixels_are_right_at_every_phase_of_the_camera(image: Build) -> None:
-    """kernel.md §4: more than about 2 Tcy of extra delay would swap bytes. The sensor's phase goes through all residues
-    of the motor tick's 1,536 Tcy in steps of 29 (they share no divisor), against clock, slices and handlers."""
+    """Pixels are correct at every phase of the camera against the clock, slices and handlers (kernel.md §4).
+
+    An extra delay of more than about 2 Tcy would swap bytes. The phase passes all residues of the motor tick's 1,536
+    Tcy in steps of 29, which is coprime to 1,536.
+    """
     machine = robot(image("clustering"), selector=START)
     camera = machine.board.camera
     camera.show(noise())
@@ -161,13 +172,16 @@ def test_pixels_are_right_at_every_phase_of_the_camera(image: Build) -> None:
 
 
 def test_votes_and_ties_are_those_of_the_original(image: Build) -> None:
-    """openswarm-original.md §8: 24 pixels, two votes, red before green, dark is red, first wins on ties."""
+    """Classification votes as the original does: 24 pixels, two votes, red before green, the first wins a tie.
+
+    Dark counts as red (openswarm-original.md §8).
+    """
     machine = robot(image("clustering"), selector=START)
 
     def seen(picture: np.ndarray) -> int:
         machine.board.camera.show(picture)
         machine.run(cycles=FCY // 4)
-        return machine.peek("speeds")  # of the left wheel: differs for all three
+        return machine.peek("speeds")  # left wheel speed: it differs for all three classes
 
     def with_votes(red: int, green: int) -> np.ndarray:
         picture = plain(SCENES["nothing"])
@@ -194,7 +208,7 @@ def i2c_wire(machine: Machine):
 
 
 def test_a_slave_that_holds_sda_is_clocked_free(image: Build) -> None:
-    """A slave stuck in the middle of a byte lets go after some clocks; the camera then works."""
+    """If a slave holds SDA in the middle of a byte, the driver clocks it free and the camera works."""
     machine = robot(image("clustering"), selector=START)
     i2c_wire(machine).hold(sda=True, clocks=7)
     machine.board.camera.show(noise())
@@ -205,14 +219,14 @@ def test_a_slave_that_holds_sda_is_clocked_free(image: Build) -> None:
 
 @pytest.mark.parametrize("lines", [{"sda": True}, {"scl": True}])
 def test_a_line_that_stays_low_stops_the_camera_not_the_robot(image: Build, lines: dict[str, bool]) -> None:
-    """The kernel starts and says which device failed."""
+    """If a bus line stays low, the kernel starts and reports which device failed."""
     machine = robot(image("selftest"))
     i2c_wire(machine).hold(**lines)
     assert b"camera 0000 FAIL" in said(machine, FCY // 2)
 
 
 def test_a_slave_may_stretch_the_clock(image: Build) -> None:
-    """dspic30f6014a.md §11: the master waits for SCL; 1 ms at each byte is within the driver's patience."""
+    """Clock stretching of 1 ms per byte stays within the driver's time-out (dspic30f6014a.md §11)."""
     machine = robot(image("clustering"), selector=START)
     machine.board.camera.stretch = lambda _cycle: FCY // 1000
     machine.board.camera.show(noise())
@@ -221,7 +235,7 @@ def test_a_slave_may_stretch_the_clock(image: Build) -> None:
 
 
 def after_camera_line(machine: Machine, act: Callable[[], None]) -> bytes:
-    """Return the self-test's report if `act` happens between its camera line and its I2C transfer by interrupt."""
+    """Return the self-test's report; call `act` between its camera line and its interrupt-driven I2C transfer."""
     heard = bytearray()
     machine.uart[1].on_byte = lambda byte, _cycle: heard.append(byte)
     while b"camera" not in heard or not heard.endswith(b"\n"):
@@ -232,7 +246,7 @@ def after_camera_line(machine: Machine, act: Callable[[], None]) -> bytes:
 
 
 def test_faults_of_a_running_bus_are_survived(image: Build) -> None:
-    """By interrupt, under the kernel; the report continues after each fault."""
+    """Bus faults during interrupt-driven transfers under the kernel are reported, and the report continues."""
 
     def report(act: Callable[[Machine], None]) -> bytes:
         machine = robot(image("selftest"))
@@ -252,7 +266,7 @@ def test_faults_of_a_running_bus_are_survived(image: Build) -> None:
 
 
 def test_a_bit_lasts_151_tcy(image: Build) -> None:
-    """dspic30f6014a.md §11: on the SCL pin of a running driver, I2CBRG = 150: 97.65 kHz."""
+    """A bit on SCL lasts 151 Tcy: with I2CBRG = 150 the bus runs at 97.65 kHz (dspic30f6014a.md §11)."""
     machine = robot(image("clustering"))
     scl = 1 << 2
     falls: list[int] = []
@@ -279,7 +293,7 @@ def said(machine: Machine, cycles: int) -> bytes:
 
 
 def test_the_self_test_finds_every_device(image: Build) -> None:
-    """Selftest exercises every device and reports over UART1; 1 s at 129 mm/s is 1000 steps."""
+    """The self-test finds every device and reports over UART1: 1 s at 129 mm/s makes 1000 steps."""
     machine = robot(image("selftest"), selector=5)
     machine.board.camera.show(plain(SCENES["robot"]))
     report = said(machine, 5 * FCY // 2)
@@ -291,12 +305,15 @@ def test_the_self_test_finds_every_device(image: Build) -> None:
 
 
 def test_distance_follows_the_reference_curve(image: Build) -> None:
-    """epuck.md §5, column OpenSwarm, log-linear between its points: every millimetre of 0-10 cm
-    through emitter, converter and driver, within 1 count (the converter rounds dark and lit) and 1 mm."""
+    """Measured distances of 0-10 cm follow the reference curve through emitter, converter and driver.
+
+    The curve is column OpenSwarm of epuck.md §5, log-linear between its points. Each millimetre is measured; the
+    tolerance is 1 count (the converter rounds the dark and the lit reading) plus 1 mm.
+    """
     machine = robot(image("selftest"))
     machine.run(cycles=FCY // 10)
     reflection, distance = machine.address_of("reflection"), machine.address_of("millimetres")
-    for first in range(0, 104, 8):  # eight distances at a time, one per sensor
+    for first in range(0, 104, 8):  # eight distances per run, one per sensor
         for sensor in range(8):
             machine.board.ir.set_distance(sensor, first + sensor)
         machine.run(cycles=FCY // 30)
@@ -310,7 +327,7 @@ def test_distance_follows_the_reference_curve(image: Build) -> None:
 
 
 def test_ambient_light_does_not_change_the_distance(image: Build) -> None:
-    """epuck.md §5: reflection = ambient - lit."""
+    """Ambient light does not change the distance: reflection = ambient reading - lit reading (epuck.md §5)."""
     machine = robot(image("selftest"))
     for sensor in range(8):
         machine.board.ir.set_distance(sensor, 20)
@@ -327,7 +344,10 @@ def test_ambient_light_does_not_change_the_distance(image: Build) -> None:
 
 @pytest.mark.parametrize("program", PROGRAMS)
 def test_engines_agree_to_the_bit(image: Build, program: str) -> None:
-    """Registers, memory, devices and robot after frames, a change of scene and a remote key."""
+    """Interpreter and JIT agree in registers, memory, devices and robot state.
+
+    The run includes camera frames, a change of the scene and a remote key.
+    """
     states = []
     for engine in ("plain", "jit"):
         machine = robot(image(program), engine=engine, selector=START)

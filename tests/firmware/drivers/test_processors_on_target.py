@@ -36,7 +36,10 @@ def say(machine: Machine, text: str) -> None:
 
 
 def test_input_devices_pass_what_their_processor_makes_of_it(machine: Machine) -> None:
-    """Camera, proximity, accelerometer, microphones: the default, another one, the default again."""
+    """Input devices deliver the result of their processor: the default, a replacement, and the default again.
+
+    The devices are camera, proximity sensors, accelerometer and microphones.
+    """
     for _ in range(2):
         choose(machine, DEFAULTS)
         assert machine.peek("colour") == GREEN
@@ -51,7 +54,10 @@ def test_input_devices_pass_what_their_processor_makes_of_it(machine: Machine) -
 
 
 def test_the_camera_processor_sees_the_whole_frame(machine: Machine) -> None:
-    """camera.h: 20 x 20 RGB565; this one compares red with blue in the first pixel."""
+    """The camera processor receives the whole 20 x 20 RGB565 frame and compares red with blue in its first pixel.
+
+    Source: camera.h.
+    """
     choose(machine, OWN)
     picture = plain((0, 0, 200))
     picture[:200, :300] = (200, 0, 0)
@@ -61,7 +67,7 @@ def test_the_camera_processor_sees_the_whole_frame(machine: Machine) -> None:
 
 
 def test_remote_control_and_selector_pass_what_their_processor_makes_of_it(machine: Machine) -> None:
-    """Processors of remote control and selector change or suppress events (remote.h, openswarm_io.h)."""
+    """Processors of the remote control and the selector change or suppress events (remote.h, openswarm_io.h)."""
     for which, key, position in ((DEFAULTS, 12, 9), (OWN, 13, 6)):
         choose(machine, which, 0.1)
         machine.board.remote.press(12)
@@ -73,7 +79,7 @@ def test_remote_control_and_selector_pass_what_their_processor_makes_of_it(machi
 
 
 def test_a_processor_may_swallow_everything(machine: Machine) -> None:
-    """A processor that returns false suppresses the event."""
+    """An event is suppressed if its processor returns false."""
     choose(machine, SWALLOW, 0.3)
     before = [machine.peek(name) for name in ("colours", "keys", "positions", "motions")]
     machine.board.remote.press(12)
@@ -85,7 +91,7 @@ def test_a_processor_may_swallow_everything(machine: Machine) -> None:
 
 
 def test_output_devices_do_what_their_processor_says(machine: Machine) -> None:
-    """LED orders go to another LED; half the speed on both wheels; the text protocol without driving."""
+    """Processors of output devices move LED orders to another LED, halve wheel speeds and refuse the drive command."""
     choose(machine, OWN, 0.1)
     machine.board.bluetooth.feed(b"x")
     say(machine, "")
@@ -106,7 +112,7 @@ def test_output_devices_do_what_their_processor_says(machine: Machine) -> None:
 
 
 def test_processors_change_under_load_without_harm(machine: Machine) -> None:
-    """Fifty exchanges while frames, keys, scans and characters arrive; no event is lost."""
+    """Processors are exchanged fifty times while frames, keys, scans and characters arrive; no event is lost."""
     machine.board.microphones.play(1, lambda cycle: 100.0 if cycle & 0x8000 else -100.0)
     for number in range(50):
         machine.poke("wanted", number % 3)

@@ -37,7 +37,7 @@ class Turret:
         return answer[(len(self.heard) - 1) % 4]
 
     def lines(self, cycles: int) -> list[str]:
-        """Return UART1's output meanwhile as whole lines."""
+        """Run and return the whole lines that UART1 sends in that time."""
         self.said.clear()
         self.machine.run(cycles=cycles)
         return self.said.decode().split("\r\n")[:-1]
@@ -57,7 +57,8 @@ def test_bytes_go_both_ways_while_the_slave_is_selected(path: Path) -> None:
 
 
 def test_the_processor_is_exchanged_while_the_program_runs(path: Path) -> None:
-    """The processor receives the bytes to send and those received, which it may refuse."""
+    """The SPI processor receives sent and received bytes and may refuse the received ones; it is exchanged at run
+    time."""
     turret = Turret(robot(path), damage=1)
     assert turret.lines(FCY // 4) == [str(MEASUREMENT)] * 3
     for letter, says, last in ((b"c", f"error {ARGUMENT}", 0xFF), (b"r", str(MEASUREMENT), 0)) * 2:
@@ -72,7 +73,7 @@ def test_the_processor_is_exchanged_while_the_program_runs(path: Path) -> None:
 
 
 def test_every_size_and_the_bounds(image: Build, tmp_path: Path) -> None:
-    """1 to 1,024 bytes, in place, without out or in; beyond: refused."""
+    """Transfers of 1 to 1,024 bytes work in place, without output or without input; larger ones are refused."""
     app = tmp_path / "sizes"
     app.mkdir()
     (app / "app.mk").write_text("DEVICES := spi\n")

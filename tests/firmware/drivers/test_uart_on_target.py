@@ -11,9 +11,9 @@ from tests.firmware.conftest import Build
 from tests.firmware.kernel.test_kernel_on_target import FCY, load
 
 TX = 1024
-"""SYS_UART_TX: a third of the heap."""
+"""Bytes of the transmit limit SYS_UART_TX: a third of the heap."""
 E, LARGEST = 6, 33
-"""Bytes in front of a payload; of a message in one block (SYS_SMALL_PAYLOAD - 1)."""
+"""Overhead of a message in bytes, and largest message in bytes that fits one block (SYS_SMALL_PAYLOAD - 1)."""
 
 SOURCE = """#include <openswarm.h>
 #include <openswarm_io.h>
@@ -72,7 +72,7 @@ def text(size: int) -> bytes:
 
 
 def bytes_of_heap(size: int) -> int:
-    """Heap bytes of a message waiting for its UART (io/README.md)."""
+    """Return the heap bytes that a message occupies while it waits for its UART (io/README.md)."""
     blocks = [LARGEST] * (size // LARGEST) + [size % LARGEST] * bool(size % LARGEST)
     return sum((E + 1 + block + 1) // 2 * 2 for block in blocks)
 
@@ -87,7 +87,7 @@ def started(path: Path) -> tuple[Machine, bytearray]:
 
 @pytest.mark.parametrize("size", [1, 2, 32, 33, 34, 64, 65, 66, 67, 100, 500, 800])
 def test_a_message_of_any_size_goes_out_whole_and_takes_what_is_said(path: Path, size: int) -> None:
-    """A message of 65 bytes is sent; a fixed buffer of 64 bytes would refuse it for ever."""
+    """A message of 65 bytes is sent completely; a fixed buffer of 64 bytes would always refuse it."""
     machine, said = started(path)
     used = machine.peek("os_statistics")
     machine.poke("size", size)

@@ -1,4 +1,4 @@
-"""Wheel speeds under the kernel, counted in steps."""
+"""Wheel speeds under the kernel, measured by counting motor steps."""
 
 from __future__ import annotations
 
@@ -14,9 +14,11 @@ SYS_ERROR_ARGUMENT = 5
 
 
 def test_every_speed_is_exact_over_a_whole_period(image: Build) -> None:
-    """openswarm-original.md §5.2: the stepper's fraction comes back to where it was after 6,192
-    ticks of 1,536 Tcy, which make 5 v steps; what holds for one period holds for any time. fuzz_wheels.py counts
-    60 s of each."""
+    """Every speed v makes exactly 5 v steps in 6,192 ticks of 1,536 Tcy (openswarm-original.md §5.2).
+
+    After this period the stepper's fraction has its initial value, so that the rate is exact for any time.
+    fuzz_wheels.py counts 60 s of each speed.
+    """
     machine = start(image("wheels", TARGET_APPS))
     for speed in range(-FASTEST, FASTEST + 1, 7):
         machine.poke("wanted_left", speed & 0xFFFF)
@@ -31,26 +33,28 @@ def test_every_speed_is_exact_over_a_whole_period(image: Build) -> None:
 
 
 def fractions(machine) -> list[int]:
-    """Of a step that is due, in 1/6192, left and right (motors.c)."""
+    """Return the accumulated fractions of the next step, left and right, in units of 1/6192 step (motors.c)."""
     return [machine.peek(machine.address_of(name) + 2) for name in ("stepper_left", "stepper_right")]
 
 
 @pytest.mark.parametrize(("left", "right"), [(129, -129), (1, -128), (64, 65)])
 def test_a_minute_is_exact_to_a_step(image: Build, left: int, right: int) -> None:
-    """Step rates are exact at every speed."""
+    """At every speed the number of steps of one minute is exact."""
     errors = measure(start(image("wheels", TARGET_APPS)), left, right, 60)
     assert max(abs(error) for error in errors) <= 1
 
 
 def handlers_error(machine: Machine) -> int:
-    """The last error of all handlers, a byte."""
+    """Return the last error of the handler context, one byte."""
     at = machine.address_of("error_of_handlers")
     return machine.peek(at & ~1) >> 8 * (at & 1) & 0xFF
 
 
 def test_speeds_out_of_range_are_clamped_and_reported(image: Build) -> None:
-    """1000 steps/s is the most; the handlers' last error says that a speed was beyond, the
-    getter which one is in force."""
+    """Speeds above 1000 steps/s are clamped: the getter returns the clamped speed.
+
+    The last error of the handler context reports the clamping.
+    """
     machine = start(image("wheels", TARGET_APPS))
     assert max(abs(error) for error in measure(machine, 129, -129, 1)) <= 1
     assert handlers_error(machine) == 0

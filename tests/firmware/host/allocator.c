@@ -1,4 +1,4 @@
-/* The allocator compared with a model of every byte, and the heap's state after bursts. */
+/* Compares the allocator with a model of every heap byte, and checks the state of the heap after bursts of messages. */
 #include "test.h"
 
 enum {
@@ -14,7 +14,7 @@ typedef struct {
 } held_block;
 
 static held_block held[BLOCKS];
-static uint8 taken[SYS_HEAP / HEAP_STEP]; /* by step: in use */
+static uint8 taken[SYS_HEAP / HEAP_STEP]; /* whether each heap step is in use */
 static bool unsettled;
 
 static uint16 steps(uint16 bytes)
@@ -50,7 +50,7 @@ static void release(held_block *b)
         CHECK_EQ(b->at[i], b->filled);
     }
     mark(b, 0);
-    unsettled = rand() % 4 == 0; /* as within a round of handlers */
+    unsettled = rand() % 4 == 0; /* deferred as within a round of handlers */
     if (unsettled) {
         heap_free_deferred(b->at, b->asked);
     } else {
@@ -111,12 +111,12 @@ TEST(random_histories_agree_with_a_model, "memory.c: no overlap, no loss, succes
         heap_coalesce();
         unsettled = false;
         held_block all;
-        obtain(&all, SYS_HEAP, false, 0); /* all free blocks are merged again */
+        obtain(&all, SYS_HEAP, false, 0); /* requires that all free blocks have been merged */
         CHECK_EQ(all.size, SYS_HEAP);
         release(&all);
     }
     CHECK(peak > SYS_HEAP / 2);
-    exit(0); /* there is no kernel whose lists could be checked */
+    exit(0); /* without a kernel main.c cannot check its lists */
 }
 
 TEST(exhaustion_is_an_error_and_all_memory_can_be_allocated_again, "engines.md ยง6: bounded, deterministic allocator")
@@ -131,7 +131,7 @@ TEST(exhaustion_is_an_error_and_all_memory_can_be_allocated_again, "engines.md ย
                 memset(blocks[n++], 0x5A, size);
             }
             CHECK(n >= (SYS_HEAP - empty) * 9 / 10 / size);
-            for (uint16 i = 0; i < n; i++) { /* every second first: the other half joins pieces on both sides */
+            for (uint16 i = 0; i < n; i++) { /* every second block first: the others then merge with both neighbours */
                 heap_free_deferred(blocks[i * 2 < n ? i * 2 : (i * 2 - n) | 1], size);
             }
             heap_coalesce();
@@ -143,8 +143,8 @@ TEST(exhaustion_is_an_error_and_all_memory_can_be_allocated_again, "engines.md ย
     }
 }
 
-/* What a robot does for long: events and subscriptions come and stay, some of them in bursts of messages, threads
- * come and go. Then all threads and messages end. */
+/* A long robot run: events and subscriptions are added and remain, some of them during bursts of messages, and threads
+ * start and end. Finally all threads and messages end. */
 enum { THREAD = 48 * HEAP_STEP, LASTING = 40, QUEUED = 120, RUNNING = 12, ROUNDS = 40 };
 
 static void a_long_day(held_block lasting[], held_block queued[], held_block running[])
@@ -235,7 +235,7 @@ TEST(an_event_registered_in_a_burst_costs_one_thread_at_most, "without low place
         for (uint16 i = 0; i < burst; i++) {
             Sys_Send_IntEvent(E1, i);
         }
-        Sys_Register_Event((uint16)(E4 + burst)); /* among the messages */
+        Sys_Register_Event((uint16)(E4 + burst)); /* allocated between the messages */
         for (uint16 i = 0; i < burst; i++) {
             Sys_Send_IntEvent(E1, i);
         }

@@ -1,4 +1,5 @@
-/* Delivery: subscriptions that change during a delivery, and its time (kernel.md §2, openswarm.h). */
+/* Event delivery: subscriptions that change during a delivery, and the time a delivery takes (kernel.md §2,
+ * openswarm.h). */
 #include "test.h"
 
 static bool once(uint16 pid, uint16 id, sys_event_data *data)

@@ -55,7 +55,7 @@ TEST(a_refused_message_has_room_when_ready_is_said, "openswarm_io.h: back-pressu
         accepted++;
     }
     CHECK_EQ(Sys_Get_LastError(), SYS_ERROR_BUSY);
-    CHECK_EQ(accepted, SYS_UART_TX / (sizeof(message) + 1 + sizeof block + 1)); /* the number of bytes, and an even size */
+    CHECK_EQ(accepted, SYS_UART_TX / (sizeof(message) + 1 + sizeof block + 1)); /* header, length byte, even size */
     CHECK_EQ(Sys_Get_UARTStatistics(SYS_UART1)->tx_refused, 1);
     host_tick();
     Sys_Yield();
@@ -97,7 +97,7 @@ TEST(messages_of_any_size_are_buffered_in_order, "dynamically buffered transmiss
     CHECK(sent[1] == 200 && memcmp(line[1], text, 200) == 0);
     Sys_Yield();
     CHECK_EQ(Sys_Get_Statistics()->heap_used, used);
-    CHECK(!Sys_Write_UART1(text, sizeof text)); /* its blocks need more than it has bytes */
+    CHECK(!Sys_Write_UART1(text, sizeof text)); /* its blocks need more bytes than the transmit limit */
     CHECK_EQ(Sys_Get_LastError(), SYS_ERROR_ARGUMENT);
     CHECK_EQ(Sys_Get_Statistics()->heap_used, used);
     uint16 largest = sizeof text;
@@ -123,7 +123,7 @@ TEST(ready_also_follows_when_the_heap_was_exhausted, "openswarm_io.h: BUSY")
     }
     CHECK(!Sys_Write_UART1("hello", 5));
     CHECK_EQ(Sys_Get_LastError(), SYS_ERROR_BUSY);
-    host_tick(); /* without memory for the event itself */
+    host_tick(); /* no memory for the READY event */
     while (blocks-- != 0) {
         heap_free(all[blocks], sizes[blocks]);
     }
@@ -181,7 +181,7 @@ TEST(a_message_is_sent_whole_or_not_at_all, "openswarm_io.h: writers that nest, 
     Sys_Yield();
     CHECK_EQ(sent[0], 5);
     Sys_Set_TxProcessor(SYS_UART1, NULL);
-    CHECK(Sys_Write_UART2("x", 1)); /* frees what the dead writer left */
+    CHECK(Sys_Write_UART2("x", 1)); /* frees the memory that the killed writer has left */
     Sys_Yield();
     CHECK_EQ(Sys_Get_Statistics()->heap_used, used);
 }
@@ -278,7 +278,7 @@ TEST(a_damaged_frame_costs_only_itself, "openswarm_io.h: damaged frames are drop
         CHECK(got_size == 4 && memcmp(got, "good", 4) == 0);
     }
     CHECK(Sys_Get_UARTStatistics(SYS_UART1)->rx_damaged >= encoded_size - 1);
-    for (int i = 0; i < 100; i++) { /* longer than the buffer: dropped at its end */
+    for (int i = 0; i < 100; i++) { /* longer than the buffer: discarded at the buffer's end */
         host_receive(SYS_UART1, 9);
     }
     host_receive(SYS_UART1, 0);
@@ -304,7 +304,7 @@ TEST(swapping_processors_under_traffic_loses_nothing, "the paper: Rx- and Tx-pro
             total += (size_t)n;
             Sys_Yield();
         }
-        bool frame = round % 2 == 0; /* in the middle of a received chunk */
+        bool frame = round % 2 == 0; /* exchanged in the middle of a received chunk */
         CHECK(Sys_Set_TxProcessor(SYS_UART1, frame ? Sys_Frame_Tx : NULL) == (frame ? Sys_Raw_Tx : Sys_Frame_Tx));
         CHECK(Sys_Set_RxProcessor(SYS_UART1, frame ? Sys_Frame_Rx : NULL) == (frame ? Sys_Chunk_Rx : Sys_Frame_Rx));
         Sys_Yield();

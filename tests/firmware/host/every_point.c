@@ -1,5 +1,5 @@
-/* Sweeps: one scenario that uses every structural call, with a preemption at each unlock, with an interrupt that
- * sends at each unlock, and with the k-th allocation failing for each k. */
+/* Sweeps over a scenario that uses every structural call: a preemption at each unlock, an interrupt that sends at each
+ * unlock, and a failure of the k-th allocation for each k. */
 #include "test.h"
 
 static int delivered, sent_extra, worker_rounds;
@@ -28,7 +28,7 @@ static void spinner(void)
     }
 }
 
-/* Returns with everything undone; each failing call has said so. */
+/* Undoes all its changes before it returns. Each failing call must have reported its error. */
 static void scenario(void)
 {
     Sys_Register_Event(E1);

@@ -1,4 +1,4 @@
-/* infrared_air.h. */
+/* The simulated medium between robots. See infrared_air.h. */
 #include "infrared_air.h"
 
 unsigned int readings[HAL_INFRARED_SENSORS];
@@ -57,7 +57,7 @@ void record(recording *r)
     uint16 before = Sys_Get_InfraredStatistics()->sent;
     unsigned wait = 0;
     memset(r, 0, sizeof *r);
-    while (r->length < 9) { /* the ones at least: not a flash */
+    while (r->length < 9) { /* wait for at least the ones of a preamble: a proximity flash is shorter */
         CHECK(++wait < 5000);
         scan_with(0, 0);
         r->lit[r->length] = true;

@@ -1,5 +1,5 @@
-/* The air between robots, for tests of the infra-red link: the test is the lower layer, sees what is lit, and says
- * what the sensors read, scan by scan. */
+/* The simulated medium between robots, for tests of the infra-red link. The test replaces the hardware layer: it
+ * observes the LED and supplies the readings of the sensors, scan by scan. */
 #ifndef INFRARED_AIR_H
 #define INFRARED_AIR_H
 
@@ -11,22 +11,22 @@ enum { DARK = 3800, LONGEST = 1200, EARLY = 1000 };
 
 extern unsigned int readings[HAL_INFRARED_SENSORS];
 extern bool own_light;
-extern uint16 fixed_number; /* of the robot, before it starts */
+extern uint16 fixed_number; /* the robot's number, set before it starts */
 
 void scan_isr(void);
-void scan_with(uint8 sensor, uint16 depth); /* one in which light takes so much from a sensor; 4,096 of them are a second */
+void scan_with(uint8 sensor, uint16 depth); /* light lowers a reading by depth; 4,096 scans are 1 s */
 void scans_in_the_dark(unsigned n);
 void begin_link(void);
 
-/* Collects the light of one frame by scans; returns their number. Omits proximity: three scans with dark before and
- * after. */
+/* LED states of one frame, one per scan, and their number. A proximity measurement is no frame: it lights for three
+ * scans, with dark scans before and after. */
 typedef struct {
     bool lit[LONGEST];
     unsigned length;
 } recording;
 
-void record(recording *r); /* the next frame that is sent */
+void record(recording *r); /* records the next frame that the robot sends */
 void play(const recording *r, uint8 sensor, uint16 depth);
-void say(const char *text, uint16 as, recording *r); /* record this message of a robot with this number */
+void say(const char *text, uint16 as, recording *r); /* records a message of the robot numbered `as` */
 
 #endif

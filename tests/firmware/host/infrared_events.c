@@ -1,4 +1,4 @@
-/* Events that neighbours share: openswarm_remote.h. */
+/* Events that neighbours share (openswarm_remote.h). */
 #include "infrared_air.h"
 
 #include "openswarm_remote.h"
@@ -24,7 +24,7 @@ static void begin_sharing(uint8 hops)
     CHECK(Sys_Subscribe_to_Event(ALARM, 0, on_alarm, NULL));
 }
 
-/* Records the frame of another robot on which the event is sent. */
+/* Records the frame with which another robot shares the event. */
 static void record_as(uint16 number, const char *text, recording *r)
 {
     CHECK(Sys_Set_RobotNumber(number));
@@ -68,7 +68,7 @@ TEST(the_same_event_of_two_robots_arrives_twice, "known by the robot and its seq
     hear(&one);
     hear(&another);
     CHECK_EQ(alarms, 2);
-    CHECK(Sys_Send_Event(ALARM, "x", 1)); /* and the own one still goes out */
+    CHECK(Sys_Send_Event(ALARM, "x", 1)); /* the robot's own equal event is still sent */
     Sys_Yield();
     record(&one);
     CHECK_EQ(Sys_Get_RemoteStatistics()->shared, 3);
@@ -81,7 +81,7 @@ TEST(events_are_passed_on_as_far_as_their_hops, "hop limit, counted down; the fi
     record_as(OTHER, "abc", &first);
     hear(&first);
     CHECK_EQ(Sys_Get_RemoteStatistics()->passed_on, 1);
-    record(&second); /* with one hop left */
+    record(&second); /* the forwarded frame, with one hop left */
     CHECK(Sys_Set_RobotNumber(OTHER));
     play(&second, 4, 100);
     CHECK_EQ(Sys_Get_RemoteStatistics()->duplicates, 1);
@@ -109,7 +109,7 @@ TEST(a_duplicate_is_forgotten_in_the_end, "a memory of fixed size: SYS_REMOTE_ME
     }
     alarms = 0;
     for (uint16 i = 0; i <= SYS_REMOTE_MEMORY; i++) {
-        while (alarms != i + 1) { /* a robot that sends cannot receive */
+        while (alarms != i + 1) { /* repeat: a robot that sends cannot receive */
             hear(&all[i]);
         }
         hear(&all[i]);

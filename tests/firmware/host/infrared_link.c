@@ -1,4 +1,4 @@
-/* Neighbour messages by infra-red: openswarm_infrared.h, io/infrared. */
+/* Neighbour messages by infra-red (openswarm_infrared.h, io/infrared). */
 #include "infrared_air.h"
 
 static sys_neighbour_message heard;
@@ -118,7 +118,7 @@ TEST(a_message_arrives_from_far_and_near, "openswarm_infrared.h: source, sensor,
     begin_link();
     CHECK(Sys_Subscribe_to_Event(SYS_NEIGHBOUR_MESSAGE, 0, hear, NULL));
     say("hello", 321, &r);
-    CHECK_EQ(r.length, 3 * (7 + 7 * CODE_BITS) + 1); /* 9 bytes are 7 words; the scan in which it ends */
+    CHECK_EQ(r.length, 3 * (7 + 7 * CODE_BITS) + 1); /* 9 bytes: 7 code words; 1: the last, dark scan */
     CHECK(Sys_Set_RobotNumber(5));
     for (unsigned i = 0; i < sizeof depths / sizeof *depths; i++) {
         play(&r, (uint8)i, depths[i]);
@@ -159,13 +159,13 @@ TEST(the_own_proximity_costs_no_frame,
     for (int scans = 0; scans < 240; scans++) {
         uint16 before = Sys_Get_InfraredStatistics()->sent;
         scans_in_the_dark((unsigned)scans);
-        if (Sys_Get_InfraredStatistics()->sent != before) { /* others leave 12 dark scans behind a frame */
+        if (Sys_Get_InfraredStatistics()->sent != before) { /* other robots wait for 12 dark scans after a frame */
             scans_in_the_dark(12);
             before++;
         }
         play(&r, 3, scans % 2 ? 200 : 7);
         Sys_Yield();
-        CHECK_EQ(messages + (Sys_Get_InfraredStatistics()->sent != before), scans + 1); /* the robot itself sends sometimes */
+        CHECK_EQ(messages + (Sys_Get_InfraredStatistics()->sent != before), scans + 1); /* received or sent itself */
         messages = scans + 1;
     }
 }
@@ -416,7 +416,7 @@ static bool feel(uint16 pid, uint16 id, sys_event_data *data)
     return true;
 }
 
-/* A scan with an object in front of sensor 3 that reflects the robot's own light. */
+/* One scan with an object in front of sensor 3, which reflects the robot's own light; `others` is additional light. */
 static void scan_near(uint16 others)
 {
     scan_with(3, (uint16)((own_light ? 205 : 0) + others));
@@ -434,7 +434,7 @@ TEST(proximity_is_measured_between_frames, "analog.h: mm every 50 ms; not while 
     CHECK_EQ(distance[3], 50);
     CHECK(distance[2] == SYS_OUT_OF_RANGE && distance[4] == SYS_OUT_OF_RANGE);
     measured = 0;
-    for (int i = 0, light = 0; i < 4096; i++) { /* another robot answers each flash */
+    for (int i = 0, light = 0; i < 4096; i++) { /* another robot lights up after each flash */
         light = own_light ? 6 : light - (light > 0);
         scan_near(light > 0 ? 300 : 0);
     }
@@ -475,7 +475,7 @@ TEST(any_light_is_survived, "random readings for a minute: no state is left for 
     }
     scans_in_the_dark(4096);
     messages = 0;
-    for (int tries = 0; tries < 3 && messages == 0; tries++) { /* the robot itself may be sending */
+    for (int tries = 0; tries < 3 && messages == 0; tries++) { /* repeat: the robot itself may be sending */
         play(&r, 2, 300);
         Sys_Yield();
     }

@@ -1,6 +1,6 @@
-/* Anything a robot may see and be asked, at random: whole frames, damaged ones, cut ones, two at once, light of the
- * room and noise, while its program calls all of openswarm_infrared.h and openswarm_remote.h.
- * tests/fuzz/kernel/fuzz_infrared.py gives seeds. */
+/* Random test of the infra-red link. The robot receives whole, damaged, truncated and overlapping frames, ambient light
+ * and noise, while its program makes all calls of openswarm_infrared.h and openswarm_remote.h.
+ * tests/fuzz/kernel/fuzz_infrared.py supplies the seeds. */
 #include "infrared_air.h"
 
 #include "openswarm_remote.h"
@@ -19,8 +19,7 @@ static bool one_in(uint32 n)
     return below(n) == 0;
 }
 
-/* ---- the air
- * ------------------------------------------------------------------------------------------------------- */
+/* ---- The medium ------------------------------------------------------------------------------------------ */
 
 static uint16 room[HAL_INFRARED_SENSORS], noise;
 
@@ -45,8 +44,7 @@ static void dark(unsigned scans)
     }
 }
 
-/* ---- frames of others
- * ---------------------------------------------------------------------------------------------- */
+/* ---- Frames of other robots ------------------------------------------------------------------------------ */
 
 typedef struct {
     uint8 kind, size;
@@ -56,7 +54,7 @@ typedef struct {
 
 static text said[SAID]; /* of late */
 static unsigned talk;
-static bool is_damaged; /* of late a frame had more errors than are repaired: its CRC may hold by chance */
+static bool is_damaged; /* a recent frame had more errors than are corrected: its CRC may match by chance */
 
 static text *anything(void)
 {
@@ -68,7 +66,7 @@ static text *anything(void)
     for (uint8 i = 0; i < FRAME_PAYLOAD; i++) {
         t->payload[i] = (uint8)(one_in(3) ? 0 : below(256));
     }
-    if (t->kind == FRAME_EVENT && !one_in(4)) { /* one of ours, from robots that talk often */
+    if (t->kind == FRAME_EVENT && !one_in(4)) { /* an event that this robot shares, from one of few robots */
         uint16 first = (uint16)((one_in(3) ? ALONE : SHARED) | below(8) << 13);
         uint16 origin = (uint16)(numbers[below(8)] | below(32) << 11);
         t->payload[0] = (uint8)first, t->payload[1] = (uint8)(first >> 8);
@@ -123,8 +121,7 @@ static void talk_at_random(void)
     dark(below(60));
 }
 
-/* ---- what arrives
- * -------------------------------------------------------------------------------------------------- */
+/* ---- Received messages and events ------------------------------------------------------------------------ */
 
 static bool was_said(uint16 number, uint8 kind, const uint8 *payload, uint8 size)
 {
@@ -150,7 +147,7 @@ static bool on_message(uint16 pid, uint16 id, sys_event_data *data)
     return true;
 }
 
-static uint16 present[2048 / 16]; /* by SEEN and LOST */
+static uint16 present[2048 / 16]; /* bit per robot: reported SEEN and not yet LOST */
 static bool on_neighbour(uint16 pid, uint16 id, sys_event_data *data)
 {
     const sys_neighbour *n = data->payload;
@@ -184,8 +181,7 @@ static void check_table(void)
     CHECK_EQ(Sys_Get_Neighbours(all, (uint8)below(SYS_NEIGHBOURS)) <= count, true);
 }
 
-/* ---- the program
- * --------------------------------------------------------------------------------------------------- */
+/* ---- The program ----------------------------------------------------------------------------------------- */
 
 static void call_something(void)
 {
@@ -264,7 +260,7 @@ TEST(anything_seen_and_asked_is_survived, "nothing damaged, false or stale arriv
         step();
     }
     noise = 0;
-    for (int i = 0; i < 2 + SYS_INFRARED_QUEUE; i++) { /* queued frames are sent, the others expire */
+    for (int i = 0; i < 2 + SYS_INFRARED_QUEUE; i++) { /* queued frames are sent or expire */
         scans_in_the_dark(4096);
         Sys_Yield();
     }
@@ -273,7 +269,7 @@ TEST(anything_seen_and_asked_is_survived, "nothing damaged, false or stale arriv
     uint16 received = Sys_Get_InfraredStatistics()->received;
     r.length = draw(r.lit, &(text){FRAME_MESSAGE, 1, 1234, "x"}, true);
     for (int tries = 0; tries < 8 && received == Sys_Get_InfraredStatistics()->received; tries++) {
-        play(&r, 2, 300); /* the robot itself may be sending */
+        play(&r, 2, 300); /* repeat: the robot itself may be sending */
     }
     CHECK(received != Sys_Get_InfraredStatistics()->received);
 }

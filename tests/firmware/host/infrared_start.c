@@ -1,4 +1,4 @@
-/* Promises of openswarm_infrared.h and openswarm_remote.h at their edges: early, late, full, after a reset. */
+/* Limits of openswarm_infrared.h and openswarm_remote.h: calls before the start, full queues, and after a reset. */
 #include "infrared_air.h"
 
 #include "openswarm_remote.h"
@@ -29,7 +29,7 @@ static void send_alarm(uint8 contents)
     Sys_Yield();
 }
 
-/* An alarm of one byte, as if a frame of OTHER had arrived whole. */
+/* Delivers an alarm of one byte to the program, as if a whole frame of robot OTHER had arrived. */
 static void receive_alarm_of(uint8 origin, uint8 hops, uint8 sequence, uint8 contents)
 {
     const uint8 payload[] = {ALARM & 0xFF, (uint8)(ALARM >> 8 | hops << 5), origin, (uint8)(sequence << 3), contents};
@@ -57,12 +57,12 @@ TEST(an_event_before_the_number_is_drawn_is_its_senders, "openswarm_remote.h: ea
     Sys_Yield();
     CHECK_EQ(alarms, 2);
     record(&passed_on);
-    scans_in_the_dark(4096 * 8); /* arrivals have expired */
+    scans_in_the_dark(4096 * 8); /* until the memory of arrived events has expired */
     CHECK(Sys_Set_RobotNumber(OTHER));
     play(&passed_on, 2, 200);
     Sys_Yield();
     CHECK(alarms == 2 && Sys_Get_RemoteStatistics()->duplicates == 1);
-    play(&early, 2, 200); /* of a third one */
+    play(&early, 2, 200); /* received by a third robot */
     Sys_Yield();
     CHECK_EQ(alarms, 3);
 }

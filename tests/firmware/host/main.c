@@ -22,7 +22,7 @@ int main(int argc, char **argv)
     }
     for (const test *t = first; t != NULL; t = t->next) {
         if (strcmp(t->name, argv[1]) == 0) {
-            alarm(50); /* a busy machine gives a tenth of its time */
+            alarm(50); /* seconds of real time; a busy host may give the test a tenth of its time */
             t->run();
             CHECK(lists_are_well_formed());
             _exit(0);

@@ -13,7 +13,7 @@ static uint16 start(void (*entry)(void *), const void *arg, uint8 priority)
     return Sys_Start_ProcessWith(&config);
 }
 
-/* All threads run at lower priority than PID 0, which observes them. */
+/* Starts a kernel in which PID 0 has a higher priority than all threads, which it observes. */
 static void boot_below(const sys_scheduler *scheduler)
 {
     boot();
@@ -128,7 +128,7 @@ static void misuse(void *unused)
     CHECK_EQ(os_running->priority, 3);
     CHECK(Sys_Lock_Mutex(&other));
     CHECK_EQ(os_running->priority, 5);
-    CHECK(Sys_Unlock_Mutex(&mutex)); /* in the order of locking */
+    CHECK(Sys_Unlock_Mutex(&mutex)); /* unlocked in the order of locking, not in reverse */
     CHECK_EQ(os_running->priority, 5);
     CHECK(Sys_Unlock_Mutex(&other));
     CHECK_EQ(os_running->priority, 2);
@@ -145,7 +145,7 @@ TEST(mutexes_refuse_what_they_cannot_do, "openswarm_mutex.h: errors, ceilings of
     start(misuse, NULL, 2);
     Sys_Sleep(1);
     CHECK(strcmp(trace, ".") == 0);
-    CHECK(!Sys_Lock_Mutex(&mutex)); /* PID 0 is above the ceiling */
+    CHECK(!Sys_Lock_Mutex(&mutex)); /* the priority of PID 0 is above the ceiling */
     CHECK_EQ(Sys_Get_LastError(), SYS_ERROR_ARGUMENT);
 }
 
@@ -192,8 +192,7 @@ TEST(a_lock_leaves_the_wait_result, "openswarm_mutex.h: Sys_Lock_Mutex")
     CHECK_EQ(heap_now(), empty);
 }
 
-/* ---- Quotas
- * ------------------------------------------------------------------------------------------------------- */
+/* ---- Quotas ---------------------------------------------------------------------------------------------- */
 
 static uint16 newest;
 static bool slow_handler(uint16 pid, uint16 id, sys_event_data *data)
@@ -238,7 +237,7 @@ TEST(the_newest_value_wins, "openswarm_quota.h: Sys_Keep_Latest")
     static sys_quota latest;
     boot();
     Sys_Register_Event(E1);
-    Sys_Register_Event(E1 + 8); /* in the same bucket */
+    Sys_Register_Event(E1 + 8); /* event in the same hash bucket */
     CHECK(Sys_Keep_Latest(&latest, E1));
     Sys_Subscribe_to_Event(E1, 0, slow_handler, NULL);
     Sys_Subscribe_to_Event(E1 + 8, 0, count_delivery, NULL);
@@ -250,7 +249,7 @@ TEST(the_newest_value_wins, "openswarm_quota.h: Sys_Keep_Latest")
     CHECK_EQ(newest, 50);
     CHECK_EQ(deliveries, 2);
     CHECK_EQ(latest.dropped, 0);
-    CHECK(!Sys_Send_IntEvent(E1 + 16, 1)); /* the gate in front belongs to no event */
+    CHECK(!Sys_Send_IntEvent(E1 + 16, 1)); /* the quota's list element must not pass for an event of the bucket */
     CHECK(!Sys_Keep_Latest(&latest, E_NEVER));
     CHECK_EQ(Sys_Get_LastError(), SYS_ERROR_EVENT);
 }
@@ -277,8 +276,7 @@ TEST(a_quota_bounds_what_waits, "openswarm_quota.h: Sys_Limit_Event")
     CHECK_EQ(deliveries, 4);
 }
 
-/* ---- Join and zombies
- * --------------------------------------------------------------------------------------------- */
+/* ---- Join and zombies ------------------------------------------------------------------------------------ */
 
 static void ends_in_3_ms(void *unused)
 {
@@ -334,8 +332,7 @@ TEST(join_waits_for_any_thread, "openswarm_join.h: Sys_Join")
     CHECK_EQ(heap_now(), empty);
 }
 
-/* ---- Cleanup
- * ------------------------------------------------------------------------------------------------------ */
+/* ---- Cleanup --------------------------------------------------------------------------------------------- */
 
 static void say(void *c)
 {
@@ -354,7 +351,7 @@ static void cleans_up(void *unused)
 
 static void leaves_it_to_the_end(void *unused)
 {
-    static sys_cleanup only; /* its stack no longer exists after it has returned */
+    static sys_cleanup only; /* static: the stack of the thread no longer exists after it has ended */
     (void)unused;
     CHECK(Sys_Push_Cleanup(&only, say, "e"));
 }
@@ -373,8 +370,7 @@ TEST(cleanups_run_whatever_ends_the_thread, "openswarm_cleanup.h: newest first, 
     CHECK(strcmp(trace, "3e21") == 0);
 }
 
-/* ---- Services
- * ----------------------------------------------------------------------------------------------------- */
+/* ---- Services -------------------------------------------------------------------------------------------- */
 
 static uint16 starts, feedings;
 static void hangs_after_three(void *unused)
@@ -405,7 +401,7 @@ TEST(a_service_that_hangs_is_restarted, "openswarm_service.h: limit_ms, restarts
     CHECK(!Sys_Feed_Watchdog());
     CHECK_EQ(Sys_Get_LastError(), SYS_ERROR_PROCESS);
     CHECK(Sys_Start_Service(&service));
-    Sys_Sleep(28); /* fed last at 10 */
+    Sys_Sleep(28); /* the watchdog was last fed at 10 ms */
     CHECK_EQ(starts, 1);
     Sys_Sleep(7);
     CHECK_EQ(starts, 2);

@@ -1,6 +1,6 @@
-/* The weaknesses of the original system, openswarm-original.md §7, one named test each. Those that only exist on the
- * chip (register save areas, DSP state, stack limits) are in tests/firmware/kernel/test_kernel_on_target.py under
- * the same numbers. */
+/* Weaknesses of the original system (openswarm-original.md §7), one named test for each. Those that only exist on the
+ * chip (register save areas, DSP state, stack limits) are tested in tests/firmware/kernel/test_kernel_on_target.py
+ * under the same numbers. */
 #include "test.h"
 
 static int calls;
@@ -236,7 +236,7 @@ TEST(bug_11_waiting_leaves_subscriptions_alone, "§7.11: Wait unlinked an own su
     Sys_Yield();
     Sys_Send_IntEvent(E1, 2);
     Sys_Yield();
-    CHECK_EQ(calls, 3); /* w has ended meanwhile, and its subscription with it */
+    CHECK_EQ(calls, 3); /* thread w has ended in the meantime, and so has its subscription */
 }
 
 TEST(bug_11b_removing_one_handler_compares_each_element, "§7.11b: the head's handler was compared instead")
@@ -267,7 +267,7 @@ TEST(bug_12_sending_does_not_end_a_critical_section_nor_lose_its_tick, "§7.12")
     Sys_End_CriticalSection();
     CHECK_EQ(calls, 0);
     CHECK_EQ(trace[0], '\0');
-    Sys_End_CriticalSection(); /* the tick that fell inside is taken here */
+    Sys_End_CriticalSection(); /* the tick that occurred in the section is handled here */
     CHECK_EQ(calls, 1);
     CHECK_EQ(trace[0], 'a');
 }
@@ -286,7 +286,7 @@ TEST(bug_13_events_from_threads_and_interrupts_mix_at_every_point, "§7.13: even
     boot();
     Sys_Register_Event(E1);
     Sys_Subscribe_to_Event(E1, 0, count_and_keep, NULL);
-    Sys_Send_IntEvent(E1, 1); /* from here on its message comes from a free list */
+    Sys_Send_IntEvent(E1, 1); /* allocates the message, which a free list supplies from now on */
     Sys_Yield();
     unsigned long start = host_unlocks();
     Sys_Send_IntEvent(E1, 1);
@@ -312,7 +312,7 @@ static void in_critical_section(void)
     Sys_Start_CriticalSection();
     Sys_Start_CriticalSection();
     note('c');
-    /* ends inside: its sections end with it */
+    /* ends within the section: the kernel ends the thread's sections */
 }
 
 TEST(bug_14_nesting_does_not_leak_between_contexts, "§7.14: one global nesting counter was shared by all contexts")
@@ -335,7 +335,7 @@ TEST(bug_15_system_time_has_32_bits_and_counts_each_tick, "§7.15: 1.1 ms ticks 
     for (long i = 0; i < MANY_TICKS; i++) {
         host_tick();
     }
-    CHECK(Sys_Get_SystemTime() >= MANY_TICKS && Sys_Get_SystemTime() < MANY_TICKS + 5000); /* on the robot real time passes as well */
+    CHECK(Sys_Get_SystemTime() >= MANY_TICKS && Sys_Get_SystemTime() < MANY_TICKS + 5000); /* real time passes on robots */
 }
 
 TEST(bug_17_the_newest_motor_speed_of_a_slot_wins, "§7.17: motor handlers used the oldest value")

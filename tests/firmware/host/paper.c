@@ -1,5 +1,5 @@
-/* The behaviour the paper (Trenkwalder et al., IROS 2016) describes, in our words as collected in
- * openswarm-original.md §2-§6 and engines.md §6; one statement, one test. */
+/* Behaviour that the paper describes (Trenkwalder et al., IROS 2016), paraphrased in openswarm-original.md §2-§6 and
+ * engines.md §6. Each test checks one statement. */
 #include "test.h"
 
 static char handler_trace[64];
@@ -25,7 +25,7 @@ static void busy(void *c)
 {
     for (;;) {
         note(*(const char *)c);
-        host_slice(); /* the 10 ms of this thread are over */
+        host_slice(); /* ends the slice of 10 ms of this thread */
     }
 }
 
@@ -55,7 +55,7 @@ TEST(the_scheduler_is_exchanged_at_run_time, "the paper: the scheduling algorith
     uint16 b = start_busy("b", 2);
     Sys_Set_Scheduler(&sys_fixed_priority);
     Sys_End_CriticalSection();
-    os_system.priority = 3; /* PID 0 decides when they run */
+    os_system.priority = 3; /* PID 0 preempts them and so decides when they run */
     Sys_Yield();
     CHECK_EQ(trace[0], '\0');
     os_system.priority = 0;
@@ -82,7 +82,7 @@ TEST(a_process_is_new_ready_running_blocked_or_zombie, "the paper: five process 
     Sys_Yield();
     CHECK_EQ(Sys_Get_ProcessState(pid), SYS_BLOCKED);
     Sys_Sleep(5);
-    CHECK_EQ(Sys_Get_ProcessState(pid), SYS_UNKNOWN); /* zombie until the kernel stack has freed it */
+    CHECK_EQ(Sys_Get_ProcessState(pid), SYS_UNKNOWN); /* the thread is a zombie until the kernel stack has freed it */
 }
 
 TEST(handlers_run_between_two_threads_in_order_of_subscription, "the paper: cooperative event handling between time slices")
@@ -206,7 +206,7 @@ TEST(a_handler_shared_by_two_threads_runs_once_for_each, "the paper: processes s
     uint16 a = start_busy("a", 0), b = start_busy("b", 0);
     Sys_Subscribe_to_Event(E1, a, collect_pid, NULL);
     Sys_Subscribe_to_Event(E1, b, collect_pid, NULL);
-    Sys_Subscribe_to_Event(E1, a, collect_pid, NULL); /* again: once per event, thread and handler */
+    Sys_Subscribe_to_Event(E1, a, collect_pid, NULL); /* duplicate: a handler is registered once per event and thread */
     Sys_Send_IntEvent(E1, 1);
     Sys_Yield();
     CHECK_EQ(pid_count, 2);

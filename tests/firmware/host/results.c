@@ -1,14 +1,14 @@
-/* Wait results, and ends of waiting threads (kernel.md §2). */
+/* Results of waits, and the end of threads that wait (kernel.md §2). */
 #include "test.h"
 
 static sys_event_data *first_result;
 static void wait_twice(void)
 {
     first_result = Sys_Wait_for_Event(E1);
-    sys_event_data *second = Sys_Wait_for_Event(E1); /* frees the first */
+    sys_event_data *second = Sys_Wait_for_Event(E1); /* frees the first result */
     CHECK(second != NULL);
     note('2');
-    /* ends without clearing: the end frees it */
+    /* returns without clearing the result: the thread's end frees it */
 }
 
 TEST(a_thread_owns_one_uncleared_result, "kernel.md §2: its next wait or its end frees it")
@@ -34,14 +34,14 @@ TEST(killing_a_waiting_thread_frees_its_wait, "kernel.md §2: subscriptions, wai
     uint16 pid = Sys_Start_Process(wait_twice);
     Sys_Yield();
     Sys_Send_IntEvent(E1, 5);
-    CHECK(Sys_Kill_Process(pid)); /* while its message is queued */
+    CHECK(Sys_Kill_Process(pid)); /* while the message to the thread is queued */
     Sys_Yield();
     CHECK_EQ(heap_now(), before);
     pid = Sys_Start_Process(wait_twice);
     Sys_Yield();
     Sys_Send_IntEvent(E1, 5);
     Sys_Yield();
-    CHECK(Sys_Kill_Process(pid)); /* while it owns a result */
+    CHECK(Sys_Kill_Process(pid)); /* while the thread owns a result */
     CHECK_EQ(heap_now(), before);
 }
 
@@ -78,7 +78,7 @@ TEST(a_thread_may_die_during_a_delivery_to_it, "kernel.md §2: also while a drai
     victim = Sys_Start_Process(wait_and_be_killed);
     Sys_Start_Process(wait_and_be_killed);
     Sys_Yield();
-    Sys_Send_IntEvent(E1, 1); /* the first waiter's condition kills it, the second's finds it gone */
+    Sys_Send_IntEvent(E1, 1); /* the first waiter's condition kills it; the kernel must then find the second waiter */
     Sys_Yield();
     CHECK_EQ(trace[0], '\0');
     CHECK_EQ(Sys_Get_ProcessState(victim), SYS_UNKNOWN);

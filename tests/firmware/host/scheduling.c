@@ -1,4 +1,4 @@
-/* Schedulers beyond round robin, and preemption in real time (openswarm.h, openswarm_scheduler.h). */
+/* Schedulers other than round robin, and preemption in real time (openswarm.h, openswarm_scheduler.h). */
 #include "test.h"
 
 /* ---- Earliest deadline first ---------------------------------------------------------------------------------- */
@@ -8,7 +8,7 @@ static void job(void *which)
 {
     int me = *(int *)which;
     for (;;) {
-        for (int ms = 0; ms <= me * 2; ms++) { /* 1, 3 or 5 ms of work */
+        for (int ms = 0; ms <= me * 2; ms++) { /* 1, 3 or 5 ms of work for job 0, 1 or 2 */
             host_tick();
             note((char)('a' + me));
         }
@@ -40,7 +40,7 @@ TEST(earliest_deadline_first_meets_every_deadline_of_a_feasible_set, "kernel.md 
 {
     boot();
     Sys_Set_Scheduler(&sys_earliest_deadline);
-    start_job(0, 5, 5);   /* 1/5 + 3/10 + 5/20 = 0.75 */
+    start_job(0, 5, 5);   /* total load: 1/5 + 3/10 + 5/20 = 0.75 */
     start_job(1, 10, 10);
     start_job(2, 20, 20);
     Sys_Sleep(1000);
@@ -55,7 +55,7 @@ TEST(a_missed_deadline_is_counted_and_reported, "kernel.md §2: a miss is counte
     Sys_Register_Event(SYS_DEADLINE_MISSED);
     Sys_Subscribe_to_Event(SYS_DEADLINE_MISSED, 0, on_miss, NULL);
     Sys_Set_Scheduler(&sys_earliest_deadline);
-    start_job(2, 50, 3); /* 5 ms of work due after 3 */
+    start_job(2, 50, 3); /* 5 ms of work with a deadline after 3 ms */
     Sys_Sleep(100);
     CHECK(missed[2] >= 1);
     CHECK(deliveries >= 1);
@@ -82,7 +82,7 @@ TEST(a_late_job_starves_no_thread, "openswarm.h: sys_earliest_deadline; once it 
     CHECK(Sys_Start_ProcessWith(&endless) != 0);
     start_job(0, 5, 5);
     for (uint32 end = 4000; Sys_Get_SystemTime() < end;) {
-        Sys_Sleep(500); /* a thread without a period: it comes to its turns */
+        Sys_Sleep(500); /* a thread without a period: it must still be scheduled */
     }
     CHECK(met[0] >= 790);
     CHECK_EQ(missed[0], 0);
@@ -128,7 +128,7 @@ TEST(a_signal_preempts_threads_that_never_call_the_kernel, "port/posix/README.md
     Sys_Init_Kernel();
     CHECK(Sys_Start_ProcessWith(&a) != 0 && Sys_Start_ProcessWith(&b) != 0);
     Sys_Start_Kernel();
-    while (spins[0] == 0 || spins[1] == 0) { /* PID 0 spins as well; the alarm of main.c ends a failure */
+    while (spins[0] == 0 || spins[1] == 0) { /* PID 0 spins as well; if the test fails, the alarm of main.c ends it */
     }
     unsigned long before = spins[1];
     while (spins[1] == before) {
@@ -171,7 +171,7 @@ TEST(a_preempted_thread_keeps_the_rest_of_its_slice, "hal_cpu.h: hal_slice_resta
     uint16 b = start_with(tick_for_ever, "b", 1);
     CHECK(waiter != 0 && a != 0 && b != 0);
     Sys_Sleep(6);
-    CHECK(strcmp(trace, "a.a.a.a.a.a") == 0); /* then PID 0 is the better one */
+    CHECK(strcmp(trace, "a.a.a.a.a.a") == 0); /* afterwards PID 0 has the higher priority */
     CHECK_EQ(process_find(a)->event_or_slice.spent, 6);
     CHECK_EQ(process_find(b)->event_or_slice.spent, 0);
 }
@@ -203,7 +203,7 @@ static void end_slice_of_preempted(void *c)
         note(*(const char *)c);
         Sys_Start_CriticalSection();
         host_tick();
-        host_slice(); /* in the same section: forced, and over */
+        host_slice(); /* the slice ends in the same section: the switch is forced, and the slice is used up */
         Sys_End_CriticalSection();
     }
 }

@@ -1,4 +1,4 @@
-/* Helpers shared by the tests on every target. */
+/* Helper functions that the host tests and the on-target tests share. */
 #include "test.h"
 
 char trace[64];

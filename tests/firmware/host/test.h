@@ -1,7 +1,7 @@
-/* A kernel test: one function, run as PID 0 of a fresh kernel. On a host each has a process of its own and virtual
- * time:
- *     ./kernel_tests            list        ./kernel_tests NAME [SEED]   run one; exit status 0 = passed
- * target/bugs runs the tests of original_bugs.c on the emulated robot, each from reset. */
+/* A kernel test is one function that runs as PID 0 of a fresh kernel. On a host each test has its own
+ * process and virtual time: `./kernel_tests` lists the tests, `./kernel_tests NAME [SEED]` runs one and
+ * exits with 0 if it passes. target/bugs runs the tests of original_bugs.c on the emulated robot, each after
+ * a reset. */
 #ifndef TEST_H
 #define TEST_H
 
@@ -17,14 +17,14 @@
 #include <string.h>
 
 #ifdef __dsPIC30F__
-#define MANY_TICKS 3000L /* an emulated robot is slower */
+#define MANY_TICKS 3000L /* fewer: emulation is slower than a host */
 #define TEST(identifier, statement) static void __attribute__((unused)) identifier(void)
 #define CHECK(condition) ((condition) ? (void)0 : Sys_Assertion_Failed(#condition, __LINE__))
 #define CHECK_EQ(got, wanted) CHECK((long)(got) == (long)(wanted))
 #else
 #include <unistd.h>
 
-#define MANY_TICKS 70000L /* more than 16 bits */
+#define MANY_TICKS 70000L /* more than 16 bits hold */
 
 typedef struct test {
     const char *name, *says;
@@ -33,9 +33,9 @@ typedef struct test {
 } test;
 
 void test_add(test *t);
-extern uint32 test_seed; /* seed of randomised tests */
+extern uint32 test_seed; /* seed of the randomised tests */
 
-/* says: the requirement that the test checks, and its source. */
+/* Defines a test. statement: the requirement that it checks, and the source of the requirement. */
 #define TEST(identifier, statement)                                                  \
     static void identifier(void);                                                    \
     static test test_##identifier = {#identifier, statement, identifier, NULL};      \
@@ -66,15 +66,15 @@ extern uint32 test_seed; /* seed of randomised tests */
 
 enum { E1 = SYS_FIRST_USER_EVENT, E2, E3, E4, E_NEVER };
 
-void boot(void);                 /* virtual time, Sys_Init_Kernel, Sys_Start_Kernel */
-uint16 heap_now(void);           /* bytes in use */
-bool lists_are_well_formed(void); /* ring, blocked list, states */
+void boot(void);                 /* sets virtual time, initialises and starts the kernel */
+uint16 heap_now(void);           /* returns the heap bytes in use */
+bool lists_are_well_formed(void); /* checks ring, blocked list and thread states */
 
-extern int deliveries; /* to count_delivery */
+extern int deliveries; /* calls of count_delivery */
 bool count_delivery(uint16 pid, uint16 id, sys_event_data *data);
 void yield_for_ever(void); /* a thread */
 
-/* What happened, in order: a short text both threads and handlers append to. */
+/* Sequence of events of a test: threads and handlers append characters with note(). */
 extern char trace[];
 void note(char c);
 

@@ -1,4 +1,4 @@
-/* Threads: PIDs, configurations, sleeping, the end (kernel.md §2 and §3, openswarm.h). */
+/* Threads: PIDs, configurations, sleeping, and the end of a thread (kernel.md §2 and §3, openswarm.h). */
 #include "test.h"
 
 static uint16 ended[3];

@@ -1,4 +1,4 @@
-"""Neighbour messages on the emulated robot: beside the camera, and between robots that talk (io/infrared/README.md)."""
+"""Neighbour messages on the emulated robot: next to the camera, and between two robots (io/infrared/README.md)."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from tests.firmware.conftest import TARGET_APPS, Build
 from tests.firmware.drivers.test_drivers_on_target import captured, noise, robot, window
 
 SENT, RECEIVED = 0, 1
-"""Places in sys_infrared_statistics."""
+"""Field indices in sys_infrared_statistics."""
 
 
 def statistics(machine: Machine) -> tuple[int, ...]:
@@ -25,7 +25,10 @@ def statistics(machine: Machine) -> tuple[int, ...]:
 
 
 def test_the_camera_loses_no_pixel_while_frames_are_sent(image: Build) -> None:
-    """kernel.md §4; openswarm_infrared.h: the link is at IPL 4, below the capture."""
+    """The camera captures every pixel while infra-red frames are sent.
+
+    The link runs at IPL 4, below the capture (kernel.md §4, openswarm_infrared.h).
+    """
     machine = robot(image("infrared", TARGET_APPS), selector=15)
     machine.board.camera.show(noise())
     machine.run(cycles=FCY // 2)
@@ -36,7 +39,7 @@ def test_the_camera_loses_no_pixel_while_frames_are_sent(image: Build) -> None:
 
 
 def test_a_number_in_the_data_eeprom_is_the_robots(image: Build) -> None:
-    """openswarm_infrared.h: the last word, if it holds 1 to 2047."""
+    """The robot number is the last word of the data EEPROM if that is 1 to 2047 (openswarm_infrared.h)."""
     machine = robot(image("infrared", TARGET_APPS))
     machine.program.put(0x7FFFFE, 42)
     machine.run(cycles=FCY // 50)
@@ -44,7 +47,10 @@ def test_a_number_in_the_data_eeprom_is_the_robots(image: Build) -> None:
 
 
 def test_what_touches_is_near(image: Build) -> None:
-    """Proximity is measured meanwhile, in mm; receivers settle late after a strong reflection."""
+    """Proximity measurement in mm continues beside the link and reports a touching object as near.
+
+    The receivers settle late after a strong reflection.
+    """
     machine = robot(image("infrared", TARGET_APPS))
     at = machine.address_of("millimetres")
     for counts, millimetres in ((300, 39), (1744, 15), (3700, 3)):
@@ -55,7 +61,11 @@ def test_what_touches_is_near(image: Build) -> None:
 
 
 def test_an_event_of_one_robot_is_sent_on_another(image: Build) -> None:
-    """openswarm_remote.h: the selector of one robot lights the body LED of the other too, over the arena's channel."""
+    """Turning one robot's selector lights the body LED of the other too: the event is shared over the infra-red
+    channel.
+
+    Source: openswarm_remote.h.
+    """
     values = {"robots__count": 2, "objects__count": 0, "infrared__noise_counts": 2.0}
     scene = load_scene("clustering").with_values(**values)
     channel = OpticalChannel(2, scene.clock.quantum_tcy)
@@ -71,4 +81,4 @@ def test_an_event_of_one_robot_is_sent_on_another(image: Build) -> None:
         for controller in controllers:
             controller.control_step(tick, poses)
     assert all("body" in controller.machine.board.leds.lit for controller in controllers)
-    assert [statistics(controller.machine)[RECEIVED] for controller in controllers] == [1, 2]  # the first beacons
+    assert [statistics(controller.machine)[RECEIVED] for controller in controllers] == [1, 2]  # with first beacons

@@ -1,4 +1,4 @@
-"""The named bugs of the original on the emulated robot: host/original_bugs.c, one test per reset."""
+"""The named bugs of the original system on the emulated robot: tests of host/original_bugs.c, each after a reset."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from tests.firmware.drivers.test_drivers_on_target import START, robot
 from tests.firmware.kernel.test_kernel_on_target import FCY, load, place, run_to
 
 HOST = Path(__file__).parents[1] / "host"
-# Needs the host's unlock hook, or its UART sink: test_interrupts_at_every_instruction and the processors test do these.
+# These need the host's unlock hook or UART sink; test_every_instruction.py and the processor tests cover them.
 HOST_ONLY = {"bug_13_events_from_threads_and_interrupts_mix_at_every_point", "bug_24b_each_uart_sends_its_own_bytes"}
 TESTS = [
     name for name in re.findall(r"^TEST\((\w+),", (HOST / "original_bugs.c").read_text(), re.M) if name not in HOST_ONLY
@@ -21,7 +21,8 @@ TESTS = [
 
 @pytest.mark.parametrize("name", TESTS)
 def test_the_kernel_on_the_robot(image: Build, name: str) -> None:
-    """openswarm-original.md §7: on posix and on emu."""
+    """Each test of host/original_bugs.c that can run on the chip passes on the emulated robot (openswarm-original.md
+    §7)."""
     defines = f"DEFINES=-DTESTS={','.join(TESTS)} -DSYS_DEFAULT_STACK=192"
     machine = load(image("bugs", TARGET_APPS, defines))
     said = bytearray()
@@ -34,9 +35,12 @@ def test_the_kernel_on_the_robot(image: Build, name: str) -> None:
 
 @pytest.mark.parametrize("level", ["-O0", "-O1", "-O2"])
 def test_bug_22_the_kernel_works_at_every_optimisation_level(image: Build, level: str) -> None:
-    """openswarm-original.md §7, 22: only -O0 worked. Every kernel call, beside a thread that checks its registers."""
+    """Bug 22, only -O0 worked: every kernel call works at each optimisation level (openswarm-original.md §7).
+
+    A second thread checks its registers meanwhile.
+    """
     machine = load(image("calls", TARGET_APPS, f"OPTIMISE={level}", "DEFINES=-DSYS_DEFAULT_STACK=256"))
-    for _ in range(18):  # scenes: two rounds
+    for _ in range(18):  # each scene is run twice
         run_to(machine, "scene_end")
         machine.step()
     assert machine.peek("failures") == 0
@@ -46,7 +50,7 @@ def test_bug_22_the_kernel_works_at_every_optimisation_level(image: Build, level
 
 
 def test_bug_16_images_are_not_classified_in_an_interrupt(image: Build) -> None:
-    """openswarm-original.md §7, 16: classification stopped stepping, clock and scheduling for milliseconds."""
+    """Bug 16: image classification no longer blocks stepping, clock and scheduling (openswarm-original.md §7)."""
     machine = robot(image("clustering"), engine="auto", selector=START)
     stop = machine.run(cycles=FCY, until=place(machine, "on_frame"))
     assert stop.reason == "until"

@@ -1,4 +1,4 @@
-"""What the headers promise in cycles, and what the port says about masking, against `toolchain bounds` of an image."""
+"""Cycle counts in the headers and masked times of the port, compared with `toolchain bounds` of an image."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ LOAD = {"n": 4, "m": 4, "b": 1, "s": 1, "q": 1, "i": 0, "u": 100, "d": 2, "k": 2
 SHORT = ("swap_reserve", "refuse_message", "first_waiter")
 """Functions that are not called if memory suffices and the event is registered and has a subscriber."""
 SWITCH = ("os_schedule", "save_dsp", "resume_dsp")
-"""Not called while nothing is pending, between threads without SYS_DSP."""
+"""Functions that are not called if no message is pending and neither thread has SYS_DSP."""
 PROMISES = {
     "Sys_Yield": (SWITCH, "54 to a yielded thread, 66 to a preempted one", 66, 1.0),
     "Sys_Start_CriticalSection": ((), "16", 16, 1.0),
@@ -36,21 +36,22 @@ PROMISES = {
     "Sys_Get_LastError": ((), "18", 18, 1.0),
     "Sys_Send_IntEvent": (SHORT, "104, or 133 + 10 b", 133 + 10 * LOAD["b"], 1.15),
 }
-"""Calls -> excluded functions, text of the contract line, its cycles under LOAD, and the permitted excess of the bound.
+"""For each call: excluded functions, contract text, its cycles under LOAD, permitted excess of the bound.
 
-Behind a promise that was measured lie ways the bound cannot rule out: for a send, a payload among the constants and a
-scheduler that preempts."""
+Measured contracts may lie below the bound, because the bound cannot exclude some paths: for a send, a constant
+payload and a scheduler that preempts.
+"""
 LINK = ("Sys_Send_Neighbours", "Sys_Get_Neighbours", "Sys_Get_RobotNumber", "Sys_Set_RobotNumber",
         "Sys_Set_InfraredThreshold", "Sys_Estimate_Range")  # fmt: skip
-"""Calls of openswarm_infrared.h; those that start something are made once."""
+"""Calls of openswarm_infrared.h that are bounded; those that start the link run once and are omitted."""
 RETURN_ADDRESS = 4
 CLOSE = ("Sys_Kill_Process", "end_thread", "Sys_Register_Event", "Sys_Unregister_Event", "Sys_Subscribe_to_Event",
          "Sys_Unsubscribe_Handler", "Sys_Send_Event", "Sys_Send_IntEvent", "Sys_Start_ProcessWith",
          "Sys_Get_ProcessState", "Sys_Start_CriticalSection", "Sys_End_CriticalSection")  # fmt: skip
-"""Calls whose worst case the image `crowded` builds: bounds are within 1.3 x of it."""
+"""Calls whose worst case the image `crowded` creates: their bounds are at most 1.3 times the measured cycles."""
 SCENES = 4
 DEVICES_MASKED = 56
-"""Longest time levels 4 and 5 are held back: with the frame of a SYS_DSP thread (port/dspic30f/README.md)."""
+"""Maximum Tcy for which levels 4 and 5 are masked, with the frame of a SYS_DSP thread (port/dspic30f/README.md)."""
 
 
 @pytest.fixture(scope="module")
@@ -62,7 +63,7 @@ def calls(image: Build) -> tuple[str, object]:
 
 @pytest.mark.parametrize("call", PROMISES)
 def test_a_call_takes_no_longer_than_its_contract(calls, call: str) -> None:
-    """The contract covers the bound, and is at most 1.6 times the bound."""
+    """The contract of each call covers its bound, and is at most 1.6 times the bound."""
     left_out, text, cycles, slack = PROMISES[call]
     header = (HEADERS / "openswarm.h").read_text()
     lines = header[: re.search(rf"\b{call}\(", header).start()]
@@ -77,7 +78,10 @@ def test_a_call_takes_no_longer_than_its_contract(calls, call: str) -> None:
 
 @pytest.mark.parametrize("call", LINK)
 def test_a_call_of_the_link_takes_no_longer_than_its_contract(image: Build, call: str) -> None:
-    """Of most by its bound; of a send, whose copy the bound cannot tell from a longer one, on the emulator."""
+    """A call of the infra-red link takes no longer than its contract.
+
+    Most are checked by their bounds. Sends are measured on the emulator, because the bound assumes the longest copy.
+    """
     path = image("infrared-calls", TARGET_APPS, "OPTIMISE=-Os -fno-lto")
     executable = read_executable(path.read_bytes(), str(path))
     program = Program(executable, Annotations(), read_annotation_section(executable, LOAD))
@@ -98,7 +102,8 @@ def test_a_call_of_the_link_takes_no_longer_than_its_contract(image: Build, call
 
 
 def test_everything_in_an_image_of_ours_is_bounded(image: Build, capsys: pytest.CaptureFixture[str]) -> None:
-    """Threads, context switch, interrupts, traps, stacks, responses; the kernel stack keeps within its limit of 204."""
+    """Every thread, context switch, interrupt, trap and stack of an image has a bound; the kernel stack stays below
+    204 bytes."""
     path = str(image("hello"))
     lets = [word for name, value in LOAD.items() for word in ("--let", f"{name}={value}")]
     gates = ["--limit", "Sys_Send_IntEvent=868", "--limit", "_T1Interrupt=2187", "--limit", "_T3Interrupt=49"]
@@ -116,12 +121,13 @@ def test_everything_in_an_image_of_ours_is_bounded(image: Build, capsys: pytest.
 
 @pytest.fixture(scope="module")
 def crowded(image: Build) -> Path:
-    """Return the image that builds the worst shapes of the kernel's structures."""
+    """Return the image that puts the kernel's data structures into their worst shapes."""
     return image("crowded", TARGET_APPS)
 
 
 def test_a_longer_memory_has_longer_paths(crowded: Path) -> None:
-    """Bound of the heap's tree without a given depth: 11 nodes in more than 4 kB."""
+    """The bound of heap_free grows with the tree depth; without a given depth it assumes 11 nodes, enough for over 4
+    kB."""
     executable = read_executable(crowded.read_bytes(), str(crowded))
     cycles = []
     for holes in ({"h": 10}, {"h": 11}, {}):
@@ -131,7 +137,10 @@ def test_a_longer_memory_has_longer_paths(crowded: Path) -> None:
 
 
 def test_bounds_are_close_where_structures_are_at_their_worst(crowded: Path) -> None:
-    """No run exceeds its bound, in one round of the scenes, whose effects are checked."""
+    """No measured call exceeds its bound when the kernel's structures have their worst shapes.
+
+    One round of the scenes is run, and their effects are checked.
+    """
     _, seconds, values = IMAGES["crowded"]
     rows = {row.call: row for row in rows_of("crowded", crowded, values, seconds / 2)}
     assert all(row.seen <= row.bound for row in rows.values() if row.bound is not None)

@@ -1,4 +1,5 @@
-"""A fault in an OpenSwarm thread is reported with its source line and thread, not where the kernel stops."""
+"""A fault in an OpenSwarm thread is reported with the source line and the thread that caused it, not with a kernel
+line."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Preemption at every instruction of every kernel call, and every allocation failing: samples of the whole campaign."""
+"""Preemption at every instruction of every kernel call, and failing allocations: samples of the whole campaign."""
 
 from __future__ import annotations
 
@@ -18,12 +18,13 @@ STRIDE = 211
 @pytest.mark.parametrize("ipl_slip", [0, 1])
 @pytest.mark.parametrize("way", WAYS)
 def test_interrupts_at_every_instruction_change_nothing(image: Build, way: str, ipl_slip: int) -> None:
-    """Inject tick, UART, a 100 us device that makes every call, stepper and an IPL 6 interrupt into every kernel call.
+    """Interrupts injected into every kernel call lose no register, message or memory.
 
-    Samples every 211th boundary from an offset that the commit determines; tests/fuzz/kernel/fuzz_kernel.py tries all.
-    kernel.md §4 `--ipl-slip`; bugs 7, 12, 13 of openswarm-original.md §7.
+    The interrupts are the tick, UART, stepper, an IPL 6 interrupt and a 100 us device that makes every call. The
+    test samples every 211th boundary, from an offset that the commit determines; tests/fuzz/kernel/fuzz_kernel.py
+    runs all. Sources: kernel.md §4 `--ipl-slip`; bugs 7, 12, 13 of openswarm-original.md §7.
     """
-    phase = (base_seed() + 53 * (2 * WAYS.index(way) + ipl_slip)) % STRIDE  # a failure names its boundary
+    phase = (base_seed() + 53 * (2 * WAYS.index(way) + ipl_slip)) % STRIDE  # a failure message names its boundary
     *_, (scenes, seen) = sweep(image("calls", TARGET_APPS), ipl_slip, way, STRIDE, phase)
     assert scenes == 9
     assert seen.boundaries > 60
@@ -33,7 +34,7 @@ def test_interrupts_at_every_instruction_change_nothing(image: Build, way: str, 
 
 
 def test_the_interrupt_makes_every_call_of_the_headers() -> None:
-    """target/calls/isr_calls.c against the contract lines: a call that is added to a header must be added there."""
+    """target/calls/isr_calls.c makes every call of the headers: a call added to a header must be added there."""
     source = (TARGET_APPS / "calls" / "isr_calls.c").read_text()
     legal, refused = source.split("/* ---- Must be refused")
     assert set(re.findall(r"\bSys_\w+(?=\()", legal)) == legal_in_interrupts()
@@ -41,14 +42,14 @@ def test_the_interrupt_makes_every_call_of_the_headers() -> None:
 
 
 def test_every_allocation_may_fail(image: Build) -> None:
-    """In every scene the k-th allocation finds no memory, for every k. Calls fail, no more."""
+    """If the k-th allocation of a scene fails, for any k, the affected call fails and nothing else changes."""
     *_, (scenes, failures) = fail_every_allocation(image("calls", TARGET_APPS))
     assert scenes == 9
     assert failures >= 25
 
 
 def test_a_register_lost_in_a_switch_is_seen(image: Build) -> None:
-    """The sweep can fail: with W10 and W11 saved twice instead of W12 and W13 it does."""
+    """The sweep detects a lost register: it fails if the switch saves W10 and W11 twice instead of W12 and W13."""
     path = image("calls", TARGET_APPS)
     save = place(load(path), "_T2Interrupt") + 14  # PUSH.D W12
     with pytest.raises(AssertionError, match="register"):

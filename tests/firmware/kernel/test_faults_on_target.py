@@ -1,4 +1,4 @@
-"""External faults on a running robot: no call hangs, and the report names the fault."""
+"""External faults on a running robot: no call hangs, and the report names the faulty device."""
 
 from __future__ import annotations
 
@@ -31,12 +31,12 @@ def listen(machine: Machine) -> bytearray:
 
 
 def finished(machine: Machine, heard: bytearray, seconds: float = 4.0) -> bytes:
-    """Return the self-test's report; fail if it does not end."""
+    """Return the self-test's report; the test fails if the report does not end."""
     end = machine.cycle + round(seconds * FCY)
     while b"end\r\n" not in heard:
         assert machine.cycle < end, bytes(heard)
         assert machine.run(cycles=FCY // 20).reason == "limit"
-    machine.run(cycles=FCY // 20)  # from now on its thread waits for questions
+    machine.run(cycles=FCY // 20)  # the self-test's thread now waits for questions
     return bytes(heard)
 
 
@@ -45,8 +45,10 @@ def finished(machine: Machine, heard: bytearray, seconds: float = 4.0) -> bytes:
 
 @pytest.mark.parametrize("microseconds", [10, 200, 700, 1500, 3000, 6000, 8000])
 def test_a_camera_pulled_out_while_it_is_programmed_costs_only_the_camera(image: Build, microseconds: int) -> None:
-    """Epuck.md §7.1: no slave acknowledges. Programming takes some 8 ms after start-up; later it is a camera without
-    frames."""
+    """Unplugging the camera while it is programmed (no slave acknowledges) costs only the camera (epuck.md §7.1).
+
+    Programming takes about 8 ms after start-up. A camera unplugged later is one that sends no frames.
+    """
     machine = robot(image("selftest"))
     heard = listen(machine)
     machine.board.stimulus.play(parse(machine.board, f"{microseconds}us camera unplug"))
@@ -58,7 +60,7 @@ def test_a_camera_pulled_out_while_it_is_programmed_costs_only_the_camera(image:
 
 @pytest.mark.parametrize("line", range(0, 40, 7))
 def test_a_camera_pulled_out_in_the_middle_of_a_frame_stops_only_its_frames(image: Build, line: int) -> None:
-    """HREF stops: the capture waits, everything else continues, and the wheels keep the last speed."""
+    """If HREF stops within a frame, the capture waits, everything else continues, and the wheels keep their speed."""
     machine = robot(image("clustering"), selector=START)
     camera = machine.board.camera
     camera.show(plain(SCENES["object"]))
@@ -80,8 +82,11 @@ def test_a_camera_pulled_out_in_the_middle_of_a_frame_stops_only_its_frames(imag
 
 
 def test_a_camera_that_loses_contact_for_a_moment_spoils_one_frame(image: Build) -> None:
-    """Lines missing in the middle of a frame: the capture takes the rest from the next frame, one frame is a mixture,
-    and those behind it are right."""
+    """Missing lines spoil one frame only.
+
+    The capture takes the missing lines from the next frame, so that one frame is a mixture; the following frames are
+    correct.
+    """
     machine = robot(image("clustering"), selector=START)
     camera = machine.board.camera
     camera.show(noise())
@@ -97,7 +102,7 @@ def test_a_camera_that_loses_contact_for_a_moment_spoils_one_frame(image: Build)
 
 @pytest.mark.parametrize(("volts", "word"), [(3.39, b"battery low"), (3.4, b"battery ok")])
 def test_a_low_battery_is_reported(image: Build, volts: float, word: bytes) -> None:
-    """epuck.md §2: RF1 is 0 below 3.4 V."""
+    """A battery below 3.4 V, which clears RF1, is reported (epuck.md §2)."""
     machine = robot(image("selftest"))
     heard = listen(machine)
     machine.board.battery.volts = volts
@@ -118,7 +123,10 @@ def counted(machine: Machine, heard: bytearray) -> tuple[int, int, int]:
 
 
 def test_framing_errors_and_breaks_are_counted_and_the_next_line_is_right(image: Build) -> None:
-    """dspic30f6014a.md §10.2: FERR comes with its character; a break is a 0 with FERR."""
+    """Framing errors and breaks are counted, and the next line is received correctly (dspic30f6014a.md §10.2).
+
+    FERR is set with its character; a break is the character 0 with FERR.
+    """
     machine = robot(image("selftest"))
     heard = listen(machine)
     finished(machine, heard)
@@ -134,12 +142,15 @@ def test_framing_errors_and_breaks_are_counted_and_the_next_line_is_right(image:
 
 
 def test_an_overrun_is_counted_and_reception_goes_on(image: Build) -> None:
-    """dspic30f6014a.md §10.2: OERR with the fifth character behind a full FIFO; clearing it empties the FIFO."""
+    """An overrun is counted and reception continues (dspic30f6014a.md §10.2).
+
+    The fifth character in a full FIFO of four sets OERR; clearing OERR empties the FIFO.
+    """
     machine = robot(image("selftest"))
     heard = listen(machine)
     finished(machine, heard)
     enabled = machine.peek("IEC0")
-    machine.write("IEC0", enabled & ~(1 << 9))  # no code reads the characters
+    machine.write("IEC0", enabled & ~(1 << 9))  # disables the receive interrupt: the characters stay in the FIFO
     machine.board.bluetooth.feed(b"D,1000,1000\r")
     machine.run(cycles=FCY // 50)
     assert machine.peek("U1STA") & 1 << 1
@@ -154,7 +165,10 @@ def test_an_overrun_is_counted_and_reception_goes_on(image: Build) -> None:
 
 
 def test_every_device_failing_at_once_ends_in_a_report(image: Build) -> None:
-    """No camera, a bus held low, empty battery, endless breaks on the radio."""
+    """With all devices failing the self-test still ends with a report.
+
+    The faults are a missing camera, a bus held low, an empty battery and endless breaks on the radio.
+    """
     machine = robot(image("selftest"), camera=None)
     heard = listen(machine)
     machine.peripherals.i2c.wire.hold(sda=True, scl=True)

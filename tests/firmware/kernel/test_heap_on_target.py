@@ -1,4 +1,4 @@
-"""Worst-case cost of allocation: random histories of the heap on the emulated robot, timed by the robot."""
+"""Worst-case cycles of allocation: random histories of the heap on the emulated robot, timed by the robot's timer."""
 
 from __future__ import annotations
 
@@ -12,20 +12,23 @@ from tests.firmware.kernel.test_kernel_on_target import place
 
 HEADER = (FIRMWARE / "openswarm" / "include" / "openswarm.h").read_text()
 RANGES = ("send", "start", "send_refused", "start_refused", "kill")
-"""Fields of the application's result, after its two counts of calls."""
+"""Measured calls in the application's result, in the order of its fields; they follow two counts of calls."""
 TIMER = 6
-"""Tcy of a measured call that belong to the call itself and to reading the timer."""
+"""Tcy that a measurement adds to a call: the call itself and reading the timer."""
 LENGTHS = (1, 3, 5, 8)
-"""Bursts of up to 1, 4, 16 and 128 messages: many threads come and go, or many messages."""
+"""Values of `bursts`: they allow bursts of up to 1, 4, 16 and 128 messages.
+
+Short bursts let many threads start and end, long ones create many messages.
+"""
 PATIENCE = 20_000_000_000
 
 
 PROMISE = re.compile(r"no \| (?:\d+, or )?(\d+) \+.*?at most (\d+) more while memory is short", re.DOTALL)
-"""Of a contract line: what a call takes, `A + ...` or `Z, or A + ...`, and what a full heap may add."""
+"""Pattern of a contract line: cycles of a call, `A + ...` or `Z, or A + ...`, and the addition for a full heap."""
 
 
 def bound(call: str) -> int:
-    """Return the header's maximum Tcy of a call without its parameters."""
+    """Return the header's maximum Tcy of a call with parameters 0."""
     start = HEADER.index(f" {call}(")
     base, more = PROMISE.search(HEADER[HEADER.rindex("/* MTH", 0, start) : start]).groups()
     return int(base) + int(more)
@@ -42,10 +45,10 @@ class Histories:
         self._start = self.machine.snapshot()
         self.sends = self.starts = 0
         self.worst = dict.fromkeys(RANGES, 0)
-        """Return the Tcy of the calls alone."""
+        """Maximum Tcy of each call, without the measurement."""
 
     def run(self, seed: int, steps: int) -> None:
-        """Run one history. Raises AssertionError if a call exceeds the header's bound."""
+        """Run one history. A call that exceeds the header's bound raises AssertionError."""
         machine = self.machine
         machine.restore(self._start)
         machine.poke(machine.address_of("seed"), seed % 0xFFFF + 1)
@@ -73,8 +76,10 @@ class Histories:
 
 
 def test_allocation_is_bounded_in_every_history(image: Build) -> None:
-    """The header's bounds of Sys_Send_Event and Sys_Start_Process; once 6,986 and 699,627 Tcy were seen.
-    tests/fuzz/kernel/fuzz_heap.py: a million calls."""
+    """Sys_Send_Event and Sys_Start_Process stay within the headers' bounds in every history.
+
+    tests/fuzz/kernel/fuzz_heap.py runs a million calls.
+    """
     histories = Histories(image("heap", TARGET_APPS))
     for seed in range(8):
         histories.run(seed, 3_000)

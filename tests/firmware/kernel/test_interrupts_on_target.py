@@ -1,4 +1,4 @@
-"""Application interrupts in C (openswarm_interrupt.h): function, and enforcement of the rules."""
+"""Application interrupts in C (openswarm_interrupt.h): they work, and violated rules break the build."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ ENABLE = "Sys_Enable_Interrupt(INT1); Sys_Enable_Interrupt(INT2);"
 
 
 def source(tmp_path: Path, text: str, enable: str = ENABLE, devices: str = "") -> Path:
-    """Return a folder with the application "own"."""
+    """Return a folder with the application "own", which defines interrupts in C."""
     app = tmp_path / "own"
     app.mkdir()
     (app / "main.c").write_text(HEAD.replace("ENABLE", enable) + text)
@@ -40,7 +40,10 @@ def source(tmp_path: Path, text: str, enable: str = ENABLE, devices: str = "") -
 
 
 def test_functions_in_c_run_at_their_levels_on_the_kernel_stack(image: Build, tmp_path: Path) -> None:
-    """INT2 at level 6 raises INT1 at level 4, which sends an event, at every one of 100 moments."""
+    """Interrupt functions in C run at their levels on the kernel stack.
+
+    INT2 at level 6 raises INT1 at level 4, which sends an event, at each of 100 instants.
+    """
     machine = load(
         image(
             "own",
@@ -107,7 +110,7 @@ REFUSED = {
 
 @pytest.mark.parametrize("rule", REFUSED)
 def test_a_broken_rule_breaks_the_build(image: Build, tmp_path: Path, rule: str) -> None:
-    """The compiler, the linker or firmware/tools/interrupts.py reports each violation."""
+    """Each violated rule of openswarm_interrupt.h fails the build in the compiler, the linker or interrupts.py."""
     text, devices, message = REFUSED[rule]
     start = "extern bool Sys_Start_Camera(void); Sys_Start_Camera();" if "camera" in devices else ""
     with pytest.raises(AssertionError, match=message):

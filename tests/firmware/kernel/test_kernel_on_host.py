@@ -1,4 +1,4 @@
-"""The portable kernel on the POSIX port, under address and undefined-behaviour sanitizers: every TEST of host/*.c."""
+"""The portable kernel on the POSIX port with address and undefined-behaviour sanitizers: every TEST of host/*.c."""
 
 from __future__ import annotations
 
@@ -15,6 +15,6 @@ TESTS = [name for file in sorted(HOST.glob("*.c")) for name in re.findall(r"^TES
 
 @pytest.mark.parametrize("name", TESTS)
 def test_the_kernel_on_posix(host_program: Path, name: str) -> None:
-    """Run one TEST; its text names the requirement (kernel.md §2, openswarm-original.md §7, the headers)."""
+    """Run one TEST of host/*.c in its own process. Its second argument names the requirement and its source."""
     done = subprocess.run([host_program, name], capture_output=True, text=True, timeout=HANG, check=False)
     assert done.returncode == 0, done.stderr

@@ -20,7 +20,7 @@ def load(path: Path, ipl_slip: int = 0) -> Machine:
 
 
 def place(machine: Machine, symbol: str) -> int:
-    """Return the program address of a C function or assembly label."""
+    """Return the program address of a C function or of an assembly label."""
     assert machine.image is not None
     found = machine.image.symbols.find("_" + symbol) or machine.image.symbols.find(symbol)
     assert found is not None, symbol
@@ -42,8 +42,9 @@ def words(machine: Machine, name: str, count: int) -> list[int]:
 
 @pytest.fixture(scope="module")
 def listing1(image: Build) -> tuple[bytes, list[int], list[int]]:
-    """Return UART1's output of 2.1 s, the cycles of the log thread's wake-ups, and of the first bit of each line."""
-    machine = emu.load(image("listing1"), engine=ENGINE, board="none")  # the camera's lines would delay a wake-up
+    """Run 2.1 s and return UART1's output, the wake-up cycles of the log thread and the first-bit cycle of each
+    line."""
+    machine = emu.load(image("listing1"), engine=ENGINE, board="none")  # camera interrupts would delay a wake-up
     said = bytearray()
     wakes: list[int] = []
     starts: list[int] = []
@@ -60,21 +61,22 @@ def listing1(image: Build) -> tuple[bytes, list[int], list[int]]:
 
 
 def test_listing1_logs_every_250_ms(listing1: tuple[bytes, list[int], list[int]]) -> None:
-    """The log has the format of the paper's Listing 1, time:(left,right)."""
+    """The log lines have the format of the paper's Listing 1, time:(left,right)."""
     said, _, _ = listing1
     assert said.decode() == "".join(f"{250 * i + 50}:(0,0)\r\n" for i in range(9))
 
 
 def test_wake_ups_are_exactly_3686400_cycles_apart(listing1: tuple[bytes, list[int], list[int]]) -> None:
-    """250 ms are 3,686,400 Tcy, and start bits differ by no more than the formatting does."""
+    """Wake-ups are exactly 250 ms = 3,686,400 Tcy apart; start bits vary only by the time of formatting."""
     _, wakes, starts = listing1
     assert [b - a for a, b in itertools.pairwise(wakes)] == [3_686_400] * (len(wakes) - 1)
-    bit = 128  # Tcy at 115,200 baud: a byte leaves at the next edge of the free-running baud clock
+    bit = 128  # Tcy at 115,200 baud: transmission starts at the next edge of the free-running baud clock
     assert all(abs(b - a - 3_686_400) <= 1000 + bit for a, b in itertools.pairwise(starts))
 
 
 def test_the_clock_does_not_drift(image: Build) -> None:
-    """kernel.md §3: every five 1 ms events are exactly 73,728 Tcy, so 3,600,000 are 53,084,160,000."""
+    """The clock does not drift: five 1 ms events take exactly 73,728 Tcy, 3,600,000 take 53,084,160,000 (kernel.md
+    §3)."""
     machine = load(image("hello"))
     ticks: list[int] = []
     machine.hook_pc(place(machine, "_T1Interrupt"), lambda *_: ticks.append(machine.cycle))
@@ -90,8 +92,12 @@ def test_the_clock_does_not_drift(image: Build) -> None:
 
 
 def test_registers_survive_preemption_under_a_storm(image: Build) -> None:
-    """kernel.md §4: all W, flags, RCOUNT, TBLPAG; with SYS_DSP accumulators, CORCON and nested DO loops. Bug 7 of
-    openswarm-original.md §7: saved registers were overwritten by an interrupt; bug 23: half-saved accumulators."""
+    """Registers survive preemption during an interrupt storm (kernel.md §4).
+
+    Checked are all W registers, flags, RCOUNT and TBLPAG; with SYS_DSP also accumulators, CORCON and nested DO
+    loops. Bugs 7 (an interrupt overwrote saved registers) and 23 (accumulators saved in part) of
+    openswarm-original.md §7.
+    """
     machine = load(image("registers", TARGET_APPS))
     machine.run(cycles=200_000)
     machine.write("PR2", 60)  # slices of 488 Tcy instead of 147,456
@@ -117,7 +123,7 @@ KINDS = ["push", "call chain", "large frame", "variadic call", "kernel call with
 
 @pytest.mark.parametrize("kind", range(len(KINDS)), ids=KINDS)
 def test_a_stack_overflow_ends_only_the_offender(image: Build, kind: int) -> None:
-    """kernel.md §4; bug 21 of openswarm-original.md §7."""
+    """A stack overflow ends only the thread that causes it (kernel.md §4; bug 21 of openswarm-original.md §7)."""
     machine = load(image("overflow", TARGET_APPS))
     run_to(machine, "begin")
     machine.poke("kind", kind)
@@ -135,7 +141,7 @@ def test_a_stack_overflow_ends_only_the_offender(image: Build, kind: int) -> Non
 
 
 def test_a_trap_stops_the_motors_and_reports(image: Build) -> None:
-    """Traps stop the motors, then report cause, PC and thread over UART1."""
+    """A trap stops the motors and then reports cause, PC and thread over UART1."""
     machine = load(image("overflow", TARGET_APPS))
     run_to(machine, "begin")
     machine.poke("kind", len(KINDS))
@@ -156,7 +162,7 @@ T2IF, T3IF, INT1IF = 1 << 6, 1 << 7, 1 << 0
 
 
 def thread_list(machine: Machine) -> list[int]:
-    """Return the PCBs on the ring and the blocked list; fail if either is malformed."""
+    """Return the PCBs on the ring and on the blocked list; assert that both lists are well-formed."""
     ring, seen = machine.peek("os_ring"), []
     at = ring
     while at and (not seen or at != ring):
@@ -173,7 +179,8 @@ def thread_list(machine: Machine) -> list[int]:
 
 
 def test_a_thread_keeps_64_of_its_128_bytes(image: Build) -> None:
-    """What interrupts and the kernel may take, found by painting under nested interrupts."""
+    """Interrupts and kernel leave a thread 64 of 128 stack bytes, measured with a fill pattern and nested
+    interrupts."""
     machine = load(image("points", TARGET_APPS))
     run_to(machine, "scenario_begin")
     begin = machine.cycle

@@ -1,4 +1,4 @@
-"""The kernel stack has its own limit: an overflow traps there, before it damages the heap."""
+"""The kernel stack has its own limit: an overflow causes a trap before it damages the heap."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from tests.firmware.conftest import TARGET_APPS, Build
 from tests.firmware.kernel.test_kernel_on_target import FCY, load, place, run_to
 
 KERNEL_STACK = 224
-"""Bytes (port/dspic30f/hal_limits.h); the heap follows."""
+"""Size of the kernel stack in bytes (port/dspic30f/hal_limits.h); the heap follows it."""
 FIRST = 0x41
-"""Value of `kind` for the first of KINDS (target/handlers)."""
+"""Value of the firmware's `kind` that selects the first of KINDS (target/handlers)."""
 KINDS = {
     "formats": ("snprintf", "vsnprintf", "format", "formats"),
     "recursion": ("chain",),
@@ -23,7 +23,7 @@ KINDS = {
     "interrupt": ("chain",),
     "scheduler": ("chain",),
 }
-"""Overflow cases and the functions that may be running then; for the first, any library function."""
+"""Overflow cases with the functions that may be running at the trap; the first case allows any library function."""
 
 
 def heap(machine: Machine) -> list[int]:
@@ -33,7 +33,7 @@ def heap(machine: Machine) -> list[int]:
 
 
 def culprit(machine: Machine, said: bytes) -> str:
-    """Return the function at the address in the report."""
+    """Return the name of the function at the address in the fault report."""
     assert machine.image is not None
     found = re.search(rb"stack trap at 0x([0-9a-f]+):([0-9a-f]+) in thread \d+\r\n", said)
     assert found, said
@@ -45,7 +45,8 @@ def culprit(machine: Machine, said: bytes) -> str:
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("ipl_slip", [0, 1])
 def test_an_overflow_of_the_kernel_stack_is_caught_at_the_culprit(image: Build, kind: str, ipl_slip: int) -> None:
-    """A handler with snprintf("%f") exceeds the kernel stack."""
+    """An overflow of the kernel stack, here by snprintf("%f") in a handler, is reported in the function that causes
+    it."""
     machine = load(image("handlers", TARGET_APPS), ipl_slip)
     run_to(machine, "begin")
     machine.poke("kind", FIRST + list(KINDS).index(kind))
@@ -66,7 +67,7 @@ def test_an_overflow_of_the_kernel_stack_is_caught_at_the_culprit(image: Build, 
 
 
 def test_half_a_kernel_stack_is_free_beside_an_ordinary_handler(image: Build) -> None:
-    """Without an overflow the same program runs: the limit leaves enough room."""
+    """The same program without an overflow runs: an ordinary handler leaves half of the kernel stack free."""
     machine = load(image("handlers", TARGET_APPS))
     run_to(machine, "begin")
     machine.poke("kind", 0)

@@ -16,14 +16,17 @@ STRIDE = 331
 def test_a_thread_killed_inside_a_driver_call_leaves_the_device_to_others(
     image: Build, scene: int, ipl_slip: int
 ) -> None:
-    """Buses work, messages are whole, memory is unchanged, and no interrupt writes into memory of an ended thread."""
+    """Killing a thread within a driver call leaves buses, messages and memory intact.
+
+    No interrupt writes into memory of the ended thread.
+    """
     *_, seen = sweep(image("kills", TARGET_APPS), ipl_slip, scene, STRIDE, 17 + 23 * ipl_slip)
     assert seen.boundaries >= len(PAUSES)
     assert seen.kills
 
 
 def test_a_write_into_a_dead_threads_memory_is_seen(image: Build) -> None:
-    """Verify that the campaign can fail: here the bus continues in the ended thread's block."""
+    """The campaign detects a bus transfer that continues in the ended thread's block."""
 
     def spoil(machine: Machine, block: int) -> None:
         job = machine.peek("transfer")
@@ -36,13 +39,13 @@ def test_a_write_into_a_dead_threads_memory_is_seen(image: Build) -> None:
     run_to_begin(stage.machine)
     memory = stage.victim()
     stage.after_kill = spoil
-    stage.machine.run(cycles=3_000)  # the bus has begun
+    stage.machine.run(cycles=3_000)  # the transfer has started
     with pytest.raises(AssertionError, match="memory of the dead thread was written"):
         stage.kill(*memory, 4)
 
 
 def test_the_bus_is_busy_while_its_thread_lives(image: Build) -> None:
-    """Only the end of its owner frees a bus, not a time-out: a living thread keeps it."""
+    """A bus is freed by the end of its owner only: a time-out does not take it from a living thread."""
     stage = Stage(image("kills", TARGET_APPS))
     machine = stage.machine
     while machine.peek("scene") != len(SCENES) - 1:

@@ -1,4 +1,4 @@
-"""Numbers in the headers of the kernel's options and in their README, against what `emu` and `toolchain` measure."""
+"""Cycles and bytes in the headers of the kernel's options and in their README, compared with `emu` and `toolchain`."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from toolchain.cli import main as toolchain
 INCLUDE = FIRMWARE / "openswarm" / "include"
 CONTRACT = re.compile(r"/\* [MTHI]+(?:, [\w ]+)? \| [^|]* \| (?P<cycles>[^|]*) \| (?P<stack>\d+)")
 CALL = 4
-"""Bytes of a return address: `toolchain stack` attributes them to the caller, the contract lines to the call."""
+"""Bytes of a return address: `toolchain stack` attributes them to the caller, contract lines to the called function."""
 
 
 @pytest.fixture(scope="module")
@@ -30,7 +30,7 @@ def cycles(path: Path, capsys: pytest.CaptureFixture[str]) -> dict[str, int]:
 
 
 def contract(option: str, call: str) -> tuple[list[int], int]:
-    """Return the numbers of the cycles field, and the stack bytes, of a contract line."""
+    """Return the numbers of the cycles field and the stack bytes of a contract line."""
     text = (INCLUDE / f"openswarm_{option}.h").read_text()
     declared = re.search(rf"^\w+ {call}\(", text, re.M)
     assert declared, f"{call} is not declared"
@@ -40,7 +40,7 @@ def contract(option: str, call: str) -> tuple[list[int], int]:
 
 
 def sentence(option: str, begin: str) -> list[int]:
-    """Return the numbers of the sentence that begins so."""
+    """Return the numbers in the sentence that begins with the given text."""
     text = re.sub(r"\s+\*?\s*", " ", (INCLUDE / f"openswarm_{option}.h").read_text())
     found = re.search(re.escape(begin) + r"([^.]*)\.", text)
     assert found, begin
@@ -105,7 +105,8 @@ def test_the_cycles_in_the_headers_are_the_measured_ones(cycles: dict[str, int])
 def test_the_stack_in_the_headers_is_the_worst_case(
     path: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Stack by `toolchain stack`, without the frame of a switch (openswarm.h)."""
+    """Stack bytes in the headers equal the worst case of `toolchain stack` without the frame of a switch
+    (openswarm.h)."""
     annotations = tmp_path / "stack"
     annotations.write_text("depth _hal_block 0\n")
     assert toolchain(["stack", str(path), "-a", str(annotations), "--functions", "--json"]) == 0

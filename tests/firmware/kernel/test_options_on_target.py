@@ -11,7 +11,7 @@ from tests.firmware.kernel.test_kernel_on_target import FCY, INT1IF, run_to
 from tests.fuzz.seeds import base_seed
 
 MUTEX, NO_MUTEX, LATEST, NO_LATEST, ENDS, INTERRUPTS = range(6)
-"""Scenes (target/options/main.c)."""
+"""Scene numbers of target/options/main.c."""
 
 
 def scene(image: Build, number: int, seconds: float) -> Machine:
@@ -23,9 +23,10 @@ def scene(image: Build, number: int, seconds: float) -> Machine:
 
 
 def test_a_ceiling_bounds_priority_inversion(image: Build) -> None:
-    """openswarm_mutex.h: a high thread waits for one section of 12 ms of a low one at most, whatever the middle does.
+    """With a mutex a high-priority thread waits at most for one 12 ms section of a low-priority thread.
 
-    By a flag instead of the mutex it waits for the 2,000 ms of the middle thread."""
+    With a flag instead of the mutex it waits for the 2,000 ms of the middle thread (openswarm_mutex.h).
+    """
     machine = scene(image, MUTEX, 0.1)
     assert machine.peek("done") == 1
     assert machine.peek("waited_ms") <= 12
@@ -35,7 +36,10 @@ def test_a_ceiling_bounds_priority_inversion(image: Build) -> None:
 
 
 def test_the_latest_value_keeps_a_slow_handler_within_its_bounds(image: Build) -> None:
-    """A handler of 1.5 ms for an event every ms, and a thread every 10 ms (openswarm_quota.h)."""
+    """A quota of the latest value bounds the queue of a slow handler (openswarm_quota.h).
+
+    The handler takes 1.5 ms for an event that is sent every ms; a thread runs every 10 ms.
+    """
     machine = scene(image, LATEST, 2)
     assert machine.peek("commands") >= 195
     assert machine.peek("ticks") >= 1000
@@ -47,7 +51,8 @@ def test_the_latest_value_keeps_a_slow_handler_within_its_bounds(image: Build) -
 
 
 def test_ends_are_seen_waited_for_and_cleaned_up(image: Build) -> None:
-    """Each scene passes its own checks (openswarm_join.h, openswarm_cleanup.h, openswarm_service.h)."""
+    """Join, cleanup and service scenes pass their own checks (openswarm_join.h, openswarm_cleanup.h,
+    openswarm_service.h)."""
     machine = scene(image, ENDS, 0.6)
     assert machine.peek("done") == 1
     assert machine.peek("zombies") == 1
@@ -57,7 +62,8 @@ def test_ends_are_seen_waited_for_and_cleaned_up(image: Build) -> None:
 
 
 def test_an_interrupt_may_call_no_option_and_breaks_none(image: Build) -> None:
-    """Every call of every option is refused, at random instants within locks, joins, burials and limited sends."""
+    """Option calls from an interrupt are refused at random instants within locks, joins, thread ends and limited
+    sends."""
     machine = emu.load(image("options", TARGET_APPS), engine="jit")
     run_to(machine, "begin")
     machine.poke("scene", INTERRUPTS)

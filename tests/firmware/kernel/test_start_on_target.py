@@ -18,8 +18,11 @@ MOMENTS = ["never", "before the threads", "before the start", "after the start"]
 @pytest.mark.parametrize("scheduler", range(len(SCHEDULERS)), ids=SCHEDULERS)
 @pytest.mark.parametrize("ipl_slip", [0, 1])
 def test_the_start_completes_under_every_scheduler(image: Build, scheduler: int, moment: int, ipl_slip: int) -> None:
-    """A slice end forced before the start must not be taken before both timers run: beside a thread that
-    never yields, no code would start them."""
+    """Sys_Start_Kernel completes under every scheduler.
+
+    A slice end that was forced before the start must not be served before both timers run: a thread that never
+    yields would prevent their start.
+    """
     machine = load(image("starts", TARGET_APPS), ipl_slip)
     run_to(machine, "begin")
     machine.poke("scheduler", scheduler)
@@ -67,7 +70,7 @@ int main(void)
 def test_calls_that_need_a_running_kernel_do_not_look_like_success(
     image: Build, tmp_path: Path, capfd: pytest.CaptureFixture[str], start: str, again: str, refused: str
 ) -> None:
-    """Blocking calls before Sys_Start_Kernel are refused; `emu run` reports such a program and exits with 1."""
+    """Blocking calls before Sys_Start_Kernel are refused; `emu run` reports the program and exits with status 1."""
     (tmp_path / "early").mkdir()
     (tmp_path / "early" / "main.c").write_text(NEVER_STARTED.replace("START", start).replace("AGAIN", again))
     path = image("early", tmp_path, f"DEFINES=-DCASE={len(start) + len(again)}")

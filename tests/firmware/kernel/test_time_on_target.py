@@ -17,9 +17,11 @@ SLICE = 147_456
 
 
 def test_a_thread_gets_its_whole_slice_under_a_storm(image: Build) -> None:
-    """kernel.md §3: ISR time counts, handler time does not, a handler that resends for ever
-    starves nobody; a storm of events and a full UART line both ways. The slice is 147,456 Tcy from dispatch to the next
-    T2 interrupt."""
+    """A thread gets its whole slice of 147,456 Tcy during an event storm and full UART traffic (kernel.md §3).
+
+    The slice is measured from dispatch to the next T2 interrupt. Interrupt time counts, handler time does not. A
+    handler that resends for ever starves no thread.
+    """
     machine = load(image("slices", TARGET_APPS))
     machine.uart[1].feed(b"0123456789abcdef" * 150)
     ends: list[int] = []
@@ -39,8 +41,10 @@ def test_a_thread_gets_its_whole_slice_under_a_storm(image: Build) -> None:
 
 
 def count_clock(path: Path, ticks: int) -> str:
-    """Run `ticks` clock events under the storm of target/slices; each must take exactly 14,745.6 Tcy. Returns
-    a summary with the worst jitter of the clock's interrupt in the first second."""
+    """Run `ticks` clock events under the storm of target/slices; assert that each takes exactly 14,745.6 Tcy.
+
+    Return a summary with the worst jitter of the clock interrupt in the first second.
+    """
     machine = emu.load(path, engine="jit")
     flag_rose = flag_since(machine.record, machine.chip.sfrs["IFS0"].address, 3)
     late: list[int] = []
@@ -50,7 +54,7 @@ def count_clock(path: Path, ticks: int) -> str:
         return False
 
     def counts() -> tuple[int, int, int]:
-        """Return (cycle of the last tick, ticks, clock events received)."""
+        """Return (cycle of the last tick, number of ticks, number of clock events received)."""
         at = machine.address_of("clock_events")
         heard = machine.peek(at) + (machine.peek(at + 2) << 16)
         return machine.record.u64[flag_rose], machine.peek("now_ms") + (machine.peek("wraps") << 16), heard
@@ -58,7 +62,7 @@ def count_clock(path: Path, ticks: int) -> str:
     remove = machine.hook_pc(place(machine, "_T1Interrupt"), entered)
     machine.run(cycles=FCY)
     remove()
-    while machine.peek("now_ms") % 5 or machine.peek("SR") & 0xE0:  # behind a tick that begins a round of five periods
+    while machine.peek("now_ms") % 5 or machine.peek("SR") & 0xE0:  # after the first tick of five periods
         machine.step()
     begin, ticks_before, heard_before = counts()
     machine.run(cycles=ticks * 73_728 // 5 + 3_000)
@@ -73,12 +77,13 @@ def count_clock(path: Path, ticks: int) -> str:
 
 
 def test_a_minute_of_clock_events_is_exact(image: Build) -> None:
-    """Kernel.md §3: 60,000 events take 884,736,000 Tcy. tests/fuzz/kernel/fuzz_clock.py counts an hour."""
+    """60,000 clock events take exactly 884,736,000 Tcy (kernel.md §3). tests/fuzz/kernel/fuzz_clock.py counts an
+    hour."""
     assert "60,000 clock events in 884,736,000 Tcy" in count_clock(image("slices", TARGET_APPS), 60_000)
 
 
 def masked_windows(machine: Machine, cycles: int) -> dict[int, int]:
-    """Return the longest run of cycles with IPL >= level, for levels 5 and 6, outside ISRs of that level."""
+    """Return the longest run of cycles with IPL >= level outside ISRs of that level, for levels 5 and 6."""
     longest = {5: 0, 6: 0}
     since: dict[int, int | None] = {5: None, 6: None}
     stepper = place(machine, "_T3Interrupt")
@@ -98,7 +103,7 @@ def masked_windows(machine: Machine, cycles: int) -> dict[int, int]:
 
 
 def test_nothing_masks_the_stepper_for_long_or_the_camera_at_all(image: Build) -> None:
-    """kernel.md §6: masked at IPL 1-5 at most 40 Tcy; IPL 6 only around PWRSAV, which listing1's idle does."""
+    """The kernel masks IPL 1-5 for at most 40 Tcy, and IPL 6 only around PWRSAV in the idle loop (kernel.md §6)."""
     machine = load(image("points", TARGET_APPS))
     run_to(machine, "scenario_begin")
     machine.step()
@@ -110,12 +115,12 @@ def test_nothing_masks_the_stepper_for_long_or_the_camera_at_all(image: Build) -
 
 
 def test_an_interrupt_never_falls_between_the_test_and_the_sleep(image: Build) -> None:
-    """kernel.md §4, idle: a device interrupt at each instruction of the idle loop is handled at once, not in 1 ms."""
+    """A device interrupt at any instruction of the idle loop is handled at once, not 1 ms later (kernel.md §4)."""
     machine = load(image("latency"))
     run_to(machine, "latency_begin")
     wanted = machine.address_of("latency_wanted")
     machine.poke(wanted + 4, 1)  # one subscriber
-    machine.poke(wanted + 10, 2)  # of 2-byte messages
+    machine.poke(wanted + 10, 2)  # two bytes per message
     run_to(machine, "latency_ready")
     machine.write("IPC4", 4)
     machine.write("IEC1", INT1IF)
@@ -125,13 +130,13 @@ def test_an_interrupt_never_falls_between_the_test_and_the_sleep(image: Build) -
     handler = place(machine, "latency_handler")
     worst = boundary = 0
     asleep = 0
-    while asleep < 3:  # from a clock interrupt until the core has slept for a while
+    while asleep < 3:  # from a clock interrupt until the core has slept for some time
         at = machine.snapshot()
         machine.write("IFS1", INT1IF)
         came = machine.cycle
         stop = machine.run(cycles=FCY // 1000, until=lambda: machine.pc in (handler, clock))
         assert stop.reason == "until"
-        if machine.pc == clock:  # it was taken on the way into this interrupt; the handler follows
+        if machine.pc == clock:  # the interrupt was served before this one; its handler follows
             machine.run(cycles=2_000, until=handler)
         assert machine.pc == handler
         worst = max(worst, machine.cycle - came)
@@ -147,7 +152,10 @@ def test_an_interrupt_never_falls_between_the_test_and_the_sleep(image: Build) -
 
 @pytest.mark.parametrize("speed", [129, 100, 68, 1, -64, -129])
 def test_the_average_motor_speed_is_exact(image: Build, speed: int) -> None:
-    """epuck.md §3: v mm/s are v * 1000 / 129 steps/s; left forward is the previous index, right the next."""
+    """The average motor speed is exact: v mm/s are v * 1000 / 129 steps/s (epuck.md §3).
+
+    Driving forward decrements the left phase index and increments the right one.
+    """
     machine = load(image("latency"))
     run_to(machine, "latency_ready")
     motors = machine.address_of("stepper_left")

@@ -1,4 +1,4 @@
-"""Slices of preempted threads, and how soon a woken one runs, on the emulated robot."""
+"""Slices of preempted threads, and the latency of a woken thread, on the emulated robot."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from tests.firmware.kernel.test_kernel_on_target import FCY, place, run_to
 from tests.firmware.kernel.test_time_on_target import SLICE
 
 SLICES, WOKEN_FIRST, ROUND_ROBIN = 9, 10, 11
-"""Scenes (target/turns/main.c)."""
+"""Scene numbers of target/turns/main.c."""
 SAVING = 40
-"""Cycles that a preemption takes from the thread's slice: saved registers, and the timer's step of 8."""
+"""Maximum cycles that a preemption takes from a thread's slice: saving registers, and the timer's resolution of 8."""
 CLOCK = 300
-"""Cycles of a clock interrupt, which may delay the end of a slice."""
+"""Maximum cycles of a clock interrupt, which may delay the end of a slice."""
 
 
 def scene(image: Build, number: int) -> Machine:
@@ -24,8 +24,11 @@ def scene(image: Build, number: int) -> Machine:
 
 
 def test_a_preempted_thread_gets_the_rest_of_its_slice(image: Build) -> None:
-    """hal_cpu.h, hal_slice_restart(): beside a better thread that waits for every tick, equal threads still change
-    every 10 ms of their own time. Once they changed with every tick."""
+    """A preempted thread gets the rest of its slice (hal_cpu.h, hal_slice_restart()).
+
+    Beside a higher-priority thread that waits for every tick, equal threads still change every 10 ms of their own
+    time.
+    """
     machine = scene(image, SLICES)
     resumed = turn = 0
     own: dict[int, int] = {}
@@ -36,7 +39,7 @@ def test_a_preempted_thread_gets_the_rest_of_its_slice(image: Build) -> None:
         resumed = machine.cycle if write else resumed
 
     def interrupted() -> bool:
-        """Return whether the turn has passed on: the thread of higher priority runs too briefly to be interrupted."""
+        """Whether the running thread changes; the thread of higher priority runs too briefly to be sampled."""
         nonlocal turn
         thread = machine.peek("os_running")
         if thread != turn and turn:
@@ -52,12 +55,12 @@ def test_a_preempted_thread_gets_the_rest_of_its_slice(image: Build) -> None:
     assert 92 <= machine.peek("turns") <= 101
     assert len(whole) >= 90
     preemptions = 11
-    settled = whole[1:]  # the system thread's turn at the start is none
+    settled = whole[1:]  # omits the system thread's initial turn
     assert all(-preemptions * SAVING <= length - SLICE <= CLOCK for length in settled), settled
 
 
 def test_a_woken_thread_runs_first(image: Build) -> None:
-    """openswarm.h, Sys_Set_Scheduler: Sys_Sleep(1) beside eight busy threads."""
+    """With fixed priorities a woken thread runs first: Sys_Sleep(1) beside eight busy threads (openswarm.h)."""
     machine = scene(image, WOKEN_FIRST)
     machine.run(cycles=FCY)
     assert machine.peek("slept_most") == 1
@@ -68,7 +71,7 @@ def test_a_woken_thread_runs_first(image: Build) -> None:
 
 
 def test_round_robin_lets_a_woken_thread_wait_for_all(image: Build) -> None:
-    """The default scheduler keeps the bound of openswarm.h."""
+    """Under the default scheduler a woken thread waits for all other threads, within the bound of openswarm.h."""
     machine = scene(image, ROUND_ROBIN)
     machine.run(cycles=FCY)
     assert 89 <= machine.peek("slept_most") <= 91

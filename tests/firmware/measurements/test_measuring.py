@@ -1,4 +1,4 @@
-"""`emu footprint` and `emu cycles` on the kernel's own measuring applications, and the baselines they are gated by."""
+"""`emu footprint` and `emu cycles` on the kernel's measuring applications, compared with the committed baselines."""
 
 from __future__ import annotations
 
@@ -16,13 +16,16 @@ BASELINES = HERE.parents[2] / "firmware" / "baseline"
 
 @pytest.fixture(scope="module")
 def footprint(image, tmp_path_factory):
-    """Return the command's JSON for the application `footprint`."""
+    """Return the JSON output of `emu footprint` for the application `footprint`."""
     out = tmp_path_factory.mktemp("footprint")
     return str(image("footprint")), out
 
 
 def test_the_memory_equation_fits_every_load_exactly(footprint, capsys):
-    """kernel.md §5: seen from outside, counted by the allocator, and given back completely."""
+    """The memory equation of kernel.md §5 equals the bytes that the emulator and the allocator count at every load.
+
+    After the load all memory is free again.
+    """
     assert main(["footprint", footprint[0], "--json"]) == 0
     equation = json.loads(capsys.readouterr().out)["equation"]
     assert equation["largest_residual"] == 0
@@ -35,7 +38,10 @@ def test_the_memory_equation_fits_every_load_exactly(footprint, capsys):
 
 
 def test_footprint_and_cycles_have_not_grown(image, capsys):
-    """The baselines are exact: refresh them with --update when a number fell, or with a reason when it rose."""
+    """Footprint and cycles equal the committed baselines.
+
+    Refresh them with --update if a number fell, or with a reason if one rose.
+    """
     for command, app, name in (
         ("footprint", "footprint", "footprint"),
         ("footprint", "options", "options-footprint"),
@@ -46,7 +52,7 @@ def test_footprint_and_cycles_have_not_grown(image, capsys):
 
 
 def test_the_one_number_that_grew_fails_the_check_and_names_the_lines(image, tmp_path, capsys):
-    """The kernel's cycles against a baseline that asks for one cycle less in one place: nothing else has grown."""
+    """One kernel cycle above the baseline fails the check, and the message names this number and its lines only."""
     table = json.loads((BASELINES / "cycles.json").read_text())
     name = "Sys_Yield to a yielded thread"
     place = max(table[name]["where"], key=table[name]["where"].get)
@@ -76,7 +82,7 @@ def test_another_application_is_refused(image, capsys, command):
 
 @pytest.mark.parametrize("level", ["-O1", "-O2"])
 def test_what_cycles_are_counted_from_stands_at_higher_levels_too(image, level):
-    """`emu cycles` finds Sys_Yield at every level; inlining it would end the command with "no symbol"."""
+    """`emu cycles` finds Sys_Yield at every optimisation level: it is not inlined."""
     symbols = load_image(str(image("latency", None, f"OPTIMISE={level}"))).symbols
     stops = ("Sys_Yield", "Sys_Send_Event", "hal_idle", "_T1Interrupt", "_T2Interrupt", "latency_handler")
     assert [name for name in stops if symbols.find(name) is None] == []

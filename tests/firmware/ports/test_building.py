@@ -24,7 +24,8 @@ int main(void) { Sys_Init_Kernel(); for (uint16 i = 0; i < 100; i++) { count += 
 
 @pytest.fixture
 def make(tmp_path: Path):
-    """Return make(*words), which builds a small application in one folder and returns whether it built anything."""
+    """Return make(*arguments), which builds a small application in one folder and returns whether files were
+    rebuilt."""
     app = tmp_path / "apps" / "small"
     app.mkdir(parents=True)
     (app / "main.c").write_text(MAIN)
@@ -55,7 +56,7 @@ def test_a_changed_option_builds_anew_and_so_does_the_way_back(make, words: list
 
 
 def test_drivers_and_files_that_come_and_go_build_anew(make) -> None:
-    """A removed source also causes a rebuild, although it leaves no newer file."""
+    """Removing a source file also causes a rebuild, although it leaves no newer file."""
     assert make()
     plain = make.image.read_bytes()
     (make.app / "app.mk").write_text("DEVICES := battery\n")
@@ -86,7 +87,10 @@ def test_drivers_and_files_that_come_and_go_build_anew(make) -> None:
 
 
 def test_another_toolchain_port_or_compiler_builds_anew(make, tmp_path: Path) -> None:
-    """Images of different compilers are kept apart. The substitute compilers only print their arguments."""
+    """Images of different compilers, ports and toolchains have separate folders.
+
+    The substitute compilers only print their arguments.
+    """
     for name in ("xc16-gcc", "xc16-bin2hex"):
         tool = tmp_path / name
         tool.write_text(

@@ -1,4 +1,4 @@
-"""The kernel on an ATmega328P in simavr and on a Cortex-M4 in QEMU, and the conformance suite on every target."""
+"""The kernel on an ATmega328P in simavr and on a Cortex-M4 in QEMU; the conformance suite on every target."""
 
 from __future__ import annotations
 
@@ -20,13 +20,16 @@ from tests.firmware.kernel.test_kernel_on_target import run_to
 
 CONFORMS = re.compile(rb"conforms: (\d+) checks")
 CHECKS, CHECKS_OF_OPTIONS = 275, 376
-"""Of the conformance suite and of its part about options; a check that is not reached would be missed otherwise."""
+"""Number of checks of the conformance suite and of its options part.
+
+The numbers reveal checks that are not reached.
+"""
 OPTIONS = "DEFINES=-DSUITE_OF_OPTIONS"
-"""For `make`: the second image."""
+"""Make variable that builds the second image, the options part of the suite."""
 
 
 def make(target: str, app: str, out: Path, *words: str, apps: Path | None = None) -> Path:
-    """An image for one of the other robots; skips with the Debian package that is missing."""
+    """Build an image for another robot; skip the test if a Debian package is missing."""
     folder = [f"APPS={os.path.relpath(apps, FIRMWARE)}"] if apps else []
     command = ["make", "-s", "-C", str(FIRMWARE), f"TARGET={target}", f"APP={app}", f"OUT={out}", *folder, *words]
     done = subprocess.run(command, capture_output=True, text=True, check=False, env={**os.environ, "MAKEFLAGS": ""})
@@ -70,7 +73,7 @@ def check_conforms(said: bytes, checks: int = CHECKS) -> None:
 )
 @pytest.mark.parametrize("target", ["posix", "template"])
 def test_a_host_conforms(target: str, words: tuple[str, ...], checks: int, tmp_path: Path) -> None:
-    """The unchanged template compiles and conforms (docs/porting.md); so does the port with real signals."""
+    """The unchanged template port and the POSIX port with real signals pass the conformance suite (docs/porting.md)."""
     flags = "-O1 -g -fsanitize=undefined -fno-sanitize-recover=undefined"
     run_make(FIRMWARE, f"TARGET={target}", "APPS=../tests/firmware/target", "APP=conformance", f"OUT={tmp_path}",
              f"HOST_FLAGS={flags}", *words)  # fmt: skip
@@ -80,19 +83,19 @@ def test_a_host_conforms(target: str, words: tuple[str, ...], checks: int, tmp_p
 
 
 ON_TARGETS = ("nothing", "clock and PIDs wrap", "earliest deadline first")
-"""What is different from a plain start; the suite itself begins with fixed priorities."""
+"""Starting conditions under which the suite runs; the suite itself begins with fixed priorities."""
 NEARLY_ROUND = (("now_ms", 0xFE00), ("newest_pid", 0xFF00))
-"""Words of the kernel that wrap half a second and 256 threads later."""
+"""Kernel variables with values that wrap after half a second and after 256 threads."""
 
 
 def words_of(case: str) -> tuple[str, ...]:
-    """For `make`."""
+    """Return the make arguments that set the starting condition."""
     return ("DEFINES=-DFIRST_SCHEDULER=sys_earliest_deadline",) if "deadline" in case else ()
 
 
 @pytest.mark.parametrize("case", ON_TARGETS)
 def test_the_dspic30f_conforms(image: Build, case: str) -> None:
-    """The same text on the emulated e-puck."""
+    """The emulated e-puck passes the conformance suite."""
     machine = emu.load(image("conformance", TARGET_APPS, *words_of(case)), engine="jit")
     said = bytearray()
     machine.uart[1].on_byte = lambda byte, _: said.append(byte)
@@ -106,7 +109,7 @@ def test_the_dspic30f_conforms(image: Build, case: str) -> None:
 
 @pytest.mark.parametrize("case", ON_TARGETS)
 def test_the_kilobot_conforms(case: str, tmp_path: Path) -> None:
-    """The same text on an ATmega328P, where a pointer is two stores."""
+    """The ATmega328P, on which storing a pointer takes two instructions, passes the conformance suite."""
     machine = kilobot(make("kilobot", "conformance", tmp_path, *words_of(case), apps=TARGET_APPS))
     if "wrap" in case:
         machine.run_to("main")
@@ -118,13 +121,13 @@ def test_the_kilobot_conforms(case: str, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("case", [case for case in ON_TARGETS if "wrap" not in case])
 def test_the_epuck2_conforms(case: str, tmp_path: Path) -> None:
-    """The same text on a Cortex-M4 with its FPU and MPU at work."""
+    """The Cortex-M4 passes the conformance suite with FPU and MPU enabled."""
     image = make("epuck2", "conformance", tmp_path, *words_of(case), apps=TARGET_APPS)
     check_conforms(said_by_epuck2(image, b" checks"))
 
 
 def test_the_options_of_the_dspic30f_conform(image: Build) -> None:
-    """Mutex, join, cleanup, quota, services, and what hostile programs do to them."""
+    """The dsPIC30F passes the options part: mutex, join, cleanup, quota, services and hostile programs."""
     machine = emu.load(image("conformance", TARGET_APPS, OPTIONS), engine="jit")
     said = bytearray()
     machine.uart[1].on_byte = lambda byte, _: said.append(byte)
@@ -148,7 +151,7 @@ LINES = b"".join(b"%d:(0,0)\r\n" % ms for ms in range(50, 2050, 250))
 
 
 def test_listing_1_logs_on_the_kilobot(tmp_path: Path) -> None:
-    """Every 250 ms of the robot's clock, from the 50th ms on."""
+    """Listing 1 on the Kilobot logs every 250 ms of the robot's clock, from 50 ms on."""
     assert said_by_kilobot(make("kilobot", "listing1", tmp_path), 2.0) == LINES
 
 
@@ -158,7 +161,8 @@ def test_listing_1_logs_on_the_epuck2(tmp_path: Path) -> None:
 
 
 def check_stress(said: bytes, reports: int) -> None:
-    """Reports every second, no assertion (they name a file), the heap as it was in each of them."""
+    """Assert one report per second, no failed assertion (which would name a file) and an unchanged heap in each
+    report."""
     text = said.decode()
     assert ".c:" not in text
     assert "trap" not in text
@@ -168,12 +172,12 @@ def check_stress(said: bytes, reports: int) -> None:
 
 
 def test_stress_on_the_kilobot(tmp_path: Path) -> None:
-    """Six threads, eight events, everything at random, for 20 s."""
+    """The stress application with six threads and eight events runs 20 s of random actions on the Kilobot."""
     check_stress(said_by_kilobot(make("kilobot", "stress", tmp_path), 20.2), 18)
 
 
 def test_stress_on_the_epuck2(tmp_path: Path) -> None:
-    """The same for 20 s."""
+    """The stress application runs 20 s of random actions on the e-puck2."""
     check_stress(said_by_epuck2(make("epuck2", "stress", tmp_path), rb"\n2\d{4} ms"), 17)
 
 
@@ -209,23 +213,28 @@ int main(void)
 
 @pytest.fixture
 def overflowing(tmp_path: Path) -> Path:
-    """A folder of applications with one whose second thread needs more stack than it has."""
+    """Return a folder of applications, one of which has a second thread that overflows its stack."""
     (tmp_path / "overflowing").mkdir()
     (tmp_path / "overflowing" / "main.c").write_text(OVERFLOW)
     return tmp_path
 
 
 def test_the_epuck2_buries_a_thread_that_overflows(overflowing: Path) -> None:
-    """The MPU stops the thread, the fault is reported, the others continue (port/cortex_m/README.md)."""
+    """The MPU of the e-puck2 stops a thread that overflows; the fault is reported and other threads continue.
+
+    Source: port/cortex_m/README.md.
+    """
     image = make("epuck2", "overflowing", overflowing / "out", apps=overflowing)
     said = said_by_epuck2(image, rb"(on\n){3}")
     assert b"stack overflow: thread 2\r\n" in said
 
 
 def test_the_kilobot_stops_when_a_stack_has_overflown(overflowing: Path) -> None:
-    """port/avr/README.md: nothing stops the thread, so that the system does, at the next switch.
+    """On the Kilobot the next switch detects a stack overflow and stops the system (port/avr/README.md).
 
-    Below this one lies untouched memory; another thread there would have been damaged first."""
+    Nothing stops the thread itself. Here unused memory lies below the stack; another thread there would have been
+    damaged.
+    """
     machine = kilobot(make("kilobot", "overflowing", overflowing / "out", apps=overflowing))
     with pytest.raises(Stopped):
         machine.run(HZ)
@@ -258,10 +267,12 @@ int main(void)
 
 @pytest.mark.parametrize("target", ["kilobot", "epuck2"])
 def test_an_overflow_of_the_kernel_stack_stops_the_system(target: str, tmp_path: Path) -> None:
-    """The MPU traps where it happens; the AVR sees it behind the handlers, by the paint of the stack's last byte.
+    """An overflow of the kernel stack stops the system: by the MPU at once, on the AVR after the handlers.
 
-    There only if what lies below the stack lets it come so far, the kernel's own variables (port/avr/README.md): so the
-    handler leaves the stack's last bytes to the tick above it."""
+    The AVR detects it by the fill pattern in the last byte of the stack, which requires that the kernel's variables
+    below survive. The handler therefore leaves the last bytes of the stack to the tick that interrupts it
+    (port/avr/README.md).
+    """
     (tmp_path / "handler").mkdir()
     (tmp_path / "handler" / "main.c").write_text(IN_A_HANDLER)
     bytes_of = {"kilobot": "(SYS_KERNEL_STACK-32)", "epuck2": "SYS_KERNEL_STACK"}
@@ -279,7 +290,7 @@ def test_an_overflow_of_the_kernel_stack_stops_the_system(target: str, tmp_path:
 
 
 def test_the_smallest_program_of_the_kilobot(tmp_path: Path) -> None:
-    """Kernel, one thread and UART: 6 kB of flash, and 500 bytes of RAM, main's included."""
+    """Kernel, one thread and UART take 6 kB of flash and 500 bytes of RAM, including main's stack."""
     image = make("kilobot", "smallest", tmp_path)
     machine = kilobot(image)
     behind, last = machine.symbols["_end"] & 0xFFFF, 0x8FF
@@ -294,7 +305,7 @@ def test_the_smallest_program_of_the_kilobot(tmp_path: Path) -> None:
 
 
 def test_seven_threads_of_128_bytes_run_on_the_kilobot(tmp_path: Path) -> None:
-    """In 2 kB of RAM, each for its slice."""
+    """Seven threads with 128-byte stacks each run for their slices in the 2 kB of RAM of the Kilobot."""
     machine = kilobot(make("kilobot", "latency", tmp_path, "DEFINES=-DSYS_HEAP=1130"))
     machine.run_to("latency_begin")
     poke_words(machine, "latency_wanted", (7, 0, 0, 0, 0, 0, 0))
@@ -313,7 +324,7 @@ def test_seven_threads_of_128_bytes_run_on_the_kilobot(tmp_path: Path) -> None:
     ("port", "packages"), [("avr", "gcc-avr avr-libc"), ("cortex_m", "gcc-arm-none-eabi libnewlib-arm-none-eabi")]
 )
 def test_a_missing_compiler_is_named_with_its_packages(port: str, packages: str, tmp_path: Path) -> None:
-    """Exit status 2 and one line; nothing is built."""
+    """A missing compiler ends the build with exit status 2 and one line that names its packages."""
     for tool in ("make", "sh", "grep", "cat", "dirname"):
         found = next(Path(folder) / tool for folder in os.get_exec_path() if (Path(folder) / tool).exists())
         (tmp_path / tool).symlink_to(found)

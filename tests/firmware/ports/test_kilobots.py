@@ -1,4 +1,4 @@
-"""Kilobots that talk by their own infrared, several ATmega328P in simavr in lock step (board/kilobot/infrared)."""
+"""Kilobots that communicate by infrared: several ATmega328P in simavr, run in lock step (board/kilobot/infrared)."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from tests.firmware.conftest import FIRMWARE, TARGET_APPS
 from tests.firmware.ports.test_kernel_ports import make
 
 MESSAGE, EVENT = 1, 2
-"""`wanted` of target/pulses."""
+"""Values of the firmware variable `wanted` (target/pulses): send a message, send an event."""
 STATISTICS = ("sent", "received", "damaged", "false_starts", "adaptations", "refused", "conflicts")
 LIFETIME_S = 7.0
 STRENGTH_OF_LOW_GAIN = 1024
@@ -35,7 +35,7 @@ def image(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def swarm() -> Iterator[Open]:
-    """A swarm that ends with the test; skips with the Debian package that is missing."""
+    """Return a function that creates a swarm for one test; skip the test if a Debian package is missing."""
     opened: list[Kilobots] = []
 
     def open_one(robots: Sequence[Robot], **settings: Any) -> Kilobots:
@@ -57,7 +57,7 @@ def say(robot: Kilobot, what: int, text: bytes) -> None:
 
 
 def message(robot: Kilobot) -> tuple[int, int, int, int, bytes]:
-    """The last one: source, strength, sensor, corrected, payload."""
+    """Return the last message received: source, strength, sensor, corrected bits, payload."""
     raw = robot.peek_bytes(robot.symbols["last_message"], 15)
     source, strength, sensor, corrected, size = struct.unpack_from("<HHBBB", raw)
     return source, strength, sensor, corrected, raw[7 : 7 + size]
@@ -80,7 +80,10 @@ def pair(image: Path, distance: float = 50.0) -> list[Robot]:
 
 
 def test_two_exchange_messages(image: Path, swarm: Open) -> None:
-    """openswarm_infrared.h: SEEN, then MESSAGE with source, strength and payload, both ways."""
+    """Two robots report each other as SEEN and exchange messages with source, strength and payload.
+
+    Source: openswarm_infrared.h.
+    """
     both = swarm(pair(image))
     both.run(0.2)
     left, right = both.robots
@@ -97,7 +100,7 @@ def test_two_exchange_messages(image: Path, swarm: Open) -> None:
 
 
 def test_every_byte_arrives(image: Path, swarm: Open) -> None:
-    """Whatever its ones: each of the 256, in messages of eight, whenever the kernel's clock comes between."""
+    """All 256 byte values arrive, in messages of eight, at any phase of the kernel's clock."""
     both = swarm(pair(image))
     both.run(0.2)
     for first in range(0, 256, 8):
@@ -110,7 +113,10 @@ def test_every_byte_arrives(image: Path, swarm: Open) -> None:
 
 
 def test_strength_tells_the_distance(image: Path, swarm: Open) -> None:
-    """Strength uses high gain, and low gain where that saturates; no robot is received beyond reach."""
+    """The received strength decreases with distance, and robots beyond the range receive nothing.
+
+    The receiver measures at high gain, and at low gain where that saturates.
+    """
     both = swarm(pair(image))
     seen = []
     for distance in (33.0, 38.0, 42.0, 50.0, 60.0, REACH_MM):
@@ -130,7 +136,10 @@ def test_strength_tells_the_distance(image: Path, swarm: Open) -> None:
 
 
 def test_a_shared_event_comes_on_both(image: Path, swarm: Open) -> None:
-    """openswarm_remote.h, eight bytes, once each; and over a robot in between to one that is out of sight."""
+    """A shared event with eight bytes occurs once on each robot, also on one reached only through a relay robot.
+
+    Source: openswarm_remote.h.
+    """
     line = swarm([Robot(image, 50.0 * n, number=n + 1, on_at=0.003 * n) for n in range(3)])
     line.run(0.5)
     say(line.robots[0], EVENT, b"8 bytes!")
@@ -143,12 +152,12 @@ def test_a_shared_event_comes_on_both(image: Path, swarm: Open) -> None:
 
 
 def test_who_is_silent_is_lost(image: Path, swarm: Open) -> None:
-    """SYS_NEIGHBOUR_LIFETIME after its last frame; and seen again."""
+    """A silent robot is reported LOST after SYS_NEIGHBOUR_LIFETIME, and SEEN when it sends again."""
     both = swarm(pair(image))
     left = both.robots[0]
     both.run(3.0)
     both.move(1, 500.0, 0)
-    both.run(LIFETIME_S - 2.7)  # the last beacon is 2.6 s old at most
+    both.run(LIFETIME_S - 2.7)  # the last beacon is at most 2.6 s old
     assert peek(left, "losses") == 0
     both.run(3.0)
     assert (peek(left, "losses"), peek(left, "last_lost")) == (1, 2047)
@@ -168,7 +177,10 @@ def talk(together: Kilobots, speakers: Sequence[int], rounds: int, seconds: floa
 
 
 def test_who_cannot_hear_each_other_collide(image: Path, swarm: Open) -> None:
-    """The ends of a line begin 0 to 19 ms apart, a frame lasts 7: what overlaps is refused, the rest arrives."""
+    """Overlapping frames of robots that cannot receive each other are refused; all other frames arrive.
+
+    The robots at the ends of the line start 0 to 19 ms apart; a frame lasts 7 ms.
+    """
     line = swarm([Robot(image, 60.0 * n, number=n + 1) for n in range(3)])
     line.run(0.2)
     whole = []
@@ -187,7 +199,7 @@ def test_who_cannot_hear_each_other_collide(image: Path, swarm: Open) -> None:
 
 
 def test_who_hear_each_other_take_turns(image: Path, swarm: Open) -> None:
-    """The same talk in sight of each other, switched on together: nothing is damaged by it."""
+    """Robots that receive each other and start together take turns: no frame is damaged."""
     heap = swarm([Robot(image, 30.0 * n, number=n + 1, on_at=0.0011 * n) for n in range(3)])
     heap.run(0.2)
     before = [statistics(robot)["damaged"] for robot in heap.robots]
@@ -198,7 +210,7 @@ def test_who_hear_each_other_take_turns(image: Path, swarm: Open) -> None:
 
 
 def test_numbers_are_drawn(image: Path, swarm: Open) -> None:
-    """Erased EEPROMs, switched on in the same cycle: the noise of the converter parts them."""
+    """Robots with erased EEPROMs that start in the same cycle draw different numbers, because of converter noise."""
     heap = swarm([Robot(image, 20.0 * n) for n in range(3)], seed=5)
     heap.run(3.0)
     numbers = {peek(robot, "infrared_number") for robot in heap.robots}
@@ -211,7 +223,7 @@ def test_numbers_are_drawn(image: Path, swarm: Open) -> None:
 
 
 def frame_begins(both: Kilobots, listener: Kilobot) -> None:
-    """Until it has taken a leading byte."""
+    """Run until the robot has received a leading byte."""
     receive = 2
     for _ in range(20_000):
         both.run(20e-6)
@@ -222,15 +234,15 @@ def frame_begins(both: Kilobots, listener: Kilobot) -> None:
 
 @pytest.mark.parametrize("after_us", [0, 300, 700, 1100, 2500, 5000])
 def test_a_foreign_pulse_damages_a_frame(image: Path, swarm: Open, after_us: float) -> None:
-    """Nothing that it changed is passed on, and the next frame is."""
+    """A frame damaged by a foreign pulse is refused, and the next frame arrives."""
     both = swarm(pair(image))
     both.run(0.2)
     left, right = both.robots
-    say(left, MESSAGE, bytes(8))  # zeros: whatever light is added changes something
+    say(left, MESSAGE, bytes(8))  # zeros: any added light changes a bit
     frame_begins(both, right)
     if after_us:
         both.run(after_us * 1e-6)
-    for _ in range(12):  # every 29 us, so that some fall upon a byte and not all between two
+    for _ in range(12):  # every 29 us, so that some pulses hit a byte
         both.run(29e-6)
         both.flash(1, 0)
     both.run(0.1)
@@ -241,7 +253,7 @@ def test_a_foreign_pulse_damages_a_frame(image: Path, swarm: Open, after_us: flo
 
 
 def test_pulses_that_are_lost(image: Path, swarm: Open) -> None:
-    """One in a hundred: some frames are refused, none is wrong."""
+    """If one pulse in a hundred is lost, some frames are refused and none is received with wrong content."""
     both = swarm(pair(image), seed=7, loss=0.01)
     both.run(0.2)
     for n in range(60):
@@ -271,7 +283,7 @@ def test_stray_light_begins_nothing(image: Path, swarm: Open) -> None:
 
 
 def test_the_same_run_twice(image: Path, swarm: Open) -> None:
-    """All of RAM, the cycle and the UART of three robots that talk with losses."""
+    """Repeating a run of three robots with losses gives the same RAM, cycle and UART output."""
     found = []
     for _ in range(2):
         heap = swarm([Robot(image, 25.0 * n) for n in range(3)], seed=9, loss=0.003)
@@ -283,7 +295,7 @@ def test_the_same_run_twice(image: Path, swarm: Open) -> None:
 
 
 def test_in_pieces_as_in_one(image: Path, swarm: Open) -> None:
-    """How a run is cut changes nothing that the robots say or know."""
+    """Splitting a run into pieces changes neither the messages nor the state of the robots."""
     found = []
     for pieces in (1, 700):
         both = swarm(pair(image), seed=3)
@@ -299,7 +311,10 @@ def test_in_pieces_as_in_one(image: Path, swarm: Open) -> None:
 
 @pytest.mark.parametrize("distance", [36, 45, 48, 69])
 def test_neighbours_tell_what_they_hear(distance: int, tmp_path: Path, swarm: Open) -> None:
-    """The e-puck's application as it is: numbers, and the distance by the tables in the EEPROM, or 0 without them."""
+    """The unchanged e-puck application reports neighbours with numbers and distances.
+
+    Distances come from the tables in the EEPROM; without tables they are 0.
+    """
     app = make("kilobot", "neighbours", tmp_path)
     robots = [Robot(app, 0, number=5), Robot(app, distance, number=6, calibrated=False, on_at=0.01)]
     both = swarm(robots)
@@ -311,7 +326,10 @@ def test_neighbours_tell_what_they_hear(distance: int, tmp_path: Path, swarm: Op
 
 
 def test_an_alarm_lights_all(tmp_path: Path, image: Path, swarm: Open) -> None:
-    """The e-puck's application as it is; its alarm is the event that `pulses` shares. Light is the pins' direction."""
+    """The unchanged e-puck alarm application lights all robots through the event that `pulses` shares.
+
+    A lit LED is recognised by the direction of its pins.
+    """
     app = make("kilobot", "alarm", tmp_path)
     line = swarm([Robot(image, 0, number=1), Robot(app, 50, number=2, on_at=0.01), Robot(app, 100, number=3)])
     line.run(0.5)
@@ -324,7 +342,7 @@ def test_an_alarm_lights_all(tmp_path: Path, image: Path, swarm: Open) -> None:
 
 
 def test_stacks_suffice(image: Path, swarm: Open) -> None:
-    """Frames, events and losses at their deepest leave a part of the kernel stack untouched."""
+    """At the deepest nesting of frames, events and losses a part of the kernel stack remains unused."""
     heap = swarm([Robot(image, 25.0 * n, number=n + 1, on_at=0.01 * n) for n in range(3)])
     stack = 208  # device.mk
     bottoms = [robot.symbols["os_memory"] & 0xFFFF for robot in heap.robots]
@@ -342,7 +360,10 @@ def test_stacks_suffice(image: Path, swarm: Open) -> None:
 
 
 def test_the_threshold_is_the_e_pucks(tmp_path: Path) -> None:
-    """openswarm_infrared.h: the Kilobot's is in its hardware, and a program that sets it is not built."""
+    """A program that sets the infrared threshold is not built for the Kilobot, whose threshold is fixed in hardware.
+
+    Source: openswarm_infrared.h.
+    """
     (tmp_path / "app").mkdir()
     (tmp_path / "app" / "app.mk").write_text("DEVICES := infrared\n")
     (tmp_path / "app" / "main.c").write_text(
@@ -358,7 +379,7 @@ def test_the_threshold_is_the_e_pucks(tmp_path: Path) -> None:
 
 
 def test_without_the_device_the_comparator_is_off(tmp_path: Path, swarm: Open) -> None:
-    """Images that do not name infrared leave it as before."""
+    """Images that do not use infrared leave the analog comparator switched off."""
     alone = swarm([Robot(make("kilobot", "hello", tmp_path))])
     alone.run(0.1)
     assert alone.now == HZ // 10

@@ -1,10 +1,11 @@
-"""Interrupts at every instruction of every kernel call, on the ports: target/boundaries.
+"""Interrupts at every instruction of every kernel call on the AVR and Cortex-M ports: target/boundaries.
 
-Takes a sample. `python -m tests.firmware.ports.test_port_boundaries` visits all boundaries of the Kilobot, or with
---robot epuck2 those of the e-puck2. In simavr a boundary is an instruction of the round, and the harness sets the
-interrupt's flag. In QEMU it is an instruction's address, the first or a later time it is come to: the CPU stops there
-at a breakpoint, executes one store to the NVIC or the SCB with interrupts held back and the clock standing, and goes
-on.
+The test runs a sample. `python -m tests.firmware.ports.test_port_boundaries` visits all boundaries of the Kilobot, or
+with --robot epuck2 those of the e-puck2.
+
+In simavr a boundary is an instruction of the round, at which the harness sets the interrupt flag. In QEMU a boundary
+is the n-th execution of an instruction address. The CPU stops there at a breakpoint and executes one store to the
+NVIC or the SCB while interrupts are masked and the clock is stopped.
 """
 
 from __future__ import annotations
@@ -26,14 +27,18 @@ from tests.firmware.conftest import TARGET_APPS
 from tests.firmware.ports.test_kernel_ports import kilobot, make
 
 EXTI0, PENDSV = (0xE000E200, 1 << 6), (0xE000ED04, 1 << 28)
-"""What is stored where to request them: NVIC_ISPR0, SCB_ICSR (ARMv7-M architecture reference manual, B3)."""
+"""(address, value) of the stores that request the interrupts: NVIC_ISPR0 and SCB_ICSR.
+
+Source: ARMv7-M architecture reference manual, B3.
+"""
 KERNEL_CODE = re.compile(r"/openswarm/(kernel|option|port)/")
 INT0, SLICE = 1, 14
-"""Vectors: the device's, T0's compare A."""
+"""Vector numbers of the ATmega328P: INT0 (device) and timer 0 compare A (end of the slice)."""
 WAYS = ("device", "slice", "nested")
-"""The device; the end of the slice; the end of the slice and up to 44 instructions later the device."""
+"""Injection modes: the device; the end of the slice; the end of the slice and, up to 44 instructions later, the
+device."""
 PRIME = 97
-"""Boundaries between two of the sample."""
+"""Distance between two sampled boundaries, in instructions."""
 
 
 def check(machine: Machine, where: str) -> None:
@@ -42,9 +47,9 @@ def check(machine: Machine, where: str) -> None:
 
 
 def round_length(machine: Kilobot) -> int:
-    """Instructions of a round that nothing disturbs."""
+    """Return the number of instructions in an undisturbed round."""
     begin = 0
-    for _ in range(2):  # the first one starts threads for the first time
+    for _ in range(2):  # the first round starts threads for the first time
         machine.run_to("round_begin")
         begin = machine.instructions
         machine.run_to("round_end")
@@ -52,7 +57,7 @@ def round_length(machine: Kilobot) -> int:
 
 
 def sweep(machine: Kilobot, way: str, stride: int) -> int:
-    """One interrupt in each round, `stride` instructions later than in the last; how many rounds."""
+    """Inject one interrupt per round, each `stride` instructions later than the last; return the number of rounds."""
     length = round_length(machine)
     rounds = 0
     for boundary in range(1, length, stride):
@@ -75,13 +80,16 @@ def sweep(machine: Kilobot, way: str, stride: int) -> int:
 
 @pytest.mark.parametrize("way", WAYS)
 def test_the_kilobot_is_interrupted_everywhere(way: str, tmp_path: Path) -> None:
-    """Every 97th boundary; another phase in each way, for the rounds shift against the clock."""
+    """Interrupts at every 97th boundary lose nothing on the Kilobot.
+
+    Each mode starts at another offset, because rounds shift against the clock.
+    """
     machine = kilobot(make("kilobot", "boundaries", tmp_path, apps=TARGET_APPS))
     assert sweep(machine, way, PRIME) > 50
 
 
 def kernel_instructions(image: Path) -> list[int]:
-    """Addresses of all instructions of kernel, options and port."""
+    """Return the addresses of all instructions of kernel, options and port."""
     symbols = subprocess.run(["arm-none-eabi-nm", "-l", "-S", image], capture_output=True, text=True, check=True).stdout
     rows = (line.split() for line in symbols.splitlines() if KERNEL_CODE.search(line))
     spans = [(int(row[0], 16), int(row[1], 16)) for row in rows if len(row) == 5 and row[2] in "tT"]
@@ -91,8 +99,10 @@ def kernel_instructions(image: Path) -> list[int]:
 
 
 def sweep_epuck2(image: Path, way: str, stride: int, phase: int, times: int) -> int:
-    """One interrupt in each round, at every stride-th instruction of the kernel, the times-th time that the round comes
-    there, if it does; how many were."""
+    """Inject one interrupt per round at the times-th execution of every stride-th kernel instruction.
+
+    Return the number of injected interrupts; an instruction that executes less often gets none.
+    """
     places = kernel_instructions(image)[phase::stride]
     tried = 0
     with closing(Epuck2(image)) as machine:
@@ -125,7 +135,10 @@ def sweep_epuck2(image: Path, way: str, stride: int, phase: int, times: int) -> 
 
 @pytest.mark.parametrize("way", WAYS)
 def test_the_epuck2_is_interrupted_everywhere(way: str, tmp_path: Path) -> None:
-    """Every 97th instruction of the kernel; interrupts inside IT blocks and under every mask among them."""
+    """Interrupts at every 97th kernel instruction lose nothing on the e-puck2.
+
+    They include instructions within IT blocks and under every mask.
+    """
     image = make("epuck2", "boundaries", tmp_path, apps=TARGET_APPS)
     try:
         assert sweep_epuck2(image, way, PRIME, 13 * WAYS.index(way), 1) > 10

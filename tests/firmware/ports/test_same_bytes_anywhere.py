@@ -1,5 +1,7 @@
-"""An image depends on the commit alone, not on where the checkout lies: otherwise one clone could not continue what
-another has begun, and a result could not be traced to its firmware."""
+"""An image depends on the commit alone, not on the path of the checkout.
+
+Otherwise one clone could not resume a run of another, and results could not be traced to their firmware.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +24,7 @@ PARTS = ("emu", "toolchain", "firmware")
 
 @pytest.fixture(scope="module")
 def checkouts(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
-    """The project twice, in folders whose names differ in length and depth."""
+    """Return two copies of the project in folders whose paths differ in length and depth."""
     folder = tmp_path_factory.mktemp("checkouts")
     roots = [folder / "a", folder / "another" / "and deeper".replace(" ", "-")]
     for root in roots:
@@ -32,7 +34,8 @@ def checkouts(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
 
 
 def built(root: Path, app: str, *words: str) -> Path:
-    """An application of a checkout, with a run-time library of its own: the shared cache would hide a difference."""
+    """Build an application of a checkout with its own run-time library, because the shared cache would hide
+    differences."""
     out = root / "out" / app
     command = ["make", "-C", str(root / "firmware"), f"APP={app}", f"OUT={out}", f"PYTHON={sys.executable}", *words]
     environment = os.environ | {"XDG_CACHE_HOME": str(root / "cache")}
@@ -43,16 +46,16 @@ def built(root: Path, app: str, *words: str) -> Path:
 
 @pytest.mark.parametrize("app", ["clustering", "clustering-bare"])
 def test_two_checkouts_of_one_commit_build_the_same_bytes(checkouts: list[Path], app: str) -> None:
-    """C, assembly, inline functions of headers and the run-time library, all with -g."""
+    """Two checkouts of one commit build identical bytes from C, assembly, inline functions and library, all with -g."""
     one, other = (built(root, app).read_bytes() for root in checkouts)
     assert one == other
-    plain = one.replace(b"\0", b"")  # debug information is stored with a phantom after every byte
+    plain = one.replace(b"\0", b"")  # debug information has a phantom byte after every byte
     for root in (*checkouts, ROOT):
         assert str(root).encode() not in plain
 
 
 def test_an_application_of_another_folder_does_not_bring_that_folder_along(checkouts: list[Path]) -> None:
-    """Build a user's application by its absolute path, which `APPS=` permits."""
+    """Building an application by absolute path (`APPS=`) does not put that path into the image."""
     images = []
     for root in checkouts:
         source = root / "mine" / "tiny" / "main.c"
@@ -65,7 +68,8 @@ def test_an_application_of_another_folder_does_not_bring_that_folder_along(check
 def test_source_lines_are_still_found(
     checkouts: list[Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Names begin at the project's folder; the listing with sources finds them from anywhere, beside the image."""
+    """Source paths start at the project's folder, and the listing with sources resolves them from any working
+    folder."""
     image = built(checkouts[0], "clustering")
     monkeypatch.chdir(tmp_path)
     assert main(["disasm", str(image), "--source"]) == 0
@@ -74,7 +78,7 @@ def test_source_lines_are_still_found(
 
 
 def test_the_assembler_records_the_path_it_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """`cc -g -ffile-prefix-map=` of an assembly file named by its absolute path."""
+    """The assembler records the path given by `cc -g -ffile-prefix-map=` for a file with an absolute path."""
     monkeypatch.chdir(tmp_path)
     source = tmp_path / "one.s"
     source.write_text("\t.text\n\t.global _main\n_main: return\n")

@@ -1,7 +1,7 @@
-"""`make TOOLCHAIN=xc16`: the command line, the C and the assembly are what Microchip's compiler understands.
+"""`make TOOLCHAIN=xc16`: Microchip's compiler supports the command line, the C and the assembly of the firmware.
 
-The compiler itself is not at hand. A stand-in on PATH accepts only options it documents (XC16 C Compiler User's Guide
-DS50002071, MPLAB Assembler, Linker and Utilities DS50002106) and builds with ours.
+The compiler itself is not available. A stand-in on PATH accepts only its documented options (XC16 C Compiler User's
+Guide DS50002071, MPLAB Assembler, Linker and Utilities DS50002106) and builds with this project's toolchain.
 """
 
 from __future__ import annotations
@@ -36,20 +36,20 @@ sys.exit(subprocess.run([sys.executable, "-m", "toolchain", "cc", *kept]).return
 '''
 DIRECTIVES = {".equ", ".global", ".text", ".bss", ".space", ".macro", ".endm", ".ifndef", ".endif", ".irp", ".endr"}
 DIRECTIVES |= {".set", ".pword", ".include"}
-"""pic30-as knows them all (DS50002106)."""
+"""Directives of pic30-as, all documented in DS50002106."""
 SECTION = r"\.section \.\w+(, (code|noload|keep|persist|address\(\w+\)))+"
-"""The attributes it knows, too (DS50002106); the number is a macro here, which the preprocessor replaces."""
+"""Section attributes of pic30-as (DS50002106); the preprocessor expands a macro to the number."""
 OTHER_ROBOTS = {"posix", "template", "host", "avr", "kilobot", "cortex_m", "epuck2"}
-"""Ports and boards that are not built for the dsPIC30F."""
+"""Names of ports and boards that are not built for the dsPIC30F."""
 BUILTINS = ["write_NVM()=((void)0)"]
 BUILTINS += [f"{name}(offset)=((unsigned)(offset))" for name in ("tblrdl", "tblrdh")]
 BUILTINS += [f"{name}(offset,value)=((void)(offset),(void)(value))" for name in ("tblwtl", "tblwth")]
-"""XC16's own, which no other GCC has, with their arguments."""
+"""Macros for the built-in functions that only XC16 has, with their arguments."""
 HEADERS = sorted({path.parent for path in (FIRMWARE / "openswarm").rglob("*.h") if not OTHER_ROBOTS & {*path.parts}})
 
 
 def sources(pattern: str) -> list[Path]:
-    """Files of the kernel, of its port to the dsPIC30F and of the e-puck's board."""
+    """Return the files of the kernel, of its dsPIC30F port and of the e-puck's board."""
     return sorted(path for path in FIRMWARE.glob(f"openswarm/**/{pattern}") if not OTHER_ROBOTS & {*path.parts})
 
 
@@ -60,7 +60,7 @@ def script(path: Path, text: str) -> None:
 
 @pytest.fixture(scope="module")
 def stand_in(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with xc16-gcc and xc16-bin2hex."""
+    """Return a folder with executable stand-ins for xc16-gcc and xc16-bin2hex."""
     folder = tmp_path_factory.mktemp("xc16")
     script(folder / "xc16-gcc", STAND_IN)
     script(
@@ -81,7 +81,10 @@ def make(stand_in: Path, app: str, out: Path) -> Path:
 
 
 def test_it_builds_and_the_measuring_commands_find_their_symbols(stand_in: Path, tmp_path: Path, capsys) -> None:
-    """`make -C firmware APP=... TOOLCHAIN=xc16`; such an image, compiled without stack checks, is measured."""
+    """`make -C firmware APP=... TOOLCHAIN=xc16` builds an image in which the measuring commands find their symbols.
+
+    The image is compiled without stack checks.
+    """
     image = make(stand_in, "latency", tmp_path / "latency")
     assert (tmp_path / "latency" / "firmware.hex").exists()
     assert main(["cycles", str(image)]) == 0
@@ -92,7 +95,10 @@ def test_it_builds_and_the_measuring_commands_find_their_symbols(stand_in: Path,
 
 
 def test_the_assembler_is_told_where_interrupt_entries_are() -> None:
-    """openswarm_interrupt.h includes isr.inc in assembly within C, and a GCC of that age gives its assembler no -I."""
+    """The assembler receives the include path of isr.inc, which openswarm_interrupt.h includes in assembly within C.
+
+    A GCC of XC16's version does not pass -I on to its assembler.
+    """
     command = ["make", "-n", "-C", str(FIRMWARE), "APP=spi", "TOOLCHAIN=xc16", "OUT=build/never"]
     words = subprocess.run(command, capture_output=True, text=True, check=True).stdout.split()
     folders = [word.removeprefix("-Wa,-I") for word in words if word.startswith("-Wa,-I")]
@@ -100,14 +106,14 @@ def test_the_assembler_is_told_where_interrupt_entries_are() -> None:
 
 
 def test_an_option_of_ours_is_none_of_theirs(stand_in: Path) -> None:
-    """The stand-in refuses what it should."""
+    """The stand-in refuses options that only this project's compiler has."""
     done = subprocess.run([stand_in / "xc16-gcc", "-fstack-check"], capture_output=True, text=True, check=False)
     assert "unknown option" in done.stderr
 
 
 @pytest.mark.parametrize("source", sources("*.c"), ids=lambda path: path.name)
 def test_the_kernel_is_gnu99(source: Path) -> None:
-    """GCC 4.5 knows neither C11 nor later extensions."""
+    """The kernel compiles as gnu99: GCC 4.5 supports neither C11 nor later extensions."""
     if shutil.which("gcc") is None:
         pytest.skip("gcc is not installed (Debian package gcc)")
     check_gnu99(source)
@@ -115,7 +121,7 @@ def test_the_kernel_is_gnu99(source: Path) -> None:
 
 @pytest.mark.parametrize("app", sorted(path.name for path in FIRMWARE.glob("apps/*") if path.is_dir()))
 def test_the_applications_are_gnu99(app: str, tmp_path: Path) -> None:
-    """The same for firmware/apps, with the programs they bring along."""
+    """The applications compile as gnu99, including the host programs in their folders."""
     if shutil.which("gcc") is None:
         pytest.skip("gcc is not installed (Debian package gcc)")
     for program in sorted((FIRMWARE / "apps" / app).glob("*/main.c")):
@@ -142,9 +148,9 @@ def check_gnu99(source: Path, *folders: Path) -> None:
         "-Wno-pointer-to-int-cast",
         "-fsyntax-only",
     ]
-    # Addresses of 16 bits only: pointers do not fit into integers on a host.
+    # Addresses have 16 bits: pointers do not fit into integers on a host.
     layout = ["-DSYS_DEFAULT_STACK=256", "-include", "stddef.h", "-Wno-type-limits", "-Wno-attributes"]
-    layout += ["-D__dsPIC30F6014A__"]  # as -mcpu does
+    layout += ["-D__dsPIC30F6014A__"]  # as -mcpu defines it
     layout += [f"-D__builtin_{one}" for one in BUILTINS]
     command = ["gcc", *flags, *layout, *includes, str(source)]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
@@ -154,7 +160,7 @@ def check_gnu99(source: Path, *folders: Path) -> None:
 
 @pytest.mark.parametrize("source", sources("*.[Si]*"), ids=lambda path: path.name)
 def test_the_assembly_uses_directives_of_pic30_as_only(source: Path) -> None:
-    """Labels, instructions, comments behind `;`, preprocessor lines and a handful of directives."""
+    """Assembly files contain only labels, instructions, comments after `;`, preprocessor lines and known directives."""
     for number, line in enumerate(source.read_text().splitlines(), 1):
         code = line.split(";")[0].strip()
         if code.startswith("#"):

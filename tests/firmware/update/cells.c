@@ -1,5 +1,5 @@
-/* One robot whose cells are bad: power fails in the middle of operations, clocks wrap, bytes and flags stick, stores
- * wear out. Whatever has happened, only whole programs are called. */
+/* One robot with faulty memory cells: power fails during operations, clocks wrap, bytes and flags are stuck, program
+ * stores wear out. The robot must only ever call whole programs. */
 #include "update.c"
 
 #include "spread.c"
@@ -19,10 +19,10 @@ static uint8 cells[SLOTS][HAL_UPDATE_ROWS + 1][HAL_UPDATE_ROW];
 static uint16 flags[HAL_UPDATE_STORES];
 static jmp_buf power_off;
 static int cut_in, history;
-static const uint8 *stuck; /* a row of which a byte does not change */
+static const uint8 *stuck; /* a row with one byte that cannot change */
 static bool sticks;
-static uint8 worn_stores;  /* bit n: nothing in store n changes any more */
-static uint16 stuck_flags; /* bits of all flags that stay as they are */
+static uint8 worn_stores;  /* bit n: no cell of store n can change */
+static uint16 stuck_flags; /* bits that cannot change, the same in all flags */
 static long changes;
 static uint32 seed, now;
 static long calls, reads;
@@ -124,7 +124,7 @@ void hal_update_run(void)
 static void draw_programs(void)
 {
     for (int n = 0; n < PROGRAMS; n++) {
-        uint8 least = n == PROGRAMS - 1 ? 3 : 1; /* the newest has rows to get on with */
+        uint8 least = n == PROGRAMS - 1 ? 3 : 1; /* several rows: can be interrupted */
         uint8 rows = (uint8)(least + chance(chance(4) != 0 ? 4 : HAL_UPDATE_ROWS + 1u - least));
         uint32 crc = 0xFFFFFFFFu;
         for (uint8 r = 0; r < rows; r++) {

@@ -1,5 +1,5 @@
-/* The messages of spread.c and their frames as they are, for the host's tests: numbers by name, then messages of given
- * facts as hexadecimal numbers. */
+/* Prints constants by name, and then messages of spread.c and their frames as hexadecimal numbers. The host's tests
+ * compare them with their own encoding. */
 #include "update.c"
 
 #include "spread.c"
@@ -57,7 +57,7 @@ bool Sys_Raw_Tx(const uint8 *message, uint16 size, sys_put put_byte)
     (void)message;
     (void)size;
     (void)put_byte;
-    return false; /* all of these are frames */
+    return false; /* never called: every message is sent as a frame */
 }
 
 static bool put(uint8 byte)

@@ -1,5 +1,5 @@
-/* Histories of anything in any order: true and false advertisements, requests, data of every program, half of them of
- * two programs with one version, failures of power, resets. Then all fall silent. */
+/* Random histories: true and false advertisements, requests, and data of all programs, half of the histories with two
+ * programs of one version; power failures and resets. Finally all neighbours fall silent. */
 #include "neighbours.c"
 
 enum { HISTORIES = 150, STEPS = 3000 };
@@ -17,12 +17,12 @@ static void something(void)
     case 1:
         hear_advertisement(facts, chance(2));
         break;
-    case 2: /* false ones */
+    case 2: /* a false advertisement */
         facts.rows = (uint8)chance(256);
         facts.version = (uint16)(chance(3) == 0 ? 65535 : chance(20));
         hear_advertisement(facts, chance(2));
         break;
-    case 3: /* for the program that is here */
+    case 3: /* a request for the stored program */
         m[0] = (uint8)(REQUEST | (m[0] & ROW));
         m[1] = (uint8)have.version;
         m[2] = (uint8)(have.version >> 8);
@@ -65,7 +65,7 @@ static void something(void)
     }
 }
 
-/* After any history: without messages from others it sends little, and after some minutes only its advertisement. */
+/* After any history a robot that hears nothing sends little, and after some minutes only its advertisement. */
 static void silence(void)
 {
     forget_kinds();

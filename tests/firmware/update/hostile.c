@@ -1,5 +1,5 @@
-/* Neighbours that say anything, true or false, to a robot with bad cells: random histories, then attacks of one kind
- * each. Whatever has happened, only whole programs are called, and only parts of whole programs are sent. */
+/* Neighbours that send true and false messages to a robot with faulty cells: random histories, then one attack of each
+ * kind. The robot must only call whole programs, and only send parts of whole programs. */
 #include "histories.c"
 
 /* An advertised program that no robot sends does not block an available one, however often it is advertised. */
@@ -26,7 +26,8 @@ static void promise(bool is_repeated)
           "it is asked for seldom");
 }
 
-/* Of two programs of one version the one that was begun comes whole, whatever is heard of the other before. */
+/* Of two programs with one version the robot completes the one it has begun, even if it first hears parts of the
+ * other. */
 static void namesakes(int wanted, int other)
 {
     sys_update facts = programs[other].facts;
@@ -46,7 +47,7 @@ static void namesakes(int wanted, int other)
     begin_interval(SHORTEST);
     hear_advertisement(facts, false);
     check(heard == 0, "nor has anybody said the same by naming the other");
-    for (uint8 r = 0; r < facts.rows; r++) { /* requests for the other program's rows get none of these */
+    for (uint8 r = 0; r < facts.rows; r++) { /* a request for rows of the other program gets no parts */
         uint8 m[SYS_SPREAD_BYTES];
         sys_update own = want;
         want = facts, row = r, lacking = ALL_PARTS;
@@ -57,8 +58,8 @@ static void namesakes(int wanted, int other)
     }
 }
 
-/* A robot that requests a row for ever, with none or all of it, gets few parts; requests of others and due messages go
- * on. */
+/* A robot that requests a row for ever, some or all of its parts, gets few of them. Requests of other robots and due
+ * messages are still served. */
 static void nagged(bool for_all_rows)
 {
     int n = PROGRAMS - 1, rows = programs[n].facts.rows, last = rows - 1, requests = 0;
@@ -109,7 +110,7 @@ static void nagged(bool for_all_rows)
     check(wanted_parts == 0, "a request for no parts gets none");
 }
 
-/* Who is behind comes first, but not for ever. */
+/* A neighbour with an older version is served first, but not for ever. */
 static void pushed(void)
 {
     enum { SECOND = 1000 / SYS_SPREAD_TICK };
@@ -161,7 +162,7 @@ static void pushed(void)
     check(kinds[REQUESTED] == 1, "until another robot advertises it");
 }
 
-/* Flash that holds nothing any more is not asked for, nor written, without end; the store that does is used. */
+/* Worn flash is neither requested for nor written without end; the other store is used. */
 static void worn_out(void)
 {
     worn_stores = 1;
@@ -181,7 +182,7 @@ static void worn_out(void)
     check(have.version == programs[PROGRAMS - 1].facts.version, "which tries again");
 }
 
-/* A CRC that no program has is not asked for without end. */
+/* A program with a CRC that no data can match is not requested without end. */
 static void false_sum(void)
 {
     programs[PROGRAMS - 1].facts.crc ^= 1;
@@ -192,7 +193,7 @@ static void false_sum(void)
     check(have.version == programs[PROGRAMS - 1].facts.version, "but the true one is");
 }
 
-/* Flags that do not change: what cannot be tried is not in the way of the one that works, nor of the next. */
+/* Flags that cannot change: a program that cannot be tried blocks neither the working program nor the next one. */
 static void stuck_bits(void)
 {
     enum { FIRST = 0, SECOND = 2, THIRD = 4 };
@@ -229,7 +230,8 @@ static void stuck_bits(void)
     stuck_flags = 0;
 }
 
-/* Who is on trial begins nothing, however long that is and whatever it hears; then it does. */
+/* While a program is on trial the robot begins no transfer, for however long and whatever it hears; afterwards it
+ * does. */
 static void long_trial(void)
 {
     take(0);
@@ -242,7 +244,7 @@ static void long_trial(void)
     take(PROGRAMS - 1);
 }
 
-/* There is nothing above the last version, and nothing below it comes back. */
+/* The version numbers end: no version above the last one exists, and lower ones are not accepted. */
 static void last_versions(void)
 {
     for (int n = 0; n < 4; n++) {

@@ -1,4 +1,4 @@
-/* What the robot says, of which only parts of whole programs are sent, and what its neighbours say to it. */
+/* Messages of the robot, in which only parts of whole programs may be sent, and messages of its neighbours. */
 #include "cells.c"
 
 enum {
@@ -8,7 +8,7 @@ enum {
     MINUTE = 60000 / SYS_SPREAD_TICK
 };
 
-static long sent, kinds[4]; /* kinds: what it has sent, by the upper three bits */
+static long sent, kinds[4]; /* kinds: messages sent, by their upper three bits */
 
 static void forget_kinds(void)
 {
@@ -73,7 +73,7 @@ static void hear_request(int n, uint8 their_row, uint32 parts)
     Sys_Hear_Update(now, m);
 }
 
-/* What it asks for, as a neighbour that has it would send it. */
+/* Delivers the requested parts, as a neighbour that has the program would send them. */
 static void hear_what_is_wanted(uint32 one_lost_of)
 {
     for (int n = 0; n < PROGRAMS; n++) {
@@ -87,7 +87,7 @@ static void hear_what_is_wanted(uint32 one_lost_of)
     }
 }
 
-/* Neighbours that have a program, as long as it is asked for; how many requests that took. */
+/* Simulates neighbours that have a program and answer requests; returns the number of requests. */
 static int serve(int n, int ticks)
 {
     int requests = 0;

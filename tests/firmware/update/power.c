@@ -1,5 +1,6 @@
-/* The stores of io/update on cells in RAM whose power fails at the operation that the test says: it has not
- * happened, has happened, or has changed some of its bits. Printed are figures; any failure ends with status 1. */
+/* The program stores of io/update in RAM cells whose power fails at an operation that the test selects. The operation
+ * has not happened, has happened, or has changed some of its bits. The test prints figures; a failure ends with status
+ * 1. */
 #include "update.c"
 
 #include <setjmp.h>
@@ -14,14 +15,14 @@ typedef struct {
 } cells;
 
 static cells now;
-static bool flags_stick; /* worn out: they do not change any more */
+static bool flags_stick; /* worn out: flags cannot change */
 static jmp_buf power_off;
 static int operations, cut_at = NEVER, mode;
 static uint32 seed = 1;
 static uint16 ran;
 static long checks;
 
-static uint8 images[8][HAL_UPDATE_ROWS][HAL_UPDATE_ROW]; /* by version */
+static uint8 images[8][HAL_UPDATE_ROWS][HAL_UPDATE_ROW]; /* indexed by version */
 static uint8 rows_of[8];
 
 static uint8 noise(void)
@@ -84,7 +85,7 @@ static void set_flags(uint8 store, uint16 flags)
         return;
     }
     uint8 to[2] = {(uint8)flags, (uint8)(flags >> 8)}, cell[2] = {(uint8)now.flags[store], (uint8)(now.flags[store] >> 8)};
-    if (operations == cut_at) { /* `change` does not return */
+    if (operations == cut_at) { /* does not return from `change` */
         uint16 bits = mode == NOT_DONE ? 0 : mode == DONE ? 0xFFFF : (uint16)(noise() | noise() << 8);
         now.flags[store] = (uint16)((now.flags[store] & ~bits) | (flags & bits));
     } else {
@@ -103,7 +104,7 @@ void hal_update_renew(uint8_t store)
     set_flags(store, 0xFFFF);
 }
 
-/* What lies where programs run has to be one of the images, whole. */
+/* The execution slot must contain one of the images, whole. */
 void hal_update_run(void)
 {
     ran = 0;
@@ -141,7 +142,7 @@ static uint16 start(void)
     return version;
 }
 
-/* Receives a version, starts it and confirms it. How it went is seen by the next start. */
+/* Receives a version, starts it and confirms it. The next start shows the result. */
 static void receive(uint16 version)
 {
     sys_update facts = facts_of(version);
@@ -163,8 +164,8 @@ static cells empty(void)
     return all;
 }
 
-/* Power fails at operation `first` of an update from `old` to `old` + 1 (0: firmware alone), then at `second` of the
- * start. How often it did: an update and a start have only so many. */
+/* Cuts power at operation `first` of an update from `old` (0: firmware alone) to `old` + 1, then at operation `second`
+ * of the next start. Returns the number of power failures that occurred: short operations sequences have fewer. */
 static int fails_twice(const cells *before, uint16 old, int first, int first_mode, int second, int second_mode)
 {
     volatile bool is_cut = false, is_cut_again = false;
@@ -188,9 +189,9 @@ static int fails_twice(const cells *before, uint16 old, int first, int first_mod
     check(version == old || version == new, "the old or the new one runs");
     check(is_cut || version == new, "an update without a failure arrives");
     Sys_Confirm_Update();
-    receive(new); /* whatever happened, it can be finished, */
+    receive(new); /* the update can be completed afterwards, */
     check(start() == new, "the update can be finished");
-    receive(new + 1); /* and is followed by another */
+    receive(new + 1); /* and so can the following one */
     check(start() == new + 1, "the next update arrives");
     return is_cut + is_cut_again;
 }
@@ -210,7 +211,7 @@ static void power(uint16 old)
         goes_on = false;
         for (int m = 0; m < MODES; m++) {
             goes_on |= fails_twice(&before, old, first, m, NEVER, DONE) != 0;
-            for (int second = 0; second < 12; second++) { /* more than a start of this image writes */
+            for (int second = 0; second < 12; second++) { /* more operations than a start of this image makes */
                 for (int n = 0; n < MODES; n++) {
                     pairs += fails_twice(&before, old, first, m, second, n) == 2;
                 }
@@ -221,7 +222,7 @@ static void power(uint16 old)
            pairs);
 }
 
-/* Starts that are never confirmed. */
+/* Starts of a program that never confirms. */
 static void roll_back(void)
 {
     now = empty();
@@ -255,7 +256,7 @@ static void roll_back(void)
     check(start() == 3, "and that version taken again");
 }
 
-/* Images that are damaged on the way, in every fashion one can think of. */
+/* Transfers images with every kind of damage and returns how many were refused. */
 static int damaged(int count)
 {
     int refused = 0;
@@ -285,14 +286,14 @@ static int damaged(int count)
         case 2: /* a row of another image */
             memcpy(spoilt[row], images[3][row], HAL_UPDATE_ROW);
             break;
-        case 3: /* rows in each other's place */
+        case 3: /* two rows exchanged */
             memcpy(spoilt[row], images[2][other], HAL_UPDATE_ROW);
             memcpy(spoilt[other], images[2][row], HAL_UPDATE_ROW);
             break;
-        case 4: /* the rest is lost */
+        case 4: /* the end of a row is missing */
             memset(spoilt[row] + at, 0xFF, (size_t)(HAL_UPDATE_ROW - at));
             break;
-        default: /* facts that are not true */
+        default: /* false facts */
             facts.crc ^= 1u << noise() % 32;
             facts.rows = noise() % 4 == 0 ? (uint8)(facts.rows + 1 + noise() % 40) : facts.rows;
         }

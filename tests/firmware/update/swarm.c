@@ -1,7 +1,8 @@
-/* Robots in a row whose cells are RAM, with one medium of frames: who hears two at once or sends itself hears nothing,
- * and a share of the rest is lost. One robot has a program, or two; printed is when all have it, and what it took.
- * There may be a deaf one among them, which asks for the first row for ever, and a greedy one, which has all and asks
- * for it. An argument: so many seeds, and 22 rows as well. */
+/* A swarm of robots in a row, with flash cells in RAM and one shared medium. A robot receives nothing while it sends or
+ * while several neighbours send; a share of the other frames is lost. One or two robots start with a program; the test
+ * prints when all have it, and how many frames that took. A deaf robot, which requests the first row for ever, and a
+ * greedy robot, which has all rows and requests them, may take part. The argument is a number of seeds; it also adds
+ * programs of 22 rows. */
 #include "update.c"
 
 #include "spread.c"
@@ -13,9 +14,9 @@ enum { MOST = 30, STEP = 15, FRAME = 105, ROWS_MOST = HAL_UPDATE_ROWS + 1, LIMIT
 enum { NORMAL, DEAF, GREEDY };
 
 typedef struct {
-    int robots, reach, loss, within; /* in sight each side, % of what does not collide, s for nine of ten */
-    uint8 rows, early;               /* how many have the program at the beginning */
-    bool with_naggers;               /* a deaf and a greedy one, who are none of the nine of ten */
+    int robots, reach, loss, within; /* range in robots, loss in %, time limit in s for nine of ten */
+    uint8 rows, early;               /* number of robots that start with the program */
+    bool with_naggers;               /* adds a deaf and a greedy robot, which do not count among the nine of ten */
 } scenario;
 
 typedef struct {
@@ -75,7 +76,7 @@ void hal_update_run(void)
 {
 }
 
-/* The firmware's variables are those of one robot at a time. */
+/* Applies an operation to each firmware variable: their values belong to one robot at a time. */
 #define EACH(move)                                                                                                     \
     move(target) move(running) move(stored) move(row) move(asked) move(doublings) move(wanted_row) move(part_sent)     \
         move(heard) move(coming) move(have) move(want) move(vain) move(missing) move(clock) move(interval) move(begun) \
@@ -117,7 +118,7 @@ static void provide(uint16 version, uint8 rows)
     }
 }
 
-/* How many have the version, activated or not. */
+/* Counts the robots that have the version; `activated`: only those that have activated it. */
 static int count(int number, uint16 version, bool activated)
 {
     int found = 0;
@@ -127,7 +128,7 @@ static int count(int number, uint16 version, bool activated)
     return found;
 }
 
-/* Frames that end now, to everybody in sight of their senders. */
+/* Delivers the frames that end now to every robot in range of their senders. */
 static void deliver(int number, int reach, int now, int loss)
 {
     for (int n = 0; n < number; n++) {
@@ -151,7 +152,7 @@ static void deliver(int number, int reach, int now, int loss)
     }
 }
 
-/* Request of a robot that never makes progress, for rows of version 7; true: it is due. */
+/* Composes the next request of a deaf or greedy robot for the program of robot 0; returns whether it is due. */
 static bool nag(robot *who, int now, uint8 *m)
 {
     sys_update facts = robots[0].have;
@@ -164,7 +165,7 @@ static bool nag(robot *who, int now, uint8 *m)
     return ask(m);
 }
 
-/* A robot whose turn it is sends its message, unless it receives another robot. */
+/* Sends the message of a robot whose turn it is, unless it is receiving; returns whether it sends. */
 static bool speak(int n, int number, int reach, int now)
 {
     bool is_busy = now < robots[n].waits_until || now < robots[n].sends_until;
@@ -187,7 +188,7 @@ static bool speak(int n, int number, int reach, int now)
     return speaks;
 }
 
-/* The first robot on the medium is drawn at each moment. */
+/* Shuffles the order in which robots try to send. */
 static void shuffle(int *order, int number)
 {
     for (int n = number - 1; n > 0; n--) {
@@ -211,7 +212,7 @@ static void set_up(const scenario *s)
         enter(n);
         if (n == 0 || (s->early == 2 && n == s->robots / 2)) {
             uint32 kept = seed;
-            seed = program; /* the same program */
+            seed = program; /* the same program for every early robot */
             provide(7, s->rows);
             seed = n == 0 ? seed : kept;
         }
@@ -278,7 +279,7 @@ static void trial(const scenario *s)
     }
 }
 
-/* Random messages: nothing breaks, and the program that works continues. */
+/* Random messages do no harm, and the running program continues. */
 static void babble(void)
 {
     enter(1);
@@ -288,7 +289,7 @@ static void babble(void)
         for (int i = 0; i < SYS_SPREAD_BYTES; i++) {
             message[i] = (uint8)random_below(256);
         }
-        if (n % 3 != 0) { /* what fits: the version that it wants, and rows that it has */
+        if (n % 3 != 0) { /* repair some fields: the wanted version, and rows that exist */
             message[0] = (uint8)(DATA | row);
             message[1] = (uint8)((message[1] & 0xF8) | identity(&want) >> 8);
             message[2] = (uint8)identity(&want);

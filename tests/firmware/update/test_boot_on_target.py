@@ -1,4 +1,5 @@
-"""The boot loader `firmware/apps/boot` in an emulated robot takes what `openswarm flash` sends, and keeps itself."""
+"""The boot loader `firmware/apps/boot` on an emulated robot accepts programs of `openswarm flash` and preserves
+itself."""
 
 from __future__ import annotations
 
@@ -48,7 +49,7 @@ def program(tmp_path_factory: pytest.TempPathFactory) -> Image:
 
 @pytest.fixture
 def robot(image) -> Machine:
-    """A robot that has nothing but the boot loader."""
+    """Return a robot that contains only the boot loader."""
     return emu.load(image("boot"))
 
 
@@ -57,7 +58,7 @@ def loader_rows(machine: Machine) -> list[int]:
 
 
 def test_it_lies_where_the_host_knows_it(image):
-    """Rows of its own up to the end of flash, none before, and reset leads there."""
+    """The boot loader occupies rows up to the end of flash, and the reset instruction jumps to it."""
     loader = load_image(image("boot"))
     assert [loader.word(0), loader.word(2)] == goto(LOADER.start)
     assert all(address < 0x100 or address >= LOADER.start for address, _ in loader.words(loader.chip.program["flash"]))
@@ -65,8 +66,10 @@ def test_it_lies_where_the_host_knows_it(image):
 
 
 def test_damage_and_a_cut_in_the_middle_leave_a_robot_that_can_be_reached(robot, program):
-    """A wrong sum is refused and nothing is erased; cut off, the robot waits for the host after every reset, until all
-    rows are there. Its own rows never change."""
+    """A wrong checksum is refused before anything is erased; an interrupted transfer leaves the robot reachable.
+
+    The robot then waits for the host after every reset until all rows are written. Its own rows never change.
+    """
     own = loader_rows(robot)
     line = Line(robot)
     talk = BootSession(line, 2.0)
@@ -82,13 +85,13 @@ def test_damage_and_a_cut_in_the_middle_leave_a_robot_that_can_be_reached(robot,
         line.write(block(address, [0] * 32))
         assert line.read(1.0) == b"N", hex(address)
     line.write(block(0, [0] * 32))
-    assert line.read(1.0) == b"N"  # word 0 has to lead to the loader
+    assert line.read(1.0) == b"N"  # word 0 must jump to the loader
 
     talk.write(wanted[:4], lambda done, total: None)
     line.write(block(*wanted[4])[:50])
     robot.run(seconds=0.01)
     robot.reset()
-    again = BootSession(line, 1.0)  # after more than it waits: without a program it waits again
+    again = BootSession(line, 1.0)  # later than the time-out: without a program the loader continues to wait
     again.write(wanted, lambda done, total: None)
     again.start()
     robot.run(seconds=0.02)
@@ -97,11 +100,11 @@ def test_damage_and_a_cut_in_the_middle_leave_a_robot_that_can_be_reached(robot,
     line.drop()
     robot.reset()
     robot.run(seconds=1.02)
-    assert b"it runs\nit runs\n" in line.heard  # after a second in which no host has greeted
+    assert b"it runs\nit runs\n" in line.heard  # after one second without a greeting from a host
 
 
 def test_the_command_flashes_a_robot_behind_a_pseudo_terminal(robot, program, capsys):
-    """The whole way: command line, serial port, boot loader; and the program greets on the same port."""
+    """`openswarm flash` writes a program through a pseudo terminal, and the program prints on the same port."""
     master, slave = pty.openpty()
     tty.setraw(slave)
     said = bytearray()

@@ -1,5 +1,7 @@
-"""Programs for the slot of updates: what `openswarm program` builds runs on the emulated robot, called by firmware that
-knows nothing of it; what cannot run there is refused."""
+"""Programs for the update slot: `openswarm program` builds them, and independently built firmware runs them.
+
+Programs that cannot run in the slot are refused.
+"""
 
 from __future__ import annotations
 
@@ -23,7 +25,8 @@ LAMP = "#include <openswarm_io.h>\nint main(void) { return Sys_Set_LED(SYS_LED_B
 
 
 def test_a_program_of_all_that_c_has_runs_in_the_slot(image):
-    """Constants, variables, the library, a handler and a thread, for which it calls the kernel of the firmware."""
+    """A program in the slot uses constants, variables, the library, a handler and a thread through the kernel's call
+    table."""
     machine = emu.load(image("programs", TARGET_APPS))
     said = bytearray()
     machine.board.bluetooth.on_byte = lambda byte, _cycle: said.append(byte)
@@ -35,7 +38,7 @@ def test_a_program_of_all_that_c_has_runs_in_the_slot(image):
 
 
 def test_firmware_that_offers_fewer_calls_is_left_in_peace(image):
-    """A program with unknown kernel calls resets; after three starts the firmware runs without it."""
+    """A program with unknown kernel calls resets the robot; after three starts the firmware runs without it."""
     machine = emu.load(image("programs", TARGET_APPS))
     machine.program.put(CALLS, machine.program.word(CALLS) - 1)
     said = bytearray()
@@ -106,7 +109,7 @@ def test_other_images_are_no_programs(image):
 
 
 def test_the_host_and_the_firmware_know_one_slot():
-    """update_slots.h is for C and assembly, program.py for Python: neither can read the other."""
+    """update_slots.h (for C and assembly) and program.py (for Python) define the same slot."""
     text = (UPDATE / "update_slots.h").read_text()
     known = {name: int(value, 0) for name, value in re.findall(r"#define (\w+) (0x[0-9A-F]+|\d+)\n", text)}
     assert (known["UPDATE_RUN"], known["UPDATE_RUN_END"], known["UPDATE_CALLS"]) == (SLOT.start, SLOT.end, CALLS)

@@ -1,4 +1,4 @@
-"""`openswarm flash` brings a program into a robot that runs `apps/spreading`, over its Bluetooth."""
+"""`openswarm flash` transfers a program over Bluetooth to a robot that runs `apps/spreading`."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ ROWS = 3
 
 
 def built(folder: Path, version: int, filling: int = 1) -> Path:
-    """A program of three rows that switches the body LED on."""
+    """Return a program of three rows that switches the body LED on."""
     source = folder / f"{version}-{filling}.c"
     words = ", ".join(str(filling * n) for n in range(1, 41))
     source.write_text(f"""
@@ -54,7 +54,7 @@ def programs(tmp_path_factory: pytest.TempPathFactory) -> dict[int, Path]:
 
 @pytest.fixture
 def robot(image) -> Machine:
-    """A robot without a program and without neighbours."""
+    """Return a robot without a program and without neighbours."""
     return emu.load(image("spreading"))
 
 
@@ -68,7 +68,10 @@ def slot(machine: Machine, rows: int) -> bytes:
 
 
 def test_a_robot_takes_checks_and_runs_what_the_host_has(robot, programs):
-    """With parts damaged on the way; then a newer one; what is old or another of the same version is refused."""
+    """A robot receives, checks and runs the host's program although parts are damaged on the way.
+
+    A newer program replaces it; an older one, or another of the same version, is refused.
+    """
     line, program = Line(robot), of(programs[4])
     assert len(program.rows) == ROWS
     write, sent = line.write, 0
@@ -89,7 +92,7 @@ def test_a_robot_takes_checks_and_runs_what_the_host_has(robot, programs):
     robot.run(seconds=4.0)
     assert slot(robot, ROWS) == b"".join(program.rows)
     line.drop()
-    assert HostNeighbour(line, program, 20.0).give(lambda done, total: None) is True  # it has it already
+    assert HostNeighbour(line, program, 20.0).give(lambda done, total: None) is True  # the robot already has it
     newer = HostNeighbour(line, of(programs[5]), 20.0)
     assert newer.give(lambda done, total: None) is False
     with pytest.raises(RobotError, match=r"the robot has version 5, and takes only what is above it: .* --version 6"):
@@ -100,7 +103,10 @@ def test_a_robot_takes_checks_and_runs_what_the_host_has(robot, programs):
 
 
 def test_a_robot_that_falls_silent_is_told(robot, programs):
-    """Nothing of the host arrives; then only what it advertises does, until a robot that asks is off."""
+    """The host reports a robot that does not answer, and one that receives nothing after it has requested rows.
+
+    First no message of the host arrives; then the robot is cut off as soon as it requests rows.
+    """
     line, program = Line(robot), of(programs[4])
     write = line.write
     line.write = lambda data: None  # type: ignore[method-assign]
@@ -116,7 +122,7 @@ def test_a_robot_that_falls_silent_is_told(robot, programs):
 
 
 def test_damaged_frames_are_none():
-    """Change, and omit, every byte of a frame."""
+    """Frames with any changed or missing byte are refused."""
     frame = framed(bytes([0x80, 0, 0, 3, 0, 9, 0, 0]))[1:-1]
     assert unframed(frame) == bytes([0x80, 0, 0, 3, 0, 9, 0, 0])
     for at in range(len(frame)):

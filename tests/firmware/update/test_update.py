@@ -1,4 +1,4 @@
-"""Programs that come as updates (io/update): whenever power fails, the old or the new one runs afterwards."""
+"""Program updates (io/update): whenever power fails, the old or the new program runs afterwards."""
 
 from __future__ import annotations
 
@@ -28,46 +28,57 @@ TARGET_APPS = HERE.parent / "target"
 RECEIVE, ACTIVATE, CONFIRM = 1, 2, 3
 ROWS = 1
 MARK = 0x1F00
-"""Where the programs of this test leave their version, in RAM."""
+"""RAM address at which the programs of this test store their version."""
 RUN, STORES = 0x00F800, 0x016800
 OPERATIONS = 11
-"""Head and flags erased, a row and the head erased and written, active, a try, the row copied, confirmed."""
+"""Number of flash and EEPROM operations of an update.
+
+Head and flags erased, a row and the head erased and written, activated, a trial, the row copied, confirmed.
+"""
 MIDDLE = 20_000
-"""Tcy: an operation takes 29,491."""
+"""Tcy after the start of an operation at which power fails; an operation takes 29,491 Tcy."""
 
 
 def test_every_operation_may_be_the_last_and_damage_is_refused(tmp_path):
-    """On a host, under sanitizers: power fails at each operation of an update, which has not happened, has happened or
-    has changed some bits, and at each of the start that follows; 10,000 damaged images."""
+    """Power may fail at each operation of an update and of the next start; 10,000 damaged images are refused.
+
+    The failing operation has not happened, has happened or has changed some bits. The program runs on a host under
+    sanitizers.
+    """
     said = on_host("power", tmp_path)
     assert [int(pairs) for pairs in re.findall(r"(\d+) pairs", said)] == [203, 351, 93]
     assert int(re.search(r"(\d+) damaged images refused", said)[1]) >= 10_000
 
 
 def test_a_program_reaches_every_robot(tmp_path):
-    """Two robots, three and thirty, ten hops from end to end, with 30 % of the messages lost: all have it, activate it
-    and run it; then they are quiet. So have all of ten among which a deaf one and a greedy one ask for rows without
-    end (nine within 10 min, or the program fails). Random messages do no harm."""
+    """Updates reach all robots of swarms of 2, 3 and 30, over ten hops, with 30 % of the messages lost.
+
+    All robots activate and run the program and then stop sending. In a swarm of ten, a deaf robot and a greedy robot
+    request rows without end; the ten robots still get the program (nine of them within 10 min). Random messages do
+    no harm.
+    """
     said = on_host("swarm", tmp_path)
     trials = re.findall(r"(\d+) robots, .* (\d) nag: .* active ([\d.]+) s, .* then (\d+) in 300 s", said)
     assert [(int(robots), int(nag)) for robots, nag, _, _ in trials] == [(2, 0), (3, 0), (30, 0), (12, 2)] * 2
     for robots, nag, seconds, frames in trials:
         assert 0 < float(seconds) < 600
-        # One of 1, 2, 4 s and so on each, or none where others say the same.
+        # each sends after 1, 2, 4 s and so on, or not at all if others send the same
         assert nag != "0" or int(frames) < 9 * int(robots)
     assert said.endswith("whatever was said\n")
 
 
 def test_neighbours_may_say_anything(tmp_path):
-    """150 histories under sanitizers: false facts, two programs of one version, requests for what is gone, power that
-    fails, flash that sticks, a clock that wraps. Programs and their parts stay whole, a promise that nobody keeps is
-    given up, and nothing makes a robot send without end once it hears no more."""
+    """150 random histories under sanitizers leave programs whole and robots silent when no message arrives.
+
+    They contain false advertisements, two programs of one version, requests for missing rows, power failures, worn
+    flash and a wrapping clock. An advertised program that no robot sends is given up.
+    """
     said = on_host("hostile", tmp_path)
     assert int(re.search(r"(\d+) messages", said)[1]) > 100_000
 
 
 def test_host_and_robot_have_one_format(tmp_path):
-    """Sizes, every kind of message, and frames: of the firmware's own code and of the host's."""
+    """Host and firmware agree on sizes, on every kind of message and on frames."""
     lines = [line.split() for line in on_host("format", tmp_path).splitlines()]
     sizes = {name: int(number) for name, number, *frame in lines if not frame}
     assert sizes == {"row": ROW_BYTES, "rows": SLOT_ROWS, "parts": PARTS, "message": MESSAGE}
@@ -85,7 +96,7 @@ def test_host_and_robot_have_one_format(tmp_path):
 
 
 def on_host(program: str, folder: Path) -> str:
-    """Build and run a program of the folder update; what it prints."""
+    """Build and run a program of the folder update; return its output."""
     if shutil.which("gcc") is None:
         pytest.skip("the host tests of updates are built with gcc, which is not installed (Debian package gcc)")
     folders = ("include", "hal", "kernel", "io", "io/update", "port/posix", "board/host")
@@ -99,14 +110,14 @@ def on_host(program: str, folder: Path) -> str:
 
 
 class Number:
-    """What the assembly parser wants to know of an operand."""
+    """Interface of an operand that the assembly parser expects."""
 
     def __init__(self, text: str) -> None:
         self.value: int | None = int(text, 0)
 
 
 def rows_of(version: int) -> bytes:
-    """A program of one row that leaves its version at MARK."""
+    """Return a program of one row that stores its version at MARK."""
     words: list[int] = []
     for line in (f"mov #{version}, w0", f"mov w0, {MARK:#x}", "return"):
         words += parse(line, Number).encode(RUN + 2 * len(words))
@@ -115,7 +126,7 @@ def rows_of(version: int) -> bytes:
 
 
 class Robot:
-    """A robot that takes commands through its RAM."""
+    """A robot that receives commands through its RAM."""
 
     def __init__(self, machine: Machine) -> None:
         self.machine = machine
@@ -124,14 +135,14 @@ class Robot:
         machine.hook_pc("ready", lambda: True)
 
     def run(self) -> bool:
-        """To the next stop; whether that is the begin of an operation on flash or EEPROM."""
+        """Run to the next stop; return whether it is the start of a flash or EEPROM operation."""
         self.machine.run(cycles=1)
         stop = self.machine.run(seconds=2.0)
         assert stop.reason == "breakpoint", stop
         return self.machine.pc == self.machine.program_address("operate")
 
     def boot(self, cause: str) -> int:
-        """The version that runs after a reset; 0: the firmware alone."""
+        """Reset and return the version that runs; 0 is the firmware alone."""
         self.machine.reset(cause)
         self.machine.record.bytes[MARK : MARK + 2] = bytes(2)
         while self.run():
@@ -148,8 +159,11 @@ class Robot:
 
 
 def after_a_failure_here(robot: Robot, old: int, new: int) -> set[int]:
-    """Power goes in the middle of the operation that begins now; or the reset line cuts it, and an erased row is half
-    erased (dspic30f6014a.md §16)."""
+    """Cut the operation that starts now and return the versions that run afterwards.
+
+    Once power fails, and once the reset line is activated; both leave an erased row half erased (dspic30f6014a.md
+    §16).
+    """
     here = robot.machine.snapshot()
     seen = set()
     robot.stops_at_operations = False
@@ -164,7 +178,7 @@ def after_a_failure_here(robot: Robot, old: int, new: int) -> set[int]:
 
 
 def test_no_image_reaches_into_the_slots(image, tmp_path):
-    """Where they are, an image loads nothing; one that would need them is not linked."""
+    """No image places code or data in the update slots; an image that would need them is not linked."""
     program = emu.load(image("updates", TARGET_APPS)).program
     kept = [*range(RUN, 0x10000, 2), *range(STORES, 0x18000, 2)]
     assert all(program.word(address) == 0xFFFFFF for address in kept)
@@ -178,8 +192,10 @@ def test_no_image_reaches_into_the_slots(image, tmp_path):
 
 
 def test_power_fails_at_every_write_of_a_robot(image):
-    """The code for the chip, on the emulated flash and EEPROM, by snapshots: each operation of an update and of the
-    start that brings it into use."""
+    """Power failure at each flash or EEPROM operation of an update leaves a robot that runs a whole program.
+
+    The code for the chip runs on the emulated flash and EEPROM; snapshots restore the state before each operation.
+    """
     robot = Robot(emu.load(image("updates", TARGET_APPS)))
     assert robot.boot("POR") == 0
     assert update(robot, 1, lambda: None) == OPERATIONS
@@ -189,7 +205,7 @@ def test_power_fails_at_every_write_of_a_robot(image):
 
 
 def update(robot: Robot, version: int, at_each: Callable[[], None]) -> int:
-    """Bring a version into use; how many operations that took."""
+    """Bring a version into use; return the number of operations."""
     operations = 0
     robot.stops_at_operations = True
     for command in (RECEIVE, ACTIVATE, None, CONFIRM):

@@ -1,5 +1,5 @@
-/* Every kernel call in a round that leaves everything as it found it; an interrupt makes, at a boundary chosen from
- * outside, every call that an ISR may make and every one that it may not. README.md. */
+/* A round of all kernel calls that restores everything it changes. An interrupt at a boundary chosen by the harness
+ * makes every call that an ISR may make and every call that it may not make. See README.md. */
 #include "boundaries.h"
 
 #include <openswarm_cleanup.h>
@@ -11,9 +11,9 @@
 
 #include <string.h>
 
-enum { HEARD = SYS_FIRST_USER_EVENT, SILENT, WAITED, SHARED = SYS_FIRST_USER_EVENT + 8 /* the bucket of HEARD */, NEVER };
+enum { HEARD = SYS_FIRST_USER_EVENT, SILENT, WAITED, SHARED = SYS_FIRST_USER_EVENT + 8 /* HEARD's bucket */, NEVER };
 
-volatile uint16 failures, first_failure; /* calls with another result than they should have; the line of the first */
+volatile uint16 failures, first_failure; /* number of calls with an unexpected result; source line of the first */
 volatile uint16 interrupts, sent, isr_sent, heard, ticks, rounds;
 static uint16 driver_pid, waiter_pid;
 static volatile uint16 woken;
@@ -47,7 +47,7 @@ static bool tick(uint16 pid, uint16 event, sys_event_data *data)
 {
     static uint16 last;
     (void)pid, (void)event;
-    MUST(ticks == 0 || data->value == (uint16)(last + 1u)); /* none lost, none twice */
+    MUST(ticks == 0 || data->value == (uint16)(last + 1u)); /* no tick is lost or duplicated */
     last = data->value;
     ticks++;
     return true;
@@ -88,8 +88,8 @@ __attribute__((used)) void boundaries_isr(void)
     MUST(Sys_IsEventRegistered(HEARD) && !Sys_IsEventRegistered(NEVER));
     isr_sent += Sys_Send_Event(HEARD, "event", 5);
     MUST(!Sys_Send_IntEvent(NEVER, 1));
-    (void)Sys_Send_IntEvent(SHARED, 1); /* perhaps registered just now */
-    (void)Sys_Send_IntEvent(WAITED, 2); /* not what the waiter waits for */
+    (void)Sys_Send_IntEvent(SHARED, 1); /* the event may be registered at this moment */
+    (void)Sys_Send_IntEvent(WAITED, 2); /* a value that the waiter's condition rejects */
     Sys_Start_CriticalSection();
     Sys_Start_CriticalSection();
     Sys_End_CriticalSection();
@@ -101,14 +101,14 @@ __attribute__((used)) void boundaries_isr(void)
     (void)Sys_Get_LastError();
     MUST(Sys_Get_LostEvents(SILENT) == 0);
     Sys_Set_Scheduler(&sys_round_robin);
-    MUST(!Sys_Send_Event(HEARD, large, sizeof large)); /* too large for an ISR */
+    MUST(!Sys_Send_Event(HEARD, large, sizeof large)); /* a payload too large for an ISR */
     MUST(!Sys_Register_Event(NEVER) && !Sys_Unregister_Event(HEARD));
     MUST(!Sys_Subscribe_to_Event(HEARD, 0, other, NULL) && !Sys_Unsubscribe_from_Event(HEARD, 0));
     MUST(!Sys_Kill_Process(driver_pid) && Sys_Start_ProcessWith(&config) == 0);
     MUST(Sys_Wait_for_Event(HEARD) == NULL);
     Sys_Sleep(1);
     Sys_Yield();
-    MUST(refused > UINT16_MAX - 11 || Sys_Get_Statistics()->refused - refused == 11); /* it saturates */
+    MUST(refused > UINT16_MAX - 11 || Sys_Get_Statistics()->refused - refused == 11); /* the counter saturates */
     options_are_refused();
 }
 
@@ -157,7 +157,7 @@ static void threads(void)
     uint16 before = woken;
     uint16 pid = Sys_Start_ProcessWith(&config);
     MUST(pid != 0);
-    (void)Sys_Get_ProcessState(pid); /* it may have ended by itself, now or below */
+    (void)Sys_Get_ProcessState(pid); /* the thread may have ended already; so below */
     Sys_Yield();
     Sys_Set_Scheduler(&sys_fixed_priority);
     Sys_Yield();
@@ -190,7 +190,7 @@ static void options(void)
     MUST(pid != 0 && Sys_Join(pid) && Sys_Get_ProcessState(pid) == SYS_UNKNOWN);
 }
 
-/* A tick that just came has its message there until it is delivered. */
+/* Returns the smallest heap use of three rounds: a recent tick occupies a message until it is delivered. */
 static uint16 heap_at_rest(void)
 {
     uint16 least = UINT16_MAX;
@@ -207,7 +207,7 @@ static void driver(void *unused)
     (void)unused;
     for (;;) {
         Sys_Sleep(1);
-        Sys_Sleep(1); /* what the last round left in the queue is gone */
+        Sys_Sleep(1); /* until messages of the previous round are delivered */
         uint16 heap = heap_at_rest();
         sent = isr_sent = heard = 0;
         rounds++;

@@ -1,4 +1,4 @@
-/* The tests of host/original_bugs.c on the robot: chosen is the index of one in TESTS (from the Makefile's DEFINES). */
+/* Runs one test of host/original_bugs.c on the robot: `chosen` is its index in TESTS (DEFINES of the Makefile). */
 #include "../../host/test.h"
 
 #include "../../host/original_bugs.c"

@@ -1,6 +1,6 @@
-/* Every call of the public headers, made by an interrupt. Those it may make leave everything as it was, apart from the
- * events they send; the others must be refused. tests/firmware/kernel/test_every_instruction.py compares the two lists with the
- * contract lines of the headers. */
+/* Every call of the public headers, made by an interrupt. Permitted calls change nothing apart from the events that
+ * they send; all other calls must be refused. tests/firmware/kernel/test_every_instruction.py compares the two lists
+ * with the contract lines of the headers. */
 #include "isr_calls.h"
 
 #include <openswarm_io.h>

@@ -1,4 +1,4 @@
-/* Calls from the interrupt of target/calls. */
+/* Calls that the injected interrupt of target/calls makes. */
 #ifndef ISR_CALLS_H
 #define ISR_CALLS_H
 
@@ -9,7 +9,7 @@ enum { HEARD = SYS_FIRST_USER_EVENT, AWAITED, PASSING, UNKNOWN };
 extern uint16 driver_pid;
 uint16 each_byte(uint8 byte, uint8 *buffer, uint16 *used);
 
-/* isr_wanted: 0 = none, n = the n-th of isr_acts, 0xFFFF = all; once. */
+/* Makes the calls that isr_wanted selects, once: 0 none, n the n-th of isr_acts, 0xFFFF all. */
 void isr_calls(void);
 
 #endif

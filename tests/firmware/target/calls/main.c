@@ -1,5 +1,5 @@
-/* Every kernel call once, in small scenes that leave everything as it was, beside a thread that checks its registers.
- * The test interrupts each scene at every instruction and lets every allocation in it fail
+/* Small scenes that make every kernel call and restore everything, while a second thread checks its registers. The
+ * harness interrupts each scene at every instruction and lets each of its allocations fail
  * (tests/firmware/injection.py). */
 #include "isr_calls.h"
 
@@ -45,7 +45,7 @@ static bool is_nine(sys_event_data *data)
     return data->value == 9;
 }
 
-/* Every byte is a message: what the UART received is heard in the same scene. */
+/* UART processor that makes a message of every byte, so that a received byte is delivered within the scene. */
 uint16 each_byte(uint8 byte, uint8 *buffer, uint16 *used)
 {
     buffer[0] = byte;
@@ -85,7 +85,7 @@ static void threads(void)
 {
     uint16 p = Sys_Start_Process(forever);
     Sys_Yield();
-    expect(p != 0 && Sys_Get_ProcessState(p) <= SYS_READY); /* new, if the slice ended at its first instruction */
+    expect(p != 0 && Sys_Get_ProcessState(p) <= SYS_READY); /* SYS_NEW if the slice ended at its first instruction */
     expect(Sys_Get_UnusedStack(p) != 0);
     expect(Sys_Kill_Process(p));
     expect(!Sys_Kill_Process(p) && Sys_Get_LastError() == SYS_ERROR_PROCESS);
@@ -109,7 +109,7 @@ static void periodic(void)
     Sys_Yield();
     Sys_Set_Scheduler(&sys_round_robin);
     if (p != 0) {
-        (void)Sys_Kill_Process(p); /* unless a tick let it end already */
+        (void)Sys_Kill_Process(p); /* fails if a tick has let the thread end already */
     }
 }
 
@@ -167,7 +167,7 @@ static void ends_waiting(void)
     Sys_Clear_EventData(&data);
 }
 
-/* An event goes while a thread waits for it and a message is queued. */
+/* Unregisters an event for which a thread waits and a message is queued. */
 static void unregistering(void)
 {
     expect(Sys_Register_Event(PASSING));
@@ -220,7 +220,7 @@ static void (*const scenes[])(void) = {threads,   periodic,      registration, s
 enum { SCENES = sizeof scenes / sizeof scenes[0] };
 const volatile uint16 scene_count __attribute__((used)) = SCENES;
 
-/* Stops for the test. */
+/* Defines a function at which the harness stops. */
 #define STOP(name)                                                    \
     __attribute__((noinline, used)) void name(void)                   \
     {                                                                 \
@@ -235,7 +235,7 @@ static void driver(void *unused)
     for (;;) {
         scene_begin();
         scenes[scene]();
-        Sys_Yield(); /* what an interrupt sent last is delivered too */
+        Sys_Yield(); /* delivers the last message of an interrupt */
         Sys_Yield();
         scene_end();
         scene = scene + 1 == SCENES ? 0 : scene + 1;
@@ -264,7 +264,7 @@ int main(void)
     return 0;
 }
 
-/* Called from checker.S. */
+/* Called by checker.S. */
 __attribute__((used)) void checker_yield(void)
 {
     Sys_Yield();

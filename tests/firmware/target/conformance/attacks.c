@@ -1,10 +1,10 @@
-/* Attacks: legal calls, or refused ones, at the worst moment and in the worst number. Each brought a kernel down
- * once, this one or the original. docs/design/kernel-tests.md lists all of them, with those that need a certain CPU. */
+/* Attacks: permitted or refused calls at the worst instant and in the worst number. Each of them has crashed a kernel,
+ * this one or the original. docs/design/kernel-tests.md lists all attacks and those that need a certain CPU. */
 #include "conformance.h"
 
 #define FILE_LETTER 'a'
 
-enum { PIDS = 1000, MESSAGES = 40 }; /* PIDs: the tests let them wrap */
+enum { PIDS = 1000, MESSAGES = 40 }; /* the tests let PIDs wrap */
 
 static uint16 heard, disorder;
 static bool in_order(uint16 pid, uint16 event, sys_event_data *data)
@@ -26,7 +26,7 @@ static void spin(void *unused)
 {
     (void)unused;
     for (;;) {
-        (void)Sys_Get_SystemTime(); /* on some hosts time passes in calls only */
+        (void)Sys_Get_SystemTime(); /* on some hosts time advances in calls only */
         spins++;
     }
 }
@@ -46,8 +46,8 @@ static bool others_run(void)
     return spins != 0 && Sys_Kill_Process(pid);
 }
 
-/* From a thread and from the clock's interrupt, until the heap is full: what is refused is told and counted, what was
- * taken arrives in order, the memory comes back, and interrupts leave a thread its own last error. */
+/* Floods the heap with events from a thread and from the clock interrupt: refused events are counted and reported,
+ * accepted ones arrive in order, all memory is freed, and interrupts do not change a thread's last error. */
 static void a_flood_is_refused(void)
 {
     heard = disorder = 0;
@@ -56,7 +56,7 @@ static void a_flood_is_refused(void)
     Sys_Yield();
     const sys_statistics *now = Sys_Get_Statistics();
     uint16 heap = now->heap_used, lost = now->events_lost, sent = 0, lost_at, lost_ticks;
-    CHECK(lost == 0); /* nothing so far was more than the heap holds */
+    CHECK(lost == 0); /* so far the heap has had room for all messages */
     Sys_Start_CriticalSection();
     while (Sys_Send_IntEvent(E1, sent)) {
         sent++;
@@ -155,7 +155,7 @@ static void sections_without_their_other_half(void)
     CHECK(start(once, NULL, 0) != 0);
     Sys_Start_CriticalSection();
     Sys_Yield();
-    CHECK(noted("ii")); /* one begin excludes all the same */
+    CHECK(noted("ii")); /* one section excludes the other thread all the same */
     Sys_End_CriticalSection();
     Sys_Yield();
     CHECK(noted("iio"));
@@ -189,7 +189,7 @@ static void handlers_that_subscribe_each_other_again(void)
     for (uint8 i = 1; i <= 3; i++) {
         CHECK(Sys_Send_IntEvent(E1, 0));
         Sys_Yield();
-        CHECK(heard == i); /* a handler subscribed again gets the next message */
+        CHECK(heard == i); /* a handler that subscribes again gets the next message */
     }
     CHECK(Sys_Unregister_Event(E1));
 }
@@ -230,7 +230,7 @@ static void hold_a_result(void *unused)
     note(data != NULL && data->value == 0x77 ? 'h' : '?');
 }
 
-/* The first, the middle or the last waiter dies under the message's delivery, or with the message in its hands. */
+/* Kills the first, the middle or the last waiter while the message is delivered, or while the waiter owns it. */
 static void waiters_and_holders_die(void)
 {
     static char all[] = "hhhh";
@@ -255,7 +255,7 @@ static void waiters_and_holders_die(void)
     }
 }
 
-/* How many threads fit; they never run. */
+/* Returns the number of threads that memory allows; they never run. */
 static uint16 capacity(void)
 {
     uint16 count = 0, first, pid;
@@ -291,7 +291,7 @@ static void an_event_registered_in_a_burst(void)
     CHECK(Sys_Unregister_Event(E1) && heap_now() == heap);
 }
 
-/* Two late jobs that never end, and round robin beside them. */
+/* Two endless jobs beyond their deadlines must not starve the threads under round robin. */
 static void late_jobs_starve_no_thread(void)
 {
     sys_process_config config = {spin, NULL, 0, 0, SYS_PERIODIC, 20, 3};
@@ -315,7 +315,7 @@ static void no_scheduler(void)
     CHECK(others_run());
 }
 
-/* A robot writes faster than its line; hosts may not. */
+/* Messages longer than the transmit buffer: a robot writes faster than its line transmits, a host may not. */
 static void long_messages(void)
 {
     uint8 text[65];

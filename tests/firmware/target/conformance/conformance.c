@@ -1,4 +1,4 @@
-/* Runs the checks as PID 0 and tells the result on UART1: "conforms: N checks", or "N of M checks failed". */
+/* Runs the checks as PID 0 and prints the result on UART1: "conforms: N checks", or "N of M checks failed". */
 #include "conformance.h"
 
 #include <string.h>
@@ -34,7 +34,7 @@ static void say(const char *line, const char *end)
     while (!Sys_Write_UART1(line, (uint16)(end - line))) {
         Sys_Sleep(5);
     }
-    Sys_Sleep(15); /* it leaves before the next one */
+    Sys_Sleep(15); /* until the line is sent, before the next one */
 }
 
 void check_line(bool holds, char file, uint16 line)
@@ -93,8 +93,8 @@ uint16 start(void (*entry)(void *), void *arg, uint8 priority)
     return Sys_Start_ProcessWith(&config);
 }
 
-/* A scheduler other than round robin may be set, and threads may exist, before the kernel starts. What may block is refused
- * until then. */
+/* A scheduler other than round robin may be set, and threads may be created, before the kernel starts. Calls that may
+ * block are refused until then. */
 #ifndef FIRST_SCHEDULER
 #define FIRST_SCHEDULER sys_fixed_priority
 #endif

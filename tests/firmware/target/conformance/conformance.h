@@ -1,5 +1,5 @@
-/* The conformance suite: what any port must get right, told with nothing but the public interface and time that passes by
- * itself. One text for every CPU and for hosts. README.md. */
+/* The conformance suite: behaviour required of every port, checked only through the public interface and with real
+ * time. The same source runs on every CPU and on hosts. See README.md. */
 #ifndef CONFORMANCE_H
 #define CONFORMANCE_H
 
@@ -8,23 +8,23 @@
 
 enum { E1 = SYS_FIRST_USER_EVENT, E2, E3, E4, E_NEVER };
 
-/* Counts, and reports a line that does not hold on UART1. Texts would not fit into a small robot's RAM. */
+/* Counts a check; reports a failed one on UART1 as file letter and line, because RAM is too small for text. */
 void check_line(bool holds, char file, uint16 line);
 #define CHECK(condition) check_line((condition), FILE_LETTER, __LINE__)
 
-uint16 heap_now(void); /* bytes in use */
+uint16 heap_now(void); /* heap bytes in use */
 
-/* What happened, in order: threads and handlers append. forget() empties it. */
+/* Records a character: threads and handlers append, forget() clears the record. */
 void note(char c);
 void forget(void);
 bool noted(const char *text);
 
-uint16 start(void (*entry)(void *), void *arg, uint8 priority); /* PID, or 0 */
+uint16 start(void (*entry)(void *), void *arg, uint8 priority); /* returns the PID, or 0 on failure */
 
 void check_threads(void);   /* threads.c: switching, sleeping, killing, critical sections, schedulers */
 void check_events(void);    /* events.c: registration to delivery, waits, memory */
 void check_attacks(void);   /* attacks.c: floods, deaths, unbalanced calls, numbers that wrap */
-void check_options(void);   /* options.c: mutex, join, cleanup, quota, service; with -DSUITE_OF_OPTIONS, alone */
-void check_registers(void); /* registers.c: what a thread computes survives preemption */
+void check_options(void);   /* options.c: mutex, join, cleanup, quota, service; only with -DSUITE_OF_OPTIONS */
+void check_registers(void); /* registers.c: registers of a thread survive preemption */
 
 #endif

@@ -36,7 +36,7 @@ static void registration(void)
     CHECK(!Sys_IsEventRegistered(E1) && !Sys_Send_IntEvent(E1, 1) && Sys_Get_LastError() == SYS_ERROR_EVENT);
     CHECK(Sys_Register_Event(E1) && Sys_Register_Event(E1) && Sys_IsEventRegistered(E1));
     uint16 with = heap_now();
-    CHECK(Sys_Send_IntEvent(E1, 1)); /* no listener: nothing is stored */
+    CHECK(Sys_Send_IntEvent(E1, 1)); /* without subscriber the message is not stored */
     CHECK(heap_now() == with);
     CHECK(!Sys_Subscribe_to_Event(E1, 0, NULL, NULL) && Sys_Get_LastError() == SYS_ERROR_ARGUMENT);
     CHECK(!Sys_Subscribe_to_Event(E_NEVER, 0, count, NULL) && Sys_Get_LastError() == SYS_ERROR_EVENT);
@@ -57,7 +57,7 @@ static void handlers_run_between_threads(void)
     CHECK(calls == 2 && noted("r"));
     CHECK(Sys_Send_IntEvent(E1, 1));
     Sys_Yield();
-    CHECK(calls == 3); /* once returned false: unsubscribed */
+    CHECK(calls == 3); /* the handler has returned false: unsubscribed */
     CHECK(!Sys_Unsubscribe_Handler(E1, 0, once) && Sys_Unsubscribe_from_Event(E1, 0));
     CHECK(heap_now() == heap);
     CHECK(Sys_Unregister_Event(E1));
@@ -85,7 +85,7 @@ static void payloads_arrive_whole(void)
         Sys_Yield();
     }
     CHECK(calls == sizeof sent + 1 && sum == sizeof sent * (sizeof sent + 1) / 2);
-    CHECK(Sys_Unsubscribe_Handler(E1, 0, compare)); /* it never returned false */
+    CHECK(Sys_Unsubscribe_Handler(E1, 0, compare)); /* this handler has never returned false */
     CHECK(Sys_Unregister_Event(E1));
 }
 
@@ -124,7 +124,7 @@ static void wait_for_odd(void *unused)
     note(data != NULL && data->value == 3 ? '3' : '?');
     data = Sys_Wait_for_Event(E1); /* frees the first result */
     note(data != NULL && data->value == 4 ? '4' : '?');
-    /* ends without clearing: the end frees it */
+    /* returns without clearing: the end frees the result */
 }
 
 static void a_thread_owns_one_result(void)
@@ -143,14 +143,14 @@ static void a_thread_owns_one_result(void)
     uint16 pid = start(wait_for_odd, NULL, 0);
     Sys_Sleep(1);
     CHECK(Sys_Send_IntEvent(E1, 3));
-    CHECK(Sys_Kill_Process(pid)); /* while its message is queued */
+    CHECK(Sys_Kill_Process(pid)); /* while a message to the thread is queued */
     Sys_Sleep(1);
     CHECK(heap_now() == heap);
     pid = start(wait_for_odd, NULL, 0);
     Sys_Sleep(1);
     CHECK(Sys_Send_IntEvent(E1, 3));
     Sys_Sleep(1);
-    CHECK(Sys_Kill_Process(pid)); /* while it owns a result */
+    CHECK(Sys_Kill_Process(pid)); /* while the thread owns a result */
     CHECK(heap_now() == heap);
     CHECK(Sys_Unregister_Event(E1));
 }
@@ -253,16 +253,16 @@ static bool follow(uint16 pid, uint16 event, sys_event_data *data)
     return count(pid, event, data);
 }
 
-/* Lists change under the clock's interrupt while it walks them. */
+/* Changes event and subscription lists while the clock interrupt may traverse them. */
 static void no_tick_is_lost_while_lists_change(void)
 {
-    Sys_Yield(); /* what the last check left in the queue is gone */
+    Sys_Yield(); /* until messages of the previous check are delivered */
     uint16 heap = heap_now(), wrong = 0;
     calls = gaps = 0;
     CHECK(Sys_Subscribe_to_Event(SYS_1ms_TIMER, 0, follow, NULL));
     uint32 begin = Sys_Get_SystemTime();
     while (Sys_Get_SystemTime() - begin < 400) {
-        wrong += !Sys_Register_Event(E3) || !Sys_Register_Event(SYS_1ms_TIMER + 64); /* shares its bucket */
+        wrong += !Sys_Register_Event(E3) || !Sys_Register_Event(SYS_1ms_TIMER + 64); /* event in the same hash bucket */
         wrong += !Sys_Subscribe_to_Event(SYS_1ms_TIMER, 0, once, NULL);
         wrong += !Sys_Subscribe_to_Event(E3, 0, count, odd);
         wrong += !Sys_Unregister_Event(E3) || !Sys_Unregister_Event(SYS_1ms_TIMER + 64);
@@ -276,7 +276,7 @@ static void no_tick_is_lost_while_lists_change(void)
     CHECK(heap_now() == heap);
 }
 
-/* Memory runs out in events; everything comes back. */
+/* Events exhaust the memory: the failure is reported and all memory is freed afterwards. */
 static void exhaustion_is_told(void)
 {
     uint16 heap = heap_now(), made = 0;

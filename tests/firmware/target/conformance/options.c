@@ -1,5 +1,5 @@
-/* The options: mutex, join, cleanup, quota, service, and what hostile programs do to them. An image of its own, built
- * with -DSUITE_OF_OPTIONS: beside the kernel's checks it would be more than a small robot holds. */
+/* The options mutex, join, cleanup, quota and service, also used by hostile programs. They have their own image, built
+ * with -DSUITE_OF_OPTIONS, because a small robot cannot hold them together with the kernel's checks. */
 #include "conformance.h"
 
 #include <openswarm_cleanup.h>
@@ -20,7 +20,7 @@ static void spin(void *unused)
 {
     (void)unused;
     for (;;) {
-        (void)Sys_Get_SystemTime(); /* on some hosts time passes in calls only */
+        (void)Sys_Get_SystemTime(); /* on some hosts time advances in calls only */
         spins++;
     }
 }
@@ -28,7 +28,7 @@ static void spin(void *unused)
 static void spend(uint16 ms)
 {
     uint32 before = Sys_Get_SystemTime();
-    for (uint16 i = 0; i < 60000 && Sys_Get_SystemTime() - before < ms; i++) { /* on some hosts time stops in a section */
+    for (uint16 i = 0; i < 60000 && Sys_Get_SystemTime() - before < ms; i++) { /* on some hosts time stands in sections */
     }
 }
 
@@ -63,7 +63,7 @@ static void mutexes_refuse_what_they_cannot_do(void)
     CHECK(Sys_Lock_Mutex(&mutex) && refused_as(Sys_Lock_Mutex(&mutex), SYS_ERROR_PROCESS));
     Sys_Start_CriticalSection();
     CHECK(refused_as(Sys_Lock_Mutex(&second), SYS_ERROR_CONTEXT));
-    CHECK(Sys_Unlock_Mutex(&mutex)); /* that it may */
+    CHECK(Sys_Unlock_Mutex(&mutex)); /* and may unlock it */
     Sys_End_CriticalSection();
     CHECK(Sys_Get_Statistics()->refused == refused + 1u && Sys_Lock_Mutex(&second) && Sys_Unlock_Mutex(&second));
 }
@@ -99,7 +99,7 @@ static void owners_and_waiters_die(void)
     uint16 a = start(lock_and_tell, (void *)&letters[0], 0), b = start(lock_and_tell, (void *)&letters[1], 0);
     Sys_Sleep(2);
     CHECK(refused_as(Sys_Lock_MutexTimeout(&mutex, 2), SYS_OK) && noted("h"));
-    CHECK(Sys_Kill_Process(a) && Sys_Kill_Process(owner)); /* a waiter, then who holds two */
+    CHECK(Sys_Kill_Process(a) && Sys_Kill_Process(owner)); /* first a waiter, then the owner of two mutexes */
     CHECK(Sys_Lock_Mutex(&second) && Sys_Unlock_Mutex(&second));
     Sys_Sleep(10);
     CHECK(noted("hbb") && Sys_Get_ProcessState(b) == SYS_UNKNOWN);
@@ -107,12 +107,12 @@ static void owners_and_waiters_die(void)
     a = start(lock_and_tell, (void *)&letters[2], 0);
     Sys_Sleep(2);
     Sys_Start_CriticalSection();
-    CHECK(Sys_Unlock_Mutex(&mutex) && Sys_Kill_Process(a)); /* it owns it, and has not run since */
+    CHECK(Sys_Unlock_Mutex(&mutex) && Sys_Kill_Process(a)); /* it owns the mutex and has not run since */
     Sys_End_CriticalSection();
     CHECK(noted("hbb") && Sys_Lock_MutexTimeout(&mutex, 1) && Sys_Unlock_Mutex(&mutex) && heap_now() == heap);
 }
 
-/* It locks when both others are there, and they wait until it has: on a busy host each may take any time. */
+/* Locks when both other threads exist; they wait for the lock, because a busy host may delay any of them. */
 static void low(void *unused)
 {
     (void)unused;
@@ -168,11 +168,11 @@ static void a_ceiling_bounds_inversion(void)
     forget();
     CHECK(Sys_Start_ProcessWith(&above) != 0);
     Sys_Sleep(10);
-    CHECK(noted("??")); /* its priority is above the ceiling */
+    CHECK(noted("??")); /* the priority is above the ceiling */
     Sys_Set_Scheduler(&sys_round_robin);
 }
 
-/* Every scheduler is set while a mutex has an owner and a waiter. */
+/* Sets each scheduler while a mutex has an owner and a waiter. */
 static void schedulers_change_under_a_mutex(void)
 {
     static const sys_scheduler *const all[] = {&sys_fixed_priority, &sys_woken_first, &sys_earliest_deadline, &sys_round_robin};
@@ -192,8 +192,8 @@ static void schedulers_change_under_a_mutex(void)
     }
 }
 
-/* ---- Join and cleanup
- * ---------------------------------------------------------------------------------------------- */
+/* Join and cleanup: waiting for the end of a thread, and functions that the kernel calls at the end of a
+ * thread. */
 
 static void brief(void *unused)
 {
@@ -220,7 +220,7 @@ static void zombies_wait_to_be_joined(void)
     uint16 pid = start_joinable(brief);
     Sys_Sleep(5);
     CHECK(Sys_Get_ProcessState(pid) == SYS_ZOMBIE && heap_now() > heap && Sys_Get_UnusedStack(pid) == 0);
-    CHECK(Sys_Subscribe_to_Event(SYS_1ms_TIMER, pid, listen, NULL)); /* a zombie may be given one: it goes with it */
+    CHECK(Sys_Subscribe_to_Event(SYS_1ms_TIMER, pid, listen, NULL)); /* a zombie's subscription ends with the zombie */
     CHECK(Sys_Join(pid) && Sys_Get_ProcessState(pid) == SYS_UNKNOWN);
     Sys_Yield();
     CHECK(heap_now() == heap && refused_as(Sys_Join(pid), SYS_ERROR_PROCESS) && refused_as(Sys_Join(0), SYS_ERROR_PROCESS));
@@ -241,7 +241,7 @@ static void joiners_die(void)
     uint16 a = start(join_it, &own_pid, 0), b = start(join_it, &own_pid, 0);
     CHECK(own_pid != 0 && a != 0 && b != 0);
     Sys_Sleep(30);
-    CHECK(Sys_Kill_Process(a) && Sys_Kill_Process(own_pid)); /* the first of two on the list, then whom they wait for */
+    CHECK(Sys_Kill_Process(a) && Sys_Kill_Process(own_pid)); /* first one of two waiting threads, then the joined one */
     Sys_Sleep(2);
     CHECK(noted("j") && Sys_Get_ProcessState(b) == SYS_UNKNOWN && heap_now() == heap);
 }
@@ -295,7 +295,7 @@ static void push_again(void *ms)
     Sys_Sleep(*(const uint16 *)ms);
 }
 
-/* Cleanups that push themselves again, block, end sections of others, kill the ending thread. */
+/* Cleanups that push themselves again, block, end sections of other code, or kill the ending thread. */
 static void hostile_cleanups(void)
 {
     static const uint16 soon = 1, never = 60000;
@@ -309,7 +309,7 @@ static void hostile_cleanups(void)
         Sys_Start_CriticalSection();
         CHECK(i == 0 || Sys_Kill_Process(pid));
         spend(12);
-        CHECK(spins == 0); /* the section is still there */
+        CHECK(spins == 0); /* the critical section still exists */
         Sys_End_CriticalSection();
         Sys_Sleep(12);
         CHECK(noted("+rrr") && spins != 0 && Sys_Kill_Process(other));
@@ -351,13 +351,13 @@ static void quotas_bound_what_waits(void)
     CHECK(Sys_Limit_Event(&quota, E1, 2) && delivered(E1, 5) == 2 && last == 2 && quota.dropped == 3);
     CHECK(Sys_Keep_Latest(&quota_too, E1) && delivered(E1, 5) == 1 && last == 5 && quota_too.dropped == 0);
     Sys_Start_CriticalSection();
-    CHECK(Sys_Send_IntEvent(E1, 7) && Sys_Send_Event(E1, "text", 4)); /* of another size: dropped */
+    CHECK(Sys_Send_IntEvent(E1, 7) && Sys_Send_Event(E1, "text", 4)); /* another payload size: dropped */
     Sys_End_CriticalSection();
     Sys_Yield();
     CHECK(last == 7 && quota_too.dropped == 1 && Sys_Unregister_Event(E1));
 }
 
-/* Set twice, its event unregistered and registered again between two others of the same bucket. */
+/* Sets a quota twice; its event is unregistered and registered again between two others of the same bucket. */
 static void quotas_come_and_go(void)
 {
     uint16 heap = heap_now();
@@ -365,10 +365,10 @@ static void quotas_come_and_go(void)
         CHECK(Sys_Register_Event(E1) && Sys_Subscribe_to_Event(E1, 0, hear, NULL));
         CHECK(Sys_Limit_Event(&quota, E1, 1) && Sys_Limit_Event(&quota, E1, 2) && delivered(E1, 4) == 2);
         CHECK(Sys_Unregister_Event(E1) && Sys_Register_Event(E1) && Sys_Register_Event(E1 + 8));
-        CHECK(Sys_Subscribe_to_Event(E1, 0, hear, NULL) && delivered(E1, 4) == 4); /* it went with the event */
+        CHECK(Sys_Subscribe_to_Event(E1, 0, hear, NULL) && delivered(E1, 4) == 4); /* the quota ended with its event */
         CHECK(Sys_Unregister_Event(E1) && Sys_Unregister_Event(E1 + 8));
     }
-    CHECK(heap_now() <= heap + 4 * sizeof(void *)); /* what the event's next quota uses */
+    CHECK(heap_now() <= heap + 4 * sizeof(void *)); /* memory that the event's next quota will use */
 }
 
 static bool leave(uint16 pid, uint16 event, sys_event_data *data)
@@ -430,7 +430,7 @@ static void services_are_restarted(void)
     CHECK(begins == 3 && busy.bitten == 3 && busy.pid == 0);
     begins = 0;
     few.restarts = 1;
-    CHECK(Sys_Start_Service(&few)); /* again, after its end */
+    CHECK(Sys_Start_Service(&few)); /* restart after its end */
     Sys_Sleep(60);
     CHECK(begins == 2);
     begins = 0;
@@ -442,7 +442,7 @@ static void services_are_restarted(void)
     begins = 0;
     CHECK(Sys_Start_Service(&storm));
     uint16 heap = heap_now();
-    Sys_Sleep(200); /* it ends and restarts all the time, and others continue */
+    Sys_Sleep(200); /* the service ends and restarts repeatedly; others run */
     uint16 pid = start(spin, NULL, 0);
     spins = 0;
     Sys_Sleep(50);

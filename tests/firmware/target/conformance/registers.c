@@ -1,4 +1,4 @@
-/* What a thread computes survives preemption, whole numbers and floating point, many registers at a time. */
+/* Registers of a thread survive preemption: integer and floating-point code that uses many registers. */
 #include "conformance.h"
 
 #define FILE_LETTER 'r'
@@ -12,7 +12,7 @@ typedef struct {
 
 static worker workers[THREADS] = {{1, 0, 0}, {0xBEEF, 0, 0}, {0x12345678, 0, 0}};
 
-/* Eight numbers live at once, so that they fill the registers. */
+/* Keeps eight integers live at once so that they fill the registers. */
 static uint32 whole(uint32 a)
 {
     uint32 b = a ^ 0x55555555u, c = a + b, d = ~a, e = b * 3u, f = c ^ d, g = a >> 3, h = d - b;
@@ -49,14 +49,14 @@ static void work(void *which)
     for (;;) {
         w->wrong = (uint16)(w->wrong + (whole(w->seed) != right || fraction(w->seed) != right_too));
         w->rounds++;
-        (void)Sys_Get_SystemTime(); /* on some hosts time passes in calls only */
+        (void)Sys_Get_SystemTime(); /* on some hosts time advances in calls only */
     }
 }
 
 static bool disturb(uint16 pid, uint16 event, sys_event_data *data)
 {
     (void)pid, (void)event;
-    return fraction(data->value) > 0.0f; /* a handler computes as well */
+    return fraction(data->value) > 0.0f; /* the handler calculates with floating point too */
 }
 
 void check_registers(void)

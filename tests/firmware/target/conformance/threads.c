@@ -7,7 +7,7 @@ static volatile uint16 spins[2];
 static void spin(void *which)
 {
     for (;;) {
-        (void)Sys_Get_SystemTime(); /* on some hosts time passes in calls only */
+        (void)Sys_Get_SystemTime(); /* on some hosts time advances in calls only */
         ++*(volatile uint16 *)which;
     }
 }
@@ -64,7 +64,7 @@ static void sleepers_wake_in_order(void)
     CHECK(heap_now() == heap);
 }
 
-/* The time never steps back and never jumps, however often its halves change while it is read. */
+/* The system time never decreases and never jumps, even if one of its halves changes during the read. */
 static void time_is_read_whole(void)
 {
     uint16 other = start(spin, (void *)&spins[0], 0);
@@ -93,7 +93,7 @@ static void critical_sections_postpone(void)
     Sys_Start_CriticalSection();
     Sys_Start_CriticalSection();
     uint32 before = Sys_Get_SystemTime();
-    for (uint16 i = 0; i < 60000 && Sys_Get_SystemTime() - before < 25; i++) { /* slices end meanwhile */
+    for (uint16 i = 0; i < 60000 && Sys_Get_SystemTime() - before < 25; i++) { /* slices end in the meantime */
     }
     Sys_End_CriticalSection();
     CHECK(noted(""));
@@ -160,7 +160,7 @@ static void priorities_preempt(void)
     Sys_Yield();
     note('<');
     CHECK(Sys_Send_IntEvent(E1, 1));
-    for (uint16 i = 0; i < 1000 && !noted("<H"); i++) { /* on some hosts the switch comes with the next call */
+    for (uint16 i = 0; i < 1000 && !noted("<H"); i++) { /* on some hosts the next call switches threads */
         (void)Sys_Get_SystemTime();
     }
     note('>');
@@ -193,7 +193,7 @@ static void wait_for_ticks(void *unused)
     }
 }
 
-/* Equal threads change every 10 ms, however often a better one preempts them. */
+/* Threads of equal priority alternate every 10 ms, however often a thread of higher priority preempts them. */
 static void preempted_threads_keep_their_slice(void)
 {
     static const uint8 both[2];
@@ -240,7 +240,7 @@ static void deadlines_are_met_and_missed(void)
     Sys_Sleep(210);
     CHECK(met >= 9 && met <= 11 && missed == 0);
     CHECK(Sys_Kill_Process(good));
-    uint16 bad = start_job(&late_ones, 3); /* 8 ms of work due after 3 */
+    uint16 bad = start_job(&late_ones, 3); /* 8 ms of work with a deadline after 3 ms */
     Sys_Sleep(110);
     CHECK(missed >= 4);
     CHECK(Sys_Get_Statistics()->deadlines_missed - before >= missed);

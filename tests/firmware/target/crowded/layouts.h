@@ -1,13 +1,13 @@
-/* Layouts of the heap in which calls do the most on its tree: where they begin (from os_memory) and their pieces, by
- * address.
+/* Heap layouts that are worst cases for calls that use the tree of free blocks: their offset in os_memory, and their
+ * pieces in order of address.
  *
- * A number is a hole of so many bytes, a negative one a subscription, which is the so many-th given back. Those of
- * `chain` lie in the half of the memory from 0x1000 on, the smaller the nearer, so that the tree is one path: taking
- * out its root pulls up all others, and putting it in pushes them down again. The others were found by simulated
- * annealing on a model of the tree that counts the steps of its searches, of taking out and putting in: for nearly all
- * pieces given back, two paths of full length are searched or pulled up, and a third is pushed down. In
- * `three_given_back` one sees how: what is to the right of each is the second largest hole, the largest but what was
- * joined before. */
+ * A positive number is a hole of that many bytes. A negative number -n is the subscription that is freed as the n-th.
+ * The pieces of `chain` lie in the upper half of memory, from 0x1000 on; the smaller a hole, the lower its address. The
+ * tree is then one path: removing its root pulls up all other nodes, and inserting it pushes them down again.
+ * The other layouts were found by simulated annealing on a model of the tree that counts the steps of searches,
+ * removals and insertions. For nearly all freed pieces, two paths of full length are searched or pulled up, and a third
+ * one is pushed down. `three_given_back` shows the principle: to the right of each freed piece lies the second largest
+ * hole; only the hole that was merged before is larger. */
 #ifndef LAYOUTS_H
 #define LAYOUTS_H
 
@@ -29,7 +29,7 @@ static const signed char three_given_back_pieces[] = {
 };
 static const layout three_given_back = {0x0E06, three_given_back_pieces};
 
-/* The event itself is the last that is given back. */
+/* The memory of the event itself is freed last. */
 static const signed char three_and_event_given_back_pieces[] = {
     KEPT, 24, KEPT,  12, KEPT, KEPT, 30, KEPT, KEPT, 8,  KEPT, 20, KEPT, KEPT, 22,   KEPT, KEPT, 8,
     KEPT, 32, EVENT, 60, -1,   56,   -2, 38,   -3,   34, KEPT, 10, KEPT, 14,   KEPT, 18,   KEPT, END,

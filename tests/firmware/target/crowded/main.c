@@ -1,7 +1,7 @@
-/* The kernel's structures at their worst for its calls, built on purpose; nothing interrupts, so that calls longer than
- * a tick are measured as they are (bench/bounds.py). Of each scene the heap's tree is the worst for what it measures:
- * the pieces of a layout (layouts.h) are taken from the reserve, one behind the other, and then its holes are given
- * back. */
+/* Puts the kernel's data structures into the worst state for each measured call (bench/bounds.py). Nothing
+ * interrupts, so that calls longer than a tick are measured correctly. Each scene has the worst heap tree for
+ * its call: the pieces of a layout (layouts.h) are allocated one after the other, and then the holes are
+ * freed. */
 #include <openswarm.h>
 #include <p30F6014A.h>
 
@@ -18,7 +18,7 @@ enum {
     KEPT_BYTES = 6,
     NEAR = 5
 };
-/* In bucket 0 the oldest event is LATE, then comes GATHERING, then the crowd; FRESH is registered last. */
+/* Bucket 0 contains LATE (oldest), GATHERING, then the events of the crowd; FRESH is registered last. */
 enum { TOKEN = FIRST + 1, LATE = FIRST + BUCKETS * 40, GATHERING = LATE + BUCKETS, FRESH = GATHERING + BUCKETS };
 
 volatile uint16 scenes __attribute__((used)), failures __attribute__((used));
@@ -29,10 +29,10 @@ static uint8 *pad;
 static uint16 padding, pieces;
 static struct {
     void *at;
-    uint16 size; /* 0: not ours */
+    uint16 size; /* 0: not allocated by the test */
     bool is_hole;
 } taken[PIECES];
-static bool (*const volatile kill)(uint16 pid) = Sys_Kill_Process; /* calls, not copies of their code */
+static bool (*const volatile kill)(uint16 pid) = Sys_Kill_Process; /* volatile: prevents inlining */
 static bool (*const volatile subscribe)(uint16 id, uint16 pid, sys_handler handler,
                                         sys_condition condition) = Sys_Subscribe_to_Event;
 static bool (*const volatile unsubscribe)(uint16 id, uint16 pid, sys_handler handler) = Sys_Unsubscribe_Handler;
@@ -53,7 +53,7 @@ static void waiter(void *last)
     }
 }
 
-/* Keeps a message and does not run any more. */
+/* Takes a message and never runs again. */
 static void victim(void *unused)
 {
     (void)unused;
@@ -96,7 +96,7 @@ static void until_all_wait(void)
     until_blocked(victim_pid);
 }
 
-/* What the victim subscribes to, in the order in which killing it gives that back: bucket after bucket, the newest
+/* Returns the k-th event of the victim's subscriptions, in the order in which killing it frees them: by bucket, newest
  * first. */
 static uint16 event_of(uint16 k)
 {
@@ -118,7 +118,7 @@ static void subscribe_to_gathering(uint16 k)
     expect(subscribe(GATHERING, victim_pid, handlers[k], NULL));
 }
 
-/* Here the measuring test lets PIDs restart at 0, where the PIDs of all living threads are in use. */
+/* Here the measuring test sets the PID counter to 0, where the PIDs of all living threads are in use. */
 __attribute__((noinline, used)) static void numbers_are_round(void)
 {
     __asm__ volatile("");
@@ -128,7 +128,7 @@ static void take(uint16 size, bool is_hole)
 {
     uint16 *at = heap_alloc(size);
     expect(at != NULL);
-    at[size / 2 - 1] = NEAR; /* read as the size of a hole that ends here, it leads a little below */
+    at[size / 2 - 1] = NEAR; /* as size of a preceding hole it points to a lower address */
     taken[pieces].at = at;
     taken[pieces].size = size;
     taken[pieces++].is_hole = is_hole;
@@ -162,7 +162,7 @@ static void build(const layout *l, void (*subscribe_kth)(uint16 k))
     }
 }
 
-/* Everything but the holes; the thread that waits for LATE is the last on the list of those that do not run. */
+/* Creates all structures except the holes; the thread that waits for LATE becomes the last one on the blocked list. */
 static void set(const layout *l, void (*subscribe_kth)(uint16 k), bool is_event_in_layout, uint16 events)
 {
     static const sys_process_config sleeper = {victim, NULL, 400, 0, 0, 0, 0};
@@ -237,7 +237,7 @@ static void scene_of_unregistering(void)
     } words = {0, 0};
     set(&three_and_event_given_back, subscribe_to_gathering, true, 0);
     move_late_waiter();
-    move_late_waiter(); /* now it is the last */
+    move_late_waiter(); /* now it is the last one of the list */
     give(true);
     expect(send(LATE, (const uint8 *)&words + 1, 2));
     late = false;

@@ -1,4 +1,4 @@
-/* Two threads; the second makes the mistake that `mistake` names when it is set. */
+/* Two threads; the second one makes the error that `mistake` selects after it is set. */
 #include "openswarm.h"
 
 volatile uint16 mistake;

@@ -1,5 +1,5 @@
-/* Every processor of every device, put in and taken out again while the devices run; what arrives is left in variables
- * (tests/firmware/drivers/test_processors_on_target.py). */
+/* Replaces every processor of every device and restores it while the devices run; received data is kept in variables
+ * for tests/firmware/drivers/test_processors_on_target.py. */
 #include <analog.h>
 #include <bluetooth.h>
 #include <camera.h>
@@ -10,7 +10,7 @@
 
 enum { PAUSE_MS = 5, SWAPPED_LED = 5 };
 
-volatile uint16 wanted __attribute__((used)); /* 1: own processors, 2: such that swallow everything, 0: the defaults */
+volatile uint16 wanted __attribute__((used)); /* processors: 0 default, 1 replaced, 2 suppress all */
 volatile uint16 installed __attribute__((used)) = 0xFFFF, swaps __attribute__((used)), wrong __attribute__((used));
 volatile uint16 colour __attribute__((used)), key __attribute__((used)), position __attribute__((used));
 volatile uint16 nearest __attribute__((used)), loudness __attribute__((used)), line __attribute__((used));
@@ -69,7 +69,7 @@ static bool own_led(sys_led_order *order)
 static bool own_bluetooth(const char *text, uint16 size)
 {
     (void)size;
-    return text[0] == 'D'; /* no driving */
+    return text[0] == 'D'; /* refuse the drive command */
 }
 
 static bool own_motors(uint16 event, const sys_event_data *data, sys_wheel_speeds *speeds)
@@ -79,7 +79,7 @@ static bool own_motors(uint16 event, const sys_event_data *data, sys_wheel_speed
     return swallow();
 }
 
-/* A setter tells what was in force: that is checked each time. */
+/* Replaces the processors as `wanted` says; each setter must return the processor that was in force. */
 static void swap(void)
 {
     static sys_camera_processor camera = Sys_LineOfSight_Processor;

@@ -1,4 +1,4 @@
-/* Handlers, conditions, interrupts and schedulers that overflow the kernel stack; which is chosen by kind. */
+/* Overflows of the kernel stack by handlers, conditions, interrupts and schedulers; `kind` selects the case. */
 #include <openswarm.h>
 #include <openswarm_scheduler.h>
 
@@ -37,7 +37,7 @@ __attribute__((noinline)) static void large_frame(void)
 
 __attribute__((noinline)) static void calls_without_room(void)
 {
-    volatile uint8 bytes[128]; /* leaves less than a kernel call needs, but no overflow of its own */
+    volatile uint8 bytes[128]; /* leaves less stack than a kernel call needs, without an overflow */
     fill(bytes, sizeof bytes);
     Sys_Send_IntEvent(HEARD, bytes[0]);
 }
@@ -103,7 +103,7 @@ static void worker(void)
     }
 }
 
-/* A stop for the test: kind is set here. */
+/* Breakpoint of the test, which sets `kind` here. */
 __attribute__((noinline, used)) void begin(void)
 {
     __asm__ volatile("nop" ::: "memory");

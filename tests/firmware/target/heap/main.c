@@ -1,12 +1,12 @@
-/* Random histories of the heap, and what the calls that allocate took in them, by a timer. Nothing interrupts: what is
- * counted is the calls alone. */
+/* Random histories of the heap; a timer measures the cycles of calls that allocate. Nothing interrupts: the counts are
+ * those of the calls alone. */
 #include <openswarm.h>
 #include <p30F6014A.h>
 
 enum { MEASURED = 0x40, FAT, HELD, OTHERS = 0x80, KINDS = 48, THREADS = 24, HANDLERS = 6, PER_THREAD = 20 /* openswarm.h */ };
 
 volatile uint16 seed __attribute__((used)), steps __attribute__((used));
-volatile uint16 bursts __attribute__((used)); /* of 1, 2, 4, ... messages: so many lengths */
+volatile uint16 bursts __attribute__((used)); /* number of burst lengths in use: 1, 2, 4, ... messages */
 
 typedef struct {
     uint16 least, most;
@@ -59,7 +59,7 @@ HANDLER(handle_e)
 HANDLER(handle_f)
 static const sys_handler handlers[HANDLERS] = {handle, handle_b, handle_c, handle_d, handle_e, handle_f};
 
-/* Keeps the result of a wait for a while. */
+/* Keeps the result of a wait for some time. */
 static void hold(void)
 {
     for (;;) {
@@ -105,7 +105,7 @@ __attribute__((noinline)) static void start(void)
     }
 }
 
-/* None in the bucket of the measured event, so that finding that takes the same time always. */
+/* Returns an event outside the bucket of the measured event, so that finding the measured one takes constant time. */
 static uint16 other_event(void)
 {
     uint16 kind = random_below(KINDS);
@@ -168,7 +168,7 @@ static void step(void)
     {                                                                 \
         __asm__ volatile("nop" ::: "memory");                         \
     }
-STOP(history_begins) /* set seed, steps and bursts here */
+STOP(history_begins) /* breakpoint: the test sets seed, steps and bursts */
 STOP(history_ended)
 
 int main(void)

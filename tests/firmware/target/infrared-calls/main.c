@@ -1,4 +1,4 @@
-/* Every call of openswarm_infrared.h and openswarm_remote.h once, for their bounds. */
+/* Makes every call of openswarm_infrared.h and openswarm_remote.h once; `toolchain bounds` analyses them. */
 #include <openswarm.h>
 #include <openswarm_infrared.h>
 #include <openswarm_remote.h>

@@ -1,5 +1,5 @@
-/* At selector 15 frame after frame by infra-red while the camera captures; elsewhere a turn of the selector is an event that
- * robots share, and lights the body LED. */
+/* With selector 15 the robot sends infra-red frames without pause while the camera captures. With other selectors a
+ * turn of the selector is a shared event, which lights the body LED. */
 #include <camera.h>
 #include <openswarm.h>
 #include <openswarm_infrared.h>

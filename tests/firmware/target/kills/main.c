@@ -1,5 +1,5 @@
-/* Scenes of driver calls whose thread is killed at any instruction (tests/firmware/kills.py): INT1 kills it. Afterwards
- * the keeper uses every device itself and leaves the memory as it was. */
+/* Scenes of driver calls, within which INT1 kills the victim thread at any instruction (tests/firmware/kills.py). The
+ * keeper thread then uses every device itself and restores the memory. */
 #include <analog.h>
 #include <battery.h>
 #include <bluetooth.h>
@@ -19,7 +19,7 @@ enum { DONE = SYS_FIRST_USER_EVENT, KILL, OTHER, CAMERA = 0x6E, NOBODY = 0x10, S
 volatile uint16 scene __attribute__((used)), rest_ms __attribute__((used)), failures __attribute__((used));
 static uint16 victim_pid;
 
-/* Places the campaign stops at. */
+/* Marks functions at which the campaign stops. */
 #define PLACE __attribute__((noinline, used))
 PLACE void scene_begin(void) { __asm__ volatile("nop"); }
 PLACE void scene_end(void) { __asm__ volatile("nop"); }
@@ -156,7 +156,7 @@ static void check_devices(void)
     (void)Sys_Unsubscribe_from_Event(OTHER, 0);
     Sys_Send_IntEvent(SYS_LEFTMOTOR_SPEED, 0);
     const i2c_transfer transfer = {CAMERA, 1, 2, id_register, in};
-    expect(Sys_I2C_Transfer(&transfer) == I2C_DONE && in[0] == 0x60); /* the camera */
+    expect(Sys_I2C_Transfer(&transfer) == I2C_DONE && in[0] == 0x60); /* reads the camera */
     expect(Sys_SPI_Transfer((const uint8 *)"abcde", in, sizeof in) && memcmp(in, "abcde", sizeof in) == 0);
     expect(Sys_Write_UART2("ok", 2) && Sys_Write_UART1(".", 1));
     for (uint8 led = 0; led < SYS_LEDS; led++) {
@@ -180,7 +180,7 @@ int main(void)
     Sys_Enable_Interrupt(INT1);
     Sys_Start_Kernel();
     for (;;) {
-        Sys_Sleep(SETTLE_MS); /* what was written is sent */
+        Sys_Sleep(SETTLE_MS); /* until written data is sent */
         checked();
         scene = (uint16)((scene + 1u) % SCENES);
         victim_pid = Sys_Start_ProcessWith(&config);

@@ -1,4 +1,4 @@
-/* The options of the kernel at work, one scene a run; the test reads the counters. */
+/* The kernel's options in use, one scene per run; the test reads the counters. */
 #include <openswarm.h>
 #include <openswarm_cleanup.h>
 #include <openswarm_join.h>
@@ -83,7 +83,7 @@ static void high(void *unused)
 static bool slow(uint16 pid, uint16 event, sys_event_data *data)
 {
     (void)pid, (void)event, (void)data;
-    for (uint16 i = 0; i < 2200; i++) { /* about 10 cycles each */
+    for (uint16 i = 0; i < 2200; i++) { /* about 10 cycles per iteration */
         __asm__ volatile("repeat #5\n\tnop");
     }
     ticks++;
@@ -205,7 +205,7 @@ static void join_for_ever(void *unused)
     }
 }
 
-/* A stop for the test: scene is set here. */
+/* Breakpoint of the test, which sets `scene` here. */
 __attribute__((noinline, used)) void begin(void)
 {
     __asm__ volatile("nop" ::: "memory");

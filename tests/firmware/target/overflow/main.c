@@ -1,4 +1,4 @@
-/* Threads that overflow their stack in different ways beside two innocent ones; which is chosen by kind. */
+/* Threads that overflow their stacks in different ways, beside two correct threads; `kind` selects the case. */
 #include <openswarm.h>
 
 #include <stdarg.h>
@@ -59,7 +59,7 @@ __attribute__((noinline)) static uint16 sum(int count, ...)
 
 static void kernel_call_without_room(void)
 {
-    volatile uint8 bytes[60]; /* leaves less than a kernel function needs, but no overflow of its own */
+    volatile uint8 bytes[60]; /* leaves less stack than a kernel function needs, without an overflow */
     fill(bytes, sizeof bytes);
     Sys_Send_IntEvent(SYS_FIRST_USER_EVENT, bytes[0]);
 }
@@ -109,7 +109,7 @@ static bool ignore(uint16 pid, uint16 event, sys_event_data *data)
     return true;
 }
 
-/* A stop for the test: kind is set here. */
+/* Breakpoint of the test, which sets `kind` here. */
 __attribute__((noinline, used)) void begin(void)
 {
     __asm__ volatile("nop" ::: "memory");

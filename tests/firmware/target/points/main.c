@@ -1,5 +1,5 @@
-/* A scenario that uses every structural kernel call, run again and again beside a thread that checks its registers. The
- * test interrupts it at every instruction (tests/firmware/kernel/test_kernel_on_target.py). */
+/* A scenario that uses every structural kernel call, repeated beside a thread that checks its registers. The test
+ * interrupts it at every instruction (tests/firmware/kernel/test_kernel_on_target.py). */
 #include <openswarm.h>
 #include <p30F6014A.h>
 
@@ -45,7 +45,7 @@ static void nobody(void)
     }
 }
 
-/* Stops for the test. */
+/* Defines a function at which the test stops. */
 #define STOP(name)                                                    \
     __attribute__((noinline, used)) void name(void)                   \
     {                                                                 \
@@ -84,7 +84,7 @@ static void driver(void *unused)
     for (;;) {
         scenario_begin();
         scenario();
-        Sys_Yield(); /* what an interrupt sent last is delivered too */
+        Sys_Yield(); /* delivers the last message of an interrupt */
         Sys_Yield();
         heap_after = Sys_Get_Statistics()->heap_used;
         scenario_end();
@@ -108,7 +108,7 @@ int main(void)
     return 0;
 }
 
-/* Called from checker.S. */
+/* Called by checker.S. */
 __attribute__((used)) void checker_yield(void)
 {
     Sys_Yield();

@@ -1,4 +1,4 @@
-/* Stores a program that was built beside it, starts it, and continues. */
+/* Firmware that stores a separately built program in the update slot, starts it, and continues to run. */
 #include <openswarm.h>
 
 #include "talker.h"
@@ -6,7 +6,7 @@
 
 enum { VERSION = 7, ROWS = sizeof talker / sizeof *talker, STACK = 700 };
 
-volatile uint16 started = 0xFFFF; /* what Sys_Start_Update says */
+volatile uint16 started = 0xFFFF; /* result of Sys_Start_Update */
 
 static bool store(void)
 {
@@ -25,7 +25,7 @@ static bool store(void)
 static void start(void *unused)
 {
     (void)unused;
-    (void)store(); /* false when it is there already */
+    (void)store(); /* fails if the program is already stored */
     started = Sys_Start_Update();
     Sys_Confirm_Update();
 }

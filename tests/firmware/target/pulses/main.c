@@ -1,4 +1,4 @@
-/* The Kilobot's infrared: the test sets messages in RAM and reads received ones from variables (test_kilobots.py). */
+/* Kilobot infrared: the test sets messages to send and reads received ones in variables (test_kilobots.py). */
 #include <openswarm.h>
 #include <openswarm_infrared.h>
 #include <openswarm_remote.h>
@@ -8,7 +8,7 @@
 enum { SHARED = SYS_FIRST_USER_EVENT, HOPS = 3, LOOK_MS = 3, NOTHING = 0, MESSAGE = 1, EVENT = 2 };
 
 #define FOR_TEST __attribute__((used))
-volatile uint8 wanted FOR_TEST;    /* MESSAGE or EVENT, NOTHING when it is done */
+volatile uint8 wanted FOR_TEST;    /* MESSAGE or EVENT; set to NOTHING when it is sent */
 volatile uint8 text[SYS_MESSAGE_BYTES] FOR_TEST, length FOR_TEST; /* of it */
 volatile uint8 refused FOR_TEST;
 volatile uint16 messages FOR_TEST, events FOR_TEST, sightings FOR_TEST, losses FOR_TEST;

@@ -1,4 +1,4 @@
-/* Register patterns under preemption and an interrupt storm; tests/firmware/kernel/test_kernel_on_target.py reads the counters. */
+/* Register patterns under preemption and an interrupt storm, for tests/firmware/kernel/test_kernel_on_target.py. */
 #include <openswarm.h>
 #include <p30F6014A.h>
 
@@ -40,7 +40,7 @@ int main(void)
     Sys_Init_Kernel();
     Sys_Register_Event(STORM);
     Sys_Subscribe_to_Event(STORM, 0, on_storm, NULL);
-    Sys_Send_IntEvent(SYS_LEFTMOTOR_SPEED, 100); /* the stepper at IPL 5 takes part */
+    Sys_Send_IntEvent(SYS_LEFTMOTOR_SPEED, 100); /* the motor interrupt at IPL 5 takes part */
     start(0, pattern_one, 0);
     start(1, pattern_two, 0);
     start(2, pattern_dsp_one, SYS_DSP);

@@ -1,5 +1,5 @@
-/* A round that makes every call of openswarm.h and openswarm_io.h, from a thread, while all devices run: the tests put the
- * camera's HREF on each of its cycles (tests/firmware/sights.py). */
+/* A round in which a thread makes every call of openswarm.h and openswarm_io.h while all devices run. The tests place
+ * the camera's HREF on each cycle of the round (tests/firmware/sights.py). */
 #include <analog.h>
 #include <bluetooth.h>
 #include <camera.h>

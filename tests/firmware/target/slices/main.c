@@ -1,5 +1,5 @@
-/* Three threads that never yield, a handler that takes long, one that resends for ever, a storm of events and an
- * echo of what UART1 receives; the test observes the running thread from outside. */
+/* Three threads that never yield, a slow handler, a handler that resends for ever, a storm of events and an echo of
+ * UART1 input; the test observes the running thread from outside. */
 #include <openswarm.h>
 #include <p30F6014A.h>
 
@@ -21,7 +21,7 @@ SPINNER(spin_a, 0)
 SPINNER(spin_b, 1)
 SPINNER(spin_c, 2)
 
-/* About 40 Tcy a call, a hundred calls a slice: a slice that paid for them would lose 4,000 of its 147,456 Tcy. */
+/* About 40 Tcy a call, a hundred calls a slice: charged to the slice they would cost 4,000 of its 147,456 Tcy. */
 static bool on_storm(uint16 pid, uint16 event, sys_event_data *data)
 {
     (void)pid;

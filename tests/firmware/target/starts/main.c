@@ -1,4 +1,4 @@
-/* A scheduler set before or after threads exist, before or after Sys_Start_Kernel; the test chooses. */
+/* Sets a scheduler before or after threads exist and before or after Sys_Start_Kernel; the test selects the case. */
 #include <openswarm.h>
 
 enum { NEVER, FIRST, BEHIND_THREADS, AFTER_START };
@@ -22,7 +22,7 @@ static void sleeper(void *counter)
     }
 }
 
-static void busy(void *unused) /* gives nothing back by itself */
+static void busy(void *unused) /* never yields */
 {
     (void)unused;
     for (;;) {
@@ -39,7 +39,7 @@ static void periodic(void *unused)
     }
 }
 
-/* A stop for the test: scheduler and moment are set here. */
+/* Breakpoint of the test, which sets scheduler and instant here. */
 __attribute__((noinline, used)) void begin(void)
 {
     __asm__ volatile("nop" ::: "memory");

@@ -1,4 +1,4 @@
-/* Equal threads that never yield, beside one that waits: running threads are counted here and observed from outside. */
+/* Equal threads that never yield, beside a waiting one. The firmware counts turns; the test observes switches. */
 #include <openswarm.h>
 
 enum { SPINNERS = 8, SLICES, SLEEPER_WOKEN_FIRST, SLEEPER_ROUND_ROBIN };
@@ -49,7 +49,7 @@ static void start(void (*entry)(void *), volatile uint16 *arg, uint8 priority)
     SYS_ASSERT(Sys_Start_ProcessWith(&config) != 0);
 }
 
-/* A stop for the test: scene is set here. */
+/* Breakpoint of the test, which sets `scene` here. */
 __attribute__((noinline, used)) void begin(void)
 {
     __asm__ volatile("nop" ::: "memory");

@@ -1,4 +1,4 @@
-/* Starts the program that is stored, then does what the test puts into `command`. */
+/* Starts the stored program, then executes the commands that the test writes to `command`. */
 #include "update.h"
 
 enum { RECEIVE = 1, ACTIVATE, CONFIRM, ROWS = 1 };
@@ -18,7 +18,7 @@ static void receive(void)
 
 void __attribute__((noinline)) ready(void)
 {
-    __asm__ volatile("nop" : : "r"(&facts), "r"(bytes) : "memory"); /* the test writes them */
+    __asm__ volatile("nop" : : "r"(&facts), "r"(bytes) : "memory"); /* volatile: the test writes them */
 }
 
 int main(void)

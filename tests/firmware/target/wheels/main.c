@@ -1,4 +1,4 @@
-/* Drives the wheels at the speeds the test puts into two variables, read every 10 ms. */
+/* Drives the wheels at the speeds that the test writes to two variables, which are read every 10 ms. */
 #include <openswarm.h>
 #include <openswarm_io.h>
 

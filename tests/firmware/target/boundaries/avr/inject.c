@@ -1,4 +1,4 @@
-/* INT0, whose flag the harness sets: PD2 stays high, so that nothing else does. */
+/* INT0 as injected interrupt: the harness sets its flag. The pin PD2 stays high, so that no edge sets the flag. */
 #include "../boundaries.h"
 
 #include <avr/io.h>
@@ -7,6 +7,6 @@ void inject_init(void)
 {
     DDRD |= 1 << PD2;
     PORTD |= 1 << PD2;
-    EICRA = 1 << ISC01; /* falling edge */
+    EICRA = 1 << ISC01; /* on a falling edge */
     EIMSK = 1 << INT0;
 }

@@ -1,12 +1,12 @@
-/* EXTI0, which nothing on the board uses: a vector table in RAM leads it to the test. The harness pends it from
- * outside, by a CPU paused at a boundary that executes one store. */
+/* EXTI0, an otherwise unused interrupt: a vector table in RAM routes it to the test. The harness sets it pending from
+ * outside: the CPU, stopped at a boundary, executes one store. */
 #include "../boundaries.h"
 #include "registers.h"
 
 enum { EXTI0 = 6, VECTORS = 16 + 82, DEVICE = 0x50 };
 #define SCB_VTOR REGISTER(0xE000ED08)
 
-/* The harness executes its first instruction alone (firmware/tools/simulated/epuck2.py). */
+/* The harness executes only the first instruction (firmware/tools/simulated/epuck2.py). */
 __attribute__((naked, noinline)) static void inject_store(volatile uint32_t *address, uint32_t value)
 {
     (void)address, (void)value;

@@ -1,5 +1,5 @@
-/* A program of all that C has: variables with values and without, constants, a table of functions, the library, a
- * handler and a thread that continue after main has returned. */
+/* A program with all storage of C: initialised and uninitialised variables, constants, a function table, library calls,
+ * and a handler and a thread that continue after main has returned. */
 #include <openswarm_io.h>
 #include <stdio.h>
 #include <string.h>
