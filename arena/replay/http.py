@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from contextlib import suppress
-from http.server import BaseHTTPRequestHandler
+from http.server import BaseHTTPRequestHandler, HTTPServer
 from typing import Any, Final
 
 from arena.trial.strict_json import json_text
@@ -19,7 +19,8 @@ class RequestHandler(BaseHTTPRequestHandler):
         """Whether the request names this server's own address as its host.
 
         Otherwise send an error: a web page may have bound its own host name to the loopback address."""
-        port = self.server.server_address[1]
+        assert isinstance(self.server, HTTPServer)
+        port = self.server.server_port
         if self.headers.get("Host") in (f"{LOOPBACK}:{port}", f"localhost:{port}"):
             return True
         self.send_error_text(403, f"the page works at its own address only: http://{LOOPBACK}:{port}/")

@@ -79,18 +79,24 @@ def write_standard(data: bytes) -> None:
 def atomic_text_file(path: str | os.PathLike[str]) -> Iterator[TextIO]:
     """Open a text file that replaces `path` when the block ends without an exception.
 
-    Pipes, devices and standard output are written directly. Raises OSError as `open` does.
+    Pipes, devices and standard output are written directly. Raises OSError as `open` does; its `filename` is `path`
+    also for a full disk.
     """
     if is_standard(path):
         yield sys.stdout
         sys.stdout.flush()
         return
-    if is_opened(path):
-        with open(path, "w", encoding="utf-8") as stream:
-            yield stream
-        return
-    with atomic_file(path) as part, part.open("w", encoding="utf-8") as stream:
-        yield stream
+    try:
+        if is_opened(path):
+            with open(path, "w", encoding="utf-8") as stream:
+                yield stream
+        else:
+            with atomic_file(path) as part, part.open("w", encoding="utf-8") as stream:
+                yield stream
+    except OSError as error:
+        if error.filename is None and error.errno in (errno.ENOSPC, errno.EFBIG):  # a write names no file
+            error.filename = os.fspath(path)
+        raise
 
 
 @contextmanager

@@ -51,6 +51,8 @@ class WaveformRecorder:
         self._writer: Final[Any] = VCDWriter(
             stream, timescale="1 ps", date="", version="emu", init_timestamp=self._time(machine.cycle)
         )
+        self._has_failed = False
+        """Whether a write has failed, for example on a full disk: the writer's state is then inconsistent."""
         pins = machine.pins
         self._edges: list[tuple[int, int, int]] = []
         self._frames: list[tuple[int, int, int, int, int, int]] = []
@@ -175,22 +177,28 @@ class WaveformRecorder:
         self._frames.clear()
         self._pending.sort(key=lambda change: change[0])
         ready = 0
-        for cycle, variable, value in self._pending:
-            if cycle > until:
-                break
-            self._writer.change(variable, self._time(cycle), value)
-            ready += 1
+        try:
+            for cycle, variable, value in self._pending:
+                if cycle > until:
+                    break
+                self._writer.change(variable, self._time(cycle), value)
+                ready += 1
+        except OSError:
+            self._has_failed = True
+            raise
         del self._pending[:ready]
 
     def close(self) -> None:
-        """Write the remaining changes and close the file."""
+        """Write the remaining changes and close the file. After a failed write, only stop recording. Raises OSError."""
         machine = self._machine
-        machine.pins.flush()
-        self._write(machine.cycle)
+        if not self._has_failed:
+            machine.pins.flush()
+            self._write(machine.cycle)
         machine.pins.edges = machine.pins.frames = None
         for remove in self._removals:
             remove()
-        self._writer.close(self._time(machine.cycle))
+        if not self._has_failed:
+            self._writer.close(self._time(machine.cycle))
 
 
 def _board_names(machine: Machine) -> dict[str, str]:

@@ -6,10 +6,13 @@ from collections.abc import Mapping
 from typing import Any
 
 from emu.image.lines import dwarf_of
+from toolchain.bounds.damage import refused_if_damaged
 
 _STRIPPED = frozenset(("DW_TAG_typedef", "DW_TAG_const_type", "DW_TAG_volatile_type"))
 
 Signature = tuple[str, ...]
+LONGEST_CHAIN = 1000
+"""Most typedefs and qualifiers of one type; damaged debug information may have a cycle of them."""
 
 
 class Signatures:
@@ -20,6 +23,10 @@ class Signatures:
         self.types: dict[str, Signature] = {}
         if not sections.get(".debug_info"):
             return
+        with refused_if_damaged():
+            self._read(sections)
+
+    def _read(self, sections: Mapping[str, bytes]) -> None:
         for unit in dwarf_of(sections).iter_CUs():
             for die in unit.iter_DIEs():
                 if die.tag == "DW_TAG_subprogram" and "DW_AT_low_pc" in die.attributes:
@@ -44,11 +51,13 @@ class Signatures:
 
 def _target(die: Any) -> Any:
     """Return the type of a DIE without qualifiers and typedefs, None for void."""
-    while die is not None and "DW_AT_type" in die.attributes:
+    for _ in range(LONGEST_CHAIN):
+        if "DW_AT_type" not in die.attributes:
+            return None
         die = die.get_DIE_from_attribute("DW_AT_type")
         if die.tag not in _STRIPPED:
             return die
-    return None
+    raise ValueError("a type that is its own typedef")
 
 
 def _kind(die: Any) -> str:

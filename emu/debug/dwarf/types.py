@@ -1,6 +1,6 @@
 """C types read from DWARF, and conversion between bytes and Python values.
 
-Bytes are in memory order, little endian. Values are ints, floats, dicts for structs and unions, and lists for arrays.
+Bytes are in memory order, little-endian. Values are ints, floats, dicts for structs and unions, and lists for arrays.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ LONGEST_TEXT: Final = 16
 FLOATS: Final = {4: "<f", 8: "<d"}
 QUALIFIERS: Final = ("typedef", "const", "volatile")
 TAGGED: Final = ("struct", "union", "enum")
-"""Kinds of types whose names are tags."""
+"""Kinds of types that have a tag name: structs, unions and enumerations."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,21 +31,21 @@ class Member:
 
 @dataclass(eq=False, slots=True)
 class Type:
-    """A C type. Fields are mutable because a type that refers to itself is completed after its creation."""
+    """A C type. Fields are mutable, because a self-referential type is completed after its creation."""
 
     kind: str
-    """"signed", "unsigned", "char" (signed or not), "bool", "float", "pointer", "array", "struct", "union", "enum",
-    "function", "void", or one of QUALIFIERS."""
+    """Kind of type: "signed", "unsigned", "char" (signed or not), "bool", "float", "pointer", "array", "struct",
+    "union", "enum", "function", "void", or one of QUALIFIERS."""
     name: str = ""
     size: int = 0
     """Size in bytes; 0 for void, functions and incomplete types."""
     target: Type | None = None
-    """Target of a pointer, element of an array, result of a function, or the qualified type."""
+    """Target of a pointer, element of an array, result of a function, or type without the qualifier."""
     count: int = 0
-    """Number of elements of an array."""
+    """Number of elements if the type is an array."""
     members: tuple[Member, ...] = ()
     names: dict[int, str] = field(default_factory=dict)
-    """Enumerators by value."""
+    """Names of enumerators by value."""
     is_signed: bool = False
 
     @property
@@ -58,7 +58,7 @@ class Type:
 
     @property
     def bytes(self) -> int:
-        """Size in bytes, also of arrays and qualified types."""
+        """Size in bytes, including that of arrays and qualified types."""
         bare = self.bare
         if bare.kind == "array" and bare.target is not None:
             return bare.count * bare.target.bytes
@@ -66,11 +66,11 @@ class Type:
 
     @property
     def is_number(self) -> bool:
-        """Whether a value of the type is one int or float."""
+        """Whether a value of the type is a single int or float."""
         return self.bare.kind in ("signed", "unsigned", "char", "bool", "float", "enum", "pointer")
 
     def member(self, name: str) -> Member | None:
-        """Return the member `name` of a struct or union, also from its unnamed members; None if there is none."""
+        """Return the member `name` of a struct or union, None if there is none. Unnamed members are searched too."""
         for one in self.bare.members:
             if one.name == name:
                 return one
@@ -97,14 +97,20 @@ class Type:
         return self.name or self.kind
 
 
+MAX_NUMBER_BYTES: Final = 16
+"""Largest plausible size of a number; the chip's compilers have none above 8 bytes."""
 VOID: Final = Type("void", "void")
 UNSIGNED: Final = {size: Type("unsigned", f"uint{8 * size}", size) for size in (1, 2, 4, 8)}
-"""Types for symbols without debug information, by size."""
+"""Types by size for symbols that have no debug information."""
 
 
 def decode(kind: Type, data: bytes) -> Any:
-    """Return the value of type `kind` in `data`, which has at least as many bytes as the type."""
+    """Return the value of type `kind` in `data`.
+
+    Raises ValueError if `data` is shorter than the type, as in damaged debug information."""
     bare = kind.bare
+    if bare.kind not in ("array", "struct", "union") and (len(data) < bare.size or bare.size > MAX_NUMBER_BYTES):
+        raise ValueError(f"the debug information is damaged: {kind} of {bare.size} bytes in {len(data)} bytes")
     match bare.kind:
         case "float" if bare.size in FLOATS:
             return struct.unpack_from(FLOATS[bare.size], data)[0]
@@ -119,7 +125,7 @@ def decode(kind: Type, data: bytes) -> Any:
 
 
 def decode_member(one: Member, data: bytes) -> Any:
-    """Return the value of a member in the bytes of its struct."""
+    """Return a member's value from the bytes of its struct or union."""
     inside = data[one.offset :]
     if not one.bits:
         return decode(one.type, inside)
@@ -175,7 +181,7 @@ def _array(target: Type, values: list[Any]) -> str:
 
 
 def parts_of(kind: Type) -> Iterator[Member]:
-    """Return the members of a struct or union, or the elements of an array as members `[0]`, `[1]`, ...; else none."""
+    """Yield the members of a struct or union, or the elements of an array as members `[0]`, `[1]`, ..."""
     bare = kind.bare
     if bare.kind == "array" and bare.target is not None:
         step = bare.target.bytes

@@ -101,7 +101,7 @@ class Interval:
     __rxor__ = __xor__
 
     def __lshift__(self, count: Value) -> Value:
-        lo, hi = extremes(count)
+        lo, hi = _shift_counts(count)
         if lo == hi:
             return interval(self.lo << lo, self.hi << lo, self.mask << lo | (1 << lo) - 1, self.bits << lo)
         corners = [v << n for v in (self.lo, self.hi) for n in (lo, hi)]
@@ -111,7 +111,7 @@ class Interval:
         return interval(*extremes(value)) << self if isinstance(value, Interval) else shift_constant(value, self, 1)
 
     def __rshift__(self, count: Value) -> Value:
-        lo, hi = extremes(count)
+        lo, hi = _shift_counts(count)
         if lo == hi:
             return interval(self.lo >> lo, self.hi >> lo, self.mask >> lo, self.bits >> lo)
         corners = [v >> n for v in (self.lo, self.hi) for n in (lo, hi)]
@@ -188,9 +188,18 @@ def clamped(value: Value, lo: int, hi: int | None) -> Value:
     return interval(max(value.lo, lo), value.hi if hi is None else min(value.hi, hi), value.mask, value.bits)
 
 
+def _shift_counts(count: Value) -> tuple[int, int]:
+    """Return the least and the greatest shift count of a set.
+
+    Instructions shift by 0 or more. A set may hold smaller numbers, because it is an over-approximation."""
+    lo, hi = extremes(count)
+    return max(lo, 0), max(hi, 0)
+
+
 def shift_constant(value: int, count: Interval, sign: int) -> Value:
     """Return a constant shifted left (sign 1) or right (-1) by an unknown count."""
-    a, b = (value << count.lo, value << count.hi) if sign > 0 else (value >> count.lo, value >> count.hi)
+    lo, hi = _shift_counts(count)
+    a, b = (value << lo, value << hi) if sign > 0 else (value >> lo, value >> hi)
     return interval(min(a, b), max(a, b))
 
 

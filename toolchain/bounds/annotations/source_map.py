@@ -9,6 +9,7 @@ from typing import Any, Final
 
 from emu.image.lines import LineTable, dwarf_of, file_names
 from toolchain.bounds.annotations.reader import Annotation
+from toolchain.bounds.damage import refused_if_damaged
 from toolchain.errors import ToolError
 
 LineKey = tuple[str, int]
@@ -36,13 +37,14 @@ class SourceMap:
     def _read(self, debug: Mapping[str, bytes]) -> None:
         if not debug.get(".debug_info"):
             return
-        dwarf = dwarf_of(debug)
-        for unit in dwarf.iter_CUs():
-            program = dwarf.line_program_for_CU(unit)
-            names = file_names(program.header) if program is not None else []
-            for die in unit.iter_DIEs():
-                if die.tag == "DW_TAG_subprogram":
-                    self._function(die, names)
+        with refused_if_damaged():
+            dwarf = dwarf_of(debug)
+            for unit in dwarf.iter_CUs():
+                program = dwarf.line_program_for_CU(unit)
+                names = file_names(program.header) if program is not None else []
+                for die in unit.iter_DIEs():
+                    if die.tag == "DW_TAG_subprogram":
+                        self._function(die, names)
 
     def _function(self, die: Any, names: list[str]) -> None:
         begin = die.attributes.get("DW_AT_low_pc")
