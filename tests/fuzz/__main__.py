@@ -1,9 +1,9 @@
-"""Runs every campaign below this folder, one after the other.
+"""Run every campaign below this folder, one after the other.
 
 Usage: `python -m tests.fuzz [--seconds S] [--seed N] [NAME...]`. With --seconds the campaigns share S seconds evenly,
-else each takes its own number of tries. With --jobs several run at once, and each is printed when it ends. A failure
-does not stop the others. Seeds come from the commit unless --seed gives the first. Exit status 1 if any campaign
-failed.
+otherwise each makes its own number of tries. With --jobs several campaigns run at the same time, and the output of
+each is printed when it ends. A failure does not stop the others. Seeds come from the commit unless --seed gives the
+first. Exit status 1 if a campaign failed.
 
 Example: python -m tests.fuzz --seconds 600; python -m tests.fuzz --seconds 60 --seed 7 devices jit
 """
@@ -24,7 +24,8 @@ from tests.fuzz.seeds import ROOT, SKIPPED, base_seed, parser
 
 HERE = Path(__file__).parent
 PATIENCE = 600.0
-"""Seconds beyond its share after which a campaign counts as hung: one try may take long, and images are built first."""
+"""Seconds beyond its share after which a campaign is considered hung. One try may take long, and images are built
+first."""
 
 
 def campaigns() -> dict[str, Path]:
@@ -33,7 +34,7 @@ def campaigns() -> dict[str, Path]:
 
 
 def run(script: Path, seed: int, seconds: float | None, output: IO[bytes] | None = None) -> str:
-    """Run one campaign with its output on `output` and return "passed", "skipped" or the failure."""
+    """Run one campaign, with its output on `output`, and return "passed", "skipped" or a description of the failure."""
     command = [sys.executable, str(script), "--seed", str(seed)]
     if seconds is not None:
         command += ["--seconds", f"{seconds:g}"]

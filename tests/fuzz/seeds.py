@@ -1,8 +1,8 @@
-"""Which seeds a campaign tries: new ones with every commit, as many as fit into its time, and how to see one again.
+"""Seeds of a campaign: new ones with every commit, as many as fit into the given time, and reproduction of a failure.
 
-Every campaign takes `--seed N` (the first seed; default: from the hash of the commit that is checked out) and
-`--seconds S` (as long as that, instead of its own number of tries). What a seed does depends on nothing but the seed,
-so an interrupted campaign resumes with the `--seed` of the last line it printed.
+Every campaign takes `--seed N` (the first seed; default: from the hash of the current commit) and `--seconds S` (a
+duration instead of the campaign's own number of tries). A try depends only on its seed, so an interrupted campaign
+resumes with the `--seed` of its last output line.
 """
 
 from __future__ import annotations
@@ -17,16 +17,16 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 SKIPPED = 77
-"""Exit status of a campaign that cannot run here, because a program it needs is not installed."""
+"""Exit status of a campaign that cannot run because a program it needs is not installed."""
 REPORT_EVERY = 30.0
-"""Seconds between two lines on standard error that say how far a campaign is."""
+"""Seconds between two progress lines on standard error."""
 WITHOUT_COMMIT = 1
-"""Where a source tree without its history begins."""
+"""First seed for a source tree without a git history."""
 
 
 @cache
 def base_seed() -> int:
-    """First seed of this commit: the first 28 bits of its hash, so that seeds fit into 31 bits."""
+    """Return the first seed of this commit: the first 28 bits of its hash, so that seeds fit into 31 bits."""
     try:
         commit = subprocess.run(
             ["git", "-C", str(ROOT), "rev-parse", "HEAD"], capture_output=True, text=True, check=True)  # fmt: skip
@@ -36,10 +36,10 @@ def base_seed() -> int:
 
 
 class Campaign:
-    """The seeds of one run of a campaign, from the command line.
+    """Iterator over the seeds of one run of a campaign, as given on the command line.
 
-    Iterate over it; the loop ends when as many seeds are done as the campaign wants or its time is over. With
-    `--seconds` alone there is no other limit; at least one seed is always tried.
+    It ends after the number of tries or the time. With `--seconds` alone the number of tries is unlimited. At least
+    one seed is always tried.
     """
 
     def __init__(self, parser: argparse.ArgumentParser, option: str, default: int, what: str) -> None:
@@ -52,13 +52,13 @@ class Campaign:
         self.default = default
         self.first = self.done = 0
         self.seed = 0
-        """The seed being tried."""
+        """Seed of the current try."""
         self._count: int | None = None
         self._seconds: float | None = None
         self._start = time.monotonic()
 
     def parse(self, arguments: list[str] | None = None) -> argparse.Namespace:
-        """The options; the campaign begins."""
+        """Parse the options and start the campaign's clock."""
         options = self.parser.parse_args(arguments)
         self.first = self.seed = base_seed() if options.seed is None else options.seed
         self._seconds = options.seconds
@@ -70,12 +70,12 @@ class Campaign:
 
     @property
     def spent(self) -> float:
-        """Seconds since the campaign began."""
+        """Return the seconds since the start of the campaign."""
         return time.monotonic() - self._start
 
     @property
     def over(self) -> bool:
-        """Whether time or tries are used up."""
+        """Whether the time or the tries are used up."""
         late = self._seconds is not None and self.spent >= self._seconds
         return late or (self._count is not None and self.done >= self._count)
 
@@ -92,12 +92,12 @@ class Campaign:
             self.done += 1
 
     def ended(self, seen: str) -> int:
-        """Say what was seen; status 0."""
+        """Print the summary and return exit status 0."""
         print(f"{self.done} {self.option} from seed {self.first}, {self.spent:.0f} s: {seen}", flush=True)
         return 0
 
     def failed(self, seen: object, seed: int | None = None) -> int:
-        """Name `seed` (default: the one that is being tried) and the command that tries it again; status 1."""
+        """Print the failed seed (default: the current one) and the command that repeats it; return exit status 1."""
         seed = self.seed if seed is None else seed
         print(f"FAILED at seed {seed}: {seen}", flush=True)
         script = Path(sys.argv[0]).resolve()
@@ -106,7 +106,7 @@ class Campaign:
         return 1
 
     def _again(self, seed: int) -> list[str]:
-        """The options of this run, for the seed that failed alone, whatever a file of verdicts says of it."""
+        """Return the options that repeat only the given seed, without a log of verdicts."""
         kept: list[str] = []
         words = iter(sys.argv[1:])
         for word in words:
@@ -120,5 +120,5 @@ class Campaign:
 
 
 def parser(text: str | None) -> argparse.ArgumentParser:
-    """A parser that shows the text of a campaign's module as it is written."""
+    """Return a parser whose help shows the docstring of a campaign's module unchanged."""
     return argparse.ArgumentParser(description=text, formatter_class=argparse.RawDescriptionHelpFormatter)

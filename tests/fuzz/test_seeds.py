@@ -1,4 +1,4 @@
-"""Campaigns begin where the commit says, end in time, and name what failed."""
+"""Campaigns start at the seed of the commit, end in time, and name the seed of a failure."""
 
 from __future__ import annotations
 
@@ -12,20 +12,21 @@ from tests.fuzz.seeds import ROOT, Campaign, base_seed, parser
 
 
 def test_the_first_seed_follows_from_the_commit() -> None:
-    """The same for one commit, and small enough for generators that take 31 bits."""
+    """The first seed is the same for one commit, and small enough for generators with 31-bit seeds."""
     assert base_seed() == base_seed()
     assert 0 < base_seed() < 1 << 28
 
 
 def campaign(*words: str) -> Campaign:
-    """A campaign of at most three tries if nothing else is said."""
+    """Return a campaign with at most three tries by default."""
     made = Campaign(parser("text"), "tries", 3, "tries")
     made.parse(list(words))
     return made
 
 
 def test_a_course_has_as_many_seeds_as_asked_for_or_as_fit_into_its_time() -> None:
-    """Counts from the first seed; at least one in no time at all."""
+    """A campaign counts from the first seed to the number of tries or until the time is over; it tries at least one
+    seed."""
     assert list(campaign("--seed", "7")) == [7, 8, 9]
     assert list(campaign("--seed", "7", "--tries", "2")) == [7, 8]
     assert list(campaign("--seed", "7", "--seconds", "0")) == [7]
@@ -34,7 +35,7 @@ def test_a_course_has_as_many_seeds_as_asked_for_or_as_fit_into_its_time() -> No
 
 
 def test_a_long_campaign_tells_where_it_is(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
-    """Progress names the next seed, to resume with; standard output holds results only."""
+    """Progress lines name the next seed, with which the campaign resumes; standard output contains only results."""
     monkeypatch.setattr("tests.fuzz.seeds.REPORT_EVERY", 0.0)
     assert list(campaign("--seed", "7", "--tries", "2")) == [7, 8]
     said = capsys.readouterr()
@@ -46,7 +47,7 @@ def test_a_long_campaign_tells_where_it_is(capsys: pytest.CaptureFixture[str], m
 def test_a_failure_names_its_seed_and_how_to_see_it_again(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """With the options of the run, without its limits."""
+    """A failure prints its seed and a command that repeats it, with the options of the run but without its limits."""
     monkeypatch.setattr(sys, "argv", [str(ROOT / "tests/fuzz/fuzz_x.py"), "--engine", "jit", "--seconds", "5"])
     failing = campaign("--seed", "40")
     for seed in failing:
@@ -60,7 +61,7 @@ def test_a_failure_names_its_seed_and_how_to_see_it_again(
 
 @pytest.mark.parametrize("name", sorted(campaigns()))
 def test_every_campaign_takes_a_seed_and_a_time(name: str) -> None:
-    """What `python -m tests.fuzz --seconds S` gives it."""
+    """Every campaign accepts --seed and --seconds, which `python -m tests.fuzz` passes."""
     command = [sys.executable, str(campaigns()[name]), "--help"]
     usage = subprocess.run(command, capture_output=True, text=True, check=True, cwd=ROOT).stdout
     assert "--seed " in usage

@@ -1,4 +1,4 @@
-"""Files of verdicts: resumed, shared between processes, and bound to one compiler."""
+"""Files of verdicts can be resumed and shared between processes, and are bound to one compiler."""
 
 from __future__ import annotations
 
@@ -44,19 +44,20 @@ sys.exit(run_all(campaign, examine, Book(Path(sys.argv[1]), "made up"), 1))
 
 
 def judge(differing: set[int], seed: int) -> Verdict:
-    """A verdict without work."""
+    """Return a verdict at once."""
     return Verdict(seed, "failed", "it differs") if seed in differing else Verdict(seed, "agreed", "", ("-O0", "-Os"))
 
 
 def campaign(count: int) -> Campaign:
-    """Seeds from 1 on."""
+    """Return a campaign whose seeds start at 1."""
     made = Campaign(parser("text"), "programs", count, "programs")
     made.parse(["--seed", "1"])
     return made
 
 
 def test_a_campaign_goes_on_where_its_file_ends(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """What has a verdict is not examined again and counts all the same; failures are named and stop nothing."""
+    """A resumed campaign does not examine seeds with a verdict again, but counts them; a failure is reported and
+    stops nothing."""
     log = tmp_path / "log"
     assert run_all(campaign(3), partial(judge, {2}), Book(log, "made up"), 1) == 1
     assert "FAILED at seed 2: it differs" in capsys.readouterr().out
@@ -68,7 +69,7 @@ def test_a_campaign_goes_on_where_its_file_ends(tmp_path: Path, capsys: pytest.C
 
 
 def test_two_processes_share_the_seeds_and_a_killed_one_leaves_its_own(tmp_path: Path) -> None:
-    """No process takes a seed that another examines; all see every verdict."""
+    """Two processes never examine the same seed, and each reads all verdicts; seeds of a killed process become free."""
     log = tmp_path / "log"
     with subprocess.Popen([sys.executable, "-c", OTHER, str(log)], cwd=ROOT, stdout=subprocess.PIPE, text=True) as one:
         assert one.stdout is not None
@@ -97,19 +98,19 @@ def test_an_interrupted_campaign_writes_down_what_it_was_at(tmp_path: Path) -> N
 
 
 def test_workers_do_not_outlive_a_killed_campaign(tmp_path: Path) -> None:
-    """A process of the pool waits for work without end otherwise."""
+    """Worker processes end when their campaign is killed; otherwise they would wait for work for ever."""
     log = tmp_path / "log"
     with subprocess.Popen([sys.executable, "-c", SLOW, str(log)], cwd=ROOT, stderr=subprocess.PIPE) as running:
         while not log.with_name("log.begun").exists():
             time.sleep(0.05)
         running.kill()
-        running.communicate(timeout=HANG)  # ends when no worker holds the other end of the pipe
+        running.communicate(timeout=HANG)  # returns when no worker holds the other end of the pipe
 
 
 def test_verdicts_on_another_compiler_or_of_another_campaign_are_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """With the file's name and what to do."""
+    """Verdicts of another compiler or campaign are refused, with the file's name and a remedy."""
     log = tmp_path / "log"
     Book(log, "made up").put(Verdict(1, "agreed"))
     with pytest.raises(LogError, match="not a file of the campaign 'other'"):
@@ -120,7 +121,7 @@ def test_verdicts_on_another_compiler_or_of_another_campaign_are_refused(
 
 
 def test_damaged_files_are_refused_and_half_a_line_is_no_verdict(tmp_path: Path) -> None:
-    """A process that is killed while it writes costs its own verdict only."""
+    """A damaged file is refused; a process that is killed while it writes loses only its own verdict."""
     log = tmp_path / "log"
     book = Book(log, "made up")
     book.put(Verdict(1, "agreed"))

@@ -1,9 +1,9 @@
-"""Long campaigns over programs: verdicts in a file that several processes share and that can be resumed.
+"""Long campaigns over programs: verdicts in a file that several processes can share and that can be resumed.
 
-Enters: seeds, and a function that examines one. Leaves: `Verdict`s, counted and written down as they come. The file has
-a line of JSON per verdict, behind a first line that says which campaign and which compiler it is about. Who works on a
-seed holds a lock on that byte of the file beside it (`FILE.lock`), so processes share the seeds between them, and those
-of one that was killed are free again.
+Input: seeds, and a function that examines one. Output: `Verdict`s, which are counted and written to the file. The
+first line of the file names the campaign and the compiler, and each other line is a verdict in JSON. A process that
+examines a seed locks the byte of that number in `FILE.lock`, so several processes share the seeds. The operating
+system releases the locks of a killed process.
 """
 
 from __future__ import annotations
@@ -27,21 +27,22 @@ from pathlib import Path
 from tests.fuzz.seeds import ROOT, Campaign
 
 INTERRUPTED = 130
-"""Exit status of a campaign that was ended by SIGINT or SIGTERM, and failed in nothing until then."""
+"""Exit status of a campaign that SIGINT or SIGTERM ended and that had no failure."""
 JUDGED = ("toolchain", "emu")
-"""What verdicts are about, relative to the project."""
+"""Packages whose sources verdicts depend on, relative to the project."""
 APART = tuple(ROOT / "toolchain" / name for name in ("bounds", "proof"))
-"""What in it only looks at what the compiler made."""
+"""Subpackages that only analyse the compiler's output; a change of them keeps verdicts valid."""
 SUFFIXES = {".py", ".c", ".cpp", ".h", ".s", ".inc", ".csv"}
-LOOK_AGAIN = 1.0
-"""Seconds between two looks whether a campaign was interrupted, or is gone."""
+POLL_S = 1.0
+"""Seconds between two checks for an interrupt, or for the death of the campaign's process."""
 COLLECT_EVERY = 100_000
-"""Objects between two collections of garbage: a compilation makes millions and leaves few cycles."""
+"""Allocations between two garbage collections; a compilation makes millions of objects but few reference cycles."""
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """`kind` is agreed, skipped or failed; `shapes` are the levels and ways of linking that were compared."""
+    """Result of one seed. `kind` is "agreed", "skipped" or "failed"; `shapes` are the compared levels and link
+    modes."""
 
     seed: int
     kind: str
@@ -50,16 +51,16 @@ class Verdict:
 
     @property
     def summary(self) -> str:
-        """The words under which it is counted."""
+        """Return the key under which the verdict is counted."""
         return f"{self.kind} {self.reason if self.kind != 'failed' else ''}".strip()
 
 
 class LogError(Exception):
-    """A file of verdicts that cannot be resumed."""
+    """A file of verdicts cannot be resumed."""
 
 
 def judged() -> str:
-    """Hash of the compiler, the library and the emulator that verdicts are about."""
+    """Return a hash of the sources of compiler, run-time library and emulator."""
     digest = hashlib.sha256()
     for folder in JUDGED:
         for path in sorted(path for path in (ROOT / folder).rglob("*") if path.suffix in SUFFIXES):
@@ -70,10 +71,10 @@ def judged() -> str:
 
 
 class Book:
-    """Verdicts by seed, in `path` if there is one, and who works on which seed."""
+    """Verdicts by seed, stored in `path` if one is given, with locks on the seeds that a process examines."""
 
     def __init__(self, path: Path | None, campaign: str) -> None:
-        """Read what is there. Raises LogError when it is of another campaign or compiler, or damaged."""
+        """Read the file. Raises LogError if it belongs to another campaign or compiler, or is damaged."""
         self.path = path
         self.verdicts: dict[int, Verdict] = {}
         self._head = {"campaign": campaign, "judged": judged() if path is not None else ""}
@@ -81,13 +82,13 @@ class Book:
         if path is None:
             return
         self._locks = os.open(path.with_name(path.name + ".lock"), os.O_RDWR | os.O_CREAT, 0o666)
-        with self._alone():
+        with self._locked():
             if not path.exists() or not path.stat().st_size:
                 self._append(self._head)
             self._read()
 
     def take(self, seed: int) -> bool:
-        """Whether the seed is to be done here: it has no verdict, and no other process is at it."""
+        """Reserve a seed. Return whether to examine it: it has no verdict, and no other process has reserved it."""
         if self.path is None:
             return seed not in self.verdicts
         try:
@@ -96,23 +97,23 @@ class Book:
             return False
         self._read()
         if seed in self.verdicts:
-            self._let_go(seed)
+            self._release(seed)
         return seed not in self.verdicts
 
     def put(self, verdict: Verdict) -> None:
-        """Write a verdict down."""
+        """Store a verdict and release its seed."""
         self.verdicts[verdict.seed] = verdict
         if self.path is not None:
-            with self._alone():
+            with self._locked():
                 self._append(asdict(verdict))
-            self._let_go(verdict.seed)
+            self._release(verdict.seed)
 
-    def _let_go(self, seed: int) -> None:
+    def _release(self, seed: int) -> None:
         fcntl.lockf(self._locks, fcntl.LOCK_UN, 1, 1 + seed)
 
     @contextmanager
-    def _alone(self) -> Iterator[None]:
-        """Exclusive access to the file's beginning and to writing: byte 0 of the lock file."""
+    def _locked(self) -> Iterator[None]:
+        """Lock the beginning of the file and the right to append (byte 0 of the lock file)."""
         fcntl.lockf(self._locks, fcntl.LOCK_EX, 1, 0)
         try:
             yield
@@ -120,7 +121,7 @@ class Book:
             fcntl.lockf(self._locks, fcntl.LOCK_UN, 1, 0)
 
     def _append(self, row: dict[str, object]) -> None:
-        """One line. What a killed process began to write is ended first."""
+        """Append one line, after completing a line that a killed process has left incomplete."""
         assert self.path is not None
         with self.path.open("a+b") as log:
             if log.tell():
@@ -130,7 +131,7 @@ class Book:
             log.write(json.dumps(row).encode() + b"\n")
 
     def _read(self) -> None:
-        """Lines that have come since the last time; half a line, of a process that was killed, is no verdict."""
+        """Read the lines added since the last call. An incomplete line, from a killed process, is no verdict."""
         assert self.path is not None
         with self.path.open("rb") as log:
             log.seek(self._read_to)
@@ -162,10 +163,10 @@ class Book:
 
 
 def run_all(campaign: Campaign, examine: Callable[[int], Verdict], book: Book, jobs: int) -> int:
-    """Examine the seeds of `campaign` in `jobs` processes; the exit status.
+    """Examine the seeds of `campaign` in `jobs` processes and return the exit status.
 
-    A failure does not stop it. After SIGINT or SIGTERM the running programs are finished and recorded; a second
-    signal ends at once.
+    A failure does not stop the campaign. After SIGINT or SIGTERM the running programs are finished and recorded; a
+    second signal ends the process at once.
     """
     stopped: list[int] = []
 
@@ -182,7 +183,7 @@ def run_all(campaign: Campaign, examine: Callable[[int], Verdict], book: Book, j
             running: set[Future[Verdict]] = set()
             for seed in campaign:
                 while len(running) > jobs and not stopped:
-                    running = _noted(running, book, done, campaign)
+                    running = _record_verdicts(running, book, done, campaign)
                 if stopped:
                     break
                 if book.take(seed):
@@ -194,7 +195,7 @@ def run_all(campaign: Campaign, examine: Callable[[int], Verdict], book: Book, j
             for future in running if stopped else ():
                 future.cancel()
             while running := {future for future in running if not future.cancelled()}:
-                running = _noted(running, book, done, campaign)
+                running = _record_verdicts(running, book, done, campaign)
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
@@ -208,26 +209,26 @@ def run_all(campaign: Campaign, examine: Callable[[int], Verdict], book: Book, j
 
 
 def _worker() -> None:
-    """A process of the pool: signals of a terminal are for the campaign, and collections seldom pay."""
+    """Initialise a process of the pool: ignore SIGINT, which the campaign handles, and collect garbage rarely."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
-    threading.Thread(target=_leave_with, args=(os.getppid(),), daemon=True).start()
+    threading.Thread(target=_exit_with, args=(os.getppid(),), daemon=True).start()
     gc.freeze()
     gc.set_threshold(COLLECT_EVERY)
 
 
-def _leave_with(campaign: int) -> None:
-    """End this process when the campaign's is gone, which a pool does not."""
+def _exit_with(campaign: int) -> None:
+    """End this process when the campaign's process has ended, which the pool does not do."""
     while os.getppid() == campaign:
-        time.sleep(LOOK_AGAIN)
+        time.sleep(POLL_S)
     os._exit(1)
 
 
-def _noted(
+def _record_verdicts(
     running: set[Future[Verdict]], book: Book, done: dict[int, Verdict], campaign: Campaign
 ) -> set[Future[Verdict]]:
-    """Wait for a verdict, write down what there is; what is left."""
-    finished, left = wait(running, LOOK_AGAIN, FIRST_COMPLETED)
+    """Wait for verdicts, store those available, and return the futures that are still running."""
+    finished, left = wait(running, POLL_S, FIRST_COMPLETED)
     for future in finished:
         if future.cancelled():
             continue

@@ -1,7 +1,7 @@
-"""Mutated sources and objects: assembler and linker give an image or clear errors, nothing else.
+"""Mutated sources and objects: assembler and linker produce an image or clear errors.
 
-`python tests/fuzz/compiler/fuzz_asm.py [--inputs N] [--seed S] [--seconds T]`; exits 1 with the first input that made
-something else happen.
+`python tests/fuzz/compiler/fuzz_asm.py [--inputs N] [--seed S] [--seconds T]`; exits with 1 at the first input with
+any other outcome.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from toolchain.link.hexfile import hex_text  # noqa: E402
 from toolchain.link.link import link  # noqa: E402
 from toolchain.link.options import LinkOptions  # noqa: E402
 
-SLOW_SECONDS = 10.0  # one input must not take longer, whatever it says
+SLOW_SECONDS = 10.0  # limit for one input
 
 SEED_TEXT = """
         .equ    BIT, 3
@@ -103,7 +103,7 @@ TOKENS = (
 
 
 def mutate(text: str, rng: random.Random) -> str:
-    """One to six random changes: tokens and lines inserted, dropped, doubled, swapped; characters damaged."""
+    """Make one to six random changes: tokens and lines inserted, dropped, doubled or swapped; characters damaged."""
     for _ in range(rng.choice((1, 1, 1, 2, 3, 6))):
         place = rng.randrange(len(text) + 1)
         match rng.randrange(7):
@@ -131,7 +131,7 @@ def mutate(text: str, rng: random.Random) -> str:
 
 
 def outcome(text: str, relax: bool) -> str:
-    """ "assembly refused", "link refused" or "linked"; anything unclean escapes as an exception."""
+    """Return "assembly refused", "link refused" or "linked"; any other outcome raises an exception."""
     try:
         obj, _ = assemble(text, "fuzz.s", Options(relax=relax, debug=relax))
     except ToolError as error:
@@ -149,7 +149,7 @@ def outcome(text: str, relax: bool) -> str:
 
 
 def mutated_object(data: bytes, rng: random.Random) -> bytes:
-    """An object with some bytes changed or its end cut off."""
+    """Return an object file with some bytes changed or its end cut off."""
     out = bytearray(data)
     for _ in range(rng.choice((1, 1, 2, 8))):
         out[rng.randrange(len(out))] = rng.choice((0, 1, 0x7F, 0x80, 0xFF, rng.randrange(256)))
@@ -157,7 +157,7 @@ def mutated_object(data: bytes, rng: random.Random) -> bytes:
 
 
 def object_outcome(data: bytes) -> str:
-    """ "object refused" or "object linked"."""
+    """Return "object refused" or "object linked"."""
     try:
         linked = link([read_object(data, "fuzz.o")], [], LinkOptions(gc_sections=True))
     except ToolError as error:
@@ -168,13 +168,14 @@ def object_outcome(data: bytes) -> str:
 
 
 def check_findings(error: ToolError) -> None:
-    """Every finding is one line with a place and the word error."""
+    """Check that every message is one line with a source position and the word "error"."""
     for finding in error.findings:
         assert "error: " in finding, finding
 
 
 def campaign(seeds: Iterable[int]) -> Counter[str]:
-    """A mutated source and object for every seed; raise AssertionError with the one that misbehaved."""
+    """Test a mutated source and a mutated object for every seed. Raises AssertionError with the first one that
+    fails."""
     good = object_bytes(assemble(SEED_TEXT, "seed.s")[0])
     outcomes: Counter[str] = Counter()
     for seed in seeds:

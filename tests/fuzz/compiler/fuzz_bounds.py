@@ -1,11 +1,16 @@
-"""Random C at every level: nothing runs longer, uses more stack or masks longer than `toolchain.bounds` says.
+"""Random C at every level: no run exceeds the cycles, the stack or the interrupt latency that `toolchain.bounds`
+computes.
 
-`python tests/fuzz/compiler/fuzz_bounds.py [--programs N] [--seed S] [--seconds T]`; exits 1 with the first program
-that exceeds a bound. The programs are those of `c_shapes.py`: interrupts, escapes, volatile, large frames, loops of
-fixed counts; every second one has what `c_features.py` has, which often leaves no bound, and every third is one of
-`c_notes.py`, which only its annotations bound. Every sixth is one of `c_interrupts.py`: there the responses of
-interrupts, and the stack under nested interrupts, are compared at many phases. Prints how tight the bounds of `main`
-are; a campaign that is long enough fails if `c_interrupts.py` never made a shape that it exists for.
+`python tests/fuzz/compiler/fuzz_bounds.py [--programs N] [--seed S] [--seconds T]`; exits with 1 at the first program
+that exceeds a bound. Generators of the programs, by seed:
+- `c_shapes.py`: interrupts, escaping addresses, volatile, large frames, loops with fixed counts; every second program
+  also contains `c_features.py`, which often makes it unbounded;
+- `c_notes.py`, every third seed: programs that are bounded only by their annotations;
+- `c_interrupts.py`, every sixth seed: responses of interrupts, and the stack under nested interrupts, are compared at
+  many phases.
+
+The summary states how tight the bounds of `main` are. A long campaign fails if `c_interrupts.py` never generated one
+of the constructs listed there.
 """
 
 from __future__ import annotations
@@ -35,31 +40,31 @@ from toolchain.stack.annotations import Annotations  # noqa: E402
 
 LEVELS = ("-Os", "-O0", "-O2", "-O1")
 CYCLES = 400_000
-"""Longest run that is measured."""
+"""Maximum length of a measured run in cycles."""
 HANDLER = "__T1Interrupt"
 NOTED = 1
-"""Of three seeds, the one that makes a program with annotations."""
+"""Seeds with this remainder modulo 3 make programs with annotations."""
 INTERRUPTED = 3
-"""Of six seeds, the one that makes a program about interrupts."""
+"""Seeds with this remainder modulo 6 make programs about interrupts."""
 PHASES, WATCHED = 24, 4_000
-"""Runs of such a program, and cycles of each."""
+"""Number of runs of a program about interrupts, and cycles of each run."""
 ENOUGH = 40
-"""So many of them make everything they are for."""
+"""Number of programs about interrupts after which every construct must have occurred."""
 NESTED = 3
-"""Handlers within each other, of as many as there are."""
+"""Depth of nested handlers that a long campaign must reach; it is the number of handlers."""
 
 
 @dataclass
 class Seen:
-    """The worst of one function or handler: cycles from its first instruction to behind its return, without those of
-    interrupts; bytes of stack above the return address."""
+    """Maxima of one function or handler: cycles from its first instruction to the one after its return, without
+    interrupts, and bytes of stack above the return address."""
 
     cycles: int = 0
     stack: int = 0
 
 
 def measure(image: Path) -> dict[str, Seen] | str:
-    """`main` and the interrupt handler as they ran."""
+    """Run an image and return the maxima of `main` and of the interrupt handler, or why they could not be measured."""
     machine = emu.load(image, engine="plain")
     assert machine.image is not None
     main, handler = (machine.image.symbols.find(name) for name in ("_main", HANDLER))
@@ -102,10 +107,10 @@ def _follow(machine: emu.Machine, main: int, handler: int | None) -> dict[str, S
 
 
 def examine(seed: int, folder: Path) -> tuple[str, dict[str, tuple[Seen, Bound]]]:
-    """One program at one level: what became of it, and what was seen beside what was said."""
+    """Test one program at one level. Return its outcome, and the measured maxima and the bound of each function."""
     level = LEVELS[seed % len(LEVELS)]
     noted = seed % 3 == NOTED
-    files = c_notes.Program(seed).files if noted else c_shapes.Program(seed, featured=seed % 2 == 1).files
+    files = c_notes.Program(seed).files if noted else c_shapes.Program(seed, has_features=seed % 2 == 1).files
     for name, text in files.items():
         (folder / name).write_text(text)
     image = folder / "program.elf"
@@ -137,7 +142,8 @@ def examine(seed: int, folder: Path) -> tuple[str, dict[str, tuple[Seen, Bound]]
 
 @dataclass
 class Held:
-    """What programs about interrupts were, and what was seen of them."""
+    """Summary of the programs about interrupts: generated constructs, and numbers of programs and of nested
+    handlers."""
 
     kinds: Counter[str]
     programs: int = 0
@@ -165,7 +171,7 @@ class Held:
         return "responses" if None not in said.values() else "responses not bounded"
 
     def missing(self) -> list[str]:
-        """What a campaign that is long enough should have done, and has not."""
+        """Return the constructs and results that a long campaign must contain and that are missing."""
         if self.programs < ENOUGH:
             return []
         absent = sorted(c_interrupts.KINDS - self.kinds.keys())
@@ -178,7 +184,7 @@ def _worst(seen: Watched) -> dict[str, int]:
 
 
 def main() -> int:
-    """Command line."""
+    """Run the campaign from the command line."""
     campaign = Campaign(parser(__doc__), "programs", 300, "programs")
     campaign.parse()
     outcomes: Counter[str] = Counter()

@@ -1,11 +1,10 @@
-"""Random firmware-like C (`c_shapes.py`) at every level, with and without -fno-lto, on the emulator: one checksum and
-
-one sequence of accesses to volatile registers, those of the host's model where gcc is installed.
+"""Random firmware-like C (`c_shapes.py`): all shapes give one checksum and one sequence of volatile accesses.
 
 `python tests/fuzz/compiler/fuzz_compiler.py [--programs N] [--seed S] [--seconds T] [--jobs J] [--log FILE] [--keep
-DIR]`; exits 1 if a program differs; DIR gets its sources. With FILE a campaign can be interrupted and resumed, and
-several processes can share it (`verdicts.py`). The compiler verifies its machine code after every pass meanwhile.
-Shapes whose images are equal to the byte are run once.
+DIR]`; exits with 1 if a program differs. A shape is an optimisation level, with or without -fno-lto, run on the
+emulator. If gcc is installed, the host's model of the program gives the expected result. DIR receives the sources of
+failures. With FILE a campaign can be interrupted and resumed, and several processes can share it (`verdicts.py`). The
+compiler verifies its machine code after every pass. Equal images of several shapes are run once.
 """
 
 from __future__ import annotations
@@ -39,14 +38,14 @@ NO_ROOM = re.compile(r"does not fit|no room for the stack|overflow")
 
 @dataclass(frozen=True)
 class Seen:
-    """What a run showed: the checksum, and port and direction of every volatile access in order."""
+    """Result of a run: the checksum, and port and direction of every volatile access in order."""
 
     checksum: str
     trace: tuple[str, ...]
 
 
 def model(folder: Path) -> Seen | None:
-    """The program on the host, None where there is no gcc."""
+    """Run the program on the host and return its result; None if gcc is not installed."""
     if shutil.which("gcc") is None:
         return None
     program = folder / "model"
@@ -58,7 +57,7 @@ def model(folder: Path) -> Seen | None:
 
 
 class OnTheChip:
-    """One program by our compiler, on the emulator."""
+    """One program that is compiled by our compiler and runs on the emulator."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -66,7 +65,7 @@ class OnTheChip:
         self._ran: dict[bytes, Seen | str] = {}
 
     def seen(self, level: str, alone: str) -> Seen | str:
-        """What a run shows, or why there is no result."""
+        """Build one shape and return the result of its run, or the reason for its failure."""
         image = self.folder / f"program{level}{alone}.elf"
         sources = [self.folder / name for name in SOURCES]
         built = build(sources, image, level, *alone.split(), "-w", "-std=gnu11", front=self._front)
@@ -79,7 +78,7 @@ class OnTheChip:
 
 
 def seen_of(image: Path) -> Seen | str:
-    """What a run of the image shows, or why it did not end."""
+    """Run an image and return its result, or the reason why it did not end."""
     machine = emu.load(image, engine="auto")
     trace: list[str] = []
     for k, name in enumerate(PORTS):
@@ -95,7 +94,7 @@ def _note(trace: list[str], port: int, write: bool, word: int) -> None:
 
 
 def examine(seed: int, keep: Path | None = None) -> Verdict:
-    """One program in all shapes."""
+    """Generate one program and compare all its shapes."""
     os.environ["DSPIC_VERIFY_MACHINE"] = "1"
     with tempfile.TemporaryDirectory(prefix="shapes-") as name:
         folder = Path(name)
@@ -112,7 +111,7 @@ def examine(seed: int, keep: Path | None = None) -> Verdict:
 
 
 def compare(seed: int, folder: Path) -> Verdict:
-    """All shapes with the model, or with each other."""
+    """Compare all shapes with the host's model, or with the first shape if there is none."""
     expected, whose = model(folder), "the host's model"
     chip, compared = OnTheChip(folder), []
     for level, alone in SHAPES:
@@ -137,7 +136,7 @@ def compare(seed: int, folder: Path) -> Verdict:
 
 
 def main() -> int:
-    """Command line."""
+    """Run the campaign from the command line."""
     options = parser(__doc__)
     options.add_argument("--jobs", type=int, default=2)
     options.add_argument("--log", type=Path, help="file of verdicts, read and continued")

@@ -1,18 +1,18 @@
-"""Random C programs: every level, with and without -fno-lto, must give one checksum on the emulator, and avr-gcc with
-simavr the same one.
+"""Random C programs of csmith: every shape gives the checksum of the others, and of avr-gcc with simavr.
 
 `python tests/fuzz/compiler/fuzz_csmith.py [--count N] [--seed S] [--seconds T] [--jobs J] [--log FILE] [--keep DIR]`.
-Needs Debian's `csmith`; the AVR, another machine with 16-bit int, joins in when `gcc-avr avr-libc simavr` are there.
+A shape is an optimisation level, with or without -fno-lto, run on the emulator; equal images are run once. Needs
+Debian's `csmith`. The AVR, which also has 16-bit int, is compared if `gcc-avr avr-libc simavr` are installed.
 Programs that run too long at -O0 or do not fit into 8 kB of RAM are skipped. With FILE a campaign can be interrupted
-and resumed, and several processes can share it (`verdicts.py`). Exit status 0 when all checksums agree; DIR keeps
-sources of failures. Shapes whose images are equal to the byte are run once.
+and resumed, and several processes can share it (`verdicts.py`). Exit status 0 if all checksums agree; DIR receives
+sources of failures.
 
-Two things csmith leaves undefined here are repaired, because a compiler may do anything with them:
+The campaign repairs two kinds of undefined behaviour in csmith's programs:
 - its shift wrappers allow distances below 32 for every type; here the limit is the width of the shifted value;
-- addresses of packed members may be odd, which an AVR does not mind; such programs come without packed structs.
+- addresses of packed members may be odd, which only an AVR permits; the programs contain no packed structs.
 
-What is read through a union of another member that is a struct depends on where that has its members, and an AVR, which
-aligns nothing, has them elsewhere: about a program with such a union its answer decides nothing.
+A read through a union of a member that is a struct depends on the layout of the struct. An AVR aligns no members and
+has another layout, so its checksum is ignored for programs with such a union.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ LEVELS = ("-O0", "-O1", "-Os", "-O2")
 SHAPES: tuple[Shape, ...] = tuple((level, alone) for level in LEVELS for alone in ("", "-fno-lto"))
 CYCLES = 15_000_000
 SHORT = 500_000
-"""Tcy for which starting native code does not pay."""
+"""Runs below this number of Tcy use the interpreter, because starting the JIT would take longer."""
 PLATFORM = "integer size = 2\npointer size = 2\n"
 GENERATOR = [
     *("--max-funcs", "5", "--max-block-depth", "3", "--max-block-size", "3", "--max-expr-complexity", "6"),
@@ -63,13 +63,14 @@ def available() -> bool:
 
 
 def avr_available() -> bool:
-    """Whether the AVR reference can take part."""
+    """Whether avr-gcc, avr-libc and simavr are installed."""
     return all(shutil.which(name) for name in ("avr-gcc", "simavr"))
 
 
 @functools.cache
 def headers() -> Path:
-    """Folder with csmith's safe_math.h, its shift distances limited by the width of the shifted value."""
+    """Return a folder with csmith's safe_math.h, in which shift distances are limited by the width of the shifted
+    value."""
     folder = Path(tempfile.mkdtemp(prefix="csmith-headers-"))
     text = (HEADERS / "safe_math.h").read_text()
     (folder / "safe_math.h").write_text(text.replace(">= 32)", ">= (int)(8 * sizeof(left + 0)))"))
@@ -78,7 +79,7 @@ def headers() -> Path:
 
 
 def generate(seed: int, folder: Path) -> Path:
-    """Program number `seed`; the generator reads the sizes of int and pointers from platform.info."""
+    """Generate the program of a seed; csmith reads the sizes of int and pointers from platform.info."""
     (folder / "platform.info").write_text(PLATFORM)
     path = folder / f"csmith_{seed}.c"
     for variant in ([], ["--no-packed-struct"]):
@@ -93,12 +94,12 @@ def generate(seed: int, folder: Path) -> Path:
 
 
 def flags() -> list[str]:
-    """Options common to both compilers."""
+    """Return the options that both compilers receive."""
     return ["-std=gnu11", f"-I{RUNTIME}", f"-I{headers()}", f"-I{HEADERS}"]
 
 
 class OnTheChip:
-    """One program by our compiler, on the emulator."""
+    """One program that is compiled by our compiler and runs on the emulator."""
 
     def __init__(self, source: Path, folder: Path) -> None:
         self.source, self.folder = source, folder
@@ -106,7 +107,7 @@ class OnTheChip:
         self._ran: dict[bytes, tuple[str, str]] = {}
 
     def checksum(self, level: str, alone: str) -> tuple[str, str]:
-        """(checksum, "") or ("", why there is none)."""
+        """Build and run one shape and return (checksum, ""), or ("", reason for the failure)."""
         image = self.folder / f"{self.source.stem}{level}{alone}.elf"
         built = build([self.source], image, level, *alone.split(), "-w", *flags(), front=self._front)
         if built.status != 0:
@@ -120,7 +121,7 @@ class OnTheChip:
 
 
 def on_avr(source: Path, folder: Path) -> str:
-    """Checksum by avr-gcc and simavr; "" when it does not build, end or print."""
+    """Return the checksum by avr-gcc and simavr, or "" if the program does not build, end or print."""
     image = folder / f"{source.stem}.avr.elf"
     command = [*AVR, *flags(), str(source), "-o", str(image)]
     if subprocess.run(command, capture_output=True, check=False).returncode != 0:
@@ -132,13 +133,13 @@ def on_avr(source: Path, folder: Path) -> str:
         )  # fmt: skip
     except subprocess.TimeoutExpired:
         return ""
-    plain = re.sub(r"\x1b\[\d*m", "", said.stdout + said.stderr)  # simavr colours what the UART says
+    plain = re.sub(r"\x1b\[\d*m", "", said.stdout + said.stderr)  # simavr colours the UART's output
     found = re.search(r"\b[0-9A-F]{8}\b", plain)
     return found[0] if found else ""
 
 
 def examine(seed: int, keep: Path | None = None, shapes: tuple[Shape, ...] = SHAPES) -> Verdict:
-    """Generate, build and run one program everywhere."""
+    """Generate one program and compare all its shapes."""
     with tempfile.TemporaryDirectory(prefix="csmith-") as name:
         folder = Path(name)
         source = generate(seed, folder)
@@ -150,7 +151,7 @@ def examine(seed: int, keep: Path | None = None, shapes: tuple[Shape, ...] = SHA
 
 
 def compare(seed: int, source: Path, folder: Path, shapes: tuple[Shape, ...] = SHAPES) -> Verdict:
-    """Checksums of one program in all shapes, -O0 first, and on the AVR. The compiler verifies its machine code."""
+    """Compare the checksums of all shapes, -O0 first, and of the AVR. The compiler verifies its machine code."""
     os.environ["DSPIC_VERIFY_MACHINE"] = "1"
     chip, sums = OnTheChip(source, folder), {}
     for level, alone in shapes:
@@ -177,7 +178,7 @@ def compare(seed: int, source: Path, folder: Path, shapes: tuple[Shape, ...] = S
 
 
 def main() -> int:
-    """Command line."""
+    """Run the campaign from the command line."""
     options = parser(__doc__)
     options.epilog = "example: csmith_campaign.py --count 1000 --jobs 2"
     options.add_argument("--jobs", type=int, default=2)

@@ -1,9 +1,10 @@
-"""Locals and parameters as a debugger shows them: `python tests/fuzz/compiler/fuzz_locals.py [--files N] [--seed N]`.
+"""Locals and parameters in a debugger: `python tests/fuzz/compiler/fuzz_locals.py [--files N] [--seed N]`.
 
-Random functions, ten to a file, with a model of what every variable holds before every line. At -O0 each variable that
-has been set is right wherever a line begins. At -Os lines move, so a shown value counts as right if the variable has it
-anywhere in the model's run; others are counted, not failed: they are in the optimiser's own debug information, which
-gives a variable the value that is left of it where only some of its bits are used.
+Each file has ten random functions and a model of the value of every variable before every line. At -O0 the debugger
+must show the right value of each variable that has been set, at the beginning of every line. At -Os lines are
+reordered, so a shown value is counted as right if the variable has it anywhere in the model's run. Other values are
+counted and are no failure: where only some bits of a variable are used, the optimiser's debug information describes
+only those bits.
 """
 
 from __future__ import annotations
@@ -26,11 +27,11 @@ FUNCTIONS = 10
 OPERATORS = ("+", "-", "^", "&", "|", "*")
 State = dict[str, int]
 Run = list[tuple[int, State]]
-"""Lines in the order they are run, each with what the variables hold before."""
+"""Executed lines in order, each with the values of the variables before it."""
 
 
 class Function:
-    """A random function from line `first` on: its text, and a run of the model."""
+    """A random function that begins at line `first`: its text, and its execution by the model."""
 
     def __init__(self, name: str, rng: random.Random, first: int) -> None:
         self.name, self.rng = name, rng
@@ -51,7 +52,7 @@ class Function:
         self.lines.append("}")
 
     def _line(self, text: str) -> None:
-        """A line that is run now."""
+        """Append a line that is executed."""
         self.run.append((self.first + len(self.lines), dict(self._state)))
         self.lines.append(f"    {text}")
 
@@ -64,7 +65,7 @@ class Function:
         return int(eval(term, {"volatile_one": 1}, dict(self._state))) & 0xFFFF
 
     def _assign(self, name: str, kind: str, term: str, times: int) -> None:
-        """`times`: 0 writes the line without running it, more runs it so often behind each other."""
+        """Append an assignment, which the model executes unless `times` is 0."""
         text = f"{kind}{name} = {term};"
         if not times:
             self.lines.append(f"    {text}")
@@ -92,7 +93,7 @@ class Function:
 
 
 def program(seed: int) -> tuple[str, list[Function]]:
-    """A C file and its functions."""
+    """Return the text of a C file and its functions."""
     rng = random.Random(seed)
     lines, functions = ["volatile unsigned result, volatile_one = 1;"], []
     for number in range(FUNCTIONS):
@@ -102,13 +103,13 @@ def program(seed: int) -> tuple[str, list[Function]]:
     return "\n".join([*lines, f"int main(void) {{ {calls} return 0; }}"]) + "\n", functions
 
 
-def checked(image: Path, functions: list[Function], exact: bool, tally: Counter[str]) -> None:
-    """Step through every function and compare. Raises AssertionError."""
+def check_functions(image: Path, functions: list[Function], exact: bool, tally: Counter[str]) -> None:
+    """Step through every function and compare its variables. Raises AssertionError."""
     machine = emu.load(image, board=None)
     starts = {row.start: row.line for row in machine.inspector.image.lines.rows}
-    called = called_of(image, functions)
+    called = called_functions(image, functions)
     for function in functions:
-        # calls of a function without effects may have become their results; the linker may have dropped it then
+        # the compiler may have replaced calls without effects by their results, and the linker dropped the function
         if not exact and function.name not in called:
             tally["gone"] += 1
             continue
@@ -136,8 +137,8 @@ def checked(image: Path, functions: list[Function], exact: bool, tally: Counter[
         tally["functions"] += 1
 
 
-def called_of(image: Path, functions: list[Function]) -> set[str]:
-    """Names of the functions that a run comes by."""
+def called_functions(image: Path, functions: list[Function]) -> set[str]:
+    """Return the names of the functions that a run of the image calls."""
     machine = emu.load(image, board=None)
     called: set[str] = set()
     for one in functions:
@@ -148,7 +149,8 @@ def called_of(image: Path, functions: list[Function]) -> set[str]:
 
 
 def compare(machine: emu.Machine, expected: dict[str, set[int]], may_lack: bool, tally: Counter[str]) -> None:
-    """Variables of the innermost frame against the values they may have."""
+    """Compare the variables of the innermost frame with their expected values. `may_lack`: a value may be absent or
+    different."""
     frame = machine.backtrace()[0]
     for name, values in expected.items():
         variable = machine.inspector.variable(name, frame)
@@ -165,14 +167,14 @@ def compare(machine: emu.Machine, expected: dict[str, set[int]], may_lack: bool,
         tally["values" if value in values else "others"] += 1
 
 
-def tried(seed: int, folder: Path, tally: dict[str, Counter[str]]) -> None:
-    """One file at both levels."""
+def check_file(seed: int, folder: Path, tally: dict[str, Counter[str]]) -> None:
+    """Test one file at both levels."""
     text, functions = program(seed)
     source = folder / "random.c"
     source.write_text(text)
     for level in ("-O0", "-Os"):
         image = emu.build(source, flags=(level, "-g"), output=folder / "random.elf")
-        checked(image, functions, level == "-O0", tally[level])
+        check_functions(image, functions, level == "-O0", tally[level])
 
 
 def main() -> int:
@@ -182,7 +184,7 @@ def main() -> int:
     with tempfile.TemporaryDirectory() as folder:
         for seed in campaign:
             try:
-                tried(seed, Path(folder), tally)
+                check_file(seed, Path(folder), tally)
             except AssertionError as error:
                 return campaign.failed(error)
     summary = "; ".join(

@@ -1,8 +1,9 @@
-"""Prove random firmware-like C (`c_shapes.py`): `python tests/fuzz/compiler/fuzz_prove.py [--files N] [--functions N]`.
+"""Prove random firmware-like C (`c_shapes.py`): `python tests/fuzz/compiler/fuzz_prove.py [--files N] [--functions
+N]`.
 
-One file of a program at one level, a few of its functions (`--functions 0`: all). A refutation is a fault of the
-compiler, or of the proof; `toolchain prove` shows its input. No emulator and no test inputs take part, so this sees
-what `fuzz_compiler.py` runs by.
+Each try proves some functions of one file of a program at one level (`--functions 0`: all). A refutation is a fault
+of the compiler or of the proof; `toolchain prove` shows its input. A proof covers all inputs, so it can find faults
+that the runs of `fuzz_compiler.py` do not reach.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ FILES = ("one.c", "two.c", "three.c")
 
 
 def examine(seed: int, most: int, counts: Counter[str]) -> None:
-    """Raises AssertionError naming file, level and function of a refutation."""
+    """Prove functions of one file. Raises AssertionError that names file, level and function of a refutation."""
     from toolchain.proof.problem import compile_file
     from toolchain.proof.prove import verdicts
 

@@ -1,8 +1,8 @@
-"""Engines against each other on random programs that live on device registers: state, UART bytes, rendered lines.
+"""Compare all engines on random programs that mainly access device registers: state, UART bytes, rendered lines.
 
 `python tests/fuzz/emulator/fuzz_devices.py [--programs N] [--seed S] [--seconds T] [--engine NAME] [--chip NAME]
-[--show]`. Exits 1 at the first difference. Every fourth seed runs on a made-up chip unless --chip names one for all.
-What was touched how often is printed at the end; --show prints the program of a seed instead.
+[--show]`. Exits with 1 at the first difference. Every fourth seed runs on a fictitious chip unless --chip names a
+chip. The summary counts the accesses per register; --show prints the program of a seed instead.
 """
 
 from __future__ import annotations

@@ -1,8 +1,9 @@
-"""Engines against each other on very short programs, hundreds to an image, that access registers in every way there is.
+"""Compare all engines on very short programs, hundreds per image, that access registers in all modes of access.
 
 `python tests/fuzz/emulator/fuzz_drills.py [--images N] [--seed S] [--seconds T] [--chip NAME] [--jobs N] [--table]`.
-Exits 1 at the first difference. Every fourth seed runs on a made-up chip unless --chip names one for all. At the end it
-tells how many combinations of register, read or write, byte or word and way were never made; --table which ones.
+Exits with 1 at the first difference. Every fourth seed runs on a fictitious chip unless --chip names a chip. The
+summary counts the combinations of register, read or write, byte or word, and mode of access that never occurred;
+--table lists them.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ from tests.fuzz.seeds import Campaign, parser  # noqa: E402
 
 
 def one(seed: int, chip: str) -> tuple[str | None, Tally]:
-    """What differs on the image of a seed, and what was run."""
+    """Run the image of a seed. Return the first difference and the counts."""
     tally = Tally()
     return check(seed, CHIPS[chip], tally), tally
 
@@ -53,7 +54,7 @@ def results(campaign: Campaign, chip: str | None, jobs: int) -> Iterator[tuple[s
 
 
 def never(tally: Tally, chip: str) -> dict[tuple[str, int, str], list[str]]:
-    """Registers of a chip without an access, by read or write, size and way."""
+    """Return the registers of a chip that were never accessed, by read or write, size and mode of access."""
     made = modes_of(tally.accesses)
     return {
         (kind, size, way): [sfr.name for sfr in registers_of(chip) if not made[chip, sfr.address, write, size, way]]

@@ -1,8 +1,7 @@
-"""Engines against each other: random (instruction, context) pairs and random programs, the whole state compared.
+"""Compare the whole state of all engines on random (instruction, context) pairs and random programs.
 
-`python tests/fuzz/emulator/fuzz_engines.py [--batches N] [--seed S] [--seconds T] [--engine NAME]
-[--chip NAME]`. A batch takes every row of
-the instruction table through 20 contexts and runs 20 programs. Exits 1 at the first difference.
+`python tests/fuzz/emulator/fuzz_engines.py [--batches N] [--seed S] [--seconds T] [--engine NAME] [--chip NAME]`. A
+batch runs every row of the instruction table in 20 contexts, and 20 programs. Exits with 1 at the first difference.
 """
 
 from __future__ import annotations
@@ -20,9 +19,9 @@ from emu.dspic30f.isa.table import ROWS  # noqa: E402
 from tests.fuzz.seeds import Campaign, parser  # noqa: E402
 
 CONTEXTS = 20
-"""Contexts per instruction."""
+"""Number of contexts per instruction."""
 PROGRAMS = 20
-"""Programs per seed."""
+"""Number of programs per seed."""
 
 
 def main() -> int:

@@ -1,9 +1,9 @@
-"""Flags: short programs of instructions that write them and instructions that read them, on all engines.
+"""Compare all engines on short programs of instructions that write flags and instructions that read them.
 
-`python tests/fuzz/emulator/fuzz_flags.py [--images N] [--seed S] [--seconds T]`. An image is 24 programs, each run
-from 16 states and cut behind every number of cycles. Exits 1 at the first difference. At the end it tells how many
-pairs there were of an instruction that writes a flag and one that reads it, of all in the table, which some 460
-images go through.
+`python tests/fuzz/emulator/fuzz_flags.py [--images N] [--seed S] [--seconds T]`. An image has 24 programs; each is
+run from 16 states and interrupted after every number of cycles. Exits with 1 at the first difference. The summary
+counts the pairs of an instruction that writes a flag and one that reads it, out of all in the table; about 460 images
+contain all pairs.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
-"""Damaged files of every other kind the commands read: each command ends with a status it documents and a sentence.
+"""Damaged files of all other kinds that commands read: each command ends with a documented status and a message.
 
-`python tests/fuzz/emulator/fuzz_inputs.py [--inputs N] [--seed S] [--seconds T] [--format NAME]`; exits 1 with the
-first input that made something else happen. Scenes, stimuli, recorded input, pictures, baselines, counts, records,
+`python tests/fuzz/emulator/fuzz_inputs.py [--inputs N] [--seed S] [--seconds T] [--format NAME]`; exits with 1 at the
+first input with another outcome. Inputs: scenes, stimuli, recorded input, pictures, baselines, counts, records,
 manifests, bundles, annotations, archives, C sources, option files, states of fault campaigns, and messages of the
-debug protocol; ELF, HEX and assembly have `fuzz_loader.py` and `fuzz_asm.py`.
+debug protocol. ELF and HEX files are tested by `fuzz_loader.py`, assembly by `fuzz_asm.py`.
 """
 
 from __future__ import annotations
@@ -125,14 +125,14 @@ flash = 1
 """
 ANNOTATIONS = b"calls main: step, *\ndepth step 40\nrecursion step 3\nthread step\n"
 MOST_MEMORY = 8 << 30
-"""Bytes of address space: an input that makes a command want more fails."""
+"""Limit of the address space in bytes: an input that needs more memory is a failure."""
 LONGEST = 20_000
-"""Characters of a refusal: more is nothing anybody reads."""
+"""Maximum length of an error message in characters."""
 TOKEN = re.compile(r"[A-Za-z_][\w.]*|-?[\d.]+|\"[^\"]*\"|\s+|.", re.DOTALL)
 
 
 def mutate_text(data: bytes, rng: random.Random) -> bytes:
-    """Numbers replaced by others, so that the form stays, or tokens replaced, dropped, doubled, so that it goes."""
+    """Replace numbers by others, which keeps the syntax valid, or replace, drop or double tokens, which damages it."""
     tokens = TOKEN.findall(data.decode(errors="replace"))
     numbers = [at for at, token in enumerate(tokens) if token[-1].isdigit()]
     if numbers and rng.random() < 0.6:
@@ -155,8 +155,8 @@ def mutate_text(data: bytes, rng: random.Random) -> bytes:
 
 
 def mutate_json(data: bytes, rng: random.Random) -> bytes:
-    """One value anywhere in a JSON text, or in one of several line by line, replaced by an odd one or by one beside it,
-    dropped or doubled."""
+    """Replace, drop or double one value anywhere in a JSON text, or in one of several lines of JSON. The replacement
+    is an unusual value or a neighbouring one."""
     lines = data.splitlines() if data.startswith(b"{") and data.count(b"\n{") else [data]
     line = rng.randrange(len(lines))
     whole = json.loads(lines[line])
@@ -180,19 +180,21 @@ def mutate_json(data: bytes, rng: random.Random) -> bytes:
 
 @dataclass(frozen=True)
 class Format:
-    """A kind of file: a valid one, its name, and the command that reads it, as arguments with {} for its path."""
+    """Kind of file: a valid sample, the file name, and the arguments of the command that reads it, with {} for the
+    path."""
 
     name: str
     sample: bytes
     file: str
     command: tuple[str, ...]
     is_text: bool = True
-    wrapped: Callable[[bytes], bytes] = bytes
-    """The file around the text that is damaged; raises ValueError or ArrowException for one no such file can hold."""
+    wrap: Callable[[bytes], bytes] = bytes
+    """Function that returns the file with the damaged text inside. Raises ValueError or ArrowException if no file can
+    contain the text."""
 
 
 class Bench:
-    """A folder with valid files of every kind and the image they belong to."""
+    """Folder with a valid file of every kind, and the image to which they belong."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -233,12 +235,12 @@ class Bench:
             Format("options", b"-Os -g \"-DX=1\" '-DY' -Wall\n", "options",
                    ("toolchain", "cc", "@{}", "-c", str(folder / "program.c"), "-o", str(folder / "again.o"))),
             Format("record", (self.run / "trial-0001.parquet").read_bytes(), "trial-0001.parquet", page, is_text=False),
-            Format("record's head", _head(self.trial), "headed.parquet", page, wrapped=self._headed),
-            Format("record's rows", _rows(self.trial), "rows.parquet", page, wrapped=self._filled),
+            Format("record's head", _head(self.trial), "headed.parquet", page, wrap=self._headed),
+            Format("record's rows", _rows(self.trial), "rows.parquet", page, wrap=self._filled),
             Format("record's head drawn", _head(self.trial), "headed.parquet",
-                   ("arena", "plot", "{}", "--out", str(folder / "plots")), wrapped=self._headed),
+                   ("arena", "plot", "{}", "--out", str(folder / "plots")), wrap=self._headed),
             Format("record's rows filmed", _rows(self.trial), "rows.parquet",
-                   ("arena", "replay", "{}", "--export", str(folder / "trial.gif")), wrapped=self._filled),
+                   ("arena", "replay", "{}", "--export", str(folder / "trial.gif")), wrap=self._filled),
             Format("manifest", *manifest, ("arena", "bundle", str(folder / "again.zip"), str(self.run))),
             Format("manifest again", *manifest, ("arena", "run", "clustering", *small, str(self.run))),
             Format("manifest reported", *manifest, ("arena", "report", str(self.run))),
@@ -256,11 +258,11 @@ class Bench:
             raise RuntimeError(f"{' '.join(words)} ended with {status}: {said}")
 
     def _headed(self, head: bytes) -> bytes:
-        """The trial with other metadata."""
+        """Return the trial's record with other metadata."""
         return _parquet(self.trial.replace_schema_metadata({"arena": head}))
 
     def _filled(self, rows: bytes) -> bytes:
-        """The trial with other columns: of the types they had, or else those of their values."""
+        """Return the trial's record with other columns, of the original types if the values permit."""
         columns = json.loads(rows)
         if not isinstance(columns, dict):
             raise ValueError("no columns")
@@ -270,19 +272,19 @@ class Bench:
         return _parquet(pyarrow.table(columns).replace_schema_metadata(self.trial.schema.metadata))
 
     def attempt(self, kind: Format, data: bytes) -> str:
-        """Give a damaged file to its command; "done", "refused" or what else the table of statuses has."""
+        """Pass a damaged file to its command. Return "done", "refused", "not made" or another documented status."""
         if kind.name == "protocol":
             return converse(data)
         path = self.folder / kind.file
         try:
-            path.write_bytes(kind.wrapped(data))
+            path.write_bytes(kind.wrap(data))
         except (ValueError, TypeError, RecursionError, OverflowError, pyarrow.ArrowException):
             return "not made"
         shutil.rmtree(self.folder / "out", ignore_errors=True)
         try:
             status, said = call([word.replace("{}", str(path)) for word in kind.command])
         finally:
-            path.write_bytes(kind.wrapped(kind.sample))
+            path.write_bytes(kind.wrap(kind.sample))
         assert status in MEANING, f"status {status}"
         assert "Traceback" not in said, said
         assert not status or said.strip(), f"status {status} without a word"
@@ -297,7 +299,7 @@ MAINS: dict[str, Callable[[list[str]], int]] = {
 
 
 def call(words: Iterable[str]) -> tuple[int, str]:
-    """Run a command in this process: its status and what it said."""
+    """Run a command in this process. Return its status and its output."""
     program, *rest = words
     main = MAINS[program]
     said = io.StringIO()
@@ -310,7 +312,7 @@ def call(words: Iterable[str]) -> tuple[int, str]:
 
 
 def _head(trial: pyarrow.Table) -> bytes:
-    """What a record says of itself."""
+    """Return the metadata of a record."""
     return bytes(trial.schema.metadata[b"arena"])
 
 
@@ -328,7 +330,8 @@ def _parquet(table: pyarrow.Table) -> bytes:
 
 
 def _conversation(image: Path) -> bytes:
-    """Requests of a whole session; the bodies only, a line each, so that damage keeps the frames."""
+    """Return the requests of a whole debug session: only the bodies, one per line, so that damage does not affect the
+    framing."""
     source = str(image.with_suffix(".c"))
     asked = [
         ("initialize", {"adapterID": "x", "linesStartAt1": True}),
@@ -365,7 +368,7 @@ def _conversation(image: Path) -> bytes:
 
 
 def converse(data: bytes) -> str:
-    """Send every line as a message to a server; it answers to the end of the conversation."""
+    """Send every line as a message to a server, which must respond until the connection ends."""
     reading, writing = os.pipe()
     written = io.BytesIO()
     wire = Wire(reading, written)
@@ -382,7 +385,8 @@ def converse(data: bytes) -> str:
 
 
 def campaign(seeds: Iterable[int], only: str | None = None) -> Counter[str]:
-    """Outcomes by format. Raises whatever escapes a command, with the format and the input in a note."""
+    """Return the number of inputs per format and outcome. Re-raises exceptions of a command with a note of format and
+    input."""
     outcomes: Counter[str] = Counter()
     with tempfile.TemporaryDirectory(prefix="inputs-") as name:
         bench = Bench(Path(name))

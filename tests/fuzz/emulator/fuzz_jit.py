@@ -1,16 +1,20 @@
-"""Native code against the interpreters: random legal code, interrupts at odd cycles, the whole record at random stops.
+"""Compare native code with the interpreters on random code, with interrupts and stops at random cycles.
 
-Three campaigns, until their targets are met: `straight` (thousands of distinct instructions per program, in step with
-the plain interpreter, each program also in exact code alone), `wild` (jumps, traps and mode changes at odd places;
-odd seeds on a made-up chip) and
-`long` (loops for millions of instructions, block code beside exact code, a share of it also beside the plain
-interpreter). Odd seeds run with ipl_slip 1. With --seconds the targets are out of reach: it ends in time.
+Three kinds of programs run until their targets are reached:
+- `straight`: thousands of distinct instructions per program, compared with the plain interpreter; each program also
+  runs in exact code alone;
+- `wild`: jumps, traps and mode changes at random places; odd seeds use a fictitious chip;
+- `long`: loops of millions of instructions, block code compared with exact code, and a share of it also with the plain
+  interpreter.
+
+Odd seeds run with ipl_slip 1. With --seconds the targets are unlimited, and the campaign ends after that time.
 
     python tests/fuzz/emulator/fuzz_jit.py                                           # a few minutes
     python tests/fuzz/emulator/fuzz_jit.py --pairs 1000000 --interrupts 100000 --instructions 1000000000 --wild 2000 \
-        --state jit.npz                                                     # all of it; may be stopped and run again
+        --state jit.npz                                             # whole campaign; can be interrupted and resumed
 
-Exits 1 at the first difference, naming campaign and seed; 130 after Ctrl-C, with what was done until then.
+Exits with 1 at the first difference, which is reported with campaign and seed, and with 130 after Ctrl-C, with the
+results so far.
 """
 
 from __future__ import annotations
@@ -39,9 +43,9 @@ from emu.chips.dspic30f6014a import DSPIC30F6014A  # noqa: E402
 from tests.fuzz.seeds import base_seed  # noqa: E402
 
 SAVE_EVERY = 60.0
-"""Seconds between two savings of the state."""
+"""Seconds between two writes of the state file."""
 LONG = 10_000_000
-"""Instructions per program of the campaign `long`."""
+"""Number of instructions per program of the campaign `long`."""
 
 
 CHECKS: dict[str, Callable[[int], Tally]] = {
@@ -52,7 +56,7 @@ CHECKS: dict[str, Callable[[int], Tally]] = {
 
 
 class Campaign:
-    """Tallies and the next seed of each kind of program; kept in a file if there is one."""
+    """Tallies and the next seed of each kind of program, stored in a file if one is given."""
 
     def __init__(self, seed: int, file: Path | None) -> None:
         self.tally = Tally()
@@ -77,11 +81,11 @@ class Campaign:
         self._saved = time.monotonic()
 
     def report(self) -> dict[str, Any]:
-        """Everything that was counted."""
+        """Return all counts."""
         return self.tally.as_json() | {"seeds": self.seeds, "seconds": round(self.seconds, 1)}
 
     def run(self, kind: str, check: Callable[[int], Tally]) -> None:
-        """One program of a kind. Raises Difference."""
+        """Run one program of a kind. Raises Difference."""
         seed, start = self.seeds[kind], time.process_time()
         try:
             found = check(seed)
@@ -122,7 +126,7 @@ def campaign(state: Campaign, options: argparse.Namespace, progress: Progress) -
 
 
 def text_of(report: dict[str, Any]) -> str:
-    """The tally for people."""
+    """Return the tally as readable text."""
     rows, native = report["rows"], report["native_rows"]
     rarest = sorted(rows.items(), key=lambda item: item[1])[:3]
     never = sorted(set(rows) - set(native), key=lambda name: int(name.split()[0]))

@@ -1,7 +1,7 @@
-"""Mutated ELF and HEX files: the loader gives a valid image or a clear refusal, nothing else.
+"""Mutated ELF and HEX files: the loader returns a valid image or refuses the file with a clear message.
 
-`python tests/fuzz/emulator/fuzz_loader.py [--inputs N] [--seed S] [--seconds T]`; exits 1 with the first input that
-made something else happen.
+`python tests/fuzz/emulator/fuzz_loader.py [--inputs N] [--seed S] [--seconds T]`; exits with 1 at the first input with
+another outcome.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ WIDE = (*INTERESTING, 0xF80000, 0x7FFFFFFF, 0x80000000, 0xFFFFFFFE, 0xFFFFFFFF)
 
 
 def samples() -> list[bytes]:
-    """Valid files to start from: ELF with DWARF, and the same program as HEX."""
+    """Return the valid files that are mutated: an ELF file with DWARF, and the same program as HEX."""
     sample = xc16_like()
     sample.parts += debug_sections()
     elf = sample.build()
@@ -47,7 +47,8 @@ def samples() -> list[bytes]:
 
 
 def mutate(data: bytes, rng: random.Random) -> bytes:
-    """One to four random changes: flipped bits, odd numbers in place of fields, cut, doubled or moved pieces."""
+    """Make one to four random changes: bits flipped, fields replaced by unusual numbers, parts cut, doubled or
+    moved."""
     out = bytearray(data)
     for _ in range(rng.randint(1, 4)):
         if not out:
@@ -73,7 +74,7 @@ def mutate(data: bytes, rng: random.Random) -> bytes:
 
 
 def attempt(data: bytes) -> str:
-    """Load and use everything a command would use; the kind of outcome."""
+    """Load an image and use it as the commands do. Return the kind of outcome."""
     try:
         image = parse_image(data, "fuzz")
     except LoadError:
@@ -90,7 +91,8 @@ def attempt(data: bytes) -> str:
 
 
 def campaign(seeds: Iterable[int]) -> Counter[str]:
-    """Outcomes of a mutated file for every seed. Raises whatever escapes the loader, with the input in a note."""
+    """Return the number of outcomes for a mutated file of every seed. Re-raises other exceptions with the input in a
+    note."""
     starts = samples()
     outcomes: Counter[str] = Counter()
     for seed in seeds:

@@ -1,7 +1,10 @@
-"""Random register accesses, pin changes, resets and naps on the peripherals alone; snapshots must continue identically,
-the converter do what a plain one does, and no two devices contradict each other (who owns a pin, when a timer matches).
+"""Random register accesses, pin changes, resets and idle periods of the peripherals without a CPU.
 
-`python tests/fuzz/emulator/fuzz_peripherals.py [--rounds N] [--seed S] [--seconds T]`; exits 1 at the first failure.
+Restored snapshots must continue identically, the converter must equal its reference model, and no two devices may
+contradict each other (owner of a pin, time of a timer match).
+
+`python tests/fuzz/emulator/fuzz_peripherals.py [--rounds N] [--seed S] [--seconds T]`; exits with 1 at the first
+failure.
 """
 
 from __future__ import annotations
@@ -21,15 +24,15 @@ from peripherals.test_fuzz import WORDS, act, contradictions  # noqa: E402
 from tests.fuzz.seeds import Campaign, parser  # noqa: E402
 
 ACTIONS = 8000
-"""Accesses per round."""
+"""Number of accesses per round."""
 CONVERTERS = 20
-"""Comparisons with the plain converter per round."""
+"""Number of comparisons with the converter's reference model per round."""
 REPLAYED = 1000
-"""Accesses done twice from one snapshot."""
+"""Number of accesses that are repeated from one snapshot."""
 
 
 def check(seed: int) -> None:
-    """One round. Raises AssertionError, or whatever a device raises."""
+    """Run one round. Raises AssertionError, or the exception of a device."""
     draw = random.Random(seed)
     rig = Rig(fosc=draw.choice((0x7FE6, 0xFFE6)), fwdt=draw.choice((0x7FFF, 0x8000, 0x803F)))
     for _ in range(ACTIONS):

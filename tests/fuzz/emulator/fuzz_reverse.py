@@ -1,10 +1,10 @@
-"""Steps back against steps forward.
+"""Compare reverse steps with forward steps.
 
-Usage: `python tests/fuzz/emulator/fuzz_reverse.py [--walks N] [--seed N] [--seconds S] [--json]`. The campaign behind
-tests/firmware/debugging/test_time_travel.py, which samples. A walk runs the clustering firmware or Listing 1 to a
-random time, with bytes for UART1 now and then, steps forward some hundred times and notes a hash of the whole state
-before every step; then it steps back all the way, and every state must be the one that was there. It tells how many
-of the steps entered an interrupt, saw an I2C register change, ran the camera's code, or began with input.
+Usage: `python tests/fuzz/emulator/fuzz_reverse.py [--walks N] [--seed N] [--seconds S] [--json]`. A sample of this
+campaign is tests/firmware/debugging/test_time_travel.py. A walk runs the clustering firmware or Listing 1 to a random
+time, sometimes with input for UART1. It then makes some hundred steps forward and stores a hash of the whole state
+before each. Then it makes as many reverse steps; each must restore the stored state. The summary counts the steps
+that entered an interrupt, changed an I2C register, executed the camera driver, or began with input.
 """
 
 from __future__ import annotations
@@ -32,20 +32,20 @@ from emu.image.model import Image  # noqa: E402
 from tests.fuzz.seeds import Campaign, parser  # noqa: E402
 
 APPS = {"clustering": 8, "listing1": 0}
-"""Applications and the position of the selector at which they start."""
-PIXELS, FRAME = "_T4Interrupt", 4_000_000
-"""What runs for every line of the camera, and about the cycles from frame to frame."""
+"""Applications, with the selector position at which they start."""
+LINE_HANDLER, FRAME = "_T4Interrupt", 4_000_000
+"""Function that the firmware calls for every camera line, and approximate number of cycles from frame to frame."""
 PERIOD = 2_000
-"""Cycles between kept states: short, since every step back runs again from the one before it."""
+"""Cycles between stored states; a reverse step runs again from the last stored state, so a short period is fast."""
 
 
-def hashed(machine: emu.Machine) -> bytes:
-    """Of the whole state."""
+def state_hash(machine: emu.Machine) -> bytes:
+    """Return a hash of the whole state."""
     return hashlib.blake2b(machine.snapshot(), digest_size=16).digest()
 
 
-def kinds_of(machine: emu.Machine, before: tuple[int, int, bytes], handlers: set[int]) -> set[str]:
-    """What the step from `before` (PC, depth of the stack, I2C registers) was."""
+def step_kinds(machine: emu.Machine, before: tuple[int, int, bytes], handlers: set[int]) -> set[str]:
+    """Return the kinds of the last step; `before`: PC, stack pointer and I2C registers before it."""
     found = set()
     where = machine.inspector.image.lines
     entered = machine.inspector.function_start(machine.pc) in handlers and machine.w[15] >= before[1] + 4
@@ -60,18 +60,18 @@ def kinds_of(machine: emu.Machine, before: tuple[int, int, bytes], handlers: set
 
 
 def i2c(machine: emu.Machine) -> bytes:
-    """The I2C registers as they stand."""
+    """Return the contents of the I2C registers."""
     return machine.peek_bytes(machine.chip.sfrs["I2CRCV"].address, 12)
 
 
 @cache
 def image_at(path: Path) -> Image:
-    """Read once, its debug information too."""
+    """Load an image with its debug information, once per path."""
     return load_image(path)
 
 
 def walk(image: Path, selector: int, seed: int, tally: Counter[str]) -> None:
-    """One walk. Raises AssertionError."""
+    """Run one walk. Raises AssertionError."""
     rng = random.Random(seed)
     program = image_at(image)
     engine = rng.choice(["jit", "jit", "plain"])
@@ -79,39 +79,39 @@ def walk(image: Path, selector: int, seed: int, tally: Counter[str]) -> None:
     machine.load(program)
     picture = np.random.default_rng(seed).integers(0, 256, (480, 640, 3), dtype=np.uint8)
     machine.board.camera.show(picture)
-    machine.run_until(rng.randrange(rng.choice([120_000, 12_000_000])))  # the camera is set up by I2C in the beginning
-    app_has_camera = machine.image.symbols.find(PIXELS) is not None
+    machine.run_until(rng.randrange(rng.choice([120_000, 12_000_000])))  # start-up configures the camera by I2C
+    app_has_camera = machine.image.symbols.find(LINE_HANDLER) is not None
     history = History(machine, period=PERIOD)
     handlers = {machine.image.word(vector.ivt) for vector in machine.chip.vectors}
     states: list[tuple[int, bytes]] = []
     for _ in range(rng.randrange(2, 6)):
         history.advance(machine.cycle + rng.randrange(20_000))
         if app_has_camera and rng.random() < 0.4:
-            remove = machine.hook_pc(PIXELS, lambda: True)
+            remove = machine.hook_pc(LINE_HANDLER, lambda: True)
             history.advance(machine.cycle + FRAME)
             remove()
         fed = rng.random() < 0.7
         if fed:
             machine.uart[1].feed(rng.randbytes(rng.randrange(1, 6)))
         elif machine.is_asleep:
-            history.step()  # the middle of a sleep is no place a step leads to
+            history.step()  # a step does not end during Sleep or Idle
         start = len(states)
         for number in range(rng.randrange(20, 400)):
-            states.append((machine.cycle, hashed(machine)))
+            states.append((machine.cycle, state_hash(machine)))
             before = machine.pc, machine.w[15], i2c(machine)
             assert history.step() is None
-            tally.update(kinds_of(machine, before, handlers))
+            tally.update(step_kinds(machine, before, handlers))
             tally["input"] += fed and not number
-        states.append((machine.cycle, hashed(machine)))
+        states.append((machine.cycle, state_hash(machine)))
         tally["steps"] += len(states) - start - 1
         for cycle, expected in reversed(states[start:-1]):
             assert history.step_back()
-            assert (machine.cycle, hashed(machine)) == (cycle, expected), f"cycle {cycle} of seed {seed}"
+            assert (machine.cycle, state_hash(machine)) == (cycle, expected), f"cycle {cycle} of seed {seed}"
         cycle, expected = rng.choice(states)
         history.seek(cycle)
-        assert hashed(machine) == expected, f"going to cycle {cycle} of seed {seed}"
+        assert state_hash(machine) == expected, f"going to cycle {cycle} of seed {seed}"
         history.seek(history.end)
-        assert hashed(machine) == states[-1][1]
+        assert state_hash(machine) == states[-1][1]
 
 
 def main() -> int:

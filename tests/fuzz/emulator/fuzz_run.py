@@ -1,7 +1,7 @@
-"""Damaged and random firmware, executed: a run always ends with a reason, never with an exception of the emulator.
+"""Damaged and random firmware: a run always ends with a stop reason, never with an exception of the emulator.
 
-`python tests/fuzz/emulator/fuzz_run.py [--images N] [--seed S] [--seconds T]`; exits 1 with the first image that made
-something else happen.
+`python tests/fuzz/emulator/fuzz_run.py [--images N] [--seed S] [--seconds T]`; exits with 1 at the first image with
+another outcome.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ CODE_WORDS = 300
 
 
 def random_code(rng: random.Random) -> list[int]:
-    """Real code with words replaced or bits flipped, or words from nowhere."""
+    """Return code of a valid program with words replaced or bits flipped, or random words."""
     if rng.random() < 0.5:
         return [rng.getrandbits(24) for _ in range(CODE_WORDS)]
     code = assembled(rng.choice((ECHO, HELLO, SPIN)))[0] * 8
@@ -41,7 +41,7 @@ def random_code(rng: random.Random) -> list[int]:
 
 
 def attempt(rng: random.Random, engine: str) -> str:
-    """Run one image with registers that let it get somewhere; the reason it ended for."""
+    """Run an image with register values that let it run for a while. Return the reason for its end."""
     code = random_code(rng)
     vectors = [0x100 + 2 * rng.randrange(len(code)) for _ in range(62)]
     reset = SampleSection(".reset", 0, words(0x040100, 0, *vectors))
@@ -62,7 +62,8 @@ def attempt(rng: random.Random, engine: str) -> str:
 
 
 def campaign(seeds: Iterable[int], engines: tuple[str, ...]) -> Counter[str]:
-    """Reasons for which an image for every seed ended, the engines in turn. Raises whatever escapes."""
+    """Run one image per seed, with alternating engines, and count the reasons for the ends of the runs. Re-raises
+    other exceptions."""
     outcomes: Counter[str] = Counter()
     for seed in seeds:
         engine = engines[seed % len(engines)]

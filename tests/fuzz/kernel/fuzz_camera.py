@@ -1,8 +1,10 @@
-"""The camera's HREF on every cycle: `python tests/fuzz/kernel/fuzz_camera.py [--rounds N] [--stride N] [--seconds T]`.
+"""Camera HREF edges at every cycle: `python tests/fuzz/kernel/fuzz_camera.py [--rounds N] [--stride N] [--seconds
+T]`.
 
-The campaign behind tests/firmware/camera/test_camera_on_target.py, which samples: a round of every kernel and device
-call with all interrupts running, without (even seeds) and with IPL slip; every line must be right to the byte. Some
-25,000 lines each. With --stride a round tries every N-th cycle, beginning at one that its seed says.
+A sample of this campaign is tests/firmware/camera/test_camera_on_target.py. A round executes every kernel and device
+call with all interrupts on, without (even seeds) or with IPL slip, and moves the HREF edge over all cycles: about
+25,000 lines, each of which must be captured without a wrong byte. With --stride a round tests every N-th cycle, from
+a first one that depends on its seed.
 """
 
 from __future__ import annotations
@@ -21,7 +23,7 @@ from tests.firmware.sights import start, sweep  # noqa: E402
 from tests.fuzz.seeds import Campaign, parser  # noqa: E402
 
 SPARSE = 499
-"""Stride of a run that was given a time."""
+"""Default stride if the duration is limited by --seconds."""
 
 
 def main() -> int:

@@ -1,8 +1,9 @@
-"""An hour of clock events on the emulated robot: `python tests/fuzz/kernel/fuzz_clock.py [--hours N] [--seconds T]`.
+"""Clock events for an hour on the emulated robot: `python tests/fuzz/kernel/fuzz_clock.py [--hours N] [--seconds T]`.
 
-3,600,000 events of 1 ms must take exactly 53,084,160,000 Tcy (kernel.md §3) while threads never yield, a device sends
-every 100 us and a handler resends for ever. Prints the worst jitter of the clock's interrupt too. With --seconds, as
-many thousand events at a time, from a number that the seed says, as the time allows.
+3,600,000 events of 1 ms must take exactly 53,084,160,000 Tcy (kernel.md §3). Meanwhile threads never yield, a device
+sends every 100 us and a handler sends an event again whenever it receives it. The output also states the maximum
+jitter of the clock's interrupt. With --seconds, the campaign tests a thousand events at a time, from a number that
+depends on the seed, until the time is over.
 """
 
 from __future__ import annotations

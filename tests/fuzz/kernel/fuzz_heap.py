@@ -1,8 +1,9 @@
-"""Random histories of the heap, a million allocations.
+"""Random sequences of heap operations, a million allocations.
 
-Usage: `python tests/fuzz/kernel/fuzz_heap.py [--histories N] [--seconds S]`. The emulated robot sends, starts and
-kills threads, registers and subscribes at random and times each call by a timer of its own. Prints the worst Tcy of
-each kind; fails when Sys_Send_Event or Sys_Start_Process took longer than the contract in openswarm.h allows.
+Usage: `python tests/fuzz/kernel/fuzz_heap.py [--histories N] [--seconds S]`. The emulated robot sends events, starts
+and kills threads, registers and subscribes at random, and times each call with a hardware timer. The output states
+the maximum Tcy of each kind of call. The campaign fails if Sys_Send_Event or Sys_Start_Process takes longer than the
+limit in openswarm.h.
 """
 
 from __future__ import annotations

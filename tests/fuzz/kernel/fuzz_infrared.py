@@ -1,9 +1,10 @@
-"""Infra-red messages and shared events under any light.
+"""Infrared messages and shared events with random frames, noise and ambient light.
 
-Usage: `python tests/fuzz/kernel/fuzz_infrared.py [--tries N] [--seconds S]`. Each seed is RUNS runs of the test
-`anything_seen_and_asked_is_survived` (tests/firmware/host/infrared_noise.c) under address and undefined-behaviour
-sanitizers: frames that are whole, damaged, cut or two at once, noise and light of the room, while the program makes
-every call; by seed with tables and queues of the usual size, of one entry, or of many.
+Usage: `python tests/fuzz/kernel/fuzz_infrared.py [--tries N] [--seconds S]`. Each seed makes RUNS runs of the host
+test `anything_seen_and_asked_is_survived` (tests/firmware/host/infrared_noise.c), built with the address and
+undefined-behaviour sanitizers. The test feeds intact, damaged, truncated and overlapping frames, noise and ambient
+light, while the program makes every call. The seed selects tables and queues of the default size, of one entry, or of
+many.
 """
 
 from __future__ import annotations
@@ -31,7 +32,7 @@ SIZES = (
 
 
 def build(sizes: str, out: Path) -> Path:
-    """The kernel's host tests with other limits."""
+    """Build the kernel's host tests with other table and queue sizes and return the program."""
     words = ["make", "-s", "-j2", "-C", str(HOST), f"OUT={out}", f"SANITIZE={SANITIZE} {sizes}".strip()]
     subprocess.run(words, check=True)
     return out / "kernel_tests"

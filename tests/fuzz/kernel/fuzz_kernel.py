@@ -1,11 +1,12 @@
-"""The kernel under interrupts and without memory: `python tests/fuzz/kernel/fuzz_kernel.py [--rounds N] [--stride N]`.
+"""Interrupts and failed allocations in kernel calls: `python tests/fuzz/kernel/fuzz_kernel.py [--rounds N] [--stride
+N]`.
 
-The campaign behind tests/firmware/kernel/test_every_instruction.py, which samples: every kernel call is interrupted
-at every instruction boundary by all interrupts together or by them one after the other, without or with IPL slip
-(kernel.md §4): four rounds, in turn by seed. An interrupt itself makes every call of the public headers, those it may
-not make too. With --stride a round tries every N-th boundary, beginning at one that its seed says. Without --seconds
-also every allocation fails once, and threads that check all their registers are preempted. An interrupted round
-resumes with its --seed and --scene, as its last line said.
+A sample of this campaign is tests/firmware/kernel/test_every_instruction.py. A round interrupts every kernel call at
+every instruction boundary, by all interrupts together or one after the other, without or with IPL slip (kernel.md
+§4); the seed selects one of these four kinds of rounds. The interrupt handler makes every call of the public headers,
+also those that handlers must not make. With --stride a round tests every N-th boundary, from a first one that depends
+on its seed. Without --seconds, every allocation also fails once, and threads that check all their registers are
+preempted. An interrupted round resumes with the --seed and --scene in its last output line.
 """
 
 from __future__ import annotations
@@ -23,18 +24,20 @@ from tests.firmware.kernel.test_kernel_on_target import load, place  # noqa: E40
 from tests.fuzz.seeds import Campaign, parser  # noqa: E402
 
 SPARSE = 499
-"""Stride of a run that was given a time."""
+"""Default stride if the duration is limited by --seconds."""
 
 
 def build(app: str, out: Path, apps: str = "../tests/firmware/target") -> Path:
-    """An application of tests/firmware/target, or of another folder, named from firmware/ on."""
+    """Build an application of tests/firmware/target, or of another folder relative to firmware/, and return its
+    image."""
     words = [f"APP={app}", f"APPS={apps}", f"OUT={out / app}", f"PYTHON={sys.executable}"]
     subprocess.run(["make", "-s", "-C", str(ROOT / "firmware"), *words], check=True)
     return out / app / "firmware.elf"
 
 
 def preempt_patterns(path: Path, wanted: int) -> None:
-    """Threads with patterns in all registers, DSP state and DO loops, preempted `wanted` times under a 100 us storm."""
+    """Preempt threads that keep patterns in all registers, DSP state and DO loops, `wanted` times, with an interrupt
+    every 100 us."""
     machine = load(path)
     machine.run(cycles=200_000)
     machine.write("PR2", 60)  # slices of 488 Tcy

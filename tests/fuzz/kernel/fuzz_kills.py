@@ -1,9 +1,9 @@
 """Threads killed inside driver calls: `python tests/fuzz/kernel/fuzz_kills.py [--rounds N] [--stride N]`.
 
-The campaign behind tests/firmware/kernel/test_kills_on_target.py, which samples: in each round one scene of driver
-calls, without or with IPL slip (kernel.md §4), both in turn by seed, is killed at every boundary of the scene, and
-the devices are used again at once and after a while. With --stride a round tries every N-th boundary, beginning at
-one that its seed says.
+A sample of this campaign is tests/firmware/kernel/test_kills_on_target.py. A round executes a scene of driver calls,
+without or with IPL slip (kernel.md §4), alternating by seed. It kills the thread at every instruction boundary of the
+scene, and then uses the devices again at once and after a while. With --stride a round tests every N-th boundary,
+from a first one that depends on its seed.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from tests.fuzz.kernel.fuzz_kernel import build  # noqa: E402
 from tests.fuzz.seeds import Campaign, parser  # noqa: E402
 
 SPARSE = 97
-"""Stride of a run that was given a time."""
+"""Default stride if the duration is limited by --seconds."""
 
 
 def main() -> int:

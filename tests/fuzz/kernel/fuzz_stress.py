@@ -1,8 +1,8 @@
 """The stress program for a simulated day: `python tests/fuzz/kernel/fuzz_stress.py [--runs N] [--seconds S]`.
 
-firmware/apps/stress on the emulated robot, in runs of an hour, each with another seed of its random numbers: threads
-started and killed, events registered, sent and waited for. Fails when the firmware stops (it asserts that the heap is
-as it was), a message is lost, the heap at a report differs, or the clock does not count every millisecond.
+firmware/apps/stress runs on the emulated robot for an hour per run, each with another seed of its random numbers. It
+starts and kills threads, and registers, sends and waits for events. A run fails if the firmware stops (it asserts that
+the heap is unchanged), a message is lost, the heap differs between reports, or the clock misses a millisecond.
 """
 
 from __future__ import annotations
@@ -23,17 +23,17 @@ from tests.fuzz.seeds import Campaign, parser  # noqa: E402
 HOUR = 3600
 MINUTE = 60
 SPARSE = 30
-"""Simulated seconds of a run that was given a time."""
+"""Simulated seconds of a run if the duration is limited by --seconds."""
 REPORT = re.compile(rb"(\d+) ms: (\d+) handled\r\n  \d+ waited, \d+ refused\r\n  heap (\d+), peak \d+\r\n  (\d+) lost,")
 
 
 def stress(path: Path, seed: int, seconds: int) -> int:
-    """That many simulated seconds; how many messages were handled."""
+    """Run the program for some simulated seconds and return the number of messages handled."""
     machine = emu.load(path, engine="jit")
     said = bytearray()
     machine.uart[1].on_byte = lambda byte, _: said.append(byte)
     run_to(machine, "main")
-    machine.poke("lfsr", seed % 0xFFFF + 1)  # any but 0
+    machine.poke("lfsr", seed % 0xFFFF + 1)  # the seed must not be 0
     heaps: set[int] = set()
     handled = 0
     for passed in range(0, seconds, MINUTE):

@@ -1,7 +1,9 @@
-"""Every wheel speed for a minute: `python tests/fuzz/kernel/fuzz_wheels.py [--speeds N] [--duration D] [--seconds T]`.
+"""Every wheel speed for a minute: `python tests/fuzz/kernel/fuzz_wheels.py [--speeds N] [--duration D] [--seconds
+T]`.
 
-The campaign behind tests/firmware/drivers/test_wheels_on_target.py: -129..129 mm/s on both wheels, unrelated to each
-other, beginning at the one the seed says; the steps of D simulated seconds (default 60) are within 1 of exact.
+A sample of this campaign is tests/firmware/drivers/test_wheels_on_target.py. Both wheels run at independent speeds
+from -129 to 129 mm/s; the seed selects the first speed. The number of steps in D simulated seconds (default 60) must
+be within 1 of the exact number.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
-"""Parts of C that a compiler seldom meets, for the programs of `c_shapes.py`: each family brings declarations,
-definitions and statements that use them, with one meaning on the chip and on the host.
+"""Rarely used constructs of C for the programs of `c_shapes.py`. Each family adds declarations, definitions and
+statements.
 
-Families: structs of odd sizes among variable arguments; unions with bit-fields; function pointers; computed goto;
-setjmp; floating point and its conversions; wide switches; _Atomic objects; recursion; inline assembly with
-constraints; objects in near, far, X, Y and constant memory.
+The statements have the same effect on the chip and on the host. Families: structs of odd sizes as variable arguments;
+unions with bit-fields; function pointers; computed goto; setjmp; floating point and its conversions; wide switches;
+_Atomic objects; recursion; inline assembly with constraints; objects in near, far, X, Y and constant memory.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import random
 from collections.abc import Callable
 
 Value = Callable[[str], str]
-"""An expression of a type, from what the statement's place can see."""
+"""Function that returns an expression of a type from the objects in scope."""
 
 HEADER = """
 #include <setjmp.h>
@@ -109,7 +109,7 @@ HUGE = (0, 1, 0x100000000, 0x100000001, 0xFFFFFFFFFFFFFFFF, 0x8000000000000000, 
 
 
 class Features:
-    """The families of one program. `declared` belongs into the header, `defined` into one file."""
+    """Families of one program. The text of `declared` belongs in the header, that of `defined` in one source file."""
 
     def __init__(self, rng: random.Random, fresh: Callable[[str], str]) -> None:
         self.rng = rng
@@ -123,16 +123,16 @@ class Features:
         self._recursion()
 
     def use(self, value: Value, assign: str) -> list[str]:
-        """A statement of some family. `assign` is an assignable u32."""
+        """Return a statement of a random family. `assign` is an assignable u32."""
         family = self.rng.choice(
             (self._variadic, self._union, self._pointer, self._goto, self._setjmp, self._float, self._double,
              self._convert, self._wide_switch, self._atomic, self._recurse, self._assembly, self._place))  # fmt: skip
         return family(value, assign)
 
-    # -- what is defined once -----------------------------------------------------------------------------------------
+    # -- definitions --------------------------------------------------------------------------------------------------
 
     def _workers(self) -> None:
-        """Functions of one type, in a constant table and in a variable."""
+        """Define functions of one type, in a constant table and in a variable."""
         ops = ("a + b", "b - a", "b << (a & 15)", "b >> (a & 31)", "a * b", "b ^ (u32)a << 16", "b / (a | 1u)",
                "b % (a | 1u)")  # fmt: skip
         names = [self.fresh("w") for _ in range(4)]
@@ -143,7 +143,7 @@ class Features:
         self.defined.append(f"const work fixed_work[4] = {{{', '.join(names)}}};\nwork present_work = {names[0]};")
 
     def _objects(self) -> None:
-        """Objects in every kind of memory, atomic ones, and constants."""
+        """Define objects in every kind of memory, atomic objects, and constants."""
         self.places: list[str] = []
         for k, place in enumerate(PLACES):
             t = self.rng.choice(("u8", "u16", "u32"))
@@ -163,7 +163,7 @@ class Features:
         )
 
     def _interpreter(self) -> None:
-        """Computed goto over a little program."""
+        """Define a function that interprets a small program with computed goto."""
         ops = ("acc += 3u;", "acc ^= acc >> 5;", "acc *= 17u;", "acc -= *at;", "acc = (acc << 3) | (acc >> 29);")
         chosen = [self.rng.choice(ops) for _ in range(4)]
         cases = "\n".join(f"op{k}: {op} if (--left == 0) return acc; goto *labels[*++at & 3];"
@@ -177,7 +177,7 @@ class Features:
         )
 
     def _jumps(self) -> None:
-        """setjmp, and longjmp out of calls."""
+        """Define functions that call setjmp, and longjmp out of nested calls."""
         self.declared.append("u32 attempt(u16 depth, u32 v);")
         self.defined.append(
             "static jmp_buf back;\nAPART static void dive(u16 depth, u32 v)\n{\n"

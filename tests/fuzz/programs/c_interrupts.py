@@ -1,8 +1,9 @@
-"""Random C whose interrupts hold each other back in every way: IPL raised, lowered and put back, DISI and DISICNT, no
-nesting, handlers in handlers, traps that come back, Idle, and all of that in functions, loops and behind conditions.
+"""Random C programs whose interrupts delay each other.
 
-Each of three timers comes once, at the cycle its variable says; a bit of `chance` decides each condition, so a run is
-given by four numbers. INTERRUPT_LEVEL states the priorities.
+Constructs: IPL raised, lowered and restored, DISI and DISICNT, no nesting, nested handlers, recurring traps, Idle,
+all of them also in functions, loops and conditions. Each of three timers interrupts once, at the cycle in its
+variable. A bit of the variable `chance` decides each condition, so four numbers determine a run. INTERRUPT_LEVEL
+states the priorities.
 """
 
 from __future__ import annotations
@@ -45,7 +46,8 @@ DEPTH = 3
 
 
 class Program:
-    """`text` of one file, `levels` of timers, and `kinds`: of what it was made. Equal seeds give equal programs."""
+    """`text` of the source file, priority `levels` of the timers, and the generated `kinds` of constructs. Equal
+    seeds give equal programs."""
 
     def __init__(self, seed: int) -> None:
         self.rng = random.Random(seed ^ 0x1A7E)
@@ -76,7 +78,8 @@ class Program:
         self.text = HEAD + notes + "".join(self._functions) + begin + "".join(handlers) + main
 
     def phases(self, count: int) -> list[dict[str, int]]:
-        """Runs: when timers come, close to each other in most, and what conditions say."""
+        """Return the variables of `count` runs: the cycles of the timers, which are close together in most runs, and
+        the conditions."""
         rng = self.rng
         found = []
         for _ in range(count):
@@ -87,7 +90,7 @@ class Program:
         return found
 
     def _body(self, level: int, most: int, depth: int = 0, main: bool = False) -> str:
-        """Statements for code that runs at this level, and leaves at it."""
+        """Return statements for code that runs at priority `level` and ends at the same priority."""
         pieces: list[Callable[[Program, int, int], str]] = [
             _work,
             _work,
@@ -105,7 +108,7 @@ class Program:
         return "".join(self.rng.choice(pieces)(self, level, depth) for _ in range(self.rng.randrange(1, most + 1)))
 
     def made(self, kind: str, text: str) -> str:
-        """Count it."""
+        """Count a construct and return its text."""
         self.kinds[kind] += 1
         return text
 
@@ -113,7 +116,7 @@ class Program:
         return f'__asm__ volatile("repeat #{self.rng.choice((0, 1, 3, 17, 60, 150))}\\n nop");\n'
 
     def function(self, body: str) -> str:
-        """A call of a new function."""
+        """Define a new function and return a call of it."""
         name = f"part{len(self._functions)}"
         room = self.rng.choice((0, 0, 1, 5, 20))
         lines = f"    volatile unsigned room[{room}];\n    room[{room - 1}] = out;\n" if room else ""
@@ -121,7 +124,7 @@ class Program:
         return f"{name}();\n"
 
     def condition(self) -> str:
-        """What a bit of a run decides."""
+        """Return a condition that a bit of `chance` decides."""
         self._chances = (self._chances + 1) % 16
         return f"chance >> {self._chances} & 1"
 
@@ -197,4 +200,4 @@ KINDS = frozenset((
     "no nesting", "equal levels", "trap", "constant", "division", "IPL raised", "IPL raised in a handler",
     "SR put back", "DISI", "DISICNT", "function", "condition", "loop", "stack", "Idle", "IPL lowered", "DISI at an end",
 ))  # fmt: skip
-"""What programs are made of; a campaign that is long enough makes all of it."""
+"""Kinds of constructs; a long campaign must contain all of them."""

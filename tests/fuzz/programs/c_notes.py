@@ -1,7 +1,9 @@
-"""Random C with notes of <bounds.h> that are true: counts are data, so that nothing but the notes bounds the program.
+"""Random C with correct annotations of <bounds.h>. Loop counts are data, so that only the annotations bound the
+program.
 
-Each part of a program is a function that main calls; its lists are as long, and its rare calls as rare, as its notes
-say, often exactly. Names, among them those of static functions, are the same in both files, numbers are not.
+Each part of a program is a function that main calls. The lengths of its lists and the frequency of its rare calls
+agree with the annotations, often exactly. Both files use the same names, also for static functions, but different
+numbers.
 """
 
 from __future__ import annotations
@@ -27,7 +29,7 @@ __attribute__((noinline)) static void repair(int n)
 
 
 class Program:
-    """`files` by name, with notes; equal seeds give equal programs."""
+    """Sources with annotations in `files`, by name. Equal seeds give equal programs."""
 
     def __init__(self, seed: int) -> None:
         self.rng = random.Random(seed ^ 0x4E0735)
@@ -60,19 +62,20 @@ class Program:
         self.lines.append(text)
 
     def list(self, name: str, length: int) -> None:
-        """A list of so many items, which the start builds: to the compiler and to bounds it is data."""
+        """Define a list of a given length that the start-up code builds, so that compiler and bounds cannot know its
+        length."""
         self.lines.append(f"struct item items_{name}[{max(1, length)}], *volatile {name};")
         if length:
             loop = f"for (int i = 1; i < {length}; i++) items_{name}[i - 1].next = &items_{name}[i], "
             self.start.append(f"    {loop}items_{name}[i].key = i;\n    {name} = items_{name};")
 
     def spare(self, count: int) -> int:
-        """A true number: the count, or somewhat more."""
+        """Return a correct limit: the count, or slightly more."""
         return count + self.rng.choice((0, 0, 0, 1, 3))
 
 
 def walk(p: Program, part: str, times: int) -> None:
-    """LOOP_BOUND of a list, with several ways back."""
+    """LOOP_BOUND of a loop over a list, with several back edges."""
     length = p.rng.randrange(12)
     p.list(f"list_{part}", length)
     form = p.rng.choice((
@@ -90,7 +93,7 @@ def walk(p: Program, part: str, times: int) -> None:
 
 
 def table(p: Program, part: str, times: int) -> None:
-    """LOOP_TOTAL: lists in buckets, all their items together."""
+    """LOOP_TOTAL: lists in buckets; the total of their lengths is limited."""
     lengths = [p.rng.randrange(6) for _ in range(p.rng.choice((2, 4, 5)))]
     for number, length in enumerate(lengths):
         p.list(f"list_{part}_{number}", length)
@@ -108,7 +111,7 @@ def table(p: Program, part: str, times: int) -> None:
 
 
 def shared(p: Program, part: str, times: int) -> None:
-    """LOOP_SHARE: each walk continues where the last one stopped."""
+    """LOOP_SHARE: each loop continues where the last one ended."""
     length, first = p.rng.randrange(1, 12), p.rng.randrange(9)
     p.list(f"list_{part}", length)
     p.add("""__attribute__((noinline)) static struct item *down_@part@(struct item *i, int most)
@@ -147,7 +150,7 @@ def rare(p: Program, part: str, times: int) -> None:
 
 
 def pointed(p: Program, part: str, times: int) -> None:
-    """CALL_TARGETS, one of them chosen by data; LOOPS_OF the one that walks."""
+    """CALL_TARGETS of a call whose target depends on data; LOOPS_OF the target that has a loop."""
     length, chosen = p.rng.randrange(9), p.rng.choice(("few", "many"))
     p.list(f"list_{part}", length)
     p.add("""LOOPS_OF(many_@part@, @length@);

@@ -1,9 +1,10 @@
-"""Random C programs of the shapes firmware has: large frames, addresses chosen by conditions, locals that escape,
-volatile registers, bit-fields, interrupts, structs by value, near bytes, several files, and what `c_features.py` has.
+"""Random C programs with the constructs of firmware, in several files.
 
-Every program has one meaning on any machine: all arithmetic is cut to named widths, distances and divisors are in
-range, nothing is read before it is written. The same files compile for the host, where `shapes.h` replaces registers
-and interrupts by a model that writes down each access; sanitizers find no fault there.
+Constructs: large frames, addresses selected by conditions, escaping locals, volatile registers, bit-fields,
+interrupts, structs by value, near bytes, and those of `c_features.py`. Every program has the same result on any
+machine: all arithmetic is truncated to fixed widths, shift distances and divisors are in range, and every object is
+written before it is read. The same files compile for the host, where `shapes.h` replaces registers and interrupts by
+a model that logs each access; sanitizers find no fault there.
 """
 
 from __future__ import annotations
@@ -29,8 +30,8 @@ STRUCTS: dict[str, list[tuple[str, str]]] = {
     "flags": [("a:3", "unsigned"), ("b:7", "unsigned"), ("c:5", "unsigned"), ("d:11", "unsigned")],
     "large": [("x", "u32"), ("y", "u32"), ("z", "u16"), ("t", "u8")],
 }
-PORTS = 9  # registers: PR1, (PR2, PR3), (PR4, PR5), (OC1RS, OC1R), (OC2RS, OC2R)
-PAIRS = (1, 3, 5, 7)  # ports that with the next one are a 32-bit object
+PORTS = 9  # number of ports, which are the registers PR1, (PR2, PR3), (PR4, PR5), (OC1RS, OC1R), (OC2RS, OC2R)
+PAIRS = (1, 3, 5, 7)  # ports that form a 32-bit object together with the next port
 
 HEADER = """#ifndef SHAPES_H
 #define SHAPES_H
@@ -121,7 +122,7 @@ int main(void)
 
 @dataclass
 class Scope:
-    """What a statement may use: assignable scalars and arrays with their element types and lengths."""
+    """Objects that a statement may use: assignable scalars, and arrays with their element types and lengths."""
 
     scalars: list[tuple[str, str]] = field(default_factory=list)
     arrays: list[tuple[str, str, int]] = field(default_factory=list)
@@ -130,12 +131,12 @@ class Scope:
     port: str = ""
     counters: list[str] = field(default_factory=list)
     quiet: bool = False
-    """In an interrupt function."""
+    """Whether the statement is in an interrupt function."""
 
 
 @dataclass(frozen=True)
 class Signature:
-    """One function: name, result type, parameter types (a struct's name for structs)."""
+    """Name, result type and parameter types of a function; a struct type is given by its name."""
 
     name: str
     result: str
@@ -143,39 +144,39 @@ class Signature:
 
 
 class Program:
-    """One program; `files` are its sources by name."""
+    """Random program; `files` are its sources by name."""
 
-    def __init__(self, seed: int, *, featured: bool = True) -> None:
-        """`featured`: with what `c_features.py` has."""
+    def __init__(self, seed: int, *, has_features: bool = True) -> None:
+        """Generate the program. `has_features`: also use the constructs of `c_features.py`."""
         self.rng = random.Random(seed)
         self.serial = 0
         self.globals: Scope = Scope()
         self.functions: list[Signature] = []
         self.calls_left = 0
         self.features = c_features.Features(self.rng, self.fresh)
-        self.feature_weight = 24 if featured else 0
+        self.feature_weight = 24 if has_features else 0
         self.files = self._make()
 
-    # -- pieces -------------------------------------------------------------------------------------------------------
+    # -- expressions --------------------------------------------------------------------------------------------------
 
     def fresh(self, stem: str) -> str:
-        """A new name."""
+        """Return a new name."""
         self.serial += 1
         return f"{stem}{self.serial}"
 
     def pick(self, items: list[str] | tuple[str, ...]) -> str:
-        """One of some words."""
+        """Return a random item."""
         return self.rng.choice(items)
 
     def constant(self, t: str) -> str:
-        """A constant of a type; extremes are frequent."""
+        """Return a constant of type `t`; extreme values are frequent."""
         bits = BITS[t]
         value = self.rng.choice((0, 1, 2, 5, (1 << bits) - 1, 1 << (bits - 1), (1 << (bits - 1)) - 1,
                                  self.rng.randrange(1 << bits), self.rng.randrange(64)))  # fmt: skip
         return f"({t}){value}{SUFFIX[bits]}"
 
     def expression(self, t: str, s: Scope, depth: int = 3) -> str:
-        """A value of type t without side effects on plain memory; it may read ports."""
+        """Return an expression of type `t` that changes no plain memory but may read ports."""
         if depth == 0 or self.rng.random() < 0.15:
             return self.leaf(t, s)
         a, n = self.expression(t, s, depth - 1), self.rng.randrange(BITS[t])
@@ -208,7 +209,7 @@ class Program:
                 return f"({t})~({work}){a}" if self.rng.random() < 0.5 else f"({t})(0u - ({work}){a})"
 
     def condition(self, s: Scope, depth: int) -> str:
-        """A truth value."""
+        """Return a random condition."""
         t = self.pick(TYPES)
         op = self.pick(("<", ">", "<=", ">=", "==", "!="))
         right = self.leaf(t, s) if self.rng.random() < 0.6 else self.constant(t)
@@ -218,7 +219,7 @@ class Program:
         return simple
 
     def leaf(self, t: str, s: Scope) -> str:
-        """Something to read."""
+        """Return a readable object or a constant as an expression of type `t`."""
         roll = self.rng.random()
         g = self.globals
         if roll < 0.35 and s.scalars + g.scalars:
@@ -236,7 +237,7 @@ class Program:
         return self.constant(t)
 
     def index(self, s: Scope, n: int) -> str:
-        """An index below n."""
+        """Return an index expression below n."""
         if s.counters and self.rng.random() < 0.4 and n >= 8:
             return self.pick(s.counters)
         if self.rng.random() < 0.5:
@@ -246,14 +247,14 @@ class Program:
     # -- statements ---------------------------------------------------------------------------------------------------
 
     def block(self, s: Scope, count: int, depth: int, calls: list[Signature], indent: str) -> list[str]:
-        """Some statements."""
+        """Return `count` random statements as lines."""
         out: list[str] = []
         for _ in range(count):
             out += [indent + line for line in self.statement(s, depth, calls)]
         return out
 
     def statement(self, s: Scope, depth: int, calls: list[Signature]) -> list[str]:
-        """One statement, perhaps of several lines."""
+        """Return one random statement, possibly of several lines."""
         kind = self.rng.choices(
             ("scalar", "array", "pointer", "select", "escape", "struct", "field", "port", "interrupt", "if", "loop",
              "switch", "call", "memory", "mix", "sized", "feature"),
@@ -281,7 +282,7 @@ class Program:
         return [f"{name}[{self.index(s, n)}] = {self.expression(t, s, 2)};"]
 
     def _select(self, s: Scope, depth: int, calls: list[Signature]) -> list[str]:
-        """p = condition ? one array : another."""
+        """Assign the address of one of several arrays, selected by a condition, to a pointer."""
         if not s.pointers:
             return []
         name, t, n = self.rng.choice(s.pointers)
@@ -297,7 +298,7 @@ class Program:
         return [f"{name} = {value};"]
 
     def _escape(self, s: Scope, depth: int, calls: list[Signature]) -> list[str]:
-        """A local's address goes to another file, which writes through it."""
+        """Pass the address of a local variable to another file, which writes through it."""
         choice = [(a, t, n) for a, t, n in s.arrays if t in ("u8", "u16", "i32")] + [
             (f"&{name}", t, 1) for name, t in s.scalars if t in ("u8", "u16", "i32") and name[0] == "v"
         ]
@@ -308,7 +309,7 @@ class Program:
         return lines[: self.rng.choice((1, 2, 2))]
 
     def _struct(self, s: Scope, depth: int, calls: list[Signature]) -> list[str]:
-        """Copies of structs."""
+        """Copy structs."""
         places = s.structs + self.globals.structs
         name, kind = self.rng.choice(places)
         same = [other for other, k in places if k == kind and other != name]
@@ -326,7 +327,7 @@ class Program:
         return [f"{name}.{plain} = {self.expression(t, s, 2)};"]
 
     def _port(self, s: Scope, depth: int, calls: list[Signature]) -> list[str]:
-        """Volatile accesses in an order."""
+        """Access volatile registers in a fixed order."""
         out = []
         for _ in range(self.rng.choice((1, 1, 2, 3))):
             out.append(self._access(s))
@@ -407,7 +408,7 @@ class Program:
         return [f"{name} = ({t}){text};"]
 
     def _memory(self, s: Scope, depth: int, calls: list[Signature]) -> list[str]:
-        """memset and memcpy of whole arrays and parts."""
+        """Call memset and memcpy on whole arrays and on parts."""
         name, t, n = self.rng.choice(s.arrays + self.globals.arrays)
         size = BITS[t] // 8
         same = [(a, m) for a, kind, m in s.arrays + self.globals.arrays if kind == t and a != name]
@@ -420,7 +421,7 @@ class Program:
         return [f"mix({self.expression('u32', s, 2)});"]
 
     def _feature(self, s: Scope, depth: int, calls: list[Signature]) -> list[str]:
-        """Of `c_features.py`; interrupt functions keep away from what is not made to be interrupted by itself."""
+        """Use a construct of `c_features.py`; in interrupt functions only those that are reentrant."""
         if s.quiet:
             return []
         name = self.fresh("r")
@@ -428,9 +429,9 @@ class Program:
         return [f"{{   u32 {name} = 1;", *(f"    {line}" for line in lines), f"    mix({name});", "}"]
 
     def _sized(self, s: Scope, depth: int, calls: list[Signature]) -> list[str]:
-        """An array whose length is computed, or room from alloca: W14 holds the frame."""
+        """Use an array of computed length or alloca, so that W14 is the frame pointer."""
         if not s.port and not s.pointers:
-            return []  # the frames of interrupt functions and of start() stay small
+            return []  # keeps the frames of interrupt functions and of start() small
         name, n, k, t = self.fresh("q"), self.fresh("n"), self.fresh("k"), self.pick(("u8", "u16", "i32"))
         room = f"{t} {name}[{n}];" if self.rng.random() < 0.5 else f"{t} *{name} = __builtin_alloca({n} * sizeof({t}));"
         inner = Scope(s.scalars, s.arrays, s.pointers, s.structs, s.port, s.counters, s.quiet)
@@ -444,7 +445,7 @@ class Program:
     # -- functions and files ------------------------------------------------------------------------------------------
 
     def function(self, f: Signature, calls: list[Signature]) -> str:
-        """One definition."""
+        """Return the definition of one function."""
         s = Scope()
         parameters = []
         for p in f.parameters:
@@ -480,7 +481,7 @@ class Program:
         return f"{apart}{result} {f.name}({', '.join(parameters) or 'void'})\n{{\n{body}\n}}\n"
 
     def _locals(self, s: Scope, lines: list[str]) -> None:
-        """Arrays, pointers to them and structs; sometimes a frame beyond every short offset."""
+        """Define local arrays, pointers to them and structs; sometimes the frame exceeds every short offset."""
         t = self.pick(("u8", "i8", "u16", "u16", "i32"))
         huge = self.rng.random() < 0.15
         for _ in range(self.rng.choice((0, 2, 2, 3))):
@@ -547,7 +548,7 @@ class Program:
         }
 
     def _keepers(self) -> str:
-        """Functions that keep the address of a caller's local variable for a while and write through it."""
+        """Define functions that keep the address of a caller's local variable for a while and write through it."""
         out = []
         for t in ("u8", "u16", "i32"):
             out.append(
@@ -559,7 +560,7 @@ class Program:
         return "\n".join([*out, f"APART void forget(void) {{ {reset} }}\n"])
 
     def _handler(self) -> str:
-        """The interrupt function: globals and ports."""
+        """Return the interrupt function, which accesses globals and ports."""
         s = Scope(self.globals.scalars, self.globals.arrays, [], self.globals.structs, quiet=True)
         body = self.block(s, self.rng.randrange(2, 6), 1, [], "    ")
         body = [line for line in body if "INTERRUPT" not in line]

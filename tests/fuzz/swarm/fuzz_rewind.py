@@ -1,10 +1,10 @@
-"""Debugs one robot of a swarm back and forth in time.
+"""Debug one robot of a swarm with random forward and reverse commands.
 
-Usage: `python tests/fuzz/swarm/fuzz_rewind.py [--walks N] [--seed N] [--seconds S]`; tests/arena/debug/test_rewind.py
-takes a sample. A walk debugs one robot of a trial whose robots push objects, avoid each other by infrared, or exchange
-messages. It steps, continues and goes back, to breakpoints, last writes and earlier times. At a time that is reached
-twice the world (all bodies with their speeds, the whole state of all robots) must be equal. After the debugger
-detaches, the record must equal, byte for byte, that of a trial without a debugger.
+Usage: `python tests/fuzz/swarm/fuzz_rewind.py [--walks N] [--seed N] [--seconds S]`. A sample of this campaign is
+tests/arena/debug/test_rewind.py. A walk debugs one robot of a trial whose robots push objects, avoid each other by
+infrared, or exchange messages. It steps, continues and rewinds to breakpoints, last writes and earlier times.
+Whenever a time is reached again, the world (bodies with their speeds, whole state of all robots) must be equal. After
+the debugger detaches, the record must equal, byte for byte, that of a trial without a debugger.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from tests.fuzz.seeds import Campaign, parser  # noqa: E402
 
 @dataclass(frozen=True)
 class Swarm:
-    """A scene, what of it is changed, and places of its firmware: functions to stop at, variables that change."""
+    """A scene with changed values, and names in its firmware: functions for breakpoints, and variables that change."""
 
     scene: str
     seconds: float
@@ -48,11 +48,11 @@ SWARMS = (
     Swarm("average", 1.2, ("Sys_Sleep",), ("clock_phase",)),
 )  # fmt: skip
 EVERY_S = 0.2
-"""Simulated seconds between moments: many in a short trial."""
+"""Simulated seconds between checkpoints; short, so that a short trial has many."""
 
 
 def plan_of(swarm: Swarm, seed: int, image_of: Callable[[str], Path]) -> Plan:
-    """A trial of it."""
+    """Return the plan of a trial of the swarm."""
     scene = load_scene(swarm.scene).with_values(**swarm.values)
     own = {one.image for one in scene.groups if one.image}
     image = image_of(swarm.scene) if not own else None
@@ -61,31 +61,31 @@ def plan_of(swarm: Swarm, seed: int, image_of: Callable[[str], Path]) -> Plan:
 
 
 class Walk:
-    """One robot in the hands of a client."""
+    """Debug client of one robot, which executes random commands."""
 
     def __init__(self, session: DebugSession, swarm: Swarm, rng: random.Random, tally: Counter[str]) -> None:
         self._client = Client(partial(RemoteServer, session), lambda _text: None)
         self._swarm, self._rng, self._tally = swarm, rng, tally
         self.seen: dict[int, str] = {}
-        """What there was to see in the world, by cycle of the robot."""
+        """State of the world by cycle of the robot."""
         self._client.ask("initialize", clientID="walk")
         self._client.ask("launch", stopOnEntry=True)
         self._client.resume("configurationDone")
-        self._look()
+        self._check_world()
 
-    def _told(self, text: str) -> str:
+    def _evaluate(self, text: str) -> str:
         return str(self._client.ask("evaluate", expression=text, context="repl")["result"])
 
     def _cycle(self) -> int:
-        time = self._told("/time")
+        time = self._evaluate("/time")
         assert "before the present" not in time
         return int(time.removeprefix("cycle ").partition(", ")[0].replace(",", ""))
 
-    def _look(self) -> None:
-        cycle, world = self._cycle(), self._told("/world")
+    def _check_world(self) -> None:
+        cycle, world = self._cycle(), self._evaluate("/world")
         if cycle in self.seen:
             self._tally["met again"] += 1
-            assert world == self.seen[cycle], f"at cycle {cycle}: {_apart(self.seen[cycle], world)}"
+            assert world == self.seen[cycle], f"at cycle {cycle}: {_differing_rows(self.seen[cycle], world)}"
         self.seen[cycle] = world
 
     def _go(self, kind: str, request: str, **arguments: Any) -> None:
@@ -96,7 +96,7 @@ class Walk:
         self._go(kind, "evaluate", expression=text, context="repl")
 
     def step(self) -> None:
-        """Something at random."""
+        """Execute a random command and check the world."""
         rng = self._rng
         kind = rng.choice(["forward", "forward", "on", "back", "back", "reverse", "last write", "again", "again"])
         fine = {"granularity": "instruction"} if rng.random() < 0.5 else {}
@@ -121,19 +121,19 @@ class Walk:
         else:
             self._stop_at()
             self._console(kind, f"/goto {rng.choice(sorted(self.seen))}")
-        self._look()
+        self._check_world()
 
     def _stop_at(self, *functions: str) -> None:
         self._client.ask("setFunctionBreakpoints", breakpoints=[{"name": one} for one in functions])
 
     def leave(self) -> None:
-        """Finish the trial without a debugger."""
+        """Disconnect, so that the trial finishes without a debugger."""
         self._stop_at()
         self._client.ask("disconnect", terminateDebuggee=False)
 
 
-def _apart(before: str, now: str) -> str:
-    """Where two worlds differ."""
+def _differing_rows(before: str, now: str) -> str:
+    """Return the rows in which two states of the world differ."""
     rows = zip(before.splitlines(), now.splitlines(), strict=False)
     return "; ".join(f"{one} <> {other}" for one, other in rows if one != other)
 
@@ -141,7 +141,7 @@ def _apart(before: str, now: str) -> str:
 def walk(
     seed: int, image_of: Callable[[str], Path], steps: int, tally: Counter[str], swarm: Swarm | None = None
 ) -> None:
-    """One walk. Raises AssertionError."""
+    """Run one walk. Raises AssertionError."""
     rng = random.Random(seed)
     swarm = swarm or SWARMS[seed % len(SWARMS)]
     plan = plan_of(swarm, rng.randrange(1000), image_of)

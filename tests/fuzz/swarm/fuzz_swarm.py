@@ -1,10 +1,10 @@
-"""Runs swarms of random robots in every mode of execution and compares them.
+"""Run swarms of random robots in every mode of execution and compare the results.
 
 Usage: `python tests/fuzz/swarm/fuzz_swarm.py [--trials N] [--seconds S]`. A trial is a scene of two or three robots
-with up to two random programs (`tests/arena/random_robots.py`), while the campaign sends messages to the robots and
-moves them. Modes: quantum after quantum, lock-step in Python, compiled code with one thread and with several.
-Records, poses, registers and RAM must be equal to the bit. The summary counts what the trials contained; a long
-campaign fails if one kind of event never occurred.
+with one or two random programs (`tests/arena/random_robots.py`), while the campaign sends messages to the robots and
+moves them. Modes: single quanta, lock-step in Python, compiled code with one thread and with several. Records, poses,
+registers and RAM must be equal to the bit. The summary counts events of the trials; a long campaign fails if a kind
+of event never occurred.
 """
 
 from __future__ import annotations
@@ -33,17 +33,17 @@ from tests.fuzz.seeds import Campaign, parser  # noqa: E402
 
 STEPWISE: Final = "quantum after quantum"
 QUANTA: Final = 150
-"""Of a trial, at least: two pictures of most sensors."""
+"""Minimum number of quanta of a trial; most sensors make two pictures in this time."""
 EXPECTED: Final = (
     "lines painted by compiled code", "lines painted by Python", "resets", "faults", "robots asleep", "robots away",
     "wheels turning", "turns of other threads", "lines heard", "changes of LEDs", "robots that measure light",
 )  # fmt: skip
 MANY: Final = 25
-"""Trials after which there must have been all of it."""
+"""Number of trials after which every kind of event must have occurred."""
 
 
 def assembled(folder: Path, name: str, text: str) -> Path:
-    """The image of a program."""
+    """Assemble a program and return its image."""
     source, image = folder / f"{name}.s", folder / f"{name}.elf"
     source.write_text(text)
     subprocess.run([sys.executable, "-m", "toolchain", "cc", str(source), "-o", str(image)], check=True, cwd=ROOT)
@@ -51,7 +51,7 @@ def assembled(folder: Path, name: str, text: str) -> Path:
 
 
 def scene_of(draw: random.Random) -> Scene:
-    """A small arena with two or three robots, switched on within 14 ms."""
+    """Return a scene with a small arena and two or three robots, which are powered on within 14 ms."""
     count = draw.randrange(2, 4)
     values: dict[str, Any] = {
         "start__spread_tcy": 200_000, "robots__count": count, "objects__count": draw.choice((0, 5, 20)),
@@ -69,7 +69,7 @@ def scene_of(draw: random.Random) -> Scene:
 
 
 class Robot(FirmwareController):
-    """One that counts the lines Python paints for it."""
+    """Firmware controller that counts the camera lines that Python renders."""
 
     painted = 0
 
@@ -79,7 +79,7 @@ class Robot(FirmwareController):
 
 
 class Trial:
-    """One trial, the same each time it is run; `seed` says all of it."""
+    """Random trial, determined by `seed`, so that every run is the same."""
 
     def __init__(self, seed: int, folder: Path) -> None:
         draw = random.Random(seed)
@@ -90,7 +90,7 @@ class Trial:
         self._images: Final = [draw.choice(images) for _ in range(count)]
         self._selectors: Final = [draw.randrange(16) for _ in range(count)]
         self._waits: Final = draw.random() < 0.5
-        """Whether every robot waits until its code is translated; otherwise native code starts anywhere."""
+        """Whether every robot waits until its code is translated; otherwise native code starts at a random time."""
         self.threads: Final = draw.choice((2, 5))
         moment, moments = 0, []
         while moment < QUANTA:
@@ -100,12 +100,12 @@ class Trial:
         self.quanta: Final = moment
 
     @property
-    def ways(self) -> tuple[str, ...]:
-        """All that are compared; the first one tells what is right."""
+    def modes(self) -> tuple[str, ...]:
+        """Modes of execution to compare; the first one is the reference."""
         return STEPWISE, "Python", "1 thread", f"{self.threads} threads"
 
-    def run(self, way: str, tally: Counter[str]) -> list[list[Any]]:
-        """What is seen at each of its moments."""
+    def run(self, mode: str, tally: Counter[str]) -> list[list[Any]]:
+        """Run the trial in one mode and return the state at each of its moments."""
         scene, channel, world = self.scene, OpticalChannel.of(self.scene), World(self.scene, self.seed)
         several = enumerate(zip(self._images, self._selectors, strict=True))
         robots = [Robot(scene, self.seed, number, image, selector, channel) for number, (image, selector) in several]
@@ -113,9 +113,9 @@ class Trial:
             assert isinstance(robot.machine.runner, JitEngine)
             robot.machine.runner.wait = self._waits
         lockstep = None
-        if way != STEPWISE:
-            threads = int(way.split()[0]) if "thread" in way else 1
-            lockstep = LockStep(world, robots, channel, is_native=way != "Python", threads=threads)
+        if mode != STEPWISE:
+            threads = int(mode.split()[0]) if "thread" in mode else 1
+            lockstep = LockStep(world, robots, channel, is_native=mode != "Python", threads=threads)
         wheels: list[tuple[float, float]] = []
         seen = []
         for until, what, who, where in self._moments:
@@ -125,7 +125,7 @@ class Trial:
                 wheels = [robot.control_step(world.ticks, world.poses) for robot in robots]
                 world.step(wheels)
             tally["wheels turning"] += sum(map(any, wheels))
-            seen.append([until, wheels, *map(partial(look, until, tally), robots), world.poses.values.tolist()])
+            seen.append([until, wheels, *map(partial(state_of, until, tally), robots), world.poses.values.tolist()])
             if what == 0:
                 robots[who].feed_uart(b"hello\n")
             elif what == 1:
@@ -138,13 +138,13 @@ class Trial:
         tally["resets"] += sum(cycle > 0 for robot in robots for cycle, _ in robot.machine.resets)
         tally["faults"] += sum(robot.has_stopped for robot in robots)
         tally["robots away"] += sum(scene.off_tick(number) < self.quanta for number in range(len(robots)))
-        tally[f"painted, {way}"] += sum(robot.painted for robot in robots)
+        tally[f"painted, {mode}"] += sum(robot.painted for robot in robots)
         if lockstep is not None:
             tally["turns of other threads"] += lockstep.scheduler.worker_runs
         return seen
 
 
-def look(until: int, tally: Counter[str], robot: FirmwareController) -> list[Any]:
+def state_of(until: int, tally: Counter[str], robot: FirmwareController) -> list[Any]:
     """Return the state of a robot between two quanta; inspecting it must not change the run."""
     machine = robot.machine
     tally["robots asleep"] += machine.is_asleep
@@ -159,24 +159,24 @@ def look(until: int, tally: Counter[str], robot: FirmwareController) -> list[Any
 
 
 def check(trial: Trial, tally: Counter[str]) -> str | None:
-    """Run a trial in all ways; what differs, None if nothing does."""
+    """Run a trial in all modes. Return the first difference, or None."""
     expected: list[list[Any]] = []
     painted = Counter[str]()
-    for way in trial.ways:
+    for mode in trial.modes:
         own = Counter[str]()
-        found = trial.run(way, own)
-        painted[way] = own.pop(f"painted, {way}")
+        found = trial.run(mode, own)
+        painted[mode] = own.pop(f"painted, {mode}")
         tally.update(own)
         expected = expected or found
         for one, other in zip(expected, found, strict=True):
             if one != other:
                 parts = [place for place, (a, b) in enumerate(zip(one, other, strict=True)) if a != b]
-                return f"{way}: by quantum {one[0]} parts {parts} differ: {one[parts[0]]} | {other[parts[0]]}"
+                return f"{mode}: by quantum {one[0]} parts {parts} differ: {one[parts[0]]} | {other[parts[0]]}"
     if painted["Python"] != painted[STEPWISE]:
         return f"{painted[STEPWISE]} lines painted quantum after quantum, in lock-step {painted['Python']}"
-    for way in trial.ways:
-        tally["lines painted by Python"] += painted[way]
-        tally["lines painted by compiled code"] += painted[STEPWISE] - painted[way]
+    for mode in trial.modes:
+        tally["lines painted by Python"] += painted[mode]
+        tally["lines painted by compiled code"] += painted[STEPWISE] - painted[mode]
     return None
 
 

@@ -1,5 +1,5 @@
-/* What csmith's programs need to run on a microcontroller: a checksum without a table, and a place to print it.
- * Stands in for csmith's own csmith.h; its safe_math.h is used as installed. */
+/* Run-time functions that csmith's programs need on a microcontroller: a checksum without a table, and its output.
+ * It replaces csmith's own csmith.h; its safe_math.h is used as installed. */
 #ifndef RANDOM_RUNTIME_H
 #define RANDOM_RUNTIME_H
 
@@ -28,7 +28,7 @@ static void csmith_put(char c)
     UDR0 = (uint8_t)c;
 }
 static void csmith_begin(void) { UCSR0B = 1 << TXEN0; }
-/* simavr ends a run at a sleep that nothing can end. */
+/* simavr ends a run when the CPU sleeps and no interrupt can wake it. */
 static void csmith_end(void)
 {
     csmith_put('\n');
@@ -42,7 +42,7 @@ static void csmith_begin(void) {}
 static void csmith_end(void) { csmith_put('\n'); }
 #endif
 
-#define printf(...) ((void)0) /* intermediate checksums, off by default */
+#define printf(...) ((void)0) /* prints intermediate checksums; off by default */
 
 static uint32_t crc32_context = 0xFFFFFFFFUL;
 
