@@ -1,1 +1,1 @@
-"""A free toolchain for the dsPIC30F6014A: compiler driver, assembler, linker and object file tools."""
+"""Toolchain for the dsPIC30F: compiler driver, assembler, linker, object file tools and analysis tools."""

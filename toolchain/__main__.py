@@ -1,4 +1,4 @@
-"""`python -m toolchain COMMAND`."""
+"""Entry point of `python -m toolchain COMMAND`."""
 
 import sys
 

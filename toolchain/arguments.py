@@ -1,4 +1,4 @@
-"""Types of command line arguments: numbers and definitions."""
+"""Parsers of command line arguments for argparse: numbers and symbol definitions."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from toolchain.errors import ToolError
 
 
 def integer(text: str) -> int:
-    """Parse a number in C notation; raises the error of argparse for other text."""
+    """Parse a number in C notation; raise argparse's ArgumentTypeError for other text."""
     try:
         return int(text, 0)
     except ValueError:
@@ -16,7 +16,7 @@ def integer(text: str) -> int:
 
 
 def definition(text: str) -> tuple[str, int]:
-    """Parse NAME=VALUE of --defsym; raises `ToolError`."""
+    """Parse NAME=VALUE of --defsym; raise `ToolError` for other text."""
     name, equals, value = text.partition("=")
     try:
         return name, int(value, 0) if equals else 1

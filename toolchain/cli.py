@@ -45,7 +45,7 @@ def _usage() -> str:
 
 @ignore_unread_output
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one command and return its exit status: 0 done, 1 C errors, 2 bad input or usage."""
+    """Run one command and return its exit status: 0 success, 1 errors in C sources, 2 bad input or usage."""
     words = list(sys.argv[1:] if arguments is None else arguments)
     if not words or words[0] in ("-h", "--help"):
         print(_usage())
@@ -70,7 +70,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 @ignore_unread_output
 def by_name() -> int:
-    """Run the command in the name of the program, such as `dspic-ar rcs x.a y.o`.
+    """Run the command that the program's name contains, such as `ar` of `dspic-ar rcs x.a y.o`.
 
     `dspic-ranlib` is `ar s`. The output of `--version` starts like that of the GNU tool, as configure scripts expect.
     """

@@ -1,4 +1,4 @@
-"""Device names of command lines: `30F6014A`, `dsPIC30F4013`, in upper or lower case."""
+"""Device names on command lines, such as `30F6014A` or `dsPIC30F4013`, in upper or lower case."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ DEFAULT: Final = DEVICES[0]
 
 
 def device(name: str) -> Chip:
-    """The chip of a name. Raises `ToolError` if there are no tables for it."""
+    """The chip with a name. Raise `ToolError` if the name is unknown."""
     try:
         return chip_named(name)
     except ValueError:

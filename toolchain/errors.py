@@ -1,4 +1,4 @@
-"""Errors of all tools: source location, message, and collections of several errors."""
+"""Error classes of all tools: source location, and an exception with one or several messages."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class SourceLocation:
 
 
 class ToolError(Exception):
-    """Bad input to a tool, with all findings; the command line prints them and exits with status 2."""
+    """Invalid input, with the messages of all errors; the command line prints them and exits with status 2."""
 
     def __init__(self, message: str, place: SourceLocation | None = None) -> None:
         super().__init__(message)
@@ -25,7 +25,7 @@ class ToolError(Exception):
 
     @classmethod
     def of(cls, findings: list[str]) -> ToolError:
-        """Return one error that lists all `findings`, each a complete line."""
+        """Return one error with all messages in `findings`, each a complete line."""
         error = cls("\n".join(findings))
         error.findings = list(findings)
         return error

@@ -18,7 +18,7 @@ def read_bytes(path: str | Path) -> bytes:
 
 
 def read_text(path: str | Path) -> str:
-    """Return `path` as text; a file that is not UTF-8 is read as Latin-1, which old sources use."""
+    """Return `path` as text; a file that is not UTF-8 is read as Latin-1, the encoding of old sources."""
     data = read_bytes(path)
     try:
         return data.decode("utf-8")

@@ -10,7 +10,7 @@ from toolchain.ir.model import Type, align_of, size_of
 
 @dataclass(frozen=True, slots=True)
 class ArgumentLocation:
-    """Location of an argument: first register, or distance of its low end below W15 at entry (`stack` > 0)."""
+    """Location of an argument: its first register, or (`stack` > 0) the bytes from its low end up to W15 at entry."""
 
     register: int | None
     words: int
@@ -22,7 +22,7 @@ class ArgumentShape:
     """Size and alignment of an argument."""
 
     words: int
-    aligned: bool  # takes a register run aligned to its size (rules 2 and 3)
+    aligned: bool  # whether its first register is a multiple of its size in words (rules 2 and 3)
 
 
 def scalar_shape(t: Type) -> ArgumentShape:
@@ -34,16 +34,16 @@ def scalar_shape(t: Type) -> ArgumentShape:
 def struct_shape(t: Type, align: int = 0, unaligned: bool = False) -> ArgumentShape:
     """Shape of a struct or union passed by value (rule 3).
 
-    `align` is its alignment in C (0: that of the type); `unaligned` is the fact that `struct_alignment` marks."""
+    `align` is its alignment in C (0: that of the type). `unaligned` is the mark that `struct_alignment` sets."""
     size = size_of(t)
     return ArgumentShape((size + 1) // 2, (align or align_of(t)) >= 2 and size in (2, 4, 8) and not unaligned)
 
 
 def argument_locations(shapes: list[ArgumentShape], named: int | None = None) -> list[ArgumentLocation]:
-    """Locations of all arguments by rules 1-5: the lowest fitting run of W0..W7, with back-fill, else the stack.
+    """Locations of all arguments by rules 1-5: the lowest free registers of W0..W7 that fit, else the stack.
 
     `named` is the number of named arguments of a variadic function, including a hidden result pointer. The last named
-    argument and all behind it are on the stack."""
+    argument and all later ones are on the stack."""
     free = [True] * ARGUMENT_REGISTERS
     stack = RETURN_ADDRESS_BYTES
     locations = []

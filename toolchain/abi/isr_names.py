@@ -17,12 +17,12 @@ VECTOR_FUNCTIONS = frozenset(
 """C names of handlers that the linker enters into the vector tables."""
 
 IRQ_PREFIX = {"irq": "", "altirq": "Alt"}
-"""Keyword of `interrupt(irq(N))` -> prefix of the handler's name."""
-FIRST_INTERRUPT = 8  # lower vector numbers are traps (abi-elf.md §2.7)
+"""Prefix of a handler's name, by the keyword of `interrupt(irq(N))` or `interrupt(altirq(N))`."""
+FIRST_INTERRUPT = 8  # number of the first interrupt vector; lower numbers are traps (abi-elf.md §2.7)
 
 
 def irq_name(number: int) -> str:
-    """Name of the vector of an interrupt number. Raises IndexError if the chip has no such vector."""
+    """Name of the vector of an interrupt number. Raise IndexError if the chip has no such vector."""
     if number < 0:
         raise IndexError(number)
     return SLOTS[number + FIRST_INTERRUPT].name
@@ -36,7 +36,7 @@ _NUMBERED = re.compile(r'^(@[\w$.]+) = [^\n]*c"(irq|altirq):([^"]*)\\00"', re.MU
 
 
 def check(ir_text: str, locate: Callable[[str], str]) -> None:
-    """Raise ToolError that lists every handler whose name and kind disagree; `locate` gives "file:line" of metadata."""
+    """Raise ToolError listing every handler whose name and kind disagree; `locate` returns "file:line" of metadata."""
     marks = set(_STRING.findall(ir_text))
     annotations = _ANNOTATIONS.search(ir_text)
     pairs = _ANNOTATED.findall(annotations[0]) if annotations else []

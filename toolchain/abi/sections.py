@@ -1,16 +1,16 @@
-"""Data sections of attributes, and near memory (abi-elf.md §1.4)."""
+"""Data sections that attributes of variables select, and near memory (abi-elf.md §1.4)."""
 
 from __future__ import annotations
 
 from toolchain.abi.target import NEAR_BYTES
 from toolchain.ir.model import Module, size_of
 
-# Sections of the macros of dspic_attributes.h -> attributes besides bss or data, which depends on the initialiser.
+# By section that a macro of dspic_attributes.h selects: its attributes. The initialiser adds bss or data.
 SECTION_ATTRIBUTES = {".near": ",near", ".far": "", ".xmemory": ",xmemory", ".ymemory": ",ymemory"}
 
 
 def attribute_section(section: str) -> str:
-    """Key of SECTION_ATTRIBUTES of a numbered section such as `.far.12`; "" for any other section."""
+    """Key of SECTION_ATTRIBUTES for a section, ignoring the number in names such as `.far.12`; "" for others."""
     stem, _, number = section.rpartition(".")
     return stem if number.isdigit() and stem in SECTION_ATTRIBUTES else ""
 

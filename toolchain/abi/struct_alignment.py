@@ -1,8 +1,9 @@
-"""Structs and unions of 2, 4 or 8 bytes that are passed in unaligned register runs (abi-elf.md §2.2 rule 3).
+"""Structs and unions of 2, 4 or 8 bytes that are passed in any free registers, unaligned (abi-elf.md §2.2 rule 3).
 
 A record with an array, struct or union of 3, 5, 6 or 7 bytes at any depth is passed like one of odd size. IR types do
-not contain this fact: a union has one member there, and bit-fields are arrays. The record layouts of the front end
-(`-fdump-record-layouts`, on its standard output) do. `mark` adds it to `byval` parameters as an attribute.
+not show whether a record has such a member: in IR a union has one member, and bit-fields are arrays. The record
+layouts that clang prints with `-fdump-record-layouts` show it. `mark` adds an attribute to `byval` parameters of such
+records.
 Limitation: an array with elements of a typedef'd array type is treated as an array of scalars.
 """
 
@@ -27,7 +28,7 @@ BYVAL = re.compile(rb"byval\(%([\w.$-]+)\)")
 
 
 def mark(ir: bytes, dump: str) -> bytes:
-    """IR text with UNALIGNED_RUN after `byval` of every such record; `dump` are the record layouts."""
+    """IR text with UNALIGNED_RUN after each `byval` of a record with odd-sized member; `dump`: record layouts."""
     loose = unaligned_types(dump) if b"byval(" in ir else set()
     return BYVAL.sub(lambda m: m[0] + b" " + UNALIGNED_RUN.encode() if m[1].decode() in loose else m[0], ir)
 
@@ -72,7 +73,7 @@ def _contains_odd(key: str, sizes: dict[str, int], fields: dict[str, list[str]])
             element, count = array[1], 1
             for dimension in re.findall(r"\d+", array[2]):
                 count *= int(dimension)
-            if count in ODD_SIZES:  # bytes, or three words: larger elements do not fit in 8 bytes
+            if count in ODD_SIZES:  # an array of bytes, or of three words; larger elements do not fit in 8 bytes
                 return True
             if not count:
                 continue

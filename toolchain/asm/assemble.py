@@ -1,6 +1,6 @@
 """Main loop of the assembler: reads statements and dispatches them; `finish` creates the object.
 
-pic30-as syntax (abi-elf.md §4).
+The source has the syntax of pic30-as (abi-elf.md §4).
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ _STATEMENT = re.compile(r"\s*([A-Za-z_.$][\w.$]*)\s*(.*?)\s*$", re.DOTALL)
 
 
 def assemble(text: str, file: str = "<text>", options: Options | None = None) -> tuple[ObjectFile, list[str]]:
-    """Assemble `text` to an object; return it and the warnings.  Raises `ToolError` listing every error found."""
+    """Assemble `text` to an object; return it and the warnings.  Raise `ToolError` that lists all errors."""
     asm = Assembler(text, file, options or Options())
     _read_all(asm)
     if asm.findings:
@@ -96,7 +96,7 @@ def _skip(asm: Assembler, line: str) -> None:
 
 
 def _call_macro(asm: Assembler, macro: Macro, operands: str) -> None:
-    """Continue with the expansion of `macro`."""
+    """Expand a macro call: its lines are read next."""
     lines = substitute(macro.body, bind(macro, operands), asm.serial)
     asm.serial += 1
     asm.source.expand(lines, asm.conditionals.depth, macro.name)

@@ -1,4 +1,4 @@
-"""Conditional assembly: .if and its family (GNU as 2.14)."""
+"""Conditional assembly: .if, .ifdef, .elseif, .else, .endif and variants (GNU as 2.14)."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ CONDITIONALS = frozenset(_COMPARISONS + _TESTS + _PARTS)
 
 
 class ConditionContext(Protocol):
-    """The parts of the assembler that conditions read."""
+    """State of the assembler that conditions depend on."""
 
     symbols: dict[str, AsmSymbol]
     declared: set[str]
@@ -32,7 +32,7 @@ class ConditionContext(Protocol):
 class _Level:
     place: SourceLocation
     active: bool
-    taken: bool  # a branch of this .if has been assembled, or the whole .if lies in skipped text
+    taken: bool  # whether a branch of this .if has been assembled, or the whole .if lies in skipped text
     had_else: bool = False
 
 
@@ -43,7 +43,7 @@ _COMPARE = {
 
 
 class Conditionals:
-    """The stack of open conditionals; `active`: whether lines are assembled now."""
+    """Stack of open conditionals; `active`: whether the current line is assembled."""
 
     def __init__(self) -> None:
         self._levels: list[_Level] = []
@@ -85,7 +85,7 @@ class Conditionals:
         elif not self.active:
             self._levels.append(_Level(place, False, True))
         else:
-            self._levels.append(_Level(place, False, True))  # stays inactive if the condition is an error
+            self._levels.append(_Level(place, False, True))  # inactive until evaluated, and if an error occurs
             truth = _condition(word, operands, context)
             self._levels[-1] = _Level(place, truth, truth)
         self._update()
@@ -106,7 +106,7 @@ def _condition(word: str, operands: str, context: ConditionContext) -> bool:
         symbol = context.symbols.get(name)
         if name in context.registers:
             return word in (".ifdef", ".ifdecl")
-        if word.endswith("decl"):  # mentioned before, defined or not
+        if word.endswith("decl"):  # .ifdecl: true if the symbol has occurred before, defined or not
             return (symbol is not None or name in context.declared) == (word == ".ifdecl")
         defined = symbol is not None and (symbol.place is not None or symbol.common is not None)
         return defined == (word == ".ifdef")

@@ -1,7 +1,7 @@
 """`as -g`: DWARF 2 line information for an assembly source (abi-elf.md §6.7).
 
-Contents are built as plain DWARF bytes; `Section` holds them with phantoms, and offsets of relocations double.
-A source that brings its own `.debug_line` (compiler output) is left alone.
+Contents are built as plain DWARF bytes. `Section` stores them with phantom bytes, which doubles offsets of relocations.
+A source with its own `.debug_line` section (compiler output) gets none.
 """
 
 from __future__ import annotations
@@ -18,22 +18,22 @@ from toolchain.elf import constants as c
 from toolchain.elf.model import Home, Reloc, Section, Symbol
 from toolchain.errors import SourceLocation
 
-LINE_BASE, LINE_RANGE, OPCODE_BASE = -5, 14, 10  # assembler units, abi-elf.md §6.7
+LINE_BASE, LINE_RANGE, OPCODE_BASE = -5, 14, 10  # header of line programs of assembly (abi-elf.md §6.7)
 ADDRESS_SIZE = 4
-LANGUAGE = 0x8001  # DW_LANG_Mips_Assembler, as GNU as writes it
+LANGUAGE = 0x8001  # DW_LANG_Mips_Assembler, which GNU as writes for every assembly source
 PRODUCER = "OpenSwarm assembler"
-_OPCODE_LENGTHS = bytes((0, 1, 1, 1, 1, 0, 0, 0, 1))  # DWARF 2 §6.2.4
+_OPCODE_LENGTHS = bytes((0, 1, 1, 1, 1, 0, 0, 0, 1))  # operands of each standard opcode (DWARF 2 §6.2.4)
 _COPY, _ADVANCE_PC, _ADVANCE_LINE, _SET_FILE = 1, 2, 3, 4  # DW_LNS_*, DWARF 2 §7.21
 _END_SEQUENCE, _SET_ADDRESS = 1, 2  # DW_LNE_*
 _COMPILE_UNIT = 0x11  # DW_TAG_compile_unit
 _ATTRIBUTES = ((0x10, 0x06), (0x03, 0x08), (0x1B, 0x08), (0x25, 0x08), (0x13, 0x05))
-"""(attribute, form): stmt_list data4, name string, comp_dir string, producer string, language data2."""
+"""(DW_AT, DW_FORM) codes of the unit: stmt_list data4; name, comp_dir, producer string; language data2."""
 
 _R32 = RELOCATION_BY_NAME["32"].number
 
 
 class _Bytes:
-    """DWARF bytes with the relocations of 4-byte fields."""
+    """Content of a DWARF section and the relocations of its 4-byte fields."""
 
     def __init__(self) -> None:
         self.data = bytearray()
@@ -55,7 +55,7 @@ class _Bytes:
 
 
 def debug_sections(asm: Assembler, sections: dict[LabelledSection, Section]) -> tuple[list[Section], list[Symbol]]:
-    """Return .debug_line, .debug_info, .debug_abbrev and their symbols; nothing without instructions."""
+    """Return .debug_line, .debug_info, .debug_abbrev and their symbols; both lists are empty without instructions."""
     if not asm.line_rows or any(name.startswith(".debug_") for name in asm.sections):
         return [], []
     starts = {s: Symbol(s.name, Home.SECTION, s, type=c.STT_SECTION) for s in sections.values()}
@@ -95,7 +95,7 @@ def _line_program(asm: Assembler, sections: dict[LabelledSection, Section], star
     out.data += b"\2\0"
     out.word(0)
     out.data += bytes((1, 1, LINE_BASE & 0xFF, LINE_RANGE, OPCODE_BASE)) + _OPCODE_LENGTHS
-    out.data += b"\0"  # no include directories: file names carry their folder
+    out.data += b"\0"  # empty table of include directories: file names contain their folder
     for file in files:
         out.text(asm.options.recorded(file))
         out.data += b"\0\0\0"
@@ -115,7 +115,7 @@ def _owner(label: Label) -> AsmSection:
 def _sequence(
     out: _Bytes, rows: list[tuple[Label, SourceLocation]], source: AsmSection, start: Symbol, files: dict[str, int]
 ) -> None:
-    """Write a line sequence of one section: start address, a row per instruction, end after the last one."""
+    """Write the line sequence of one section: its start address, a row per instruction, the end of sequence."""
     addresses = [label.frag.start + label.offset for label, _ in rows]
     out.data += bytes((0, 1 + ADDRESS_SIZE, _SET_ADDRESS))
     out.word(addresses[0], start)
@@ -141,7 +141,7 @@ def _instruction_units(source: AsmSection, label: Label) -> int:
 
     piece = next((p for p in source.pieces if p is label.frag), None)
     data = piece.data[label.offset * 2 :] if piece is not None else b""
-    if piece is not None and not data:  # the label closed the piece before a relaxable call
+    if piece is not None and not data:  # the instruction is the relaxable call in the next piece
         following = source.pieces[source.pieces.index(piece) + 1 :]
         data = next((p.data for p in following if p.data), b"")
     words = [int.from_bytes(data[i : i + 3], "little") for i in (0, 4)]

@@ -1,7 +1,7 @@
-"""`.include "p30F6014A.inc"`: Microchip's device include, made from the chip's tables when no such file is found.
+"""`.include "p30F6014A.inc"`: the device include file, generated from the chip's tables if no such file exists.
 
-It names register bits, bytes of registers and configuration settings and defines the macro `config`; registers
-themselves stay undefined, for the linker to resolve (abi-elf.md §2.6, §3.3).
+The file defines names of register bits, of bytes of registers and of configuration settings, and the macro `config`. It
+leaves the registers themselves undefined; the linker resolves them (abi-elf.md §2.6, §3.3).
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from emu.chips.chip import Chip
 from toolchain.device_header import second_names
 
 _SETTINGS = Path(__file__).resolve().parents[1] / "include" / "dspic_compiler.h"
-"""The C header that lists the configuration settings by name; C and assembly share the numbers."""
+"""C header with the names and values of the configuration settings, which assembly sources share."""
 _SETTING = re.compile(r"#define ([A-Z][A-Z0-9_]*) (0x[0-9A-F]{4})$", re.MULTILINE)
 _CONFIG_MACRO = """
         .macro  config REG, VALUE
@@ -42,7 +42,7 @@ def _bits(chip: Chip) -> Iterator[tuple[str, int]]:
 
 
 def _bytes(chip: Chip) -> Iterator[tuple[str, int]]:
-    """Bytes of registers and their addresses: SRL and SRH of SR, as far as no register has that name."""
+    """Names and addresses of bytes of registers, such as SRL and SRH of SR; names of existing registers are omitted."""
     for sfr in chip.sfrs.values():
         if sfr.size == 2:
             for name, address in ((f"{sfr.name}L", sfr.address), (f"{sfr.name}H", sfr.address + 1)):
@@ -51,7 +51,7 @@ def _bytes(chip: Chip) -> Iterator[tuple[str, int]]:
 
 
 def include_text(chip: Chip) -> str:
-    """Return the include file.  A bit name with different positions in two registers is omitted."""
+    """Return the text of the include file.  A bit name with different positions in two registers is omitted."""
     positions: dict[str, set[int]] = {}
     for name, bit in _bits(chip):
         positions.setdefault(name, set()).add(bit)

@@ -1,7 +1,7 @@
-"""Instructions: statement text -> words and fixups, by the instruction table's own reader.
+"""Instructions: translation of statements to program words and fixups by the parser of the instruction table.
 
-Statements that mention only literals and plain symbols read the same every time, so the result of reading (and, where
-no symbol occurs, of encoding) is kept by text: compiler output repeats itself.
+Results are cached by statement text, because compiler output contains many equal statements. The parsed statement is
+cached if it contains only literals and plain symbols; its encoding is cached if it contains no symbol.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ from toolchain.asm.state import Assembler
 from toolchain.asm.symbols import ExprValue, SymbolValue
 from toolchain.elf.model import Bind
 
-CACHE_LIMIT = 100_000  # statements; a bound for long-lived processes
+CACHE_LIMIT = 100_000  # maximum number of cached statements; bounds the memory of long-lived processes
 _TARGETS = frozenset(("PCREL_BRANCH", "PCREL_DO"))
 _SHORT = {"CALL": "rcall 0", "GOTO": "bra 0"}
 
 
 @dataclass(frozen=True, slots=True)
 class _Operand:
-    """What the table's reader gets for an expression; `value` only when it is a number already."""
+    """An operand expression as the table's parser reads it; `value` is set if it is already a number."""
 
     tree: expr.Tree
     value: int | None
@@ -33,7 +33,7 @@ class _Operand:
 
 @dataclass(slots=True)
 class _Known:
-    """A statement read before; `words` when nothing in it depends on symbols or place."""
+    """A cached statement; `words` is its encoding if that depends neither on symbols nor on the location."""
 
     parsed: Parsed
     words: tuple[int, ...] | None
@@ -73,7 +73,7 @@ def _read(asm: Assembler, statement: str) -> _Known:
             return _Operand(tree, tree)
         value = asm.value_of(tree)
         if isinstance(value, int):
-            depends = True  # on a symbol that may be redefined
+            depends = True  # the encoding depends on a symbol that may be redefined
             return _Operand(tree, value)
         return _Operand(tree, None)
 
@@ -135,7 +135,7 @@ def _kind(slot: Slot, value: ExprValue) -> tuple[RelocationType, int]:
 
 
 def _put_relaxable(asm: Assembler, parsed: Parsed, words: tuple[int, ...], value: ExprValue) -> bool:
-    """Emit CALL or GOTO in a piece of its own, ready to become RCALL or BRA; False when the target forbids it."""
+    """Emit CALL or GOTO in its own piece, so that relaxation can shorten it; False if its target rules that out."""
     if not isinstance(value, SymbolValue) or value.add is None or value.offset or value.sub or value.op:
         return False
     if value.add.bind is Bind.WEAK:

@@ -1,6 +1,6 @@
 """Assembler expressions: parsing of text to a tree, and evaluation of the tree to a value of `symbols`.
 
-Operators and ranks are those of GNU as 2.14, on which pic30-as is based (abi-elf.md §4): `* / % << >>` bind
+Operators and precedence are those of GNU as 2.14, on which pic30-as is based (abi-elf.md §4): `* / % << >>` bind
 tightest, then `| & ^ !` (or-not), then `+ -`, then comparisons (true is -1), then `&&`, then `||`.
 """
 
@@ -14,10 +14,10 @@ from functools import lru_cache
 from toolchain.asm.symbols import AsmSymbol, ExprValue, Label, PendingOperation, SymbolValue
 
 MASK64 = 0xFFFF_FFFF_FFFF_FFFF
-MAX_DEPTH = 64  # parentheses and prefixes; a limit, so that hostile input ends in a message
+MAX_DEPTH = 64  # maximum nesting of parentheses and prefixes; deeper input is an error instead of a stack overflow
 OPERATORS = frozenset(
     ["tbloffset", "tblpage", "psvoffset", "psvpage", "handle", "paddr", "edspage", "edsoffset", "addr_lo", "addr_hi"]
-)  # abi-elf.md §4.2; dmaoffset, boot, secure serve other parts and are refused by name
+)  # abi-elf.md §4.2; dmaoffset, boot and secure are operators of other chips and are refused by name
 _REFUSED = {
     "lo": "lo() is not an operator of this assembler: use & 0xFFFF",
     "hi": "hi() is not an operator of this assembler: use >> 16",
@@ -61,7 +61,7 @@ class Binary:
 
 @dataclass(frozen=True, slots=True)
 class Apply:
-    """`tbloffset(x)` and its kin."""
+    """Application of an operator such as `tbloffset(x)`."""
 
     op: str
     operand: Tree
@@ -92,7 +92,7 @@ _ESCAPES = {"b": 8, "f": 12, "n": 10, "r": 13, "t": 9, "v": 11, "a": 7}
 
 
 def unescape(text: str) -> bytes:
-    """Return the bytes of a quoted string's inside; octal and \\x escapes as GNU as reads them."""
+    """Return the bytes of a quoted string's inside; octal and \\x escapes are read as GNU as does."""
     out = bytearray()
     for match in re.finditer(r"\\([0-7]{1,3})|\\[xX]([0-9a-fA-F]+)|\\(.)|([^\\])", text, re.DOTALL):
         octal, hexadecimal, other, plain = match.groups()
@@ -276,11 +276,11 @@ CONSTANT_OPERATORS: dict[str, Callable[[int], int]] = {
     "paddr": lambda v: v & 0xFFFFFF,
     "addr_lo": lambda v: v & 0xFFFF,
     "addr_hi": lambda v: v >> 16 & 0xFFFF,
-}  # abi-elf.md §4.2; handle() and eds*() of a plain number mean nothing
+}  # abi-elf.md §4.2; handle() and eds*() of a plain number are errors
 
 
 def distance(a: AsmSymbol, b: AsmSymbol, final: bool) -> int | None:
-    """Return a - b in address units, None while unknown; across fragments it is known once all sizes are `final`."""
+    """Return a - b in address units, None if unknown; between fragments it is known only when all sizes are `final`."""
     left, right = a.place, b.place
     if not isinstance(left, Label) or not isinstance(right, Label):
         return None
@@ -298,7 +298,7 @@ def combine(op: str, a: ExprValue, b: ExprValue, final: bool = False) -> ExprVal
     if op in "+-":
         if isinstance(b, int) and isinstance(
             a, SymbolValue
-        ):  # also op(x)+n: a relocation has one addend, inside the operator
+        ):  # also for op(x)+n: the addend of a relocation is inside the operator
             return SymbolValue(a.add, a.sub, wrap(a.offset + b if op == "+" else a.offset - b), a.op)
         if op == "+" and isinstance(a, int) and isinstance(b, SymbolValue):
             return SymbolValue(b.add, b.sub, wrap(a + b.offset), b.op)
@@ -320,12 +320,12 @@ _COMPARABLE = frozenset(("-", "==", "!=", "<", ">", "<=", ">="))
 
 
 def prefix(op: str, a: ExprValue) -> ExprValue:
-    """Return `op a` for a prefix - ~ !."""
+    """Return `op a` for a prefix operator - ~ or !."""
     return wrap(_UNARY[op](a)) if isinstance(a, int) else PendingOperation("u" + op, a, None)
 
 
 def apply(op: str, a: ExprValue) -> ExprValue:
-    """Return tbloffset(a) and its kin."""
+    """Return op(a) for an operator such as tbloffset."""
     if isinstance(a, int):
         if op not in CONSTANT_OPERATORS:
             raise ExprError(f"{op}() needs a symbol, not a number")
@@ -353,7 +353,7 @@ def evaluate(tree: Tree, name: Callable[[str], ExprValue], here: Callable[[], Ex
 
 
 def resolve(value: ExprValue, final: bool, seen: tuple[AsmSymbol, ...] = ()) -> ExprValue:
-    """Return `value` with equated symbols replaced and, when `final`, label distances known."""
+    """Return `value` with equated symbols replaced by their values and, if `final`, label distances by numbers."""
     if isinstance(value, int):
         return value
     if isinstance(value, PendingOperation):

@@ -1,7 +1,7 @@
 """Completion of an object: relaxation, fixups to bits or relocations, the symbol table.
 
-Precondition: all statements are read, fixups have unresolved values.  Result: fields that depend on no symbol are
-final; every field with a symbol has a relocation, local branches included (abi-elf.md §5).
+Precondition: all statements are read; values of fixups are unresolved.  Result: fields that depend on no symbol are
+final; every field that depends on a symbol has a relocation, even a local branch (abi-elf.md §5).
 """
 
 from __future__ import annotations
@@ -247,12 +247,12 @@ class _Finisher:
         return result
 
 
-_PROGRAM = 0x30000000  # PSV | EEDATA
+_PROGRAM = 0x30000000  # section flags PSV | EEDATA
 _DATA_ONLY = frozenset((RELOCATION_BY_NAME["WORD"].number, RELOCATION_BY_NAME["16"].number))
 
 
 def _absolute_call(section: Section, offset: int, kind: RelocationType, value: int) -> None:
-    """Store the target of a CALL or GOTO to a number in both words (isa.md §7.1)."""
+    """Store the numeric target of a CALL or GOTO in its two words (isa.md §7.1)."""
     if value & 1 or not 0 <= value <= 0x7FFFFE:
         raise ExprError(f"{value:#x} is no instruction address")
     fields.store(section.data, offset, kind, True, value)
@@ -269,7 +269,7 @@ def _signature() -> Section:
 
 
 def _local_name(name: str) -> str:
-    """Return a local label as the source spells it."""
+    """Return the name of a local label as it is spelled in the source."""
     return f"local label {name[3:].partition('.')[0]}:" if name.startswith(".LN") else f"local label {name}"
 
 

@@ -13,12 +13,12 @@ OPEN_REPEAT = re.compile(r"\s*(?:[\w.$]+:\s*)*\.(?:rept|irpc?)\b", re.IGNORECASE
 CLOSE_REPEAT = re.compile(r"\s*\.endr\b", re.IGNORECASE)
 
 _PARAMETER = re.compile(r"\s*([A-Za-z_.$][\w.$]*)\s*(?:=\s*(\"(?:\\.|[^\"\\])*\"|[^\s,]*))?\s*,?")
-_USE = re.compile(r"\\(?:([A-Za-z_$][\w$]*)|(@)|(\(\)))")  # a dot ends the name: `\\reg.b`
+_USE = re.compile(r"\\(?:([A-Za-z_$][\w$]*)|(@)|(\(\)))")  # a dot ends the name, as in `\\reg.b`
 
 
 @dataclass(slots=True)
 class Macro:
-    """A macro: parameters in order with their defaults, and the body's lines."""
+    """A macro: its parameters in order with their defaults, and the lines of its body."""
 
     name: str
     parameters: dict[str, str]
@@ -26,7 +26,7 @@ class Macro:
 
 
 def parse_head(text: str) -> tuple[str, dict[str, str]]:
-    """Return (name, parameters with defaults) of what follows `.macro`."""
+    """Parse the text after `.macro`; return the name, and the parameters with their defaults."""
     match = re.match(r"\s*([A-Za-z_.$][\w.$]*)\s*,?", text)
     if match is None:
         raise SourceError("expected a name after .macro")

@@ -1,7 +1,8 @@
 """Relaxation, only with --relax: CALL -> RCALL and GOTO -> BRA within a section (abi-elf.md §5).
 
 Precondition: every relaxable call is alone in its piece, in its two-word form.  Result: pieces have their final start.
-All calls start short and become long if their target is out of reach; a long call stays long, so the loop ends.
+The algorithm starts with all calls short and makes a call long if its target is out of range. A long call stays long,
+so the iteration terminates.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ from toolchain.asm.sections import AsmSection, Relaxable
 from toolchain.asm.symbols import Label
 from toolchain.elf.model import Bind
 
-REACH = (-0x8000, 0x7FFF)  # words, isa.md §3.2 Slit16
+REACH = (-0x8000, 0x7FFF)  # least and greatest distance of RCALL and BRA in words (Slit16, isa.md §3.2)
 
 
 def _candidates(section: AsmSection) -> list[Relaxable]:

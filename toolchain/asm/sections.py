@@ -1,7 +1,7 @@
 """Sections under construction: location counting of abi-elf.md §4.4 and the octet layout of §6.2.
 
-In code a location is a PC unit; data bytes fill the low then the middle byte of consecutive words, `.p` data all
-three.  Everywhere else a location is a byte, and the phantom octets are added when the section is finished.
+In code sections a location is a PC unit. Data fills the low and the middle byte of each program word; `.p` data fills
+all three bytes.  In other sections a location is a byte; phantom octets are added when the section is finished.
 """
 
 from __future__ import annotations
@@ -16,19 +16,19 @@ from toolchain.errors import SourceLocation
 
 CODE_LIMIT = 1 << 24  # PC units: no program address is longer than 24 bits (isa.md §1.1)
 DATA_LIMIT = 1 << 16  # data space is 64 KB (isa.md §1.2)
-INFO_LIMIT = 1 << 24  # debug sections are not in any address space; a limit against runaway .space
+INFO_LIMIT = 1 << 24  # bytes; debug sections are in no address space, the limit stops an unintended .space
 
 
 @dataclass(slots=True)
 class Fixup:
-    """A field whose value is not a number yet."""
+    """A field whose value is not yet a number."""
 
     frag: Frag
-    offset: int  # octets (code) or bytes (elsewhere) from the frag start
+    offset: int  # from the start of the piece, in octets (code) or bytes (other sections)
     kind: RelocationType
     value: ExprValue
     place: SourceLocation
-    next_word: bool = False  # CALL/GOTO: the high part goes into the following word
+    next_word: bool = False  # CALL, GOTO: the next word holds the high part of the address
 
 
 @dataclass(slots=True, eq=False)
@@ -74,16 +74,16 @@ class AsmSection(LabelledSection):
         self.labelled = False
         self.pieces: list[SectionPiece] = [SectionPiece(self)]
         self.piece = self.pieces[0]
-        self.closed_units = 0  # length of all pieces but the current one, as long as nothing is relaxed
+        self.closed_units = 0  # length of all pieces except the current one, before relaxation
         self.fixups: list[Fixup] = []
         self.relaxables: list[Relaxable] = []
-        self.fill_value = self.fill_upper = self.packed_fill_value = 0  # of gaps
+        self.fill_value = self.fill_upper = self.packed_fill_value = 0  # bytes that fill gaps
         self._data_bytes = 0  # data bytes in the last word, 0 or 1
         self._packed_bytes = 0  # .p bytes in the last word, 0..2
         self.configure(flags, kind)
 
     def configure(self, flags: int, kind: int) -> None:
-        """Set flags, ELF type and location counting; only while the section is empty."""
+        """Set flags, ELF type and unit of locations; the section must be empty."""
         self.flags, self.type = flags, kind
         self.align = 2 if flags & SectionFlag.ALLOC else 1
         self.is_code = bool(flags & SectionFlag.EXECINSTR)
@@ -130,7 +130,7 @@ class AsmSection(LabelledSection):
         return len(data) - OCTETS_PER_WORD
 
     def align_word(self, fill: int | None = None, packed: bool = False) -> None:
-        """Advance to the next program word; the rest of this one becomes `fill`, by default the section's fill value.
+        """Advance to the next program word; fill the rest of this one with `fill`, by default the section's value.
 
         The upper byte of a data word is that of `.fillupper`, unless `packed` fills all three bytes.
         """
@@ -191,7 +191,7 @@ class AsmSection(LabelledSection):
         return self.packed_fill_value if packed else self.fill_value
 
     def skip(self, units: int, fill: int, packed: bool = False) -> None:
-        """Advance by `units` locations, bytes of value `fill`; `packed`: all three of each word."""
+        """Advance by `units` locations, filled with bytes `fill`; if `packed`, all three bytes of each word."""
         if units < 0:
             raise ExprError(f"cannot advance by {units}")
         self._check_room(units)
@@ -206,7 +206,7 @@ class AsmSection(LabelledSection):
         return part + -self.location() % units
 
     def align_to(self, units: int, fill: int, packed: bool = False) -> None:
-        """Advance to the next multiple of `units` (a power of two), filling as `skip` does."""
+        """Advance to the next multiple of `units` (a power of two); fill the gap as `skip` does."""
         if units <= 0 or units & (units - 1):
             raise ExprError(f"alignment {units} is not a power of two")
         if units > self.limit:
@@ -233,7 +233,7 @@ class AsmSection(LabelledSection):
         return self.piece
 
     def octets(self, piece: SectionPiece, offset: int) -> int:
-        """File offset, in octets from the section start, of a fixup's `offset` (abi-elf.md §5)."""
+        """Return the file offset of a fixup's `offset`, in octets from the section start (abi-elf.md §5)."""
         return piece.start * 2 + (offset if self.is_code else offset * 2)
 
     def content(self) -> bytearray:

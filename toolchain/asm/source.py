@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 
 from toolchain.errors import SourceLocation
 
-MAX_DEPTH = 64  # nested includes and expansions
-MAX_EXPANDED = 1_000_000  # lines that macros and repeats may produce in one assembly
+MAX_DEPTH = 64  # maximum nesting of include files and expansions
+MAX_EXPANDED = 1_000_000  # maximum number of lines that macros and repeats produce in one assembly
 
 _COMMENT = re.compile(
     r"""(?P<line>^[ \t]*\#[^\n]*)
@@ -22,11 +22,11 @@ _LINE_MARKER = re.compile(r'[ \t]*#(?:line)?[ \t]+(\d+)[ \t]+"((?:\\.|[^"\\])*)"
 
 
 class SourceError(Exception):
-    """A structural mistake (depth, unterminated block); the caller adds file and line."""
+    """An error in the structure of the source (nesting depth, unterminated block); the caller adds file and line."""
 
 
 def strip_comments(text: str) -> list[str]:
-    """Return the lines of `text` without comments; `# 12 "file"` markers stay, for `Source` to read."""
+    """Return the lines of `text` without comments; line markers such as `# 12 "file"` are kept for `Source`."""
 
     def replace(match: re.Match[str]) -> str:
         if match["line"] is not None:
@@ -40,16 +40,16 @@ def strip_comments(text: str) -> list[str]:
 
 @dataclass(slots=True)
 class SourceFrame:
-    """A run of lines being read: a file, or the expansion of a macro or repeat."""
+    """A sequence of lines being read: a file, or the expansion of a macro or repeat."""
 
     lines: list[str]
     file: str
-    line: int  # number of the line before the next one
-    macro: str = ""  # name of the macro this is an expansion of
-    fixed: bool = False  # expansions report the line that caused them
-    counted: bool = True  # lines have numbers of their own; in compiler output only line markers set them
+    line: int  # number of the last line read
+    macro: str = ""  # name of the expanded macro, "" for other frames
+    fixed: bool = False  # an expansion: all its lines have the position of the statement that caused it
+    counted: bool = True  # each line increments the line number; in compiler output only line markers change it
     index: int = 0
-    conditionals: int = 0  # open conditionals when the frame began
+    conditionals: int = 0  # number of open conditionals at the start of the frame
     labels: dict[str, str] = field(default_factory=dict)
 
 
@@ -63,7 +63,7 @@ class Source:
         self.on_end: Callable[[SourceFrame], None] = lambda frame: None
 
     def next(self) -> str | None:
-        """Return the next line, None at the end of everything; `place` then names it."""
+        """Return the next line, None after the last one; `place` becomes its position."""
         frames = self.frames
         while frames:
             frame = frames[-1]
@@ -85,7 +85,7 @@ class Source:
         return None
 
     def push(self, frame: SourceFrame) -> None:
-        """Read `frame` next, then continue with the current one."""
+        """Push a frame: its lines are read next, then those of the current frame."""
         if len(self.frames) >= MAX_DEPTH:
             raise SourceError(f"includes and macros nested deeper than {MAX_DEPTH}")
         if frame.fixed:
@@ -95,15 +95,15 @@ class Source:
         self.frames.append(frame)
 
     def include(self, text: str, file: str, conditionals: int) -> None:
-        """Read another file's `text` next."""
+        """Push the text of an include file as a frame."""
         self.push(SourceFrame(strip_comments(text), file, 0, conditionals=conditionals))
 
     def expand(self, lines: list[str], conditionals: int, macro: str = "") -> None:
-        """Read generated `lines` next; messages name the line being read now."""
+        """Push generated lines as a frame; messages about them name the current line."""
         self.push(SourceFrame(lines, self.place.file, self.place.line, macro, True, conditionals=conditionals))
 
     def block(self, opening: re.Pattern[str], closing: re.Pattern[str], what: str) -> list[str]:
-        """Return the lines up to the matching end, which is consumed; nested blocks stay inside."""
+        """Return the lines before the matching end of a block, with nested blocks; the end is consumed."""
         frame, depth, start = self.frames[-1], 1, self.place
         first = frame.index
         while frame.index < len(frame.lines):
@@ -121,7 +121,7 @@ class Source:
         raise SourceError(f"{what} is never closed")
 
     def leave_macro(self) -> SourceFrame | None:
-        """Drop everything down to and including the innermost macro expansion (.exitm); return its frame."""
+        """Pop frames up to and including the innermost macro expansion (.exitm); return its frame."""
         for index in range(len(self.frames) - 1, -1, -1):
             if self.frames[index].macro:
                 frame = self.frames[index]

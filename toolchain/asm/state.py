@@ -1,6 +1,6 @@
 """State of an assembly: symbols, sections, location, errors.
 
-Errors are collected, so that one run shows all of them; after MAX_ERRORS it stops.
+Errors are collected, so that one run reports all of them; the assembly stops after MAX_ERRORS.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ DEVICE_SYMBOLS = (
     "__HAS_5VOLTS",
     "__C30ELF",
 )
-"""Absolute symbols of value 1 that are always defined, beside the part's own name (abi-elf.md §4.3)."""
+"""Absolute symbols of value 1 that are always defined, in addition to the name of the chip (abi-elf.md §4.3)."""
 
 
 def device_symbols(chip: Chip) -> tuple[str, ...]:
@@ -51,7 +51,7 @@ class Options:
     include: list[str] = field(default_factory=list)
     define: dict[str, int] = field(default_factory=dict)
     relax: bool = False
-    compiled: bool = False  # `file` is what the text was compiled from: its lines are those of markers alone
+    compiled: bool = False  # `file` is the source of the compiler; only line markers set line numbers
     debug: bool = False
     chip: Chip = field(default_factory=chip_named)
     prefix_map: list[tuple[str, str]] = field(default_factory=list)
@@ -73,19 +73,19 @@ class Assembler:
         self.conditionals = Conditionals()
         self.source.on_end = self._frame_ended
         self.symbols: dict[str, AsmSymbol] = {}
-        self.registers: dict[str, str] = {}  # names that equates gave to working registers
-        self.declared: set[str] = set()  # by .extern
+        self.registers: dict[str, str] = {}  # working register by the name that .equ or .set defines for it
+        self.declared: set[str] = set()  # symbols declared by .extern
         self.macros: dict[str, Macro] = {}
-        self.serial = 0  # number of macro expansions so far, `\@`
+        self.serial = 0  # number of macro expansions so far, the value of `\@`
         self.findings: list[str] = []
-        self.messages: list[str] = []  # of .print and warnings, for the caller to show
+        self.messages: list[str] = []  # text of .print and warnings, which the caller prints
         self.sections: dict[str, AsmSection] = {}
         self.section_stack: list[tuple[AsmSection, AsmSection]] = []
         self.numeric: dict[str, int] = {}
         self.anonymous = 0
-        self.after_repeat = ""  # mnemonic REPEAT when the previous instruction was one
+        self.after_repeat = ""  # "REPEAT" or its suffixed form if the previous instruction is one, else ""
         self.file_name = ""
-        self.label = ""  # the last one defined, for messages
+        self.label = ""  # last label defined, for messages
         self.line_rows: list[tuple[Label, SourceLocation]] = []
         self.ended = False
         place = SourceLocation(file, 0)
@@ -106,14 +106,14 @@ class Assembler:
     # -- errors ------------------------------------------------------------------------------------------------
 
     def error(self, message: str, place: SourceLocation | None = None) -> None:
-        """Record a finding at `place`, by default the current line; stop when there are too many."""
+        """Record an error at `place`, by default the current line; stop the assembly if there are too many."""
         self.findings.append(f"{place or self.source.place}: error: {message}")
         if len(self.findings) >= MAX_ERRORS:
             self.findings.append(f"{self.source.place.file}: error: more than {MAX_ERRORS} errors, giving up")
             raise ToolError.of(self.findings)
 
     def warn(self, message: str) -> None:
-        """Record a warning with the current line; the caller prints it."""
+        """Record a warning at the current line; the caller prints it."""
         self.messages.append(f"{self.source.place}: warning: {message}")
 
     # -- symbols and expressions ---------------------------------------------------------------------------------
@@ -159,14 +159,14 @@ class Assembler:
         return expr.resolve(expr.evaluate(tree, self.lookup, self.here), final=False)
 
     def constant(self, text: str, what: str = "expression") -> int:
-        """Return the value of `text`, which must be a number at this point; raises `ExprError`."""
+        """Return the value of `text`; raise `ExprError` if it is not yet a number."""
         value = self.evaluate(text)
         if not isinstance(value, int):
             raise ExprError(f"{what} {text.strip()!r} must be a constant at this point")
         return value
 
     def location(self, text: str) -> int:
-        """Return the location in the current section that `text` denotes: a number, or a label of it plus a number."""
+        """Return the location in the current section that `text` denotes: a number, or a label plus a number."""
         value = self.evaluate(text)
         if isinstance(value, int):
             return value
@@ -190,7 +190,7 @@ class Assembler:
         self.label = name
 
     def assign(self, name: str, text: str, once: bool = False) -> None:
-        """Set `name` to the value of `text` (.set, .equ, =; `once` for .equiv), which may be a working register."""
+        """Assign the value of `text`, possibly a working register, to `name` (.set, .equ, =; `once`: .equiv)."""
         symbol = self.symbols.get(name)
         known = name in self.registers or (symbol is not None and symbol.place is not None)
         if (once and known) or (symbol is not None and isinstance(symbol.place, Label)):
@@ -215,7 +215,7 @@ class Assembler:
         return _WORD.sub(lambda word: self.registers.get(word[0], word[0]), operands)
 
     def find_file(self, name: str) -> str:
-        """Return the path of an included file: beside the including file, then the current folder, then each -I.
+        """Return the path of an include file, found in the folder of the including file, the current or an -I folder.
 
         If no file has that name, backslashes in it separate folders.
         """

@@ -1,7 +1,7 @@
 """Symbols, locations and values of expressions while a file is being assembled.
 
 The value of an expression is an `int`, a `SymbolValue` (symbol - symbol + offset under an optional operator), or a
-`PendingOperation` whose operands become numbers only when all labels have their location.
+`PendingOperation` whose operands become numbers when all labels have their final location.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from toolchain.errors import SourceLocation
 
 
 class LabelledSection:
-    """What a label needs to know about its section; `sections.AsmSection` holds the content."""
+    """Section of a label, without content; `sections.AsmSection` adds the content."""
 
     name: str
     flags: int
@@ -23,10 +23,10 @@ class LabelledSection:
 
 @dataclass(slots=True, eq=False)
 class Frag:
-    """A fragment of a section with fixed inner distances; a call that --relax may shorten ends it."""
+    """A fragment of a section with fixed distances within it; it ends at a call that --relax may shorten."""
 
     section: LabelledSection
-    start: int = 0  # address units from the section start; final once relaxation has ended
+    start: int = 0  # address units from the section start; final after relaxation
 
 
 @dataclass(slots=True, eq=False)

@@ -18,9 +18,9 @@ MAX_RECURSION: Final = 60
 MAX_CALL_DEPTH: Final = 8 * MAX_RECURSION
 """Greatest depth of the abstract call stack."""
 RESULTS: Final = frozenset((0, 1))
-"""Values of W0 at a return for which separate return states are kept."""
+"""Values of W0 (0 and 1) at a return for which separate return states are kept."""
 MAX_TEST_BLOCK: Final = 6
-"""Greatest length of a block after a call that tests such a result."""
+"""Greatest number of instructions of a block that tests such a result after a call."""
 
 
 class CallExecution(InstructionExecution):
@@ -28,7 +28,7 @@ class CallExecution(InstructionExecution):
 
     @abstractmethod
     def _arrive(self, target: int, state: AbstractState) -> None:
-        """Continue at a block with a state."""
+        """Continue the execution in a state at the block `target`."""
 
     @abstractmethod
     def _block(self, block: BasicBlock, state: AbstractState) -> None:
@@ -84,7 +84,7 @@ class CallExecution(InstructionExecution):
         explorer = self.explorer
         if target in explorer.flow_facts.excluded or explorer.flow_facts.is_never_called(last.pc, target):
             return
-        if target == 0:  # a weak function that is not linked
+        if target == 0:  # an undefined weak function
             if not tail:
                 state.w[15] = state.w[15] - 4 & 0xFFFF
                 self._arrive(last.after, state)
@@ -154,7 +154,7 @@ class CallExecution(InstructionExecution):
         return new
 
     def _tests_result(self, head: int) -> bool:
-        """Whether a block only tests a result: the return states of a call are kept separate until then."""
+        """Whether a block only tests the result of a call; until then, the call's return states are kept separate."""
         block = self.code.blocks[head]
         short = len(block.steps) <= MAX_TEST_BLOCK and block.steps[-1].flow in (Branch, Skip)
         return short and head not in self.code.heads
@@ -182,7 +182,7 @@ class CallExecution(InstructionExecution):
             if not self.explorer.flow_facts.switches_stack(self.code.entry):
                 self.result.unbounded[self.code.entry] = UNKNOWN_RETURN
             self._record_stack_switch(state)
-            state.ipl, state.disi_end = (0, 0), 0  # masking ends for this stack, whatever the new priority is
+            state.ipl, state.disi_end = (0, 0), 0  # masking ends for this stack, independent of the new priority
             self._update_masking(state, self.code.entry)
             return
         self._record_return(state)

@@ -17,20 +17,20 @@ from toolchain.bounds.result import FunctionResult, Scope
 from toolchain.bounds.transfer import ImageModel, TransferFunctions, is_constant
 
 MAX_CONTEXTS: Final = 8
-"""Calling contexts of one function that are analysed separately."""
+"""Maximum number of calling contexts of one function that are analysed separately."""
 MAX_EXPOSED_CONTEXTS: Final = 40
-"""The same while the callee may reach its caller's frame; the general context makes the frame's contents unknown."""
+"""The same for callees that may access the caller's frame, whose contents the general context makes unknown."""
 CALLER_FRAME_BYTES: Final = 64
 """Bytes below the callee's frame that the general context reserves for accesses to the caller's frame."""
 FIRST_RAM_ADDRESS: Final = SFR_END
-"""Values below it are numbers, not RAM addresses."""
+"""First RAM address; smaller values are taken as numbers."""
 
 
 class CallContexts(ABC):
     """Results of the functions of one image by calling context; `execute` is the analysis of one function."""
 
     def __init__(self, model: ImageModel, graph: GraphBuilder, flow_facts: FlowFacts, sharing: bool = False) -> None:
-        """`sharing`: results exclude iterations that loops share and list them in `shared_iterations`."""
+        """Prepare the analysis; `sharing`: results list iterations that loops share in `shared_iterations`."""
         self.model, self.graph, self.flow_facts, self.sharing = model, graph, flow_facts, sharing
         self.transfer: Final = TransferFunctions(model)
         self.codes: Final[dict[int, FunctionGraph]] = {}
@@ -110,7 +110,7 @@ class CallContexts(ABC):
         """
         key = self._key(entry, state)
         if entry in self.call_stack:
-            return self.run(entry, state), False  # its arguments end a recursion
+            return self.run(entry, state), False  # the recursion ends by its arguments, so the context must be kept
         exposed = state.lowest_leak < NO_ADDRESS or any(map(self.model.stack_areas.points_into, state.w[:8]))
         if (
             not is_constant(state.w[15])

@@ -2,8 +2,8 @@
 and infeasible paths for WCET analysis using abstract execution", 2006).
 
 States are joined where paths meet, and the join takes the greater time: the time at a return is the worst case.
-Loops are executed iteration by iteration.  This finds iteration counts that follow from constants, and it skips
-infeasible branches and calls.  A loop whose state repeats runs for as many iterations as its annotation allows.
+Loops are executed iteration by iteration.  This derives iteration counts from constants and excludes infeasible
+branches and calls.  A loop whose state repeats runs for as many iterations as its annotation allows.
 """
 
 from __future__ import annotations
@@ -30,10 +30,10 @@ from toolchain.stack.effects import CALL_BYTES
 
 MAX_ITERATIONS: Final = 5_000
 NONTERMINATING_ITERATIONS: Final = 6
-"""Iterations of a loop that did not terminate in an earlier execution."""
+"""Maximum number of iterations executed of a loop that did not terminate in an earlier execution."""
 MAX_STEPS: Final = 60_000
 MAX_RETURN_BLOCK: Final = 12
-"""Greatest length of a returning block that is executed once per incoming path."""
+"""Greatest number of instructions of a returning block that is executed once per incoming path."""
 
 
 class BudgetExceededError(Exception):

@@ -48,7 +48,7 @@ class Loop:
     body: list[OrderElement]
     members: set[int]
     heads: set[int] = field(default_factory=set)
-    """Where iterations begin: the head, and the heads of inner loops merged with this one."""
+    """Starts of iterations: the head, and the heads of inner loops merged with this one."""
 
 
 OrderElement = int | Loop

@@ -18,12 +18,12 @@ from toolchain.stack.effects import CALL_BYTES
 
 TRAP_LEVEL = 8
 LATENCY = 5
-"""Least cycles from a request to the handler's first instruction: 4, and one more after an instruction of three cycles
-(isa.md §14.3)."""
+"""Minimum of the worst-case latency in cycles from a request to the handler's first instruction: 4, and one more if the
+interrupted instruction takes three cycles (isa.md §14.3)."""
 ENTRY = 2
 """Cycles of interrupt entry in addition to the instruction in whose first cycle the request occurs."""
 MOST_ORDERS = 12
-"""Greatest number of interrupts whose nesting orders are enumerated; above it, all are assumed to nest."""
+"""Greatest number of interrupts whose nesting orders are enumerated; with more, all are assumed to nest."""
 START = "_main"
 
 
@@ -51,16 +51,16 @@ class BoundsReport:
     on_second_stack: list[Bound]
     """The same interrupts, entered on the second stack (STACK_AREA)."""
     main: Bound | None = None
-    """Bound of main, which runs before threads or without them; present whatever functions were requested."""
+    """Bound of main, which runs before threads or without them; computed for every report."""
     responses: list[Response] = field(default_factory=list)
     stacks: dict[str, int | None] = field(default_factory=dict)
     """Bytes by stack: main and each thread under nested interrupts, and the second stack."""
     contradictions: dict[str, str] = field(default_factory=dict)
-    """Why no response and no stack under interrupts is known: source line -> contradiction to an annotated level."""
+    """Reasons why responses and stacks are unknown: source line -> contradiction to an annotated level."""
 
     @property
     def unbounded_responses(self) -> dict[str, str]:
-        """Why responses have no bound: source line -> endless masking, or a stopped clock."""
+        """Return the reasons why responses have no bound: source line -> endless masking, or a stopped clock."""
         rows = [row for row in self.rows if row.masked_for_ever and row.level < TRAP_LEVEL]
         highest: dict[str, int] = {}
         for row in rows:

@@ -28,17 +28,17 @@ UNUSED = "__DefaultInterrupt"
 RESET_LEVEL = 4
 """Priority of every interrupt after a reset (isa.md §2.1)."""
 PYTHON_DEPTH = 20_000
-"""Recursion limit of Python, for deep calls in the firmware."""
+"""Recursion limit of Python; the analysis recurses with the calls of the firmware."""
 
 
 def _neighbour_file(annotation: Annotation) -> str:
-    """Return the path of the file that an annotation names in its own folder, or its own file without a name."""
+    """Return the path of the file that an annotation names, relative to its own file; without a name, its own file."""
     name = annotation.text[1:].strip()
     return annotation.file.rpartition("/")[0] + "/" + name if name else annotation.file
 
 
 class Program:
-    """Facts of an image, and the answers of its annotations to the queries of `FlowFacts`."""
+    """Facts of an image, and its annotations as implementations of the queries of `FlowFacts`."""
 
     def __init__(
         self,
@@ -81,7 +81,7 @@ class Program:
         found: dict[int, int] = {}
         for section in sections:
             base = WINDOW | section.address & PAGE - 1
-            low = (octet for i, octet in enumerate(section.data) if not i & 2)  # PSV shows the low 16 bits of a word
+            low = (octet for i, octet in enumerate(section.data) if not i & 2)  # PSV maps the low 16 bits of words
             found.update(enumerate(low, base))
         return found
 

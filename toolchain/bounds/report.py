@@ -21,7 +21,7 @@ from toolchain.stack.effects import CALL_BYTES
 
 RAM = (0x0800, 0x2800)
 STACK_END = 0x8000
-"""End of the stack area that functions are analysed on: above all RAM, so that no stack overflows."""
+"""End of the stack area in the analysis: above all RAM, so that no analysed stack overflows."""
 
 
 @dataclass(slots=True)
@@ -47,18 +47,18 @@ class Bound:
     """Code without a bound: source line -> reason."""
     is_endless: bool = False
     masked_for_ever: dict[int, str] = field(default_factory=dict)
-    """By level: the endless loop that masks it."""
+    """By level: the endless loop that masks interrupts of that level."""
     disi_after_return: int = 0
     """Cycles for which DISI still blocks interrupts after the return."""
     returns: bool = False
     longest_instruction: int = 0
     """Cycles of the longest instruction."""
     clock_stopped_at: str = ""
-    """Where the code stops the clock."""
+    """Source line that stops the clock, "" if none does."""
     nesting_disabled_at: str = ""
-    """Where the code disables interrupt nesting."""
+    """Source line that disables interrupt nesting, "" if none does."""
     priority_changes: dict[str, str] = field(default_factory=dict)
-    """Where the code sets a priority that contradicts an annotation: source line -> interrupt."""
+    """Source lines that set a priority that contradicts an annotation: source line -> interrupt."""
 
     @property
     def stack_is_known(self) -> bool:
@@ -67,7 +67,7 @@ class Bound:
 
     @property
     def bytes(self) -> int:
-        """Greatest depth in bytes of the stack it was entered on."""
+        """Greatest depth in bytes of the stack on which the entry is called."""
         return max(self.stack.values(), default=0)
 
 

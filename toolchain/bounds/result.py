@@ -29,25 +29,25 @@ class FunctionResult:
     switch_time: int | None = None
     """Longest time to a switch to another stack, None without one."""
     unknown_store: bool = False
-    """Whether it stores through an unknown address."""
+    """Whether the function stores through an unknown address."""
     reads_caller_stack: bool = False
-    """Whether it reads its caller's part of the stack."""
+    """Whether the function reads its caller's part of the stack."""
     visited: set[int] = field(default_factory=set)
     """Functions executed."""
     waits: set[int] = field(default_factory=set)
-    """PWRSAV on paths to a stack switch; PWRSAV on paths to a return is in the return states."""
+    """Addresses of PWRSAV on paths to a stack switch; those on paths to a return are in the return states."""
     clock_stops: set[int] = field(default_factory=set)
-    """PWRSAV #0 on any path: it stops the clock."""
+    """Addresses of PWRSAV #0 on any path, which stops the clock."""
     masked_for_ever: dict[int, int] = field(default_factory=dict)
     """Levels masked for ever: level -> head of the endless loop."""
     longest_instruction: int = 0
     """Greatest number of cycles between two instruction boundaries."""
     nesting_disabled: set[int] = field(default_factory=set)
-    """Where interrupt nesting is disabled (INTCON1.NSTDIS)."""
+    """Addresses of instructions that disable interrupt nesting (INTCON1.NSTDIS)."""
     priority_changes: dict[int, str] = field(default_factory=dict)
-    """Where a priority is set that contradicts an annotation: address -> interrupt."""
+    """Addresses of instructions that set a priority that contradicts an annotation: address -> interrupt."""
     shared_iterations: dict[Scope, tuple[int, int]] = field(default_factory=dict)
-    """Shared iterations that its times exclude, by scope: cost of the longest, and their number."""
+    """Shared iterations that the times exclude, by scope: cycles of the longest one, and their number."""
 
     def exclude_iteration(self, scope: Scope, total: int, cycles: int) -> None:
         """Exclude one iteration from the times and record it in its scope.

@@ -21,7 +21,7 @@ DO_LEVELS: Final = 2
 REPEATED_WINDOW: Final = 4
 """Additional cycles of PSV window reads over all iterations of a REPEAT (isa.md §13.3)."""
 REPEATS: Final = 600
-"""Iterations of REPEAT that are executed one by one; of further ones only the number counts."""
+"""Maximum number of iterations of REPEAT that are executed one by one; with more, only the cycles are counted."""
 
 
 class InstructionExecution:
@@ -50,7 +50,7 @@ class InstructionExecution:
             self.result.unknown_store, transfer.unknown_store = True, False
         self._record_effects(step)
         if self.code.has_frame and is_constant(top) and not is_constant(state.w[15]):
-            self.result.unbounded[step.pc] = VARIABLE_FRAME  # functions that switch stacks have no frame
+            self.result.unbounded[step.pc] = VARIABLE_FRAME  # only functions without frame switch stacks
         self._record_stack_depth(state)
         match flow:
             case Repeat(count):
@@ -72,7 +72,7 @@ class InstructionExecution:
         return flow
 
     def _repeated(self, step: Instruction, state: AbstractState) -> Flow:
-        """Execute the target of REPEAT; PSV window reads cost in its first and last iteration (isa.md §7.5, §13.3)."""
+        """Execute the target of REPEAT; PSV reads stall in its first and last iteration (isa.md §7.5, §13.3)."""
         transfer, count = self.explorer.transfer, state.repeat
         state.repeat = None
         least, most = extremes(count)
@@ -112,7 +112,7 @@ class InstructionExecution:
         return None
 
     def _long_repeat(self, step: Instruction, state: AbstractState, most: int) -> AbstractState:
-        """Return the state after a REPEAT of more than REPEATS iterations: what it changes becomes unknown."""
+        """Return the state after a REPEAT of more than REPEATS iterations: changed values become unknown."""
         before = state.copy()
         transfer = self.explorer.transfer
         for _ in range(2):
@@ -141,7 +141,7 @@ class InstructionExecution:
             self.result.priority_changes[step.pc] = transfer.priority_change
             transfer.priority_change = None
 
-    # -- what is measured ----------------------------------------------------------------------------------------
+    # -- measurements ------------------------------------------------------------------------------------------
 
     def _record_stack_depth(self, state: AbstractState) -> None:
         top = state.w[15]

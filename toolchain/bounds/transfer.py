@@ -49,7 +49,7 @@ ENABLES = {register("MODCON"): 0xC000, register("XBREV"): 0x8000}
 EDT = 1 << 11
 """Bit of CORCON that ends a DO loop early (isa.md §7.6)."""
 IPL3 = TRAP = 8
-"""Bit of CORCON that a trap sets and code can only clear, and what it adds to the priority (isa.md §2.4)."""
+"""Bit of CORCON that a trap sets and code can only clear; it adds 8 to the CPU priority (isa.md §2.4)."""
 STACK = 15
 """W15; an unknown W15 is assumed to address RAM."""
 MAX_TABLE = 64
@@ -66,7 +66,7 @@ class ImageModel:
     program_words: dict[int, int]
     """24-bit words by program address."""
     psv_bytes: dict[int, int] | None
-    """Bytes of the PSV window by data address; None if the image has no constants, so that no pointer points there."""
+    """Bytes of the PSV window by data address; None if the image has no constants: no pointer points into it."""
     tracked_words: set[int] = field(default_factory=set)
     """Word addresses of tracked variables: only the analysed code changes them."""
     pointers_in_ram: Callable[[int], bool] = lambda _pc: False
@@ -101,7 +101,7 @@ class TransferFunctions:
         self.unknown_store = False
         """Whether a store through an unknown address has been executed."""
         self.unbounded_reason: str | None = None
-        """Why the instruction has no bound, None if it has one."""
+        """Reason why the instruction has no bound, None if it has one."""
         self.lowest_stack_read = NO_ADDRESS
         """Lowest stack address that the instruction has read."""
         self.overwrote_registers = False
@@ -329,7 +329,7 @@ class TransferFunctions:
             if area.points_into(value) and state.w[15] is not value:
                 state.lowest_leak = min(state.lowest_leak, extremes(value)[0])
             return
-        if area.points_into(value) and state.w[15] is not value:  # the top of the stack holds no data
+        if area.points_into(value) and state.w[15] is not value:  # not W15 itself: above it the stack holds no data
             state.lowest_leak = min(state.lowest_leak, extremes(value)[0])
         if not is_unknown_address(ea):
             low, high = extremes(ea)
@@ -356,7 +356,7 @@ class TransferFunctions:
     def _control(self, ea: int, value: Value, size: Size) -> None:
         """Store to a register that controls DO loops, interrupts or addressing modes.
 
-        An unknown value is assumed to be one that was read from the register before: EDT is 0, addressing is unchanged.
+        An unknown value is assumed to restore one read before: EDT is 0, addressing modes are unchanged.
         """
         shift = 8 * (ea & 1) if size == 1 else 0
         register, (mask, bits) = ea & ~1, known_bits(value)

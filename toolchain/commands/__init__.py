@@ -1,1 +1,1 @@
-"""The sub-commands of `python -m toolchain` but for `cc`, one module each with `main(arguments) -> exit status`."""
+"""The sub-commands of `python -m toolchain` except `cc`, one module each with `main(arguments) -> exit status`."""

@@ -1,4 +1,4 @@
-"""`ar`: static libraries."""
+"""Command `ar`: create, list and extract static libraries."""
 
 from __future__ import annotations
 

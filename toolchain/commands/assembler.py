@@ -1,4 +1,4 @@
-"""`as`: one assembly source to one object."""
+"""Command `as`: assemble one source to one object."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def options_of() -> argparse.ArgumentParser:
 
 
 def main(arguments: list[str]) -> int:
-    """Assemble; returns 0.  Raises `ToolError` with every finding."""
+    """Assemble a source; return 0.  Raise `ToolError` with all errors."""
     options = options_of().parse_args(arguments)
     chip = device(options.part)
     name, text = "<stdin>" if is_standard(options.source) else options.source, read_text(options.source)

@@ -1,4 +1,4 @@
-"""`bounds`: worst-case execution time, stack, interrupt masking and interrupt response."""
+"""Command `bounds`: worst-case execution time, stack, interrupt masking and interrupt response."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def options_of() -> argparse.ArgumentParser:
 
 
 def main(arguments: list[str]) -> int:
-    """Print the report; returns 0, or 1 when a --limit is exceeded or there is no bound to compare."""
+    """Print the report; return 0, or 1 if a --limit is exceeded or there is no bound to compare."""
     options = options_of().parse_args(arguments)
     file = options.annotations
     stack_annotations = read_annotations(read_text(file), file) if file else Annotations()

@@ -1,4 +1,4 @@
-"""`completion`: shell completion scripts for the commands and their options."""
+"""Command `completion`: shell completion scripts for the commands and their options."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def options_of() -> argparse.ArgumentParser:
 
 
 def main(arguments: list[str]) -> int:
-    """Print the script; returns 0."""
+    """Print the script; return 0."""
     from toolchain.cli import COMMANDS
 
     options = options_of().parse_args(arguments)
@@ -30,7 +30,7 @@ def main(arguments: list[str]) -> int:
 
 
 def _compiler() -> argparse.ArgumentParser:
-    """Return a parser with the compiler's options from its help text; the compiler itself parses them as gcc does."""
+    """Return a parser with the options in the compiler's help text; the compiler has its own gcc-like parser."""
     from toolchain.frontend.options import HELP
 
     made = argparse.ArgumentParser(add_help=False)

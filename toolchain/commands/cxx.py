@@ -1,4 +1,4 @@
-"""`c++`: the driver with .c and .h files compiled as C++."""
+"""Command `c++`: the compiler driver, with .c and .h files compiled as C++."""
 
 from __future__ import annotations
 

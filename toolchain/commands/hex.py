@@ -1,4 +1,4 @@
-"""`hex`: ELF executable to Intel HEX."""
+"""Command `hex`: convert an ELF executable to Intel HEX."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def options_of() -> argparse.ArgumentParser:
 
 
 def main(arguments: list[str]) -> int:
-    """Convert; returns 0."""
+    """Convert the file; return 0."""
     options = options_of().parse_args(arguments)
     image = read_executable(read_bytes(options.image), options.image)
     write_outputs([(options.output or Path(options.image).with_suffix(".hex"), hex_text(image).encode())])

@@ -1,4 +1,4 @@
-"""`ld`: objects and libraries to an executable."""
+"""Command `ld`: link objects and libraries to an executable."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from toolchain.link.command import add_options, link_files, link_options, output
 
 
 def find_library(name: str, folders: list[str]) -> Path:
-    """Return the path of -lNAME; raise `ToolError` when no -L folder has it."""
+    """Return the path of the library for -lNAME; raise `ToolError` if no -L folder contains it."""
     for folder in folders:
         path = Path(folder) / f"lib{name}.a"
         if path.is_file():
@@ -38,7 +38,7 @@ def options_of() -> argparse.ArgumentParser:
 
 
 def main(arguments: list[str]) -> int:
-    """Link; returns 0.  Raises `ToolError` with every finding."""
+    """Link the files; return 0.  Raise `ToolError` with all errors."""
     options = options_of().parse_args(arguments)
     names = [*options.inputs, *(str(find_library(n, options.folders)) for n in options.libraries)]
     if not names:

@@ -1,4 +1,4 @@
-"""`nm`: the symbol table."""
+"""Command `nm`: print the symbol table."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from toolchain.files import read_bytes
 
 
 def letter(symbol: Symbol) -> str:
-    """Return nm's class letter, upper case when global."""
+    """Return nm's class letter of a symbol, in upper case if the symbol is global."""
     if symbol.home is Home.UNDEFINED:
         return "w" if symbol.bind is Bind.WEAK else "U"
     if symbol.home is Home.COMMON:
@@ -50,7 +50,7 @@ def options_of() -> argparse.ArgumentParser:
 
 
 def main(arguments: list[str]) -> int:
-    """Print the symbols; returns 0."""
+    """Print the symbols; return 0."""
     options = options_of().parse_args(arguments)
     listing = {name: _rows(name, options.all) for name in options.files}
     for name, rows in listing.items():

@@ -1,4 +1,4 @@
-"""`objdump`: contents of an object or executable."""
+"""Command `objdump`: print the contents of an object or executable."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def options_of() -> argparse.ArgumentParser:
         "objdump",
         "Show parts of an object or executable.",
         "python -m toolchain objdump -S firmware.elf",
-        help_switches=("--help",),  # -h means headers, as in every objdump
+        help_switches=("--help",),  # -h prints section headers, as in GNU objdump
     )
     p.add_argument("files", nargs="+", metavar="FILE")
     p.add_argument("-d", "--disassemble", action="store_true", help="instructions of code sections")
@@ -134,7 +134,7 @@ def _range(image: ObjectFile | Executable, start: str | None) -> tuple[int, int]
 def _print_item(
     section: Section, item: CodeItem, names: Names, lines: LineTable, text: SourceText, previous: str, relocs: bool
 ) -> str:
-    """Print one item with label, source and relocations; return the source line it belongs to."""
+    """Print one instruction with its label, source and relocations; return its source line."""
     symbol = names.at["code"].get(item.address)
     if symbol is not None:
         print(f"\n{item.address:08x} <{symbol.name}>:")

@@ -1,4 +1,4 @@
-"""Argument parser of the sub-commands: description as written, an example, usage errors with status 2."""
+"""Argument parser of the sub-commands: unwrapped description, an example, exit status 2 for usage errors."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pathlib import Path
 def parser(
     command: str, description: str, example: str, help_switches: tuple[str, ...] = ("-h", "--help")
 ) -> argparse.ArgumentParser:
-    """Return an empty parser for `python -m toolchain COMMAND`, or for the program `dspic-COMMAND` if that runs."""
+    """Return an empty parser for `python -m toolchain COMMAND`, or for `dspic-COMMAND` if that program is running."""
     called = Path(sys.argv[0]).stem
     result = argparse.ArgumentParser(
         prog=called if called.startswith("dspic-") else f"python -m toolchain {command}",

@@ -1,4 +1,4 @@
-"""`prove`: proof that machine code implements the optimised IR."""
+"""Command `prove`: proof that machine code implements the optimised IR."""
 
 from __future__ import annotations
 

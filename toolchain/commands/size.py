@@ -1,4 +1,4 @@
-"""`size`: flash and RAM use of objects and executables."""
+"""Command `size`: flash and RAM use of objects and executables."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def options_of() -> argparse.ArgumentParser:
 
 
 def main(arguments: list[str]) -> int:
-    """Print a table, or JSON; returns 0."""
+    """Print a table or JSON; return 0."""
     options = options_of().parse_args(arguments)
     rows: dict[str, dict[str, int]] = {}
     detail: dict[str, list[Section]] = {}

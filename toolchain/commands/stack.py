@@ -1,4 +1,4 @@
-"""`stack`: worst-case stack use."""
+"""Command `stack`: worst-case stack use."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def options_of() -> argparse.ArgumentParser:
 
 
 def main(arguments: list[str]) -> int:
-    """Print the report; returns 0, or 1 when a --limit is exceeded or cannot be proved."""
+    """Print the report; return 0, or 1 if a --limit is exceeded or cannot be proved."""
     options = options_of().parse_args(arguments)
     file = options.annotations
     annotations = read_annotations(read_text(file), file) if file else Annotations()

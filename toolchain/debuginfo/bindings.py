@@ -1,7 +1,7 @@
-"""The debug record that is valid for each source variable at each instruction, by forward data flow.
+"""Data flow of debug records: the record that is valid for each source variable at each instruction.
 
-Needs: IR as read. Ensures: the `line` of every instruction with one is a `BoundLine`, which passes copy like any other
-line. If two paths into a block disagree, the variable has no record there.
+Needs: IR as parsed. Ensures: every `line` of an instruction is a `BoundLine`, which passes copy like any other line. If
+two paths into a block have different records of a variable, no record of it is valid there.
 """
 
 from __future__ import annotations
@@ -11,9 +11,9 @@ from toolchain.ir.cfg import predecessors
 from toolchain.ir.model import Arg, Block, ConstInt, DbgRecord, Function, Instr, Type, size_of
 
 ValidRecords = dict[str, int]
-"""Variable (`name_of`) -> index of its record."""
+"""Index of the valid record of each variable, by `name_of`."""
 
-MAX_ROUNDS = 50  # of the data flow; a function that needs more gets no locations
+MAX_ROUNDS = 50  # maximum number of rounds of the data flow; a function that needs more gets no locations
 
 
 class BoundLine(str):
@@ -23,15 +23,15 @@ class BoundLine(str):
 
 
 def bind(f: Function, info: DebugMetadata) -> None:
-    """Bind the lines of `f` to records. Assignment records become values, or memory if that contains the value."""
+    """Bind the lines of `f` to records. Assignment records become memory locations if memory has the value."""
     for k, home in in_memory(f, info).items():
         f.dbg_records[k].kind, f.dbg_records[k].value = "memory", home
     for record in f.dbg_records:
-        if record.kind == "dbg_declare" and isinstance(record.value, Arg):  # a struct, possibly in registers
+        if record.kind == "dbg_declare" and isinstance(record.value, Arg):  # a struct parameter, possibly in registers
             record.kind = "parameter"
         if record.kind == "dbg_assign":
             record.kind = "dbg_value"
-            if isinstance(record.address, Instr):  # stored to memory that other code may change
+            if isinstance(record.address, Instr):  # the value is in memory, which other code may change
                 record.value = None
         record.variable = name_of(record, info)
     if not any(record.kind != "dbg_declare" for record in f.dbg_records):
@@ -57,7 +57,7 @@ def bind(f: Function, info: DebugMetadata) -> None:
 
 
 class _RecordFlow:
-    """Records of a function by block, and the effect of each on the valid records."""
+    """Records of a function by block, and the effect of each record on the set of valid records."""
 
     def __init__(self, f: Function) -> None:
         self.records = f.dbg_records
@@ -68,10 +68,10 @@ class _RecordFlow:
         self.sunk = self._sunk()
 
     def _sunk(self) -> dict[int, set[int]]:
-        """Record of a value that the middle end has moved down -> the records that it replaces.
+        """The records that each record of a moved value replaces; the middle end has moved the value to a later place.
 
-        The middle end moves the record with the value, even past a later assignment to the variable, and leaves a
-        record that computes the value from its operands. The moved record is valid only where that record is.
+        The middle end moves a record with its value, even past a later assignment to the variable. At the old place it
+        leaves a record that computes the value from operands. The moved record is valid only where that one is.
         """
         by_variable: dict[str, list[int]] = {}
         for k, record in enumerate(self.records):
@@ -88,7 +88,7 @@ class _RecordFlow:
         return found
 
     def apply(self, k: int, known: ValidRecords) -> None:
-        """Change the valid records to those behind record `k`."""
+        """Update the valid records by record `k`."""
         name = self.records[k].variable
         if k in self.sunk and known.get(name) not in {k, *self.sunk[k]}:
             known.pop(name, None)
@@ -113,7 +113,7 @@ class _RecordFlow:
 
 
 def name_of(record: DbgRecord, info: DebugMetadata) -> str:
-    """Reference of the variable, followed by that of the call at which its function was inlined."""
+    """Key of a variable: its metadata reference, followed by that of the call at which its function was inlined."""
     call = info.node(record.location).get("inlinedAt", "") if record.location else ""
     return f"{record.variable}{call}"
 
@@ -127,9 +127,9 @@ def _meet(incoming: list[ValidRecords]) -> ValidRecords:
 
 
 def in_memory(f: Function, info: DebugMetadata) -> dict[int, Instr]:
-    """Index of every assignment record behind which the whole variable is in memory -> its alloca.
+    """By index of an assignment record after which the whole variable is in memory: the alloca of the variable.
 
-    The store linked to the record precedes it, or the object has not been written yet. Variables with a part in
+    The store linked to the record precedes it, or the object has not been written yet. Variables that are partly in
     registers are excluded.
     """
     found: dict[int, Instr] = {}
@@ -154,13 +154,13 @@ def in_memory(f: Function, info: DebugMetadata) -> dict[int, Instr]:
 
 
 def _is_whole(home: Instr, record: DbgRecord, info: DebugMetadata) -> bool:
-    """Whether an object has the size of the variable, so that it is not a part of a split one."""
+    """Whether an object has the size of the variable, so that it is not one part of a split variable."""
     t = home.extra.get("type")
     return isinstance(t, Type) and 8 * size_of(t) == info.bits(info.node(record.variable).get("type", ""))
 
 
 def constants(f: Function) -> dict[str, bytes]:
-    """Variables (`name_of`) with the same constant value in all their records."""
+    """Constant value of each variable (`name_of`) whose records all have that value."""
     found: dict[str, set[bytes | None]] = {}
     for record in f.dbg_records:
         v = record.value
@@ -170,7 +170,7 @@ def constants(f: Function) -> dict[str, bytes]:
 
 
 def bytes_of(v: ConstInt) -> bytes:
-    """Bytes of a constant in memory."""
+    """Bytes of a constant as they are in memory."""
     return v.value.to_bytes((v.type.bits + 7) // 8, "little")
 
 

@@ -16,16 +16,16 @@ from toolchain.mir.mir import MI, Mem, MFunction
 from toolchain.verify.stack import stack_change
 
 RETURN_BYTES = 4
-RCOUNT, RETURN_ADDRESS = 16, 37  # DWARF register numbers beside W0-W15 (abi-elf.md §6.7)
+RCOUNT, RETURN_ADDRESS = 16, 37  # DWARF register numbers other than those of W0-W15 (abi-elf.md §6.7)
 DATA_ALIGN = 2
 SCRATCH = range(8)  # W0-W7, which a function need not preserve (abi-elf.md §2.1)
-SHADOWED = range(4)  # PUSH.S
+SHADOWED = range(4)  # W0-W3, which PUSH.S saves in shadow registers
 ADVANCE_LOC4, UNDEFINED, DEF_CFA, DEF_CFA_REGISTER = "0x04", "0x07", "0x0c", "0x0d"  # DWARF 2 §7.23
 DEF_CFA_EXPRESSION, DEF_CFA_OFFSET_SF, VAL_EXPRESSION = "0x0f", "0x13", "0x16"  # DWARF 3 §7.23
 OFFSET, RESTORE = 0x80, 0xC0
 OP_DEREF, OP_CONST4U, OP_DUP, OP_AND, OP_PLUS = "0x06", "0x0c", "0x12", "0x1a", "0x22"
 OP_BREG_SP, OP_BREG_RCOUNT = str(0x70 + SP), str(0x70 + RCOUNT)
-STACKED_PC = ("0xfe", "0xff", "0x7f", "0")  # mask; the other bits of the upper word are SRL and IPL3 (isa.md §14.2)
+STACKED_PC = ("0xfe", "0xff", "0x7f", "0")  # mask; other bits are SRL and IPL3 (isa.md §14.2)
 CIE_ID = "0xffffffff"
 NAMED = re.compile(r"(push|pop)(?:\.d)?\s+w(\d+)$")
 ASM_STACK = re.compile(r"(?:(push|pop)|mov)(\.d)? (?:([^,\[]+)|([^,\[]+),\[w15\+\+\]|\[--w15\],([^,]+))")
@@ -33,23 +33,23 @@ ASM_STACK = re.compile(r"(?:(push|pop)|mov)(\.d)? (?:([^,\[]+)|([^,\[]+),\[w15\+
 
 @dataclass(frozen=True, slots=True)
 class CallFrameState:
-    """State of the frame in front of an instruction. All numbers are bytes above the CFA."""
+    """State of the frame before an instruction. All offsets are bytes above the CFA."""
 
     depth: int = RETURN_BYTES
-    """Offset of W15; before a change by an unknown amount, if there is one."""
+    """Offset of W15; after a change of W15 by an unknown amount, its last known offset."""
     frame: int | None = None
-    """Offset of W14 between LNK and ULNK."""
+    """Offset of W14 between LNK and ULNK, else None."""
     repeats: int = 0
-    """n in front of a push under REPEAT #n; RCOUNT is the number of remaining repetitions."""
+    """n before a push that REPEAT #n repeats, else 0; RCOUNT holds the number of remaining repetitions."""
     saved: tuple[tuple[int, int | None], ...] = ()
-    """Register -> offset of the caller's value; None if it is not in memory."""
+    """(register, offset of the caller's value) of saved registers; the offset is None if the value is not in memory."""
 
     def with_saved(self, changes: dict[int, int | None]) -> CallFrameState:
         """The state with more registers saved; an earlier location of a register has precedence."""
         return replace(self, saved=tuple(sorted((changes | dict(self.saved)).items())))
 
     def without(self, gone: set[int]) -> CallFrameState:
-        """The state in which the registers `gone` contain the caller's values again."""
+        """The state after the registers `gone` have been restored to the caller's values."""
         return replace(self, saved=tuple(one for one in self.saved if one[0] not in gone))
 
 
@@ -59,21 +59,21 @@ class CallFrames:
 
     prefix: str
     interrupt: bool
-    states: dict[int, CallFrameState]  # id(instruction) -> state in front of it
-    rows: list[tuple[str, CallFrameState]] = field(default_factory=list)  # label, state from there on
+    states: dict[int, CallFrameState]  # state before each instruction, by id(instruction)
+    rows: list[tuple[str, CallFrameState]] = field(default_factory=list)  # (label, state from that label on)
     now: CallFrameState = CallFrameState()
 
     def at(self, mi: MI) -> str:
-        """Label line to write in front of an instruction if the state changes, else ""."""
+        """Label line to write before an instruction if the state changes there, else ""."""
         return self._change(self.states.get(id(mi), self.now))
 
     def inside(self, line: str) -> str:
-        """Label line to write behind a line of inline assembly if the state changes, else ""."""
+        """Label line to write after a line of inline assembly that changes the state, else ""."""
         state = _asm_after(self.now, line, self.interrupt)
         return self._change(state)
 
     def repeated(self, count: int) -> str:
-        """Label line to write between REPEAT #count and its push of a word, or ""."""
+        """Label line to write between REPEAT #count and the push that it repeats, or ""."""
         return self._change(replace(self.now, repeats=count)) if self.now.frame is None else ""
 
     def _change(self, state: CallFrameState) -> str:
@@ -137,7 +137,7 @@ def _by(mi: MI) -> int:
 
 
 def _asm_after(state: CallFrameState, line: str, interrupt: bool) -> CallFrameState:
-    """State behind a line of inline assembly, which may push and pop registers."""
+    """State after a line of inline assembly, which may push and pop registers."""
     change, registers = _asm_change(line)
     if change > 0:
         kept = {r: state.depth + 2 * k for k, r in enumerate(registers) if interrupt or r not in SCRATCH}

@@ -35,7 +35,7 @@ ATTRIBUTES = {"location": 0x02, "name": 0x03, "byte_size": 0x0B, "bit_offset": 0
 FORMS = {"addr": 0x01, "block1": 0x0A, "data1": 0x0B, "data2": 0x05, "data4": 0x06, "string": 0x08, "flag": 0x0C,
          "sdata": 0x0D, "ref4": 0x13}  # fmt: skip
 OP_ADDR = 0x03  # DWARF 2 §7.7.1
-LINE_BASE, LINE_RANGE, OPCODE_BASE = -10, 245, 10  # abi-elf.md §6.7, C units
+LINE_BASE, LINE_RANGE, OPCODE_BASE = -10, 245, 10  # header of line programs of C (abi-elf.md §6.7)
 STANDARD_LENGTHS = (0, 1, 1, 1, 1, 0, 0, 0, 1)
 
 
@@ -88,7 +88,7 @@ class DwarfWriter:
                 self.unit(cu).globals.append((ref, number.to_bytes(size, "little")))
 
     def _owners(self) -> dict[str, str]:
-        """DIGlobalVariable -> its compile unit."""
+        """Compile unit of each DIGlobalVariable."""
         return {self.info.node(expression).get("var", ""): cu for cu, expression in self._expressions()}
 
     def _expressions(self) -> Iterator[tuple[str, str]]:
@@ -175,7 +175,7 @@ class DwarfWriter:
     # -- .debug_loc ---------------------------------------------------------------------------------------------------
 
     def _locations(self, unit: CompileUnit) -> None:
-        """Location lists: start, end, expression; the base address is 0, a pair of zeros ends a list."""
+        """Append location lists: start, end, expression. The base address is 0; a pair of zeros ends a list."""
         for k, ranges in enumerate(unit.lists):
             self.out.append(f".Ldbg_loc{unit.number}_{k}:")
             for start, end, data in ranges:
@@ -204,7 +204,7 @@ class DwarfWriter:
         self.out.append(f".Ldbg_line_end{n}:")
 
     def _sequence(self, unit: CompileUnit, f: FunctionInfo) -> None:
-        """Rows of one function. Every row sets its address, because the compiler does not know distances."""
+        """Append the rows of one function. Every row sets its address, because code sizes are unknown."""
         line = file = 1
         for label, node, row_line in f.rows:
             self.out += [f"\t.byte 0,{1 + ADDRESS_BYTES},2", f"\t.4byte {label}"]

@@ -1,7 +1,7 @@
 """Debugging information entries of a compile unit: functions, variables, types, scopes (DWARF 2 §3-5).
 
-Frame variables are relative to W15 at entry, which the frame base expresses by W15 or W14. Variables in registers have
-location lists. A variable without a location is reported as optimised out by debuggers.
+Locations of frame variables are relative to W15 at entry; DW_AT_frame_base computes that address from W15 or W14.
+Variables in registers have location lists. Debuggers report a variable without a location as optimised out.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ ENCODINGS = {"address": 1, "boolean": 2, "float": 4, "signed": 5, "signed_char":
 LANGUAGE_C89 = 1
 INLINED = 1  # DW_INL_inlined
 OP_PLUS_UCONST, OP_REG0, OP_BREG0, OP_FBREG, OP_PIECE = 0x23, 0x50, 0x70, 0x91, 0x93  # DWARF 2 §7.7.1
-OP_IMPLICIT_VALUE = 0x9E  # DWARF 4
+OP_IMPLICIT_VALUE = 0x9E  # DW_OP_implicit_value of DWARF 4
 SPECIFIERS = {"DW_TAG_const_type": "const_type", "DW_TAG_volatile_type": "volatile_type",
               "DW_TAG_pointer_type": "pointer_type", "DW_TAG_typedef": "typedef"}  # fmt: skip
 COMPOSITES = {"DW_TAG_structure_type": "structure_type", "DW_TAG_union_type": "union_type",
@@ -46,7 +46,7 @@ def _octets(word: int) -> bytes:
 
 
 def _constant(value: bytes) -> tuple[str, str, str | int | list[str]]:
-    """Attribute DW_AT_const_value."""
+    """Attribute DW_AT_const_value with the bytes of a constant."""
     if len(value) in (1, 2, 4):
         return ("const_value", f"data{len(value)}", int.from_bytes(value, "little"))
     return ("const_value", "block1", [str(b) for b in value])
@@ -63,10 +63,10 @@ class CompileUnit:
         self.types: dict[str, DebugEntry] = {}
         self.files: list[tuple[str, str]] = []
         self.functions: list[FunctionInfo] = []
-        self.globals: list[tuple[str, str | bytes]] = []  # DIGlobalVariable, assembler symbol or value
+        self.globals: list[tuple[str, str | bytes]] = []  # (DIGlobalVariable, assembler symbol or constant value)
         self.lists: list[list[tuple[str, str, list[str]]]] = []  # location lists, for .debug_loc
-        self.ranges: list[list[tuple[str, str]]] = []  # addresses of units and scopes, for .debug_ranges
-        self.abstract: dict[str, DebugEntry] = {}  # abstract instances of inlined functions
+        self.ranges: list[list[tuple[str, str]]] = []  # address ranges of units and scopes, for .debug_ranges
+        self.abstract: dict[str, DebugEntry] = {}  # abstract instances of inlined functions, by DISubprogram
 
     def file_number(self, ref: str) -> int:
         """Number of the file of a node in the unit's file table, from 1."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 
 def uleb(value: int) -> list[str]:
-    """Unsigned LEB128."""
+    """Return an unsigned LEB128 number."""
     out = []
     while True:
         byte, value = value & 0x7F, value >> 7
@@ -14,7 +14,7 @@ def uleb(value: int) -> list[str]:
 
 
 def sleb(value: int) -> list[str]:
-    """Signed LEB128."""
+    """Return a signed LEB128 number."""
     out = []
     while True:
         byte, value = value & 0x7F, value >> 7

@@ -21,7 +21,7 @@ class DebugMetadata:
         self._files: dict[str, tuple[str, str]] = {}
 
     def node(self, ref: str) -> dict[str, str]:
-        """Fields of node "!n"; field "kind" is its class, such as DISubprogram."""
+        """Fields of node "!n"; the field "kind" is the class of the node, such as DISubprogram."""
         found = self._nodes.get(ref)
         if found is None:
             body = self.module.metadata.get(ref[1:], "")
@@ -41,7 +41,7 @@ class DebugMetadata:
         return int(text) if re.fullmatch(r"-?\d+", text) else default
 
     def bits(self, ref: str) -> int:
-        """Size of a type in bits, through typedefs and qualifiers; 0 if it has none."""
+        """Size of a type in bits, with typedefs and qualifiers resolved; 0 if the type has no size."""
         for _ in range(MAX_DEPTH):
             if not ref.startswith("!"):
                 return 0
@@ -51,7 +51,7 @@ class DebugMetadata:
         return 0
 
     def file(self, ref: str) -> tuple[str, str]:
-        """(directory, name) of the DIFile of a node or of its closest scope with one."""
+        """(directory, name) of the DIFile of a node, or of its nearest enclosing scope with a DIFile."""
         if ref not in self._files:
             at = ref
             for _ in range(MAX_DEPTH):
@@ -68,7 +68,7 @@ class DebugMetadata:
     def position(self, ref: str | None) -> tuple[str, int] | None:
         """(file name, line) of a DILocation or DISubprogram; None without a line.
 
-        The name is relative to the current folder, as far as clang has removed that folder from it."""
+        The name is relative to the current folder if clang has removed the path of that folder from it."""
         if ref is None or not (line := self.number(ref, "line")):
             return None
         directory, name = self.file(ref)

@@ -1,7 +1,7 @@
 """Debug information of one function, and the tree of its lexical blocks and inlined functions.
 
 The tree is built from the line table. Every row names the scope of its code, so the addresses of a scope are those of
-its rows and of the scopes inside it.
+its own rows and of its inner scopes.
 """
 
 from __future__ import annotations
@@ -21,18 +21,18 @@ class FunctionInfo:
     name: str  # assembler symbol
     subprogram: str  # metadata reference
     end_label: str
-    frame_base: tuple[int, int]  # register, and offset of W15 at entry from it
-    rows: list[tuple[str, str, int]] = field(default_factory=list)  # label, position node, line
-    variables: list[tuple[str, int]] = field(default_factory=list)  # DILocalVariable, offset from W15 at entry
-    ranges: dict[str, list[tuple[str, str, tuple[int, ...]]]] = field(default_factory=dict)  # start, end, registers
-    known: list[str] = field(default_factory=list)  # all variables, with those of inlined functions
+    frame_base: tuple[int, int]  # register, and offset from it to the address that W15 had at entry
+    rows: list[tuple[str, str, int]] = field(default_factory=list)  # (label, node of the source position, line)
+    variables: list[tuple[str, int]] = field(default_factory=list)  # (DILocalVariable, offset from W15 at entry)
+    ranges: dict[str, list[tuple[str, str, tuple[int, ...]]]] = field(default_factory=dict)  # start, end, words
+    known: list[str] = field(default_factory=list)  # all variables, including those of inlined functions
     constants: dict[str, bytes] = field(default_factory=dict)  # variables with the same constant value everywhere
-    objects: dict[int, int] = field(default_factory=dict)  # frame object -> offset from W15 at entry
+    objects: dict[int, int] = field(default_factory=dict)  # offset of each frame object from W15 at entry
 
 
 @dataclass
 class DebugEntry:
-    """Debugging information entry (DIE): tag, (attribute, form, value), children; `label` if others refer to it."""
+    """Debugging information entry (DIE): tag, (attribute, form, value), children; `label` if referenced."""
 
     tag: str
     attributes: list[tuple[str, str, str | int | list[str]]]
@@ -45,7 +45,7 @@ class LexicalScope:
     """A lexical block or, with `call`, an inlined function. `pieces` are pairs of labels around its code."""
 
     ref: str
-    call: str = ""  # DILocation of the inlined call
+    call: str = ""  # DILocation of the inlined call, "" for a lexical block
     pieces: list[tuple[str, str]] = field(default_factory=list)
     variables: list[DebugEntry] = field(default_factory=list)
     inside: dict[tuple[str, str], LexicalScope] = field(default_factory=dict)
@@ -84,7 +84,7 @@ class ScopeTree:
         at.variables.append(die)
 
     def _path(self, scope: str, call: str) -> list[tuple[str, str]]:
-        """Scopes from the function to `scope`, each with the call that it was inlined at or ""."""
+        """Scopes from the function down to `scope`, each with the call at which it was inlined, or ""."""
         path: list[tuple[str, str]] = []
         for _ in range(1000):
             node = self.info.node(scope)

@@ -16,13 +16,13 @@ from toolchain.mir.liveness import live_out
 from toolchain.mir.mir import MI, OPTIMISED_OUT, MFunction, VariableLocation
 
 RegisterValues = dict[int, int]
-"""Register -> number of the value that it contains."""
+"""Number of the value that each register contains."""
 
 
 def attach_claims(m: MFunction, rename: Mapping[int, int], group: Mapping[int, int]) -> None:
     """Attach claims about variables to every instruction, before virtual registers are renamed.
 
-    `rename` maps them to real registers, `group` maps coalesced registers to one number.
+    `rename` maps virtual registers to real ones; `group` maps coalesced registers to one number.
     """
     known: dict[int, tuple[str, tuple[int, ...], tuple[int, ...], tuple[int, ...]]] = {}
     for k, (variable, words) in m.bindings.items():
@@ -46,7 +46,7 @@ def attach_claims(m: MFunction, rename: Mapping[int, int], group: Mapping[int, i
 
 
 def verified_locations(m: MFunction) -> dict[int, tuple[VariableLocation, ...]]:
-    """id(instruction) of the finished function -> verified locations of variables in front of it."""
+    """Verified locations of variables before each instruction of the finished function, by id(instruction)."""
     at_start = _values_at_start(m)
     found: dict[int, tuple[VariableLocation, ...]] = {}
     for b in m.blocks:
@@ -73,7 +73,7 @@ def _has_location(words: tuple[int, ...]) -> bool:
 
 
 def _step(values: RegisterValues, mi: MI) -> None:
-    """Change the values to those behind an instruction."""
+    """Update the values by the writes of an instruction."""
     for r in mi.defs():
         if r in mi.written_values:
             values[r] = mi.written_values[r]
@@ -82,7 +82,7 @@ def _step(values: RegisterValues, mi: MI) -> None:
 
 
 def _values_at_start(m: MFunction) -> dict[str, RegisterValues]:
-    """Forward data flow: values that registers contain on all paths into a block."""
+    """Values that registers contain on all paths into each block, by forward data flow."""
     preds: dict[str, list[str]] = {b.name: [] for b in m.blocks}
     for b in m.blocks:
         for s in b.succs:

@@ -1,4 +1,4 @@
-"""`python -m toolchain cc`: C, assembly and objects in; object, ELF or Intel HEX out, used like gcc.
+"""`python -m toolchain cc`: compiler driver with gcc's interface, from C, assembly and objects to object, ELF or HEX.
 
 Stages: front end (clang, in parallel) → merge and optimise (whole program) → `pipeline.compile_module` → assembler →
 linker. Modules with a long import time are imported by their stage, so that `-E` and error messages are fast.
@@ -26,11 +26,11 @@ if TYPE_CHECKING:
 FrontEnd = Callable[[CcOptions, Path], dict[Input, bytes]]
 IR_SOURCES = {"c", "cpp-output", "c++", "c++-cpp-output"}
 CXX_OF = {"c": "c++", "cpp-output": "c++-cpp-output"}
-MAX_MIDDLE_END_RUNS = 4  # each run forbids the library functions that the previous one introduced
+MAX_MIDDLE_END_RUNS = 4  # each run forbids the missing library functions that the previous run introduced
 
 
 def main(argv: list[str], cxx: bool = False, front: FrontEnd | None = None) -> int:
-    """Run the compiler driver on `argv` (without program name) and return the exit status; bad input raises nothing.
+    """Run the compiler driver on `argv` (without program name); return its exit status, also for bad input.
 
     With `cxx`, C sources are compiled as C++. `front` replaces `front_end` when files are compiled and linked together;
     a caller that builds the same sources several times can use it to cache the IR.
@@ -175,7 +175,7 @@ def _to_assembly(options: CcOptions, ir_text: str) -> str:
 
 
 def assembler_options(options: CcOptions, compiled: bool) -> AssemblerOptions:
-    """Options of the assembler. Only branches of compiled code are shortened, as in XC16 (abi-elf.md §5)."""
+    """Options of the assembler. Only branches of compiled code are relaxed (shortened), as in XC16 (abi-elf.md §5)."""
     from toolchain.asm.state import Options
 
     folders = [word[2:] for word in options.clang if word.startswith("-I") and len(word) > 2]
@@ -185,7 +185,7 @@ def assembler_options(options: CcOptions, compiled: bool) -> AssemblerOptions:
 
 
 def _assemble(options: CcOptions, text: str, name: str, compiled: bool) -> bytes:
-    """Assemble a text; returns the object file."""
+    """Assemble a text; return the content of the object file."""
     from toolchain.asm.assemble import assemble
     from toolchain.elf.write import object_bytes
 

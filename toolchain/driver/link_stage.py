@@ -22,9 +22,9 @@ from toolchain.link.smartio import plain_name
 
 RUNTIME_NAME = "run-time library"
 BUILT_IN_LIBRARIES = {"c", "m", "gcc", "pic30", "dsp"}
-"""Libraries of other toolchains whose content is part of the run-time library; -l with them has no effect."""
+"""Names of libraries whose content is part of the run-time library; -l has no effect for them."""
 
-# Conversions whose code is linked only if a format string contains them (runtime/format.h, runtime/scan.h).
+# Patterns of conversions whose code is linked only if a format string has them (runtime/format.h, runtime/scan.h).
 _FLAGS = rb"%[-+ #0]*(?:\d+|\*)?(?:\.(?:\d+|\*)?)?"
 _WIDTH = rb"%\*?\d*"
 FORMAT_PARTS = {
@@ -54,7 +54,7 @@ def output_path(options: CcOptions) -> Path:
 
 
 def find_library(options: CcOptions, name: str) -> tuple[str, bytes] | None:
-    """Archive for -lNAME; None if its content is part of the run-time library. Raises ToolError if there is none."""
+    """Archive for -lNAME; None if its content is part of the run-time library. Raise ToolError if no file is found."""
     for folder in options.library_dirs:
         path = folder / f"lib{name}.a"
         if path.is_file():

@@ -52,12 +52,12 @@ class CompileOptions(Protocol):
     stack_check: bool
     large_code: bool
     large_data: bool
-    verify: bool  # check the machine form after every pass
+    verify: bool  # verify the machine form after every pass
 
 
 @dataclass(frozen=True)
 class BackendOptions:
-    """CompileOptions without a command line."""
+    """CompileOptions for callers without a command line."""
 
     level: str = "s"
     debug: bool = False
@@ -76,9 +76,9 @@ class FunctionContext:
     function: Function
     options: CompileOptions
     interrupt: str
-    taken: set[str]  # blocks whose address the module takes
-    probe: bool  # check the stack limit at entry
-    notes: set[str]  # its annotations
+    taken: set[str]  # blocks whose address is taken in the module
+    probe: bool  # whether the function checks the stack limit at entry
+    notes: set[str]  # annotations of the function
     machine: MFunction | None = None
 
     @property
@@ -172,7 +172,7 @@ FUNCTION_PASSES = [
 
 
 def check_order(passes: list[Pass]) -> None:
-    """Raise AssertionError if a pass needs a property that no earlier pass of all levels gives."""
+    """Raise AssertionError if a pass requires a property that no earlier pass establishes at every level."""
     have = {"ssa"}
     for p in passes:
         missing = set(p.needs) - have
@@ -191,7 +191,7 @@ def source_position(info: DebugMetadata, f: Function, line: str | None) -> str:
 
 
 def address_taken_blocks(module: Module) -> dict[str, set[str]]:
-    """Function name -> blocks whose address code or data of the module takes."""
+    """By function: the blocks whose address is taken in code or data of the module."""
     out: dict[str, set[str]] = {}
     work: list[Value] = [v.init for v in module.globals.values() if v.init is not None]
     work += [a for f in module.functions.values() for b in f.blocks for i in b.instrs for a in i.args]
@@ -249,7 +249,7 @@ def frame_variables(f: Function, m: MFunction) -> list[tuple[str, int]]:
 
 
 def frame_offsets(f: Function, m: MFunction) -> dict[str, int]:
-    """IR name of every variable and struct parameter in the frame -> its offset from W15 at entry."""
+    """Offset from W15 at entry of every variable and struct parameter in the frame, by IR name."""
     slots = [(i.extra["source"], i) for i in f.blocks[0].instrs if i.op == "slot" and "source" in i.extra]
     named = [*slots, *((a.name, a) for a in f.args)]
     return {name: offset_of(m, m.slot_of[id(value)]) for name, value in named if id(value) in m.slot_of}
@@ -262,7 +262,7 @@ def offset_of(m: MFunction, index: int) -> int:
 
 
 class ModuleCompiler:
-    """Compiles one module: assembly text so far, and the counter that makes local labels unique."""
+    """Compiler of one module; holds the assembly text so far and the counter that makes local labels unique."""
 
     def __init__(self, module: Module, options: CompileOptions) -> None:
         self.module = module
@@ -275,7 +275,7 @@ class ModuleCompiler:
         self.taken = address_taken_blocks(module)
         self.dwarf = DwarfWriter(module)
         module.far = data.far_objects(self.notes, self.declared)
-        self.frame_offsets: dict[str, dict[str, int]] = {}  # by function: `frame_offsets` of its variables
+        self.frame_offsets: dict[str, dict[str, int]] = {}  # `frame_offsets` of each function
 
     def run(self) -> str:
         """Return the assembly text: functions, data, aliases, debug sections."""
@@ -347,7 +347,7 @@ class ModuleCompiler:
         emitter = emit.FunctionEmitter(c.m, str(self.serial), self.options.large_code, self.dwarf.info.position)
         frames = call_frames.trace_frames(c.m, str(self.serial)) if self.options.debug else None
         self.lines += emitter.text(rows.mark if rows is not None else no_rows, ranges, frames)
-        removed = c.taken - {b.name for b in c.m.blocks}  # no code jumps to them, but their addresses are still values
+        removed = c.taken - {b.name for b in c.m.blocks}  # no jump leads there, but code uses the addresses
         self.lines += [f"{block_label(f.name, block)}:" for block in sorted(removed)]
         self.lines.append(f"\t.size {name},.-{name}")
         end = f".Lend{self.serial}"
@@ -366,9 +366,9 @@ class ModuleCompiler:
             self.dwarf.add_function(info)
 
     def header(self, f: Function, interrupt: str) -> None:
-        """Append section, symbol and type. Each function has its own section for --gc-sections."""
+        """Append the directives of section, symbol and type. Each function has its own section for --gc-sections."""
         name = symbol(self.module, f.name)
-        # near and far are attributes of the call, which -mlarge-code decides
+        # sections `near` and `far` are ignored: -mlarge-code alone selects the form of calls
         own = "" if sections.attribute_section(f.section) else f.section
         section = own or (".isr.text." if interrupt else ".text.") + name
         modifiers = isr.section_modifiers(f.name, self.notes.get(f.name, set()))
@@ -397,7 +397,7 @@ class ModuleCompiler:
 
 
 def compile_module(ll_text: str, options: CompileOptions) -> str:
-    """Translate the IR text of one module. Raises UnsupportedError naming the construct and its source line."""
+    """Translate the IR text of one module. Raise UnsupportedError with the construct and its source line."""
     try:
         module = read_module(ll_text)
     except UnsupportedError as e:

@@ -17,11 +17,11 @@ _HANDLER = re.compile(r"error: (interrupt )?function '")
 _FUNCTION = re.compile(r'^define .*?@("[^"]+"|[\w$.]+)\(')
 _NAME = re.compile(r'@("[^"]+"|[\w$.]+)')
 _LOCATION = re.compile(r"!dbg (!\d+)")
-MAX_POSITIONS = 3  # shown per symbol
+MAX_POSITIONS = 3  # maximum number of positions shown per symbol
 
 
 def concerns_generated_code(error: ToolError) -> bool:
-    """Whether debug information can add positions to an error of assembler, back end, linker or handler names."""
+    """Whether debug information adds positions to an error, one of assembler, back end, linker or handler names."""
     return any(
         re.match(r"[^:\n]+: error: ", line) or _UNDEFINED.search(line) or _REFUSED.search(line) or _HANDLER.match(line)
         for line in error.findings

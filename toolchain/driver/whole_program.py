@@ -1,4 +1,4 @@
-"""Whole-program optimisation: merge LLVM modules, and make symbols internal that no other object can name.
+"""Whole-program optimisation: merge LLVM modules, and make symbols internal that no other object references.
 
 Input: IR (text or bitcode) of every C file, and the assembler names that objects use. Output: one module. Modules are
 passed as text, because clang would assemble file-scope asm as MSP430 code when it writes bitcode.
@@ -85,7 +85,7 @@ def names_used(objects: Iterable[tuple[str, bytes]]) -> set[str]:
 
 
 def names_in_inline_assembly(text: str) -> set[str]:
-    """C names that inline assembly and `preprologue` annotations of a module use as `_name`, and those in `save`."""
+    """C names that occur as `_name` in inline assembly and `preprologue` annotations, or in `save` annotations."""
     names: set[str] = set()
     for line in text.splitlines():
         found = NAMES_SYMBOLS.search(line)
@@ -114,7 +114,7 @@ def internalise(module: llvm.ModuleRef, assembler_names: Iterable[str]) -> None:
 
 
 def _duplicate_definitions(modules: list[tuple[Path, llvm.ModuleRef]]) -> list[str]:
-    """One message per strong symbol that more than one module defines, with their files."""
+    """One message per strong symbol that several modules define, with their files."""
     owners: dict[str, list[Path]] = {}
     for source, module in modules:
         for value in [*module.functions, *module.global_variables]:

@@ -1,4 +1,4 @@
-"""Static libraries: the common `ar` format with a GNU symbol index, as Microchip's tools read and write it."""
+"""Static libraries in `ar` format with a GNU symbol index, as Microchip's tools read and write them."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from toolchain.errors import ToolError
 
 MAGIC = b"!<arch>\n"
 _HEADER = 60
-_LONG_NAME = 15  # longer names live in the `//` member
+_LONG_NAME = 15  # maximum length of a name in a member header; longer names are in the `//` member
 
 
 @dataclass(slots=True)
@@ -25,7 +25,7 @@ class ArchiveMember:
 
 @dataclass(slots=True)
 class Archive:
-    """An archive being linked: members and which member defines which global symbol."""
+    """An archive being linked: its members, and the member that defines each global symbol."""
 
     name: str
     members: list[ArchiveMember]
@@ -33,7 +33,7 @@ class Archive:
 
 
 def read_members(data: bytes, name: str) -> list[ArchiveMember]:
-    """Return the members of an archive in order; raise `ToolError` when it is damaged."""
+    """Return the members of an archive in order; raise `ToolError` if the archive is damaged."""
     if data[: len(MAGIC)] != MAGIC:
         raise ToolError(f"{name}: not an archive (bad magic at offset 0)")
     members: list[ArchiveMember] = []
@@ -67,7 +67,7 @@ def _member_name(raw: str, long_names: bytes, archive: str) -> str:
 
 
 def open_archive(data: bytes, name: str) -> Archive:
-    """Return an archive with its symbol index, taken from the `/` member or, when it has none, from the members."""
+    """Return an archive with its symbol index: that of the `/` member, or one built from the symbols of the members."""
     archive = Archive(name, read_members(data, name))
     by_offset = {m.offset: m for m in archive.members}
     if data[8:10] == b"/ ":
@@ -100,7 +100,7 @@ def _defined(member: ArchiveMember, archive: str) -> list[str]:
 
 
 def archive_bytes(members: list[ArchiveMember]) -> bytes:
-    """Return an archive of `members` with a symbol index; times, owners and modes are fixed, so bytes repeat."""
+    """Return the content of an archive with a symbol index; fixed times, owners and modes make it reproducible."""
     long_names = bytearray()
     labels: list[str] = []
     for member in members:

@@ -1,4 +1,4 @@
-"""Generic ELF32 numbers (System V ABI, chapter 4) that the dsPIC30F facts of `emu.image.elf_facts` build upon."""
+"""Constants of generic ELF32 (System V ABI, chapter 4); those of the dsPIC30F are in `emu.image.elf_facts`."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ SIGNATURE_SECTION = "__c30_signature"
 """Info section of every object: three 16-bit words 1, 0, 0 (abi-elf.md §6.7, §7 item 8)."""
 SIGNATURE_WORDS = (1, 0, 0)
 
-COFF_MAGIC = (0x1236).to_bytes(2, "little")  # abi-elf.md §6.8
+COFF_MAGIC = (0x1236).to_bytes(2, "little")  # first two bytes of a COFF object of the dsPIC30F (abi-elf.md §6.8)
 MAGIC = b"\x7fELF"
 ELFCLASS32, ELFDATA2LSB, EV_CURRENT = 1, 1, 1
 ET_REL, ET_EXEC = 1, 2

@@ -1,6 +1,6 @@
 """Disassembly of sections, with symbol names.
 
-Reads `emu.dspic30f.isa`; used by `objdump` and by the stack analysis.
+It decodes by the table of `emu.dspic30f.isa`. `objdump` and the stack and time analyses use it.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from toolchain.elf.model import Bind, Home, Section, Symbol
 from toolchain.elf.symbols import is_named
 
 NO_INSTRUCTIONS = frozenset((".ivt", ".aivt", ".dinit"))
-"""Sections with code flags that hold tables (abi-elf.md §6.3)."""
+"""Sections that have code flags but contain tables, not instructions (abi-elf.md §6.3)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,10 +30,10 @@ class CodeItem:
 
 
 class Names:
-    """Nearest symbol at or below an address, for code and for data."""
+    """Lookup of the nearest symbol at or below an address, in code and in data."""
 
     def __init__(self, symbols: Iterable[Symbol], section: Section | None = None) -> None:
-        """With `section`, only its symbols, section-relative as in objects."""
+        """Index the symbols; with `section`, only those of that section, with section-relative values as in objects."""
         best: dict[str, dict[int, Symbol]] = {"code": {}, "data": {}}
         for symbol in symbols:
             if not is_named(symbol) or symbol.home is Home.UNDEFINED:
@@ -48,7 +48,7 @@ class Names:
         self._order = {space: sorted(table) for space, table in best.items()}
 
     def find(self, address: int, space: str) -> tuple[Symbol, int] | None:
-        """Return (symbol, distance) for an address, None when nothing is below it or the symbol ends before it."""
+        """Return (symbol, distance) for an address; None if no symbol is below it or the nearest one ends before it."""
         order = self._order[space]
         index = bisect_right(order, address) - 1
         if index < 0:
@@ -71,7 +71,7 @@ class Names:
 
 
 def _better(new: Symbol, old: Symbol) -> bool:
-    """Prefer functions, then globals (abi-elf.md §6.5)."""
+    """Whether `new` is the preferred name of two at one address: functions first, then globals (abi-elf.md §6.5)."""
     return (new.type == c.STT_FUNC, new.bind is not Bind.LOCAL) > (old.type == c.STT_FUNC, old.bind is not Bind.LOCAL)
 
 

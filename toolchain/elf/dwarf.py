@@ -11,12 +11,12 @@ __all__ = ["LineTable", "SourceLine", "SourceText", "lines_of"]
 
 
 def lines_of(image: Executable) -> LineTable:
-    """Return the line table of `image`; empty when it carries no DWARF."""
+    """Return the line table of `image`; empty if the image contains no DWARF."""
     return LineTable({s.name: bytes(s.data) for s in image.sections if s.name.startswith(".debug_")})
 
 
 class SourceText:
-    """Lines of source files, by their DWARF names; of a missing file only line numbers are shown."""
+    """Lines of source files by their DWARF names; files that cannot be read have no lines."""
 
     def __init__(self) -> None:
         self._files: dict[str, list[str] | None] = {}

@@ -6,7 +6,7 @@ from emu.image.elf_facts import OCTETS_PER_WORD, Formula, RelocatedField, Reloca
 
 
 class FieldError(Exception):
-    """A value that does not fit its field, or a field outside its section; the caller adds the place."""
+    """A value that does not fit its field, or a field outside its section; the caller adds the source location."""
 
 
 def positions(kind: RelocationType, offset: int, code: bool) -> list[int]:
@@ -53,7 +53,7 @@ def store(data: bytearray, offset: int, kind: RelocationType, code: bool, raw: i
 
 
 def checked(kind: RelocationType, value: int) -> int:
-    """Return `value` when it is in the range of the field; raise `FieldError` with the limits otherwise."""
+    """Return `value` if it is in the range of the field, else raise `FieldError` with the limits."""
     if not kind.low <= value <= kind.high:
         raise FieldError(f"value {_show(value)} is outside {_show(kind.low)}..{_show(kind.high)}")
     if kind.even and value & 1 and kind.formula in (Formula.ADDRESS, Formula.HALF):

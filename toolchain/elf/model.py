@@ -16,7 +16,7 @@ NO_ATTRIBUTES = ExtendedAttribute(0)
 
 
 class Bind(Enum):
-    """Symbol binding, as ELF numbers it."""
+    """Symbol binding with the numbers of ELF."""
 
     LOCAL = c.STB_LOCAL
     GLOBAL = c.STB_GLOBAL
@@ -48,7 +48,7 @@ class Symbol:
 
 @dataclass(slots=True)
 class Reloc:
-    """A relocation: `offset` in octets from the section start (abi-elf.md §5), `type` a number of elf_facts."""
+    """A relocation: `offset` in octets from the section start (abi-elf.md §5), `type` a RelocationType of elf_facts."""
 
     offset: int
     type: int
@@ -94,7 +94,7 @@ class Section:
 
 @dataclass(slots=True)
 class ObjectFile:
-    """A relocatable object: where it came from, its sections and its symbols."""
+    """A relocatable object: its origin (file or archive member), its sections and its symbols."""
 
     name: str
     sections: list[Section] = field(default_factory=list)

@@ -1,4 +1,4 @@
-"""ELF32 reader for dsPIC30F objects and executables, ours and Microchip's (abi-elf.md §6).
+"""ELF32 reader for dsPIC30F objects and executables of this toolchain and of Microchip's tools (abi-elf.md §6).
 
 Every link reads whole objects, so the reader is small and fast.  DWARF is read with pyelftools (`emu.image.lines`).
 """
@@ -87,7 +87,7 @@ _BINDS = {b.value: b for b in Bind}
 
 
 def _sections(reader: _Reader) -> dict[int, Section]:
-    """Return the sections that carry program content, by section index."""
+    """Return the sections with program content (no symbol, string or relocation tables), by section index."""
     found: dict[int, Section] = {}
     for index, header in enumerate(reader.headers):
         if header.type not in _CONTENT_TYPES:
@@ -152,7 +152,7 @@ def _relocations(reader: _Reader, sections: dict[int, Section], symbols: list[Sy
 def read_object(data: bytes, name: str) -> ObjectFile:
     """Return the relocatable object in `data`; `name` is used in messages.
 
-    Raises `ToolError` when the file is not a dsPIC30F ET_REL or is damaged.
+    Raises `ToolError` if the file is damaged or no relocatable object (ET_REL) for the dsPIC30F.
     """
     reader = _Reader(data, name)
     if reader.kind != c.ET_REL:
@@ -176,7 +176,7 @@ def read_object(data: bytes, name: str) -> ObjectFile:
 def read_executable(data: bytes, name: str) -> Executable:
     """Return the executable in `data`; LMAs of psv and eedata come from the program headers (abi-elf.md §6.4).
 
-    Raises `ToolError` when the file is not a dsPIC30F ET_EXEC or is damaged.
+    Raises `ToolError` if the file is damaged or no executable (ET_EXEC) for the dsPIC30F.
     """
     reader = _Reader(data, name)
     if reader.kind != c.ET_EXEC:
@@ -192,7 +192,7 @@ def read_executable(data: bytes, name: str) -> Executable:
 
 
 def _load_address(header: _Header, segments: list[tuple[int, ...]]) -> int:
-    """Translate a psv/eedata VMA to its LMA by the covering PT_LOAD (abi-elf.md §6.8 step 2)."""
+    """Return the load address (LMA) of a psv or eedata section from its PT_LOAD (abi-elf.md §6.8 step 2)."""
     for kind, offset, vaddr, paddr, file_size, _, _, _ in segments:
         inside = offset <= header.offset and header.offset + header.size <= offset + file_size
         if kind == c.PT_LOAD and inside and vaddr <= header.address:

@@ -7,11 +7,11 @@ from collections.abc import Iterable
 from toolchain.elf import constants as c
 from toolchain.elf.model import Section, Symbol
 
-_COMPILER_LABELS = (".L", "L0", "___PA___", "___BP___")  # abi-elf.md §6.5: thousands of meaningless locals
+_COMPILER_LABELS = (".L", "L0", "___PA___", "___BP___")  # prefixes of labels that compilers generate (abi-elf.md §6.5)
 
 
 def is_named(symbol: Symbol) -> bool:
-    """Whether a symbol is a name of the source rather than a label of the compiler."""
+    """Whether a symbol is named in the source, unlike a label that the compiler generated."""
     return (
         bool(symbol.name)
         and symbol.type not in (c.STT_SECTION, c.STT_FILE)

@@ -45,7 +45,7 @@ class _Writer:
         self, name: str, kind: int, flags: int, address: int, offset: int, size: int,
         *, link: int = 0, info: int = 0, align: int = 1, entry_size: int = 0,
     ) -> int:  # fmt: skip
-        """Add one section header, return its index. Raises ToolError when there are more than ELF can number."""
+        """Add one section header; return its index. Raise ToolError if ELF's section numbers are exhausted."""
         if len(self.headers) >= c.SHN_LORESERVE:
             raise ToolError(f"more than {c.SHN_LORESERVE - 1} sections: an ELF file cannot number them")
         self.headers.append(
@@ -99,7 +99,7 @@ def _content(writer: _Writer, section: Section) -> tuple[int, int]:
 
 
 def _symbol_table(symbols: list[Symbol], index_of: dict[Section, int]) -> tuple[bytes, bytes, int, dict[Symbol, int]]:
-    """Return (.symtab, .strtab, number of locals, index of each symbol); locals come first as ELF demands."""
+    """Return (.symtab, .strtab, number of locals, index of each symbol); locals precede globals, as ELF requires."""
     strings = _Strings()
     ordered = [s for s in symbols if s.bind is Bind.LOCAL] + [s for s in symbols if s.bind is not Bind.LOCAL]
     rows = [bytes(c.SYM_SIZE)]
@@ -134,7 +134,7 @@ def _add_symbols(writer: _Writer, table: bytes, strings: bytes, local_count: int
 
 
 def object_bytes(obj: ObjectFile) -> bytes:
-    """Return `obj` as an ET_REL file: `.rel` sections with the addend in place, `__ext_attr_` symbols (§7 item 8)."""
+    """Return `obj` as an ET_REL file: `.rel` sections, addends in the fields, `__ext_attr_` symbols (§7 item 8)."""
     writer = _Writer(c.ET_REL, obj.processor, 0, 0)
     index_of: dict[Section, int] = {}
     for section in obj.sections:

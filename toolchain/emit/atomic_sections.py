@@ -1,7 +1,7 @@
-"""Atomic sections: cycles for which DISI must delay interrupts.
+"""Atomic sections: computes the number of cycles for which their DISI delays interrupts.
 
-`begin_atomic` becomes `DISI #n`, unless a DISI of the source is active for at least n more cycles, which it must not
-shorten (isa.md §12). `end_atomic` marks the end and emits no code. Needs: final instructions and blocks. Ensures: every
+`begin_atomic` becomes `DISI #n`. Code skips it if a DISI of the source is active for at least n more cycles, which it
+would shorten (isa.md §12). `end_atomic` emits no code. Needs: final instructions and blocks. Ensures: every
 `begin_atomic` has its n.
 """
 
@@ -9,12 +9,12 @@ from __future__ import annotations
 
 from toolchain.mir.mir import MI, SKIPS, Imm, MFunction
 
-LIMIT = 0x3FFF  # DISI #lit14
-BRANCH_CYCLES = 3  # a taken branch and a stall
+LIMIT = 0x3FFF  # greatest operand of DISI #lit14
+BRANCH_CYCLES = 3  # cycles of a taken branch with a stall
 
 
 def run(m: MFunction) -> None:
-    """Compute n of every `begin_atomic`. Raises AssertionError if the section does not end within LIMIT cycles."""
+    """Compute n of every `begin_atomic`. Raise AssertionError if a section does not end within LIMIT cycles."""
     for number, b in enumerate(m.blocks):
         for k, mi in enumerate(b.insts):
             if mi.op == "begin_atomic":

@@ -1,7 +1,7 @@
 """Functions that run before main: calls in section .user_init (abi-elf.md §1.4, §3.1).
 
-The attributes `constructor` and XC16's `user_init` mark them. The start-up code calls the section if the program has
-one; the linker ends it with RETURN.
+The attributes `constructor` and XC16's `user_init` select these functions. The start-up code calls the section if the
+program has one; the linker appends a RETURN to it.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from toolchain.ir.model import ConstAgg, ConstInt, GlobalRef, Module, Unsupporte
 
 
 def emit_constructors(module: Module, large_code: bool) -> list[str]:
-    """One call per function, in order of priority, then in order of the source. Raises UnsupportedError."""
+    """Lines of section .user_init: one call per function, in order of priority, then of the source."""
     if _rows(module, "llvm.global_dtors"):
         raise UnsupportedError("destructor functions: no code runs after main", "attribute destructor")
     rows = sorted(_rows(module, "llvm.global_ctors"), key=lambda row: row[0])

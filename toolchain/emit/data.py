@@ -32,17 +32,17 @@ from toolchain.ir.model import (
 WORDS_PER_LINE = 8
 SKIPPED_SECTIONS = ("llvm.metadata",)
 NOTES = ".note.bounds"
-"""Section of the notes of bounds.h."""
+"""Section of the annotations of bounds.h."""
 WEAK = ("weak", "weak_odr", "linkonce", "linkonce_odr", "extern_weak", "common")
 SECTION_TYPES = {".const": "psv,page", ".nbss": "bss,near", ".ndata": "data,near", ".bss": "bss", ".data": "data",
                  ".xbss": "bss,xmemory,near", ".xdata": "data,xmemory,near", ".ybss": "bss,ymemory",
                  ".ydata": "data,ymemory", ".note": "info",
                  ".pbss": "persist", ".eedata": "eedata", ".prog": "code", ".psv": "psv,page"}  # fmt: skip
-CONFIG_SECTION = re.compile(r"__\w+\.sec")  # configuration words are program words (abi-elf.md §6.6)
+CONFIG_SECTION = re.compile(r"__\w+\.sec")  # sections of configuration words, which are program words (abi-elf.md §6.6)
 
 
 def far_objects(notes: dict[str, set[str]], locate: Callable[[str], str]) -> frozenset[str]:
-    """Objects whose `address(N)` lies beyond near memory; `locate` gives the position of an object for errors."""
+    """Objects whose `address(N)` is beyond near memory; `locate` returns the position of an object for errors."""
     return frozenset(
         name
         for name, texts in notes.items()
@@ -95,7 +95,7 @@ class DataEmitter:
             self.lines.append(f"\t.space {max(size, 1)}")
             return
         self.lines += self._content(var, size)
-        if var.section == NOTES and "._" in var.name:  # static in a function: name the function
+        if var.section == NOTES and "._" in var.name:  # static in a function: record its name
             self.lines.append(f'\t.ascii "in {var.name.partition(".")[0]}\\n"')
 
     def _content(self, var: GlobalVar, size: int) -> list[str]:
@@ -118,7 +118,7 @@ class DataEmitter:
         stem = attribute_section(var.section)
         if stem:
             return f"{stem}.{suffix},{kind}{SECTION_ATTRIBUTES[stem]}"
-        if "," in var.section:  # name and attributes, as in assembly
+        if "," in var.section:  # the source gives name and attributes in the syntax of assembly
             return var.section
         if CONFIG_SECTION.fullmatch(var.section):
             return f"{var.section},code"
@@ -128,7 +128,7 @@ class DataEmitter:
                 return f"{var.section},{SECTION_TYPES[base]}"
             return f"{var.section}," + ("psv,page" if var.constant else "bss" if zero else "data")
         if var.constant:
-            return ".const,psv,page"  # one section, as Microchip's linker requires (abi-elf.md §1.4)
+            return ".const,psv,page"  # one section for all, as Microchip's linker requires (abi-elf.md §1.4)
         near = is_near(self.module, var.name) and "address" not in modifiers
         return f".n{kind}.{suffix},{kind},near" if near else f".{kind}.{suffix},{kind}"
 
@@ -138,7 +138,7 @@ class InitialiserImage:
 
     def __init__(self, module: Module) -> None:
         self.module = module
-        self.items: list[int | str] = []  # bytes, or two-byte expressions
+        self.items: list[int | str] = []  # bytes, and expressions of two bytes
         self.size = 0
 
     def pad_to(self, size: int) -> None:
@@ -147,7 +147,7 @@ class InitialiserImage:
         self.size = max(size, self.size)
 
     def value(self, v: Value, t: Type) -> None:
-        """Append a constant of type `t` at the present offset."""
+        """Append a constant of type `t` at the current offset."""
         start = self.size
         match v:
             case ConstInt():
@@ -189,7 +189,7 @@ class InitialiserImage:
             case ConstInt():
                 return str(v.value)
             case ConstExpr(op="sub", args=args) if any(_is_label(a) for a in args):
-                # a handle may be the address of a jump to the label, so the difference of two has no meaning
+                # a handle may be the address of a jump to the label, so differences of handles are undefined
                 raise UnsupportedError("a difference of labels in an initialiser: keep the labels themselves (&&label)")
             case ConstExpr(op="add" | "sub", args=[a, b]):
                 return f"({self.expression(a)}{'+' if v.op == 'add' else '-'}{self.expression(b)})"

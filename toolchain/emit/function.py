@@ -31,7 +31,7 @@ BIT_OPS = {"bset", "bclr", "btg", "btst", "btsc", "btss"}
 WREG_OPS = {n + "w": n for n in ("and", "ior", "xor")}
 CONDITION_TEXT = {"c": "geu", "nc": "ltu"}
 ASM_OPERAND = re.compile("\x00(\\d+):(\\w?)\x00|\x00uid\x00")
-ENTRY_CYCLES = 4  # from the comparison with DISICNT to the first instruction of the section
+ENTRY_CYCLES = 4  # cycles from the comparison with DISICNT to the first instruction of the atomic section
 SHIFT_FIRST = {"shl": "sl", "lshr": "lsr", "ashr": "asr"}
 
 
@@ -61,8 +61,8 @@ class FunctionEmitter:
         self, m: MFunction, prefix: str, large_code: bool, position: Callable[[str | None], tuple[str, int] | None]
     ) -> None:
         self.m = m
-        self.position = position  # source file and line of a !dbg reference
-        self.prefix = prefix  # makes local labels unique in the file
+        self.position = position  # returns source file and line of a !dbg reference
+        self.prefix = prefix  # prefix that makes local labels unique in the file
         self.large_code = large_code
         self.serial = 0
         self.lines: list[str] = []
@@ -82,7 +82,7 @@ class FunctionEmitter:
     def text(
         self, location: Callable[[str | None], str], ranges: LocationLists, frames: CallFrames | None
     ) -> list[str]:
-        """All lines of the function; `location` gives the label of the line table for a !dbg reference, or ""."""
+        """All lines of the function; `location` returns the line-table label of a !dbg reference, or ""."""
         self.frames = frames
         self.variables = verified_locations(self.m) if self.m.bindings else {}
         for block in self.m.blocks:
@@ -94,7 +94,7 @@ class FunctionEmitter:
             self.lines.append(f"{self.label(block.name)}:")
         if block.address_taken:
             self.lines.append(f"{block_label(self.m.name, block.name)}:")
-        label = ""  # label behind the instructions that a skip covers
+        label = ""  # label after the instructions that a skip covers
         for mi in block.insts:
             frame = self.frames.at(mi) if self.frames is not None else ""
             marks = (ranges.at(self.variables.get(id(mi), ())), location(mi.line), frame)
@@ -189,7 +189,7 @@ class FunctionEmitter:
             self._out(f"mov{suffix} w{mi.args[2]},[w{mi.args[1]}++]")
 
     def _shiftloop(self, mi: MI) -> None:
-        """Loop: decrement the count, leave if it is negative, shift by one through the carry (abi-elf.md §8.1)."""
+        """Emit a loop: decrement the count, exit if negative, shift by one through the carry (abi-elf.md §8.1)."""
         kind, count, *words = mi.args
         top, end = self.fresh(), self.fresh()
         self.lines.append(f"{top}:")
@@ -213,12 +213,12 @@ class FunctionEmitter:
             modifier = m[2]
             if isinstance(a, int) and modifier == "d":
                 return f"w{a + 1}"
-            if isinstance(a, Imm):  # bare: XC16 sources write the sign themselves, "disi #%0"
+            if isinstance(a, Imm):  # no `#`: XC16 sources contain it in the template, as in "disi #%0"
                 return str(-int(a.value)) if modifier == "n" else str(a.value)
             return operand_text(a)
 
         position = self.position(mi.line)
-        if position is not None:  # the assembler reports errors at the source line
+        if position is not None:  # a line marker, so that the assembler reports errors at the source line
             self.lines.append(f'# {position[1]} "{position[0]}"')
         for line in ASM_OPERAND.sub(replace, mi.text).split("\n"):
             if line.strip():
@@ -226,10 +226,10 @@ class FunctionEmitter:
                 if self.frames is not None and (mark := self.frames.inside(line)):
                     self.lines.append(mark)
         if position is not None:
-            self.lines.append(f'# 0 "{position[0]}"')  # end of the lines of the source
+            self.lines.append(f'# 0 "{position[0]}"')  # line 0: end of the source lines
 
     def _begin_atomic(self, mi: MI) -> None:
-        """DISI for the section (`atomic_sections`), unless DISICNT is larger already."""
+        """Emit DISI for an atomic section (`atomic_sections`), skipped if DISICNT is already larger."""
         cycles, end = mi.number(0), self.fresh()
         self._out(f"mov #{cycles + ENTRY_CYCLES},w0")
         self._out("cp _DISICNT")
@@ -238,14 +238,14 @@ class FunctionEmitter:
         self.lines.append(f"{end}:")
 
     def _end_atomic(self, mi: MI) -> None:
-        """No code: DISI counts the cycles itself."""
+        """Emit no code: the DISI ends after its cycles."""
 
     def _clear_pair(self, mi: MI) -> None:
-        """Clear a register pair by a multiplication with 0, which changes no flags (isa.md §6.5)."""
+        """Emit a multiplication by 0 that clears a register pair without changing flags (isa.md §6.5)."""
         self._out(f"mul.uu w{mi.args[0]},#0,w{mi.args[0]}")
 
     def _borrow(self, mi: MI) -> None:
-        """Set a register to -1 after a borrow, else to 0."""
+        """Emit the subtraction that sets a register to -1 after a borrow, else to 0."""
         r = operand_text(mi.args[0])
         self._out(f"subb {r},{r},{r}")
 

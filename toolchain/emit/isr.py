@@ -21,7 +21,7 @@ WORDS = {"interrupt", "auto_psv", "no_auto_psv", "shadow"}
 
 
 def annotations_of(module: Module) -> dict[str, set[str]]:
-    """Name of a function or variable -> its annotation strings."""
+    """Annotation strings of each function and variable, by name."""
     table = module.globals.get("llvm.global.annotations")
     out: dict[str, set[str]] = {}
     if table is None or not isinstance(table.init, ConstAgg):
@@ -33,7 +33,7 @@ def annotations_of(module: Module) -> dict[str, set[str]]:
 
 
 def _text(module: Module, v: Value) -> str:
-    """String constant that a value points to."""
+    """The string constant to which a value points."""
     if not isinstance(v, GlobalRef):
         return ""
     init = module.globals[v.name].init

@@ -1,7 +1,7 @@
 """`used` and `retain`: definitions that --gc-sections keeps without a reference.
 
-In GCC, `used` keeps a definition in the object and `retain` keeps it in the image; XC16's `keep` does both. Here every
-one of them does both.
+In GCC, `used` keeps a definition in the object and `retain` keeps it in the image; XC16's `keep` does both. In this
+compiler, each of the three attributes keeps the definition in the object and in the image.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ TABLES = ("llvm.used", "llvm.compiler.used")
 
 
 def retained_names(module: Module) -> frozenset[str]:
-    """Names of the functions and variables with these attributes, and of the targets of such aliases."""
+    """Names of functions and variables with these attributes, and of the targets of aliases with them."""
     work: list[Value] = []
     for table in TABLES:
         var = module.globals.get(table)

@@ -1,6 +1,6 @@
-"""XC16's accumulator variables, `register int a asm("A")`, and its DSP builtins, one instruction each.
+"""XC16's accumulator variables, such as `register int a asm("A")`, and its DSP builtins of one instruction each.
 
-Clang has no registers of 40 bits. `rewrite` therefore removes the variables from preprocessed C, and replaces each
+Clang has no 40-bit registers. `rewrite` therefore removes the variables from preprocessed C, and replaces each
 `a = __builtin_mac(...)` by an asm statement on the accumulator. Operands are in W4 and W5, X pointers in W8, Y pointers
 in W10, the write-back of the other accumulator in W13 (abi-elf.md §2.9). The input is preprocessed C with line markers.
 """
@@ -66,7 +66,7 @@ class _Rewriter:
         return "".join([*self.out, self.text[self.copied :]])
 
     def step(self, i: int) -> int:
-        """Handle the token at `i`; returns the number of the next one."""
+        """Process the token at `i`; return the index of the next one."""
         token = self.tokens[i]
         if token.text == "{":
             self.scopes.append({})
@@ -88,7 +88,7 @@ class _Rewriter:
         return before.endswith((".", "->"))
 
     def end_of(self, i: int, closers: str) -> int:
-        """Index of the first token in `closers` outside of parentheses, from `i` on."""
+        """Index of the first token from `i` on that is in `closers` and outside of parentheses."""
         depth = 0
         while i < len(self.tokens):
             text = self.tokens[i].text
@@ -136,7 +136,7 @@ class _Rewriter:
         if self.tokens[follows].text != "=":
             raise self.error(i, f"accumulator '{self.tokens[i].text}' can only be an argument of a DSP builtin")
         at = follows + 1
-        while self.tokens[at].text in ("(", ")", "int", "short"):  # a cast
+        while self.tokens[at].text in ("(", ")", "int", "short"):  # skip a cast
             at += 1
         if target is None or not self.tokens[at].text.startswith("__builtin_"):
             raise self.error(i, f"accumulator '{self.tokens[i].text}' takes the result of a DSP builtin only")
@@ -223,7 +223,7 @@ class _Builtin:
         return self.engine(f"{name.replace('mpyn', 'mpy.n')} w4*w5,{self.target}", a[0:2], a[2:8], a[8:10])
 
     def own(self, argument: str) -> str:
-        """The accumulator of an argument. Raises ToolError for other arguments."""
+        """The accumulator that an argument names. Raise ToolError if it is no accumulator variable."""
         found = self.accumulator(argument.strip("() "))
         if found is None:
             raise self.error(f"'{argument}' is not an accumulator variable")
@@ -251,7 +251,7 @@ class _Builtin:
         return _Prefetch(pointer, value, number)
 
     def engine(self, instruction: str, factors: list[str], moved: list[str], back: list[str]) -> str:
-        """MAC-class instruction: two factors, prefetches from X and Y, write-back of the other accumulator."""
+        """Statement for a MAC-class instruction: two factors, prefetches from X and Y, accumulator write-back."""
         before, outputs, inputs, after = [], [], [], []
         for number, factor in enumerate(factors):
             before.append(f'register int __f{number} __asm__("r{4 + number}") = ({factor});')
@@ -278,7 +278,7 @@ class _Builtin:
         return _statement(before, instruction, outputs, inputs, after)
 
     def distance(self, a: list[str]) -> str:
-        """ED and EDAC: the square of W4, and the difference of two elements for the next instruction."""
+        """Statement for ED and EDAC: square W4, and load the difference of two elements for the next instruction."""
         x, y = self.prefetch(a[1], a[5], a[2]), self.prefetch(a[3], a[5], a[4])
         if x is None or y is None:
             raise self.error(f"__builtin_{self.name} needs both pointers")

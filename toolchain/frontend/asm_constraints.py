@@ -12,7 +12,7 @@ CLASSES = {
     "a": (0,), "b": (1,), "c": (2,), "d": tuple(range(1, 8)), "e": tuple(range(2, 8)),
     "v": (13,), "x": (8, 9), "y": (10, 11), "z": (4, 5, 6, 7),
 }  # fmt: skip
-"""Letter -> registers (XC16 User's Guide, register letters): WREG, divide, multiply, general, not for divide,
+"""Registers by constraint letter (XC16 User's Guide, register letters): WREG, divide, multiply, general, no divide,
 write-back of accumulators, X and Y prefetch, MAC factors. Classes W1-W14 and W2-W14 have the caller-saved ones only."""
 
 REFUSED = re.compile(rb"invalid (?:in|out)put constraint '[=+&%]*[abcdevxyz]' in asm")
@@ -30,12 +30,12 @@ def respell(text: str) -> str:
     """Replace the constraint letters of asm statements by `r` and marks."""
     out: list[str] = []
     at = depth = part = operand = start = 0
-    found: list[tuple[int, int, str, str]] = []  # begin and end of a constraint, its replacement, its mark
+    found: list[tuple[int, int, str, str]] = []  # (begin and end of a constraint, its replacement, its mark)
     for token in _TOKEN.finditer(text):
         sign = token[0]
         if token["asm"]:
             if depth == 0:
-                depth, part = -1, 0  # before the parenthesis
+                depth, part = -1, 0  # depth -1: before the opening parenthesis
         elif sign in "([" and depth:
             if depth < 0:
                 depth, operand, start, found = 0, 0, token.end(), []

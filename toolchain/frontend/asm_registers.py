@@ -21,7 +21,7 @@ def respell(text: str) -> str:
     """Replace string literals that are register names inside the parentheses of asm statements and declarations."""
     out: list[str] = []
     at = depth = 0
-    waiting = False  # after `asm`, before its parenthesis
+    waiting = False  # whether the last word was `asm` and its parenthesis has not been reached
     for token in _TOKEN.finditer(text):
         if token["asm"]:
             waiting = depth == 0

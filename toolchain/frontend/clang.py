@@ -40,12 +40,12 @@ TARGET_FLAGS = [
 ]
 # Plain char is signed (abi-elf.md §1.1), unlike on the MSP430; wchar_t is unsigned short.
 # Unknown pragmas cause a warning, which also reveals `#pragma config`.
-# `space(ymemory), far` are two section names for clang, which uses the first. Notes about our macros are suppressed.
+# `space(ymemory), far` are two section names for clang, which uses the first. Notes about macro expansions are omitted.
 LANGUAGE_FLAGS = ["-nostdinc", "-fsigned-char", "-fshort-wchar", "-fno-ident", "-Wunknown-pragmas", "-Wno-section",
                   "-Wno-atomic-alignment",
                   "-fmacro-backtrace-limit=1"]  # fmt: skip
-# Errors of clang that are warnings in GCC 4, and so in XC16, in every dialect of C: calls of undeclared functions,
-# `main()`, incompatible pointers, `return` with or without a value. With -Werror they are errors there, too.
+# Errors of clang that are warnings in GCC 4 and XC16 in every dialect of C: calls of undeclared functions, `main()`,
+# incompatible pointers, a missing or superfluous value of `return`. With -Werror, GCC reports them as errors as well.
 WARNINGS_OF_C = ["implicit-function-declaration", "implicit-int", "int-conversion", "incompatible-pointer-types",
                  "incompatible-function-pointer-types", "return-mismatch"]  # fmt: skip
 # Library functions that clang may introduce, but that the run-time library does not contain.
@@ -79,7 +79,7 @@ class Job:
 
     arguments: list[str]
     source: Path
-    printed: Path | None = None  # file for its standard output
+    printed: Path | None = None  # file that receives its standard output
     chip: Chip = field(default_factory=chip_named)
 
 
@@ -93,7 +93,7 @@ def clang_program() -> list[str]:
 
 
 def builtin_include_dir() -> Path:
-    """Folder of clang's headers (stdatomic.h, iso646.h, ...), searched after ours."""
+    """Folder of clang's headers (stdatomic.h, iso646.h, ...), searched after the toolchain's own headers."""
     return Path(clang_program()[0]).parent / "lib" / "include"
 
 
@@ -182,7 +182,7 @@ def preprocess_job(options: CcOptions, item: Input, output: Path | None) -> Job:
 def optimise_job(options: CcOptions, module: Path, output: Path) -> Job:
     """Job that runs clang's middle end on a module."""
     passed = [flag for flag in options.clang if flag.startswith(("-funroll", "-fno-unroll", "-ffast", "-fno-inline"))]
-    if options.level != "2":  # it replaces a loop of eight iterations by a table of 256 words
+    if options.level != "2":  # clang replaces a CRC loop of eight iterations by a table of 256 words
         passed += ["-mllvm", "-disable-loop-idiom-hashrecognize"]
     arguments = [*TARGET_FLAGS, CLANG_LEVEL[options.level], *passed, "-Wno-override-module", "-x", "ir"]
     return Job([*arguments, "-S", "-emit-llvm", str(module), "-o", str(output)], module)

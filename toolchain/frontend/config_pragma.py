@@ -22,9 +22,9 @@ _PRAGMA = re.compile(r"^[ \t]*#[ \t]*pragma[ \t]+config\b(.*)$", re.MULTILINE)
 _MARKER = re.compile(r'^# (\d+) "((?:[^"\\]|\\.)*)".*$', re.MULTILINE)
 _HEADER = Path(__file__).parents[1] / "include" / "dspic_compiler.h"
 _MACRO = re.compile(r"^#define (\w+) 0x([0-9A-F]{4})$", re.MULTILINE)
-_PRAGMA_VALUES = {"NONE": 0xFFFF}  # XC16's name of the reserved brown-out voltage; too common a word for a macro
+_PRAGMA_VALUES = {"NONE": 0xFFFF}  # reserved brown-out voltage in XC16; a macro of that name could conflict
 _SETTING = re.compile(r"\s*(\w+)\s*=\s*(\w+)\s*")
-# Names of MPLAB X that differ from the name of the field: setting -> word, fields.
+# Settings whose name in MPLAB X differs from the field's name: their word and fields.
 _SETTINGS = {
     "FOSFPR": ("FOSC", ("FOS", "FPR")), "FCKSMEN": ("FOSC", ("FCKSM",)), "WDT": ("FWDT", ("FWDTEN",)),
     "BODENV": ("FBORPOR", ("BORV",)), "MCLRE": ("FBORPOR", ("MCLREN",)), "GCP": ("FGS", ("GSS",)),
@@ -32,7 +32,7 @@ _SETTINGS = {
 
 
 def settings(chip: Chip) -> dict[str, tuple[str, int]]:
-    """Name of a setting -> name of its word, mask of its bits."""
+    """Name of the configuration word and mask of the bits of each setting, by name of the setting."""
     known = {}
     for word in chip.config.values():
         for field, (lsb, width) in word.fields.items():
@@ -44,7 +44,7 @@ def settings(chip: Chip) -> dict[str, tuple[str, int]]:
 
 
 def values() -> dict[str, int]:
-    """Name of a value -> mask with zeros for the bits that it clears, from the device header and XC16."""
+    """Mask of each named value of device header and XC16, with zeros for the bits that it clears."""
     return _PRAGMA_VALUES | {name: int(number, 16) for name, number in _MACRO.findall(_HEADER.read_text())}
 
 
@@ -71,7 +71,7 @@ def rewrite(text: str, chip: Chip) -> str:
 
 
 def _apply(setting: str, known: dict[str, tuple[str, int]], codes: dict[str, int], words: dict[str, int]) -> str:
-    """Apply one setting to `words`; returns an error message or ""."""
+    """Apply one setting to `words`; return an error message or ""."""
     found = _SETTING.fullmatch(setting)
     if found is None:
         return f"#pragma config expects SETTING = VALUE, found '{setting.strip()}'"
@@ -92,7 +92,7 @@ def _apply(setting: str, known: dict[str, tuple[str, int]], codes: dict[str, int
 
 
 def _contradiction(setting: str, position: str, given: dict[str, tuple[str, str]]) -> str:
-    """Record a setting; returns an error message if an earlier one has another value, else ""."""
+    """Record a setting; return an error message if an earlier one has another value, else ""."""
     name, _, value = (word.strip() for word in setting.partition("="))
     before, earlier = given.setdefault(name, (value, position))
     return "" if before == value else f"#pragma config {name} = {value}, but {name} = {before} at {earlier}"

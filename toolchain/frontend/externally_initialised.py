@@ -1,7 +1,7 @@
-"""Marks variables that the start-up code does not initialise as `externally_initialized` in unoptimised IR.
+"""Attribute `externally_initialized` for variables in unoptimised IR that the start-up code does not initialise.
 
 `persistent` and `noload` variables start with the previous content of RAM. Without the mark, the middle end assumes the
-value of the definition: it turns a variable that is compared with and set to one constant only into a boolean, and a
+value of the definition. It turns a variable that is compared with one constant and set to it into a boolean, and a
 store in a `user_init` function into an initial value.
 """
 

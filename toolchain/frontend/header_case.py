@@ -1,4 +1,4 @@
-"""Case-insensitive header names, as in sources written on Windows.
+"""Case-insensitive lookup of headers, for sources written on Windows.
 
 If clang does not find a header, it runs again with a case-insensitive overlay of its include folders (`-ivfsoverlay`).
 """
@@ -14,7 +14,7 @@ MISSING = re.compile(rb"fatal error: .*'[^'\n]+\.[hH]' file not found")
 """Error message of clang for a missing header."""
 
 FOLDER_OPTIONS = ("-I", "-iquote", "-isystem", "-idirafter")
-MAX_FILES = 20_000  # the names of further files remain case-sensitive
+MAX_FILES = 20_000  # maximum number of files in the overlay; lookup of further files remains case-sensitive
 
 
 def overlay(arguments: list[str]) -> str:
@@ -37,7 +37,7 @@ def overlay(arguments: list[str]) -> str:
 
 
 def _folders(arguments: list[str]) -> Iterator[Path]:
-    """Folders that `#include` searches, that of the source first, without those of clang."""
+    """Folders that `#include` searches, the folder of the source first; those of clang are excluded."""
     words = iter(arguments)
     named: list[str] = []
     for word in words:

@@ -1,7 +1,7 @@
-"""Warning about polled flags: non-volatile variables that an interrupt function writes and a loop waits for.
+"""Warning about polled flags: non-volatile variables that a loop polls and an interrupt function writes.
 
-The optimiser may read such a variable only once. The input is unoptimised IR text of the whole program. A loop waits
-for variables if they alone decide one of its exits, and it neither writes them, nor calls functions, nor writes through
+The optimiser may read such a variable only once. The input is unoptimised IR text of the whole program. A loop polls
+variables if they alone decide one of its exits, and it neither writes them, nor calls functions, nor writes through
 pointers.
 """
 
@@ -37,7 +37,7 @@ class _FunctionText:
 
 
 def findings(text: str) -> list[str]:
-    """Warnings for the user, in the order of the program."""
+    """Warnings to print, in the order of the source."""
     bodies = {name.strip('"'): body for name, body in FUNCTION.findall(text)}
     interrupts = _closure({name for name in bodies if name in VECTOR_FUNCTIONS}, bodies)
     written = {place for name in interrupts for place in STORE.findall(bodies[name]) if place.startswith("@")}
@@ -86,7 +86,7 @@ def _parse(body: str) -> _FunctionText:
 
 
 def _polled(code: _FunctionText, written: set[str], text: str) -> list[tuple[str, str]]:
-    """(variable, line of the source or "") of loops that wait for a variable."""
+    """(variable, source line or "") of every loop that polls a variable."""
     out = []
     for body in natural_loops(code.succs, next(iter(code.blocks))).values():
         lines = [line for name in body for line in code.blocks[name]]
@@ -113,7 +113,7 @@ def _line_number(reference: str, text: str) -> str:
 
 
 def _read_by(line: str, code: _FunctionText) -> set[str]:
-    """Variables whose loads decide a branch."""
+    """Variables on whose loads a branch depends."""
     found: set[str] = set()
     work, seen = OPERAND.findall(line.partition(",")[0]), set[str]()
     while work:

@@ -92,7 +92,7 @@ class IrBuilder:
         return i
 
     def binary(self, op: str, a: Value, b: Value) -> Value:
-        """Binary integer operation; folded if an operand is a suitable constant."""
+        """Build a binary integer operation; it is folded if an operand is a suitable constant."""
         if op in COMMUTATIVE and isinstance(a, ConstInt | GlobalRef) and not isinstance(b, ConstInt):
             a, b = b, a
         if isinstance(b, ConstInt):
@@ -133,7 +133,7 @@ class IrBuilder:
         return None
 
     def cast(self, op: str, a: Value, t: Type) -> Value:
-        """trunc, zext or sext; `a` itself for the same width."""
+        """Build trunc, zext or sext; return `a` itself if the width does not change."""
         if a.type.bits == t.bits:
             return a
         if isinstance(a, ConstInt):
@@ -151,7 +151,7 @@ class IrBuilder:
         return self.emit(op, t, [a])
 
     def icmp(self, pred: str, a: Value, b: Value) -> Value:
-        """Comparison, an i1."""
+        """Build an integer comparison; its value is an i1."""
         if isinstance(a, ConstInt):
             if isinstance(b, ConstInt):
                 return const(I1, compare(pred, a, b))
@@ -159,7 +159,7 @@ class IrBuilder:
         return self.emit("icmp", I1, [a, b], pred=pred)
 
     def select(self, c: Value, a: Value, b: Value) -> Value:
-        """The value c ? a : b."""
+        """Build the value c ? a : b."""
         if isinstance(c, ConstInt):
             return a if c.value else b
         if a is b:
@@ -169,29 +169,29 @@ class IrBuilder:
         return self.emit("select", a.type, [c, a, b])
 
     def logical_not(self, a: Value) -> Value:
-        """The negation of an i1."""
+        """Build the negation of an i1."""
         return self.binary("xor", a, const(I1, 1))
 
     def add(self, a: Value, offset: int) -> Value:
-        """The sum of a value and a constant."""
+        """Build the sum of a value and a constant."""
         return self.binary("add", a, const(a.type, offset))
 
     def shift(self, op: str, a: Value, n: int) -> Value:
-        """Shift by a constant (`shl`, `lshr` or `ashr`)."""
+        """Build a shift by a constant (`shl`, `lshr` or `ashr`)."""
         return self.binary(op, a, const(a.type, n))
 
     def load(self, t: Type, p: Value, volatile: bool = False) -> Value:
-        """Load of a legal integer type."""
+        """Build a load of a legal integer type."""
         i = self.emit("load", t, [p])
         i.volatile = volatile
         return i
 
     def store(self, v: Value, p: Value, volatile: bool = False) -> None:
-        """Store of a legal integer type."""
+        """Build a store of a legal integer type."""
         self.emit("store", VOID, [v, p]).volatile = volatile
 
     def call(self, name: str, t: Type, args: list[Value]) -> Instr:
-        """Call of a run-time library function by its C name (abi-elf.md §2.8)."""
+        """Build a call of a run-time library function by its C name (abi-elf.md §2.8)."""
         i = self.emit("call", t, [*args, GlobalRef(name)], attrs=[{} for _ in args], vararg=False)
         return i
 
@@ -203,7 +203,7 @@ SWAPPED = {
 
 
 def legal_type(t: Type) -> Type:
-    """The integer container of a type: i1, i8, i16 or a multiple of 16 bits."""
+    """The legal integer type that holds a type: i1, i8, i16 or a multiple of 16 bits."""
     if t.kind == "ptr":
         return I16
     if t.kind not in ("int", "float"):

@@ -1,4 +1,4 @@
-"""Control-flow graph: predecessors, loops, unreachable blocks, short-circuit branches, critical edges, dead code."""
+"""Control-flow graph: predecessors, loops, dominance order, unreachable blocks, critical edges, dead code."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from toolchain.ir.model import VOID, Block, ConstInt, Function, Instr, Value
 
 
 def predecessors(f: Function) -> dict[str, list[str]]:
-    """Block name -> names of its predecessors, each once."""
+    """Names of the predecessors of each block, each once."""
     preds: dict[str, list[str]] = {b.name: [] for b in f.blocks}
     for b in f.blocks:
         for s in b.succs:
@@ -52,7 +52,7 @@ def remove_unreachable(f: Function) -> None:
 
 
 def reverse_postorder(f: Function) -> list[Block]:
-    """Reachable blocks in reverse postorder: every block follows its dominators."""
+    """Reachable blocks in reverse postorder: every block comes after its dominators."""
     blocks = {b.name: b for b in f.blocks}
     order: list[Block] = []
     seen = {f.blocks[0].name}
@@ -72,7 +72,7 @@ def reverse_postorder(f: Function) -> list[Block]:
 
 
 def use_counts(f: Function) -> dict[int, int]:
-    """id(value) -> number of operands that are the value."""
+    """Number of operands that use each value, by id(value)."""
     counts: dict[int, int] = {}
     for b in f.blocks:
         for i in b.instrs:
@@ -84,8 +84,8 @@ def use_counts(f: Function) -> dict[int, int]:
 def split_logical_branches(f: Function) -> None:
     """Replace br (a && b) and br (a || b) by two branches, so that no truth value is computed.
 
-    Ensures: a branch condition is a select of i1 only if that select has other uses. Both operands of a select have
-    been computed before it, so the order of the two branches does not matter.
+    Ensures: a branch condition is a select of i1 only if that select has other uses. Both operands are computed before
+    the select, so the order of the two branches does not matter.
     """
     counts = use_counts(f)
     serial = 0
@@ -134,7 +134,7 @@ def _logical_parts(c: Value) -> tuple[str, Value, Value] | None:
 
 
 def _sink_compare(block: Block, rest: Block, second: Value, c: Value, counts: dict[int, int]) -> None:
-    """Remove the select, and move the second comparison to its branch if it has no other use."""
+    """Remove the select, and move the second comparison to its branch if the comparison has no other use."""
     if c in block.instrs:
         block.instrs.remove(c)
     if not isinstance(second, Instr) or second.op not in ("icmp", "select", "and", "or"):
@@ -145,10 +145,10 @@ def _sink_compare(block: Block, rest: Block, second: Value, c: Value, counts: di
 
 
 def split_critical_edges(f: Function) -> None:
-    """Split critical edges, so that the copies of phis have a block.
+    """Split critical edges, so that copies of phi operands have a block of their own.
 
-    Ensures: no successor of a block with several successors has phis, except behind indirectbr, whose edges cannot be
-    split. There the selector copies values twice.
+    Ensures: no successor of a block with several successors has phis. Exception: edges of indirectbr cannot be split;
+    for them the selector copies values twice.
     """
     blocks = {b.name: b for b in f.blocks}
     k = 0
@@ -176,7 +176,7 @@ def split_critical_edges(f: Function) -> None:
 
 
 def loop_depths(f: Function) -> dict[str, int]:
-    """Block name -> loop nesting depth."""
+    """Loop nesting depth of each block."""
     depth = {b.name: 0 for b in f.blocks}
     for body in natural_loops({b.name: b.succs for b in f.blocks}, f.blocks[0].name).values():
         for n in body:
@@ -185,7 +185,7 @@ def loop_depths(f: Function) -> dict[str, int]:
 
 
 def natural_loops(succs: dict[str, list[str]], entry: str) -> dict[str, set[str]]:
-    """Header -> blocks of its natural loop, from the back edges of a depth-first search.
+    """Blocks of the natural loop of each header, from the back edges of a depth-first search.
 
     Irreducible cycles, which have several entries, are omitted: a backward walk from their tail reaches `entry`.
     """
@@ -246,7 +246,7 @@ NO_SIDE_EFFECTS = frozenset((
 
 
 def sink_compares(f: Function) -> None:
-    """Copy comparisons of other blocks before the branch or select that uses them, so that they fold into it."""
+    """Copy comparisons of other blocks before the branch or select that uses them, for selection to fuse the two."""
     home: dict[int, str] = {id(i): b.name for b in f.blocks for i in b.instrs}
     for b in f.blocks:
         at = 0

@@ -1,4 +1,4 @@
-"""Functions as text: unlegalised IR as LLVM IR that `read` accepts, legal IR with its additional operations."""
+"""Printer of functions: unlegalised IR as LLVM IR that `read` accepts, legal IR with additional operations."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from .model import (
 
 
 def quoted(name: str) -> str:
-    """Identifier after % or @, quoted if it contains other characters than a plain identifier."""
+    """Identifier after % or @, in quotes if it contains characters that need them."""
     plain = all(ch.isalnum() or ch in "-._$" for ch in name)
     return name if plain and name else '"' + name.replace("\\", "\\5C").replace('"', "\\22") + '"'
 
@@ -105,7 +105,7 @@ class Dumper:
         return left + self._body(i)
 
     def _body(self, i: Instr) -> str:
-        """The line without the name of the result."""
+        """Text of one instruction without the name of its result."""
         formatter = FORMATTERS.get(i.op)
         if formatter is not None:
             return formatter(self, i)
@@ -213,7 +213,7 @@ FORMATTERS: dict[str, Callable[[Dumper, Instr], str]] = {
     "cmpxchg": Dumper._cmpxchg,
     **dict.fromkeys(("unreachable", "fence"), Dumper._no_operands),
 }  # fmt: skip
-"""Text of an instruction by its opcode. All others are binary operations or operations of legal IR."""
+"""Formatter by opcode. Opcodes not listed are binary operations or operations of legal IR."""
 
 
 def _volatile(i: Instr) -> str:
@@ -229,7 +229,7 @@ def _escaped(text: str) -> str:
 
 
 def _as_double(v: ConstInt) -> int:
-    """LLVM prints every float as the double of equal value."""
+    """Bits of the double with the value of a float constant; LLVM prints every float as a double."""
     if v.type.bits == 64:
         return v.value
     number = struct.unpack("<f", v.value.to_bytes(4, "little"))[0]

@@ -30,7 +30,7 @@ CASTS = {
     "bitcast", "addrspacecast", "ptrtoaddr",
 }  # fmt: skip
 TYPED_ATTRS = {"byval", "sret", "byref", "inalloca", "preallocated", "elementtype"}
-UNALIGNED_RUN = '"unaligned-run"'  # string attribute that abi.struct_alignment adds
+UNALIGNED_RUN = '"unaligned-run"'  # string attribute that abi.struct_alignment sets
 PAREN_ATTRS = {"dereferenceable", "dereferenceable_or_null", "captures", "initializes", "range", "memory", "nofpclass",
                "allocsize", "vscale_range"}  # fmt: skip
 
@@ -94,7 +94,7 @@ class Cursor:
 
 
 def name_of(token: str) -> str:
-    """Identifier of a token %x, @x or %"x"."""
+    """Identifier in a token such as %x, @x or %"x"."""
     body = token[1:]
     return unquote(body[1:-1]).decode("latin-1") if body.startswith('"') else body
 

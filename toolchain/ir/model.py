@@ -22,7 +22,7 @@ class UnsupportedError(Exception):
 
 
 # ---------------------------------------------------------------------------------------------------------------------
-# Types. Equal types are equal objects by value; `bits` is 0 for everything that is not an integer or a float.
+# Types. They compare by value; `bits` is 0 for types other than integers and floats.
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,13 +62,13 @@ VOID = Type("void")
 PTR = Type("ptr", 16)
 LABEL = Type("label")
 META = Type("meta")
-MAX_INT_BITS = 128  # of input; products with overflow check have twice as many
+MAX_INT_BITS = 128  # greatest width in the input; products with overflow check have twice as many bits
 _INTS = {n: Type("int", n) for n in range(1, 2 * MAX_INT_BITS + 17)}
 I1, I8, I16, I32, I64 = (_INTS[n] for n in (1, 8, 16, 32, 64))
 
 
 def int_type(bits: int) -> Type:
-    """The integer type of `bits` bits, 1..272; the parser accepts up to 128 (engines.md §5)."""
+    """The integer type of `bits` bits, 1..272; the parser accepts at most 128 (engines.md §5)."""
     found = _INTS.get(bits)
     if found is None:
         raise UnsupportedError(f"integer type i{bits}: wider than {MAX_INT_BITS} bits")
@@ -244,7 +244,7 @@ class ParameterAttributes(TypedDict, total=False):
     sret: Type
     elementtype: Type
     align: int
-    unaligned_run: bool  # of a struct passed by value: abi.struct_alignment
+    unaligned_run: bool  # mark of a struct passed by value that abi.struct_alignment sets
 
 
 class Arg(Value):
@@ -284,26 +284,26 @@ class InstrExtra(TypedDict, total=False):
     kind: str  # atomicrmw: its operation
     indices: list[int]  # extractvalue, insertvalue
     cases: list[int]  # switch: one value per successor after the default
-    assign: str  # store: DIAssignID that links it to a debug record
+    assign: str  # store: DIAssignID that links the store to a debug record
     attrs: list[ParameterAttributes]  # call, asm: attributes of every argument
     vararg: bool  # call: the callee is variadic
     fixed: int  # call of a variadic function: number of its named parameters
     tail: str  # call: "tail", "musttail", "notail" or ""
     flags: set[str]  # call: words after the arguments, such as attribute groups
     results: list[Type]  # call and asm with several results: their legal types
-    index: int  # callresult, asmresult: number of the result
-    divides: str  # call of a division function: the operation it replaced
-    other: Instr  # division: the `divother` that takes its second result
-    signed: bool  # mulhigh
-    asm: InlineAsm  # asm
+    index: int  # callresult, asmresult: index of the result
+    divides: str  # call of a division function: the opcode that it replaced
+    other: Instr  # division: the `divother` that uses its second result
+    signed: bool  # mulhigh: whether the factors are signed
+    asm: InlineAsm  # asm: the inline assembly
     name: str  # builtin: its C name
-    size: int  # slot: bytes
-    source: str  # slot: name of the alloca it was
+    size: int  # slot: size in bytes
+    source: str  # slot: name of the alloca that it replaced
     count: int  # blockcopy, blockfill: number of units
     unit: int  # blockcopy, blockfill: bytes of a unit, 1 or 2
     address: bool  # entryword: the frame address instead of the return address
     argument: Arg  # argword: the struct parameter
-    word: int  # argword: number of the word in it
+    word: int  # argword: index of the word in the parameter
 
 
 class Instr(Value):
@@ -312,7 +312,7 @@ class Instr(Value):
     op      LLVM opcode, or an operation of legal IR
     args    operands; for phi the incoming values, in the order of `blocks`
     blocks  names of successors (br, switch, indirectbr) or of incoming blocks (phi)
-    extra   fields of some operations only
+    extra   fields that only some operations have
     """
 
     __slots__ = ("args", "blocks", "extra", "line", "name", "op", "volatile")
@@ -375,7 +375,7 @@ class Function:
 
 @dataclass(slots=True)
 class DbgRecord:
-    """Debug record (#dbg_value, #dbg_declare, #dbg_assign): location of a source variable from its position on.
+    """Debug record (#dbg_value, #dbg_declare, #dbg_assign): location of a source variable from here on.
 
     `value` is None if it is unknown. Of an assignment, `address` is the memory written and `link` the DIAssignID of its
     stores. `location` refers to the scope and to the call at which the code was inlined.
@@ -391,7 +391,7 @@ class DbgRecord:
     address: Value | None = None
     link: str = ""
     words: tuple[Value | None, ...] = ()
-    """Of a struct parameter in registers: its words, None for words that are not read."""
+    """Words of a struct parameter in registers; None for words that the function does not read."""
 
 
 @dataclass(slots=True)
@@ -420,5 +420,5 @@ class Module:
     metadata: dict[str, str] = field(default_factory=dict)
     named_metadata: dict[str, str] = field(default_factory=dict)
     module_asm: list[str] = field(default_factory=list)
-    large_data: bool = False  # -mlarge-data: only variables with attribute near are near
+    large_data: bool = False  # -mlarge-data: only variables with the attribute `near` are in near memory
     far: frozenset[str] = frozenset()  # variables with an address beyond near memory

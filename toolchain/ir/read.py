@@ -56,7 +56,7 @@ class Reader(InstrReader):
         return self.module
 
     def _named_types(self) -> None:
-        """Parse the named struct types, inner types first, because a type may refer to a later one."""
+        """Parse the named struct types, inner types first; in the text a type may refer to a later one."""
         bodies = {}
         for n, line in enumerate(self.lines):
             if line.startswith("%") and " = type " in line:
@@ -194,7 +194,7 @@ class Reader(InstrReader):
         return f, groups
 
     def type_no_func(self, c: Cursor) -> Type:
-        """Parse a result type; a parenthesis behind it starts the parameters of the function."""
+        """Parse the result type of a function; a parenthesis after it starts the parameters."""
         return self._type1(c)
 
     # -- function bodies ----------------------------------------------------------------------------------------------
@@ -225,7 +225,7 @@ class Reader(InstrReader):
         self.module.functions[f.name] = f
 
     def _entry_name(self, f: Function) -> str:
-        """Name of an unlabelled entry block: the number after those of the unnamed parameters."""
+        """Name of an entry block without label: the number that follows those of the unnamed parameters."""
         return str(sum(1 for a in f.args if a.name.isdigit()))
 
     def _line(self, block: Block, text: str) -> None:
@@ -303,7 +303,7 @@ class Reader(InstrReader):
         f.dbg_records.append(record)
 
     def _debug_value(self, c: Cursor) -> Value | None:
-        """Parse the value of a debug record; None for lists of values and for removed values."""
+        """Parse the value of a debug record; return None for a list of values (DIArgList) and for a removed value."""
         if c.peek().startswith("!"):
             c.next()
             if c.peek() == "(":
@@ -314,5 +314,5 @@ class Reader(InstrReader):
 
 
 def read_module(text: str) -> Module:
-    """Parse LLVM IR text. Raises UnsupportedError naming the line of the text."""
+    """Parse LLVM IR text. Raise UnsupportedError with the number of the unsupported line."""
     return Reader(text).read()

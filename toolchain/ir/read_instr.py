@@ -189,7 +189,7 @@ class InstrReader(ValueReader):
         return Instr(op, a.type, [a])
 
     def _operands(self, c: Cursor) -> list[Value]:
-        """Parse `type value, type value...` up to the attachments."""
+        """Parse `type value, type value...` up to the metadata attachments."""
         args = [self.typed(c)]
         while c.peek() == "," and not c.tokens[c.at + 1].startswith("!"):
             c.next()
@@ -271,7 +271,7 @@ class InstrReader(ValueReader):
         self._attrs(c)
         t = self._type1(c)
         vararg, fixed = False, -1
-        if c.peek() == "(":  # full function type, printed for variadic callees
+        if c.peek() == "(":  # parameter types of the callee, which LLVM prints for variadic functions
             c.next()
             fixed = 0
             while not c.accept(")"):

@@ -281,9 +281,9 @@ class ValueReader:
 
 
 def _narrow(bits64: int) -> int:
-    """Bits of the float with the value of a 64-bit pattern (LLVM prints floats as doubles)."""
+    """Bits of the float whose value the given bits of a double have; LLVM prints floats as doubles."""
     value = struct.unpack("<d", bits64.to_bytes(8, "little"))[0]
-    if value != value:  # NaN: sign and upper bits of the payload
+    if value != value:  # NaN: keep the sign and the upper bits of the payload
         return (bits64 >> 63) << 31 | 0x7F800000 | ((bits64 >> 29) & 0x7FFFFF)
     return int.from_bytes(struct.pack("<f", value), "little")
 

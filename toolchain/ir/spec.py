@@ -16,7 +16,7 @@ NOT_LEGAL = frozenset((
 
 
 def check(f: Function, legal: bool = False) -> list[str]:
-    """Violations as sentences, none if the function is well-formed; `legal` adds the rules of legal IR."""
+    """Violations as sentences, empty if the function is well-formed; `legal` adds the rules of legal IR."""
     found: list[str] = []
     names = [b.name for b in f.blocks]
     if len(set(names)) != len(names):

@@ -42,14 +42,14 @@ class LegalizationContext:
     def __init__(self, module: Module, function: Function, locate: Callable[[str | None], str]) -> None:
         self.module = module
         self.function = function
-        self.locate = locate  # !dbg reference -> "file:line"
+        self.locate = locate  # returns "file:line" of a !dbg reference
         self.values: dict[int, Value] = {}
         self.aggregates: dict[int, list[Value]] = {}
         self.blocks: list[Block] = []
         self.last_block: dict[str, str] = {}  # old block name -> name of the new block that holds its terminator
-        self.pending_phis: list[tuple[Instr, list[Value], int | None]] = []  # phi, old operands, leaf of an aggregate
+        self.pending_phis: list[tuple[Instr, list[Value], int | None]] = []  # phi, old operands, leaf index
         self.b = IrBuilder(Block(""))  # appends to the current block
-        self.alive: list[object] = []  # keeps ids in `values` unique while the map lives
+        self.alive: list[object] = []  # objects kept alive, so that their ids, the keys of `values`, stay unique
 
     def begin(self, name: str) -> Block:
         """Add a new block to the function."""
@@ -60,7 +60,7 @@ class LegalizationContext:
     # -- operands -----------------------------------------------------------------------------------------------------
 
     def legal(self, v: Value) -> Value:
-        """The legal value of a scalar operand. Raises UnsupportedError for kinds of operands that have none."""
+        """The legal value of a scalar operand. Raise UnsupportedError for unsupported kinds of operands."""
         if isinstance(v, Lane):
             return self.legal_leaves(v.source)[v.index]
         found = self.values.get(id(v))
@@ -146,7 +146,7 @@ class LegalizationContext:
         return packing.unpack(self.b, self.legal(source), t)
 
     def packed(self, v: Value) -> Value:
-        """A vector operand as one integer, first lane lowest."""
+        """A vector operand as one integer with the first lane in the low bits."""
         return packing.pack(self.b, self.legal_leaves(v), v.type)
 
     def extractvalue(self, i: Instr) -> LegalResult:
@@ -173,7 +173,7 @@ class LegalizationContext:
 
 
 def leaves_of(t: Type, at: int = 0) -> list[tuple[Type, int]]:
-    """Scalar members of an aggregate with their byte offsets, the aggregate starting at `at`."""
+    """Scalar members of an aggregate that starts at offset `at`, with their byte offsets."""
     if t.kind in ("array", "vector"):
         step = size_of(t.elems[0])
         return [leaf for k in range(t.count) for leaf in leaves_of(t.elems[0], at + k * step)]

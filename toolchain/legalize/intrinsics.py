@@ -11,7 +11,7 @@ from toolchain.legalize import mathlib, softfloat
 from toolchain.legalize.context import LegalResult
 from toolchain.legalize.memory import MemoryLegalizer
 
-MAX_INLINE_UNITS = 0x4000  # REPEAT has a count of 14 bits (isa.md §5.7)
+MAX_INLINE_UNITS = 0x4000  # greatest number of units of a REPEAT, whose count has 14 bits (isa.md §5.7)
 
 
 def expand(lz: MemoryLegalizer, i: Instr, name: str) -> LegalResult:
@@ -24,7 +24,7 @@ def expand(lz: MemoryLegalizer, i: Instr, name: str) -> LegalResult:
 
 
 def _no_code(lz: MemoryLegalizer, i: Instr, name: str) -> LegalResult:
-    """No code: hints such as lifetime, assume and prefetch."""
+    """Build no code: hints such as lifetime, assume and prefetch."""
     return None
 
 
@@ -42,7 +42,7 @@ def _minmax(lz: MemoryLegalizer, i: Instr, name: str) -> LegalResult:
 
 
 def _compare3(lz: MemoryLegalizer, i: Instr, name: str) -> LegalResult:
-    """scmp and ucmp: -1, 0 or 1."""
+    """Build scmp or ucmp, a three-way comparison with the value -1, 0 or 1."""
     signed = name[0] == "s"
     extend = lz.sign_extended if signed else lz.zero_extended
     a, b = extend(i.args[0]), extend(i.args[1])
@@ -86,7 +86,7 @@ def _checked(lz: MemoryLegalizer, op: str, signed: bool, bits: int, a: Value, b:
         return result, lz.b.icmp("ult", result, a) if op == "add" else lz.b.icmp("ult", a, b)
     changed = lz.b.binary("xor", a, result)
     other = lz.b.binary("xor", b, result) if op == "add" else lz.b.binary("xor", a, b)
-    both = lz.b.binary("and", changed, other)  # negative if the sign differs from that of the exact result
+    both = lz.b.binary("and", changed, other)  # negative if the result has the wrong sign
     return result, lz.b.icmp("slt", both, const(t, 0))
 
 
@@ -256,7 +256,7 @@ def _entry_word(lz: MemoryLegalizer, i: Instr, name: str) -> LegalResult:
 
 
 def _fmuladd(lz: MemoryLegalizer, i: Instr, name: str) -> LegalResult:
-    """Multiplication and addition with two roundings, as in XC16."""
+    """Build a multiplication and an addition, each of which rounds, as in XC16."""
     a, b, c = (lz.legal(x) for x in i.args[:3])
     mode = "sf" if a.type.bits == 32 else "df"
     return lz.b.call(f"__add{mode}3", a.type, [lz.b.call(f"__mul{mode}3", a.type, [a, b]), c])
@@ -279,7 +279,7 @@ def _round_to_int(lz: MemoryLegalizer, i: Instr, name: str) -> LegalResult:
 
 
 def _fpclass(lz: MemoryLegalizer, i: Instr, name: str) -> LegalResult:
-    """llvm.is.fpclass: the classes of the mask (order of LangRef), decided on the bits of the value."""
+    """llvm.is.fpclass: the classes of the mask (order of LangRef), tested on the bits of the value."""
     a, mask = lz.legal(i.args[0]), i.args[1]
     assert isinstance(mask, ConstInt)
     t, bits = a.type, a.type.bits
@@ -323,9 +323,9 @@ def _fptoint_sat(lz: MemoryLegalizer, i: Instr, name: str) -> LegalResult:
 
 
 def _trap(lz: MemoryLegalizer, i: Instr, name: str) -> LegalResult:
-    """Software breakpoint, then reset, as in the default interrupt handler (abi-elf.md §3.3).
+    """Build a software breakpoint followed by a reset, as in the default interrupt handler (abi-elf.md §3.3).
 
-    The number of the failed check follows as data, which a debugger reads.
+    The number of the failed check follows as data for the debugger.
     """
     if name == "debugtrap":
         lz.b.emit("builtin", VOID, [], name="__builtin_software_breakpoint")

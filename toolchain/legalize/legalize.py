@@ -47,7 +47,7 @@ LIBGCC_MODE = {32: "si", 64: "di", 128: "ti"}
 class Legalizer(MemoryLegalizer):
     """Legalises one function; handlers of arithmetic, control flow and calls."""
 
-    result_address: Arg | None = None  # parameter with the address of a result that registers cannot hold
+    result_address: Arg | None = None  # parameter that holds the address of a result too large for registers
 
     # -- entry --------------------------------------------------------------------------------------------------------
 
@@ -56,7 +56,7 @@ class Legalizer(MemoryLegalizer):
         f = self.function
         parameters = f.args
         self._legalize_parameters(parameters)
-        order = reverse_postorder(f)  # definitions before uses, whatever the textual order
+        order = reverse_postorder(f)  # reverse postorder visits definitions before uses
         for block in order:
             self.b = IrBuilder(self.begin(block.name))
             if block is order[0]:
@@ -107,7 +107,7 @@ class Legalizer(MemoryLegalizer):
                 raise UnsupportedError(e.what, e.where or self.locate(i.line) or self.function.name) from e
 
     def _complete_phis(self) -> None:
-        """Give every new phi its operands, which all exist by now, and the names of the new blocks."""
+        """Set the operands and block names of every new phi; all values exist now."""
         for phi, args, leaf in self.pending_phis:
             phi.args = [self.legal(a) if leaf is None else self.legal_leaves(a)[leaf] for a in args]
             phi.blocks = [self.last_block[n] for n in phi.blocks]
@@ -297,7 +297,7 @@ class Legalizer(MemoryLegalizer):
         self.jump("unreachable", [], [])
 
     def fence(self, i: Instr) -> None:
-        """No code: the CPU is in-order, and the compiler does not reorder memory operations."""
+        """Build no code: the CPU executes in order, and the compiler does not reorder memory operations."""
 
     # -- calls --------------------------------------------------------------------------------------------------------
 
@@ -334,7 +334,7 @@ class Legalizer(MemoryLegalizer):
         return self.clean_result(i.type, new)
 
     def passed_values(self, a: Value) -> list[Value]:
-        """Legal values that an argument or result is passed as."""
+        """Legal values in which an argument or result is passed."""
         if a.type.kind == "vector" and not vectors.is_wide(a.type):
             return [self.packed(a)]
         return self.legal_leaves(a) if a.type.kind in AGGREGATES else [self.legal(a)]

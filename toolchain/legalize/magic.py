@@ -2,7 +2,7 @@
 
 MUL takes one cycle, REPEAT DIV takes 19 (isa.md §6.7). Signed division by 2^k is a shift of x, plus 2^k - 1 if x is
 negative. For size, the rewrite applies only if it takes no more words than DIV. Divisions of 32 bits are rewritten for
-speed only: 17 words and cycles instead of a library call of 3 words and 50 cycles. Needs: legal IR.
+speed only: they take 17 words and cycles; a library call takes 3 words and 50 cycles. Needs: legal IR.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ def run(f: Function, for_size: bool, for_speed: bool = False) -> None:
 
 
 def _inline(i: Instr) -> None:
-    """Turn a call that legalisation made of a 32-bit division by a constant into the division again."""
+    """Restore a 32-bit division by a constant from the library call into which legalisation turned it."""
     op = i.extra.get("divides")
     if isinstance(op, str) and i.type is I32 and _is_divisor(op, i.args[0], i.args[1]):
         i.op, i.args, i.extra = op, i.args[:2], {}
@@ -57,7 +57,7 @@ def _is_divisor(op: str, x: Value, d: Value) -> bool:
 
 
 def _saves_words(i: Instr, others: list[Instr]) -> bool:
-    """Whether the rewrite takes no more words than MOV, REPEAT, DIV, and no remainder shares that DIV."""
+    """Whether the rewrite takes no more words than MOV, REPEAT and DIV, and no remainder uses the same DIV."""
     d = i.args[1]
     assert isinstance(d, ConstInt)
     halved = i.op == "sdiv" and d.value == 2
@@ -68,7 +68,7 @@ def _saves_words(i: Instr, others: list[Instr]) -> bool:
 
 
 def _rewrite(block: Block, i: Instr, quotients: dict[tuple[str, int, int], Value]) -> None:
-    """Append the first steps of the computation to the block, and turn `i` into the last step."""
+    """Append all steps of the computation except the last to the block, and turn `i` into the last one."""
     x, d = i.args
     assert isinstance(d, ConstInt)
     b = IrBuilder(block)
@@ -85,7 +85,7 @@ def _rewrite(block: Block, i: Instr, quotients: dict[tuple[str, int, int], Value
 
 
 def unsigned_factor(d: int, bits: int = 16) -> tuple[int, int]:
-    """(m, s) with x // d == x * m >> bits + s for all x of that many bits; m has at most one bit more."""
+    """(m, s) with x // d == x * m >> bits + s for all x of `bits` bits; m has at most bits + 1 bits."""
     word = 1 << bits
     for s in range(bits + 1):
         m = (word << s) // d + 1
@@ -95,7 +95,7 @@ def unsigned_factor(d: int, bits: int = 16) -> tuple[int, int]:
 
 
 def signed_factor(d: int, bits: int = 16) -> tuple[int, int]:
-    """(m, s) with x / d == (x * m >> bits + s) + (x < 0), towards 0, for all signed x; m has no bit more."""
+    """(m, s) with x / d == (x * m >> bits + s) + (x < 0), towards 0, for all signed x; m has at most `bits` bits."""
     word = 1 << bits
     for s in range(bits):
         m = (word << s) // d + 1
@@ -118,7 +118,7 @@ def _unsigned(b: IrBuilder, x: Value, d: int) -> Value:
     m, s = unsigned_factor(d, bits)
     if m < 1 << bits:
         return b.shift("lshr", _high(b, x, m, "zext"), s)
-    high = _high(b, x, m - (1 << bits), "zext")  # (x + high) >> s without the bit above the others
+    high = _high(b, x, m - (1 << bits), "zext")  # (x + high) >> s without the carry out of x + high
     half = b.shift("lshr", b.binary("sub", x, high), 1)
     return b.shift("lshr", b.binary("add", half, high), s - 1)
 

@@ -13,11 +13,11 @@ SAME_NAME = {
     "lrint", "llrint", "lround", "llround",
 }  # fmt: skip
 RENAMED = {"minnum": "fmin", "maxnum": "fmax", "minimumnum": "fmin", "maximumnum": "fmax"}
-TWO_RESULTS = {"modf", "frexp"}  # the second result is stored through a pointer
+TWO_RESULTS = {"modf", "frexp"}  # functions that store a second result through a pointer
 
 
 def expand(lz: MemoryLegalizer, i: Instr, base: str) -> LegalResult:
-    """Call the function of intrinsic llvm.BASE. Raises UnsupportedError if there is none."""
+    """Build the call of the math.h function for intrinsic llvm.BASE. Raise UnsupportedError if there is none."""
     stem = base.split(".")[0]
     suffix = "f" if i.args[0].type.bits == 32 else ""
     args = [lz.legal(a) for a in i.args[:-1]]

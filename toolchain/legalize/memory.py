@@ -56,7 +56,7 @@ class MemoryLegalizer(LegalizationContext):
         return self.b.binary("add", address, const(I16, offset)) if offset & 0xFFFF else address
 
     def alloca(self, i: Instr) -> Value:
-        """Objects of constant size in the entry block become frame slots, others are allocated at run time."""
+        """Turn an object of constant size in the entry block into a frame slot, others into run-time allocations."""
         t = i.extra["type"]
         size = size_of(t)
         count = self.legal(i.args[0]) if i.args else const(I16, 1)
@@ -72,14 +72,14 @@ class MemoryLegalizer(LegalizationContext):
         return self.aligned(self.b.emit("dynalloca", I16, [total]), slack)
 
     def frame_slot(self, size: int) -> Instr:
-        """Add an object to the frame, from any block; returns its address."""
+        """Add an object to the frame; return its address, which is valid in every block."""
         slot = Instr("slot", I16, [])
         slot.extra["size"] = size
         self.blocks[0].instrs.insert(0, slot)
         return slot
 
     def aligned(self, p: Value, align: int) -> Value:
-        """The next multiple of `align` (0: p itself); the stack is aligned to 2 bytes only."""
+        """Build the pointer rounded up to a multiple of `align` (0: p itself); the stack is aligned only to 2 bytes."""
         return self.b.binary("and", self.b.add(p, align - 1), const(I16, -align)) if align else p
 
     def even(self, p: Value, align: int) -> bool:
@@ -112,7 +112,7 @@ class MemoryLegalizer(LegalizationContext):
         return self.to_bool(value) if i.type.bits == 1 else value
 
     def load_atomic(self, t: Type, size: int, p: Value, even: bool) -> Value:
-        """Atomic load: one instruction, or an atomic section."""
+        """Build an atomic load: one instruction, or an atomic section."""
         if size == 1 or (even and size == 2):
             return self.load_bits(t, size, p, even, True)
         if even and size == 4:
@@ -154,7 +154,7 @@ class MemoryLegalizer(LegalizationContext):
             self.store_bits(value, size, p, even, i.volatile)
 
     def store_atomic(self, value: Value, size: int, p: Value, even: bool) -> None:
-        """Atomic store: one instruction, or an atomic section."""
+        """Build an atomic store: one instruction, or an atomic section."""
         if size == 1 or (even and size == 2):
             self.store_bits(value, size, p, even, True)
         elif even and size == 4:
@@ -223,7 +223,7 @@ class MemoryLegalizer(LegalizationContext):
         return old
 
     def modified(self, kind: str, t: Type, old: Value, v: Value) -> Value:
-        """Value that atomicrmw writes."""
+        """Build the value that atomicrmw writes."""
         if kind in ("add", "sub", "and", "or", "xor"):
             return self.b.binary(kind, old, v)
         if kind == "xchg":
@@ -246,7 +246,7 @@ class MemoryLegalizer(LegalizationContext):
         return [old, same]
 
     def atomic_call(self, i: Instr, name: str) -> Value | None:
-        """Calls of GCC's generic atomic functions, which the front end emits for _Atomic objects."""
+        """Build a call of one of GCC's generic atomic functions, which the front end emits for _Atomic objects."""
         size, p, *operands = (self.legal(a) for a in i.args[:-2])
         assert isinstance(size, ConstInt)
         n = size.value
@@ -275,7 +275,7 @@ class MemoryLegalizer(LegalizationContext):
         same = self.b.icmp("eq", old, expected)
         self.store_bits(self.b.select(same, new, old), n, p, even, True)
         self.end_atomic()
-        self.store_bits(old, n, where, self.even(where, 1), False)  # no change if they were equal
+        self.store_bits(old, n, where, self.even(where, 1), False)  # no change if both are equal
         return same
 
 

@@ -8,8 +8,8 @@ from toolchain.ir.model import I16, I32, I64, Type, UnsupportedError, Value, int
 MODE = {32: "sf", 64: "df"}
 INT_MODE = {32: "si", 64: "di"}
 ARITHMETIC = {"fadd": "__add{}3", "fsub": "__sub{}3", "fmul": "__mul{}3", "fdiv": "__div{}3"}
-# Predicate -> (library function, comparison of its result with 0). An unordered predicate negates the opposite ordered
-# one, because the functions return for NaN a value that makes the ordered comparison false (abi-elf.md §2.8).
+# By predicate: library function, and comparison of its result with 0. An unordered predicate is the negation of the
+# opposite ordered one: for NaN, a function returns a value that makes the ordered comparison false (abi-elf.md §2.8).
 COMPARISONS = {
     "oeq": ("eq", "eq"), "une": ("ne", "ne"), "olt": ("lt", "slt"), "ole": ("le", "sle"), "ogt": ("gt", "sgt"),
     "oge": ("ge", "sge"), "ult": ("ge", "slt"), "ule": ("gt", "sle"), "ugt": ("le", "sgt"), "uge": ("lt", "sge"),

@@ -31,7 +31,7 @@ OWN_HANDLER = frozenset(
 
 
 def lane_count(i: Instr) -> int:
-    """Lanes of an instruction that is translated lane by lane; 0 for scalar ones and those with their own handler."""
+    """Number of lanes of an instruction that is translated lane by lane; 0 for scalar ones and those with a handler."""
     if i.op in OWN_HANDLER:
         return 0
     for v in (i, *i.args):
@@ -57,7 +57,7 @@ def expand(lz: MemoryLegalizer, i: Instr, lanes: int, translate: Translate) -> l
 
 
 def intrinsic(lz: MemoryLegalizer, i: Instr, translate_call: Translate) -> list[Value]:
-    """Translate one scalar call per lane; the callee's name serves for them, because only its first word counts."""
+    """Translate one scalar call per lane; the callee keeps its name, of which only the first word matters."""
     out: list[Value] = []
     for k in range(i.type.count):
         args = [Lane(a, k) if a.type.kind == "vector" else a for a in i.args]
@@ -72,7 +72,7 @@ def intrinsic(lz: MemoryLegalizer, i: Instr, translate_call: Translate) -> list[
 
 
 def extractelement(lz: MemoryLegalizer, i: Instr) -> Value:
-    """A constant index names the lane; a variable index becomes a chain of selects."""
+    """Build the lane at an index; a variable index becomes a chain of selects."""
     lanes, index = lz.legal_leaves(i.args[0]), i.args[1]
     if isinstance(index, ConstInt):
         return lanes[index.value] if index.value < len(lanes) else Undef(legal_type(i.type))
@@ -110,7 +110,7 @@ def bitcast(lz: MemoryLegalizer, i: Instr) -> LegalResult:
 
 
 def is_wide(t: Type) -> bool:
-    """Whether a type is a vector that the argument registers cannot hold; such vectors travel through memory."""
+    """Whether a type is a vector that the argument registers cannot hold; such vectors are passed in memory."""
     return t.kind == "vector" and size_of(t) > 2 * ARGUMENT_REGISTERS
 
 

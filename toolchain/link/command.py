@@ -21,10 +21,10 @@ from toolchain.link.mapfile import map_text, memory_summary
 from toolchain.link.options import MINIMUM_STACK, STACK_GUARD, LinkOptions, PartRegions
 
 IGNORED_WORDS = (
-    "--start-group", "--end-group", "-(", "-)",  # all libraries are one group anyway
-    "--local-stack", "--no-local-stack",  # the stack follows the data, which may all lie in near RAM
+    "--start-group", "--end-group", "-(", "-)",  # all libraries always form one group
+    "--local-stack", "--no-local-stack",  # no effect: the stack always follows the data
     "--check-sections", "--no-check-sections",  # overlaps are always errors
-    "--smart-io", "--no-smart-io",  # printf's parts are linked as the format strings need them
+    "--smart-io", "--no-smart-io",  # parts of printf are always linked by need of the format strings
     "--force-link", "--no-force-link", "--warn-common", "--cref", "--select-objects", "--no-select-objects",
     "--warn-section-align", "--no-warn-section-align",
 )  # fmt: skip
@@ -34,7 +34,7 @@ _NUMBERS = {"heap": 0xFFFF, "stack": 0xFFFF, "stackguard": 0xFFFF, "fill_upper":
 
 
 def add_options(p: argparse.ArgumentParser) -> None:
-    """Add the options that steer a link (names as in Microchip's linker, abi-elf.md §3.3)."""
+    """Add the options of the linker, with the names of Microchip's linker (abi-elf.md §3.3)."""
     p.add_argument("-e", "--entry", default="__reset", help="start symbol (default __reset)")
     p.add_argument("--gc-sections", action="store_true", help="leave out sections nothing refers to")
     p.add_argument("--no-gc-sections", dest="gc_sections", action="store_false", help=argparse.SUPPRESS)
@@ -68,7 +68,7 @@ def add_options(p: argparse.ArgumentParser) -> None:
 
 
 def link_options(options: argparse.Namespace) -> LinkOptions:
-    """Return the linker's options from parsed arguments; raises `ToolError` for values out of range."""
+    """Return the linker's options from parsed arguments; raise `ToolError` for values out of range."""
     for name, most in _NUMBERS.items():
         if not 0 <= getattr(options, name) <= most:
             raise ToolError(f"--{name.replace('_', '-')} {getattr(options, name)} is outside 0..{most}")
@@ -118,14 +118,14 @@ def _part(text: str, chip: Chip) -> PartRegions:
 
 
 class _Words(argparse.ArgumentParser):
-    """Argument parser that raises `ToolError`."""
+    """Argument parser that raises `ToolError` instead of exiting."""
 
     def error(self, message: str) -> NoReturn:
         raise ToolError(f"linker option: {message} (see `python -m toolchain ld --help`)")
 
 
 def parse_link_words(words: Sequence[str]) -> argparse.Namespace:
-    """Parse linker options of -Wl, and -Xlinker; raises `ToolError` for an unknown option."""
+    """Parse the linker options of -Wl and -Xlinker; raise `ToolError` for an unknown option."""
     p = _Words(prog="cc -Wl", allow_abbrev=False, add_help=False)
     add_options(p)
     return p.parse_args(list(words))
@@ -145,7 +145,7 @@ def output_files(
     hex_file: str | Path | None = None,
     summary_file: str | Path | None = None,
 ) -> list[tuple[str | Path, bytes]]:
-    """Return (path, content) of everything a link writes; `output` in .hex becomes Intel HEX instead of ELF."""
+    """Return (path, content) of all output files of a link; an `output` that ends in .hex is Intel HEX, not ELF."""
     is_hex = output.suffix.lower() in (".hex", ".ihex")
     content = hex_text(linked.image).encode() if is_hex else executable_bytes(linked.image)
     files: list[tuple[str | Path, bytes]] = [(output, content)]

@@ -1,7 +1,7 @@
 """The `.dinit` table, from which crt0 initialises RAM (abi-elf.md §3.2).
 
-Adjacent sections of equal treatment share a record: the format allows it, and each record takes three program words.
-Initialised sections that contain only zeros are cleared, not copied.
+Adjacent sections with the same treatment share a record, because each record takes three program words. Initialised
+sections that contain only zeros are cleared, not copied.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ _NEVER = SectionFlag.PERSIST | SectionFlag.NOLOAD
 
 
 class Format(IntEnum):
-    """Low seven bits of a record's third word (abi-elf.md §3.2)."""
+    """Format of a record: the low seven bits of its third word (abi-elf.md §3.2)."""
 
     CLEAR = 0
     COPY_TWO = 1  # two data bytes per program word
@@ -29,7 +29,7 @@ class Format(IntEnum):
 
 @dataclass(slots=True)
 class DinitRecord:
-    """One table entry: RAM address, length in bytes, how it is filled, and the sections it covers."""
+    """One table entry: RAM address, length in bytes, format of its data, and the sections that it initialises."""
 
     address: int
     size: int
@@ -61,7 +61,7 @@ def plan(layout: Layout, pack: bool) -> list[DinitRecord]:
 
 
 def empty_section(records: list[DinitRecord]) -> Section:
-    """Return `.dinit` with its final length and without content; the end mark is one word."""
+    """Return `.dinit` with its final length and without content; the end marker is one word."""
     words = sum(record.words for record in records) + 1
     return Section(".dinit", CODE, data=bytearray(words * OCTETS_PER_WORD))
 

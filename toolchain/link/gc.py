@@ -1,4 +1,4 @@
-"""--gc-sections: input sections that are reachable from the roots."""
+"""--gc-sections: selection of the input sections that are reachable from the roots."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from toolchain.link.memory import CONFIG_SECTIONS
 from toolchain.link.resolve import Resolution
 
 SECTION_LIMIT = re.compile(r"\.(startof|sizeof|endof)\.(.+)")
-"""Symbols of `.startof.(section)`, `.sizeof.(section)` and `.endof.(section)` (abi-elf.md §4.2)."""
+"""Pattern of the symbols for `.startof.(section)`, `.sizeof.(section)` and `.endof.(section)` (abi-elf.md §4.2)."""
 
 ROOT_NAMES = frozenset((".reset", ".init", ".user_init", ".ivt", ".aivt"))
 
 
 def vector_names() -> set[str]:
-    """Return the symbols that become vectors if they are defined (abi-elf.md §2.7)."""
+    """Return the symbols that are entered in the vector tables if they are defined (abi-elf.md §2.7)."""
     names = {"__DefaultInterrupt"}
     for vector in SLOTS:
         names |= {vector.symbol, vector.alternate_symbol}
@@ -56,7 +56,7 @@ def live_sections(resolution: Resolution, names: list[str], collect: bool) -> se
             continue
         live.add(section)
         if not section.flags & SectionFlag.ALLOC:
-            continue  # references from debug information keep nothing
+            continue  # references from debug information keep no section
         for reloc in section.relocs:
             target = resolution.lookup(reloc.symbol)
             if target.home is Home.SECTION and target.section is not None and target.section not in live:

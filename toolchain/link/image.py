@@ -17,12 +17,12 @@ _KEPT = (
     F.WRITE | F.ALLOC | F.EXECINSTR | F.NOLOAD | F.NEAR | F.PERSIST | F.XMEM | F.YMEM | F.PSV | F.EEDATA | F.ABSOLUTE
 )
 _OWN_NAME = (".reset", ".ivt", ".aivt", ".handle", ".dinit")
-"""Sections that keep their name.  `.handle` lists functions whose address is taken; Microchip puts it in .text."""
+"""Sections that keep their name, unlike Microchip's `.handle` (functions whose address is taken), which is in .text."""
 
 
 @dataclass(slots=True)
 class Output:
-    """One section of the executable and the input sections it is made of, in order."""
+    """One section of the executable, and its input sections in order."""
 
     section: Section
     inputs: list[Section]
@@ -53,7 +53,7 @@ def _flags(section: Section) -> int:
     if section.is_ram and section.type != c.SHT_NOBITS:
         flags |= (
             F.NOLOAD
-        )  # the contents are in .dinit; without the flag bin2hex writes them over the program (§7 item 4)
+        )  # the contents are in .dinit; without this flag bin2hex overwrites program words with them (§7 item 4)
     if section.is_psv or section.is_eedata:
         flags &= ~(F.EXECINSTR | F.ABSOLUTE)
     return flags
@@ -77,10 +77,10 @@ def _content(section: Section, octets: bytearray, size: int, fill_upper: int) ->
 def build_outputs(
     layout: Layout, contents: dict[Section, bytearray], fill_upper: int, debug_phantoms: bool
 ) -> list[Output]:
-    """Join adjacent input sections of one kind; order: program, constants, data, debug.
+    """Join adjacent input sections of the same kind, in the order program, constants, data, debug.
 
-    Debug sections lose their phantom octets, so that any DWARF reader can read the image; `debug_phantoms` keeps
-    them as in XC16's images.
+    Phantom octets of debug sections are removed, so that any DWARF reader can read the image. `debug_phantoms`
+    keeps them, as in XC16's images.
     """
     rank = {"program": 0, "config": 1, "eeprom": 2, "data": 3, "info": 4}
 
@@ -116,7 +116,7 @@ def build_outputs(
 def build_executable(
     resolution: Resolution, outputs: list[Output], relocator: Relocator, entry: int, processor: int
 ) -> Executable:
-    """Return the executable with its symbols: named symbols of the objects, and linker symbols in use."""
+    """Return the executable with its symbols: named symbols of the objects, and referenced linker symbols."""
     home = {section: output.section for output in outputs for section in output.inputs}
     symbols: list[Symbol] = []
     for obj in resolution.objects:

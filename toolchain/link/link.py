@@ -1,4 +1,4 @@
-"""The linker: objects and libraries -> an image.  `_link` lists the steps in order."""
+"""The linker: links objects and libraries to an image.  `_link` lists the steps in order."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ LINKER_OBJECT = "<linker>"
 
 @dataclass(slots=True)
 class Linked:
-    """A finished link: the image, and what the map file and reports are made from."""
+    """Result of a link: the image, and the data for map file and reports."""
 
     image: Executable
     resolution: Resolution
@@ -42,14 +42,14 @@ class Linked:
     outputs: list[Output]
     records: list[dinit.DinitRecord]
     live: set[Section]
-    stack: tuple[int, int]  # first address of the stack, limit (SPLIM)
+    stack: tuple[int, int]  # first address of the stack, and stack limit (SPLIM)
     messages: list[str]
 
 
 def link(objects: list[ObjectFile], archives: list[Archive], options: LinkOptions) -> Linked:
-    """Link `objects` and what they need of `archives`.  Raises `ToolError` listing everything that is wrong.
+    """Link `objects` with the members of `archives` that they need.  Raise `ToolError` with all errors.
 
-    GOTO slots for function pointers take flash only in images where a function lies beyond the reach of a pointer.
+    GOTO slots for function pointers are reserved only if the address of a function exceeds 16 bits.
     """
     linked = _link(objects, archives, options, False) or _link(objects, archives, options, True)
     assert linked is not None, "with slots every function is within reach"
@@ -57,7 +57,7 @@ def link(objects: list[ObjectFile], archives: list[Archive], options: LinkOption
 
 
 def _link(objects: list[ObjectFile], archives: list[Archive], options: LinkOptions, with_slots: bool) -> Linked | None:
-    """Link once; None when function pointers turn out to need GOTO slots that `with_slots` did not reserve."""
+    """Link once; return None if function pointers need GOTO slots and `with_slots` did not reserve them."""
     inputs = _gather_inputs(objects, archives, options)
     handles = _handles(inputs, options, with_slots)
     memory = ChipMemory(options.chip, options.part)
@@ -81,14 +81,14 @@ def _link(objects: list[ObjectFile], archives: list[Archive], options: LinkOptio
 
 @dataclass(slots=True)
 class _Inputs:
-    """The input sections of a link: resolved symbols, the linker's own object, and the live sections."""
+    """The input sections of a link: resolved symbols, the object that the linker generates, and the live sections."""
 
     resolution: Resolution
     generated: ObjectFile
     live: set[Section]
 
     def adopt(self) -> None:
-        """Enter the sections and symbols of the linker's own object into the resolution."""
+        """Add the sections and symbols of the object that the linker generates to the resolution."""
         for section in self.generated.sections:
             self.resolution.owner[section] = self.generated
         for symbol in self.generated.symbols:
@@ -115,7 +115,7 @@ class _Placement:
 
 
 def _gather_inputs(objects: list[ObjectFile], archives: list[Archive], options: LinkOptions) -> _Inputs:
-    """Resolve symbols, select the live sections, and generate the sections that the program does not bring."""
+    """Resolve symbols, select the live sections, and generate the sections that the program does not define."""
     roots = [options.entry, *options.undefined]
     resolution = resolve(objects, archives, roots)
     if options.part is not None:
@@ -145,7 +145,7 @@ def _handles(inputs: _Inputs, options: LinkOptions, with_slots: bool) -> _Handle
 
 
 def _check_inputs(inputs: _Inputs, absolute: set[str], options: LinkOptions) -> None:
-    """Raise `ToolError` for undefined and duplicate symbols, and for handlers that no vector takes."""
+    """Raise `ToolError` for undefined and duplicate symbols, and for handlers without a vector."""
     limits = {name for name in inputs.resolution.wanted if SECTION_LIMIT.fullmatch(name)}
     check(inputs.resolution, absolute | limits, inputs.live)
     if options.part is None:
@@ -155,7 +155,7 @@ def _check_inputs(inputs: _Inputs, absolute: set[str], options: LinkOptions) -> 
 
 
 def _place_sections(inputs: _Inputs, memory: ChipMemory, options: LinkOptions) -> _Placement:
-    """Give every live section its address; data first, because the `.dinit` table depends on its placement."""
+    """Assign an address to every live section; data first, because the `.dinit` table depends on its placement."""
     sections = [section for obj in inputs.resolution.objects for section in obj.sections]
     order = [s for s in sections if s in inputs.live and s.name != c.SIGNATURE_SECTION]
     placer = Placer(inputs.resolution, order, memory)
@@ -186,14 +186,14 @@ def _relocate(relocator: Relocator, placement: _Placement, options: LinkOptions)
 
 
 def _beyond_pointers(layout: Layout, target: Symbol) -> bool:
-    """Whether a function lies where a 16-bit pointer cannot point (abi-elf.md §1.5)."""
+    """Whether the address of a function exceeds a 16-bit pointer (abi-elf.md §1.5)."""
     if target.section is None or target.section not in layout.placed:
         return target.home is Home.ABSOLUTE and target.value >= HANDLE_LIMIT
     return layout.placed[target.section].load + target.value >= HANDLE_LIMIT
 
 
 def _common_sections(resolution: Resolution, own: ObjectFile) -> None:
-    """Give every COMMON symbol a zeroed section; near when there is room is what small-data code assumes (§1.4)."""
+    """Create a zeroed section for every COMMON symbol; it is near if it fits, as small-data code assumes (§1.4)."""
     for name, symbol in resolution.globals.items():
         if symbol.home is not Home.COMMON:
             continue
@@ -206,7 +206,7 @@ def _common_sections(resolution: Resolution, own: ObjectFile) -> None:
 
 
 def _fixed_sections(resolution: Resolution, own: ObjectFile, live: set[Section], options: LinkOptions) -> None:
-    """Generate reset, vector tables, heap and the end of .user_init, unless the program has its own."""
+    """Generate reset, vector tables, heap and the RETURN of .user_init, unless the program defines them."""
     present = {s.name for s in live if s.units}
     if ".reset" not in present:
         own.sections.append(synthesize.reset_section(options.entry))
@@ -226,7 +226,7 @@ _LINKER_SYMBOLS = (
     "__const_length", "__dinit_tblpage", "__dinit_tbloffset", "__user_init", "__has_user_init",
     "__bootconst_psvpage", "__secureconst_psvpage", "__enable_fixed",
 )  # fmt: skip
-"""Absolute symbols the linker defines, abi-elf.md §3.3; `__enable_fixed` is 0 = no fixed-point types (§3.1)."""
+"""Absolute symbols that the linker defines (abi-elf.md §3.3); `__enable_fixed` is 0: no fixed-point types (§3.1)."""
 
 
 def _linker_symbols(
@@ -273,7 +273,7 @@ def _section_limits(resolution: Resolution, layout: Layout) -> dict[str, int]:
 
 
 def _stack(resolution: Resolution, placement: _Placement, options: LinkOptions) -> tuple[int, int]:
-    """Return (first address, limit): a stack section of the program, else the largest free block (abi-elf.md §3.3)."""
+    """Return (first address, limit) of the stack: the program's section, else the largest gap (abi-elf.md §3.3)."""
     layout, order = placement.layout, placement.order
     given = [s for s in order if s.extended & ExtendedAttribute.STACK and s.units]
     if given:
@@ -315,7 +315,7 @@ def _check_handlers(resolution: Resolution, live: set[Section]) -> None:
 
 
 def _foreign_processors(objects: list[ObjectFile], chip: Chip) -> list[str]:
-    """Warn about objects assembled for another part: register addresses may differ (abi-elf.md §6.1)."""
+    """Return a warning for each object assembled for another chip: register addresses may differ (abi-elf.md §6.1)."""
     fitting = (*chip.processors, *GENERIC_PROCESSORS)
     part = chip.name.removeprefix("dsPIC")
     return [
@@ -326,7 +326,7 @@ def _foreign_processors(objects: list[ObjectFile], chip: Chip) -> list[str]:
 
 
 def memory_use(linked: Linked) -> dict[str, int]:
-    """Return bytes used: "flash" (three per instruction word), "data", "eeprom", and "stack" left over."""
+    """Return bytes used: "flash" (three per instruction word), "data", "eeprom", and the bytes free for the "stack"."""
     used = {"flash": 0, "data": 0, "eeprom": 0}
     for section, placed in linked.layout.placed.items():
         space = space_of(section)

@@ -1,4 +1,4 @@
-"""Memories of the chip and symbols of its linker script, from `emu.chips`; free intervals of a memory."""
+"""Memory regions of a chip and symbols of its linker script, from `emu.chips`; allocation of free intervals."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from emu.chips.family import UNIT_ID
 from emu.image.elf_facts import UNITS_PER_WORD
 from toolchain.link.options import PartRegions
 
-HANDLE_LIMIT = 0x10000  # abi-elf.md §1.5: a function pointer is 16 bits
-UNIT_ID_WORDS = 4  # FUID0..3, abi-elf.md §3.3
+HANDLE_LIMIT = 0x10000  # first address that a function pointer of 16 bits cannot hold (abi-elf.md §1.5)
+UNIT_ID_WORDS = 4  # number of unit-id words, FUID0..3 (abi-elf.md §3.3)
 
 
 class ChipMemory:
@@ -33,14 +33,14 @@ class ChipMemory:
 
     @cached_property
     def config_sections(self) -> Mapping[str, int]:
-        """Input section name -> program address of the configuration and unit-id words (abi-elf.md §6.6)."""
+        """Program addresses of the configuration and unit-id words by input section name (abi-elf.md §6.6)."""
         places = {f"__{name}.sec": word.address for name, word in self.chip.config.items()}
         for index in range(UNIT_ID_WORDS):
             places[f"__FUID{index}.sec"] = UNIT_ID.start + index * UNITS_PER_WORD
         return places
 
     def script_symbols(self) -> dict[str, int]:
-        """Absolute symbols of a device's linker script (abi-elf.md §3.3): bases, config words, SFRs twice spelt."""
+        """Absolute symbols of a device's linker script (abi-elf.md §3.3): bases, config words, SFRs in two cases."""
         symbols = {
             "__CODE_BASE": self.program.start,
             "__IVT_BASE": self.ivt.start,
@@ -53,7 +53,7 @@ class ChipMemory:
             symbols[f"__{name}"] = word.address
         for name, sfr in self.chip.sfrs.items():
             symbols[name] = symbols[f"_{name}"] = symbols[f"_{name}bits"] = sfr.address
-        for accumulator in ("ACCA", "ACCB"):  # three registers each; `PUSH ACCA` takes the lowest (abi-elf.md §3.3)
+        for accumulator in ("ACCA", "ACCB"):  # three registers each; `PUSH ACCA` refers to the lowest (abi-elf.md §3.3)
             symbols[accumulator] = symbols[f"_{accumulator}"] = self.chip.sfrs[f"{accumulator}L"].address
         return symbols
 
@@ -70,7 +70,7 @@ CONFIG_SECTIONS: Final = frozenset(name for chip in map(chip_named, NAMES) for n
 
 @dataclass(slots=True)
 class Pool:
-    """Free intervals of one space, in address units, sorted; allocation is first fit, so results repeat."""
+    """Free intervals of one space, in address units, sorted; allocation is first fit and deterministic."""
 
     start: int
     end: int

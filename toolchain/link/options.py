@@ -7,13 +7,13 @@ from dataclasses import dataclass, field
 from emu.chips import chip_named
 from emu.chips.chip import Chip, Region
 
-STACK_GUARD = 16  # abi-elf.md §3.3: --stackguard default
-MINIMUM_STACK = 16  # --stack default
+STACK_GUARD = 16  # default of --stackguard in bytes (abi-elf.md §3.3)
+MINIMUM_STACK = 16  # default of --stack in bytes
 
 
 @dataclass(frozen=True, slots=True)
 class PartRegions:
-    """Memory of a program that another image calls: a range of program memory and one of RAM.
+    """Memory of a program that another image calls (`--part`): a range of program memory and one of RAM.
 
     Such a program has no vectors, reset and stack.  Its constants are in its RAM, because the PSV window shows the
     constants of the other image.
@@ -37,7 +37,7 @@ class LinkOptions:
     handles: bool = True
     isr: bool = True
     fill_upper: int = 0
-    debug_phantoms: bool = False  # DWARF bytes doubled, as XC16 stores them (abi-elf.md §6.2)
+    debug_phantoms: bool = False  # store each DWARF byte followed by a phantom octet, as XC16 does (abi-elf.md §6.2)
     undefined: list[str] = field(default_factory=list)
     define: dict[str, int] = field(default_factory=dict)
     chip: Chip = field(default_factory=chip_named)

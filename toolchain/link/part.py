@@ -1,4 +1,4 @@
-"""Programs that another image calls (`--part`): constants in RAM, and checks of what they cannot have."""
+"""Programs that another image calls (`--part`): constants in RAM, and checks for unsupported contents."""
 
 from __future__ import annotations
 

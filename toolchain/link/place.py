@@ -1,7 +1,7 @@
 """Placement: every live input section gets an address and a load address (abi-elf.md §3.3, "Allocation").
 
 In: sections with their sizes.  Out: a `PlacedSection` for each, without overlaps, by the rules of PSV, near, X, Y,
-`address()` and alignment; or a `ToolError` with the number of missing bytes.
+`address()` and alignment.  If memory is exhausted, a `ToolError` states the number of missing bytes.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ def space_of(section: Section) -> str:
 
 
 class Placer:
-    """Places sections space by space; largest constraints first."""
+    """Places sections space by space; the most constrained sections first."""
 
     def __init__(self, resolution: Resolution, sections: list[Section], memory: ChipMemory) -> None:
         self.resolution, self.layout, self.memory = resolution, Layout(memory), memory
@@ -194,7 +194,7 @@ class Placer:
             self._record(section, psv_address(at + offset), at + offset)
 
     def place_eeprom(self) -> None:
-        """Place EEPROM contents; code sees the low half of the address, 0xF000.. (abi-elf.md §6.4)."""
+        """Place EEPROM contents; code uses the low half of the address, from 0xF000 on (abi-elf.md §6.4)."""
         members = self.by_space.get("eeprom", [])
         for section in members:
             if section.flags & SectionFlag.ABSOLUTE:
@@ -208,7 +208,7 @@ class Placer:
                 self._record(section, psv_address(at), at)
 
     def place_info(self) -> None:
-        """Place debug sections at offsets within the joined section of their name."""
+        """Place debug sections of one name one after another, from offset 0."""
         ends: dict[str, int] = {}
         for section in self.by_space.get("info", []):
             start = ends.get(section.name, 0)

@@ -13,9 +13,9 @@ from toolchain.link.memory import HANDLE_LIMIT
 from toolchain.link.place import Layout, space_of
 from toolchain.link.resolve import Resolution
 
-_NEAR_FORMS = frozenset((4, 5))  # FILE_REG_BYTE, FILE_REG
+_NEAR_FORMS = frozenset((4, 5))  # relocations FILE_REG_BYTE and FILE_REG, whose target must be near
 _LSB, _MSB = 32, 33
-_DATA_WORD = frozenset((2, 8))  # `.word` and MOV #lit16: a code address does not fit there (§4.2)
+_DATA_WORD = frozenset((2, 8))  # relocations of `.word` and MOV #lit16, which a code address does not fit (§4.2)
 
 _LISTS = frozenset((".debug_loc", ".debug_ranges"))
 
@@ -56,7 +56,7 @@ class Relocator:
         if symbol.home is Home.SECTION and symbol.section is not None:
             placed = self.layout.placed.get(symbol.section)
             if placed is None:
-                return SymbolTarget(0, 0, "")  # in a discarded section: only debug information refers to it
+                return SymbolTarget(0, 0, "")  # the section is discarded; only debug information refers to it
             space = space_of(symbol.section)
             return SymbolTarget(placed.address + symbol.value, placed.load + symbol.value, space)
         if symbol.home is Home.UNDEFINED:
@@ -92,7 +92,7 @@ class Relocator:
         target = self.target(reloc.symbol)
         formula = kind.formula
         if section.name in _LISTS and self._is_discarded(reloc.symbol):
-            return 1  # a pair of zeros ends a list
+            return 1  # not 0: in debug information a pair of zeros ends a list
         if formula is Formula.ADDRESS:
             if (
                 target.space == "program"
@@ -132,7 +132,7 @@ class Relocator:
         return home is not None and home not in self.layout.placed
 
     def _address(self, kind: RelocationType, target: SymbolTarget, field: int) -> int:
-        """Return S+A; the addend is signed, or unsigned if the signed sum is out of range, as GNU ld does it."""
+        """Return S+A; the addend is signed, or unsigned if the signed sum is out of range, as in GNU ld."""
         signed = target.address + _signed(field, kind.width)
         value = signed if kind.low <= signed <= kind.high else target.address + field
         if kind.number in _NEAR_FORMS and not kind.low <= value <= kind.high:
@@ -143,7 +143,7 @@ class Relocator:
         return fields.checked(kind, value)
 
     def _program_value(self, symbol: Symbol, kind: RelocationType, target: SymbolTarget, load: int) -> int:
-        """Return the value of an operator of abi-elf.md §4.2 on the load address."""
+        """Return the value of an operator of abi-elf.md §4.2 applied to the load address."""
         formula = kind.formula
         if target.space == "data" and formula in _PROGRAM_ONLY:
             raise FieldError(f"{formula.name.lower()}() needs a program address, this symbol is data")
@@ -168,7 +168,7 @@ class Relocator:
         return fields.checked(kind, value)
 
     def _handle(self, symbol: Symbol, load: int) -> int:
-        """Return a function's own address below 0x10000, else that of its GOTO slot (abi-elf.md §1.5)."""
+        """Return the address of a function if it is below 0x10000, else that of its GOTO slot (abi-elf.md §1.5)."""
         target = self.resolution.lookup(symbol)
         if target.home is Home.UNDEFINED and target.bind is Bind.WEAK:
             return 0

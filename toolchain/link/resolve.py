@@ -1,6 +1,6 @@
 """Symbol resolution: the definition of each name, and the archive members that are needed.
 
-Every global name has one definition afterwards, or all undefined and duplicate names are reported together.
+Afterwards every global name has one definition; otherwise one error lists all undefined and duplicate names.
 """
 
 from __future__ import annotations
@@ -14,18 +14,18 @@ from toolchain.elf.symbols import is_named
 from toolchain.errors import ToolError
 from toolchain.link.smartio import plain_name
 
-MAX_REFERENCES = 4  # places shown per undefined symbol
+MAX_REFERENCES = 4  # maximum number of references shown per undefined symbol
 
 
 @dataclass(slots=True)
 class Resolution:
-    """Objects of the link in order, definitions by name, and the object each section came from."""
+    """Objects of the link in order, definitions by name, and the object of each section."""
 
     objects: list[ObjectFile] = field(default_factory=list)
     globals: dict[str, Symbol] = field(default_factory=dict)
     owner: dict[Section, ObjectFile] = field(default_factory=dict)
     defined_in: dict[str, ObjectFile] = field(default_factory=dict)
-    wanted: dict[str, bool] = field(default_factory=dict)  # name -> strongly referenced
+    wanted: dict[str, bool] = field(default_factory=dict)  # referenced names; True if any reference is strong
     duplicates: dict[str, list[str]] = field(default_factory=dict)
 
     def add(self, obj: ObjectFile) -> None:
@@ -55,7 +55,7 @@ class Resolution:
             known.value = max(known.value, symbol.value)
 
     def lookup(self, symbol: Symbol) -> Symbol:
-        """Return the definition of `symbol`: the global one if it is not local and there is one, else itself."""
+        """Return the definition of `symbol`: itself if it is local, else the global definition of its name, if any."""
         if symbol.bind is Bind.LOCAL:
             return symbol
         return self.globals.get(symbol.name, symbol)
@@ -65,7 +65,7 @@ _STRONG = 3
 
 
 def _rank(symbol: Symbol) -> int:
-    """Return the rank of a definition: strong over common, common over weak."""
+    """Return the precedence of a definition: strong over common over weak."""
     if symbol.home is Home.COMMON:
         return 2
     return 1 if symbol.bind is Bind.WEAK else _STRONG

@@ -1,7 +1,8 @@
 """Symbols of XC16 for formatted input and output (abi-elf.md §2.8, "Smart-io").
 
-`__dsnprintf_cdnopuxX` is snprintf called with a literal format with these conversions, from a file with 64-bit
-`double`; without the `d`, 32 bits.  The library's functions support all conversions, so each is the plain function.
+XC16 encodes the conversions of a literal format in the function's name.  `__dsnprintf_cdnopuxX` is snprintf with the
+conversions c, d, n, o, p, u, x, X; the `d` after `__` means 64-bit `double`, its absence 32-bit.  The functions of the
+run-time library support all conversions, so each such name is resolved to the plain function.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ _FLOATING = frozenset("aAeEfFgG")
 
 
 def plain_name(name: str, where: str) -> str:
-    """Return the plain function's symbol for such a name, else `name`; `where` is the object for errors.
+    """Return the symbol of the plain function for such a name, else `name`; `where` is the object, for errors.
 
     Raises ToolError for a call with 32-bit doubles, which the library does not support.
     """

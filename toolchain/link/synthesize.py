@@ -35,7 +35,7 @@ def _goto(section: Section, symbol: Symbol) -> None:
 
 
 def wanted(name: str) -> Symbol:
-    """Return a reference to a global symbol."""
+    """Return an undefined global symbol, to which a relocation refers."""
     return Symbol(name, Home.UNDEFINED, bind=Bind.GLOBAL)
 
 
@@ -54,7 +54,7 @@ def default_interrupt(obj: ObjectFile) -> None:
 
 
 def vector_tables(resolution: Resolution, filled: bool) -> tuple[Section, Section]:
-    """Return .ivt and .aivt: slot X holds `__X`, the alternate one `__AltX`, else the default (abi-elf.md §2.7)."""
+    """Return .ivt and .aivt: vector X is `__X` or `__AltX` if defined, else the default (abi-elf.md §2.7)."""
     tables = (Section(".ivt", CODE), Section(".aivt", CODE))
     for vector in SLOTS:
         choices = ((vector.symbol,), (vector.alternate_symbol, vector.symbol))
@@ -67,7 +67,7 @@ def vector_tables(resolution: Resolution, filled: bool) -> tuple[Section, Sectio
 
 
 def handle_section(resolution: Resolution, live: set[Section]) -> tuple[Section, dict[Symbol, int]]:
-    """Return .handle, a GOTO per function whose address is taken, and the slot offset of each (abi-elf.md §1.5)."""
+    """Return .handle, a GOTO slot per function whose address is taken, and the slot offsets (abi-elf.md §1.5)."""
     section = Section(".handle", CODE)
     slots: dict[Symbol, int] = {}
     for obj in resolution.objects:

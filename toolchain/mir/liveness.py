@@ -26,7 +26,7 @@ def registers_in(mask: int) -> list[int]:
 
 
 def live_out(m: MFunction, at_return: int = 0) -> dict[str, int]:
-    """Block name -> registers live at its end. `at_return` are those live after RETURN (callee-saved registers)."""
+    """Registers live at the end of each block. `at_return`: registers live after RETURN (callee-saved registers)."""
     gen: dict[str, int] = {}
     kill: dict[str, int] = {}
     for b in m.blocks:
@@ -78,7 +78,7 @@ def remove_dead(m: MFunction) -> None:
     kill: dict[str, int] = {}
     for b in m.blocks:
         gen[b.name], kill[b.name] = summary(b)
-    known: dict[str, int] = {}  # registers that were live behind a block when its dead code was removed
+    known: dict[str, int] = {}  # registers that were live after a block when its dead code was removed
     changed = True
     while changed:
         out = solve(m, gen, kill)

@@ -6,12 +6,12 @@ if `MFunction.pairs` contains it (result of MUL, dividend of DIV.SD).
 OPS describes every operation: the operands that it reads and writes, and its effect on flags and memory. Passes use
 `uses`, `defs`, `reads_memory`, `writes_memory` and `has_effect` instead of the name of the operation.
 
-Skips. A skip instruction covers the conditional instructions (`pred`) that follow it directly, up to the first other
-one. The number of covered instructions is not stored. All replacements of a conditional instruction are conditional
+Skips. A skip instruction covers the conditional instructions (`pred`) that follow it directly; the first unconditional
+instruction ends them. Their number is not stored. All replacements of a conditional instruction are conditional
 (`replacement`).
 
-Volatile accesses. A memory operand carries the number of the volatile access of the source that it belongs to, 0 for
-plain memory. All words of one access have one number; two accesses never share a number.
+Volatile accesses. A memory operand carries the number of its volatile access in the source, or 0 if it is not volatile.
+All words of one access have the same number; two accesses never share a number.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ class FrameSlot:
 
 @dataclass(frozen=True, slots=True)
 class FileRegister:
-    """Directly addressed memory: assembler expression of the address; `near` if it is known to lie below 0x2000."""
+    """Directly addressed memory: assembler expression of the address; `near`: it is known to be below 0x2000."""
 
     expr: str
     near: bool
@@ -77,10 +77,10 @@ class OpInfo:
 
     roles           one letter per operand: s read, d written, b both, n neither; capital S D B for even-aligned pairs,
                     which the low register represents after allocation
-    writes, reads   flags
-    words           program words
-    memory          "r" and "w" if it reads or writes memory other than by its operands
-    fixed           whether it has other effects than on registers, flags and memory, so that it cannot be moved
+    writes, reads   flags that it writes and reads
+    words           size in program words
+    memory          "r" and "w" if it reads or writes memory in addition to its operands
+    fixed           whether it has effects besides those on registers, flags and memory, so that it cannot be moved
     """
 
     __slots__ = ("access", "fixed", "flags", "memory", "reads", "roles", "words", "writes")
@@ -98,7 +98,7 @@ class OpInfo:
         self.access = tuple(ROLE_ACCESS[role] for role in roles)
 
 
-# Role -> whether a register operand is read, is written, is also read by a conditional write; mask of real registers.
+# By role: whether a register operand is read, is written, is also read by a conditional write; mask of real registers.
 ROLE_ACCESS = {
     "n": (False, False, False, 1),
     "s": (True, False, False, 1),
@@ -173,11 +173,11 @@ OPS: dict[str, OpInfo] = {
     "repmov": OpInfo("nbb", words=2, memory="rw"),
     "repfill": OpInfo("nbs", words=2, memory="w"),
     "repclr": OpInfo("nb", words=2, memory="w"),
-    # skip covers the conditional instructions behind it, the skip instructions cover one (isa.md §7.3)
+    # skip covers all conditional instructions that follow it, CPSxx and BTSx cover one (isa.md §7.3)
     "skip": OpInfo("n", fixed=True),
     **{n: OpInfo("ss", fixed=True) for n in ("cpseq", "cpsne", "cpslt", "cpsgt")},
     **{n: OpInfo("sn", fixed=True) for n in ("btsc", "btss", "btscf", "btssf")},
-    # control
+    # control flow
     "call": opaque("n", ARITH),
     "callr": opaque("s", ARITH),
     "bra": OpInfo("n", fixed=True),
@@ -216,14 +216,14 @@ class MI:
 
     byte    byte-sized form
     cc      condition of bra and skip
-    pred    conditional: executed only if the skip before it is not taken, so its results are also inputs
+    pred    conditional: executed only if the skip before it is not taken; its results are therefore also inputs
     also_uses, also_defs   implicit registers (calls, DIV, inline assembly)
     late    indices of the operands that are read after the results are written (DIV divisor)
     tail    of a call: the callee does not access this frame, and only the epilogue follows
     epilogue        inserted before RETURN by the frame pass
-    claims          locations of source variables in front of the instruction
-    written_values  register that it writes -> number of the value that the register then contains
-    values_before   the same for copies in front of it that allocation removed
+    claims          locations of source variables before the instruction
+    written_values  for each register that it writes, the number of the value that the register then contains
+    values_before   the same for copies before it that allocation removed
     text    template of inline assembly; \\0n:m\\0 represents operand n with modifier m
     """
 
@@ -278,7 +278,7 @@ class MI:
         return a.value
 
     def slot(self, k: int) -> FrameSlot:
-        """Operand `k`, which lies in the frame."""
+        """Operand `k`, which is in the frame."""
         a = self.args[k]
         assert isinstance(a, FrameSlot)
         return a
@@ -357,7 +357,7 @@ class MI:
 
     def clone(self) -> MI:
         """An independent copy."""
-        new = MI.__new__(MI)  # ten times as fast as copy.copy(); allocation clones functions up to three times
+        new = MI.__new__(MI)  # faster than copy.copy(); the allocator clones functions up to three times
         new.op, new.info, new.args = self.op, self.info, list(self.args)
         new.byte, new.cc, new.pred, new.late, new.line = self.byte, self.cc, self.pred, self.late, self.line
         new.also_uses, new.also_defs = self.also_uses, self.also_defs
@@ -367,7 +367,7 @@ class MI:
 
     @property
     def volatile(self) -> int:
-        """Number of its volatile access, 0 if it has none."""
+        """Number of the volatile access that the instruction belongs to, 0 if there is none."""
         for a in self.args:
             if isinstance(a, MEMORY) and a.volatile:
                 return a.volatile
@@ -385,13 +385,13 @@ class MI:
         return "w" in self.info.memory or self._memory("dDbB")
 
     def has_effect(self) -> bool:
-        """Whether it has other effects than on registers and flags. A modified pointer counts as an effect."""
+        """Whether it has effects besides those on registers and flags. Modifying a pointer counts as an effect."""
         if self.info.fixed or self.info.memory or self.volatile or self._memory("dDbB"):
             return True
         return any(a.__class__ is Mem and a.mode in STEPPING for a in self.args)
 
     def replacement(self, made: list[MI]) -> list[MI]:
-        """Return its replacement `made`, conditional if the instruction is conditional."""
+        """Return the instructions `made` that replace this one; they are made conditional if this one is."""
         for mi in made:
             mi.pred = self.pred
         return made
@@ -430,7 +430,7 @@ class MI:
 
 @dataclass(frozen=True, slots=True)
 class PairMove:
-    """The operands of split, splitlo and join: words copied out of a pair, or into it."""
+    """Operands of split, splitlo and join, which copy words out of a register pair or into it."""
 
     pair: int
     words: tuple[int, ...]  # low word first
@@ -464,9 +464,9 @@ def _show(a: Operand) -> str:
 
 
 VariableClaim = tuple[str, tuple[int, ...], tuple[int, ...]]
-"""DILocalVariable, the registers of its words, and the values that these must contain for the claim to hold."""
+"""A claim: DILocalVariable, the registers of its words, and the values that the registers must contain."""
 VariableLocation = tuple[str, tuple[int, ...]]
-"""DILocalVariable and its words: register, OPTIMISED_OUT or CONSTANT_WORD + value. A single -1 - k: frame object k."""
+"""DILocalVariable and its words: register, OPTIMISED_OUT or CONSTANT_WORD + value. One word -1 - k: frame object k."""
 OPTIMISED_OUT, CONSTANT_WORD = 1 << 20, 1 << 21
 
 
@@ -477,7 +477,7 @@ class MBlock:
     name: str
     insts: list[MI] = field(default_factory=list)
     succs: list[str] = field(default_factory=list)
-    depth: int = 0  # loop nesting
+    depth: int = 0  # loop nesting depth
     address_taken: bool = False
 
 
@@ -500,17 +500,17 @@ class MFunction:
     frame: list[FrameObject] = field(default_factory=list)
     pairs: set[int] = field(default_factory=set)
     next_register: int = FIRST_VIRTUAL
-    pair_hints: dict[int, int] = field(default_factory=dict)  # low word register -> high word register
+    pair_hints: dict[int, int] = field(default_factory=dict)  # preferred high word register of each low word register
     dynamic_stack: bool = False  # W15 changes by amounts that are known only at run time
     uses_fp: bool = False  # W14 is the frame pointer
     interrupt: str = ""  # "", "no_auto_psv", "auto_psv"; "shadow" may be appended after a comma
     preserved: tuple[str, ...] = ()  # variables that an interrupt function saves in addition to registers
     preprologue: tuple[str, ...] = ()  # lines of assembly before the prologue
     tables: list[tuple[str, list[str]]] = field(default_factory=list)
-    slot_of: dict[int, int] = field(default_factory=dict)  # id(IR value) -> frame object, for debug information
-    bindings: dict[int, VariableLocation] = field(default_factory=dict)  # debug record -> its variable, located
+    slot_of: dict[int, int] = field(default_factory=dict)  # frame object by id(IR value), for debug information
+    bindings: dict[int, VariableLocation] = field(default_factory=dict)  # variable's location by debug record
     locals_base: int = 0  # offset of the locals from W15 at entry
-    frame_base: tuple[int, int] = (15, 0)  # register in the body, and offset of W15 at entry from it
+    frame_base: tuple[int, int] = (15, 0)  # base register in the body, offset of W15 at entry
     frame_bytes: int = 0  # locals and saved registers, known after the frame pass
     temps: set[int] = field(default_factory=set)  # registers of spill code, which must not be spilled again
 

@@ -1,7 +1,7 @@
 """Block order: chains of fall-through edges, hottest first (Pettis and Hansen 1990).
 
-Removing an unconditional jump saves a word and two cycles, so these edges come before conditional ones of the same loop
-depth. As a consequence, a loop with the test at the top is laid out with the test at the bottom.
+Removing an unconditional jump saves a word and two cycles. Edges of such jumps therefore precede conditional edges of
+the same loop depth. As a consequence, a loop with the test at the top is laid out with the test at the bottom.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ def run(m: MFunction) -> None:
     edges.sort(key=lambda e: (e[0], e[1], e[2], order[e[3]], order[e[4]]))
     after: dict[str, str] = {}
     before: dict[str, str] = {}
-    head = {n: n for n in order}  # first block of the chain of every block; exact for ends of chains only
+    head = {n: n for n in order}  # first block of the chain of each block; valid only for the last blocks of chains
     tail = {n: n for n in order}
     entry = m.blocks[0].name
     for _, _, _, a, b_name in edges:

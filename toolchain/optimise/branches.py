@@ -11,7 +11,7 @@ from toolchain.optimise.peephole import ALL, AT_RETURN
 
 
 def reorder(m: MFunction) -> None:
-    """Bypass branches with a known outcome, empty edge blocks and order the blocks. Needs: explicit branches."""
+    """Bypass branches with a known outcome, empty blocks on edges, and order blocks. Needs: explicit branches."""
     thread_constants(m)
     hoist_edge_moves(m)
     thread_jumps(m)
@@ -89,9 +89,9 @@ NEUTRAL = {"clr", "clrd", "setm", "mov"}
 
 
 def hoist_edge_moves(m: MFunction) -> None:
-    """Move register moves on one edge of a conditional branch before the branch, if they do not affect the other edge.
+    """Hoist register moves from one edge of a conditional branch above the branch, if the other edge is not affected.
 
-    The block of the edge then only jumps, so the branch can be redirected to its target. Moves change no flags.
+    The block on the edge then contains only a jump, so the branch is redirected to its target. Moves change no flags.
     """
     blocks = m.block_map()
     out = live_out(m, ALL if m.interrupt else AT_RETURN)
@@ -128,7 +128,7 @@ def _is_neutral(mi: MI) -> bool:
 def live_in(block: MBlock, live: int) -> int:
     """Registers live at the start of a block, computed from those live at its end.
 
-    Hoisting moves from an edge changes them for the emptied block only, so the pass needs one analysis."""
+    Hoisting changes the live registers of the emptied block only, so the pass needs only one liveness analysis."""
     reads, kill = summary(block)
     return reads | live & ~kill
 
@@ -180,7 +180,7 @@ def _known_value(b: MBlock, r: int) -> int | None:
 
 
 def _evaluate(cc: str, a: int, b: int, mask: int) -> bool | None:
-    """Value of a condition after CP a, b; None for conditions that CP does not define."""
+    """Value of a condition after CP a, b; None for conditions not handled here."""
     sign = (mask >> 1) + 1
     x, y = a - 2 * (a & sign), b - 2 * (b & sign)
     answers = {"z": a == b, "nz": a != b, "c": a >= b, "nc": a < b, "gtu": a > b, "leu": a <= b, "lt": x < y,

@@ -1,7 +1,7 @@
-"""Scalar replacement of struct parameters: structs in registers that the function only reads need no copy in memory.
+"""Scalar replacement of struct parameters: no copy in memory for structs in registers that are only read.
 
-For the front end, a struct passed by value is a pointer to a copy. If registers carry the struct (abi-elf.md §2.2) and
-the function only loads from the copy, this pass replaces every load by the register of its word (`argword`).
+In the IR of the front end, a struct passed by value is a pointer to a copy. If registers hold the struct (abi-elf.md
+§2.2) and the function only loads from the copy, this pass replaces every load by the register of its word (`argword`).
 Needs: legal IR.
 """
 
@@ -13,7 +13,7 @@ from toolchain.select.calls import is_struct, parameter_locations
 
 
 def run(f: Function) -> None:
-    """Replace the loads of every struct parameter in registers that is only loaded from."""
+    """Replace the loads of every struct parameter that is in registers and only read."""
     for a, location in zip(f.args, parameter_locations(f), strict=True):
         if is_struct(a) and location.register is not None:
             loads = _loads(f, a, location.words)
@@ -22,7 +22,7 @@ def run(f: Function) -> None:
 
 
 def _loads(f: Function, a: Arg, words: int) -> list[tuple[Instr, int]] | None:
-    """Loads from the copy with their byte offsets; None if its address has other uses or a load is not of words."""
+    """Loads from the copy with their byte offsets; None if its address has other uses or a load is of another size."""
     offsets: dict[int, int] = {id(a): 0}
     found: list[tuple[Instr, int]] = []
     pending: list[Value] = [a]

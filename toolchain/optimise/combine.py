@@ -1,15 +1,15 @@
-"""Target-specific rewrites of legal IR, which the middle end does not make.
+"""Target-specific rewrites of legal IR that LLVM's middle end does not perform.
 
-reuse_quotients              x < c becomes x / c == 0 if x / c is computed anyway, so that x need not be live behind the
+reuse_quotients              x < c becomes x / c == 0 if x / c is computed anyway, so that x is not live after the
                              division
 recover_remainders           x - x/c*c becomes x % c again
 pair_divisions               quotient and remainder of one division share one DIV (isa.md §6.7)
 make_operations_conditional  x op (c ? y : 0) becomes c ? x op y : x, whose operation a skip can cover
 group_selects                selects on one condition are adjacent and share the test
-sink_increments              steps of pointers and counters move behind the last use of the old value, so that both
+sink_increments              steps of pointers and counters move after the last use of the old value, so that both
                              share a register and the step can become a post-increment
 hoist_block_steps            steps by the size of a block move before its copy, which advances the pointer
-move_countdowns              the decrement of `n-- != 0` moves to the test, which its carry decides
+move_countdowns              the decrement of `n-- != 0` moves to the test, which then uses its carry
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from toolchain.select.compare import COUNTDOWN_CONDITION
 
 
 def users_of(f: Function) -> dict[int, list[Instr]]:
-    """id(instruction) -> instructions that use its value."""
+    """Instructions that use the value of each instruction, by id(instruction)."""
     out: dict[int, list[Instr]] = {}
     for b in f.blocks:
         for i in b.instrs:
@@ -56,14 +56,14 @@ def reuse_quotients(f: Function) -> None:
                 divided[id(i.args[0]), i.args[1].value] = i
             if i.op != "icmp" or not isinstance(i.args[1], ConstInt) or i.pred not in ("ult", "ugt", "ule", "uge"):
                 continue
-            below = i.args[1].value + (i.pred in ("ugt", "ule"))  # the comparison decides x < below
+            below = i.args[1].value + (i.pred in ("ugt", "ule"))  # the comparison is x < below, or its negation
             quotient = divided.get((id(i.args[0]), below))
             if quotient is not None:
                 i.args = [quotient, ConstInt(quotient.type, 0)]
                 i.extra["pred"] = "eq" if i.pred in ("ult", "ule") else "ne"
 
 
-NEUTRAL_RIGHT = ("add", "sub", "or", "xor")  # x op 0 is x
+NEUTRAL_RIGHT = ("add", "sub", "or", "xor")  # operations for which x op 0 is x
 
 
 def make_operations_conditional(f: Function) -> None:
@@ -83,7 +83,7 @@ def make_operations_conditional(f: Function) -> None:
 
 
 def _conditional(i: Instr, counts: dict[int, int], here: set[int]) -> Instr | None:
-    """Turn `i` into the select; returns the operation to insert before it, or None if the rewrite does not apply."""
+    """Turn `i` into the select; return the operation to insert before it, or None if the rewrite does not apply."""
     a, b = i.args
     for x, chosen in ((a, b), (b, a)) if i.op != "sub" else ((a, b),):
         if not isinstance(chosen, Instr) or chosen.op != "select" or counts[id(chosen)] != 1 or id(chosen) not in here:
@@ -117,7 +117,7 @@ def group_selects(f: Function) -> None:
 def recover_remainders(f: Function, for_size: bool) -> None:
     """Replace sub x, (mul (div x, c), c) by rem x, c.
 
-    For c = 2^k the product is a shift; there the remainder saves words only, because DIV computes both results."""
+    For c = 2^k the product is a shift, and the remainder saves only words, because DIV computes both results."""
     for b in f.blocks:
         for i in b.instrs:
             if i.op == "sub" and i.type.bits == 16:
@@ -127,7 +127,7 @@ def recover_remainders(f: Function, for_size: bool) -> None:
 
 
 def _division_of(x: Value, product: Value, sign: int, shifts: bool) -> tuple[Instr, Value] | None:
-    """The division q = x / c of product = q * (sign*c), with `shifts` also of q << k for c = 2^k; None otherwise."""
+    """(division q = x / c, c) for product = q * (sign*c), with `shifts` also for q << k with c = 2^k; else None."""
     if not isinstance(product, Instr) or product.op not in ("mul", "shl"):
         return None
     q, c = product.args
@@ -151,7 +151,7 @@ def _recover_remainder(i: Instr, for_size: bool) -> None:
 
 
 def _recover_negative(i: Instr) -> None:
-    """Replace x + q * -c, the middle end's form for constants c, by a remainder."""
+    """Replace x + q * -c by a remainder; the middle end writes x - q * c in this form for constants c."""
     for x, product in ((i.args[0], i.args[1]), (i.args[1], i.args[0])):
         found = _division_of(x, product, -1, False)
         if found is not None:
@@ -186,7 +186,7 @@ def _share(first: Instr, second: Instr) -> None:
 
 
 def sink_increments(f: Function) -> None:
-    """Move the step p + constant of a phi p behind the last use of p."""
+    """Move the step p + constant of a phi p after the last use of p."""
     users = users_of(f)
     depths = loop_depths(f)
     dominators = immediate_dominators(f)
@@ -222,7 +222,7 @@ def sink_increments(f: Function) -> None:
 
 
 def hoist_block_steps(f: Function) -> None:
-    """Move p + size before the copy or fill of a block of that size at p, which leaves its pointer there."""
+    """Move p + size before the copy or fill of a block of that size at p, which advances p by that size."""
     for b in f.blocks:
         for block in [i for i in b.instrs if i.op in ("blockcopy", "blockfill")]:
             count, unit = block.extra["count"], block.extra["unit"]
@@ -244,7 +244,7 @@ def _using_blocks(p: Instr, users: list[Instr], home: dict[int, Block], f: Funct
 
 
 def _last_using_block(using: list[Block], b: Block, phis: list[Instr], idom: dict[str, str]) -> Block | None:
-    """The block behind `b` that all others of `using` dominate, if it dominates the edge to the phi of the step."""
+    """The block after `b` that all others of `using` dominate, if it dominates the edge to the phi of the step."""
     last = next((t for t in using if all(_dominates(idom, other, t) for other in using)), None)
     if last is None or last is b or not _dominates(idom, b, last):
         return None
@@ -265,7 +265,7 @@ def _to_last_use(b: Block, i: Instr, users: dict[int, list[Instr]]) -> None:
 
 
 def immediate_dominators(f: Function) -> dict[str, str]:
-    """Block name -> name of its immediate dominator (Cooper, Harvey, Kennedy: A Simple, Fast Dominance Algorithm)."""
+    """Immediate dominator of each block (Cooper, Harvey, Kennedy: A Simple, Fast Dominance Algorithm)."""
     order = [b.name for b in reverse_postorder(f)]
     number = {n: k for k, n in enumerate(order)}
     preds = predecessors(f)
@@ -307,7 +307,7 @@ def _named_dominates(idom: dict[str, str], a: str, b: str) -> bool:
 
 
 def move_countdowns(f: Function) -> None:
-    """Move y = x - 1 to a branch on x == 0 or x == 1, from its block or a successor that only it reaches."""
+    """Move y = x - 1 to a branch on x == 0 or x == 1, from the branch's block or a successor that only it reaches."""
     preds = predecessors(f)
     blocks = {b.name: b for b in f.blocks}
     users = users_of(f)
@@ -333,7 +333,7 @@ def move_countdowns(f: Function) -> None:
 
 
 def _to_test(b: Block, step: Instr, c: Instr, users: dict[int, list[Instr]]) -> None:
-    """Move a step and the test of its result directly before the branch, which the flags of the step decide there."""
+    """Move a step and the test of its result directly before the branch, which then uses the flags of the step."""
     alone = all(u is c or u.op == "phi" or u not in b.instrs for u in users.get(id(step), ()))
     if alone and users.get(id(c)) == [b.instrs[-1]]:
         b.instrs = [*(i for i in b.instrs[:-1] if i is not step and i is not c), step, c, b.instrs[-1]]

@@ -9,8 +9,8 @@ from toolchain.ir.cfg import natural_loops
 from toolchain.mir.liveness import live_out
 from toolchain.mir.mir import MI, Imm, MBlock, MFunction
 
-REACH = 12  # most instructions between two uses of a shared constant
-LOOP_REGISTERS = 9  # most registers live in a loop with its constants: W0-W7 and one more
+REACH = 12  # maximum number of instructions between two uses of a shared constant
+LOOP_REGISTERS = 9  # maximum number of registers live in a loop including its constants: W0-W7 and one more
 LoadKey = tuple[str, object]
 
 
@@ -52,7 +52,7 @@ def _is_call(mi: MI) -> bool:
 
 
 def _share_in_block(b: MBlock, counts: dict[int, int], live: int) -> None:
-    """Reuse the register of an equal constant loaded shortly before; constants live at the end of the block remain."""
+    """Reuse the register of an equal constant loaded up to REACH instructions before; keep loads live at the end."""
     known: dict[LoadKey, tuple[int, int]] = {}
     rename: dict[int, int] = {}
     out: list[MI] = []
@@ -94,7 +94,7 @@ def _hoist_from_loops(m: MFunction, counts: dict[int, int]) -> None:
 
 
 def _entry(blocks: dict[str, MBlock], succs: dict[str, list[str]], header: str, body: set[str]) -> MBlock | None:
-    """The only predecessor of a loop outside it, if the loop is its only successor."""
+    """The only predecessor of a loop outside it, if the loop is the only successor of that block; else None."""
     outside = [n for n, s in succs.items() if header in s and n not in body]
     if len(outside) != 1 or succs[outside[0]] != [header]:
         return None

@@ -1,4 +1,4 @@
-"""Copy and constant propagation: remove loads of values that the register contains, replace copies by their originals.
+"""Copy and constant propagation: removes redundant loads of registers, and replaces copies by their originals.
 
 Forward data flow over the whole function: a fact holds at the start of a block if it holds at the end of every
 predecessor. Needs: real registers, frames built. The caller removes dead code with a new liveness analysis.
@@ -11,7 +11,7 @@ from toolchain.mir.mir import MI, FileRegister, Imm, MBlock, Mem, MFunction
 
 KnownConstant = tuple[str, object]
 RegisterFacts = dict[int, int | KnownConstant]
-"""Register -> the register that it is a copy of, or the constant that it contains."""
+"""By register: the register of which it is a copy, or the constant that it contains."""
 Transfer = tuple[int, int, KnownConstant | None, int]
 """Registers that an instruction writes; source of a copy (-1: none), loaded constant, destination of either (-1)."""
 
@@ -56,7 +56,7 @@ def _transfer(mi: MI) -> Transfer:
 
 
 def _apply_transfer(transfer: Transfer, facts: RegisterFacts) -> None:
-    """Change the facts to those after one instruction."""
+    """Update the facts by one instruction."""
     written, source, value, dest = transfer
     result: int | KnownConstant | None = value if source < 0 else facts.get(source, source)
     if facts:
@@ -67,7 +67,7 @@ def _apply_transfer(transfer: Transfer, facts: RegisterFacts) -> None:
 
 def _forget(written: int, facts: RegisterFacts) -> None:
     """Remove the facts about registers that are written."""
-    moved = written >> SP & 1  # addresses in the frame are relative to it
+    moved = written >> SP & 1  # whether W15 changes, to which frame addresses are relative
     gone = [
         r for r, v in facts.items()
         if written >> r & 1 or (written >> v & 1 if isinstance(v, int) else moved and v[0] != "k")
@@ -92,9 +92,9 @@ def _constant(mi: MI) -> KnownConstant | None:
 
 
 def _rewrite(b: MBlock, facts: RegisterFacts) -> bool:
-    """Rewrite one block with the facts at its start; returns whether it changed."""
+    """Rewrite one block with the facts at its start; return whether it changed."""
     out: list[MI] = []
-    made: RegisterFacts = {}  # facts of this block only: longer live ranges of originals cost more than they save
+    made: RegisterFacts = {}  # originals are replaced only within a block: longer live ranges cost more than they save
     changed = False
     for mi in b.insts:
         if _is_redundant(mi, facts):
@@ -122,11 +122,11 @@ def _is_redundant(mi: MI, facts: RegisterFacts) -> bool:
 
 
 def _use_originals(mi: MI, facts: RegisterFacts) -> bool:
-    """Replace copies in read-only operands by their originals; returns whether there were any."""
+    """Replace copies in read-only operands by their originals; return whether there were any."""
     if not facts or mi.pred or mi.op in ("asm", "split", "join", "movd"):
         return False
     if mi.byte and any(isinstance(a, FileRegister) for a in mi.args):
-        return False  # near bytes move through W0 only (isa.md §3.3)
+        return False  # byte moves of near memory use W0 only (isa.md §3.3)
     changed = False
     for k, (role, a) in enumerate(zip(mi.info.roles, mi.args, strict=False)):
         if role != "s":

@@ -1,10 +1,10 @@
 """Induction variables: strength reduction of array indices, and loop counters that count down to zero.
 
     a[i] with i += c    ->  a pointer stepped by c elements, which becomes [Wn++]
-    i == n as the exit  ->  n - i == 0, which the flags of the decrement decide
+    i == n as the exit  ->  n - i == 0, tested by the flags of the decrement
     i == max(n, start)  ->  i >= n: the middle end's trip count of `i < n`
 
-Needs: legal IR. Changes loops with one entry only. The middle end runs no loop strength reduction (engines.md §5).
+Needs: legal IR. Only loops with one entry are changed. The middle end runs no loop strength reduction (engines.md §5).
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from toolchain.ir.cfg import dead_code, natural_loops, predecessors
 from toolchain.ir.model import I16, Block, ConstInt, Function, Instr, Value
 
 MAX_POINTERS = 3
-MAX_HEADER_PHIS = 6  # with more loop-carried values, another register would be spilled
+MAX_HEADER_PHIS = 6  # maximum number of loop-carried values; with more, a register would be spilled
 CALLS = frozenset(("call", "asm", "builtin"))
 
 
@@ -28,7 +28,7 @@ class CountedLoop:
     header: Block
     entry: Block
     body: list[Block]
-    inside: set[int] = field(default_factory=set)  # ids of its instructions
+    inside: set[int] = field(default_factory=set)  # ids of the instructions in the loop
 
     def invariant(self, v: Value) -> bool:
         """Whether a value is the same in every iteration."""
@@ -37,7 +37,7 @@ class CountedLoop:
 
 @dataclass
 class InductionVariable:
-    """A phi in the header that grows by a constant: `step` = `phi` + amount in the body."""
+    """A phi in the header that increases by a constant per iteration: `step` = `phi` + amount in the body."""
 
     phi: Instr
     step: Instr
@@ -111,7 +111,7 @@ def _users(f: Function, v: Value) -> list[Instr]:
 
 
 def _make_pointers(loop: CountedLoop, counter: InductionVariable) -> None:
-    """Give every pair of base and scale a pointer."""
+    """Create a pointer for every pair of base and scale."""
     groups: dict[tuple[str, int], list[tuple[Instr, Value, int]]] = {}
     for b in loop.body:
         for i in b.instrs:
@@ -180,8 +180,8 @@ def _make_pointer(
     stride = counter.amount * scale
     early = next((i for i, _, ahead in sums if stride < 0 and ahead == stride and i in home.instrs), None)
     if early is not None and any(i is not early and _follows(loop, home, early, i) for i, _, _ in sums):
-        early = None  # the pointer before the step is still used behind it, which would cost a copy
-    if early is not None:  # downwards, the stepped pointer is the address: [--Wn]
+        early = None  # the pointer before the step is still used after it, which would cost a copy
+    if early is not None:  # counting downwards, the address is the stepped pointer: [--Wn]
         home.instrs.insert(home.instrs.index(early), step)
     else:
         home.instrs.insert(home.instrs.index(counter.step) + 1, step)
@@ -196,7 +196,7 @@ def _make_pointer(
 
 
 def _follows(loop: CountedLoop, home: Block, early: Instr, i: Instr) -> bool:
-    """Whether an address is used behind address `early` of block `home`."""
+    """Whether an address is used after address `early` of block `home`."""
     behind = home.instrs[home.instrs.index(early) :]
     return any(u in behind for u in _users(loop.f, i)) or any(
         u in b.instrs for u in _users(loop.f, i) for b in loop.body if b is not home
@@ -214,7 +214,7 @@ def _replace(f: Function, old: Instr, new: Instr) -> None:
 
 
 def _leaves_at(loop: CountedLoop, test: Instr) -> bool:
-    """Whether the header tests the counter and leaves the loop there, so that the counter never passes 0."""
+    """Whether the header tests the counter and exits the loop, so that the counter never passes 0."""
     br = loop.header.instrs[-1]
     if br.op != "br" or not br.args or br.args[0] is not test:
         return False
@@ -222,7 +222,7 @@ def _leaves_at(loop: CountedLoop, test: Instr) -> bool:
 
 
 def _unclamped(v: Value, start: Value) -> Value | None:
-    """n if a value is the signed max(n, start) for a constant start, else None."""
+    """The n of a value that is the signed max(n, start) for a constant start; None for other values."""
     if not isinstance(v, Instr) or v.op != "select" or not isinstance(v.args[0], Instr) or v.args[0].op != "icmp":
         return None
     test, a, b = v.args
@@ -287,7 +287,7 @@ def _count_down(loop: CountedLoop, counter: InductionVariable) -> None:
 
 
 def _count_down_signed(loop: CountedLoop, counter: InductionVariable, test: Instr) -> None:
-    """Let a counter from 0 or 1 with the exit test i >= n count down from n; n - i might overflow."""
+    """Let a counter that starts at 0 or 1, with the exit test i >= n, count down from n; n - i could overflow."""
     n, start = test.args[1], counter.start
     if test.args[0] is not counter.phi or not _leaves_at(loop, test) or not loop.invariant(n):
         return
@@ -298,10 +298,10 @@ def _count_down_signed(loop: CountedLoop, counter: InductionVariable, test: Inst
 
 
 def _start_at(loop: CountedLoop, counter: InductionVariable, start: Value) -> None:
-    """Let the counter start at a value and count down."""
+    """Let the counter start at `start` and count down."""
     counter.phi.args = [start if n == loop.entry.name else v
                         for v, n in zip(counter.phi.args, counter.phi.blocks, strict=True)]  # fmt: skip
     counter.step.args = [counter.phi, const(I16, -1)]
     for record in loop.f.dbg_records:
         if record.value is counter.phi or record.value is counter.step:
-            record.value = None  # the source variable counts up
+            record.value = None  # the source variable counts up, so its value is unknown

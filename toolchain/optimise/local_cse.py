@@ -1,7 +1,7 @@
-"""Local common subexpression elimination: replace a repeated computation in a block by the register of the first one.
+"""Local common subexpression elimination: replaces a repeated computation in a block by the first one's register.
 
 Addresses such as a[i] and b[i] share their scaled index only in the machine form. Needs: virtual registers. Both
-registers have a single definition, so the first one contains the value at every use of the second.
+registers have a single definition, so the first register contains the value at every use of the second.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from __future__ import annotations
 from toolchain.mir.mir import FIRST_VIRTUAL, MI, Imm, MBlock, MFunction
 from toolchain.optimise.peephole import flags_unused
 
-REACH = 12  # most instructions between the computations; longer live ranges cost registers
+REACH = 12  # maximum number of instructions between the computations; longer live ranges cost registers
 PURE = frozenset((
     "add", "sub", "subr", "and", "ior", "xor", "inc", "inc2", "dec", "dec2", "neg", "com", "sl", "lsr", "asr", "sl1",
     "lsr1", "asr1", "se", "ze", "rlnc", "rrnc",

@@ -1,6 +1,6 @@
 """Peephole optimisation: local rewrites over real registers.
 
-Each rewrite examines neighbouring instructions of one block and the registers and flags that are live behind them.
+Each rewrite examines neighbouring instructions of one block and the registers and flags that are live after them.
 Needs: frames built. No rewrite adds an instruction.
 """
 
@@ -13,7 +13,7 @@ from toolchain.optimise import copies
 
 AT_RETURN = mask_of([*CALLEE_SAVED, 15])
 ALL = 0xFFFF
-# Operations with one result, whose N and Z describe the word or byte that they write.
+# Operations with one result that set N and Z by the word or byte that they write.
 SETS_NZ = {"add", "sub", "subr", "addc", "subb", "and", "ior", "xor", "addl", "subl", "andl", "iorl", "xorl",
            "inc", "dec",
            "inc2", "dec2", "neg", "com", "sl", "lsr", "asr", "sl1", "lsr1", "asr1", "se", "ze", "rlc",
@@ -36,7 +36,7 @@ def run(m: MFunction) -> None:
 
 
 def clear_pairs(b: MBlock) -> None:
-    """Merge two CLR of the registers of a pair into one instruction."""
+    """Merge CLR of both registers of a pair into one instruction."""
     k = 0
     while k + 1 < len(b.insts):
         one, two = b.insts[k : k + 2]
@@ -79,7 +79,7 @@ def flags_read_after(b: MBlock, at: int) -> set[str] | None:
 
 
 def drop_compares(b: MBlock) -> bool:
-    """Remove repeated comparisons, and CP0 of a register whose last write set the same Z and N."""
+    """Remove repeated comparisons, and each CP0 of a register whose last write set the same Z and N."""
     changed = False
     k = 0
     while k < len(b.insts):
@@ -135,7 +135,7 @@ def compare_while_copying(b: MBlock) -> bool:
 
 
 def compare_in_place(b: MBlock, live: int) -> bool:
-    """Replace MOV #k,Wt; CP Wn,Wt by SUB #k,Wn, which sets the same flags, if both registers are dead behind it."""
+    """Replace MOV #k,Wt; CP Wn,Wt by SUB #k,Wn, which sets the same flags, if both registers are dead afterwards."""
     changed = False
     for k in range(len(b.insts) - 1, 0, -1):
         mi, load = b.insts[k], b.insts[k - 1]
@@ -156,7 +156,7 @@ def compare_in_place(b: MBlock, live: int) -> bool:
 
 
 def _flag_source(b: MBlock, at: int, r: int, byte: bool) -> MI | None:
-    """The instruction before `at` that wrote register r and set the flags; None if another one changed either."""
+    """The instruction before `at` that wrote register r and set the flags; None if either changed since."""
     for k in range(at - 1, -1, -1):
         mi = b.insts[k]
         if mi.pred or mi.op in SKIPS:
@@ -185,7 +185,7 @@ STEPS = {"inc": 1, "inc2": 2, "dec": -1, "dec2": -2}
 
 
 def auto_increment(b: MBlock) -> bool:
-    """Merge an access through [Wn] with the step of Wn by the access size: [Wn++] and [Wn--], or [++Wn] and [--Wn]."""
+    """Merge an access through [Wn] with the step of Wn by the access size: to [Wn++] or [Wn--], [++Wn] or [--Wn]."""
     changed = False
     k = 0
     while k < len(b.insts):
@@ -208,7 +208,7 @@ def _step_amount(mi: MI) -> int | None:
     if mi.op in STEPS and isinstance(mi.args[0], int) and mi.args[0] == mi.args[1]:
         return STEPS[mi.op]
     if mi.op in ("add", "sub") and isinstance(mi.args[0], int) and mi.args[0] == mi.args[2] and mi.args[1] == Imm(4):
-        return 4 if mi.op == "add" else -4  # MOV.D
+        return 4 if mi.op == "add" else -4  # the access is a MOV.D
     return None
 
 
@@ -219,7 +219,7 @@ def flags_unused(b: MBlock, at: int) -> bool:
 
 
 def _fold_after(b: MBlock, at: int, r: int, amount: int) -> bool:
-    """Merge the step with the last access through [r] before it. Return whether that was possible."""
+    """Merge the step of r at index `at` with the last access through [r] before it; return whether it succeeded."""
     for k in range(at - 1, -1, -1):
         mi = b.insts[k]
         if r in mi.uses() or r in mi.defs():
@@ -230,7 +230,7 @@ def _fold_after(b: MBlock, at: int, r: int, amount: int) -> bool:
 
 
 def _fold_before(b: MBlock, at: int, r: int, amount: int) -> bool:
-    """Merge the step with the first access through [r] after it. Return whether that was possible."""
+    """Merge the step of r at index `at` with the first access through [r] after it; return whether it succeeded."""
     for k in range(at + 1, len(b.insts)):
         mi = b.insts[k]
         if r in mi.uses() or r in mi.defs():
@@ -241,7 +241,7 @@ def _fold_before(b: MBlock, at: int, r: int, amount: int) -> bool:
 
 
 def _modify(mi: MI, r: int, amount: int, mode: AddressingMode) -> bool:
-    """Make the only [r] of an instruction modify r, if the instruction does not use r otherwise (isa.md §3.4)."""
+    """Make an instruction's only operand [r] modify r, if the instruction has no other use of r (isa.md §3.4)."""
     size = 1 if mi.byte or mi.op in ("se", "ze") else 4 if mi.op == "movd" else 2
     if abs(amount) != size or mi.pred or mi.info.fixed or mi.info.memory:
         return False

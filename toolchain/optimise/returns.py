@@ -1,7 +1,7 @@
 """Returns: RETURN instead of a branch to RETURN, and RETLW for constant results.
 
-RETLW #lit10, W0 returns and loads the result (isa.md §5.7). It takes a word less than MOV and RETURN and the same three
-cycles. Needs: the final order of blocks.
+RETLW #lit10, W0 returns and loads the result (isa.md §5.7). It takes one word less than MOV and RETURN, and three
+cycles like RETURN. Needs: the final order of blocks.
 """
 
 from __future__ import annotations
@@ -12,11 +12,11 @@ from toolchain.abi.target import LIT10_MAX
 from toolchain.mir.mir import MI, Imm, MBlock, MFunction
 from toolchain.optimise.branches import remove_unreached
 
-RESULT = 0  # W0
+RESULT = 0  # W0, the result register
 
 
 def run(m: MFunction) -> None:
-    """Replace branches to RETURN, then constant results."""
+    """Replace branches to RETURN by RETURN, then loads of constant results by RETLW."""
     _return_early(m)
     if not m.interrupt:
         for b in list(m.blocks):
@@ -25,7 +25,7 @@ def run(m: MFunction) -> None:
 
 
 def _return_early(m: MFunction) -> None:
-    """Replace a branch to a block that only returns by the return, which has the same size."""
+    """Replace a branch to a block that only returns by RETURN, which has the same size."""
     bare = {b.name: b.insts[0] for b in m.blocks if len(b.insts) == 1 and b.insts[0].op == "ret"}
     for b in m.blocks:
         if b.insts and b.insts[-1].op == "jump" and str(b.insts[-1].args[0]) in bare:

@@ -73,7 +73,7 @@ def _independent(a: MI, b: MI) -> bool:
 
 
 def _fill_from_below(insts: list[MI], k: int) -> bool:
-    """Move a later instruction up between insts[k] and insts[k+1]; returns whether there was one."""
+    """Move a later instruction up between insts[k] and insts[k+1]; return whether there was one."""
     for j in range(k + 2, min(k + 2 + WINDOW, len(insts))):
         mover = insts[j]
         if insts[j - 1].op in SKIPS or insts[j - 1].pred or mover.info.fixed:
@@ -97,7 +97,7 @@ def _flags_reach_end(insts: list[MI], j: int, mover: MI) -> bool:
 
 
 def _fill_from_above(insts: list[MI], k: int) -> None:
-    """Move insts[k-1] down behind insts[k] if they are independent and no new stall results."""
+    """Move insts[k-1] down after insts[k] if they are independent and no new stall results."""
     if k == 0 or insts[k - 1].op in SKIPS or insts[k].pred or insts[k + 1].pred:
         return
     mover = insts[k - 1]

@@ -1,14 +1,14 @@
 """Single-bit writes: one BSET, BCLR or BTG for every write of one bit of a volatile object in near memory.
 
-These instructions change one bit (isa.md §5.4), so an interrupt cannot lose the change of another bit. Programs rely on
-that for the flags of peripherals. The front end clears a bit-field before it sets it; `one_operation` merges the two.
-The middle end merges the writes of several branches; this pass reverses that. It recognises four shapes:
+These instructions change one bit (isa.md §5.4), so a change that an interrupt makes to another bit is not lost.
+Programs rely on that for the flags of peripherals. The front end clears a bit-field before it sets it; `one_operation`
+merges the two. The middle end merges the writes of several branches; this pass separates them again. It recognises:
 
     shape                                                       result
-    one store behind the branches, of a phi                     a store in each branch
+    one store after the branches, of a phi                      a store in each branch
     one load before the branches                                a load in each branch
     a store of a select between two values                      two branches with a load and a store each
-    a store of the old value with one bit inserted              the same, selected by that bit
+    a store of the old value with one bit inserted              two branches likewise, selected by that bit
 
 Needs: legal IR without critical edges. The order of volatile accesses on every path is unchanged.
 """
@@ -25,7 +25,7 @@ from toolchain.optimise.combine import users_of
 from toolchain.select.state import MEMORY_BARRIERS
 
 IsNear = Callable[[str], bool]
-"""Whether the variable of that name lies in near memory."""
+"""Function that returns whether the variable with a name is in near memory."""
 BitChange = tuple[Instr, str, int]
 """A load, and the operation with a constant that changes one bit of its value."""
 
@@ -38,7 +38,7 @@ class BitChoice:
     mask: int
     first: BitChange
     second: BitChange
-    own: frozenset[int]  # identities of the load and of the instructions that compute the value from it
+    own: frozenset[int]  # ids of the load and of the instructions that compute the value from it
 
 
 def run(f: Function, is_near: IsNear) -> None:
@@ -114,7 +114,7 @@ def _change(v: Value, p: Value) -> BitChange | None:
 
 
 def _one_bit(load: Instr, kept: int, flipped: int, steps: list[Instr]) -> BitChange | None:
-    """The change of one bit that `steps` make of load & kept ^ flipped; None for another number of bits."""
+    """The change of one bit that `steps` make, which compute load & kept ^ flipped; None for another number of bits."""
     ones = (1 << load.type.bits) - 1
     for step in steps:
         k = _constant(step)
@@ -186,7 +186,7 @@ def _possible_bits(v: Value) -> int:
 
 
 def _truth(v: Value, mask: int, made: list[Instr]) -> Value:
-    """Whether a value has a bit of `mask`, as an i1; appends the instructions that compute it to `made`."""
+    """Build an i1: whether a value has a bit of `mask`; the instructions that compute it are appended to `made`."""
     if v.type is I1:
         return v
     if isinstance(v, Instr) and v.op in ("zext", "trunc"):
@@ -253,8 +253,8 @@ def _store_in_branches(f: Function, b: Block, is_near: IsNear) -> None:
 def _load_in_branches(f: Function, b: Block, is_near: IsNear, addresses: list[Value]) -> None:
     """Replace a load before a two-way branch by a load in each branch.
 
-    The load must be the last memory access of its block, and only code that both branches alone lead to may use it.
-    Branches without an access are searched through, because a switch is a tree of such blocks.
+    The load must be the last memory access of its block. Its uses must be in code reached only through the branches.
+    Blocks without an access between branch and use are allowed, because a switch is a tree of such blocks.
     """
     load = _last_access_before_branch(b)
     p = _near_address(load, is_near) if load is not None and load.op == "load" else None
@@ -288,7 +288,7 @@ def _last_access_before_branch(b: Block) -> Instr | None:
 
 
 def _region_without_access(f: Function, t: Block, preds: dict[str, list[str]]) -> list[Block]:
-    """`t`, and the blocks that only paths from `t` without a memory access lead to."""
+    """`t`, and the blocks that are reached only from `t`, without a memory access in between."""
     found = [t]
     for x in found:
         if not any(_accesses(i) for i in x.instrs):
@@ -342,13 +342,13 @@ def _branches_for_choice(f: Function, b: Block, is_near: IsNear) -> None:
 
 
 def _used_only_by(f: Function, own: frozenset[int], store: Instr) -> bool:
-    """Whether the instructions `own` have no users but each other and the store."""
+    """Whether the instructions `own` have no users except each other and the store."""
     users = users_of(f)
     return all(u is store or id(u) in own for i in own for u in users.get(i, ()))
 
 
 def _split(f: Function, b: Block, store: Instr, choice: BitChoice, bodies: list[list[Instr]]) -> Block:
-    """Replace a store by a branch to one of two blocks with `bodies`; returns the block behind them."""
+    """Replace a store by a branch to one of two blocks with `bodies`; return the block after them."""
     at = b.instrs.index(store)
     end = Block(f"{b.name}.written", b.instrs[at + 1 :])
     b.instrs = [i for i in b.instrs[:at] if id(i) not in choice.own]

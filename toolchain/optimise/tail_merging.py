@@ -1,7 +1,7 @@
-"""Tail merging: one copy of the common ending of blocks with the same successor.
+"""Tail merging: replaces the common ending of blocks with the same successor by one copy.
 
-The common ending becomes a block, to which the others branch instead of branching to the successor. Needs: frames
-built, explicit branches.
+The common ending becomes a new block; the merged blocks branch to it instead of the successor. Needs: frames built,
+explicit branches.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ def run(m: MFunction) -> None:
 
 
 def _signature(mi: MI) -> tuple[object, ...]:
-    """Key that is equal for instructions with the same effect; numbers of volatile accesses do not count."""
+    """Key that is equal for instructions with the same effect; numbers of volatile accesses are ignored."""
     args = tuple(replace(a, volatile=1) if isinstance(a, MEMORY) and a.volatile else a for a in mi.args)
     return (mi.op, args, mi.byte, mi.cc, mi.pred, mi.text, mi.also_uses, mi.also_defs)
 
@@ -91,7 +91,7 @@ def _common(group: list[MBlock], skip: int) -> int:
 
 
 def _depends_on_predecessor(insts: list[MI]) -> bool:
-    """Whether instructions cannot start a block: they begin under a skip, or read flags set before them."""
+    """Whether instructions cannot start a block: the first is covered by a skip, or they read flags set before them."""
     if insts[0].pred or insts[0].op in ("bra", "jump"):
         return True
     written: set[str] = set()

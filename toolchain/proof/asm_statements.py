@@ -30,7 +30,7 @@ class Operand:
 
     early  whether an output is written before all inputs are read
     tied   number of the output that the operand shares registers with, None without one
-    fixed  its first register, where the constraint names one
+    fixed  its first register, if the constraint names one
     """
 
     output: bool
@@ -38,12 +38,12 @@ class Operand:
     tied: int | None
     fixed: int | None
     allowed: tuple[int, ...] | None
-    """Registers of the operand's class, where the constraint names a class."""
+    """Registers of the operand's class, if the constraint names a class."""
 
 
 @dataclass(frozen=True)
 class Shape:
-    """The constraints of a statement: operands by number, clobbered registers, whether memory is clobbered."""
+    """Constraints of a statement: operands by number, clobbered registers, and whether memory is clobbered."""
 
     operands: tuple[Operand, ...]
     clobbered: frozenset[int]
@@ -95,7 +95,7 @@ def shape_of(code: InlineAsm) -> Shape:
 
 
 def plain(text: str) -> str:
-    """Return a template without the front end's mark."""
+    """Return a template without the mark that `asm_constraints` adds."""
     return MARK.sub("", text)
 
 
@@ -106,7 +106,7 @@ def templates(module: Module) -> set[str]:
 
 
 def marked(text: str, wanted: Iterable[str]) -> tuple[str, list[tuple[str, str, dict[tuple[int, str], str], str]]]:
-    """Return assembly text with labels around each sequence that matches a template, and a list of the sequences.
+    """Return assembly text with labels around each sequence that matches a template, and a list of these sequences.
 
     A sequence is (label at its start, template, operand texts, label after it).
     """

@@ -40,7 +40,7 @@ def counterexample_of(model: z3.ModelRef, function: str, registers: list[Any], a
     if str(array) in named:
         for at in range(SFR_END, RAM_END):
             memory[at] = int(model.eval(z3.Select(array, z3.BitVecVal(at, 16)), model_completion=True).as_long())
-        usual = max(set(memory.values()), key=list(memory.values()).count)  # the default value of the solver's array
+        usual = max(set(memory.values()), key=list(memory.values()).count)  # default of the solver's array
         memory = {at: byte for at, byte in memory.items() if byte != usual}
     for name, declared in named.items():
         if name.startswith("stack."):

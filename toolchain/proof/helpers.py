@@ -28,7 +28,7 @@ class Helper:
 
     @property
     def gives(self) -> range:
-        """Return the registers of the result."""
+        """Return the numbers of the registers that hold the result."""
         return range(self.result // 16)
 
     def call(self, registers: Sequence[Term]) -> list[Term]:

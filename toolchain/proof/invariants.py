@@ -16,9 +16,9 @@ from toolchain.proof.ir.operands import either
 from toolchain.proof.terms import WORD, Term, vector
 
 FACTORS: Final = (1, -1, 2, -2, 4, -4)
-"""Factors of a value in a sum: steps of pointers, and decreasing counts."""
+"""Factors of a value in a candidate sum, for pointers that step by 1, 2 or 4 and for decreasing counters."""
 MIN_VISITS: Final = 4
-"""Least number of visits for a candidate with a sum, which could hold by coincidence."""
+"""Minimum number of visits for a candidate with a sum; with fewer, sums hold by coincidence."""
 
 
 @dataclass(frozen=True)
@@ -60,14 +60,14 @@ class Invariant:
         return z3.simplify(sum(terms[1:], terms[0]))
 
     def poison(self, values: Mapping[Any, Any]) -> Term | None:
-        """Return the condition under which the sum is poison, None if never."""
+        """Return the condition under which the sum is poison, None if it never is."""
         found = None
         for _, part in self.parts:
             found = either(found, values[part.key][1])
         return found
 
     def holds(self, held: Term, values: Mapping[Any, Any]) -> Term:
-        """Return the condition that the invariant holds, for the contents of its location."""
+        """Return the condition that the invariant holds for the contents `held` of its location."""
         poison = self.poison(values)
         same = z3.Extract(self.bits - 1, 0, held) == z3.Extract(self.bits - 1, 0, self.term(values))
         return same if poison is None else z3.Or(poison, same)
@@ -93,7 +93,7 @@ class OrderInvariant:
 
 
 def candidate_orders(rows: list[dict[ValueWord, int]], sizes: Mapping[ValueWord, int]) -> Iterator[OrderInvariant]:
-    """Yield orders that held in all visits: constant words, and words that were never greater than others."""
+    """Yield order invariants that held in all visits, for constant words and for words never greater than another."""
     moving = [part for part in rows[0] if len({row[part] for row in rows}) > 1]
     for part, number in rows[0].items():
         if part not in moving:
@@ -147,7 +147,7 @@ def candidate_invariants(
 
 
 def _sums(place: int, held: list[int], rows: list[dict[ValueWord, int]]) -> Iterator[Invariant]:
-    """Yield candidates of one value and a number, or of two values, one with a factor, and a number."""
+    """Yield candidate sums: one value plus a number, or two values, one of them with a factor, plus a number."""
     moving = [part for part in rows[0] if len({row[part] for row in rows}) > 1]
     for a in moving:
         number = _rest(held, [row[a] for row in rows])

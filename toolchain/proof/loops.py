@@ -1,11 +1,12 @@
 """Proof by induction of loops with input-dependent iteration counts.
 
-Whenever the source is at a loop head, the code is at one address, and registers and frame words hold certain values of
-the source.  Candidates for these invariants come from sample runs with random inputs (`invariants.py`).  Candidates
-that an iteration does not preserve are dropped until the others are inductive.  With the invariants, each segment from
-the entry or a loop head to the next loop head or return is proved like a function without loops.
+The invariants of a loop head state that, whenever the source is there, the code is at one address, and certain
+registers and frame words hold certain values of the source.  Candidates for these invariants come from sample runs with
+random inputs (`invariants.py`).  Candidates that an iteration does not preserve are dropped until the others are
+inductive.  With the invariants, each segment from the entry or a loop head to the next loop head or return is proved
+like a function without loops.
 
-A failed induction refutes nothing: a needed invariant may be missing.
+A failed induction does not refute the function: a necessary invariant may be missing.
 """
 
 from __future__ import annotations
@@ -108,7 +109,7 @@ class Induction:
         self.f: Final = f
         self.registers: Final = start.w[:SP]
         self.entry: Final[dict[Any, Any]] = {("W", n): (term, None) for n, term in enumerate(self.registers)}
-        """Values besides those of the source: registers at entry."""
+        """Values for invariants in addition to those of the source: registers at entry."""
         self.blocks: Final = {b.name: b for b in reverse_postorder(f)}
         self.dominators: Final = {name: self._dominators(name) for name in self.blocks}
         before = predecessors(f)
@@ -122,7 +123,7 @@ class Induction:
         """Addresses of the machine at loop heads."""
 
     def _reached(self, first: str, without: str = "") -> set[str]:
-        """Return the blocks reachable from one, including itself, without passing another."""
+        """Return the blocks reachable from `first`, including itself, on paths that avoid the block `without`."""
         seen, work = {without}, [first]
         while work:
             one = work.pop()
@@ -168,7 +169,7 @@ class Induction:
             code.watched = frozenset(range(code.start, code.end))
             try:
                 ended = code.run(self.registers, self.start.copy(), self.volatile)
-            except Undecided:  # a partial run is a usable sample
+            except Undecided:  # an incomplete run is a usable sample
                 ended = [code.state] if code.state.event == len(path.events) else []
             for state in ended:
                 preferences = [register == chance.randrange(1 << 16) for register in self.registers]

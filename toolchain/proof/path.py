@@ -27,7 +27,7 @@ class Event:
     arguments: list[tuple[Value, Any, ParameterAttributes]] = field(default_factory=list)
     named_arguments: int | None = None
     memory: SymbolicMemory | None = None
-    """Memory at the event, None if stores may be moved over it: calls and compiler barriers fix it."""
+    """Memory at the event, None if stores may be moved across it; calls and compiler barriers forbid that."""
     movable_stores: tuple[tuple[Term, Term], ...] = ()
     """Stores, by address and value, that may be executed before or after the event."""
     aligned: bool = False
@@ -37,7 +37,7 @@ class Event:
     is_tail_call: bool = False
     """Whether a call does not access the caller's variables."""
     memory_after: Any = None
-    """Array of the memory after the event, where other code may have written."""
+    """Unknown array of the memory after the event, if the event lets other code write."""
 
 
 @dataclass
@@ -56,7 +56,7 @@ class Path:
     visits: dict[str, int] = field(default_factory=dict)
     forks: dict[str, int] = field(default_factory=dict)
     behind_barrier: bool = False
-    """Whether the last point that stores may not be moved over was a compiler barrier."""
+    """Whether the last point that stores may not cross was a compiler barrier."""
     pending_stores: list[tuple[Term, Term]] = field(default_factory=list)
     """Stores since that point."""
     movable_events: list[tuple[int, SymbolicMemory]] = field(default_factory=list)
@@ -83,15 +83,15 @@ class Path:
         self.pending_stores.append((address, value))
 
     def record_event(self, event: Event) -> None:
-        """Record an event that stores may be moved over."""
+        """Record an event that stores may cross."""
         self.movable_events.append((len(self.events), self.memory.copy()))
         self.events.append(event)
 
     def fix_store_order(self, barrier: bool) -> None:
-        """Record a point that no store may be moved over.
+        """Record a point that no store may cross.
 
-        If this point or the previous one is a compiler barrier, the events between them fix memory: stores before the
-        previous point are executed, stores after this one are not.
+        If this point or the previous one is a compiler barrier, memory is known at the events between them: stores
+        before the previous point have been executed, stores after this one have not.
         """
         if barrier or self.behind_barrier:
             for number, memory in self.movable_events:

@@ -1,6 +1,6 @@
 """The proof problem: the optimised IR of one C file, and the machine code that the back end generates from it.
 
-The file is compiled and linked alone.  Symbols that it only declares get artificial addresses: variables in unused RAM,
+The file is compiled and linked alone.  Symbols that it only declares have artificial addresses: variables in free RAM,
 functions above its code.  Special function registers have their real addresses.
 """
 
@@ -38,9 +38,9 @@ PRIVATE = re.compile(r"^(@\S+ = )private ", re.MULTILINE)
 DATA, DATA_END = 0x1000, STACK - 0x100
 """Address range of variables that are only declared."""
 MAX_BYTES = 0x200
-"""Bytes reserved for a declared variable; larger variables overlap the next one."""
+"""Distance in bytes between declared variables; a larger variable overlaps the next one."""
 CODE, CODE_STEP = 0x6000, 0x10
-"""First address and distance of functions that are only declared."""
+"""First address of functions that are only declared, and distance between them, in PC units."""
 WORD_UNITS = 2
 PAGE = "__const_psvpage"
 """Linker symbol with the value of PSVPAG for constants (abi-elf.md §1.4)."""
@@ -105,7 +105,7 @@ def compile_file(arguments: list[str], edit: Callable[[str], str] = str) -> Comp
     with tempfile.TemporaryDirectory(prefix="dspic-proof-") as scratch:
         modules = front_end(options, Path(scratch))
         ir = optimise(options, modules[options.inputs[0]], Path(scratch))
-    ir = PRIVATE.sub(r"\1internal ", ir)  # local labels have no address in the image
+    ir = PRIVATE.sub(r"\1internal ", ir)  # private symbols are local labels, which have no address in the image
     compiler = ModuleCompiler(read_module(ir), options)
     text = edit(compiler.run())
     module = read_module(ir)

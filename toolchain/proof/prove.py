@@ -1,7 +1,7 @@
-"""Proof that the machine code of a function implements its IR: each path of the IR against each path of the code.
+"""Proof that the machine code of a function implements its IR: compares each path of the IR with the code's paths.
 
-For each feasible path of the IR, the code is executed symbolically under the conditions of that path.  It must have the
-same events in the same order, the same result and memory, and preserve W8-W14, W15 and the return address
+For each feasible path of the IR, the code is executed symbolically under the conditions of that path.  It must produce
+the same events in the same order and the same result and memory.  It must preserve W8-W14, W15 and the return address
 (abi-elf.md §2.1).
 """
 

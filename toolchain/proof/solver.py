@@ -10,7 +10,7 @@ import z3
 from toolchain.proof.terms import Term
 
 WORK: Final = 12_000_000
-"""Resource limit (rlimit) of one query, some seconds; it gives the same answer on every machine."""
+"""Resource limit (rlimit) of one query, a few seconds; unlike a time limit it is reproducible."""
 ALL_WORK: Final = 10 * WORK
 """Resource limit of all queries about one function."""
 
@@ -20,7 +20,7 @@ class Undecided(Exception):
 
 
 class Refuted(Exception):
-    """Code and IR differ for every input that satisfies `conditions`; None stands for the conditions of the path."""
+    """Code and IR differ for every input that satisfies `conditions`, or (None) the conditions of the path."""
 
     def __init__(self, what: str, conditions: Sequence[Term] | None = None) -> None:
         super().__init__(what)

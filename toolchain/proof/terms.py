@@ -1,4 +1,4 @@
-"""Integers of the instruction table as z3 terms, or plain ints where they are known.
+"""Integers of the instruction table as z3 terms, or as plain ints if they are known.
 
 A table value is an exact integer.  `SymbolicInteger` has it in 48 bits, enough for products of two words and a 40-bit
 accumulator.  Its low word is a separate term, so that 16-bit computations give the same terms as in the source.
@@ -12,7 +12,7 @@ from typing import Any, TypeAlias
 import z3
 
 BITS = 48
-"""Width of the integers the table computes with; products of two words need 33."""
+"""Width in bits of the integers with which the table computes; products of two words need 33."""
 WORD = 16
 HALF = 0x8000
 
@@ -51,7 +51,7 @@ class SymbolicInteger:
     truth    the condition that it is 1, if it is known to be 0 or 1
     narrow   whether it equals its zero-extended word
     signed   whether it equals its sign-extended word
-    flipped  the word whose inverted top bit gives it, an intermediate step of sign extension
+    flipped  the word from which it results by inverting the top bit, an intermediate step of sign extension
     """
 
     __slots__ = ("flipped", "narrow", "signed", "truth", "wide", "word")

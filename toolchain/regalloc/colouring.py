@@ -29,8 +29,8 @@ WORD_COLOURS = mask_of(list(ALLOCATABLE))
 PAIR_COLOURS = mask_of([r for r in ALLOCATABLE if r % 2 == 0 and r < 14])
 REAL = (1 << FIRST_VIRTUAL) - 1
 LOOP_WEIGHT = 8
-EXACT_SPILL_NODES = 300  # up to this many nodes, the best spill candidate is computed again at every step
-TRIAL_LIMIT = 400  # instructions; larger functions are allocated once
+EXACT_SPILL_NODES = 300  # maximum number of nodes for which the best spill candidate is recomputed at every step
+TRIAL_LIMIT = 400  # maximum number of instructions for several trials; larger functions are allocated once
 
 
 class InterferenceGraph:
@@ -40,9 +40,9 @@ class InterferenceGraph:
         self.m = m
         self.adjacent: dict[int, int] = {}
         self.alias: dict[int, int] = {}
-        self.moves: list[tuple[int, int, int]] = []  # weight, source, destination
+        self.moves: list[tuple[int, int, int]] = []  # copies as (weight, source, destination)
         self.cost: dict[int, float] = {}
-        self.hints: dict[int, list[tuple[int, int]]] = {}  # node -> (partner, colour offset from the partner)
+        self.hints: dict[int, list[tuple[int, int]]] = {}  # by node: (copy partner, colour offset)
         self.pair_mask = mask_of(sorted(m.pairs))
         self._build()
 
@@ -94,13 +94,13 @@ class InterferenceGraph:
         return live & ~d | mask_of(uses)
 
     def find(self, n: int) -> int:
-        """The node that a coalesced node was merged into."""
+        """The node into which a coalesced node was merged."""
         while n in self.alias:
             n = self.alias[n]
         return n
 
     def pressure(self, n: int, mask: int) -> int:
-        """Number of colours of n's class that the nodes in `mask` can occupy at most."""
+        """Maximum number of colours of n's class that the nodes in `mask` can occupy."""
         if n in self.m.pairs:
             return mask.bit_count()
         return mask.bit_count() + (mask & self.pair_mask).bit_count()
@@ -112,7 +112,7 @@ class InterferenceGraph:
     # -- coalescing ---------------------------------------------------------------------------------------------------
 
     def coalesce(self, eager: bool, thorough: bool) -> None:
-        """Merge copies, most frequent first, if that is safe; with `eager` also copies from and to real registers.
+        """Merge the nodes of copies, most frequent first, if that is safe; with `eager` also copies of real registers.
 
         `thorough` uses George's test for virtual registers, too, which removes more moves but may cause more spills."""
         pending = sorted(self.moves, key=lambda m: -m[0])
@@ -183,13 +183,13 @@ class InterferenceGraph:
     # -- simplification -----------------------------------------------------------------------------------------------
 
     def simplify(self) -> list[int]:
-        """Remove all virtual nodes; returns them in the order of removal."""
+        """Remove all virtual nodes; return them in the order of removal."""
         remaining = {n for n in self.adjacent if n >= FIRST_VIRTUAL}
         active = mask_of(sorted(remaining)) | REAL
         stack: list[int] = []
         ready = [n for n in remaining if self.pressure(n, self.adjacent[n] & active) < self.limit(n)]
         queued = set(ready)
-        ranked: list[int] = []  # large graphs: cheapest last, by the degrees at the start
+        ranked: list[int] = []  # for large graphs: spill candidates by their degree at the start, cheapest last
         if len(remaining) > EXACT_SPILL_NODES:
             ranked = sorted(remaining, key=lambda n: (self._spill_metric(n, active), n), reverse=True)
         while remaining:
@@ -272,11 +272,11 @@ class Colouring:
         return self._best(n, allowed)
 
     def _fresh(self, c: int) -> int:
-        """1 if the function would have to save the register for this node only, else 0."""
+        """1 if the function would have to save the register only because of this node, else 0."""
         return int(c in CALLEE_SAVED and not self.used_saved >> c & 1)
 
     def _best(self, n: int, allowed: int) -> int:
-        """The cheapest register: preferably one that need not be saved, and of the parity that the pair needs."""
+        """The cheapest register: preferably one that need not be saved, with the parity that a pair hint requires."""
         registers = registers_in(allowed)
         if self.m.interrupt:
             return registers[0]
@@ -317,7 +317,7 @@ def allocate(m: MFunction, for_size: bool, verify: bool = False) -> MFunction:
 def _allocate(m: MFunction, eager: bool, thorough: bool, verify: bool, first: InterferenceGraph | None = None) -> None:
     """Allocate in place. `first` is the graph of the first round, if it is known.
 
-    Every round spills at least one register of the program and none of the spill code, so the loop ends."""
+    Every round spills at least one register of the program and none of the spill code, so the iteration terminates."""
     while True:
         g, first = first or InterferenceGraph(m), None
         g.coalesce(eager, thorough)
@@ -351,7 +351,7 @@ def _crowded(m: MFunction) -> bool:
 
 
 def _cost(m: MFunction, for_size: bool) -> int:
-    """Cost of a result: words, weighted by loop depth unless `for_size`, with the saves of registers."""
+    """Cost of an allocation: words, including saves of registers, weighted by loop depth unless `for_size`."""
     saved: set[int] = set()
     total = 0
     for b in m.blocks:
@@ -374,7 +374,7 @@ def _apply(m: MFunction, g: InterferenceGraph, colour: dict[int, int]) -> None:
         variables.attach_claims(m, rename, {r: g.find(r) for r in rename})
     for b in m.blocks:
         out: list[MI] = []
-        dropped: dict[int, int] = {}  # values that the dropped copies would have written
+        dropped: dict[int, int] = {}  # values that the removed copies would have written
         for mi in b.insts:
             mi.map_registers(rename)
             start = len(out)

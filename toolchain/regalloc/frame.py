@@ -2,7 +2,7 @@
 
 Without frame pointer (addresses are relative to W15, which pushed arguments change):
     entry W15 ->  saved registers | locals, spill slots nearest the top | pushed arguments  <- W15
-With it (dynamic stack, or locals beyond the reach of ADD #lit10), as in abi-elf.md §2.4:
+With frame pointer (dynamic stack, or locals beyond the range of ADD #lit10), as in abi-elf.md §2.4:
     entry W15 ->  caller's W14 | locals, spill slots first | saved registers | dynamic blocks
                   ^ W14
 Interrupt functions save all registers that they change, in the order of abi-elf.md §2.5.
@@ -14,9 +14,9 @@ from toolchain.abi.target import CALLEE_SAVED, CALLER_SAVED, FP, LIT5_MAX, LIT10
 from toolchain.ir.model import UnsupportedError
 from toolchain.mir.mir import MI, FrameSlot, Imm, Mem, MFunction, Operand
 
-FRAME_POINTER_BYTES = 900  # locals above this use LNK: ADD #lit10 reaches 1023
+FRAME_POINTER_BYTES = 900  # maximum bytes of locals without LNK; the greatest literal of ADD #lit10 is 1023
 PROBE_REACH = 1022  # largest word offset of [Wn+lit] (isa.md §3)
-PROBE_BYTES = 8  # -fstack-check probes frames above this (kernel.md §4)
+PROBE_BYTES = 8  # -fstack-check probes frames of more bytes (kernel.md §4)
 REPEATS = {"repmov", "repfill", "repclr", "div.s", "div.u", "div.sd", "div.ud"}
 
 
@@ -50,7 +50,7 @@ class FrameBuilder:
         return [r for r in range(shadow, 15) if r in written and not (r == FP and self.m.uses_fp)]
 
     def _layout(self) -> int:
-        """Assign offsets to the objects in use; returns the bytes of locals."""
+        """Assign offsets to the objects in use; return the bytes of locals."""
         used = {a.index for b in self.m.blocks for mi in b.insts for a in mi.args if isinstance(a, FrameSlot)}
         free = [(k, o) for k, o in enumerate(self.m.frame) if o.fixed is None and k in used]
         free.sort(key=lambda e: (e[1].spill, -e[1].size), reverse=self.m.uses_fp)
@@ -65,7 +65,7 @@ class FrameBuilder:
     # -- addresses ----------------------------------------------------------------------------------------------------
 
     def _locate(self, slot: FrameSlot, pushed: int) -> tuple[int, int]:
-        """(base register, offset) of a slot while `pushed` bytes lie above the frame."""
+        """(base register, offset) of a slot while `pushed` bytes are above the frame."""
         o = self.m.frame[slot.index]
         if self.m.uses_fp:
             below = -2 - (self.interrupt_bytes() if self.m.interrupt else 0)
@@ -127,7 +127,7 @@ class FrameBuilder:
         return self._slot_operand(mi, pushed)
 
     def _slot_operand(self, mi: MI, pushed: int) -> list[MI]:
-        """MOV with a frame operand. A load beyond the offset range computes the address in its destination."""
+        """MOV with a frame operand; a load beyond the offset range computes the address in its destination register."""
         k = next(n for n, a in enumerate(mi.args) if isinstance(a, FrameSlot))
         slot = mi.slot(k)
         base, offset = self._locate(slot, pushed)
@@ -172,7 +172,7 @@ class FrameBuilder:
             if not m.interrupt:
                 out += _push_registers(self.saved)
             out += _adjust(self.locals, None)
-        if self.stack_check and self.locals > PROBE_BYTES:  # pushes access the stack themselves
+        if self.stack_check and self.locals > PROBE_BYTES:  # the pushes probe smaller frames
             out[0:0] = _probe(self.locals + 2 * len(self.saved))
         m.blocks[0].insts[0:0] = out
 

@@ -1,4 +1,4 @@
-"""Spill code: registers without a colour move to frame slots or are rematerialised at every use."""
+"""Spill code: registers without a colour are stored in frame slots or rematerialised at every use."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Set
 from toolchain.mir.mir import MI, FrameObject, FrameSlot, Imm, MFunction, covered_count
 
 REMATERIALISABLE = {"clr", "setm", "lea"}
-UNIT_REGISTERS = 12  # most registers that the instructions under one skip may use; others are live across the skip
+UNIT_REGISTERS = 12  # maximum number of registers used under one skip; the others are live across the skip
 
 
 def rewrite_spills(m: MFunction, groups: dict[int, list[int]]) -> None:
@@ -29,7 +29,7 @@ def rewrite_spills(m: MFunction, groups: dict[int, list[int]]) -> None:
 
 
 def _single_definitions(m: MFunction, wanted: set[int]) -> dict[int, MI]:
-    """Register -> the instruction that writes it, for registers with exactly one unconditional definition."""
+    """The instruction that writes a register, for registers with exactly one unconditional definition."""
     found: dict[int, MI] = {}
     many: set[int] = set()
     for b in m.blocks:
@@ -64,9 +64,9 @@ def _slot_written(m: MFunction, index: int) -> bool:
 
 
 def _rewrite_block(m: MFunction, insts: list[MI], slot_of: dict[int, int], rematerialised: dict[int, MI]) -> list[MI]:
-    """Insert loads before and stores after the instructions of a block; a skip and what it covers are one unit."""
+    """Insert loads before and stores after the instructions of a block; a skip and its instructions are one unit."""
     out: list[MI] = []
-    chain = 0  # length of `out` before the last instruction that started a computation of flags
+    chain = 0  # index in `out` of the last instruction that starts a chain of flag computations
     k = 0
     while k < len(insts):
         size = 1 + covered_count(insts, k)
@@ -97,9 +97,9 @@ def _rewrite_block(m: MFunction, insts: list[MI], slot_of: dict[int, int], remat
 
 
 def _narrow_skips(insts: list[MI], spilled: Set[int]) -> list[MI]:
-    """Repeat a skip before the rest of its instructions if they use too many registers; the flags are unchanged.
+    """Split a skip into two if its covered instructions use too many registers; the flags are unchanged.
 
-    Loads of covered instructions come before the skip and stores behind it, so their registers are live at once."""
+    Loads for covered instructions precede the skip and stores follow it, so all their registers are live at once."""
     out: list[MI] = []
     skip = None
     named: set[int] = set()

@@ -11,7 +11,7 @@ from toolchain.select.state import words_of
 
 
 def select_binary(s: SelectionContext, i: Instr) -> None:
-    """Addition, subtraction, logic: by the rules of immediates, with a folded load, or as a chain of words."""
+    """Select addition, subtraction, logic: with an immediate, with a folded load, or word by word with carry."""
     if _into_low_byte(s, i):
         return
     if words_of(i) > 1:
@@ -66,7 +66,7 @@ def _into_low_byte(s: SelectionContext, i: Instr) -> bool:
 
 
 def _file_logic(s: SelectionContext, i: Instr, a: Value, b: ConstInt, d: int, byte: bool) -> bool:
-    """Select near object op constant through W0, a word less than loading both (abi-elf.md §8.1, bit-fields)."""
+    """Select (near object) op constant through W0; loading both takes one word more (abi-elf.md §8.1, bit-fields)."""
     if i.op not in ("and", "or", "xor") or immediate_rule(i.op, b.value, i.type.bits) is not None:
         return False
     near = s.near_operand(a, i)
@@ -92,7 +92,7 @@ def _reverse_subtract(s: SelectionContext, i: Instr, a: ConstInt, d: int, byte: 
 
 
 def apply_immediate(s: SelectionContext, op: str, a: Value, k: int, d: int, byte: bool, user: Instr | None) -> None:
-    """d = a op k by the first matching rule, else with the constant in a register."""
+    """Emit d = a op k by the first matching rule, else with the constant in a register."""
     rule = immediate_rule(op, k, 8 if byte else 16)
     if rule is not None and rule.form == "unary" and user is not None and rule.op != "ze":
         s.emit(rule.op, s.source(a, user), d, byte=byte)
@@ -101,7 +101,7 @@ def apply_immediate(s: SelectionContext, op: str, a: Value, k: int, d: int, byte
 
 
 def apply_rule(s: SelectionContext, rule: ImmediateRule | None, op: str, a: int, k: int, d: int, byte: bool) -> None:
-    """d = a op k for a register a; without a rule, the constant is loaded into a register."""
+    """Emit d = a op k for a register a; without a rule, the constant is loaded into a register."""
     if rule is None:
         t = s.temp()
         s.load_imm(k, t)
@@ -175,7 +175,7 @@ def _wide_reverse(s: SelectionContext, i: Instr, a: ConstInt) -> None:
 
 
 def _wide_immediate(s: SelectionContext, op: str, a: tuple[int, ...], value: int, d: tuple[int, ...]) -> None:
-    """Select an operation of several words with a constant; words that change nothing become copies."""
+    """Select an operation of several words with a constant; words for which it is neutral become copies."""
     words = [value >> 16 * k & 0xFFFF for k in range(len(a))]
     if op in ("add", "sub"):
         _wide_add_immediate(s, op, a, words, d)
@@ -192,7 +192,7 @@ def _wide_immediate(s: SelectionContext, op: str, a: tuple[int, ...], value: int
 
 
 def _wide_add_immediate(s: SelectionContext, op: str, a: tuple[int, ...], words: list[int], d: tuple[int, ...]) -> None:
-    """Add or subtract a constant, whichever needs more short literals; leading zero words become copies."""
+    """Emit an addition or subtraction, whichever has more short literals; leading zero words become copies."""
     value = sum(w << 16 * k for k, w in enumerate(words))
     bits = 16 * len(words)
     negated = -value & ((1 << bits) - 1)
@@ -218,7 +218,7 @@ def _wide_add_immediate(s: SelectionContext, op: str, a: tuple[int, ...], words:
 
 
 def select_extend(s: SelectionContext, i: Instr) -> None:
-    """zext and sext. The result shares the registers of its source words."""
+    """Select zext and sext. The result shares the registers of its source words."""
     v, signed = i.args[0], i.op == "sext"
     d = s.value_regs(i)
     if s.is_leaf(v):
@@ -259,12 +259,12 @@ def _byte_source(s: SelectionContext, v: Value, i: Instr) -> int | Mem:
 
 
 def select_unary(s: SelectionContext, i: Instr) -> None:
-    """FF1L and FF1R."""
+    """Select FF1L and FF1R."""
     s.emit(i.op, s.source(i.args[0], i), s.result(i))
 
 
 def select_swap(s: SelectionContext, i: Instr) -> None:
-    """SWAP works in place."""
+    """Select SWAP on a copy of the operand, because SWAP works in place."""
     d = s.result(i)
     s.copy(s.reg(i.args[0]), d)
     s.emit("swap", d)

@@ -10,7 +10,7 @@ from toolchain.ir.model import ConstInt, GlobalRef, Instr, Type, UnsupportedErro
 from toolchain.mir.mir import FIRST_VIRTUAL, MI, Imm, Mem, Operand, opaque
 from toolchain.select.context import SelectionContext
 
-# Register names of the front end, which are those of the MSP430; r0-r3 have other names there.
+# Register names of the front end, which are those of the MSP430; r0-r3 have alternative names.
 REGISTER_NAMES = {"pc": 0, "sp": 1, "sr": 2, "cg": 3, "fp": 4, **{f"r{n}": n for n in range(16)}}
 REFERENCE = re.compile(r"\$(?:(\d+)|\{(\d+)(?::(\w))?\}|\{:uid\}|\$)")
 REFUSED_LETTERS = frozenset("abcdetwABxyz")
@@ -29,12 +29,12 @@ class AsmConstraint:
 
     @property
     def either(self) -> bool:
-        """Whether register and memory are allowed (`rm`, `g`): the operand becomes a register, as in XC16."""
+        """Whether register and memory are allowed (`rm`, `g`); in this case a register is used, as in XC16."""
         return "r" in self.text and "m" in self.text
 
 
 def _parse(text: str) -> tuple[list[AsmConstraint], list[int]]:
-    """Operands and clobbered registers of a constraint string. Raises UnsupportedError."""
+    """Operands and clobbered registers of a constraint string. Raise UnsupportedError for unknown constraints."""
     operands, clobbers = [], []
     for part in _split(text):
         if part.startswith("~"):
@@ -61,9 +61,9 @@ def _parse(text: str) -> tuple[list[AsmConstraint], list[int]]:
 
 
 def _assign_classes(constraints: list[AsmConstraint], clobbers: list[int], text: str) -> None:
-    """Assign registers to operands with a register class. Raises UnsupportedError if a class has too few registers.
+    """Assign registers to operands with a register class. Raise UnsupportedError if a class has too few registers.
 
-    An input may share the register of an output, unless that is written early."""
+    An input may share the register of an output, unless the output is early-clobber."""
     mark = MARK.match(text)
     if mark is None:
         return
@@ -98,11 +98,11 @@ class AsmBuilder:
         self.roles: list[str] = []
         self.late: list[int] = []
         self.after: list[tuple[int, tuple[int, ...]]] = []
-        self.stores: list[tuple[int, int, bool]] = []  # pointer, register, byte: outputs in memory
+        self.stores: list[tuple[int, int, bool]] = []  # outputs in memory: (pointer, register, whether it is a byte)
         self.fixed_uses: list[int] = []
         self.fixed_defs: list[int] = []
-        self.blocks = [0, 4]  # free register runs for 64-bit operands
-        self.reference: list[int] = []  # operand number in the text -> index in `operands`
+        self.blocks = [0, 4]  # first registers of the blocks W0-W3 and W4-W7 that are free for 64-bit operands
+        self.reference: list[int] = []  # index in `operands` of each operand number of the template
 
     def run(self) -> None:
         """Emit the statement."""
@@ -144,10 +144,10 @@ class AsmBuilder:
                 self.s.emit("split", dest[0], dest[1], source)
 
     def _check(self, c: AsmConstraint, t: Type) -> int:
-        """Words of an operand. Raises UnsupportedError for unsupported sizes and constraints."""
+        """Number of words of an operand. Raise UnsupportedError for unsupported sizes and constraints."""
         words = max(1, t.bits // 16)
         if words == 4 and c.fixed is None and self.blocks and "r" in c.text:
-            c.fixed = self.blocks.pop()  # 64 bits travel in W4-W7 or W0-W3, as in calls
+            c.fixed = self.blocks.pop()  # 64-bit operands are in W4-W7 or W0-W3, as in calls
         elif words > 2 and c.fixed is None:
             raise UnsupportedError(f"inline assembly operand of {t.bits} bits")
         letters = set(c.text) & REFUSED_LETTERS
@@ -174,7 +174,7 @@ class AsmBuilder:
         self.after.append((r, dest))
 
     def memory_output_in_register(self, c: AsmConstraint, p: Value, t: Type) -> None:
-        """An output in memory for which a register is allowed: the register is stored behind the statement."""
+        """Add an output in memory for which a register is allowed; the register is stored after the statement."""
         size = size_of(t)
         if size > 2:
             raise UnsupportedError(f"inline assembly operand '{c.text}' of {size} bytes (use r or m)")
@@ -183,11 +183,11 @@ class AsmBuilder:
         self.stores.append((self.s.reg(p), r, size == 1))
 
     def tied(self, c: AsmConstraint, v: Value) -> None:
-        """An input in the register of an output, which becomes read and written."""
+        """Add an input that is tied to an output, whose register is then read and written."""
         assert c.tied is not None
         at = self.reference[c.tied]
         r = self.operands[at]
-        if not isinstance(r, int):  # "+m": the object contains the value before the statement
+        if not isinstance(r, int):  # "+m": the object in memory already contains the value
             self.s.emit("mov", self.s.reg(v), r, byte=v.type.bits == 8)
             self.reference.append(at)
             return
@@ -244,7 +244,7 @@ class AsmBuilder:
         return Mem("ind", self.s.reg(p))
 
     def template(self) -> str:
-        """The text with operand numbers replaced by indices into `args` (`MI.text`)."""
+        """The template with operand numbers replaced by indices into `args` (`MI.text`)."""
 
         def replace(m: re.Match[str]) -> str:
             number = m[1] or m[2]
@@ -262,7 +262,7 @@ def element(asm: Instr, k: int) -> Type:
 
 
 def result_registers(s: SelectionContext, asm: Instr, index: int, words: int) -> tuple[int, ...]:
-    """Registers of result `index`; new ones if it has no user."""
+    """Registers of result `index`; new ones if the result is not used."""
     for user in s.users.get(id(asm), ()):
         if user.op == "asmresult" and user.extra["index"] == index:
             return s.value_regs(user)
@@ -275,4 +275,4 @@ def select_asm(s: SelectionContext, i: Instr) -> None:
 
 
 def select_asmresult(s: SelectionContext, i: Instr) -> None:
-    """No code: the statement writes its results."""
+    """Emit no code: the statement writes its results."""

@@ -6,14 +6,14 @@ from toolchain.ir.model import ConstInt, Instr, Value
 from toolchain.mir.mir import AddressingMode, Imm, Mem
 from toolchain.select.context import Handler, SelectionContext
 
-MAX_UNROLLED_UNITS = 3  # larger copies and fills use REPEAT
+MAX_UNROLLED_UNITS = 3  # maximum number of units copied one by one; larger copies and fills use REPEAT
 
 
 def _pointer(s: SelectionContext, p: Value, size: int, block: Instr) -> tuple[int, int | None]:
-    """(copy of a pointer to be advanced, register of p + size or None).
+    """(register with a copy of the pointer, which the operation advances; register of p + size, or None).
 
-    The register receives the advanced pointer if code behind the operation uses p + size. It has no value before, so
-    the copy is a separate register for the debugger."""
+    The second register receives the advanced pointer if later code uses p + size. The copy is a separate register,
+    because a debugger must not see a value of p + size before the operation."""
     r = s.temp()
     if s.is_leaf(p):
         s.load_leaf(p, 0, r)
@@ -27,7 +27,7 @@ def _pointer(s: SelectionContext, p: Value, size: int, block: Instr) -> tuple[in
 
 
 def _step_behind(s: SelectionContext, p: Value, size: int, block: Instr) -> Instr | None:
-    """The addition p + size of this block whose register is read behind `block` only; None if there is none."""
+    """The addition p + size of this block whose register is read only after `block`; None if there is none."""
     _, at = s.position[id(block)]
     for step in s.users.get(id(p), ()):
         k = step.args[1] if step.op == "add" and step.args[0] is p else None
@@ -41,7 +41,7 @@ def _step_behind(s: SelectionContext, p: Value, size: int, block: Instr) -> Inst
 
 
 def _modes(count: int, behind: int | None) -> list[AddressingMode]:
-    """Addressing modes of `count` accesses; the last one advances the pointer only if its end is used."""
+    """Addressing modes of `count` accesses; the last one advances the pointer only if the end address is used."""
     modes: list[AddressingMode] = ["++"] * count
     if behind is None:
         modes[-1] = "ind"
@@ -49,7 +49,7 @@ def _modes(count: int, behind: int | None) -> list[AddressingMode]:
 
 
 def select_blockcopy(s: SelectionContext, i: Instr) -> None:
-    """MOV [Ws++],[Wd++], under REPEAT for more than a few units (isa.md §15)."""
+    """Select MOV [Ws++],[Wd++], under REPEAT for more than a few units (isa.md §15)."""
     count, unit = i.extra["count"], i.extra["unit"]
     (dest, dest_end), (source, source_end) = (_pointer(s, p, count * unit, i) for p in i.args[:2])
     byte = unit == 1
@@ -64,7 +64,7 @@ def select_blockcopy(s: SelectionContext, i: Instr) -> None:
 
 
 def select_blockfill(s: SelectionContext, i: Instr) -> None:
-    """CLR [Wd++] or MOV Ws,[Wd++], under REPEAT for more than a few units."""
+    """Select CLR [Wd++] or MOV Ws,[Wd++], under REPEAT for more than a few units."""
     count, unit = i.extra["count"], i.extra["unit"]
     value, byte = i.args[1], unit == 1
     zero = isinstance(value, ConstInt) and value.value == 0

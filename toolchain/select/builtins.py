@@ -1,4 +1,4 @@
-"""Selection of XC16's builtins (abi-elf.md §2.9), which are calls of external functions in the IR."""
+"""Selection of XC16's builtins (abi-elf.md §2.9), which in the IR are calls of external functions."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from toolchain.select.context import Handler, SelectionContext
 
 
 def _constant(i: Instr, k: int, limit: int) -> int:
-    """Constant argument `k`. Raises UnsupportedError unless it is a constant from 0 to `limit`."""
+    """Argument `k`, a constant. Raise UnsupportedError unless it is a constant from 0 to `limit`."""
     v = i.args[k]
     if not isinstance(v, ConstInt) or v.value > limit:
         raise UnsupportedError(f"{i.extra['name']}: argument {k + 1} must be a constant from 0 to {limit}")
@@ -42,7 +42,7 @@ def _pwrsav(s: SelectionContext, i: Instr) -> None:
 
 
 def _osccon(byte: str, keys: tuple[int, int]) -> Handler:
-    """Write two keys and the value by three consecutive byte moves through a register."""
+    """Return the handler that writes two keys and the value to OSCCON by three consecutive byte moves."""
 
     def expand(s: SelectionContext, i: Instr) -> None:
         value = s.reg(i.args[0])
@@ -58,7 +58,7 @@ def _osccon(byte: str, keys: tuple[int, int]) -> Handler:
 
 
 def _write_nvm(s: SelectionContext, i: Instr) -> None:
-    """Write 0x55 and 0xAA to NVMKEY and set WR, followed by two NOPs (abi-elf.md §2.9)."""
+    """Select: write 0x55 and 0xAA to NVMKEY, set WR, two NOPs (abi-elf.md §2.9)."""
     for key in (0x55, 0xAA):
         r = s.temp()
         s.load_imm(key, r)
@@ -106,7 +106,7 @@ def _multiply(kind: str) -> Handler:
 
 
 def _divide(op: str, result: int) -> Handler:
-    """Divide 32 by 16 bits: REPEAT #17, DIV.SD or DIV.UD; the result is in W0 or W1."""
+    """Return the handler for a division of 32 by 16 bits: REPEAT #17, DIV.SD or DIV.UD; result in W0 or W1."""
 
     def expand(s: SelectionContext, i: Instr) -> None:
         low, high = s.regs(i.args[0])
@@ -126,7 +126,7 @@ def _bit_toggle(s: SelectionContext, i: Instr) -> None:
 
 
 def _get_isr_state(s: SelectionContext, i: Instr) -> None:
-    """Return SR.IPL, bits 7-5."""
+    """Select the value of SR.IPL, bits 7-5 of SR."""
     r, t = s.temp(), s.temp()
     mi = s.emit("asm", r)
     mi.info = opaque("d")
@@ -136,7 +136,7 @@ def _get_isr_state(s: SelectionContext, i: Instr) -> None:
 
 
 def _set_isr_state(s: SelectionContext, i: Instr) -> None:
-    """Set SR.IPL; the flags in the low bits of SR are overwritten."""
+    """Select a write of SR.IPL; the flags in the low bits of SR are overwritten."""
     r = s.temp()
     s.emit("sl", s.reg(i.args[0]), Imm(5), r)
     s.copy(r, 0)

@@ -22,7 +22,7 @@ from toolchain.mir.mir import FrameSlot, Imm, Mem
 from toolchain.select import asm_inline, builtins
 from toolchain.select.context import Handler, SelectionContext
 
-BLOCK_PUSH_WORDS = 5  # structs of this size and more are pushed under REPEAT
+BLOCK_PUSH_WORDS = 5  # minimum number of words of a struct that is pushed by REPEAT
 
 
 def shape_of(v: Value, attrs: ParameterAttributes) -> ArgumentShape:
@@ -48,7 +48,7 @@ def parameter_locations(f: Function) -> list[ArgumentLocation]:
 
 
 def incoming(s: SelectionContext) -> None:
-    """Choose frame slots for parameters on the stack and for structs, before any code is selected."""
+    """Allocate frame slots for parameters on the stack and for structs, before code is selected."""
     f = s.f
     s.parameters = parameter_locations(f)
     read = [i.extra["argument"] for i in f.blocks[0].instrs if i.op == "argword"]
@@ -67,7 +67,7 @@ def incoming(s: SelectionContext) -> None:
 
 
 def receive(s: SelectionContext) -> None:
-    """Entry code: move parameters from registers and stack to virtual registers or slots."""
+    """Emit entry code: move parameters from registers and stack to virtual registers or slots."""
     late: list[tuple[Arg, ArgumentLocation]] = []
     for a, location in zip(s.f.args, s.parameters, strict=True):
         if location.register is None:
@@ -94,7 +94,7 @@ def receive(s: SelectionContext) -> None:
 
 
 def select_call(s: SelectionContext, i: Instr) -> None:
-    """Push stack arguments from last to first, load register arguments, call, take the result."""
+    """Select a call: push stack arguments from last to first, load register arguments, call, copy the result."""
     callee = i.args[-1]
     args = i.args[:-1]
     attrs = i.extra["attrs"]
@@ -114,7 +114,7 @@ def select_call(s: SelectionContext, i: Instr) -> None:
 
 
 def _take_results(s: SelectionContext, i: Instr) -> None:
-    """Copy the result from its registers; the members of an aggregate occupy consecutive registers from W0."""
+    """Copy the result from its registers; the members of an aggregate are in consecutive registers from W0."""
     results = i.extra.get("results")
     if not results:
         if id(i) in s.needed:
@@ -135,7 +135,7 @@ def _take_results(s: SelectionContext, i: Instr) -> None:
 def _push_stack_arguments(
     s: SelectionContext, args: list[Value], attrs: list[ParameterAttributes], locations: list[ArgumentLocation]
 ) -> int:
-    """Push stack arguments in descending distance; returns the bytes pushed."""
+    """Push stack arguments in descending order of their offset; return the bytes pushed."""
     pushed = 0
     for k in sorted((k for k in range(len(args)) if locations[k].stack), key=lambda k: -locations[k].stack):
         v = args[k]
@@ -163,7 +163,7 @@ def _push_struct(s: SelectionContext, v: Value, t: Type) -> None:
         s.copy(s.reg(v), source)
         s.emit("repmov", Imm(words - 1), source, SP)
         return
-    if words >= BLOCK_PUSH_WORDS:  # copied by bytes; W15 itself must remain even
+    if words >= BLOCK_PUSH_WORDS:  # copied byte by byte through another pointer, because W15 must remain even
         source, dest = s.temp(), s.temp()
         s.copy(s.reg(v), source)
         s.emit("mov", SP, dest)
@@ -199,7 +199,7 @@ def _struct_words(s: SelectionContext, v: Value, t: Type) -> list[int]:
 def _load_register_arguments(
     s: SelectionContext, args: list[Value], attrs: list[ParameterAttributes], locations: list[ArgumentLocation]
 ) -> list[int]:
-    """Copy arguments into W0-W7; returns these registers. All values are computed before the first copy."""
+    """Copy arguments into W0-W7; return these registers. All values are computed before the first copy."""
     moves: list[tuple[int, int]] = []
     leaves: list[tuple[Value, int, int]] = []
     used: list[int] = []
@@ -250,11 +250,11 @@ def select_entryword(s: SelectionContext, i: Instr) -> None:
 
 
 def select_argword(s: SelectionContext, i: Instr) -> None:
-    """No code: `receive` copies the word into its register."""
+    """Emit no code: `receive` copies the word into its register."""
 
 
 def select_callresult(s: SelectionContext, i: Instr) -> None:
-    """No code: the call copies all members of its result."""
+    """Emit no code: the call copies all members of its result."""
 
 
 HANDLERS: dict[str, Handler] = {

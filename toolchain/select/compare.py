@@ -9,12 +9,12 @@ from toolchain.mir.mir import CC_INVERSE, MI, Imm
 from toolchain.select.context import Handler, SelectionContext
 from toolchain.select.rules import CONDITION
 
-# Predicate of a comparison with 0 -> condition after CP0. N is the sign, because CP0 clears OV (isa.md §6.1).
+# Condition after CP0 by predicate of a comparison with 0. N is the sign, because CP0 clears OV (isa.md §6.1).
 ZERO_CONDITION = {"eq": "z", "ne": "nz", "slt": "n", "sge": "nn", "sgt": "gt", "sle": "le", "ugt": "nz", "ule": "z"}
 
 
-# Comparisons of x with 0 and 1 -> condition after DEC of x. DEC borrows exactly for 0, and N^OV is the sign of the
-# exact difference. A comparison with 1 is one of the result with 0.
+# Condition after DEC of x by comparison of x with 0 or 1. DEC borrows only for x = 0, and N^OV is the sign of the exact
+# difference. A comparison of x with 1 is a comparison of the result with 0.
 COUNTDOWN_CONDITION = (
     {"eq": "nc", "ne": "c", "sle": "lt", "sgt": "ge"},
     {"eq": "z", "ne": "nz", "sle": "le", "sgt": "gt", "ule": "leu", "ugt": "gtu"},
@@ -40,7 +40,7 @@ def condition(s: SelectionContext, c: Value, user: Instr) -> str:
 
 
 def _countdown(s: SelectionContext, c: Instr) -> Instr | None:
-    """The decrement x - 1 of this block that is used behind it only, for a comparison of x with 0 or 1; or None."""
+    """For a comparison of x with 0 or 1, the decrement x - 1 of this block that only later code uses; else None."""
     x, against = c.args
     if not isinstance(against, ConstInt) or against.value > 1 or c.pred not in COUNTDOWN_CONDITION[against.value]:
         return None
@@ -55,7 +55,7 @@ def _countdown(s: SelectionContext, c: Instr) -> Instr | None:
 
 
 def compare(s: SelectionContext, c: Instr, at: Instr) -> str:
-    """Emit a comparison for icmp `c` at its user `at`; returns the condition under which it is true.
+    """Emit a comparison for icmp `c` at its user `at`; return the condition under which it is true.
 
     The comparison is repeated for every user, so loads fold into it only if it has one.
     """
@@ -80,7 +80,7 @@ def compare(s: SelectionContext, c: Instr, at: Instr) -> str:
 
 
 def _compare_constant(s: SelectionContext, a: Value, b: ConstInt, pred: str, byte: bool, fold: Instr | None) -> str:
-    """Compare with a constant; returns the condition. Loads fold into the user `fold`, if there is one."""
+    """Compare with a constant; return the condition. Loads fold into the user `fold`, if given."""
     bits = max(b.type.bits, 8)
     ones = (1 << bits) - 1
     pred, k = _canonical(pred, b.value, ones)
@@ -89,7 +89,7 @@ def _compare_constant(s: SelectionContext, a: Value, b: ConstInt, pred: str, byt
     if k <= LIT5_MAX:
         s.emit("cp", s.reg(a), Imm(k), byte=byte)
         return CONDITION[pred]
-    if -k & ones <= LIT5_MAX:  # a + (-k) leaves the flags of a - k, except for k = 0 and the least number
+    if -k & ones <= LIT5_MAX:  # a + (-k) sets the same flags as a - k, except for k = 0 and the most negative number
         s.emit("add", s.reg(a), Imm(-k & ones), s.temp(), byte=byte)
         return CONDITION[pred]
     t = s.temp()
@@ -132,7 +132,7 @@ def _subtract(s: SelectionContext, a: int, k: int, bits: int, t: int) -> bool:
 
 
 def _compare_zero(s: SelectionContext, a: Value, pred: str, byte: bool, fold: Instr | None) -> str:
-    """Compare with 0 by a bit test, on a near object, or by CP0; returns the condition."""
+    """Compare with 0 by a bit test, in near memory, or by CP0; return the condition."""
     if fold is None:
         s.emit("cp0", s.reg(a), byte=byte)
         return ZERO_CONDITION[pred]
@@ -152,7 +152,7 @@ def _is_mask(s: SelectionContext, a: Value) -> bool:
 
 
 def _test_bits(s: SelectionContext, a: Instr, at: Instr) -> bool:
-    """Emit BTST if the mask of `a` has one bit; returns whether it has."""
+    """Emit BTST if the mask of `a` has one bit; return whether it has."""
     mask = a.args[1]
     assert isinstance(mask, ConstInt)
     if mask.value and mask.value & (mask.value - 1) == 0:
@@ -167,7 +167,7 @@ def _test_bits(s: SelectionContext, a: Instr, at: Instr) -> bool:
 
 
 def _compare_wide(s: SelectionContext, a: Value, b: Value, pred: str) -> str:
-    """Compare several words by CP and CPB, which has a sticky Z (isa.md §6.1); returns the condition."""
+    """Compare several words by CP and CPB, which has a sticky Z (isa.md §6.1); return the condition."""
     left = s.regs(a)
     if isinstance(b, ConstInt):
         if b.value == 0 and pred in ("eq", "ne"):
@@ -193,7 +193,7 @@ def _compare_wide(s: SelectionContext, a: Value, b: Value, pred: str) -> str:
 
 
 def _or_words(s: SelectionContext, words: tuple[int, ...]) -> None:
-    """Set Z if all words are 0."""
+    """Emit an OR of all words, which sets Z if all are 0."""
     total = words[0]
     for x in words[1:]:
         t = s.temp()
@@ -202,7 +202,7 @@ def _or_words(s: SelectionContext, words: tuple[int, ...]) -> None:
 
 
 def select_icmp(s: SelectionContext, i: Instr) -> None:
-    """Select icmp as a value: from the carry if that decides it, else 1, cleared under a skip."""
+    """Select icmp as a value: the carry if possible, else 1 that is cleared under a skip."""
     d = s.result(i)
     a, b = i.args
     if i.pred == "slt" and isinstance(b, ConstInt) and b.value == 0:
@@ -210,7 +210,7 @@ def select_icmp(s: SelectionContext, i: Instr) -> None:
         return
     zero = isinstance(b, ConstInt) and b.value == 0 and i.pred in ("eq", "ne") and a.type.bits in (8, 16)
     if zero and not _is_mask(s, a):
-        s.emit("cp", s.reg(a), Imm(1), byte=a.type.bits == 8)  # borrows exactly for 0
+        s.emit("cp", s.reg(a), Imm(1), byte=a.type.bits == 8)  # borrows only for 0
         _from_carry(s, "nc" if i.pred == "eq" else "c", d)
         return
     cc = compare(s, i, i)
@@ -226,7 +226,7 @@ def select_icmp(s: SelectionContext, i: Instr) -> None:
 
 
 def _from_carry(s: SelectionContext, cc: str, d: int) -> None:
-    """d = C, or d = !C as the negated result of d - d with borrow."""
+    """Emit d = C, or d = !C as the negated result of d - d with borrow."""
     if cc == "c":
         zero = s.temp()
         s.emit("clr", zero)
@@ -245,7 +245,7 @@ def _skippable(mi: MI, cc: str) -> bool:
 
 
 def _sign_bit(s: SelectionContext, a: Value, d: int) -> None:
-    """d = 1 if a < 0, else 0."""
+    """Emit d = 1 if a < 0, else 0."""
     top = s.regs(a)[-1]
     if a.type.bits == 8:
         wide = s.temp()

@@ -1,7 +1,7 @@
-"""Selection of `select`: conditional values.
+"""Selection of the IR operation `select` (conditional values).
 
 Adjacent selects on one condition share a test and a skip. Each starts with one of its two values; the covered
-instruction replaces it by the other: a move, a constant load, or the operation that computes one value from the other.
+instruction replaces it by the other value. That instruction is a move, a constant load, or an operation on the first.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from toolchain.select.context import Handler, SelectionContext
 from toolchain.select.rules import CARRY_OP, REGISTER_OP, immediate_rule
 
 CONDITIONAL = frozenset(("add", "sub", "and", "or", "xor"))
-# Operation on the first word, operation on the other words, order of the words.
+# For a shift by one: operation on the first word, operation on the other words, order of the words.
 SHIFT_BY_ONE = {"shl": ("sl1", "rlc", 1), "lshr": ("lsr1", "rrc", -1), "ashr": ("asr1", "rrc", -1)}
 
 
@@ -41,7 +41,7 @@ def select_select(s: SelectionContext, i: Instr) -> None:
 
 
 def _undefined(s: SelectionContext, i: Instr) -> bool:
-    """Select the other value if one value is undefined; returns whether one is."""
+    """If one of the two values is undefined, select the other; return whether one is."""
     _, a, b = i.args
     if not isinstance(a, Undef) and not isinstance(b, Undef):
         return False
@@ -50,7 +50,7 @@ def _undefined(s: SelectionContext, i: Instr) -> bool:
 
 
 def _assign(s: SelectionContext, v: Value, d: tuple[int, ...]) -> None:
-    """d = v, as copies or constant loads."""
+    """Emit d = v as copies or constant loads."""
     if s.is_leaf(v):
         for k, r in enumerate(d):
             s.load_leaf(v, k, r)
@@ -74,7 +74,7 @@ def _group(s: SelectionContext, i: Instr) -> list[Instr]:
 
 
 def _starts_from(i: Instr, when: bool) -> tuple[Value, Value]:
-    """(initial value, value under the skip), where the covered instructions run if the condition is `when`."""
+    """(initial value, value set under the skip); the covered instructions are executed if the condition is `when`."""
     return (i.args[2], i.args[1]) if when else (i.args[1], i.args[2])
 
 
@@ -84,7 +84,7 @@ def _cost(s: SelectionContext, i: Instr, when: bool) -> int:
     cost = 1 if when else 0
     if _operation(s, i, base, other) is not None:
         cost -= 16
-    if isinstance(base, Instr) and base.op == "phi" and i in base.args:  # remains in the register of the loop
+    if isinstance(base, Instr) and base.op == "phi" and i in base.args:  # the value stays in the register of the phi
         cost -= 12
     if s.is_leaf(base) and not s.is_leaf(other):
         cost += 8
@@ -94,7 +94,7 @@ def _cost(s: SelectionContext, i: Instr, when: bool) -> int:
 
 
 def _strict(i: Instr, skip: str) -> str:
-    """The strict condition for a minimum or maximum, where equality does not matter; CPSLT and CPSGT are strict.
+    """The condition of a minimum or maximum made strict, as CPSLT and CPSGT are; for equal values both are correct.
 
     Comparisons with a constant are excluded: the constant may have been replaced by its neighbour."""
     c = i.args[0]
@@ -106,7 +106,7 @@ def _strict(i: Instr, skip: str) -> str:
 
 
 def _alternative(s: SelectionContext, i: Instr, when: bool, shifted: bool) -> list[MI]:
-    """Emit the initial value of a select; returns the instructions that replace it by the other value."""
+    """Emit the initial value of a select; return the instructions that replace it by the other value."""
     base, other = _starts_from(i, when)
     d = s.value_regs(i)
     operation = _operation(s, i, base, other)
@@ -138,7 +138,7 @@ def _operation(s: SelectionContext, i: Instr, base: Value, other: Value) -> Inst
 
 
 def _operate(s: SelectionContext, operation: Instr, base: Value, d: tuple[int, ...], shifted: bool) -> list[MI]:
-    """Emit d = base; returns the instructions of d = d op x. Constants without an immediate form are loaded first."""
+    """Emit d = base; return the instructions of d = d op x. Constants without an immediate form are loaded first."""
     byte = base.type.bits == 8
     s.folded.add(id(operation))
     negated = operation.args[0] is not base
@@ -169,7 +169,7 @@ def _operand(s: SelectionContext, op: str, x: Value, k: int, byte: bool) -> int 
         return s.leaf_word(x, k) if s.is_leaf(x) else s.value_regs(x)[k]
     ones = 0xFF if byte else 0xFFFF
     word = ConstInt(x.type, x.value >> 16 * k & ones)
-    if x.type.bits > 16 and op in ("add", "sub"):  # every word has a carry
+    if x.type.bits > 16 and op in ("add", "sub"):  # every word but the last produces a carry for the next one
         return word if word.value <= 31 else s.leaf_word(x, k)
     name, value = ("add", -word.value & ones) if op == "sub" else (op, word.value)
     return word if _changes_nothing(op, word) or immediate_rule(name, value, 8 if byte else 16) else s.leaf_word(x, k)
@@ -181,7 +181,7 @@ def _changes_nothing(op: str, word: ConstInt) -> bool:
 
 
 def _apply(s: SelectionContext, op: str, operand: int | ConstInt, r: int, k: int, byte: bool) -> None:
-    """r = r op operand, for word k of a value."""
+    """Emit r = r op operand for word k of a value."""
     name = (CARRY_OP if k else REGISTER_OP)[op]
     if isinstance(operand, int):
         s.emit(name, r, operand, r, byte=byte)
@@ -195,7 +195,7 @@ def _apply(s: SelectionContext, op: str, operand: int | ConstInt, r: int, k: int
 
 
 # ---------------------------------------------------------------------------------------------------------------------
-# selects on the bit that a shift moves out
+# selects on the bit that a shift by one moves out
 
 
 def _shifted_out(s: SelectionContext, i: Instr, when: bool) -> str | None:
@@ -230,7 +230,7 @@ def _only_bit(masked: Value, x: Value, bit: int) -> bool:
 
 
 def _shift_out(s: SelectionContext, base: Instr, d: tuple[int, ...]) -> None:
-    """d = x shifted by one, with the bit moved out in the carry."""
+    """Emit d = x shifted by one; the bit moved out is in the carry."""
     first, rest, order = SHIFT_BY_ONE[base.op]
     for k, (source, r) in enumerate(list(zip(s.value_regs(base.args[0]), d, strict=True))[::order]):
         s.emit(rest if k else first, source, r)

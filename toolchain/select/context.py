@@ -12,12 +12,12 @@ from toolchain.select.state import SelectionState
 
 
 class SelectionContext(SelectionState):
-    """State of one function with operands in memory; the argument of all handlers of instructions."""
+    """Selection state of one function, with methods for operands in memory; argument of all instruction handlers."""
 
     # -- addresses ----------------------------------------------------------------------------------------------------
 
     def decompose(self, p: Value) -> tuple[Value, int]:
-        """(base, constant) of a pointer, looking through additions that only compute addresses."""
+        """(base, constant offset) of a pointer; additions that only compute addresses are folded into the offset."""
         offset = 0
         while (
             isinstance(p, Instr)
@@ -30,7 +30,7 @@ class SelectionContext(SelectionState):
         return p, offset
 
     def address_only(self, p: Instr) -> bool:
-        """Whether only loads and stores use a sum, as their address."""
+        """Whether a sum is used only as the address of loads and stores."""
         for user in self.users.get(id(p), ()):
             if user.op == "load":
                 continue
@@ -49,7 +49,7 @@ class SelectionContext(SelectionState):
     def address(self, p: Value, byte: bool, extra: int = 0, count: int = 1, volatile: int = 0) -> Operand:
         """Operand of MOV for the first of `count` words, or for a byte, at p + extra.
 
-        It is a FileRegister for words and near bytes only. `volatile` is the number of the access (`mir`)."""
+        Only words and near bytes have a FileRegister operand. `volatile` is the number of the access (`mir`)."""
         base, offset = self.decompose(p)
         offset += extra
         if isinstance(base, GlobalRef):
@@ -57,7 +57,7 @@ class SelectionContext(SelectionState):
             if base.name not in self.module.functions:
                 near = is_near(self.module, base.name)
                 constant = self._constant_global(base.name)
-                odd = not byte and offset & 1  # an address error at run time, but no instruction has such an operand
+                odd = not byte and offset & 1  # no operand can encode it; the access traps
                 if (near and not odd) or (not byte and not constant and not odd):
                     return FileRegister(self.address_expr(ref), near, volatile)
             r = self.temp()
@@ -81,7 +81,7 @@ class SelectionContext(SelectionState):
         return self.offset_operand(self.reg(base), offset, byte, volatile)
 
     def _is_index_sum(self, base: Instr) -> bool:
-        """Whether a sum base + index is used as an address only."""
+        """Whether a pointer is a sum base + index that is used only as an address."""
         return base.op == "add" and not isinstance(base.args[1], ConstInt) and self.address_only(base)
 
     def _constant_global(self, name: str) -> bool:
@@ -103,8 +103,8 @@ class SelectionContext(SelectionState):
     def foldable_load(self, v: Value, user: Instr) -> Instr | None:
         """The load that defines `v`, if it may move down to its only user; else None.
 
-        The user may be selected twice, folded into an address and for its own value. A load that already has a register
-        is not folded.
+        A user can be selected twice: folded into an address, and for its own value. Therefore a load that already has a
+        register is not folded.
         """
         if not isinstance(v, Instr) or v.op != "load" or not self.single_use(v) or not self.same_block(v):
             return None
@@ -116,7 +116,7 @@ class SelectionContext(SelectionState):
         return v if start == self.epoch[id(user)] else None
 
     def source(self, v: Value, user: Instr) -> Operand:
-        """Operand Ws of an ALU instruction: a register, or [Wn] if a load folds."""
+        """Operand Ws of an ALU instruction: [Wn] if a load can be folded, else a register."""
         load = self.foldable_load(v, user)
         if load is not None and load.type.bits in (8, 16) and not load.volatile:
             base, offset = self.decompose(load.args[0])
@@ -127,9 +127,9 @@ class SelectionContext(SelectionState):
         return self.reg(v)
 
     def _stepping(self, p: Value, load: Instr, user: Instr) -> Mem | None:
-        """[Wn++] for a comparison at a branch, if p + size is live behind it and p is not; else None.
+        """Operand [Wn++] for a comparison at a branch, if p + size is live after it and p is not; else None.
 
-        In other cases the peephole pass merges the step; here the step would separate comparison and branch."""
+        In other cases the peephole pass merges the step. In this case the step would separate comparison and branch."""
         if user.op != "br" or not isinstance(p, Instr):
             return None
         others = [u for u in self.users[id(p)] if u is not load]
@@ -163,4 +163,4 @@ class SelectionContext(SelectionState):
 
 
 Handler = Callable[[SelectionContext, Instr], None]
-"""Selects one instruction. Every module of handlers has a table HANDLERS by opcode; `select` assembles them."""
+"""Function that selects one instruction. Modules of handlers have a table HANDLERS by opcode; `select` joins them."""

@@ -28,7 +28,7 @@ def move_out(s: SelectionContext, r: int, dest: Operand, byte: bool) -> None:
 
 
 def select_load(s: SelectionContext, i: Instr) -> None:
-    """One MOV per word, low word first. A volatile load without users still reads."""
+    """Select one MOV per word, low word first. A volatile load without users still reads."""
     d = s.value_regs(i)
     p, byte, number = i.args[0], i.type.bits == 8, s.access_number(i)
     if len(d) == 1:
@@ -39,7 +39,7 @@ def select_load(s: SelectionContext, i: Instr) -> None:
 
 
 def select_loadpair(s: SelectionContext, i: Instr) -> None:
-    """Load two words by MOV.D, which an interrupt cannot divide."""
+    """Select a load of two words by MOV.D, which is atomic."""
     low, high = s.value_regs(i)
     pair = s.m.new_pair()
     s.emit("movd", Mem("ind", s.reg(i.args[0]), 0, s.access_number(i)), pair)
@@ -47,7 +47,7 @@ def select_loadpair(s: SelectionContext, i: Instr) -> None:
 
 
 def select_storepair(s: SelectionContext, i: Instr) -> None:
-    """Store two words by MOV.D, which an interrupt cannot divide."""
+    """Select a store of two words by MOV.D, which is atomic."""
     low, high = s.regs(i.args[0])
     pair = s.m.new_pair()
     s.emit("join", pair, low, high)
@@ -139,7 +139,7 @@ def _store_modified(s: SelectionContext, i: Instr) -> bool:
 
 
 def _load_of(s: SelectionContext, v: Value, p: Value, store: Instr) -> Instr | None:
-    """The load `v` if it reads the address of the store and may move down to it; else None."""
+    """The load `v` if it reads the address of the store and may be moved to the store; else None."""
     load = s.foldable_load(v, store)
     if load is None or load.volatile != store.volatile:
         return None
@@ -176,7 +176,7 @@ def _target(s: SelectionContext, p: Value, byte: bool, load: Instr) -> FileRegis
 
 
 def _modify_constant(s: SelectionContext, op: Instr, b: ConstInt, load: Instr, p: Value, byte: bool) -> bool:
-    """Select memory op= constant; returns whether there is a form."""
+    """Select memory op= constant; return whether an instruction for it exists."""
     name, k, bits = op.op, b.value, op.type.bits
     if name == "sub":
         name, k = "add", -k & ((1 << bits) - 1)
@@ -226,7 +226,7 @@ def _single_bit(name: str, k: int, bits: int) -> tuple[str, int] | None:
 
 
 def _modify_register(s: SelectionContext, op: Instr, b: Value, load: Instr, p: Value, byte: bool) -> bool:
-    """Select memory op= register; returns whether there is a form."""
+    """Select memory op= register; return whether an instruction for it exists."""
     target = _target(s, p, byte, load)
     if target is None:
         return False
@@ -242,7 +242,7 @@ def _modify_register(s: SelectionContext, op: Instr, b: Value, load: Instr, p: V
 
 
 def _modify_wide(s: SelectionContext, store: Instr, op: Instr, p: Value) -> bool:
-    """Modify several words in near memory one after the other through W0. CLR and MOV preserve the carry between them.
+    """Select the modification of several words in near memory through W0. CLR and MOV preserve the carry between them.
 
     Volatile objects are excluded: the source reads all their words before it writes the first."""
     if store.volatile or not s.single_use(op) or not s.same_block(op) or id(op) in s.needed or op.op not in FILE_BINARY:
@@ -270,14 +270,14 @@ def _modify_wide(s: SelectionContext, store: Instr, op: Instr, p: Value) -> bool
 
 
 def _modify_words_register(s: SelectionContext, op: str, targets: list[Operand], registers: tuple[int, ...]) -> None:
-    """Words in near memory op= words in registers."""
+    """Emit (words in near memory) op= (words in registers)."""
     for k, (target, r) in enumerate(zip(targets, registers, strict=True)):
         s.copy(r, 0)
         s.emit(FILE_CARRY[op] if k else FILE_BINARY[op], target, 0)
 
 
 def _modify_words_constant(s: SelectionContext, op: str, targets: list[Operand], value: int) -> None:
-    """Words in near memory op= constant; words that change nothing are skipped until there is a carry."""
+    """Emit (words in near memory) op= constant; neutral words are skipped if no carry enters them."""
     neutral = 0xFFFF if op == "and" else 0
     carry = False
     for k, target in enumerate(targets):
@@ -310,19 +310,19 @@ def select_dynalloca(s: SelectionContext, i: Instr) -> None:
 
 
 def select_getsp(s: SelectionContext, i: Instr) -> None:
-    """llvm.stacksave."""
+    """Select llvm.stacksave."""
     s.m.dynamic_stack = True
     s.emit("mov", 15, s.value_regs(i)[0])
 
 
 def select_setsp(s: SelectionContext, i: Instr) -> None:
-    """llvm.stackrestore."""
+    """Select llvm.stackrestore."""
     s.m.dynamic_stack = True
     s.emit("setsp", s.reg(i.args[0]))
 
 
 def select_vastart(s: SelectionContext, i: Instr) -> None:
-    """Address of the last named argument (abi-elf.md §2.4)."""
+    """Select va_start: store the address of the last named argument (abi-elf.md §2.4)."""
     s.emit("lea", FrameSlot(s.variadic_anchor), s.value_regs(i)[0])
 
 

@@ -16,7 +16,7 @@ def _extension_kind(v: Value) -> tuple[str, Value] | None:
 
 
 def select_mul(s: SelectionContext, i: Instr) -> None:
-    """Product: one MUL for words and for extended words of 32 bits, else a sum of partial products."""
+    """Select a product: one MUL for words and for words extended to 32 bits, else a sum of partial products."""
     if words_of(i) == 1:
         _mul_word(s, i)
         return
@@ -32,7 +32,7 @@ def select_mul(s: SelectionContext, i: Instr) -> None:
 
 
 def _signed_word(s: SelectionContext, i: Instr) -> tuple[Value, int] | None:
-    """(factor of two words, register of the other) if that is a signed word or a small negative constant; else None."""
+    """(factor of two words, register of the other factor) if the latter is a signed word or small negative constant."""
     for a, b in (i.args, i.args[::-1]):
         kind = _extension_kind(b)
         if kind is not None and kind[0] == "s":
@@ -45,7 +45,7 @@ def _signed_word(s: SelectionContext, i: Instr) -> tuple[Value, int] | None:
 
 
 def _mul_signed(s: SelectionContext, i: Instr, a: Value, b: int) -> None:
-    """(h * 2^16 + l) * b: the full unsigned-by-signed product l * b, plus the low word of h * b in the upper word."""
+    """Emit (h * 2^16 + l) * b: the unsigned-by-signed product l * b, plus the low word of h * b in the upper word."""
     d = s.value_regs(i)
     words = s.regs(a)
     upper = s.m.new_pair()
@@ -63,7 +63,7 @@ def _fits(b: Value, kind: str) -> bool:
 
 
 def _pair(s: SelectionContext, kind: str, a: int, b: int | Imm | Mem) -> tuple[int, int]:
-    """Emit MUL.kind a, b; returns new registers (low, high)."""
+    """Emit MUL.kind a, b; return new registers (low, high)."""
     p = s.m.new_pair()
     s.emit(f"mul.{kind}", a, b, p)
     low, high = s.temp(), s.temp()
@@ -107,7 +107,7 @@ def _narrow_reg(s: SelectionContext, kind: str, v: Value) -> int:
 
 
 def _extended_load(s: SelectionContext, v: Value, i: Instr) -> Instr | None:
-    """The load of an extended word without another user that may fold into the product; else None."""
+    """The load of an extended word that can be folded into the product and has no other user; else None."""
     if not isinstance(v, Instr) or not s.single_use(v) or id(v) in s.register_values or v.args[0].type.bits != 16:
         return None
     return s.foldable_load(v.args[0], i)
@@ -135,13 +135,13 @@ def _mul_extended(s: SelectionContext, i: Instr, ka: tuple[str, Value], kb: tupl
 
 
 def _mul_wide(s: SelectionContext, i: Instr, ka: tuple[str, Value] | None, kb: tuple[str, Value] | None) -> None:
-    """Schoolbook product modulo 2^bits; words known to be zero are skipped."""
+    """Emit the product modulo 2^bits as a sum of partial products; words known to be zero are skipped."""
     n = words_of(i)
     a, b = s.regs(i.args[0]), s.regs(i.args[1])
     d = s.value_regs(i)
     zero_a, zero_b = _zero_words(i.args[0], ka), _zero_words(i.args[1], kb)
     total: list[int | None] = [None] * n
-    # Two words start with the upper one, so that the last product can remain in its registers.
+    # For two words, the upper one is first, so that the last product can remain in its registers.
     for k in range(n) if n > 2 else (1, 0):
         for j in range(k + 1):
             if j in zero_a or k - j in zero_b:
@@ -170,7 +170,7 @@ def _zero_words(v: Value, kind: tuple[str, Value] | None) -> set[int]:
 
 
 def _accumulate(s: SelectionContext, total: list[int | None], k: int, low: int, high: int | None) -> None:
-    """total += (high:low) << 16k; the carry propagates to the top word."""
+    """Emit total += (high:low) << 16k; the carry propagates to the top word."""
     parts = [low] if high is None else [low, high]
     carry = False
     for j, part in enumerate(parts):
@@ -203,7 +203,7 @@ def _accumulate(s: SelectionContext, total: list[int | None], k: int, low: int, 
 
 
 def select_mulhigh(s: SelectionContext, i: Instr) -> None:
-    """Upper two words of the product of two words and an unsigned constant of two words.
+    """Select the upper two words of the product of two words and an unsigned constant of two words.
 
     x * y + z fits in two words for words x, y, z, so the first carry propagates one word only. MUL changes no flags."""
     (low, high), d = s.regs(i.args[0]), s.value_regs(i)
@@ -231,7 +231,7 @@ def select_mulhigh(s: SelectionContext, i: Instr) -> None:
 
 
 def select_divide(s: SelectionContext, i: Instr) -> None:
-    """16-bit DIV under REPEAT #17: quotient in W0, remainder in W1 (isa.md §6.7), which must not hold the divisor."""
+    """Select a 16-bit DIV under REPEAT #17: quotient in W0, remainder in W1 (isa.md §6.7), never the divisor."""
     signed = i.op in ("sdiv", "srem")
     m, n = s.reg(i.args[0]), s.reg(i.args[1])
     mi = s.emit("div.s" if signed else "div.u", m, n)
@@ -246,7 +246,7 @@ def select_divide(s: SelectionContext, i: Instr) -> None:
 
 
 def select_divother(s: SelectionContext, i: Instr) -> None:
-    """The second result of a division, which the division copies to its register."""
+    """Emit no code: the division copies its second result to the register."""
     s.value_regs(i)
     s.needed.add(id(i.args[0]))
 

@@ -22,7 +22,7 @@ ImmediateForm = Literal["unary", "lit5", "tied", "bit"]
 
 @dataclass(frozen=True, slots=True)
 class ImmediateRule:
-    """One form of an operation with a constant; `when` and `literal` get k as an unsigned value of `bits` bits."""
+    """One form of an operation with a constant; `when` and `literal` receive k as unsigned value of `bits` bits."""
 
     when: Callable[[int, int], bool]
     op: str
@@ -106,16 +106,16 @@ IMMEDIATE: dict[str, list[ImmediateRule]] = {
 
 REGISTER_OP = {"add": "add", "sub": "sub", "and": "and", "or": "ior", "xor": "xor"}
 COMMUTES = frozenset(("add", "and", "or", "xor"))
-# Second and later words of a multi-word operation (carry in; Z is sticky, isa.md §6.1).
+# Operation on the second and later words of a multi-word operation (carry in; Z is sticky, isa.md §6.1).
 CARRY_OP = {"add": "addc", "sub": "subb", "and": "and", "or": "ior", "xor": "xor"}
 
-# Predicate of icmp -> branch condition after CP (isa.md §7.2).
+# Branch condition after CP by predicate of icmp (isa.md §7.2).
 CONDITION = {
     "eq": "z", "ne": "nz", "slt": "lt", "sle": "le", "sgt": "gt", "sge": "ge",
     "ult": "nc", "uge": "c", "ugt": "gtu", "ule": "leu",
 }  # fmt: skip
 
-# Read-modify-write of one near object: operation, constant test -> file-register instruction (isa.md §5.1, §5.4).
+# File-register instruction by operation and constant, for a read-modify-write of a near object (isa.md §5.1, §5.4).
 FILE_UNARY = {("add", 1): "incf", ("add", -1): "decf", ("add", 2): "inc2f", ("add", -2): "dec2f", ("xor", -1): "comf",
               ("shl", 1): "slf", ("lshr", 1): "lsrf", ("ashr", 1): "asrf"}  # fmt: skip
 FILE_BINARY = {"add": "addf", "sub": "subf", "and": "andf", "or": "iorf", "xor": "xorf"}

@@ -1,8 +1,8 @@
 """Instruction selection: legal IR to machine form over virtual registers.
 
-The selector visits the instructions of a block from the last to the first. An instruction emits code if it has an
-effect or a later instruction has requested its registers. A later instruction may fold it instead: a load into an ALU
-operand, an addition into an address, a comparison into a branch.
+The selector visits the instructions of a block from the last to the first. It emits code for an instruction that has an
+effect or whose registers a later instruction has requested. A later instruction may fold an earlier one instead: a load
+into an ALU operand, an addition into an address, a comparison into a branch.
 Needs: legal IR, critical edges split, no switch. Ensures: virtual registers, copies instead of phis.
 """
 
@@ -45,7 +45,7 @@ class FunctionSelector(SelectionContext):
                 self.two_stage.add(b.name)
 
     def _select_block(self, block: Block) -> list[MI]:
-        """Select the instructions of a block from the last to the first; returns their code in order."""
+        """Select the instructions of a block from the last to the first; return their code in order."""
         self.block = block
         chunks: list[list[MI]] = []
         for i in reversed(block.instrs):
@@ -60,7 +60,7 @@ class FunctionSelector(SelectionContext):
         return [mi for chunk in reversed(chunks) for mi in chunk]
 
     def _entry_code(self, block: Block) -> list[MI]:
-        """Code at the start of a block: parameters in the first one, copies of phis behind an indirectbr."""
+        """Code at the start of a block: moves of parameters in the first block, copies of phis after an indirectbr."""
         code: list[MI] = []
         if block is self.f.blocks[0]:
             self.out = []
@@ -96,7 +96,7 @@ class FunctionSelector(SelectionContext):
         return tuple(self.registers.get(id(record.value), ()))
 
     def phi_input(self, phi: Instr) -> tuple[int, ...]:
-        """Registers that predecessors write for a phi: its own, or separate ones behind an indirectbr."""
+        """Registers that predecessors write for a phi: its own, or separate ones after an indirectbr."""
         if self.position[id(phi)][0] not in self.two_stage:
             return self.value_regs(phi)
         if id(phi) not in self.phi_inputs:
@@ -130,7 +130,7 @@ class FunctionSelector(SelectionContext):
         return moves
 
     def parallel_copy(self, moves: list[tuple[int, int | tuple[Value, int]]]) -> None:
-        """Perform parallel moves: registers first, cycles through a temporary, constants last."""
+        """Emit parallel moves: registers first, cycles through a temporary register, constants last."""
         pending = {d: s for d, s in moves if isinstance(s, int)}
         while pending:
             sources = set(pending.values())
@@ -149,7 +149,7 @@ class FunctionSelector(SelectionContext):
 
 
 def select_br(s: FunctionSelector, i: Instr) -> None:
-    """Unconditional branch, or comparison and conditional branch."""
+    """Select an unconditional branch, or a comparison and conditional branch."""
     if not i.args:
         s.parallel_copy(s.phi_copies(i.blocks))
         s.emit("jump", i.blocks[0])
@@ -160,34 +160,34 @@ def select_br(s: FunctionSelector, i: Instr) -> None:
 
 
 def select_brtable(s: FunctionSelector, i: Instr) -> None:
-    """BRA Wn into a table of BRA instructions (isa.md §7.1: the offset counts instruction words)."""
+    """Select BRA Wn into a table of BRA instructions (isa.md §7.1: the offset counts instruction words)."""
     s.m.tables.append((s.block.name, list(i.blocks)))
     s.emit("brtable", s.reg(i.args[0]), str(len(s.m.tables) - 1))
 
 
 def select_indirectbr(s: FunctionSelector, i: Instr) -> None:
-    """GNU computed goto, through a handle."""
+    """Select a GNU computed goto, through a handle."""
     r = s.reg(i.args[0])
     s.parallel_copy(s.phi_copies(list(dict.fromkeys(i.blocks))))
     s.emit("jumpr", r)
 
 
 def select_unreachable(s: FunctionSelector, i: Instr) -> None:
-    """RESET: the block is never executed, but an empty function needs an instruction."""
+    """Select RESET: the block is never executed, but a function needs at least one instruction."""
     s.emit("text", "reset")
 
 
 def select_phi(s: FunctionSelector, i: Instr) -> None:
-    """No code: predecessors copy into the registers of phis."""
+    """Emit no code: predecessors copy values into the registers of phis."""
     s.value_regs(i)
 
 
 def select_no_code(s: FunctionSelector, i: Instr) -> None:
-    """No code: slots are addressed by their users."""
+    """Emit no code: the users of a slot compute its address."""
 
 
 def select_cast_alias(s: FunctionSelector, i: Instr) -> None:
-    """trunc and bits: the registers of the operand's low words, or a leaf loaded into new registers."""
+    """Select trunc and bits: reuse the registers of the operand's low words, or load a leaf into new registers."""
     if s.is_leaf(i.args[0]):
         for k, r in enumerate(s.value_regs(i)):
             s.load_leaf(i.args[0], k, r)

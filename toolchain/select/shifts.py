@@ -1,4 +1,4 @@
-"""Selection of shifts by constants and variables, any width."""
+"""Selection of shifts of any width by constants and variables."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from toolchain.mir.mir import MI, Imm, OpInfo
 from toolchain.select.context import Handler, SelectionContext
 from toolchain.select.state import words_of
 
-MAX_MULTIPLIED_SHIFT = 4  # MUL has literals below 32
+MAX_MULTIPLIED_SHIFT = 4  # maximum shift count as a product; MUL has literals below 32
 
 
 def select_shift(s: SelectionContext, i: Instr) -> None:
-    """shl, lshr and ashr by constants or variables, of any width."""
+    """Select shl, lshr and ashr of any width, by constants or variables."""
     a, n = i.args
     if isinstance(n, ConstInt):
         if words_of(i) == 1:
@@ -55,7 +55,7 @@ def _shift_word(s: SelectionContext, i: Instr, n: int) -> None:
 
 
 def _shift_word_variable(s: SelectionContext, i: Instr) -> None:
-    """Shift of a word by a variable; counts of 16 and more are undefined in the IR."""
+    """Select the shift of a word by a variable; counts of 16 and more are undefined in the IR."""
     d, byte = s.result(i), i.type.bits == 8
     a = _extended_byte(s, i.args[0], i.op == "ashr", i) if byte and i.op != "shl" else s.reg(i.args[0])
     s.emit(SHIFT_OP[i.op], a, s.reg(i.args[1]), d)
@@ -121,7 +121,7 @@ def _shift_by_byte(s: SelectionContext, op: str, a: tuple[int, ...], d: tuple[in
 
 
 def _combine(s: SelectionContext, op: str, main: int, bits: int, other_op: str, other: int, d: int) -> None:
-    """d = main shifted by `bits`, combined with the neighbour shifted the other way."""
+    """Emit d = main shifted by `bits`, combined with the neighbour word shifted in the other direction."""
     x, y = s.temp(), s.temp()
     s.emit(op, main, Imm(bits), x)
     s.emit(other_op, other, Imm(16 - bits), y)
@@ -129,7 +129,7 @@ def _combine(s: SelectionContext, op: str, main: int, bits: int, other_op: str, 
 
 
 def fill(s: SelectionContext, op: str, top: int, d: int) -> None:
-    """Set a word above a value to zero, or for ashr to the sign of its top word."""
+    """Emit the word above a value: zero, or for ashr the sign of the value's top word."""
     if op == "ashr":
         s.emit("asr", top, Imm(15), d)
     else:

@@ -1,4 +1,4 @@
-"""State of the selection of one function: uses of values, registers of values, emission of instructions."""
+"""Selection state of one function: uses of values, registers of values, emission of instructions."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from toolchain.ir.model import (
 )
 from toolchain.mir.mir import MI, FrameObject, FrameSlot, Imm, MFunction, Operand
 
-FAR_FRAME_BYTES = 380  # with more bytes of locals, their addresses are computed (offset limits, isa.md §3.2)
+FAR_FRAME_BYTES = 380  # maximum bytes of locals addressed by offsets (offset limits, isa.md §3.2)
 
 
 def words_of(v: Value) -> int:
@@ -45,8 +45,8 @@ class SelectionState:
         self.out: list[MI] = []
         self.line: str | None = None
         self.registers: dict[int, tuple[int, ...]] = {}
-        self.needed: set[int] = set()  # instructions whose value is used, so that they emit code
-        self.register_values: set[int] = set()  # values that are read from their registers
+        self.needed: set[int] = set()  # instructions whose value is used, so that code is emitted for them
+        self.register_values: set[int] = set()  # values whose registers are read
         self.users: dict[int, list[Instr]] = {}
         self.position: dict[int, tuple[str, int]] = {}
         self.epoch: dict[int, int] = {}

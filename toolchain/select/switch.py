@@ -12,11 +12,11 @@ from toolchain.ir.model import I16, VOID, Block, Function, Instr, Value
 
 TABLE_OVERHEAD_WORDS = 5
 CHAIN_WORDS = 2
-CaseRange = tuple[int, int, str]  # first value, last value, target
+CaseRange = tuple[int, int, str]  # (first value, last value, target)
 
 
 class SwitchLowering:
-    """Replaces one switch; collects the new blocks and the predecessors of the targets."""
+    """Lowering of one switch; collects the new blocks and the predecessors of the targets."""
 
     def __init__(self, blocks: dict[str, Block], block: Block, for_size: bool) -> None:
         self.blocks = blocks
@@ -30,7 +30,7 @@ class SwitchLowering:
         self.edges: dict[str, list[str]] = {}
 
     def run(self) -> list[Block]:
-        """Replace the switch; returns the added blocks in layout order."""
+        """Replace the switch; return the added blocks in layout order."""
         cases = self.switch.extra["cases"]
         pairs = sorted(zip(cases, self.switch.blocks[1:], strict=True))
         pairs = [(k, t) for k, t in pairs if t != self.default]
@@ -42,7 +42,7 @@ class SwitchLowering:
         return self.new_blocks
 
     def _narrow(self, pairs: list[tuple[int, str]]) -> list[tuple[int, str]]:
-        """For a wide value whose cases span at most a word, check the range once and continue with the low word."""
+        """If the cases of a wide value span at most a word, check the range once and continue with the low word."""
         base, top = pairs[0][0], pairs[-1][0]
         if top - base > 0xFFFF or len(pairs) < 3:
             return pairs
@@ -82,7 +82,7 @@ class SwitchLowering:
         self._edge(block.name, target)
 
     def _search(self, block: Block, ranges: list[CaseRange], low: int, high: int) -> None:
-        """Code for the cases `ranges`; the value is known to lie in low..high."""
+        """Build code for the cases `ranges`; the value is known to be in low..high."""
         if not ranges:
             self._jump(block, self.default)
         elif self._wants_table(ranges):
@@ -130,7 +130,7 @@ class SwitchLowering:
         b.line = self.switch.line
         index = b.cast("zext", self.value, I16) if self.value.type.bits < 16 else self.value
         if 0 < base <= 2 and low == 0 and top - base > 3:
-            base = 0  # one or two extra table words replace the subtraction
+            base = 0  # one or two additional table words are cheaper than the subtraction
         if base:
             index = b.binary("sub", index, const(I16, base))
         if low < base or high > top:

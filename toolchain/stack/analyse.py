@@ -18,7 +18,7 @@ from toolchain.stack.totals import Usage, totals
 from toolchain.stack.walk import CallSite, FunctionStack, Walker
 
 TABLES = NO_INSTRUCTIONS | {".handle"}
-ANY = "*"  # annotation for "any function whose address is taken"
+ANY = "*"  # target in an annotation that stands for any function whose address is taken
 
 
 @dataclass(slots=True)
@@ -27,7 +27,7 @@ class Entry:
 
     kind: str
     usage: Usage
-    extra: int = 0  # bytes the hardware pushes first
+    extra: int = 0  # bytes that the hardware pushes at entry
 
     @property
     def total(self) -> int:
@@ -96,7 +96,7 @@ class Analysis:
         return {entry: walker.walk(entry) for entry in sorted(self.entries)}
 
     def name(self, address: int) -> str:
-        """Return the symbol of an address, with its distance."""
+        """Return the nearest symbol of an address, with the distance from it."""
         found = self.names.find(address, "code")
         if found is None:
             return f"{address:#x}"

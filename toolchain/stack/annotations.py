@@ -1,10 +1,10 @@
-"""Annotations: targets of pointer calls, recursion bounds, thread entries.
+"""Annotations of the stack analysis: targets of pointer calls, recursion bounds, thread entries.
 
 A text file, one statement per line, `#` starts a comment:
 
     calls FUNCTION: TARGET, TARGET ...   pointer calls inside FUNCTION reach one of these; * is every
                                          function whose address the program takes
-    depth FUNCTION BYTES                 FUNCTION and all it calls use at most BYTES
+    depth FUNCTION BYTES                 FUNCTION and its callees use at most BYTES
     recursion FUNCTION COUNT             at most COUNT activations of FUNCTION exist at once
     thread FUNCTION                      FUNCTION is the entry of a thread
 
@@ -34,7 +34,7 @@ class Annotations:
     depth: dict[str, int] = field(default_factory=dict)
     recursion: dict[str, int] = field(default_factory=dict)
     threads: list[str] = field(default_factory=list)
-    any_handle: bool = False  # every pointer call without targets of its own reaches *
+    any_handle: bool = False  # pointer calls without annotated targets may reach all functions in `*`
 
 
 def read_annotations(text: str, file: str) -> Annotations:

@@ -13,9 +13,9 @@ from emu.dspic30f.isa.row import Insn
 
 SP = 15
 FRAME = 14
-CALL_BYTES = 4  # isa.md §7.4: CALL, RCALL and exceptions push two words
-_SP_ADDRESSES = (2 * SP, 2 * SP + 1)  # W15 through its data address, isa.md §2.2
-_STEP = {2: -1, 3: 1, 4: -1, 5: 1}  # addressing modes [Wn--] [Wn++] [--Wn] [++Wn], isa.md §3.1
+CALL_BYTES = 4  # CALL, RCALL and exceptions push two words (isa.md §7.4)
+_SP_ADDRESSES = (2 * SP, 2 * SP + 1)  # data addresses of the bytes of W15 (isa.md §2.2)
+_STEP = {2: -1, 3: 1, 4: -1, 5: 1}  # step by encoding of the addressing modes [Wn--] [Wn++] [--Wn] [++Wn] (isa.md §3.1)
 _READS_F = frozenset(("CP", "CPB", "CP0", "BTST", "BTSS", "BTSC", "MUL"))
 
 
@@ -34,7 +34,7 @@ class Successor(Enum):
 
 
 class StackPointerChange(Enum):
-    """How the stack pointer changes, apart from a known number of bytes."""
+    """Kind of a change of the stack pointer, in addition to a known number of bytes."""
 
     MOVED = "moved by a number of bytes"
     LINK = "LNK: W14 pushed, then a frame"
@@ -52,7 +52,7 @@ class Effect:
 
     delta           change of W15 in bytes
     target          program address for BRANCH, JUMP and CALL
-    register        register that W15 is copied to or from, for SAVED and RESTORED
+    register        register to or from which W15 is copied, for SAVED and RESTORED
     pushed, popped  register of a word push or pop
     """
 

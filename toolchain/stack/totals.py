@@ -1,7 +1,7 @@
 """Worst-case stack of every function from its own frame and its calls, callees first.
 
-Mutually recursive functions form a component.  Within it every activation counts at its deepest call, as often as
-annotations allow, once without an annotation.  This bounds recursion without trying all orders.
+Mutually recursive functions form a component.  In it, every activation is counted at its deepest call.  The number of
+activations is that of the annotation, or one.  This bounds recursion without enumerating the order of calls.
 """
 
 from __future__ import annotations
@@ -16,19 +16,19 @@ from toolchain.stack.walk import CallSite, FunctionStack
 
 @dataclass(slots=True)
 class Usage:
-    """Stack of one function: own frame, worst total in bytes, the path that reaches it, and what is unknown."""
+    """Stack of one function: its frame, worst-case total in bytes, the path that reaches it, and unknown parts."""
 
     name: str
     entry: int
     frame: int
     total: int = 0
-    switch: int | None = None  # bytes on the interrupted stack when the function moves to one of its own
+    switch: int | None = None  # bytes on the interrupted stack at a switch to another stack
     path: list[str] = field(default_factory=list)
     unknown: list[str] = field(default_factory=list)
 
 
 class CallGraph(Protocol):
-    """The call graph."""
+    """Interface of the call graph."""
 
     functions: dict[int, FunctionStack]
     annotations: Annotations
@@ -58,7 +58,7 @@ def totals(program: CallGraph) -> dict[int, Usage]:
 
 
 def _outside(program: CallGraph, entry: int, members: set[int], done: dict[int, Usage]) -> Usage:
-    """Return the worst case of one function over calls that leave its component."""
+    """Return the worst case of one function over calls to functions outside its component."""
     function, name = program.functions[entry], program.name(entry)
     result = Usage(name, entry, function.frame, function.frame, function.switch, [name])
     bound = program.annotation(program.annotations.depth, entry)
@@ -86,7 +86,7 @@ def _outside(program: CallGraph, entry: int, members: set[int], done: dict[int, 
 
 
 def _close(program: CallGraph, component: list[int], members: set[int], done: dict[int, Usage]) -> None:
-    """Add the stack of the recursion: each activation but the last is at its deepest call within the component."""
+    """Add the stack of the recursion: each activation except the last is at its deepest call within the component."""
     steps: dict[int, int] = {}
     reasons: list[str] = []
     activations = 0

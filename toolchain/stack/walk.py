@@ -1,4 +1,4 @@
-"""Stack of single functions: follows every path from the entry and keeps the deepest stack at each instruction."""
+"""Stack of single functions: follows every path from the entry and records the deepest stack at each instruction."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from toolchain.elf.disassemble import CodeItem
 from toolchain.stack.effects import SP, Effect, StackPointerChange, Successor, effect_of
 
 CALLER_SAVED = 0x00FF
-"""W0 to W7 (abi-elf.md §2.1)."""
+"""Bit mask of W0 to W7 (abi-elf.md §2.1)."""
 
-MAX_VISITS = 12  # times one instruction may be reached with an ever deeper stack before its loop counts as unbounded
+MAX_VISITS = 12  # visits of an instruction with an ever deeper stack after which its loop is considered unbounded
 
 
 @dataclass(slots=True)
 class CallSite:
-    """A call site: where, how deep the stack is there, to which address (None through a pointer), tail call or not."""
+    """A call site: its address, its stack depth, the target (None through a pointer), and whether it is a tail call."""
 
     address: int
     depth: int
@@ -58,7 +58,7 @@ class _State:
     outer: int | None = None
     saved: tuple[int, int, int | None] | None = None
     shelved: tuple[int, int | None, int, int | None] | None = None
-    lost: bool = False  # W15 was replaced by an unknown value: what follows cannot be balanced
+    lost: bool = False  # W15 was replaced by an unknown value, so pushes and pops cannot be matched any more
 
 
 class Walker:
@@ -70,7 +70,7 @@ class Walker:
     def walk(self, entry: int) -> FunctionStack:
         """Return the result for the function at `entry`."""
         result = FunctionStack(entry)
-        seen: dict[tuple[int, bool], tuple[int, int]] = {}  # place, switched or not -> deepest yet, visits
+        seen: dict[tuple[int, bool], tuple[int, int]] = {}  # by (address, whether switched): (depth, visits)
         work = [_State(entry)]
         calls: dict[int, CallSite] = {}
         while work:
@@ -135,7 +135,7 @@ class Walker:
         """
         shelved = state.shelved
         if shelved is not None and shelved[1] == state.outer and state.depth <= shelved[0]:
-            state, shelved = replace(state, shelved=None), None  # its location has been popped
+            state, shelved = replace(state, shelved=None), None  # the location of the copy has been popped
         if effect.popped is not None and shelved is not None and shelved[:2] == (state.depth - 2, state.outer):
             return replace(state, saved=(effect.popped, *shelved[2:]))
         if state.saved is None:

@@ -9,7 +9,7 @@ blocks end in their successors; branches have targets                           
 a skip covers conditional instructions, and every conditional instruction has a skip     form.py
 pairs are even, words are words, near bytes move through W0                              form.py
 every reader of a flag gets it from the same kind of instruction as before               flags.py
-no register is read that the pass left undefined; callee-saved registers are saved       registers.py
+a pass makes no register undefined at a read; callee-saved registers are saved           registers.py
 every instruction reads the value that it read before allocation                         allocation.py
 pushes and pops balance on every path                                                    stack.py
 volatile accesses, calls and assembly: number, order and width on every path             traces.py
@@ -39,13 +39,13 @@ Layout = tuple[object, ...]
 
 
 def layout_of(m: MFunction) -> Layout:
-    """Properties of a function besides its instructions that the rules use."""
+    """Properties of a function, other than its instructions, on which the rules depend."""
     tables = tuple((name, tuple(blocks)) for name, blocks in m.tables)
     return ([b.name for b in m.blocks], tables, frozenset(m.pairs), m.uses_fp, m.dynamic_stack, m.interrupt)
 
 
 class Verifier:
-    """Checks one function after every pass; remembers its facts from pass to pass."""
+    """Verifier of one function; it stores the function's facts from pass to pass."""
 
     def __init__(self, f: Function) -> None:
         self.allocated = self.framed = self.selected = False
@@ -67,7 +67,7 @@ class Verifier:
             raise MachineError(f"{m.name}: after pass {name}: {e}\n{m.dump()}") from None
 
     def _check(self, name: str, m: MFunction, new_rules: bool) -> None:
-        """Check all rules; `new_rules` if more rules apply than before the pass, or the registers have new names."""
+        """Check all rules; `new_rules`: more rules apply than before the pass, or registers have been renamed."""
         keys = {b.name: key_of(b) for b in m.blocks}
         layout, before = layout_of(m), self.facts
         same_layout = layout == self.layout and not new_rules

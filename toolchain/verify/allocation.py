@@ -9,7 +9,7 @@ from __future__ import annotations
 from toolchain.mir.mir import FIRST_VIRTUAL, MI, MFunction
 from toolchain.verify.error import fail
 
-Contents = tuple[list[int], int]  # sets of W0-W15; virtual registers that may have been written
+Contents = tuple[list[int], int]  # sets of virtual registers: in each of W0-W15; possibly written
 
 
 class ValueTransfer:
@@ -21,12 +21,12 @@ class ValueTransfer:
         self.mi = mi
         self.uses = [(r, colour[r]) for r in mi.uses() if r >= FIRST_VIRTUAL]
         source = mi.args[0] if mi.is_copy() else None
-        self.source = -1  # the real register it copies
+        self.source = -1  # real register that it copies, -1 if it is no copy
         if isinstance(source, int):
             self.source = colour[source] if source >= FIRST_VIRTUAL else source
-        self.wiped: list[int] = []  # real registers that lose their contents
-        self.written: list[tuple[int, int]] = []  # real register, and its new set
-        self.names = 0  # virtual registers that get new values
+        self.wiped: list[int] = []  # real registers whose contents become unknown
+        self.written: list[tuple[int, int]] = []  # (real register, its new set of virtual registers)
+        self.names = 0  # virtual registers that it writes
         for r in mi.defs():
             if r < FIRST_VIRTUAL:
                 self.wiped.append(r)
@@ -40,7 +40,7 @@ class ValueTransfer:
 
 
 def check(m: MFunction, colour: dict[int, int]) -> None:
-    """Check an allocation that has not been applied; raises MachineError.
+    """Check an allocation that has not been applied yet; raise MachineError if a value is lost.
 
     `colour` is the real register of each virtual register, the lower one of a pair."""
     steps = {b.name: [ValueTransfer(m, mi, colour) for mi in b.insts] for b in m.blocks}
@@ -70,7 +70,7 @@ def _meet(a: Contents, b: Contents) -> Contents:
 
 
 def _through(steps: list[ValueTransfer], state: Contents, checked: str) -> Contents:
-    """Contents behind a block; `checked` is its name if its uses are to be checked, else ""."""
+    """Contents after a block; `checked` is the block's name if its uses are to be checked, else ""."""
     contents, written = list(state[0]), state[1]
     for step in steps:
         if checked:

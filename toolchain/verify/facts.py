@@ -1,4 +1,4 @@
-"""Facts of one block that the rules of the verifier use, computed once for as long as no pass changes the block."""
+"""Facts of one block for the rules of the verifier, cached until a pass changes the block."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class BlockFacts:
 
 
 def key_of(b: MBlock) -> list[Key]:
-    """The present content of a block, for a later comparison."""
+    """The current content of a block, for a later comparison."""
     return [tuple(b.succs), *map(instruction_key, b.insts)]
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from toolchain.mir.mir import CC_INVERSE, READS_FLAGS, MBlock
 from toolchain.verify.error import MachineError, fail
 
-FlagUse = tuple[str, str, str]  # reader, flag, writer
-COMPARISONS = {"cp", "cp0", "btst"}  # another instruction with the same result may replace them
+FlagUse = tuple[str, str, str]  # (opcode of the reader, flag, opcode of the writer)
+COMPARISONS = {"cp", "cp0", "btst"}  # comparisons that an instruction with the same flags may replace
 
 
 def flag_uses(b: MBlock) -> list[FlagUse]:
@@ -17,7 +17,7 @@ def flag_uses(b: MBlock) -> list[FlagUse]:
         for flag in mi.flags_read():
             if flag not in writer:
                 fail(f"flag {flag.upper()} is read but was not set in the block", b.name, mi)
-            op = "bra" if mi.op in READS_FLAGS else mi.op  # a skip is a branch over the instructions that it covers
+            op = "bra" if mi.op in READS_FLAGS else mi.op  # a skip counts as a branch over its instructions
             reader = f"{op} {min(mi.cc, CC_INVERSE.get(mi.cc, mi.cc))}".strip()
             out.append((reader, flag, writer[flag]))
         for flag in mi.flags_written():

@@ -17,8 +17,8 @@ TWO_WORDS = {"call", "tailcall", "jumpr", "repmov", "repclr", "repfill", "div.s"
 def check(m: MFunction, allocated: bool, known: Collection[str] = (), same_layout: bool = False) -> None:
     """Check all rules of form. Raises MachineError.
 
-    `allocated` says that registers are real. The instructions of the blocks `known` have been checked before; with
-    `same_layout` their neighbours and branch tables are the same, too."""
+    `allocated`: registers are real. The instructions of the blocks in `known` have been checked before. `same_layout`:
+    the next blocks and branch tables of those blocks are unchanged, too."""
     names = [b.name for b in m.blocks]
     if len(set(names)) != len(names):
         fail("two blocks have the same name", names[0])
@@ -53,7 +53,7 @@ def _ends(b: MBlock, names: set[str], following: str, m: MFunction) -> None:
     falls = not b.insts or b.insts[-1].op not in BLOCK_ENDS
     if not targets <= set(b.succs):
         fail(f"successors {b.succs} miss a target of {sorted(targets)}", b.name)
-    ended = bool(b.insts) and b.insts[-1].op == "text"  # unreachable
+    ended = bool(b.insts) and b.insts[-1].op == "text"  # inline assembly, then unreachable
     if falls and b.succs and following not in b.succs and not ended:
         fail(f"falls through to {following or 'nothing'}, not to one of {b.succs}", b.name)
 

@@ -1,4 +1,4 @@
-"""Rules of registers: no pass makes one undefined, and the function preserves those of its caller."""
+"""Rules of registers: no pass makes a register undefined, and the function preserves callee-saved registers."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def check_saved(m: MFunction, pushed: int, written: int) -> None:
         saved |= 1 << 14
     lost = written & ~saved & ~(1 << SP) & (KEPT if not m.interrupt else 0xFFFF)
     if m.interrupt and m.blocks[0].insts and any(mi.args and mi.args[0] == "pop w0" for mi in m.blocks[0].insts):
-        lost &= ~1  # the prologue saves W0 around its own use
+        lost &= ~1  # W0 is excluded: the prologue saves it around its own use
     if lost:
         names = ", ".join(f"W{r}" for r in registers_in(lost))
         raise MachineError(f"{names} must be preserved, but is written and not saved")

@@ -6,11 +6,11 @@ from toolchain.abi.target import SP
 from toolchain.mir.mir import MI, MBlock, Mem, MFunction
 from toolchain.verify.error import fail
 
-LINK = 1 << 20  # added to the depth between LNK and ULNK, where the depth of the dynamic part is not followed
+LINK = 1 << 20  # added to the depth between LNK and ULNK, where dynamic changes of the depth are not tracked
 
 
 def check(m: MFunction, framed: bool, changes: dict[str, int | None]) -> None:
-    """Check the depth along every path; before frames are built, that every block pops what it pushes.
+    """Check the depth along every path; before frames are built, check that pushes and pops balance in every block.
 
     `changes` is `plain_change` of every block. Raises MachineError.
     """
@@ -49,7 +49,7 @@ def _is_link(text: str) -> bool:
 
 
 def _through(b: MBlock, at: int, m: MFunction) -> int:
-    """Depth behind a block that starts at depth `at`."""
+    """Depth after a block that starts at depth `at`."""
     for mi in b.insts:
         if mi.op in ("ret", "tailcall") and at and not m.dynamic_stack:
             fail(f"{at} bytes are left on the stack", b.name, mi)

@@ -13,12 +13,12 @@ from toolchain.ir.model import Function, Instr
 from toolchain.mir.mir import MEMORY, MI, FileRegister, MBlock, MFunction
 from toolchain.verify.error import MachineError
 
-TraceEvent = tuple[str, int, str]  # "r", "w", "call", "asm" or "return"; bytes; address, if the code has it
+TraceEvent = tuple[str, int, str]  # ("r", "w", "call", "asm" or "return"; bytes; address, "" if unknown)
 BlockEvents = tuple[list[tuple[TraceEvent, bool]], list[int]]
 """Events of a block, each with whether it is conditional; numbers of its volatile accesses."""
-TraceState = tuple[str, int]  # block, number of its events already read
+TraceState = tuple[str, int]  # (block, number of its events already read)
 END: TraceEvent = ("return", 0, "")
-MAX_PAIRS = 20_000  # larger product automata are checked in part only
+MAX_PAIRS = 20_000  # maximum number of state pairs checked in a product automaton
 
 
 def events_of(mi: MI) -> list[TraceEvent]:
@@ -61,7 +61,7 @@ class TraceAutomaton:
 
     def __init__(self, first: str) -> None:
         self.first = first
-        self.events: dict[str, list[tuple[TraceEvent, bool]]] = {}  # by block, each with whether it is conditional
+        self.events: dict[str, list[tuple[TraceEvent, bool]]] = {}  # by block: (event, is conditional)
         self.numbers: dict[str, list[int]] = {}
         self.succs: dict[str, list[str]] = {}
         self.ends: set[str] = set()
@@ -97,7 +97,7 @@ class TraceAutomaton:
         return made
 
     def steps(self, states: frozenset[TraceState]) -> dict[TraceEvent, frozenset[TraceState]]:
-        """Possible next events -> states behind them."""
+        """States after each possible next event."""
         out: dict[TraceEvent, set[TraceState]] = {}
         work, seen = list(states), set(states)
         while work:

@@ -1,4 +1,4 @@
-"""`.section` names and attributes -> flags (abi-elf.md §4.3 and §6.3)."""
+"""Translation of `.section` names and attributes to section flags (abi-elf.md §4.3 and §6.3)."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _MODIFIERS: dict[str, SectionFlag] = {
     "noload": _F.NOLOAD,
 }
 OMITTED = _F.NEAR | _F.XMEM | _F.YMEM | _F.NOLOAD | _F.ABSOLUTE | _F.REVERSE
-"""Attributes that later `.section` directives of a name inherit from the first if they omit them."""
+"""Attributes that a repeated `.section` directive inherits from the first one of the same name if it omits them."""
 _RESERVED: dict[str, str] = {
     ".text": "code",
     ".data": "data",
@@ -44,7 +44,7 @@ _RESERVED: dict[str, str] = {
     ".dconst": "data",
     ".ndconst": "data,near",
     ".eedata": "eedata",
-    ".const": "psv,page",  # Microchip's assembler mis-types a bare .const; psv,page is what is meant (§4.3)
+    ".const": "psv,page",  # Microchip's assembler gives a bare .const another, wrong type (§4.3)
 }
 _OTHER_PARTS = frozenset(("eds", "dma", "boot", "secure", "auxflash", "packedflash", "memory"))
 
@@ -123,7 +123,7 @@ def _with_number(result: Attributes, name: str, argument: str | None) -> None:
         result.flags |= SectionFlag.ABSOLUTE
         return
     if name == "merge":
-        return  # merging duplicate constants is an optimisation this linker does not do
+        return  # `merge` is ignored: the linker does not merge duplicate constants
     if number < 1 or number & (number - 1) or number > 0x8000:
         raise ExprError(f"{name}({number}) is not a power of two up to 32768")
     result.align = number
@@ -143,7 +143,7 @@ def _apply_type(result: Attributes, kind: str) -> None:
 
 
 def _make_info(result: Attributes, kind: str) -> None:
-    """Apply `info` (also written `info, data`): the section has no memory, its bytes are for tools."""
+    """Apply `info` (also written `info, data`): the section occupies no memory of the chip; only tools read it."""
     if kind != "data" or result.flags != _DATA:
         raise ExprError("an info section has no place in memory and takes no other attributes")
     result.flags, result.type = 0, c.SHT_NOTE

@@ -25,7 +25,7 @@ from toolchain.errors import ToolError
 from toolchain.files import read_text
 
 Handler = Callable[[Assembler, str], None]
-MAX_REPEAT = 1_000_000  # lines one repeat may produce
+MAX_REPEAT = 1_000_000  # maximum number of lines that one repeat produces
 
 
 _NAME = re.compile(r"[A-Za-z_.$][\w.$]*")

@@ -16,7 +16,7 @@ from toolchain.files import read_bytes
 
 Handler = Callable[[Assembler, str], None]
 
-# Relocation of a datum by its operator ("" = plain), per directive size (abi-elf.md §5).
+# Relocation of a datum by its size in bytes and its operator ("": none) (abi-elf.md §5).
 _DATA_KINDS: dict[int, dict[str, str]] = {
     1: {"": "8"},
     2: {
@@ -62,7 +62,7 @@ def string_argument(text: str, directive: str) -> str:
 
 
 def _no_content(asm: Assembler) -> ExprError:
-    """Return the error for a nonzero value in a section of kind bss."""
+    """Return the error for a nonzero value in a section without content (bss)."""
     label = f" at {asm.label}" if asm.label else ""
     return ExprError(f"section {asm.section.name} has no content: only zero may be stored into it{label}")
 
@@ -125,7 +125,7 @@ def _reals(form: str) -> Handler:
 
 
 def _real(text: str, form: str) -> float:
-    cleaned = re.sub(r"^([-+]?)0[defghDEFGH]", r"\1", text.strip())  # GNU as spells a float 0f1.5
+    cleaned = re.sub(r"^([-+]?)0[defghDEFGH]", r"\1", text.strip())  # 0f1.5 is a float in GNU as
     try:
         value = float(cleaned)
         struct.pack(form, value)
@@ -135,7 +135,7 @@ def _real(text: str, form: str) -> float:
 
 
 def _fixed(asm: Assembler, text: str) -> None:
-    """Store 1.15 fractions, -1 <= x < 1."""
+    """Store 1.15 fixed-point fractions x with -1 <= x < 1."""
     for part in split_arguments(text, spaces=False):
         value = _real(part, "<d")
         if not -1.0 <= value < 1.0:
@@ -155,7 +155,7 @@ def _leb128(signed: bool) -> Handler:
 
 
 def leb128(value: int, signed: bool) -> bytes:
-    """Return `value` in DWARF's variable length coding."""
+    """Return `value` as LEB128, DWARF's variable-length integer."""
     out = bytearray()
     while True:
         byte, value = value & 0x7F, value >> 7
@@ -242,7 +242,7 @@ def _org(packed: bool) -> Handler:
 
 
 move_location: Handler = _org(packed=False)
-"""Effect of an assignment to `.`; operands as of `.org`."""
+"""Handler of an assignment to `.`; its operands are those of `.org`."""
 
 
 def _include_binary(packed: bool) -> Handler:
@@ -267,7 +267,7 @@ DATA_DIRECTIVES: dict[str, Handler] = {
     ".short": _integers(2),
     ".2byte": _integers(2),
     ".long": _integers(4),
-    ".int": _integers(4),  # four bytes in this assembler (§4.3)
+    ".int": _integers(4),  # four bytes, although int of C has two (§4.3)
     ".4byte": _integers(4),
     ".dc": _integers(2),
     ".dc.b": _integers(1),

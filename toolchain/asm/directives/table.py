@@ -1,4 +1,4 @@
-"""Directives that are not data: sections, symbols, blocks, messages (abi-elf.md §4.3).  The table is at the end."""
+"""Table of all directives, and handlers of those for sections, symbols and messages (abi-elf.md §4.3)."""
 
 from __future__ import annotations
 
@@ -124,7 +124,7 @@ def _visibility(value: int) -> Handler:
 
 
 def set_symbol(asm: Assembler, name: str, value: str, once: bool = False) -> None:
-    """Give symbol `name` the value of the expression `value`; the location counter moves there (.set, =)."""
+    """Assign the value of an expression to a symbol (.set, =); an assignment to `.` moves the location counter."""
     if name in (".", "$"):
         move_location(asm, value)
     else:
@@ -160,7 +160,7 @@ def _local_common(asm: Assembler, text: str) -> None:
 
 
 def _bss(asm: Assembler, text: str) -> None:
-    """Enter section .bss, or with operands reserve bytes in it as .lcomm does."""
+    """Switch to section .bss; with operands, reserve bytes in it as .lcomm does."""
     if text:
         _local_common(asm, text)
     else:
@@ -302,7 +302,7 @@ DIRECTIVES: dict[str, Handler] = {
     **DATA_DIRECTIVES,
 }
 
-REJECTED: dict[str, str] = {  # abi-elf.md §4.3: refused by pic30-as, so refused here
+REJECTED: dict[str, str] = {  # pic30-as refuses these directives as well (abi-elf.md §4.3)
     ".zero": "use .space",
     ".balign": "use .align",
     ".balignw": "use .align",
@@ -327,7 +327,7 @@ REJECTED: dict[str, str] = {  # abi-elf.md §4.3: refused by pic30-as, so refuse
 
 
 def rejection(word: str) -> str | None:
-    """Return what to use instead of a directive that pic30-as refuses, None for other directives."""
+    """Return the suggested replacement for a directive that pic30-as refuses, None for other directives."""
     if word.startswith(".cfi_"):
         return "omit it, callers of assembly are found from its instructions"
     return REJECTED.get(word)

@@ -167,7 +167,7 @@ def _subtraction_operands(steps: list[Instruction], index: int, written: int) ->
 
 
 def _narrow(condition: str, a: Value, b: Value) -> tuple[Value, Value] | None:
-    """Return the members of a and b for which the condition can hold, None if there are none."""
+    """Return the members of a and b for which `a condition b` can hold, None if there are none."""
     if condition in ("LT", "LE", "GT", "GE", "N", "NN"):
         low, high = extremes(a), extremes(b)
         if any(lo < _SIGN <= hi for lo, hi in (low, high)) or (low[0] < _SIGN) != (high[0] < _SIGN):

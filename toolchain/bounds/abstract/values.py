@@ -23,7 +23,7 @@ class Interval:
         return f"{self.lo}..{self.hi}"
 
     def key(self) -> tuple[int, int, int, int, bool]:
-        """Return what identifies the set; `==` is the comparison of the instruction table."""
+        """Return a key for equality of sets; `==` builds the comparison of the instruction table instead."""
         return self.lo, self.hi, self.mask, self.bits, self.ram
 
     __hash__ = None  # type: ignore[assignment]
@@ -39,7 +39,7 @@ class Interval:
         return interval(self.lo - hi, self.hi - lo, ram=self._moved(other))
 
     def _moved(self, by: Value) -> bool:
-        """Whether the set plus `by` still consists of RAM addresses.
+        """Whether all members of the set plus `by` are RAM addresses.
 
         A constant that is a PSV window address in 16 bits, as every negative number is, may be the base address and
         the set the index.
@@ -64,7 +64,7 @@ class Interval:
             width = other.bit_length()
             if self.lo >> width == self.hi >> width:
                 return interval(self.lo & other, self.hi & other, self.mask & other, self.bits & other, self.ram)
-        if self.ram and isinstance(other, int) and other == WORD.hi:  # a RAM address plus an offset, cut to 16 bits
+        if self.ram and isinstance(other, int) and other == WORD.hi:  # RAM address plus offset, truncated to 16 bits
             return RAM_POINTER
         if isinstance(other, int) and other > 0:
             below = (other & -other) - 1  # clearing low bits preserves the order

@@ -36,7 +36,7 @@ class FlowFacts:
     """Queries that annotations answer; the defaults are those of a program without annotations."""
 
     loop_bound: Callable[[FunctionGraph, Loop], int | None] = lambda _code, _loop: None
-    """Greatest number of iterations of a loop after its first, per entry."""
+    """Greatest number of iterations of a loop per entry, not counting the first."""
     total_iterations: Callable[[FunctionGraph, Loop], int | None] = lambda _code, _loop: None
     """Greatest number of iterations of a loop over all its entries."""
     shared_iterations: Callable[[FunctionGraph, Loop], dict[int, tuple[str, int]]] = lambda _code, _loop: {}

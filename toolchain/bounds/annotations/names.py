@@ -19,7 +19,7 @@ class NameResolver:
         self._symbols: dict[str, list[Symbol]] = {}
         for symbol in image.symbols:
             name, dot, number = symbol.name.rpartition(".")
-            plain = name if dot and number.isdigit() else symbol.name  # a number distinguishes statics of several files
+            plain = name if dot and number.isdigit() else symbol.name  # the number distinguishes statics of files
             self._symbols.setdefault(plain, []).append(symbol)
 
     def find(self, name: str, annotation: Annotation | None = None) -> int | None:

@@ -14,9 +14,9 @@ from toolchain.errors import ToolError
 SECTION = ".note.bounds"
 _LINE = re.compile(r"(\w+) (.*)@(.+):(\d+)")
 _FUNCTION = re.compile(r"in (\w+)")
-"""The compiler writes the enclosing function after an annotation (toolchain/emit)."""
+"""Pattern of the enclosing function, which the compiler writes after an annotation (toolchain/emit)."""
 _OF_A_FILE = re.compile(r"(\.\w+) ?/ ?(?=\w)")
-"""`file.c/name`; C formatters insert blanks because they read it as a division."""
+"""Pattern of `file.c/name`, with the blanks that C formatters insert as in a division."""
 _OPERATORS: dict[type[ast.operator], Callable[[int, int], int]] = {
     ast.Add: operator.add,
     ast.Sub: operator.sub,

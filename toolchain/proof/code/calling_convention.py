@@ -82,7 +82,8 @@ class ConventionChecker:
     def execute_statement(self, state: MachineState, statement: Statement, e: Event) -> bool:
         """Execute a code sequence as the assembly statement that is the source's next event, if its operands are equal.
 
-        Return whether they are.  Outputs get the values of the source; flags and clobbered memory become unknown.
+        Return whether the operands are equal.  Outputs get the values of the source; flags and clobbered memory become
+        unknown.
         """
         assert e.shape is not None
         leaves, inputs = iter(_leaves(e.value or [])), iter(e.arguments)
@@ -158,7 +159,7 @@ class ConventionChecker:
         state.w[register] = term
 
     def target(self, e: Event) -> Any:
-        """Return the program address of a call's target, or a term for a pointer."""
+        """Return the program address of a call's target, or the term of the pointer through which it calls."""
         if not isinstance(e.address, str):
             place = known(e.address)
             return e.address if place is None else place
@@ -203,7 +204,7 @@ class ConventionChecker:
         state.w[: len(results)] = results
 
     def check_handler_return(self, state: MachineState) -> None:
-        """Check the end of an interrupt handler, which restores W0-W7 and the core registers as well."""
+        """Check the state at the end of an interrupt handler, which must also restore W0-W7 and the core registers."""
         for n in CALLER_SAVED:
             same = word(self.machine.w(n)) == self.registers[n]
             require(same, self.machine.conditions, f"W{n} is not what it was")

@@ -106,7 +106,7 @@ class CodeExecution:
     def _step(self, state: MachineState) -> list[MachineState]:
         """Execute one instruction and return the successor states: the state itself if single, none at the end."""
         if self.path.end_kind == "unreachable" and state.event == len(self.path.events):
-            return []  # undefined behaviour: anything is right
+            return []  # undefined behaviour: any code is correct
         insn = self.compiled.insn(state.pc)
         if insn is None or not self.start <= state.pc < self.end:
             raise Refuted(f"leaves the function to {state.pc:#x}")
@@ -148,7 +148,7 @@ class CodeExecution:
                 raise Undecided(f"{insn.row.syntax}")
 
     def _statement(self, state: MachineState) -> bool:
-        """Execute an assembly statement of the source if it is here; return whether it is."""
+        """Execute the assembly statement of the source at this address, if any; return whether there is one."""
         e = self.machine.expected()
         if e is None or e.kind != "asm":
             return False
@@ -223,7 +223,7 @@ class CodeExecution:
         if division and rounds != DIVIDE_COUNT:
             raise Refuted(f"a division of {rounds + 1} steps")
         steps = {rounds, 0} if division else range(rounds + 1)
-        for left in sorted(steps, reverse=True):  # the intermediate steps of a division change nothing
+        for left in sorted(steps, reverse=True):  # only the last steps of a division change the state
             state.pc = pc
             state.regs["RCOUNT"] = left
             self.machine.begin(state, insn)

@@ -1,6 +1,6 @@
 """Symbolic machine: evaluates the instruction table on z3 terms.
 
-The meaning of instructions comes from the table alone.  Observable actions of the code (volatile accesses, calls,
+The semantics of instructions come from the table alone.  Observable actions of the code (volatile accesses, calls,
 assembly statements) are compared, in order, with the events of one path of the source (`Event`).
 """
 
@@ -41,7 +41,7 @@ PSVPAG: Final = register("PSVPAG")
 ACCUMULATORS: Final = tuple(SymbolicInteger(z3.SignExt(BITS - 40, z3.BitVec(f"ACC{name}", 40))) for name in "AB")
 """Accumulators at entry."""
 SINGLE_BIT: Final = ("BSET", "BCLR", "BTG", "BTSS", "BTSC", "BTST", "BTSTS", "BSW")
-"""Instructions that access a whole device register whichever byte they name (isa.md §5.4)."""
+"""Instructions that access the whole word of a device register even if they address one byte (isa.md §5.4)."""
 
 
 @dataclass
@@ -359,7 +359,7 @@ class SymbolicMachine:
         return z3.simplify(part)
 
     def _distance(self, at: Any, e: Event, size: int) -> int | None:
-        """Return the byte offset of an access within that of the event, None if it is outside."""
+        """Return the byte offset of an access within the access of the event, None if it is outside."""
         start = known(e.address)
         if isinstance(at, int) and start is not None:
             distance = at - start
@@ -368,7 +368,7 @@ class SymbolicMachine:
         return next((k for k in range(0, e.size, size) if self._same(here, e.address + k)), None)
 
     def _rest_as_read(self, e: Event, distance: int) -> None:
-        """Check that a single-bit write leaves the other byte as it was read."""
+        """Check that a single-bit write stores the other byte with the value read."""
         before = self.events[self.state.event - 1] if self.state.event else None
         if before is None or before.kind != "read" or before.size != 2 or not self._same(before.address, e.address):
             raise Refuted("writes a single bit where the source did not read the register immediately before")

@@ -21,7 +21,7 @@ class Accesses:
         self._places: dict[int, VariableByte] = {id(i): (f"%{i.name}", 0) for i in self._instrs if i.op == "alloca"}
         addresses = [i for i in self._instrs if i.op == "getelementptr"]
         found = -1
-        while found != len(self._places):  # blocks are in no particular order
+        while found != len(self._places):  # repeat until stable, because blocks are in no particular order
             found = len(self._places)
             for i in addresses:
                 base = self._place(i.args[0])

@@ -23,7 +23,7 @@ class Effects(OperandValues):
         self.frame: Final = frame
 
     def access(self, path: Path, address: Term, size: int, even: bool) -> Term:
-        """Assume of an accessed address that it is outside the private frame and, for words, even; return it."""
+        """Return an accessed address; assume that it is outside the private frame and, for words, even."""
         if known(address) is None:
             path.assumptions.append(self.frame.avoids_private_bytes(address, size))
             path.preferences.append(z3.And(z3.UGE(address, SFR_END), z3.ULT(address, self.frame.lowest - size)))

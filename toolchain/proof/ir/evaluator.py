@@ -57,7 +57,7 @@ class Evaluator(Effects):
     def __init__(
         self, function: Function, frame: StackFrame, address: Callable[[str], int], watched: Set[str] = frozenset()
     ) -> None:
-        """`watched`: blocks at whose visits paths record all values (`Path.loop_visits`)."""
+        """Prepare the execution; at visits of blocks in `watched`, paths record all values (`Path.loop_visits`)."""
         super().__init__(frame, address)
         self.watched: Final = watched
         self.function: Final = function
@@ -115,7 +115,7 @@ class Evaluator(Effects):
     # -- a block -----------------------------------------------------------------------------------------------------
 
     def _enter(self, path: Path, block: Block, came: str) -> None:
-        """Assign the phis of a block entered from the block `came`."""
+        """Assign the phis of a block that is entered from the block `came`."""
         entered = [(phi, self.value(path, phi.args[phi.blocks.index(came)])) for phi in block.phis()]
         for phi, value in entered:
             path.values[id(phi)] = value
@@ -170,7 +170,7 @@ class Evaluator(Effects):
     # -- instructions ------------------------------------------------------------------------------------------------
 
     def again(self, path: Path, i: Instr) -> None:
-        """Give an instruction before the start of a path a value: computed, or unknown where it depends on state."""
+        """Assign a value to an instruction before the start of a path: computed, or unknown if it depends on memory."""
         if i.type.kind == "void":
             return
         callee = i.args[-1] if i.op == "call" else None
@@ -371,7 +371,7 @@ class Evaluator(Effects):
         return event.value
 
     def _unchanged(self, shape: Shape, inputs: list[tuple[Value, Any]]) -> Any:
-        """Return the outputs of an assembly statement without text: the inputs tied to them."""
+        """Return the outputs of an assembly statement with an empty template: the inputs tied to them."""
         places = [o.tied for o in shape.operands if not o.output]
         tied = {n: value for n, (_, value) in zip(places, inputs, strict=True)}
         outputs = [n for n, o in enumerate(shape.operands) if o.output]

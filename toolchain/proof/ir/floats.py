@@ -1,7 +1,7 @@
 """Floating-point operations of the IR as uninterpreted functions, named as in the run-time library (abi-elf.md §2.8).
 
-The mapping from operations to library functions is independent of the back end's, so that the proof checks that the
-back end calls the right function with the right operands.
+The mapping from operations to library functions is independent of the one in the back end. The proof therefore checks
+that the back end calls the correct function with the correct operands.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from toolchain.proof.terms import Term, one_bit, vector
 MODES: Final = {32: "sf", 64: "df"}
 SUMS: Final = {"fadd": "add", "fsub": "sub", "fmul": "mul", "fdiv": "div"}
 ORDERED: Final = {"oeq": "eq", "une": "ne", "olt": "lt", "ole": "le", "ogt": "gt", "oge": "ge"}
-"""Library function whose result compares with 0 as the operands compare with each other; false for NaN."""
+"""By predicate: comparison function, whose result relates to 0 as its operands to each other; false for NaN."""
 NEGATED: Final = {"ult": "oge", "ule": "ogt", "ugt": "ole", "uge": "olt"}
 
 
@@ -55,7 +55,7 @@ def converted(op: str, a: Term, bits: int) -> Term:
     if op in ("sitofp", "uitofp"):
         width = 32 if a.size() <= 32 else 64
         wide = (z3.SignExt if signed else z3.ZeroExt)(width - a.size(), a)
-        unsigned = "" if signed or a.size() < width else "un"  # a narrower value is positive either way
+        unsigned = "" if signed or a.size() < width else "un"  # narrower values are never negative
         return opaque(f"__float{unsigned}{'si' if width == 32 else 'di'}{MODES[bits]}", bits)(wide)
     width = 32 if bits <= 32 else 64
     name = f"__fix{'' if signed else 'uns'}{MODES[a.size()]}{'si' if width == 32 else 'di'}"

@@ -32,7 +32,7 @@ def _scalar(e: Effects, path: Path, i: Instr, n: int) -> tuple[Term, Term | None
 
 
 def _of_words(make: Callable[..., Term], count: int = 2) -> Meaning:
-    """Return the meaning of an intrinsic that is a function of its first operands, poison if one of them is."""
+    """Return the meaning of an intrinsic that is a function of its first operands; it is poison if an operand is."""
 
     def meaning(e: Effects, path: Path, i: Instr) -> Any:
         parts = [_scalar(e, path, i, n) for n in range(count)]
@@ -140,7 +140,7 @@ def _sign_of(a: Term, b: Term) -> Term:
 
 
 FRACTION_BITS: Final = {32: 23, 64: 52}
-"""IEEE 754, single and double precision."""
+"""Number of fraction bits of IEEE 754 single and double precision, by width in bits."""
 
 
 def _is_class(e: Effects, path: Path, i: Instr) -> Any:
@@ -172,7 +172,7 @@ def _copy(e: Effects, path: Path, i: Instr) -> None:
         target, source = (e.sure(path, a) for a in i.args[:2])
         e.access(path, target, size, _is_even(i, 0))
         e.access(path, source, size, _is_even(i, 1))
-        if "memcpy" in getattr(i.args[-1], "name", ""):  # operands are equal or do not overlap
+        if "memcpy" in getattr(i.args[-1], "name", ""):  # memcpy: assume that the operands are equal or do not overlap
             apart = [z3.UGE(one, vector(size, 16)) for one in (target - source, source - target)]
             path.assumptions.append(z3.Or(target == source, z3.And(*apart)))
         path.write(target, path.memory.read(source, size))
