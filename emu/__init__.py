@@ -34,8 +34,8 @@ FCY_HZ: Final = 14_745_600
 TCY_SECONDS: Final = 1 / FCY_HZ
 """Length of one instruction cycle in s at `FCY_HZ`."""
 
-# Modules are imported when a name is first used: tools that need only the instruction table or the chip's data start
-# faster.
+# A module is imported when one of its names is first used. Tools that need only the instruction table or the chip's
+# data therefore start faster.
 _MODULES: Final = {
     "BuildError": "emu.api",
     "Change": "emu.api",

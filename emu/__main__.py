@@ -1,4 +1,4 @@
-"""`python -m emu`."""
+"""Entry point of `python -m emu`."""
 
 import sys
 

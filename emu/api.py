@@ -48,7 +48,7 @@ if TYPE_CHECKING:
 
 
 class Machine(BareMachine):
-    """A machine with a debugger attached: access by names of the source, and stops that explain firmware faults.
+    """A machine with a debugger attached: access by source names, and stops that explain firmware faults.
 
     With `strict`, null pointers, uninitialised reads and stores into other threads' stacks are faults
     (emu/debug/strict.py); this needs the plain engine. The other arguments are those of `emu.machine.machine.Machine`.
@@ -112,8 +112,10 @@ class Machine(BareMachine):
         return symbolic.read(self.inspector, expression)
 
     def set_var(self, expression: str, value: float) -> None:
-        """Assign to the object that a C expression denotes. Raises as `value`, and ValueError if `value` does not
-        fit."""
+        """Assign to the object that a C expression denotes.
+
+        Raises as `value`, and ValueError if `value` does not fit.
+        """
         self.value(expression).set(value)
 
     def backtrace(self) -> list[Frame]:
@@ -187,7 +189,7 @@ class BuildError(RuntimeError):
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """A change of a watched value by the instruction that ended before `cycle`. `pc` is the next instruction."""
+    """Change of a watched value. The instruction that ended before `cycle` made it; `pc` is the next instruction."""
 
     cycle: int
     pc: int
@@ -198,7 +200,8 @@ class Change:
 def watch(machine: BareMachine, place: str | int, *, size: int = 2, cycles: int | None = None) -> Iterator[Change]:
     """Run `machine` and yield every change of a variable, register or data address (`size` 1 or 2 bytes).
 
-    The value is compared after every instruction, so the machine runs at the speed of single steps. The iterator ends
+    The value is compared after every instruction, so the machine runs only as fast as in single steps. The iterator
+    ends
     with the run, after at most `cycles` Tcy. Raises KeyError for an unknown name.
     """
     address = machine.address_of(place)

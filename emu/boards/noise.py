@@ -1,4 +1,4 @@
-"""Repeatable noise without state: a function of seed, channel and cycle, so repeated reads give the same value."""
+"""Repeatable, stateless noise: a function of seed, channel and cycle, so that repeated reads give the same value."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ def _splitmix64(seed: int, channel: int, cycle: int) -> int:
 class Noise:
     """Approximately Gaussian noise for analog inputs. Strength and seed are in the record.
 
-    Strength 0 (the default) means no noise, 1 the deviations of the reference.
+    Strength 0 (the default) means no noise, 1 the standard deviations of the reference.
     """
 
     def __init__(self, record: Record, seed: int = 0) -> None:
         self._seed: Final = StateCell(record, "noise.seed", "Q", seed & _ONES)
         self._strength: Final = StateCell(record, "noise.strength", "Q")
         self.on_change: Final[list[Callable[[], None]]] = []
-        """Callbacks before and after a change of the strength, for parts that predict levels."""
+        """Callbacks that run before and after a change of the strength; parts that predict levels use them."""
 
     @property
     def strength(self) -> float:
@@ -46,7 +46,7 @@ class Noise:
             callback()
 
     def at(self, channel: int, cycle: int, deviation: float) -> float:
-        """Return noise with standard deviation `deviation` on a channel in a cycle."""
+        """Return the noise of a channel at a cycle, with standard deviation `deviation`."""
         if not self._strength.value:
             return 0.0
         x = _splitmix64(self._seed.value, channel, cycle)

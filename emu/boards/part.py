@@ -1,6 +1,6 @@
-"""Base class of the parts on a board: state in the record, event slots, and the chip's pins.
+"""Base class of a board's parts: state in the record, event slots, and the chip's pins.
 
-Parts are outside the chip: they neither stop when the chip sleeps nor change when it is reset.
+Parts are outside the chip. They keep running when the chip sleeps and keep their state when it is reset.
 """
 
 from __future__ import annotations
@@ -27,23 +27,23 @@ class BoardPart:
 
     @property
     def now(self) -> int:
-        """Cycle of the access or event being handled, in Tcy."""
+        """Cycle (Tcy) of the access or event that is being handled."""
         return self.events.now
 
     def cell(self, purpose: str, kind: str = "I", initial: int = 0) -> StateCell:
-        """Reserve a scalar of state under `<part>.<purpose>`."""
+        """Reserve a scalar of state, named `<part>.<purpose>` in the record."""
         return StateCell(self.record, f"{self.name}.{purpose}", kind, initial)
 
     def array(self, purpose: str, kind: str, count: int) -> memoryview[int]:
-        """Reserve `count` elements of state ("B", "H", "I" or "Q") under `<part>.<purpose>`."""
+        """Reserve `count` elements of state ("B", "H", "I" or "Q"), named `<part>.<purpose>` in the record."""
         field = self.record.reserve(f"{self.name}.{purpose}", kind, count)
         view = {"B": self.record.u8, "H": self.record.u16, "I": self.record.u32, "Q": self.record.u64}[kind]
         return view[field.index : field.index + count]
 
     def slot(self, purpose: str, fire: Callable[[int], None]) -> int:
-        """Reserve an event slot."""
+        """Reserve an event slot that calls `fire`."""
         return self.events.slot(f"{self.name}.{purpose}", fire)
 
     def cycles(self, seconds: float) -> int:
-        """Return the Tcy in `seconds` at the current clock."""
+        """Return the number of Tcy in `seconds` at the current clock."""
         return round(seconds * self.chip.fcy)

@@ -1,4 +1,4 @@
-"""Reading and writing of picture files."""
+"""Reading and writing picture files."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def read_picture(path: str | os.PathLike[str]) -> NDArray[np.uint8]:
-    """Read the picture in a PNG, JPEG or similar file: height x width x 3, red, green, blue.
+    """Read a PNG, JPEG or similar file as an array of height x width x 3: red, green, blue.
 
     Raises OSError if the file cannot be read, ValueError if it does not contain a picture.
     """
@@ -32,7 +32,10 @@ def read_picture(path: str | os.PathLike[str]) -> NDArray[np.uint8]:
 
 
 def write_picture(path: str | os.PathLike[str], pixels: NDArray[np.uint8], enlarge: int = 1) -> None:
-    """Write height x width x 3 pixels as PNG, every pixel `enlarge` x `enlarge` large, atomically. Raises OSError."""
+    """Write height x width x 3 pixels as PNG, atomically. Each pixel becomes `enlarge` x `enlarge` pixels.
+
+    Raises OSError.
+    """
     import numpy as np
     from PIL import Image
 

@@ -1,4 +1,4 @@
-"""Chips as data: one folder of tables each, found by name or by the processor id of an ELF file."""
+"""Chips as data: one folder of tables each. Chips are found by name or by the processor id of an ELF file."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ NAMES: Final = ("dsPIC30F6014A", "dsPIC30F4013")
 
 
 def chip_named(name: str = NAMES[0]) -> Chip:
-    """Return the chip called `name`, in any case, with or without "dsPIC". Raises ValueError for an unknown one."""
+    """Return the chip called `name`, in upper or lower case, with or without "dsPIC". Raises ValueError if unknown."""
     wanted = name.lower().removeprefix("dspic")
     for known in NAMES:
         if known.lower().removeprefix("dspic") == wanted:

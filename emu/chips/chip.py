@@ -1,7 +1,7 @@
 """A chip as data: registers, memory, vectors, configuration words, and the pins of each device.
 
 The tables contain no behaviour. Devices, the CPU, the assembler, the linker and the header generator read the same
-tables. A second chip is a second folder of tables, not a subclass.
+tables. To add a second chip, add a folder of tables, not a subclass.
 """
 
 from __future__ import annotations
@@ -25,15 +25,15 @@ class Sfr:
     mask: int
     """Implemented bits; the others read 0."""
     fields: Mapping[str, tuple[int, int]]
-    """Field name to (least significant bit, width)."""
+    """Bit fields: name to (least significant bit, width)."""
     hw_owned: int
-    """Bits on which a write by software has no effect."""
+    """Bits owned by hardware: a write by software has no effect on them."""
     clear_only: int
-    """Bits software can clear but not set."""
+    """Bits that software can clear but not set."""
 
     @property
     def writable(self) -> int:
-        """Bits software can change freely."""
+        """Bits that software can both set and clear."""
         return self.mask & ~self.hw_owned & ~self.clear_only
 
 
@@ -65,9 +65,9 @@ class Vector:
     aivt: int
     """Program address of the vector word in the alternate table."""
     level: int
-    """Fixed priority of a trap (11..14), 0 for interrupts and reserved slots."""
+    """Fixed priority of a trap (11..14); 0 for interrupts and reserved vectors."""
     implemented: bool
-    """Whether this chip has the source."""
+    """Whether this chip has the exception's source."""
 
     @property
     def irq(self) -> int | None:
@@ -81,7 +81,7 @@ class Vector:
 
     @property
     def alternate_symbol(self) -> str:
-        """Linker symbol of the handler preferred by the alternate table."""
+        """Linker symbol of a handler that the alternate table prefers."""
         return "__Alt" + self.name
 
 
@@ -96,14 +96,14 @@ class ConfigWord:
     erased: int = 0xFFFF
 
     def field(self, word: int, name: str) -> int:
-        """The named field of a stored word, right-aligned. Raises KeyError for an unknown field."""
+        """Return the named field of a stored word, right-aligned. Raises KeyError for an unknown field."""
         lsb, width = self.fields[name]
         return word >> lsb & (1 << width) - 1
 
 
 @dataclass(frozen=True, slots=True)
 class InterruptSource:
-    """Locations of the flag, enable and priority bits of one interrupt."""
+    """Register bits of one interrupt: flag, enable and priority."""
 
     irq: int
     name: str
@@ -114,15 +114,15 @@ class InterruptSource:
 
 @dataclass(frozen=True, slots=True)
 class TimerSite:
-    """A timer. Type A may count asynchronously; B is the low half of a 32-bit pair, C the high half."""
+    """A timer. Type A can count asynchronously. Type B is the low half of a 32-bit pair, type C the high half."""
 
     number: int
     kind: str
     clock_pin: str
-    """Empty where the timer has no clock input."""
+    """Clock input pin; empty if the timer has none."""
     irq: int
     partner: int
-    """Number of the other half of the pair, 0 for type A."""
+    """Number of the pair's other timer, 0 for type A."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,7 +133,7 @@ class UartSite:
     rx_irq: int
     tx_irq: int
     autobaud_capture: int
-    """Input capture module that ABAUD connects the receive pin to."""
+    """Input capture module to which ABAUD connects the receive pin."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -206,12 +206,12 @@ class Chip:
     device_id: int
     revision: int
     processors: tuple[int, ...]
-    """Accepted processor ids of ELF files; a linker writes the first (abi-elf.md §6.1)."""
+    """Accepted processor ids of ELF files. The linker writes the first one (abi-elf.md §6.1)."""
     ports: tuple[str, ...]
     change_pins: tuple[str, ...]
-    """Pin of CN0, CN1, ...; empty where the chip has none."""
+    """Pins of CN0, CN1, ...; an empty name where the chip lacks the input."""
     external_pins: tuple[tuple[str, int], ...]
-    """(pin, irq) of INT0, INT1, ..."""
+    """(pin, interrupt number) of INT0, INT1, ..."""
     timers: tuple[TimerSite, ...]
     uarts: tuple[UartSite, ...]
     spis: tuple[SpiSite, ...]
@@ -223,7 +223,7 @@ class Chip:
     cans: tuple[CanSite, ...]
     nvm_irq: int
     lvd_irq: int | None
-    """None without low-voltage detect."""
+    """Interrupt number of low-voltage detect; None if the chip lacks it."""
 
     def __post_init__(self) -> None:
         sfr, ram, x, y = (self.data[name] for name in ("sfr", "ram", "xram", "yram"))
@@ -235,7 +235,7 @@ class Chip:
 
 
 def _fields(text: str) -> Mapping[str, tuple[int, int]]:
-    """Parse `NAME:lsb:width;...`."""
+    """Parse bit fields written as `NAME:lsb:width;...`."""
     parts = (item.split(":") for item in text.split(";") if item)
     return MappingProxyType({name: (int(lsb), int(width)) for name, lsb, width in parts})
 

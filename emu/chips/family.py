@@ -1,6 +1,6 @@
-"""Data common to all dsPIC30F members: vectors, interrupt bit locations, the maps of both address spaces.
+"""Data common to all dsPIC30F chips: vectors, interrupt bit locations, maps of both address spaces.
 
-A member's own folder says which parts the member implements. Sources: dspic30f6014a.md §1, §2, §5, abi-elf.md §2.7,
+Each chip's own folder says which of the devices it implements. Sources: dspic30f6014a.md §1, §2, §5, abi-elf.md §2.7,
 isa.md §14. Program addresses are in PC units (2 per 24-bit word).
 """
 
@@ -27,15 +27,15 @@ _NATURAL_ORDER: Final = (
     "INT1 IC7 IC8 OC3 OC4 T4 T5 INT2 U2RX U2TX SPI2 C1 IC3 IC4 IC5 IC6 "
     "OC5 OC6 OC7 OC8 INT3 INT4 C2 PWM QEI DCI LVD FLTA FLTB"
 )
-"""Interrupt sources by number, as the vendor's linker script spells them (abi-elf.md §2.7)."""
+"""Interrupt sources by number, spelled as in the vendor's linker script (abi-elf.md §2.7)."""
 _SOURCES: Final = _NATURAL_ORDER.split()
 _SLOTS: Final = 62
 _FLAG_NAMES: Final = {"ADC": "AD"}
-"""Bit names are source + IF, IE, IP, but ADIF for ADC (§5.2)."""
+"""Exceptions to the rule that an interrupt's bits are called source + IF, IE, IP: ADC has ADIF etc. (§5.2)."""
 
 
 def interrupts_of(sfrs: Mapping[str, Sfr]) -> Mapping[int, InterruptSource]:
-    """Return the interrupt sources of a chip by number: those whose flag bit exists in its registers."""
+    """Return a chip's interrupt sources by number: those whose flag bit exists in its registers."""
     table = {}
     for irq, source in enumerate(_SOURCES):
         flag, enable, group = f"IFS{irq // 16}", f"IEC{irq // 16}", f"IPC{irq // 4}"
@@ -71,7 +71,7 @@ def _by_name(*regions: Region) -> Mapping[str, Region]:
 
 
 def data_space(y_start: int, ram_end: int) -> Mapping[str, Region]:
-    """Return the map of data space in bytes (§1.1): RAM follows the SFRs, Y RAM is its upper part."""
+    """Return the map of data space in bytes (§1.1). RAM follows the SFRs; Y RAM is the upper part of RAM."""
     return _by_name(
         Region("sfr", 0x0000, _SFR_END),
         Region("ram", _SFR_END, ram_end),
@@ -83,7 +83,7 @@ def data_space(y_start: int, ram_end: int) -> Mapping[str, Region]:
 
 
 def program_space(flash_end: int, eeprom_bytes: int) -> Mapping[str, Region]:
-    """Return the map of program space in PC units (§1.2); a word of EEPROM takes two."""
+    """Return the map of program space in PC units (§1.2). A word of EEPROM takes two PC units."""
     return _by_name(
         Region("flash", 0x000000, flash_end),
         Region("reset", 0x000000, IVT.start),
@@ -98,7 +98,7 @@ def program_space(flash_end: int, eeprom_bytes: int) -> Mapping[str, Region]:
 
 
 def config_word(name: str, address: int, mask: int, **fields: tuple[int, int]) -> ConfigWord:
-    """Return a configuration word; `mask`: the bits that read back as written."""
+    """Return a configuration word. `mask` selects the bits that read back as written."""
     return ConfigWord(name, address, mask, MappingProxyType(fields))
 
 
@@ -108,4 +108,4 @@ def config_words(*words: ConfigWord) -> Mapping[str, ConfigWord]:
 
 
 SLOTS: Final = vectors_of({})
-"""Names and addresses of all vectors, equal for every member; the implemented ones differ."""
+"""Names and addresses of all vectors, equal for every chip; which of them are implemented differs."""

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 SENSORS: Final = ("PO6030K", "PO3030K", "PO8030D", "none")
 SELECTOR_POSITIONS: Final = 16
 MOST_HZ: Final = 40_000_000
-"""Fastest external clock of the family (dspic30f6014a.md §3)."""
+"""Frequency in Hz of the family's fastest external clock (dspic30f6014a.md §3)."""
 
 
 def add_board_options(parser: argparse.ArgumentParser) -> None:
@@ -91,7 +91,7 @@ def _bare(crystal: int, chip: Peripherals) -> None:
 
 
 def set_up(machine: Machine, options: argparse.Namespace) -> None:
-    """Show the picture to the camera and start the stimulus file; the machine must have its image."""
+    """Show the picture to the camera and start the stimulus file. The image must already be loaded."""
     board: Epuck | None = machine.board
     if board is None:
         return
@@ -114,7 +114,7 @@ def set_up(machine: Machine, options: argparse.Namespace) -> None:
 
 
 def links_of(machine: Machine) -> dict[int, Any]:
-    """Return the devices between UARTs and the host: Bluetooth on UART1 of a robot."""
+    """Return the devices that connect UARTs with the host, by UART number: Bluetooth on UART1 of a robot."""
     bluetooth = getattr(machine.board, "bluetooth", None)
     return {} if bluetooth is None else {1: bluetooth}
 

@@ -18,7 +18,7 @@ def parser() -> Parser:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Exit status as the description says."""
+    """Print the script. Return the exit status given in the parser's description."""
     commands = {name: (import_module(f"emu.commands.{name}").parser(), text) for name, text in COMMANDS.items()}
     print(script("emu", commands, options.shell))
     return DONE

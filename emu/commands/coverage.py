@@ -44,7 +44,7 @@ def parser() -> Parser:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Exit status as DESCRIPTION says."""
+    """Run the command. Return the exit status as listed in DESCRIPTION."""
     from emu.api import Machine
 
     image = image_of(options)

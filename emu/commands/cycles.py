@@ -1,4 +1,4 @@
-"""`emu cycles`: print exact cycles of the kernel's operations, check them against a baseline, or update it."""
+"""`emu cycles`: print the kernel operations' exact cycles, check them against a baseline, or update the baseline."""
 
 from __future__ import annotations
 
@@ -30,14 +30,14 @@ def parser() -> Parser:
 
 
 def add_baseline_arguments(parser: Parser) -> None:
-    """Add --check FILE and --update FILE, for commands with exact numbers."""
+    """Add --check FILE and --update FILE, for commands that print exact numbers."""
     group = parser.add_mutually_exclusive_group()
     group.add_argument("--check", metavar="FILE", help="compare with a baseline; status 1 if anything grew")
     group.add_argument("--update", metavar="FILE", help="write the baseline")
 
 
 def run(options: argparse.Namespace) -> int:
-    """Exit status: 0 printed or no increase, 1 a number grew, 2 bad input."""
+    """Run the command. Return 0 if printed or no number grew, 1 if a number grew, 2 for bad input."""
     image = load_image(options.image)
     known = [each for each in (latency, kernel_options) if image.symbols.find(each.APPLICATION)]
     if not known:
@@ -60,7 +60,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def verdict(options: argparse.Namespace, numbers: dict[str, baseline.Number], unit: str) -> int:
-    """Print the comparison for --check. Return status 1 if a number grew."""
+    """Print the comparison for --check. Return exit status 1 if a number grew, otherwise 0."""
     try:
         rows = baseline.compare(baseline.load(options.check), numbers)
     except ValueError as error:

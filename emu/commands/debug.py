@@ -51,7 +51,7 @@ def parser() -> Parser:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Run the command and return the exit status of DESCRIPTION."""
+    """Run the command. Return the exit status as listed in DESCRIPTION."""
     if options.tui is not None:
         return _prompted(options)
     from emu.dap.wire import Wire, wire_over
@@ -87,7 +87,7 @@ def _prompted(options: argparse.Namespace) -> int:
 
 
 def _refuse_options_of_the_prompt(options: argparse.Namespace) -> None:
-    """Raise CommandError for options that belong in an editor's launch configuration."""
+    """Raise CommandError for a command-line option that an editor sets in its launch configuration."""
     made = parser()
     for name in ("engine", "strict", "board", "crystal", "selector", "camera", "sensor", "stimulus"):
         if getattr(options, name) != made.get_default(name):
@@ -95,7 +95,7 @@ def _refuse_options_of_the_prompt(options: argparse.Namespace) -> None:
 
 
 def _serve(wire: Wire) -> int:
-    """Serve one client and return the exit status."""
+    """Serve one debugger client. Return the exit status."""
     from emu.dap.server import Server
 
     Server(wire, machine_of).serve()

@@ -34,7 +34,7 @@ def parser() -> Parser:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Exit status: 0 printed, 2 bad input."""
+    """Run the command. Return 0 if printed, 2 for bad input."""
     image = image_of(options)
     start, end = _range(image, options.start, options.end)
     for warning in image.warnings:
@@ -48,7 +48,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _range(image: Image, start: str | None, end: str | None) -> tuple[int, int]:
-    """Return the address range to show. A function name alone selects the whole function."""
+    """Return the address range to disassemble. A function name alone selects the whole function."""
     flash = image.chip.program["flash"]
     first = flash.start if start is None else code_address(image, start)
     if end is not None:
@@ -61,7 +61,7 @@ def _range(image: Image, start: str | None, end: str | None) -> tuple[int, int]:
 
 
 def code_address(image: Image, text: str) -> int:
-    """Return a program address from a symbol's name or an even number. Raises CommandError for anything else."""
+    """Return the program address denoted by a symbol's name or an even number. Raises CommandError for other text."""
     symbol = image.symbols.find(text)
     if symbol is not None:
         if symbol.space not in ("code", "absolute"):
@@ -107,7 +107,7 @@ def _json(image: Image, found: Iterator[Item]) -> Iterator[str]:
 
 
 class _Sources:
-    """Texts of source files, read once; a missing file has no text.
+    """Lines of source files. Each file is read once; a missing file has no lines.
 
     File names in images are relative to the project folder. They are searched from the current folder and from the
     parent folders of the image.

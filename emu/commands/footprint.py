@@ -39,7 +39,7 @@ def parser() -> Parser:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Exit status: 0 printed or no increase, 1 a number grew, 2 bad input."""
+    """Run the command. Return 0 if printed or no number grew, 1 if a number grew, 2 for bad input."""
     image = load_image(options.image)
     facts = static(image)
     numbers = {name: Number(facts[key][size]) for name, key, size in _KEPT} | {
@@ -70,7 +70,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _places(facts: dict[str, Any], size: str) -> dict[str, int]:
-    """Return bytes by source file, with names that do not depend on the checkout's location."""
+    """Return bytes by source file. The file names do not depend on the location of the checkout."""
     return {short(name): sizes[size] for name, sizes in sorted(facts["modules"].items()) if sizes[size]}
 
 
@@ -82,7 +82,7 @@ _KEPT = (
 
 
 def _equation(image: Image) -> dict[str, Any] | None:
-    """Return the memory equation as plain data, None for an image that is not the measuring application."""
+    """Return the memory equation as plain data; None if the image is not the measuring application."""
     from emu.kernel_metrics.memory import APPLICATION, measure
     from emu.kernel_metrics.target import MeasureError
 
@@ -103,7 +103,7 @@ def _equation(image: Image) -> dict[str, Any] | None:
 
 
 def _options(image: Image) -> dict[str, int] | None:
-    """Return the bytes of the kernel's options, None for an image that is not the application `options`."""
+    """Return the bytes that each kernel option costs; None if the image is not the application `options`."""
     from emu.kernel_metrics.options import APPLICATION, sizes
     from emu.kernel_metrics.target import MeasureError
 
@@ -116,7 +116,7 @@ def _options(image: Image) -> dict[str, int] | None:
 
 
 def equation_text(equation: dict[str, Any]) -> str:
-    """Return the equation as text, beside those of the paper and of the original."""
+    """Return the memory equation as text, beside the equations of the paper and of the original."""
     from emu.kernel_metrics.memory import ORIGINAL, ORIGINAL_ROM, PAPER, PAPER_ROM
 
     alone, whole = equation["sizes"]["kernel"], equation["sizes"]["devices"]
@@ -187,7 +187,7 @@ def _pairs(table: dict[str, tuple[int, int]]) -> dict[str, dict[str, int]]:
 
 
 def _by_name(found: list[Piece]) -> list[Piece]:
-    """Return the pieces with those of one symbol joined, under the file that contributes most."""
+    """Join the pieces of each symbol, under the file that contributes most, and return them."""
     joined: dict[tuple[str, str], list[Piece]] = {}
     for piece in found:
         joined.setdefault((piece.name, piece.kind), []).append(piece)

@@ -1,4 +1,4 @@
-"""The image argument of a command, and its chip option."""
+"""Command-line arguments that select the firmware image and its chip."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def add_chip_option(parser: argparse.ArgumentParser) -> None:
 
 
 def image_of(options: argparse.Namespace) -> Image:
-    """Load the image named by the options, for their chip. Raises CommandError and LoadError."""
+    """Load the image that the options name, for their chip. Raises CommandError and LoadError."""
     try:
         return load_image(options.image, None if options.chip is None else chip_named(options.chip))
     except ValueError as error:

@@ -21,14 +21,14 @@ def parser() -> Parser:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Exit status: 0 printed, 2 bad input."""
+    """Run the command. Return 0 if printed, 2 for bad input."""
     facts = describe(image_of(options))
     print(json.dumps(facts, indent=2) if options.json else text(facts))
     return DONE
 
 
 def describe(image: Image) -> dict[str, Any]:
-    """Return the output of the command as plain data. The names of sizes contain their unit."""
+    """Return the output of the command as plain data. Names of sizes contain the unit."""
     return {
         "path": image.path,
         "format": image.kind,
@@ -81,7 +81,7 @@ def _memory(image: Image) -> dict[str, Any]:
 
 
 def _vectors(image: Image) -> list[dict[str, Any]]:
-    """Return every vector that the image defines, of main and alternate table."""
+    """Return every vector that the image defines, of the main and the alternate table."""
     found = []
     for vector in image.chip.vectors:
         for table, address in (("ivt", vector.ivt), ("aivt", vector.aivt)):
@@ -151,9 +151,9 @@ def _memory_lines(memory: dict[str, Any]) -> list[str]:
 
 
 def _vector_lines(vectors: list[dict[str, Any]]) -> list[str]:
-    """Return the lines of the vectors: each handler of its own, and the number with the most common handler.
+    """Return one line per handler of a single vector, and one line with the count of the most common handler.
 
-    Equal entries of both tables share a line.
+    Equal entries of the main and the alternate table share a line.
     """
     handlers = [vector["handler"] for vector in vectors]
     usual = max(set(handlers), key=handlers.count)

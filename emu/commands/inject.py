@@ -75,7 +75,7 @@ def _jobs(text: str) -> int:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Exit status as DESCRIPTION says."""
+    """Run the command. Return the exit status as listed in DESCRIPTION."""
     image = image_of(options)
     try:
         campaign = read(options.campaign)
@@ -105,7 +105,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _all(image: Image, campaign: Campaign, options: argparse.Namespace) -> list[Outcome]:
-    """Return every outcome in order of the numbers; trials in the state file are not run again."""
+    """Return every trial's outcome, sorted by trial number. Trials in the state file are not run again."""
     header = {"image": fingerprint(image), "campaign": campaign.fingerprint}
     done = (
         _read_state(options.state, header, campaign.trials)
@@ -157,7 +157,7 @@ def _read_state(path: Path, header: dict[str, str], trials: int) -> dict[int, Ou
 
 
 _PROCESS_TRIALS: list[Trials] = []
-"""The trial runner of this process."""
+"""Trial runner of this worker process."""
 
 
 def _trials(image: Image, campaign: Campaign) -> Trials:
@@ -178,7 +178,7 @@ def _one(number: int) -> Outcome:
 def _run(options: argparse.Namespace, campaign: Campaign, numbers: list[int]) -> Iterator[Outcome]:
     if not numbers:
         return
-    _begin(options, campaign)  # reports errors of the golden run
+    _begin(options, campaign)  # here, so that this process reports errors of the golden run
     if options.jobs == 1:
         yield from map(_one, numbers)
         return

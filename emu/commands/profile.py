@@ -62,7 +62,7 @@ def _group(text: str) -> tuple[str, list[str]]:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Exit status as DESCRIPTION says."""
+    """Run the command. Return the exit status as listed in DESCRIPTION."""
     from emu.api import Machine
 
     image = image_of(options)
@@ -86,7 +86,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _write(profile: Profile, profiler: Profiler, image: Image, options: argparse.Namespace) -> None:
-    """Write the requested files."""
+    """Write the files that the options request."""
     if options.callgrind:
         with atomic_text_file(options.callgrind) as stream:
             stream.writelines(f"{line}\n" for line in callgrind.lines(profile, str(image.path), profiler.location))

@@ -1,4 +1,4 @@
-"""`emu screenshot`: run a firmware image and write the picture captured by its driver, or the sensor's view."""
+"""`emu screenshot`: run a firmware image, then write the picture that its driver captured or its sensor would send."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from emu.api import Machine
 
 FORMATS: Final = {"rgb565": 2, "yuv": 2, "grey": 1}
-"""Bytes per pixel."""
+"""Bytes per pixel of each format."""
 
 DESCRIPTION: Final = """\
 Run a firmware image for a while and write a picture as PNG.
@@ -60,7 +60,7 @@ def _enlargement(text: str) -> int:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Exit status as DESCRIPTION says."""
+    """Run the command. Return the exit status as listed in DESCRIPTION."""
     from emu.api import Machine
     from emu.boards.picture import write_picture
 
@@ -96,7 +96,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _place(machine: Machine, options: argparse.Namespace) -> int:
-    """Return the data address of the buffer, which must be in RAM entirely."""
+    """Return the data address of the picture buffer, all of which must be in RAM."""
     try:
         address = int(options.buffer, 0)
     except ValueError:

@@ -1,1 +1,1 @@
-"""Debug Adapter Protocol server, through which editors debug emulated firmware."""
+"""Debug Adapter Protocol server: editors use it to debug emulated firmware."""

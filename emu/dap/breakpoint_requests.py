@@ -1,4 +1,4 @@
-"""Requests that set breakpoints: at lines, functions, instructions, data and faults."""
+"""Protocol requests that set breakpoints at lines, functions, instructions, data and faults."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from emu.debug.expressions.expression import evaluate
 from emu.debug.inspector import Value
 
 ACCESSES: Final = ("read", "write", "readWrite")
-"""Accesses at which a data breakpoint can stop."""
+"""Access types at which a data breakpoint can stop."""
 
 
 class BreakpointRequests(StateRequests):
-    """Handlers of breakpoint requests: methods `_do_` followed by the name of the request."""
+    """Handlers of breakpoint requests. A handler is called `_do_` followed by the request's name."""
 
     _last_id = 0
-    """Number of the last breakpoint."""
+    """Id of the breakpoint created last."""
 
     def _breakpoint(self, requested: Row, kind: str, addresses: tuple[int, ...], **more: Any) -> Breakpoint:
         self._last_id += 1
@@ -100,7 +100,7 @@ class BreakpointRequests(StateRequests):
         }
 
     def _not_in_memory(self, address: int, size: int) -> str:
-        """Return why a range of data space is invalid, empty if it is valid."""
+        """Return why a data breakpoint cannot observe a range of data space; empty if it can."""
         try:
             self._debuggee.machine.peek_bytes(address, size)
         except ValueError as error:

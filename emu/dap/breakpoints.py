@@ -28,29 +28,31 @@ DEFINING_FIELDS: Final = ("kind", "addresses", "condition", "hit_condition", "me
 
 @dataclass(eq=False, slots=True)
 class Breakpoint:
-    """One breakpoint of a client. `addresses` are program addresses; a data breakpoint has the first data address."""
+    """One breakpoint of a client. `addresses` are program addresses; for a data breakpoint, its first data address."""
 
     id: int
     kind: str
-    """"source", "function", "instruction" or "data"."""
+    """Kind of breakpoint: "source", "function", "instruction" or "data"."""
     addresses: tuple[int, ...]
     condition: str = ""
     hit_condition: str = ""
     message: str = ""
     size: int = 0
     access: str = "write"
-    """Access that a data breakpoint observes: "read", "write" or "readWrite"."""
+    """Access at which a data breakpoint stops: "read", "write" or "readWrite"."""
     hits: int = 0
     facts: dict[str, Any] = field(default_factory=dict)
-    """The breakpoint as reported to the client."""
+    """The breakpoint in the form that the protocol reports to the client."""
 
     def is_same(self, other: Breakpoint) -> bool:
-        """Whether the client has set the same breakpoint again."""
+        """Whether `other` is the same breakpoint, set again by the client."""
         return all(getattr(self, name) == getattr(other, name) for name in DEFINING_FIELDS)
 
     def should_stop(self, inspector: Inspector, write_output: Callable[[str], None]) -> bool:
-        """Count an arrival and return whether the run stops here. An invalid condition stops the run and is
-        reported."""
+        """Count a hit and return whether the run stops here.
+
+        An invalid condition stops the run and is reported.
+        """
         if self.condition:
             try:
                 frames = inspector.frames()
@@ -70,7 +72,7 @@ class Breakpoint:
 
 
 def formatted_message(inspector: Inspector, message: str) -> str:
-    """Return a log message in which values replace the expressions in braces."""
+    """Return a log message with each expression in braces replaced by its value."""
     frames = inspector.frames()
 
     def value(match: re.Match[str]) -> str:

@@ -12,14 +12,14 @@ from emu.debug.expressions.expression import ExpressionError, evaluate
 from emu.debug.inspector import Frame, Inspector, Value
 
 LAST: Final = re.compile(r"(?:([A-Za-z_$][\w.\[\]>-]*?)(?:\.|->))?([A-Za-z_$]?\w*)$")
-"""The expression before the last dot or arrow, if there is one, and the beginning of a name."""
+"""Splits a text into the expression before the last dot or arrow, if there is one, and the beginning of a name."""
 MOST: Final = 500
 Name = tuple[str, str]
-"""A name and its kind as the protocol defines it."""
+"""A completed name and its kind, as the protocol defines it."""
 
 
 def completions(inspector: Inspector, frame: Frame | None, text: str) -> tuple[list[Name], int]:
-    """Return the sorted completions of `text`, and the number of its last characters that they replace."""
+    """Return the sorted completions of `text`, and how many of its last characters they replace."""
     if text.startswith("/") and " " not in text:
         return [(f"/{word}", "keyword") for word in COMMANDS if word.startswith(text[1:])], len(text)
     match = LAST.search(text)
@@ -44,7 +44,7 @@ def _members(inspector: Inspector, frame: Frame | None, whole: str) -> Iterator[
 
 
 def _all(inspector: Inspector, frame: Frame | None) -> Iterator[Name]:
-    """Yield all names. A later name replaces an earlier one that is equal."""
+    """Yield all visible names. A later name hides an earlier equal one."""
     symbols = (one for one in inspector.image.symbols.all if one.names_content)
     for one in symbols:
         yield one.name.removeprefix("_"), "function" if one.space == "code" else "variable"

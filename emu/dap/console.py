@@ -1,4 +1,4 @@
-"""Console commands that begin with a slash: time, threads, and moves through time."""
+"""Console commands that begin with a slash: time, threads, running to a cycle and rewinding."""
 
 from __future__ import annotations
 
@@ -25,7 +25,10 @@ HELP: Final = "an expression of C; NAME = VALUE; or\n" + "".join(f"/{word}{text}
 
 
 def console_command(target: Debuggee, text: str) -> str | Callable[[], StopEvent]:
-    """Return the output of a command, or the function that moves the machine. Raises ValueError, ExpressionError."""
+    """Return a command's output, or the function that runs or rewinds the machine for it.
+
+    Raises ValueError, ExpressionError.
+    """
     word, _, rest = text.partition(" ")
     machine, history = target.machine, target.history
     if word == "time":
@@ -55,7 +58,7 @@ def console_command(target: Debuggee, text: str) -> str | Callable[[], StopEvent
 
 
 def _stack(thread: Thread) -> str:
-    """Return the stack use of a thread as text, empty if it has no stack of its own."""
+    """Return a thread's stack use as text; empty if the thread has no stack of its own."""
     if thread.stack is None or thread.used is None:
         return ""
     return f", stack {thread.used} of {thread.stack[1] - thread.stack[0]} bytes used"

@@ -1,7 +1,7 @@
 """Execution control of the debugged machine: run and step in both directions, breakpoints.
 
-Inputs: commands of a user. Outputs: `StopEvent`s with the reason of each stop. A `History` records every run, so every
-movement forward can be reversed.
+Inputs: the user's commands. Outputs: `StopEvent`s with the reason of each stop. A `History` records every run, so that
+every forward run can be reversed.
 """
 
 from __future__ import annotations
@@ -26,17 +26,17 @@ if TYPE_CHECKING:
     from emu.machine.stops import Stop
 
 SLICE_CYCLES: Final = 400_000
-"""Cycles between two checks for requests of the client."""
+"""Cycles between two polls for requests of the client."""
 POLL_STEPS: Final = 2_000
-"""Single steps between two such checks."""
+"""Single steps between two polls for requests of the client."""
 STACK_POINTER: Final = 15
 EXCEPTION_FRAME_BYTES: Final = 4
-"""Bytes that the entry of an interrupt pushes onto the stack."""
+"""Number of bytes that interrupt entry pushes onto the stack."""
 
 
 @dataclass(frozen=True, slots=True)
 class StopEvent:
-    """Why the machine is paused, with the reasons that the protocol defines."""
+    """Reason why the machine is paused, in the terms of the protocol."""
 
     reason: str
     description: str = ""
@@ -45,7 +45,7 @@ class StopEvent:
 
 
 class Debuggee:
-    """Controls `machine`.
+    """Execution control of `machine`.
 
     `is_stop_requested()` says whether the client has requested a pause. `write_output(text)` prints log messages.
     """
@@ -61,7 +61,7 @@ class Debuggee:
         self.inspector: Final = Inspector(machine)
         self.history: Final = history
         self.breakpoints: Final[dict[str, list[Breakpoint]]] = {}
-        """Breakpoints by kind, and for source breakpoints by file."""
+        """Breakpoints by kind; source breakpoints by file."""
         self.stops_at_faults = True
         self._is_stop_requested: Final = is_stop_requested
         self._write_output: Final = write_output
@@ -74,7 +74,7 @@ class Debuggee:
     # Breakpoints
 
     def set_breakpoints(self, key: str, breakpoints: list[Breakpoint]) -> None:
-        """Replace one list of breakpoints. A breakpoint that remains keeps its hit count."""
+        """Replace one list of breakpoints. A breakpoint that is in both lists keeps its hit count."""
         for one in breakpoints:
             one.hits = next((old.hits for old in self.breakpoints.get(key, []) if old.is_same(one)), 0)
         self.breakpoints[key] = breakpoints
@@ -97,7 +97,7 @@ class Debuggee:
         self._hooks = [self.machine.hook_pc(place, self._is_breakpoint_hit) for place in sorted(addresses)]
 
     def _is_breakpoint_hit(self) -> bool:
-        """Record which breakpoints at the current PC are hit, and return whether the run stops."""
+        """Mark the breakpoints at the current PC that are hit. Return whether the run stops here."""
         pc = self.machine.pc
         self._hit = [
             one.id
@@ -117,7 +117,7 @@ class Debuggee:
         return self._run() or StopEvent("pause")
 
     def _run(self) -> StopEvent | None:
-        """Run until a stop. Return None at a requested pause and at the target of `run_to`."""
+        """Run until a stop. Return None for a requested pause and at the target of `run_to`."""
         while not self._is_stop_requested() and not self._is_limit_reached():
             self._hit = []
             data = [one for one in self.all() if one.kind == "data"]
@@ -156,9 +156,9 @@ class Debuggee:
         return StopEvent("pause", stop.detail or stop.reason, stop=stop)
 
     def _step(self) -> StopEvent | None:
-        """Run one instruction and ignore breakpoints.
+        """Execute one instruction and ignore breakpoints.
 
-        A sleeping CPU sleeps until an interrupt wakes it, at most for SLEEP_CYCLES or until the client requests a
+        A sleeping CPU sleeps until an interrupt wakes it, but at most for SLEEP_CYCLES or until the client requests a
         pause.
         """
         limit = self.machine.cycle + SLEEP_CYCLES
@@ -170,16 +170,16 @@ class Debuggee:
                 return StopEvent("pause", f"{STILL_ASLEEP}; `continue` runs on until one does", stop=stop)
 
     def _step_slice(self, limit: int) -> Stop | None:
-        """Step once; a sleeping CPU sleeps at most for SLICE_CYCLES and to cycle `limit`."""
+        """Execute one instruction. A sleeping CPU sleeps for at most SLICE_CYCLES and at most until cycle `limit`."""
         return self.history.step(min(self.machine.cycle + SLICE_CYCLES, limit))
 
     def _event_of_step(self, stop: Stop | None) -> StopEvent | None:
-        """Return the event of a step's stop, None if the step is complete."""
+        """Return the event for the stop that ended a step, None if the step is complete."""
         is_complete = stop is None or (stop.reason == "breakpoint" and not stop.detail)
         return None if stop is None or is_complete else self._event_of_stop(stop)
 
     def _run_with_data_breakpoints(self, data: list[Breakpoint]) -> StopEvent | None:
-        """Single-step and check the data breakpoints."""
+        """Run by single steps and check the data breakpoints after each."""
         machine, space = self.machine, self.machine.core.data
         read, write = space.read, space.write
         touched: list[tuple[str, int, int]] = []
@@ -218,8 +218,10 @@ class Debuggee:
         return None
 
     def run_to(self, addresses: Collection[int], condition: Callable[[], bool]) -> StopEvent | None:
-        """Run to one of the addresses at which `condition` holds and return None; return the event of an earlier
-        stop."""
+        """Run to one of the addresses at which `condition` holds, and return None.
+
+        Return the event if the machine stops earlier.
+        """
         self._run_target = (addresses, condition)
         self._update_hooks()
         try:
@@ -230,16 +232,18 @@ class Debuggee:
             self._update_hooks()
 
     def step_instruction(self) -> StopEvent:
-        """Run one instruction."""
+        """Execute one instruction."""
         return self._step() or StopEvent("step")
 
     def step_over(self) -> StopEvent:
-        """Run one instruction; a call or an interrupt counts as one."""
+        """Execute one instruction. A call or an interrupt counts as part of it."""
         return self._step_instruction_or_call(into=False) or StopEvent("step")
 
     def step_line(self, into: bool) -> StopEvent:
-        """Run to the next line, with `into` also of a called function that has lines. Interrupt handlers run as a
-        whole."""
+        """Run to the next source line. With `into`, the first line of a called function also counts.
+
+        Interrupt handlers run to their end.
+        """
         frames = self.inspector.frames()
         entry = frames[0].raw.entry if frames else None
         line = self._line()
@@ -267,8 +271,10 @@ class Debuggee:
         return StopEvent("step")
 
     def _step_instruction_or_call(self, into: bool) -> StopEvent | None:
-        """Run one instruction and skip interrupts. A call counts as one, except with `into` to a function that has
-        lines."""
+        """Execute one instruction and run interrupt handlers to their end.
+
+        A call counts as one instruction, except with `into` and a function that has line information.
+        """
         machine = self.machine
         pc, top = machine.pc, machine.w[STACK_POINTER]
         insn = decode_for_execution(machine.program.word(pc), machine.program.word(pc + 2))
@@ -296,7 +302,7 @@ class Debuggee:
         return self.run_to([frames[1].pc], lambda: self.machine.w[STACK_POINTER] == top) or StopEvent("step")
 
     def goto(self, cycle: int) -> StopEvent:
-        """Go to a cycle of the recording, or run on to a later cycle unless another stop comes first."""
+        """Go to a cycle. A cycle after the recording is run to, unless the machine stops earlier."""
         history = self.history
         if cycle <= history.end:
             history.seek(max(cycle, history.start))
@@ -310,7 +316,7 @@ class Debuggee:
         return event or StopEvent("goto" if self.machine.cycle >= cycle else "pause")
 
     def run_to_cycle(self, cycle: int, offer_checkpoint: Callable[[], None] = lambda: None) -> bool:
-        """Run to a cycle past all breakpoints, and return whether the machine got there before a pause was requested.
+        """Run to a cycle and ignore breakpoints. Return False if the client requested a pause before it.
 
         `offer_checkpoint` is called between slices of the run.
         """
@@ -350,7 +356,7 @@ class Debuggee:
         return START_OF_RECORDING
 
     def reverse_step_into(self) -> StopEvent:
-        """Go back to the start of the previous line in any function. Interrupts are skipped."""
+        """Go back to the start of the previous line in any function. Interrupt handlers are skipped."""
         now, line, depth = self.machine.pc, self._line(), len(self._interrupts())
         here = (
             (line.file, line.line, self.inspector.function_start(now))
@@ -375,11 +381,11 @@ class Debuggee:
         return START_OF_RECORDING
 
     def _interrupts(self) -> list[int | None]:
-        """Return the entries of the active interrupt handlers, innermost first."""
+        """Return the entry addresses of the active interrupt handlers, innermost first."""
         return [self.inspector.function_start(one.raw.pc) for one in self.inspector.frames() if one.kind == "interrupt"]
 
     def reverse_finish(self) -> StopEvent:
-        """Go back to the call of the current function, or to before the interrupt."""
+        """Go back to the call of the current function, or to the instruction before the interrupt."""
         frame = next((one for one in self.inspector.frames() if one.kind != "inlined"), None)
         start = self.inspector.function_start(self.machine.pc)
         if frame is None or frame.raw.entry is None or start is None:
@@ -390,7 +396,7 @@ class Debuggee:
         return self.reverse_step_instruction()
 
     def reverse_continue(self) -> StopEvent:
-        """Go back to the last breakpoint, or to the last write that a data breakpoint observes."""
+        """Go back to the previous breakpoint hit, or to the previous write that a data breakpoint observes."""
         addresses = self._breakpoint_addresses()
         now = self.machine.cycle
         found: list[tuple[int, StopEvent]] = []
@@ -423,7 +429,7 @@ class Debuggee:
         self._update_hooks()
 
     def release(self) -> None:
-        """Restore the machine to its state without a debugger: in the present, without breakpoints."""
+        """Detach the debugger: return to the present and remove all breakpoints."""
         self.breakpoints.clear()
         self._update_hooks()
         self.history.seek(self.history.end)

@@ -1,4 +1,4 @@
-"""Launch arguments of an editor's configuration: names and types."""
+"""Arguments of an editor's launch configuration: names and types."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ KINDS: Final[dict[str, tuple[type, str]]] = {
     "stopOnEntry": (bool, "true or false"),
     "sourceRoots": (list, "a list of folders"),
 }
-"""Type and description by name. Editors send further arguments of their own."""
+"""Type and description of each argument. Editors also send arguments of their own."""
 
 
 def validated(arguments: dict[str, Any]) -> dict[str, Any]:

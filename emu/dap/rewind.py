@@ -1,8 +1,8 @@
-"""Rewinding a machine together with its environment, the trial in which it is a robot.
+"""Rewinding a debugged robot together with its environment, the trial.
 
-The machine first goes back alone, in its own recording. Then the environment goes to the same time
-(`Environment.rewind`). The session continues either in a checkpoint, a forked copy of this process to which it passes
-its `SessionState`, or in this process.
+The machine first goes back alone, in its own recording. Then `Environment.rewind` takes the environment to the same
+time. The session continues in this process or in a checkpoint. A checkpoint is a forked copy of this process; it
+receives the session's `SessionState`.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ if TYPE_CHECKING:
     from emu.machine.machine import Machine
 
 ALREADY_THERE: Final = StopEvent("goto")
-"""The machine is already at the requested time."""
+"""Event of a rewind for which the machine is already at the requested time."""
 INTERRUPTED: Final = StopEvent("pause", "interrupted while rewinding")
 
 
 class SessionState(NamedTuple):
-    """State that a session passes to the checkpoint that continues it."""
+    """State that a session hands over to the checkpoint that continues it."""
 
     cycle: int
     """Cycle to which the checkpoint runs."""
@@ -44,7 +44,7 @@ class SessionState(NamedTuple):
 
 
 class RewindingSession(BreakpointRequests):
-    """Session that rewinds the environment to the time of the machine. `_record` creates the machine's recording."""
+    """Session that rewinds the environment together with the machine. `_record` creates the machine's recording."""
 
     _record: Callable[[Machine], History]
     _deferred: list[Message]
@@ -55,9 +55,9 @@ class RewindingSession(BreakpointRequests):
 
     def __init__(self) -> None:
         self._changes: list[tuple[int, StateChange]] = []
-        """Changes made by the client, each with its cycle."""
+        """The client's changes to the machine, each with its cycle."""
         self._is_muted = False
-        """Whether output is discarded, because the client has already received it in the original run."""
+        """Whether output is discarded. During a replay the client already has it from the original run."""
 
     @abstractmethod
     def _is_stop_requested(self) -> bool:
@@ -76,13 +76,16 @@ class RewindingSession(BreakpointRequests):
         """Report to the client where the machine is paused."""
 
     def _offer_checkpoint(self) -> None:
-        """Offer a checkpoint if the machine is in its present. Raises CheckpointResumedError in the checkpoint."""
+        """Offer a checkpoint if the machine is in the present.
+
+        Raises CheckpointResumedError in a resumed checkpoint.
+        """
         history = self._target.history if self._target is not None else None
         if history is not None and history.environment is not None and not history.is_past:
             history.environment.offer_checkpoint()
 
     def _rewind_if_followed(self, event: StopEvent) -> StopEvent:
-        """Rewind the environment to the machine if it has checkpoints. Return the event to report."""
+        """Rewind the environment too if it has checkpoints. Return the event to report."""
         history = self._debuggee.history
         follows = history.environment is not None and history.environment.has_checkpoints and history.is_past
         return self._rewound(event) if follows else event
@@ -98,7 +101,10 @@ class RewindingSession(BreakpointRequests):
             raise RequestRefusedError(f"interrupted while rewinding, at cycle {self._debuggee.machine.cycle:,}")
 
     def _rewound(self, event: StopEvent) -> StopEvent:
-        """Rewind the environment to the machine's cycle. Return `event`, or INTERRUPTED after a pause on the way."""
+        """Rewind the environment to the machine's cycle.
+
+        Return `event`, or INTERRUPTED if the client paused the rewind.
+        """
         target, environment = self._debuggee, self._debuggee.history.environment
         assert environment is not None
         cycle = target.machine.cycle
@@ -116,7 +122,7 @@ class RewindingSession(BreakpointRequests):
         return event if is_there else INTERRUPTED
 
     def _resume_session(self, session_state: SessionState) -> None:
-        """Continue the session in a resumed checkpoint in place of the process that passed it `session_state`."""
+        """Continue the session in this resumed checkpoint, with the state passed by the earlier process."""
         target = self._debuggee
         target.install_breakpoints({}, session_state.stops_at_faults)
         self._last_id, self._references.last_reference = session_state.last_id, session_state.last_reference
@@ -135,9 +141,9 @@ class RewindingSession(BreakpointRequests):
     def _replay_changes(
         self, cycle: int, done: list[tuple[int, StateChange]], changes: list[tuple[int, StateChange]]
     ) -> bool:
-        """Run to a cycle past all breakpoints and repeat `changes`, of which `done` are already made.
+        """Run to a cycle, ignore breakpoints, and repeat `changes`, of which `done` are already made.
 
-        Return whether the machine got there before a pause was requested.
+        Return False if the client requested a pause before that cycle.
         """
         target = self._debuggee
         self._changes, self._is_muted = list(done), True

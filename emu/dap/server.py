@@ -1,7 +1,7 @@
 """One debugging session: executes a client's requests on the debuggee and reports its stops as events.
 
 Inputs: a channel to the client, and a factory that makes a machine from launch arguments. Outputs: messages only. The
-server reads its inbox between two slices of a run. While the machine runs it answers all requests that do not need a
+server reads its inbox between two slices of a run. While the machine runs, it answers all requests that do not need a
 paused machine.
 """
 
@@ -46,7 +46,7 @@ REQUESTS_WHILE_RUNNING: Final = (
     "threads", "setBreakpoints", "setFunctionBreakpoints", "setInstructionBreakpoints", "setDataBreakpoints",
     "setExceptionBreakpoints",
 )  # fmt: skip
-"""Requests that are answered while the machine runs; all others are deferred until it is paused."""
+"""Requests that the server answers while the machine runs. It defers all others until the machine is paused."""
 REQUEST_ERRORS: Final = (
     RequestRefusedError, ExpressionError, Unavailable, ValueError, LookupError, ArithmeticError, TypeError,
     AttributeError, RecursionError, OSError,
@@ -69,12 +69,12 @@ class Server(RewindingSession):
         self._make: Final = make
         self._record = record
         self.terminate_debuggee = False
-        """Whether the client has requested that the debuggee ends, and not only the session."""
+        """Whether the client has requested to end the debuggee, not only the session."""
         self._target: Debuggee | None = None
         self._views: tuple[ReferenceTable, SourceFiles] | None = None
         self._launch: Row = {}
         self._client: Row = {}
-        """Capabilities and identity that the client has sent."""
+        """Capabilities and name that the client has sent."""
         self._configured = self._is_over = False
         self._last_stop = StopEvent("entry")
         self._pause = False
@@ -137,9 +137,9 @@ class Server(RewindingSession):
 
     @property
     def _is_past(self) -> bool:
-        """Whether the machine is before its present.
+        """Whether the machine has been rewound to a time before the present.
 
-        A change in the past, or a rewind of the environment, makes that time the present.
+        A change there, or a rewind of the environment, makes that time the present.
         """
         return self._target is not None and self._target.history.is_past
 
@@ -225,7 +225,7 @@ class Server(RewindingSession):
     # Execution
 
     def _is_stop_requested(self) -> bool:
-        """Whether the client has requested a pause. New messages are answered or deferred."""
+        """Whether the client has requested a pause. Before that, answer or defer the new messages."""
         self._flush()
         self._offer_checkpoint()
         while not self._wire.inbox.empty():
@@ -323,7 +323,7 @@ class Server(RewindingSession):
 
 
 def _error_text(command: str, error: BaseException) -> str:
-    """Return the error message of a request. A KeyError with an identifier stands for a missing argument."""
+    """Return the error message for a failed request. A KeyError for an identifier means that an argument is missing."""
     if isinstance(error, KeyError) and error.args:
         text = str(error.args[0])
         return f"{command} needs `{text}`" if text.isidentifier() else text

@@ -1,4 +1,4 @@
-"""Special function registers by peripheral: the response to the custom request `sfrs`. Reads have no side effect."""
+"""Response to the custom request `sfrs`: special function registers by peripheral, read without side effects."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ PERIPHERALS: Final = {
     0x0280: "A/D converter", 0x02C0: "I/O ports", 0x0300: "CAN 1", 0x03C0: "CAN 2", 0x0740: "System",
     0x0760: "Flash and EEPROM", 0x0770: "Peripheral module disable",
 }  # fmt: skip
-"""First address of each peripheral's registers in all dsPIC30F (chip reference, register map)."""
+"""First register address of each peripheral, equal in all dsPIC30F (chip reference, register map)."""
 
 
 def sfr_groups(machine: Machine) -> list[dict[str, Any]]:
-    """Return peripherals with their registers, and registers with their fields, most significant first.
+    """Return the peripherals, each with its registers, and the registers with their fields, most significant first.
 
     Each row has a name, and a path that `evaluate` accepts. Registers and fields also have a value.
     """

@@ -1,5 +1,7 @@
-"""Changes that a client makes to a paused machine, as records. They can be repeated in another machine in that
-state."""
+"""Records of changes that a client makes to a paused machine.
+
+A record can be applied again in another machine that is in the same state.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +14,7 @@ from emu.debug.inspector import Frame, Inspector, Value
 
 
 class StateChange(Protocol):
-    """A change as plain values, so that it can be sent to another process."""
+    """A change described by plain values, so that it can be sent to another process."""
 
     def apply(self, inspector: Inspector) -> None:
         """Apply the change to the inspector's machine. Raises Unavailable, ValueError, TypeError."""
@@ -20,7 +22,7 @@ class StateChange(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Assignment:
-    """Assignment to an object of the program."""
+    """Assignment of a value to an object of the program."""
 
     type: Type
     pieces: tuple[Piece, ...]
@@ -30,22 +32,22 @@ class Assignment:
     number: Any
 
     def apply(self, inspector: Inspector) -> None:
-        """Apply the change as `StateChange.apply` specifies."""
+        """Perform the assignment; see `StateChange.apply`."""
         Value(self.type, self.pieces, inspector.view(self.frame), self.name, self.bits).set(self.number)
 
 
 @dataclass(frozen=True, slots=True)
 class MemoryWrite:
-    """Write of bytes to data space."""
+    """Write of bytes to data memory."""
 
     address: int
     data: bytes
 
     def apply(self, inspector: Inspector) -> None:
-        """Apply the change as `StateChange.apply` specifies."""
+        """Write the bytes; see `StateChange.apply`."""
         inspector.machine.poke(self.address, int.from_bytes(self.data, "little"), len(self.data))
 
 
 def assignment(place: Value, number: Any) -> Assignment:
-    """Return the assignment of `number` to `place`, applicable in every machine in the same state."""
+    """Return the assignment of `number` to `place`. It can be applied in every machine in the same state."""
     return Assignment(place.type, place.pieces, place.frame, place.name, place.bits, number)

@@ -1,4 +1,4 @@
-"""Requests that read or change a paused machine: values, memory, instructions, names."""
+"""Protocol requests that read or change a paused machine: values, memory, instructions, names."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ from emu.debug.expressions.expression import evaluate
 from emu.debug.inspector import Value
 
 MAX_ROWS: Final = 1 << 16
-"""Maximum number of instructions or bytes in one request: as many as a chip has."""
+"""Maximum number of instructions or bytes per request: the size of a chip's memory."""
 
 
 class RequestRefusedError(Exception):
-    """The request cannot be executed. The text is for the user."""
+    """The request cannot be executed. The text is shown to the user."""
 
 
 class StateRequests(ABC):
-    """Handlers of requests: methods `_do_` followed by the name of the request.
+    """Handlers of requests about state. A handler is called `_do_` followed by the request's name.
 
-    `_target` and `_views` are the debuggee and its views, None before the launch.
+    `_target` is the debuggee, `_views` its views; both are None before the launch.
     """
 
     _target: Debuggee | None
@@ -35,18 +35,18 @@ class StateRequests(ABC):
 
     @abstractmethod
     def _run_action(self, action: Callable[[], StopEvent]) -> None:
-        """Execute a function that moves the machine, and report where it stops."""
+        """Execute a function that runs, steps or rewinds the machine, and report where it stops."""
 
     @abstractmethod
     def _rewind_environment(self) -> None:
-        """Rewind the environment to the time of the machine. Raises RequestRefusedError if that is interrupted."""
+        """Rewind the environment to the machine's time. Raises RequestRefusedError if the client interrupts it."""
 
     @abstractmethod
     def _apply(self, change: StateChange) -> None:
-        """Apply a change now, and again whenever the session returns to this time. Raises RequestRefusedError."""
+        """Apply a change now, and again whenever a rewind passes this time. Raises RequestRefusedError."""
 
     def _environment_state(self) -> list[tuple[str, str]]:
-        """Return the state of the environment at the time of the machine. Raises RequestRefusedError."""
+        """Return the environment's state at the machine's time. Raises RequestRefusedError."""
         environment = self._debuggee.history.environment
         if environment is None:
             raise RequestRefusedError("this machine has no environment")
@@ -166,12 +166,12 @@ class StateRequests(ABC):
         return {"sources": self._sources.all()}
 
     def _do_sfrs(self, _arguments: Row) -> Row:
-        """Handle the project's own request behind an editor's register view."""
+        """Return the registers for an editor's register view; `sfrs` is a request of this project."""
         return {"groups": sfr_groups(self._debuggee.machine)}
 
 
 def _size(arguments: Row, name: str) -> int:
-    """Return a number of rows or bytes. Raises RequestRefusedError, KeyError, ValueError."""
+    """Return an argument that is a number of rows or bytes. Raises RequestRefusedError, KeyError, ValueError."""
     count = int(arguments[name])
     if not 0 <= count <= MAX_ROWS:
         raise RequestRefusedError(f"{name} {count} is not within 0 to {MAX_ROWS}")

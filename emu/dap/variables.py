@@ -1,6 +1,6 @@
-"""Responses about a stopped machine: scopes, variables, registers, sources, disassembly.
+"""Responses about a paused machine: scopes, variables, registers, sources, disassembly.
 
-References to variables and frames are valid until the machine continues. Their numbers are not reused.
+References to variables and frames are valid until the machine runs again. Their numbers are not reused.
 """
 
 from __future__ import annotations
@@ -20,13 +20,15 @@ from emu.instruments.disassembly import instruction
 REGISTERS: Final = 16
 FLAGS: Final = ("C", "Z", "OV", "N", "RA", "DC", "DA", "SAB", "OAB", "SB", "SA", "OB", "OA")
 POSTFIX: Final = re.compile(r"[\w$][\w$.\[\]>-]*|\(\*\(.*\)\)[\w.\[\]]*")
-"""Expressions to which a member access can be appended without brackets."""
+"""Expressions to which a member access can be appended without parentheses."""
 Row = dict[str, Any]
 
 
 class ReferenceTable:
-    """Variable and frame references of the current stop. `world` returns the state of the environment, if there is
-    one."""
+    """Variable and frame references of the current stop.
+
+    `world` returns the state of the environment; None if there is no environment.
+    """
 
     def __init__(
         self, inspector: Inspector, sources: SourceFiles, world: Callable[[], list[tuple[str, str]]] | None = None
@@ -36,17 +38,17 @@ class ReferenceTable:
         self._sources: Final = sources
         self._world: Final = world
         self.last_reference = 0
-        """The last reference that was assigned."""
+        """Number of the reference created last."""
         self._frames: dict[int, Frame] = {}
         self._lists: dict[int, Callable[[], Iterator[tuple[str, Value | None, str]]]] = {}
 
     def clear(self) -> None:
-        """Invalidate all references, because the machine continues."""
+        """Invalidate all references, because the machine runs again."""
         self._frames.clear()
         self._lists.clear()
 
     def frame(self, number: int | None) -> Frame | None:
-        """Return the frame of a reference, by default the innermost one. Raises ValueError for an invalid reference."""
+        """Return the frame with a reference number, for None the innermost one. Raises ValueError if it is invalid."""
         if number is not None:
             if number not in self._frames:
                 raise ValueError(f"frame {number} is not valid at this stop")
@@ -137,7 +139,7 @@ class ReferenceTable:
         return self.last_reference
 
     def variables(self, reference: int, start: int = 0, count: int = 0) -> list[Row]:
-        """Return the members of a list from `start`; `count` 0 means all."""
+        """Return the rows of a variable list from index `start`; a `count` of 0 means all."""
         rows = self._list(reference)
         found = []
         for index, (name, value, path) in enumerate(rows()):
@@ -148,17 +150,17 @@ class ReferenceTable:
         return found
 
     def find(self, reference: int, name: str) -> Value | None:
-        """Return the member `name` of a list, None if there is none."""
+        """Return the value called `name` in a variable list, None if there is none."""
         return next((value for one, value, _ in self._list(reference)() if one == name), None)
 
     def _list(self, reference: int) -> Callable[[], Iterator[tuple[str, Value | None, str]]]:
-        """Return the list of a reference. Raises ValueError for an invalid reference."""
+        """Return the variable list with a reference number. Raises ValueError if it is invalid."""
         if reference not in self._lists:
             raise ValueError(f"reference {reference} is not valid at this stop")
         return self._lists[reference]
 
     def row_of(self, value: Value, path: str) -> Row:
-        """Return text, type and references of a value. `path` is an expression that denotes it."""
+        """Return a value's text, type and references. `path` is an expression that denotes the value."""
         row: Row = {"value": value.text(), "type": str(value.type), "variablesReference": 0, "evaluateName": path}
         if value.address is not None:
             row["memoryReference"] = f"{value.address:#06x}"
@@ -194,7 +196,7 @@ class ReferenceTable:
 
 
 class SourceFiles:
-    """Source files of the line table and their paths on this computer."""
+    """Source files in the line table, and their paths on this host."""
 
     def __init__(self, inspector: Inspector, roots: list[Path]) -> None:
         self._inspector: Final = inspector
@@ -202,7 +204,7 @@ class SourceFiles:
         self._paths: Final[dict[str, Path]] = {}
 
     def path(self, file: str) -> Path:
-        """Return the path of `file`: as it is in the line table, or relative to one of the roots."""
+        """Return the path of `file`: the path in the line table, or one relative to a root folder."""
         if file not in self._paths:
             candidates = [Path(file), *(root / file for root in self._roots)]
             found = next((one for one in candidates if one.exists()), candidates[0])
@@ -228,7 +230,7 @@ class SourceFiles:
         return [row for row in self._inspector.image.lines.rows if row.file in own_files]
 
     def addresses(self, path: str, line: int) -> tuple[int, tuple[int, ...]]:
-        """Return the first line at or after `line` with code, and its address in each function; 0 if there is none."""
+        """Return the first line with code at or after `line`, and its address in each function; 0 if there is none."""
         rows = self.lines(path)
         behind = sorted({row.line for row in rows if row.line >= line})
         if not behind:
@@ -243,7 +245,10 @@ class SourceFiles:
 
 
 def disassembled(inspector: Inspector, sources: SourceFiles, address: int, count: int, symbols: bool) -> list[Row]:
-    """Return exactly `count` rows of one program word each from `address`, with source lines at their starts."""
+    """Return exactly `count` rows from `address`, one per program word.
+
+    The first word of a line has its source line.
+    """
     rows: list[Row] = []
     program, end = inspector.machine.program, inspector.image.chip.program["flash"].end
     second = address >= 2 and _words(inspector, address - 2) == 2

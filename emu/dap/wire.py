@@ -1,4 +1,4 @@
-"""Messages of the Debug Adapter Protocol on two byte streams: a Content-Length header, a blank line, JSON."""
+"""Framing of Debug Adapter Protocol messages on byte streams: a Content-Length header, a blank line, JSON."""
 
 from __future__ import annotations
 
@@ -15,22 +15,22 @@ from typing import Any, BinaryIO, Final, Protocol
 
 LENGTH: Final = re.compile(rb"content-length:[ \t]*(\d{1,20})[ \t]*", re.IGNORECASE)
 OTHER_FIELD: Final = re.compile(rb"content-type:[ \t]*[\x21-\x7e \t]*", re.IGNORECASE)
-"""The header field that is accepted beside Content-Length and has no effect."""
+"""Header field that is accepted besides Content-Length and ignored."""
 HTTP_REQUEST: Final = re.compile(rb"[A-Za-z]{1,20} [^ \r\n]{1,8000}(?: HTTP/|$)")
 MAX_HEADER_BYTES: Final = 4096
 READ_SIZE: Final = 1 << 16
 POLL_SECONDS: Final = 0.1
-"""Interval at which the reader thread checks whether it must end."""
+"""Interval in s at which the reader thread checks whether it must end."""
 MAX_MESSAGE_BYTES: Final = 1 << 24
-"""Maximum size of a message; a larger size is a protocol error."""
+"""Maximum size of a message in bytes; a larger size is a protocol error."""
 EXCERPT_BYTES: Final = 60
-"""Bytes of an invalid message that are shown in the error."""
+"""Maximum number of bytes of an invalid message that an error shows."""
 
 Message = dict[str, Any]
 
 
 class _ProtocolError(Exception):
-    """The received bytes are no valid message. The text gives the reason."""
+    """The received bytes are not a valid message. The text gives the reason."""
 
 
 class Channel(Protocol):
@@ -38,16 +38,16 @@ class Channel(Protocol):
 
     @property
     def inbox(self) -> SimpleQueue[Message | None]:
-        """Messages received from the client, then None at the end of the connection."""
+        """Messages received from the client, then None when the connection has ended."""
 
     def send(self, message: Message) -> None:
         """Send a message to the client."""
 
 
 class Wire:
-    """Connection over byte streams. A reader thread puts received messages into `inbox`, then None at the end.
+    """Connection over byte streams. A reader thread puts received messages into `inbox`, then None at the stream's end.
 
-    `source` is the file descriptor that it reads.
+    `source` is the file descriptor from which the thread reads.
     """
 
     def __init__(self, source: int, writer: BinaryIO) -> None:
@@ -68,7 +68,10 @@ class Wire:
         self._listener.join()
 
     def send(self, message: Message) -> None:
-        """Write one message and fill in its `seq`. If the client has disconnected, discard it and end the inbox."""
+        """Write one message and fill in its `seq`.
+
+        If the client has disconnected, discard it and end the inbox with None.
+        """
         self._seq += 1
         body = json.dumps({"seq": self._seq, **message}).encode()
         try:
@@ -81,7 +84,7 @@ class Wire:
         try:
             while (message := self._read()) is not None:
                 self.inbox.put(message)
-        except _ProtocolError as problem:  # after an error the start of the next message is unknown
+        except _ProtocolError as problem:  # the start of the next message is unknown after an error, so reading ends
             self.problem = "" if self._closed else str(problem)
         self.inbox.put(None)
 
@@ -98,7 +101,7 @@ class Wire:
         return False
 
     def _read(self) -> Message | None:
-        """Return the next message, None at the end. Raises _ProtocolError."""
+        """Return the next message, None at the end of the stream. Raises _ProtocolError."""
         while (end := self._unread.find(b"\r\n\r\n")) < 0:
             if len(self._unread) > MAX_HEADER_BYTES:
                 _refuse_http(bytes(self._unread[:MAX_HEADER_BYTES]))
@@ -123,16 +126,16 @@ class Wire:
 
 
 def _refuse_http(header: bytes) -> None:
-    """Raise _ProtocolError if a header begins with the request line of HTTP."""
+    """Raise _ProtocolError if a header begins with an HTTP request line."""
     if HTTP_REQUEST.match(header):
         raise _ProtocolError("an HTTP request, perhaps from a web page; this port is for editors (Debug Adapter "
                              f"Protocol) only: {_excerpt(header)}")  # fmt: skip
 
 
 def _message_size(header: bytes) -> int:
-    """Return the size of a message from its header. Raises _ProtocolError for any line that is no field of a header.
+    """Return the message size given by a header. Raises _ProtocolError for any line that is not a header field.
 
-    A web page can send an HTTP request to this port; a lenient parser would take its body for messages."""
+    A web page can send an HTTP request to this port. A lenient parser would accept the request's body as messages."""
     _refuse_http(header)
     lines = header.split(b"\r\n")
     sizes = [int(found[1]) for found in map(LENGTH.fullmatch, lines) if found]
@@ -144,13 +147,13 @@ def _message_size(header: bytes) -> int:
 
 
 def _excerpt(data: bytes | bytearray) -> str:
-    """Return the first bytes as text."""
+    """Return the first bytes of an invalid message as text."""
     return repr(bytes(data[:EXCERPT_BYTES]))[1:] + ("..." if len(data) > EXCERPT_BYTES else "")
 
 
 @contextmanager
 def wire_over(connection: socket.socket) -> Iterator[Wire]:
-    """Context manager for a wire over `connection`. At exit both are closed, also if output is lost."""
+    """Context manager for a wire over `connection`. On exit it closes both, even if output is lost."""
     writer = connection.makefile("wb")
     wire = Wire(connection.fileno(), writer)
     try:

@@ -1,4 +1,4 @@
-"""The environment of a debugged machine (its trial), which can be rewound together with it."""
+"""The environment of a debugged machine (its trial), which can be rewound together with the machine."""
 
 from __future__ import annotations
 
@@ -9,8 +9,10 @@ if TYPE_CHECKING:
 
 
 class CheckpointResumedError(Exception):
-    """Raised in a checkpoint, a forked copy of the process, when it is resumed in place of the process that left it
-    `session_state`."""
+    """Raised in a checkpoint when it is resumed.
+
+    A checkpoint is a forked copy of the process. It replaces the process that passed it `session_state`.
+    """
 
     def __init__(self, session_state: Any) -> None:
         super().__init__("checkpoint resumed")
@@ -18,26 +20,28 @@ class CheckpointResumedError(Exception):
 
 
 class Environment(Protocol):
-    """The world around the machine. It runs only together with the machine, and every run of it is the same."""
+    """The world around the machine. It runs only together with the machine, and all its runs are identical."""
 
     @property
     def has_checkpoints(self) -> bool:
-        """Whether the environment takes checkpoints and can therefore follow every step back. Without checkpoints each
-        rewind repeats the run from its start."""
+        """Whether the environment takes checkpoints and can therefore follow every step back.
+
+        Without checkpoints, each rewind repeats the run from its start.
+        """
 
     def describe(self) -> list[tuple[str, str]]:
         """Return names and values of the environment's current state. The last value is a digest of the whole state."""
 
     def rewind(self, cycle: int, session_state: Any) -> Machine:
-        """Go back to a state before `cycle` of the machine.
+        """Rewind to a state before `cycle` of the machine.
 
-        If there is a checkpoint, the latest one before `cycle` is resumed with `session_state`, and this call does not
-        return. Otherwise the run starts again, and the result is the new machine at its start.
+        If a checkpoint exists, the latest one before `cycle` is resumed with `session_state`, and this call does not
+        return. Otherwise the run is restarted, and the result is the new machine at its start.
         """
 
     def offer_checkpoint(self, near: int | None = None) -> None:
-        """Give the environment an opportunity to take a checkpoint; the machine is in its present.
+        """Let the environment take a checkpoint. The machine must be in its present.
 
-        The environment takes one if it is due, or if the last one is far from `near`, the cycle that the machine will
-        run to. Raises CheckpointResumedError in the checkpoint when it is resumed.
+        The environment takes one if it is due, or if the last one is far from `near`, the cycle to which the machine
+        will run. Raises CheckpointResumedError in the checkpoint when it is resumed.
         """

@@ -1,11 +1,14 @@
 """Diagnosis of firmware faults: cause, place, variables, thread, call stack and the branches that led there.
 
 Inputs: a stopped machine and its checkpoints (`emu.machine.stops.RunCheckpoints`). Output: the `Stop` with a
-`FaultReport`, or the unchanged stop if the firmware simply ended. A handled trap is no fault, unless the firmware never
-returns from its handler. A kernel that stops the system is one. An unhandled exception is recognised by a debugger word
-at the vector's target: the linkers of XC16 and of this project put one there (abi-elf.md §3.3).
+`FaultReport`, or the unchanged stop if the firmware ended regularly.
 
-The fault is often much earlier than the stop. The diagnosis therefore replays the run in a sandbox
+- A handled trap is not a fault, unless the firmware never returns from its handler.
+- A kernel that stops the system is a fault.
+- An unhandled exception is recognised by a debugger word at the vector's target, where the linkers of XC16 and of this
+  project put one (abi-elf.md §3.3).
+
+The fault often happens long before the stop. The diagnosis therefore replays the run in a sandbox
 (`emu.debug.replay`) up to the faulty instruction, and reads variables and call stack there.
 """
 
@@ -39,13 +42,13 @@ TRAPS: Final = {
     "StackError": ("STKERR", "stack error trap"),
     "MathError": ("MATHERR", "math error trap"),
 }
-"""Flag in INTCON1 (isa.md §14.4) and description of each trap, by the name of its vector."""
+"""By the vector name of each trap: its flag in INTCON1 (isa.md §14.4) and its description."""
 STOP_FUNCTION: Final = "hal_stop"
-"""Function in which OpenSwarm sleeps after a failed assertion or a fatal trap (firmware/openswarm/hal/hal_cpu.h)."""
+"""Function in which OpenSwarm halts after a failed assertion or a fatal trap (firmware/openswarm/hal/hal_cpu.h)."""
 REPORTING_FUNCTIONS: Final = frozenset(
     (STOP_FUNCTION, "stop", "os_trap", "Sys_Assertion_Failed", "__assert_fail", "abort")
 )
-"""Functions that report a fault of their caller."""
+"""Functions that report a fault that their caller made."""
 TRAP_FUNCTION: Final = "os_trap"
 RESET_WORD: Final = 0xFE0000
 CHECKS: Final = {
@@ -73,43 +76,45 @@ CHECKS: Final = {
     24: "an array whose length is not positive",
     PLAIN_TRAP: "__builtin_trap()",
 }
-"""Causes by clang's SanitizerHandler number (clang 20, CodeGen/SanitizerHandler.h). The tests compile the usual ones;
-a number that is not listed appears as such in the report."""
+"""Causes by clang's SanitizerHandler number (clang 20, CodeGen/SanitizerHandler.h).
+
+The tests compile the usual ones. A report shows a number that is not listed as it is.
+"""
 VECNUM: Final = 0x3F
-"""Field of INTTREG: slot of the exception entered last (isa.md §14.4)."""
+"""Field of INTTREG with the vector number of the last exception entered (isa.md §14.4)."""
 FRAMES_WITH_VARIABLES: Final = 2
 
 
 @dataclass(slots=True)
 class _Case:
-    """What is known about a fault. The diagnosis refines `cause` and `pc`."""
+    """Facts known about a fault. The diagnosis refines `cause` and `pc`."""
 
     cause: str
     pc: int
     cycle: int
     fault_state: bytes | None = None
-    """Snapshot taken at the fault; None: the current state of the machine."""
+    """Snapshot taken at the fault; None if the machine is still in that state."""
     start: bytes | None = None
-    """Snapshot from which the run to the fault can be replayed."""
+    """Earlier snapshot from which the run to the fault can be replayed."""
     vector: Vector | None = None
     is_exact: bool = False
-    """Whether `pc` is the faulty instruction itself."""
+    """Whether `pc` is exactly the faulty instruction."""
 
 
 def attach(machine: Machine) -> None:
-    """Let `machine` report firmware faults in its stops."""
+    """Make `machine` report firmware faults in its stops."""
     machine.diagnose = partial(explain, machine)
 
 
 def explain(machine: Machine, stop: Stop) -> Stop:
-    """Return `stop` with reason "fault" and a `FaultReport` if the firmware failed, else `stop` itself."""
+    """Return `stop` with reason "fault" and a `FaultReport` if the firmware failed, else the unchanged `stop`."""
     inspector = Inspector(machine)
     case = _case_of_stop(machine, inspector, stop)
     return stop if case is None else replace(stop, reason="fault", fault=_diagnosed(machine, inspector, case))
 
 
 def never_started(machine: Machine, stop: Stop, refused: int) -> Stop:
-    """Return `stop` as the fault of a kernel that was never started and refused `refused` calls."""
+    """Return `stop` as a fault: the kernel was never started and refused `refused` calls."""
     calls = "a call that needs" if refused == 1 else f"{refused:,} calls that need"
     cause = f"the kernel was never started (Sys_Start_Kernel) and refused {calls} it to run; ended"
     case = _Case(cause, stop.pc, stop.cycle, is_exact=True)
@@ -117,7 +122,7 @@ def never_started(machine: Machine, stop: Stop, refused: int) -> Stop:
 
 
 def state_report(machine: Machine, cause: str) -> FaultReport:
-    """Return thread, call stack and last branches of a machine without a fault, in the form of a `FaultReport`."""
+    """Return the thread, call stack and last branches of a machine without a fault, as a `FaultReport`."""
     case = _Case(cause, machine.pc, machine.cycle, None, machine.checkpoints.start)
     return _diagnosed(machine, Inspector(machine), case)
 
@@ -126,7 +131,7 @@ def state_report(machine: Machine, cause: str) -> FaultReport:
 
 
 def _case_of_stop(machine: Machine, inspector: Inspector, stop: Stop) -> _Case | None:
-    """Return the fault that `stop` is, None for a regular end."""
+    """Return the fault that caused `stop`, None for a regular end."""
     checkpoints = machine.checkpoints
     if stop.reason == "fault":
         reset = checkpoints.reset
@@ -150,7 +155,10 @@ def _case_of_stop(machine: Machine, inspector: Inspector, stop: Stop) -> _Case |
 
 
 def _case_of_debugger_word(machine: Machine, inspector: Inspector, stop: Stop, in_trap: bool) -> _Case | None:
-    """Return the fault behind a debugger word: a failed sanitizer check or an unhandled exception. None: an end."""
+    """Return the fault that ends in a debugger word: a failed sanitizer check or an unhandled exception.
+
+    None means that the debugger word is a regular end.
+    """
     program, image = machine.program, inspector.image
     check = program.word(stop.pc + 4) - FAILED_CHECK
     if program.word(stop.pc + 2) == RESET_WORD and 0 <= check <= PLAIN_TRAP:
@@ -171,7 +179,7 @@ def _case_of_debugger_word(machine: Machine, inspector: Inspector, stop: Stop, i
 
 
 def _case_of_trap(machine: Machine, trap: tuple[Vector, bytes, bytes | None]) -> _Case:
-    """Return the fault for the trap that the machine entered last."""
+    """Return the fault that caused the trap entered last."""
     vector, state, start = trap
     cause = TRAPS[vector.name][1] if vector.name in TRAPS else f"{vector.name} trap"
     with sandboxed(machine, state):
@@ -203,7 +211,7 @@ def _diagnosed(machine: Machine, inspector: Inspector, case: _Case) -> FaultRepo
 
 
 def _trace(machine: Machine, case: _Case) -> ExecutionTrace | None:
-    """Return how the machine came to the fault; for a trap, up to the instruction that requested it."""
+    """Return a trace of the run to the fault. For a trap, it ends with the instruction that requested the trap."""
     if case.start is None:
         return None
     if case.cause == RESTART:
@@ -215,7 +223,7 @@ def _trace(machine: Machine, case: _Case) -> ExecutionTrace | None:
 
 
 def _locate(machine: Machine, inspector: Inspector, case: _Case, trace: ExecutionTrace | None) -> int | None:
-    """Set `case.pc` to the faulty instruction if `trace` shows it. Return the cycle in which it begins, or None."""
+    """Set `case.pc` to the faulty instruction if `trace` contains it. Return its first cycle, otherwise None."""
     cycle = None
     jump = _wild_jump(inspector, case, trace)
     if trace is not None and trace.last is not None and (case.vector is not None or not case.is_exact):
@@ -228,7 +236,7 @@ def _locate(machine: Machine, inspector: Inspector, case: _Case, trace: Executio
 
 @contextmanager
 def _state_at_fault(machine: Machine, case: _Case, replay_cycle: int | None) -> Iterator[None]:
-    """Run a block with the machine in its state at the fault, as far as that state is known."""
+    """Run the block with the machine in its state at the fault, as far as that is known."""
     if replay_cycle is not None and case.start is not None:
         with sandboxed(machine, case.start):
             machine.run_until(replay_cycle)
@@ -241,7 +249,7 @@ def _state_at_fault(machine: Machine, case: _Case, replay_cycle: int | None) -> 
 
 
 def _frames_of_culprit(inspector: Inspector, case: _Case) -> list[Frame]:
-    """Return the call stack of the fault, without functions that only report it."""
+    """Return the call stack of the fault without the functions that only report it."""
     frames = inspector.frames(case.pc)
     if inspector.function_name(case.pc) in REPORTING_FUNCTIONS:
         frames = [frame for frame in frames if frame.function not in REPORTING_FUNCTIONS] or frames
@@ -250,7 +258,7 @@ def _frames_of_culprit(inspector: Inspector, case: _Case) -> list[Frame]:
 
 
 def _wild_jump(inspector: Inspector, case: _Case, trace: ExecutionTrace | None) -> TakenBranch | None:
-    """Return the branch by which control left the program for good, if there is one."""
+    """Return the branch with which control left the program for the rest of the run, None if there is none."""
     if trace is None:
         return None
     if case.cause == RESTART:
@@ -261,7 +269,7 @@ def _wild_jump(inspector: Inspector, case: _Case, trace: ExecutionTrace | None) 
 
 
 def _jump_text(machine: Machine, jump: TakenBranch, cause: str) -> str:
-    """Return the cause of a fault after a wild jump."""
+    """Describe the cause of a fault after a wild jump."""
     word = machine.program.word(jump.source)
     insn = decode_for_execution(word, machine.program.word(jump.source + 2))
     name = insn.row.mnemonic if insn is not None else ""
@@ -274,7 +282,7 @@ def _jump_text(machine: Machine, jump: TakenBranch, cause: str) -> str:
 
 
 def _estimated_pc(inspector: Inspector, case: _Case) -> int:
-    """Return the faulty instruction of a trap from the return address it pushes (isa.md §14.4).
+    """Return the presumably faulty instruction of a trap, from the return address that the trap pushed (isa.md §14.4).
 
     A math error pushes the address of the division. Other traps push the address of the next instruction.
     """
@@ -285,7 +293,7 @@ def _estimated_pc(inspector: Inspector, case: _Case) -> int:
 
 
 def _detailed_cause(machine: Machine, case: _Case, trace: ExecutionTrace | None) -> str:
-    """Return the cause, for address and stack errors with the values of the registers concerned."""
+    """Describe the cause. For address and stack errors, add the values of the registers involved."""
     if case.vector is None or case.vector.name not in ("AddressError", "StackError"):
         return case.cause
     top, ram = machine.w[STACK_POINTER], machine.chip.data["ram"]
@@ -304,7 +312,7 @@ def _detailed_cause(machine: Machine, case: _Case, trace: ExecutionTrace | None)
 
 
 def _running_thread(inspector: Inspector) -> str:
-    """Return the running thread as text; empty without a kernel, or if the kernel's variables are corrupt."""
+    """Return the name of the running thread; empty without a kernel, or if the kernel's variables are corrupt."""
     try:
         return Threads(inspector).running()
     except (Unavailable, KeyError, TypeError, ValueError):
@@ -312,7 +320,7 @@ def _running_thread(inspector: Inspector) -> str:
 
 
 def _entry(inspector: Inspector, frame: Frame, with_values: bool) -> StackEntry:
-    """Return a call stack entry as plain text, with the values of variables if requested."""
+    """Return a call stack entry as text, with the values of variables if `with_values`."""
     values = []
     for one in inspector.variables(frame) if with_values else ():
         try:
@@ -328,7 +336,7 @@ def _branch_text(inspector: Inspector, one: TakenBranch) -> str:
 
 
 def _return_address(machine: Machine) -> int:
-    """Return the address that the last exception pushed, 0 if the stack pointer was not in RAM."""
+    """Return the return address that the last exception pushed, 0 if the stack pointer was not in RAM."""
     ram = machine.chip.data["ram"]
     slot = machine.w[STACK_POINTER] - 4
     if slot not in ram or slot + 4 > ram.end:
@@ -337,7 +345,7 @@ def _return_address(machine: Machine) -> int:
 
 
 def _is_pending(machine: Machine, irq: int | None) -> bool:
-    """Whether the flag and the enable bit of an interrupt are set."""
+    """Whether an interrupt is both requested and enabled."""
     assert irq is not None
     source = machine.chip.interrupts[irq]
     return all(machine.peek(register) >> bit & 1 for register, bit in (source.flag, source.enable))

@@ -1,7 +1,7 @@
-"""Calls of single firmware functions from outside, for tests.
+"""Calls of individual firmware functions by the host, for tests.
 
 Inputs: a paused machine, a function, arguments. Output: the function's result. Effects on memory and peripherals
-persist; registers, stack pointer and priority are restored. Arguments are placed as the compiler's calls place them
+persist; registers, stack pointer and priority are restored. Arguments are placed as in calls made by the compiler
 (abi-elf.md §2.2): each in the first free registers of W0 to W7 that are aligned to its size.
 """
 
@@ -19,9 +19,9 @@ if TYPE_CHECKING:
 
 ARGUMENT_REGISTERS: Final = 8
 CALL_LEVEL: Final = 7
-"""CPU priority during the call: no interrupt is accepted."""
+"""CPU priority during the call; it blocks all interrupts."""
 SAFETY_MARGIN: Final = 32
-"""Bytes left free above W15, where the interrupted function may be about to push data."""
+"""Bytes left free above W15, because the interrupted function may have data there that it has not yet pushed."""
 POINTER: Final = Type("pointer", size=2)
 
 
@@ -30,7 +30,7 @@ class CallError(RuntimeError):
 
 
 def call(machine: Machine, name: str, arguments: Sequence[Any], cycles: int) -> Any:
-    """Return the result of `name(*arguments)`: None for void, else as `Value.get` returns it.
+    """Call `name(*arguments)` and return its result: None for void, else a Python object as from `Value.get`.
 
     Numbers are converted to the parameters' types. Bytes are copied to the stack and passed as a pointer. Raises
     KeyError for an unknown function, ValueError for unsuitable arguments, CallError if the function does not return
@@ -77,7 +77,7 @@ def call(machine: Machine, name: str, arguments: Sequence[Any], cycles: int) -> 
 
 
 def _parameter_types(function: Scope | None, arguments: Sequence[Any]) -> list[Type]:
-    """Return the types of the parameters. Without debug information, numbers are 16-bit words."""
+    """Return the parameter types. Without debug information, numbers are passed as 16-bit words."""
     if function is None:
         return [POINTER if isinstance(one, bytes | bytearray) else UNSIGNED[2] for one in arguments]
     types = [one.type for one in function.variables if one.is_parameter]

@@ -1,4 +1,4 @@
-"""View of a paused machine by its source: call stack, variables in scope, and values by name.
+"""Source-level view of a paused machine: call stack, variables in scope, and values by name.
 
 Input: a machine between two instructions. Outputs: `Frame`s and `Value`s. Only `Value.set` changes the machine.
 """
@@ -24,27 +24,27 @@ if TYPE_CHECKING:
 REGISTERS: Final = 16
 STACK_POINTER: Final = 15
 FRAME_BASE_OPERATION: Final = bytes([location.FBREG])
-"""First operation of the location of a variable in a frame."""
+"""DWARF operation with which the location of a frame variable begins."""
 REMOVED_BY_LINKER: Final = bytes(location.ADDR_0)
-"""Location expression that the linker writes for a variable it has removed."""
+"""Location expression that the linker writes for a removed variable."""
 
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """One entry of a call stack; lists have the innermost first. An inlined function has an entry of its own."""
+    """One entry of a call stack; lists begin with the innermost. An inlined function has its own entry."""
 
     pc: int
-    """Next instruction of the frame; for a caller, the return address."""
+    """Address of the frame's next instruction; for a caller, the return address."""
     function: str
-    """Name of the function in C or assembly; its address if it has no name."""
+    """Name of the C or assembly function; its address if it has no name."""
     line: SourceLine | None
     kind: str
-    """"call", "interrupt" (entered by an exception) or "inlined"."""
+    """How the frame was entered: "call", "interrupt" (any exception) or "inlined"."""
     scopes: tuple[Scope, ...]
-    """Blocks and functions around `pc` that belong to this entry, outermost first. Empty without debug information."""
+    """Nested scopes of this entry that contain `pc`, outermost first. Empty without debug information."""
     raw: RawFrame
     at: int
-    """Address at which variables are looked up: `pc`, or for a caller an address inside its call instruction."""
+    """Address for the lookup of variables: `pc`, or for a caller an address inside its call instruction."""
 
     def __str__(self) -> str:
         where = f" ({self.line})" if self.line is not None else ""
@@ -52,7 +52,7 @@ class Frame:
 
 
 class Inspector:
-    """Inspects `machine` by the debug information of its image. Raises ValueError if no image is loaded."""
+    """Inspector of `machine` that uses its image's debug information. Raises ValueError if no image is loaded."""
 
     def __init__(self, machine: Machine) -> None:
         if machine.image is None:
@@ -77,18 +77,18 @@ class Inspector:
 
     @cached_property
     def _vector_targets(self) -> frozenset[int]:
-        """Addresses that the interrupt vectors contain."""
+        """Addresses stored in the interrupt vectors."""
         vectors = self.image.chip.vectors
         targets = {self.image.word(table) for vector in vectors for table in (vector.ivt, vector.aivt)}
         return frozenset(target for target in targets if target is not None)
 
     def is_code(self, pc: int) -> bool:
-        """Whether the image defines an instruction at `pc`."""
+        """Whether the image contains an instruction at `pc`."""
         index = bisect_right(self._starts, pc) - 1
         return index >= 0 and pc < self._ends[index]
 
     def function_start(self, pc: int) -> int | None:
-        """Return the first instruction of the function that contains `pc`, None outside the program."""
+        """Return the address of the function that contains `pc`, None outside the program."""
         if not self.is_code(pc):
             return None
         function = self.debug.function(pc)
@@ -98,9 +98,9 @@ class Inspector:
         return symbol[0].address if symbol is not None else None
 
     def prologue_end(self, start: int) -> int:
-        """Return the end of the prologue of the function at `start`, where its parameters are stored.
+        """Return the end of the prologue of the function at `start`. The prologue stores the parameters.
 
-        The prologue has its own row in the line table, that of the function's opening line. A function without frame
+        In the line table, the prologue has its own row for the function's opening line. A function without frame
         variables has no prologue; the result is then `start`.
         """
         if start not in self._bodies:
@@ -114,7 +114,7 @@ class Inspector:
         return first.end if (start, first.end) not in function.ranges else start
 
     def is_handler(self, start: int | None) -> bool:
-        """Whether `start` is the entry of an exception handler."""
+        """Whether `start` is the address of an exception handler."""
         return start is not None and start in self._vector_targets
 
     def function_name(self, pc: int) -> str:
@@ -126,7 +126,7 @@ class Inspector:
         return symbol[0].name.removeprefix("_") if symbol is not None else f"{pc:#08x}"
 
     def where(self, pc: int) -> str:
-        """Return `pc` with function and source line: `0x000124 (worker+0x4, main.c:12)`."""
+        """Return `pc` as text with function and source line: `0x000124 (worker+0x4, main.c:12)`."""
         start = self.function_start(pc)
         if start is None:
             return f"{pc:#08x}"
@@ -141,7 +141,7 @@ class Inspector:
         return tuple(self.machine.record.u16[:REGISTERS])
 
     def frames(self, pc: int | None = None, registers: tuple[int | None, ...] | None = None) -> list[Frame]:
-        """Return the call stack from `pc` with `registers`; by default those of the machine."""
+        """Return the call stack for a PC and register values, by default those of the machine."""
         if pc is None:
             pc = self.machine.pc
         raws = self.unwinder.frames(pc, registers or self.registers(), self._ram_word)
@@ -178,12 +178,14 @@ class Inspector:
     # Variables
 
     def view(self, frame: Frame | None = None) -> FrameView:
-        """Return registers and memory as seen in `frame`; by default those of the machine."""
+        """Return the registers and memory as visible from `frame`; None means the machine's current registers."""
         return FrameView(self, frame)
 
     def variables(self, frame: Frame) -> list[Variable]:
-        """Return parameters and locals in scope in order of declaration. Inner ones hide outer ones of the same
-        name."""
+        """Return the parameters and locals in scope, in order of declaration.
+
+        An inner variable hides an outer one of the same name.
+        """
         found: dict[str, Variable] = {}
         for scope in frame.scopes:
             for one in scope.variables:
@@ -192,8 +194,10 @@ class Inspector:
         return list(found.values())
 
     def variable(self, name: str, frame: Frame | None = None) -> Variable | None:
-        """Return the variable called `name` in `frame`: a local, a static of its file, or a global; None if there is
-        none."""
+        """Return the variable called `name` that is visible in `frame`, None if there is none.
+
+        It is a local, a static of the frame's file, or a global.
+        """
         if frame is not None:
             for scope in reversed(frame.scopes):
                 for one in scope.variables:
@@ -207,7 +211,7 @@ class Inspector:
         return same_name[0] if same_name else None
 
     def value(self, variable: Variable, frame: Frame | None = None) -> Value:
-        """Return the object that `variable` denotes. Raises Unavailable, for example if it was optimised out."""
+        """Return the object denoted by `variable`. Raises Unavailable, for example if it was optimised out."""
         view = self.view(frame)
         if variable.location is None:
             if variable.constant is None:
@@ -245,7 +249,7 @@ class Inspector:
         return found
 
     def symbol(self, name: str) -> Value | None:
-        """Return a variable that only the symbol table contains, as an unsigned number of its size."""
+        """Return a variable that is only in the symbol table, as an unsigned number of its size; None if unknown."""
         found = self.image.symbols.find(name)
         if found is None or found.space not in ("data", "psv", "absolute"):
             return None
@@ -256,13 +260,13 @@ class Inspector:
 
 
 def is_frame_variable(variable: Variable) -> bool:
-    """Whether the variable has one fixed place in the frame of its function."""
+    """Whether the variable has a fixed location in its function's frame."""
     entries = variable.location.entries if variable.location is not None else ()
     return len(entries) == 1 and entries[0][0] is None and entries[0][2][:1] == FRAME_BASE_OPERATION
 
 
 def has_frame_variables(scope: Scope) -> bool:
-    """Whether a function has a variable with a place in its frame."""
+    """Whether a function has a variable with a fixed location in its frame."""
     return any(map(is_frame_variable, scope.variables)) or any(map(has_frame_variables, scope.inner))
 
 
@@ -278,11 +282,11 @@ class FrameView:
 
     @property
     def pc(self) -> int:
-        """Address at which variables are looked up: inside the call instruction of a frame that waits for a return."""
+        """Address for the lookup of variables. For a caller's frame it is inside the call instruction."""
         return self._machine.pc if self.frame is None else self.frame.at
 
     def register(self, number: int) -> int | None:
-        """Return Wn, None if it is unknown in this frame."""
+        """Return the value of Wn, None if it is unknown in this frame."""
         if number >= REGISTERS:
             return None
         if self.frame is None or self._is_innermost:
@@ -300,7 +304,7 @@ class FrameView:
         return self._machine.peek_bytes(address, size)
 
     def set_memory(self, address: int, data: bytes) -> None:
-        """Write bytes of data space; to registers as an instruction does. Raises ValueError."""
+        """Write bytes of data space; peripheral registers react as to an instruction. Raises ValueError."""
         value = int.from_bytes(data, "little")
         if address < self._machine.bus.end and len(data) <= 2:
             self._machine.write(address, value, len(data))
@@ -309,7 +313,7 @@ class FrameView:
 
 
 class Value:
-    """A typed object with its place in memory, registers or debug information."""
+    """A typed object located in memory, in registers, or in debug information as a constant."""
 
     def __init__(
         self,
@@ -324,11 +328,11 @@ class Value:
         self.name: Final = name
         self._view: Final = view
         self.bits: Final = bits
-        """Width and lowest bit of a bit field."""
+        """Width and least significant bit of a bit field; None for other objects."""
 
     @property
     def address(self) -> int | None:
-        """Data address of the object, None if it is not in memory as a whole."""
+        """Data address of the object, None if it does not lie entirely in memory."""
         return location.address_of(self.pieces)
 
     @property
@@ -337,8 +341,10 @@ class Value:
         return location.read(self.pieces, max(self.type.bytes, 1), self._view)
 
     def get(self) -> Any:
-        """Return the value as a Python object: int, float, bool, dict of members, list of elements. Raises
-        Unavailable."""
+        """Return the value as a Python object: int, float, bool, dict of members, list of elements.
+
+        Raises Unavailable.
+        """
         if self.bits is not None:
             from emu.debug.dwarf.types import Member
 
@@ -367,14 +373,14 @@ class Value:
         return Value(self.type, self.pieces, inspector.view(self.frame), self.name, self.bits)
 
     def text(self) -> str:
-        """Return the value in one line of text, or the reason why there is none."""
+        """Return the value as one line of text, or the reason why it is unavailable."""
         try:
             return text_of(self.type, self.get())
         except location.Unavailable as why:
             return f"<{why}>"
 
     def __getitem__(self, part: str | int) -> Value:
-        """Return a member by name, an element by number, or the target of a pointer (0). Raises KeyError, TypeError."""
+        """Return a member by name, an element by index, or a pointer's target (index 0). Raises KeyError, TypeError."""
         bare = self.type.bare
         if isinstance(part, str):
             member = self.type.member(part)
@@ -393,7 +399,7 @@ class Value:
         return Value(target, self._slice(part * target.bytes, target.bytes), self._view, f"{self.name}[{part}]")
 
     def parts(self) -> Iterator[Value]:
-        """Yield the members or elements, or the target of a pointer."""
+        """Yield the members of a struct, the elements of an array, or the target of a pointer."""
         bare = self.type.bare
         if bare.kind == "pointer" and bare.target is not None and bare.target.bare.kind not in ("void", "function"):
             yield self[0]

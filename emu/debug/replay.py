@@ -1,7 +1,7 @@
 """Sandboxed runs of a machine, and the replay of a run from an earlier state.
 
-Inputs: a machine, a snapshot to begin with, a last cycle. Output: the branches of the replayed run. The state is one
-record, and equal records run equally (docs/reference/engines.md), so a run needs no log.
+Inputs: a machine, the snapshot from which to start, a last cycle. Output: the branches of the replayed run. A machine's
+state is one record, and equal records run identically (docs/reference/engines.md), so a replay needs no log.
 """
 
 from __future__ import annotations
@@ -21,32 +21,32 @@ if TYPE_CHECKING:
     from emu.machine.stops import Stop
 
 MAX_BRANCHES: Final = 20
-"""Branches that a trace keeps."""
+"""Maximum number of branches in a trace."""
 WINDOWS: Final = (4_000, 64_000, 400_000)
-"""Cycles before the end that are single-stepped. The windows are tried in turn until one has enough branches."""
+"""Lengths in cycles of the single-stepped end of a replay. They are tried in turn until one has enough branches."""
 
 
 @dataclass(frozen=True, slots=True)
 class ExecutionTrace:
-    """How a machine came to its state."""
+    """Last part of a run: how the machine reached its state."""
 
     branches: tuple[TakenBranch, ...]
     """The last branches, oldest first."""
     last: int | None
-    """Address of the instruction that ran last."""
+    """Address of the last instruction executed."""
     cycle: int
-    """Cycle in which that instruction began."""
+    """First cycle of that instruction."""
     stack_pointer: int
-    """W15 after that instruction."""
+    """Value of W15 after that instruction."""
     bad_access: tuple[int, int, bool] | None
-    """The data access of that instruction that is an address error: address, bytes, whether it is a write."""
+    """Data access by which that instruction caused an address error: address, bytes, whether it is a write."""
 
 
 @contextmanager
 def sandboxed(machine: Machine, state: bytes | None = None) -> Iterator[None]:
-    """Run a block in which the machine may be run and changed, from the snapshot `state` if one is given.
+    """Permit a block to run and change the machine, starting from the snapshot `state` if given.
 
-    No observer and no hook is called. Afterwards the machine has its previous state, to the bit.
+    No observers or hooks are called. Afterwards the machine has its previous state, bit for bit.
     """
     before = machine.save_state()
     restore_host_state = machine.save_host_state()
@@ -62,10 +62,10 @@ def sandboxed(machine: Machine, state: bytes | None = None) -> Iterator[None]:
 
 
 def retrace(machine: Machine, state: bytes, end: int, until: Callable[[], bool] | None = None) -> ExecutionTrace | None:
-    """Replay from `state` to the first instruction boundary at which `until` holds, or without `until` to a stop.
+    """Replay from `state` to the first instruction boundary at which `until` holds; without `until`, to a stop.
 
-    Both must happen by cycle `end`. Returns None if the replay does not get there: then the original run received
-    input that `state` does not contain.
+    Return None if the replay has not got there by cycle `end`. In that case the original run received input that
+    `state` does not contain.
     """
     for window in WINDOWS:
         with sandboxed(machine, state):
@@ -79,7 +79,7 @@ def retrace(machine: Machine, state: bytes, end: int, until: Callable[[], bool] 
 
 
 def _stepped(machine: Machine, end: int, until: Callable[[], bool] | None) -> ExecutionTrace | None:
-    """Single-step the machine as `retrace` does and return the trace."""
+    """Single-step the machine and return the trace, with the end conditions of `retrace`."""
     branches: deque[TakenBranch] = deque(maxlen=MAX_BRANCHES)
     stop: Stop | None = None
     last: int | None = None
@@ -107,7 +107,7 @@ def _stepped(machine: Machine, end: int, until: Callable[[], bool] | None) -> Ex
 
 @contextmanager
 def _address_errors(machine: Machine) -> Iterator[list[tuple[int, int, bool]]]:
-    """Collect every data access that is an address error while the machine is single-stepped inside the block."""
+    """Collect the data accesses that are address errors while the block single-steps the machine."""
     data, builder = machine.core.data, machine.core.builder
     found: list[tuple[int, int, bool]] = []
     faulty, commit = data.faulty, builder.commit
@@ -135,6 +135,6 @@ def _address_errors(machine: Machine) -> Iterator[list[tuple[int, int, bool]]]:
 
 
 def _sequential_targets(machine: Machine, pc: int) -> tuple[int, ...]:
-    """Return where execution continues without a branch: after the instruction, or at it again under REPEAT."""
+    """Return the next addresses without a branch: the next instruction, or the same one under REPEAT."""
     insn = decode_for_execution(machine.program.word(pc), machine.program.word(pc + 2))
     return (pc + 2 * (insn.words if insn is not None else 1), pc)

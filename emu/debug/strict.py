@@ -1,11 +1,11 @@
-"""Strict mode (`--strict`): accesses that the hardware permits but that are almost always errors become faults.
+"""Strict mode (`--strict`): report as faults the accesses that hardware permits but that are almost always errors.
 
 - Null page: an access through a pointer to an address below the first peripheral register (W and core registers).
 - Uninitialised read: a load from RAM of which no byte was written since power-on, or since the stack shrank below it.
-- Foreign stack: a store by an OpenSwarm thread, outside the kernel, into another thread's stack or control block.
+- Uninitialised read: a load from RAM of which no byte was written since power-on or since the stack shrank below it.
 
-A copy from memory to memory in one instruction is no read: it copies the initialisation marks. Reads above W15
-relative to W15 are the compiler's stack probes and are permitted. The marks, one per data address, lie in the
+An instruction that copies from memory to memory does not count as a read: it copies the initialisation marks. Reads
+above W15 relative to W15 are the compiler's stack probes and are permitted. The marks, one per data address, lie in the
 machine's record, so snapshots and replays contain them. Strict mode needs the plain engine.
 """
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 
 class StrictMode:
-    """Memory observer that checks every instruction of `machine`, which must have the plain engine.
+    """Memory observer that checks every instruction of `machine`, which must use the plain engine.
 
     Pass the class as `observer` to `Machine`.
     """
@@ -40,14 +40,14 @@ class StrictMode:
         marks = machine.record.reserve("strict.written", "B", ram.end)
         self._written: Final = machine.record.u8[marks.offset : marks.offset + ram.end]
         self._violation = ""
-        """Description of the first violation of the current instruction."""
+        """Description of the current instruction's first violation."""
         self._copying = False
         """Whether the current instruction copies from memory to memory."""
         self._copies_uninitialised = False
-        """Whether the current copy has read uninitialised memory."""
+        """Whether the current memory-to-memory copy has read uninitialised memory."""
         self._inspector: Inspector | None = None
         self._foreign_stacks: tuple[object, list[range]] = (None, [])
-        """The running thread's control block, and the stacks of all other threads."""
+        """Control block of the running thread, and stacks of all other threads."""
         core = machine.core
         self._load, self._store = core.builder.load, core.builder.store
         self._write, self._execute = core.data.write, core.sequencer.execute
@@ -65,7 +65,7 @@ class StrictMode:
         self._written[:] = bytes(len(self._written))
 
     def on_external_write(self, address: int, size: int) -> None:
-        """Mark bytes that a caller of `poke` has written as initialised."""
+        """Mark bytes written by `poke` as initialised."""
         end = min(address + size, len(self._written))
         for at in range(address, end):
             self._written[at] = 1
@@ -116,7 +116,7 @@ class StrictMode:
         self._violation = self._violation or text
 
     def _symbol(self, address: int) -> str:
-        """Return the variable at `address` as ` (name+offset)`, empty if there is none."""
+        """Return the variable at `address` as text ` (name+offset)`, empty if there is none."""
         image = self._machine.image
         found = image.symbols.data(address) if image is not None else None
         if found is None:
@@ -125,7 +125,7 @@ class StrictMode:
         return f" ({symbol.name.removeprefix('_')}{f'+{distance}' if distance else ''})"
 
     def _check_stack(self, ea: int, size: int) -> None:
-        """Report a store of the running thread into the memory of another thread."""
+        """Report a violation if the running thread stores into another thread's memory."""
         image = self._machine.image
         if image is None:
             return
@@ -142,7 +142,7 @@ class StrictMode:
 
 
 def _stacks_of_others(inspector: Inspector, running: int) -> list[range]:
-    """Return the memory of all threads but `running`; empty if the kernel's variables cannot be read."""
+    """Return the memory of all threads except `running`; empty if the kernel's variables cannot be read."""
     try:
         return Threads(inspector).memory_of_others(running)
     except (Unavailable, KeyError, TypeError, ValueError):

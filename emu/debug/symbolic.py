@@ -1,4 +1,4 @@
-"""Access to a machine by C expressions, evaluated in the innermost frame."""
+"""Access to a machine by C expressions that are evaluated in the innermost frame."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ if TYPE_CHECKING:
 def read(inspector: Inspector, expression: str) -> Any:
     """Return the value of a C expression as a Python object: int, float, bool, list of elements, dict of members.
 
-    Raises ExpressionError for text that is no expression, Unavailable for a value that was optimised out.
+    Raises ExpressionError for invalid text, Unavailable for a value that was optimised out.
     """
     return number_of(_evaluated(inspector, expression))
 
 
 def variable(inspector: Inspector, expression: str) -> Value:
-    """Return the typed object that a C expression denotes. Raises as `read`, and ValueError for a mere number."""
+    """Return the typed object denoted by a C expression. Raises as `read`, and ValueError for a plain number."""
     found = _evaluated(inspector, expression)
     if isinstance(found, (int, float)):
         raise ValueError(f"{expression!r} is the number {found} and names no object in memory or a register")

@@ -1,8 +1,8 @@
-"""The threads of an OpenSwarm firmware, read from the kernel's variables by their debug information.
+"""The threads of an OpenSwarm firmware, read from the kernel's variables by means of debug information.
 
-Input: a machine whose image contains the kernel's variables. Output: `Thread`s. The module contains no offset of a
-structure and no value of an enumeration: it looks up names. It finds the registers of a waiting thread by running the
-kernel's own code for resuming it in a sandbox.
+Input: a machine whose image contains the kernel's variables. Output: `Thread`s. The module looks up names and contains
+no structure offsets or enumeration values. To find the registers of a suspended thread, it runs the kernel's own resume
+code in a sandbox.
 """
 
 from __future__ import annotations
@@ -22,34 +22,34 @@ if TYPE_CHECKING:
     from emu.machine.machine import Machine
 
 RUNNING, RING, BLOCKED, PCB = "os_running", "os_ring", "os_blocked", "sys_pcb"
-"""Variables and a type of the kernel (firmware/openswarm/kernel/kernel.h)."""
+"""Names of variables and of a type of the kernel (firmware/openswarm/kernel/kernel.h)."""
 RESUME: Final = "resume"
 """Label at which the port resumes the thread in W0 (firmware/openswarm/port/dspic30f/switch.S)."""
 THREAD_START: Final = "os_thread_start"
-"""Function that calls a thread's function (same file)."""
+"""Function that calls a thread's entry function (same file)."""
 STACK_FILL: Final = 0xA5
 """Byte with which the kernel fills a stack before its first use (firmware/openswarm/kernel/stack.c)."""
 LIMIT: Final = 256
-"""Number of threads, or of steps, after which a list or a resumption counts as corrupt."""
+"""Maximum number of threads in a list, or of steps of a resumption; beyond it the data counts as corrupt."""
 ALL_MASKED_LEVEL: Final = 7
 
 
 @dataclass(frozen=True, slots=True)
 class Thread:
-    """One thread. Byte counts are None where they are unknown, for example for the system thread's stack."""
+    """One thread. Byte counts are None if unknown, for example for the system thread's stack."""
 
     pid: int
     name: str
-    """The thread's function; "main" for the system thread."""
+    """The thread's entry function; "main" for the system thread."""
     state: str
-    """"running", "ready", "sleeping" (for a time), "blocked" (on an event) or "zombie"."""
+    """Thread state: "running", "ready", "sleeping" (for a time), "blocked" (on an event) or "zombie"."""
     priority: int
     address: int
     """Address of the thread's control block."""
     stack: tuple[int, int] | None
-    """First address and end of the thread's stack."""
+    """Start and end address of the thread's stack."""
     free: int | None
-    """Bytes of the stack that were never written."""
+    """Number of bytes of the stack that were never written."""
     frames: tuple[Frame, ...]
 
     def __str__(self) -> str:
@@ -57,12 +57,12 @@ class Thread:
 
     @property
     def used(self) -> int | None:
-        """High-water mark: bytes of the stack that have been used."""
+        """High-water mark of the stack in bytes."""
         return None if self.stack is None or self.free is None else self.stack[1] - self.stack[0] - self.free
 
 
 class Threads:
-    """The current threads. Empty without an OpenSwarm kernel, or before it has started."""
+    """The current threads. There are none without an OpenSwarm kernel, or before it has started."""
 
     def __init__(self, inspector: Inspector) -> None:
         self._inspector: Final = inspector
@@ -76,7 +76,7 @@ class Threads:
         return [self._thread(pcb, blocked) for pcb, blocked in self._control_blocks()]
 
     def memory_of_others(self, address: int) -> list[range]:
-        """Return stack and control block of every thread except the one with the control block at `address`."""
+        """Return the stack and control block of every thread except the one whose control block is at `address`."""
         found = []
         for pcb, _ in self._control_blocks():
             first = _number(pcb, "block")
@@ -85,7 +85,7 @@ class Threads:
         return found
 
     def running(self) -> str:
-        """Return the running thread as `thread 1 (worker)`, also during an interrupt; empty if there are no threads."""
+        """Return the running or interrupted thread as text `thread 1 (worker)`; empty if there are no threads."""
         pcb = self._dereferenced(RUNNING)
         if pcb is None:
             return ""
@@ -100,7 +100,7 @@ class Threads:
         return value[0] if value.get() else None
 
     def _control_blocks(self) -> Iterator[tuple[Value, bool]]:
-        """Yield the threads' control blocks, each with whether its thread is off the ready ring."""
+        """Yield each thread's control block, and whether the thread is blocked, that is, not in the ready ring."""
         seen: set[int] = set()
         for name, blocked in ((RING, False), (BLOCKED, True)):
             pcb = self._dereferenced(name)
@@ -124,7 +124,7 @@ class Threads:
         return Thread(pid, name, state, _number(pcb, "priority"), pcb.address or 0, stack, free, frames)
 
     def _name(self, pid: int, frames: tuple[Frame, ...]) -> str:
-        """Return the function that the kernel's start code calls."""
+        """Return the entry function of a thread, which the kernel's start code calls."""
         names = [frame.function for frame in frames if frame.kind == "call"]
         if THREAD_START in names[1:]:
             return names[names.index(THREAD_START, 1) - 1]
@@ -133,10 +133,10 @@ class Threads:
         return names[-1] if names else "?"
 
     def _stack(self, pcb: Value) -> tuple[tuple[int, int] | None, int | None]:
-        """Return the bounds of the stack and its unused bytes.
+        """Return the bounds of a thread's stack and its number of unused bytes.
 
-        The stack lies between the start of the thread's block and its control block. The port uses the part above the
-        limit.
+        The stack lies between the start of the thread's memory block and its control block. The port uses the part
+        above the limit.
         """
         first, end = _number(pcb, "block"), _number(pcb, "limit") + 2
         ram = self._inspector.image.chip.data["ram"]
@@ -155,18 +155,20 @@ class Threads:
         return self._inspector.frames(*found) if found is not None else []
 
     def _is_on_own_stack(self, pcb: Value) -> bool:
-        """Whether the machine's call stack leads back to this thread, so that no context switch has suspended it."""
+        """Whether the machine's call stack leads back to this thread; then no context switch has suspended it."""
         first, end = _number(pcb, "block"), _number(pcb, "limit") + 2
         frames = self._inspector.frames()
         tops = [frame.raw.registers[REGISTERS - 1] for frame in frames]
-        if not first:  # the system thread, if the stack belongs to no other thread
+        if not first:  # the system thread runs if the stack belongs to no other thread
             names = {frame.function for frame in frames}
             return "main" in names or not names & {"os_schedule", "os_slice_end", "hal_idle"}
         return any(top is not None and first <= top <= end + LIMIT for top in tops)
 
     def _resume_state(self, resume: int, pcb: int) -> tuple[int, tuple[int | None, ...]] | None:
-        """Return PC and registers with which a waiting thread will resume. The port's code runs to its return in a
-        sandbox."""
+        """Return the PC and registers with which a suspended thread will resume.
+
+        The port's resume code runs up to its return in a sandbox.
+        """
         machine = self._machine
         with sandboxed(machine):
             machine.pc = resume
@@ -175,7 +177,7 @@ class Threads:
             for _ in range(LIMIT):
                 insn = decode_for_execution(machine.program.word(machine.pc), machine.program.word(machine.pc + 2))
                 if insn is None or machine.step() is not None or machine.state.intcon1 & machine.core.traps.flags:
-                    return None  # the saved context is no longer there: the thread has discarded it
+                    return None  # the saved context no longer exists: the thread has discarded it
                 if facts_of(insn).flow is Return:
                     return machine.pc, self._inspector.registers()
         return None

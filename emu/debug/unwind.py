@@ -1,10 +1,10 @@
 """Call stack unwinding by symbolic execution of the code.
 
-The analysis runs a function from its first instruction to the PC with symbolic values: "a register at function entry
-plus a constant", a constant, or unknown. The result says where W15 was at entry, hence where the return address lies,
-and where callee-saved registers were stored. It needs no debug information. It also works for assembly, for interrupt
-handlers that switch stacks, and for any compiler. The stack grows upwards. CALL and exceptions push four bytes; bits
-6:0 of the high word are the upper part of the PC (isa.md §14.2).
+The analysis runs a function from its first instruction to the PC with symbolic values. A value is "a register at
+function entry plus a constant", a constant, or unknown. The result says where W15 was at entry, hence where the return
+address lies, and where callee-saved registers were stored. It needs no debug information. It also works for assembly,
+for interrupt handlers that switch stacks, and for any compiler. The stack grows upwards. CALL and exceptions push four
+bytes; bits 6:0 of the high word are the upper part of the PC (isa.md §14.2).
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from emu.dspic30f.isa.row import Insn
 REGISTERS: Final = 16
 STACK_POINTER: Final = 15
 CALLEE_SAVED: Final = range(8, 16)
-"""W8 to W15: a function restores these registers before it returns (abi-elf.md §2)."""
+"""Callee-saved registers W8 to W15 (abi-elf.md §2)."""
 RETURN_BYTES: Final = 4
 MAX_INSTRUCTIONS: Final = 6000
 """Maximum number of instructions of an analysed function."""
@@ -30,15 +30,15 @@ MAX_FRAMES: Final = 64
 """Maximum number of frames of a call stack."""
 
 Word = Callable[[int], int]
-"""Function that returns the 24-bit program word at an even address."""
+"""Function that returns the 24-bit program word at an even program address."""
 Memory = Callable[[int], int | None]
 
 
 @dataclass(frozen=True, slots=True)
 class SymbolicValue:
-    """The sum of a base and `offset`. Bases 0 to 15 are the registers at function entry, CONSTANT is 0.
+    """Sum of a base and `offset`. Bases 0 to 15 are the registers at function entry; CONSTANT is the number 0.
 
-    MERGED + pc is W15 at the last passage through `pc`, where paths with different values of W15 join.
+    The base MERGED + pc is W15 when control last passed `pc`, where paths with different values of W15 join.
     """
 
     base: int
@@ -48,12 +48,12 @@ class SymbolicValue:
 CONSTANT: Final = -1
 MERGED: Final = 0x1000000
 MaybeSymbolic = SymbolicValue | None
-"""None: the value is unknown."""
+"""Symbolic value, or None for an unknown value."""
 
 
 @dataclass(slots=True)
 class FrameState:
-    """What is known about registers and memory at one instruction. Memory words have symbolic addresses."""
+    """Knowledge about registers and memory before one instruction. Memory words have symbolic addresses."""
 
     registers: list[MaybeSymbolic] = field(default_factory=lambda: [SymbolicValue(n, 0) for n in range(REGISTERS)])
     memory: dict[SymbolicValue, SymbolicValue] = field(default_factory=dict)
@@ -62,8 +62,10 @@ class FrameState:
         return FrameState(list(self.registers), dict(self.memory))
 
     def merge(self, other: FrameState, pc: int) -> bool:
-        """Remove all knowledge that does not hold in `other`, another predecessor of `pc`. Return whether anything
-        changed."""
+        """Keep only the knowledge that also holds in `other`, the state from another predecessor of `pc`.
+
+        Return whether anything changed.
+        """
         changed = False
         joint = SymbolicValue(MERGED + pc, 0)
         for number, value in enumerate(self.registers):
@@ -104,7 +106,7 @@ class _Operand:
         return self._shifted(other, -1)
 
     def __and__(self, other: object) -> _Operand:
-        """Return the operand itself for masks that keep 16 bits or clear bit 0: they do not change an address."""
+        """Return the operand itself for a mask that keeps 16 bits or clears bit 0, which does not change an address."""
         return self if other in (0xFFFF, 0xFFFE) else _UNKNOWN
 
     def _unknown_result(self, *_operands: object) -> _Operand:
@@ -126,14 +128,14 @@ def _symbolic(value: object) -> MaybeSymbolic:
 
 
 class _SymbolicBuilder:
-    """Builder (isa/builder.py) that updates a `FrameState`."""
+    """Builder (isa/builder.py) that applies an instruction's effects to a `FrameState`."""
 
     def __init__(self) -> None:
         self.context = Context()
         self.pc = 0
         self.state = FrameState()
         self.is_unconditional = True
-        """Whether the current effect always happens; inside `when` it may not."""
+        """Whether the current effect happens unconditionally; inside `when` it does not."""
 
     def _unknown(self, *_arguments: object, **_more: object) -> Any:
         return _UNKNOWN
@@ -174,7 +176,7 @@ class _SymbolicBuilder:
     def store(self, ea: Any, v: Any, size: Size, ptr: int | None = None) -> None:
         place = _symbolic(ea)
         if place is None:
-            return  # a store through an unknown pointer: to the program's data, not to saved registers
+            return  # a store through an unknown pointer is assumed to hit the program's data, not saved registers
         if place.base == CONSTANT and place.offset < 2 * REGISTERS:
             self.set_w(place.offset >> 1, v if size == 2 else _UNKNOWN)
             return
@@ -196,22 +198,22 @@ def _decoded(word1: int, word2: int) -> Insn | None:
 
 
 class CodeAnalysis:
-    """States before every instruction of the functions analysed so far."""
+    """Symbolic states before every instruction of the functions analysed so far."""
 
     def __init__(self, word: Word, has_code: Callable[[int], bool]) -> None:
-        """`has_code(pc)` says whether the program defines `pc`."""
+        """`has_code(pc)` returns whether the program defines an instruction at `pc`."""
         self._word: Final = word
         self._has_code: Final = has_code
         self._functions: Final[dict[int, dict[int, FrameState]]] = {}
 
     def insn(self, pc: int) -> Insn | None:
-        """Return the instruction at `pc`, None if there is none."""
+        """Return the instruction at `pc`, None if there is none or it is invalid."""
         return _decoded(self._word(pc), self._word(pc + 2)) if self._has_code(pc) else None
 
     def state_before(self, start: int, pc: int) -> FrameState | None:
-        """Return the state before the instruction at `pc` of the function that begins at `start`.
+        """Return the state before the instruction at `pc`, in the function that begins at `start`.
 
-        None if the function does not reach `pc`.
+        Return None if the function does not reach `pc`.
         """
         if start not in self._functions:
             self._functions[start] = self._analyse(start)
@@ -234,7 +236,7 @@ class CodeAnalysis:
         return states
 
     def _successors(self, pc: int, before: FrameState) -> list[tuple[int, FrameState]]:
-        """Return the possible next instructions in the function, each with the state before it."""
+        """Return the possible next instructions of the function, each with the state before it."""
         insn = self.insn(pc)
         if insn is None:
             return []
@@ -271,21 +273,21 @@ def _after_call(before: FrameState, called: FrameState) -> FrameState:
 
 @dataclass(frozen=True, slots=True)
 class RawFrame:
-    """One physical frame: its PC and what is known about its registers."""
+    """One physical frame: its PC and the known values of its registers."""
 
     pc: int
-    """Next instruction of the frame; for a caller, the return address."""
+    """Address of the frame's next instruction; for a caller, the return address."""
     registers: tuple[int | None, ...]
     entry: int | None
     """W15 at the function's first instruction. The return address lies in the four bytes below it."""
     start: int | None
-    """First instruction of the function."""
+    """Address of the function's first instruction."""
     is_handler: bool = False
-    """Whether an exception entered this frame: the next outer frame was interrupted and made no call."""
+    """Whether an exception entered this frame, so that the next outer frame was interrupted and made no call."""
 
 
 class Unwinder:
-    """Unwinds call stacks of one program.
+    """Call stack unwinder of one program.
 
     `function_start(pc)` returns the first instruction of the function that contains `pc`, None outside the program.
     `handlers` are the entries of exception handlers.
@@ -324,24 +326,27 @@ class Unwinder:
         return frames
 
     def _is_plausible(self, pc: int, called: bool) -> bool:
-        """Whether `pc` can be a return address, or for an interrupted frame any instruction of the program."""
+        """Whether `pc` can be a return address.
+
+        For an interrupted frame, any instruction of the program is plausible.
+        """
         return _call_before(self._code, pc) is not None if called else self._function_start(pc) is not None
 
     def _state_at(self, pc: int, called: bool) -> tuple[int | None, FrameState | None]:
-        """Return the start of the function that contains `pc` and the state before `pc`."""
+        """Return the start of the function that contains `pc`, and the state before `pc`."""
         call = _call_before(self._code, pc) if called else None
         start = self._function_start(pc if call is None else call)
         if start is None:
             return None, None
         state = self._code.state_before(start, pc)
-        if state is None and call is not None:  # a call that never returns ends the function
+        if state is None and call is not None:  # the analysis ends a function at a call that never returns
             before = self._code.state_before(start, call)
             state = _after_call(before, before) if before is not None else None
         return start, state
 
 
 def _call_before(code: CodeAnalysis, pc: int) -> int | None:
-    """Return the address of the call that returns to `pc`, None if there is none."""
+    """Return the address of the call whose return address is `pc`, None if there is none."""
     for words in (2, 1):
         insn = code.insn(pc - 2 * words) if pc >= 2 * words else None
         if insn is not None and insn.words == words and insn.row.mnemonic in ("CALL", "RCALL"):
@@ -350,9 +355,9 @@ def _call_before(code: CodeAnalysis, pc: int) -> int | None:
 
 
 def _solve(state: FrameState, registers: tuple[int | None, ...], memory: Memory) -> dict[int, int]:
-    """Return the values of the bases, computed from the registers and memory of the frame.
+    """Return the values of the symbolic bases, computed from the frame's registers and memory.
 
-    The bases are the registers at function entry, by number, and W15 at merge points.
+    Bases are the registers at function entry, by number, and the values of W15 at merge points.
     """
     solved = {CONSTANT: 0}
     for number in (STACK_POINTER, *range(STACK_POINTER)):

@@ -1,4 +1,4 @@
-"""The CPU of one machine: all parts of `emu.dspic30f`, connected to the record, the event schedule and the bus."""
+"""The CPU of one machine: connects all parts of `emu.dspic30f` with the record, the event schedule and the bus."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from emu.system.record import Record
 
 
 class WRegisters:
-    """W0..W15 for tools and tests. A write counts as a word write by the program."""
+    """W0..W15 for tools and tests. Writing an element counts as a word write by the program."""
 
     def __init__(self, state: State) -> None:
         self._state: Final = state
@@ -39,7 +39,7 @@ class WRegisters:
 
 
 class Core:
-    """One CPU and its parts."""
+    """One CPU: its state, sequencer, exceptions and power saving."""
 
     def __init__(self, record: Record, events: Events, bus: Bus, program: ProgramMemory, chip: Chip) -> None:
         self.record: Final = record
@@ -57,6 +57,6 @@ class Core:
         self.sequencer: Final = Sequencer(self.state, events, program, self.exceptions, self.builder)
 
     def reset(self) -> None:
-        """Reset the core, after any cause of reset. SFRs have their reset values already."""
+        """Reset the core, after any cause of reset. The SFRs must already have their reset values."""
         self.state.reset()
         self.exceptions.forget()

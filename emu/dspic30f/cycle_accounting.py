@@ -1,8 +1,8 @@
 """Cycle accounting: cycles by instruction address and CPU priority, and a log of calls, interrupts and sleeps.
 
-Input: a wired core. Output: cells whose cycles add up to the cycles that passed, and log entries for a consumer.
-Native code accounts for itself (jit/translate/cycle_counters.py). This module wraps the sequencer, through which the
-plain engine runs entirely. A machine without accounting runs the unwrapped functions.
+Input: a connected core. Outputs: cells whose sum equals the cycles that passed, and log entries for a consumer.
+Native code does its own accounting (jit/translate/cycle_counters.py). For the plain engine, this module wraps the
+sequencer, which runs everything. A machine without accounting runs the unwrapped functions.
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ from emu.dspic30f.isa.flow import Call, Return
 from emu.dspic30f.state.state import STACK_POINTER
 
 LEVELS: Final = 16
-"""Number of CPU priorities, traps included (isa.md §14.1)."""
+"""Number of CPU priorities, including those of traps (isa.md §14.1)."""
 IDLE, LOG_COUNT, RETFIE_CELL, LOG = range(4)
-"""Words behind the cells: cycles in Idle and Sleep; number of log entries; address of the cell of the RETFIE that
-native code ran last; first log entry."""
+"""Indices of the words after the cells: cycles in Idle and Sleep; number of log entries; address of the cell of the
+RETFIE that native code ran last; first log entry."""
 ENTRY_WORDS: Final = 4
 """Words of a log entry:
 
@@ -38,28 +38,28 @@ ENTRY_WORDS: Final = 4
 CALLED, RETURNED, ENTERED, SLEPT, RESET = range(1, 6)
 """Kinds of log entries."""
 LONGEST_RUN: Final = 1 << 20
-"""Longest native run between two flushes of the log, in Tcy: a cycle makes at most one entry."""
+"""Maximum length in Tcy of a native run between two flushes of the log; each cycle adds at most one entry."""
 LOG_ROOM: Final = 1024
-"""Log entries of the sequencer after which the log is flushed."""
+"""Number of entries from the sequencer after which the log is flushed."""
 
 LogConsumer = Callable[[int, int], None]
-"""consumer(address, count): gets the host address and the number of log entries."""
+"""consumer(address, count): receives the host address and the number of log entries."""
 
 
 class CycleAccounting:
-    """Accounts for all cycles between `start` and `stop`. Without a consumer, log entries are dropped."""
+    """Accounts for all cycles between `start` and `stop`. Without a consumer, log entries are discarded."""
 
     def __init__(self, core: Core, consumer: LogConsumer | None = None) -> None:
         self._core: Final = core
         self._consumer: Final = consumer
         self.words: Final = core.chip.program["flash"].end // 2
-        """Cells of one CPU priority: one per program word of flash."""
+        """Number of cells per CPU priority: one for each program word of flash."""
         cells = LEVELS * self.words
         self._memory: Final = np.zeros(cells + LOG + ENTRY_WORDS * (LONGEST_RUN + 2 * LOG_ROOM), dtype=np.uint64)
         self.address: Final = int(self._memory.ctypes.data)
         """Host address of the cells."""
         self.tail: Final = 8 * cells
-        """Byte offset of the words behind the cells."""
+        """Byte offset of the words after the cells."""
         self._tail: Final = self._memory[cells:]
         self._undo: Final[list[Callable[[], None]]] = []
 
@@ -88,7 +88,7 @@ class CycleAccounting:
     # The sequencer
 
     def start(self) -> None:
-        """Account for everything that the sequencer runs from now on."""
+        """Start to account for all cycles that the sequencer runs."""
         sequencer = self._core.sequencer
         for owner, name, wrap in (
             (sequencer, "execute", self._count_instruction),
@@ -111,7 +111,7 @@ class CycleAccounting:
         self._memory[level * self.words + word] += np.uint64(cycles)
 
     def _log(self, kind: int, site: int, target: int, cycles: int = 0, level: int = 0, since: int = 0) -> None:
-        """Append a log entry with the present cycle and stack pointer."""
+        """Append a log entry with the current cycle and stack pointer."""
         state, entry = self._core.state, LOG + ENTRY_WORDS * int(self._tail[LOG_COUNT])
         stack = state.u16[STACK_POINTER]
         self._tail[entry : entry + ENTRY_WORDS] = [

@@ -1,4 +1,4 @@
-"""Engines: implementations of the instruction loop between two boundaries, with equal states and equal cycles."""
+"""Engines: implementations of the instruction loop between two boundaries. All give equal states and equal cycles."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from emu.dspic30f.core import Core
 from emu.system.native_handle import Native, Run
 
 NAMES: Final = ("auto", "jit", "plain")
-"""Names for `--engine`; `auto` is the fastest engine that the host supports."""
+"""Engine names for `--engine`; `auto` selects the fastest engine that the host supports."""
 
 
 class Engine(Protocol):
@@ -18,26 +18,36 @@ class Engine(Protocol):
     name: str
 
     def run(self, limit: int) -> None:
-        """Run at least one instruction, from PC on, as long as no boundary has work, no hooked PC is reached and the
-        cycle is below `limit`. Raises DeviceReset and Breakpoint as `Sequencer.execute` does."""
+        """Run at least one instruction, starting at PC.
+
+        Continue until a boundary has work, a hooked PC is reached or the cycle is `limit` or later. Raises DeviceReset
+        and Breakpoint as `Sequencer.execute` does.
+        """
 
     def natively(self, limit: int) -> bool:
-        """Run boundaries and instructions without Python as far as possible. Return False if the boundary at PC has
-        still to be done, or has to be done again."""
+        """Run boundaries and instructions without Python as far as possible.
+
+        Return False if the caller still has to perform the boundary at PC, or has to repeat it.
+        """
 
     def forget(self) -> None:
         """Discard translations because the set of hooked addresses has changed."""
 
     def pass_limits(self, period: int, last: int) -> None:
-        """Let native code pass limits without returning: it notes the cycle and continues to the next limit, `period`
-        cycles later and at most at `last`. 0 switches this off."""
+        """Let native code pass limits without returning.
+
+        It records the cycle of each limit and continues to the next one, `period` cycles later and at most at `last`.
+        A period of 0 disables this.
+        """
 
     def passed(self) -> list[int]:
-        """Return the first boundary, in Tcy, at or after each limit that was passed since the last call."""
+        """Return, for each limit passed since the last call, the first boundary (Tcy) at or after it."""
 
     def lend(self, run: Run) -> Native | None:
-        """Let `natively` call `run` instead of native code, except while cycles or host time are measured. Return the
-        addresses that `run` needs, or None for an engine without native code."""
+        """Make `natively` call `run` instead of native code, except while cycles or host time are measured.
+
+        Return the addresses that `run` needs, None for an engine without native code.
+        """
 
 
 class PlainEngine:
@@ -53,21 +63,21 @@ class PlainEngine:
         self._sequencer.execute()
 
     def natively(self, limit: int) -> bool:
-        """Return False: this engine has no native code."""
+        """Return False, because this engine has no native code."""
         return False
 
     def forget(self) -> None:
-        """Do nothing: this engine keeps no translations."""
+        """Do nothing, because this engine keeps no translations."""
 
     def pass_limits(self, period: int, last: int) -> None:
-        """Do nothing: this engine returns at every limit."""
+        """Do nothing, because this engine returns at every limit."""
 
     def passed(self) -> list[int]:
-        """Return an empty list: this engine passes no limit."""
+        """Return an empty list, because this engine passes no limits."""
         return []
 
     def lend(self, run: Run) -> None:
-        """Return None: this engine has no native code."""
+        """Return None, because this engine has no native code."""
 
 
 def make_engine(name: str, core: Core, pc_hooks: Mapping[int, Any]) -> Engine:

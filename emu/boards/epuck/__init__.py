@@ -1,4 +1,4 @@
-"""The e-puck around its microcontroller. `CONFIG` is data; the working board is `emu.boards.epuck.board.Epuck`."""
+"""The e-puck's circuits around its microcontroller. The board to load is `emu.boards.epuck.board.Epuck`."""
 
 from emu.boards.epuck.config import CONFIG
 

@@ -20,19 +20,19 @@ from emu.peripherals import Peripherals
 SENSORS: Final = 8
 _FIRST_CHANNEL: Final = 8
 PULSE_PINS: Final = ("RF7", "RF8", "RG0", "RG1")
-"""Line n lights the emitters of sensors n and n + 4 (epuck.md §2)."""
+"""Pins of the infrared pulse lines. Line n lights the emitters of sensors n and n + 4 (epuck.md §2)."""
 TAU_SECONDS: Final = 60e-6
-"""Time constant of the receiver behind its emitter (epuck.md §10)."""
+"""Time constant of an infrared receiver's response to its emitter, in s (epuck.md §10)."""
 _SETTLED: Final = 9.2
-"""Time constants after which the largest reflection has settled to within half a count."""
+"""Settling time, in time constants: the largest reflection is then within half a count of its final value."""
 _DECAYED: Final = 45.0
-"""Time constants after which a switch no longer affects a sum of counts: 4095 e^-45 is 1e-16."""
+"""Time constants after which a switch of the emitter no longer affects a level: 4095 e^-45 is 1e-16."""
 _FASTEST_HZ: Final = 30e6
-"""The fastest clock (chip §3)."""
+"""Frequency in Hz of the fastest instruction clock (chip §3)."""
 AMBIENT: Final = 3800  # UNVERIFIED: 3500 to 4000 indoors (epuck.md §5)
 
 NOISE_COUNTS, NOISE_SHARE = 5.0, 0.03
-"""Standard deviation in counts and as a share of the reflection, whichever is larger (epuck.md §5)."""
+"""Standard deviation of sensor noise, in counts and as a share of the reflection; the larger applies (epuck.md §5)."""
 
 RESPONSE: Final = (  # distance in mm, reflection in counts: OpenSwarm's table (epuck.md §5)
     (0.0, 3788.0), (10.0, 3548.0), (20.0, 857.0), (30.0, 474.0), (40.0, 296.0), (50.0, 205.0),
@@ -42,7 +42,7 @@ RESPONSE: Final = (  # distance in mm, reflection in counts: OpenSwarm's table (
 
 _NEAR: Final = tuple(distance for distance, _ in RESPONSE)
 _SLOPE: Final = tuple(math.log(low / high) / (far - near) for (near, high), (far, low) in pairwise(RESPONSE))
-"""Slope of the logarithm per mm, after each point of the table."""
+"""Slope of the logarithm of the reflection per mm, after each point of the table."""
 
 
 def reflection_at(distance_mm: float) -> float:
@@ -56,7 +56,7 @@ def reflection_at(distance_mm: float) -> float:
 
 
 class _Ring(Structure):
-    """`struct ring` of ring.c."""
+    """Mirror of `struct ring` in ring.c."""
 
     _fields_ = [
         *((name, c_int64) for name in ("ambient", "reflection", "lit", "since", "from", "tau", "seed", "strength")),
@@ -86,11 +86,11 @@ class Infrared(BoardPart):
         self.ambient: Final = self.array("ambient", "H", SENSORS)
         """Raw counts with the emitter off, per sensor; more light gives fewer counts."""
         self.reflection: Final = self.array("reflection", "H", SENSORS)
-        """Counts by which the sensor's own emitter lowers them once settled, per sensor."""
+        """Reflection per sensor: counts by which its own lit emitter lowers the level once settled."""
         self._lit: Final = self.array("lit", "B", len(PULSE_PINS))
         self._since: Final = self.array("since", "Q", len(PULSE_PINS))
         self._from: Final = self.array("from", "H", len(PULSE_PINS))
-        """Settled share at the last switch, in 1/65535."""
+        """Settled share of each line at its last switch, in 1/65535."""
         self._tau: Final = self.cell("tau", "Q")
         """`tau_seconds` in Tcy, stored as the bits of a double."""
         own = ("ir.ambient", "ir.reflection", "ir.lit", "ir.since", "ir.from", "ir.tau")
@@ -127,10 +127,10 @@ class Infrared(BoardPart):
         (self._tau.value,) = struct.unpack("<Q", struct.pack("<d", self._tau_seconds * self.chip.fcy))
 
     def set_external_light(self, prepare: Callable[[int], None], light: int, data: int) -> None:
-        """Subtract external light: native code double light(data, sensor, cycle) returns the counts to subtract.
+        """Subtract external light from the sensors' levels.
 
-        Each conversion first calls `prepare(cycle)`, which may set `ambient` and `reflection`, unless
-        `set_native_ready(True)` is in force.
+        The native function double light(data, sensor, cycle) returns the counts to subtract. Before each conversion,
+        `prepare(cycle)` is called and may set `ambient` and `reflection`, unless
         """
         self._prepare = prepare
         self._ring.outside, self._ring.light = light, data
@@ -138,7 +138,7 @@ class Infrared(BoardPart):
         self._predict_all()
 
     def set_native_ready(self, is_ready: bool) -> None:
-        """Declare whether native code may compute levels without `prepare`, until the next call."""
+        """Set whether native code may compute levels without calling `prepare`; holds until the next call."""
         if is_ready == self._is_ready:
             return
         self._is_ready = is_ready
@@ -147,7 +147,9 @@ class Infrared(BoardPart):
             self.chip.adc.source.set_native(_FIRST_CHANNEL + sensor, source, code, self._ring_at)
 
     def start_segment(self, cycle: int) -> None:
-        """Start a new segment: values set from now on hold from `cycle` on; earlier conversions use the current ones.
+        """Start a new segment at `cycle`: values set from now on apply to later conversions only.
+
+        Earlier conversions use the values that were current before the call.
 
         All conversions before the previous segment's start must be complete.
         """
@@ -156,11 +158,14 @@ class Infrared(BoardPart):
         ring.past_ambient[:], ring.past_reflection[:] = self.ambient, self.reflection
 
     def set_distance(self, sensor: int, millimetres: float, share: float = 1.0) -> None:
-        """Place a surface in front of a sensor (0..7); `share` scales for colour and angle (0..1, black about 0.2)."""
+        """Place a surface in front of a sensor (0..7).
+
+        `share` scales the reflection for colour and angle (0..1, black about 0.2).
+        """
         self.set_distances([(sensor, millimetres, share)])
 
     def set_distances(self, surfaces: Iterable[tuple[int, float, float]]) -> None:
-        """Place several surfaces, each (sensor, millimetres, share); see `set_distance`."""
+        """Place several surfaces, each given as (sensor, millimetres, share); see `set_distance`."""
         self.chip.adc.catch_up(self.now)
         for sensor, millimetres, share in surfaces:
             self.reflection[sensor] = round(reflection_at(millimetres) * share)
@@ -194,7 +199,7 @@ class Infrared(BoardPart):
             self._predict(line)
 
     def _predict(self, line: int) -> None:
-        """Predict the levels of a line's receivers once settled; without noise they are constant."""
+        """Predict the settled levels of a line's receivers, which are constant without noise."""
         for sensor in (line, line + len(PULSE_PINS)):
             raw = self.ambient[sensor] - self.reflection[sensor] * bool(self._lit[line])
             level = None if self._noise.strength or self._prepare else min(max(raw, 0), 4095) << 4
@@ -242,7 +247,10 @@ class Microphones(BoardPart):
         noise.on_change.append(self._predict)
 
     def play(self, microphone: int, sound: Callable[[int], float] | None) -> None:
-        """Play sound(cycle), in counts around 0, at microphone 0..2 (right, left, back); None means silence."""
+        """Play a sound at microphone 0..2 (right, left, back); None means silence.
+
+        `sound(cycle)` returns the sound's level in counts around 0.
+        """
         self.chip.adc.catch_up(self.now)
         channel = self._FIRST + microphone
         loud = partial(self._level, channel, sound)
@@ -250,7 +258,7 @@ class Microphones(BoardPart):
         self._predict()
 
     def _predict(self) -> None:
-        """Predict the level of silent microphones, which is constant without noise."""
+        """Predict the levels of silent microphones, which are constant without noise."""
         self.chip.adc.catch_up(self.now)
         for microphone, quiet in enumerate(self._quiet):
             level = None if self._noise.strength else self.ZERO << 4

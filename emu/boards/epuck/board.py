@@ -1,4 +1,4 @@
-"""The e-puck: its parts, its stimulus player, and its inputs and outputs as arrays."""
+"""The complete e-puck: hardware, stimulus player, and array access to its inputs and outputs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The e-puck as data: its chip, its crystal, and the configuration words for firmware without any."""
+"""The e-puck as data: its chip, its crystal, and configuration words for firmware that has none."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Final
 CHIP: Final = "dsPIC30F6014A"
 
 CRYSTAL_HZ: Final = 7_372_800
-"""Crystal at OSC1 in Hz (dspic30f6014a.md §3)."""
+"""Frequency in Hz of the crystal at OSC1 (dspic30f6014a.md §3)."""
 
 CONFIG: Final[Mapping[str, int]] = MappingProxyType(
     {
@@ -19,5 +19,8 @@ CONFIG: Final[Mapping[str, int]] = MappingProxyType(
         "FGS": 0xFFFF,  # no code protection
     }
 )
-"""What the robot's library and boot loader program (dspic30f6014a.md §2). Firmware images often omit these words,
-because a boot loader cannot write them; an erased FWDT would enable the watchdog."""
+"""Configuration words that the robot's library and boot loader program (dspic30f6014a.md §2).
+
+Firmware images often omit these words, because a boot loader cannot write them. An erased FWDT would enable the
+watchdog.
+"""

@@ -21,33 +21,36 @@ from emu.boards.epuck.hardware import EpuckHardware
 from emu.boards.epuck.simple import LED_PINS
 
 LEFT, RIGHT = 0, 1
-"""Index of the wheels."""
+"""Indices of the wheels."""
 
 
 class Outputs:
-    """Outputs of the robot. `update` fills the arrays in place."""
+    """The robot's outputs as arrays, which `update` fills in place."""
 
     def __init__(self, board: EpuckHardware) -> None:
         self._board: Final = board
         self.steps: Final[NDArray[np.int64]] = np.zeros(2, np.int64)
         """Motor steps since power-on, left and right, forward positive; 1000 make one turn (epuck.md §3)."""
         self.lost: Final[NDArray[np.int64]] = np.zeros(2, np.int64)
-        """Steps lost by jumps of two phases."""
+        """Steps lost because the phase jumped by two."""
         self.illegal: Final[NDArray[np.int64]] = np.zeros(2, np.int64)
-        """Coil patterns that are not a phase."""
+        """Coil patterns that are not a phase and were constant for 1 us or more."""
         self.coil_cycles: Final[NDArray[np.int64]] = np.zeros(2, np.int64)
-        """Tcy during which coils were on."""
+        """Tcy during which at least one coil was on."""
         self.leds: Final[NDArray[np.bool_]] = np.zeros(len(LED_PINS), np.bool_)
-        """Ring LEDs 0-7, front, body."""
+        """Whether each LED is lit: ring LEDs 0-7, front, body."""
         self.emitters: Final[NDArray[np.bool_]] = np.zeros(len(PULSE_PINS), np.bool_)
-        """Infrared pulse lines; line n lights the emitters of sensors n and n + 4."""
+        """Whether each infrared pulse line is on; line n lights the emitters of sensors n and n + 4."""
         self.camera_running = False
         """Whether the camera is plugged in and not in reset."""
         self.speaker_on = False
         self._levels = b""
 
     def update(self) -> None:
-        """Read the current state. Complete all conversions that sampled earlier, so later inputs cannot affect them."""
+        """Read the current outputs.
+
+        Complete all conversions that sampled earlier, so that later inputs cannot affect them.
+        """
         board = self._board
         board.chip.adc.catch_up(board.chip.adc.now)
         left, right = board.motors.left.counts(), board.motors.right.counts()
@@ -65,16 +68,16 @@ class Outputs:
 
 
 class Inputs:
-    """Inputs of the robot. Write the arrays and attributes, then call `apply`."""
+    """The robot's inputs. Write the arrays and attributes, then call `apply`."""
 
     def __init__(self, board: EpuckHardware) -> None:
         self._board: Final = board
         self.distance: Final[NDArray[np.float64]] = np.full(SENSORS, np.inf)
-        """Distance in mm from each infrared sensor to the nearest surface; inf = none."""
+        """Distance in mm from each infrared sensor to the nearest surface; inf means no surface."""
         self.share: Final[NDArray[np.float64]] = np.ones(SENSORS)
-        """Reflection relative to a white perpendicular surface, 0..1."""
+        """Reflection relative to a white surface that is perpendicular to the beam, 0..1."""
         self.ambient: Final[NDArray[np.int64]] = np.array(board.ir.ambient, np.int64)
-        """Raw counts 0..4095 with the emitter off; dark is high."""
+        """Ambient light in raw counts 0..4095, with the emitter off; dark is high."""
         self.acceleration: Final[NDArray[np.float64]] = np.array([0.0, 0.0, 1.0])
         """Acceleration in g; see `Accelerometer.set_g`."""
         self.selector = board.selector.position
@@ -84,7 +87,7 @@ class Inputs:
         self._surfaces = self._light = self._motion = b""
 
     def apply(self) -> None:
-        """Apply all changes since the last call from the current cycle on.
+        """Apply all changes since the last call, effective from the current cycle on.
 
         Raises ValueError for a value out of range.
         """

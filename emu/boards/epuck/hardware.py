@@ -15,7 +15,7 @@ from emu.peripherals import Peripherals
 
 
 class EpuckHardware:
-    """An e-puck of hardware version 1.1 or 1.2: analog accelerometer, nothing at I2C address 0x3C.
+    """An e-puck of hardware version 1.1 or 1.2: analog accelerometer, no device at I2C address 0x3C.
 
     `chip` is `machine.peripherals`. `camera` names the sensor (PO3030K, PO6030K, PO8030D), None means no camera. `seed`
     determines noise and radio losses, which are off by default (`noise.strength`, `bluetooth.loss`). Raises ValueError

@@ -7,12 +7,12 @@ typedef int64_t i64;
 
 enum { SETTLE = 15, NOWHERE = 4, ILLEGAL = -1, ROOM = 4096 };
 
-// State of a motor in the machine's record.
+// State of a motor in the machine's record. `nibble` is the current coil pattern, `since` its first cycle.
 struct state {
     i64 steps, lost, illegals, index, nibble, since, settled, on_time;
 };
 
-// Step history: the value of `steps` by cycle. `before`: its value before the first entry.
+// Step history: values of `steps` with their cycles. `before` is the value before the first entry.
 struct history {
     i64 before, count, cycle[ROOM], steps[ROOM];
 };
@@ -20,13 +20,13 @@ struct history {
 struct motor {
     struct state *state;
     i64 shift, forward;
-    struct history *history; // null: no history is kept
+    struct history *history; // null if no history is recorded
 };
 
-// Phase index of a nibble; NOWHERE for all coils off, ILLEGAL for a pattern that is not a phase.
+// Phase index of each coil pattern; NOWHERE if all coils are off, ILLEGAL for a pattern that is not a phase.
 static const int8_t meaning[16] = {NOWHERE, -1, -1, -1, -1, 2, 1, -1, -1, 3, 0, -1, -1, -1, -1, -1};
 
-// Count the present pattern, which has been constant long enough.
+// Update the counters for the current coil pattern, which has been constant for SETTLE Tcy.
 static void settle(const struct motor *m)
 {
     struct state *s = m->state;
@@ -54,14 +54,14 @@ static void settle(const struct motor *m)
     h->steps[h->count++] = s->steps;
 }
 
-// Count the present pattern if it has been constant long enough by cycle `now`.
+// Update the counters for the current coil pattern if it has been constant for SETTLE Tcy at cycle `now`.
 void settle_by(const struct motor *m, i64 now)
 {
     if (!m->state->settled && now - m->state->since >= SETTLE)
         settle(m);
 }
 
-// Record that the port has `levels` from `cycle` on.
+// Record that the port's pins have `levels` from `cycle` on.
 void change(const struct motor *m, i64 cycle, i64 levels)
 {
     struct state *s = m->state;
@@ -73,7 +73,7 @@ void change(const struct motor *m, i64 cycle, i64 levels)
     s->settled = 0;
 }
 
-// Process changes of ports in order, each cycle << 24 | port << 16 | levels.
+// Process port changes in order; each is encoded as cycle << 24 | port << 16 | levels.
 void decode(const struct motor *m, const uint64_t *changes, i64 count, i64 port)
 {
     for (i64 i = 0; i < count; i++)

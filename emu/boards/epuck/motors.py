@@ -1,6 +1,6 @@
 """The two stepper motors (epuck.md §3): phases to steps, lost and illegal sequences, coil time.
 
-Software writes the four phase bits one after the other, so intermediate nibbles appear for a few cycles. A nibble
+Software writes the four phase bits one after the other, so intermediate patterns appear for a few cycles. A pattern
 counts once it has been constant for `SETTLE` Tcy. No event is posted for that: the next pattern or read evaluates it.
 """
 
@@ -19,16 +19,16 @@ from emu.native_library import ADDRESS, INT, address_of, functions
 from emu.peripherals import Peripherals
 
 PORT: Final = 3
-"""Port D: left motor on bits 3:0, right motor on bits 7:4 (epuck.md §2)."""
+"""Port of the motors: left motor on bits 3:0, right motor on bits 7:4 of port D (epuck.md §2)."""
 STEPS_PER_TURN: Final = 1000
-"""Motor steps per turn of the wheel: 20 steps, gear 50:1 (epuck.md §3)."""
+"""Motor steps per turn of the wheel: 20 steps per turn of the motor, gear 50:1 (epuck.md §3)."""
 MM_PER_STEP: Final = 0.128
 """Travel of the wheel's rim per step in mm (epuck.md §3)."""
 
 _NOWHERE: Final = 4
-"""Index before the first pattern."""
+"""Phase index before the first coil pattern."""
 _STEPS, _LOST, _ILLEGALS, _INDEX, _NIBBLE, _SINCE, _SETTLED, _ON_TIME = range(8)
-"""Indices in `motor.<side>.state`; twin of `struct state` in motors.c."""
+"""Indices of members in `motor.<side>.state`; twin of `struct state` in motors.c."""
 
 
 class _History(Structure):
@@ -57,7 +57,7 @@ def _code() -> dict[str, Callable[..., int]]:
 class Stepper(BoardPart):
     """A stepper motor. `steps` counts full steps, forward positive.
 
-    The state is an array of signed 64-bit numbers in the record, which the decoder in motors.c reads and writes.
+    The state is an array of signed 64-bit numbers in the record. The decoder in motors.c reads and writes it.
     """
 
     def __init__(self, name: str, chip: Peripherals, shift: int, forward: int) -> None:
@@ -93,7 +93,7 @@ class Stepper(BoardPart):
 
     @property
     def illegal(self) -> int:
-        """Patterns that are not a phase and were constant for 1 us or more."""
+        """Coil patterns that are not a phase and were constant for 1 us or more."""
         self._catch_up()
         return self._state[_ILLEGALS]
 
@@ -112,12 +112,13 @@ class Stepper(BoardPart):
         return state[_STEPS], state[_LOST], state[_ILLEGALS], coil_cycles
 
     def listen(self, on_step: Callable[[int, int], None]) -> None:
-        """Call on_step(cycle, direction) for each step; `cycle` is when its pattern appeared."""
+        """Call on_step(cycle, direction) for each step; `cycle` is the start of the step's coil pattern."""
         self._on_step = on_step
-        self.pins.watch_port(PORT, 0xF << self._shift, lambda *_edge: None)  # an eager watcher: every edge calls Python
+        # an eager watcher makes every edge call Python
+        self.pins.watch_port(PORT, 0xF << self._shift, lambda *_edge: None)
 
     def record_history(self) -> None:
-        """Record the cycles of steps from now on, for `Motors.steps_by`."""
+        """Start to record the cycle of each step, for `Motors.steps_by`."""
         self._catch_up()
         self._history = _History(self._state[_STEPS], 0)
         self._motor.history = pointer(self._history)
@@ -136,14 +137,14 @@ class Stepper(BoardPart):
         self.settled_steps(self.now)
 
     def settled_steps(self, now: int) -> int:
-        """Return the steps up to cycle `now`; the pin changes must be flushed."""
+        """Return the steps settled by cycle `now`. The recorded pin changes must already be processed."""
         state = self._state
         if not state[_SETTLED]:
             self._run_and_notify(self._settle_by, now)
         return state[_STEPS]
 
     def _changed(self, cycle: int, _changed: int, levels: int) -> None:
-        """Handle a new pattern, which completes the previous one."""
+        """Handle a new coil pattern, which ends the previous one."""
         self._run_and_notify(self._change, cycle, levels)
 
     @property
@@ -152,7 +153,7 @@ class Stepper(BoardPart):
         return self._on_step is not None
 
     def _run_and_notify(self, work: Callable[..., int], *arguments: int) -> None:
-        """Run a decoder function and call the listener if it has counted a step."""
+        """Call a decoder function, then call the listener if the function has counted a step."""
         state = self._state
         before, since = state[_STEPS], state[_SINCE]
         work(self.address, *arguments)
@@ -160,12 +161,12 @@ class Stepper(BoardPart):
             self._on_step(since, state[_STEPS] - before)
 
     def _read(self, changes: int, count: int) -> None:
-        """Process the ring; it is only used while no step listener exists."""
+        """Decode the ring of pin changes, which is only used while no step listener exists."""
         self._decode(self.address, changes, count, PORT)
 
 
 class Motors:
-    """Both motors. Forward: the left phase index falls, the right one rises (epuck.md §3)."""
+    """Both motors. For forward motion the left phase index falls and the right one rises (epuck.md §3)."""
 
     def __init__(self, chip: Peripherals) -> None:
         self.left: Final = Stepper("motor.left", chip, 0, -1)
@@ -183,13 +184,13 @@ class Motors:
         return left.settled_steps(now), self.right.settled_steps(now)
 
     def record_history(self) -> None:
-        """Record the cycles of both motors' steps from now on."""
+        """Start to record the cycles of both motors' steps."""
         self.left.record_history()
         self.right.record_history()
 
     @contextmanager
     def history_paused(self) -> Iterator[None]:
-        """Suspend the step history inside the block, for a replay of steps that are already recorded."""
+        """Suspend the step history inside the block, for a replay whose steps are already recorded."""
         with self.left.history_paused(), self.right.history_paused():
             yield
 
@@ -199,7 +200,7 @@ class Motors:
         return address_of(self._both_by)
 
     def native_pair(self) -> int:
-        """Return the host address of `struct pair` for native code, 0 while a step listener exists.
+        """Return the host address of `struct pair` for native code; 0 while a step listener exists.
 
         The struct is up to date until a pin watcher is added or removed.
         """

@@ -1,4 +1,4 @@
-"""Report of the robot's visible and audible outputs, as lines of text."""
+"""Observer of the robot's visible and audible outputs, which reports changes as lines of text."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from emu.peripherals.uart.uart import Uart
 
 TOPICS: Final = ("leds", "motors", "uart1", "uart2", "sound")
 _PAUSE_SECONDS: Final = 0.1
-"""Motors and sound are reported at most this often."""
+"""Minimum time in s between two reports of motors or sound."""
 
 
 class RobotObserver:
-    """Writes a line with its time when an observed output changes. `write` gets lines without newline.
+    """Writes a line with the time when an observed output changes. `write` receives lines without newline.
 
     Raises ValueError for a topic that is not one of TOPICS.
     """
@@ -48,14 +48,14 @@ class RobotObserver:
             motor.listen(self._stepped)
 
     def _stepped(self, cycle: int, _direction: int) -> None:
-        """Report both step counts after a step; the count includes it already."""
+        """Report both step counts after a step; they already include the step."""
         if cycle < self._next_report:
             return
         second = self._board.chip.fcy
         last, self._last_report = self._last_report, cycle
         self._next_report = cycle + round(
             _PAUSE_SECONDS * second
-        )  # set first: reading the other motor may call this method
+        )  # set before the other motor is read, because that may call this method
         steps = [self._board.motors.left.steps, self._board.motors.right.steps]
         text = f"motors {steps[0]} {steps[1]} steps"
         if last is not None:

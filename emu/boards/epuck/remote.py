@@ -1,4 +1,4 @@
-"""The infrared remote control (epuck.md §6): RC-5 frames on RF6, idle high, low while the carrier is received."""
+"""Infrared remote control (epuck.md §6): RC-5 frames on RF6, which is high when idle and low during the carrier."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ from emu.system.events import NEVER
 
 PIN: Final = "RF6"
 HALF_BIT_SECONDS: Final = 0.889e-3
-"""Half of a Manchester bit of 1.778 ms (epuck.md §6)."""
+"""Duration in s of half a Manchester bit, whose length is 1.778 ms (epuck.md §6)."""
 REPEAT_SECONDS: Final = 113.8e-3
 _BITS: Final = 14
 _WAITING: Final = 64
-"""Capacity of the frame queue."""
+"""Capacity of the frame queue, in frames."""
 
 KEYS: Final = {"standby": 12, "swap": 34, "sleep": 42, "ok": 53}
-"""Command codes the demonstration programs use (openswarm-original.md §5.6)."""
+"""RC-5 command codes that the demonstration programs use (openswarm-original.md §5.6)."""
 
 
 class Remote(BoardPart):
-    """The remote control. Frames are queued; snapshots contain the queue and the frame being sent."""
+    """The infrared remote control. Snapshots contain its frame queue and the frame that it is sending."""
 
     def __init__(self, chip: Peripherals) -> None:
         super().__init__("remote", chip)
@@ -38,7 +38,9 @@ class Remote(BoardPart):
         self.pins.set(PIN, 1)
 
     def press(self, command: int | str, address: int = 0, cycle: int | None = None, repeat: int = 1) -> None:
-        """Send a command (0..63, or a name of `KEYS`) to a device address (0..31), `repeat` frames of one key press.
+        """Queue `repeat` frames of one key press.
+
+        `command` is 0..63 or a name of `KEYS`, `address` a device address, 0..31.
 
         The first frame begins at `cycle` (default: now) or after the previous frame. Raises ValueError for numbers out
         of range or more than 64 queued frames, KeyError for an unknown name.
@@ -68,7 +70,7 @@ class Remote(BoardPart):
             self.events.set(self._edge, self._start.value)
 
     def _next_half(self, due: int) -> None:
-        """Output one half bit: a 1 is high then low, a 0 low then high (the carrier pulls the pin low)."""
+        """Output one half bit. A 1 is high, then low; a 0 is low, then high. The carrier pulls the pin low."""
         half = self._half.value
         if half == 2 * _BITS:
             self.pins.set(PIN, 1, due)

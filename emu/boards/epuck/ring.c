@@ -1,5 +1,5 @@
-// Levels of the eight infrared sensors (epuck.md §5, §10): ambient light, less the own emitter's reflection times the
-// settled share, less external light, plus noise. Levels are in the unit of the ADC: counts << 4.
+// Levels of the eight infrared sensors (epuck.md §5, §10): ambient light, minus the own emitter's reflection times the
+// settled share, minus external light, plus noise. Levels are in the unit of the ADC: counts << 4.
 
 #include <stdint.h>
 
@@ -15,7 +15,7 @@ static const f64 ROOT_3 = 1.73205080756887729353;
 
 struct light; // defined by the provider of the external light
 
-// The first eight members are byte offsets in the machine's record. `past_*` hold before cycle `begin`.
+// The first eight members are byte offsets in the machine's record. `past_*` apply before cycle `begin`.
 struct ring {
     i64 ambient, reflection, lit, since, from, tau, seed, strength;
     f64 decayed; // Tcy after which a switch has no effect, at any clock
@@ -26,7 +26,7 @@ struct ring {
     const struct light *light;
 };
 
-// Settled share of a line's receivers, 0 to 1.
+// Settled share of a line's receivers at a cycle, 0 to 1.
 f64 settled(const uint8_t *record, const struct ring *r, i64 line, i64 cycle)
 {
     f64 target = record[r->lit + line] ? 1 : 0, tau = *(const f64 *)(record + r->tau);
@@ -37,7 +37,7 @@ f64 settled(const uint8_t *record, const struct ring *r, i64 line, i64 cycle)
     return target + (start - target) * exp((f64)(age > 0 ? -age : 0) / tau);
 }
 
-// Noise with a standard deviation, on a channel in a cycle; equal to emu/boards/noise.py.
+// Noise of a channel at a cycle with a standard deviation; equal to emu/boards/noise.py.
 static f64 noise(const uint8_t *record, const struct ring *r, i64 channel, i64 cycle, f64 deviation)
 {
     u64 strength = *(const u64 *)(record + r->strength);
@@ -51,7 +51,7 @@ static f64 noise(const uint8_t *record, const struct ring *r, i64 channel, i64 c
     return ((f64)sum / 65536.0 - 2) * ROOT_3 * deviation * ((f64)strength / 65536.0);
 }
 
-// Level of an ADC channel in a cycle.
+// Level of an ADC channel at a cycle.
 i64 level(const uint8_t *record, const struct ring *r, i64 channel, i64 cycle)
 {
     i64 sensor = channel - FIRST_CHANNEL, is_past = cycle < r->begin;

@@ -1,4 +1,4 @@
-"""LEDs, selector, battery, codec and Bluetooth (epuck.md §2, §6)."""
+"""Simple parts of the e-puck: LEDs, selector, battery, codec and Bluetooth (epuck.md §2, §6)."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ LED_PINS: Final = {
     "front": "RC1",
     "body": "RC2",
 }
-"""LED0 is in front, the ring goes clockwise seen from above (epuck.md §2)."""
+"""Pin of each LED. LED0 is at the front; the ring is numbered clockwise as seen from above (epuck.md §2)."""
 
 
 class Leds(BoardPart):
-    """Ten LEDs, on while their pin is driven high."""
+    """Ten LEDs. An LED is on while its pin is driven high."""
 
     def __init__(self, chip: Peripherals) -> None:
         super().__init__("leds", chip)
@@ -77,7 +77,10 @@ class Selector(BoardPart):
 
 
 class Battery(BoardPart):
-    """BATT_LOW on RF1: 1 = ok, 0 = below 3.4 V (epuck.md §2). On hardware 1.3 AN7 measures the voltage."""
+    """Battery and its comparator BATT_LOW on RF1: 1 = ok, 0 = below 3.4 V (epuck.md §2).
+
+    On hardware 1.3, AN7 measures the voltage.
+    """
 
     LOW_VOLTS: Final = 3.4
     _CHANNEL: Final = 7
@@ -93,7 +96,7 @@ class Battery(BoardPart):
 
     @property
     def volts(self) -> float:
-        """Battery voltage, 3.0 to 4.2 V in use."""
+        """Battery voltage in V; 3.0 to 4.2 in normal use."""
         return self._millivolts.value / 1000
 
     @volts.setter
@@ -121,9 +124,9 @@ class Codec(BoardPart):
         self._last: Final = self.cell("last", "H")
         self._control_next: Final = self.cell("control_next", "B")
         self.registers: Final = self.array("registers", "B", self._REGISTERS)
-        """Codec registers as written by control words."""
+        """Values of the codec registers, as written by control words."""
         self.on_sample: Callable[[int, int], None] | None = None
-        """on_sample(sample, cycle): called with each sample, -32768..32767."""
+        """on_sample(sample, cycle): called for each sample, -32768..32767."""
         assert chip.dci is not None
         chip.dci.on_word = self._accept_word
         chip.dci.source = lambda _slot, _cycle: 0
@@ -137,12 +140,12 @@ class Codec(BoardPart):
 
     @property
     def words(self) -> int:
-        """Words accepted while out of reset."""
+        """Number of words accepted outside reset."""
         return self._words.value
 
     @property
     def last(self) -> int:
-        """The newest word."""
+        """The last word accepted."""
         return self._last.value
 
     def _accept_word(self, word: int, _slot: int, cycle: int) -> None:
@@ -166,7 +169,9 @@ class Codec(BoardPart):
 
 
 class Bluetooth(BoardPart):
-    """Bluetooth link: UART1 as a byte pipe to a computer. Bytes are lost while the link is down, or at random (seeded).
+    """Bluetooth link that carries the bytes of UART1 to and from a computer.
+
+    Bytes are lost while the link is down, or at random (seeded).
 
     It has the external interface of a `Uart`: `on_byte`, `listen` and `feed`.
     """
@@ -176,11 +181,11 @@ class Bluetooth(BoardPart):
         self._uart: Final = chip.uart[1]
         self._uart.listen(self._from_robot, part=True, lazy=True)
         self._remove_listener: Callable[[], None] | None = None
-        """Removes the eager UART listener that exists while the link has an eager listener."""
+        """Removes the eager UART listener, which exists only while the link has an eager listener."""
         self.loss = loss
-        """Probability that a byte is lost, each way, 0..1."""
+        """Probability that a byte is lost, 0..1, the same in both directions."""
         self.dropouts: Final[list[tuple[int, int]]] = []
-        """Half-open ranges of cycles in which all bytes are lost."""
+        """Half-open cycle ranges in which all bytes are lost."""
         self._listeners: Final[Listeners[[int, int]]] = Listeners(self.events, self._urgency_changed)
         self._down: Final = self.cell("down", "B")
         self._random: Final = self.cell("random", "Q", seed * 2 + 1 & _ONES)
@@ -202,7 +207,9 @@ class Bluetooth(BoardPart):
         return self._lost.value
 
     def listen(self, listener: Callable[[int, int], object], *, lazy: bool = False) -> Callable[[], None]:
-        """Call listener(byte, start_cycle) for each byte that reaches the computer. Return a function that removes it.
+        """Call listener(byte, start_cycle) for each byte that reaches the computer.
+
+        Return a function that removes the listener.
 
         `lazy`: see `Uart.listen`.
         """
@@ -223,7 +230,7 @@ class Bluetooth(BoardPart):
         self._listeners.assigned = listener
 
     def feed(self, data: bytes | Iterable[int], cycle: int | None = None, *, errors: int = 0) -> None:
-        """Send bytes from the computer; see `Uart.feed` for `cycle` and `errors`."""
+        """Send bytes from the computer to the robot; see `Uart.feed` for `cycle` and `errors`."""
         at = self.now if cycle is None else cycle
         self._uart.deliver_sent()
         self._uart.feed([byte for byte in data if not self._drops(at)], cycle, errors=errors)

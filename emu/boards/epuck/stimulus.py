@@ -11,13 +11,13 @@
     3.5s    uart1     "x" framing     the same with a broken stop bit; also parity, break
     4.0s    pin       RF6 0           any input pin
     5.0s    camera    unplug          or: plug
-    5.0s    picture   room.png        what the camera sees; paths are relative to the working folder
+     5.0s    picture   room.png        scene of the camera; paths are relative to the working folder
     6.0s    lamp      0.5             brightness of the scene, 1 = as in the picture
     7.0s    bluetooth down            or: up
-    8.0s    i2c       sda 5           SDA is held low for 5 clocks (0: until `free`); or: scl, free
-    0       noise     1               sensor noise as in the reference; 0 = none
+     8.0s    i2c       sda 5           SDA is held low for 5 clocks (0: until `free`); or: scl, free
+     0       noise     1               sensor noise: 1 = the reference's deviations, 0 = none
 
-Files called *.vcd and *.csv are waveforms, which are converted to the same events (waveform.py).
+Files called *.vcd and *.csv are waveforms, which waveform.py converts to the same events.
 
 Times are in s, ms or us (`1.5s`) or cycles (`22118400`). Lines may be in any order; lines with equal times keep their
 order.
@@ -46,16 +46,16 @@ from emu.peripherals.uart.rx_queue import BREAK, FRAMING_ERROR, PARITY_ERROR
 Action = Callable[[], None]
 
 _ERRORS: Final = {"framing": FRAMING_ERROR, "parity": PARITY_ERROR, "break": BREAK}
-"""Transmission errors of a character, by name."""
+"""Transmission errors of a character by name."""
 
 
 class StimulusError(ValueError):
-    """A stimulus file is invalid: the message names file, line and what was expected."""
+    """Invalid stimulus file. The message names the file, the line and what was expected."""
 
 
 @dataclass(frozen=True, slots=True)
 class StimulusStep:
-    """One event: the action at `cycle`, and its line in the file."""
+    """One event of a script: an action, the cycle at which it happens, and its line in the file."""
 
     cycle: int
     line: int
@@ -63,7 +63,7 @@ class StimulusStep:
 
 
 def parse(board: EpuckHardware, text: str, name: str = "stimulus") -> list[StimulusStep]:
-    """Parse a script and return its steps in order of time. Raises StimulusError."""
+    """Parse a script and return its steps sorted by cycle. Raises StimulusError."""
     steps = []
     for number, line in enumerate(text.splitlines(), start=1):
         try:
@@ -89,7 +89,7 @@ def _lines(path: Path) -> Iterator[tuple[int, Fraction, list[str]]]:
 
 
 def load_waveform(board: EpuckHardware, path: Path) -> list[StimulusStep]:
-    """Read a VCD or CSV file and return its steps in order of time. Raises StimulusError, OSError."""
+    """Read a VCD or CSV file and return its steps sorted by cycle. Raises StimulusError, OSError."""
     steps: list[StimulusStep] = []
     number = 1
     try:
@@ -110,7 +110,7 @@ _UNITS: Final = {"ms": Fraction(1, 1000), "us": Fraction(1, 1_000_000), "s": Fra
 
 
 def _time(board: EpuckHardware, word: str) -> int:
-    """Return the cycle of a time. Fractions are exact, so 0.1s is the same cycle on every host."""
+    """Return the cycle of a written time. Fractions are exact, so 0.1s is the same cycle on every host."""
     unit = next((unit for unit in _UNITS if word.endswith(unit)), "")
     value = parse_time(word.removesuffix(unit))
     if value < 0 or not (unit or value.denominator == 1):
@@ -119,7 +119,7 @@ def _time(board: EpuckHardware, word: str) -> int:
 
 
 def _cycle(board: EpuckHardware, seconds: Fraction) -> int:
-    """Return the cycle of a time in seconds. Raises ValueError beyond `LATEST`."""
+    """Return the cycle of a time in seconds. Raises ValueError for a cycle after `LATEST`."""
     cycle = round(seconds * Fraction(board.chip.fcy))
     if cycle > LATEST:
         raise ValueError("expected a time of at most 10^18 cycles")
@@ -280,7 +280,7 @@ def _i2c(board: EpuckHardware, words: list[str]) -> Action:
 
 
 class Stimulus(BoardPart):
-    """Plays a script on a board. The position is in the record, so a restored snapshot continues the script."""
+    """Player of a script on a board. Its position is in the record, so a restored snapshot continues the script."""
 
     def __init__(self, board: EpuckHardware) -> None:
         super().__init__("stimulus", board.chip)
@@ -300,7 +300,7 @@ class Stimulus(BoardPart):
             self.play(parse(self._board, decode_text(read_file(path), str(path)), str(path)))
 
     def play(self, steps: list[StimulusStep]) -> None:
-        """Play `steps`, in order of time; steps in the past are executed at once. Replaces an earlier script."""
+        """Play `steps`, which are sorted by cycle, instead of an earlier script. Steps in the past run immediately."""
         self._steps = steps
         self._next.value = 0
         if steps:

@@ -1,7 +1,7 @@
 """Waveform files as stimulus: conversion of CSV and VCD files to stimulus events.
 
-CSV   a header line with names, then one line per time: `time` in s, then pins and uart1, uart2 (a byte, 0 to 255). An
-      empty cell changes nothing.
+CSV   a header line with column names, then one line per time: `time` in s, then pins and uart1, uart2 (a byte, 0 to
+ 255). An empty cell changes nothing.
 VCD   one-bit wires whose names begin with a pin name (`RB3`, `RC1_front`), in any scope. Other variables and the
       values x and z are ignored. `emu run --vcd` writes such files.
 """
@@ -23,11 +23,11 @@ TIME_PATTERN = re.compile(
 )
 """Syntax of a time. The exponent is limited because 1e999999999 would take hours to compute."""
 StimulusLine = tuple[int, Fraction, list[str]]
-"""Line number in the file, time in s, and the event as words of a stimulus script."""
+"""Line number in the file, time in s, and the words of an event as in a stimulus script."""
 
 
 class WaveformError(ValueError):
-    """A waveform file is invalid: the line number, and what was expected there."""
+    """Invalid waveform file: the line number, and what was expected there."""
 
     def __init__(self, line: int, expected: str) -> None:
         super().__init__(expected)
@@ -35,7 +35,7 @@ class WaveformError(ValueError):
 
 
 def parse_time(text: str) -> Fraction:
-    """Return a written time exactly; -1 for invalid text or a time not below 10^18."""
+    """Return the exact value of a written time; -1 for invalid text or a time of 10^18 or more."""
     if TIME_PATTERN.fullmatch(text):
         with suppress(ZeroDivisionError):
             time = Fraction(text)

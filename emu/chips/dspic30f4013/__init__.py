@@ -1,11 +1,15 @@
 """The dsPIC30F4013 as data: 40 pins, 48 KB of flash, 2 KB of RAM.
 
-Sources. Device id 0x0141, 16 K instruction words of flash and 1 KB of EEPROM: device tables of public programmers and
-boot loaders, which agree. Names of ports and pins that public programs for this part use (RA11, RB0-RB12, RD8 for IC1,
-RF2/RF3 for UART1, RF4/RF5 for UART2, boot loader at 0x7E00). Register addresses and bits: those of the family
-(registers.csv) as far as this part has the device. UNVERIFIED, without access to the data sheet (DS70138):
-the pins of CNx, the DCI's and OCFA's pins, the absence of T3CK to T5CK, the start of Y RAM, the fields of FOSC
-(those of the A parts) and FGS, the processor id in ELF files (position in the vendor's list of parts).
+Sources:
+- device id 0x0141, 16 K instruction words of flash, 1 KB of EEPROM: device tables of public programmers and boot
+  loaders, which agree;
+- names of ports and pins (RA11, RB0-RB12, RD8 for IC1, RF2/RF3 for UART1, RF4/RF5 for UART2, boot loader at 0x7E00):
+  public programs for this part;
+- register addresses and bits: those of the family (registers.csv), for the devices that this part has.
+
+UNVERIFIED, without access to the data sheet (DS70138): the pins of CNx, the DCI's and OCFA's pins, the absence of T3CK
+to T5CK, the start of Y RAM, the fields of FOSC (those of the A parts) and FGS, the processor id in ELF files (position
+in the vendor's list of parts).
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
-"""DWARF location expressions: where a variable is, and access to its bytes (DWARF 2 §2.4 and some later operations).
+"""DWARF location expressions: location of a variable and access to its bytes (DWARF 2 §2.4, some later operations).
 
-Inputs: an expression and a `View` of registers and memory. Output: pieces, through which the bytes are read.
+Inputs: an expression and a `View` of registers and memory. Output: pieces through which the bytes are read or written.
 """
 
 from __future__ import annotations
@@ -12,9 +12,9 @@ from typing import Final, Protocol
 LIT0, REG0, BREG0 = 0x30, 0x50, 0x70
 FBREG: Final = 0x91
 ADDR_0: Final = (0x03, 0, 0, 0, 0)
-"""Expression for address 0."""
+"""DWARF expression for address 0."""
 REGISTERS: Final = 32
-"""Number of registers that have an operation of their own."""
+"""Number of registers that have their own DWARF operations."""
 _BINARY: Final[dict[int, Callable[[int, int], int]]] = {
     0x22: lambda a, b: a + b,  # plus
     0x1C: lambda a, b: a - b,  # minus
@@ -39,13 +39,13 @@ _FIXED: Final = {
 
 
 class View(Protocol):
-    """Registers and memory as seen in one frame of a call stack."""
+    """Registers and memory as visible from one frame of a call stack."""
 
     def register(self, number: int) -> int | None:
-        """Return Wn, None if it is unknown in this frame."""
+        """Return the value of Wn, None if it is unknown in this frame."""
 
     def set_register(self, number: int, value: int) -> None:
-        """Set Wn. Raises ValueError if the frame does not permit it."""
+        """Set Wn. Raises ValueError if this frame does not permit it."""
 
     def memory(self, address: int, size: int) -> bytes:
         """Return bytes of data space without side effects. Raises ValueError for unimplemented addresses."""
@@ -63,12 +63,12 @@ class Piece:
     """Part of a variable: in memory, in a register, or a known value. Size 0 means the rest of the variable."""
 
     kind: str
-    """"memory", "register", "value", or "gone" for a part that was optimised out."""
+    """Kind of location: "memory", "register", "value", or "gone" for a part that was optimised out."""
     at: int
     size: int = 0
     data: bytes = b""
     skip: int = 0
-    """1 if the part begins with the upper byte of its register, else 0."""
+    """1 if the part begins in the upper byte of its register, else 0."""
 
 
 def pieces_of(code: bytes, view: View, frame_base: Callable[[], int]) -> tuple[Piece, ...]:
@@ -77,7 +77,7 @@ def pieces_of(code: bytes, view: View, frame_base: Callable[[], int]) -> tuple[P
 
 
 def address_of(pieces: tuple[Piece, ...]) -> int | None:
-    """Return the data address of an object that is in memory as a whole, else None."""
+    """Return the data address of an object that lies entirely in memory, else None."""
     return pieces[0].at if len(pieces) == 1 and pieces[0].kind == "memory" else None
 
 
@@ -101,7 +101,7 @@ def read(pieces: tuple[Piece, ...], size: int, view: View) -> bytes:
 
 
 def _registers(number: int, size: int, view: View) -> bytes:
-    """Return `size` bytes from Wn and the registers after it."""
+    """Return `size` bytes from Wn and the following registers."""
     data = b""
     while len(data) < size:
         value = view.register(number)
@@ -156,7 +156,7 @@ class _Evaluation:
         return tuple(self.pieces)
 
     def _part(self, size: int) -> Piece:
-        """Return the piece that the operations since the last piece describe."""
+        """Return the piece described by the operations since the previous piece."""
         if self.simple is not None:
             part, self.simple = self.simple, None
             return Piece(part.kind, part.at, size, part.data)

@@ -1,6 +1,6 @@
 """Functions, variables and types of an image from its DWARF 2 to 5 sections (abi-elf.md §6.7).
 
-Input: an image with debug sections. Output: `DebugInfo`. Entries that cannot be read are omitted; damaged debug
+Input: an image with debug sections. Output: `DebugInfo`. Entries that cannot be read are omitted, so that damaged debug
 information never makes a run fail. Addresses are PC units for code and bytes for data.
 """
 
@@ -19,7 +19,7 @@ from emu.image.model import Image
 Ranges = tuple[tuple[int, int], ...]
 """Half-open ranges of program addresses."""
 ENCODINGS: Final = {2: "bool", 4: "float", 5: "signed", 6: "char", 7: "unsigned", 8: "char"}
-"""Kinds of base types by DW_ATE code (DWARF 2 §7.8)."""
+"""Kinds of base types by their DW_ATE code (DWARF 2 §7.8)."""
 SIGNED: Final = (5, 6)
 TYPE_KINDS: Final = {
     "DW_TAG_structure_type": "struct",
@@ -35,16 +35,16 @@ TYPE_KINDS: Final = {
     "DW_TAG_unspecified_type": "void",
 }
 ADDRESS: Final = 4
-"""Bytes of an address in debug sections (abi-elf.md §6.7)."""
+"""Size in bytes of an address in debug sections (abi-elf.md §6.7)."""
 BASE_SELECTION: Final = 0xFFFFFFFF
 
 
 @dataclass(frozen=True, slots=True)
 class VariableLocation:
-    """Location of a variable: DWARF expressions, each for a range of program addresses or for all."""
+    """Location of a variable: DWARF expressions, each valid for a range of program addresses or for all."""
 
     entries: tuple[tuple[int | None, int, bytes], ...]
-    """(start or None, end, expression)."""
+    """Tuples of (start, end, expression). A start of None means all program addresses."""
 
     def at(self, pc: int) -> bytes | None:
         """Return the expression that is valid at `pc`, None if the variable is optimised out there."""
@@ -53,7 +53,7 @@ class VariableLocation:
 
 @dataclass(frozen=True, slots=True)
 class Variable:
-    """A variable or parameter. `constant` is the value of a variable without a location."""
+    """A variable or parameter. A variable without a location may have a `constant` value."""
 
     name: str
     type: Type
@@ -66,10 +66,10 @@ class Variable:
 
 @dataclass(eq=False, slots=True)
 class Scope:
-    """A function, a block inside it, or a function inlined into it."""
+    """Scope of names: a function, a block inside it, or a function inlined into it."""
 
     kind: str
-    """"function", "block" or "inlined"."""
+    """Kind of scope: "function", "block" or "inlined"."""
     name: str
     ranges: Ranges
     variables: list[Variable] = field(default_factory=list)
@@ -79,17 +79,17 @@ class Scope:
     line: int = 0
     call_file: str = ""
     call_line: int = 0
-    """Line of the call of an inlined function."""
+    """For an inlined function, the source line of its call."""
     unit: int = 0
     returns: Type | None = None
-    """Type of a function's result, None for void."""
+    """Type of a function's result; None for void."""
 
     def contains(self, pc: int) -> bool:
         """Whether the scope contains the instruction at `pc`."""
         return any(start <= pc < end for start, end in self.ranges)
 
     def chain(self, pc: int) -> list[Scope]:
-        """Return this scope and its nested scopes that contain `pc`, outermost first."""
+        """Return this scope and those nested in it that contain `pc`, outermost first."""
         found = [self]
         while True:
             deeper = next((scope for scope in found[-1].inner if scope.contains(pc)), None)
@@ -105,7 +105,7 @@ class DebugInfo:
         self.functions: Final[list[Scope]] = []
         """Functions with code, sorted by address."""
         self.globals: Final[dict[str, list[Variable]]] = {}
-        """Variables outside functions, by name. Several files may have variables of the same name."""
+        """Variables outside functions, by name. Several files may define variables of the same name."""
         self.statics: Final[dict[int, dict[str, Variable]]] = {}
         """Variables outside functions, by compile unit and name."""
         self.types: Final[dict[str, dict[int, Type]]] = {}
@@ -119,7 +119,10 @@ class DebugInfo:
         self._starts: Final = [one.ranges[0][0] for one in self.functions]
 
     def type(self, name: str, unit: int = -1) -> Type | None:
-        """Return the type `name` (`node`, `struct node`) of a compile unit, else of any unit; None if there is none."""
+        """Return the type called `name` (`node`, `struct node`), preferably of compile unit `unit`;
+
+        None if there is none.
+        """
         known = self.types.get(name, {})
         return known.get(unit) or next(iter(known.values()), None)
 
@@ -135,7 +138,7 @@ _KNOWN: Final[WeakKeyDictionary[Image, DebugInfo]] = WeakKeyDictionary()
 
 
 def debug_of(image: Image) -> DebugInfo:
-    """Return the debug information of `image`. It is read at the first call."""
+    """Return the debug information of `image`. The first call reads it."""
     found = _KNOWN.get(image)
     if found is None:
         found = _KNOWN[image] = DebugInfo(image)
@@ -143,8 +146,10 @@ def debug_of(image: Image) -> DebugInfo:
 
 
 class _Reader:
-    """Reader of all compile units. pyelftools raises many kinds of exceptions for damaged input; a damaged unit is
-    skipped."""
+    """Reader of all compile units.
+
+    pyelftools raises many kinds of exceptions for damaged input; the reader skips a damaged unit.
+    """
 
     def __init__(self, info: DebugInfo, sections: dict[str, bytes]) -> None:
         self.info: Final = info
@@ -194,7 +199,7 @@ class _Reader:
             self._register_type(die)
 
     def _register_type(self, die: Any, is_local: bool = False) -> None:
-        """Register a type by its name. A type local to a function does not replace one of the file."""
+        """Register a type by its name. A type that is local to a function does not replace a type at file scope."""
         made = self._type(die)
         if made.name and (made.bytes or made.members):
             known = self.info.types.setdefault(f"{made.kind} {made.name}" if made.kind in TAGGED else made.name, {})
@@ -252,14 +257,16 @@ class _Reader:
         return VariableLocation(tuple(self._location_list(found.value)))
 
     def _location_list(self, offset: int) -> Iterator[tuple[int, int, bytes]]:
-        """Yield start, end and expression of each entry of a location list (DWARF 2 §2.4.6)."""
+        """Yield (start, end, expression) of each entry in a location list (DWARF 2 §2.4.6)."""
         for start, end, place in self._pairs(self.loc, offset):
             size = int.from_bytes(self.loc[place : place + 2], "little")
             yield start, end, self.loc[place + 2 : place + 2 + size]
 
     def _pairs(self, section: bytes, offset: int) -> Iterator[tuple[int, int, int]]:
-        """Yield (start, end, offset after both) of every list entry. Entries of location lists have an expression after
-        them."""
+        """Yield (start, end, offset of the next byte) for every entry of a list.
+
+        In a location list, that byte begins the entry's expression.
+        """
         base = self.unit_base
         carries_more = section is self.loc
         while offset + 2 * ADDRESS <= len(section):
@@ -341,7 +348,7 @@ class _Reader:
 
 
 def _origin(die: Any) -> Any:
-    """Return the entry that has the name; for an inlined or specialised function, the abstract entry."""
+    """Return the debugging entry that holds the name. For an inlined or out-of-line instance it is the abstract one."""
     while "DW_AT_name" not in die.attributes and "DW_AT_type" not in die.attributes:
         if "DW_AT_abstract_origin" in die.attributes:
             die = die.get_DIE_from_attribute("DW_AT_abstract_origin")
@@ -371,7 +378,7 @@ def _count(die: Any) -> int:
 
 
 def _member_offset(die: Any) -> int:
-    """Return the offset of a member: a number, or the operand of `plus_uconst N` in DWARF 2."""
+    """Return the byte offset of a member, given as a number or, in DWARF 2, as the operand of `plus_uconst N`."""
     found = die.attributes.get("DW_AT_data_member_location")
     if found is None:
         return 0

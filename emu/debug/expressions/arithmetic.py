@@ -1,7 +1,7 @@
 """Arithmetic of C (C11 §6.3.1): promotion, usual arithmetic conversions, unsigned results modulo their width.
 
-Inputs and outputs: integers and floating-point numbers with their types. Where C leaves the result of a signed overflow
-undefined, the result is the exact number as long as a type can represent it.
+Inputs and outputs: integers and floating-point numbers with their types. For a signed overflow, which C leaves
+undefined, the result is the exact number if a type can represent it.
 """
 
 from __future__ import annotations
@@ -16,18 +16,18 @@ from typing import Any, Final
 from emu.debug.dwarf.types import UNSIGNED, Type
 
 INT: Final = 2
-"""Bytes of an int."""
+"""Size of an int in bytes."""
 SIGNED: Final = {size: Type("signed", f"int{8 * size}", size, is_signed=True) for size in (2, 4, 8)}
 FLOATING: Final = Type("float", "double", 8)
 FLOAT: Final = Type("float", "float", 4)
 WIDEST: Final = 64
-"""Bits of the longest type. C does not define a shift by as many bits, and a shift by 10^10 would exhaust the
-memory."""
+"""Width of the longest type in bits. C does not define a shift by that many bits or more, and a shift by 10^10 would
+exhaust the memory."""
 
 
 @dataclass(frozen=True, slots=True)
 class TypedNumber:
-    """A value with a type and without a place in memory."""
+    """A value with its type, but without an address."""
 
     value: int | float
     kind: Type = SIGNED[INT]
@@ -54,7 +54,7 @@ def integer_constant(
 
 
 def promote(value: Any, kind: Type, bits: int = 0) -> TypedNumber:
-    """Return a value read from an object of type `kind` after integer promotion. `bits` is the width of a bit field."""
+    """Return the value of an object of type `kind` after integer promotion. `bits` is the width of a bit field."""
     bare = kind.bare
     if isinstance(value, float):
         return TypedNumber(value, bare)
@@ -66,7 +66,7 @@ def promote(value: Any, kind: Type, bits: int = 0) -> TypedNumber:
 
 
 def wrap_result(value: int | float, kind: Type) -> TypedNumber:
-    """Return a result of type `kind`: unsigned modulo its width, signed in the first type that can represent it."""
+    """Return a result as type `kind`: unsigned modulo its width, signed in the first type that represents it."""
     if isinstance(value, float):
         return TypedNumber(_round_to(value, kind), kind)
     if kind.kind == "unsigned":
@@ -125,7 +125,7 @@ def _divide(a: Any, b: Any) -> int | float:
 
 
 def _shift_count(bits: int) -> int:
-    """Check a shift count. Raises ValueError for one outside 0 to 63."""
+    """Return a shift count that is in the range 0 to 63. Raises ValueError for any other."""
     if not 0 <= bits < WIDEST:
         raise ValueError(f"a shift by {bits} bits; expected 0 to {WIDEST - 1}")
     return bits
@@ -152,7 +152,7 @@ ARITHMETIC: Final[dict[str, Rule]] = {
 BINARY: Final = LOGIC | COMPARISONS | SHIFTS | ARITHMETIC
 """Precedence and function of each binary operator."""
 INTEGER_ONLY: Final = ("|", "^", "&", "<<", ">>", "%")
-"""Operators for integers only."""
+"""Operators that accept only integers."""
 
 
 def apply_binary(sign: str, one: TypedNumber, other: TypedNumber) -> TypedNumber:

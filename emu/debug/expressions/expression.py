@@ -1,6 +1,6 @@
 """C expressions on a paused machine: `robot.speed[1]`, `*p`, `list->pid == 3`, `U1STA.TRMT`, `W3 + 2`.
 
-Inputs: a text and the frame in which it is evaluated. Output: a `Value` if it denotes an object, else a number.
+Inputs: a text and the frame in which it is evaluated. Output: a `Value` if the text denotes an object, else a number.
 Evaluation changes nothing. Names are looked up in this order: locals, statics of the file, globals, symbols without
 type, enumerators, registers (SFRs and their fields, `W0` to `W15`, `PC`), and `cycle`. Arithmetic is that of C
 (`arithmetic.py`): `now - then` of two unsigned ints is unsigned, and pointers count in units of their target. Casts and
@@ -40,23 +40,23 @@ TOKEN: Final = re.compile(
     r"|(->|<<|>>|<=|>=|==|!=|&&|\|\||[-+*/%&|^~!<>()\[\].?:]))"
 )
 TOKEN_KINDS: Final = ("fraction", "number", "letter", "name", "sign")
-"""Names of the groups of TOKEN."""
+"""Names of the groups of the regular expression TOKEN."""
 MAX_NESTING: Final = 50
-"""Maximum nesting of brackets, unary operators and conditional operators."""
+"""Maximum nesting depth of parentheses, brackets, unary operators and conditional operators."""
 ESCAPES: Final = dict(zip("abfnrtv\\'\"?", (7, 8, 12, 10, 13, 9, 11, 92, 39, 34, 63), strict=True))
 
 
 UNEVALUATED: Final = TypedNumber(0)
-"""Result of an expression that is not evaluated."""
+"""Placeholder result of an expression that is not evaluated."""
 
 
 class ExpressionError(ValueError):
-    """The text is no valid expression, or has no value here."""
+    """The text is not a valid expression, or has no value in this state."""
 
 
 @lru_cache(maxsize=512)
 def tokens(text: str) -> tuple[tuple[str, str], ...]:
-    """Return (kind, text) of every token. Raises ExpressionError."""
+    """Return all tokens as (kind, text). Raises ExpressionError."""
     found, place = [], 0
     while text[place:].strip():
         match = TOKEN.match(text, place)
@@ -81,12 +81,12 @@ def evaluate(inspector: Inspector, text: str, frame: Frame | None = None) -> Val
 
 
 def number_of(result: Value | int | float) -> Any:
-    """Return a result of `evaluate` as a Python object. Raises Unavailable."""
+    """Return a result of `evaluate` as a Python number or other object. Raises Unavailable."""
     return result.get() if isinstance(result, Value) else result
 
 
 class _Parser:
-    """Precedence-climbing parser that evaluates while it parses, except for operands that C does not evaluate."""
+    """Precedence-climbing parser that evaluates while it parses, apart from the operands that C does not evaluate."""
 
     def __init__(self, inspector: Inspector, text: str, frame: Frame | None) -> None:
         self.inspector: Final = inspector
@@ -95,11 +95,10 @@ class _Parser:
         self.tokens: Final = tokens(text)
         self.at = self.depth = 0
         self.evaluates = True
-        """False inside an unevaluated operand: expressions have a type there but no value, and the machine is not
+        """False inside an unevaluated operand. Expressions there have a type but no value, and the machine is not
         read."""
         self.is_lenient = False
-        """Whether errors yield 0, because an operand that C does not evaluate may name an object that does not
-        exist."""
+        """Whether errors yield 0. An operand that C does not evaluate may name an object that does not exist."""
 
     def _peek(self) -> str:
         return self.tokens[self.at][1] if self.at < len(self.tokens) and self.tokens[self.at][0] == "sign" else ""
@@ -133,7 +132,7 @@ class _Parser:
         return left
 
     def _conditional_result(self, taken: Any, other: Any) -> Any:
-        """Return the selected operand of a conditional operator, converted to the type of both (C11 §6.5.15)."""
+        """Return the selected operand of a conditional operator, converted to the common type of both (C11 §6.5.15)."""
         if not (self._is_arithmetic(taken) and self._is_arithmetic(other)):
             return taken
         if isinstance(taken, Value) and isinstance(other, Value) and taken.type is other.type:
@@ -148,7 +147,7 @@ class _Parser:
 
     @contextmanager
     def _nested(self) -> Iterator[None]:
-        """Count a level of nesting. Raises ExpressionError beyond MAX_NESTING."""
+        """Enter one more nesting level inside the block. Raises ExpressionError beyond MAX_NESTING."""
         self.depth += 1
         if self.depth > MAX_NESTING:
             raise ExpressionError(f"more than {MAX_NESTING} brackets or signs inside one another")
@@ -159,7 +158,7 @@ class _Parser:
 
     @contextmanager
     def _unevaluated(self, is_lenient: bool | None = None) -> Iterator[None]:
-        """Parse without evaluation inside the block."""
+        """Parse without evaluating inside the block."""
         before = self.evaluates, self.is_lenient
         self.evaluates, self.is_lenient = False, self.is_lenient if is_lenient is None else is_lenient
         try:
@@ -168,24 +167,24 @@ class _Parser:
             self.evaluates, self.is_lenient = before
 
     def _short_circuit(self, decided: bool, lowest: int) -> Any:
-        """Return an operand; without evaluation if `decided`, that is, if the result does not depend on it."""
+        """Parse an operand of && or ||; do not evaluate it if the result is already `decided`."""
         if not decided:
             return self.expression(lowest)
         with self._unevaluated(is_lenient=True):
             return self.expression(lowest)
 
     def _error(self, why: object) -> TypedNumber:
-        """Raise ExpressionError, or return 0 where errors are permitted."""
+        """Raise ExpressionError. Return 0 instead where errors are permitted."""
         if self.is_lenient:
             return UNEVALUATED
         raise ExpressionError(f"{self.text!r}: {why}")
 
     def _read(self, value: Value) -> Any:
-        """Return the value of an object; 1 where nothing is evaluated, because every operator accepts it."""
+        """Return the value of an object. In an unevaluated operand return 1, because every operator accepts it."""
         return value.get() if self.evaluates else 1.0 if value.type.bare.kind == "float" else 1
 
     def _placeholder(self, kind: Type, name: str = "", bits: tuple[int, int] | None = None) -> Value:
-        """Return an object of type `kind` without a place, for unevaluated operands."""
+        """Return an object of type `kind` without a location, for unevaluated operands."""
         return Value(kind, (Piece("gone", 0),), self.inspector.view(self.frame), name, bits)
 
     def _binary(self, sign: str, left: Any, right: Any) -> Any:
@@ -255,7 +254,7 @@ class _Parser:
         return self.postfix()
 
     def _parenthesised_type(self) -> Type | None:
-        """Return the type in parentheses that the next tokens name, None if they name none."""
+        """Parse a type name in parentheses. Return its type, None if the next tokens are not a type name."""
         if self._peek() != "(":
             return None
         try:
@@ -269,7 +268,7 @@ class _Parser:
         return found[0]
 
     def _find_type(self, name: str) -> Type | None:
-        """Return the type that the program calls `name`, None if `name` is a variable or unknown."""
+        """Return the program's type called `name`, None if `name` is a variable or unknown."""
         unit = self.frame.scopes[0].unit if self.frame is not None and self.frame.scopes else -1
         return None if self.inspector.variable(name, self.frame) is not None else self.inspector.debug.type(name, unit)
 
@@ -366,7 +365,7 @@ class _Parser:
         raise ExpressionError(f"{self.text!r}: {text!r} is not expected there")
 
     def _fraction(self, text: str) -> TypedNumber:
-        """Return a floating-point constant of the program's own `double`: some compilers make it as short as float."""
+        """Return a floating-point constant as the program's `double`, which some compilers make as short as float."""
         kind = FLOAT if text[-1] in "fF" else self.inspector.debug.type("double") or FLOATING
         return TypedNumber(float(convert(float(text.rstrip("fFlL")), kind)), kind)
 
@@ -429,5 +428,5 @@ def _is_pointer(value: Any) -> bool:
 
 
 def _constant(kind: Type, number: int | float, inspector: Inspector) -> Value:
-    """Return a value that has no place in memory."""
+    """Return a constant as a value without a location."""
     return Value(kind, (Piece("value", 0, data=encode(kind, number)),), inspector.view())

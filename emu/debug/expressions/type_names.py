@@ -1,6 +1,6 @@
 """Type names of casts and `sizeof` (C11 §6.7.7): `unsigned char`, `struct node *`, `int (*)[3]`.
 
-Inputs: tokens of an expression and a lookup of the program's own types. Output: a `Type`. Sizes are those of the chip
+Inputs: tokens of an expression, and a function that finds the program's types. Output: a `Type`. Sizes are the chip's
 (int 16, long 32, pointers 16 bits). Base types of the program take precedence, for example its `double`.
 """
 
@@ -12,12 +12,12 @@ from typing import Final
 from emu.debug.dwarf.types import TAGGED, VOID, Type
 
 Find = Callable[[str], Type | None]
-"""Lookup of the program's types: `node` is a typedef or a base type, `struct node` a tag."""
+"""Function that finds a type of the program by name: `node` is a typedef or a base type, `struct node` a tag."""
 QUALIFIERS: Final = ("const", "volatile", "restrict", "register")
 POINTER: Final = 2
-"""Bytes of a pointer."""
+"""Size of a pointer in bytes."""
 _INTEGER_SIZES: Final = {("char",): 1, (): 2, ("short",): 2, ("long",): 4, ("long", "long"): 8}
-"""Size in bytes of each integer type by its keywords without `int`, `signed` and `unsigned`."""
+"""Size in bytes of each integer type, by its keywords other than `int`, `signed` and `unsigned`."""
 _OTHERS: Final = {
     ("float",): Type("float", "float", 4),
     ("double",): Type("float", "double", 8),
@@ -41,15 +41,18 @@ _LIBRARY: Final = {
     "ptrdiff_t": Type("signed", "ptrdiff_t", POINTER, is_signed=True),
     "bool": Type("bool", "bool", 1),
 }
-"""Types of the C library that a program without a use of them lacks in its debug information."""
+"""Types of the C library. The debug information of a program lacks them if the program does not use them."""
 
 
 class TypeNameError(ValueError):
-    """Tokens that begin like a type name but name no type here."""
+    """The tokens begin like a type name but do not name a type."""
 
 
 def type_name(tokens: Sequence[tuple[str, str]], at: int, find: Find) -> tuple[Type, int] | None:
-    """Return the type named by the tokens from `at` and the position after it, or None. Raises TypeNameError."""
+    """Return the type named by the tokens from index `at`, and the index after it; None if they begin otherwise.
+
+    Raises TypeNameError.
+    """
     reader = _Reader(tokens, at, find)
     kind = reader.specifiers()
     return (reader.declarator(kind), reader.at) if kind is not None else None
@@ -65,7 +68,7 @@ class _Reader:
         return self.tokens[self.at] if self.at < len(self.tokens) else ("", "")
 
     def _accept(self, *texts: str) -> str:
-        """Consume the next token if it is one of `texts`, and return it; else return ""."""
+        """Consume and return the next token's text if it is one of `texts`; else return ""."""
         text = self._next()[1] if self._next()[0] in ("name", "sign") else ""
         if text not in texts or not text:
             return ""

@@ -1,1 +1,1 @@
-"""Interrupts, traps, core faults, Idle and Sleep: what changes the flow between two instructions."""
+"""Interrupts, traps, core faults, Idle and Sleep: all that changes the control flow between two instructions."""

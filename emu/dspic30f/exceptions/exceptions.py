@@ -1,9 +1,9 @@
-"""Rules of exceptions (isa.md §14): which interrupt is accepted at an instruction boundary, and the entry of a handler.
+"""Rules of exceptions (isa.md §14): which interrupt an instruction boundary accepts, and how a handler is entered.
 
-All engines use these functions (contract: emu/system/rules.py). The rule of time is isa.md §14.3. Let c be the cycle in
-which the request was first visible and e the last cycle of the instruction before the boundary (c <= e). Then the first
-instruction of the handler executes in cycle max(c + 4, e + 3). The words are pushed in the two cycles before it. Until
-they are entered, traps are handled in `interrupts.py`.
+All engines use these functions (contract: emu/system/rules.py). The timing rule is isa.md §14.3. Let c be the cycle in
+which the request was first visible, and e the last cycle of the instruction before the boundary (c <= e). Then the
+first instruction of the handler executes in cycle max(c + 4, e + 3). The two cycles before it push the words.
+`interrupts.py` handles traps until they are entered.
 """
 
 from __future__ import annotations
@@ -18,51 +18,52 @@ from emu.system.device import flag_since
 from emu.system.rules import Cell, EventSlot, Number, RuleBuilder, cell_of, event_slot
 
 ALTIVT: Final = 1 << 15
-"""INTCON2<15> (isa.md §14.4)."""
+"""ALTIVT bit, INTCON2<15> (isa.md §14.4)."""
 UNMASKABLE: Final = 7
-"""User interrupt priority that DISI does not block (isa.md §12)."""
+"""Interrupt priority that DISI does not block (isa.md §12)."""
 NO_REQUEST: Final = -1
-"""Number that stands for no request."""
+"""Request number that means no request."""
 _IPL_SHIFT: Final = 5
 
 
 class BoundaryBuilder(RuleBuilder, Protocol):
-    """Operations of a rule that runs between two instructions."""
+    """Builder operations for rules that run between two instructions."""
 
     def push(self, low: Number, high: Number, cycle: Number) -> None:
-        """Push two words at [W15++], in `cycle` and the next one, with the checks of every stack access (isa.md
-        §10)."""
+        """Push two words at [W15++], in `cycle` and the next, with the checks of every stack access (isa.md §10)."""
 
     def handler(self, vector: Number) -> Number:
-        """Return the program word of a vector."""
+        """Return the handler address stored in the vector at `vector`."""
 
 
 @dataclass(frozen=True, slots=True)
 class ExceptionOperands:
-    """Registers and cells of acceptance and entry. The number of a request is 16 x index of its flag register + bit."""
+    """Registers and cells for acceptance and entry. A request's number is 16 x index of its flag register + bit."""
 
     words: tuple[tuple[Cell, Cell], ...]
-    """Flag registers, each with its enable register."""
+    """Pairs of flag register and enable register."""
     implemented: int
-    """Numbers of the implemented requests, as bits."""
+    """Bit mask of the numbers of the implemented requests."""
     priority: tuple[int, ...]
-    """Index of the register with its priority, by number. `shift` is the position of the priority in that register,
-    `since` the index of the request's cycle. `ivt` and `aivt` are the addresses of its vectors, `slot` is its vector
-    number."""
+    """Table by request number: index of the register that holds the priority.
+
+    The next fields are such tables too. `shift` is the priority's position in that register, `since` the index of the
+    cell with the request's cycle, `ivt` and `aivt` the vectors' addresses, and `slot` the vector number.
+    """
     shift: tuple[int, ...]
     since: tuple[int, ...]
     ivt: tuple[int, ...]
     aivt: tuple[int, ...]
     slot: tuple[int, ...]
     first_word: Cell
-    """Data address 0, the base of `priority`."""
+    """Data address 0, the base of the register indices in `priority`."""
     first_request: Cell
-    """Base of `since`."""
+    """Base of the cell indices in `since`."""
     recheck: EventSlot
-    """Event that makes the engine check for interrupts again."""
+    """Event that makes the engine check again for acceptable requests."""
     slip_cycle: Cell
     slip_words: Cell
-    """With `ipl_slip`: SR and enables before the last write; `slip_cycle` is the cycle after it."""
+    """With `ipl_slip`: SR and enable registers before the last write; `slip_cycle` is the cycle after the write."""
     sr: Cell
     corcon: Cell
     intcon1: Cell
@@ -77,7 +78,7 @@ class ExceptionOperands:
 
 
 def operands_of(state: State, chip: Chip, recheck: int) -> ExceptionOperands:
-    """Return the operands for a chip, after the cells of `Exceptions` are reserved; `recheck` is its event slot."""
+    """Return the operands for a chip. The cells of `Exceptions` must be reserved; `recheck` is its event slot."""
     record, sfrs = state.record, chip.sfrs
     names = sorted({(sfrs[s.flag[0]].address, sfrs[s.enable[0]].address) for s in chip.interrupts.values()})
     order = {flags: number for number, (flags, _enables) in enumerate(names)}
@@ -108,7 +109,7 @@ def operands_of(state: State, chip: Chip, recheck: int) -> ExceptionOperands:
 
 
 def requested(m: RuleBuilder, p: ExceptionOperands, slip: Number | None = None) -> Number:
-    """Return the numbers of the enabled requests as bits. `slip` is the next cycle if interrupts may slip through."""
+    """Return a bit mask of the enabled requests. `slip` is the next cycle if interrupts may slip through."""
     bits: Number = 0
     for number, (flags, enables) in enumerate(p.words):
         enabled = m.get(enables)
@@ -119,7 +120,7 @@ def requested(m: RuleBuilder, p: ExceptionOperands, slip: Number | None = None) 
 
 
 def ipl(m: RuleBuilder, p: ExceptionOperands, slip: Number | None = None) -> Number:
-    """Return the CPU priority that an exception must exceed, 0..15. `slip` is as for `requested`."""
+    """Return the CPU priority that an exception must exceed, 0..15; `slip` as for `requested`."""
     priority = m.get(p.sr) & IPL_MASK
     if slip is not None:
         before = m.get(p.slip_words) & IPL_MASK
@@ -135,9 +136,9 @@ def level_of(m: RuleBuilder, p: ExceptionOperands, number: Number) -> Number:
 def accepted(
     m: RuleBuilder, p: ExceptionOperands, bits: Number, last: Number, slip: Number | None = None
 ) -> tuple[Number, Number]:
-    """Return number and level of the request among `bits` that is accepted after cycle `last`, or NO_REQUEST.
+    """Return number and level of the request in `bits` that is accepted after cycle `last`; NO_REQUEST if none is.
 
-    A request that becomes acceptable later by time alone posts the recheck event."""
+    A request that becomes acceptable later merely by time makes this rule post the recheck event."""
     disi_end = m.get(p.disi_end)
 
     def better(number: Number, level: Number, winner: Number, check: Number) -> tuple[Number, ...]:
@@ -155,8 +156,10 @@ def accepted(
 
 
 def waking(m: RuleBuilder, p: ExceptionOperands, bits: Number) -> Number:
-    """Return the first request among `bits` that ends Idle or Sleep, or NO_REQUEST. Its priority is 1 or more; the CPU
-    priority does not matter (isa.md §11)."""
+    """Return the first request in `bits` that ends Idle or Sleep, or NO_REQUEST.
+
+    Its priority is 1 or more; the CPU priority does not matter (isa.md §11).
+    """
 
     def first(number: Number, found: Number) -> tuple[Number, ...]:
         return (m.select((found == NO_REQUEST) & (level_of(m, p, number) != 0), number, found),)

@@ -1,15 +1,18 @@
-"""Exceptions that end a run from inside the core: resets that the core causes, and debugger words."""
+"""Python exceptions by which the core ends a run: resets that the core causes, and debugger words."""
 
 from __future__ import annotations
 
 from typing import Final
 
 RESTART: Final = "the program went to address 0 without a reset"
-"""Message of debuggers, not of the core: a call through a null function pointer ends at address 0."""
+"""Message for a call through a null function pointer, which ends at address 0. Debuggers show it."""
 
 
 class DeviceReset(Exception):
-    """The device resets. `cause` is the RCON bit (isa.md §14.6). `fault` says whether the program is at fault."""
+    """Reset of the device.
+
+    `cause` is the RCON bit (isa.md §14.6). `fault` says whether the program caused it by an error.
+    """
 
     def __init__(self, cause: str, detail: str, fault: bool) -> None:
         super().__init__(detail)
@@ -33,14 +36,14 @@ class UninitialisedPointer(DeviceReset):
 
 
 class TrapConflict(DeviceReset):
-    """A lower hard trap arose while a higher one is pending or in progress (isa.md §14.4)."""
+    """A hard trap occurred while one of higher level is pending or in progress (isa.md §14.4)."""
 
     def __init__(self, detail: str) -> None:
         super().__init__("TRAPR", f"trap conflict: {detail}", fault=True)
 
 
 class Violation(Exception):
-    """The instruction at `pc` violates a rule of strict runs, which the message names."""
+    """The instruction at `pc` violates a rule of strict mode, which the message describes."""
 
     def __init__(self, detail: str, pc: int) -> None:
         super().__init__(detail)
@@ -48,4 +51,4 @@ class Violation(Exception):
 
 
 class Breakpoint(Exception):
-    """A debugger word was executed; the run stops after it (isa.md §4.1)."""
+    """The program executed a debugger word; the run stops after it (isa.md §4.1)."""

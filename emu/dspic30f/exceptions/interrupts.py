@@ -1,7 +1,7 @@
-"""Interrupts and traps: hooks of the registers that decide acceptance, and the machine side of exceptions.py.
+"""Interrupts and traps: hooks of the registers that decide acceptance, and the rules of exceptions.py interpreted.
 
-A change by the writing instruction (IPL, IEC, IPC, DISICNT) counts at the boundary right after it. With `ipl_slip` = 1,
-that boundary still accepts by IPL and IEC from before the write. UNVERIFIED which of the two silicon does (isa.md
+A change that an instruction writes (IPL, IEC, IPC, DISICNT) counts at the boundary after it. With `ipl_slip` = 1,
+that boundary still uses IPL and IEC from before the write. UNVERIFIED which of the two silicon does (isa.md
 §14.3). A flag that software sets in cycle e is first 1 in e + 1, so one more instruction executes.
 """
 
@@ -36,7 +36,7 @@ from emu.system.rules import Rule, RuleInterpreter
 
 @dataclass(frozen=True, slots=True)
 class Accepted:
-    """An exception that is accepted at a boundary: its CPU priority, its vector, and c of isa.md §14.3."""
+    """Exception that a boundary accepts: its CPU priority, its vector, and its request cycle (c of isa.md §14.3)."""
 
     level: int
     vector: Vector
@@ -44,7 +44,7 @@ class Accepted:
 
 
 class Exceptions(RuleInterpreter):
-    """Acceptance and entry of exceptions. The recheck event covers requests that become acceptable by time alone."""
+    """Acceptance and entry of exceptions. The recheck event covers requests that become acceptable merely by time."""
 
     def __init__(
         self, state: State, events: Events, bus: Bus, data: DataSpace, program: ProgramMemory, traps: Traps, chip: Chip
@@ -73,7 +73,7 @@ class Exceptions(RuleInterpreter):
         events.set_rule(self._recheck, recheck, self.fire)
 
     def _hook(self, bus: Bus) -> None:
-        """Hook all registers whose writes can change the result of `acceptable`."""
+        """Hook all registers for which a write can change the result of `acceptable`."""
         indices, priorities = iter(self.operands.since), iter(self.operands.priority)
         for flags, enables in self._words:
             bus.modelled[flags] = bus.modelled[enables] = True
@@ -105,12 +105,12 @@ class Exceptions(RuleInterpreter):
         self.traps.intcon1_written(old, new)
 
     def _read_intcon2(self) -> int:
-        """INTCON2<14> reads 1 while DISICNT is not 0 (isa.md §12)."""
+        """Return INTCON2. Its bit 14 reads 1 while DISICNT is not 0 (isa.md §12)."""
         stored = self._state.intcon2 & ~0x4000
         return stored | 0x4000 if self._state.disi_end > self._events.now else stored
 
     def _flags_written(self, since: list[int], old: int, new: int, _lanes: int) -> None:
-        """Record the cycle of flags that software sets: they are first 1 in the next cycle."""
+        """Record the request cycle of flags that software sets: they are first visible in the next cycle."""
         set_now = new & ~old
         for bit, index in enumerate(since):
             if set_now >> bit & 1:
@@ -118,7 +118,7 @@ class Exceptions(RuleInterpreter):
         self._events.kick()
 
     def _remember(self, word: int, old: int) -> None:
-        """Save SR and the enables from before the first write of this cycle, for `ipl_slip`."""
+        """Save SR and the enable registers as they were before this cycle's first write, for `ipl_slip`."""
         if self.ipl_slip:
             now = self._events.now
             if self._u64[self._slip_cycle] != now + 1:
@@ -128,13 +128,13 @@ class Exceptions(RuleInterpreter):
         self._events.kick()
 
     def forget(self) -> None:
-        """Cancel the recheck event, after a reset or because the next boundary checks in any case."""
+        """Cancel the recheck event after a reset, or because the next boundary checks anyway."""
         self._events.cancel(self._recheck)
 
     def acceptable(self, last: int) -> Accepted | None:
-        """Return the exception to enter at the boundary after cycle `last`, or None.
+        """Return the exception that the boundary after cycle `last` accepts, or None.
 
-        A request that becomes acceptable later by time alone posts the recheck event.
+        A request that becomes acceptable later merely by time posts the recheck event.
         """
         pending = self._state.intcon1 & self.traps.flags
         slip = last + 1 if self.ipl_slip else None
@@ -160,8 +160,12 @@ class Exceptions(RuleInterpreter):
         return False
 
     def waking(self) -> int | None:
-        """Return the cycle of a request that ends Idle or Sleep, None if there is none. Such a request is a trap, or an
-        enabled interrupt of priority 1 or more; the CPU priority does not matter (isa.md §11)."""
+        """Return the cycle of a request that ends Idle or Sleep, None if there is none.
+
+        Such a request is a trap, or an enabled interrupt of priority 1 or more; the CPU priority does not matter
+        (isa.md
+        §11).
+        """
         for trap in self.traps.all:
             if self._state.intcon1 & trap.flag:
                 return self._u64[trap.since]
@@ -169,7 +173,7 @@ class Exceptions(RuleInterpreter):
         return None if number == NO_REQUEST else request_cycle(self, self.operands, number)
 
     def has_enabled_interrupt(self) -> bool:
-        """Return whether any interrupt of priority 1 or more is enabled."""
+        """Whether an interrupt of priority 1 or more is enabled."""
         bits = sum(self.get(enables) << 16 * number for number, (_flags, enables) in enumerate(self.operands.words))
         return bool(waking(self, self.operands, bits & self.operands.implemented) != NO_REQUEST)
 
@@ -181,7 +185,7 @@ class Exceptions(RuleInterpreter):
         enter(self, self.operands, chosen.level, chosen.since, last, (vector.ivt, vector.aivt, vector.slot))
 
     def last_entered(self) -> str:
-        """Return the exception entered last, read from INTTREG and the stack, for messages; empty if there was none."""
+        """Describe the exception entered last, from INTTREG and the stack, for messages; empty if there was none."""
         slot, top = self._u16[self._inttreg] & 0x3F, self._u16[STACK_POINTER]
         if not slot or slot >= len(self._names) or self._data.faulty(top - 4 & 0xFFFF, 2):
             return ""
@@ -189,8 +193,7 @@ class Exceptions(RuleInterpreter):
         return f"{self._names[slot]} at {(high & 0x7F) << 16 | low:06X}"
 
     def push(self, low: int, high: int, cycle: int) -> None:
-        """Push two words at [W15++], in `cycle` and the next one, with the checks of every stack access (isa.md
-        §10)."""
+        """Push two words at [W15++], in `cycle` and the next, with the checks of every stack access (isa.md §10)."""
         for later, value in enumerate((low, high)):
             ea = self._u16[STACK_POINTER]
             self._events.arrive(cycle + later)
@@ -203,9 +206,9 @@ class Exceptions(RuleInterpreter):
             self._state.set_w(STACK_POINTER, ea + 2)
 
     def handler(self, vector: int) -> int:
-        """Return the program word of a vector."""
+        """Return the handler address stored in the vector at `vector`."""
         return self._program.word(vector)
 
     def beyond_stack(self, ea: int) -> bool:
-        """Return whether a W15 address is out of bounds (isa.md §10.1, §10.2)."""
+        """Whether an address in W15 is out of bounds (isa.md §10.1, §10.2)."""
         return ea < self._ram_start or (bool(self._state.limit_armed) and ea > self._state.splim)

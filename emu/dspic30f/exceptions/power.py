@@ -1,4 +1,4 @@
-"""Idle and Sleep: how time passes while the CPU is stopped, and what wakes it (isa.md §11)."""
+"""Idle and Sleep: passing of time while the CPU is stopped, and wake-up (isa.md §11)."""
 
 from __future__ import annotations
 
@@ -14,12 +14,16 @@ from emu.system.rules import Rule
 
 NO_RULE: Final = Rule(None)
 DRAIN_CYCLES: Final = 1_000_000
-"""Cycles for which devices run on after the CPU stops with no enabled wake-up source, so that transmitters drain."""
+"""Cycles that devices run after the CPU stops without an enabled wake-up source, so that transmitters can drain."""
 
 
 class Sleeping(Enum):
-    """Result of `PowerSaving.pass_time`. ENDED: the CPU runs. GOES_ON: the CPU still sleeps at the limit. FOR_EVER: no
-    source can wake the CPU."""
+    """Result of `PowerSaving.pass_time`.
+
+    - ENDED: the CPU runs.
+    - GOES_ON: the CPU still sleeps at the limit.
+    - FOR_EVER: no source can wake the CPU.
+    """
 
     ENDED = auto()
     GOES_ON = auto()
@@ -28,20 +32,20 @@ class Sleeping(Enum):
 
 @dataclass(slots=True)
 class PowerSignals:
-    """Signals between the core and the rest of the machine; the machine connects them."""
+    """Signals between the core and the rest of the machine, which the machine connects."""
 
     clear_watchdog: Callable[[], None] = lambda: None
     power: Callable[[int, int], None] = lambda mode, cycle: None
-    """power(mode, cycle): the CPU stops (IDLE, SLEEP) or runs again (RUN) from `cycle`."""
+    """power(mode, cycle): the CPU stops (IDLE, SLEEP) or runs again (RUN) in `cycle`."""
     idle_rule: Rule = NO_RULE
     clrwdt_rule: Rule = NO_RULE
-    """Rule of CLRWDT. `idle_rule` is the rule of PWRSAV #1."""
+    """Rule for CLRWDT; `idle_rule` is the rule for PWRSAV #1."""
     can_wake: Callable[[], bool] = lambda: False
     """Whether the watchdog can wake a sleeping CPU."""
     restart: Callable[[], int] = lambda: 0
     """Start-up time of the oscillator after Sleep, in Tcy."""
     interrupted: Callable[[], bool] = lambda: False
-    """Whether the run must end now, even if the CPU sleeps."""
+    """Whether the run must end now even though the CPU may be asleep."""
 
 
 class PowerSaving:
@@ -55,7 +59,7 @@ class PowerSaving:
         self.signals: Final = PowerSignals()
 
     def stop(self, mode: int, cycle: int) -> None:
-        """Stop the CPU: PWRSAV has executed in `cycle`. `mode` is IDLE or SLEEP."""
+        """Stop the CPU after PWRSAV executed in `cycle`. `mode` is IDLE or SLEEP."""
         self._events.arrive(cycle)
         self._state.mode = mode
         self._state.record.u64[self._slept] = cycle
@@ -63,7 +67,7 @@ class PowerSaving:
         self._events.kick()
 
     def wake(self) -> None:
-        """Leave Idle, or Sleep after the oscillator has started, and continue execution."""
+        """Leave Idle, or Sleep once the oscillator has started, and continue execution."""
         if self._state.mode != RUN:
             if self._state.mode == SLEEP:
                 self._state.cycle += self.signals.restart()
@@ -72,9 +76,9 @@ class PowerSaving:
             self._events.kick()
 
     def pass_time(self, limit: int) -> Sleeping:
-        """Let time pass until a request wakes the CPU, at most to `limit`.
+        """Let time pass until a request wakes the CPU, at most until `limit`.
 
-        The cycle in which the waking flag is first 1 counts as that of an instruction: UNVERIFIED.
+        UNVERIFIED: the cycle in which the waking flag becomes 1 counts as an instruction's cycle.
         """
         state, events = self._state, self._events
         while True:
@@ -100,5 +104,5 @@ class PowerSaving:
             state.cycle = max(state.cycle, due)
 
     def _is_final(self) -> bool:
-        """Return whether no enabled source can wake the CPU any more."""
+        """Whether no enabled source can wake the CPU any more."""
         return not self._exceptions.has_enabled_interrupt() and not self.signals.can_wake()

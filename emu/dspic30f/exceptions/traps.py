@@ -1,6 +1,6 @@
-"""Trap requests: flags of INTCON1, the cycle of each request, and the trap conflict (isa.md §14.4).
+"""Trap requests: INTCON1 flags, the cycle of each request, and trap conflicts (isa.md §14.4).
 
-A request is data: the flag stays set until software clears it. Acceptance is decided together with the interrupts.
+A request persists: its flag stays set until software clears it. Traps are accepted by the same rule as interrupts.
 """
 
 from __future__ import annotations
@@ -14,12 +14,12 @@ from emu.dspic30f.state.state import OA, OB, State
 from emu.system.events import Events
 
 HARD_LEVEL: Final = 13
-"""Lowest level of hard traps: no instruction runs between the faulting instruction and their handler."""
+"""Lowest priority of hard traps. No instruction runs between the faulting instruction and a hard trap's handler."""
 
 
 @dataclass(frozen=True, slots=True)
 class Trap:
-    """One trap: its flag in INTCON1, its vector, and the index of the cycle of its request."""
+    """One trap: its INTCON1 flag, its vector, and the index of the cell with its request cycle."""
 
     flag: int
     vector: Vector
@@ -27,7 +27,7 @@ class Trap:
 
 
 class Traps:
-    """The four traps of the core. `all` lists them from the highest level down."""
+    """The four traps of the core. `all` lists them by falling priority."""
 
     def __init__(self, state: State, events: Events, chip: Chip) -> None:
         self._state: Final = state
@@ -52,7 +52,7 @@ class Traps:
         )
 
     def request(self, trap: Trap, cycle: int) -> None:
-        """Set a trap flag that is first 1 in `cycle`. Raises TrapConflict."""
+        """Set a trap's flag, which is visible from `cycle` on. Raises TrapConflict."""
         state = self._state
         if trap.vector.level >= HARD_LEVEL and state.ipl > trap.vector.level:
             raise TrapConflict(f"{trap.vector.name} below a higher trap")
@@ -65,15 +65,17 @@ class Traps:
         self._events.kick()
 
     def request_flag(self, flag: str) -> None:
-        """Request the trap whose INTCON1 flag has this name, for a device. It is visible as `Irq.request` describes.
+        """Request the trap whose INTCON1 flag is called `flag`; for devices. It becomes visible as in `Irq.request`.
 
         Raises TrapConflict, KeyError for an unknown flag.
         """
         self.request(self._by_flag[flag], self._events.now + (not self._events.firing))
 
     def intcon1_written(self, old: int, new: int) -> None:
-        """Handle a write of INTCON1: flags that it sets are requests, and a lasting accumulator overflow requests
-        again."""
+        """Handle a write of INTCON1.
+
+        A flag set by the write is a request. An accumulator overflow that persists requests its trap again.
+        """
         for enable, overflow in self._overflow:
             if new & enable and self._state.sr & overflow:
                 new |= self.math.flag

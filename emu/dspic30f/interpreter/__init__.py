@@ -1,1 +1,1 @@
-"""The plain interpreter: sequencing rules, instruction facts, and rows run on Python integers."""
+"""The plain interpreter: sequencing rules, instruction facts, and table rows executed with Python integers."""

@@ -1,8 +1,8 @@
 """Integer expressions as Python source text, each with the interval of its values.
 
-Flow rules compute with plain operators, which `Expr` overloads. Values that are known when the text is written stay
-Python ints and are folded. The interval allows masks to be dropped that have no effect. Operands are atoms or
-parenthesised text.
+Flow rules compute with plain operators, which `Expr` overloads. Values that are known at translation time stay Python
+ints and are folded. By the interval of a value, masks without effect are omitted. Operands are atoms or parenthesised
+text.
 """
 
 from __future__ import annotations
@@ -10,13 +10,13 @@ from __future__ import annotations
 from typing import Any, Final, TypeAlias
 
 LIMIT: Final = 1 << 62
-"""Bound of the magnitude of all values (engine contract); wider intervals are cut to it."""
+"""Bound on the magnitude of all values (engine contract). Wider intervals are clipped to it."""
 
 Number: TypeAlias = "Expr | int"
 
 
 class Expr:
-    """Source text of an int in `low`..`high`. `atom` says that the text is a name or a literal."""
+    """Source text of an int in the range `low`..`high`. `atom` says whether the text is a name or a literal."""
 
     __slots__ = ("atom", "high", "low", "text")
 
@@ -143,12 +143,12 @@ class Expr:
 
 
 def interval(value: Number) -> tuple[int, int]:
-    """Return the smallest and the largest value."""
+    """Return the smallest and the largest possible value."""
     return (value.low, value.high) if isinstance(value, Expr) else (int(value), int(value))
 
 
 def choose(condition: Number, yes: Number, no: Number) -> Number:
-    """Return the expression `yes` if `condition` else `no`."""
+    """Return the expression that selects `yes` if `condition` is true, else `no`."""
     if not isinstance(condition, Expr):
         return yes if condition else no
     bounds = (*interval(yes), *interval(no))

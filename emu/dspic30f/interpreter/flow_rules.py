@@ -1,8 +1,8 @@
 """Rules of REPEAT, DO, RETFIE, DISI, skips and stalls (isa.md §7, §12, §13), shared by the sequencer and native code.
 
-A rule gets and puts cells of the record as device rules do (contract: emu/system/rules.py). It may branch on
-`m.is_true`; a code generator then evaluates the rule once for each path (rule_paths.py). Cells keep their old values
-until the whole rule has been evaluated. PC and the cycle belong to the engines; a rule returns what they need.
+A rule reads and writes cells of the record, as device rules do (contract: emu/system/rules.py). It may branch on
+`m.is_true`; a code generator then evaluates the rule once for each path (rule_paths.py). A cell keeps its old value
+until the whole rule has been evaluated. The engines maintain PC and the cycle; a rule returns what they need.
 """
 
 from __future__ import annotations
@@ -15,37 +15,37 @@ from emu.dspic30f.state.state import DA, DL_MASK, DL_SHIFT, FIRST, IPL3, LAST, M
 from emu.system.rules import Cell, Number, cell_of
 
 EDT_MATURE: Final = 3
-"""Lowest `State.edt` at which the end test of a DO loop applies EDT. Two instructions have completed since the write of
-EDT, so it was latched before the penultimate instruction (isa.md §7.6)."""
+"""Minimum `State.edt` for which the end test of a DO loop applies EDT. Two instructions have then completed since the
+write of EDT, so it was latched before the penultimate instruction (isa.md §7.6)."""
 TAKEN: Final = 1
-"""Additional cycles of a taken branch (isa.md §13.1)."""
+"""Number of additional cycles of a taken branch (isa.md §13.1)."""
 SHADOWED: Final = 2
-"""CORCON.DL of a loop nested in a loop whose registers are in the shadow registers (isa.md §2.6)."""
+"""CORCON.DL in the inner of two nested loops; the shadow registers hold the outer one's registers (isa.md §2.6)."""
 
 
 class StraightLineBuilder(Protocol):
-    """Operations of a rule without branches."""
+    """Builder operations of a rule without branches."""
 
     def get(self, cell: Cell) -> Number:
         """Return the number in a cell."""
 
     def put(self, cell: Cell, value: Number) -> None:
-        """Store the low bits of a number, after the whole rule has been evaluated."""
+        """Store the low bits of a number in a cell, after the whole rule has been evaluated."""
 
     def select(self, condition: Number, a: Number, b: Number) -> Number:
-        """Return `a` if `condition`, else `b`."""
+        """Return `a` if `condition` is not 0, else `b`."""
 
 
 class FlowBuilder(StraightLineBuilder, Protocol):
-    """Operations of a flow rule."""
+    """Builder operations of a flow rule."""
 
     def is_true(self, condition: Number) -> bool:
-        """Return whether `condition` is not 0, for an `if`."""
+        """Return whether `condition` is not 0, for use in an `if`."""
 
 
 @dataclass(frozen=True, slots=True)
 class FlowOperands:
-    """Registers and cells of flow rules."""
+    """Registers and cells that flow rules access."""
 
     sr: Cell
     corcon: Cell
@@ -58,11 +58,11 @@ class FlowOperands:
     loop: tuple[Cell, ...]
     """DCOUNT, DOSTARTL, DOSTARTH, DOENDL, DOENDH."""
     shadow: tuple[Cell, ...]
-    """Shadow registers of `loop`, in the same order."""
+    """Shadow registers of those in `loop`, in the same order."""
 
 
 def operands_of(state: State) -> FlowOperands:
-    """Return the operands in the record of one CPU."""
+    """Return the operands of flow rules for one CPU, located in its record."""
     registers = ("SR", "CORCON", "RCOUNT", "DCOUNT", "DISICNT")
     cells = {name: cell_of(state.record, f"cpu.{name}") for name in ("disi_end", "repeat", "edt")}
     names = ("DCOUNT", "DOSTARTL", "DOSTARTH", "DOENDL", "DOENDH")
@@ -75,13 +75,16 @@ def operands_of(state: State) -> FlowOperands:
 
 
 def stall(written: Number, pointers: int) -> Number:
-    """Return whether an instruction is stalled by a cycle: its predecessor wrote, on its destination side, a register
-    that this one uses as source pointer (isa.md §13.2). Both arguments are masks, bit n for Wn."""
+    """Return whether an instruction stalls for a cycle.
+
+    It stalls if its predecessor wrote, on its destination side, a register that this one uses as source pointer
+    (isa.md §13.2). Both arguments are masks in which bit n stands for Wn.
+    """
     return (written & pointers) != 0 if pointers else 0
 
 
 def words_skipped(insn: Insn | None) -> int:
-    """Return the words, and cycles, that a skip adds; an illegal word counts as one (isa.md §7.3)."""
+    """Return the number of words, and cycles, that a skip adds; an illegal word counts as one (isa.md §7.3)."""
     return 1 if insn is None else insn.words
 
 
@@ -96,8 +99,10 @@ def execute_repeat(m: FlowBuilder, p: FlowOperands, count: Number) -> bool:
 
 
 def end_iteration(m: FlowBuilder, p: FlowOperands, counting: Number) -> bool:
-    """End an iteration of a REPEAT target that has fallen through. Return whether another iteration follows. `counting`
-    is SR.RA, which is 0 in the last iteration (isa.md §7.5)."""
+    """End an iteration of a REPEAT target without a flow change. Return whether another iteration follows.
+
+    `counting` is SR.RA, which is 0 in the last iteration (isa.md §7.5).
+    """
     left = m.get(p.rcount)
     if m.is_true(left) and m.is_true(counting):
         if m.is_true(left != 1):
@@ -113,16 +118,20 @@ def end_iteration(m: FlowBuilder, p: FlowOperands, counting: Number) -> bool:
 
 
 def restore_repeat(m: StraightLineBuilder, p: FlowOperands, count: Number, left: Number) -> None:
-    """Restore the REPEAT state before the iteration with RCOUNT = `left`, for code that counts iterations itself.
-    `count` is the count of the REPEAT."""
+    """Restore the REPEAT state as before the iteration with RCOUNT = `left`, for code that counts iterations itself.
+
+    `count` is the count given to REPEAT.
+    """
     m.put(p.rcount, left)
     m.put(p.repeat, m.select(left == 0, LAST, m.select(left == count, FIRST, MIDDLE)))
     m.put(p.sr, m.get(p.sr) & (0xFFFF & ~RA) | m.select(left == 0, 0, RA))
 
 
 def execute_do(m: StraightLineBuilder, p: FlowOperands, count: Number, start: int, end: int) -> None:
-    """Execute DO for the loop from `start` to the instruction at `end`. The registers of the outer loop go to the
-    shadow registers (isa.md §7.6)."""
+    """Execute DO for the loop from `start` to the instruction at `end`.
+
+    The registers of the outer loop are copied to the shadow registers (isa.md §7.6).
+    """
     for register, shadow in zip(p.loop, p.shadow, strict=True):
         m.put(shadow, m.get(register))
     for register, value in zip(p.loop, (count, start & 0xFFFF, start >> 16, end & 0xFFFF, end >> 16), strict=True):
@@ -132,7 +141,7 @@ def execute_do(m: StraightLineBuilder, p: FlowOperands, count: Number, start: in
 
 
 def end_loop_iteration(m: FlowBuilder, p: FlowOperands) -> bool:
-    """End the instruction at DOEND, which has fallen through. Return whether the loop continues at DOSTART (isa.md
+    """End the instruction at DOEND, which did not change the flow. Return whether the loop continues at DOSTART (isa.md
     §7.6)."""
     left = m.get(p.dcount)
     if m.is_true(left) and m.is_true(m.get(p.edt) < EDT_MATURE):
@@ -148,19 +157,19 @@ def end_loop_iteration(m: FlowBuilder, p: FlowOperands) -> bool:
 
 
 def _nest(m: StraightLineBuilder, p: FlowOperands, level: Number) -> None:
-    """Set CORCON.DL, and SR.DA unless the level is 0."""
+    """Set CORCON.DL to `level`, and SR.DA to whether it is not 0."""
     m.put(p.corcon, m.get(p.corcon) & (0xFFFF & ~DL_MASK) | level << DL_SHIFT)
     m.put(p.sr, m.get(p.sr) & (0xFFFF & ~DA) | m.select(level == 0, 0, DA))
 
 
 def execute_retfie(m: StraightLineBuilder, p: FlowOperands, srl: Number, ipl3: Number) -> None:
-    """Execute RETFIE after SR<7:0> and IPL3 were popped (isa.md §7.4): continue an interrupted REPEAT."""
+    """Execute RETFIE after SR<7:0> and IPL3 are popped (isa.md §7.4). An interrupted REPEAT continues."""
     m.put(p.sr, m.get(p.sr) & 0xFF00 | srl)
     m.put(p.corcon, m.get(p.corcon) & (0xFFFF & ~IPL3) | m.select(ipl3 != 0, IPL3, 0))
     m.put(p.repeat, m.select((srl & RA) != 0, FIRST, m.get(p.repeat)))
 
 
 def execute_disi(m: StraightLineBuilder, p: FlowOperands, count: int, after: Number) -> None:
-    """Execute DISI, whose last cycle precedes `after`: that cycle and the next `count` are blocked (isa.md §12)."""
+    """Execute DISI. Its last cycle, which precedes `after`, and the next `count` cycles are blocked (isa.md §12)."""
     m.put(p.disi_end, after + count)
     m.put(p.disicnt, count)

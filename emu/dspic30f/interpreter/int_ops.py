@@ -1,10 +1,10 @@
-"""Integer operations that Python's operators lack, for the interpreter and the folding of constants."""
+"""Integer operations that Python's operators lack, for the interpreter and constant folding."""
 
 from __future__ import annotations
 
 
 def div_trunc(a: int, b: int) -> int:
-    """Return the quotient rounded towards zero, 0 for b = 0."""
+    """Return the quotient rounded towards zero; 0 for b = 0."""
     if b == 0:
         return 0
     quotient = abs(a) // abs(b)
@@ -12,7 +12,7 @@ def div_trunc(a: int, b: int) -> int:
 
 
 def rem_trunc(a: int, b: int) -> int:
-    """Return the remainder, which has the sign of a; 0 for b = 0."""
+    """Return the remainder, which has the sign of `a`; 0 for b = 0."""
     return 0 if b == 0 else a - div_trunc(a, b) * b
 
 

@@ -1,9 +1,10 @@
-"""The builder of the interpreter: rows run directly on Python ints and the state record.
+"""The interpreter's builder: executes table rows directly on Python ints and the state record.
 
-It is slow and simple, the reference for native code. One `Interpreter` serves one CPU. The sequencer prepares it for
-each instruction with `begin` and commits the stores with `commit`. Stores are deferred until the row is done, because
-an address error inhibits all of them (isa.md §14.4), and because a data write overrides what the same instruction does
-to the register (isa.md §2.2, §2.3).
+It is slow and simple, and the reference for native code. One `Interpreter` serves one CPU. The sequencer prepares it
+for each instruction with `begin` and commits the stores with `commit`. Stores are deferred to the end of the row for
+two
+reasons: an address error inhibits all of them (isa.md §14.4), and a data write overrides the same instruction's other
+effects on the register (isa.md §2.2, §2.3).
 """
 
 from __future__ import annotations
@@ -24,11 +25,11 @@ from emu.system.program import ProgramMemory
 
 ACC_SIGN: Final = 1 << 39
 OVERFLOW_FLAGS: Final = frozenset(("OA", "OB", "SA", "SB"))
-"""Flags that determine OAB and SAB."""
+"""Flags from which OAB and SAB are computed."""
 
 
 class Interpreter:
-    """The builder on ints; isa/builder.py defines its methods."""
+    """Builder that computes with Python ints; isa/builder.py defines its methods."""
 
     def __init__(
         self, state: State, events: Events, data: DataSpace, program: ProgramMemory, exceptions: Exceptions
@@ -46,11 +47,11 @@ class Interpreter:
         self.context = Context()
         self.pc = 0
         self.last = 0
-        """Last cycle of the instruction; a PSV read moves it."""
+        """Last cycle of the instruction; a PSV read delays it."""
         self.window = False
         """Whether the instruction has read the PSV window."""
         self.faulted = False
-        """Whether the instruction has made an address error."""
+        """Whether the instruction has caused an address error."""
         self.math = False
         """Whether the instruction requests a math error trap."""
         self.stack_error = False
@@ -60,8 +61,11 @@ class Interpreter:
         self._stores: list[tuple[int, int, Size]] = []
 
     def begin(self, pc: int, last: int, loads: int, window_extra: int) -> None:
-        """Prepare for the instruction at `pc` whose accesses fall in cycle `last`, or `window_extra` cycles later if
-        it reads the PSV window. Of two loads the first is made one cycle earlier (engines.md §4.2)."""
+        """Prepare for the instruction at `pc`.
+
+        Its accesses happen in cycle `last`, or `window_extra` cycles later if it reads the PSV window. The first of two
+        loads happens one cycle earlier (engines.md §4.2).
+        """
         self.context = self._modes.context
         self.pc = pc
         self.last = last
@@ -72,7 +76,7 @@ class Interpreter:
         self._state.stall = 0
 
     def commit(self) -> None:
-        """Make the stores, unless a store or a load is an address error. Raises TrapConflict."""
+        """Perform the stores, unless a store or a load is an address error. Raises TrapConflict."""
         data = self._data
         if not self.faulted and any(data.faulty(ea, size) for ea, _value, size in self._stores):
             self.faulted = True
@@ -87,8 +91,10 @@ class Interpreter:
             self._exceptions.traps.request(self._exceptions.traps.address, self.last)
 
     def request_soft_traps(self, last: int) -> None:
-        """Request the soft traps of the instruction that ended in cycle `last`; visible one cycle later (isa.md
-        §14.4)."""
+        """Request the soft traps of the instruction that ended in cycle `last`.
+
+        They are visible one cycle later (isa.md §14.4).
+        """
         traps = self._exceptions.traps
         if self.stack_error:
             traps.request(traps.stack, last + 1)

@@ -1,7 +1,7 @@
 """Code generation from flow rules with branches (flow_rules.py): a rule is evaluated once for each path through it.
 
 At a condition that is known only at run time, the evaluation stops and both branches are opened. In each branch the
-rule is evaluated again, up to the next such condition. The values that a rule puts are written at the end of a path.
+rule is evaluated again, up to the next such condition. Values stored by a rule are written at the end of a path.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ R = TypeVar("R")
 
 
 class _Fork(Exception):
-    """The path forks at a condition that is known only at run time."""
+    """Raised where the path forks, at a condition that is known only at run time."""
 
     def __init__(self, condition: Any) -> None:
         super().__init__()
@@ -28,7 +28,7 @@ class _Fork(Exception):
 
 
 class RulePaths(ABC):
-    """Evaluates a rule path by path; subclasses emit the code. `known` holds cells whose values are known already."""
+    """Evaluates a rule path by path; subclasses emit the code. `known` maps cells to values known in advance."""
 
     def __init__(self, known: Mapping[Cell, Any]) -> None:
         self._known: dict[Cell, Any] = dict(known)
@@ -36,7 +36,7 @@ class RulePaths(ABC):
         self._decisions: Iterator[bool] = iter(())
 
     def each(self, rule: Callable[[Any], R], end: Callable[[R], None], decisions: tuple[bool, ...] = ()) -> None:
-        """Emit `rule(self)` for each path. `end(result)` emits the code that follows on that path."""
+        """Emit `rule(self)` for each path. `end(result)` emits the code that follows the rule on that path."""
         self._puts.clear()
         self._decisions = iter(decisions)
         try:
@@ -56,7 +56,7 @@ class RulePaths(ABC):
         self.each(rule, lambda _result: None)
 
     def get(self, cell: Cell) -> Any:
-        """Return the value of a cell, which is loaded once on each path."""
+        """Return the value of a cell. Each path loads a cell at most once."""
         if cell not in self._known:
             self._known[cell] = self.load(cell)
         return self._known[cell]
@@ -66,7 +66,7 @@ class RulePaths(ABC):
         self._puts[cell] = value
 
     def is_true(self, condition: Any) -> bool:
-        """Return the decision of the current path at this condition."""
+        """Return the current path's decision at this condition."""
         if isinstance(condition, int):
             return bool(condition)
         for decision in self._decisions:
@@ -83,11 +83,11 @@ class RulePaths(ABC):
 
     @abstractmethod
     def branches(self, condition: Any) -> Iterator[bool]:
-        """Open the branch for True, then the branch for False."""
+        """Open the branch for True, yield True, then the same for False."""
 
 
 class PythonRulePaths(RulePaths):
-    """Emits Python statements on the record's views `u16`, `u64`, ... `emit` takes a line."""
+    """Emits Python statements that use the record's views `u16`, `u64`, ... `emit` receives one line."""
 
     def __init__(self, emit: Callable[[str], None]) -> None:
         super().__init__({})
@@ -125,12 +125,12 @@ class PythonRulePaths(RulePaths):
 
 @lru_cache(maxsize=4096)
 def compiled(text: str) -> CodeType:
-    """Return the compiled text of a function; all machines of the process share it."""
+    """Return the compiled text of a function, which all machines of the process share."""
     return compile(text, "<flow rule>", "exec")
 
 
 def function_of(record: Record, rule: Callable[..., R], operands: Any, *parameters: str) -> Callable[..., R]:
-    """Return rule(builder, operands, *parameters) as a Python function of its parameters, which are ints >= 0."""
+    """Return rule(builder, operands, *parameters) as a Python function of `parameters`, which are ints >= 0."""
     views = {"u16": record.u16, "u64": record.u64}
     lines = [f"def run({', '.join(parameters + tuple(f'{name}={name}' for name in views))}):"]
     values = [Expr(name, 0, LIMIT, atom=True) for name in parameters]

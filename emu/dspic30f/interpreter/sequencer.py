@@ -1,20 +1,21 @@
-"""The sequencer: the rules of order and time of the dsPIC30F core. Every engine behaves as this module defines.
+"""The sequencer defines the order and timing of the dsPIC30F core. Every engine behaves as this module.
 
-Time. An instruction that starts in cycle s occupies s..e: a RAW stall first (isa.md §13.2), then its base cycles
-(§13.1), then PSV cycles (§13.3). A taken branch or a skip adds cycles after its data access. Data accesses fall in e
-(of two, the first in e - 1). Devices are advanced to the cycle of an access before it is made. A write in cycle t
+Time. An instruction that starts in cycle s occupies cycles s..e: first a RAW stall (isa.md §13.2), then its base cycles
+(§13.1), then PSV cycles (§13.3). A taken branch or a skip adds cycles after its data access. Data accesses happen in e
+(of two, the first in e - 1). Devices advance to the cycle of an access before the access happens. A write in cycle t
 affects them from t + 1 (engines.md §4.2; UNVERIFIED on silicon).
 
 Boundaries. Between two instructions, after last cycle e, the engine handles the boundary if an event is due by e or
-`kick` was called (`Events.deadline` <= e). Events fire, then an acceptable exception is entered, with its handler
-starting in max(c + 4, e + 3) (isa.md §14.3, interrupts.py). The entry is followed by another boundary, so an exception
-of higher priority can be entered at once. RETURN, RETLW and RETFIE check one cycle early: they take 2 cycles instead of
-3 if an exception is acceptable then.
+`kick` was called (`Events.deadline` <= e). Due events fire. Then an acceptable exception is entered; its handler starts
+in max(c + 4, e + 3) (isa.md §14.3, interrupts.py). Another boundary follows the entry, so that an exception of higher
+priority can be entered immediately. RETURN, RETLW and RETFIE check one cycle early: they take 2 cycles instead of 3 if
+an exception is acceptable then.
 
-Loops. Within REPEAT, PC stays at the target, and every iteration is followed by a boundary. RA is 0 during the last
-iteration (isa.md §7.5, UNVERIFIED). If the instruction at DOEND falls through, the loop continues or ends (§7.6). The
-rules in flow_rules.py define what REPEAT, DO, RETFIE and DISI do to registers, and the cost of skips and stalls. A flow
-change out of a REPEAT target or out of the last instruction of a DO loop is executed (undefined on silicon).
+Loops. Within REPEAT, PC stays at the target, and a boundary follows every iteration. RA is 0 during the last
+iteration (isa.md §7.5, UNVERIFIED). If the instruction at DOEND does not change the flow, the loop continues or ends
+(§7.6). The rules in flow_rules.py define the register effects of REPEAT, DO, RETFIE and DISI, and the cost of skips and
+stalls. A flow change out of a REPEAT target, or by the last instruction of a DO loop, is executed (undefined on
+silicon).
 
 Faults. An address error inhibits the stores of its instruction, which otherwise completes. Stack and math errors are
 visible from e + 1, hard traps from e. An illegal opcode, an uninitialised pointer and a trap conflict reset the device.
@@ -92,7 +93,7 @@ class Sequencer:
         self._disi: Final = function_of(record, flow_rules.execute_disi, operands, "count", "after")
 
     def _forget(self, start: int, end: int) -> None:
-        """Discard decoded instructions: flash words in [start, end) have changed."""
+        """Discard decoded instructions because the flash words in [start, end) have changed."""
         for pc in [pc for pc in self._steps if start - 2 <= pc < end]:
             del self._steps[pc]
 
@@ -131,7 +132,7 @@ class Sequencer:
     # Instructions
 
     def fetch(self, pc: int) -> Step:
-        """Return the instruction at `pc`. Raises IllegalOpcode, or Breakpoint if it is a debugger word."""
+        """Return the decoded instruction at `pc`. Raises IllegalOpcode, or Breakpoint for a debugger word."""
         step = self._steps.get(pc)
         if step is None:
             word1 = self.program.word(pc)
@@ -144,9 +145,9 @@ class Sequencer:
         return step
 
     def execute(self) -> None:
-        """Run the instruction at PC, from its stall to its last cycle.
+        """Execute the instruction at PC, from its stall to its last cycle.
 
-        Raises DeviceReset, with PC at the faulting instruction, and Breakpoint, with PC and cycle after the word.
+        Raises DeviceReset, with PC at the faulting instruction. Raises Breakpoint, with PC and cycle after the word.
         """
         state = self.state
         pc = state.pc
@@ -186,8 +187,9 @@ class Sequencer:
     def _fetch_error(self) -> None:
         """Request a hard trap at this boundary: no instruction can be fetched at PC (isa.md §14.4, causes 4 and 5).
 
-        UNVERIFIED: with a trap of an equal or higher level in progress, the device resets. No boundary precedes cycle
-        0, so a fetch error in cycle 0 counts from cycle 1.
+        UNVERIFIED: if a trap of equal or higher level is in progress, the device resets. No boundary precedes cycle 0,
+        so
+        a fetch error in cycle 0 counts as one in cycle 1.
         """
         state = self.state
         state.cycle = max(state.cycle, 1)
@@ -198,10 +200,10 @@ class Sequencer:
             raise TrapConflict(f"no instruction can be fetched at {state.pc:06X}{origin}")
         traps.request(traps.address, state.cycle - 1)
 
-    # Flow
+    # Flow of control
 
     def _follow(self, flow: Flow, pc: int, last: int) -> int:
-        """Apply the flow of a row to PC and the loop registers. Return the last cycle of the instruction."""
+        """Apply a row's flow to PC and the loop registers. Return the last cycle of the instruction."""
         state = self.state
         match flow:
             case Branch(cond, target):
@@ -242,8 +244,10 @@ class Sequencer:
         return words
 
     def _return(self, flow: Return, second: int) -> int:
-        """Execute RETURN, RETLW or RETFIE. Return its last cycle: `second` if an exception can be entered then, else
-        the next one."""
+        """Execute RETURN, RETLW or RETFIE and return its last cycle.
+
+        It is `second` if an exception can be entered then, otherwise the next one.
+        """
         if flow.kind == "retfie":
             self._resume(flow.srl, flow.ipl3)
             self.events.kick()
@@ -251,12 +255,15 @@ class Sequencer:
         return second if self._exception_at(second) else second + 1
 
     def after_retfie(self) -> None:
-        """Complete a RETFIE that native code has run for two cycles: add the third unless an exception is entered."""
+        """Complete a RETFIE of which native code has run two cycles: add the third unless an exception is entered."""
         if not self._exception_at(self.state.cycle - 1):
             self.state.cycle += 1
 
     def _exception_at(self, last: int) -> bool:
-        """Return whether an exception can be entered after cycle `last`. If so, the boundary there will check again."""
+        """Return whether an exception can be entered after cycle `last`.
+
+        In that case the boundary there will check again.
+        """
         if self.events.deadline > last:
             return False
         self.events.settle(last)
@@ -266,7 +273,7 @@ class Sequencer:
         return True
 
     def _after_target(self, step: Step, flow: Flow, pc: int, last: int) -> int:
-        """Count an iteration of a REPEAT target. Return its last cycle, which a PSV read may move (isa.md §13.3)."""
+        """End an iteration of a REPEAT target. Return its last cycle, which a PSV read may delay (isa.md §13.3)."""
         state = self.state
         if isinstance(flow, Repeat | Return) or state.pc != step.next_pc:
             return last

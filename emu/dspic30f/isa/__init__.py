@@ -1,1 +1,1 @@
-"""The instruction table of the dsPIC30F and its readers: codec, text. A leaf: imports nothing else of the project."""
+"""Instruction table of the dsPIC30F, its codec and its assembly text. Imports no other package of the project."""

@@ -1,4 +1,4 @@
-"""Effective addresses and pointer updates: indirect modes, modulo, bit-reversed, the stack (isa.md §3).
+"""Effective addresses and pointer updates: indirect, modulo and bit-reversed addressing, the stack (isa.md §3).
 
 All addresses and pointer values passed to the builder are reduced modulo 2**16.
 """
@@ -19,14 +19,14 @@ def signed16(m: Builder, v: Value) -> Value:
 
 
 def advance(m: Builder, n: int, value: Value, delta: Value, side: Side) -> Value:
-    """Return the pointer ``value`` of Wn moved by ``delta`` bytes, modulo the buffer if Wn is selected (isa.md
-    §3.6)."""
+    """Return the pointer ``value`` of Wn plus ``delta`` bytes, wrapped in the modulo buffer if Wn is selected for it
+    (isa.md §3.6)."""
     c = m.context
     moved = value + delta
     if side == "y":
         enabled, first, last = bool(c.ymod and c.ywm == n), "YMODSRT", "YMODEND"
     else:
-        reversed_writes = bool(side == "dst" and c.brev and c.bwm == n)  # before modulo, isa.md §3.7
+        reversed_writes = bool(side == "dst" and c.brev and c.bwm == n)  # takes precedence over modulo, isa.md §3.7
         enabled, first, last = bool(c.xmod and c.xwm == n and not reversed_writes), "XMODSRT", "XMODEND"
     if enabled:
         start, end = m.reg(first), m.reg(last)
@@ -54,10 +54,10 @@ def bit_reverse16(m: Builder, v: Value) -> Value:
 def indirect(
     m: Builder, n: int, mode: int, step: int, side: Side, index: int | None = None, reversible: bool = False
 ) -> tuple[Value, Value | None]:
-    """Return the EA of Wn in an indirect ``mode`` and the new pointer, None if the pointer does not change.
+    """Return the EA of Wn in an indirect ``mode``, and the new pointer; None if the pointer does not change.
 
-    ``step`` is the access size in bytes, ``index`` the register of [Wn+Wb], ``reversible`` marks a word write, the only
-    access to which bit-reversed addressing applies.
+    ``step`` is the access size in bytes, ``index`` the register Wb of [Wn+Wb]. ``reversible`` marks a word write, the
+    only access to which bit-reversed addressing applies.
     """
     value = m.ptr(n, side)
     if mode == INDIRECT:
@@ -74,18 +74,20 @@ def indirect(
 
 
 def offset_address(m: Builder, n: int, offset: int, side: Side) -> Value:
-    """Return the EA of [Wn+lit]. UNVERIFIED: modulo addressing is not applied to literal offsets (isa.md §3.6 names
-    [Wn+Wb])."""
+    """Return the EA of [Wn+lit].
+
+    UNVERIFIED: modulo addressing does not apply to literal offsets (isa.md §3.6 names only [Wn+Wb]).
+    """
     return m.let((m.ptr(n, side) + offset) & 0xFFFF)
 
 
 def truncated(v: Value, size: Size) -> Value:
-    """Return the low ``size`` bytes."""
+    """Return the low ``size`` bytes of a value."""
     return v & (0xFF if size == 1 else 0xFFFF)
 
 
 def set_register(m: Builder, n: int, v: Value, size: Size) -> None:
-    """Write Wn, or only its low byte (isa.md §2.2)."""
+    """Write Wn; with size 1 only its low byte (isa.md §2.2)."""
     if size == 1:
         m.set_wb(n, v)
     else:
@@ -93,15 +95,15 @@ def set_register(m: Builder, n: int, v: Value, size: Size) -> None:
 
 
 def size_of(x: Operands) -> Size:
-    """Return the access size that the B field selects."""
+    """Return the access size in bytes that field B selects."""
     return 1 if x.B else 2
 
 
 class Location:
-    """Location of an operand whose address is formed. Later phases of a row ``read`` and ``write`` it.
+    """Location of an operand after its address is formed. Later phases of a row ``read`` and ``write`` it.
 
-    A direct register is read at once, before any pointer moves: the data operand is the old value (isa.md §3.4).
-    The update of a destination pointer waits until the write, behind all reads.
+    A direct register is read immediately, before any pointer changes, so that the operand is the old value (isa.md
+    §3.4). A destination pointer is updated by the write, after all reads.
     """
 
     __slots__ = ("ea", "held", "m", "moved", "register", "size")
@@ -121,7 +123,7 @@ class Location:
         return self.held if self.ea is None else self.m.load(self.ea, self.size, ptr=self.register)
 
     def write(self, v: Value) -> None:
-        """Store the low bits of ``v``; of a direct register, a byte write keeps the high byte."""
+        """Store the low bits of ``v``. A byte write to a direct register keeps the high byte."""
         if self.ea is None:
             set_register(self.m, self.register, v, self.size)
             return
@@ -129,15 +131,15 @@ class Location:
         self.m.store(self.ea, v, self.size, ptr=self.register)
 
     def move_pointer(self) -> None:
-        """Apply ++ or -- of a destination; those of a source have been applied."""
+        """Apply the ++ or -- of a destination pointer; source pointers are already updated."""
         if self.moved is not None:
             self.m.set_ptr(self.register, self.moved, "dst")
 
 
 def source(m: Builder, x: Operands, size: Size, mode: int | None = None) -> Location:
-    """Ws in mode ``p``, or in ``mode`` of the 8-mode set with Wb as index. Its pointer is updated at once.
+    """Return the location of Ws in mode ``p``, or in ``mode`` of the 8-mode set with index Wb. Update its pointer now.
 
-    UNVERIFIED: where it points to its own place in data memory, the new value is read.
+    UNVERIFIED: if the pointer points to its own data address, the new value is read.
     """
     mode = x.p if mode is None else mode
     if mode == 0:
@@ -151,8 +153,10 @@ def source(m: Builder, x: Operands, size: Size, mode: int | None = None) -> Loca
 
 
 def destination(m: Builder, x: Operands, size: Size, mode: int | None = None) -> Location:
-    """Wd in mode ``q``, or in ``mode`` of the 8-mode set; write only. It is formed after ``source``, whose pointer
-    update it sees."""
+    """Return the location of Wd in mode ``q``, or in ``mode`` of the 8-mode set, for a write only.
+
+    Call it after ``source``, so that it uses the updated source pointer.
+    """
     mode = x.q if mode is None else mode
     if mode == 0:
         return Location(m, x.d, size)

@@ -1,6 +1,6 @@
 """ALU operations on 8 or 16 bits: results and flags (isa.md §6).
 
-An operation takes the builder, the size and zero-extended operands, sets its flags and returns the result, truncated.
+An operation takes the builder, the size and zero-extended operands. It sets its flags and returns the truncated result.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ def ones(size: Size) -> int:
 
 
 def adder(m: Builder, size: Size, a: Value, b: Value, carry: Value, sticky: bool = False) -> Value:
-    """Return a + b + carry and set all five flags; ``sticky`` Z can only be cleared (isa.md §6.1)."""
+    """Return a + b + carry and set all five flags. With ``sticky``, Z can only be cleared (isa.md §6.1)."""
     bits, half = 8 * size, 4 * size
     total = m.let(a + b + carry)
-    apart = a ^ b  # a sum without its carries
+    apart = a ^ b  # the sum without carries
     result = m.let(total & ones(size))
     zero = result == 0
     m.set_flags(
@@ -80,7 +80,7 @@ def ior(m: Builder, size: Size, a: Value, b: Value) -> Value:
 
 
 def test(m: Builder, size: Size, a: Value) -> Value:
-    """Return the operand and set N and Z: MOV f."""
+    """Return the operand and set N and Z, as MOV f does."""
     return set_nz(m, size, a)
 
 

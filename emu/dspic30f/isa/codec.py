@@ -1,7 +1,7 @@
-"""Codec: decodes program words to instructions and encodes instructions to words.
+"""Codec: decodes program words to instructions, and encodes instructions to program words.
 
-``decode`` accepts exactly the 11,165,253 legal first words of isa.md §4. ``decode_loosely`` also names words that break
-a rule of their row, for disassembly; ``decode_for_execution`` decodes as the CPU does.
+``decode`` accepts exactly the 11,165,253 legal first words of isa.md §4. ``decode_loosely`` is for disassembly: it also
+accepts words that break a rule of their row. ``decode_for_execution`` decodes as the CPU does.
 """
 
 from __future__ import annotations
@@ -15,14 +15,15 @@ from .table import BY_BYTE
 
 CACHE_WORDS = 1 << 17  # more than twice the flash of the chip
 
-# Rules that the CPU does not enforce: a word-mode file register at an odd address makes an address error when it runs
-# (isa.md §3.3), SFTAC by more than 16 a math error (§8.5), mode 7 acts as 6 (§3.1), f of CLR WREG is ignored (§5.1).
-# A breach of any other is an illegal opcode (§4.1). UNVERIFIED but for SFTAC: isa.md §22 items 6, 7, 11, 12.
+# Rules that the CPU does not enforce. A word-mode file register at an odd address causes an address error at run time
+# (isa.md §3.3), SFTAC by more than 16 a math error (§8.5). Mode 7 acts as mode 6 (§3.1), and f of CLR WREG is ignored
+# (§5.1). A violation of any other rule is an illegal opcode (§4.1). UNVERIFIED except for SFTAC: isa.md §22 items 6, 7,
+# 11, 12.
 RUNS_ANYWAY = frozenset(("B=0: f even", "k>=-16", "k<=16", "g<=6", "h<=6", "z=0"))
 
 
 class EncodeError(ValueError):
-    """Field values do not fit the row: they break a rule of it, or field ``letter`` cannot hold ``value``."""
+    """Field values do not fit the row: they break one of its rules, or field ``letter`` cannot hold ``value``."""
 
     def __init__(self, row: Row, letter: str, value: int, clause: Clause | None, text: str) -> None:
         super().__init__(f"{row.syntax}: {text}")
@@ -39,7 +40,7 @@ def _operands(row: Row, word1: int, word2: int) -> Operands:
 
 
 def _candidates(word1: int, word2: int) -> list[tuple[int, Insn]]:
-    """Return the rows whose fixed bits match, each with the number of broken rules."""
+    """Return the rows whose fixed bits match, each with the number of rules that the word breaks."""
     found = []
     for row in BY_BYTE[word1 >> 16]:
         mask, value = row.pattern.mask, row.pattern.value
@@ -51,7 +52,10 @@ def _candidates(word1: int, word2: int) -> list[tuple[int, Insn]]:
 
 @lru_cache(CACHE_WORDS)
 def decode(word1: int, word2: int = 0) -> Insn | None:
-    """Return the instruction in one or two 24-bit words, or None if illegal. One-word instructions ignore ``word2``."""
+    """Return the instruction in one or two 24-bit words, None if it is illegal.
+
+    A one-word instruction ignores ``word2``.
+    """
     for broken, insn in _candidates(word1, word2):
         if not broken:
             return insn
@@ -60,9 +64,11 @@ def decode(word1: int, word2: int = 0) -> Insn | None:
 
 @lru_cache(CACHE_WORDS)
 def decode_loosely(word1: int, word2: int = 0) -> Insn | None:
-    """As ``decode``, but decode a word that only breaks rules on field values by the row with the fewest broken rules.
+    """Decode as ``decode`` does, but also accept words that only break rules about field values.
 
-    Ties are resolved as binutils prints them: CLR first, then by row number.
+    The row with the fewest broken rules is used.
+
+    Ties are resolved as binutils does: CLR first, then by row number.
     """
     candidates = _candidates(word1, word2)
     if not candidates:
@@ -72,7 +78,10 @@ def decode_loosely(word1: int, word2: int = 0) -> Insn | None:
 
 @lru_cache(CACHE_WORDS)
 def decode_for_execution(word1: int, word2: int = 0) -> Insn | None:
-    """As ``decode``, plus instructions that the CPU executes although assemblers refuse them: RUNS_ANYWAY."""
+    """Decode as ``decode`` does, plus the instructions that the CPU executes although assemblers reject them.
+
+    These are the ones that break only rules in RUNS_ANYWAY.
+    """
     insn = decode(word1, word2)
     if insn is None:
         loose = decode_loosely(word1, word2)
@@ -84,9 +93,9 @@ def decode_for_execution(word1: int, word2: int = 0) -> Insn | None:
 def encode(
     row: Row, operands: Operands | Mapping[str, int], tolerate: Sequence[tuple[str, int]] = ()
 ) -> tuple[int, ...]:
-    """Return the words of an instruction with these field values; fields absent from a mapping are 0.
+    """Return the words of an instruction with these field values; a field that a mapping lacks is 0.
 
-    EncodeError if they break a rule; ``tolerate`` lists (rule, value) pairs to let pass.
+    Raises EncodeError if they break a rule. ``tolerate`` lists (rule, value) pairs that are permitted.
     """
     words = list(row.pattern.value)
     x = Operands()

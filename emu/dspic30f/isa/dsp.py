@@ -10,7 +10,7 @@ from .fields import Operands
 from .flow import Value
 from .row import Does
 
-GUARD = 1 << 39  # an accumulator is -GUARD .. GUARD - 1
+GUARD = 1 << 39  # an accumulator's range is -GUARD .. GUARD - 1
 LIMIT = 1 << 31  # its 1.31 range is -LIMIT .. LIMIT - 1
 MULTIPLICANDS = {0: (4, 5), 1: (4, 6), 2: (4, 7), 4: (5, 6), 5: (5, 7), 6: (6, 7)}  # mmm, isa.md §8.1
 NO_PREFETCH, WITH_OFFSET, OFFSET_REGISTER = 4, 12, 12
@@ -50,14 +50,14 @@ def outside(v: Value, limit: int) -> Value:
 
 
 def clamp(m: Builder, v: Value, limit: int) -> Value:
-    """Return v limited to -limit .. limit - 1."""
+    """Return v clamped to -limit .. limit - 1."""
     return m.select(v < -limit, -limit, m.select(v >= limit, limit - 1, v))
 
 
 def accumulate(m: Builder, a: int, exact: Value, keep: Value = 0) -> None:
-    """Write the exact result of an operation to accumulator ``a``: saturation, OA/SA, traps (isa.md §8.3, §8.5).
+    """Write an operation's exact result to accumulator ``a``, with saturation, OA/SA and traps (isa.md §8.3, §8.5).
 
-    With ``keep`` 1 nothing changes.
+    If ``keep`` is 1, nothing changes.
     """
     c = m.context
     v = m.let(exact)
@@ -82,7 +82,7 @@ def accumulate(m: Builder, a: int, exact: Value, keep: Value = 0) -> None:
 
 
 def product(m: Builder, a: Value, b: Value) -> Value:
-    """Return the exact multiplier result of two 16-bit values under CORCON.US and CORCON.IF."""
+    """Return the exact product of two 16-bit values, as CORCON.US and CORCON.IF specify."""
     if not m.context.us:
         a, b = signed16(m, a), signed16(m, b)
     return a * b if m.context.if_ else a * b * 2
@@ -94,10 +94,10 @@ def shifted(m: Builder, v: Value, right: int) -> Value:
 
 
 def rounded_word(m: Builder, v: Value, rounding: bool) -> Value:
-    """Return the word that SAC, or SAC.R with ``rounding``, and the write-back store for the 40-bit value v (§8.4)."""
+    """Return the word that SAC, or SAC.R with ``rounding``, and write-back store for the 40-bit value v (§8.4)."""
     if rounding and m.context.rnd:
         v = v + 0x8000
-    elif rounding:  # convergent: halves go to the even word
+    elif rounding:  # convergent rounding: a tie goes to the even word
         low = m.let(v & 0xFFFF)
         up = (low > 0x8000) | (low == 0x8000) & (v >> 16 & 1)
         v = v + (up << 16)
@@ -107,7 +107,7 @@ def rounded_word(m: Builder, v: Value, rounding: bool) -> Value:
 
 
 def on_accumulators(op: Callable[[Value, Value], Value]) -> Does:
-    """Acc <- op(Acc, the other accumulator)."""
+    """Return the function for Acc <- op(Acc, other accumulator)."""
 
     def does(m: Builder, x: Operands) -> None:
         accumulate(m, x.A, op(m.acc(x.A), m.acc(1 - x.A)))
@@ -116,7 +116,7 @@ def on_accumulators(op: Callable[[Value, Value], Value]) -> Does:
 
 
 def load_accumulator(op: Callable[[Value, Value], Value]) -> Does:
-    """Acc <- op(Acc, Ws << 16 >> Slit4)."""
+    """Return the function for Acc <- op(Acc, Ws << 16 >> Slit4)."""
 
     def does(m: Builder, x: Operands) -> None:
         word = source(m, x, 2, mode=x.g).read()
@@ -126,7 +126,10 @@ def load_accumulator(op: Callable[[Value, Value], Value]) -> Does:
 
 
 def store_accumulator(rounding: bool) -> Does:
-    """Wd <- bits 31:16 of Acc >> Slit4. UNVERIFIED: a left shift is cut to 40 bits before it saturates."""
+    """Return the function for Wd <- bits 31:16 of Acc >> Slit4.
+
+    UNVERIFIED: a left shift is truncated to 40 bits before saturation.
+    """
 
     def does(m: Builder, x: Operands) -> None:
         value = signed40(m, shifted(m, m.acc(x.A), x.r))
@@ -136,7 +139,7 @@ def store_accumulator(rounding: bool) -> Does:
 
 
 def shift_accumulator(count_of: Callable[[Builder, Operands], Value]) -> Does:
-    """Acc <- Acc >> count, or a math trap and no change if the count is beyond 16 (isa.md §8.5)."""
+    """Return the function for Acc <- Acc >> count. A count beyond 16 causes a math trap and no change (isa.md §8.5)."""
 
     def does(m: Builder, x: Operands) -> None:
         count = m.let(count_of(m, x))
@@ -159,7 +162,7 @@ def register_count(m: Builder, x: Operands) -> Value:
 
 
 class Prefetch:
-    """Make the X and Y reads of a MAC-class instruction: addresses first, data last (isa.md §8.1, §8.2)."""
+    """X and Y prefetch of a MAC-class instruction: forms addresses first, reads data later (isa.md §8.1, §8.2)."""
 
     __slots__ = ("m", "x_ea", "x_pointer", "y_ea", "y_pointer")
 
@@ -187,7 +190,10 @@ class Prefetch:
 
 
 def mac_class(op: Callable[[Value, Value], Value] | None, square: bool = False, write_back: bool = True) -> Does:
-    """Acc <- op(Acc, product), with prefetch and write-back; ``op`` None leaves the accumulator alone (MOVSAC)."""
+    """Return the function for Acc <- op(Acc, product), with prefetch and write-back.
+
+    With ``op`` None, the accumulator does not change (MOVSAC).
+    """
 
     def does(m: Builder, x: Operands) -> None:
         first, second = (4 + x.m, 4 + x.m) if square else MULTIPLICANDS[x.m] if op else (4, 4)
@@ -208,21 +214,21 @@ def mac_class(op: Callable[[Value, Value], Value] | None, square: bool = False, 
                 m.store(target, word, 2, ptr=WRITE_BACK)
         if x_data is not None:
             m.set_w(4 + x.x, x_data)
-        if y_data is not None:  # UNVERIFIED: of equal destinations the Y value stays (isa.md §22 item 18)
+        if y_data is not None:  # UNVERIFIED: if both destinations are equal, the Y value remains (isa.md §22 item 18)
             m.set_w(4 + x.y, y_data)
 
     return does
 
 
 def clear_accumulator(m: Builder, x: Operands) -> None:
-    """CLR: Acc, Ox and Sx become 0; prefetch and write-back as in MAC."""
+    """Execute CLR: Acc, Ox and Sx become 0. Prefetch and write-back are as in MAC."""
     mac_class(None)(m, x)
     m.set_acc(x.A, 0)
     m.set_flags(**({"OB": 0, "SB": 0} if x.A else {"OA": 0, "SA": 0}))
 
 
 def euclidean(op: Callable[[Value, Value], Value]) -> Does:
-    """ED, EDAC: Acc <- op(Acc, Wm * Wm); Wxd <- [Wx] - [Wy]."""
+    """Return the function of ED and EDAC: Acc <- op(Acc, Wm * Wm); Wxd <- [Wx] - [Wy]."""
 
     def does(m: Builder, x: Operands) -> None:
         a = m.w(4 + x.m)

@@ -1,7 +1,7 @@
-"""Static facts about one decoded instruction, found by running its row against a recording builder.
+"""Static facts about a decoded instruction, determined by running its row on a recording builder.
 
-The sequencer needs them before and between instructions: which W registers form source addresses, which are
-written on the destination side (RAW stalls, isa.md §13.2), and how many data accesses there are.
+The sequencer needs them before and between instructions: which W registers form source addresses, which ones the
+destination side writes (RAW stalls, isa.md §13.2), and the number of data accesses.
 """
 
 from __future__ import annotations
@@ -21,23 +21,23 @@ class Facts:
     """Facts of an instruction that hold for all operand values. In masks, bit n stands for Wn."""
 
     source_pointers: int
-    """Registers that form a source EA: a write of one by the preceding instruction causes a stall (isa.md §13.2)."""
+    """Registers that form a source EA. If the preceding instruction wrote one, a stall occurs (isa.md §13.2)."""
     writes: int
-    """Registers written directly or as a modified destination pointer: they may stall the next instruction."""
+    """Registers written directly or as a modified destination pointer. They may stall the next instruction."""
     loads: int
     reads: tuple[int, ...]
-    """Data addresses that the instruction reads and encodes itself."""
+    """Data addresses that the instruction reads and that are encoded in it."""
     stores: int
     access: int
-    """Cycle of the only or last data access, counted from the instruction's first one (engines.md §4.2)."""
+    """Cycle of the last data access, counted from the instruction's first cycle (engines.md §4.2)."""
     window_cycles: int
-    """Additional cycles of a read of the PSV window outside of REPEAT (isa.md §13.3)."""
+    """Additional cycles of a PSV window read outside REPEAT (isa.md §13.3)."""
     flow: type | None
-    """Class of the Flow that the row returns, None if the next word follows."""
+    """Class of the Flow that the row returns; None if execution continues with the next word."""
 
 
 class _Unknown:
-    """An unknown value: the result of every operation on it is unknown too."""
+    """An unknown value. The result of every operation on it is unknown too."""
 
     def _same(self, *_operands: object) -> _Unknown:
         return self
@@ -70,7 +70,7 @@ class _Notes:
     select = div_trunc = rem_trunc = clz16 = ctz16 = let = w = prog = flag = reg = acc = _value
 
     def _nothing(self, *_arguments: object, **_flags: object) -> None:
-        """Ignore an operation that is neither a stall nor a data access."""
+        """Ignore an operation that affects neither stalls nor data accesses."""
 
     table_write = set_flags = set_reg = set_acc = trap_math = _nothing
 
@@ -108,7 +108,7 @@ class _Notes:
 
 @lru_cache(maxsize=65536)
 def facts_of(insn: Insn) -> Facts:
-    """Return the facts of a decoded instruction; they do not depend on its address."""
+    """Return the facts of a decoded instruction, which do not depend on its address."""
     notes: Any = _Notes(0)
     flow: Flow = insn.row.does(notes, insn.x)
     kind = None if flow is None else type(flow)
@@ -120,6 +120,6 @@ def facts_of(insn: Insn) -> Facts:
 
 
 def flow_of(insn: Insn, pc: int) -> Flow:
-    """Return the flow of a decoded instruction at `pc`, with its static targets; computed values are unknown."""
+    """Return the flow of a decoded instruction at `pc` with its static targets. Computed values are unknown."""
     notes: Any = _Notes(pc)
     return insn.row.does(notes, insn.x)

@@ -1,8 +1,8 @@
-"""Bit fields: the notation of 24-bit patterns and the meaning of each letter in them.
+"""Bit fields: notation of 24-bit patterns, and meaning of each letter in a pattern.
 
-A pattern is 24 characters, spaces ignored: ``0``/``1`` must match, ``-`` is ignored by the CPU, a letter is a field.
+A pattern is 24 characters without spaces: ``0``/``1`` must match, ``-`` is ignored by the CPU, a letter is a field.
 Letters follow isa.md §4.2 with three differences, so that each letter has one meaning: ``o`` is the signed offset of
-``[Wn+Slit10]``, ``z`` is to be 0, and the f-bit forms show the 13-bit byte address ``f`` and the bit 0..7 ``b`` that
+``[Wn+Slit10]``, ``z`` must be 0, and the f-bit forms show the 13-bit byte address ``f`` and the bit ``b``, 0..7, that
 the hardware uses.
 A field's *value* is its operand: signed, and scaled to a byte address or register number.
 """
@@ -15,9 +15,9 @@ from dataclasses import dataclass
 from operator import eq, ge, gt, le, lt, ne
 from typing import Any
 
-# (letter, width) -> (signed, scale). Not listed: unsigned, scale 1. isa.md §3.2, §3.3, §4.2.
+# (letter, width) -> (signed, scale). Fields that are not listed are unsigned with scale 1. isa.md §3.2, §3.3, §4.2.
 INTERPRETATION: Mapping[tuple[str, int], tuple[bool, int]] = {
-    ("f", 15): (False, 2),  # MOV f,Wnd  PUSH f: word address of the whole 64 KB
+    ("f", 15): (False, 2),  # MOV f,Wnd  PUSH f: word address anywhere in the 64 KB
     ("d", 3): (False, 2),  # even register of MUL, MOV.D
     ("s", 3): (False, 2),  # even register of MOV.D Wns
     ("k", 13): (False, 2),  # LNK: even frame size
@@ -28,7 +28,7 @@ INTERPRETATION: Mapping[tuple[str, int], tuple[bool, int]] = {
     ("n", 22): (False, 2),  # CALL, GOTO: program address; the second word holds the high part
 }
 
-# Rules that come with a field, whatever the row: (letter, width or None for any, other letter needed) -> clause.
+# Rules that a field implies in every row: (letter, width or None for any, other letter needed) -> clause.
 # Reserved modes isa.md §3.1; word alignment, byte literals and byte bits §3.2, §3.3; MAC operands §8.1.
 FIELD_RULES: tuple[tuple[str, int | None, str, str], ...] = (
     ("p", None, "", "p<=5"),
@@ -45,7 +45,7 @@ FIELD_RULES: tuple[tuple[str, int | None, str, str], ...] = (
 
 
 class Operands:
-    """The decoded fields of one instruction, by letter; reading a letter the row lacks is an AttributeError."""
+    """Decoded fields of one instruction, by letter. Reading a letter that the row lacks raises AttributeError."""
 
     __slots__ = tuple("ABabdfghijkmnopqrstvwxyz")
     A: int  # 0 ACCA, 1 ACCB
@@ -83,7 +83,7 @@ class Operands:
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """Contiguous part of a field: bits ``mask`` at ``shift`` in word ``word``, with the weight 2**``weight``."""
+    """Contiguous part of a field: the bits ``mask`` at ``shift`` in word number ``word``, with weight 2**``weight``."""
 
     word: int
     shift: int
@@ -93,7 +93,7 @@ class Run:
 
 @dataclass(frozen=True, slots=True)
 class Field:
-    """One letter of a pattern: the position of its bits and their interpretation as a number."""
+    """One letter of a pattern: the positions of its bits and their interpretation as a number."""
 
     letter: str
     width: int
@@ -102,7 +102,7 @@ class Field:
     scale: int
 
     def get(self, word1: Any, word2: Any = 0) -> Any:
-        """Return the value of the field in instruction words, which may be numpy arrays."""
+        """Return the field's value in instruction words, which may be numpy arrays."""
         words = (word1, word2)
         raw = 0
         for run in self.runs:
@@ -113,7 +113,10 @@ class Field:
         return raw * self.scale
 
     def put(self, value: int) -> tuple[int, int]:
-        """Return the bits to OR into both words. Raises ValueError if ``value`` is out of range or not a multiple."""
+        """Return the bits to OR into both words.
+
+        Raises ValueError if ``value`` is out of range or not a multiple of the scale.
+        """
         low, high = self.limits
         if not low <= value <= high or value % self.scale:
             step = f" in steps of {self.scale}" if self.scale > 1 else ""
@@ -126,7 +129,7 @@ class Field:
 
     @property
     def limits(self) -> tuple[int, int]:
-        """Return the smallest and the largest value."""
+        """Return the smallest and the largest value of the field."""
         span = 1 << self.width
         low, high = (-span // 2, span // 2 - 1) if self.signed else (0, span - 1)
         return low * self.scale, high * self.scale
@@ -134,7 +137,7 @@ class Field:
 
 @dataclass(frozen=True, slots=True)
 class Pattern:
-    """One or two instruction words: fixed bits and fields."""
+    """One or two instruction words described as fixed bits and fields."""
 
     mask: tuple[int, int]
     value: tuple[int, int]
@@ -142,11 +145,11 @@ class Pattern:
 
 
 def parse_pattern(*words: str) -> Pattern:
-    """Read the patterns of the first and, for two-word instructions, the second word."""
+    """Parse the pattern of the first and, for two-word instructions, of the second word."""
     mask, value = [0, 0], [0, 0]
     runs: dict[str, list[Run]] = {}
     widths: dict[str, int] = {}
-    for word in reversed(range(len(words))):  # of a field in both words, the second word holds the high part
+    for word in reversed(range(len(words))):  # the second word holds the high part of a field in both words
         text = words[word].replace(" ", "")
         assert len(text) == 24, words[word]
         for match in reversed(list(re.finditer(r"0+|1+|-+|([A-Za-z])\1*", text))):
@@ -176,17 +179,17 @@ CLAUSE = re.compile(r"(?:(\w)=(\d+): )?(\w)(?: (even)|(<=|>=|!=|=)(?:(-?\d+)|(\w
 
 @dataclass(frozen=True, slots=True)
 class Clause:
-    """One rule about field values, e.g. ``B=1: k<=255`` or ``v even``. Holds where its condition does not apply."""
+    """Rule about field values, e.g. ``B=1: k<=255`` or ``v even``. It holds if its condition does not apply."""
 
     text: str
     when: tuple[str, int] | None
     letter: str
     relation: str  # a key of COMPARISONS, or "even"
-    other: str | None  # compare with this field plus ``number``; None: with ``number`` alone
+    other: str | None  # compare with this field plus ``number``; None: compare with ``number``
     number: int
 
     def holds(self, get: Callable[[str], Any]) -> Any:
-        """Return whether the rule holds; ``get(letter)`` returns an int or a numpy array."""
+        """Return whether the rule holds. ``get(letter)`` returns a field's value as an int or a numpy array."""
         value = get(self.letter)
         if self.relation == "even":
             good = value % 2 == 0
@@ -196,7 +199,7 @@ class Clause:
 
 
 def rules_of(pattern: Pattern) -> tuple[Clause, ...]:
-    """Return the clauses that the fields of a pattern imply."""
+    """Return the rules that the fields of a pattern imply."""
     widths = {field.letter: field.width for field in pattern.fields}
     texts = [
         text
@@ -207,7 +210,7 @@ def rules_of(pattern: Pattern) -> tuple[Clause, ...]:
 
 
 def parse_constraints(text: str) -> tuple[Clause, ...]:
-    """Read clauses separated by ``;``, all of which must hold."""
+    """Parse rules separated by ``;``, all of which must hold."""
     clauses = []
     for part in filter(None, (p.strip() for p in text.split(";"))):
         match = CLAUSE.fullmatch(part)

@@ -1,7 +1,7 @@
-"""Flows: requests of an instruction to the sequencer, other than to continue with the next word.
+"""Flows: requests of an instruction to the sequencer to do other than continue with the next word.
 
-The function ``does`` of a row returns one of these, or None. Addresses are program addresses (23 bit, even); a target
-or count may be a static int or a builder value. The sequencer alone changes PC, REPEAT and DO state (isa.md §7).
+A row's function ``does`` returns a flow or None. Addresses are program addresses (23 bits, even). A target or count may
+be a static int or a builder value. Only the sequencer changes PC, REPEAT and DO state (isa.md §7).
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ class Goto:
 
 @dataclass(frozen=True, slots=True)
 class Branch:
-    """Continue at ``target`` if ``cond`` (0 or 1), else with the next word."""
+    """Continue at ``target`` if ``cond`` is 1; if it is 0, with the next word."""
 
     cond: Value
     target: int
@@ -36,7 +36,7 @@ class Call:
 
 @dataclass(frozen=True, slots=True)
 class Return:
-    """Continue at the popped ``target``. RETFIE also carries the popped SR<7:0> and IPL3 (isa.md §7.4)."""
+    """Continue at the popped ``target``. For RETFIE, it also has the popped SR<7:0> and IPL3 (isa.md §7.4)."""
 
     kind: Literal["return", "retlw", "retfie"]
     target: Value
@@ -46,7 +46,7 @@ class Return:
 
 @dataclass(frozen=True, slots=True)
 class Skip:
-    """Discard the next instruction, one or two words, if ``cond`` (isa.md §7.3)."""
+    """Skip the next instruction, of one or two words, if ``cond`` is 1 (isa.md §7.3)."""
 
     cond: Value
 
@@ -60,7 +60,7 @@ class Repeat:
 
 @dataclass(frozen=True, slots=True)
 class Do:
-    """Run from the next instruction to the one at ``end``, ``count`` + 1 times (isa.md §7.6)."""
+    """Run the instructions from the next one to the one at ``end``, ``count`` + 1 times (isa.md §7.6)."""
 
     count: Value
     end: int
@@ -68,7 +68,7 @@ class Do:
 
 @dataclass(frozen=True, slots=True)
 class Sleep:
-    """Stop the CPU: "sleep" stops the clock too, "idle" leaves peripherals running (isa.md §11)."""
+    """Stop the CPU. "sleep" also stops the clock; "idle" leaves peripherals running (isa.md §11)."""
 
     mode: Literal["sleep", "idle"]
 
@@ -80,7 +80,7 @@ class Reset:
 
 @dataclass(frozen=True, slots=True)
 class Disi:
-    """Block priorities 1-6 in this cycle and the next ``count`` (isa.md §12)."""
+    """Block interrupts of priority 1-6 in this cycle and the next ``count`` (isa.md §12)."""
 
     count: int
 

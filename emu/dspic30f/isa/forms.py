@@ -1,6 +1,6 @@
-"""Operand forms: functions that turn an operation into the ``does`` of a row, in the phase order of builder.py.
+"""Operand forms: functions that make a row's ``does`` from an operation, in the phase order of builder.py.
 
-Their names give the operands and the destination, as in the syntax column of the table.
+A form's name lists its operands and destination, as in the syntax column of the table. Its docstring is the effect.
 """
 
 from __future__ import annotations

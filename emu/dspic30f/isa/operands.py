@@ -1,7 +1,7 @@
-"""Operand kinds: the text of each operand in the syntax of a row, and the fields that it fills.
+"""Operand kinds: parsing, encoding and printing of each operand in a row's syntax.
 
-A kind reads tokens of a statement into a ``Part`` (known fields and open slots), turns numbers into fields, and writes
-fields as text in the spelling of binutils. Fields are found by letter, so one kind serves every row that has them.
+A kind parses tokens of a statement to a ``Part`` (known fields and open slots), converts numbers to fields, and prints
+fields in the spelling of binutils. It finds fields by letter, so one kind serves every row that has them.
 """
 
 from __future__ import annotations
@@ -19,25 +19,25 @@ SymbolOf: TypeAlias = Callable[[int, str], str | None]  # address, "code" or "da
 
 
 class OperandError(ValueError):
-    """The operand has the right shape but a value that cannot be encoded."""
+    """The operand has a valid form but a value that cannot be encoded."""
 
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """Result of a kind for some tokens: fields that are known, and expressions still to be parsed.
+    """Result of parsing tokens: known fields, and expressions that are still to be parsed.
 
-    Nothing is parsed before the whole statement fits a form, so that trying a form has no effect on the caller.
+    No expression is parsed before the whole statement matches a form, so that trying a form does not affect the caller.
     """
 
     taken: int
     fields: Mapping[str, int] = field(default_factory=dict)
-    text: str | None = None  # becomes a number, which ``Kind.number`` turns into fields
-    bit: str = ""  # becomes the bit number of an f-bit form
+    text: str | None = None  # expression for a number, which ``Kind.number`` converts to fields
+    bit: str = ""  # expression for the bit number of an f-bit form
 
 
 @dataclass(frozen=True, slots=True)
 class Site:
-    """Address of an instruction and access size of its mnemonic, which kinds need besides the row."""
+    """Context that kinds need besides the row: the instruction's address and the access size of its mnemonic."""
 
     row: Row
     pc: int = 0
@@ -53,29 +53,31 @@ MODE_TEXT = {mode: f"[{before}w{{}}{after}]" for (before, after), mode in MODES.
 
 
 def register_number(token: str) -> int | None:
-    """Return the number 0..15 of a W register's name."""
+    """Return the number 0..15 of a W register by its name, None for any other name."""
     match = REGISTER.fullmatch(token)
     return int(match[1]) if match else None
 
 
 class Kind:
-    """One operand, or an optional group of operands."""
+    """Parser and printer of one operand, or of an optional group of operands."""
 
     @abstractmethod
     def read(self, tokens: Sequence[str], at: Site) -> Part | None:
-        """Consume tokens from the front. Return None if their shape does not fit."""
+        """Consume tokens from the front. Return None if they do not have the form of the operand."""
 
     @abstractmethod
     def write(self, x: Operands, at: Site, symbol: SymbolOf | None, source: bool) -> list[str]:
         """Return the tokens of the operand."""
 
     def number(self, value: int, at: Site) -> dict[str, int]:
-        """Return the fields of a numeric operand. Raises OperandError if out of range, TypeError if it is not
-        numeric."""
+        """Return the fields of a numeric operand.
+
+        Raises OperandError if it is out of range, TypeError if the operand is not numeric.
+        """
         raise TypeError(f"{type(self).__name__} is not a numeric operand")
 
     def relocation(self, at: Site) -> str:
-        """Return the relocation of a numeric operand that is a plain symbol; "" if it must be a number."""
+        """Return the relocation type of a numeric operand that is a plain symbol; "" if only a number is permitted."""
         raise TypeError(f"{type(self).__name__} is not a numeric operand")
 
 
@@ -116,7 +118,7 @@ class Register(Kind):
 
 @dataclass(frozen=True)
 class Address(Kind):
-    """Ws or Wd in any mode of the row's mode field; [Wn+Wb] where the row has eight modes."""
+    """Ws or Wd in any mode of the row's mode field; also [Wn+Wb] in rows with eight modes."""
 
     register: str
     mode3: str
@@ -146,7 +148,7 @@ class Address(Kind):
 
 @dataclass(frozen=True)
 class OffsetAddress(Kind):
-    """[Wn+lit]: the offset counts bytes in text, elements in the field."""
+    """[Wn+lit]. The offset is in bytes in the text and in elements in the field."""
 
     register: str
 
@@ -170,7 +172,7 @@ class OffsetAddress(Kind):
         return [f"[w{getattr(x, self.register)}{x.o * (1 if x.B else 2):+d}]"]
 
 
-# By width of k (abi-elf.md §5); the assembler picks the variants for tbloffset() and the like.
+# Relocation by width of field k (abi-elf.md §5); the assembler selects the variants for tbloffset() and the like.
 LITERAL_RELOCATION = {
     16: "WORD",
     14: "UNSIGNED_14",
@@ -184,7 +186,10 @@ LITERAL_RELOCATION = {
 
 @dataclass(frozen=True)
 class Literal(Kind):
-    """#lit in field ``letter``, ``low``..``high``. Byte literals go from -128 to 255; 10-bit ones follow the size."""
+    """#lit in field ``letter``, ``low``..``high``.
+
+    Byte literals are -128 to 255; 10-bit ones depend on the access size.
+    """
 
     letter: str
     low: int
@@ -220,13 +225,13 @@ class Literal(Kind):
         if value < 0:
             value &= (1 << at.row.fields[self.letter].width) - 1
         if self.high == 1023 and x.B:
-            value &= 0xFF  # an illegal k<9:8> is not shown
+            value &= 0xFF  # bits k<9:8>, which are illegal for bytes, are not shown
         return [f"#{value:#x}"]
 
 
 @dataclass(frozen=True)
 class Bit(Kind):
-    """#bit4 of a W register; of a byte only 0..7."""
+    """#bit4 of a W register, 0..15; 0..7 for a byte."""
 
     def read(self, tokens: Sequence[str], at: Site) -> Part | None:
         return Part(1, text=tokens[0][1:].strip()) if tokens and tokens[0].startswith("#") else None
@@ -245,13 +250,13 @@ class Bit(Kind):
 
 
 def is_expression(token: str) -> bool:
-    """Return whether a token is neither a register, a literal nor an indirect operand."""
+    """Return whether a token can be an expression: it is no register, literal or indirect operand."""
     return not token.startswith(("#", "[")) and register_number(token) is None and token.upper() != "WREG"
 
 
 @dataclass(frozen=True)
 class FileAddress(Kind):
-    """f: a data address. 13-bit forms reach 0x1FFF; words are even."""
+    """f: a data address. 13-bit forms reach 0x1FFF; word addresses are even."""
 
     def read(self, tokens: Sequence[str], at: Site) -> Part | None:
         return Part(1, text=tokens[0]) if tokens and is_expression(tokens[0]) else None
@@ -275,7 +280,7 @@ class FileAddress(Kind):
 
 @dataclass(frozen=True)
 class FileBit(Kind):
-    """``f, #bit4`` of the f-bit forms: two tokens. A word bit 8..15 is a bit of the byte behind f (isa.md §16)."""
+    """``f, #bit4`` of the f-bit forms: two tokens. Bits 8..15 of a word are in the byte after f (isa.md §16)."""
 
     def read(self, tokens: Sequence[str], at: Site) -> Part | None:
         if len(tokens) < 2 or not is_expression(tokens[0]) or not tokens[1].startswith("#"):
@@ -283,7 +288,7 @@ class FileBit(Kind):
         return Part(2, text=tokens[0], bit=tokens[1][1:].strip())
 
     def bit(self, number: int | None, at: Site) -> tuple[int, int]:
-        """Return field b, and the offset to add to the address."""
+        """Return the value of field b, and the offset to add to the address."""
         high = 7 if at.byte else 15
         if number is None or not 0 <= number <= high:
             raise OperandError(f"bit number must be a number in 0..{high}")
@@ -301,7 +306,7 @@ class FileBit(Kind):
 
 @dataclass(frozen=True)
 class Target(Kind):
-    """Expr: a program address. Relative in branches and DO, absolute in CALL and GOTO."""
+    """Expr: a program address. It is encoded relative to the PC in branches and DO, absolute in CALL and GOTO."""
 
     def read(self, tokens: Sequence[str], at: Site) -> Part | None:
         return Part(1, text=tokens[0]) if tokens and is_expression(tokens[0]) else None

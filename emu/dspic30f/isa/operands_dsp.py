@@ -1,4 +1,4 @@
-"""Operand kinds of the DSP instructions: accumulators, products, prefetches, write-back (isa.md §8.1, §16)."""
+"""Operand kinds of DSP instructions: accumulators, products, prefetches, write-back (isa.md §8.1, §16)."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ UNKNOWN = "???"
 
 @dataclass(frozen=True)
 class Accumulator(Kind):
-    """A or B."""
+    """Accumulator A or B."""
 
     def read(self, tokens: Sequence[str], at: Site) -> Part | None:
         return Part(1, {"A": "AB".index(tokens[0].upper())}) if tokens and tokens[0].upper() in ("A", "B") else None
@@ -56,7 +56,7 @@ class Prefetch(Kind):
 
     pointer: str  # field: i or j
     data: str  # field: x or y; "" if the data register is a separate operand
-    first: int  # 8 or 10: the lower of the two pointer registers
+    first: int  # number of the lower of the two pointer registers: 8 or 10
 
     def read(self, tokens: Sequence[str], at: Site) -> Part | None:
         code = self.code(tokens[0]) if tokens else None
@@ -90,14 +90,14 @@ class Prefetch(Kind):
         return tokens
 
     def _shows_idle_register(self, x: Operands, row: Row) -> bool:
-        """Return whether binutils prints the data register of a prefetch that is absent, if its field is not 0."""
+        """Return whether binutils prints the data register, if its field is not 0, although there is no prefetch."""
         hidden = self.pointer == "i" and x.j != NO_PREFETCH and not ("m" in row.fields and row.fields["m"].width == 2)
         return getattr(x, self.data) != 0 and not hidden
 
 
 @dataclass(frozen=True)
 class PrefetchData(Kind):
-    """Wxd of ED and EDAC."""
+    """Data register Wxd of ED and EDAC."""
 
     def read(self, tokens: Sequence[str], at: Site) -> Part | None:
         n = register_number(tokens[0]) if tokens else None

@@ -1,4 +1,4 @@
-"""Rows, each an instruction form, and instructions, each a row with its field values."""
+"""Rows and instructions. A row is an instruction form; an instruction is a row with field values."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ class Row:
     """One instruction form: a line of the table.
 
     id           row number of reference isa.csv
-    syntax       operands in assembly order; ``{.B}``: byte form by field B; ``{.W}``: suffix printed, optional to write
+    syntax       operands in assembly order; ``{.B}``: byte form by field B; ``{.W}``: suffix printed, optional in input
     bits, word2  patterns (fields.py); ``word2`` is empty for one-word instructions
-    flags        SR bits the instruction may change; ``Z=s`` is the sticky Z of ADDC and SUBB (isa.md §5)
-    does         the meaning, against a Builder
-    cycles       without stalls, PSV, skip or taken branch (isa.md §13.1)
-    constraints  rules on field values beyond the pattern and FIELD_RULES
+    flags        SR bits that the instruction may change; ``Z=s`` is the sticky Z of ADDC and SUBB (isa.md §5)
+    does         the instruction's effect, expressed with a Builder
+    cycles       number of cycles without stalls, PSV reads, skips or taken branches (isa.md §13.1)
+    constraints  rules about field values in addition to the pattern and FIELD_RULES
     repeat_ok    may follow REPEAT (isa.md §7.5)
-    psv_class    "mov": one extra cycle for a PSV read, "other": two (isa.md §13.3)
+    psv_class    "mov": a PSV read costs one extra cycle, "other": two (isa.md §13.3)
     """
 
     id: int
@@ -43,12 +43,12 @@ class Row:
 
     @property
     def source(self) -> str:
-        """Return the source of the row."""
+        """Return the row as a line of source text."""
         return f"PRM {self.mnemonic}; isa.csv {self.id}"
 
     @cached_property
     def mnemonic(self) -> str:
-        """Return the mnemonic in upper case, without optional suffix: ADD, BTST.C, DIV.S."""
+        """Return the mnemonic in upper case without optional suffix: ADD, BTST.C, DIV.S."""
         return re.split(r"[ {]", self.syntax)[0]
 
     @cached_property
@@ -68,16 +68,16 @@ class Row:
 
     @cached_property
     def clauses(self) -> tuple[Clause, ...]:
-        """Return the parsed rules of its fields and its own constraints."""
+        """Return all parsed rules: those that the fields imply and the row's own constraints."""
         return rules_of(self.pattern) + parse_constraints(self.constraints)
 
     def broken(self, x: Operands) -> tuple[Clause, ...]:
-        """Return the clauses that the field values violate; empty for a legal instruction."""
+        """Return the rules that the field values violate; empty for a legal instruction."""
         return tuple(c for c in self.clauses if not c.holds(lambda letter: getattr(x, letter)))
 
 
 class Insn:
-    """One instruction: its row, field values ``x`` and words. Two are equal if rows and values are equal."""
+    """One instruction: its row, field values ``x`` and words. Instructions with equal rows and values are equal."""
 
     __slots__ = ("_key", "row", "word1", "word2", "x")
 

@@ -78,7 +78,7 @@ def spellings(syntax: str) -> Mapping[str, bool]:
 
 @lru_cache(None)
 def printed_mnemonic(row: Row, byte: int) -> str:
-    """Return the spelling of binutils for a row with B = ``byte``."""
+    """Return the mnemonic that binutils prints for a row with B = ``byte``."""
     head, _, suffix = row.syntax.split(" ")[0].lower().partition("{")
     if suffix == ".b}":
         return head + (".b" if byte or "B" not in row.fields else ".w")
@@ -87,7 +87,7 @@ def printed_mnemonic(row: Row, byte: int) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Form:
-    """One spelling of a row: its own syntax, or an alias that sets ``fixed`` fields."""
+    """One spelling of a row: the row's own syntax, or an alias that sets the ``fixed`` fields."""
 
     syntax: str
     row: Row
@@ -123,7 +123,10 @@ ALIASES = (
 
 
 def _forms_by_name() -> Mapping[str, tuple[tuple[Form, bool], ...]]:
-    """Return the forms by mnemonic. Forms with accumulators come first, since A and B are not file addresses there."""
+    """Return the forms by mnemonic.
+
+    Forms with accumulators come first, because A and B are not file addresses there.
+    """
     found: dict[str, list[tuple[Form, bool]]] = {}
     forms = [Form(row.syntax, row) for row in ROWS] + list(ALIASES)
     for form in sorted(forms, key=lambda form: "Acc" not in form.syntax):

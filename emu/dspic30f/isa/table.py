@@ -1,4 +1,4 @@
-"""The instruction table: all rows, by opcode byte and by mnemonic."""
+"""The instruction table: all rows, accessible by opcode byte and by mnemonic."""
 
 from __future__ import annotations
 

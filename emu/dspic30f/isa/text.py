@@ -1,4 +1,4 @@
-"""Instructions as assembly text: ``format`` writes the spelling of binutils, ``parse`` reads what pic30-as accepts."""
+"""Assembly text of instructions: ``format`` writes binutils' spelling, ``parse`` reads what pic30-as accepts."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from .operands import FileBit, Kind, OperandError, Part, Site, SymbolOf
 from .row import Insn, Row
 from .syntax import FORMS, Form, kinds_of, printed_mnemonic
 
-# Descriptions of broken rules; a rule that is not listed is shown as in the table.
+# Explanations of broken rules. A rule that is not listed is shown as the table writes it.
 EXPLANATION = {
     "d!=14": "the product cannot go to w14",
     "s>=2": "the divisor cannot be w0",
@@ -21,12 +21,12 @@ EXPLANATION = {
     "p>=1": "the source must be a pointer",
     "q>=1": "the destination must be a pointer",
 }
-# pic30-as takes w1 as divisor although the manual forbids it (isa.md §6.7); the CPU refuses the word.
+# pic30-as accepts w1 as divisor although the manual forbids it (isa.md §6.7); for the CPU the word is illegal.
 TOLERATED = (("s>=2", 1),)
 
 
 class Expression(Protocol):
-    """Result of the caller's expression parser: a number, or ``value`` None if it is known only later."""
+    """Result of the caller's expression parser. ``value`` is None if the number is not known yet."""
 
     @property
     def value(self) -> int | None: ...
@@ -36,15 +36,15 @@ Expr: TypeAlias = Callable[[str], Expression]
 
 
 class StatementError(ValueError):
-    """The statement is not an instruction; the message says what was expected."""
+    """The statement is not a valid instruction; the message says what was expected."""
 
 
 @dataclass(frozen=True, slots=True)
 class Slot:
-    """A numeric operand: ``expression`` is what the caller's parser returned, its value may still be unknown.
+    """A numeric operand. ``expression`` is what the caller's parser returned; its value may still be unknown.
 
-    ``relocation`` is the R_PIC30_ name for a plain symbol (abi-elf.md §5), ``PGM_ADDR`` standing for the pair in
-    CALL and GOTO; "" where only a number will do. ``addend`` is to be added to the symbol.
+    ``relocation`` is the R_PIC30_ name for a plain symbol (abi-elf.md §5), and ``PGM_ADDR`` stands for the pair in CALL
+    and GOTO; "" if only a number is permitted. ``addend`` is added to the symbol.
     """
 
     kind: Kind
@@ -55,7 +55,7 @@ class Slot:
 
 @dataclass(frozen=True, slots=True)
 class Parsed:
-    """A parsed statement: the row, the fields that are known, and the numeric operands."""
+    """A parsed statement: the row, the known fields, and the numeric operands."""
 
     row: Row
     fields: Mapping[str, int]
@@ -65,14 +65,14 @@ class Parsed:
 
     @property
     def words(self) -> int:
-        """Return the length in instruction words, 1 or 2; it does not depend on values."""
+        """Return the length in instruction words, 1 or 2. It does not depend on operand values."""
         return self.row.words
 
     def encode(self, pc: int, values: Mapping[int, int | None] | None = None) -> tuple[int, ...]:
         """Return the words at program address ``pc``.
 
-        ``values`` gives numbers for slots by position and overrides the expressions' own; a slot without any number
-        leaves its field 0, for a relocation to fill. Raises StatementError if a value or combination is not encodable.
+        ``values`` gives numbers for slots by position and overrides the expressions' values. A slot without a number
+        leaves its field 0, for a relocation to fill. Raises StatementError if a value or combination cannot be encoded.
         """
         site = Site(self.row, pc, self.byte)
         fields = dict(self.fields)
@@ -93,7 +93,7 @@ class Parsed:
 def _reason(error: EncodeError) -> str:
     if error.clause is not None:
         return EXPLANATION.get(error.clause.text, f"{error.clause.text} does not hold")
-    if error.letter == "t":  # W16 as the high half
+    if error.letter == "t":  # W16 would be the high half
         return EXPLANATION["v even"]
     if error.letter in ("s", "d"):
         return f"w{error.value} is not an even register"
@@ -103,8 +103,9 @@ def _reason(error: EncodeError) -> str:
 def format(insn: Insn, pc: int = 0, symbol: SymbolOf | None = None, source: bool = False) -> str:
     """Return the assembly text of an instruction at program address ``pc``, as binutils prints it.
 
-    ``symbol(address, space)`` may name an address, ``space`` being "code" or "data". With ``source`` ``parse``
-    accepts the text: it keeps negative literals and wrapped targets, and omits ignored register fields.
+    ``symbol(address, space)`` may return a name for an address; ``space`` is "code" or "data". With ``source``, the
+    text
+    can be parsed again: it keeps negative literals and wrapped targets, and omits ignored register fields.
     """
     site = Site(insn.row, pc)
     tokens = [t for kind in kinds_of(insn.row.syntax) for t in kind.write(insn.x, site, symbol, source)]
@@ -114,7 +115,7 @@ def format(insn: Insn, pc: int = 0, symbol: SymbolOf | None = None, source: bool
 
 @dataclass(frozen=True, slots=True)
 class Number:
-    """Default expression parser: integers with C prefixes."""
+    """Default expression parser: integers with the prefixes of C."""
 
     value: int
 
@@ -128,10 +129,11 @@ class Number:
 
 
 def parse(statement: str, expr: Expr = Number.read) -> Parsed:
-    """Parse one instruction, without label and comment.
+    """Parse one instruction without label and comment.
 
-    ``expr`` parses the expressions inside operands and may raise its own errors; what it returns needs a ``value``, an
-    int or None. Raises StatementError for unknown mnemonics and operands that fit no form.
+    ``expr`` parses the expressions in operands and may raise its own errors. Its result must have a ``value``, an int
+    or
+    None. Raises StatementError for an unknown mnemonic and for operands that fit no form.
     """
     statement = statement.strip()
     mnemonic, *rest = statement.split(None, 1) or [""]
@@ -157,7 +159,7 @@ def is_mnemonic(name: str) -> bool:
 
 
 def split_operands(text: str) -> list[str]:
-    """Split at commas outside brackets, parentheses and character literals."""
+    """Split an operand list at commas outside brackets, parentheses and character literals."""
     pieces, depth, start, i = [], 0, 0, 0
     while i < len(text):
         c = text[i]
@@ -177,7 +179,7 @@ def split_operands(text: str) -> list[str]:
 
 
 def _match(form: Form, site: Site, tokens: Sequence[str]) -> list[tuple[Kind, Part]] | None:
-    """Return the operands by kind if the tokens have the shape of the form."""
+    """Return the operands by kind if the tokens match the form, else None."""
     parts, rest = [], list(tokens)
     for kind in kinds_of(form.syntax):
         part = kind.read(rest, site)

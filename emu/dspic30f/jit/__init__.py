@@ -1,1 +1,1 @@
-"""Native code for the dsPIC30F core: regions translated through the instruction table to LLVM IR."""
+"""JIT for the dsPIC30F core: translates regions of firmware to LLVM IR by means of the instruction table."""

@@ -1,4 +1,4 @@
-"""Runner for code without a native translation: the sequencer, until a boundary has work or a limit is reached."""
+"""Runner for code without a native translation: the sequencer, up to a boundary with work or a limit."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from emu.dspic30f.core import Core
 
 
 class ColdRunner:
-    """Interprets several instructions per call, so that native code is looked up rarely."""
+    """Interprets several instructions per call, to make lookups of native code rare."""
 
     def __init__(self, core: Core, pc_hooks: Mapping[int, Any]) -> None:
         self._core: Final = core
         self._hooks: Final = pc_hooks
 
     def run(self, limit: int) -> None:
-        """Run at least one instruction; stop at `limit`, at an event that is due and in front of a hooked address."""
+        """Run at least one instruction. Stop at `limit`, at a due event, and before a hooked address."""
         core, hooks = self._core, self._hooks
         u32, u64, at = core.record.u32, core.record.u64, core.state.at
         cycle_index, pc_index, deadline_index = at["cpu.cycle"], at["cpu.pc"], core.events.deadline_index

@@ -1,10 +1,10 @@
-"""Compilation of IR text to callable code: disk cache, compile process, loading.
+"""Compiler from IR text to callable code, with disk cache, compile process and loader.
 
-`request` returns at once. Cached objects are loaded with `lookup`; other objects come from the compile process, and
-`poll` collects them. `compile_now` compiles in this process, for the few objects that the engine needs to start.
+`request` returns immediately. `lookup` loads cached objects. Other objects come from the compile process, and `poll`
+collects them. `compile_now` compiles in this process, for the few objects that the engine needs at its start.
 
-If the compile process dies, it is replaced and its request is sent again once. If processes keep dying, code that is
-not compiled yet stays interpreted, and a line on standard error says so.
+If the compile process dies, it is replaced, and its request is sent again once. If processes die repeatedly, code that
+is not yet compiled stays interpreted, and a message on standard error says so.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from emu.host.paths import native_code
 
 @dataclass(slots=True)
 class Statistics:
-    """Numbers of objects: requested, compiled, read from disk, loaded."""
+    """Object counts: requested, compiled, read from disk, loaded."""
 
     requested: int = 0
     compiled: int = 0
@@ -41,7 +41,7 @@ class Statistics:
 
 
 MAX_DEATHS: Final = 3
-"""Number of compile processes in a row that may die before they have compiled an object."""
+"""Maximum number of compile processes in succession that may die before one has compiled an object."""
 
 
 @dataclass(slots=True, weakref_slot=True, eq=False)
@@ -49,7 +49,7 @@ class LoadedCode:
     """Native code in memory. It is unloaded together with this object."""
 
     address: int
-    """Address of its function `entry`."""
+    """Address of the function `entry`."""
     entries: Sequence[int]
     """Program addresses at which the function can be entered."""
     library: Any
@@ -57,16 +57,16 @@ class LoadedCode:
 
 
 class CompileError(RuntimeError):
-    """LLVM rejected generated IR: a defect of the translator."""
+    """LLVM rejected generated IR, which is a defect of the translator."""
 
 
 def pack_object(entries: Sequence[int], code: bytes) -> bytes:
-    """Return an object file and the program addresses at which it can be entered, as one byte string."""
+    """Return one byte string that contains an object file and the program addresses at which it can be entered."""
     return struct.pack(f"<I{len(entries)}I", len(entries), *entries) + code
 
 
 def unpack_object(blob: bytes) -> tuple[list[int], bytes]:
-    """Return the two parts of `pack_object`."""
+    """Return the entry addresses and the object file that `pack_object` has packed."""
     (count,) = struct.unpack_from("<I", blob)
     return list(struct.unpack_from(f"<{count}I", blob, 4)), blob[4 + 4 * count :]
 
@@ -77,14 +77,14 @@ def _shared(_where: Path) -> Compiler:
 
 
 def shared_compiler() -> Compiler:
-    """Return the compiler that all machines of this process share, with one compile process and one cache."""
+    """Return the compiler that all machines of this process share. It has one compile process and one cache."""
     return _shared(native_code())
 
 
 class Compiler:
-    """Compiler with a cache of objects by key. Each object exports one function, `entry`. Threads may share a compiler.
+    """Compiler with a cache of objects by key. Each object exports one function, `entry`. It is thread-safe.
 
-    An object is loaded once for all machines and unloaded with the last of them: Linux allows a process 65,530 mappings
+    All machines share a loaded object, and the last one unloads it: Linux limits a process to 65,530 mappings
     (vm.max_map_count), and each object takes two.
     """
 
@@ -97,14 +97,14 @@ class Compiler:
         self._received = bytearray()
         self._waiting: dict[int, tuple[str, Sequence[int]]] = {}
         self._tags: dict[str, list[object]] = {}
-        """Tags of the requests that wait for an object, by key."""
+        """Tags of the requests that are waiting for an object, by key."""
         self._outbox: deque[tuple[int, int, bytes]] = deque()
         self._in_flight: tuple[int, int, bytes] | None = None
-        """(ticket, level, text) of the object that the process is compiling."""
+        """(ticket, level, text) of the object that the process is compiling; None if it is idle."""
         self._retried = 0
-        """Last ticket that was sent to a second process."""
+        """Ticket of the last request that was sent again, to a second process."""
         self._deaths = 0
-        """Number of processes that died since the last object was compiled."""
+        """Number of processes that have died since the last compiled object."""
         self._warned = False
         self._tickets = 0
         self._loader: Any = None
@@ -125,7 +125,7 @@ class Compiler:
         return self._host
 
     def key(self, level: int, *identity: bytes) -> str:
-        """Return the key of an object, from the inputs of its translation, its level and the host."""
+        """Return the key of an object that is translated from these inputs, compiled at `level`, for this host."""
         return self.cache.key(self._host_name(), bytes([level]), *identity)
 
     def lookup(self, key: str) -> LoadedCode | None:
@@ -150,7 +150,10 @@ class Compiler:
         return self.load(code, key, entries)
 
     def request(self, text: str, level: int, key: str, entries: Sequence[int], tag: object) -> None:
-        """Compile `text` in the background, once for all requests with this key. `poll` will return (tag, code)."""
+        """Compile `text` in the background, once for all requests with this key.
+
+        `poll` will return (tag, code) for each.
+        """
         with self._lock:
             if key in self._tags:
                 self._tags[key].append(tag)
@@ -165,12 +168,12 @@ class Compiler:
         request = (self._tickets, level, text.encode())
         if level:
             self._outbox.append(request)
-        else:  # it compiles quickly, and ends the use of the interpreter
+        else:  # it compiles quickly and replaces interpretation
             self._outbox.appendleft(request)
         self._send()
 
     def _send(self) -> None:
-        """Send the idle process its next request. Only one is in flight, because two full pipes would deadlock."""
+        """Send the next request to the idle process. Only one is in flight, because two full pipes would deadlock."""
         while self._outbox and self._in_flight is None:
             if self._deaths >= MAX_DEATHS:
                 self._outbox.clear()
@@ -187,7 +190,7 @@ class Compiler:
                 self._replace_process(error)
 
     def _replace_process(self, reason: object) -> None:
-        """Handle a compile process that died or did not start: send its request again, but only once."""
+        """Replace a compile process that died or did not start, and send its request again, but only once."""
         process, self._process = self._process, None
         if process is not None:
             assert process.stdin is not None
@@ -217,7 +220,7 @@ class Compiler:
             print(message, file=sys.stderr)
 
     def poll(self) -> list[tuple[object, LoadedCode]]:
-        """Load the code that has arrived since the last call. Raises CompileError on a defect of the translator."""
+        """Load the code that has arrived since the last call. Raises CompileError for a defect of the translator."""
         if not self._waiting:
             return []
         with self._lock:
@@ -243,7 +246,7 @@ class Compiler:
 
     @property
     def busy(self) -> int:
-        """Return the number of requests that are not finished."""
+        """Return the number of unfinished requests."""
         return len(self._waiting)
 
     def load(self, code: bytes, key: str, entries: Sequence[int]) -> LoadedCode:
@@ -254,7 +257,7 @@ class Compiler:
             if self._loader is None:
                 llvm.initialize_native_target()
                 llvm.initialize_native_asmprinter()
-                # LLVM's older linker maps each section alone and aborts if two lie 2 GB apart in a fragmented process
+                # LLVM's older linker maps sections separately and aborts if two are 2 GB apart in a fragmented process
                 self._loader = llvm.create_lljit_compiler(use_jit_link=True)
             self._modules += 1
             library = (
@@ -281,8 +284,10 @@ class Compiler:
         return self._process
 
     def after_fork(self) -> None:
-        """Reset the state in a forked process: the compile process answers only its parent, so requests are sent again
-        to a process of its own."""
+        """Reset the state in a forked process.
+
+        The compile process answers only the parent, so this process sends the requests again to its own one.
+        """
         self._lock = RLock()
         self._selector.close()
         self._selector = selectors.DefaultSelector()

@@ -1,7 +1,7 @@
 """Dump of native code for debugging the translator: LLVM IR with guest instructions, and host assembly.
 
-Input: an engine that has run, and the addresses of interest. Output: one text for every set of processor modes in which
-an address was reached. Blocks are named by program addresses (`b434`) in the IR and in the assembly.
+Input: an engine that has run, and program addresses. Output: one text for each set of processor modes in which
+an address was reached. In the IR and the assembly, blocks are named by program addresses (`b434`).
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ from emu.dspic30f.jit.worker import Backend
 
 
 class Disassembler(Protocol):
-    """Returns the text of a decoded instruction."""
+    """Function that returns the text of a decoded instruction."""
 
     def __call__(self, pc: int, insn: Insn) -> str: ...
 
 
 class _AnnotatingTranslator(Translator):
-    """Translator that writes each guest instruction as a comment in front of its IR."""
+    """Translator that writes each guest instruction as a comment before its IR."""
 
     disassemble: Disassembler
 
@@ -35,7 +35,7 @@ class _AnnotatingTranslator(Translator):
 
 
 def dump(engine: JitEngine, is_meant: Callable[[int], bool], disassemble: Disassembler) -> Iterator[str]:
-    """Yield the text of each region with an instruction whose address `is_meant` accepts."""
+    """Yield the text of each region that contains an instruction for whose address `is_meant` returns true."""
     backend = Backend()
     for code in engine.translated():
         for region in code.regions.values():

@@ -1,7 +1,7 @@
-"""The native engine: finds translated regions by PC and processor modes and runs them between two boundaries.
+"""The native engine: looks up translated regions by PC and processor modes, and runs them between two boundaries.
 
 Native code returns to Python for instructions with side effects, for events, and at addresses that have no code yet.
-Code comes from the disk cache at once, or from the compile process later; until then the interpreter runs.
+Code comes immediately from the disk cache or later from the compile process; until then the interpreter runs.
 """
 
 from __future__ import annotations
@@ -60,18 +60,18 @@ from emu.system.native_handle import FRESH_ROOM, Native, Run
 from emu.system.rules import Rule
 
 BLOCK_LEVEL, STEP_LEVEL = 2, 0
-"""LLVM optimisation levels of block code and of exact code."""
+"""LLVM optimisation levels for block code and for exact code."""
 
 COLD_CYCLES: Final = 1000
-"""Longest interpreted run before native code is looked up again, in Tcy."""
+"""Maximum length of an interpreted run in Tcy before native code is looked up again."""
 
 NATIVE_CYCLES: Final = 30_000_000
-"""Longest native run before Python handles signals, in Tcy."""
+"""Maximum length of a native run in Tcy before Python handles signals."""
 
 NATIVE_FIELDS: Final = {"cycle": "cpu.cycle", "now": "events.now", "deadline": "events.deadline", "pc": "cpu.pc",
                         "mode": "cpu.mode"}  # fmt: skip
 NATIVE_SFRS: Final = {"corcon": "CORCON", "ie0": "IEC0", "ie1": "IEC1", "ie2": "IEC2"}
-"""Fields and registers of the record by the names of `Native`'s fields."""
+"""Record fields and registers by the names of the fields in `Native`."""
 
 Call = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_void_p, ctypes.c_void_p)
 
@@ -80,34 +80,34 @@ Call = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_void_p, ctypes.c_void_p)
 class CodeTable:
     """Native code for one set of processor modes: two tables of code addresses by program word.
 
-    Machines of one kind with the same program share it, so a region is translated once for all of them.
+    Machines of the same kind with the same program share it, so that a region is translated once for all of them.
     """
 
     context: Context
     layout: MachineLayout
     identity: bytes
-    """Hash of everything that the code depends on apart from program words."""
+    """Hash of all inputs of the code except program words."""
     indirect_sfr: LoadedCode
-    """The helper for indirect SFR access."""
+    """Native helper for indirect SFR access."""
     blocks: Any
     steps: Any
     loaded: list[LoadedCode] = field(default_factory=list)
-    """Code that the tables point into."""
+    """Loaded code to which the tables point; it must stay alive."""
     regions: dict[int, Region] = field(default_factory=dict)
     """Requested regions by start address."""
     entries: set[int] = field(default_factory=set)
-    """Leaders of all requested regions."""
+    """Leaders (entry addresses) of all requested regions."""
     heat: dict[int, int] = field(default_factory=dict)
-    """Number of times that each address without code was reached."""
+    """How often each address without code was reached."""
 
 
 _shared: Final[WeakValueDictionary[object, CodeTable]] = WeakValueDictionary()
-"""Tables in use, by everything that they depend on."""
+"""Code tables in use, by the inputs of their code."""
 
 
 @dataclass
 class EngineStatistics:
-    """Numbers of native runs, interpreted instructions, cold runs and regions (`emu run --stats`)."""
+    """Counts of native runs, interpreted instructions, cold runs and regions (`emu run --stats`)."""
 
     runs: int = 0
     interpreted: int = 0
@@ -116,7 +116,7 @@ class EngineStatistics:
 
 
 class JitEngine:
-    """Engine on native code; the interpreter runs code that is not translated yet."""
+    """Engine that runs native code, and interprets code that is not translated yet."""
 
     name = "jit"
 
@@ -124,11 +124,11 @@ class JitEngine:
         self._core: Final = core
         self._hooks: Final = pc_hooks
         self.threshold = 4
-        """Number of times that an address without code is reached before it is translated."""
+        """How often an address without code must be reached before it is translated."""
         self.wait = False
-        """Whether code is compiled before it is run, for tests and benchmarks."""
+        """Whether code is compiled before it runs, for tests and benchmarks."""
         self.share_group: object = None
-        """Machines with equal values share translations. Tests that change translations set an object of their own."""
+        """Machines with equal values share translations. Tests that change translations set a unique object."""
         self._longest = NATIVE_CYCLES
         self._accounting: CycleAccounting | None = None
         self._row_of: RowOf = lambda pc: pc
@@ -162,14 +162,14 @@ class JitEngine:
         self._wiring: tuple[list[Rule | None], bytes] = [], b""
         self.counts: Final = EngineStatistics()
         self.seconds: dict[str, float] | None = None
-        """Host seconds by activity, after `measure_time` was called."""
+        """Host seconds by activity; filled after a call of `measure_time`."""
         core.program.changed.append(self._flash_changed)
 
     # -- the engine -------------------------------------------------------------------------------------------------
     def run(self, limit: int) -> None:
         """Run at least one instruction, natively where possible."""
         state = self._state
-        if state.edt or self._core.events.deadline < state.cycle:  # a hook has kicked after the boundary was handled
+        if state.edt or self._core.events.deadline < state.cycle:  # a hook called `kick` after the boundary
             self._core.sequencer.execute()
             return
         if self.compiler.busy:
@@ -190,14 +190,14 @@ class JitEngine:
         self._after_run(reason, start, limit)
 
     def _after_run(self, reason: int, start: int, limit: int) -> None:
-        """Do the work for which native code has returned to `run`."""
+        """Do the work for which native code returned to `run`."""
         state, sequencer = self._state, self._core.sequencer
         if reason == RETFIE:
             sequencer.after_retfie()
         elif reason == UNFINISHED:
             sequencer.boundary(limit)
         elif (reason == INTERPRET and (state.cycle == start or state.pc not in self._hooks)) or (
-            reason == HOOK and state.cycle == start  # the block behind the hook did not fit; exact code stops there too
+            reason == HOOK and state.cycle == start  # the block after the hook did not fit; exact code stops there too
         ):
             self.counts.interpreted += 1
             self._interpret()
@@ -208,9 +208,9 @@ class JitEngine:
                 self._miss(limit)
 
     def natively(self, limit: int) -> bool:
-        """As `Engine.natively`. Many calls are short, so this function reads the record directly."""
+        """Implement `Engine.natively`. Calls are often short, so this function reads the record directly."""
         start = self._u64[self._now]
-        if self._dispatch is None or not start or self._u16[self._edt]:  # native boundaries need an earlier cycle
+        if self._dispatch is None or not start or self._u16[self._edt]:  # a native boundary needs an earlier cycle
             return False
         if self.compiler.busy:
             self._collect()
@@ -229,8 +229,10 @@ class JitEngine:
         return cycle >= limit or (reason != BOUNDARY_WORK and cycle != start)
 
     def _run_native(self, start: int, limit: int) -> tuple[int, int, int]:
-        """Run native code from the boundary at cycle `start` as long as Python can continue it without an instruction.
-        Return the last exit reason, its cycle, and the limit, which native code may have passed."""
+        """Run native code from the boundary at cycle `start`, as long as Python can continue it without an instruction.
+
+        Return the last exit reason, its cycle, and the limit, which native code may have passed.
+        """
         u64, now, env = self._u64, self._now, self._env
         record, environment = self._core.record.address, self._env_address
         native = self._native if self._lent is None or self._native is not self._dispatch else self._lent
@@ -249,8 +251,8 @@ class JitEngine:
         return reason, cycle, limit
 
     def _continue(self, reason: int, cycle: int) -> bool:
-        """Fire events, or refresh a device, if native code has returned for that. Return whether it may run again."""
-        if reason == BOUNDARY_WORK:  # in most cases the event of a device is due
+        """Fire events or update a device if native code returned for that. Return whether native code may run again."""
+        if reason == BOUNDARY_WORK:  # usually a device's event is due
             self._core.events.fire_until(cycle if self._u16[self._mode] != RUN else cycle - 1)
             return not self._core.sequencer.power.signals.interrupted()
         if reason == INTERPRET and self._refresh(self._u32[self._pc], cycle):
@@ -259,11 +261,11 @@ class JitEngine:
         return False
 
     def pass_limits(self, period: int, last: int) -> None:
-        """As `Engine.pass_limits`."""
+        """Implement `Engine.pass_limits`."""
         self._env[PERIOD], self._env[LAST_LIMIT] = period, last
 
     def passed(self) -> list[int]:
-        """As `Engine.passed`."""
+        """Implement `Engine.passed`."""
         count = self._env[PASSED_COUNT]
         if not count:
             return []
@@ -271,7 +273,7 @@ class JitEngine:
         return list(self._env[PASSED : PASSED + count])
 
     def lend(self, run: Run) -> Native:
-        """As `Engine.lend`."""
+        """Implement `Engine.lend`."""
         core, env, record = self._core, self._env_address, self._core.record
         at = {name: record.address + record.fields[field].offset for name, field in NATIVE_FIELDS.items()}
         at |= {name: record.address + core.chip.sfrs[sfr].address for name, sfr in NATIVE_SFRS.items()}
@@ -291,13 +293,15 @@ class JitEngine:
         return self._lent_as
 
     def _publish_native_handle(self) -> None:
-        """Publish the dispatch loop to the program that runs native code."""
+        """Publish the dispatch loop to the host program that calls native code."""
         if self._run is not None and self._lent_as is not None and self._dispatcher is not None:
             self._lent, self._lent_as.entry = partial(self._run, self._dispatch), self._dispatcher.address
 
     def _refresh(self, pc: int, cycle: int) -> bool:
-        """Let a device update the register in the record that the instruction at `pc` reads. Return whether native
-        code can then run that instruction."""
+        """Let a device update the register in the record that the instruction at `pc` reads.
+
+        Return whether native code can then run that instruction.
+        """
         word = self._computed.get(pc)
         if word is None:
             word = self._computed[pc] = self._computed_word(pc)
@@ -315,7 +319,7 @@ class JitEngine:
         return True
 
     def _remember_refresh(self, instruction: int) -> None:
-        """Record an instruction that waits for a device, so that the program that runs native code can serve it."""
+        """Record an instruction that waits for a device, so that the program around native code can update it."""
         fresh = self._env[REFRESHED : REFRESHED + FRESH_ROOM]
         free = fresh.index(0)
         if instruction not in fresh and free < FRESH_ROOM - 1:
@@ -326,8 +330,10 @@ class JitEngine:
         self._env[REFRESHED : REFRESHED + FRESH_ROOM] = [0] * FRESH_ROOM
 
     def _computed_word(self, pc: int) -> int:
-        """Return the index of the register that the one-cycle instruction at `pc` reads by its address, if native code
-        can read it; else 0."""
+        """Return the index of the register that the one-cycle instruction at `pc` reads by its address.
+
+        Return 0 if native code cannot read it.
+        """
         insn = self._fetch(pc)
         if insn is None or insn.row.cycles != 1 or self._code is None:
             return 0
@@ -335,14 +341,14 @@ class JitEngine:
         return words[0] if words and 2 * words[0] in self._code.layout.rules else 0
 
     def start_accounting(self, accounting: CycleAccounting, row_of: RowOf) -> Callable[[], None]:
-        """Account for all cycles in `accounting`, per source line by `row_of`. Return the function that stops it.
+        """Account for all cycles in `accounting`, per source line by `row_of`. Return the function that ends it.
 
         Until then, all code is compiled before it runs, and the sequencer runs code that is not compiled."""
         saved = self._interpret, self._run_cold, self.wait, self._native
 
         def run(record: int, env: int) -> Any:
             reason = self._dispatch(record, env)
-            if reason != RETFIE:  # else the cycle of the last log entry may still change
+            if reason != RETFIE:  # after a RETFIE, the cycle of the last log entry may still change
                 accounting.flush_log()
             return reason
 
@@ -362,7 +368,7 @@ class JitEngine:
         return stop
 
     def measure_time(self) -> None:
-        """Measure the host time of each activity from now on (`emu run --stats`)."""
+        """Start to measure the host time of each activity (`emu run --stats`)."""
         seconds = self.seconds = dict.fromkeys(("native code", "side effects", "cold code", "translation"), 0.0)
 
         def timed(activity: str, work: Callable[..., Any]) -> Callable[..., Any]:
@@ -381,13 +387,13 @@ class JitEngine:
         self._request = timed("translation", self._request)  # type: ignore[method-assign]
 
     def forget(self) -> None:
-        """Discard the translations: native code must return to Python at hooked addresses, which have changed."""
+        """Discard the translations, because the hooked addresses at which native code returns have changed."""
         self._codes.clear()
         self._forget_computed()
         self._key = None
 
     def translated(self) -> Iterable[CodeTable]:
-        """Return the code of each set of processor modes."""
+        """Return the code tables of all sets of processor modes."""
         return self._codes.values()
 
     @property
@@ -396,7 +402,7 @@ class JitEngine:
         return int(self._env[INTERRUPTS])
 
     def _miss(self, limit: int) -> None:
-        """Handle a PC without code: request a translation if it is reached often, and run the interpreter."""
+        """Handle a PC without code: run the interpreter, and request a translation if the PC is reached often."""
         pc = self._state.pc
         code = self._code
         assert code is not None
@@ -407,14 +413,14 @@ class JitEngine:
         code.heat[pc] = heat
         if heat >= self.threshold and pc not in code.regions and pc >> 1 < self._words:
             self._request(code, pc)
-            if code.steps[pc >> 1] and pc not in self._hooks:  # the hook at PC was called already
+            if code.steps[pc >> 1] and pc not in self._hooks:  # the hook at PC has already been called
                 return
         self.counts.cold += 1
         self._run_cold(min(limit, self._state.cycle + COLD_CYCLES))
 
     # -- modes ------------------------------------------------------------------------------------------------------
     def _select(self) -> None:
-        """Select the tables of the current processor modes."""
+        """Select the code tables for the current processor modes."""
         key = (self._modes.key(), self._core.bus.off)
         if key == self._key:
             return
@@ -434,7 +440,7 @@ class JitEngine:
             self._wiring = core.bus.rules[:], wiring_hash(layout)
         identity = translation_hash(key.context, layout, self._wiring[1])
         program = hashlib.sha256(core.program.flash).digest()
-        counted = 0 if self._accounting is None else self._env_address  # accounting code depends on its own cells
+        counted = 0 if self._accounting is None else self._env_address  # accounting code depends on the cells
         switches = core.bus.off, frozenset(core.bus.watched), self.wait, counted, self.share_group
         shared = identity, program, layout.hooks, *switches
         code = _shared.get(shared)
@@ -465,12 +471,12 @@ class JitEngine:
             self._native = self._dispatch
 
     def _at_once(self, text: str, level: int) -> LoadedCode:
-        """Return compiled code that the engine needs to start."""
+        """Compile and return code that the engine needs at its start."""
         key = self.compiler.key(level, text.encode())
         return self.compiler.lookup(key) or self.compiler.compile_now(text, level, key)
 
     def _fetch(self, pc: int) -> Insn | None:
-        """Return the decoded instruction at `pc` for the translator, or None if none can be executed there."""
+        """Return the decoded instruction at `pc` for the translator, None if none can be executed there."""
         if pc >> 1 >= self._words or not self._core.program.executable(pc):
             return None
         flash = self._core.program.flash
@@ -478,7 +484,7 @@ class JitEngine:
         return decode_for_execution(flash[pc >> 1], second)
 
     def _request(self, code: CodeTable, pc: int) -> None:
-        """Install the region at `pc` from memory or disk, or request it from the compile process."""
+        """Install the region at `pc` from memory or disk, otherwise request it from the compile process."""
         region = discover(pc, self._fetch, code.entries, self._hooks)
         code.regions[pc] = region
         if not region.steps:
@@ -504,7 +510,7 @@ class JitEngine:
                 self.compiler.request(text, level, key, entries, (code, exact))
 
     def _collect(self) -> None:
-        """Install the code that the compile process has finished, for any machine, and send it the next request."""
+        """Install all code that the compile process has finished, for any machine, and send it the next request."""
         for tag, loaded in self.compiler.poll():
             self._install(tag, loaded)
 
@@ -517,7 +523,7 @@ class JitEngine:
                 table[pc >> 1] = loaded.address
 
     def _flash_changed(self, start: int, end: int) -> None:
-        """Discard the translations: program words in [start, end) have changed."""
+        """Discard the translations, because the program words in [start, end) have changed."""
         self._codes.clear()
         self._forget_computed()
         self._key = None

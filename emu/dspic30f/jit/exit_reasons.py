@@ -1,4 +1,4 @@
-"""Exit reasons: numbers that native code returns to say why it came back to its caller."""
+"""Exit reasons: numbers with which native code tells its caller why it returned."""
 
 from __future__ import annotations
 
@@ -14,5 +14,5 @@ NEXT, INTERPRET, DEADLINE, BOUNDARY_WORK, MISS, RETFIE, HOOK, MODES, ARRIVE, UNF
 - HOOK: PC is hooked.
 - MODES: the processor modes have changed; PC belongs to another table of code.
 - ARRIVE: events are due before the access of the instruction at PC.
-- UNFINISHED: the boundary before PC has begun and must be finished whatever the limit.
+- UNFINISHED: the boundary before PC has begun and must be finished regardless of the limit.
 """

@@ -1,4 +1,4 @@
-"""Facts about a machine that its translations depend on, apart from the program: offsets, register access, rules."""
+"""Facts about a machine, apart from the program, on which its translations depend: offsets, register access, rules."""
 
 from __future__ import annotations
 
@@ -15,13 +15,19 @@ from emu.dspic30f.state.modes import REGISTERS, Key
 from emu.system.rules import Rule
 
 SfrAccess = Literal["plain", "slow", "irq", "flags", "sr"]
-"""How native code accesses an SFR. `plain`: as memory under a mask. `slow`: only Python accesses it. `irq`: as memory,
-and an interrupt may become acceptable. `flags`: interrupt flags. `sr`: the status register."""
+"""How native code accesses an SFR.
+
+- `plain`: as memory, under a mask.
+- `slow`: only through Python.
+- `irq`: as memory; an interrupt may become acceptable.
+- `flags`: as interrupt flags.
+- `sr`: as the status register.
+"""
 
 
 @dataclass(frozen=True)
 class Latches:
-    """Destinations of table writes: byte offsets in the record and the address range of EEPROM."""
+    """Destinations of table writes: byte offsets of the latches in the record, and the address range of EEPROM."""
 
     flash: int
     flash_count: int
@@ -29,49 +35,52 @@ class Latches:
     eeprom_count: int
     eeprom_range: tuple[int, int]
     captured_in: tuple[int, int] | None
-    """Data addresses of the registers that capture the address of a table write; None if the chip has none."""
+    """Data addresses of the registers that store the address of a table write; None if the chip has none."""
 
 
 @dataclass(frozen=True)
 class MachineLayout:
-    """Facts that the translator may compile into code for one set of processor modes."""
+    """Facts about one set of processor modes that the translator may compile into code."""
 
     offset: Mapping[str, int]
     """Byte offsets in the record of registers and hidden state, by name."""
     reads: Mapping[int, SfrAccess]
-    """Read access by even SFR address; an address that is absent is `slow`."""
+    """Read access by even SFR address. For a missing address it is `slow`."""
     writes: Mapping[int, tuple[SfrAccess, int]]
-    """Write access by even SFR address, with the bits that a write can change; an address that is absent is `slow`."""
+    """Write access by even SFR address, with the bits that a write can change. For a missing address it is `slow`."""
     initialised: int
-    """Bit n is set if Wn is known to be initialised, so that pointers need no check (isa.md §2.2)."""
+    """Bit n is set if Wn is known to be initialised, so that its use as a pointer needs no check (isa.md §2.2)."""
     limit_armed: bool
     """Whether SPLIM has been written since reset (isa.md §10.2)."""
     ram: tuple[int, int]
-    """First data address after the SFRs, and the first one after RAM."""
+    """Data addresses of the end of the SFRs and of the end of RAM."""
     y_ram: int
-    """First data address of Y RAM, which is the upper part of RAM."""
+    """First data address of Y RAM, the upper part of RAM."""
     flash_words: int
     flag_words: tuple[tuple[int, int], ...]
     """Addresses of the interrupt flag registers, each with the address of its enable register."""
     trap_flags: int
-    """Bits of INTCON1 that request a trap."""
+    """Flags in INTCON1 that request a trap."""
     idle_rule: Rule
-    """Effect of PWRSAV #1 on devices."""
+    """Rule for the effect of PWRSAV #1 on devices."""
     clrwdt_rule: Rule
-    """Effect of CLRWDT on devices."""
+    """Rule for the effect of CLRWDT on devices."""
     latches: Latches
     flow: flow_rules.FlowOperands
     rules: Mapping[int, Rule] = field(default_factory=dict)
-    """Rules of device registers, by even address."""
+    """Rules of device registers, by even data address."""
     hooks: frozenset[int] = frozenset()
-    """Hooked program addresses: native code returns to Python in front of them."""
+    """Hooked program addresses, before which native code returns to Python."""
     do_start: int = -1
-    """First instruction of the active DO loop; -1 if none is active."""
+    """Address of the active DO loop's first instruction; -1 if no loop is active."""
     do_end: int = -1
-    """Last instruction of the active DO loop; -1 if none is active."""
+    """Address of the active DO loop's last instruction; -1 if no loop is active."""
 
     def accumulator_at(self, address: int) -> tuple[int, int] | None:
-        """Return the accumulator that contains the word at `address` and the word's lowest bit in it, or None."""
+        """Return the accumulator that contains the word at `address`, and the word's bit position in it;
+
+        None if none does.
+        """
         for i, low in enumerate((self.offset["ACCAL"], self.offset["ACCBL"])):
             if low <= address < low + 6:
                 return i, 8 * (address - low)
@@ -79,20 +88,22 @@ class MachineLayout:
 
 
 def wiring_hash(layout: MachineLayout) -> bytes:
-    """Return the hash of the facts that are long and equal in all modes of a machine: offsets and rules of devices."""
+    """Return the hash of the large facts that are equal in all modes of a machine: offsets and device rules."""
     return hashlib.sha256(repr((sorted(layout.offset.items()), sorted(layout.rules.items()))).encode()).digest()
 
 
 def translation_hash(context: Context, layout: MachineLayout, wiring: bytes) -> bytes:
-    """Return the hash of processor modes and layout. `wiring` is its `wiring_hash`. Hooks are excluded: those within
-    a region are part of the key of that region."""
+    """Return the hash of processor modes and layout. `wiring` is the layout's `wiring_hash`.
+
+    Hooks are excluded, because a region's key contains the hooks inside the region.
+    """
     facts = vars(layout) | {"hooks": None, "offset": None, "rules": wiring}
     parts = [sorted(part.items()) if isinstance(part, Mapping) else part for part in facts.values()]
     return hashlib.sha256(repr((context, parts)).encode()).digest()
 
 
 def record_offsets(core: Core) -> dict[str, int]:
-    """Return the byte offset in the record of every register and reserved field, by name."""
+    """Return the byte offset in the record of every register and reserved field by name."""
     offset = {name: sfr.address for name, sfr in core.chip.sfrs.items()}
     offset |= {name: reserved.offset for name, reserved in core.record.fields.items()}
     offset |= {name: 2 * core.state.at[name] for name in ("W0S", "W1S", "W2S", "W3S", "SRS")}
@@ -137,7 +148,7 @@ def latch_layout(core: Core) -> Latches:
 
 
 def sfr_access_kinds(core: Core) -> tuple[dict[int, SfrAccess], dict[int, tuple[SfrAccess, int]]]:
-    """Return how native code may read and write each SFR, from the hooks on the bus."""
+    """Return how native code may read and write each SFR, derived from the hooks on the bus."""
     bus, sfrs = core.bus, core.chip.sfrs
     sources = core.chip.interrupts.values()
     special: dict[int, SfrAccess] = {}

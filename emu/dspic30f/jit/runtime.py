@@ -1,4 +1,4 @@
-"""The native dispatch loop: from PC to native code and back, until Python is needed."""
+"""The native dispatch loop: calls native code by PC until Python is needed."""
 
 from __future__ import annotations
 
@@ -179,7 +179,7 @@ miss:
 
 
 def dispatch_text(core: Core, flash_end: int, counter: BoundaryCounter | None = None) -> str:
-    """Return the IR of the dispatch loop and of its boundaries. Flash ends at `flash_end` (PC units)."""
+    """Return the IR of the dispatch loop and its boundaries. `flash_end` is the end of flash in PC units."""
     counter = counter if counter is not None else BoundaryCounter()
     offset = {name: core.record.fields[f"cpu.{name}"].offset for name in ("pc", "repeat", "cycle")}
     return boundary_text(core, counter) + DISPATCH.format(

@@ -1,8 +1,8 @@
-"""The camera: register file on I2C, sync lines and pixel bus as functions of the cycle (epuck.md §7).
+"""The e-puck's camera: I2C registers, sync lines and pixel bus as functions of the cycle (epuck.md §7).
 
 The camera posts no events. HREF, VSYNC and PCLK are closed forms of the cycle (`scan.py`), so timers that count them
 post one event per match. The first read of a line renders its pixels into the record, where they stay until the line
-ends. Rules of the port read them from there.
+ends. Generated code of the port reads the pixels from the record.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from emu.peripherals.ports.rules import ByteStream
 from emu.system.events import NEVER
 from emu.system.rules import cell_of
 
-if TYPE_CHECKING:  # imported with the first picture: most runs start faster without
+if TYPE_CHECKING:  # imported when the first picture is shown: runs without a picture start faster
     import numpy as np
     from numpy.typing import NDArray
 
@@ -37,11 +37,11 @@ SYNC_PORT: Final = 2
 RESET_PIN: Final = "RC13"
 
 RowSource = Callable[[int, int], "Pixels"]
-"""rows(y, cycle): returns line y (0 = top) of the upright scene in `cycle`, 640 x 3 values."""
+"""rows(y, cycle): returns line y (0 = top) of the upright scene at `cycle`, 640 x 3 values."""
 
 
 class Camera(BoardPart, I2cDevice):
-    """An image sensor and its connector. Raises ValueError for a sensor that is not in SENSORS."""
+    """An image sensor and its connector. Raises ValueError for a sensor type that is not in SENSORS."""
 
     def __init__(self, chip: Peripherals, sensor: str = "PO6030K", plugged: bool = True) -> None:
         super().__init__("camera", chip)
@@ -65,7 +65,7 @@ class Camera(BoardPart, I2cDevice):
         places = (cell_of(self.record, f"camera.{name}") for name in ("line_from", "line_to", "line", "line_byte_tcy"))
         chip.ports[DATA_PORT].attach_byte_stream(ByteStream(DATA_MASK, 8, *places), self._refresh)
         self.native: Final = NativeCamera.of(self.record)
-        """State for native code that renders the scene given to `sample`."""
+        """State for native code that renders the scene set by `sample`."""
         self._native_address: Final = ctypes.addressof(self.native)
         self._has_native_source, self._settings = False, 0
         self._pixels: PixelSource | None = None
@@ -98,14 +98,15 @@ class Camera(BoardPart, I2cDevice):
         self._still = still
 
     def look(self, rows: RowSource) -> None:
-        """Show a scene by rows: `rows(y, cycle)` is called for each line when it is read out."""
+        """Set a scene that is computed row by row. The camera calls `rows(y, cycle)` when it reads out a line."""
         self.sample(lambda y, columns, cycle: rows(y, cycle)[columns])
 
     def sample(self, pixels: PixelSource, has_native_source: bool = False) -> None:
-        """Show a scene by pixels: `pixels(y, columns, cycle)` is called for each line when it is read out.
+        """Set a scene that is computed pixel by pixel.
 
-        `cycle` is the one in which the line's HREF rises. The call is made once per line, only for lines that are read.
-        `has_native_source`: native code that uses `native` may render the same scene instead.
+        The camera calls `pixels(y, columns, cycle)` once for each line that the firmware reads; `cycle` is the rising
+        edge
+        of the line's HREF. With `has_native_source`, native code that uses `native` may render the same scene instead.
         """
         self._pixels, self._has_native_source, self._still = pixels, has_native_source, None
         self.native.setting = 0
@@ -118,7 +119,7 @@ class Camera(BoardPart, I2cDevice):
 
     @property
     def lamp(self) -> float:
-        """Brightness of the scene's light, 1 = as in the picture; automatic exposure follows a change."""
+        """Brightness of the scene's light, 1 = as in the picture. Automatic exposure adapts to a change."""
         return self._exposure.lamp
 
     @lamp.setter
@@ -127,7 +128,7 @@ class Camera(BoardPart, I2cDevice):
         self._line_to.value = 0
 
     def frame(self, cycle: int | None = None) -> Pixels:
-        """Return the picture the sensor would send in `cycle` (default: now): lines x pixels x 3.
+        """Return the picture that the sensor would send at `cycle` (default: now): lines x pixels x 3.
 
         The sensor's current window, format and exposure apply.
         """
@@ -144,7 +145,7 @@ class Camera(BoardPart, I2cDevice):
         return np.stack(lines) if lines else np.zeros((0, 0, 3), np.uint8)
 
     def _encode_line(self, line: int, cycle: int, address: int) -> int:
-        """Write the bytes of a line read out in `cycle` to a host address. Return their number."""
+        """Encode a line read out at `cycle` and write its bytes to a host address. Return the number of bytes."""
         if self._readout is None:
             from emu.boards.epuck.camera.pixels import Readout
 
@@ -167,7 +168,7 @@ class Camera(BoardPart, I2cDevice):
         self._set_plugged(True)
 
     def unplug(self) -> None:
-        """Unplug the camera: no I2C answers, no edges."""
+        """Unplug the camera: it no longer answers on I2C, and its lines have no edges."""
         self._set_plugged(False)
 
     def _set_plugged(self, plugged: bool) -> None:
@@ -176,7 +177,7 @@ class Camera(BoardPart, I2cDevice):
         self.pins.change_waveform(self.now, self._connect)
 
     def _connect(self) -> None:
-        """Attach or detach the waveforms and the I2C address, as the connector state says."""
+        """Attach or detach the waveforms and the I2C address, depending on whether the camera is plugged in."""
         for port, mask, wave in ((DATA_PORT, DATA_MASK, self), (SYNC_PORT, HREF | VSYNC | PCLK, self.scan)):
             if self.is_plugged:
                 self.pins.attach(port, mask, wave)
@@ -214,23 +215,23 @@ class Camera(BoardPart, I2cDevice):
         return self._line[(cycle - u64[first]) // u64[self._byte.index]] << 8
 
     def constant_until(self, cycle: int) -> int:
-        """Between lines: the start of the next line. Within a line: no guarantee."""
+        """Return the start of the next line if `cycle` is between lines; within a line, promise nothing."""
         u64 = self._u64
         in_line = u64[self._line_from.index] <= cycle < u64[self._line_to.index]
         return cycle if in_line else self.scan.next_line(cycle)
 
     def rises(self, mask: int, after: int, until: int) -> int:
-        """No device of the chip is clocked by the data lines."""
+        """Report no rising edges, because no device of the chip is clocked by the data lines."""
         return 0
 
     def nth_rise(self, mask: int, after: int, count: int) -> int:
-        """No device of the chip is clocked by the data lines."""
+        """Report no rising edges, because no device of the chip is clocked by the data lines."""
         return NEVER
 
     def _refresh(self, cycle: int) -> bool:
-        """Render the line on the bus into the record, for native code that reads its bytes there.
+        """Render the line on the bus into the record, where native code reads its bytes.
 
-        Return whether it did.
+        Return whether a line was rendered.
         """
         u64 = self._u64
         if not self._plugged.value or u64[self._line_from.index] <= cycle < u64[self._line_to.index]:
@@ -238,9 +239,9 @@ class Camera(BoardPart, I2cDevice):
         return (self._still is not None and self._render_natively(self._still, cycle)) or self._render(cycle)
 
     def _render_natively(self, still: StillImage, cycle: int) -> bool:
-        """Render a line of a still picture by native code. Return False if only `_render` can do it.
+        """Render a line of a still picture by native code. Return False if `_render` has to do it.
 
-        Native code needs a row that `_render` has cut before.
+        Native code needs a row that an earlier `_render` has cut to the current columns.
         """
         row = still.row_on_bus(self._native_address, self.native.setting, cycle, self._href_at)
         pixels = still.row_address(row)
@@ -268,12 +269,12 @@ class Camera(BoardPart, I2cDevice):
         return self._registers[256 * bank + number]
 
     def start(self, read: bool, cycle: int) -> bool:
-        """Handle being addressed; in reset the sensor does not acknowledge."""
+        """Handle the sensor's I2C address. In reset, the sensor does not acknowledge it."""
         self._pointer_next.value = not read
         return self.scan.running
 
     def write(self, byte: int, cycle: int) -> bool:
-        """Handle a byte: first the register number, then its value."""
+        """Handle a byte written on I2C: first the register number, then the register's value."""
         if self._pointer_next.value:
             self._pointer.value = byte
             self._pointer_next.value = 0
@@ -285,7 +286,10 @@ class Camera(BoardPart, I2cDevice):
         return True
 
     def read(self, cycle: int) -> int:
-        """Return the selected register: 0 and 1 hold the sensor type; the bank register reads back."""
+        """Return the value of the selected register.
+
+        Registers 0 and 1 hold the sensor type; the bank register reads back.
+        """
         number = self._pointer.value
         if number < len(self.sensor.identity):
             return self.sensor.identity[number]
@@ -294,7 +298,7 @@ class Camera(BoardPart, I2cDevice):
         return self.register(self._bank.value, number)
 
     def _register_changed(self, cycle: int) -> None:
-        """Apply a register change. UNVERIFIED: a new timing starts a new frame at once."""
+        """Apply a register change. UNVERIFIED: a new timing starts a new frame immediately."""
         before = self._picture.exposure
         self._decode_registers()
         if (before is None) != (self._picture.exposure is None):
@@ -332,7 +336,7 @@ class Camera(BoardPart, I2cDevice):
             self._registers[256 * bank + number] = value
 
     def restored(self) -> None:
-        """Rebuild derived state after a snapshot replaced the record. A rendered line stays valid."""
+        """Rebuild derived state after a snapshot was restored. A rendered line stays valid."""
         line_to = self._line_to.value
         self._decode_registers()
         self._line_to.value = line_to

@@ -1,7 +1,7 @@
-"""Exposure: brightness of the lamp, manual exposure, and automatic exposure control (epuck.md §7.6).
+"""Exposure of the camera: lamp brightness, manual exposure, automatic exposure control (epuck.md §7.6).
 
-A scene's pixel values hold at brightness 1. Automatic control approaches the exposure that compensates the lamp, by a
-constant share per frame. Its state is therefore an exposure value and the cycle at which it was valid.
+A scene's pixel values hold at brightness 1. In each frame, automatic control removes a constant share of the difference
+to the exposure that compensates the lamp. Its state is an exposure value and the cycle at which it was valid.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ SHORTEST, LONGEST = 1 / 128, 8.0  # UNVERIFIED range of exposure and gain togeth
 ONE: Final = 1 << 16
 """Fixed-point representation of a brightness or exposure of 1."""
 _SETTLED: Final = 1 / 256
-"""Relative difference below which control counts as settled: invisible in 8 bits."""
+"""Relative difference below which automatic exposure counts as settled; it is invisible in 8 bits."""
 
 
 class Exposure:
@@ -34,12 +34,12 @@ class Exposure:
         return self._lamp.value / ONE
 
     def set_lamp(self, brightness: float, cycle: int, frame_tcy: int) -> None:
-        """Change the lamp in `cycle`; automatic control continues from the exposure reached by then."""
+        """Change the lamp at `cycle`. Automatic control continues from the exposure that it has reached by then."""
         self.hold(cycle, frame_tcy)
         self._lamp.value = round(brightness * ONE)
 
     def hold(self, cycle: int, frame_tcy: int) -> None:
-        """Store the exposure that automatic control has reached by `cycle`, before its target changes."""
+        """Store the exposure that automatic control has reached at `cycle`. Call this before its target changes."""
         self._exposure.value = round(self._automatic(cycle, frame_tcy) * ONE)
         self._since.value = cycle
 
@@ -48,7 +48,7 @@ class Exposure:
         self._exposure.value, self._since.value = ONE, cycle
 
     def brightness(self, manual: float | None, cycle: int, frame_tcy: int) -> float:
-        """Return the factor on the scene's pixels, for a manual exposure or the automatic one (None)."""
+        """Return the factor on the scene's pixels. `manual` is the manual exposure, None for automatic exposure."""
         lamp = self._lamp.value
         if manual is None:
             if lamp == ONE == self._exposure.value:

@@ -8,7 +8,7 @@ typedef double f64;
 
 enum form { RGB565, GREY, YUV };
 
-// ITU-R BT.601 in 1/256.
+// Luma by ITU-R BT.601, with weights in 1/256.
 static int32_t luma(const int32_t *p)
 {
     return (77 * p[0] + 150 * p[1] + 29 * p[2] + 128) >> 8;
@@ -20,8 +20,8 @@ static uint8_t chroma(int32_t difference, int32_t share)
     return (uint8_t)(value < 0 ? 0 : value > 255 ? 255 : value);
 }
 
-// RGB565 is sent high byte first: R4..R0 G5..G3, G2..G0 B4..B0. YUV is U Y V Y, with the chroma of the first pixel of a
-// pair.
+// Encode a line. RGB565 is sent high byte first: R4..R0 G5..G3, G2..G0 B4..B0. YUV is sent as U Y V Y, with the chroma
+// of the first pixel of each pair.
 void encode(const uint8_t *pixels, i64 count, i64 form, const f64 *gains, uint8_t *out)
 {
     int32_t red = 0;
@@ -56,7 +56,7 @@ struct camera {
     const struct scan *scan;
     const uint8_t *plugged;
     const u64 *lamp, *exposure; // in 1 / `one`
-    u64 *from, *to, *byte_tcy;  // when the bytes of the line in the record are on the bus
+    u64 *from, *to, *byte_tcy;  // cycles in which the recorded line is on the bus
     uint8_t *line;
     i64 setting;    // changes with the members below and with the pixel source; 0: only Python can render
     const i64 *row; // scene row of each line
@@ -66,7 +66,7 @@ struct camera {
 };
 
 // Return the scene row of the line on the bus in a cycle, and set `href` to the cycle in which its HREF rises; as
-// `Scan.line_at`. Return -1 if there is no such line, the line is in the record already, `setting` is out of date, or
+// `Scan.line_at`. Return -1 if there is no such line, the line is in the record already, `setting` is outdated, or
 // automatic exposure is still adapting; Python then renders.
 i64 row_on_bus(const struct camera *c, i64 setting, i64 cycle, i64 *href)
 {

@@ -1,6 +1,6 @@
-"""`NativeCamera`: camera state for native code that renders lines instead of Python; twin of `struct camera` in line.c.
+"""`NativeCamera`: camera state for native code that renders lines; twin of `struct camera` in line.c.
 
-Native code renders the same bytes as `Camera`, or leaves a line to Python.
+Native code renders the same bytes as `Camera`, or declines a line, which Python then renders.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from emu.system.record import Record
 
 
 class NativeCamera(Structure):
-    """Addresses in the record, and the settings of `Readout`; `setting` is 0 until `Readout.publish`."""
+    """Addresses in the record, and the settings of a `Readout`. `setting` is 0 before the first `Readout.publish`."""
 
     _fields_ = [
         *((name, c_void_p) for name in ("scan", "plugged", "lamp", "exposure", "begin", "end", "byte_tcy", "line")),
@@ -23,6 +23,6 @@ class NativeCamera(Structure):
 
     @classmethod
     def of(cls, record: Record) -> NativeCamera:
-        """Return the native state of the camera in a record."""
+        """Return the camera state for native code, with the addresses of a record."""
         cells = ("frame_tcy", "plugged", "lamp", "exposure", "line_from", "line_to", "line_byte_tcy", "line")
         return cls(*(record.address + record.fields[f"camera.{cell}"].offset for cell in cells), one=ONE)

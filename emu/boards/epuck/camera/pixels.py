@@ -1,4 +1,4 @@
-"""Conversion of the scene to the bytes of a line: mirroring, gains and colour formats (epuck.md §7.2, §7.4)."""
+"""Conversion of a scene to the bytes of a sensor line: mirroring, gains and colour formats (epuck.md §7.2, §7.4)."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from emu.boards.epuck.camera.sensors import GREY, HEIGHT, RGB565, WIDTH, YUV, Im
 from emu.native_library import ADDRESS, INT, functions
 
 Pixels = NDArray[np.uint8]
-"""n x 3 values, red, green, blue."""
+"""Array of n x 3 values: red, green, blue."""
 PixelSource = Callable[[int, NDArray[np.intp], int], Pixels]
-"""pixels(y, columns, cycle): returns the given columns (0..639) of line y, len(columns) x 3 values."""
+"""pixels(y, columns, cycle): returns the pixels of line y in the given columns (0..639), len(columns) x 3 values."""
 
 
 def scene_columns(timing: SensorTiming, picture: ImageSettings) -> NDArray[np.intp]:
@@ -41,7 +41,7 @@ def darkness(_y: int, columns: NDArray[np.intp], _cycle: int) -> Pixels:
 
 
 class StillImage:
-    """Pixel source of a still picture (480 x 640 x 3). It returns the same array for the same row and columns."""
+    """Pixel source of a still picture (480 x 640 x 3). Equal row and columns give the identical array."""
 
     def __init__(self, scene: Pixels) -> None:
         self._scene: Final = scene
@@ -65,12 +65,12 @@ class StillImage:
         return found
 
     def row_address(self, y: int) -> int:
-        """Return the host address of a row already cut to the current columns, 0 if it was not."""
+        """Return the host address of a row that is already cut to the current columns, otherwise 0."""
         return self._addresses.get(y, 0)
 
 
 Gains = ctypes.c_double * 3
-"""Factors of red, green and blue."""
+"""Gain factors of red, green and blue."""
 
 
 def encode(pixels: int, count: int, form: str, gains: ctypes.Array[ctypes.c_double], address: int) -> int:
@@ -80,7 +80,7 @@ def encode(pixels: int, count: int, form: str, gains: ctypes.Array[ctypes.c_doub
 
 
 class Readout:
-    """Encoder of the frame's lines for one set of sensor settings."""
+    """Encoder of a frame's lines for one set of sensor settings."""
 
     def __init__(self, timing: SensorTiming, picture: ImageSettings, lines: int) -> None:
         self._columns: Final = scene_columns(timing, picture)
@@ -93,7 +93,10 @@ class Readout:
         self._held: Final[dict[int, tuple[Pixels, int]]] = {}
 
     def publish(self, camera: NativeCamera, setting: int, picture: ImageSettings) -> None:
-        """Publish the settings to native code under the unique number `setting`. Keep this object alive meanwhile."""
+        """Publish the settings to native code under the unique number `setting`.
+
+        Keep this object alive while they are used.
+        """
         camera.row, camera.count = ctypes.addressof(self._row_numbers), len(self._columns)
         camera.form, camera.gains[:] = _FORMS.index(self._form), self._gains
         camera.manual = -1.0 if picture.exposure is None else picture.exposure
@@ -110,7 +113,7 @@ class Readout:
             self._brightness = brightness
             self._factors[:] = [gain * brightness for gain in self._gains]
         held, at = self._held.get(line, (None, 0))
-        if seen is not held:  # a source that reuses one array saves the address look-up
+        if seen is not held:  # a source that reuses one array saves looking up its address
             if seen.shape != (count, 3):
                 raise ValueError(
                     f"the pixel source returned shape {seen.shape}; expected {count} pixels, shape ({count}, 3)"
@@ -145,18 +148,18 @@ def decode(data: bytes, form: str) -> Pixels:
 
 
 def decode_line(data: bytes, form: str) -> Pixels:
-    """Decode the pixels of a whole line.
+    """Decode the pixels of a complete line.
 
-    A YUV line may end with the first of two pixels that share chroma; its missing red difference is taken as 0.
+    A YUV line may end with the first of two pixels that share chroma. Its missing red difference is taken as 0.
     """
     is_alone = form == YUV and len(data) % 4 == _SIZES[YUV]
     return decode(data + bytes((128, data[-1])), form)[:-1] if is_alone else decode(data, form)
 
 
 def as_vga(image: NDArray[np.uint8], turned: int = 0) -> NDArray[np.uint8]:
-    """Scale a grey, RGB or RGBA picture to 480 x 640 x 3 by nearest pixel.
+    """Scale a grey, RGB or RGBA picture to 480 x 640 x 3 by nearest pixel, after a rotation.
 
-    It is first rotated counter-clockwise by `turned` = 0, 90, 180 or 270 degrees, for sensors mounted rotated (epuck.md
+    The picture is rotated counter-clockwise by `turned` = 0, 90, 180 or 270 degrees, for rotated sensors (epuck.md
     §7.1). Raises ValueError for other shapes and angles.
     """
     if image.ndim == 2:
@@ -172,9 +175,9 @@ def as_vga(image: NDArray[np.uint8], turned: int = 0) -> NDArray[np.uint8]:
 
 
 _FORMS: Final = (RGB565, GREY, YUV)
-"""Formats in the order of `enum form` in line.c."""
+"""Pixel formats in the order of `enum form` in line.c."""
 _SIZES: Final = {RGB565: 2, GREY: 1, YUV: 2}
-"""Bytes of a pixel."""
+"""Bytes per pixel of each format."""
 
 
 def _from_rgb565(data: NDArray[np.uint8]) -> Pixels:

@@ -1,7 +1,7 @@
 """Timing of the sensor's lines and bytes: HREF, VSYNC, PCLK and byte numbers in closed form (epuck.md §7.4).
 
-Every number is a record cell `camera.<name>`, so snapshots contain it. `sensors.py` uses columns and rows; this module
-uses Tcy.
+All numbers are record cells `camera.<name>`, so snapshots contain them. `sensors.py` counts in columns and rows, this
+module in Tcy.
 """
 
 from __future__ import annotations
@@ -16,27 +16,30 @@ from emu.system.record import Record
 from emu.system.rules import INTEGER_OPERATIONS, Number, RuleBuilder
 
 HREF, VSYNC, PCLK = 1 << 3, 1 << 4, 1 << 14
-"""RC3, RC4, RC14 (epuck.md §2)."""
+"""Pins of the sync lines: RC3, RC4, RC14 (epuck.md §2)."""
 
 _SIGN: Final = 1 << 63
 
 LINE_PIXELS: Final = 1024
-"""Longest line in pixels: no sensor has more columns, but registers can request them."""
+"""Maximum length of a line in pixels. Registers can request more columns than any sensor has."""
 
 
 @dataclass(frozen=True, slots=True)
 class FrameTiming:
-    """Timing of one frame in Tcy; frames repeat without end. A line's bytes and its HREF begin together."""
+    """Timing of one frame in Tcy.
+
+    Frames repeat indefinitely. A line's first byte coincides with the rise of its HREF.
+    """
 
     frame_tcy: int
     first_href: int
-    """From the start of the frame to the rise of its first HREF."""
+    """Tcy from the start of the frame to the rise of its first HREF."""
     line_tcy: int
-    """From one HREF to the next; skipped rows have none (§7.4)."""
+    """Tcy from one HREF to the next; skipped rows have no HREF (§7.4)."""
     lines: int
     line_bytes: int
     byte_tcy: int
-    """8 in every mode of the library's fast driver (§7.3)."""
+    """Tcy per byte: 8 in every mode of the library's fast driver (§7.3)."""
     vsync_rise: int
     vsync_fall: int
 
@@ -61,7 +64,7 @@ def frame_timing(timing: SensorTiming) -> FrameTiming:
 
 
 class Scan:
-    """The current frame timing and the cycle in which its first frame began. `running` is False in reset."""
+    """Current frame timing and the start cycle of its first frame. `running` is False while the sensor is in reset."""
 
     def __init__(self, record: Record) -> None:
         self._cells: Final = {
@@ -88,11 +91,11 @@ class Scan:
         self.running = bool(self._running.value)
 
     def place(self, cycle: int) -> tuple[int, int]:
-        """Return (frame, Tcy since its start); the frame is negative before the sensor started."""
+        """Return (frame number, Tcy since that frame's start); the number is negative before the sensor starts."""
         return divmod(cycle - self.start, self.timing.frame_tcy)
 
     def line_at(self, cycle: int) -> tuple[int, int] | None:
-        """Return (line, cycle of its HREF) for the line whose byte is on the bus in `cycle`, None between lines.
+        """Return (line, cycle of its HREF) for the line whose byte is on the bus at `cycle`, None between lines.
 
         Byte k is on the bus from HREF + (k - 1/2) to HREF + (k + 1/2) byte times (§7.5).
         """
@@ -104,7 +107,7 @@ class Scan:
         return (line, self.href(line, frame)) if behind < timing.line_bytes * timing.byte_tcy else None
 
     def href(self, line: int, frame: int = 0) -> int:
-        """Return the cycle in which HREF rises for a line (0 = first) of a frame since the last restart."""
+        """Return the cycle at which HREF rises for a line (0 = first) of a frame since the last restart."""
         timing = self.timing
         return self.start + frame * timing.frame_tcy + timing.first_href + line * timing.line_tcy
 
@@ -123,15 +126,15 @@ class Scan:
         return levels
 
     def rises(self, mask: int, after: int, until: int) -> int:
-        """Return the rising edges of one sync line in after < c <= until."""
+        """Return the number of rising edges of one sync line in after < c <= until."""
         return self.edges(mask, until) - self.edges(mask, after)
 
     def nth_rise(self, mask: int, after: int, count: int) -> int:
-        """Return the cycle of the `count`-th rising edge after `after`, or NEVER."""
+        """Return the cycle of the `count`-th rising edge after `after`, or NEVER if there is none."""
         return self.edge_cycle(mask, self.edges(mask, after) + count)
 
     def constant_until(self, cycle: int) -> int:
-        """Return the next edge of a sync line; no guarantee while PCLK runs."""
+        """Return the cycle of the next edge of a sync line. While PCLK runs, promise nothing."""
         timing = self.timing
         frame, offset = self.place(cycle)
         if not self.running:
@@ -151,7 +154,10 @@ class Scan:
         return timing.first_href + line * timing.line_tcy if line < timing.lines else timing.frame_tcy
 
     def next_line(self, cycle: int) -> int:
-        """Return the first cycle in which `line_at` may return a line, for a `cycle` between lines; NEVER in reset."""
+        """Return the first cycle after `cycle` at which `line_at` may return a line; NEVER in reset.
+
+        `cycle` must be between lines.
+        """
         timing = self.timing
         half = timing.byte_tcy // 2
         frame, offset = self.place(cycle + half)
@@ -160,7 +166,7 @@ class Scan:
         return self.start - half if frame < 0 else cycle + self._next_line(offset) - offset
 
     def edges(self, mask: int, cycle: int) -> int:
-        """Return the rising edges of one sync line since the start, `cycle` included."""
+        """Return the number of rising edges of one sync line since the start, up to and including `cycle`."""
         return int(edges(INTEGER_OPERATIONS, mask, self.timing, (self.start, self.running), cycle))
 
     def edge_cycle(self, mask: int, number: int) -> int:
@@ -178,7 +184,7 @@ class Scan:
 def edges(m: RuleBuilder, mask: int, timing: FrameTiming, begun: tuple[Number, Number], cycle: Number) -> Number:
     """Return `Scan.edges` as a rule expression.
 
-    `begun`: cycle of the first frame's start, and whether the sensor runs.
+    `begun`: start cycle of the first frame, and whether the sensor runs.
     """
     start, running = begun
     counts = (cycle >= start) & (running != 0)

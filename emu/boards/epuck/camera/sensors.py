@@ -1,6 +1,6 @@
-"""Image sensors of e-pucks: the meaning of their registers (epuck.md §7; openswarm-original.md §5.5).
+"""Image sensors of e-pucks: decoding of their registers (epuck.md §7; openswarm-original.md §5.5).
 
-Positions are sensor columns and rows. A column lasts `column_tcy` Tcy, a row is `columns` of them, a frame `rows` rows.
+Positions are sensor columns and rows. A column lasts `column_tcy` Tcy, a row `columns` columns, a frame `rows` rows.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from types import MappingProxyType
 from typing import Final
 
 WIDTH, HEIGHT = 640, 480
-"""Active pixels of all three sensors."""
+"""Active pixels of the sensors: columns and rows, equal for all three types."""
 RGB565, YUV, GREY = "rgb565", "yuv", "grey"
 
 ReadRegister = Callable[[int, int], int]
@@ -31,13 +31,13 @@ class SensorTiming:
     first_column: int
     """Column in which HREF rises."""
     end_column: int
-    """Column from which HREF is low."""
+    """Column in which HREF falls."""
     first_row: int
     end_row: int
     vsync_row: int
     vsync_column: int
     vsync_end_row: int
-    """Row from which VSYNC is low."""
+    """Row in which VSYNC falls."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,12 +52,12 @@ class ImageSettings:
     gains: tuple[float, float, float]
     """Factors on red, green and blue."""
     exposure: float | None
-    """Factor of the exposure registers, 1 = nominal; None with automatic exposure."""
+    """Exposure factor of the exposure registers, 1 = nominal; None with automatic exposure."""
 
 
 @dataclass(frozen=True, slots=True)
 class Sensor:
-    """One sensor type."""
+    """Sensor type: defaults and decoding of its registers."""
 
     name: str
     identity: tuple[int, int]
@@ -73,7 +73,7 @@ def _word(read: ReadRegister, bank: int, high: int) -> int:
 
 
 def _defaults(text: str) -> dict[tuple[int, int], int]:
-    """Parse groups `bank:register=value value ...`, all hexadecimal; values are for consecutive registers."""
+    """Parse groups `bank:register=value value ...`, all hexadecimal. The values belong to consecutive registers."""
     table = {}
     for group in text.split(";"):
         place, values = group.split("=")
@@ -134,7 +134,7 @@ def _po3030k_picture(read: ReadRegister) -> ImageSettings:
 
 
 def _gains(registers: tuple[float, float, float], balanced: bool) -> tuple[float, float, float]:
-    """Return the gains: registers are 1.0 at 0x40; automatic white balance is taken as converged."""
+    """Return the colour gains. Register value 0x40 is gain 1.0; automatic white balance counts as converged."""
     red, green, blue = (1.0 if balanced else value / 0x40 for value in registers)
     return red, green, blue
 
@@ -151,7 +151,7 @@ class _Banked:
     origin_x: int
     origin_y: int
     window_x: int
-    """Sensor column of window position 0."""
+    """Sensor column of horizontal window position 0."""
     clock: tuple[int, int]
     dividers: Mapping[int, int]
     scale_x: tuple[int, int]
@@ -162,22 +162,21 @@ class _Banked:
     vsync: tuple[int, int]
     mirror: tuple[int, int]
     upright: int
-    """Mirror bits (0x40 horizontal, 0x80 vertical) with which the sensor sends an unmirrored picture."""
+    """Mirror bits (0x40 horizontal, 0x80 vertical) for which the sensor sends an unmirrored picture."""
     control: tuple[int, int]
     exposure: tuple[int, int]
     gains: tuple[int, int]
 
 
 _NOMINAL_EXPOSURE: Final = 0x0008_0000
-"""Value of the exposure registers at which the exposure factor is 1. UNVERIFIED: "8.0 units" in a public driver
-(§7.6)."""
+"""Value of the exposure registers for an exposure factor of 1. UNVERIFIED: "8.0 units" in a public driver (§7.6)."""
 
 
 def _banked_timing(chip: _Banked, read: ReadRegister) -> SensorTiming:
     scale_x = max(read(*chip.scale_x) >> 5, 1)
     scale_y = max(read(*chip.scale_y) >> 5, 1)
     form = chip.forms.get(read(*chip.form), YUV)
-    # UNVERIFIED: the pixel behind the register's value is the first, so that drivers get the column they ask for
+    # UNVERIFIED: the first pixel is the one after the register's value, so that drivers get the column they request
     first = chip.window_x + (_word(read, *chip.start_x) + 1) * scale_x
     return SensorTiming(
         columns=chip.columns,
@@ -288,4 +287,4 @@ SENSORS: Final[Mapping[str, Sensor]] = MappingProxyType(
         )
     }
 )
-"""Sensors by name. Defaults not in the library's tables are UNVERIFIED; drivers write all of them."""
+"""Sensors by name. Defaults that are not in the library's tables are UNVERIFIED; drivers overwrite all of them."""

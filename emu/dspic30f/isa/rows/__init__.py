@@ -1,1 +1,1 @@
-"""Rows of the instruction table by group, one module per section of isa.md §5."""
+"""Rows of the instruction table in groups: one module per table in isa.md §5."""

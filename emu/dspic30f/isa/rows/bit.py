@@ -1,7 +1,7 @@
-"""Bit operations (isa.md §5.4, §6.5). The f forms access the byte that holds the bit, the Ws forms a word or byte.
+"""Bit operations (isa.md §5.4, §6.5). The f forms access the byte that holds the bit; the Ws forms a word or byte.
 
-Ws is read and written at one EA and its pointer moves once. UNVERIFIED: that move is a source-side update for stalls
-(isa.md §13.2), and bit-reversed addressing, a matter of destination pointers, does not apply.
+Ws is read and written at one EA, and its pointer is updated once. UNVERIFIED: for stalls this update is on the source
+side (isa.md §13.2), and bit-reversed addressing, which concerns destination pointers, does not apply.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ def to_z(m: Builder, bit: Value) -> None:
 
 
 def change_f_bit(change: Change) -> Does:
-    """Bit b of byte f."""
+    """Return the function that changes bit b of byte f."""
 
     def does(m: Builder, x: Operands) -> None:
         m.store(x.f, change(m.load(x.f, 1), 1 << x.b), 1)
@@ -49,7 +49,7 @@ def change_f_bit(change: Change) -> Does:
 
 
 def change_bit(change: Change) -> Does:
-    """Bit b of Ws."""
+    """Return the function that changes bit b of Ws."""
 
     def does(m: Builder, x: Operands) -> None:
         place = source(m, x, size_of(x))
@@ -69,7 +69,7 @@ def test_and_set_f_bit(m: Builder, x: Operands) -> None:
 
 
 def test_bit(report: Report) -> Does:
-    """Bit b of Ws to C or, inverted, to Z."""
+    """Return the function that copies bit b of Ws to C or, inverted, to Z."""
 
     def does(m: Builder, x: Operands) -> None:
         report(m, source(m, x, 2).read() >> x.b & 1)
@@ -78,7 +78,7 @@ def test_bit(report: Report) -> Does:
 
 
 def test_bit_wb(report: Report) -> Does:
-    """Bit Wb<3:0> of Ws to C or, inverted, to Z."""
+    """Return the function that copies bit Wb<3:0> of Ws to C or, inverted, to Z."""
 
     def does(m: Builder, x: Operands) -> None:
         number = m.w(x.w) & 15
@@ -88,7 +88,7 @@ def test_bit_wb(report: Report) -> Does:
 
 
 def test_and_set_bit(report: Report) -> Does:
-    """As ``test_bit``, then set the bit; it is written even if it was 1."""
+    """Return the function that tests bit b as ``test_bit`` and then sets it. It is written even if it was 1."""
 
     def does(m: Builder, x: Operands) -> None:
         place = source(m, x, 2)
@@ -100,7 +100,7 @@ def test_and_set_bit(report: Report) -> Does:
 
 
 def write_bit(flag: str, inverted: int) -> Does:
-    """Bit Wb<3:0> of Ws <- C or !Z."""
+    """Return the function for bit Wb<3:0> of Ws <- C or !Z."""
 
     def does(m: Builder, x: Operands) -> None:
         number = m.let(m.w(x.w) & 15)

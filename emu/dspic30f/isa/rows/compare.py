@@ -1,4 +1,4 @@
-"""Compare (isa.md §5.2): the flags of a subtraction. CPSxx skips are in rows_flow."""
+"""Compare instructions (isa.md §5.2): set the flags of a subtraction. The CPSxx skips are in flow.py."""
 
 from __future__ import annotations
 

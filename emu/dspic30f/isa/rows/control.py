@@ -9,7 +9,7 @@ from emu.dspic30f.isa.row import Row
 
 
 def nothing(m: Builder, x: Operands) -> None:
-    """NOP."""
+    """Execute NOP: no effect."""
 
 
 def disable_interrupts(m: Builder, x: Operands) -> Disi:

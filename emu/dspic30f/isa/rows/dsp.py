@@ -1,4 +1,4 @@
-"""DSP instructions (isa.md §5.10, §8). MPY.N sets flags as MPY does: UNVERIFIED, isa.md §22 item 20."""
+"""DSP instructions (isa.md §5.10, §8). UNVERIFIED: MPY.N sets flags as MPY does (isa.md §22 item 20)."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from emu.dspic30f.isa.dsp import (
 )
 from emu.dspic30f.isa.row import Row
 
-ACC = "OA OB SA SB"  # of the addressed accumulator
+ACC = "OA OB SA SB"  # flags of the addressed accumulator
 
 sft = partial(Row, constraints="k>=-16; k<=16")
 mac = partial(Row, psv_class="mov")

@@ -1,6 +1,6 @@
 """Branches, calls, returns, skips, REPEAT and DO (isa.md §5.7, §7). None of them may follow REPEAT.
 
-Cycles are those of the branch not taken and of the skip not made; the sequencer adds the rest (isa.md §13.1).
+The cycles are those without a taken branch or skip; the sequencer adds the rest (isa.md §13.1).
 """
 
 from __future__ import annotations
@@ -28,10 +28,10 @@ ret = partial(row, cycles=3)
 
 
 def skip_if(relation: Callable[[Value, Value], Value]) -> Does:
-    """CPSxx: signed comparison of Wb with Wn."""
+    """Return the function of CPSxx: skip by a signed comparison of Wb with Wn."""
 
     def does(m: Builder, x: Operands) -> Skip:
-        top = 0x80 if x.B else 0x8000  # flipping the sign bit turns signed order into unsigned order
+        top = 0x80 if x.B else 0x8000  # inverting the sign bit converts signed order to unsigned order
         mask = 2 * top - 1
         return Skip(relation((m.w(x.w) ^ top) & mask, (m.w(x.s) ^ top) & mask))
 
@@ -39,7 +39,7 @@ def skip_if(relation: Callable[[Value, Value], Value]) -> Does:
 
 
 def skip_f_bit(wanted: int) -> Does:
-    """BTSS, BTSC of a file register bit."""
+    """Return the function of BTSS, BTSC for a bit of a file register."""
 
     def does(m: Builder, x: Operands) -> Skip:
         return Skip((m.load(x.f, 1) >> x.b & 1) == wanted)
@@ -48,7 +48,7 @@ def skip_f_bit(wanted: int) -> Does:
 
 
 def skip_bit(wanted: int) -> Does:
-    """BTSS, BTSC of a bit of Ws."""
+    """Return the function of BTSS, BTSC for a bit of Ws."""
 
     def does(m: Builder, x: Operands) -> Skip:
         return Skip((source(m, x, 2).read() >> x.b & 1) == wanted)
@@ -57,7 +57,7 @@ def skip_bit(wanted: int) -> Does:
 
 
 def bit(name: str) -> Condition:
-    """Return a condition that is an SR bit."""
+    """Return a condition that tests an SR bit."""
     return lambda m: m.flag(name)
 
 
@@ -74,12 +74,12 @@ def less_or_equal_unsigned(m: Builder) -> Value:
 
 
 def relative(m: Builder, words: Value) -> Value:
-    """Target of a branch by ``words`` from the next instruction (isa.md §7.1)."""
+    """Return the target of a branch by ``words`` from the next instruction (isa.md §7.1)."""
     return (m.pc + 2 + 2 * words) & PC_MASK
 
 
 def branch_if(condition: Condition, wanted: int = 1) -> Does:
-    """Conditional branch, taken if the condition equals ``wanted`` (isa.md §7.2)."""
+    """Return the function of a conditional branch. It is taken if the condition equals ``wanted`` (isa.md §7.2)."""
 
     def does(m: Builder, x: Operands) -> Branch:
         return Branch(condition(m) == wanted, relative(m, x.n))
@@ -104,7 +104,7 @@ def goto_register(m: Builder, x: Operands) -> Goto:
 
 
 def push_return(m: Builder, words: int) -> None:
-    """Push the address after this instruction of ``words`` words (isa.md §7.4)."""
+    """Push the address after this instruction, which has ``words`` words (isa.md §7.4)."""
     after = (m.pc + 2 * words) & PC_MASK
     push(m, after & 0xFFFF, after >> 16)
 
@@ -132,7 +132,7 @@ def relative_call_register(m: Builder, x: Operands) -> Call:
 
 
 def pop_return(m: Builder) -> tuple[Value, Value]:
-    """Pop a program address. Return it and the whole upper word."""
+    """Pop a program address. Return the address and the whole upper word."""
     low, high = pop_addresses(m, 2)
     upper, lower = m.let(m.load(high, 2, ptr=15)), m.load(low, 2, ptr=15)
     return m.let((upper & 0x7F) << 16 | lower & 0xFFFE), upper
@@ -162,7 +162,7 @@ def repeat_register(m: Builder, x: Operands) -> Repeat:
 
 
 def do_end(m: Builder, x: Operands) -> int:
-    """Address of the last instruction of the loop (isa.md §7.6)."""
+    """Return the address of the loop's last instruction (isa.md §7.6)."""
     return m.pc + 4 + 2 * x.n & PC_MASK
 
 

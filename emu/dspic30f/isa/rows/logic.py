@@ -1,4 +1,4 @@
-"""Logic, clear and set (isa.md §5.1, §6.2)."""
+"""Logic, clear and set instructions (isa.md §5.1, §6.2)."""
 
 from __future__ import annotations
 

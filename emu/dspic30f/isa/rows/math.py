@@ -21,7 +21,7 @@ from emu.dspic30f.isa.row import Row
 
 
 def decimal_adjust(m: Builder, x: Operands) -> None:
-    """Correct a sum of two packed BCD bytes; the sum is kept wider than 8 bits between the steps."""
+    """Correct the sum of two packed BCD bytes. Between the steps the sum has more than 8 bits."""
     v = m.w(x.s) & 0xFF
     v = m.let(v + 6 * ((v & 15 > 9) | m.flag("DC")))
     v = m.let(v + 0x60 * ((v > 0x9F) | m.flag("C")))
@@ -45,7 +45,7 @@ def first_one_right(m: Builder, x: Operands) -> None:
 
 
 def first_bit_change(m: Builder, x: Operands) -> None:
-    """Minus the number of bits below the sign bit that equal it."""
+    """Return minus the number of bits below the sign bit that equal it."""
     v = m.let(source(m, x, 2).read())
     same = m.let(m.clz16(v ^ (v >> 15) * 0xFFFF) - 1)
     search(m, x, -same, same == 15)

@@ -22,7 +22,7 @@ from emu.dspic30f.isa.forms import WREG, f_only, f_to_wreg
 from emu.dspic30f.isa.row import Does, Row
 
 mov = partial(Row, psv_class="mov")
-mvd = partial(mov, cycles=2, repeat_ok=False)  # pairs begin at even registers
+mvd = partial(mov, cycles=2, repeat_ok=False)  # register pairs begin at even registers
 tbr = partial(Row, cycles=2, constraints="p>=1")
 tbw = partial(Row, cycles=2, constraints="q>=1")
 
@@ -66,7 +66,7 @@ def move(m: Builder, x: Operands) -> None:
 
 
 def load_pair(m: Builder, x: Operands) -> None:
-    """Wnd+1:Wnd <- Ws+1:Ws or two words, the low one at the lower address (isa.md §7.4)."""
+    """Wnd+1:Wnd <- Ws+1:Ws, or two words of memory, the low one at the lower address (isa.md §7.4)."""
     if x.p:
         ea, moved = indirect(m, x.s, x.p, 4, "src")
         if moved is not None:
@@ -94,7 +94,7 @@ def exchange(m: Builder, x: Operands) -> None:
 
 
 def swap(m: Builder, x: Operands) -> None:
-    """Exchange the bytes of Wn, or the nibbles of its low byte."""
+    """Exchange the bytes of Wn; in byte mode the nibbles of its low byte."""
     half, size = (4, size_of(x)) if x.B else (8, size_of(x))
     v = truncated(m.w(x.s), size)
     set_register(m, x.s, v >> half | v << half, size)
@@ -117,15 +117,20 @@ def table_address(m: Builder, ea: Value) -> Value:
 
 
 def table_pointer(location: Location) -> Value:
-    """Return the address of a table instruction from its operand location. A destination pointer moves after all
-    reads."""
+    """Return the address of a table instruction from its operand's location.
+
+    A destination pointer is updated after all reads.
+    """
     assert location.ea is not None, "a table pointer is never register direct"
     location.move_pointer()
     return location.ea
 
 
 def table_read(low: int) -> Does:
-    """Wd <- bits of the program word at TBLPAG:[Ws], from ``low`` on; an odd byte address takes the next byte."""
+    """Return the function for Wd <- bits of the program word at TBLPAG:[Ws], from bit ``low`` on.
+
+    In byte mode, an odd address selects the next byte.
+    """
 
     def does(m: Builder, x: Operands) -> None:
         size = size_of(x)
@@ -138,7 +143,7 @@ def table_read(low: int) -> Does:
 
 
 def table_write_low(m: Builder, x: Operands) -> None:
-    """Latch<15:0> or one byte of it <- Ws."""
+    """Latch<15:0>, or in byte mode one of its bytes, <- Ws."""
     size = size_of(x)
     operand, result = source(m, x, size), destination(m, x, size)
     v, ea = operand.read(), table_pointer(result)
@@ -150,7 +155,7 @@ def table_write_low(m: Builder, x: Operands) -> None:
 
 
 def table_write_high(m: Builder, x: Operands) -> None:
-    """Latch<23:16> <- Ws<7:0>; an odd byte address has no effect."""
+    """Latch<23:16> <- Ws<7:0>. In byte mode, an odd address has no effect."""
     size = size_of(x)
     operand, result = source(m, x, size), destination(m, x, size)
     v, ea = operand.read() & 0xFF, table_pointer(result)

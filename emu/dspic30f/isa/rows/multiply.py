@@ -1,4 +1,4 @@
-"""Multiply and divide (isa.md §5.6, §6.6, §6.7)."""
+"""Multiply and divide instructions (isa.md §5.6, §6.6, §6.7)."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Dividend: TypeAlias = Callable[[Builder, Operands], Value]
 
 mul = partial(Row, constraints="d!=14")
 DIVIDE_COUNT = 17
-"""Of the REPEAT in front of a divide: 18 steps (isa.md §6.7)."""
+"""Count of the REPEAT before a divide, which has 18 steps (isa.md §6.7)."""
 
 div = partial(Row, constraints="s>=2")
 dvd = partial(Row, constraints="s>=2; v even; t=v+1")
@@ -38,7 +38,7 @@ def set_pair(m: Builder, low: int, v: Value) -> None:
 
 
 def multiply(base: Reading, factor: Reading) -> Does:
-    """Wnd+1:Wnd <- Wb * Ws, each read as signed or unsigned."""
+    """Return the function for Wnd+1:Wnd <- Wb * Ws, each operand read as signed or unsigned."""
 
     def does(m: Builder, x: Operands) -> None:
         b = base(m, m.w(x.w))
@@ -48,7 +48,7 @@ def multiply(base: Reading, factor: Reading) -> Does:
 
 
 def multiply_literal(base: Reading) -> Does:
-    """Wnd+1:Wnd <- Wb * lit5."""
+    """Return the function for Wnd+1:Wnd <- Wb * lit5."""
 
     def does(m: Builder, x: Operands) -> None:
         set_pair(m, x.d, m.let(base(m, m.w(x.w)) * x.k))
@@ -57,7 +57,7 @@ def multiply_literal(base: Reading) -> Does:
 
 
 def multiply_f(m: Builder, x: Operands) -> None:
-    """W3:W2 <- f * WREG; of bytes, W2 <- f * WREG<7:0>. Unsigned."""
+    """W3:W2 <- f * WREG; in byte mode W2 <- f * WREG<7:0>. Unsigned."""
     size = size_of(x)
     wreg = truncated(m.w(WREG), size)
     v = m.let(m.load(x.f, size) * wreg)
@@ -88,9 +88,11 @@ def fraction(m: Builder, x: Operands) -> Value:
 
 
 def divide(dividend: Dividend, reading: Reading) -> Does:
-    """One of the 18 steps of a divide under REPEAT: the first looks for zero, the last delivers W0, W1 and flags.
+    """Return the function for one of a divide's 18 steps under REPEAT.
 
-    UNVERIFIED: the steps between change nothing, C ends as 0, after overflow W0 and W1 hold low bits (isa.md §6.7).
+    The first step checks for zero; the last writes W0, W1 and the flags.
+
+    UNVERIFIED: the other steps change nothing; C ends as 0; after overflow W0 and W1 hold the low bits (isa.md §6.7).
     """
 
     def does(m: Builder, x: Operands) -> None:

@@ -1,4 +1,4 @@
-"""Shifts and rotates (isa.md §5.3, §6.3)."""
+"""Shift and rotate instructions (isa.md §5.3, §6.3)."""
 
 from __future__ import annotations
 
@@ -29,7 +29,10 @@ def right_signed(m: Builder, v: Value, count: Value) -> Value:
 
 
 def shift_by_register(shift: Shift) -> Does:
-    """Wnd <- Wb shifted by Wns<4:0>; 16 and more leave zeros or sign bits. C is kept."""
+    """Return the function for Wnd <- Wb shifted by Wns<4:0>. C does not change.
+
+    A shift by 16 or more leaves only zeros or sign bits.
+    """
 
     def does(m: Builder, x: Operands) -> None:
         m.set_w(x.d, set_nz(m, 2, m.let(shift(m, m.w(x.w), m.w(x.s) & 31) & 0xFFFF)))
@@ -38,7 +41,7 @@ def shift_by_register(shift: Shift) -> Does:
 
 
 def shift_by_literal(shift: Shift) -> Does:
-    """Wnd <- Wb shifted by lit4. C is kept."""
+    """Return the function for Wnd <- Wb shifted by lit4. C does not change."""
 
     def does(m: Builder, x: Operands) -> None:
         m.set_w(x.d, set_nz(m, 2, m.let(shift(m, m.w(x.w), x.k) & 0xFFFF)))

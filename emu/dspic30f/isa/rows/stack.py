@@ -1,4 +1,4 @@
-"""Stack and frame (isa.md §5.8, §7.4, §2.6)."""
+"""Stack and frame instructions (isa.md §5.8, §7.4, §2.6)."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def pop_f(m: Builder, x: Operands) -> None:
 
 
 def link(m: Builder, x: Operands) -> None:
-    """Push W14, set it to the address after the pushed word, and reserve k bytes by a plain sum (isa.md §10.4)."""
+    """Push W14, set it to the address after the pushed word, and add k to W15 without wrapping (isa.md §10.4)."""
     top = m.ptr(STACK_POINTER, "dst")
     old = m.w(FRAME_POINTER)
     m.set_ptr(STACK_POINTER, (top + 2 + x.k) & 0xFFFF, "dst")
@@ -35,7 +35,7 @@ def link(m: Builder, x: Operands) -> None:
 
 
 def unlink(m: Builder, x: Operands) -> None:
-    """W15 <- W14, pop W14. The pointer is W14; UNVERIFIED: a write of W14 just before stalls (isa.md §13.2)."""
+    """W15 <- W14, pop W14. UNVERIFIED: W14 is the pointer, so a preceding write of W14 stalls (isa.md §13.2)."""
     top = m.let((m.ptr(FRAME_POINTER, "src") - 2) & 0xFFFF)
     m.set_ptr(STACK_POINTER, top, "src")
     m.set_w(FRAME_POINTER, m.load(top, 2, ptr=STACK_POINTER))
@@ -51,7 +51,7 @@ def push_shadow(m: Builder, x: Operands) -> None:
 
 
 def pop_shadow(m: Builder, x: Operands) -> None:
-    """UNVERIFIED: counts as a word write that marks W0-W3 initialised (isa.md §2.2)."""
+    """Restore W0-W3 and flags. UNVERIFIED: this counts as a word write that initialises W0-W3 (isa.md §2.2)."""
     flags = m.let(m.reg("SRS"))
     for n in SHADOWED:
         m.set_w(n, m.reg(f"W{n}S"))

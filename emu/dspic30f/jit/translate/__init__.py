@@ -1,1 +1,1 @@
-"""From a region of instructions to LLVM IR: builder, lazy flags, polling loops, boundaries, counters."""
+"""Translation of a region of instructions to LLVM IR: builder, lazy flags, polling loops, boundaries, counters."""

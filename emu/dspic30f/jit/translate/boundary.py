@@ -1,8 +1,8 @@
-"""Native work at an instruction boundary: events that have rules, interrupts, and the time spent in Idle.
+"""Native work at an instruction boundary: events that have rules, interrupts, and time spent in Idle.
 
 The rules are those of the devices and of exceptions.py, in the order of `Sequencer.boundary`. Python handles traps,
-events without a rule and cases that a rule does not cover. Then the function returns with all earlier work done, and
-Python finishes the boundary.
+events without a rule, and cases that a rule does not cover. In these cases the function returns after it has done all
+earlier work, and Python finishes the boundary.
 """
 
 from __future__ import annotations
@@ -20,11 +20,16 @@ from emu.system.events import NEVER
 from emu.system.rules import Cell, Number, cell_of, event_slot
 
 DONE, PYTHON, UNFINISHED = 0, 1, 2
-"""Results. DONE: the boundary has no work left. PYTHON: Python must do the boundary. UNFINISHED: Python must finish it;
-an exception was entered already, so a limit that was reached meanwhile counts only after the boundary."""
+"""Results of the boundary function.
+
+- DONE: the boundary has no more work.
+- PYTHON: Python must perform the boundary.
+- UNFINISHED: Python must finish it. An exception has already been entered, so a limit that was reached meanwhile counts
+  only after the boundary.
+"""
 
 LANES: Final = 8
-"""Due cycles in the widest vector register."""
+"""Number of due cycles in the widest vector register."""
 
 DECLARATIONS: Final = f"""declare i64 @llvm.vector.reduce.umin.v{LANES}i64(<{LANES} x i64>)
 declare <{LANES} x i64> @llvm.umin.v{LANES}i64(<{LANES} x i64>, <{LANES} x i64>)
@@ -56,11 +61,11 @@ _SETTLE: Final = """fire:
 settled:
   store i64 %first.due, ptr %p.deadline
   br label %accept"""
-"""Fires the events that are due at the boundary, before an exception may be accepted."""
+"""IR that fires the events due at the boundary, before an exception may be accepted."""
 
 
 def _head(core: Core, counter: BoundaryCounter) -> str:
-    """Return the IR from the call up to an event that is due (`fire`), including the time spent in Idle."""
+    """Return the IR from the call to the first due event (`fire`), including the time spent in Idle."""
     record_offsets = {name: core.record.fields[field].offset for name, field in FIELDS.items()}
     return "\n".join(
         [
@@ -130,12 +135,12 @@ jump:
 def _events(core: Core) -> str:
     """Return the IR of `i64 @fire(ptr %rec, i64 %last)`.
 
-    It fires the events due up to cycle `%last`, in order of (due, slot). It returns the earliest later due cycle, or 0
+    It fires the events due up to cycle `%last`, sorted by (due, slot). It returns the earliest later due cycle, or 0
     if Python must continue. The caller updates the deadline."""
     due = core.record.fields[FIELDS["due"]].offset
     lanes, groups = f"<{LANES} x i64>", range(-(-len(core.events.names) // LANES))
     loads, hits, least = [], [], "%dues0"
-    for g in groups:  # slots behind the last one are never due
+    for g in groups:  # slots after the last one are never due
         loads += [
             f"  %p.group{g} = getelementptr i64, ptr %p.due, i64 {LANES * g}",
             f"  %dues{g} = load {lanes}, ptr %p.group{g}, align 8",
@@ -185,7 +190,7 @@ def _fire(core: Core, m: BoundaryEmitter) -> None:
 
 
 def _accept(core: Core, m: BoundaryEmitter, counter: BoundaryCounter) -> None:
-    """Emit the search for an interrupt that is accepted after cycle `%last`, or that wakes the CPU."""
+    """Emit the search for an interrupt that is accepted after cycle `%last` or that wakes the CPU."""
     e, p = m.e, core.exceptions.operands
     cycle, last = (Value(e, name, False) for name in ("%cycle", "%last"))
     e.start("accept")
@@ -200,8 +205,7 @@ def _accept(core: Core, m: BoundaryEmitter, counter: BoundaryCounter) -> None:
     found = exceptions.waking(m, p, bits)
     e.end(f"br i1 {truth(found == exceptions.NO_REQUEST)}, label %sleeping, label %rouse")
     e.start("rouse")
-    risen = exceptions.request_cycle(
-m, p, found) + 1
+    risen = exceptions.request_cycle(m, p, found) + 1
     until = e.select(cycle < risen, risen, cycle)
     for name, value in (("cycle", until), ("mode", RUN), ("power", RUN), ("deadline", 0)):
         m.put(cell_of(core.record, FIELDS[name]), value)
