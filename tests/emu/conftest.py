@@ -1,4 +1,4 @@
-"""Fixture for the emulator's tests: the folder of recorded vectors."""
+"""Fixture of the emulator's tests: the folder of recorded vectors."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ VECTORS = Path(__file__).resolve().parents[1] / "vectors"
 
 @pytest.fixture(scope="session")
 def vectors(request: pytest.FixtureRequest) -> Path:
-    """Folder of recorded vectors: ``tests/vectors``, or the one that ``--vectors`` names."""
+    """Return the folder of recorded vectors: ``tests/vectors``, or the one in ``--vectors``."""
     named = request.config.getoption("--vectors", default=None)
     folder = Path(named) if named else VECTORS
     if not folder.is_dir():

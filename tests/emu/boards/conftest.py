@@ -17,7 +17,7 @@ PROGRAMS = Path(__file__).with_name("programs")
 
 @pytest.fixture(scope="session")
 def program(tmp_path_factory) -> Callable[..., Path]:
-    """program("camera.c", "lines.s") -> path of the ELF file."""
+    """Return a function that builds programs: program("camera.c", "lines.s") returns the path of the ELF file."""
     folder = tmp_path_factory.mktemp("programs")
 
     @cache
@@ -31,7 +31,7 @@ def program(tmp_path_factory) -> Callable[..., Path]:
 
 
 class Robot:
-    """Test rig for a robot. Only `at` advances time; all other methods act in the current cycle."""
+    """Test rig for a robot without a program. Only `at` advances time; all other methods act in the current cycle."""
 
     def __init__(self, **options) -> None:
         self.machine = Machine(engine="plain")
@@ -39,7 +39,7 @@ class Robot:
         self.events = self.machine.events
 
     def at(self, cycle: int) -> Robot:
-        """Make `cycle` the cycle of the next access."""
+        """Advance time so that the next access is in `cycle`."""
         assert cycle >= self.events.now
         self.events.arrive(cycle)
         self.events.settle(cycle)
@@ -62,7 +62,7 @@ class Robot:
         self.write("TRIS" + letter, tris & ~mask)
 
     def configure(self, registers) -> None:
-        """Write camera registers over I2C's device side: (bank, register, value)."""
+        """Write camera registers as the I2C bus does: (bank, register, value)."""
         camera = self.board.camera
         for bank, register, value in registers:
             for number, byte in ((camera.sensor.bank_register, bank), (register, value)):

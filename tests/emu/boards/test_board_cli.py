@@ -1,4 +1,4 @@
-"""`emu run` with a robot around the chip, and `emu screenshot`."""
+"""`emu run` on the e-puck board, and `emu screenshot`."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def scene(tmp_path):
 
 
 def test_run_gives_the_program_its_selector_and_camera(program, capsys):
-    """Part E: --selector, --sensor; the banner arrives through Bluetooth."""
+    """`emu run` passes --selector and --sensor to the program, and the program's banner arrives through Bluetooth."""
     status = main(["run", str(program("startup.c")), "--selector", "7", "--seconds", "2", "--json"])
     facts = json.loads(capsys.readouterr().out)
     assert status == 0
@@ -32,7 +32,7 @@ def test_run_gives_the_program_its_selector_and_camera(program, capsys):
 
 
 def test_watch_reports_the_robots_outputs(program, tmp_path, capsys):
-    """Part E: --watch reports LEDs, motors and UARTs with simulated time."""
+    """`emu run --watch` reports LEDs, motors and UARTs with simulated time."""
     arguments = ["run", str(program("steps.c")), "--seconds", "0.35", "--watch", "motors,leds", "--engine", "plain"]
     assert main(arguments) == 0
     lines = [line.split("  ")[-1] for line in capsys.readouterr().err.splitlines()]
@@ -41,7 +41,7 @@ def test_watch_reports_the_robots_outputs(program, tmp_path, capsys):
 
 
 def test_stimulus_file_reaches_the_program(program, tmp_path, capsys):
-    """Part E: --stimulus; a line break in the echo ends a watched line."""
+    """A stimulus file feeds text to the program; a line break in the echo ends a line of --watch."""
     script = tmp_path / "events.txt"
     script.write_text('0.001s uart1 "hello\\n"\n0.01s battery 3.0\n')
     status = main(["run", str(program("serial.c")), "--seconds", "0.1", "--stimulus", str(script), "--watch", "uart1"])
@@ -51,7 +51,8 @@ def test_stimulus_file_reaches_the_program(program, tmp_path, capsys):
 
 
 def test_screenshot_writes_what_the_driver_captured(program, scene, tmp_path, capsys):
-    """Part E: emu screenshot; 20 x 20 pixels of the middle, left red, right green."""
+    """`emu screenshot` writes the 20 x 20 pixels that the driver captured from the middle of the picture: left red,
+    right green."""
     target = tmp_path / "frame.png"
     arguments = ["screenshot", str(program("camera.c", "lines.s")), "--camera", scene, "--seconds", "0.2", "-o"]
     arguments += [str(target), "--buffer", "frame", "--size", "20x20", "--enlarge", "3", "--json", "--engine", "plain"]
@@ -65,7 +66,8 @@ def test_screenshot_writes_what_the_driver_captured(program, scene, tmp_path, ca
 
 
 def test_screenshot_without_buffer_shows_what_the_sensor_sees(program, scene, tmp_path):
-    """The window is 101 pixels wide and 120 lines high with the driver's registers."""
+    """Without a buffer, `emu screenshot` shows the sensor's window: with the driver's registers 101 pixels wide and
+    120 lines high."""
     target = tmp_path / "sensor.png"
     image = str(program("camera.c", "lines.s"))
     assert main(["screenshot", image, "--camera", scene, "--seconds", "0.2", "-o", str(target)]) == 0
@@ -92,7 +94,7 @@ def test_screenshot_without_buffer_shows_what_the_sensor_sees(program, scene, tm
     ],
 )
 def test_bad_input_is_refused_in_one_line(program, tmp_path, capfd, arguments, message):
-    """engines.md §10: status 2, a message, no traceback."""
+    """engines.md §10: invalid input ends with status 2 and a message without a traceback."""
     script = tmp_path / "events.txt"
     script.write_text("# nothing yet\n1s dance\n")
     names = {"IMAGE": str(program("startup.c")), "SCRIPT": str(script)}

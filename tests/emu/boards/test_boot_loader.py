@@ -13,7 +13,8 @@ RETURN = 0x060000
 
 
 def constant(value: int) -> list[int]:
-    """mov #value, w0; return; the rest erased (isa.md: MOV #lit16 is 0010 kkkk kkkk kkkk kkkk dddd)."""
+    """Return the program words of `mov #value, w0; return`, padded with erased words (isa.md: MOV #lit16 is 0010 kkkk
+    kkkk kkkk kkkk dddd)."""
     return [0x200000 | value << 4, RETURN] + [0xFFFFFF] * 30
 
 
@@ -42,7 +43,7 @@ def talk(machine: Machine, data: bytes, cycles: int = 300_000) -> bytes:
 
 
 def test_programmed_rows_replace_compiled_code(machine):
-    """§16: erase and program take 2 ms each, during which the CPU stalls; native code of the old row is discarded."""
+    """§16: erasing and programming stall the CPU for 2 ms each, and native code of the old row is discarded."""
     machine.run(cycles=2_500_000)
     assert machine.peek("answer") == 7
     for number, value in enumerate((1234, 0, 0xBEEF), start=1):

@@ -1,4 +1,4 @@
-"""The camera (epuck.md §7). A driver in a few lines of Python reads the bus when the library's handler would."""
+"""The camera (epuck.md §7). A driver in Python reads the bus in the cycles in which the library's handler does."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from .conftest import Robot
 
 FCY = 14_745_600
 FIRST_READ = 17
-"""Tcy from an HREF edge to the first read of PORTD in the library's handler: 16 to 18 (§7.5)."""
+"""Tcy from an HREF edge to the first read of PORTD in the library's handler, which are 16 to 18 (§7.5)."""
 
 
 def po6030(x=240, y=160, scale=4, form="rgb565"):
-    """Register writes of the fast driver for PO6030K (openswarm-original.md §5.5)."""
+    """Return the register writes of the fast driver for PO6030K (openswarm-original.md §5.5)."""
     speed = {("grey", 1): 0x90, ("grey", 2): 0x50, ("grey", 4): 0x10, 1: 0xB0, 2: 0x90, 4: 0x50}
     start = (x + 16 - scale) // scale - 1
     row = y + 8 - scale
@@ -42,7 +42,7 @@ def po6030(x=240, y=160, scale=4, form="rgb565"):
 
 
 def po3030(x=240, y=160, scale=4, form="rgb565"):
-    """Register writes of the fast driver for PO3030K (§7.5)."""
+    """Return the register writes of the fast driver for PO3030K (§7.5)."""
     bytes_per_pixel = 1 if form == "grey" else 2
     divider = {2: 0, 4: 2, 8: 3, 16: 4}[8 * bytes_per_pixel // scale]
     x1, y1 = x + 210 - scale - 1, y + 7 - scale
@@ -55,13 +55,14 @@ def po3030(x=240, y=160, scale=4, form="rgb565"):
 
 
 def scene():
-    """A picture whose pixels encode their own position, within the precision of RGB565."""
+    """Return a picture whose pixels encode their own position within the precision of RGB565."""
     y, x = np.mgrid[0:480, 0:640]
     return np.stack([(x // 3) & 0xF8, (y // 2) & 0xFC, (x * 7 + y * 13) & 0xF8], axis=2).astype(np.uint8)
 
 
 def capture(robot, lines, bytes_per_line, skip_lines=0):
-    """T5 counts VSYNC, T4 counts HREF; PORTD is read every 8 Tcy from 17 Tcy behind the HREF edge."""
+    """Capture a frame: T5 counts VSYNC, T4 counts HREF, and PORTD is read every 8 Tcy from 17 Tcy after the HREF
+    edge."""
     camera = robot.board.camera
     robot.write("TMR5", 0)
     robot.write("PR5", 1)
@@ -79,7 +80,7 @@ def capture(robot, lines, bytes_per_line, skip_lines=0):
         while not robot.read("IFS1") & 1 << 5:
             robot.at(robot.events.next_due())
         robot.write("TMR4", 0)
-        edge = robot.events.now - 2  # an edge in c raises the flag in c + 2
+        edge = robot.events.now - 2  # an edge in cycle c raises the flag in c + 2
         assert camera.scan.bits(edge) & HREF
         assert not camera.scan.bits(edge - 1) & HREF
         data = []
@@ -98,7 +99,8 @@ def rgb565(pixels):
 
 
 def test_openswarm_window_is_captured_pixel_by_pixel():
-    """§7.5: 160 x 160 centred, zoom 8: QQVGA in the sensor, every second pixel and line in software."""
+    """§7.5: for a window of 160 x 160, centred, with zoom 8, the sensor sends QQVGA, and software takes every second
+    pixel and line."""
     robot = Robot()
     picture = scene()
     robot.board.camera.show(picture)
@@ -110,7 +112,7 @@ def test_openswarm_window_is_captured_pixel_by_pixel():
 
 @pytest.mark.parametrize(("scale", "shift"), [(1, -1), (2, -1), (4, -1)])
 def test_po3030k_rgb_window_begins_one_column_early(scale, shift):
-    """§7.5: the first stored pixel is column x - 1 in every RGB mode."""
+    """§7.5: in every RGB mode of the PO3030K, the first stored pixel is that of column x - 1."""
     robot = Robot(camera="PO3030K")
     picture = scene()
     robot.board.camera.show(picture)
@@ -123,7 +125,7 @@ def test_po3030k_rgb_window_begins_one_column_early(scale, shift):
 
 @pytest.mark.parametrize(("scale", "shift"), [(1, 0), (2, 1), (4, 3)])
 def test_po3030k_grey_window(scale, shift):
-    """§7.5: grey starts at x, x + 1, x + 3 for VGA, QVGA, QQVGA."""
+    """§7.5: grey windows of the PO3030K start at column x for VGA, x + 1 for QVGA and x + 3 for QQVGA."""
     robot = Robot(camera="PO3030K")
     ramp = np.tile((np.arange(640) // 4).astype(np.uint8) + 40, (480, 1))
     ramp[:, ::4] += 90
@@ -146,7 +148,7 @@ def test_po3030k_grey_window(scale, shift):
     ],
 )
 def test_frame_rates(sensor, writes, frame, fps):
-    """§7.4, §7.1: 800 x 500 or 852 x 1000 columns of N Tcy."""
+    """§7.4, §7.1: a frame lasts 800 x 500 or 852 x 1000 columns of N Tcy."""
     robot = Robot(camera=sensor)
     robot.configure(writes)
     assert robot.board.camera.scan.timing.frame_tcy == frame
@@ -155,7 +157,7 @@ def test_frame_rates(sensor, writes, frame, fps):
 
 @pytest.mark.parametrize(("scale", "form", "line"), [(4, "rgb565", 13632), (1, "rgb565", 13632), (2, "grey", 6816)])
 def test_line_spacing_of_the_fast_driver_is_the_same_in_every_mode(scale, form, line):
-    """§7.4: 6816 grey, 13632 RGB; one byte every 8 Tcy."""
+    """§7.4: lines of the fast driver are 6816 Tcy apart for grey and 13632 for RGB, with one byte every 8 Tcy."""
     robot = Robot(camera="PO3030K")
     robot.configure(po3030(scale=scale, form=form))
     camera = robot.board.camera
@@ -164,14 +166,14 @@ def test_line_spacing_of_the_fast_driver_is_the_same_in_every_mode(scale, form, 
 
 
 def test_short_exposure_shortens_the_frame_of_the_po3030k():
-    """§7.4: rows = max(852, integration + 2)."""
+    """§7.4: a frame of the PO3030K has max(852, integration + 2) rows."""
     robot = Robot(camera="PO3030K")
     robot.configure([*po3030(), (0, 0x1A, 0x01), (0, 0x1B, 0x00)])
     assert robot.board.camera.scan.timing.frame_tcy == 852 * 852 * 4
 
 
 def test_vsync_rises_two_columns_behind_href_of_its_row():
-    """§7.4: 2 N Tcy; the handler therefore takes the next line."""
+    """§7.4: VSYNC rises two columns (2 N Tcy) after HREF of its row, so the handler takes the next line."""
     robot = Robot(camera="PO3030K")
     robot.configure(po3030())
     camera = robot.board.camera
@@ -184,7 +186,7 @@ def test_vsync_rises_two_columns_behind_href_of_its_row():
 @pytest.mark.parametrize("sensor", sorted(SENSORS))
 @pytest.mark.parametrize("mask", [HREF, VSYNC, PCLK])
 def test_edge_arithmetic_agrees_with_the_levels(sensor, mask):
-    """Closed forms against stepping through the levels, around line and frame ends."""
+    """Closed forms of the signal edges equal the levels stepped cycle by cycle, around the ends of lines and frames."""
     robot = Robot(camera=sensor)
     robot.configure({"PO3030K": [], "PO6030K": [(0, 0x91, 0x90)], "PO8030D": [(0, 0x6A, 0x04)]}[sensor])
     camera = robot.board.camera
@@ -199,7 +201,7 @@ def test_edge_arithmetic_agrees_with_the_levels(sensor, mask):
 
 
 def test_byte_stands_on_the_bus_from_half_a_byte_before_to_half_behind():
-    """§7.5: byte k for HREF + 8 k - 4 <= t < HREF + 8 k + 4."""
+    """§7.5: byte k is on the bus for HREF + 8 k - 4 <= t < HREF + 8 k + 4."""
     robot = Robot()
     robot.board.camera.show(np.full((480, 640, 3), 255, np.uint8))
     robot.configure(po6030())
@@ -211,7 +213,7 @@ def test_byte_stands_on_the_bus_from_half_a_byte_before_to_half_behind():
 
 
 def test_mirrors_turn_the_picture():
-    """§7.1: PO6030K is mounted upside down; without the mirror bits the picture is turned by 180 degrees."""
+    """§7.1: PO6030K is mounted upside down, so without the mirror bits the picture is turned by 180 degrees."""
     robot = Robot()
     picture = scene()
     robot.board.camera.show(picture)
@@ -223,7 +225,7 @@ def test_mirrors_turn_the_picture():
 
 @pytest.mark.parametrize(("mirrors", "turned"), [(0x00, {"PO6030K"}), (0xC0, {"PO8030D"})])
 def test_equal_mirrors_turn_the_pictures_of_the_two_banked_sensors_against_each_other(mirrors, turned):
-    """§7.1: the library sets both mirrors for PO6030K and none for PO8030D, and gets upright pictures."""
+    """§7.1: with both mirrors for PO6030K and none for PO8030D, as the library sets them, both pictures are upright."""
     picture = np.zeros((480, 640, 3), np.uint8)
     picture[:240, :320, 0] = 255
     for sensor, register in (("PO6030K", 0x90), ("PO8030D", 0x6C)):
@@ -238,7 +240,7 @@ def test_equal_mirrors_turn_the_pictures_of_the_two_banked_sensors_against_each_
 
 
 def test_yuv_and_grey_follow_bt601():
-    """§7.4: U Y V Y; grey is Y."""
+    """§7.4: YUV pixels are U Y V Y by BT.601, and grey is Y."""
     robot = Robot()
     robot.board.camera.show(np.full((480, 640, 3), (200, 100, 50), np.uint8))
     robot.configure(po6030(form="yuv"))
@@ -253,19 +255,19 @@ def test_yuv_and_grey_follow_bt601():
 
 
 def test_gain_and_exposure_registers_scale_the_picture():
-    """§7.2, §7.6: gains 0x40 = 1.0, automatic control off."""
+    """§7.2, §7.6: with automatic control off, gain (0x40 = 1.0) and exposure scale the picture."""
     robot = Robot()
     robot.board.camera.show(np.full((480, 640, 3), 64, np.uint8))
     off = (2, 0x04, 0x98 | 5)
     robot.configure([*po6030(), off, (2, 0xA4, 0x80), (2, 0xA5, 0x40), (2, 0xA6, 0x20)])
     assert list(capture(robot, 1, 2)[0]) == list(rgb565(np.array([128, 64, 32])))
-    robot.configure([(2, 0x2D, 0x10)])  # twice the exposure
+    robot.configure([(2, 0x2D, 0x10)])  # doubles the exposure
     assert list(capture(robot, 1, 2)[0]) == list(rgb565(np.array([255, 128, 64])))
 
 
 @pytest.mark.parametrize(("sensor", "identity"), [("PO3030K", 0x3030), ("PO6030K", 0x6030), ("PO8030D", 0x8030)])
 def test_identity_over_i2c(sensor, identity):
-    """§7.1: registers 0 and 1 at 0xDC/0xDD, read with the I2C module."""
+    """§7.1: the I2C module reads the identity from registers 0 and 1 at 0xDC/0xDD."""
     robot = Robot(camera=sensor)
     robot.write("I2CBRG", 150)
     robot.write("I2CCON", 0x9000)
@@ -293,7 +295,7 @@ def test_identity_over_i2c(sensor, identity):
 
 
 def test_reset_line_stops_the_sensor_and_clears_its_registers(robot):
-    """§2: RC13 = 0."""
+    """§2: RC13 = 0 stops the sensor and clears its registers."""
     robot.configure([(1, 0x80, 0x80)])
     robot.output("RC13", 0)
     camera = robot.board.camera
@@ -306,7 +308,7 @@ def test_reset_line_stops_the_sensor_and_clears_its_registers(robot):
 
 
 def test_unplugged_camera_gives_neither_answers_nor_edges(robot):
-    """Fault input: nothing at 0x6E, no VSYNC to count."""
+    """An unplugged camera does not answer at address 0x6E and has no VSYNC edges."""
     robot.write("PR5", 1)
     robot.write("T5CON", 0x8002)
     robot.board.camera.unplug()
@@ -319,7 +321,7 @@ def test_unplugged_camera_gives_neither_answers_nor_edges(robot):
 
 
 def test_lines_of_a_moving_scene_are_seen_when_they_are_read_out(robot):
-    """Rolling shutter: the source gets the cycle of each line."""
+    """The pixel source receives the cycle of each line, so that a moving scene shows the rolling shutter."""
     seen = []
 
     def rows(y, cycle):
@@ -335,7 +337,7 @@ def test_lines_of_a_moving_scene_are_seen_when_they_are_read_out(robot):
 
 
 def test_snapshot_restores_registers_and_timing(robot):
-    """The state is in the record; derived state is rebuilt."""
+    """A restored snapshot has the camera's registers and timing; derived state is computed again."""
     robot.configure(po6030())
     state = robot.machine.snapshot()
     frame = robot.board.camera.scan.timing.frame_tcy
@@ -346,7 +348,7 @@ def test_snapshot_restores_registers_and_timing(robot):
 
 
 def test_pictures_of_any_size_are_scaled_and_bad_shapes_refused(robot):
-    """Grey, RGB and RGBA are pictures."""
+    """Grey, RGB and RGBA pictures of any size are scaled to the sensor, and arrays of other shapes are refused."""
     robot.board.camera.show(np.zeros((3, 4), np.uint8))
     robot.board.camera.show(np.zeros((30, 40, 4), np.uint8))
     with pytest.raises(ValueError, match="picture is height x width"):
@@ -356,7 +358,7 @@ def test_pictures_of_any_size_are_scaled_and_bad_shapes_refused(robot):
 
 
 def test_po8030d_delivers_the_openswarm_window():
-    """openswarm-original.md §5.5: register values for 160 x 160 centred, zoom 8."""
+    """openswarm-original.md §5.5: the PO8030D delivers the window of 160 x 160, centred, with zoom 8."""
     robot = Robot(camera="PO8030D")
     picture = scene()
     robot.board.camera.show(picture)
@@ -368,7 +370,7 @@ def test_po8030d_delivers_the_openswarm_window():
 
 
 def test_t1_counts_one_edge_of_pclk_per_byte(robot):
-    """§2: PCLK is T1CK; §7.4: once per byte, only within lines."""
+    """§2, §7.4: T1 counts one PCLK edge (T1CK) per byte, only within lines."""
     robot.configure(po6030())
     camera = robot.board.camera
     robot.write("PR1", 0xFFFF)
@@ -381,7 +383,7 @@ def test_t1_counts_one_edge_of_pclk_per_byte(robot):
 
 
 def test_polling_portc_sees_the_sync_lines(robot):
-    """§2: HREF is RC3, VSYNC RC4."""
+    """§2: PORTC shows HREF in bit 3 and VSYNC in bit 4."""
     robot.configure(po6030())
     scan = robot.board.camera.scan
     edge, vsync = scan.href(0), scan.edge_cycle(VSYNC, 1)
@@ -394,7 +396,7 @@ def grey_level(robot):
 
 
 def test_automatic_exposure_follows_the_lamp_in_ten_frames(robot):
-    """§7.6: converges in 5 to 10 frames."""
+    """§7.6: automatic exposure converges in 5 to 10 frames after a change of the lamp."""
     camera = robot.board.camera
     camera.show(np.full((48, 64), 120, np.uint8))
     robot.configure(po6030(form="grey"))
@@ -412,7 +414,7 @@ def test_automatic_exposure_follows_the_lamp_in_ten_frames(robot):
 
 
 def test_without_automatic_exposure_the_lamp_shows(robot):
-    """§7.6: fixed settings."""
+    """§7.6: without automatic exposure, the lamp changes the picture's brightness."""
     robot.board.camera.show(np.full((48, 64), 120, np.uint8))
     robot.configure([*po6030(form="grey"), (2, 0x04, 0x99)])
     robot.board.camera.lamp = 0.5
@@ -421,7 +423,8 @@ def test_without_automatic_exposure_the_lamp_shows(robot):
 
 
 def test_po3030k_manual_exposure_and_gain():
-    """§7.2: D4 = 0x0C both off; B0 exposure, 15 global gain 0x10 = 1, 16 red gain 0x40 = 1."""
+    """§7.2: D4 = 0x0C turns automatic exposure and gain off. Register B0 is the exposure, 15 the global gain (0x10 =
+    1) and 16 the red gain (0x40 = 1)."""
     robot = Robot(camera="PO3030K")
     robot.board.camera.show(np.full((480, 640, 3), 64, np.uint8))
     robot.configure([*po3030(), (0, 0xD4, 0x0C), (0, 0x15, 0x20), (0, 0x16, 0x60)])
@@ -429,7 +432,7 @@ def test_po3030k_manual_exposure_and_gain():
 
 
 def test_pixel_sources_are_called_for_read_lines_only(robot):
-    """The source is called with the window's columns, and only for lines that are read."""
+    """The pixel source is called with the window's columns, only for lines that are read."""
     asked = []
 
     def pixels(y, columns, cycle):
@@ -447,7 +450,7 @@ def test_pixel_sources_are_called_for_read_lines_only(robot):
 
 
 def test_frame_is_the_picture_the_sensor_sends(robot):
-    """As on the bus: window, format, gains."""
+    """`frame` returns the picture as on the bus, with window, format and gains."""
     picture = scene()
     robot.board.camera.show(picture)
     robot.configure(po6030())
@@ -458,7 +461,8 @@ def test_frame_is_the_picture_the_sensor_sends(robot):
 
 @pytest.mark.parametrize(("sensor", "writes"), [("PO6030K", po6030(form="yuv")), ("PO3030K", po3030(236, form="yuv"))])
 def test_a_line_of_an_odd_number_of_pixels_in_yuv_is_shown_whole(sensor, writes):
-    """§7.4: the last pixel has no partner; its luma and blue difference are sent."""
+    """§7.4: in a line with an odd number of pixels, the last pixel's luma and blue difference are sent without a
+    partner."""
     robot = Robot(camera=sensor)
     robot.board.camera.show(np.repeat(scene()[:, :, :1], 3, axis=2))
     robot.configure(writes)
@@ -470,7 +474,8 @@ def test_a_line_of_an_odd_number_of_pixels_in_yuv_is_shown_whole(sensor, writes)
 
 @pytest.mark.parametrize("form", ["rgb565", "grey", "yuv"])
 def test_decoding_gives_back_what_the_format_keeps(form):
-    """Grey scales survive every format to its precision; colours survive RGB565 and, within 3, YUV pairs."""
+    """Decoding restores grey scales within the precision of every format, and colours with RGB565 and, within 3, with
+    YUV."""
     grey = np.repeat(np.arange(0, 256, 8, dtype=np.uint8)[:, None], 3, axis=1)
 
     def there_and_back(pixels):
@@ -485,7 +490,7 @@ def test_decoding_gives_back_what_the_format_keeps(form):
 
 
 def test_a_source_with_a_wrong_number_of_pixels_is_refused(robot):
-    """The record after the line is unchanged."""
+    """A pixel source that returns a wrong number of pixels is refused, and the record is unchanged."""
     robot.configure(po6030())
     robot.board.camera.sample(lambda _y, columns, _cycle: np.zeros((len(columns) + 1, 3), np.uint8))
     with pytest.raises(ValueError, match="expected 101 pixels"):
@@ -493,9 +498,9 @@ def test_a_source_with_a_wrong_number_of_pixels_is_refused(robot):
 
 
 def test_turned_sensors_see_a_turned_picture(robot):
-    """§7.1: PO3030K robots have the array mounted turned by 90 degrees."""
+    """§7.1: the array of PO3030K robots is mounted turned by 90 degrees, and so is their picture."""
     marked = np.zeros((64, 48), np.uint8)
-    marked[0, 0] = 255  # top left of an upright, high picture
+    marked[0, 0] = 255  # top left pixel of an upright picture
     robot.board.camera.show(marked, turned=90)
     robot.configure([(1, 0x80, 0x20), (0, 0x90, 0xC0), (1, 0x38, 0x0D)])
     frame = robot.board.camera.frame()
@@ -506,7 +511,7 @@ def test_turned_sensors_see_a_turned_picture(robot):
 
 
 def test_plug_is_part_of_a_snapshot(robot):
-    """A camera that was plugged in at the snapshot answers and sends edges again."""
+    """A camera that was plugged in at the time of a snapshot answers and sends edges after the restore."""
     state = robot.machine.snapshot()
     robot.board.camera.unplug()
     robot.machine.restore(state)
@@ -517,7 +522,8 @@ def test_plug_is_part_of_a_snapshot(robot):
 
 @pytest.mark.parametrize("line", [0, 40, 119])
 def test_an_edge_can_be_put_on_any_cycle(robot, line):
-    """Tests of interrupt latency align HREF with an instruction; counters that wait for it see the new edge."""
+    """`align` moves an HREF edge to any cycle, and counters of HREF count the moved edge. Tests of interrupt latency
+    use this."""
     robot.configure(po6030())
     camera = robot.board.camera
     robot.at(10_000).write("T4CON", 0x8002)
@@ -530,7 +536,7 @@ def test_an_edge_can_be_put_on_any_cycle(robot, line):
 
 
 def test_unplugging_in_the_middle_of_a_line_ends_it_at_once(robot):
-    """Fault input: the rendered line is no longer on the bus, for Python and for rules."""
+    """Unplugging the camera ends the current line at once, both for Python and for rules."""
     robot.board.camera.show(np.full((480, 640), 255, np.uint8))
     robot.configure(po6030())
     camera = robot.board.camera
@@ -543,7 +549,8 @@ def test_unplugging_in_the_middle_of_a_line_ends_it_at_once(robot):
 
 @pytest.mark.parametrize("seed", range(4))
 def test_timers_on_sync_lines_are_switched_alike_with_and_without_the_rule(seed):
-    """TON around edges and matches: the rule of native code and the device's hooks leave the same record."""
+    """Switching TON of timers on HREF and VSYNC, around edges and matches, leaves the same record with the rule of
+    native code and with the device's hooks."""
     robots = [Robot(), Robot()]
     bus, events = robots[0].machine.bus, [robot.events for robot in robots]
     hooks = robots[1].machine.bus
@@ -583,7 +590,7 @@ def test_timers_on_sync_lines_are_switched_alike_with_and_without_the_rule(seed)
             robot.machine.bus.write(robot.machine.chip.sfrs[register].address, value, lanes)
             robot.later(later)
             robot.machine.peripherals.pins.flush()
-            robot.machine.record.u64[robot.events.deadline_index] = 0  # derived
+            robot.machine.record.u64[robot.events.deadline_index] = 0  # derived state
         counts = [[robot.read(name) for name in ("TMR4", "TMR5")] for robot in robots]
         assert counts[0] == counts[1], (step, register, hex(value), counts)
         record = robots[0].machine.record

@@ -12,7 +12,7 @@ from emu.boards.epuck.board import Epuck
 from emu.image.loader import load_image
 
 SETTLED = 3_000
-"""Tcy until the program has read its variables."""
+"""Tcy after which the program has read its variables."""
 
 
 def machine_with(image, engine: str, settings: dict[str, int]) -> Machine:
@@ -27,7 +27,7 @@ def machine_with(image, engine: str, settings: dict[str, int]) -> Machine:
 
 
 def random_settings(generator: random.Random) -> dict[str, int]:
-    """Return random settings: mostly plain scans, sometimes arbitrary values."""
+    """Return random converter settings: mostly plain scans, sometimes arbitrary values."""
     if generator.random() < 0.25:
         con1, con2 = generator.randrange(0x10000) & 0x03E6, generator.randrange(0x10000) & 0xE43F
     else:
@@ -66,7 +66,8 @@ def test_engines_agree_in_any_setting(program, seed):
 
 
 def test_a_scan_at_the_vendors_rate_needs_no_python(program):
-    """epuck.md §5: three microphones, 450 Tcy a scan, ADON cleared and set in each interrupt."""
+    """epuck.md §5: a scan of three microphones every 450 Tcy, with ADON cleared and set in each interrupt, stays in
+    native code."""
     machine = machine_with(load_image(program("convert.c")), "jit", {"con2": 0x0408, "con3": 0x0113, "ways": 19})
     machine.run(cycles=100_000)
     before, rounds = machine.runner.counts.interpreted, machine.peek("rounds")
@@ -78,8 +79,9 @@ def test_a_scan_at_the_vendors_rate_needs_no_python(program):
 
 @pytest.mark.parametrize("engine", ["plain", "jit"])
 def test_one_late_interrupt_does_not_shift_the_channels_for_good(program, engine):
-    """dspic30f6014a.md §13: the scan restarts after every interrupt. Interrupt 5 comes when a round of five has
-    three results; the round after the next has its own channels again."""
+    """dspic30f6014a.md §13: the scan restarts after every interrupt, so one late interrupt does not shift the
+    channels for good. Interrupt 5 comes when three of five results are there; two rounds later the channels are right
+    again."""
     image = load_image(program("late.c"))
     machine = Machine(image.chip, engine=engine)
     machine.load(image)

@@ -1,4 +1,4 @@
-"""A program's EEPROM write cut off by a reset (dspic30f6014a.md §16; issue 6, Must show 8)."""
+"""A program's EEPROM write that a reset interrupts (dspic30f6014a.md §16)."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from emu.image.loader import load_image
 
 LAST_WORD = 0x7FFFFE
 BUSY_TCY = 29_491
-"""2 ms."""
+"""Duration of an erase or a program operation in Tcy: 2 ms."""
 
 
 @pytest.fixture(params=["plain", "auto"])
@@ -30,7 +30,7 @@ def run_until_led(machine: Machine, pin: str) -> None:
 
 
 def test_an_undisturbed_write_takes_two_times_two_milliseconds(machine):
-    """§16: erase and program 2 ms each; the CPU runs meanwhile and sees WR."""
+    """§16: erase and program take 2 ms each; meanwhile the CPU runs and reads WR = 1."""
     machine.run(cycles=2 * BUSY_TCY + 2_000)
     assert machine.peek("done") == machine.program.word(LAST_WORD) == 1
     assert (machine.peek("found"), machine.peek("errors")) == (0xFFFF, 0)
@@ -42,8 +42,8 @@ def test_an_undisturbed_write_takes_two_times_two_milliseconds(machine):
 @pytest.mark.parametrize(("pin", "left"), [("RA6", 0xFFFF), ("RA7", 0xFFFF)])
 @pytest.mark.parametrize("cause", ["EXTR", "WDTO"])
 def test_a_reset_during_a_write_sets_wrerr_and_the_next_write_works(machine, pin, left, cause):
-    """§16: WRERR = 1 if an operation is cut by reset. A word cut while erased or programmed reads as erased; the
-    program starts over and the next write works."""
+    """§16: a reset during an operation sets WRERR. The word then reads as erased, the program starts again, and its
+    next write works."""
     machine.program.put(LAST_WORD, 7)
     run_until_led(machine, pin)
     machine.run(cycles=BUSY_TCY // 2)

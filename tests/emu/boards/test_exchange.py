@@ -9,7 +9,7 @@ from .test_parts import convert, drive
 
 
 def test_outputs_contain_steps_lights_and_emitters(robot):
-    """epuck.md §2, §3."""
+    """epuck.md §2, §3: the output array contains motor steps, LEDs and infrared emitters."""
     outputs = robot.board.outputs
     steps = outputs.steps
     outputs.update()
@@ -35,7 +35,7 @@ def test_outputs_contain_steps_lights_and_emitters(robot):
 
 
 def test_inputs_reach_the_pins_when_applied(robot):
-    """epuck.md §2, §5, §6."""
+    """epuck.md §2, §5, §6: inputs reach the pins when `apply` is called."""
     inputs = robot.board.inputs
     inputs.selector = 9
     inputs.battery = 3.2
@@ -57,7 +57,7 @@ def test_inputs_reach_the_pins_when_applied(robot):
 
 
 def test_samples_before_a_change_use_the_old_inputs(robot):
-    """Conversions that sampled before `apply` are complete before the inputs change."""
+    """A conversion that sampled before `apply` has a result from the inputs before the change."""
     robot.write("ADPCFG", 0)
     robot.write("ADCHS", 13)
     robot.write("ADCON3", 0x0102)
@@ -71,11 +71,11 @@ def test_samples_before_a_change_use_the_old_inputs(robot):
     codes = [robot.read(f"ADCBUF{index:X}") for index in range(8)]
     assert codes == sorted(codes, reverse=True)
     assert set(codes) == {3800, 1000}
-    assert codes.index(1000) == 5  # sampling ends every 15 TAD = 22.5 Tcy, first after 1.5
+    assert codes.index(1000) == 5  # sampling ends every 15 TAD = 22.5 Tcy, for the first time after 1.5 Tcy
 
 
 def test_values_out_of_range_are_refused(robot):
-    """Bad input."""
+    """Input values out of range are refused."""
     robot.board.inputs.selector = 16
     with pytest.raises(ValueError, match="positions 0 to 15"):
         robot.board.inputs.apply()

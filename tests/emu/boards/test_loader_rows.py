@@ -1,6 +1,6 @@
 """A boot loader programs, verifies and starts an image, over both UARTs, in every engine (dspic30f6014a.md §10, §16).
 
-It walks through its rows with [Wn++] and [Wn--] in table reads and writes, as loaders do.
+It accesses its rows by table reads and writes with [Wn++] and [Wn--], as boot loaders do.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ FIRST_ROW, ROWS, ROW_WORDS = 0x8000, 6, 32
 EEPROM_ROW, EEPROM_WORDS = 0x7FF020, 16
 SUM, END = 0x2000, FIRST_ROW + 2 * ROWS * ROW_WORDS
 PATIENCE = 400_000
-"""Tcy for a packet: its bytes, and four times 2 ms."""
+"""Maximum Tcy for a packet: its bytes, and four times 2 ms."""
 
-# Adds up what the loader has programmed, byte by byte, leaves the sum in RAM and waits.
+# Adds up the programmed bytes, stores the sum in RAM and loops.
 CHECKSUM = f"""
     clr w2
     mov #{FIRST_ROW >> 16}, w0
@@ -54,7 +54,7 @@ class Number:
 
 
 def image() -> list[int]:
-    """The program and random words behind it."""
+    """Return the words of the program, followed by random words."""
     words: list[int] = []
     for line in CHECKSUM.strip().splitlines():
         here = FIRST_ROW + 2 * len(words)
@@ -89,7 +89,7 @@ class Host:
 @pytest.mark.parametrize("port", [1, 2])
 @pytest.mark.parametrize("engine", [name for name in NAMES if name != "auto"])
 def test_an_image_is_programmed_verified_and_started(engine: str, port: int, program) -> None:
-    """§16: every word arrives, in flash and EEPROM, and the image runs."""
+    """§16: every word of the image arrives in flash and EEPROM, is verified, and the image runs."""
     loader = load_image(program("loader.s"))
     machine = Machine(loader.chip, engine=engine)
     if hasattr(machine.runner, "wait"):

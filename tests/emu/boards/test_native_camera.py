@@ -1,4 +1,4 @@
-"""Native rendering of camera lines (`line.c`): the same record as Python's, line by line, in every setting."""
+"""Native rendering of camera lines (`line.c`) leaves the same record as Python, line by line, for every setting."""
 
 from __future__ import annotations
 
@@ -16,11 +16,12 @@ from .conftest import Robot
 from .test_camera import po3030, po6030, scene
 
 DARK = [(0, 0xD4, 0x2C)]
-"""Manual exposure of a PO3030K."""
+"""Register writes for manual exposure of a PO3030K."""
 
 
 def rendered(robot: Robot, camera: Camera, cycle: int, pixels: np.ndarray) -> tuple[bool, bool]:
-    """Return whether Python and native code render a line in a cycle; if both do, the records must be equal."""
+    """Render a line in Python and in native code and compare the records. Return for each whether it rendered the
+    line."""
     record, href = robot.machine.record, c_int64()
     before = record.snapshot()
     by_python = camera._refresh(cycle)
@@ -43,14 +44,15 @@ def rendered(robot: Robot, camera: Camera, cycle: int, pixels: np.ndarray) -> tu
 ])  # fmt: skip
 @pytest.mark.parametrize("lamp", [1.0, 0.37])
 def test_native_and_python_lines_are_equal(sensor: str, writes: list[tuple[int, int, int]], lamp: float) -> None:
-    """Python must render all lines only while automatic exposure differs from its initial value."""
+    """Native and Python lines are equal; Python must render only while automatic exposure differs from its initial
+    value."""
     robot, pixels, draw = Robot(camera=sensor), scene(), random.Random(repr((sensor, writes)))
     robot.configure(writes)
     camera = robot.board.camera
     camera.sample(lambda y, columns, _cycle: pixels[y, columns], has_native_source=True)
     camera.lamp = lamp
     course = camera.scan.timing
-    assert camera._refresh(camera.scan.href(0, 3))  # Python is asked first
+    assert camera._refresh(camera.scan.href(0, 3))  # Python renders first
     assert camera.native.setting
     both = 0
     for _ in range(300):
@@ -66,7 +68,8 @@ def test_native_and_python_lines_are_equal(sensor: str, writes: list[tuple[int, 
 
 @pytest.mark.parametrize("sensor", ["PO6030K", "PO3030K"])
 def test_a_still_picture_is_rendered_like_a_callback(sensor: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Settings, lamp and connector change during the test; native code uses the published settings."""
+    """A still picture is rendered like a callback while settings, lamp and connector change; native code uses the
+    published settings."""
     pixels, draw = scene(), random.Random(sensor)
     still, other = Robot(camera=sensor), Robot(camera=sensor)
     still.board.camera.show(pixels)
@@ -99,7 +102,8 @@ def test_a_still_picture_is_rendered_like_a_callback(sensor: str, monkeypatch: p
 
 
 def test_python_renders_first_after_every_change() -> None:
-    """Changes of registers, sources and snapshots invalidate the published settings."""
+    """Changes of registers, sources and snapshots invalidate the published settings, so Python renders the next
+    line."""
     robot, pixels = Robot(), scene()
     robot.configure(po6030())
     camera, href = robot.board.camera, c_int64()

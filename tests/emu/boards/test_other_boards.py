@@ -1,4 +1,4 @@
-"""Board-specific settings: crystal, configuration words, parts on the pins."""
+"""Board-specific settings: crystal, configuration words, and devices on the pins."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ WATCHDOG_ON = 0xFFFF
 
 
 class Bench(BoardPart):
-    """A board with a slow crystal, an enabled watchdog and a lamp on RD0."""
+    """Board with a slow crystal, an enabled watchdog and a lamp on RD0."""
 
     def __init__(self, chip: Peripherals) -> None:
         super().__init__("bench", chip)
@@ -32,12 +32,13 @@ class Bench(BoardPart):
 
 
 def image() -> Image:
-    """A program without configuration words, for the 30F4013."""
+    """Return an image for the 30F4013 without configuration words."""
     return parse_image(LOOP_HEX, "loop.hex", chip_named("30F4013"))
 
 
 def test_a_board_brings_its_crystal_and_its_configuration_words() -> None:
-    """XT with PLL 8 from 4 MHz gives 8 MIPS; the words are those the board says, where the image has none."""
+    """A board defines the crystal (XT with PLL 8 from 4 MHz gives 8 MIPS) and the configuration words that the image
+    lacks."""
     machine = Machine(chip_named("30F4013"), engine="plain", board=Bench)
     machine.load(image())
     assert machine.hz == 8_000_000
@@ -51,7 +52,7 @@ def test_a_board_brings_its_crystal_and_its_configuration_words() -> None:
 
 
 def test_bare_pins_have_the_watchdog_off_and_nothing_of_a_robot() -> None:
-    """All other words stay erased."""
+    """Without a board the watchdog is off, all other configuration words are erased, and no robot device exists."""
     machine = Machine(chip_named("30F4013"), engine="plain")
     machine.load(image())
     assert machine.program.setting("FWDT") == 0x7FFF
@@ -59,13 +60,13 @@ def test_bare_pins_have_the_watchdog_off_and_nothing_of_a_robot() -> None:
 
 
 def test_an_epuck_refuses_another_chip() -> None:
-    """Its parts use pins that the other chip lacks."""
+    """The e-puck board refuses another chip, which lacks pins of its devices."""
     with pytest.raises(ValueError, match="an e-puck has a dsPIC30F6014A, not a dsPIC30F4013"):
         Machine(chip_named("30F4013"), engine="plain", board=Epuck)
 
 
 def test_boards_are_found_by_name() -> None:
-    """As the command line and `emu.load` do."""
+    """The command line and `emu.load` find boards by name."""
     assert [board_named(name) for name in BOARDS] == [Epuck, None]
     with pytest.raises(ValueError, match="expected one of epuck, none"):
         board_named("kilobot")

@@ -1,4 +1,4 @@
-"""The parts of the e-puck except the camera (epuck.md; sections cited)."""
+"""Devices of the e-puck except the camera (sections are those of epuck.md)."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ PHASES = [0xA, 0x6, 0x5, 0x9]
 
 @pytest.mark.parametrize(("name", "pin"), list(LED_PINS.items()))
 def test_led_is_lit_while_its_pin_is_driven_high(robot, name, pin):
-    """§2: note that LED3 is RA12 and LED4 is RA10."""
+    """§2: an LED is lit while its pin is driven high; LED3 is RA12 and LED4 is RA10."""
     robot.output(pin, 1)
     assert robot.board.leds.lit == (name,)
     robot.output(pin, 0)
@@ -30,7 +30,7 @@ def test_led_is_lit_while_its_pin_is_driven_high(robot, name, pin):
 
 
 def test_selector_shows_its_position_on_port_g(robot):
-    """§2: S0 + 2 S1 + 4 S2 + 8 S3 on RG6..RG9."""
+    """§2: the selector position is S0 + 2 S1 + 4 S2 + 8 S3 on RG6..RG9."""
     robot.board.selector.position = 11
     assert robot.at(2).read("PORTG") >> 6 & 0xF == 11
     with pytest.raises(ValueError, match="positions 0 to 15"):
@@ -38,7 +38,7 @@ def test_selector_shows_its_position_on_port_g(robot):
 
 
 def test_low_battery_pulls_its_line_down(robot):
-    """§2: RF1 = 0 below 3.4 V."""
+    """§2: a battery below 3.4 V pulls RF1 low."""
     assert robot.at(2).read("PORTF") & 2
     robot.board.battery.volts = 3.39
     assert not robot.at(4).read("PORTF") & 2
@@ -48,7 +48,7 @@ def test_low_battery_pulls_its_line_down(robot):
 
 
 def drive(robot, shift, indices, period=1000):
-    """Write phase patterns bit by bit, as BSET and BCLR do: one bit a cycle."""
+    """Write phase patterns one bit per cycle, as BSET and BCLR do."""
     robot.write("TRISD", 0xFF00)
     for index in indices:
         target = PHASES[index % 4] if index is not None else 0
@@ -61,7 +61,8 @@ def drive(robot, shift, indices, period=1000):
 
 
 def test_right_motor_goes_forward_with_rising_and_left_with_falling_phases(robot):
-    """§3: 5000 steps each; intermediate patterns of the bit-by-bit writes do not count."""
+    """§3: 5000 rising phases turn the right motor forward, 5000 falling ones the left. Intermediate patterns of
+    bit-by-bit writes do not count."""
     drive(robot, 4, range(5001))
     drive(robot, 0, range(5000, -1, -1))
     motors = robot.board.motors
@@ -71,7 +72,8 @@ def test_right_motor_goes_forward_with_rising_and_left_with_falling_phases(robot
 
 @pytest.mark.parametrize("blinks", [False, True])
 def test_step_history_equals_reads_at_each_quantum(blinks):
-    """The ring also holds changes of the LEDs' port; their watchers receive all of them."""
+    """Step counts from the ring of port changes equal reads at each quantum, although the ring also holds changes of
+    the LEDs, whose watchers receive all of them."""
     quick, plain = Robot(), Robot()
     draw = random.Random(7)
     index, cycle, lit, entries, ends = 0, 100, [], [], list(range(1_000, 41_000, 1_000))
@@ -109,19 +111,19 @@ def test_step_history_equals_reads_at_each_quantum(blinks):
 
 
 def test_reversing_counts_backward(robot):
-    """§3."""
+    """§3: reversed phases count backward."""
     drive(robot, 4, [0, 1, 2, 3, 2, 1, 0, 3, 2])
     assert robot.board.motors.right.steps == 3 - 5
 
 
 def test_jump_by_two_phases_loses_the_step(robot):
-    """§3: d = 2: no motion."""
+    """§3: a jump by two phases does not turn the motor."""
     drive(robot, 4, [0, 2, 3])
     assert (robot.board.motors.right.steps, robot.board.motors.right.lost) == (1, 1)
 
 
 def test_a_constant_pattern_that_is_not_a_phase_counts_as_illegal(robot):
-    """§3: all four patterns have two coils on."""
+    """§3: a constant pattern that is no phase counts as illegal, because each of the four phases drives two coils."""
     robot.write("TRISD", 0xFF00)
     robot.write("LATD", 0x0F)
     assert robot.at(15).board.motors.left.illegal == 0
@@ -129,7 +131,7 @@ def test_a_constant_pattern_that_is_not_a_phase_counts_as_illegal(robot):
 
 
 def test_reading_the_motors_does_not_change_the_record(robot):
-    """Steps are evaluated lazily; snapshots are equal with and without earlier reads."""
+    """Reading the motors does not change the record, although steps are computed on access."""
     other = Robot()
     for one in (robot, other):
         one.write("TRISD", 0xFF00)
@@ -139,13 +141,13 @@ def test_reading_the_motors_does_not_change_the_record(robot):
 
 
 def test_coils_off_keep_the_rotor_in_place(robot):
-    """§3: power save switches the coils off between steps."""
+    """§3: turning the coils off between steps (power save) does not turn the motor."""
     drive(robot, 4, [0, None, 1, None, 2])
     assert robot.board.motors.right.steps == 2
 
 
 def test_coil_time_is_counted_to_the_cycle(robot):
-    """§3: on from 11 to 111."""
+    """§3: coils that are on from cycle 11 to 111 count 100 cycles."""
     robot.write("TRISD", 0xFF00)
     robot.at(10).write("LATD", 0x5)
     robot.at(110).write("LATD", 0)
@@ -156,7 +158,7 @@ def test_coil_time_is_counted_to_the_cycle(robot):
 
 
 def convert(robot, channel):
-    """One polled conversion as the library does it (chip reference §13)."""
+    """Make one polled conversion as the library does (chip reference §13)."""
     robot.write("ADPCFG", 0)
     robot.write("ADCON1", 0)
     robot.write("ADCON3", 0x12)
@@ -174,7 +176,7 @@ PULSES = ["RF7", "RF8", "RG0", "RG1"]
 
 @pytest.mark.parametrize("sensor", range(8))
 def test_reflection_is_seen_only_under_the_sensors_own_pulse_line(robot, sensor):
-    """§5: line n lights n and n + 4; raw falls by the reflection after 350 us."""
+    """§5: emitter line n lights sensors n and n + 4; after 350 us their raw counts are lower by the reflection."""
     robot.board.ir.set_distance(sensor, 20)
     assert convert(robot, 8 + sensor) == 3800
     robot.output(PULSES[(sensor + 1) % 4], 1)
@@ -190,7 +192,7 @@ def test_reflection_is_seen_only_under_the_sensors_own_pulse_line(robot, sensor)
     [(0, 3788), (10, 3548), (20, 857), (30, 474), (40, 296), (50, 205), (60, 153), (80, 84), (100, 53), (150, 0)],
 )
 def test_distance_sweep_gives_the_reference_curve(robot, mm, counts):
-    """§5 table, read as the library does: ambient minus lit."""
+    """§5: proximity (ambient minus lit) over distance equals the reference table."""
     robot.board.ir.set_distance(2, mm)
     dark = convert(robot, 10)
     robot.output("RG0", 1)
@@ -199,13 +201,13 @@ def test_distance_sweep_gives_the_reference_curve(robot, mm, counts):
 
 
 def test_curve_falls_everywhere():
-    """§5: log-linear between the points of the table."""
+    """§5: proximity decreases with distance everywhere and is log-linear between the points of the table."""
     values = [reflection_at(0.5 * step) for step in range(201)]
     assert all(near > far for near, far in pairwise(values))
 
 
 def test_receiver_settles_with_its_time_constant(robot):
-    """§5, §10: tau 60 us = 885 Tcy: 63 % after tau, more than 99 % after 300 us."""
+    """§5, §10: the receiver settles with 60 us = 885 Tcy: 63 % after this time, more than 99 % after 300 us."""
     ir = robot.board.ir
     ir.set_distance(0, 10)
     robot.at(1000).output("RF7", 1)
@@ -216,12 +218,12 @@ def test_receiver_settles_with_its_time_constant(robot):
 
 
 def test_accelerometer_at_rest_reads_one_g_on_z(robot):
-    """§6: 2048, 2048, 2848."""
+    """§6: the accelerometer at rest reads 2048, 2048 and 2848, which is 1 g on z."""
     assert [convert(robot, channel) for channel in (5, 6, 7)] == [2048, 2048, 2848]
 
 
 def test_microphones_hear_a_function_of_the_cycle(robot):
-    """§6: AN2..AN4."""
+    """§6: the microphones on AN2 to AN4 convert a function of the cycle."""
     assert convert(robot, 2) == 2048
     robot.board.microphones.play(1, lambda cycle: 500.0)
     assert convert(robot, 3) == 2548
@@ -231,7 +233,8 @@ def test_microphones_hear_a_function_of_the_cycle(robot):
 
 
 def test_remote_frame_has_its_bits_where_the_library_samples_them(robot):
-    """§6: t = 0 at the first falling edge; 2.1 ms low, 3.0 ms toggle, then every 1.8 ms: address, command."""
+    """§6: the remote control's frame has its bits where the library samples them. From the first falling edge, low at
+    2.1 ms and the toggle bit at 3.0 ms, then address and command every 1.8 ms."""
     robot.board.remote.press("ok", address=5, cycle=10_000)
     while robot.board.chip.pins.get("RF6"):
         robot.later(100)
@@ -249,7 +252,7 @@ def test_remote_frame_has_its_bits_where_the_library_samples_them(robot):
 
 
 def test_toggle_bit_changes_with_every_press_and_frames_wait_for_each_other(robot):
-    """§6: repeat after 113.8 ms."""
+    """§6: the toggle bit changes with every key press, and frames repeat after 113.8 ms without overlap."""
     edges = []
     robot.board.chip.pins.watch("RF6", lambda cycle, changed, levels: edges.append(cycle))
     robot.board.remote.press("swap")
@@ -260,7 +263,7 @@ def test_toggle_bit_changes_with_every_press_and_frames_wait_for_each_other(robo
 
 
 def test_remote_raises_int0(robot):
-    """§6: INT0 on the falling edge."""
+    """§6: the falling edge of a remote control frame raises INT0."""
     robot.write("INTCON2", 1)
     robot.board.remote.press(12)
     robot.at(20_000)
@@ -271,7 +274,7 @@ def test_remote_raises_int0(robot):
 
 
 def test_codec_takes_words_only_out_of_reset(robot):
-    """§6: AUDIO_ON = RF0."""
+    """§6: the codec ignores words while AUDIO_ON (RF0) keeps it in reset."""
     robot.write("DCICON2", 0x01EF)
     robot.write("DCICON3", 3)
     robot.write("TSCON", 1)
@@ -288,7 +291,8 @@ def test_codec_takes_words_only_out_of_reset(robot):
 
 
 def test_codec_control_words_follow_samples_with_bit_0_set(robot):
-    """§6: LSB = 1 of the primary word requests a secondary frame; DAC volume 0x5F into register 7."""
+    """§6: a primary word with LSB = 1 requests a secondary frame, whose control word writes the DAC volume 0x5F into
+    register 7."""
     heard = []
     robot.board.codec.on_sample = lambda sample, _cycle: heard.append(sample)
     robot.output("RF0", 1)
@@ -302,7 +306,7 @@ def test_codec_control_words_follow_samples_with_bit_0_set(robot):
 
 
 def test_noise_is_off_by_default_repeatable_and_scaled(robot):
-    """§5: sigma = max(5, 3 %); §6: microphones +-20."""
+    """§5, §6: noise is off by default; it has sigma = max(5, 3 %), +-20 for microphones, and repeats with its seed."""
     ir, microphones = robot.board.ir, robot.board.microphones
     assert {ir._level(0, cycle) >> 4 for cycle in range(100)} == {3800}
     robot.board.noise.strength = 1.0
@@ -325,7 +329,7 @@ def send(robot, data):
 
 
 def test_bluetooth_passes_bytes_both_ways(robot):
-    """§6: a transparent pipe."""
+    """§6: Bluetooth passes bytes unchanged in both directions."""
     heard = []
     robot.board.bluetooth.on_byte = lambda byte, start: heard.append(byte)
     send(robot, b"hello")
@@ -336,7 +340,7 @@ def test_bluetooth_passes_bytes_both_ways(robot):
 
 
 def test_bluetooth_dropouts_lose_bytes(robot):
-    """Nothing passes in the given windows."""
+    """Bluetooth loses all bytes in the given dropout windows."""
     heard = []
     robot.board.bluetooth.on_byte = lambda byte, start: heard.append(byte)
     robot.board.bluetooth.dropouts.append((1500, 4500))
@@ -347,7 +351,7 @@ def test_bluetooth_dropouts_lose_bytes(robot):
 
 
 def test_random_loss_repeats_with_its_seed():
-    """Everything random is seeded."""
+    """Random loss of bytes repeats with the same seed."""
 
     def run(seed):
         robot = Robot(seed=seed)

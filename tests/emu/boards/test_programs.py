@@ -27,7 +27,7 @@ def start(path: Path, engine: str = "auto", **options) -> Machine:
 
 
 def picture() -> np.ndarray:
-    """A picture in which all pixels of the captured grid differ."""
+    """Return a picture in which all pixels of the captured grid differ."""
     y, x = np.mgrid[0:480, 0:640]
     return np.stack([(x - 240) * 3 // 2, (y - 160) * 3 // 2, (x * 7 + y * 13)], axis=2).astype(np.uint8)
 
@@ -46,7 +46,8 @@ def shown() -> np.ndarray:
 
 
 def test_camera_driver_captures_every_pixel(program):
-    """epuck.md §7.5: 160 x 160 centred, zoom 8, RGB565 from a PO6030K: 20 x 20 pixels."""
+    """epuck.md §7.5: the fast driver captures all 20 x 20 pixels of 160 x 160, centred, zoom 8, RGB565 from a
+    PO6030K."""
     machine = start(program("camera.c", "lines.s"))
     machine.board.camera.show(picture())
     assert machine.run(cycles=4_000_000).reason == "halt"
@@ -55,7 +56,8 @@ def test_camera_driver_captures_every_pixel(program):
 
 
 def test_handler_reads_the_bus_16_to_18_tcy_behind_href_and_frames_come_every_1600000(program):
-    """epuck.md §7.5 and §7.1: 800 x 500 columns of 4 Tcy, 9.216 frames/s; lines 12,800 Tcy apart."""
+    """epuck.md §7.1, §7.5: the handler reads the bus 16 to 18 Tcy after HREF. Frames of 800 x 500 columns of 4 Tcy
+    come every 1,600,000 Tcy (9.216 per second), lines every 12,800 Tcy."""
     machine = start(program("camera.c", "lines.s"))
     machine.board.camera.show(picture())
     machine.run(cycles=100_000)
@@ -86,9 +88,10 @@ def test_handler_reads_the_bus_16_to_18_tcy_behind_href_and_frames_come_every_16
 )
 @pytest.mark.parametrize("noise", [0.0, 1.0])
 def test_engines_agree_to_the_bit_on_a_busy_robot(program, sources, cycles, noise):
-    """engines.md §4.3: same inputs, same record, same cycle; noise, remote control and radio included.
+    """engines.md §4.3: the same inputs give the same record in the same cycle in every engine, including noise,
+    remote control and radio.
 
-    Without noise the analog inputs are numbers, which native code converts by itself.
+    Without noise the analog inputs are numbers, which native code converts without Python.
     """
     states = []
     for engine in ("plain", "auto"):
@@ -107,7 +110,7 @@ def test_engines_agree_to_the_bit_on_a_busy_robot(program, sources, cycles, nois
 
 
 def test_snapshot_in_the_middle_of_a_line_continues_alike(program):
-    """The line on the bus, the frame's phase and the registers are in the record."""
+    """A snapshot in the middle of a camera line contains the line on the bus, the frame's phase and the registers."""
     machine = start(program("camera.c", "lines.s"))
     machine.board.camera.show(picture())
     reads = 0
@@ -129,7 +132,7 @@ def test_snapshot_in_the_middle_of_a_line_continues_alike(program):
 
 
 def test_unplugged_camera_does_not_hang_the_program(program):
-    """epuck.md §7.1: an absent device reads 0xFF; no frame ever comes."""
+    """epuck.md §7.1: a program with an unplugged camera, which reads 0xFF and sends no frame, does not hang."""
     machine = start(program("startup.c"), camera=None)
     assert machine.run(cycles=20_000_000).reason == "halt"
     assert machine.peek("camera_id") == 0xFFFF
@@ -142,7 +145,8 @@ def test_unplugged_camera_does_not_hang_the_program(program):
 
 
 def test_steps_over_a_minute_are_exact(program):
-    """epuck.md §3: an interrupt every 14,746 Tcy makes 59,998 steps in 60 s; a third of them on the right, backward."""
+    """epuck.md §3: with an interrupt every 14,746 Tcy, the left motor makes 59,998 steps in 60 s, and the right one a
+    third of them backward."""
     machine = start(program("steps.c"), engine="auto")
     machine.run_until(60 * FCY)
     robot = machine.board
@@ -157,7 +161,8 @@ def test_steps_over_a_minute_are_exact(program):
 
 
 def test_polled_proximity_driver_measures_the_reference_curve(program):
-    """epuck.md §5: emitter, settling, ADC and driver, on all eight sensors; 350 us settle to better than 0.4 %."""
+    """epuck.md §5: the polled driver measures the reference curve with all eight sensors, because 350 us settle to
+    better than 0.4 %."""
     machine = start(program("proximity.c"))
     inputs = machine.board.inputs
 
@@ -182,7 +187,8 @@ def test_polled_proximity_driver_measures_the_reference_curve(program):
 
 
 def test_start_up_program_finds_the_robot_the_reference_describes(program):
-    """epuck.md §2, §6, §7.1; chip reference §4: POR is cleared, RESET executed once, SWR set; no device at 0x3C."""
+    """epuck.md §2, §6, §7.1; chip reference §4: the start-up program clears POR, executes RESET once and finds SWR
+    set; no device answers at 0x3C."""
     machine = start(program("startup.c"), selector=13)
     machine.program.put(0x7FFFFE, 0xFFF7)
     said = bytearray()
@@ -190,7 +196,7 @@ def test_start_up_program_finds_the_robot_the_reference_describes(program):
     assert machine.run(cycles=20_000_000).reason == "halt"
     machine.uart[1].drain()
     assert [cause for _, cause in machine.resets] == ["POR", "POR", "SWR"]
-    assert machine.peek("RCON") & 0x00C3 == 0x0042  # SWR and BOR; POR cleared, EXTR never set
+    assert machine.peek("RCON") & 0x00C3 == 0x0042  # SWR and BOR are set; POR was cleared, EXTR was never set
     assert machine.peek("ports_ok") == 1
     assert machine.peek("accelerometer_id") == 0xFF
     assert machine.peek("camera_id") == 0x6030
@@ -204,7 +210,7 @@ def test_start_up_program_finds_the_robot_the_reference_describes(program):
 
 @pytest.mark.parametrize(("sensor", "identity"), [("PO3030K", 0x3030), ("PO8030D", 0x8030)])
 def test_cameras_are_identified_by_their_registers(program, sensor, identity):
-    """epuck.md §7.1."""
+    """epuck.md §7.1: the program identifies each camera by its registers."""
     machine = start(program("startup.c"), camera=sensor)
     assert machine.run(cycles=20_000_000).reason == "halt"
     assert machine.peek("camera_id") == identity
@@ -214,7 +220,7 @@ def test_cameras_are_identified_by_their_registers(program, sensor, identity):
 
 
 def test_low_battery_is_seen_by_the_program(program):
-    """epuck.md §2: RF1 = 0 below 3.4 V."""
+    """epuck.md §2: the program reads RF1 = 0 if the battery is below 3.4 V."""
     machine = start(program("startup.c"))
     machine.board.battery.volts = 3.3
     assert machine.run(cycles=20_000_000).reason == "halt"
@@ -247,7 +253,7 @@ def test_framing_errors_and_overruns_reach_the_program(program):
 
 
 def test_stuck_data_line_ends_the_probe_with_collisions_not_in_a_hang(program):
-    """Chip reference §11: a start with SDA low is a collision; the polled driver gives up and continues."""
+    """Chip reference §11: a start with SDA stuck low is a collision; the polled driver gives up and continues."""
     machine = start(program("startup.c"))
     machine.board.stimulus.play(parse(machine.board, "2000 i2c sda 0"))
     assert machine.run(cycles=40_000_000).reason == "halt"
@@ -256,7 +262,8 @@ def test_stuck_data_line_ends_the_probe_with_collisions_not_in_a_hang(program):
 
 
 def test_scanning_driver_measures_everything_at_the_vendors_rates(program):
-    """epuck.md §5: 900 Tcy per scan (and the handler's time), 65 scans per pair, all four pairs in about 15.9 ms."""
+    """epuck.md §5: the scanning driver makes a scan in 900 Tcy plus the handler's time, a pair in 65 scans, and all
+    four pairs in about 15.9 ms."""
     machine = start(program("adscan.c"))
     robot = machine.board
     robot.inputs.distance[:] = [10, 20, 30, 40, 50, 60, 80, np.inf]

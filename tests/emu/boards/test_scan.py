@@ -1,4 +1,4 @@
-"""Closed forms of the camera's signals against a cycle-by-cycle model, and arbitrary register values."""
+"""Closed forms of the camera's signals equal a cycle-by-cycle model; arbitrary register values are accepted."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from .conftest import Robot
 
 @st.composite
 def courses(draw):
-    """Small frames: lines that end before the next begins and lie inside the frame."""
+    """Return scans with small frames: some lines end before the next begins and lie inside the frame, others do not."""
     byte_tcy, line_bytes = draw(st.integers(1, 9)), draw(st.integers(0, 6))
     line_tcy = line_bytes * byte_tcy + draw(st.integers(1, 12))
     lines = draw(st.integers(0, 5)) if line_bytes else 0
@@ -28,7 +28,7 @@ def courses(draw):
 
 
 def ticking(course, cycles):
-    """Levels cycle by cycle, from nested loops instead of divisions, and which byte is on the bus."""
+    """Return the levels and the byte on the bus in every cycle, from nested loops instead of divisions."""
     levels, bytes_ = [0] * cycles, [None] * cycles
     for frame in range(0, cycles + course.frame_tcy, course.frame_tcy):
         for cycle in range(frame + course.vsync_rise, min(frame + course.vsync_fall, cycles)):
@@ -49,7 +49,8 @@ def ticking(course, cycles):
 @settings(max_examples=150, deadline=None)
 @given(courses(), st.integers(0, 100))
 def test_closed_forms_equal_a_cycle_by_cycle_model(course, start):
-    """epuck.md §7.4: levels, edge counts, next edges and bytes, in every cycle of three frames."""
+    """epuck.md §7.4: levels, edge counts, next edges and bytes of the closed forms equal the model in every cycle of
+    three frames."""
     scan = Scan(Record(0))
     scan.begin(course, start, running=True)
     cycles = 3 * course.frame_tcy
@@ -74,7 +75,7 @@ def test_closed_forms_equal_a_cycle_by_cycle_model(course, start):
 
 @pytest.mark.parametrize("sensor", sorted(SENSORS))
 def test_no_register_value_breaks_the_sensor(sensor):
-    """Firmware may write anything: edges still alternate, bytes still come."""
+    """With any register values, edges still alternate and bytes are still sent."""
     generator = random.Random(sensor)
     for _ in range(60):
         robot = Robot(camera=sensor)

@@ -28,7 +28,7 @@ SCRIPT = """
 
 
 def test_steps_happen_at_their_times(robot):
-    """Seconds or cycles, in any order."""
+    """Stimulus steps execute at their times, given in seconds or cycles in any order."""
     robot.write("U2BRG", 7)
     robot.write("U2MODE", 0x8000)
     robot.board.stimulus.play(parse(robot.board, SCRIPT))
@@ -77,13 +77,13 @@ def test_steps_happen_at_their_times(robot):
     ],
 )
 def test_mistakes_are_reported_with_file_and_line(robot, line, message):
-    """Bad input: file, line and what was expected."""
+    """An error in a stimulus file is reported with file, line and expected input."""
     with pytest.raises(StimulusError, match=rf"^file:2: .*({message})"):
         parse(robot.board, "# first\n" + line, "file")
 
 
 def test_script_position_is_part_of_a_snapshot(robot):
-    """After a restore the same steps are repeated."""
+    """After a restore, the stimulus steps after the snapshot are repeated."""
     robot.board.stimulus.play(parse(robot.board, "1000 selector 1\n3000 selector 2"))
     robot.at(2000)
     state = robot.machine.snapshot()
@@ -96,7 +96,7 @@ def test_script_position_is_part_of_a_snapshot(robot):
 
 
 def test_observer_reports_visible_outputs(robot):
-    """LEDs, motors and text lines, each with its time."""
+    """The observer reports LEDs, motors and text lines, each with its time."""
     lines = []
     RobotObserver(robot.board, ["leds", "motors", "uart1"], lines.append)
     robot.at(FCY).output("RA6", 1)
@@ -122,13 +122,13 @@ def test_observer_reports_visible_outputs(robot):
 
 
 def test_unknown_topics_are_refused(robot):
-    """Bad usage."""
+    """Unknown topics of the observer are refused."""
     with pytest.raises(ValueError, match="cannot watch 'smell'"):
         RobotObserver(robot.board, ["smell"], print)
 
 
 def test_key_presses_beyond_the_queue_are_dropped(robot):
-    """64 frames are queued, further ones are lost without an error."""
+    """The remote control queues 64 frames; further key presses are dropped without an error."""
     robot.board.stimulus.play(parse(robot.board, "1000 remote ok\n" * 100))
     robot.at(2000)
     assert robot.read("PORTF") & 0x40

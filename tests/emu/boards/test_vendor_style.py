@@ -1,4 +1,4 @@
-"""Programs in the style of the robot's own library, on the whole robot and on both engines (epuck.md §3, §6, §7)."""
+"""Programs in the style of the vendor's library, on the whole robot and on both engines (epuck.md §3, §6, §7)."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ FCY = 14_745_600
 
 @pytest.fixture(params=["plain", "auto"])
 def start(request, program):
-    """start("agenda.c", camera="PO3030K") -> a machine with the program loaded."""
+    """Return a function that starts a program: start("agenda.c", camera="PO3030K") returns a machine with it."""
 
     def load(source: str, **options) -> Machine:
         image = load_image(program(source))
@@ -28,7 +28,8 @@ def start(request, program):
 
 
 def test_agenda_steps_both_motors_at_the_library_s_rates(start):
-    """epuck.md §3: 1,475 Tcy a tick; every 20th and every 40th for 500 and 250 steps/s."""
+    """epuck.md §3: an agenda with a tick of 1,475 Tcy steps one motor every 20 and the other every 40 ticks: 500 and
+    250 steps/s."""
     machine = start("agenda.c")
     machine.run(cycles=2 * FCY)
     ticks = 2 * FCY // 1475
@@ -40,7 +41,8 @@ def test_agenda_steps_both_motors_at_the_library_s_rates(start):
 
 
 def test_remote_control_sampled_by_the_agenda_gives_the_keys_pressed(start):
-    """epuck.md §6: INT0 on the first edge, then every 1.8 ms."""
+    """epuck.md §6: the agenda decodes pressed keys by sampling every 1.8 ms after the first edge, which INT0
+    detects."""
     machine = start("agenda.c")
     machine.run(cycles=FCY // 20)
     for number, key in enumerate((53, 12, 0, 63), start=1):
@@ -51,7 +53,8 @@ def test_remote_control_sampled_by_the_agenda_gives_the_keys_pressed(start):
 
 
 def test_codec_gets_its_settings_and_the_samples(start):
-    """dspic30f6014a.md §14: an interrupt every 4 frames of 2,048 Tcy; §6: control words in secondary frames."""
+    """dspic30f6014a.md §14, epuck.md §6: the codec receives its control words in secondary frames, and samples with
+    an interrupt every 4 frames of 2,048 Tcy."""
     machine = start("sound.c")
     heard: list[tuple[int, int]] = []
     machine.board.codec.on_sample = lambda sample, cycle: heard.append((sample, cycle))
@@ -65,7 +68,8 @@ def test_codec_gets_its_settings_and_the_samples(start):
 
 
 def test_serial_protocol_by_interrupt_answers_text_and_binary(start):
-    """epuck.md §6: several binary commands in a row, ended by 0; banner; RCON shows the RESET."""
+    """epuck.md §6: the serial protocol answers text commands and several binary commands in a row, ended by 0; RCON
+    shows the RESET."""
     machine = start("sercom.c", selector=9)
     heard = bytearray()
     machine.uart[1].on_byte = lambda byte, _cycle: heard.append(byte)
@@ -95,7 +99,8 @@ def test_serial_protocol_by_interrupt_answers_text_and_binary(start):
 
 
 def test_slow_camera_driver_captures_a_grey_picture(start):
-    """epuck.md §7.3: PO3030K, an interrupt every 64 Tcy; 40 x 40 of 320 x 320, identity 0x3030."""
+    """epuck.md §7.3: the slow driver captures 40 x 40 of 320 x 320 grey pixels from a PO3030K with an interrupt every
+    64 Tcy; the identity is 0x3030."""
     machine = start("slowcam.c", camera="PO3030K")
     y, x = np.mgrid[0:480, 0:640]
     picture = np.repeat(((x // 8 * 3 + y // 8 * 5) % 256).astype(np.uint8)[:, :, None], 3, axis=2)
@@ -111,7 +116,7 @@ def test_slow_camera_driver_captures_a_grey_picture(start):
 
 @pytest.mark.parametrize("source", ["agenda.c", "sound.c", "sercom.c", "slowcam.c"])
 def test_engines_agree_to_the_bit(program, source):
-    """engines.md §4.3."""
+    """engines.md §4.3: both engines reach the same state at the same cycle."""
     states = []
     for engine in ("plain", "auto"):
         image = load_image(program(source))

@@ -1,4 +1,4 @@
-"""Waveforms as stimulus: a VCD file of `emu run` gives the same edges; CSV cells set pins and send bytes."""
+"""Waveforms as stimulus: a VCD file of `emu run` reproduces its edges; CSV cells set pins and send bytes."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def edges(path, pin: str):
 
 
 def test_our_own_waveform_read_back_gives_the_same_edges(tmp_path, capsys):
-    """One robot's pins drive another's inputs: every edge is equal to the picosecond."""
+    """If the recorded pins of one robot drive another's inputs, every edge is at the same time to the picosecond."""
     first, second = tmp_path / "first.vcd", tmp_path / "second.vcd"
     idle = compiled(tmp_path, "idle", "#include <p30F6014A.h>\nint main(void) { ADPCFG = 0xFFFF; for (;;) {} }")
     pulses = compiled(tmp_path, "pulses", PULSES)

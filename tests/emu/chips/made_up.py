@@ -1,7 +1,7 @@
-"""A fictitious chip: it differs in everything that engines and devices must take from `Chip`.
+"""A fictitious chip that differs in every property that engines and devices must take from `Chip`.
 
-Its SFRs end later, RAM is neither as large nor a power of two, Y RAM is smaller than X RAM, flash ends earlier, half of
-the devices are missing, and every interrupt has another number, another flag and another priority field.
+Its SFRs end later, the size of its RAM differs and is no power of two, Y RAM is smaller than X RAM, flash ends
+earlier, half of the devices are missing, and every interrupt has another number, flag and priority field.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _WITHOUT: Final = (
 
 
 def _interrupts(whole: Chip) -> dict[int, InterruptSource]:
-    """The remaining sources, counted backwards from 40."""
+    """Return the interrupt sources of the remaining devices, numbered backwards from 40."""
     kept = [source for source in whole.interrupts.values() if source.name not in _GONE]
     table = {}
     for place, source in enumerate(kept):
@@ -36,7 +36,8 @@ def _interrupts(whole: Chip) -> dict[int, InterruptSource]:
 
 
 def _sfrs(whole: Chip, interrupts: dict[int, InterruptSource]) -> dict[str, Sfr]:
-    """Those of the remaining devices; flags, enables and priorities where `interrupts` says."""
+    """Return the registers of the remaining devices, with flags, enables and priorities in the places that
+    `interrupts` gives."""
     sfrs = {name: sfr for name, sfr in whole.sfrs.items() if not name.startswith(_WITHOUT)}
     fields: dict[str, dict[str, tuple[int, int]]] = {}
     for source in interrupts.values():
@@ -107,4 +108,4 @@ def _made_up(whole: Chip) -> Chip:
 
 MADE_UP: Final = _made_up(DSPIC30F6014A)
 CHIPS: Final = {chip.name: chip for chip in (DSPIC30F6014A, MADE_UP)}
-"""Chips the campaigns run on."""
+"""Chips on which the campaigns run."""

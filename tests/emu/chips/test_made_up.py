@@ -1,4 +1,4 @@
-"""Engines take memory limits, vectors and interrupt numbers from `Chip`, shown with a fictitious chip."""
+"""Engines take memory limits, vectors and interrupt numbers from `Chip`, which a fictitious chip shows."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def machine_with(engine: str, text: str, **registers: int) -> Machine:
 @pytest.mark.parametrize("store", ["mov w1, [w0]", "mov.b w1, [w0]", "push w1"])
 @pytest.mark.parametrize(("address", "inside"), [(RAM_END - 2, True), (RAM_END, False), (0x2000, False)])
 def test_ram_ends_where_the_chip_says(engine: str, store: str, address: int, inside: bool) -> None:
-    """isa.md §14.4 cause 3: a store behind RAM is an address error and writes nothing."""
+    """isa.md §14.4 cause 3: a store beyond the chip's RAM is an address error and writes nothing."""
     text = f"{store}\nend: bra end\nAddressError: bra AddressError"
     states = []
     for name in ("plain", engine):
@@ -66,7 +66,7 @@ def test_ram_ends_where_the_chip_says(engine: str, store: str, address: int, ins
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("address", [SFR_END, Y_START - 2, Y_START, RAM_END - 2])
 def test_prefetches_know_where_y_ram_begins(engine: str, address: int) -> None:
-    """isa.md §1.2: X prefetches read 0 from Y RAM, Y prefetches 0 from elsewhere."""
+    """isa.md §1.2: X prefetches read 0 from the chip's Y RAM, and Y prefetches read 0 from outside of it."""
     machine = machine_with(engine, "movsac a, [w8], w4, [w10], w5\nend: bra end", w8=address, w10=address)
     machine.poke(address, 0x1111)
     machine.run_until(machine.cycle + 4)
@@ -76,7 +76,8 @@ def test_prefetches_know_where_y_ram_begins(engine: str, address: int) -> None:
 
 @pytest.mark.parametrize("engine", ENGINES)
 def test_a_stack_pointer_at_the_end_of_ram_cannot_take_an_interrupt_natively(engine: str) -> None:
-    """Both words of an exception frame must fit below the end of RAM; else an address error (isa.md §14.4)."""
+    """isa.md §14.4: an exception frame must fit below the end of RAM with both words; otherwise native code leaves
+    the address error to Python."""
     text = "inc w2, w2\nloop: bra loop\nT1Interrupt: bra T1Interrupt\nAddressError: bra AddressError"
     states = []
     for name in ("plain", engine):
@@ -94,7 +95,8 @@ def test_a_stack_pointer_at_the_end_of_ram_cannot_take_an_interrupt_natively(eng
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("begun", [0, 4])
 def test_reset_puts_the_stack_at_the_start_of_ram_and_fetches_end_with_flash(engine: str, begun: int) -> None:
-    """isa.md §2.1, and §14.4 cause 5; in the very first cycle as well, which has no boundary before it."""
+    """isa.md §2.1, §14.4 cause 5: reset sets the stack pointer to the start of RAM, and a fetch beyond flash is an
+    address error, also in the first cycle after reset."""
     machine = machine_with(engine, "AddressError: bra AddressError")
     assert machine.w[15] == SFR_END
     machine.run_until(begun)
@@ -104,18 +106,18 @@ def test_reset_puts_the_stack_at_the_start_of_ram_and_fetches_end_with_flash(eng
 
 
 def test_an_inconsistent_memory_map_is_refused() -> None:
-    """Y RAM is the upper part of RAM, RAM follows the SFRs: engines rely on it."""
+    """A chip is refused unless Y RAM is the upper part of RAM and RAM follows the SFRs, on which the engines rely."""
     with pytest.raises(ValueError, match="do not follow each other"):
         replace(DSPIC30F6014A, data=dict(DSPIC30F6014A.data) | {"yram": Region("yram", 0x1A00, 0x2800)})
 
 
 def test_a_sample_of_the_instruction_campaign() -> None:
-    """tests/fuzz/emulator/fuzz_engines.py --chip."""
+    """A sample of tests/fuzz/emulator/fuzz_engines.py with the fictitious chip finds no difference."""
     assert check_pairs(7, len(ROWS), 2, "jit", MADE_UP)
     assert check_programs(7, 4, "jit", MADE_UP)
 
 
 @pytest.mark.parametrize("seed", [1, 3, 5])
 def test_a_sample_of_the_native_campaign(seed: int) -> None:
-    """tests/fuzz/emulator/fuzz_jit.py."""
+    """A sample of tests/fuzz/emulator/fuzz_jit.py with the fictitious chip finds no difference."""
     assert check_wild(seed, stops=8, chip=MADE_UP).stops == 8

@@ -1,4 +1,4 @@
-"""Every supported chip: its tables are consistent, and a machine can be constructed."""
+"""Every supported chip has consistent tables, and a machine with it can be constructed."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def pins_of(chip: Chip) -> set[str]:
 
 @pytest.mark.parametrize("chip", CHIPS, ids=NAMES)
 def test_registers_do_not_overlap_and_fields_lie_in_their_masks(chip: Chip) -> None:
-    """A word belongs to one register; byte rows name halves of words; fields lie in implemented bits."""
+    """Registers do not overlap, byte rows name halves of words, and fields are implemented bits."""
     words = [sfr.address for sfr in chip.sfrs.values() if sfr.size == 2]
     assert len(set(words)) == len(words)
     for sfr in chip.sfrs.values():
@@ -37,7 +37,7 @@ def test_registers_do_not_overlap_and_fields_lie_in_their_masks(chip: Chip) -> N
 
 @pytest.mark.parametrize("chip", CHIPS, ids=NAMES)
 def test_pins_exist(chip: Chip) -> None:
-    """Every pin a device uses is a bit of a port."""
+    """Every pin that a device uses is a bit of a port."""
     for pin in pins_of(chip):
         _port, mask = parse_pin(pin)
         assert mask & chip.sfrs[f"PORT{pin[1]}"].mask, pin
@@ -46,7 +46,7 @@ def test_pins_exist(chip: Chip) -> None:
 
 @pytest.mark.parametrize("chip", CHIPS, ids=NAMES)
 def test_every_interrupt_has_flag_enable_and_priority(chip: Chip) -> None:
-    """The three places are fields of the registers, three bits wide for the priority."""
+    """Flag, enable bit and priority of every interrupt are fields of registers; the priority has three bits."""
     for source in chip.interrupts.values():
         stem = "AD" if source.name == "ADC" else source.name
         places = ((source.flag, "IF", 1), (source.enable, "IE", 1), (source.priority, "IP", 3))
@@ -57,7 +57,8 @@ def test_every_interrupt_has_flag_enable_and_priority(chip: Chip) -> None:
 
 @pytest.mark.parametrize("chip", CHIPS, ids=NAMES)
 def test_a_program_runs_in_every_engine(chip: Chip) -> None:
-    """Timer 1 interrupts a loop at the end of flash; the same state in the same cycle."""
+    """A program at the end of flash, interrupted by timer 1, reaches the same state in the same cycle in every
+    engine."""
     states = []
     for engine in ("plain", "jit"):
         machine = Machine(chip, engine=engine)
@@ -79,7 +80,7 @@ def test_a_program_runs_in_every_engine(chip: Chip) -> None:
 
 
 def test_chips_are_found_by_name_and_by_processor_id() -> None:
-    """As command lines spell them, and as the flags of ELF files number them."""
+    """Chips are found by the names that command lines use and by the processor ids in the flags of ELF files."""
     for chip in CHIPS:
         short = chip.name.removeprefix("dsPIC")
         assert chip_named(short).name == chip_named(short.lower()).name == chip.name

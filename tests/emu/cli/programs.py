@@ -18,7 +18,8 @@ DEBUG_WORD = 0xDA4000
 
 
 def assembled(source: str, start: int = START) -> tuple[list[int], dict[str, int]]:
-    """Words and labels of `source`: one statement per line, `label:`, `.pword N`, and names of registers in braces."""
+    """Return words and labels of `source`: one statement per line, `label:`, `.pword N`, and register names in
+    braces."""
     lines = [line.split(";")[0].strip() for line in source.splitlines()]
     labels: dict[str, int] = {}
     for _pass in ("addresses", "words"):
@@ -41,7 +42,8 @@ def _filled(line: str, labels: dict[str, int], pc: int) -> str:
 
 
 def executable(source: str, vectors: dict[str, str] | None = None) -> bytes:
-    """An ELF file that starts with `source`; `vectors` maps vector names to labels; the rest stop."""
+    """Return an ELF file that starts with `source`. `vectors` maps vector names to labels; all other vectors stop the
+    machine."""
     from emu.chips.dspic30f6014a import VECTORS
 
     code, labels = assembled(source)
@@ -71,7 +73,7 @@ SETUP = """
     bset {U1MODE}, #15
     bset {U1STA}, #10
 """
-"""UART1 at 115,200 baud on the e-puck (dspic30f6014a.md §10)."""
+"""Set-up of UART1 for 115,200 baud on the e-puck (dspic30f6014a.md §10)."""
 
 HELLO = (
     "main:"
@@ -85,7 +87,7 @@ forever:
     bra @forever
 """
 )
-"""Sends a line and sleeps with nothing left to wake it, leaving status 5."""
+"""Program that sends a line and then sleeps without a wake-up source; its status is 5."""
 
 ECHO = (
     "main:"
@@ -103,7 +105,7 @@ receive:
     retfie
 """
 )
-"""Sends back every byte plus one; vector U1RXInterrupt -> receive."""
+"""Program that sends back every byte plus one; needs the vector U1RXInterrupt -> receive."""
 
 SPIN = """
 main:

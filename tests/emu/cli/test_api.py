@@ -23,7 +23,7 @@ main:
 
 @pytest.fixture
 def load(tmp_path):
-    """A function that assembles a program and loads it into a machine."""
+    """Return a function that assembles a program and loads it into a machine."""
 
     def make(source, vectors=None, **options):
         path = tmp_path / "program.elf"
@@ -99,7 +99,7 @@ def test_a_hook_at_no_instruction_is_refused(load, place):
 
 @pytest.mark.parametrize("board", ["epuck", "none"])
 def test_every_listener_receives_the_bytes(load, board):
-    """On an e-puck, the Bluetooth radio is a listener as well."""
+    """Every listener of a UART receives its bytes; on an e-puck the Bluetooth radio is a listener too."""
     machine = load(HELLO, board=board)
     said: list[tuple[str, int]] = []
     removed = machine.uart[1].listen(lambda byte, _cycle: said.append(("removed", byte)))

@@ -148,7 +148,7 @@ def build(tmp_path_factory):
 
 @pytest.fixture(params=["-O0", "-Os"])
 def machine(build, request):
-    """A machine paused in the deepest call of `inner`."""
+    """Return a machine paused in the deepest call of `inner`."""
     made = emu.load(build(request.param))
     made.run(until="main")
     made.uart[1].expect("ready", within=20)
@@ -229,7 +229,8 @@ int main(void)
 
 
 def test_an_interrupted_frame_keeps_its_locals(build):
-    """Also if a variable changes its place at the interrupted instruction: the frame is not inside a call."""
+    """The frame of an interrupted function has its locals, also if a variable moves at the interrupted instruction,
+    because the instruction is no call."""
     machine = emu.load(build("-Os", source=INTERRUPTED), board=None)
     machine.run(until="main")
     inspector = machine.inspector
@@ -245,7 +246,7 @@ def test_an_interrupted_frame_keeps_its_locals(build):
     handler, history = machine.program_address("_T1Interrupt"), History(machine)
     interrupted: set[int] = set()
     before: list[tuple[str, int | None]] = []
-    for _ in range(3000):  # the timer's period changes, so every instruction is interrupted at some time
+    for _ in range(3000):  # the timer's period changes, so that it interrupts every instruction at some time
         pc = machine.pc
         history.step()
         top, *callers = machine.backtrace()
@@ -287,7 +288,7 @@ def test_a_local_is_correct_or_optimised_out(build):
                 known += 1
         machine.step()
         assert machine.inspector.debug.function(machine.pc) is start
-    assert known >= 4  # the parameters, at least before the first call
+    assert known >= 4  # the parameters are known at least before the first call
 
 
 @pytest.mark.parametrize("level", ["-O0", "-Os"])
@@ -344,7 +345,7 @@ int main(void) { U1BRG = 7; U1MODE = 0x8000; U1STA = 0x400; PR1 = 9999; IEC0bits
 
 @pytest.mark.parametrize("engine", ["jit", "plain"])
 def test_expect_stops_at_the_byte_while_the_firmware_sleeps(build, engine):
-    """Native code must not run past the byte."""
+    """`expect` stops a sleeping firmware at the cycle of the byte, because native code does not run past it."""
     machine = emu.load(build("-Os", source=SLEEPER), engine=engine)
     said = []
     machine.uart[1].listen(lambda byte, start: said.append(start))

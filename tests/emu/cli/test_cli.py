@@ -1,4 +1,4 @@
-"""The command line as shells and pipes see it."""
+"""The command line in shells and pipes."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def test_only_one_output_can_use_standard_output(spin, other):
 
 def test_completion_knows_commands_options_and_choices():
     bash = shutil.which("bash")
-    if bash is None:  # only it can say what the script makes it offer
+    if bash is None:  # only bash can evaluate its completion script
         pytest.skip("there is no bash (Debian package bash)")
     script = emu("completion", "bash").stdout
     ask = 'COMP_WORDS=(emu {words}); COMP_CWORD={last}; _shtab_emu; echo "${{COMPREPLY[@]}}"'
@@ -77,7 +77,8 @@ def test_completion_knows_commands_options_and_choices():
 
 
 def test_output_is_never_coloured(spin):
-    """NO_COLOR therefore holds; only the compiler's messages are coloured, and they check it."""
+    """Output is never coloured, so NO_COLOR is respected; only compiler messages are coloured, and the compiler
+    checks NO_COLOR."""
     import pty
 
     leader, follower = pty.openpty()

@@ -1,4 +1,4 @@
-"""Coverage equals a full trace, and third-party tools read the reports."""
+"""Coverage equals a full trace, and third-party tools can read the reports."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def build(tmp_path):
 
 
 def random_program(seed):
-    """Branches, loops and calls that depend on data."""
+    """Return a program of branches, loops and calls that depend on data."""
     rng = random.Random(seed)
     functions = []
     for number in range(4):

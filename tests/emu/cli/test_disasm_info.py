@@ -1,4 +1,4 @@
-"""`emu disasm` and `emu info` on a synthesised XC16-like executable."""
+"""`emu disasm` and `emu info` on a synthetic executable with XC16's layout."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def test_a_range_that_holds_nothing_is_refused(firmware, capsys, first, last):
 
 
 def test_info_counts_memory_as_the_sections_say(firmware, capsys):
-    """Flash in bytes is 3 per program word; RAM is counted from data and bss sections."""
+    """`emu info` counts 3 bytes of flash per program word, and RAM from data and bss sections."""
     facts = json.loads(output(capsys, "info", firmware, "--json").out)
     memory = facts["memory"]
     assert memory["flash_words"] == 2 + 62 + 5 + 2 + 2

@@ -1,4 +1,4 @@
-"""`emu run --dump-native`: generated code with the guest's addresses and instructions."""
+"""`emu run --dump-native` shows generated code with the guest's addresses and instructions."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from emu.cli import main
 
 @pytest.fixture
 def spin(tmp_path: Path) -> str:
-    """A program that counts for ever from 0x102 on."""
+    """Return a program that counts for ever from address 0x102 on."""
     path = tmp_path / "spin.elf"
     path.write_bytes(executable(SPIN))
     return str(path)
@@ -21,7 +21,8 @@ def spin(tmp_path: Path) -> str:
 
 @pytest.mark.parametrize("place", ["_spin", "0x104"])
 def test_the_code_of_a_place_shows_guest_addresses(spin: str, place: str, capsys: pytest.CaptureFixture[str]) -> None:
-    """By function and by address: the IR has each instruction of the loop, the host's assembly names its blocks."""
+    """The code of a function or address is shown as IR with each guest instruction and as host assembly with named
+    blocks."""
     assert main(["run", spin, "--engine", "jit", "--cycles", "200000", "--dump-native", place]) == 0
     text = capsys.readouterr().out
     ir, host = text.split("; host code", 1)
@@ -32,7 +33,7 @@ def test_the_code_of_a_place_shows_guest_addresses(spin: str, place: str, capsys
 
 
 def test_a_function_is_all_of_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """The function is entered once, before native code exists, and stays in its loop."""
+    """The code of a whole function is shown, although the function is entered once, before native code exists."""
     path = tmp_path / "loop.elf"
     path.write_bytes(executable("""
 work:
@@ -48,7 +49,7 @@ work:
 
 
 def test_an_unknown_symbol_is_refused_before_the_run(spin: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The run itself would not end."""
+    """An unknown symbol is refused before the run, which would not end."""
     monkeypatch.setattr("emu.run.session.Session.run", lambda _session: pytest.fail("it ran"))
     assert main(["run", spin, "--dump-native", "_nobody"]) == 2
 
@@ -64,6 +65,6 @@ def test_an_unknown_symbol_is_refused_before_the_run(spin: str, monkeypatch: pyt
 def test_code_that_cannot_be_shown_is_reported(
     spin: str, arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """One line, status 2."""
+    """Code that cannot be shown is reported in one line, with status 2."""
     assert main(["run", spin, "--cycles", "20000", *arguments]) == 2
     assert message in capsys.readouterr().err

@@ -1,4 +1,4 @@
-"""Fault reports name the mistake: C programs with one mistake each, built with the project's compiler."""
+"""Fault reports name the cause: C programs with one mistake each, built with the project's compiler."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ CHECKS = {
 
 @pytest.fixture
 def build(tmp_path):
-    """A function that compiles C source and returns the path of the image."""
+    """Return a function that compiles C source and returns the path of the image."""
 
     def make(source, *options):
         path = tmp_path / "program.c"
@@ -66,7 +66,7 @@ def build(tmp_path):
 
 
 def fault(path, **options):
-    """Return the fault of a run through the Python interface; the command line reports the same."""
+    """Return the fault of a run through the Python API, after checking that the command line reports the same."""
     stop = emu.load(path).run(seconds=1, **options)
     assert stop.reason == "fault", stop
     assert stop.fault is not None
@@ -181,7 +181,7 @@ int main(void) { PR1 = 1000; IEC0bits.T1IE = 1; T1CON = 0x8000; wait(0); }
 
 @pytest.mark.parametrize("engine", ["plain", "jit"])
 def test_the_report_depends_on_neither_engine_nor_slices(build, engine):
-    """Any division of the run and any engine give the same stop, and the diagnosis does not change the machine."""
+    """The report is the same for any engine and any division of the run, and making it does not change the machine."""
     path = build(DIVISION)
     whole = emu.load(path)
     expected = whole.run(seconds=1)
@@ -212,7 +212,8 @@ int main(void) { printf("before\\n"); for (volatile int i = 0; i < 3000; i++) { 
 
 
 def test_input_from_a_callback_leaves_a_report_without_branches(build):
-    """A replay cannot repeat what a callback feeds during a run: the report has no branches, but all the rest."""
+    """A replay cannot repeat input that a callback feeds during a run, so the report omits the branches and has all
+    other parts."""
     machine = emu.load(build("""
 #include <p30F6014A.h>
 #include <stdio.h>

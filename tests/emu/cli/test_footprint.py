@@ -1,4 +1,4 @@
-"""`emu footprint`, static part: every byte is counted once and under a name."""
+"""`emu footprint`, static part: every byte is counted once and belongs to a name."""
 
 from __future__ import annotations
 
@@ -47,7 +47,8 @@ def test_rom_belongs_to_the_symbol_before_it_and_ram_to_its_own(image):
 
 
 def test_a_word_shared_by_two_constants_is_counted_once(image):
-    """Strings follow each other at odd addresses in the PSV window (abi-elf.md §1.1)."""
+    """A program word whose bytes belong to two constants is counted once. Strings follow each other at odd addresses
+    in the PSV window (abi-elf.md §1.1)."""
     sample = xc16_like()
     sample.names.append(Name("_text", 0x8181, 4, size=3, kind=1))
     table = totals(pieces(parse_image(sample.build(), "x.elf")), "name")
@@ -56,7 +57,7 @@ def test_a_word_shared_by_two_constants_is_counted_once(image):
 
 
 def test_source_files_come_from_the_line_table(image):
-    """The sample's line table covers 0x104..0x10A: three words."""
+    """The line table assigns code to source files; the sample's table covers three words, 0x104..0x10A."""
     table = totals(pieces(image), "module")
     assert table["src/main.c"] == (9, 0)
     assert set(table) == {"src/main.c", UNKNOWN}

@@ -1,4 +1,4 @@
-"""A sample of the fuzz campaign `tests/fuzz/emulator/fuzz_inputs.py`, with inputs that once made it fail."""
+"""A sample of the fuzz campaign `tests/fuzz/emulator/fuzz_inputs.py`, and inputs that have made it fail."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def test_damaged_files_are_refused_or_read() -> None:
 
 
 def requests(*asked: tuple[str, object]) -> bytes:
-    """Messages of the debug protocol, a line each."""
+    """Return messages of the debug protocol, one per line."""
     lines = [
         {"seq": n, "type": "request", "command": name, "arguments": given} for n, (name, given) in enumerate(asked)
     ]
@@ -47,7 +47,8 @@ def test_a_request_out_of_order_or_shape_is_answered(asked: tuple[str, object]) 
 
 
 def test_a_message_nested_too_deeply_ends_the_session() -> None:
-    """json raises RecursionError; the reading thread must report the end of input."""
+    """A message nested too deeply for json (RecursionError) ends the session, because the reader thread reports the
+    end of input."""
     assert converse(b'{"arguments": ' + b"[" * 100_000) == "answered"
 
 
@@ -55,7 +56,7 @@ def test_a_message_nested_too_deeply_ends_the_session() -> None:
     ("command", "key"), [("disassemble", "instructionCount"), ("readMemory", "count")]
 )  # fmt: skip
 def test_a_request_for_more_than_there_is_is_refused(command: str, key: str) -> None:
-    """A request for 10^20 rows must not exhaust the memory."""
+    """A request for 10^20 rows is refused and does not exhaust the memory."""
     many = {"memoryReference": "0", key: 10**20}
     asked = requests(("launch", {"program": str(HELLO), "board": "none", "stopOnEntry": True}), (command, many))
     code = (

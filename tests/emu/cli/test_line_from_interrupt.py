@@ -1,4 +1,4 @@
-"""An assembly program that prints a line at 115,200 baud from a T1 interrupt: on the terminal, and to the cycle."""
+"""An assembly program prints a line at 115,200 baud from a T1 interrupt; each start bit is at the exact cycle."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from emu.api import load
 
 LINE = "swarm\n"
 BIT_TCY = 16 * (7 + 1)
-"""BRG = 7 (dspic30f6014a.md §10): Fcy / 115,200 = 128 Tcy."""
+"""Tcy per bit with BRG = 7 (dspic30f6014a.md §10): Fcy / 115,200 = 128."""
 
 PROGRAM = (
     "main:\n"
@@ -50,14 +50,14 @@ tick:
 
 @pytest.fixture
 def image(tmp_path: Path) -> Path:
-    """The program as an ELF file."""
+    """Return the program as an ELF file."""
     path = tmp_path / "line.elf"
     path.write_bytes(executable(PROGRAM, {"T1Interrupt": "tick"}))
     return path
 
 
 def test_the_line_is_on_the_terminal(image: Path) -> None:
-    """`python -m emu run` shows what UART1 sends."""
+    """`python -m emu run` prints what UART1 sends."""
     done = subprocess.run(
         [sys.executable, "-m", "emu", "run", str(image)],
         capture_output=True, text=True, timeout=HANG, check=False, stdin=subprocess.DEVNULL,
@@ -68,7 +68,8 @@ def test_the_line_is_on_the_terminal(image: Path) -> None:
 
 @pytest.mark.parametrize("engine", ["plain", "jit"])
 def test_every_start_bit_is_on_the_next_edge_of_the_bit_clock(image: Path, engine: str) -> None:
-    """The bit clock runs from the cycle after the write of UARTEN (dspic30f6014a.md §10.1)."""
+    """Every start bit begins at the next edge of the bit clock, which runs from the cycle after the write of UARTEN
+    (dspic30f6014a.md §10.1)."""
     machine = load(image, engine=engine)
     enabled: list[int] = []
     written: list[int] = []

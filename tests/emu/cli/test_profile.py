@@ -1,4 +1,4 @@
-"""`emu profile`: every cycle is counted once, and the files agree with a single-stepped machine."""
+"""`emu profile` counts every cycle once, and its files agree with a single-stepped machine."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ int main(void) {
 
 
 def compiled(folder, text):
-    """The image of a C program."""
+    """Return the image of a C program."""
     source, target = folder / "program.c", folder / "program.elf"
     source.write_text(text)
     assert compile_program(["-Os", "-g", "-fxc16-attributes", str(source), "-o", str(target)]) == 0
@@ -48,7 +48,7 @@ def profile_of(image, cycles: int, skip: int = 5_000):
 
 
 def test_shares_add_up_and_repeat_with_the_timer(image):
-    """1000 Tcy from interrupt to interrupt (dspic30f6014a.md §7): ten periods are ten times one."""
+    """With an interrupt every 1000 Tcy (dspic30f6014a.md §7), the counts of ten periods are ten times those of one."""
     _, ten = profile_of(image, 10_000)
     _, one = profile_of(image, 1_000)
     assert ten.cycles == 10_000
@@ -58,8 +58,8 @@ def test_shares_add_up_and_repeat_with_the_timer(image):
 
 
 def test_entering_an_interrupt_counts_for_its_handler(image):
-    """isa.md §14.2: from the first cycle that runs to the handler's first instruction; the machine's own count of what
-    happens at level 4, the reset priority."""
+    """isa.md §14.2: the entry of an interrupt, up to the handler's first instruction, counts for the handler. The
+    machine itself counts what happens at level 4, the priority after reset."""
     _, one = profile_of(image, 1_000)
     assert one.functions["__T1Interrupt"] == one.levels[4]
     machine = Machine(image.chip, engine="plain")
@@ -80,7 +80,7 @@ def test_groups_match_functions_and_files(image):
     assert not one.matched("spin")
 
 
-# Against the machine stepped by hand
+# -- comparison with a single-stepped machine
 
 NESTED = """
 #include <p30F6014A.h>
@@ -110,7 +110,7 @@ def nested(tmp_path_factory):
 
 
 def stepped(image, until: int):
-    """Return cycles by function and level, cycles in sleep, and calls by function, from single steps."""
+    """Return cycles by function and level, cycles in Sleep, and calls by function, counted with single steps."""
     machine = Machine(image.chip, engine="plain")
     machine.load(image)
     functions, levels, idle, calls = Counter(), Counter(), 0, Counter()
@@ -119,7 +119,7 @@ def stepped(image, until: int):
         machine.service_boundary(until)
         entry = machine.cycle - cycle
         if was_asleep:
-            entry = min(entry, 3) if machine.pc != pc else 0  # from the first cycle awake to the handler
+            entry = min(entry, 3) if machine.pc != pc else 0  # from the first cycle after wake-up to the handler
             idle += machine.cycle - cycle - entry
         before, pc, level = machine.cycle, machine.pc, machine.state.ipl
         if before >= until:
@@ -143,8 +143,9 @@ def counted(image, engine: str, until: int, timed: bool = False):
 
 
 def test_native_counts_equal_single_stepping(nested):
-    """Functions, levels, sleep and calls of 200,000 cycles with two nested interrupts, to the cycle. Where both are
-    entered at one boundary a look from outside cannot tell whose cycles are whose, so theirs are compared as a sum."""
+    """Functions, levels, sleep and calls of 200,000 cycles with two nested interrupts equal the counts of single
+    steps. If both interrupts are entered at one boundary, single steps cannot separate their cycles, so the sum is
+    compared."""
     functions, levels, idle, calls = stepped(nested, 200_000)
     profile = counted(nested, "jit", 200_000)
     assert profile.cycles == profile.end - profile.start
@@ -165,7 +166,7 @@ def test_native_counts_equal_single_stepping(nested):
     assert {place: n for place, n in seen.items() if place not in handlers} == {
         place: n for place, n in calls.items() if place not in handlers
     }
-    assert all(0 <= seen[name] - calls[name] <= 1 for name in handlers)  # one may be under way
+    assert all(0 <= seen[name] - calls[name] <= 1 for name in handlers)  # one call may be in progress
     assert profile == counted(nested, "plain", 200_000)
 
 
@@ -185,7 +186,7 @@ def test_inclusive_cycles_leave_out_interrupts_and_count_recursion_once(nested):
 
 
 class Callgrind:
-    """Reader of Callgrind's format (version 1) that rejects anything outside the specification."""
+    """Parser for Callgrind's format (version 1) that rejects everything outside the specification."""
 
     COST = re.compile(r"(0x[0-9a-f]+) (\d+) (\d+)")
 
@@ -236,7 +237,7 @@ def test_callgrind_files_are_what_the_specification_says(files):
     read = Callgrind(files[0].read_text())
     assert {"_main", "_work", "_depth", "__T1Interrupt", "__T2Interrupt"} <= read.own.keys()
     assert read.calls["_work", "_depth"] > 10
-    assert read.inclusive["_work", "_depth"] >= read.own["_depth"] - 1_000  # a call may have been under way
+    assert read.inclusive["_work", "_depth"] >= read.own["_depth"] - 1_000  # a call may be in progress
     if shutil.which("callgrind_annotate"):
         done = subprocess.run(["callgrind_annotate", files[0]], capture_output=True, text=True, check=True)
         total = re.search(r"([\d,]+) \(100.0%\)  PROGRAM TOTALS", done.stdout)
@@ -244,7 +245,8 @@ def test_callgrind_files_are_what_the_specification_says(files):
 
 
 def test_speedscope_files_nest_and_add_up(files):
-    """Time only grows, what ends is the innermost, all is closed at the end; open time is the time of the level."""
+    """In a speedscope file time only increases, the innermost frame ends first, all frames are closed at the end, and
+    the time of open frames is the time of the level."""
     data = json.loads(files[1].read_text())
     cycles = Counter()
     for profile in data["profiles"]:

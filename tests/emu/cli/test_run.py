@@ -1,4 +1,4 @@
-"""`emu run`: output, ends, exit statuses, input, traces."""
+"""`emu run`: output, ends of runs, exit statuses, input, traces."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ ROOT = Path(__file__).resolve().parents[3]
 
 @pytest.fixture
 def build(tmp_path):
-    """Writes a program and returns its path."""
+    """Return a function that writes a program and returns its path."""
 
     def write(source, vectors=None):
         path = tmp_path / "program.elf"
@@ -34,7 +34,7 @@ def build(tmp_path):
 
 
 def emu(*arguments, **options):
-    """`python -m emu` in a process of its own, without input unless given."""
+    """Run `python -m emu` in a separate process, without input by default."""
     options.setdefault("stdin", subprocess.DEVNULL)
     if "input" in options:
         del options["stdin"]
@@ -65,7 +65,7 @@ def test_exit_code_is_the_status_stored_by_start_up_code(build):
 
 
 def test_a_debugger_word_ends_the_run_with_w0_as_status(build):
-    """engines.md §10: an XC16 image returns from main into DA4000."""
+    """engines.md §10: a debugger word ends the run with W0 as status; an XC16 image returns from main into DA4000."""
     path = build("main:\nmov #7, w0\n.pword 0xDA4000\nreset\n")
     assert emu("run", path).returncode == 0
     done = emu("run", path, "--exit-code")
@@ -93,7 +93,8 @@ def test_a_debugger_word_ends_the_run_with_w0_as_status(build):
     ],
 )
 def test_faults_end_with_status_1_and_name_cause_and_place(build, capfd, source, cause):
-    """engines.md §10; isa.md §14.4, §14.6."""
+    """engines.md §10; isa.md §14.4, §14.6: a fault ends the run with status 1, and the message names cause and
+    address."""
     path = build(source)
     assert main(["run", path, "--cycles", "100000"]) == 1
     captured = capfd.readouterr().err
@@ -103,7 +104,8 @@ def test_faults_end_with_status_1_and_name_cause_and_place(build, capfd, source,
 
 
 def test_a_fault_is_placed_at_the_instruction_that_made_it(build, capfd):
-    """isa.md §14.4: an address error stacks the address behind the faulting instruction."""
+    """isa.md §14.4: the fault is reported at the faulting instruction, although an address error stacks the address
+    after it."""
     assert main(["run", build("main:\nmov #0x801, w1\nmov [w1], w2\nnop\n"), "--json"]) == 1
     fault = json.loads(capfd.readouterr().out)["fault"]
     assert (fault["pc"], fault["symbol"]) == (0x102, "_main+0x2")
@@ -136,7 +138,8 @@ def test_a_firmware_that_sleeps_in_a_trap_handler_is_a_fault(build, capfd):
     [(["--cycles", "1000"], 1000), (["--seconds", "0.01"], 147456), (["--seconds", "1/100"], 147456)],
 )
 def test_limits_end_the_run_at_the_first_boundary_behind_them(build, capfd, limit, cycles):
-    """One second of an e-puck is 14,745,600 Tcy (dspic30f6014a.md §3)."""
+    """--cycles and --seconds end the run at the first instruction boundary after the limit; an e-puck second is
+    14,745,600 Tcy (dspic30f6014a.md §3)."""
     assert main(["run", build(SPIN), *limit, "--json"]) == 0
     facts = json.loads(capfd.readouterr().out)
     assert facts["reason"] == "limit"
@@ -198,7 +201,7 @@ def test_standard_input_reaches_uart1_and_its_end_ends_a_sleeping_firmware(build
 
 
 def test_an_open_input_keeps_a_sleeping_firmware_alive_until_it_is_closed(build):
-    """engines.md §10: a sleeping firmware with open input continues; end of file ends the run."""
+    """engines.md §10: a sleeping firmware runs on while its input is open; end of file ends the run."""
     process = subprocess.Popen(
         [sys.executable, "-m", "emu", "run", build(ECHO, {"U1RXInterrupt": "receive"})],
         stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, cwd=ROOT,
@@ -378,7 +381,7 @@ def test_an_incomplete_trace_file_is_removed(build, tmp_path, capfd):
 
 @pytest.mark.parametrize("engine", ["plain", "jit"])
 def test_a_register_without_a_model_is_named_once(build, capfd, engine):
-    """BSRAM and SSRAM are on the list of plain registers (docs/plain-registers.md)."""
+    """An access to a register without a model is reported once; BSRAM and SSRAM are in docs/plain-registers.md."""
     source = "main:\nmov #1, w0\nmov w0, {BSRAM}\nmov {SSRAM}, w1\nmov w0, {BSRAM}\npwrsav #1\n"
     main(["run", build(source), "--engine", engine])
     notes = [line for line in capfd.readouterr().err.splitlines() if "note:" in line]
@@ -389,7 +392,7 @@ def test_a_register_without_a_model_is_named_once(build, capfd, engine):
 
 @pytest.mark.parametrize("engine", ["plain", "jit"])
 def test_a_setting_without_a_model_is_named_once(build, capfd, engine):
-    """Frame sync of SPI1 is on the list of docs/accuracy.md."""
+    """A setting without a model is reported once; frame sync of SPI1 is in docs/accuracy.md."""
     source = "main:\nmov #0x4020, w0\nmov w0, {SPI1CON}\nmov w0, {SPI1CON}\npwrsav #1\n"
     main(["run", build(source), "--engine", engine])
     (note,) = [line for line in capfd.readouterr().err.splitlines() if "note:" in line]

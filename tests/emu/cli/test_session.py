@@ -1,4 +1,4 @@
-"""Sessions: slices have no effect, timestamped input reproduces a run, the Python examples run."""
+"""Sessions: dividing a run has no effect, timestamped input reproduces a run, and the Python examples run."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def machine_with(source, vectors=None, engine="plain"):
 @pytest.mark.parametrize("engine", ["plain", "jit"])
 @pytest.mark.parametrize("length", [1, 7, 1280, 1_000_000])
 def test_slices_do_not_affect_the_run(monkeypatch, length, engine):
-    """The same input at the same cycles gives the same final state for any slicing."""
+    """The same input at the same cycles gives the same final state for any division of the run."""
     stamps = [TimestampedInput(100, 1, b"hello"), TimestampedInput(9_000, 1, b"x"), TimestampedInput(40_000, 1, b"yz")]
 
     def ended(slice_cycles, name):
@@ -48,7 +48,7 @@ def test_slices_do_not_affect_the_run(monkeypatch, length, engine):
 
 
 def test_a_paced_run_takes_as_long_as_the_robot(monkeypatch):
-    """The host's clock is replaced: the run sleeps for the time by which simulated time is ahead."""
+    """A paced run sleeps for the time by which simulated time is ahead of the host's clock, which the test replaces."""
     now = [0.0]
     waited = []
 
@@ -74,7 +74,7 @@ def test_a_watched_variable_reports_every_change_with_its_cycle():
 
 
 def test_memory_is_read_and_written_by_name():
-    """Registers by data-sheet name, W registers, variables by C or object name."""
+    """Memory is accessible by name: registers by data-sheet name, W registers, variables by C name or object name."""
     machine = machine_with(SPIN)
     machine.poke("counter", 0x1234)
     assert machine.peek("_counter") == machine.peek(0x800) == 0x1234
@@ -107,7 +107,7 @@ def test_the_documented_example_runs(monkeypatch):
 
 
 def test_modules_are_imported_lazily():
-    """engines.md §2: tools that need only the instruction table or chip data import nothing else."""
+    """engines.md §2: tools that need only the instruction table or chip data import no other modules."""
     code = (
         "import sys, emu.chips.dspic30f6014a, emu.image.elf_facts\n"
         "print({'emu.machine.machine', 'numpy'} & set(sys.modules))"

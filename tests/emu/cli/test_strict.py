@@ -1,4 +1,4 @@
-"""Strict mode reports accesses that the hardware permits, and accepts correct programs."""
+"""Strict mode reports invalid accesses that the hardware permits, and accepts correct programs."""
 
 from __future__ import annotations
 

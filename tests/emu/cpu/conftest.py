@@ -1,4 +1,4 @@
-"""Engines of the CPU tests: `engine` is each of them, `other` each one that is compared with the plain engine."""
+"""Engines of the CPU tests: `engine` is each engine, `other` each engine that is compared with the plain engine."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """A machine with a small assembly program in flash, and measurements of its cycles.
 
-Programs are assembled with the instruction table itself: one statement per line, `label:` in front, `.word` for a raw
-program word. They start at START in cycle 0; SPLIM is not armed, all W registers count as initialised.
+Programs use the syntax of the instruction table: one statement per line, `label:` before it, `.word` for a raw program
+word. They start at START in cycle 0. The stack limit is not armed, and all W registers count as initialised.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ def assemble(text: str, start: int = START) -> tuple[dict[int, int], dict[str, i
 
 
 class Rig:
-    """A machine with a program at START."""
+    """Machine with an assembly program at START."""
 
     def __init__(self, text: str, engine: str = "plain", ipl_slip: int = 0, **w: int) -> None:
         self.machine = Machine(engine=engine, ipl_slip=ipl_slip)
@@ -77,7 +77,7 @@ class Rig:
         self.machine.program.put(address, self.labels[label])
 
     def window(self, *words: int, page: int = 1) -> None:
-        """Switch PSV on with `words` at the start of the window: program page 1 begins at 0x8000 (isa.md §7.8)."""
+        """Enable PSV with `words` at the start of the window: program page 1 begins at 0x8000 (isa.md §7.8)."""
         for index, word in enumerate(words):
             self.machine.program.put(page << 15 | 2 * index, word)
         self.machine.poke("PSVPAG", page)
@@ -89,7 +89,7 @@ class Rig:
         self.machine.events.set(slot, cycle)
 
     def interrupt_at(self, cycle: int, irq: int = 3, priority: int = 4) -> None:
-        """Enable interrupt `irq` at `priority` and raise its flag, first 1 in `cycle`."""
+        """Enable interrupt `irq` at `priority`; its flag is 1 from `cycle` on."""
         chip = self.machine.chip
         source = chip.interrupts[irq]
         self.enable(irq, priority)
@@ -107,7 +107,7 @@ class Rig:
         machine.poke(group, machine.peek(group) & ~(7 << lsb) | priority << lsb)
 
     def note(self, label: str, stop: bool = False) -> None:
-        """Record every cycle in which the instruction at `label` starts; with `stop`, end the run there."""
+        """Record every cycle in which the instruction at `label` starts; with `stop`, the run ends there."""
 
         def arrived() -> bool:
             self.arrivals.append((label, self.machine.cycle))
@@ -116,7 +116,7 @@ class Rig:
         self.machine.hook_pc(self.labels[label], arrived)
 
     def run(self, cycles: int = 2000) -> Stop:
-        """Run until the machine stops, at most for `cycles`."""
+        """Run until the machine stops, for at most `cycles`."""
         return self.machine.run(cycles)
 
     def cycles_to(self, label: str = "end") -> int:
@@ -127,5 +127,5 @@ class Rig:
         return stop.cycle
 
     def first(self, label: str) -> int:
-        """Return the cycle of the first arrival at a label of `note`."""
+        """Return the cycle of the first recorded arrival at a label."""
         return next(cycle for name, cycle in self.arrivals if name == label)

@@ -1,8 +1,8 @@
 """Random (instruction, context) pairs and random programs, run on the plain engine and on another.
 
-No difference is allowed. Contexts cover registers, SR, CORCON modes, modulo and bit-reversed addressing, stack limit,
-REPEAT and DO state, the stall mask, and memory. Programs mix all rows with loops, calls, skips, REPEAT, DO and timer
-interrupts, and are compared at random cycles. Everything follows from the seed.
+No difference is allowed. Contexts include registers, SR, CORCON modes, modulo and bit-reversed addressing, stack
+limit, REPEAT and DO state, the stall mask, and memory. Programs contain all rows, with loops, calls, skips, REPEAT,
+DO and timer interrupts, and are compared at random cycles. The seed determines everything.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ HANDLER, TRAP_HANDLER, SUBROUTINE = 0x8000, 0x8100, 0x8200
 
 
 class Difference(Exception):
-    """Two engines disagree; the message holds what is needed to reproduce it."""
+    """Two engines disagree; the message contains what is needed to reproduce it."""
 
 
 def random_insn(rng: random.Random, row: Row, ram: int = DSPIC30F6014A.data["ram"].start) -> Insn:
@@ -56,7 +56,8 @@ def random_insn(rng: random.Random, row: Row, ram: int = DSPIC30F6014A.data["ram
 
 
 def machines(engine: str, chip: Chip = DSPIC30F6014A) -> tuple[Machine, Machine]:
-    """Return a machine with the plain engine and one with the engine under test, which compiles before it runs."""
+    """Return a machine with the plain engine and one with the engine under test, which compiles code before it runs
+    it."""
     pair = Machine(chip, engine="plain"), Machine(chip, engine=engine)
     for machine in pair:
         machine.program.put(chip.config["FWDT"].address, 0x7FFF)  # FWDT: no watchdog
@@ -187,7 +188,7 @@ SKIPS = tuple(row for row in ROWS if row.mnemonic in ("BTSS", "BTSC", "CPSEQ", "
 
 
 CORE = ("DCOUNT", "DCOUNT", "RCOUNT", "SR", "CORCON", "DOSTARTL", "DOENDL", "DOENDH", "PSVPAG", "TBLPAG")
-"""Registers of the CPU that control flow."""
+"""CPU registers that control execution; repeated names are more frequent."""
 
 
 class Program:
@@ -223,7 +224,7 @@ class Program:
             insn = random_insn(rng, rng.choice(rows))
             x = insn.x
             if 15 in (getattr(x, "d", 0), getattr(x, "s", 0)) and rng.random() < 0.95:
-                continue  # keep the stack where it is, mostly
+                continue  # usually leaves the stack pointer unchanged
             if getattr(x, "f", RAM_START) < RAM_START and rng.random() < 0.9:
                 continue
             self.words += (insn.word1, insn.word2)[: insn.words]
@@ -254,7 +255,7 @@ class Program:
             self._one(tuple(row for row in PLAIN_ROWS if row.repeat_ok))
 
     def _core(self) -> None:
-        """Emit an access to a register that controls flow. Counts mostly fall, so that loops end."""
+        """Emit an access to a register that controls execution. Counts mostly decrease, so that loops end."""
         rng = self._rng
         f, byte = DSPIC30F6014A.sfrs[rng.choice(CORE)].address, int(rng.random() < 0.3)
         way = rng.random()
@@ -298,7 +299,7 @@ class Program:
         self._add("PWRSAV #lit1", k=1)
 
     def _status(self) -> None:
-        """Emit a critical section as in kernels: by the IPL in SR, or by an enable bit."""
+        """Emit a critical section like those of kernels: by the IPL in SR, or by an enable bit."""
         if self._rng.random() < 0.5:
             self._add("MOV{.B} WREG, f", f=0x42, B=1)
         else:
@@ -323,7 +324,7 @@ def _handler(bits: list[tuple[int, int]]) -> list[int]:
 
 
 def prepare(rng: random.Random, start: bytes, plain: Machine, other: Machine) -> list[int]:
-    """Load one random program and context into both machines. Return the cycles at which to compare."""
+    """Load one random program and context into both machines. Return the cycles at which the machines are compared."""
     program = Program(rng, rng.randrange(10, 80))
     slip = rng.randrange(2)
     chip = plain.chip
@@ -367,7 +368,7 @@ def prepare(rng: random.Random, start: bytes, plain: Machine, other: Machine) ->
 
 
 def check_programs(seed: int, count: int, engine: str = "jit", chip: Chip = DSPIC30F6014A) -> int:
-    """Run `count` random programs. Return the cycles simulated on each engine. Raises Difference."""
+    """Run `count` random programs. Return the number of cycles simulated on each engine. Raises Difference."""
     rng = random.Random(seed)
     plain, other = machines(engine, chip=chip)
     start = plain.snapshot()

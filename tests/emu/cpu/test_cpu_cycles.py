@@ -1,4 +1,4 @@
-"""Base cycles of every kind of instruction (isa.md §13.1), measured between two instruction starts."""
+"""Base cycles of every kind of instruction (isa.md §13.1), measured between the starts of two instructions."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from cpu_rig import RAM, Rig
         ("mul.uu w0, w1, w2", 1),
         ("bset 0x1000, #3", 1),
         ("add 0x1000", 1),
-        ("mov 0x2C6, w0", 1),  # SFR read: nothing extra
-        ("mov w0, 0x2CA", 1),  # SFR write: nothing extra
+        ("mov 0x2C6, w0", 1),  # reading an SFR takes no extra cycle
+        ("mov w0, 0x2CA", 1),  # writing an SFR takes no extra cycle
         ("exch w0, w1", 1),
         ("lnk #4", 1),
         ("push w0", 1),
@@ -37,18 +37,18 @@ from cpu_rig import RAM, Rig
     ],
 )
 def test_an_instruction_takes_its_base_cycles(engine: str, statement: str, cycles: int) -> None:
-    """isa.md §13.1."""
+    """isa.md §13.1: each instruction takes its base cycles."""
     assert Rig(f"{statement}\nend: nop", engine).cycles_to() == cycles
 
 
 def test_two_word_instructions_take_two_cycles(engine: str) -> None:
-    """isa.md §13.1: DO, CALL and GOTO."""
+    """isa.md §13.1: the two-word instructions DO, CALL and GOTO take two cycles."""
     assert Rig("do #0, last\nend: nop\nlast: nop", engine).cycles_to() == 2
 
 
 @pytest.mark.parametrize(("sr", "cycles"), [(0x0002, 2), (0x0000, 1)])
 def test_a_conditional_branch_takes_two_cycles_only_when_taken(engine: str, sr: int, cycles: int) -> None:
-    """isa.md §13.1."""
+    """isa.md §13.1: a conditional branch takes two cycles if it is taken, otherwise one."""
     rig = Rig("bra z, taken\nfall: nop\ntaken: nop", engine)
     rig.machine.poke("SR", sr)
     assert rig.cycles_to("taken" if sr else "fall") == cycles
@@ -56,14 +56,15 @@ def test_a_conditional_branch_takes_two_cycles_only_when_taken(engine: str, sr: 
 
 @pytest.mark.parametrize("statement", ["return", "retfie", "retlw #5, w3"])
 def test_returns_take_three_cycles(engine: str, statement: str) -> None:
-    """isa.md §13.1, no exception pending."""
+    """isa.md §13.1: returns take three cycles if no exception is pending."""
     rig = Rig(f"call sub\nend: nop\nsub: nop\n{statement}", engine)
     assert rig.cycles_to() == 2 + 1 + 3
 
 
 @pytest.mark.parametrize("branch", ["bra w3", "goto w3", "call w3", "rcall w3"])
 def test_computed_flow_takes_two_cycles(engine: str, branch: str) -> None:
-    """isa.md §13.1, §7.1: BRA and RCALL count words from the next instruction."""
+    """isa.md §7.1, §13.1: computed branches and calls take two cycles; BRA and RCALL count words from the next
+    instruction."""
     rig = Rig(f"{branch}\nnop\nend: nop", engine, w3=1 if branch in ("bra w3", "rcall w3") else 0x204)
     assert rig.cycles_to() == 2
 
@@ -83,7 +84,8 @@ def test_computed_flow_takes_two_cycles(engine: str, branch: str) -> None:
     ],
 )
 def test_a_skip_costs_a_cycle_per_skipped_word(engine: str, skip: str, next_: str, taken: int, cycles: int) -> None:
-    """isa.md §7.3, §13.1: no skip 1, one word 2, two words 3."""
+    """isa.md §7.3, §13.1: a skip instruction takes 1 cycle without a skip, 2 if it skips one word, and 3 for two
+    words."""
     rig = Rig(f"{skip}\nskipped: {next_}\nend: nop", engine, w0=taken, w1=1)
     rig.machine.poke(RAM, taken)
     label = "skipped" if cycles == 1 else "end"
@@ -91,7 +93,7 @@ def test_a_skip_costs_a_cycle_per_skipped_word(engine: str, skip: str, next_: st
 
 
 def test_a_divide_takes_nineteen_cycles(engine: str) -> None:
-    """isa.md §6.7: REPEAT #17 plus 18 iterations."""
+    """isa.md §6.7: a divide takes 19 cycles: REPEAT #17 plus 18 iterations."""
     rig = Rig("repeat #17\ndiv.u w4, w2\nend: nop", engine, w4=0x3000, w2=0x27)
     assert rig.cycles_to() == 19
     assert (rig.machine.w[0], rig.machine.w[1]) == (0x013B, 0x0003)
@@ -99,13 +101,13 @@ def test_a_divide_takes_nineteen_cycles(engine: str) -> None:
 
 @pytest.mark.parametrize(("count", "cycles"), [(0, 2), (1, 3), (5, 7), (100, 102)])
 def test_repeat_takes_one_cycle_and_runs_its_target_count_plus_one_times(engine: str, count: int, cycles: int) -> None:
-    """isa.md §7.5, §13.1."""
+    """isa.md §7.5, §13.1: REPEAT takes one cycle, and its target runs count + 1 times."""
     rig = Rig(f"repeat #{count}\ninc w0, w0\nend: nop", engine, w0=0)
     assert rig.cycles_to() == cycles
     assert rig.machine.w[0] == count + 1
 
 
 def test_table_reads_under_repeat_take_two_cycles_each(engine: str) -> None:
-    """isa.md §7.7, UNVERIFIED on silicon."""
+    """isa.md §7.7, UNVERIFIED on silicon: table reads under REPEAT take two cycles each."""
     rig = Rig("repeat #3\ntblrdl [w1++], w2\nend: nop", engine, w1=0x400)
     assert rig.cycles_to() == 1 + 4 * 2

@@ -1,4 +1,4 @@
-"""The machine around the CPU: hooks, stops, resets, self-programming, slices of time."""
+"""The machine around the CPU: hooks, stops, resets, self-programming, divided runs."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from emu.machine.machine import Machine
 
 
 def test_an_unknown_engine_is_refused() -> None:
-    """engine contract."""
+    """Engine contract: an unknown engine name is refused."""
     with pytest.raises(ValueError, match="warp"):
         Machine(engine="warp")
 
 
 def test_a_pc_hook_sees_every_arrival_with_its_cycle(engine: str) -> None:
-    """engine contract: also in the middle of code that runs as one piece."""
+    """Engine contract: a PC hook is called with the cycle of every arrival, also in the middle of translated code."""
     rig = Rig("loop: inc w0, w0\nmid: inc w1, w1\nbra loop", engine, w0=0, w1=0)
     rig.note("mid")
     rig.machine.run(40)
@@ -23,7 +23,7 @@ def test_a_pc_hook_sees_every_arrival_with_its_cycle(engine: str) -> None:
 
 
 def test_a_removed_hook_is_not_called(engine: str) -> None:
-    """engine contract."""
+    """Engine contract: a removed hook is not called."""
     rig = Rig("loop: inc w0, w0\nmid: inc w1, w1\nbra loop", engine, w0=0, w1=0)
     calls = []
     remove = rig.machine.hook_pc(rig.labels["mid"], lambda: calls.append(rig.machine.cycle))
@@ -34,14 +34,14 @@ def test_a_removed_hook_is_not_called(engine: str) -> None:
 
 
 def test_a_stop_at_a_hook_resumes_behind_it(engine: str) -> None:
-    """engine contract: the instruction at a breakpoint runs when the run continues."""
+    """Engine contract: after a stop at a hook, the run continues with the hooked instruction."""
     rig = Rig("loop: inc w0, w0\nmid: inc w1, w1\nbra loop", engine, w0=0, w1=0)
     rig.note("mid", stop=True)
     assert [rig.run().cycle for _ in range(3)] == [1, 5, 9]
 
 
 def test_an_sfr_hook_sees_accesses_with_values_and_cycles(engine: str) -> None:
-    """engine contract: the hook runs in the cycle of the access."""
+    """Engine contract: an SFR hook is called in the cycle of the access, with its value."""
     rig = Rig("nop\nmov w0, 0x2CA\nmov 0x2CA, w1\nbset 0x2CA, #3\nend: nop", engine, w0=0x0100)
     seen = []
     rig.machine.hook_sfr("LATB", lambda write, word: seen.append((rig.machine.events.now, write, word)))
@@ -50,7 +50,7 @@ def test_an_sfr_hook_sees_accesses_with_values_and_cycles(engine: str) -> None:
 
 
 def test_a_sleeping_run_can_be_ended_from_outside(engine: str) -> None:
-    """engine contract: also while only time passes."""
+    """Engine contract: `interrupt` ends a run also while the CPU sleeps."""
     rig = Rig("mov w0, 0x102\nmov w1, 0x104\npwrsav #1\nend: nop", engine, w0=99, w1=0x8000)
     rig.enable(6, 4)
     rig.at(5000, rig.machine.interrupt)
@@ -60,7 +60,7 @@ def test_a_sleeping_run_can_be_ended_from_outside(engine: str) -> None:
 
 @pytest.mark.parametrize("kind", ["address", "condition"])
 def test_a_run_ends_where_it_is_told(engine: str, kind: str) -> None:
-    """engine contract: reason "until"."""
+    """Engine contract: `run(until=...)` ends at the address, or when the condition holds, with the reason "until"."""
     rig = Rig("loop: inc w0, w0\nmid: inc w1, w1\nbra loop", engine, w0=0, w1=0)
     machine = rig.machine
     until = rig.labels["mid"] if kind == "address" else lambda: machine.w[0] == 1
@@ -70,13 +70,13 @@ def test_a_run_ends_where_it_is_told(engine: str, kind: str) -> None:
 
 
 def test_a_run_ends_at_the_first_boundary_at_or_behind_its_limit(engine: str) -> None:
-    """engine contract: GOTOs of two cycles."""
+    """Engine contract: a run ends at the first boundary at or after its limit, here between GOTOs of two cycles."""
     rig = Rig("loop: goto loop", engine)
     assert [rig.machine.run(5).cycle for _ in range(3)] == [6, 12, 18]
 
 
 def test_a_run_can_be_ended_from_outside(engine: str) -> None:
-    """engine contract: reason "interrupted"."""
+    """Engine contract: `interrupt` ends a run with the reason "interrupted"."""
     rig = Rig("loop: inc w0, w0\nbra loop", engine)
     rig.at(500, rig.machine.interrupt)
     stop = rig.machine.run(10_000)
@@ -85,7 +85,7 @@ def test_a_run_can_be_ended_from_outside(engine: str) -> None:
 
 
 def test_a_loop_of_resets_is_a_fault(engine: str) -> None:
-    """engine contract: RESET instructions that lead to themselves."""
+    """Engine contract: an endless loop of RESET instructions is a fault."""
     rig = Rig("again: nop\nreset", engine)
     rig.machine.program.put_flash(0, [0x040000 | START, 0])
     stop = rig.machine.run(1000)
@@ -95,7 +95,8 @@ def test_a_loop_of_resets_is_a_fault(engine: str) -> None:
 
 
 def test_the_watchdog_resets_a_program_that_does_not_clear_it(engine: str) -> None:
-    """dspic30f6014a.md §4: 2 ms with both prescalers at 1; CLRWDT in time prevents it."""
+    """dspic30f6014a.md §4: the watchdog resets after 2 ms with both prescalers at 1, unless CLRWDT clears it in
+    time."""
     for statement, expired in (("nop", True), ("clrwdt", False)):
         rig = Rig(f"loop: {statement}\nbra loop", engine)
         rig.machine.program.put(0xF80002, 0x8000)
@@ -106,7 +107,7 @@ def test_the_watchdog_resets_a_program_that_does_not_clear_it(engine: str) -> No
 
 
 def test_programs_may_rewrite_themselves(engine: str) -> None:
-    """dspic30f6014a.md §16: a flash row is erased and programmed while its code has been run before.
+    """dspic30f6014a.md §16: a program can erase and program a flash row whose code has been executed before.
 
     The row at 0x400 holds `inc w0, w0; return`; the program replaces it by `dec w0, w0; return`.
     """
@@ -154,7 +155,7 @@ def test_programs_may_rewrite_themselves(engine: str) -> None:
 
 
 def test_a_snapshot_of_one_engine_continues_in_another() -> None:
-    """engine contract: snapshot and restore are copies, whatever the engine."""
+    """Engine contract: a snapshot of one engine can be restored and continued in another."""
     text = "loop: inc w0, w0\nadd w0, [w1], [w1]\nrepeat #5\nrlc w2, w2\nbra loop"
     first, second = Rig(text, "plain"), Rig(text, "jit")
     first.machine.run(101)
@@ -165,7 +166,7 @@ def test_a_snapshot_of_one_engine_continues_in_another() -> None:
 
 
 def test_peek_and_poke_have_no_side_effects(engine: str) -> None:
-    """engine contract."""
+    """Engine contract: `peek` and `poke` have no side effects."""
     rig = Rig("end: nop", engine)
     rig.machine.poke(RAM + 1, 0xAB, size=1)
     assert rig.machine.peek(RAM) == 0xAB00
@@ -175,7 +176,8 @@ def test_peek_and_poke_have_no_side_effects(engine: str) -> None:
 
 
 def test_a_run_in_pieces_is_the_run_in_one_go(engine: str) -> None:
-    """engine contract: a snapshot does not contain the recheck event of a request that DISI blocks."""
+    """Engine contract: a divided run equals one run, because a snapshot excludes the recheck event of a request that
+    DISI blocks."""
     text = "loop: disi #29\nnop\nnop\nrepeat #11\nnop\nbra loop\nisr: bclr 0x84, #3\nretfie"
     whole, pieces = Rig(text, engine), Rig(text, engine)
     for rig in whole, pieces:

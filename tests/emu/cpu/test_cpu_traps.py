@@ -1,4 +1,4 @@
-"""Traps and the resets the core causes: causes, timing, priorities, conflicts (isa.md §10, §14.4, §14.6)."""
+"""Traps, and resets that the core causes: causes, timing, priorities, conflicts (isa.md §10, §14.4, §14.6)."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def trapped(engine: str, text: str, vector: int, **w: int) -> Rig:
 
 
 def stacked(rig: Rig) -> int:
-    """Return address of the handler, relative to `end`."""
+    """Return the handler's return address relative to `end`."""
     top = rig.machine.w[15]
     return (rig.machine.peek(top - 2) & 0x7F) << 16 | rig.machine.peek(top - 4) - rig.labels["end"]
 
@@ -25,7 +25,7 @@ def stacked(rig: Rig) -> int:
 @pytest.mark.parametrize(
     ("statement", "w1"),
     [
-        ("mov [w1], w2", RAM + 1),  # cause 1: odd word read
+        ("mov [w1], w2", RAM + 1),  # cause 1: odd address in a word read
         ("mov w0, [w1]", RAM + 1),
         ("mov.d [w1], w2", RAM + 1),
         ("mac w4*w5, a, [w8]+=2, w4", 0),
@@ -38,7 +38,8 @@ def stacked(rig: Rig) -> int:
     ],
 )
 def test_address_errors_trap_at_once(engine: str, statement: str, w1: int) -> None:
-    """isa.md §14.4: hard: c = e, handler in e + 4, stacked PC = the following instruction, level 13."""
+    """isa.md §14.4: an address error is a hard trap of level 13: c = e, the handler starts in e + 4, and the stacked
+    PC is the following instruction."""
     cycles = 2 if statement.startswith("mov.d") else 1
     rig = trapped(engine, statement, ADDRESS, w1=w1, w8=RAM + 1)
     assert rig.cycles_to("trap") == cycles - 1 + 4
@@ -49,7 +50,7 @@ def test_address_errors_trap_at_once(engine: str, statement: str, w1: int) -> No
 
 
 def test_a_faulting_instruction_writes_nothing_but_completes(engine: str) -> None:
-    """isa.md §14.4: data writes are inhibited; pointers and registers are updated."""
+    """isa.md §14.4: an instruction with an address error writes no data but updates pointers and registers."""
     rig = trapped(engine, "mov [w1++], [w2++]", ADDRESS, w1=RAM + 1, w2=RAM + 0x100)
     rig.machine.poke(RAM + 0x100, 0x5555)
     rig.machine.poke(RAM, 0x1234)
@@ -59,7 +60,8 @@ def test_a_faulting_instruction_writes_nothing_but_completes(engine: str) -> Non
 
 
 def test_a_double_store_that_leaves_memory_writes_neither_word(engine: str) -> None:
-    """isa.md §14.4, engines.md §4.1: all addresses are probed before the first access."""
+    """isa.md §14.4, engines.md §4.1: a double store that leaves memory writes neither word, because all addresses are
+    checked before the first access."""
     rig = trapped(engine, "mov.d w2, [w1]", ADDRESS, w1=0x27FE, w2=1)
     rig.cycles_to("trap")
     assert rig.machine.peek(0x27FE) == 0
@@ -67,24 +69,26 @@ def test_a_double_store_that_leaves_memory_writes_neither_word(engine: str) -> N
 
 @pytest.mark.parametrize("target", [0x018000, 0x000004, 0x0000FE])
 def test_jumping_where_no_instruction_can_be_is_an_address_error(engine: str, target: int) -> None:
-    """isa.md §14.4, causes 4 and 5: GOTO in 0..1, handler in 1 + 4; the target is stacked."""
+    """isa.md §14.4, causes 4 and 5: a jump to an address without an instruction is an address error: GOTO in 0..1,
+    handler in 1 + 4; the target is stacked."""
     rig = trapped(engine, f"goto {target}", ADDRESS)
     assert rig.cycles_to("trap") == 5
     assert stacked(rig) + rig.labels["end"] == target
 
 
 def test_the_first_push_beyond_the_limit_traps_softly(engine: str) -> None:
-    """isa.md §10.2, §14.4: a push at SPLIM is legal, the next one traps: PUSH in 1, c = 2, one NOP, handler in 6."""
+    """isa.md §10.2, §14.4: a push at SPLIM is legal; the next one is a soft trap: PUSH in 1, c = 2, one NOP, handler
+    in 6."""
     rig = trapped(engine, "push w0\npush w0\nnext: nop", STACK_ERROR)
     rig.machine.write("SPLIM", STACK)
     assert rig.cycles_to("trap") == 6
     assert stacked(rig) == 0
     assert rig.machine.peek("INTCON1") & STKERR
-    assert rig.machine.peek(STACK + 2) == rig.machine.w[0]  # the faulting access itself happens
+    assert rig.machine.peek(STACK + 2) == rig.machine.w[0]  # the faulting access is executed
 
 
 def test_the_limit_is_armed_by_a_word_write_only(engine: str) -> None:
-    """isa.md §10.2."""
+    """isa.md §10.2: only a word write to SPLIM arms the stack limit."""
     rig = trapped(engine, "push w0\npush w0", STACK_ERROR)
     rig.machine.write("SPLIM", STACK & 0xFF, size=1)
     rig.cycles_to("end")
@@ -96,7 +100,7 @@ def test_the_limit_is_armed_by_a_word_write_only(engine: str) -> None:
     [("pop w0", 0x0800), ("mov [w15], w0", 0x07FE), ("mov [w15-0x10], w0", 0x0800), ("return", 0x0802)],
 )
 def test_stack_underflow_is_always_checked(engine: str, statement: str, w15: int) -> None:
-    """isa.md §10.1, §10.4."""
+    """isa.md §10.1, §10.4: stack underflow is always checked."""
     rig = trapped(engine, f"{statement}\nnop\nnop", STACK_ERROR, w15=w15)
     rig.note("trap", stop=True)
     rig.run(20)
@@ -104,7 +108,8 @@ def test_stack_underflow_is_always_checked(engine: str, statement: str, w15: int
 
 
 def test_a_stack_error_of_a_return_counts_from_its_last_cycle(engine: str) -> None:
-    """isa.md §14.4: soft: RETURN in 0..2, c = 3, one NOP, handler in 7."""
+    """isa.md §14.4: a stack error of RETURN is a soft trap that counts from its last cycle: RETURN in 0..2, c = 3,
+    one NOP, handler in 7."""
     rig = trapped(engine, "return\nback: nop", STACK_ERROR, w15=0x0802)
     rig.machine.poke(0x07FE, rig.labels["back"])
     rig.machine.poke(0x0800, 0)
@@ -112,14 +117,15 @@ def test_a_stack_error_of_a_return_counts_from_its_last_cycle(engine: str) -> No
 
 
 def test_arithmetic_on_the_stack_pointer_is_not_checked(engine: str) -> None:
-    """isa.md §10.4."""
+    """isa.md §10.4: arithmetic on W15 is not checked against the stack limit."""
     rig = trapped(engine, "mov #0x0700, w15\nadd w15, #8, w15\nmov #0x0900, w15", STACK_ERROR)
     assert rig.cycles_to("end") == 3
     assert rig.machine.peek("INTCON1") == 0
 
 
 def test_divide_by_zero_stacks_the_divide(engine: str) -> None:
-    """isa.md §6.7, §14.4: first iteration in cycle 1, c = 2, one more iteration, handler in 6; RA and RCOUNT kept."""
+    """isa.md §6.7, §14.4: division by zero: first iteration in cycle 1, c = 2, one more iteration, handler in 6. The
+    divide is stacked; RA and RCOUNT are kept."""
     rig = trapped(engine, "repeat #17\ndiv.u w4, w2", MATH, w2=0)
     assert rig.cycles_to("trap") == 6
     assert stacked(rig) == -2
@@ -129,7 +135,7 @@ def test_divide_by_zero_stacks_the_divide(engine: str) -> None:
 
 
 def test_a_shift_beyond_sixteen_is_a_math_error(engine: str) -> None:
-    """isa.md §8.5: accumulator unchanged."""
+    """isa.md §8.5: an accumulator shift by more than 16 is a math error and leaves the accumulator unchanged."""
     rig = trapped(engine, "sftac a, w2\nnop", MATH, w2=17)
     rig.machine.poke("ACCAL", 0x1234)
     assert rig.cycles_to("trap") == 5
@@ -138,7 +144,8 @@ def test_a_shift_beyond_sixteen_is_a_math_error(engine: str) -> None:
 
 @pytest.mark.parametrize(("enable", "traps"), [(0x0400, True), (0x0200, False), (0, False)])
 def test_accumulator_overflow_traps_if_enabled(engine: str, enable: int, traps: bool) -> None:
-    """isa.md §8.5: OVATE for ACCA; the condition lasts, so clearing the flag alone does not help (§14.4)."""
+    """isa.md §8.5, §14.4: OVATE enables the trap on overflow of ACCA. The condition persists, so clearing the flag
+    alone does not end the trap."""
     rig = trapped(engine, "add a\nnop", MATH)
     rig.machine.poke("INTCON1", enable)
     rig.machine.poke("ACCAH", 0x7FFF)
@@ -150,14 +157,14 @@ def test_accumulator_overflow_traps_if_enabled(engine: str, enable: int, traps: 
 
 
 def test_a_trap_is_not_masked_by_disi_or_priority_seven(engine: str) -> None:
-    """isa.md §14.1."""
+    """isa.md §14.1: neither DISI nor CPU priority 7 masks a trap."""
     rig = trapped(engine, "disi #100\nmov [w1], w2", ADDRESS, w1=RAM + 1)
     rig.machine.poke("SR", 0x00E0)
     assert rig.cycles_to("trap") == 5
 
 
 def test_a_flag_left_set_enters_again_after_retfie(engine: str) -> None:
-    """isa.md §14.4: the handler must clear its flag."""
+    """isa.md §14.4: if the handler does not clear the trap flag, the trap is entered again after RETFIE."""
     rig = Rig("mov [w1], w2\nend: nop\ntrap: inc w3, w3\nretfie", engine, w1=RAM + 1, w3=0)
     rig.vector(ADDRESS, "trap")
     rig.machine.run(100)
@@ -165,7 +172,7 @@ def test_a_flag_left_set_enters_again_after_retfie(engine: str) -> None:
 
 
 def test_a_higher_trap_interrupts_a_lower_one(engine: str) -> None:
-    """isa.md §14.4: an address error in the handler of a math error."""
+    """isa.md §14.4: an address error in the handler of a math error is taken at once, because its level is higher."""
     text = "repeat #17\ndiv.u w4, w2\nend: nop\nmath: mov [w1], w3\nnop\naddr: nop\nstay: bra stay"
     rig = Rig(text, engine, w1=RAM + 1, w2=0)
     rig.vector(MATH, "math")
@@ -175,7 +182,7 @@ def test_a_higher_trap_interrupts_a_lower_one(engine: str) -> None:
 
 
 def test_a_lower_trap_waits_for_a_higher_one(engine: str) -> None:
-    """isa.md §14.4: a stack error raised in the address error handler is taken after it."""
+    """isa.md §14.4: a stack error raised in the handler of an address error is taken after that handler."""
     text = (
         "mov [w1], w2\nend: nop\nstay: bra stay\naddr: bclr 0x80, #3\nmov w0, [w15]\nnop\nretfie\n"
         "stack: mov w4, 0x20\nbclr 0x80, #2\nretfie"
@@ -191,7 +198,8 @@ def test_a_lower_trap_waits_for_a_higher_one(engine: str) -> None:
 
 
 def test_an_oscillator_failure_enters_after_the_current_instruction(engine: str) -> None:
-    """isa.md §14.4: level 14, hard: requested by a device event in cycle 5."""
+    """isa.md §14.4: an oscillator failure (level 14, hard), raised by a device event in cycle 5, is entered after the
+    current instruction."""
     rig = trapped(engine, "nop\n" * 12, OSCILLATOR)
     rig.at(5, lambda: rig.machine.core.traps.request_flag("OSCFAIL"))
     assert rig.cycles_to("trap") == 9
@@ -199,7 +207,8 @@ def test_an_oscillator_failure_enters_after_the_current_instruction(engine: str)
 
 
 def test_an_address_error_below_an_oscillator_failure_resets(engine: str) -> None:
-    """isa.md §14.4, §14.6: trap conflict, RCON.TRAPR; the run stops and names the faulting address."""
+    """isa.md §14.4, §14.6: an address error in the handler of an oscillator failure is a trap conflict: the chip
+    resets with RCON.TRAPR, and the run stops at the faulting address."""
     rig = Rig("nop\n" * 10 + "osc: nop\nculprit: mov [w1], w2\nnop", engine, w1=RAM + 1)
     rig.vector(OSCILLATOR, "osc")
     rig.at(2, lambda: rig.machine.core.traps.request_flag("OSCFAIL"))
@@ -211,7 +220,7 @@ def test_an_address_error_below_an_oscillator_failure_resets(engine: str) -> Non
 
 @pytest.mark.parametrize("word", [0x3F0000, 0xDB1234, 0x0A0000, 0xF40000])
 def test_an_illegal_opcode_resets(engine: str, word: int) -> None:
-    """isa.md §4.1, §14.6: RCON.IOPUWR; the run stops at the faulting address."""
+    """isa.md §4.1, §14.6: an illegal opcode resets with RCON.IOPUWR; the run stops at the faulting address."""
     rig = Rig(f"nop\nbad: .word {word}\nnop", engine)
     stop = rig.run()
     assert (stop.reason, stop.pc, stop.cycle) == ("fault", rig.labels["bad"], 2)
@@ -221,7 +230,8 @@ def test_an_illegal_opcode_resets(engine: str, word: int) -> None:
 
 
 def test_an_uninitialised_pointer_resets(engine: str) -> None:
-    """isa.md §2.2: a byte write does not initialise, a word write does."""
+    """isa.md §2.2: use of an uninitialised pointer resets. A word write initialises a W register, a byte write does
+    not."""
     rig = Rig("mov.b #0x10, w1\nbad: mov [w1], w2\nnop", engine)
     rig.machine.state.initialised &= ~2
     stop = rig.run()
@@ -232,14 +242,14 @@ def test_an_uninitialised_pointer_resets(engine: str) -> None:
 
 @pytest.mark.parametrize("writing", ["mov #0x1000, w1", "mov w0, 0x0002", "pop.s"])
 def test_what_initialises_a_register(engine: str, writing: str) -> None:
-    """isa.md §2.2, UNVERIFIED for the memory-mapped write and POP.S."""
+    """isa.md §2.2: a register is initialised by word writes; UNVERIFIED for the memory-mapped write and POP.S."""
     rig = Rig(f"push.s\n{writing}\nmov.b [w1], w2\nend: nop", engine, w0=RAM)
     rig.machine.state.initialised &= ~2
     rig.cycles_to()
 
 
 def test_the_check_of_pointers_can_be_turned_off(engine: str) -> None:
-    """isa.md §2.2: a switch of the emulator."""
+    """isa.md §2.2: an option of the emulator turns the check for uninitialised pointers off."""
     rig = Rig("mov [w1], w2\nend: nop", engine)
     rig.machine.state.check_pointers = False
     rig.machine.program.put_flash(0, [0x040000 | START, 0])
@@ -249,7 +259,7 @@ def test_the_check_of_pointers_can_be_turned_off(engine: str) -> None:
 
 @pytest.mark.parametrize("word", [0xDA4000, 0xDAC000])
 def test_debugger_words_stop_the_run_and_fall_through(engine: str, word: int) -> None:
-    """isa.md §4.1, engines.md §10."""
+    """isa.md §4.1, engines.md §10: a debugger word stops the run; a continued run executes the next instruction."""
     rig = Rig(f"mov #7, w0\nbrk: .word {word}\nend: nop", engine)
     stop = rig.run()
     assert (stop.reason, stop.pc) == ("breakpoint", rig.labels["brk"])
@@ -258,7 +268,8 @@ def test_debugger_words_stop_the_run_and_fall_through(engine: str, word: int) ->
 
 
 def test_the_reset_instruction(engine: str) -> None:
-    """isa.md §11, §9, §14.6: RCON.SWR, core state as after reset, RAM kept; the GOTO at 0 takes two cycles."""
+    """isa.md §9, §11, §14.6: RESET sets RCON.SWR, resets the core state and keeps RAM; the GOTO at 0 takes two
+    cycles."""
     rig = Rig("mov #0x1234, w3\nmov w3, 0x1000\nreset\nagain: nop", engine)
     rig.machine.program.put_flash(0, [0x040000 | rig.labels["again"], 0])
     assert rig.cycles_to("again") == 3 + 2
@@ -271,7 +282,7 @@ def test_the_reset_instruction(engine: str) -> None:
 
 
 def test_a_run_may_go_on_over_faults(engine: str) -> None:
-    """isa.md §14.6: with `stop_on_fault` off the device just resets."""
+    """isa.md §14.6: with `stop_on_fault` off, a fault resets the device and the run continues."""
     rig = Rig("bad: .word 0x3F0000", engine)
     rig.machine.stop_on_fault = False
     rig.machine.program.put_flash(0, [0x040000 | START, 0])

@@ -1,4 +1,4 @@
-"""Flow rules: the generated code has the effect of the rules evaluated on numbers."""
+"""Flow rules: generated code has the same effect as the rules evaluated on numbers."""
 
 from __future__ import annotations
 
@@ -91,7 +91,7 @@ def test_a_repeat_that_is_counted_elsewhere_leaves_the_same_state(count: int) ->
 
 
 def eager(text: str, engine: str, **w: int) -> Rig:
-    """All native code is compiled before it runs."""
+    """Return a machine that compiles all code before it runs it."""
     rig = Rig(text, engine, **w)
     if isinstance(rig.machine.runner, JitEngine):
         rig.machine.runner.threshold, rig.machine.runner.wait = 1, True
@@ -100,7 +100,7 @@ def eager(text: str, engine: str, **w: int) -> Rig:
 
 @pytest.mark.parametrize(("last", "iterations"), [("clr 0x38", 1), ("dec 0x38", 3), ("mov w5, 0x38", 2)])
 def test_the_last_instruction_of_a_loop_may_write_its_counter(engine: str, last: str, iterations: int) -> None:
-    """isa.md §7.6: DCOUNT is read after the instruction at DOEND."""
+    """isa.md §7.6: DCOUNT is read after the instruction at DOEND, which may write it."""
     again = "btsc w0, #1\nclr w5\n"  # the second iteration writes 0
     rig = eager(f"do #5, last\ninc w0, w0\n{again}last: {last}\nend: nop", engine, w0=0, w5=3)
     rig.cycles_to()
@@ -109,7 +109,8 @@ def test_the_last_instruction_of_a_loop_may_write_its_counter(engine: str, last:
 
 
 def test_an_interrupt_that_the_last_instruction_of_a_loop_enables_comes_behind_it(engine: str) -> None:
-    """isa.md §14.3: a write to IEC counts at the boundary right after it."""
+    """isa.md §14.3: if the last instruction of a loop enables an interrupt by writing IEC, the interrupt is accepted
+    at the boundary after it."""
     text = """again: mov #0, w0
         bclr 0x8C, #3
         bset 0x84, #3
@@ -131,7 +132,8 @@ def test_an_interrupt_that_the_last_instruction_of_a_loop_enables_comes_behind_i
 
 
 def test_an_event_that_the_last_instruction_of_a_loop_brings_nearer_is_in_time(engine: str) -> None:
-    """engines.md §4.2: the timer's period is 30 from the first write on; its interrupt is on time."""
+    """engines.md §4.2: if the last instruction of a loop shortens a timer's period to 30, the timer's interrupt is on
+    time."""
     text = """mov #0x8000, w3
         mov w3, 0x104
         again: mov #1000, w1

@@ -1,4 +1,4 @@
-"""Snapshots contain the UART input that waits, however long it is: restore, time travel and fault campaigns."""
+"""Snapshots contain the pending UART input of any length: restore, time travel and fault campaigns."""
 
 from __future__ import annotations
 
@@ -47,12 +47,12 @@ ECHO = """
 BUFFER = 0x1000
 DATA = bytes((i * 7 + i // 251) & 255 for i in range(3 * CAPACITY))
 WHOLE = 600_000
-"""Cycles in which all of DATA arrives."""
+"""Number of cycles in which all of DATA arrives."""
 
 
 @pytest.fixture
 def program(tmp_path: Path) -> Path:
-    """A program that stores what UART1 receives."""
+    """Return a program that stores the input of UART1."""
     path = tmp_path / "receiver.elf"
     path.write_bytes(executable(RECEIVER))
     return path
@@ -70,7 +70,7 @@ def _received(machine: emu.Machine) -> bytes:
 
 
 def test_a_restored_machine_receives_all_input(program: Path) -> None:
-    """The snapshot is taken before the run, and restored in the same and in another machine."""
+    """A machine restored from a snapshot taken before the run, the same or another one, receives all pending input."""
     machine = _fed(program)
     state = machine.snapshot()
     machine.run(cycles=WHOLE)
@@ -86,7 +86,7 @@ def test_a_restored_machine_receives_all_input(program: Path) -> None:
 
 
 def test_restoring_an_earlier_snapshot_discards_later_input(program: Path) -> None:
-    """Input that was fed after the snapshot does not arrive after the restore."""
+    """Input fed after a snapshot does not arrive after its restore."""
     machine = emu.load(program, board=None)
     machine.run(cycles=100)
     state = machine.snapshot()
@@ -97,7 +97,7 @@ def test_restoring_an_earlier_snapshot_discards_later_input(program: Path) -> No
 
 
 def test_time_travel_keeps_the_waiting_input(program: Path) -> None:
-    """Back and forth leads to the same state, and the run continues as without time travel."""
+    """Running back and forth leads to the same state, and the run then continues as without time travel."""
     machine = _fed(program)
     history = History(machine)
     history.advance(300_000)
@@ -110,7 +110,7 @@ def test_time_travel_keeps_the_waiting_input(program: Path) -> None:
 
 
 def test_a_snapshot_with_damaged_input_is_refused(program: Path) -> None:
-    """The machine keeps its state."""
+    """A snapshot with damaged input is refused, and the machine keeps its state."""
     machine = _fed(program)
     state = machine.snapshot()
     with pytest.raises(ValueError, match="bytes"):
@@ -119,7 +119,7 @@ def test_a_snapshot_with_damaged_input_is_refused(program: Path) -> None:
 
 
 def test_trials_of_a_fault_campaign_keep_the_waiting_input(tmp_path: Path) -> None:
-    """A flipped bit of RAM does not change the output of a program that echoes and uses no RAM."""
+    """A flipped RAM bit does not change the output of a program that echoes its input and uses no RAM."""
     path = tmp_path / "echo.elf"
     path.write_bytes(executable(ECHO))
     campaign = Campaign(

@@ -15,7 +15,7 @@ PATIENCE = 3600
 
 
 class Client:
-    """Sends requests, waits for responses and stores events."""
+    """Client that sends requests, waits for responses and stores events."""
 
     def __init__(self, *words: str) -> None:
         command = [sys.executable, "-m", *(words or ("emu", "debug"))]
@@ -41,7 +41,7 @@ class Client:
             raise AssertionError("the adapter does not respond") from None
 
     def send(self, command: str, **arguments: Any) -> int:
-        """Send a request and return its number."""
+        """Send a request and return its sequence number."""
         self.seq += 1
         body = json.dumps({"seq": self.seq, "type": "request", "command": command, "arguments": arguments}).encode()
         assert self.process.stdin is not None
@@ -76,11 +76,11 @@ class Client:
             self.events.append(self._next())
 
     def said(self) -> str:
-        """Return the output so far."""
+        """Return the program's output so far."""
         return "".join(e["body"]["output"] for e in self.events if e["type"] == "event" and e["event"] == "output")
 
     def start(self, program: str, **arguments: Any) -> None:
-        """Initialize the adapter and launch a program."""
+        """Initialise the adapter and launch a program."""
         self.ask("initialize", clientID="test", adapterID="emu", pathFormat="path")
         self.ask("launch", program=program, **arguments)
         self.event("initialized")
@@ -91,7 +91,7 @@ class Client:
         return frame
 
     def evaluate(self, expression: str, context: str = "watch") -> str:
-        """Return the value of an expression in the innermost frame as text."""
+        """Return the value of an expression in the innermost frame, as text."""
         return str(self.ask("evaluate", expression=expression, context=context, frameId=self.top()["id"])["result"])
 
     def close(self) -> None:

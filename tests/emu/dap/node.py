@@ -1,4 +1,4 @@
-"""An independent client: the test-support package of the protocol from npm, run by mocha."""
+"""Independent client: the protocol's test-support package from npm, run by mocha."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ PACKAGES = ("@vscode/debugadapter-testsupport@1.68", "mocha@11")
 
 
 def node_modules(folder: Path) -> Path:
-    """Install the packages in `folder` and return their path; EMU_DAP_NODE_MODULES replaces it if set.
+    """Install the npm packages in `folder` and return their path, or return EMU_DAP_NODE_MODULES if it is set.
 
-    Skips the test if they cannot be installed.
+    Skips the test if the packages cannot be installed.
     """
     given = os.environ.get("EMU_DAP_NODE_MODULES")
     if given:
@@ -36,7 +36,7 @@ def node_modules(folder: Path) -> Path:
 
 
 def mocha(modules: Path, script: Path, **environment: str) -> str:
-    """Run the tests of a script, which must pass, and return their output."""
+    """Run the tests of a script, which must pass, and return the output."""
     given = {"NODE_PATH": str(modules), "EMU_PYTHON": sys.executable, "EMU_ROOT": str(ROOT), "PYTHONPATH": str(ROOT)}
     done = subprocess.run(
         ["node", str(modules / "mocha" / "bin" / "mocha.js"), str(script)],

@@ -1,5 +1,5 @@
-/* The library's scan of all analog inputs: microphones always, accelerometer and one infrared pair per 65 scans, the
-   pair's emitters on for five scans (epuck.md §5, "advance_ad_scan"). */
+/* The vendor library's scan of all analog inputs: microphones in every scan, the accelerometer and one infrared
+   pair once per 65 scans, with the pair's emitters on for five scans (epuck.md §5, "advance_ad_scan"). */
 #include <p30F6014A.h>
 #include <stdint.h>
 

@@ -1,11 +1,11 @@
-/* A program built on an agenda as the library has it (epuck.md §3, §6): T2 every 1,475 Tcy calls functions whose time has
-   come; both motors, an LED and the sampling of the remote control are entries of it. */
+/* A program built on an agenda like the vendor library's (epuck.md §3, §6): every 1,475 Tcy, T2 calls the
+   functions that are due. The entries drive both motors and an LED, and sample the remote control. */
 #include <p30F6014A.h>
 #include <stddef.h>
 #include <stdint.h>
 
 typedef struct entry {
-    uint16_t cycle, counter; /* cycle 0: off */
+    uint16_t cycle, counter; /* period in ticks, 0: off */
     char active;
     void (*function)(void);
     struct entry *next;
@@ -59,7 +59,7 @@ static void blink(void)
     LATAbits.LATA6 ^= 1;
 }
 
-/* RC-5: INT0 on the first falling edge, then the line is looked at in the middle of the first half of every bit. */
+/* RC-5: INT0 detects the first falling edge; then the line is sampled in the middle of the first half of every bit. */
 static entry remote;
 static uint8_t bit;
 static uint16_t collected;
@@ -68,7 +68,7 @@ static void look(void)
 {
     uint8_t level = (uint8_t)PORTFbits.RF6;
     if (bit == 0) {
-        if (level) { /* not a start bit */
+        if (level) { /* no start bit */
             noise++;
             remote.active = 0;
             IFS0bits.INT0IF = 0;
@@ -80,7 +80,7 @@ static void look(void)
         remote.cycle = 18;
         collected = (uint16_t)(collected << 1 | level);
     }
-    if (++bit == 14) { /* 24.6 ms: the last bit is over */
+    if (++bit == 14) { /* 24.6 ms: after the last bit */
         remote.active = 0;
         address = collected >> 6 & 31;
         command = collected & 63;

@@ -1,5 +1,5 @@
-/* A boot loader's life (dspic30f6014a.md §16): a greeting answered, rows of 32 instructions received on UART1, erased and
-   programmed, then a call into what was programmed; without a greeting it goes there at once. */
+/* A boot loader (dspic30f6014a.md §16): answers a greeting, receives rows of 32 instructions on UART1, erases and
+   programs them, then calls the programmed code; without a greeting it calls that code at once. */
 #include <p30F6014A.h>
 #include <stdint.h>
 
@@ -53,7 +53,7 @@ static void program(uint16_t row)
     operate(0x4001);
 }
 
-/* The function's address is no constant for the compiler; on this chip it is the program address itself. */
+/* The compiler does not treat the function's address as a constant; on this chip it is the program address. */
 static uint16_t call(uint16_t address)
 {
     uint16_t result;

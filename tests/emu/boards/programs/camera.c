@@ -7,7 +7,7 @@
 #define SKIPPED_LINES 1
 
 volatile uint8_t frame[WIDTH * HEIGHT * 2];
-uint8_t pattern[WIDTH * 4 + 1]; /* per byte on the bus: 1 store, 0 skip, 2 end of line */
+uint8_t pattern[WIDTH * 4 + 1]; /* action per bus byte: 1 store, 0 skip, 2 end of line */
 volatile uint8_t *volatile cursor = frame;
 volatile uint16_t lines_left = HEIGHT;
 volatile uint16_t id;

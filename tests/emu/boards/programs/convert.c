@@ -1,4 +1,4 @@
-/* The converter in whatever setting the test has put into variables; every interrupt may switch it off and on again. */
+/* Runs the ADC with settings that the test writes into variables; each interrupt may switch it off and on. */
 #include <p30F6014A.h>
 #include <stdint.h>
 

@@ -1,5 +1,5 @@
-/* Keeps a counter in the last EEPROM word (dspic30f6014a.md §16): read, erase, program, each told by a pin; a start finds what
-   a reset in the middle left. */
+/* Keeps a counter in the last EEPROM word (dspic30f6014a.md §16): reads, erases and programs it; a pin signals
+   each step. After a reset, the start-up code finds the state in which the reset interrupted a write. */
 #include <p30F6014A.h>
 #include <stdint.h>
 

@@ -1,4 +1,4 @@
-/* Polled I2C master as the vendor's library does it: every step waits for MI2CIF or gives up (dspic30f6014a.md §11). */
+/* Polled I2C master like the vendor library's: every step polls MI2CIF, with a time-out (dspic30f6014a.md §11). */
 #ifndef I2C_H
 #define I2C_H
 #include <p30F6014A.h>
@@ -40,7 +40,7 @@ static int i2c_stop(void)
     return i2c_wait();
 }
 
-/* True if the byte was acknowledged. */
+/* Returns true if the byte was acknowledged. */
 static int i2c_send(uint8_t byte)
 {
     I2CTRN = byte;
@@ -67,7 +67,7 @@ static inline int i2c_write_register(uint8_t device, uint8_t reg, uint8_t value)
     return acknowledged;
 }
 
-/* The library never looks at ACKSTAT: an absent device reads 0xFF (epuck.md §2). */
+/* The library does not check ACKSTAT, so an absent device reads 0xFF (epuck.md §2). */
 static uint8_t i2c_read_register(uint8_t device, uint8_t reg)
 {
     i2c_start();

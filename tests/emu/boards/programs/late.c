@@ -1,4 +1,4 @@
-/* Scans three channels and five in turn with the converter on all the time; one interrupt comes late. */
+/* Alternates scans of three and of five channels with the converter always on; one interrupt is delayed. */
 #include <p30F6014A.h>
 #include <stdint.h>
 
@@ -17,7 +17,7 @@ void __attribute__((interrupt, no_auto_psv)) _ADCInterrupt(void)
         seen[rounds][4] = ADCBUF4;
     }
     if (rounds == LATE_ROUND)
-        __asm__ volatile("repeat #1580\n nop"); /* three and a half conversions */
+        __asm__ volatile("repeat #1580\n nop"); /* delay of three and a half conversions */
     if (rounds & 1) {
         ADCSSL = 0x001C;
         ADCON2 = 0x0408;
@@ -31,7 +31,7 @@ void __attribute__((interrupt, no_auto_psv)) _ADCInterrupt(void)
 int main(void)
 {
     ADPCFG = 0;
-    ADCON3 = 0x1F13; /* the handler is done while the first input is sampled: 31 TAD */
+    ADCON3 = 0x1F13; /* 31 TAD of sampling: the handler ends while the first input is sampled */
     ADCSSL = 0x001C;
     ADCON2 = 0x0408;
     IEC0bits.ADIE = 1;

@@ -1,5 +1,5 @@
-/* The library's polled proximity driver (epuck.md §5): ambient, emitter on, 350 us, lit; all eight sensors, one round
-   per command byte on UART2. */
+/* The vendor library's polled proximity driver (epuck.md §5): converts without light, turns the emitter on, waits
+   350 us, converts again. A command byte on UART2 starts one round over all eight sensors. */
 #include <p30F6014A.h>
 #include <stdint.h>
 

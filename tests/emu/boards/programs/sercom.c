@@ -1,5 +1,5 @@
-/* Interrupt-driven UART as the library's (dspic30f6014a.md §10): UTXISEL = 1, the first character by hand, the rest from the
-   ISR; OERR cleared on every entry. On it binary commands of the robot's protocol (epuck.md §6): letter negated, little endian. */
+/* Interrupt-driven UART like the vendor library's (dspic30f6014a.md §10): UTXISEL = 1, main writes the first character,
+   the ISR the others; each ISR entry clears OERR. Binary commands (epuck.md §6): letter negated, little endian. */
 #include <p30F6014A.h>
 #include <stdint.h>
 #include <stdio.h>

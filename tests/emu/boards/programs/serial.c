@@ -1,4 +1,4 @@
-/* Echoes what arrives on UART1 and counts what is wrong with it (dspic30f6014a.md §10.2). */
+/* Echoes characters of UART1 and counts receive errors (dspic30f6014a.md §10.2). */
 #include <p30F6014A.h>
 #include <stdint.h>
 
@@ -23,7 +23,7 @@ int main(void)
             framing_errors++;
         else
             U1TXREG = byte;
-        if (byte == 's') /* sleep on the job */
+        if (byte == 's') /* delay, so that the FIFO overruns */
             for (volatile uint16_t i = 0; i < 2000; i++) {
             }
     }

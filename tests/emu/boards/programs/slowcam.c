@@ -1,11 +1,11 @@
-/* The library's slow camera driver (epuck.md §7.3, §7.5) for the PO3030K: T1 counts the pixel clock, T4 HREF, T5 VSYNC; one
-   interrupt per byte, 64 Tcy apart. All registers are written over I2C with its interrupt. Grey, 40 x 40, zoom 8, centred. */
+/* The library's slow camera driver (epuck.md §7.3, §7.5) for the PO3030K: T1 counts the pixel clock, T4 HREF, T5 VSYNC;
+   an interrupt per byte, every 64 Tcy. Interrupt-driven I2C writes the registers. Grey, 40 x 40, zoom 8, centred. */
 #include <p30F6014A.h>
 #include <stdint.h>
 
 #define WIDTH 40
 #define HEIGHT 40
-#define ZOOM 2 /* beyond quarter size */
+#define ZOOM 2 /* software zoom in addition to the sensor's quarter size */
 
 volatile uint8_t frame[WIDTH * HEIGHT];
 volatile uint16_t id, row, column, done, skip;
@@ -63,7 +63,7 @@ static uint8_t i2c_read(uint8_t reg)
     return value;
 }
 
-/* A byte: every ZOOM-th is kept. */
+/* Byte interrupt: keeps every ZOOM-th byte. */
 void __attribute__((interrupt, no_auto_psv)) _T1Interrupt(void)
 {
     IFS0bits.T1IF = 0;
@@ -83,7 +83,7 @@ void __attribute__((interrupt, no_auto_psv)) _T1Interrupt(void)
     skip--;
 }
 
-/* A row: T1 would only count from the second byte on, so the first one is taken by hand. */
+/* Row interrupt: reads the first byte itself, because T1 only counts from the second byte on. */
 void __attribute__((interrupt, no_auto_psv)) _T4Interrupt(void)
 {
     IFS1bits.T4IF = 0;

@@ -1,5 +1,5 @@
-/* The library's way to make sound (epuck.md §6, dspic30f6014a.md §14): codec out of reset, control words in secondary frames,
-   then blocks of four samples from constant memory at every DCI interrupt. */
+/* Sound as in the vendor library (epuck.md §6, dspic30f6014a.md §14): releases the codec from reset, sends control
+   words in secondary frames, then sends four samples from constant memory at every DCI interrupt. */
 #include <p30F6014A.h>
 #include <stdint.h>
 
@@ -19,7 +19,7 @@ void __attribute__((interrupt, no_auto_psv)) _DCIInterrupt(void)
     unused = RXBUF2;
     unused = RXBUF3;
     (void)unused;
-    if (setting < 6) { /* a primary word that asks for a secondary frame, and the control word in it */
+    if (setting < 6) { /* a primary word that requests a secondary frame, then the control word */
         TXBUF0 = 0x7FFF;
         TXBUF1 = (uint16_t)(settings[setting][0] << 8 | settings[setting][1]);
         TXBUF2 = 0;

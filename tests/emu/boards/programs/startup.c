@@ -1,4 +1,4 @@
-/* What the vendor's programs do first (epuck.md §2, §6, §7.1): reset causes, ports, probes, selector, banner, EEPROM. */
+/* Start-up of the vendor's programs (epuck.md §2, §6, §7.1): reset causes, ports, probes, selector, banner, EEPROM. */
 #include "i2c.h"
 
 volatile uint16_t camera_id, accelerometer_id, selector, eeprom_word, ports_ok, battery_ok, remote_idle;

@@ -1,5 +1,5 @@
-/* Both motors from one timer: an interrupt every PR3 + 1 = 14,746 Tcy; the left wheel steps forward at each, the right
-   wheel backward at every third. Bits are written one by one, as the library does (epuck.md §3). */
+/* Both motors on one timer: each interrupt, every PR3 + 1 = 14,746 Tcy, steps the left wheel forward, each third one
+   the right wheel backward. Bits are written one by one, as in the vendor library (epuck.md §3). */
 #include <p30F6014A.h>
 #include <stdint.h>
 
