@@ -1,7 +1,7 @@
-"""Compile C programs with the driver and run them on the emulator, in this process.
+"""Compiles C programs with the driver and runs them on the emulator, in this process.
 
-The result of a program is its exit status, which it leaves when it sleeps after `main` or `exit`. Any other end is a
-failure with a reason.
+The result of a program is its exit status, which is available when it sleeps after `main` or `exit`. Any other end
+is a failure with a reason.
 """
 
 from __future__ import annotations
@@ -21,21 +21,24 @@ INTCON1_TRAPS = {1: "oscillator", 2: "stack error", 3: "address error", 4: "math
 
 @dataclass(frozen=True)
 class Built:
-    """Exit status and stderr of the driver."""
+    """Exit status and stderr output of the driver."""
 
     status: int
     messages: str
 
     @property
     def first_error(self) -> str:
-        """The first line with an error."""
+        """Return the first message line that contains an error, otherwise the first line."""
         lines = [line for line in self.messages.splitlines() if "error" in line]
         return lines[0] if lines else self.messages.strip().splitlines()[0] if self.messages.strip() else "no message"
 
 
 @dataclass(frozen=True)
 class Ran:
-    """Result of a run: `status` is W0 after a normal end, otherwise None; `why` is the reason of another end."""
+    """Result of a run.
+
+    `status` is W0 after a normal end, otherwise None. `why` is the reason of any other end.
+    """
 
     status: int | None
     why: str
@@ -44,17 +47,17 @@ class Ran:
 
 
 class FrontEndOnce:
-    """Front end that caches the IR of a program, for tests that build it in several ways.
+    """Front end that caches the IR of a program, for tests that build it in several modes.
 
     The IR depends on the sources, the level and the C options, but not on -fno-lto or the name of the output. The
-    sources must not change meanwhile. Diagnostics are printed once.
+    sources must not change between the builds. Diagnostics are printed once.
     """
 
     def __init__(self) -> None:
         self._made: dict[str, dict[Input, bytes]] = {}
 
     def __call__(self, options: CcOptions, scratch: Path) -> dict[Input, bytes]:
-        """Replacement of `driver.front_end`."""
+        """Replace `driver.front_end`: return cached IR, or compile."""
         assert not options.dependency, "a dependency file names the output"
         key = repr(replace(options, lto=None, output=None))
         if key not in self._made:
@@ -63,7 +66,7 @@ class FrontEndOnce:
 
 
 def build(sources: list[Path], output: Path, *options: str, front: driver.FrontEnd | None = None) -> Built:
-    """Run `python -m toolchain cc options sources -o output` in this process; `front` as for `driver.main`."""
+    """Run `python -m toolchain cc options sources -o output` in this process; `front` replaces the front end."""
     said = io.StringIO()
     with contextlib.redirect_stderr(said), contextlib.redirect_stdout(said):
         status = driver.main([*options, *map(str, sources), "-o", str(output)], front=front)
@@ -71,7 +74,7 @@ def build(sources: list[Path], output: Path, *options: str, front: driver.FrontE
 
 
 def run(image: Path, cycles: int = 30_000_000, engine: str = "auto", native_after: int | None = None) -> Ran:
-    """Run an image for at most `cycles` Tcy; after `native_after` Tcy it continues as native code."""
+    """Run an image for at most `cycles` Tcy, in the interpreter first and with the JIT after `native_after` Tcy."""
     machine = emu.load(image, engine=engine)
     said = bytearray()
     machine.uart[1].on_byte = lambda byte, cycle: said.append(byte)
@@ -94,7 +97,7 @@ def run(image: Path, cycles: int = 30_000_000, engine: str = "auto", native_afte
 
 
 def run_both(folder: Path, level: str, c_text: str, s_text: str) -> int:
-    """Exit status of a program of one C and one assembly file."""
+    """Return the exit status of a program that consists of a C and an assembly file."""
     (folder / "a.c").write_text(c_text)
     (folder / "b.s").write_text("        .section .text,code\n" + s_text)
     built = build([folder / "a.c", folder / "b.s"], folder / "a.elf", level, "-std=gnu11", "-Wall")

@@ -1,4 +1,4 @@
-"""Compilation of C text to LLVM IR and assembly, for tests of generated code."""
+"""Compiles C text to LLVM IR and to assembly, for tests of generated code."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ TWO_WORDS = re.compile(r"\t(call|goto) [^w]")
 
 
 def llvm(source: str, level: str = "s", *flags: str) -> str:
-    """Optimised LLVM IR of a C text."""
+    """Return the optimised LLVM IR of a C text."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "unit.c"
         path.write_text(source)
@@ -31,17 +31,17 @@ def llvm(source: str, level: str = "s", *flags: str) -> str:
 
 
 def assembly(source: str, level: str = "s", **options: bool) -> str:
-    """Assembly of a C text; options are those of `BackendOptions`."""
+    """Return the assembly of a C text; options are those of `BackendOptions`."""
     flags = ["-g"] if options.get("debug") else []
     return compile_module(llvm(source, level, *flags), BackendOptions(level=level, **options))
 
 
 def body(text: str, function: str) -> list[str]:
-    """Instructions of one function, without labels and directives."""
+    """Return the instructions of one function, without labels and directives."""
     lines = text.split(f"_{function}:\n", 1)[1].split("\t.size", 1)[0].split("\n")
     return [line.strip() for line in lines if line.startswith("\t") and not line.startswith("\t.")]
 
 
 def words(text: str, function: str) -> int:
-    """Size of one function in program words."""
+    """Return the size of one function in program words."""
     return sum(2 if TWO_WORDS.match("\t" + line) else 1 for line in body(text, function))

@@ -20,7 +20,7 @@ VECTORS = Path(__file__).resolve().parents[1] / "vectors"
 
 @pytest.fixture(scope="session")
 def vectors() -> Path:
-    """Folder of recorded vectors, a part of the repository."""
+    """Return the folder of recorded vectors, which is part of the repository."""
     return VECTORS
 
 
@@ -29,29 +29,32 @@ class Assembled:
 
     def __init__(self, obj: ObjectFile, messages: list[str]) -> None:
         self.object = obj
-        self.messages = messages  # of .print and warnings
+        self.messages = messages  # messages of .print and warnings
         self.sections = {s.name: s for s in obj.sections}
         self.symbols = {s.name: s for s in obj.symbols}
 
     def words(self, section: str = ".text") -> list[int]:
-        """Program words of a code section."""
+        """Return the program words of a code section."""
         data = self.sections[section].data
         return [int.from_bytes(data[i : i + 4], "little") for i in range(0, len(data), 4)]
 
     def bytes(self, section: str) -> bytes:
-        """Bytes of a data section, without the phantoms, which must be 0."""
+        """Return the bytes of a data section; assert that the phantom octets are 0."""
         data = self.sections[section].data
         assert not any(data[1::2])
         return bytes(data[::2])
 
     def relocs(self, section: str = ".text") -> list[tuple[int, int, str]]:
-        """(octet offset, type, symbol)."""
+        """Return the relocations of a section as (octet offset, type, symbol)."""
         return [(r.offset, r.type, r.symbol.name) for r in self.sections[section].relocs]
 
 
 @pytest.fixture(scope="session")
 def asm() -> Callable[..., Assembled]:
-    """Assemble text; the object goes through its file form, so every test also covers writer and reader."""
+    """Function that assembles text and reads the object back from its file form.
+
+    Every test thus also covers the ELF writer and reader.
+    """
 
     def run(text: str, **options: object) -> Assembled:
         obj, messages = assemble(text, "test.s", Options(**options))  # type: ignore[arg-type]
@@ -73,11 +76,11 @@ class Image:
                     self.flash[section.load + i // 2] = int.from_bytes(section.data[i : i + 4], "little")
 
     def sections(self, name: str) -> list[Section]:
-        """Output sections of that name."""
+        """Return the output sections with a name."""
         return [s for s in self.linked.image.sections if s.name == name]
 
     def words(self, symbol: str, count: int) -> list[int]:
-        """Flash words from a symbol on."""
+        """Return flash words from a symbol on."""
         return [self.flash[self.symbols[symbol] + 2 * i] for i in range(count)]
 
 
@@ -86,7 +89,7 @@ START = "\n .global __reset\n .text\n__reset:\n nop\n"
 
 @pytest.fixture(scope="session")
 def image() -> Callable[..., Image]:
-    """Assemble sources (a minimal `__reset` is added when none defines it) and link them."""
+    """Function that assembles and links sources; it adds a minimal `__reset` if none is defined."""
 
     def run(*sources: str, **options: object) -> Image:
         texts = list(sources)

@@ -1,12 +1,17 @@
-"""Compile and run a folder of C tests, each of which must exit 0: `python tests/toolchain/run_c_tests.py DIR`.
+"""Compile and run a folder of C tests that must exit with 0: `python tests/toolchain/run_c_tests.py DIR`.
 
-Made for GCC's c-torture `execute` directory, but takes any folder. Prints every failure and skip with its reason, then
-the counts. Exit status 0 when nothing failed. What is skipped:
-- what the front end refuses for a reason in SKIP_RULES, and what does not fit into the device's memory;
-- of what fails: what a dg- directive excludes that GCC's own harness obeys; what is undefined for 16-bit int, as
-  clang's sanitizer, clang's warning about uninitialised variables or the division trap prove; and the few programs
-  named in EXPECTATIONS, each with what it expects.
-Programs that check which library calls GCC folds away are compiled without __OPTIMIZE__: then they check results only.
+The runner was written for GCC's c-torture `execute` directory, but takes any folder. It prints every failure and every
+skip with its reason, and then the counts. The exit status is 0 if no test failed.
+
+A test that does not compile is skipped if SKIP_RULES gives a reason, or if it exceeds the device's memory. A failing
+test is skipped if one of these conditions holds:
+
+- A dg- directive that GCC's harness obeys excludes it.
+- Its behaviour is undefined with 16-bit int, as clang's sanitizer, clang's warning about uninitialised variables or the
+  division trap proves.
+- EXPECTATIONS lists it together with the property of GCC that it expects.
+
+Tests that check which library calls GCC folds are compiled without __OPTIMIZE__ and then check results only.
 """
 
 from __future__ import annotations
@@ -27,12 +32,12 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 from tests.toolchain.c_programs import Built, Ran, build, run
 
 STACK_SIZE = 5000
-"""Bytes of stack a test may count on; GCC's tests read it as a macro and shrink their arrays."""
+"""Stack bytes available to a test. GCC's tests read this macro and shrink their arrays accordingly."""
 
 HEAP_SIZE = 3200
 WALL_SECONDS = 100
 SHORT = 3_000_000
-"""Cycles after which the compiling engine takes over: short runs start faster in the interpreter."""
+"""Cycles run by the interpreter before the JIT continues: short runs start faster in the interpreter."""
 
 FLAGS = ["-std=gnu17", "-w", f"-DSTACK_SIZE={STACK_SIZE}", "-DNO_TRAMPOLINES", "-DSIGNAL_SUPPRESS",
 
@@ -45,7 +50,7 @@ KNOWN_OPTION = re.compile(
     r"-(fwrapv|fno-builtin.*|fgnu89-inline|std=.*|D.*|f(un)?signed-char|fno-strict-aliasing|fms-extensions|finstrument-functions)"
 )
 
-# dg-require-effective-target names that this target does not fulfil, with the reason.
+# dg-require-effective-target names that this target does not fulfil, with the reason
 ABSENT_TARGETS = {
     "int32plus": "needs 32-bit int", "int32": "needs 32-bit int", "size32plus": "needs objects above 64 kB",
     "ptr32plus": "needs 32-bit pointers", "size20plus": "needs objects above 64 kB", "trampolines": "nested functions",
@@ -55,7 +60,7 @@ ABSENT_TARGETS = {
 }  # fmt: skip
 SIXTEEN_BIT_TARGETS = re.compile(r"\b(avr|msp430|xstormy16|pdp11|rl78|h8300)[-*]")
 
-# Messages of the C front end that mean: this program uses what the target or clang does not have.
+# messages of the C front end for features that the target or clang lacks, with the reason of the skip
 SKIP_RULES = [
     (r"function definition is not allowed here|nested function|'auto' storage class", "GNU nested functions"),
     (r"variable.* has incomplete type|size of array|array is too large|array size", "object larger than 64 kB or RAM"),
@@ -82,7 +87,7 @@ SKIP_RULES = [
      r"|must return a value|not assignable|expected|requires|cannot|duplicate case|flexible array|invalid|typeof|enum",
      "code clang rejects"),
 ]  # fmt: skip
-# Refusals of the back end that are GNU extensions and not C.
+# messages of the back end for GNU extensions
 UNSUPPORTED_RULES = [
     (r"vector type|(extract|insert)element|shufflevector", "GNU vector types"),
     (r"builtin function __builtin_", "GCC builtin that clang does not have"),
@@ -101,14 +106,14 @@ EXPECTATIONS = {
     "pr64242": "checks that __builtin_setjmp takes nothing from the stack",
     "strstr-asm": "expects an asm label to rename the builtin function too",
 }
-"""Tests that fail because of something that is neither C nor a documented extension of clang."""
+"""Tests that expect something beyond C and clang's documented extensions."""
 
 MEMORY = re.compile(r"does not fit|no room for the stack|overflow|largest symbols|must be less than 8192|bytes too")
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """Result of one test at one level: `kind` is passed, failed or skipped."""
+    """Result of one test at one level; `kind` is passed, failed or skipped."""
 
     test: str
     level: str
@@ -117,7 +122,7 @@ class Verdict:
 
 
 def directive_skip(source: str) -> str | None:
-    """Reason why a dg- directive excludes this test on a 16-bit machine, or None."""
+    """Return the reason for which a dg- directive excludes this test on a 16-bit machine, or None."""
     for name in re.findall(r"dg-require-effective-target\s+([\w-]+)", source):
         reason = ABSENT_TARGETS.get(name)
         if reason:
@@ -134,7 +139,7 @@ def directive_skip(source: str) -> str | None:
 
 
 def options_of(path: Path, source: str) -> list[str]:
-    """Options of dg- directives and of a .x file beside the test, without GCC's optimiser switches."""
+    """Return the options of dg- directives and of the test's .x file, without switches of GCC's optimiser."""
     words = ["-fno-lto"] if "externally_visible" in source else []
     beside = path.with_suffix(".x")
     if beside.exists():
@@ -146,23 +151,23 @@ def options_of(path: Path, source: str) -> list[str]:
 
 
 def sources_of(path: Path) -> list[Path]:
-    """The file, and in GCC's `builtins` folder also its library functions and the common main."""
+    """Return the source files: the test and, in GCC's `builtins` folder, its library functions and the common main."""
     main = path.parent / "lib" / "main.c"
     return [path, path.with_name(f"{path.stem}-lib.c"), main] if main.exists() else [path]
 
 
 def is_test(path: Path) -> bool:
-    """Whether a file is a test and not a part of another one."""
+    """Whether a file is a test of its own and not part of another test."""
     return not path.stem.endswith("-lib") and path.parent.name != "lib"
 
 
 def heap_of(source: str) -> list[str]:
-    """Linker option that gives a heap to programs that allocate."""
+    """Return the linker option that provides a heap if the program allocates memory."""
     return [f"-Wl,--heap={HEAP_SIZE}"] if re.search(r"malloc|calloc|realloc", source) else []
 
 
 def judge(path: Path, level: str, cycles: int) -> Verdict:
-    """Compile and run one test."""
+    """Compile and run one test and return the verdict."""
     source = path.read_text(encoding="latin-1")
     excluded = directive_skip(source)
     with tempfile.TemporaryDirectory(prefix="ctest-") as folder:
@@ -188,13 +193,13 @@ def compile_test(path: Path, source: str, image: Path, level: str, *more: str) -
 
 
 def run_test(image: Path, cycles: int) -> Ran:
-    """Run one test: in the interpreter first, then as native code."""
+    """Run one test, in the interpreter first and then with the JIT."""
     result = run(image, SHORT, engine="auto")
     return run(image, cycles) if result.why.startswith("limit") and cycles > SHORT else result
 
 
 def refusal(built: Built) -> tuple[str, str]:
-    """Kind and reason of a test that does not compile."""
+    """Return kind and reason of the verdict on a test that does not compile."""
     if built.status == 1:
         for pattern, why in SKIP_RULES:
             if re.search(pattern, built.first_error):
@@ -207,7 +212,10 @@ def refusal(built: Built) -> tuple[str, str]:
 
 
 def excuse(path: Path, source: str, result: Ran, image: Path) -> str | None:
-    """Reason to skip a test that did not exit with 0: undefined behaviour, or an expectation of GCC's behaviour."""
+    """Return the reason to skip a test that did not exit with 0, or None.
+
+    Reasons are undefined behaviour and expectations of GCC's behaviour.
+    """
     if path.stem in EXPECTATIONS:
         return EXPECTATIONS[path.stem]
     if result.why == "trap: stack error":
@@ -242,7 +250,7 @@ def _judge(work: tuple[Path, str, int]) -> Verdict:
 
 
 def main() -> int:
-    """Run the command line."""
+    """Run the command line and return the exit status."""
     parser = argparse.ArgumentParser(
         description=__doc__,
         formatter_class=argparse.RawDescriptionHelpFormatter,

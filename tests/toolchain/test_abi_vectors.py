@@ -1,9 +1,12 @@
-"""Every vector of tests/vectors/abi.csv, on the caller's and on the callee's side (abi-elf.md §2.2, §2.3).
+"""All vectors of tests/vectors/abi.csv, as caller and as callee (abi-elf.md §2.2, §2.3).
 
-Caller: a compiled function passes objects of random bytes; at the entry of the called function each is found where the
-vector says, and the result given back there arrives. Callee: entered with random registers and stack, it copies its
-parameters out, which must be the bytes of their places, and returns a known object. `double` of the vectors has 4
-bytes, which here is `float`; where promotion would widen that, `long`, which travels alike.
+As caller, a compiled function passes objects of random bytes. At the entry of the called function each object must be
+at the vector's location, and the result that is put at its location must arrive. As callee, a compiled function starts
+with random registers and stack, copies its parameters, which must equal the bytes at the vector's locations, and
+returns a known object.
+
+`double` of the vectors has 4 bytes, which is `float` here. Where promotion would widen it, the test uses `long`,
+which has the same location.
 """
 
 from __future__ import annotations
@@ -21,7 +24,7 @@ from tests.toolchain.c_programs import build
 
 BATCH = 64
 ENTRY, BACK = "_arrived", "_sentinel"
-STACK_BYTES = 96  # more than any vector has on the stack
+STACK_BYTES = 96  # more than any vector uses
 SCALAR_DOUBLE = re.compile(r"(?<!long )double")
 STUB = "\n".join([" .text", " .global _arrived,_sentinel", "{labels}", "_arrived: nop", " return", "_sentinel: nop",
                   " bra _sentinel"])  # fmt: skip
@@ -29,7 +32,10 @@ STUB = "\n".join([" .text", " .global _arrived,_sentinel", "{labels}", "_arrived
 
 @dataclass(frozen=True)
 class Vector:
-    """One signature: types, sizes and locations of the arguments and the result; unnamed arguments start at `named`."""
+    """One signature: types, sizes and locations of the arguments and the result.
+
+    Variadic arguments start at index `named`.
+    """
 
     number: int
     types: list[str]
@@ -43,7 +49,7 @@ class Vector:
 
 
 def read(path: Path) -> list[Vector]:
-    """All vectors of the file."""
+    """Return all vectors of the file."""
     rows: dict[int, list[dict[str, str]]] = {}
     for row in csv.DictReader(path.open()):
         rows.setdefault(int(row["id"]), []).append(row)
@@ -78,7 +84,7 @@ def _parameters(v: Vector) -> str:
 
 
 def caller_source(v: Vector) -> str:
-    """C text: objects for the arguments and the result, and the function with the call."""
+    """Return C source of the objects for the arguments and the result, and of the function that makes the call."""
     objects = [f"{_type(v, k)} a{v.number}_{k};" for k in range(len(v.types))]
     call = f"f{v.number}({', '.join(f'a{v.number}_{k}' for k in range(len(v.types)))})"
     if v.result != "void":
@@ -90,7 +96,7 @@ def caller_source(v: Vector) -> str:
 
 
 def callee_source(v: Vector) -> str:
-    """C text: the function that copies its arguments out and returns an object."""
+    """Return C source of the function that copies its arguments and returns an object."""
     lines = [f"{_type(v, k)} b{v.number}_{k};" for k in range(len(v.types))]
     body = [f"b{v.number}_{k} = p{k};" for k in range(len(v.types) if v.named is None else v.named)]
     if v.named is not None:
@@ -118,7 +124,7 @@ class Bench:
         self.top = self.machine.w[15] + STACK_BYTES + 64
 
     def enter(self, function: str) -> None:
-        """Random registers and stack, then the function's first instruction with a return address pushed."""
+        """Fill registers and stack with random values, push a return address and start the function."""
         m = self.machine
         for k in range(STACK_BYTES // 2):
             m.poke(self.top - STACK_BYTES + 2 * k, self.rng.randrange(0x10000))
@@ -131,14 +137,14 @@ class Bench:
         m.pc = m.program_address(function)
 
     def fill(self, name: str, size: int) -> bytes:
-        """Random bytes into an object."""
+        """Fill an object with random bytes."""
         data = self.rng.randbytes(size)
         for k, byte in enumerate(data):
             self.machine.poke(self.machine.address_of(name) + k, byte, 1)
         return data
 
     def at(self, place: str, size: int) -> bytes:
-        """Bytes of an argument at the present instruction, the first of the called function."""
+        """Return the bytes of an argument at the first instruction of the called function."""
         if place == "none" or not size:
             return b""
         if place.startswith("stack"):
@@ -148,7 +154,7 @@ class Bench:
         return b"".join(w.to_bytes(2, "little") for w in words)[:size]
 
     def call(self, v: Vector) -> str:
-        """What is wrong on the caller's side, "" for nothing."""
+        """Check the caller's side; return a description of the first error, or ""."""
         given = [self.fill(f"_a{v.number}_{k}", size) for k, size in enumerate(v.sizes)]
         self.enter(f"_c{v.number}")
         if self.machine.run(20_000, until=ENTRY).reason != "until":
@@ -163,7 +169,7 @@ class Bench:
         return "" if self.machine.w[15] == self.top - 4 else "caller: the stack is not balanced"
 
     def give(self, v: Vector) -> bytes:
-        """Put a random result where the vector says."""
+        """Put a random result at the vector's location."""
         data, m = self.rng.randbytes(v.result_size), self.machine
         if v.result_place == "memory":
             for k, byte in enumerate(data):
@@ -174,7 +180,10 @@ class Bench:
         return data
 
     def receive(self, v: Vector, where: int) -> str:
-        """What is wrong on the callee's side. `where` is free memory for a result in memory."""
+        """Check the callee's side; return a description of the first error, or "".
+
+        `where` is free memory for a result in memory.
+        """
         result = self.fill(f"_s{v.number}", v.result_size) if v.result != "void" else b""
         self.enter(f"_g{v.number}")
         if v.result_place == "memory":
@@ -195,7 +204,7 @@ class Bench:
 @pytest.mark.parametrize("level", ["-O0", "-Os"])
 @pytest.mark.parametrize("side", ["caller", "callee"])
 def test_every_vector_of_the_calling_convention(side: str, level: str, vectors: Path, tmp_path: Path) -> None:
-    """All rows of tests/vectors/abi.csv."""
+    """Compiled callers and callees use the locations of every row of tests/vectors/abi.csv."""
     every = read(vectors / "abi.csv")
     types = SCALAR_DOUBLE.sub("float", (vectors / "abi.h").read_text())
     wrong: dict[int, str] = {}

@@ -1,4 +1,4 @@
-"""Accumulator variables and DSP builtins as XC16 has them (abi-elf.md §2.9)."""
+"""Accumulator variables and DSP builtins, compatible with XC16 (abi-elf.md §2.9)."""
 
 from __future__ import annotations
 
@@ -110,7 +110,7 @@ def test_an_interrupt_function_keeps_the_accumulators_it_uses(level: str, lto: s
 
 
 def test_a_tap_takes_one_instruction(tmp_path: Path) -> None:
-    """The loop of `dot`: MAC with both prefetches, and nothing moved around it."""
+    """A filter tap takes one instruction: the loop of `dot` is MAC with both prefetches."""
     (tmp_path / "a.c").write_text(PROGRAM)
     assert build([tmp_path / "a.c"], tmp_path / "a.s", "-Os", "-S").status == 0
     text = (tmp_path / "a.s").read_text()
@@ -143,7 +143,7 @@ def test_misuse_names_its_line(statement: str, tmp_path: Path) -> None:
 
 
 def test_a_structure_chosen_by_a_branch_is_a_value_like_others(tmp_path: Path) -> None:
-    """Two asm statements with several results meet in one phi of a structure; that was refused once."""
+    """A structure may be chosen by a branch: two asm statements with several results meet in one phi."""
     source = r"""
     volatile int c = 1;
     int main(void)

@@ -1,4 +1,4 @@
-"""XC16's register letters in inline assembly, and what is refused of it."""
+"""Register letters of XC16 in inline assembly, and refused uses."""
 
 from __future__ import annotations
 
@@ -36,7 +36,8 @@ int main(void) { return f(five, seven); }
 @pytest.mark.parametrize("letter", sorted(CLASSES))
 @pytest.mark.parametrize("level", ["-O0", "-Os"])
 def test_a_letter_is_a_register_of_its_class(letter: str, level: str, tmp_path: Path) -> None:
-    """XC16 User's Guide, "register letters supported by the compiler"."""
+    """Each constraint letter selects a register of its class (XC16 User's Guide, "register letters supported by the
+    compiler")."""
     (tmp_path / "one.c").write_text(ONE % {"letter": letter})
     built = build([tmp_path / "one.c"], tmp_path / "one.s", level, "-S", "-fno-lto")
     assert built.status == 0, built.messages
@@ -50,7 +51,7 @@ def test_a_letter_is_a_register_of_its_class(letter: str, level: str, tmp_path: 
 
 @pytest.mark.parametrize("level", ["-O0", "-O1", "-Os", "-O2"])
 def test_letters_of_several_operands(level: str, tmp_path: Path) -> None:
-    """Named operands, one that is read and written, two of one class."""
+    """Letters work for named operands, read-write operands and two operands of one class."""
     (tmp_path / "several.c").write_text(SEVERAL)
     built = build([tmp_path / "several.c"], tmp_path / "several.elf", level)
     assert built.status == 0, built.messages

@@ -1,7 +1,7 @@
-"""The calling convention of abi-elf.md §2, arguments rule by rule: C calls assembly and assembly calls C.
+"""Argument rules of the calling convention (abi-elf.md §2): C calls assembly, and assembly calls C.
 
-From each row of SIGNATURES a C caller, an assembly callee that records registers and stack, an assembly caller and a C
-callee that checks its parameters are generated; all rows run in one image per level.
+Each row of SIGNATURES generates a C caller, an assembly callee that records registers and stack, an assembly caller,
+and a C callee that checks its parameters. All rows run in one image per level.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ NARROW = ("char", "unsigned char")
 
 @dataclass(frozen=True)
 class Signature:
-    """Parameter types, and for each its first register or "stack"; `rule` cites abi-elf.md §2.2."""
+    """Parameter types, with the first register or "stack" for each; `rule` cites abi-elf.md §2.2."""
 
     rule: str
     types: tuple[str, ...]
@@ -74,14 +74,14 @@ SIGNATURES = [
 
 
 def words_of(index: int, type_name: str) -> list[int]:
-    """Distinct test words of argument `index`; narrow arguments use the low byte only."""
+    """Return distinct test words of argument `index`; narrow arguments use the low byte only."""
     if type_name in NARROW:
         return [0x11 + index]
     return [(0x1000 * (index % 7 + 1) + 0x0101 * index + 0x13 * k) & 0x7FFF for k in range(WORDS[type_name])]
 
 
 def initialiser(index: int, type_name: str) -> str:
-    """C statements that build argument `index` in variable `v{index}` from its words."""
+    """Return C statements that build argument `index` in variable `v{index}` from its words."""
     words = ", ".join(map(hex, words_of(index, type_name)))
     if type_name in NARROW:
         return f"{type_name} v{index} = {words};"
@@ -92,7 +92,7 @@ def initialiser(index: int, type_name: str) -> str:
 
 
 def stack_offsets(signature: Signature) -> dict[int, list[int]]:
-    """For each stack argument the distance of its words below W15 at the callee's entry (abi-elf.md §2.4)."""
+    """Return for each stack argument how far its words lie below W15 at the callee's entry (abi-elf.md §2.4)."""
     offsets = {}
     below = 4  # the return address
     for index, (type_name, place) in enumerate(zip(signature.types, signature.places, strict=True)):
@@ -103,7 +103,7 @@ def stack_offsets(signature: Signature) -> dict[int, list[int]]:
 
 
 def c_source(number: int, signature: Signature) -> str:
-    """The C half of one row: caller of the assembly probe, and callee for the assembly caller."""
+    """Return the C half of one row: the caller of the assembly probe, and the callee of the assembly caller."""
     count = len(signature.types)
     parameters = ", ".join(f"{t} p{i}" for i, t in enumerate(signature.types))
     setup = "\n    ".join(initialiser(i, t) for i, t in enumerate(signature.types))
@@ -140,14 +140,14 @@ int callee_{number}({parameters})
 
 
 def assembly_source(number: int, signature: Signature) -> str:
-    """The assembly half: a probe that records what it got, and a caller that loads everything by the rules."""
+    """Return the assembly half of one row: a probe that records its arguments, and a caller that follows the rules."""
     lines = [f"        .global _probe_{number}", f"_probe_{number}:", "        bra _record"]
     lines += [f"        .global _call_{number}", f"_call_{number}:"]
     stack = [(i, t) for i, (t, p) in enumerate(zip(signature.types, signature.places, strict=True)) if p == STACK]
     pushed = 0
     for index, type_name in reversed(stack):
         for word in words_of(index, type_name):
-            # a char on the stack leaves its upper byte undefined: fill it with noise
+            # the upper byte of a char on the stack is undefined: fill it with noise
             noise = word | 0xA500 if type_name in NARROW else word
             lines += [f"        mov #{noise:#x},w0", "        mov w0,[w15++]"]
             pushed += 2
@@ -201,7 +201,7 @@ int main(void)
 
 @cache
 def outcomes(level: str, folder: Path) -> dict[str, int]:
-    """Result of every generated function by name: 0 is right."""
+    """Return the result of every generated function by name; 0 means correct."""
     c_file, s_file, main_file = folder / "rows.c", folder / "rows.s", folder / "main.c"
     rows = range(len(SIGNATURES))
     c_file.write_text(
@@ -231,20 +231,27 @@ def abi_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.mark.parametrize("level", LEVELS)
 @pytest.mark.parametrize("number", range(len(SIGNATURES)), ids=[s.rule for s in SIGNATURES])
 def test_c_puts_arguments_where_assembly_expects_them(number: int, level: str, abi_folder: Path) -> None:
-    """abi-elf.md §2.2, §2.4; status = 10 * argument + word of the first difference."""
+    """C callers put arguments where the rules say (abi-elf.md §2.2, §2.4).
+
+    Status = 10 * argument + word of the first difference.
+    """
     assert outcomes(level, abi_folder)[f"c_calls_{number}"] == 0
 
 
 @pytest.mark.parametrize("level", LEVELS)
 @pytest.mark.parametrize("number", range(len(SIGNATURES)), ids=[s.rule for s in SIGNATURES])
 def test_c_finds_arguments_where_assembly_puts_them(number: int, level: str, abi_folder: Path) -> None:
-    """abi-elf.md §2.2, §2.4; the upper bytes of narrow arguments are noise. Status = first wrong argument."""
+    """C callees find arguments where the rules say, although the upper bytes of narrow arguments are noise.
+
+    Source: abi-elf.md §2.2, §2.4. Status = first wrong argument.
+    """
     assert outcomes(level, abi_folder)[f"call_{number}"] == 0
 
 
 @pytest.mark.parametrize("level", LEVELS)
 def test_variadic_functions_get_everything_on_the_stack(level: str, tmp_path: Path) -> None:
-    """abi-elf.md §2.2 rule 5 and the last row of its table: g(int n, ...) called g(1, 2, 3L, 'c', 1.0f)."""
+    """All arguments of g(int n, ...) are on the stack: call g(1, 2, 3L, 'c', 1.0f) (abi-elf.md §2.2 rule 5, last
+    row)."""
     c_text = """
 extern int g(int n, ...);
 extern int caller(void);

@@ -38,7 +38,7 @@ def files(tmp_path, monkeypatch):
 
 
 def test_assemble_link_and_convert(files, capsys):
-    """as, ld with map and HEX, hex, size, nm and objdump in sequence."""
+    """as, ld with map and HEX, hex, size, nm and objdump work on each other's files."""
     assert main(["as", "-g", "hello.s"]) == 0
     assert main(["ld", "hello.o", "-o", "hello.elf", "-Map", "hello.map", "--hex", "both.hex", "--report-mem"]) == 0
     assert main(["hex", "hello.elf"]) == 0
@@ -63,7 +63,7 @@ def test_assemble_link_and_convert(files, capsys):
 
 
 def test_size_counts_flash_and_ram_only(files, capsys):
-    """Three bytes per instruction word, without configuration words; EEPROM is counted separately."""
+    """`size` counts three bytes per instruction word without configuration words; EEPROM is counted separately."""
     text = HELLO + " .section __FOSC.sec,code\n .pword 1\n .section .eedata,eedata\n .word 1\n"
     (files / "c.s").write_text(text)
     assert main(["as", "c.s"]) == 0
@@ -73,14 +73,14 @@ def test_size_counts_flash_and_ram_only(files, capsys):
 
 
 def test_ld_writes_hex_for_outputs_with_that_suffix(files):
-    """The suffix .hex selects Intel HEX."""
+    """`ld` writes Intel HEX if the output's suffix is .hex."""
     assert main(["as", "hello.s", "-o", "h.o"]) == 0
     assert main(["ld", "h.o", "-o", "out.hex"]) == 0
     assert (files / "out.hex").read_text().startswith(":020000040000fa\n")
 
 
 def test_libraries(files, capsys):
-    """ar rcs, t, x, d; -L and -l."""
+    """`ar` rcs, t, x and d work, and ld finds libraries with -L and -l."""
     (files / "lib.s").write_text(".global _f\n_f: return\n")
     (files / "main.s").write_text(".global __reset\n__reset: call _f\n")
     assert [main(["as", n]) for n in ("lib.s", "main.s")] == [0, 0]
@@ -123,7 +123,7 @@ def test_libraries(files, capsys):
     ],
 )
 def test_bad_input_is_one_clear_message_and_status_2(files, capsys, arguments, message):
-    """engines.md §10: exit status 2, no traceback, no output file."""
+    """Bad input gives one message and exit status 2, without traceback or output file (engines.md §10)."""
     (files / "bad.s").write_text(" nop\n frob\n")
     (files / "u.s").write_text(".global __reset\n__reset: call _nowhere\n")
     assert main(["as", "u.s", "-o", "undefined.o"]) == 0
@@ -136,7 +136,7 @@ def test_bad_input_is_one_clear_message_and_status_2(files, capsys, arguments, m
 
 @pytest.mark.parametrize("command", [name for name in COMMANDS if name not in ("cc", "c++")])
 def test_every_command_explains_itself_with_an_example(command, capsys):
-    """`--help` with an example, status 0; an unknown option ends with status 2."""
+    """`--help` of every command contains an example; an unknown option ends with status 2."""
     with pytest.raises(SystemExit) as done:
         main([command, "--help"])
     assert done.value.code == 0
@@ -147,7 +147,7 @@ def test_every_command_explains_itself_with_an_example(command, capsys):
 
 
 def test_the_module_runs_as_a_program(files):
-    """`python -m toolchain` from a shell; standard input as source."""
+    """`python -m toolchain` runs from a shell and accepts standard input as source."""
     done = subprocess.run(
         [sys.executable, "-m", "toolchain", "as", "-", "-o", "x.o"],
         input="nop\n",

@@ -15,13 +15,13 @@ from tests.fuzz.programs.c_shapes import Program
 
 @pytest.mark.parametrize("seed", range(1, 3))
 def test_a_program_does_the_same_at_every_level_and_on_the_host(seed: int) -> None:
-    """One checksum, one sequence of register accesses."""
+    """A program has one checksum and one sequence of register accesses at every level and on the host."""
     verdict = examine(seed)
     assert verdict.kind in ("agreed", "skipped"), verdict.reason
 
 
 def test_sanitizers_find_no_fault_in_the_programs(tmp_path: Path) -> None:
-    """The programs have no undefined behaviour, for which compilers may differ."""
+    """Sanitizers find no undefined behaviour in the generated programs, for which compilers could differ."""
     if shutil.which("gcc") is None:
         pytest.skip("gcc is not installed (Debian package gcc)")
     for seed in range(100, 105):
@@ -34,6 +34,6 @@ def test_sanitizers_find_no_fault_in_the_programs(tmp_path: Path) -> None:
 
 
 def test_the_same_seed_gives_the_same_program() -> None:
-    """A seed determines the program, so that it suffices to report a failure."""
+    """The same seed generates the same program, so that a seed suffices to report a failure."""
     assert Program(77).files == Program(77).files
     assert Program(77).files != Program(78).files

@@ -1,4 +1,4 @@
-"""Freestanding C++17: language, libc++'s headers, and refused features."""
+"""Freestanding C++17: the language, headers of libc++, and refused features."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def compiled(source: Path, folder: Path, *options: str) -> int:
 @pytest.mark.parametrize(("level", "lto"), MODES)
 @pytest.mark.parametrize("program", sorted(path.name for path in PROGRAMS.glob("*.cpp")))
 def test_program(program: str, level: str, lto: str, tmp_path: Path) -> None:
-    """Each program returns 0, or the number of its first failing check."""
+    """Each C++ program returns 0; otherwise the number of its first failing check."""
     assert compiled(PROGRAMS / program, tmp_path, level, lto, "-Wall", "-Werror", "-Wl,--heap=256") == 0
     assert run(tmp_path / "a.elf").status == 0
 
@@ -39,7 +39,7 @@ def test_header_compiles(header: str, tmp_path: Path) -> None:
 
 
 def test_c_and_cxx_in_one_program(tmp_path: Path) -> None:
-    """`cc` takes both by their suffix; `c++` takes .c for C++."""
+    """C and C++ files form one program: `cc` selects the language by suffix, `c++` compiles .c as C++."""
     (tmp_path / "a.c").write_text("int add(int a, int b) { return a + b; }\nint class;\n")
     (tmp_path / "b.cpp").write_text('extern "C" int add(int, int);\nint main() { return add(40, 2); }\n')
     both = [str(tmp_path / "a.c"), str(tmp_path / "b.cpp")]
@@ -65,7 +65,7 @@ def test_what_is_not_there_is_refused(source: str, tmp_path: Path, capfd: pytest
 
 
 def test_new_without_room_ends_the_program(tmp_path: Path) -> None:
-    """A failing new ends the program, because there are no exceptions; nothrow new returns null."""
+    """If memory is exhausted, new ends the program, because there are no exceptions; nothrow new returns null."""
     source = """
     #include <new>
     int main()

@@ -1,4 +1,4 @@
-"""-mcpu=: memory, registers, header and configuration words of another device, from C to the running image."""
+"""Option -mcpu=: memory, registers, header and configuration words of another device, up to the running image."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ int main(void)
 
 
 def build(tmp_path: Path, text: str, *words: str) -> Path:
-    """The image of a program for the 30F4013."""
+    """Return the image of a program for the 30F4013."""
     source, image = tmp_path / "a.c", tmp_path / "a.elf"
     source.write_text(text)
     assert cli.main(["cc", "-Os", "-mcpu=30F4013", *words, str(source), "-o", str(image)]) == 0
@@ -42,7 +42,7 @@ def build(tmp_path: Path, text: str, *words: str) -> Path:
 
 
 def test_a_program_for_another_part_runs_on_it(tmp_path: Path) -> None:
-    """The image names the device, uses its pin RA11, and has stack, data and vectors in its memory."""
+    """A program for the 30F4013 runs on it: device name, pin RA11, stack, data and vectors fit the device."""
     image = build(tmp_path, PROGRAM)
     machine = emu.load(image, board=None)
     assert machine.chip.name == CHIP.name
@@ -55,7 +55,7 @@ def test_a_program_for_another_part_runs_on_it(tmp_path: Path) -> None:
 
 
 def test_a_program_larger_than_its_memory_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """A program that fits the RAM of the 30F6014A does not fit the 2 KB of the 30F4013."""
+    """A program that fits the RAM of the 30F6014A but not the 2 KB of the 30F4013 is refused."""
     source = tmp_path / "a.c"
     source.write_text("static char big[3000]; int main(void) { return (int)(unsigned)&big; }")
     assert cli.main(["cc", "-Os", "-mcpu=30F4013", str(source), "-o", str(tmp_path / "a.elf")]) == 2
@@ -64,6 +64,6 @@ def test_a_program_larger_than_its_memory_is_refused(tmp_path: Path, capsys: pyt
 
 
 def test_an_unknown_device_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """An unknown device is one message and status 2."""
+    """An unknown device gives one message and exit status 2."""
     assert cli.main(["cc", "-mcpu=30F2010", "a.c"]) == 2
     assert "device '30F2010' is not supported (expected 30F6014A or 30F4013)" in capsys.readouterr().err

@@ -18,7 +18,7 @@ from toolchain.frontend.options import parse
 
 
 def cc(capsys: pytest.CaptureFixture[str], *words: object) -> tuple[int, str]:
-    """Exit status and stderr of one run in this process."""
+    """Run the driver in this process; return exit status and stderr."""
     status = driver.main([str(word) for word in words])
     return status, capsys.readouterr().err
 
@@ -30,13 +30,16 @@ def write(folder: Path, name: str, text: str) -> Path:
 
 
 def test_the_hidden_clang_command_of_the_wheel_exists() -> None:
-    """engines.md §5: the front end is `ziglang`'s clang."""
+    """The front end exists: the `clang` command hidden in the wheel `ziglang` (engines.md §5)."""
     said = subprocess.run([*clang_program(), "--version"], capture_output=True, text=True, check=True).stdout
     assert said.startswith("clang version")
 
 
 def test_predefined_macros_are_those_of_the_device(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    """abi-elf.md §2.9; no MSP430 macro of the borrowed target may remain (engines.md §5)."""
+    """The predefined macros are those of the device (abi-elf.md §2.9).
+
+    No MSP430 macro of the borrowed clang target may remain (engines.md §5).
+    """
     source = write(tmp_path, "empty.c", "")
     assert driver.main(["-E", "-dM", str(source)]) == 0
     macros = capsys.readouterr().out
@@ -51,7 +54,7 @@ def test_predefined_macros_are_those_of_the_device(capsys: pytest.CaptureFixture
 
 
 def test_compile_link_and_run(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    """Two C files and one assembly file form one image, which returns the status of main."""
+    """Two C files and one assembly file are linked to one image, which returns the status of main."""
     a = write(tmp_path, "a.c", "int b(int); extern int c(void); int main(void) { return b(20) + c(); }\n")
     b = write(tmp_path, "b.c", "int b(int x) { return 2 * x; }\n")
     s = write(tmp_path, "c.s", "\t.section .text,code\n\t.global _c\n_c: mov #2,w0\n\treturn\n")
@@ -62,7 +65,7 @@ def test_compile_link_and_run(capsys: pytest.CaptureFixture[str], tmp_path: Path
 
 @pytest.mark.parametrize("flags", [(), ("-flto",), ("-g",)])
 def test_separate_compilation(capsys: pytest.CaptureFixture[str], tmp_path: Path, flags: tuple[str, ...]) -> None:
-    """-c and linking of the objects; with -flto the objects are bitcode, and the program is optimised as a whole."""
+    """Objects can be compiled with -c and linked later; with -flto they are bitcode, optimised as a whole program."""
     a = write(tmp_path, "a.c", "int b(int); static int k = 3; int main(void) { return b(20) + k; }\n")
     b = write(tmp_path, "b.c", "static int k = 1; int b(int x) { return 2 * x + k; }\n")
     for source in (a, b):
@@ -74,7 +77,7 @@ def test_separate_compilation(capsys: pytest.CaptureFixture[str], tmp_path: Path
 
 
 def test_whole_program_and_separate_linking_agree(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    """-fno-lto gives the same result; whole-program optimisation, the default, is not larger."""
+    """Whole-program optimisation, the default, gives the same result as -fno-lto and no larger image."""
     a = write(tmp_path, "a.c", "int b(int); int main(void) { return b(20) + b(1); }\n")
     b = write(tmp_path, "b.c", "int unused(int x) { return x / 3; } int b(int x) { return 2 * x; }\n")
     sizes = []
@@ -87,7 +90,7 @@ def test_whole_program_and_separate_linking_agree(capsys: pytest.CaptureFixture[
 
 
 def test_hex_output_equals_the_elf(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    """-o x.hex equals the output of `toolchain hex` for the ELF (abi-elf.md §6.8)."""
+    """The output of -o x.hex equals that of `toolchain hex` for the ELF file (abi-elf.md §6.8)."""
     source = write(tmp_path, "a.c", "const int t[3] = {1, 2, 3}; volatile int i = 2; int main(void) { return t[i]; }\n")
     assert cc(capsys, "-Os", source, "-o", tmp_path / "x.hex") == (0, "")
     assert cc(capsys, "-Os", source, "-o", tmp_path / "x.elf") == (0, "")
@@ -96,7 +99,7 @@ def test_hex_output_equals_the_elf(capsys: pytest.CaptureFixture[str], tmp_path:
 
 
 def test_dependency_file_names_headers_and_output(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    """-MMD: user headers, no system headers, as gcc does."""
+    """-MMD lists user headers but no system headers, as gcc does."""
     write(tmp_path, "mine.h", "#define N 3\n")
     source = write(tmp_path, "a.c", '#include <stdint.h>\n#include "mine.h"\nint main(void) { return N; }\n')
     assert cc(capsys, "-c", "-MMD", source, "-o", tmp_path / "a.o") == (0, "")
@@ -110,7 +113,7 @@ def test_dependency_file_names_headers_and_output(capsys: pytest.CaptureFixture[
 
 
 def test_diagnostics_carry_the_users_file_and_line(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    """All diagnostics of clang are printed; a warning does not fail the run."""
+    """All diagnostics of clang are printed with the user's file and line; warnings do not fail the run."""
     source = write(tmp_path, "warn.c", "int main(void)\n{\n    int unused = 3;\n    return 0;\n}\n")
     status, said = cc(capsys, "-Wall", source, "-o", tmp_path / "x.elf")
     assert status == 0
@@ -118,7 +121,7 @@ def test_diagnostics_carry_the_users_file_and_line(capsys: pytest.CaptureFixture
 
 
 def test_single_precision_constants(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    """-fsingle-precision-constant: no double arithmetic for 1.1 * float."""
+    """-fsingle-precision-constant avoids double arithmetic for 1.1 * float."""
     source = write(tmp_path, "a.c", "float f(float x) { return x * 1.1; }\n")
     assert cc(capsys, "-Os", "-S", source, "-o", tmp_path / "double.s") == (0, "")
     assert cc(capsys, "-Os", "-S", "-fsingle-precision-constant", source, "-o", tmp_path / "single.s") == (0, "")
@@ -153,7 +156,7 @@ int main(void)
 
 
 def test_xc16_attributes(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    """abi-elf.md §1.4 and §2.5: section of each of Microchip's attributes, in its spelling."""
+    """Each Microchip attribute, in its spelling, selects its section (abi-elf.md §1.4, §2.5)."""
     source = write(tmp_path, "a.c", XC16_ATTRIBUTES)
     assert cc(capsys, "-Os", "-Wall", "-S", source, "-o", tmp_path / "a.s") == (0, "")
     said = (tmp_path / "a.s").read_text()
@@ -183,7 +186,7 @@ def test_xc16_attributes(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> 
 def test_unsupported_attributes_of_location_are_errors(
     line: str, attribute: str, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
-    """Attributes that clang does not support and that change the location of a variable are errors."""
+    """An attribute that clang does not support and that affects a variable's location is an error."""
     source = write(tmp_path, "a.c", f"\n{line}\n")
     code, said = cc(capsys, "-c", source, "-o", tmp_path / "a.o")
     assert code == 1
@@ -192,7 +195,10 @@ def test_unsupported_attributes_of_location_are_errors(
 
 
 def test_xc16_register_names_in_inline_assembly(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    """Clobbers and register variables named w0-w15; equal strings elsewhere and diagnostics are unchanged."""
+    """Inline assembly may use w0-w15 as clobbers and register variables.
+
+    Equal strings elsewhere, and diagnostics, are unchanged.
+    """
     source = write(
         tmp_path,
         "a.c",
@@ -214,7 +220,7 @@ int main(void) { int unused; const char *s = "w4"; return f(4) == 5 && g() == 8 
 
 @pytest.mark.parametrize("cycles", [13, 14, 15, 16, 17, 100, 1001, 70000])
 def test_delays_have_the_requested_length(capsys: pytest.CaptureFixture[str], tmp_path: Path, cycles: int) -> None:
-    """libpic30.h: __delay32 includes its call and return, measured by timer 1."""
+    """__delay32 of libpic30.h takes the requested cycles with call and return, measured by timer 1."""
     source = write(
         tmp_path,
         "a.c",
@@ -238,7 +244,7 @@ int main(void)
 
 
 def test_configuration_words_are_program_words(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    """abi-elf.md §6.6: output sections __FOSC, ... with code flags."""
+    """Configuration words are in the output sections __FOSC, ... with code flags (abi-elf.md §6.6)."""
     text = "#include <p30F6014A.h>\n_FOSC(CSW_FSCM_OFF & XT_PLL8);\n_FWDT(WDT_OFF);\nint main(void) { return 0; }\n"
     assert cc(capsys, "-Os", write(tmp_path, "a.c", text), "-o", tmp_path / "x.elf") == (0, "")
     image = read_executable((tmp_path / "x.elf").read_bytes(), "x.elf")
@@ -249,7 +255,7 @@ def test_configuration_words_are_program_words(capsys: pytest.CaptureFixture[str
 
 
 def test_calls_of_large_programs(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    """abi-elf.md §1.4: -mlarge-code emits two-word calls, otherwise RCALL."""
+    """-mlarge-code emits two-word calls; otherwise calls are RCALL (abi-elf.md §1.4)."""
     text = "extern void f(void), g(void); int main(void) { f(); g(); return 0; }\n"
     source = write(tmp_path, "a.c", text)
     for option, call in (("-mlarge-code", "\tcall _f\n"), ("-msmall-code", "\trcall _f\n")):
@@ -258,7 +264,7 @@ def test_calls_of_large_programs(capsys: pytest.CaptureFixture[str], tmp_path: P
 
 
 def test_a_program_replaces_library_functions(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    """Library functions are weak archive members: the program's memcpy and __putchar override them."""
+    """Functions of the program, such as memcpy and __putchar, override the library's weak archive members."""
     source = write(tmp_path, "a.c", """
 #include <stdio.h>
 #include <string.h>
@@ -287,7 +293,7 @@ int main(void)
 
 
 def test_only_what_is_used_is_linked(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    """An empty main contains start-up code, vectors and no other part of the library."""
+    """An empty main is linked with start-up code and vectors only."""
     source = write(tmp_path, "a.c", "int main(void) { return 0; }\n")
     assert cc(capsys, "-Os", source, "-o", tmp_path / "x.elf") == (0, "")
     from toolchain.elf.read import read_executable
@@ -321,7 +327,7 @@ BAD_COMMAND_LINES = [
 def test_bad_command_lines_say_what_is_wrong(
     words: list[str], message: str, capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Exit status 2, one message, no output file."""
+    """A bad command line ends with exit status 2 and one message, without output file."""
     monkeypatch.chdir(tmp_path)
     for name in ("a.c", "b.c"):
         write(tmp_path, name, "int main(void) { return 0; }\n" if name == "a.c" else "")
@@ -365,7 +371,7 @@ BAD_PROGRAMS = {
 def test_bad_programs_leave_a_message_and_no_output(
     files: dict[str, str], status: int, message: str, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
-    """Exit status 1 for C errors and 2 for all others, no output file, no traceback."""
+    """Bad programs end with status 1 for C errors, otherwise 2, without output file or traceback."""
     paths = [write(tmp_path, name, text) for name, text in files.items()]
     before = sorted(os.listdir(tmp_path))
     got, said = cc(capsys, "-Os", *paths, "-o", tmp_path / "x.elf")
@@ -376,7 +382,7 @@ def test_bad_programs_leave_a_message_and_no_output(
 
 
 def test_errors_of_all_files_are_reported(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    """The parallel front end compiles every file before it fails, and reports in command line order."""
+    """The parallel front end compiles every file and reports all errors in command line order."""
     paths = [write(tmp_path, f"{n}.c", f"int f{n} = x{n};\n") for n in range(4)]
     status, said = cc(capsys, "-j", 2, *paths, "-o", tmp_path / "x.elf")
     assert status == 1
@@ -385,7 +391,7 @@ def test_errors_of_all_files_are_reported(capsys: pytest.CaptureFixture[str], tm
 
 
 def test_options_reach_their_stage() -> None:
-    """Options are passed to the front end, the back end or the linker."""
+    """Options reach the front end, the back end or the linker."""
     words = ["-O2", "-DX=1", "-I", "inc", "-Wall", "-Wl,--heap=64,--gc-sections", "-fstack-check", "-g"]
     options = parse([*words, "-x", "c", __file__])
     assert options.level == "2"
@@ -396,7 +402,7 @@ def test_options_reach_their_stage() -> None:
 
 
 def test_response_files_nest(tmp_path: Path) -> None:
-    """@file with quoting; endless nesting is refused."""
+    """Response files @file may be nested and quoted; endless nesting is refused."""
     write(tmp_path, "a.c", "")
     inner = write(tmp_path, "inner", f"-DNAME='a b' {tmp_path / 'a.c'}")
     outer = write(tmp_path, "outer", f"-O1 @{inner}")
@@ -415,7 +421,7 @@ def test_help_shows_an_example(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def test_usage_errors_import_neither_llvmlite_nor_the_back_end() -> None:
-    """A usage error imports neither llvmlite nor the back end, so that messages are fast."""
+    """A usage error imports neither llvmlite nor the back end, which keeps messages fast."""
     code = (
         "import sys\nfrom toolchain.cli import main\nmain(['cc', '--nonsense'])\n"
         "print([name for name in sys.modules if 'llvmlite' in name])"
@@ -425,7 +431,7 @@ def test_usage_errors_import_neither_llvmlite_nor_the_back_end() -> None:
 
 
 def test_archives_and_preprocessed_assembly(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    """-L and -l, members linked by symbol; .S files are preprocessed with the device header."""
+    """-L and -l link archive members by symbol; .S files are preprocessed with the device header."""
     from toolchain.elf.archive import ArchiveMember, archive_bytes
 
     f = write(tmp_path, "f.c", "int f(int x) { return x + 2; }\n")
@@ -441,7 +447,7 @@ def test_archives_and_preprocessed_assembly(capsys: pytest.CaptureFixture[str], 
 
 
 def test_linker_options_pass_through(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    """-Wl,--heap gives malloc its memory; the map contains the library's members."""
+    """-Wl,--heap provides memory for malloc, and the map lists the library's members."""
     source = write(tmp_path, "a.c", "#include <stdlib.h>\nint main(void) { char *p = malloc(100), *q = malloc(100); "
                    "free(p); return p && q && malloc(90) == p ? 0 : 1; }\n")  # fmt: skip
     words = [

@@ -43,7 +43,7 @@ def test_a_wrong_instruction_in_inline_assembly_names_its_line(
 def test_a_source_beside_the_present_folder_is_named_in_full(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Positions have the full name of a source outside of the current folder, although clang shortens it."""
+    """Errors name a source outside of the current folder with its full path, although clang shortens it."""
     (tmp_path / "here").mkdir()
     (tmp_path / "there").mkdir()
     monkeypatch.chdir(tmp_path / "here")
@@ -66,7 +66,7 @@ def test_a_source_beside_the_present_folder_is_named_in_full(
 def test_assembler_errors_of_a_declaration_name_its_line(
     line: str, said: str, options: tuple[str, ...], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The position is that of the declaration, not a line of generated assembly."""
+    """An assembler error caused by a declaration has the declaration's position, not a line of generated assembly."""
     source = tmp_path / "main.c"
     source.write_text(f'void first(void) {{ __asm__("nop"); }}\n\n\n{line}\nint main(void) {{ return 0; }}\n')
     assert driver.main([*options, str(source), "-o", str(tmp_path / "x")]) == 2
@@ -93,7 +93,7 @@ def test_a_global_variable_in_a_register_is_refused_in_words(
 def test_a_refused_initialiser_names_the_line_of_its_variable(
     declared: str, said: str, options: tuple[str, ...], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The message has a position and does not mention generated assembly."""
+    """A refused initialiser is reported at its variable, without mention of generated assembly."""
     source = tmp_path / "main.c"
     read = "f(n)" if "f(int" in declared else "*odd.p"
     source.write_text(f"volatile int n;\n\n{declared}\nint main(void) {{ return {read}; }}\n")

@@ -1,7 +1,7 @@
-"""Every case of `exec/*.c` on the emulator at four optimisation levels, whole program and file by file.
+"""Cases of `exec/*.c` on the emulator at four levels, compiled as a whole program and file by file.
 
-There is one image per file and level. A generated main calls the cases in order and reports each over UART1 as
-`name line`, with line 0 for a pass. A case that traps or hangs is reported as such, and those after it as not run.
+There is one image per file and level. A generated main calls the cases in order and reports each over UART1 as `name
+line`, with line 0 for a pass. A case that traps or hangs is reported as such, and the cases after it as not run.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from tests.toolchain.c_programs import build, run
 FOLDER = Path(__file__).parent / "exec"
 LEVELS = ("-O0", "-O1", "-Os", "-O2")
 ALONE = " -fno-lto"
-"""Files compiled one by one: functions keep their calls, so that what they do to each other's objects shows."""
+"""Option that compiles files separately: calls are not inlined, so that aliasing effects of functions show."""
 CASE = re.compile(r'^TEST\((\w+),\s*"([^"]+)"\)', re.MULTILINE)
 CYCLES = 40_000_000
 
@@ -40,13 +40,13 @@ int main(void)
 
 
 def cases_of(path: Path) -> list[str]:
-    """Names of the cases of one file, in order."""
+    """Return the names of the cases of one file, in order."""
     return [name for name, _ in CASE.findall(path.read_text())]
 
 
 @cache
 def results(path: Path, level: str, folder: Path) -> dict[str, str]:
-    """Result of each case: "ok", or a description of the failure."""
+    """Return the result of each case: "ok", or a description of the failure."""
     names = cases_of(path)
     main = folder / f"{path.stem}_main.c"
     main.write_text(
@@ -87,7 +87,7 @@ PARAMETERS = [
 
 @pytest.mark.parametrize(("path", "level", "name"), PARAMETERS)
 def test_c_program_does_what_the_standard_says(path: Path, level: str, name: str, image_folder: Path) -> None:
-    """Paragraphs of C11 and of abi-elf.md are cited at each case."""
+    """Each case passes; its second argument cites the paragraph of C11 or of abi-elf.md."""
     assert results(path, level, image_folder)[name] == "ok"
 
 
@@ -97,7 +97,7 @@ def test_there_are_at_least_300_cases() -> None:
 
 
 def test_a_failing_case_is_reported_as_failing(tmp_path: Path) -> None:
-    """A wrong check, a trap and the case after the trap do not pass."""
+    """A failed check, a trap and the case after the trap are reported as not passed."""
     source = tmp_path / "broken.c"
     source.write_text(
         '#include "exec.h"\n'

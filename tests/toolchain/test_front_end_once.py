@@ -14,7 +14,7 @@ TWO = "extern int values[3];\nint other(int x) { return x * values[2] + ADDED; }
 
 
 def test_images_are_those_of_builds_on_their_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Images equal those of separate builds, at every level, merged and file by file."""
+    """Images built from cached IR equal those of separate builds, at every level, merged and file by file."""
     runs: list[str] = []
     original = driver.front_end
     monkeypatch.setattr(driver, "front_end", lambda o, scratch: runs.append(o.level) or original(o, scratch))

@@ -1,4 +1,4 @@
-"""Code of interrupt functions (abi-elf.md §2.5)."""
+"""Generated code of interrupt functions (abi-elf.md §2.5)."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from tests.toolchain.c_programs import build
 
 
 def assembly_of(folder: Path, c_text: str, level: str = "-Os") -> str:
-    """Assembly of one C file."""
+    """Return the assembly of one C file."""
     (folder / "x.c").write_text("#include <dspic30f6014a.h>\n" + c_text)
     built = build([folder / "x.c"], folder / "x.s", level, "-S")
     assert built.status == 0, built.messages
@@ -19,20 +19,20 @@ def assembly_of(folder: Path, c_text: str, level: str = "-Os") -> str:
 
 
 def body_of(text: str, name: str) -> list[str]:
-    """Instructions of one function, without labels and directives."""
+    """Return the instructions of one function, without labels and directives."""
     part = text.split(f"\n{name}:", 1)[1].split(".size", 1)[0]
     lines = [line.strip() for line in part.splitlines() if line.startswith("\t")]
     return [line for line in lines if line and not line.startswith(".")]
 
 
 def test_minimal_handler_is_two_words(tmp_path: Path) -> None:
-    """abi-elf.md §2.5: INC f and RETFIE, no saved registers."""
+    """A minimal handler has two words, INC f and RETFIE, and saves no registers (abi-elf.md §2.5)."""
     text = assembly_of(tmp_path, "volatile int n; OS_ISR(_T1Interrupt) { n++; }")
     assert body_of(text, "__T1Interrupt") == ["inc _n", "retfie"]
 
 
 def test_handler_that_calls_saves_rcount_and_w0_to_w7(tmp_path: Path) -> None:
-    """abi-elf.md §2.5 items 2 and 3, mirrored at the end."""
+    """A handler with a call saves RCOUNT and W0 to W7 and restores them in reverse (abi-elf.md §2.5 items 2 and 3)."""
     body = body_of(assembly_of(tmp_path, "void f(void); OS_ISR(_T1Interrupt) { f(); }"), "__T1Interrupt")
     assert body[:5] == ["push _RCOUNT", "mov.d w0,[w15++]", "mov.d w2,[w15++]", "mov.d w4,[w15++]", "mov.d w6,[w15++]"]
     assert body[-6:] == [
@@ -41,7 +41,7 @@ def test_handler_that_calls_saves_rcount_and_w0_to_w7(tmp_path: Path) -> None:
 
 
 def test_shadow_handler_uses_the_shadow_registers(tmp_path: Path) -> None:
-    """abi-elf.md §2.5, attribute `shadow`."""
+    """A handler with the attribute `shadow` uses the shadow registers (abi-elf.md §2.5)."""
     text = assembly_of(tmp_path, "volatile int a, b; OS_ISR_SHADOW(_T1Interrupt) { a = b + 3; }")
     body = body_of(text, "__T1Interrupt")
     assert body[0] == "push.s"
@@ -49,7 +49,7 @@ def test_shadow_handler_uses_the_shadow_registers(tmp_path: Path) -> None:
 
 
 def test_auto_psv_handler_loads_and_restores_psvpag(tmp_path: Path) -> None:
-    """abi-elf.md §2.5 item 6."""
+    """An auto_psv handler loads and restores PSVPAG (abi-elf.md §2.5 item 6)."""
     source = "volatile int a; OS_ISR_AUTO_PSV(_T1Interrupt) { static const int t[3] = {5, 6, 7}; a = t[a]; }"
     body = "\n".join(body_of(assembly_of(tmp_path, source), "__T1Interrupt"))
     assert "push _PSVPAG" in body
@@ -92,7 +92,10 @@ int main(void)
 
 @pytest.mark.parametrize("level", ["-O1", "-Os", "-O2"])
 def test_single_bit_writes_of_a_handler_are_not_lost(level: str, tmp_path: Path) -> None:
-    """isa.md §5.4: program and handler write bits of the same words; T1 interrupts in every cycle."""
+    """Single-bit writes of program and handler to the same words are not lost (isa.md §5.4).
+
+    T1 interrupts in every cycle.
+    """
     (tmp_path / "x.c").write_text(f"#include <dspic30f6014a.h>\n{SHARED}")
     built = build([tmp_path / "x.c"], tmp_path / "x.elf", level)
     assert built.status == 0, built.messages

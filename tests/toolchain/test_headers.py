@@ -1,4 +1,4 @@
-"""Headers: the generated device header is current; layouts and limits equal XC16's (abi-elf.md §1)."""
+"""Headers: the device header is generated, layouts and limits equal XC16's (abi-elf.md §1)."""
 
 from __future__ import annotations
 
@@ -17,10 +17,8 @@ INCLUDE = Path(__file__).resolve().parents[2] / "toolchain" / "include"
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_the_device_header_is_generated_once(
-    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """The cache holds the header of each chip; a damaged cache folder makes a temporary one."""
+def test_the_device_header_is_generated_once(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The header of each device is generated once and cached; without a usable cache folder it is temporary."""
     monkeypatch.setenv("OPENSWARM_CACHE", str(tmp_path / "cache"))
     device_header.folder_of.cache_clear()
     chip = chip_named(name)
@@ -36,7 +34,7 @@ def test_the_device_header_is_generated_once(
 
 
 def test_every_register_has_the_address_of_the_chip_table(tmp_path: Path) -> None:
-    """dspic30f6014a.md §1: words, bytes and bit-field structs of all registers, after linking.
+    """Every register has the address of the chip table, as word, bytes and bit-field struct (dspic30f6014a.md §1).
 
     The comparison runs on the target, because the compiler assumes that no object has the address of WREG0.
     """
@@ -64,7 +62,7 @@ int main(void)
 
 
 def test_bit_fields_are_where_the_chip_table_says(tmp_path: Path) -> None:
-    """Every field of every register that is plain memory for software: write all ones through the struct."""
+    """Bit-fields are at the positions of the chip table: each field of a plain register is set through the struct."""
     lines = []
     for sfr in DSPIC30F6014A.sfrs.values():
         for name, (lsb, width) in sfr.fields.items():
@@ -81,7 +79,8 @@ def test_bit_fields_are_where_the_chip_table_says(tmp_path: Path) -> None:
 
 
 def test_second_names_of_bits_denote_the_same_bits(tmp_path: Path) -> None:
-    """XC16's headers name bits of CAN, I2C and UARTs as the data sheet and as the reference manual do."""
+    """The names of CAN, I2C and UART bits in the data sheet and in the reference manual denote the same bits, as in
+    XC16."""
     same = [
         ("C1INTF", "RXB0IF", "RX0IF"), ("C2INTF", "TXB2IF", "TX2IF"), ("C1INTF", "IRXIF", "IVRIF"),
         ("C2INTF", "RXB0OVFL", "RX0OVR"), ("C1INTF", "TXBP", "TXEP"), ("C2INTE", "IRXIE", "IVRIE"),
@@ -107,13 +106,16 @@ def test_header_stands_alone_and_twice(path: Path, tmp_path: Path) -> None:
     line = f"#include <{path.name}>\n"
     (tmp_path / "a.c").write_text(line + line + "int main(void) { return 0; }\n")
     part = re.fullmatch(r"(?:p|dspic)(30f\d+[a-z]?)", path.stem, re.IGNORECASE)
-    chip = [f"-mcpu={part[1].upper()}"] if part else []  # a part's header refuses every other
+    chip = [f"-mcpu={part[1].upper()}"] if part else []  # a device header refuses other devices
     built = build([tmp_path / "a.c"], tmp_path / "a.o", "-c", "-std=c11", "-Wall", "-Wextra", "-pedantic", *chip)
     assert (built.status, built.messages) == (0, "")
 
 
 def test_configuration_words_reach_the_image(tmp_path: Path) -> None:
-    """_FOSC(CSW_FSCM_OFF & XT_PLL8) and the other macros; dspic30f6014a.md §2, abi-elf.md §6.6."""
+    """Configuration macros such as _FOSC(CSW_FSCM_OFF & XT_PLL8) reach the image.
+
+    Sources: dspic30f6014a.md §2, abi-elf.md §6.6.
+    """
     (tmp_path / "a.c").write_text(
         "#include <p30F6014A.h>\n_FOSC(CSW_FSCM_OFF & XT_PLL8);\n_FWDT(WDT_OFF);\n"
         "_FBORPOR(PBOR_OFF & MCLR_EN & PWRT_64);\n"

@@ -1,4 +1,4 @@
-"""Results, preserved registers, names and function pointers between C and assembly (abi-elf.md §2), both ways."""
+"""Results, preserved registers, names and function pointers between C and assembly, both ways (abi-elf.md §2)."""
 
 from __future__ import annotations
 
@@ -13,7 +13,10 @@ LEVELS = ("-O0", "-Os", "-O2")
 
 @pytest.mark.parametrize("level", LEVELS)
 def test_results_come_in_w0_to_w3(level: str, tmp_path: Path) -> None:
-    """abi-elf.md §2.3: 8, 16, 32, 64 bits, float, double; the upper byte of an 8-bit result is undefined."""
+    """Results of 8 to 64 bits, float and double are in W0 to W3 (abi-elf.md §2.3).
+
+    The upper byte of an 8-bit result is undefined.
+    """
     c_text = """
 signed char r8(void); unsigned char u8(void); int r16(void); long r32(void); long long r64(void);
 float rf(void); double rd(void); int check(void);
@@ -99,7 +102,10 @@ fail:   mov w6,w0
 
 @pytest.mark.parametrize("level", LEVELS)
 def test_struct_results_go_through_a_hidden_pointer_in_w0(level: str, tmp_path: Path) -> None:
-    """abi-elf.md §2.2 rule 7 and §2.3: any size, even one byte; the other arguments follow from W1."""
+    """Struct results of any size are returned through a hidden pointer in W0; other arguments start at W1.
+
+    Source: abi-elf.md §2.2 rule 7 and §2.3.
+    """
     c_text = """
 struct one { char a; };
 struct three { int a, b, c; };
@@ -166,7 +172,10 @@ _check: mov #room,w0
 
 @pytest.mark.parametrize("level", LEVELS)
 def test_c_functions_preserve_w8_to_w14_and_balance_w15(level: str, tmp_path: Path) -> None:
-    """abi-elf.md §2.1: a C function with many live values, called from assembly."""
+    """C functions preserve W8 to W14 and balance W15 (abi-elf.md §2.1).
+
+    Assembly calls a C function with many live values.
+    """
     c_text = """
 volatile int sink;
 extern int check(void);
@@ -200,7 +209,10 @@ int main(void) { return check(); }
 
 @pytest.mark.parametrize("level", LEVELS)
 def test_c_expects_calls_to_change_w0_to_w7_and_rcount(level: str, tmp_path: Path) -> None:
-    """abi-elf.md §2.1: a callee that changes all registers that it may change."""
+    """C code expects that calls change W0 to W7 and RCOUNT (abi-elf.md §2.1).
+
+    The callee changes all registers that it may change.
+    """
     c_text = """
 extern void ruin(void);
 int main(void)
@@ -230,7 +242,10 @@ int main(void)
 
 @pytest.mark.parametrize("level", LEVELS)
 def test_names_get_an_underscore_in_both_directions(level: str, tmp_path: Path) -> None:
-    """abi-elf.md §2.6: functions, variables, and constants that assembly reads through the PSV window."""
+    """C names get an underscore in assembly, in both directions (abi-elf.md §2.6).
+
+    This holds for functions, variables and constants, which assembly reads through the PSV window.
+    """
     c_text = """
 int shared = 5;
 const int table[3] = {10, 20, 30};
@@ -260,7 +275,7 @@ _from_assembly: .word 7
 
 @pytest.mark.parametrize("level", LEVELS)
 def test_function_pointers_cross_the_border(level: str, tmp_path: Path) -> None:
-    """abi-elf.md §1.5: a handle made by assembly is called by C, and the other way round."""
+    """Function pointers are handles in C and in assembly: each can call the other's (abi-elf.md §1.5)."""
     c_text = """
 typedef int (*function)(int);
 extern function give(void);

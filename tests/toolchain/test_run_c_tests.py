@@ -1,4 +1,4 @@
-"""The runner of foreign C tests reports passed, failed and skipped tests with reasons."""
+"""The runner of external C tests reports passed, failed and skipped tests with reasons."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ def verdict(folder: Path, name: str, text: str) -> tuple[str, str]:
 
 
 def test_exit_status_zero_passes(tmp_path: Path) -> None:
-    """By return from main, by exit, and by falling off the end of main (C11 5.1.2.2.3)."""
+    """A test passes with exit status 0: by return from main, by exit, or at the end of main (C11 5.1.2.2.3)."""
     assert verdict(tmp_path, "a", "int main(void) { return 0; }")[0] == "passed"
     assert verdict(tmp_path, "b", "void exit(int); int main(void) { exit(0); }")[0] == "passed"
     assert verdict(tmp_path, "c", "int main(void) { }")[0] == "passed"
 
 
 def test_everything_else_fails_with_its_reason(tmp_path: Path) -> None:
-    """Status, abort, trap, endless loop, undefined symbol."""
+    """A test fails with its reason: exit status, abort, trap, endless loop, undefined symbol."""
     assert verdict(tmp_path, "a", "int main(void) { return 3; }") == ("failed", "exit status 3")
     assert verdict(tmp_path, "b", "void abort(void); int main(void) { abort(); }") == ("failed", "exit status 134")
     odd = 'int main(void) { __asm__ volatile("mov #0x801,w0\\n\\tmov [w0],w0" ::: "r0"); }'
@@ -38,7 +38,8 @@ def test_everything_else_fails_with_its_reason(tmp_path: Path) -> None:
 
 
 def test_skips_follow_rules(tmp_path: Path) -> None:
-    """dg- directives, GNU features that clang lacks, memory, undefined behaviour with 16-bit int."""
+    """Tests are skipped for dg- directives, GNU features that clang lacks, memory, or undefined behaviour of 16-bit
+    int."""
     skips = {
         "int32": "/* { dg-require-effective-target int32plus } */\nint main(void) { return 1; }",
         "avr": '/* { dg-skip-if "too big" { avr-*-* } } */\nint main(void) { return 1; }',

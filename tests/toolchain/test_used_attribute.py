@@ -1,4 +1,4 @@
-"""Definitions without references that the image must contain: `used`, `retain` and XC16's `keep`."""
+"""Unreferenced definitions that the image must contain: attributes `used`, `retain` and XC16's `keep`."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ NAMES = {
 
 
 def names_of(built: Built, image: Path) -> set[str]:
-    """Symbols of a linked image."""
+    """Return the symbols of a linked image."""
     assert built.status == 0, built.messages
     return {symbol.name for symbol in read_executable(image.read_bytes(), image.name).symbols}
 
@@ -45,7 +45,7 @@ def names_of(built: Built, image: Path) -> set[str]:
 @pytest.mark.parametrize("alone", ALONE)
 @pytest.mark.parametrize("level", LEVELS)
 def test_used_definitions_remain_in_the_image(level: str, alone: str, tmp_path: Path) -> None:
-    """Marked definitions and their references remain, others are removed, and no helper symbol is added."""
+    """Definitions with the attribute and their references remain; others are removed, and no helper symbol is added."""
     (tmp_path / "a.c").write_text(MARKED + "int main(void) { return 0; }\n")
     names = names_of(build([tmp_path / "a.c"], tmp_path / "a.elf", level, *alone.split(), "-Wall"), tmp_path / "a.elf")
     assert not NAMES - names
@@ -55,7 +55,7 @@ def test_used_definitions_remain_in_the_image(level: str, alone: str, tmp_path: 
 
 @pytest.mark.parametrize("level", ["-O0", "-Os"])
 def test_used_definitions_of_objects_and_archives_remain(level: str, tmp_path: Path) -> None:
-    """An archive provides the referenced members, as with GNU's linker; in these, used definitions remain."""
+    """Only referenced members of an archive are linked, as by GNU's linker; in these, used definitions remain."""
     (tmp_path / "main.c").write_text("int wanted(void); int main(void) { return wanted(); }\n")
     (tmp_path / "direct.c").write_text("__attribute__((used)) void in_object(void) {}\n")
     (tmp_path / "one.c").write_text(
@@ -74,7 +74,7 @@ def test_used_definitions_of_objects_and_archives_remain(level: str, tmp_path: P
 
 
 def test_a_section_remains_if_its_second_function_is_used(tmp_path: Path) -> None:
-    """The mark belongs to the section, in any order of its definitions."""
+    """A section remains if any of its functions has the attribute, in any order of definitions."""
     (tmp_path / "a.c").write_text(
         '__attribute__((section("mine"))) void first(void) {}\n'
         '__attribute__((section("mine"), used)) void second(void) {}\nint main(void) { return 0; }\n'
@@ -84,7 +84,7 @@ def test_a_section_remains_if_its_second_function_is_used(tmp_path: Path) -> Non
 
 
 def test_used_functions_are_not_specialised(tmp_path: Path) -> None:
-    """Whole-program optimisation must not specialise its argument, nor its variable's value."""
+    """Whole-program optimisation specialises neither the argument of a used function nor the value of its variable."""
     (tmp_path / "a.c").write_text(
         "__attribute__((used)) int factor = 1;\n"
         "__attribute__((used, noinline)) int twice(int n) { return factor ? n + n : 7; }\n"

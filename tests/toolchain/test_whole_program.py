@@ -1,4 +1,4 @@
-"""Whole programs: functions before main, loops that wait, library functions introduced by the middle end."""
+"""Whole programs: constructors, polling loops, library functions introduced by the optimiser."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ int main(void) { return value; }
 @pytest.mark.parametrize("alone", ALONE)
 @pytest.mark.parametrize("level", LEVELS)
 def test_constructors_run_before_main_in_order_of_priority(level: str, alone: str, tmp_path: Path) -> None:
-    """GCC's attribute, and XC16's `user_init` (abi-elf.md §1.4)."""
+    """Constructors run before main in order of priority: GCC's attribute and XC16's `user_init` (abi-elf.md §1.4)."""
     assert status(CONSTRUCTORS, tmp_path, level, *alone.split()) == 32
 
 
@@ -76,12 +76,14 @@ int main(void) {
 @pytest.mark.parametrize("alone", ALONE)
 @pytest.mark.parametrize("level", LEVELS)
 def test_loops_replaced_by_library_functions_link_and_work(level: str, alone: str, tmp_path: Path) -> None:
-    """The middle end replaces loops and calls by library functions, but only by those that the library contains."""
+    """The optimiser replaces loops and calls only by library functions that the library contains; such programs
+    link."""
     assert status(IDIOMS, tmp_path, level, "-std=gnu11", "-w", "-Wl,--heap=64", *alone.split()) == 7
 
 
 def test_the_middle_end_introduces_no_missing_library_function(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The driver uses the symbols of the library: with an empty list of functions the program links, too."""
+    """The driver derives the available functions from the library's symbols: with an empty list the program links
+    too."""
     from toolchain.frontend import clang
 
     monkeypatch.setattr(clang, "ABSENT_FUNCTIONS", [])
@@ -105,7 +107,7 @@ int main(void) { wait(); waiting(); called(); wide(); careful(); bounded(); retu
 
 @pytest.mark.parametrize("level", LEVELS)
 def test_polled_flags_that_are_not_volatile_cause_a_warning(level: str, tmp_path: Path) -> None:
-    """The warning names loops that only an interrupt can end."""
+    """A polled flag that is not volatile causes a warning that names the loop."""
     source = tmp_path / "polls.c"
     source.write_text(POLLS)
     built = build([source], tmp_path / "polls.elf", level, "-g")
@@ -118,7 +120,7 @@ def test_polled_flags_that_are_not_volatile_cause_a_warning(level: str, tmp_path
 
 @pytest.mark.parametrize("level", LEVELS)
 def test_delay_loops_are_not_deleted(level: str, tmp_path: Path) -> None:
-    """Delay loops remain, although C11 6.8.5p6 allows to remove them."""
+    """Delay loops are not removed, although C11 6.8.5p6 permits it."""
     source = tmp_path / "wait.c"
     source.write_text("int flag; int main(void) { while (!flag) ; return 0; }")
     image = tmp_path / "wait.elf"
@@ -127,7 +129,7 @@ def test_delay_loops_are_not_deleted(level: str, tmp_path: Path) -> None:
 
 
 def status(text: str, folder: Path, *options: str) -> int | None:
-    """Exit status of a program."""
+    """Return the exit status of a program."""
     source, image = folder / "program.c", folder / "program.elf"
     source.write_text(text)
     built = build([source], image, *options)

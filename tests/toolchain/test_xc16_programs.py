@@ -19,7 +19,7 @@ LEVELS = ("-O0", "-O1", "-O2", "-Os")
 
 
 def status_of(folder: Path, source: str, *options: str) -> int:
-    """Exit status of a program on the emulator; compiling prints nothing."""
+    """Return the exit status of a program on the emulator; assert that compiling prints nothing."""
     (folder / "main.c").write_text(source)
     image = folder / "main.elf"
     assert driver.main([*options, str(folder / "main.c"), "-o", str(image)]) == 0
@@ -33,7 +33,7 @@ def refusal(capsys: pytest.CaptureFixture[str], *words: object) -> str:
 
 @pytest.mark.parametrize("level", LEVELS)
 def test_plain_inline_defines_the_function(level: str, tmp_path: Path) -> None:
-    """XC16's default language is gnu89; in C99 another file would have to define the function."""
+    """Plain `inline` also defines the function (gnu89, XC16's default); in C99 another file would have to define it."""
     source = """
     inline int two(int x) { return x + 2; }
     int (*volatile f)(int) = two;
@@ -44,7 +44,10 @@ def test_plain_inline_defines_the_function(level: str, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("level", LEVELS)
 def test_operands_with_register_and_memory_constraints_are_registers(level: str, tmp_path: Path) -> None:
-    """GCC's reload prefers a register for "rm" and "g", and most instructions of this CPU require one."""
+    """Operands with the constraints "rm" and "g" are registers.
+
+    GCC's reload prefers registers, and most instructions of this CPU require them.
+    """
     source = """
     volatile unsigned kept; unsigned char small;
     int main(void)
@@ -64,7 +67,7 @@ def test_operands_with_register_and_memory_constraints_are_registers(level: str,
 
 
 def test_accumulators_have_names_in_assembly(tmp_path: Path) -> None:
-    """0x22 and 0x28, the lowest of three registers each."""
+    """Accumulators have names in assembly: 0x22 and 0x28 are the lowest of three registers each."""
     source = """
     int main(void)
     {
@@ -87,7 +90,7 @@ def test_every_header_is_accepted_in_every_dialect(options: tuple[str, ...], tmp
 
 
 def test_header_names_are_not_case_sensitive(tmp_path: Path) -> None:
-    """Headers beside the source, in an -I folder, and of the device, spelt in another case."""
+    """Header names are case-insensitive beside the source, in an -I folder, and for the device header."""
     (tmp_path / "Library").mkdir()
     (tmp_path / "Library" / "e_motors.h").write_text("#define ONE 1\n")
     (tmp_path / "Own.h").write_text("#define TWO 2\n")
@@ -103,7 +106,7 @@ def test_a_header_that_is_nowhere_stays_an_error(tmp_path: Path, capfd: pytest.C
 
 
 def test_configuration_pragmas_make_configuration_words(tmp_path: Path) -> None:
-    """Pragmas of MPLAB X's code generator for this device (dspic30f6014a.md §2)."""
+    """Configuration pragmas of MPLAB X's code generator create configuration words (dspic30f6014a.md §2)."""
     source = """
     #pragma config FOSFPR = XT_PLL8, FCKSMEN = CSW_FSCM_OFF
     #pragma config FWPSB = WDTB_16
@@ -123,7 +126,7 @@ def test_configuration_pragmas_make_configuration_words(tmp_path: Path) -> None:
 
 
 def test_protection_of_segments_by_pragmas_and_macros(tmp_path: Path) -> None:
-    """Every setting of MPLAB X for this device, with its names of values (DS70138, section 20)."""
+    """Pragmas and macros accept every setting of MPLAB X for this device with its value names (DS70138, section 20)."""
     (tmp_path / "main.c").write_text("""
     #pragma config BODENV = NONE
     #pragma config BWRP = WR_PROTECT_BOOT_OFF, BSS = NO_BOOT_CODE, EBS = SMALL_BOOT_EEPROM, RBS = MED_BOOT_RAM
@@ -163,7 +166,8 @@ def test_a_wrong_configuration_pragma_names_its_line(tmp_path: Path, capfd: pyte
 def test_a_setting_made_twice_is_refused_unless_it_is_the_same(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Two different values of a setting are an error, because the result would depend on their order."""
+    """Two different values of one setting are an error, because the result would depend on their order; equal ones
+    are not."""
     main = tmp_path / "main.c"
     twice = "#pragma config WDT = WDT_OFF\n#pragma config WDT = {}, GWRP = GWRP_OFF\nint main(void) {{ return 0; }}\n"
     main.write_text(twice.format("WDT_ON"))
@@ -175,7 +179,7 @@ def test_a_setting_made_twice_is_refused_unless_it_is_the_same(
 
 
 def test_every_value_macro_of_the_header_changes_one_word() -> None:
-    """A mask has zeros only inside one setting of one word."""
+    """Each value macro of the header changes one setting of one word: its mask has zeros only there."""
     masks = [mask for _, mask in config_pragma.settings(chip_named()).values()]
     for name, value in config_pragma.values().items():
         assert any((value | mask) & 0xFFFF == 0xFFFF for mask in [*masks, 0xC71F, 0x803F]), name
@@ -212,7 +216,10 @@ def test_what_means_nothing_here_is_refused_with_a_sentence(tmp_path: Path, caps
 @pytest.mark.parametrize("options", [(), ("-mlarge-data",)])
 @pytest.mark.parametrize("level", LEVELS)
 def test_variables_beyond_near_memory(level: str, options: tuple[str, ...], tmp_path: Path) -> None:
-    """An address determines the access; with -mlarge-data all other variables are far, too."""
+    """Variables beyond near memory are accessed correctly.
+
+    A fixed address determines the access; with -mlarge-data all other variables are far as well.
+    """
     source = """
     int big __attribute__((address(0x2100))) = 3;
     unsigned char small __attribute__((address(0x2200)));
@@ -253,7 +260,7 @@ NAMES = ["__printf_cdnopuxX", "__dprintf_cdnopuxX", "__dprintf_acdeEfFgGnopsuxX"
 
 @pytest.mark.parametrize("name", NAMES)
 def test_names_of_smart_io_link(name: str, tmp_path: Path) -> None:
-    """abi-elf.md §2.8: XC16's objects call variants of printf by other names."""
+    """The names by which XC16's objects call variants of printf link (abi-elf.md §2.8)."""
     (tmp_path / "call.s").write_text(
         "\t.section .text,code\n\t.global _main\n_main: mov #42,w1\n\tmov w1,[w15++]\n\tmov #text,w1\n"
         f"\tmov w1,[w15++]\n\tcall {name}\n\tsub w15,#4,w15\n\tclr w0\n\treturn\n"
@@ -330,7 +337,7 @@ SCANNED = """\
 
 @pytest.mark.parametrize("level", ["-O0", "-Os"])
 def test_scanf_reads_what_c_says(level: str, tmp_path: Path) -> None:
-    """C11 7.21.6.2; the expected text is the output of a hosted C library for the same program."""
+    """scanf reads as C11 7.21.6.2 says; the expected text is the output of a hosted C library for the same program."""
     (tmp_path / "main.c").write_text(SCANF.replace("\\\\", "\\"))
     image = tmp_path / "main.elf"
     assert driver.main([level, str(tmp_path / "main.c"), "-o", str(image)]) == 0
@@ -368,7 +375,8 @@ int main(void)
 
 @pytest.mark.parametrize("level", LEVELS)
 def test_arguments_of_the_interrupt_attribute(level: str, tmp_path: Path) -> None:
-    """irq(N) binds a handler of any name, save() saves variables, preprologue() runs first.
+    """Arguments of the interrupt attribute: irq(N) binds a handler of any name, save() saves variables, preprologue()
+    runs code.
 
     Variables that only these arguments name are linked.
     """
@@ -386,7 +394,7 @@ def test_an_interrupt_number_that_is_none(tmp_path: Path, capsys: pytest.Capture
 @pytest.mark.parametrize("alone", ["", "-fno-lto"], ids=["whole program", "file by file"])
 @pytest.mark.parametrize("level", LEVELS)
 def test_persistent_and_noload_variables_have_no_known_initial_value(level: str, alone: str, tmp_path: Path) -> None:
-    """`persistent` and `noload` variables start with the content of RAM, even if all stores are of one value."""
+    """`persistent` and `noload` variables start with the RAM's content, even if all stores have the same value."""
     (tmp_path / "main.c").write_text("""
     static int __attribute__((persistent)) magic, boots;
     static unsigned __attribute__((noload)) kept;
@@ -414,7 +422,10 @@ def test_persistent_and_noload_variables_have_no_known_initial_value(level: str,
 
 @pytest.mark.parametrize("level", LEVELS)
 def test_attributes_of_place_stand_on_variables_constants_and_functions_of_one_file(level: str, tmp_path: Path) -> None:
-    """Clang implements the attributes by sections, and one section contains one kind of definition only."""
+    """Placement attributes may be used for variables, constants and functions of one file.
+
+    Clang implements them as sections, and a section contains one kind of definition only.
+    """
     source = """
     extern int __attribute__((far)) one;
     int __attribute__((far)) one = 1;
@@ -438,7 +449,7 @@ def test_attributes_of_place_stand_on_variables_constants_and_functions_of_one_f
 
 
 def test_a_macro_called_like_a_configuration_word(tmp_path: Path) -> None:
-    """A macro of the program may have the name of a configuration word (`#define FOSC 7372800`)."""
+    """A program's macro may have the name of a configuration word (`#define FOSC 7372800`)."""
     source = """
     #include <p30F6014A.h>
     #define FOSC 7.3728e6
@@ -477,7 +488,8 @@ int later(int a, int b) { return a * b; }
 def test_errors_of_clang_that_gcc_4_warns_of_are_warnings(
     options: tuple[str, ...], tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    """Calls of undeclared functions, `main()` and incompatible pointers are warnings, as in GCC 4."""
+    """Undeclared functions, `main()` and incompatible pointers cause warnings, as in GCC 4, instead of clang's
+    errors."""
     assert status_of(tmp_path, OLD_C, *options) == 15
     assert "warning: incompatible function pointer types passing" in capfd.readouterr().err
     assert driver.main(["-Werror", *options, str(tmp_path / "main.c"), "-o", str(tmp_path / "not.elf")]) == 1
@@ -486,7 +498,7 @@ def test_errors_of_clang_that_gcc_4_warns_of_are_warnings(
 
 @pytest.mark.parametrize("level", LEVELS)
 def test_section_macros_of_the_device_header(level: str, tmp_path: Path) -> None:
-    """Macros such as `_XBSS(64)`, which DSP programs use for their buffers."""
+    """Section macros of the device header such as `_XBSS(64)`, used for DSP buffers, work."""
     source = """
     #include <p30F6014A.h>
     _FBS(0xFFFF) _FSS(0xFFFE);

@@ -1,4 +1,4 @@
-/* C side of the calling-convention tests: main returns the number of the first rule that fails, 0 if none does. */
+/* C half of the calling-convention tests: main returns the number of the first violated rule, or 0. */
 #include <stdarg.h>
 #include <stdint.h>
 
@@ -129,7 +129,7 @@ int c_struct(struct pair p, struct odd q, int r)
     return p.a == 0x1111 && p.b == 0x2222 && q.a == 1 && q.b == 2 && q.c == 3 && r == 0x4444;
 }
 
-/* Needs every register. */
+/* A function that uses every register. */
 long c_busy(void)
 {
     volatile int in[16] = {1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16};

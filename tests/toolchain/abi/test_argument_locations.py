@@ -1,4 +1,4 @@
-"""Locations of arguments: every row of the table in abi-elf.md §2.2."""
+"""Locations of arguments: each row of the table in abi-elf.md §2.2."""
 
 from __future__ import annotations
 
@@ -41,20 +41,27 @@ ROWS: list[tuple[str, list[ArgumentShape], list[object]]] = [
 
 @pytest.mark.parametrize(("name", "shapes", "expected"), ROWS, ids=[r[0] for r in ROWS])
 def test_arguments_have_the_locations_of_xc16(name: str, shapes: list[ArgumentShape], expected: list[object]) -> None:
-    """abi-elf.md §2.2, rules 1-4 and the table. "stack n": the low end lies n bytes below W15 at entry."""
+    """Arguments have XC16's locations (abi-elf.md §2.2, rules 1-4 and table).
+
+    "stack n": the low end of the argument lies n bytes below W15 at entry.
+    """
     places = argument_locations(shapes, False)
     assert [p.register if p.register is not None else f"stack {p.stack}" for p in places] == expected
 
 
 def test_all_arguments_of_a_variadic_function_with_one_named_are_on_the_stack() -> None:
-    """abi-elf.md §2.2, rule 5: the first ends right below the return address."""
+    """Arguments of f(first, ...) are all on the stack, the first one right below the return address (§2.2, rule 5).
+
+    Source: abi-elf.md.
+    """
     places = argument_locations([INT, LONG, scalar(8)], named=1)
     assert [p.register for p in places] == [None] * 3
     assert [p.stack for p in places] == [6, 10, 12]
 
 
 def test_named_arguments_before_the_last_of_a_variadic_function_are_in_registers() -> None:
-    """abi-elf.md §2.2, rule 5, row `g(int a,long b,int n,...)`."""
+    """Named arguments that precede the last named one are in registers: g(int a,long b,int n,...) (abi-elf.md §2.2,
+    rule 5)."""
     places = argument_locations([INT, LONG, INT, LONG], named=3)
     assert [p.register for p in places] == [0, 2, None, None]
     assert [p.stack for p in places[2:]] == [6, 10]

@@ -1,6 +1,6 @@
-"""Calling convention between C and assembly: one check per rule of abi-elf.md §2, on the emulator.
+"""Calling convention between C and assembly on the emulator: one check per rule of abi-elf.md §2.
 
-`calls.c` checks the rules in order; its exit status is the number of the first that fails.
+`calls.c` checks the rules in order; its exit status is the number of the first violated rule.
 """
 
 from __future__ import annotations
@@ -16,7 +16,10 @@ FOLDER = Path(__file__).parent
 
 @pytest.mark.parametrize("level", ["-O0", "-O1", "-Os", "-O2"])
 def test_c_and_assembly_agree_on_every_rule(level: str, tmp_path: Path) -> None:
-    """abi-elf.md §2.1-2.4: argument registers, back-fill, stack, structs, varargs, results, preserved registers."""
+    """C and assembly agree on every rule of abi-elf.md §2.1-2.4.
+
+    The rules concern argument registers, back-fill, the stack, structs, varargs, results and preserved registers.
+    """
     image = tmp_path / "calls.elf"
     built = build([FOLDER / "calls.c", FOLDER / "probe.s"], image, level)
     assert built.status == 0, built.messages

@@ -17,29 +17,30 @@ from toolchain.errors import ToolError
     ],
 )  # fmt: skip
 def test_code_sections_advance_in_pc_units(asm, line, units):
-    """abi-elf.md §4.4, table."""
+    """In code sections the location counter advances in PC units, as the table of abi-elf.md §4.4 says."""
     assert asm(f"{line}\nend: nop\n").symbols["end"].value == units
 
 
 def test_bytes_in_code_fill_low_then_middle_and_leave_the_upper_byte(asm):
-    """abi-elf.md §4.4: .byte fills low, then middle byte of consecutive words."""
+    """In code sections .byte fills the low and then the middle byte of each word (abi-elf.md §4.4)."""
     assert asm(".byte 0x11,0x22,0x33\n .align 2\n nop\n").words() == [0x2211, 0x33, 0]
 
 
 def test_packed_bytes_fill_all_three(asm):
-    """abi-elf.md §4.4: .pbyte low, middle, upper."""
+    """.pbyte fills the low, middle and upper byte of each program word (abi-elf.md §4.4)."""
     assert asm(".pbyte 1,2,3,4\n .palign 2\n nop\n").words() == [0x030201, 0x000004, 0]
 
 
 def test_labels_instructions_and_data_of_the_other_kind_begin_a_word(asm):
-    """pic30-as: program memory is aligned implicitly at each of them; the rest of the word is filled."""
+    """Labels, instructions and data of another kind align program memory implicitly; unused bytes are filled
+    (pic30-as)."""
     out = asm('.byte 1\na: .byte 2\n .pbyte 3\n .byte 4\nb:\nc: nop\n .pasciz "abc"\nd: .pbyte 5\n')
     assert [out.symbols[n].value for n in "abcd"] == [2, 8, 8, 14]
     assert out.words() == [1, 2, 3, 4, 0, 0x636261, 0, 5]
 
 
 def test_a_section_left_ends_its_word(asm):
-    """pic30-as: alignment is implicit upon transition between sections."""
+    """A change of section completes the current program word (pic30-as: alignment is implicit)."""
     assert asm(".byte 1\n .data\n .byte 2\n .text\n .byte 3\n .section c,code\n .previous\n .pbyte 4\n").words() == [
         1,
         3,
@@ -48,13 +49,13 @@ def test_a_section_left_ends_its_word(asm):
 
 
 def test_dot_among_bytes_of_a_word_is_that_word(asm):
-    """pic30-as: the last valid address of the program counter."""
+    """Within a partly filled word `.` is the address of that word: the last valid program address (pic30-as)."""
     out = asm(".pword 7\n .byte 1\n .org . + 2\n .pbyte 2,3\n .org . + 4\n nop\n")
     assert out.words() == [7, 1, 0x0302, 0, 0]
 
 
 def test_fillupper_sets_the_upper_byte_of_data_words(asm):
-    """abi-elf.md §4.3: .fillupper v."""
+    """`.fillupper v` sets the upper byte of data words in program memory (abi-elf.md §4.3)."""
     assert asm(".fillupper 0x3F\n .word 0x1234\n .fillupper\n .word 1\n").words() == [0x3F1234, 1]
 
 
@@ -72,12 +73,15 @@ def test_fillupper_sets_the_upper_byte_of_data_words(asm):
     ],
 )  # fmt: skip
 def test_fill_values_reach_every_byte_that_nothing_is_written_into(asm, text, words):
-    """pic30-as: .fillvalue for data, .fillupper above it, .pfillvalue for all three bytes of .p directives."""
+    """Fill values reach every unwritten byte (pic30-as).
+
+    .fillvalue fills data, .fillupper the byte above, .pfillvalue all three bytes of .p directives.
+    """
     assert asm(text).words() == words
 
 
 def test_fill_values_are_of_their_section_and_of_code(asm):
-    """pic30-as: `.fillvalue` in .text has no effect on RAM."""
+    """A fill value applies to its own code section: `.fillvalue` in .text does not affect RAM (pic30-as)."""
     out = asm(
         ".fillvalue 0xFF\n .data\n .space 2\n .fill 2\n .bss\n .space 2\n .section b,code\n .fill 2\n .text\n .fill 2\n"
     )
@@ -88,12 +92,12 @@ def test_fill_values_are_of_their_section_and_of_code(asm):
 
 @pytest.mark.parametrize("move", [" . = . + 3", " .org . + 3", " .set ., . + 3", " .org x + 3", " . = 4"])
 def test_the_location_counter_moves_relative_to_itself(asm, move):
-    """GNU as: assigning to `.` is .org."""
+    """Assigning to `.` moves the location counter like .org (GNU as)."""
     assert asm(f".data\n .byte 1\nx:\n{move}\ny: .byte 2\n").symbols["y"].value == 4
 
 
 def test_data_sections_count_bytes_and_int_is_four_of_them(asm):
-    """abi-elf.md §4.3: .int is four bytes; §4.4: in data sections 1 unit = 1 byte."""
+    """In data sections .int has four bytes (abi-elf.md §4.3) and a unit is one byte (§4.4)."""
     out = asm(
         '.data\n .byte 1\n .word 0x0302\n .int 0x07060504\n .asciz "a\\n"\n .single 1.0\n .double -2.0\n'
         " .fixed 0.5, -1.0\n"
@@ -103,14 +107,15 @@ def test_data_sections_count_bytes_and_int_is_four_of_them(asm):
 
 
 def test_objects_carry_a_phantom_octet_behind_every_data_byte(asm):
-    """abi-elf.md §6.2: RAM data and psv in objects are b0, 0, b1, 0; sizes count octets."""
+    """Objects store a phantom octet after each byte of RAM data and psv: b0, 0, b1, 0; sizes count octets
+    (abi-elf.md §6.2)."""
     out = asm(".section .const,psv,page\n .byte 1, 2, 3\n")
     assert out.sections[".const"].data == bytes([1, 0, 2, 0, 3, 0])
     assert out.sections[".const"].units == 3
 
 
 def test_align_and_org_count_from_the_section_start(asm):
-    """abi-elf.md §4.3, location directives."""
+    """.align and .org count from the start of the section (abi-elf.md §4.3, location directives)."""
     out = asm(".data\n .byte 1\n .align 4\nx: .byte 2\n .org 0x10, 0xEE\ny:\n")
     assert (out.symbols["x"].value, out.symbols["y"].value) == (4, 16)
     assert out.bytes(".data")[5:] == b"\xee" * 11
@@ -118,13 +123,13 @@ def test_align_and_org_count_from_the_section_start(asm):
 
 
 def test_leb128_is_dwarfs(asm):
-    """DWARF 2 §7.6, examples of figures 22 and 23."""
+    """LEB128 encodings equal the examples of DWARF 2 §7.6, figures 22 and 23."""
     out = asm(".section .debug_x,info\n .uleb128 2, 127, 128, 12857\n .sleb128 2, -2, 127, -127, 128, -128\n")
     assert out.bytes(".debug_x").hex() == "027f8001b964" + "027eff00817f8001807f"
 
 
 def test_bss_only_counts(asm):
-    """abi-elf.md §6.2: bss has no content, its size is still doubled in the file."""
+    """A bss section has no content, but its size in the file is doubled as well (abi-elf.md §6.2)."""
     out = asm(".section .nbss,bss,near\nx: .space 10\n .bss\n .space 3\n")
     assert (out.sections[".nbss"].units, out.sections[".bss"].units, len(out.sections[".nbss"].data)) == (10, 3, 0)
     with pytest.raises(ToolError, match="only zero"):
@@ -143,7 +148,7 @@ def test_bss_only_counts(asm):
     ],
 )  # fmt: skip
 def test_impossible_layouts_are_refused(asm, text, message):
-    """abi-elf.md §4.4."""
+    """Data and locations that a section cannot hold are refused (abi-elf.md §4.4)."""
     with pytest.raises(ToolError) as error:
         asm(text + "\n")
     assert message in str(error.value)

@@ -21,7 +21,10 @@ def value(text):
     ],
 )  # fmt: skip
 def test_numbers_and_operators_have_their_value(text, expected):
-    """abi-elf.md §4.1: decimal, 0x, 0b, leading 0, 'A'; comparisons are -1 when true, as in GNU as."""
+    """Numbers and operators have the values of abi-elf.md §4.1; a true comparison is -1, as in GNU as.
+
+    Forms of numbers: decimal, 0x, 0b, leading 0 and 'A'.
+    """
     assert value(text) == expected
 
 
@@ -29,7 +32,7 @@ def test_numbers_and_operators_have_their_value(text, expected):
     ("text", "expected"), [("1 + 2 & 1", 1), ("8 | 1 + 1", 10), ("6 & 3 << 1", 6), ("1 + 1 == 2", -1)]
 )
 def test_bit_operators_bind_tighter_than_plus_as_in_gnu_as(text, expected):
-    """GNU as 2.14: | & ^ rank above + - and comparisons, unlike C; comparisons rank below + -."""
+    """Unlike in C, | & ^ bind tighter than + -, and comparisons bind less tightly than + - (GNU as 2.14)."""
     assert value(text) == expected
 
 
@@ -41,7 +44,7 @@ def test_bit_operators_bind_tighter_than_plus_as_in_gnu_as(text, expected):
     ],
 )  # fmt: skip
 def test_address_operators_apply_to_plain_numbers(text, expected):
-    """abi-elf.md §4.2, absolute targets."""
+    """Address operators may be applied to plain numbers (abi-elf.md §4.2, absolute targets)."""
     assert value(text) == expected
 
 
@@ -54,20 +57,24 @@ def test_address_operators_apply_to_plain_numbers(text, expected):
     ],
 )  # fmt: skip
 def test_bad_expressions_say_what_is_wrong(text, message):
-    """abi-elf.md §4.2: lo() and hi() are rejected by this assembler."""
+    """A malformed expression is refused with a message that names the mistake; lo() and hi() do not exist (§4.2).
+
+    Source: abi-elf.md.
+    """
     with pytest.raises(ExprError, match=None) as error:
         value(text)
     assert message in str(error.value)
 
 
 def test_labels_in_one_section_have_a_distance_before_the_end_of_the_file(asm):
-    """A difference of labels is a number; differences with forward labels are resolved at the end."""
+    """The difference of two labels of a section is a number; with forward labels it is resolved at the end of the
+    file."""
     out = asm(".data\na: .word b - a, (b - a) / 2, . - a\n .space 4\nb:\n")
     assert out.bytes(".data")[:6] == bytes([10, 0, 5, 0, 4, 0])
 
 
 def test_equates_may_be_set_again_and_keep_the_value_they_had_at_each_use(asm):
-    """.set and = redefine; .equiv does not."""
+    """.set and = may redefine a symbol, .equiv may not; each use has the value at that point."""
     out = asm(".data\nx = 1\n .word x\n .set x, x + 1\n .word x\n .equ x, 9\n .word x\n")
     assert out.bytes(".data") == bytes([1, 0, 2, 0, 9, 0])
     with pytest.raises(ToolError, match="already defined"):
@@ -75,18 +82,18 @@ def test_equates_may_be_set_again_and_keep_the_value_they_had_at_each_use(asm):
 
 
 def test_an_equate_to_a_label_is_a_symbol_in_its_section(asm):
-    """Aliases can be exported."""
+    """A symbol equated to a label is a symbol of the label's section and can be exported."""
     out = asm(".global b\na: nop\n nop\nb = a + 2\n")
     assert (out.symbols["b"].section.name, out.symbols["b"].value) == (".text", 2)
 
 
 def test_a_difference_across_sections_is_refused(asm):
-    """No relocation type expresses it (abi-elf.md §5)."""
+    """A difference of labels in different sections is refused: no relocation type expresses it (abi-elf.md §5)."""
     with pytest.raises(ToolError, match="neither a constant"):
         asm(".data\na: .word a - b\n .text\nb: nop\n")
 
 
 def test_section_limits_become_symbols_the_linker_resolves(asm):
-    """abi-elf.md §4.2: .startof.(sec) .sizeof.(sec) .endof.(sec)."""
+    """.startof.(sec), .sizeof.(sec) and .endof.(sec) become symbols that the linker resolves (abi-elf.md §4.2)."""
     out = asm(" mov #.startof.(.nbss), w0\n mov #.sizeof.(.nbss), w1\n")
     assert [name for _, _, name in out.relocs()] == [".startof..nbss", ".sizeof..nbss"]

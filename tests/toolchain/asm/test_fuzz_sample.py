@@ -7,7 +7,10 @@ SCRIPT = Path(__file__).resolve().parents[2] / "fuzz" / "compiler" / "fuzz_asm.p
 
 
 def test_mutated_sources_and_objects_give_images_or_clean_errors():
-    """No traceback and no hang; every error has a position.  Both images and errors must occur."""
+    """Mutated sources and objects give an image or errors with positions, without traceback or hang.
+
+    The sample must contain both images and errors.
+    """
     spec = importlib.util.spec_from_file_location("fuzz_asm", SCRIPT)
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)

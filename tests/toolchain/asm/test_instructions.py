@@ -9,7 +9,7 @@ from toolchain.errors import ToolError
 
 
 def test_everything_the_vendor_assembler_takes_gives_the_same_words(asm, vectors):
-    """encodings.csv, rows marked `yes`."""
+    """Every statement that the vendor's assembler accepts gives the same words (encodings.csv, rows marked `yes`)."""
     with open(vectors / "encodings.csv", newline="") as file:
         rows = [row for row in csv.DictReader(file) if row["assembles"] == "yes"]
     expected = [int(row[key], 16) for row in rows for key in ("word1", "word2") if row[key]]
@@ -18,7 +18,7 @@ def test_everything_the_vendor_assembler_takes_gives_the_same_words(asm, vectors
 
 
 def test_word_accesses_to_odd_file_addresses_are_refused(asm, vectors):
-    """encodings.csv, rows marked `no` because of an odd address; isa.md §3.3."""
+    """Word accesses to odd file addresses are refused (encodings.csv, rows marked `no`; isa.md §3.3)."""
     with open(vectors / "encodings.csv", newline="") as file:
         texts = [row["text"] for row in csv.DictReader(file) if row["assembles"] == "no"]
     odd = [text for text in texts if re.fullmatch(r"\w+\.w 0x[0-9a-f]*[13579bdf](, WREG)?", text)]
@@ -29,7 +29,7 @@ def test_word_accesses_to_odd_file_addresses_are_refused(asm, vectors):
 
 
 def test_a_word_bit_above_seven_is_a_bit_of_the_next_byte(asm):
-    """abi-elf.md §4.1: bset 0x1ffe,#15 is the byte form at 0x1FFF bit 7."""
+    """A word bit above 7 is a bit of the next byte: bset 0x1ffe,#15 accesses byte 0x1FFF, bit 7 (abi-elf.md §4.1)."""
     assert asm("bset 0x1ffe, #15\n bset.b 0x1fff, #7\n").words() == [0xA8FFFF, 0xA8FFFF]
 
 
@@ -38,7 +38,7 @@ def test_a_word_bit_above_seven_is_a_bit_of_the_next_byte(asm):
                                   "add #1024, w0", "mov [w0+3], w1", "mov [w0+1024], w1", "mov.b [w0+512], w1",
                                   "repeat #16384", "lnk #3", "lnk #16384"])  # fmt: skip
 def test_literals_out_of_range_are_errors_never_expanded(asm, line):
-    """abi-elf.md §4.1, literal ranges."""
+    """A literal out of range is an error; the assembler never expands an instruction (abi-elf.md §4.1)."""
     with pytest.raises(ToolError):
         asm(line + "\n")
 
@@ -50,13 +50,13 @@ def test_literals_out_of_range_are_errors_never_expanded(asm, line):
      "ulnk"],
 )  # fmt: skip
 def test_what_must_not_be_repeated_is_refused(asm, line):
-    """isa.md §16: mnemonics rejected after REPEAT."""
+    """An instruction that must not follow REPEAT is refused there (isa.md §16)."""
     with pytest.raises(ToolError, match="cannot be repeated"):
         asm(f"repeat #4\nx: {line}\n nop\n nop\n")
 
 
 def test_what_may_be_repeated_is_accepted(asm):
-    """isa.md §7.5; data and section changes end the obligation."""
+    """Instructions that REPEAT permits are accepted (isa.md §7.5); data or another section may also follow."""
     assert (
         len(
             asm(
@@ -68,20 +68,20 @@ def test_what_may_be_repeated_is_accepted(asm):
 
 
 def test_the_same_statement_means_another_thing_after_an_equate_changes(asm):
-    """Parsed statements are cached by text; values of symbols are not."""
+    """A statement is encoded with the present values of its symbols, although parsed statements are cached by text."""
     out = asm("k = 1\n mov #k, w0\n bset w0, #k\nk = 2\n mov #k, w0\n bset w0, #k\n mov #late, w1\nlate = 5\n")
     assert out.words() == [0x200010, 0xA01000, 0x200020, 0xA02000, 0x200051]
 
 
 def test_a_number_known_late_is_checked_like_one_known_early(asm):
-    """Fields filled at the end keep their ranges."""
+    """A value that is only known at the end of the file is checked against the same range as an early one."""
     with pytest.raises(ToolError, match="outside"):
         asm("add w0, #late, w1\nlate = 32\n")
     assert asm("call late\nlate = 0x12346\n").words() == [0x022346, 1]
 
 
 def test_equates_may_name_working_registers(asm):
-    """pic30-as: registers are symbols, and DSP sources give them names."""
+    """An equate may name a working register (pic30-as), as DSP sources do."""
     named = asm(
         ".equ xW, w10\n .set yW, w11\nsumW = W4\n .equ facW, W5\n .equiv sameW, sumW\n .ifdef sumW\n nop\n .endif\n"
         " mov [xW++], sumW\n mov.b [xW+sumW], [yW+sumW]\n mac sumW*facW, A, [w8]+=2, sumW, [yW]+=2, facW\n"

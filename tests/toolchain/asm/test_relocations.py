@@ -30,7 +30,10 @@ from toolchain.errors import ToolError
     ],
 )  # fmt: skip
 def test_each_field_gets_its_relocation(asm, line, expected):
-    """abi-elf.md §5, table; pairing [verified] there for all but 9, 10, 25, 26, 29, 74."""
+    """Each instruction or data field gets its relocation (abi-elf.md §5, table).
+
+    The pairing is [verified] there for all but 9, 10, 25, 26, 29, 74.
+    """
     assert asm(line + "\n").relocs() == [(offset, number, asm_symbol(line)) for offset, number in expected]
 
 
@@ -39,7 +42,10 @@ def asm_symbol(line):
 
 
 def test_offsets_count_file_octets(asm):
-    """abi-elf.md §5: code 4 per instruction, data 2 per byte; code data skip the upper octets."""
+    """Relocation offsets count file octets: 4 per instruction, 2 per data byte (abi-elf.md §5).
+
+    Data in code sections skip the upper octets.
+    """
     assert [o for o, _, _ in asm("nop\n call x\n mov #x, w0\n").relocs()] == [4, 8, 12]
     assert [o for o, _, _ in asm(".data\n .byte 1, 2\n .word x, x\n").relocs(".data")] == [4, 8]
     assert [o for o, _, _ in asm(".byte 1\n .word x\n .byte x\n").relocs()] == [1, 5]
@@ -54,26 +60,32 @@ def test_offsets_count_file_octets(asm):
     ],
 )  # fmt: skip
 def test_the_addend_stands_in_the_field(asm, line, word):
-    """abi-elf.md §5: branches in PC units (unscaled), MOV f in words, a word bit above 7 in the next byte."""
+    """The addend is stored in the field: branches in PC units, MOV f in words, bits above 7 in the next byte.
+
+    Source: abi-elf.md §5.
+    """
     assert asm(line + "\n").words() == [word]
 
 
 def test_local_branches_stay_relocations_with_an_empty_field(asm):
-    """abi-elf.md §5: the assembler keeps all branches as relocations, even local ones."""
+    """All branches remain relocations with an empty field, even local ones (abi-elf.md §5)."""
     out = asm("a: nop\n bra a\n bra 1f\n1: nop\n")
     assert out.words() == [0, 0x370000, 0x370000, 0]
     assert [n for _, n, _ in out.relocs()] == [28, 28]
 
 
 def test_branches_relative_to_themselves_need_no_relocation(asm):
-    """The distance of `.+4` is fixed when it is written; isa.md §3.2: target = PC + 2 + 2n."""
+    """A branch to `.+4` needs no relocation: the target is PC + 2 + 2n (isa.md §3.2)."""
     out = asm("bra .+4\n bra .\n rcall $-2\n do #1, .+6\n")
     assert out.words() == [0x370001, 0x37FFFF, 0x07FFFE, 0x080001, 1]
     assert out.relocs() == []
 
 
 def test_a_call_with_an_offset_names_a_label_of_its_own(asm):
-    """abi-elf.md §5, 33: the addend of word 1 does not carry into word 2; emit addend-free calls."""
+    """A call with an offset refers to a new label without addend (abi-elf.md §5, 33).
+
+    The addend of word 1 would not carry into word 2.
+    """
     out = asm("f: nop\n nop\n call f+2\n")
     (_, lsb, name), (_, msb, same) = out.relocs()
     assert (lsb, msb, name, out.symbols[name].value) == (32, 33, same, 2)
@@ -96,13 +108,13 @@ def test_a_call_with_an_offset_names_a_label_of_its_own(asm):
     ],
 )  # fmt: skip
 def test_meaningless_references_are_refused(asm, line, message):
-    """abi-elf.md §4.2 allowed targets, §5 DO result -2, -1, 0 rejected."""
+    """References without meaning are refused: targets beyond abi-elf.md §4.2, and DO lengths -2, -1, 0 (§5)."""
     with pytest.raises(ToolError) as error:
         asm(f"code: {line}\n nop\n .data\ndata: .word 0\n")
     assert message in str(error.value)
 
 
 def test_info_sections_may_hold_code_addresses(asm):
-    """DWARF stores PC values with relocation 32 and 16 (abi-elf.md §6.7)."""
+    """Debug sections may contain code addresses, with relocation 32 or 16 (abi-elf.md §6.7)."""
     out = asm("f: nop\n .section .debug_line,info\n .4byte f\n .2byte f\n")
     assert out.relocs(".debug_line") == [(0, 3, "f"), (8, 2, "f")]

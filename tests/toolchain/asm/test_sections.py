@@ -23,7 +23,7 @@ from toolchain.errors import ToolError
     ],
 )  # fmt: skip
 def test_attributes_become_section_flags(asm, attributes, flags, kind):
-    """abi-elf.md §6.3; quoted flags of §4.3."""
+    """Section attributes become the flags of abi-elf.md §6.3, also in the quoted form of §4.3."""
     section = asm(f".section mine,{attributes}\n").sections["mine"]
     assert (section.flags, section.type) == (flags, kind)
 
@@ -35,12 +35,12 @@ def test_attributes_become_section_flags(asm, attributes, flags, kind):
      (".dconst", 3), (".xbss", 0x04000003), (".ydata", 0x08000003), ("anything", 3)],
 )  # fmt: skip
 def test_reserved_names_imply_their_type(asm, name, flags):
-    """abi-elf.md §4.3; a bare .const means psv,page."""
+    """A reserved section name implies its type; a bare .const means psv,page (abi-elf.md §4.3)."""
     assert asm(f".section {name}\n").sections[name].flags == flags
 
 
 def test_page_travels_in_an_extended_attribute_symbol():
-    """abi-elf.md §6.3: `.const,psv,page` comes with __ext_attr_.const = 8."""
+    """The attribute `page` of `.const,psv,page` becomes the symbol __ext_attr_.const = 8 (abi-elf.md §6.3)."""
     from toolchain.elf.write import object_bytes
 
     obj, _ = assemble(".section .const,psv,page\n .word 1\n", "x.s")
@@ -49,30 +49,33 @@ def test_page_travels_in_an_extended_attribute_symbol():
 
 
 def test_address_and_alignment_reach_the_header(asm):
-    """abi-elf.md §6.3: sh_addr = LMA, sh_addralign in address units."""
+    """Address and alignment of a section are in its header: sh_addr is the LMA, sh_addralign counts address units.
+
+    Source: abi-elf.md §6.3.
+    """
     out = asm(".section here,code,address(0x2000)\n nop\n .section buf,bss,align(32)\n")
     assert (out.sections["here"].load, out.sections["buf"].align) == (0x2000, 32)
 
 
 def test_text_data_and_bss_are_always_there(asm):
-    """abi-elf.md §7 item 8."""
+    """Every object contains .text, .data and .bss (abi-elf.md §7 item 8)."""
     assert list(asm("").sections)[:3] == [".text", ".data", ".bss"]
 
 
 def test_private_sections_get_names_of_their_own(asm):
-    """abi-elf.md §1.4: `*` makes a private section."""
+    """A section named `*` gets a unique name (abi-elf.md §1.4)."""
     out = asm(".section *,bss,near\na: .space 2\n .section *,data\nb: .word 1\n")
     assert out.symbols["a"].section is not out.symbols["b"].section
 
 
 def test_section_stack_and_previous(asm):
-    """.pushsection .popsection .previous."""
+    """.pushsection, .popsection and .previous switch between sections."""
     out = asm("nop\n .pushsection .data\n .byte 1\n .popsection\n nop\n .data\n .byte 2\n .previous\n nop\n")
     assert (len(out.words()), out.bytes(".data")) == (3, b"\1\2")
 
 
 def test_symbol_attributes(asm):
-    """.global .weak .type .size .comm .lcomm; an undefined reference becomes global."""
+    """.global .weak .type .size .comm .lcomm set the attributes of symbols; an undefined reference becomes global."""
     out = asm(
         ".global f\n .weak g, u\n .type f, @function\n .size f, e - f\nf: nop\n nop\ne:\ng: rcall h\n rcall u\n"
         " .comm buf, 10, 4\n .lcomm lbuf, 6\n.Llocal: nop\n"
@@ -92,7 +95,10 @@ def test_symbol_attributes(asm):
 
 
 def test_relax_shortens_calls_within_the_section_only_when_asked(asm):
-    """abi-elf.md §5 Relaxation: CALL -> RCALL, GOTO -> BRA; weak symbols and other sections are left alone."""
+    """Relaxation, if enabled, shortens CALL to RCALL and GOTO to BRA within a section (abi-elf.md §5).
+
+    Weak symbols and other sections are left alone.
+    """
     text = (
         "a: call b\n goto a\n call far\n .weak w\nw: call w\nb: nop\n call 0x200\n .section other,code\nfar: call far\n"
     )
@@ -104,7 +110,7 @@ def test_relax_shortens_calls_within_the_section_only_when_asked(asm):
 
 
 def test_relax_keeps_a_call_that_does_not_reach(asm):
-    """Reach is -32768..32767 words (isa.md §3.2)."""
+    """Relaxation keeps a call whose target is out of reach, -32768..32767 words (isa.md §3.2)."""
     out = asm(f"call end\n call near\nnear: .space {2 * 32766}\n call end\nend: nop\n", relax=True)
     assert out.words()[0] == 0x020000 or out.symbols["near"].value == 4
     distance = (out.symbols["end"].value - 2) // 2
@@ -114,13 +120,13 @@ def test_relax_keeps_a_call_that_does_not_reach(asm):
 
 
 def test_label_distances_across_relaxed_calls_are_final(asm):
-    """.size and .word of a difference see the shortened code."""
+    """.size and .word of a label difference have the value after relaxation."""
     out = asm(".size f, .-f\nf: call g\n call g\ng: nop\n .section .debug_x,info\n .word g - f\n", relax=True)
     assert out.bytes(".debug_x") == b"\4\0"
 
 
 def test_keep_protects_from_section_collection(image):
-    """`keep` attribute with --gc-sections."""
+    """A section with the attribute `keep` survives --gc-sections."""
     text = ".section a,code,keep\nkept: nop\n .section b,code\ngone: nop\n"
     symbols = image(text, gc_sections=True).symbols
     assert "kept" in symbols
@@ -128,20 +134,26 @@ def test_keep_protects_from_section_collection(image):
 
 
 def test_alignment_behind_a_relaxable_call_is_refused(asm):
-    """The size of the call is unknown until relaxation."""
+    """Alignment after a call that may be relaxed is refused, because the size of the call is not yet known."""
     with pytest.raises(ToolError, match="--relax may shorten"):
         asm("f: call f\n .align 16\n nop\n", relax=True)
 
 
 def test_every_object_carries_the_signature_microchips_linker_looks_for(asm):
-    """abi-elf.md §6.7, §7 item 8: info section of three words 1, 0, 0; one of the source is kept."""
+    """Every object has the info section that Microchip's linker expects, words 1, 0, 0 (abi-elf.md §6.7, §7 item 8).
+
+    If the source defines that section, it is kept.
+    """
     assert asm("").bytes("__c30_signature") == bytes([1, 0, 0, 0, 0, 0])
     out = asm(".section __c30_signature, info, data\n .word 1, 2, 3\n")
     assert out.bytes("__c30_signature") == bytes([1, 0, 2, 0, 3, 0])
 
 
 def test_modifiers_alone_keep_the_type_the_name_implies(asm):
-    """As in e-puck library sources: `.section .data, near`; an untouched section may still change its attributes."""
+    """A `.section` with modifiers only keeps the type that its name implies: `.section .data, near` (e-puck library).
+
+    An untouched section may still change its attributes.
+    """
     out = asm(
         " .section .data, near\n .word 1\n .section .bss, near\n .space 2\n .section .text, address(0x200)\n nop\n"
     )
@@ -150,7 +162,8 @@ def test_modifiers_alone_keep_the_type_the_name_implies(asm):
 
 
 def test_a_section_named_again_needs_only_its_type(asm):
-    """pic30-as: address, alignment and memory are those of the first `.section` of the name."""
+    """A section that is named again needs only its type; address, alignment and memory are those of the first use
+    (pic30-as)."""
     out = asm(
         ".section boot,code,address(0x1100)\n nop\n .section fast,bss,xmemory,near\n .space 2\n .text\n"
         " .section boot,code\n nop\n .section fast,bss\n .space 2\n"

@@ -7,7 +7,10 @@ from toolchain.errors import ToolError
 
 
 def test_comments_labels_and_local_labels(asm):
-    """abi-elf.md §4.1: `;` anywhere, `#` first on a line, /* */ over lines, several labels on a line, 1: 1b 1f."""
+    """Comments, several labels per line and local labels are accepted (abi-elf.md §4.1).
+
+    `;` starts a comment anywhere, `#` at the start of a line; /* */ may span lines; local labels are 1: 1b 1f.
+    """
     out = asm(
         "# whole line; bra nowhere\n"
         "a: b: nop ; c: nop\n"
@@ -20,14 +23,14 @@ def test_comments_labels_and_local_labels(asm):
 
 
 def test_mnemonics_and_registers_ignore_case_but_symbols_do_not(asm):
-    """abi-elf.md §4.1."""
+    """Mnemonics and registers are case-insensitive, symbols are case-sensitive (abi-elf.md §4.1)."""
     out = asm("MOV #1, W3\n Inc.B wreg_, WREG\n BRA Nz, X\nx: X: nop\n")
     assert out.words()[0] == 0x200013
     assert {"x", "X"} <= out.symbols.keys()
 
 
 def test_macros_take_defaults_keywords_and_a_serial_number(asm):
-    """GNU as 2.14 macros: \\name, \\@, \\(), defaults, keyword arguments; a dot ends a name."""
+    r"""Macros support \name, \@, \(), defaults and keyword arguments; a dot ends a name (GNU as 2.14)."""
     out = asm(
         ".macro put reg, val=7, size\n mov\\size #\\val, \\reg\nl\\@\\()_x: nop\n.endm\n"
         " put w1\n put val=2 reg=w3\n put w0, 9, .b\n"
@@ -37,7 +40,7 @@ def test_macros_take_defaults_keywords_and_a_serial_number(asm):
 
 
 def test_macros_nest_end_early_and_can_be_purged(asm):
-    """.exitm leaves the innermost macro with its conditionals; .purgem forgets it."""
+    """.exitm ends the innermost macro with its conditionals, and .purgem deletes a macro; macros nest."""
     text = """
     .macro inner n
       .if \\n > 2
@@ -61,7 +64,7 @@ def test_macros_nest_end_early_and_can_be_purged(asm):
 
 
 def test_repeats(asm):
-    """.rept, .irp, .irpc, nested."""
+    """.rept, .irp and .irpc repeat their bodies and may be nested."""
     text = ".rept 2\n .irp r, w1, w2\n clr \\r\n .endr\n .endr\n .irpc c, 34\n clr w\\c\n .endr\n"
     assert asm(text).words() == [0xEB0080, 0xEB0100] * 2 + [0xEB0180, 0xEB0200]
 
@@ -76,13 +79,13 @@ def test_repeats(asm):
     ],
 )  # fmt: skip
 def test_conditions(asm, condition, taken):
-    """abi-elf.md §4.3, control group; the device symbols are always defined."""
+    """Conditional directives select text (abi-elf.md §4.3, control group); the symbols of the device are predefined."""
     out = asm(f"known = 0\n{condition}\n mov #1, w0\n .else\n mov #2, w0\n .endif\n")
     assert out.words() == [0x200010 if taken else 0x200020]
 
 
 def test_conditionals_nest_and_skip_everything_inside(asm):
-    """In skipped text only conditionals have an effect."""
+    """Within skipped text only conditional directives have an effect, and they nest."""
     text = (
         ".if 0\n .if 1\n rubbish ! here\n .else\n more\n .endif\n .elseif 1\n nop\n .elseif 1\n"
         " mov #3, w0\n .else\n bad\n .endif\n"
@@ -91,7 +94,7 @@ def test_conditionals_nest_and_skip_everything_inside(asm):
 
 
 def test_include_looks_beside_the_source_and_in_the_folders_given(tmp_path, asm):
-    """Messages name the included file and line."""
+    """.include searches the source's folder and the given folders; messages name the included file and line."""
     (tmp_path / "lib").mkdir()
     (tmp_path / "lib" / "far.inc").write_text(' mov #2, w0\n .include "near.inc"\n')
     (tmp_path / "lib" / "near.inc").write_text(" mov #3, w0\n frob\n")
@@ -105,20 +108,20 @@ def test_include_looks_beside_the_source_and_in_the_folders_given(tmp_path, asm)
 
 
 def test_line_markers_of_the_c_preprocessor_move_the_place_of_messages(asm):
-    """`# 12 "file"` as cpp writes it."""
+    """A line marker `# 12 "file"` of the C preprocessor sets the position of messages."""
     with pytest.raises(ToolError, match=r"user\.S:41: error: unknown instruction"):
         asm('# 1 "user.S"\n nop\n# 40 "user.S" 2\n nop\n frob\n')
 
 
 def test_incbin_takes_a_part_of_a_file(tmp_path):
-    """.incbin "file", skip, count."""
+    """.incbin "file", skip, count includes a part of a file."""
     (tmp_path / "blob").write_bytes(bytes(range(10)))
     obj, _ = assemble(f'.data\n .incbin "{tmp_path}/blob", 2, 3\n', "x.s")
     assert obj.sections[1].data[::2] == bytes([2, 3, 4])
 
 
 def test_all_errors_of_a_file_are_reported_with_their_lines(asm):
-    """One run shows every mistake."""
+    """One run reports all errors of a file with their lines."""
     with pytest.raises(ToolError) as error:
         asm("frob\n nop\n mov #70000, w0\nx:\nx: nop\n .frob\n bra 9f\n .word 1f\n")
     lines = str(error.value).splitlines()
@@ -155,14 +158,17 @@ def test_all_errors_of_a_file_are_reported_with_their_lines(asm):
     ],
 )  # fmt: skip
 def test_structural_mistakes_have_a_clear_message(asm, text, message):
-    """abi-elf.md §4.3."""
+    """Unbalanced and misplaced directives are refused with a clear message (abi-elf.md §4.3)."""
     with pytest.raises(ToolError) as error:
         asm(text)
     assert message in str(error.value)
 
 
 def test_the_device_include_is_there_without_a_file(asm):
-    """It defines bits (numbered in wide fields), settings and `config`; the linker defines the registers."""
+    """The device include file is built in: bits (numbered in wide fields), settings and `config`.
+
+    The linker defines the registers.
+    """
     out = asm(
         ' .equ __30F6014A, 1\n .include "p30f6014A.INC"\n config __FOSC, CSW_FSCM_OFF & XT_PLL8\n'
         " bclr IFS0, #U1RXIF\n bset IPC10, #DCIIP2\n bra N, 1f\n1: pwrsav #IDLE_MODE\n"
@@ -174,21 +180,21 @@ def test_the_device_include_is_there_without_a_file(asm):
 
 
 def test_a_device_include_of_the_users_own_comes_first(tmp_path):
-    """Microchip's file takes precedence if the user has it."""
+    """A device include file of the user takes precedence over the built-in one."""
     (tmp_path / "p30f6014A.inc").write_text(" .equ MINE, 7\n")
     obj, _ = assemble(' .include "p30f6014A.inc"\n mov #MINE, w0\n', str(tmp_path / "x.s"))
     assert bytes(obj.sections[0].data) == bytes([0x70, 0, 0x20, 0])
 
 
 def test_a_macro_may_be_redefined(asm):
-    """pic30-as warns and uses the last definition, so that an include file may be read twice."""
+    """A macro may be redefined with a warning (pic30-as), so that an include file may be read twice."""
     out = asm(".macro m\n .word 1\n .endm\n m\n .macro m a\n .word \\a\n .endm\n m 5\n")
     assert out.words() == [1, 5]
     assert out.messages == ["test.s:5: warning: macro m has been defined before: this definition replaces that one"]
 
 
 def test_what_equiv_defined_can_be_set_later(asm):
-    """GNU as: .equiv refuses a symbol that has a value; .set takes any that is no label."""
+    """.set may redefine a symbol that .equiv has defined, but no label; .equiv refuses a defined symbol (GNU as)."""
     assert asm(".equiv depth, 0\n .set depth, depth + 2\n .equ depth, depth + 2\n .word depth\n").words() == [4]
     with pytest.raises(ToolError, match="already defined"):
         asm(".set depth, 1\n .equiv depth, 2\n")
@@ -200,13 +206,13 @@ def test_what_equiv_defined_can_be_set_later(asm):
      ("", False)],
 )  # fmt: skip
 def test_ifdecl_asks_whether_a_name_has_been_mentioned(asm, before, known):
-    """pic30-as: declared, not necessarily defined."""
+    """.ifdecl tests whether a symbol has been declared; it need not be defined (pic30-as)."""
     text = f"{before}\n .ifdecl it\n .pword 1\n .else\n .pword 2\n .endif\n .ifndecl it\n .pword 3\n .endif\n"
     assert asm(text).words()[-2 + known :] == ([1] if known else [2, 3])
 
 
 def test_a_file_may_be_named_with_backslashes(asm, tmp_path):
-    """Projects of MPLAB were written on Windows; nothing in a file's name is an escape."""
+    """File names may contain backslashes, as in MPLAB projects from Windows; they are no escapes."""
     (tmp_path / "new" / "table").mkdir(parents=True)
     (tmp_path / "new" / "table" / "two.inc").write_text(" .word 2\n")
     (tmp_path / "new" / "bits.bin").write_bytes(b"\x34\x12")
@@ -217,19 +223,22 @@ def test_a_file_may_be_named_with_backslashes(asm, tmp_path):
 
 
 def test_bss_with_operands_reserves_room(asm):
-    """pic30-as: `.bss name, size, alignment`."""
+    """`.bss name, size, alignment` reserves space (pic30-as)."""
     out = asm(".bss a, 3\n .bss b, 8, 16\n nop\n")
     assert [out.symbols[n].value for n in "ab"] == [0, 16]
     assert (out.sections[".bss"].units, out.words()) == (24, [0])
 
 
 def test_the_device_include_names_bytes_of_registers(asm):
-    """Microchip's include files: `bset.b CORCONL, #PSV`; names of registers keep their meaning."""
+    """The device include file names the bytes of registers: `bset.b CORCONL, #PSV`.
+
+    Register names keep their meaning.
+    """
     named = asm('.include "xc.inc"\n bset.b CORCONL, #PSV\n mov.b SRH, WREG\n mov #OSCCONL, w1\n clr.b MODCONH\n')
     plain = asm(" bset.b 0x44, #2\n mov.b 0x43, WREG\n mov #OSCCONL, w1\n clr.b 0x47\n")
     assert (named.words(), named.relocs()) == (plain.words(), plain.relocs())
 
 
 def test_a_number_sign_before_a_value_means_nothing(asm):
-    """pic30-as accepts it in every expression."""
+    """A number sign before a value in an expression has no effect (pic30-as)."""
     assert asm(".equ rate, #0x70\n .word #rate, # 5\n mov #rate, w0\n").words() == [0x70, 5, 0x200700]

@@ -1,4 +1,4 @@
-"""Measured responses of interrupts, and stack depth, of programs on the emulator."""
+"""Measures interrupt response times and stack depth of programs on the emulator."""
 
 from __future__ import annotations
 
@@ -16,7 +16,10 @@ CHIP = chip_named()
 
 @dataclass
 class Handled:
-    """One handler: longest time from a request to its first instruction, while it does not serve an earlier request."""
+    """Observations of one handler: maximum Tcy from a request to its first instruction.
+
+    Times during which the handler serves an earlier request are excluded.
+    """
 
     late: int = 0
     times: int = 0
@@ -24,15 +27,18 @@ class Handled:
 
 @dataclass
 class Watched:
-    """Observations of one run, or the maxima of several: handlers by C name without `_`, and stack above main's."""
+    """Observations of one run, or the maxima of several runs.
+
+    Handlers are keyed by their C name without `_`; the stack depth is counted from main's.
+    """
 
     handlers: dict[str, Handled]
     stack: int = 0
     nested: int = 0
-    """Greatest number of nested handlers."""
+    """Maximum number of nested handlers."""
 
     def add(self, other: Watched) -> None:
-        """Keep the worst of both."""
+        """Take the maximum of both observations in each field."""
         self.stack, self.nested = max(self.stack, other.stack), max(self.nested, other.nested)
         for name, one in other.handlers.items():
             mine = self.handlers.setdefault(name, Handled())
@@ -40,7 +46,10 @@ class Watched:
 
 
 def watched(image: Path, names: Iterable[str], phases: Iterable[Mapping[str, int]], cycles: int) -> Watched:
-    """Return the maxima over runs of `cycles` Tcy from main, each with the variables of one phase set."""
+    """Run `cycles` Tcy from main once per phase and return the maxima.
+
+    A phase sets the variables that shift the interrupts.
+    """
     machine = emu.load(image, engine="plain")
     assert machine.image is not None
     vectors = {vector.name: vector for vector in CHIP.vectors}

@@ -1,4 +1,4 @@
-"""Bounds of linked images: never below a measurement on the emulator, exact where every value is known."""
+"""Bounds of linked images: at least the time measured on the emulator, and equal to it if every value is known."""
 
 from __future__ import annotations
 
@@ -118,7 +118,7 @@ def built(folder: Path, text: str, *options: str) -> Path:
 
 
 def report(capsys: pytest.CaptureFixture[str], image: Path, *options: str) -> dict:
-    """Return the row of main in the --json report."""
+    """Return the row of main in the report of `bounds --json`."""
     assert main(["bounds", str(image), "--json", *options]) == 0
     row: dict = json.loads(capsys.readouterr().out)["calls"][0]
     return row
@@ -126,7 +126,7 @@ def report(capsys: pytest.CaptureFixture[str], image: Path, *options: str) -> di
 
 @pytest.mark.parametrize("level", ["-O0", "-Os", "-O2"])
 def test_counted_loops_recursion_and_division_are_bounded_closely(tmp_path, capsys, level: str) -> None:
-    """The bound is at least the measured time, and at most 5 % above it."""
+    """Bounds of counted loops, recursion and division are at least the measured time and at most 5 % above it."""
     image = built(tmp_path, COUNTDOWN_CONDITION, level)
     seen = measure(image)
     assert isinstance(seen, dict)
@@ -137,7 +137,7 @@ def test_counted_loops_recursion_and_division_are_bounded_closely(tmp_path, caps
 
 @pytest.mark.parametrize("seed", [2])
 def test_random_programs_stay_within_their_bounds(tmp_path: Path, seed: int) -> None:
-    """A sample of tests/fuzz/compiler/fuzz_bounds.py."""
+    """Bounds of random programs are at least the measured cycles and stack (sample of fuzz_bounds.py)."""
     outcome, pairs = examine(seed, tmp_path)
     assert outcome == "bounded"
     seen, bound = pairs["_main"]
@@ -146,7 +146,7 @@ def test_random_programs_stay_within_their_bounds(tmp_path: Path, seed: int) -> 
 
 
 def test_a_loop_over_a_list_is_named_with_its_line(tmp_path, capsys) -> None:
-    """The length of the list depends on data."""
+    """The report names the line of a loop over a list, whose length depends on data, and gives no bound."""
     image = built(tmp_path, LIST.replace("NOTE", ""))
     row = report(capsys, image)
     assert row["cycles"] is None
@@ -157,7 +157,10 @@ def test_a_loop_over_a_list_is_named_with_its_line(tmp_path, capsys) -> None:
 
 
 def test_an_annotated_loop_is_bounded_by_its_annotation(tmp_path, capsys) -> None:
-    """The loop has eight iterations; each further iteration that the annotation allows costs the same."""
+    """A loop has the bound of its annotation: each further permitted iteration adds the same cycles.
+
+    The program executes eight iterations.
+    """
     image = built(tmp_path, LIST.replace("NOTE", "LOOP_BOUND(n + 1);"))
     seen = measure(image)
     assert isinstance(seen, dict)
@@ -165,26 +168,32 @@ def test_an_annotated_loop_is_bounded_by_its_annotation(tmp_path, capsys) -> Non
     seven, eight, nine = (report(capsys, image, "--let", f"n={n}")["cycles"] for n in (7, 8, 9))
     assert seen["_main"].cycles <= seven
     assert nine - eight == eight - seven > 0
-    assert report(capsys, image, "--let", "n=2")["cycles"] < seen["_main"].cycles  # the annotation is what counts
+    assert report(capsys, image, "--let", "n=2")["cycles"] < seen["_main"].cycles  # as annotated
 
 
 @pytest.mark.parametrize("level", ["-Os", "-O1", "-O2"])
 def test_the_annotation_of_an_inner_loop_does_not_apply_to_the_outer_one(tmp_path, capsys, level: str) -> None:
-    """The line of the inner loop also has an exit of both loops."""
+    """The annotation of an inner loop does not bound the outer loop, although the inner loop's line also exits both."""
     row = report(capsys, built(tmp_path, NESTED, level))
     assert row["cycles"] is None
     assert [place for place in row["open"] if "program.c:6 " in place or "program.c:8 " in place]
 
 
 def test_one_loop_of_the_source_that_became_two_shares_its_rounds(tmp_path, capsys) -> None:
-    """Ten more iterations cost ten times one, not its square; visit() alone takes over 100 cycles."""
+    """Two loops compiled from one source loop share its iterations.
+
+    Ten more iterations then add ten times the cost of one, not its square; visit() alone takes over 100 cycles.
+    """
     image = built(tmp_path, SPLIT)
     few, many = (report(capsys, image, "--let", f"n={n}")["cycles"] for n in (10, 20))
     assert 1_000 < many - few < 2_000
 
 
 def test_rounds_of_all_entries_together_are_counted_once(tmp_path, capsys) -> None:
-    """Eight lists of up to eight items have eight items in total: 8 visits of over 100 cycles, not 64."""
+    """An annotated total over all entries of a loop is counted once.
+
+    Eight lists of up to eight items have eight items in total: 8 visits of over 100 cycles, not 64.
+    """
     image = built(tmp_path, TABLE)
     seen = measure(image)
     assert isinstance(seen, dict)
@@ -194,17 +203,20 @@ def test_rounds_of_all_entries_together_are_counted_once(tmp_path, capsys) -> No
     assert seen["_main"].cycles <= together <= 1.2 * seen["_main"].cycles
     assert apart > 64 * 100 > 3 * together
     assert 100 < more - together < 150
-    assert report(capsys, image, "--let", "b=1", "--let", "t=80")["cycles"] <= together  # the smaller way to count
+    assert report(capsys, image, "--let", "b=1", "--let", "t=80")["cycles"] <= together  # the smaller bound
 
 
 def test_a_bounded_argument_bounds_a_copy(tmp_path, capsys) -> None:
-    """memcpy counts down from its argument, in bytes for odd addresses, and tests the sign of the remaining count."""
+    """The bounded length argument of memcpy bounds its loop.
+
+    memcpy counts down in bytes for odd addresses, and tests the sign of the remaining count.
+    """
     row = report(capsys, built(tmp_path, COPY), "--function", "copy")
     assert 20 < row["cycles"] < 80
 
 
 def test_paths_that_call_a_function_can_be_excluded(tmp_path, capsys) -> None:
-    """Without the division main is cheaper; without main's own callee it has no path to its return."""
+    """Paths that call an excluded function do not count: main is then cheaper, or has no path to its return."""
     text = '__attribute__((noinline)) int rare(int x) { __asm__ volatile("repeat #99\\n nop"); return x; }\n'
     text += "volatile int v; int main(void) { int x = v; return x == 7 ? rare(x) : x; }"
     image = built(tmp_path, text)
@@ -215,7 +227,10 @@ def test_paths_that_call_a_function_can_be_excluded(tmp_path, capsys) -> None:
 
 
 def test_a_call_is_bounded_inside_of_sections_too(tmp_path, capsys) -> None:
-    """Within a section a PRIVATE_VALUE does not hold; the code that leaves a section runs only there."""
+    """A call within a critical section is bounded too.
+
+    There a PRIVATE_VALUE does not hold, and the code that leaves a section runs only there.
+    """
     text = "#include <bounds.h>\nint depth; PRIVATE_VALUE(depth, 0);\n__attribute__((noinline)) void leave(void)\n"
     text += '{ if (depth) { depth--; __asm__ volatile("repeat #99\\n nop" ::: "memory"); } }\n'
     text += "int main(void) { depth = 1; leave(); return depth; }"
@@ -223,14 +238,14 @@ def test_a_call_is_bounded_inside_of_sections_too(tmp_path, capsys) -> None:
 
 
 def test_a_branch_on_a_shift_is_followed(tmp_path, capsys) -> None:
-    """Shifts by a literal set Z and N and have no byte form."""
+    """The analysis follows branches on shift results: shifts by a literal set Z and N and have no byte form."""
     shift = '__asm__("lsr %1,#3,%0\\n\\tbra z,1f\\n\\tnop\\n1:" : "=r"(r) : "r"(v));'
     text = "volatile int v; int main(void) { int r; " + shift + " return r; }"
     assert report(capsys, built(tmp_path, text))["cycles"] > 5
 
 
 def test_an_annotation_costs_neither_code_nor_memory(tmp_path: Path) -> None:
-    """An image with annotations equals one without in code and data."""
+    """Annotations change neither the code nor the data of an image."""
     (tmp_path / "a").mkdir()
     (tmp_path / "b").mkdir()
     without = read_executable(built(tmp_path / "a", LIST.replace("NOTE", "")).read_bytes(), "a")
@@ -243,7 +258,10 @@ def test_an_annotation_costs_neither_code_nor_memory(tmp_path: Path) -> None:
 
 
 def test_the_longest_masked_time_is_reported(tmp_path, capsys) -> None:
-    """REPEAT #29, NOP takes 1 + 30 cycles at level 5, and the instructions that write SR come on top."""
+    """The longest masked time is reported: REPEAT #29, NOP takes 1 + 30 cycles at level 5.
+
+    The instructions that write SR are added.
+    """
     row = report(capsys, built(tmp_path, MASKS))
     cycles, place = row["masked"]["5"]
     assert 31 < cycles <= 40
@@ -252,7 +270,7 @@ def test_the_longest_masked_time_is_reported(tmp_path, capsys) -> None:
 
 
 def test_a_limit_that_can_be_exceeded_fails(tmp_path, capsys) -> None:
-    """A limit on a function without a bound fails as well."""
+    """A bound above its limit fails, for cycles (`--limit`) and for stack bytes (`--stack-limit`)."""
     image = built(tmp_path, COUNTDOWN_CONDITION)
     cycles = report(capsys, image)["cycles"]
     assert main(["bounds", str(image), "--limit", f"main={cycles}"]) == 0
@@ -270,7 +288,7 @@ def test_a_limit_that_can_be_exceeded_fails(tmp_path, capsys) -> None:
     ],
 )
 def test_bad_arguments_are_refused(tmp_path, capsys, options: list[str], message: str) -> None:
-    """The exit status is 2, and the message names the argument."""
+    """Bad arguments end with exit status 2 and a message that names the argument."""
     assert main(["bounds", str(built(tmp_path, COUNTDOWN_CONDITION)), *options]) == 2
     assert message in capsys.readouterr().err
 
@@ -311,7 +329,7 @@ int main(void) { u = 9; CALLED(); return 0; }
 @pytest.mark.parametrize("called", ["sized", "any", "some"])
 @pytest.mark.parametrize("level", ["-O0", "-O2"])
 def test_room_of_unknown_length_is_no_other_stack(level: str, called: str, tmp_path: Path) -> None:
-    """A function with `alloca` has no stack bound, rather than one below the measurement."""
+    """A function with `alloca` of unknown length has no stack bound, instead of one below the measurement."""
     (tmp_path / "a.c").write_text(ROOM.replace("CALLED", called))
     assert build([tmp_path / "a.c"], tmp_path / "a.elf", level, "-w", "-fno-lto").status == 0
     seen = measure(tmp_path / "a.elf")
@@ -331,7 +349,7 @@ def test_room_of_unknown_length_is_no_other_stack(level: str, called: str, tmp_p
 
 @pytest.mark.parametrize("level", ["-O0", "-Os"])
 def test_annotations_are_no_variables_of_the_program(tmp_path: Path, level: str) -> None:
-    """DWARF describes no annotation as a variable: its section is not in data memory."""
+    """DWARF describes no annotation as a variable: the section of annotations is not in data memory."""
     image = load_image(str(built(tmp_path, LIST.replace("NOTE", "LOOP_BOUND(8);"), level)))
     assert set(image.lines.files) <= {symbol.address for symbol in image.symbols.all if symbol.space == "data"}
     head = image.symbols.find("_head")

@@ -1,4 +1,4 @@
-"""Annotations apply to one line, function and file, and to one call or loop."""
+"""An annotation applies to one line, function and file, and to one call or loop."""
 
 from __future__ import annotations
 
@@ -93,7 +93,7 @@ def cycles(image: Path) -> int:
 
 @pytest.mark.parametrize("level", ["-Os", "-O2"])
 def test_the_annotation_of_a_call_does_not_apply_to_the_next_line(tmp_path: Path, capsys, level: str) -> None:
-    """Both lines call repair(); only the first is limited to one call."""
+    """The annotation of a call does not apply to the call of repair() in the next line."""
     text = TWICE.format(slow=SLOW.format("", 999), annotation="CALL_SHARE(repair, work, 1);")
     image = built(tmp_path, text, level)
     assert cycles(image) <= report(capsys, image)["cycles"] <= 1.1 * cycles(image)
@@ -110,14 +110,14 @@ def test_the_annotation_of_a_call_does_not_apply_to_the_next_line(tmp_path: Path
     ],
 )
 def test_an_annotation_without_its_call_is_refused(tmp_path: Path, capsys, annotation: str, message: str) -> None:
-    """The message has file and line of the annotation."""
+    """An annotation without a call to apply to is refused with its file and line."""
     image = built(tmp_path, TWICE.format(slow=SLOW.format("", 9), annotation=annotation))
     assert main(["bounds", str(image)]) == 2
     assert message in capsys.readouterr().err
 
 
 def test_an_annotation_after_all_code_is_refused(tmp_path: Path, capsys) -> None:
-    """It could apply to nothing."""
+    """An annotation after the last code is refused, because it applies to nothing."""
     text = "#include <bounds.h>\nvolatile int a;\nint main(void)\n{\n    a = 2;\n    return 0;\n    LOOP_BOUND(3);\n}\n"
     assert main(["bounds", str(built(tmp_path, text))]) == 2
     assert "program.c:7: main has no code after this annotation" in capsys.readouterr().err
@@ -125,7 +125,10 @@ def test_an_annotation_after_all_code_is_refused(tmp_path: Path, capsys) -> None
 
 @pytest.mark.parametrize("lto", [[], ["-fno-lto"]])
 def test_static_functions_with_equal_names_are_distinguished(tmp_path: Path, capsys, lto: list[str]) -> None:
-    """Files and folders have equal names, annotations equal lines: 40 items in one list, 5 in the other."""
+    """Annotations distinguish static functions with equal names in files with equal names and lines.
+
+    One list has 40 items, the other 5.
+    """
     sources = []
     for name, count, annotation in (("one", 40, "LOOP_BOUND(40);"), ("two", 5, "LOOP_BOUND(5);")):
         (tmp_path / name / "part").mkdir(parents=True)
@@ -152,7 +155,10 @@ def test_static_functions_with_equal_names_are_distinguished(tmp_path: Path, cap
 
 
 def test_a_static_function_of_another_file_is_named_with_it(tmp_path: Path, capsys) -> None:
-    """main.c writes `list.c/length`, with or without blanks; plain `length` is not visible there."""
+    """A static function of another file is named with its file: `list.c/length`, with or without blanks.
+
+    The plain name `length` is not visible in main.c.
+    """
     (tmp_path / "list.c").write_text(PART.format(name="one", count=8, annotation=""))
     for name in ("list.c/length", "list.c / length", "length"):
         (tmp_path / "main.c").write_text(
@@ -167,7 +173,8 @@ def test_a_static_function_of_another_file_is_named_with_it(tmp_path: Path, caps
 
 
 def test_several_back_edges_are_one_loop_only_with_an_annotation(tmp_path: Path, capsys) -> None:
-    """The target of `continue` could as well be the condition of an inner loop."""
+    """Several back edges form one loop only with an annotation: `continue` could also lead to an inner loop's
+    condition."""
     image = built(tmp_path, WAYS_BACK.format(annotation="LOOP_BOUND(8);"), "-Os")
     row = report(capsys, image)
     assert row["cycles"] is None
@@ -177,14 +184,14 @@ def test_several_back_edges_are_one_loop_only_with_an_annotation(tmp_path: Path,
 
 
 def test_the_annotation_of_an_unrolled_loop_does_not_apply_to_the_enclosing_loop(tmp_path: Path, capsys) -> None:
-    """At -O2 the inner loop is unrolled; only its line is left."""
+    """The annotation of an unrolled inner loop does not apply to the enclosing loop, although only its line remains."""
     row = report(capsys, built(tmp_path, UNROLLED, "-O2"))
     assert row["cycles"] is None
     assert "this loop has no known bound" in row["open"].values()
 
 
 def test_a_loop_with_too_many_iterations_is_reported(tmp_path: Path, capsys) -> None:
-    """The loop has a bound, but above the limit of the analysis."""
+    """A loop whose iteration count exceeds the limit of the analysis is reported."""
     text = "volatile unsigned n; int main(void) { for (unsigned i = 0; i < 6000; i++) n = i; return 0; }"
     row = report(capsys, built(tmp_path, text, "-Os"))
     assert row["cycles"] is None
@@ -193,6 +200,9 @@ def test_a_loop_with_too_many_iterations_is_reported(tmp_path: Path, capsys) -> 
 
 @pytest.mark.parametrize("seed", [4, 7, 10])
 def test_programs_with_correct_annotations_of_every_kind_stay_within_their_bounds(tmp_path: Path, seed: int) -> None:
-    """A sample of tests/fuzz/compiler/fuzz_bounds.py with programs of tests/fuzz/programs/c_notes.py."""
+    """Programs with correct annotations of every kind stay within their bounds.
+
+    Sample of tests/fuzz/compiler/fuzz_bounds.py with programs of tests/fuzz/programs/c_notes.py.
+    """
     outcome, _ = examine(seed, tmp_path)
     assert outcome == "bounded"

@@ -1,4 +1,4 @@
-"""Programs with late responses and deep nesting: no response and no stack exceeds its bound, or it has none."""
+"""Response times and stack of programs with late responses and deep nesting never exceed their bounds."""
 
 from __future__ import annotations
 
@@ -75,14 +75,14 @@ PROGRAMS = {
     "Idle": (
         "1: bset 0x42,#7\n repeat #50\n nop\n pwrsav #1\n repeat #60\n nop\n bclr 0x42,#7\n bra 1b\n" + T1 + T2, 4, 2),
 }  # fmt: skip
-"""By name: main after `begin` and handlers, and the levels of T1 and T2."""
+"""Test programs by name: code of main after `begin`, handlers, and interrupt levels of T1 and T2."""
 PHASES = [{"first": 160 + k, "second": 60_000 if k % 2 else 150 + k * 11 % 600} for k in range(0, 420, 3)]
 PHASES += [{"first": 425 + k, "second": 400 + k} for k in range(0, 60, 2)]
 CYCLES = 1_200
 
 
 def images(folder: Path, text: str, annotated: tuple[int, int], actual: tuple[int, int]) -> Path:
-    """Build a program with annotated and actual levels of its two interrupts."""
+    """Build a program whose two interrupts have the annotated and the actual levels; return the image's path."""
     (folder / "p.s").write_text(HEAD + text)
     (folder / "c.c").write_text(DEVICES % (*annotated, *actual))
     built = build([folder / "p.s", folder / "c.c"], folder / "p.elf", "-Os", "-g", "-fno-lto")
@@ -91,7 +91,7 @@ def images(folder: Path, text: str, annotated: tuple[int, int], actual: tuple[in
 
 
 def said_of(image: Path, function: str = "main") -> BoundsReport:
-    """Return the report of an image."""
+    """Return the report of `bounds` on an image."""
     executable = read_executable(image.read_bytes(), str(image))
     return report_of(Program(executable, Annotations(), read_annotation_section(executable, {})), [function])
 
@@ -111,7 +111,10 @@ def compare(seen: Watched, report: BoundsReport) -> None:
 
 @pytest.mark.parametrize("name", PROGRAMS)
 def test_no_response_and_no_stack_is_above_its_bound(tmp_path: Path, name: str) -> None:
-    """Both interrupts occur at many phases; the response of the higher one comes close to its bound."""
+    """No response and no stack depth exceeds its bound; the higher interrupt comes close to its response bound.
+
+    Both interrupts occur at many phases.
+    """
     text, *levels = PROGRAMS[name]
     image = images(tmp_path, text, (levels[0], levels[1]), (levels[0], levels[1]))
     seen, report = watched(image, ["T1Interrupt", "T2Interrupt"], PHASES, CYCLES), said_of(image)
@@ -122,7 +125,7 @@ def test_no_response_and_no_stack_is_above_its_bound(tmp_path: Path, name: str) 
 
 
 def test_what_holds_interrupts_back_for_ever_leaves_no_response(tmp_path: Path, capsys) -> None:
-    """An endless loop at IPL 4, entered there; the command names the loop."""
+    """An endless loop entered at IPL 4 leaves lower interrupts without a response bound; the command names the loop."""
     image = images(tmp_path, "bset 0x42,#7\n" + LOOP + T1 + T2, (4, 5), (4, 5))
     report = said_of(image)
     assert {one.name: one.cycles is None for one in report.responses} == {"_T1Interrupt": True, "_T2Interrupt": False}
@@ -131,13 +134,16 @@ def test_what_holds_interrupts_back_for_ever_leaves_no_response(tmp_path: Path, 
 
 
 def test_a_round_of_an_endless_loop_that_may_stay_masked(tmp_path: Path) -> None:
-    """A variable decides whether an iteration unmasks: possibly none does."""
+    """If no iteration of an endless loop certainly unmasks interrupts, there is no response bound.
+
+    Here a variable decides.
+    """
     text = "1: bset 0x42,#7\n btss _out,#0\n bra 1b\n bclr 0x42,#7\n bra 1b\n"
     assert [one.cycles for one in said_of(images(tmp_path, text + T1 + T2, (4, 4), (4, 4))).responses] == [None, None]
 
 
 def test_sleep_leaves_no_response(tmp_path: Path, capsys) -> None:
-    """The start-up time of the oscillator is unknown."""
+    """Sleep mode leaves no response bound, because the start-up time of the oscillator is unknown."""
     image = images(tmp_path, "1: pwrsav #0\n bra 1b\n" + T1 + T2, (4, 4), (4, 4))
     assert [one.cycles for one in said_of(image).responses] == [None, None]
     assert main(["bounds", str(image)]) == 0
@@ -145,7 +151,7 @@ def test_sleep_leaves_no_response(tmp_path: Path, capsys) -> None:
 
 
 def test_a_stopped_machine_holds_nothing_back(tmp_path: Path) -> None:
-    """Without an enabled interrupt there is no request to delay."""
+    """A stopped machine delays no response: without an enabled interrupt there is no request."""
     text = (
         "btsc _out,#0\n bra 2f\n" + LOOP + "2: bset 0x42,#7\n clr 0x8c\n clr 0x8e\n clr 0x90\n3: pwrsav #1\n bra 3b\n"
     )
@@ -153,7 +159,10 @@ def test_a_stopped_machine_holds_nothing_back(tmp_path: Path) -> None:
 
 
 def test_a_level_that_contradicts_its_annotation_is_reported(tmp_path: Path) -> None:
-    """T2 is annotated with level 2 and gets 5, so that it delays T1, which has 4."""
+    """An actual level above the annotated one is reported.
+
+    T2 is annotated with level 2 and gets 5, so that it delays T1 at level 4.
+    """
     image = images(tmp_path, LOOP + T1 + SLOW, (4, 2), (4, 5))
     seen = watched(image, ["T1Interrupt"], PHASES, CYCLES)
     assert seen.handlers["T1Interrupt"].late > 200
@@ -166,7 +175,7 @@ def test_a_level_that_contradicts_its_annotation_is_reported(tmp_path: Path) -> 
 
 
 def test_main_counts_whatever_is_asked_for(tmp_path: Path) -> None:
-    """Code outside the analysed function can delay an interrupt."""
+    """Code outside the analysed function counts for response bounds: it can delay an interrupt."""
     text = "1: bset 0x42,#7\n repeat #300\n nop\n bclr 0x42,#7\n bra 1b\n"
     image = images(tmp_path, text + T1 + T2, (4, 2), (4, 2))
     compare(watched(image, ["T1Interrupt", "T2Interrupt"], PHASES, CYCLES), said_of(image, "nothing"))
@@ -174,14 +183,17 @@ def test_main_counts_whatever_is_asked_for(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("seed", [3, 15])
 def test_random_programs_answer_within_their_bounds(tmp_path: Path, seed: int) -> None:
-    """A sample of tests/fuzz/compiler/fuzz_bounds.py with programs of tests/fuzz/programs/c_interrupts.py."""
+    """Random programs with interrupts stay within their response bounds.
+
+    Sample of tests/fuzz/compiler/fuzz_bounds.py with programs of tests/fuzz/programs/c_interrupts.py.
+    """
     held = Held(Counter())
     assert held.examine(seed, tmp_path) == "responses"
     assert held.nested > 1
 
 
 def test_random_programs_hold_interrupts_back_in_every_way() -> None:
-    """A long campaign contains every shape; an empty one lacks all of them."""
+    """A long campaign generates every way of delaying an interrupt; an empty campaign reports all as missing."""
     made: Counter[str] = Counter()
     for seed in range(INTERRUPTED, 6 * ENOUGH, 6):
         made += c_interrupts.Program(seed).kinds

@@ -1,4 +1,4 @@
-"""Shared iterations and calls, constants in the PSV window, and longjmp."""
+"""Bounds with shared iterations and calls, with constants in the PSV window, and with longjmp."""
 
 from __future__ import annotations
 
@@ -104,9 +104,11 @@ def measured(image: Path) -> int:
 
 
 def test_rounds_of_two_calls_are_shared_in_the_function_that_makes_them(tmp_path: Path, capsys) -> None:
-    """Each of two calls of walk() has eight iterations, three of them in the first call of down().
+    """Iterations annotated as shared by two calls are counted once in their caller.
 
-    Without the annotation the second call of down() may have eight."""
+    Each of two calls of walk() has eight iterations, three of them in the first call of down(). Without the
+    annotation the second call of down() may have eight.
+    """
     image = built(tmp_path, SHARED.replace("NOTE", "LOOP_SHARE(walk, 8);"))
     assert measured(image) <= report(capsys, image)["cycles"] <= 1.1 * measured(image)
     apart = built(tmp_path, SHARED.replace("NOTE", ""))
@@ -114,7 +116,7 @@ def test_rounds_of_two_calls_are_shared_in_the_function_that_makes_them(tmp_path
 
 
 def test_a_call_is_made_only_so_often(tmp_path: Path, capsys) -> None:
-    """The call is made in one of ten iterations, or never."""
+    """An annotated call that is made in one of ten iterations, or never, is counted that often."""
     image = built(tmp_path, RARE.replace("NOTE", "CALL_SHARE(repair, work, 1);"))
     assert measured(image) <= report(capsys, image)["cycles"] <= 1.1 * measured(image)
     image = built(tmp_path, RARE.replace("NOTE", "CALL_IF(repair, x);"))
@@ -123,26 +125,29 @@ def test_a_call_is_made_only_so_often(tmp_path: Path, capsys) -> None:
 
 @pytest.mark.parametrize("level", ["-O0", "-Os", "-O2"])
 def test_constants_behind_the_window_have_both_their_bytes(tmp_path: Path, capsys, level: str) -> None:
-    """The iteration count of a loop is a constant in the window."""
+    """The analysis reads both bytes of a constant in the PSV window, here the iteration count of a loop."""
     image = built(tmp_path, CONSTANTS, level)
     assert measured(image) <= report(capsys, image)["cycles"] <= 1.1 * measured(image)
 
 
 def test_an_address_that_is_moved_still_leads_to_ram(tmp_path: Path, capsys) -> None:
-    """The address of a link in a loaded object costs no PSV cycle to follow."""
+    """Following a link whose address was moved still costs no PSV cycle: the object is in RAM."""
     image = built(tmp_path, LINKS)
     assert measured(image) <= report(capsys, image)["cycles"] <= 1.03 * measured(image)
 
 
 @pytest.mark.parametrize("level", ["-O0", "-Os", "-O2"])
 def test_an_index_that_is_loaded_may_lead_into_the_window(tmp_path: Path, capsys, level: str) -> None:
-    """The index is no pointer, although it comes from a file whose pointers point to RAM."""
+    """A loaded index may lead into the PSV window.
+
+    The index is no pointer, although its file contains only pointers to RAM.
+    """
     image = built(tmp_path, INDEXED, level)
     assert measured(image) <= report(capsys, image)["cycles"]
 
 
 def test_a_long_jump_leaves_no_bound(tmp_path: Path, capsys) -> None:
-    """The report names longjmp as the reason."""
+    """A function with longjmp has no bound, and the report names longjmp as the reason."""
     row = report(capsys, built(tmp_path, LONG_JUMP))
     assert row["cycles"] is None
     assert any("longjmp" in reason for reason in row["open"].values())

@@ -1,4 +1,4 @@
-"""Adversarial programs: the bound is at least the longest run, or the report names the line without a bound."""
+"""Adversarial programs: the bound covers the longest run, or the report names the line that has no bound."""
 
 from __future__ import annotations
 
@@ -93,10 +93,12 @@ PROGRAMS = {
         " mov #0x910,w1\n mov #100,w3\n1: mov [w1++],w2\n mov #0x920,w4\n dec w3,w3\n bra z,2f\n cp w1,w4\n bra nz,1b\n"
         "2: clr 0x46\n nop\n return\n", 1, (SPECIAL_ADDRESSING, 10)),
 }  # fmt: skip
-"""What gets past -> the code behind `mov _in,w0`, how many inputs there are, and the reason and line of what is
-refused (None: it is bounded)."""
+"""Adversarial code by name: code after `mov _in,w0`, number of inputs, and reason and line of the refusal.
+
+None stands for a program that is bounded.
+"""
 LOOSE = {"half a word of the stack": 11}
-"""Greatest ratio of bound and longest run where it is not 1.1: a byte of the program is unknown."""
+"""Maximum ratio of bound and longest run if it exceeds 1.1: the analysis does not know a byte of the program."""
 NINTH = """
 __attribute__((noinline)) void set(int a, int b, int c, int d, int e, int f, int g, int h, unsigned *p)
 {
@@ -111,7 +113,10 @@ int main(void)
     return 0;
 }
 """
-"""Only a pointer among the stack arguments points to the variable; it has more contexts than the analysis separates."""
+"""C program in which only one pointer among the stack arguments points to the variable.
+
+It has more contexts than the analysis separates.
+"""
 
 
 def bound_of(image: Path) -> Bound:
@@ -124,7 +129,7 @@ def bound_of(image: Path) -> Bound:
 
 
 def worst(image: Path, inputs: int) -> int:
-    """Return the cycles of main's longest run with the values 0..inputs-1 in `in`."""
+    """Return the cycles of main's longest run over all inputs 0..inputs-1 in the variable `in`."""
     longest = 0
     for value in range(inputs):
         machine = emu.load(image, engine="plain")
@@ -140,7 +145,10 @@ def worst(image: Path, inputs: int) -> int:
 
 @pytest.mark.parametrize("name", PROGRAMS)
 def test_assembly_stays_within_its_bound_or_is_refused_by_its_line(tmp_path: Path, name: str) -> None:
-    """The programs use DO loops, registers through memory, jump tables and addressing modes in unusual ways."""
+    """Unusual assembly stays within its bound or is refused with its line.
+
+    The programs use DO loops, registers accessed through memory, jump tables and rare addressing modes.
+    """
     text, inputs, refused = PROGRAMS[name]
     most = LOOSE.get(name, 1.1)
     (tmp_path / "p.s").write_text(HEAD + text)
@@ -161,7 +169,7 @@ def test_assembly_stays_within_its_bound_or_is_refused_by_its_line(tmp_path: Pat
 
 
 def test_a_pointer_to_the_stack_among_arguments_on_the_stack(tmp_path: Path) -> None:
-    """The callee may store through the pointer."""
+    """The bound covers a callee that stores through a pointer which is passed among the stack arguments."""
     calls = " ".join(f"n = {k}; set({k}, 2, 3, 4, 5, 6, 7, 8, &n);" for k in range(14))
     (tmp_path / "p.c").write_text(DATA + NINTH.replace("CALLS", calls))
     built = build([tmp_path / "p.c"], tmp_path / "p.elf", "-O0", "-g")
@@ -172,7 +180,10 @@ def test_a_pointer_to_the_stack_among_arguments_on_the_stack(tmp_path: Path) -> 
 
 @pytest.mark.parametrize("level", ["-O0", "-Os", "-O2"])
 def test_the_table_of_a_switch_has_an_end_the_compiler_asks_for(tmp_path: Path, level: str) -> None:
-    """No jump into the table is refused, although the number of cases, seven, is no power of two."""
+    """The analysis derives the end of a switch's jump table from the compiler's range check.
+
+    No jump into the table is refused, although the number of cases, seven, is no power of two.
+    """
     cases = " ".join(f"case {k}: out += {k * k + 1}; break;" for k in range(3, 10))
     (tmp_path / "p.c").write_text(DATA + f"int main(void) {{ switch (in) {{ {cases} }} return 0; }}\n")
     built = build([tmp_path / "p.c"], tmp_path / "p.elf", level, "-g", "-fno-lto")

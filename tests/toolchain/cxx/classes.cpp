@@ -1,4 +1,4 @@
-// Classes: construction, virtual functions, several bases, members, operators, statics and their guards.
+// Classes: construction, virtual functions, multiple inheritance, members, operators, statics and their guards.
 namespace
 {
 int order[8];

@@ -1,4 +1,4 @@
-// libc++'s headers, the C library from C++, new and delete.
+// Headers of libc++, calls of the C library from C++, new and delete.
 #include <algorithm>
 #include <array>
 #include <atomic>

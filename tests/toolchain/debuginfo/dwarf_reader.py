@@ -1,4 +1,4 @@
-"""Reader of the debug sections of our images with pyelftools."""
+"""Reader of the debug sections of this toolchain's images, with pyelftools."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from elftools.elf.elffile import ELFFile
 
 
 def dwarf_of(image: Path) -> DWARFInfo:
-    """DWARF of an image."""
+    """Return the DWARF information of an image."""
     content: dict[str, bytes] = {}
     with image.open("rb") as file:
         for section in ELFFile(file).iter_sections():

@@ -1,7 +1,8 @@
-"""Call frame information: unwound at every instruction of programs on the emulator.
+"""Call frame information, used for unwinding at every instruction of programs on the emulator.
 
-The frames are compared with the calls, returns and interrupts that were executed: return addresses, W15 and registers
-of the callers."""
+The unwound frames are compared with the executed calls, returns and interrupts: return addresses, W15 and the
+registers of the callers.
+"""
 
 from __future__ import annotations
 
@@ -22,11 +23,11 @@ from tests.toolchain.debuginfo.dwarf_reader import dwarf_of
 from tests.toolchain.test_exec import FOLDER, cases_of
 
 SP, RCOUNT, RETURN_ADDRESS = 15, 16, 37
-RCOUNT_AT = 0x36  # registers.csv
+RCOUNT_AT = 0x36  # address of RCOUNT (registers.csv)
 PC_MASK = 0x7FFFFE
 DEEPEST = 40
 STEPS = 12_000
-"""Instructions executed of each program."""
+"""Number of executed instructions per program."""
 MAIN = """
 int exec_failed_line;
 {declarations}
@@ -102,14 +103,14 @@ int main(void)
 
 @dataclass
 class ExecutedCall:
-    """An executed call or interrupt: return address, and W0 to W15 and RCOUNT of the caller."""
+    """An executed call or interrupt: its return address, and the caller's W0 to W15 and RCOUNT."""
 
     back: int
     registers: tuple[int, ...]
 
 
 class FrameTable:
-    """Rows of .debug_frame by address."""
+    """Rows of .debug_frame, indexed by address."""
 
     def __init__(self, image: Path) -> None:
         self.rows: list[tuple[int, int, dict]] = []
@@ -125,12 +126,12 @@ class FrameTable:
         self.starts = [row[0] for row in self.rows]
 
     def find(self, pc: int) -> dict | None:
-        """The row for address `pc`."""
+        """Return the row that applies at address `pc`."""
         index = bisect_right(self.starts, pc) - 1
         return self.rows[index][2] if index >= 0 and pc < self.rows[index][1] else None
 
     def walk(self, machine: Machine) -> list[tuple[int, dict[int, int]]]:
-        """Frames from the innermost one: return address and known registers of the caller."""
+        """Return the frames from the innermost one on: return address and known registers of the caller."""
         pc, registers = machine.pc, dict(enumerate(_registers(machine)))
         found = []
         while len(found) < DEEPEST and (row := self.find(pc)) is not None:
@@ -150,12 +151,12 @@ class FrameTable:
                 elif rule.type == "OFFSET":
                     registers[r] = word(rule.arg)
             found.append((pc, dict(registers)))
-            pc -= 0 if handler else 1  # the return address of a call at the end of a function lies behind it
+            pc -= 0 if handler else 1  # the return address of a call in last position is beyond the function
         return found
 
 
 def _cfa(rule: CFARule, registers: dict[int, int]) -> int:
-    """Value of a CFA rule: register and offset, or an expression for a push under REPEAT."""
+    """Return the value of a CFA rule: register and offset, or an expression (a push under REPEAT)."""
     if rule.expr is None:
         return registers[rule.reg] + rule.offset & 0xFFFF
     view = SimpleNamespace(register=registers.get)
@@ -163,12 +164,12 @@ def _cfa(rule: CFARule, registers: dict[int, int]) -> int:
 
 
 def _registers(machine: Machine) -> tuple[int, ...]:
-    """W0 to W15 and RCOUNT."""
+    """Return W0 to W15 and RCOUNT."""
     return (*(machine.w[r] for r in range(16)), machine.record.u16[RCOUNT_AT >> 1])
 
 
 def walked(image: Path) -> tuple[int, int]:
-    """Unwind at every instruction from `main` on; returns the numbers of instructions and frames that were compared."""
+    """Unwind at every instruction from `main` on and compare; return the numbers of instructions and of frames."""
     machine, table = emu.load(image, engine="auto"), FrameTable(image)
     machine.run(until="main", cycles=1_000_000)
     calls: list[ExecutedCall] = []
@@ -176,9 +177,7 @@ def walked(image: Path) -> tuple[int, int]:
     for _ in range(STEPS):
         pc, registers = machine.pc, _registers(machine)
         machine.service_boundary(machine.cycle + 1)
-        while (
-            registers[SP] != machine.w[SP]
-        ):  # an exception, and perhaps another before its handler's first instruction
+        while registers[SP] != machine.w[SP]:  # an exception, possibly with a second one before its handler starts
             calls.append(ExecutedCall(pc, registers))
             top = registers[SP] >> 1
             pc = (machine.record.u16[top + 2] | machine.record.u16[top + 3] << 16) & PC_MASK
@@ -209,7 +208,11 @@ LEVELS = ("-O0", "-O1", "-Os", "-O2 -fno-lto")
 
 @pytest.mark.parametrize("level", LEVELS)
 def test_frames_of_a_program_with_nested_interrupts(tmp_path: Path, level: str) -> None:
-    """Frames with and without W14, arguments on the stack, VLAs, inline assembly that pushes, handlers of each kind."""
+    """A program with nested interrupts is unwound correctly at every instruction.
+
+    It has frames with and without W14, arguments on the stack, VLAs, inline assembly that pushes, and handlers of
+    each kind.
+    """
     (tmp_path / "own.c").write_text(OWN)
     built = build([tmp_path / "own.c"], tmp_path / "own.elf", "-g", *level.split())
     assert built.status == 0, built.messages
@@ -221,7 +224,7 @@ def test_frames_of_a_program_with_nested_interrupts(tmp_path: Path, level: str) 
 @pytest.mark.parametrize("level", LEVELS)
 @pytest.mark.parametrize("name", ["frames", "interrupts", "varargs", "structs"])
 def test_frames_of_the_execution_tests(tmp_path: Path, name: str, level: str) -> None:
-    """Frames of the execution tests, which use other features."""
+    """The execution tests, which use further features, are unwound correctly at every instruction."""
     cases = cases_of(FOLDER / f"{name}.c")
     declarations = "".join(f"void test_{case}(void);" for case in cases)
     (tmp_path / "main.c").write_text(

@@ -1,4 +1,4 @@
-"""binutils' readelf and LLVM's dwarfdump read our debug information without warnings."""
+"""binutils' readelf and LLVM's dwarfdump read the debug information without warnings."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ _in_assembly:
 
 
 def made(folder: Path, *options: str) -> Path:
-    """Image of a C and an assembly file with debug information."""
+    """Return an image with debug information, linked from a C and an assembly file."""
     (folder / "main.c").write_text(MAIN)
     (folder / "low.s").write_text(ASSEMBLY)
     image = folder / "both.elf"
@@ -68,7 +68,10 @@ def made(folder: Path, *options: str) -> Path:
     "options", [("-O0",), ("-Os",), ("-O2", "-fno-lto"), ("-O1", "-fno-lto", "-Wl,--gc-sections")], ids=" ".join
 )
 def test_readelf_and_dwarfdump_report_no_errors(tmp_path: Path, options: tuple[str, ...]) -> None:
-    """Plain DWARF is the default; discarded functions leave no gaps and do not end lists."""
+    """readelf and dwarfdump report no errors in images with plain DWARF, the default.
+
+    Discarded functions leave no gaps and do not end lists.
+    """
     image = made(tmp_path, *options)
     for view in READELF_VIEWS:
         said = subprocess.run(["readelf", view, str(image)], capture_output=True, text=True, check=True)
@@ -83,7 +86,11 @@ def test_readelf_and_dwarfdump_report_no_errors(tmp_path: Path, options: tuple[s
 
 
 def test_debug_phantoms_are_stored_on_request_and_both_forms_are_readable(tmp_path: Path) -> None:
-    """abi-elf.md §6.2: XC16's images store every DWARF byte with a phantom octet, in SHT_NOTE sections."""
+    """With the option images store each DWARF byte with a phantom octet in SHT_NOTE sections, like XC16 (abi-elf.md
+    §6.2).
+
+    Both forms are readable.
+    """
     plain = made(tmp_path, "-Os")
     doubled = plain.rename(tmp_path / "plain.elf")
     plain, doubled = doubled, made(tmp_path, "-Os", "-Wl,--debug-phantoms")

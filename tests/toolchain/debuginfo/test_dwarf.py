@@ -36,7 +36,7 @@ int main(void)
 
 @pytest.fixture(scope="module", params=["-O0", "-Os"])
 def dwarf(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> DWARFInfo:
-    """DWARF of SOURCE at two levels."""
+    """Return the DWARF information of SOURCE at one of two optimisation levels."""
     folder = tmp_path_factory.mktemp("debug")
     (folder / "unit.c").write_text(SOURCE)
     built = build([folder / "unit.c"], folder / "unit.elf", request.param, "-g")
@@ -45,7 +45,7 @@ def dwarf(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFacto
 
 
 def entries(dwarf: DWARFInfo, tag: str) -> dict[str, dict[str, object]]:
-    """Entries with a name and a tag: name -> attribute values."""
+    """Return the DWARF entries with a tag by name: attribute values."""
     found = {}
     for unit in dwarf.iter_CUs():
         for die in unit.iter_DIEs():
@@ -56,7 +56,7 @@ def entries(dwarf: DWARFInfo, tag: str) -> dict[str, dict[str, object]]:
 
 
 def test_functions_variables_and_types_are_described(dwarf: DWARFInfo) -> None:
-    """DWARF 2 §3.3, §4.1, §5: names, sizes, members, bit-fields."""
+    """DWARF describes functions, variables and types: names, sizes, members, bit-fields (DWARF 2 §3.3, §4.1, §5)."""
     functions = entries(dwarf, "subprogram")
     assert set(functions) == {"weigh", "main"}
     assert functions["weigh"]["decl_line"] == 7
@@ -76,14 +76,14 @@ def test_functions_variables_and_types_are_described(dwarf: DWARFInfo) -> None:
 
 
 def test_parameters_and_locals_have_locations(dwarf: DWARFInfo) -> None:
-    """Locations in the frame at -O0, location lists with registers when optimised."""
+    """Parameters and locals have frame locations at -O0, and location lists with registers when optimised."""
     assert "location" in entries(dwarf, "formal_parameter")["a"]
     assert "location" in entries(dwarf, "formal_parameter")["p"]
     assert "location" in entries(dwarf, "variable")["sum"]
 
 
 def test_the_line_table_covers_every_statement_in_address_order(dwarf: DWARFInfo) -> None:
-    """DWARF 2 §6.2: addresses of a sequence do not decrease, and every sequence ends."""
+    """The line table covers every statement; addresses do not decrease, and every sequence ends (DWARF 2 §6.2)."""
     rows = []
     for unit in dwarf.iter_CUs():
         rows += [e.state for e in dwarf.line_program_for_CU(unit).get_entries() if e.state is not None]
@@ -95,7 +95,7 @@ def test_the_line_table_covers_every_statement_in_address_order(dwarf: DWARFInfo
 
 @pytest.mark.parametrize("level", ["0", "1", "s", "2"])
 def test_debug_information_does_not_change_the_code(level: str) -> None:
-    """The code with -g equals that without it."""
+    """Code compiled with -g equals the code without it."""
 
     def code(text: str) -> list[str]:
         text = text.split("\t.section .debug_info", 1)[0]

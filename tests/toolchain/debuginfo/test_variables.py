@@ -1,7 +1,7 @@
-"""Locations of local variables: in optimised code correct or "optimised out", never wrong.
+"""Locations of local variables in optimised code are correct or "optimised out", never wrong.
 
-Random functions pass their variables to a probe. At each of its calls, the argument is the value of the variable; the
-location of that variable at the address of the call must yield the same value.
+Random functions pass their variables to a probe function. At each call the argument is the variable's value. The
+location of the variable at the address of the call must yield the same value.
 """
 
 from __future__ import annotations
@@ -29,12 +29,12 @@ __attribute__((noinline)) void change(void *p) { *(unsigned char *)p ^= 5; __asm
 
 
 class Program:
-    """Random functions with locals of every kind: scalars, address-taken scalars, arrays, structs, inlined calls."""
+    """Generator of random functions with scalars, address-taken scalars, arrays, structs and inlined calls."""
 
     def __init__(self, seed: int) -> None:
         self.random = random.Random(seed)
         self.lines = PROLOGUE.splitlines()
-        self.probes: dict[int, str] = {}  # line -> variable
+        self.probes: dict[int, str] = {}  # line -> probed variable
         for n in range(FUNCTIONS):
             self.function(n)
         self.lines.append("int main(void) {")
@@ -103,7 +103,7 @@ class LocationReader:
         self.scopes = [die for die in entries if die.tag == "DW_TAG_subprogram"]
 
     def line(self, pc: int) -> int:
-        """Source line of an address."""
+        """Return the source line of an address."""
         best = (-1, 0)
         for unit in self.info.iter_CUs():
             states = [e.state for e in self.info.line_program_for_CU(unit).get_entries() if e.state is not None]
@@ -122,7 +122,7 @@ class LocationReader:
         return False
 
     def value(self, name: str, pc: int) -> int | None:
-        """Value of the innermost variable of a name at `pc`; None if it has no location."""
+        """Return the value of the innermost variable with a name at `pc`, or None if it has no location."""
         for function in self.scopes:
             if self.covers(function, pc):
                 found = self._innermost(function, name, pc, function)
@@ -131,7 +131,7 @@ class LocationReader:
         return None
 
     def _innermost(self, scope: DIE, name: str, pc: int, function: DIE) -> tuple[DIE, DIE] | None:
-        """The variable, or the inlined function that hides the outer ones."""
+        """Return the variable's entry, or the entry of an inlined function that hides outer variables."""
         for child in scope.iter_children():
             if child.tag in ("DW_TAG_lexical_block", "DW_TAG_inlined_subroutine") and self.covers(child, pc):
                 found = self._innermost(child, name, pc, function)
@@ -173,7 +173,7 @@ class LocationReader:
             data = bytes(self.machine.peek(at + k, 1) for k in range(size))
         elif code[0] == 0x9E:  # DW_OP_implicit_value
             data = bytes(code[2:])[:size]
-        elif 0x93 in (code[0], code[3] if len(code) > 3 else 0):  # DW_OP_piece without a location
+        elif 0x93 in (code[0], code[3] if len(code) > 3 else 0):  # DW_OP_piece without location
             return None
         else:
             words = [code[k] - 0x50 for k in range(0, len(code), 3)]
@@ -181,7 +181,7 @@ class LocationReader:
         return int.from_bytes(data, "little", signed=signed)
 
     def stack(self, register: int) -> int:
-        """W14 or W15 as it was before the call: the probe's return address lies above."""
+        """Return W14 or W15 of the caller: the probe's return address lies above it."""
         return self.machine.w[register] - (4 if register == 15 else 0)
 
 
@@ -194,7 +194,10 @@ def _sleb(code: list[int]) -> int:
 
 
 def compare(seed: int, options: tuple[str, ...], folder: Path) -> tuple[int, int]:
-    """(probes whose variable has a location, probes) of one program; a wrong value fails."""
+    """Run a program; return (number of probes whose variable has a location, number of probes).
+
+    A wrong value fails.
+    """
     program = Program(seed)
     (folder / "p.c").write_text("\n".join(program.lines) + "\n")
     built = build([folder / "p.c"], folder / "p.elf", "-g", "-w", "-fwrapv", *options)
@@ -231,7 +234,7 @@ def test_locations_of_variables_are_correct(options: tuple[str, ...], tmp_path: 
     if options == ("-O0",):
         assert evaluated == seen
     else:
-        assert evaluated > seen / 5  # constants have no location in DWARF 2
+        assert evaluated > seen / 5  # DWARF 2 gives constants no location
 
 
 WORDS = """
@@ -259,7 +262,7 @@ int main(void)
 
 @pytest.mark.parametrize("level", ["-O1", "-Os", "-O2"])
 def test_structs_in_registers_and_constants_have_values(level: str, tmp_path: Path) -> None:
-    """Struct members in registers, and variables that the optimiser has replaced by their value."""
+    """Struct members in registers and variables that the optimiser replaced by constants have correct values."""
     (tmp_path / "words.c").write_text(WORDS)
     built = build([tmp_path / "words.c"], tmp_path / "words.elf", "-g", level, "-fno-lto")
     assert built.status == 0, built.messages

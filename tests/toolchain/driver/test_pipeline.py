@@ -38,7 +38,7 @@ int vla(int n) { char buf[n]; for (int i = 0; i < n; i++) buf[i] = i; return buf
 
 @pytest.mark.parametrize("level", ["0", "1", "s", "2"])
 def test_every_ir_pass_leaves_well_formed_legal_functions(level: str) -> None:
-    """Functions are well-formed after every IR pass."""
+    """Every IR pass leaves well-formed, legal functions."""
     module = read_module(llvm(SOURCE, level))
     for f in module.functions.values():
         if not f.blocks:
@@ -61,13 +61,13 @@ def test_every_ir_pass_leaves_well_formed_legal_functions(level: str) -> None:
 
 @pytest.mark.parametrize("level", ["0", "1", "s", "2"])
 def test_output_is_the_same_every_time(level: str) -> None:
-    """Equal input gives equal assembly."""
+    """Compiling equal input twice gives equal assembly."""
     text = llvm(SOURCE, level)
     assert compile_module(text, BackendOptions(level)) == compile_module(text, BackendOptions(level))
 
 
 def test_no_virtual_register_reaches_the_assembly() -> None:
-    """All registers in the text are W0-W15."""
+    """The assembly contains no virtual register: all registers are W0-W15."""
     import re
 
     text = compile_module(llvm(SOURCE), BackendOptions())
@@ -75,7 +75,7 @@ def test_no_virtual_register_reaches_the_assembly() -> None:
 
 
 def test_a_pass_before_what_it_needs_is_refused() -> None:
-    """`check_order` refuses a pass before the one that gives a property that it needs."""
+    """`check_order` refuses a pass that precedes the pass which establishes a required property."""
     check_order(FUNCTION_PASSES)
     with pytest.raises(AssertionError, match="single-bits"):
         check_order([p for p in FUNCTION_PASSES if p.name != "critical-edges"])
@@ -85,7 +85,7 @@ def test_a_pass_before_what_it_needs_is_refused() -> None:
 
 @pytest.mark.parametrize("level", ["0", "1", "s", "2"])
 def test_a_pass_runs_only_at_its_levels(level: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The names of the executed passes are those of the table for the level, in its order."""
+    """The executed passes are those that the table lists for the level, in its order."""
     executed: list[str] = []
 
     def recorded(p: Pass) -> Pass:

@@ -15,7 +15,7 @@ CASES = [
 
 @pytest.mark.parametrize(("source", "what", "line"), CASES)
 def test_unsupported_constructs_name_themselves_and_their_line(source: str, what: str, line: int) -> None:
-    """engines.md §5."""
+    """The message for an unsupported construct names the construct and its line (engines.md §5)."""
     with pytest.raises(UnsupportedError) as caught:
         assembly(source, debug=True)
     assert what in str(caught.value)
@@ -23,6 +23,6 @@ def test_unsupported_constructs_name_themselves_and_their_line(source: str, what
 
 
 def test_without_debug_information_the_function_is_named() -> None:
-    """The message names the function instead of a line."""
+    """Without debug information the message for an unsupported construct names the function instead of a line."""
     with pytest.raises(UnsupportedError, match="in function 'f'"):
         assembly(CASES[0][0])

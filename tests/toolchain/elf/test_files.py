@@ -1,4 +1,4 @@
-"""ELF files: written contents, as independent readers see them, and damaged files (abi-elf.md §6, §7)."""
+"""ELF files (abi-elf.md §6, §7): their contents as read by independent tools, and damaged files."""
 
 import io
 import shutil
@@ -46,7 +46,7 @@ def executable(image):
 
 
 def test_the_header_says_dspic30f6014a(executable):
-    """abi-elf.md §6.1, §7 item 1."""
+    """The ELF header names the dsPIC30F6014A (abi-elf.md §6.1, §7 item 1)."""
     elf = ELFFile(io.BytesIO(executable))
     header = elf.header
     assert (header["e_machine"], header["e_type"], header["e_flags"]) in (
@@ -60,7 +60,10 @@ def test_the_header_says_dspic30f6014a(executable):
 
 
 def test_sections_follow_the_octet_rule_and_flags(executable):
-    """abi-elf.md §6.2, §6.3, §7 items 3, 4; debug information is plain unless asked otherwise."""
+    """Sections follow the rules for octets and flags (abi-elf.md §6.2, §6.3, §7 items 3, 4).
+
+    Debug information is stored without phantoms by default.
+    """
     elf = ELFFile(io.BytesIO(executable))
     rows = {s.name: (s["sh_type"], s["sh_flags"], s["sh_size"]) for s in elf.iter_sections()}
     assert rows[".ivt"] == ("SHT_PROGBITS", 6, 62 * 4)
@@ -74,7 +77,7 @@ def test_sections_follow_the_octet_rule_and_flags(executable):
 
 
 def test_each_loaded_section_has_its_segment(executable):
-    """abi-elf.md §7 item 2: p_paddr is the LMA, sizes in octets."""
+    """Each loaded section has a segment; p_paddr is its LMA, sizes are in octets (abi-elf.md §7 item 2)."""
     elf = ELFFile(io.BytesIO(executable))
     sections = {s["sh_offset"]: s for s in elf.iter_sections() if s["sh_flags"] & 2 and s["sh_type"] == "SHT_PROGBITS"}
     seen = 0
@@ -93,7 +96,7 @@ def test_each_loaded_section_has_its_segment(executable):
 
 
 def test_symbols_have_units_types_and_order(executable):
-    """abi-elf.md §6.5, §7 item 5: locals first, FUNC sizes in PC units."""
+    """Symbols are ordered with locals first, and FUNC sizes are in PC units (abi-elf.md §6.5, §7 item 5)."""
     elf = ELFFile(io.BytesIO(executable))
     table = elf.get_section_by_name(".symtab")
     symbols = {s.name: s for s in table.iter_symbols()}
@@ -107,7 +110,7 @@ def test_symbols_have_units_types_and_order(executable):
 
 @pytest.mark.skipif(shutil.which("readelf") is None, reason="readelf is not installed (Debian package binutils)")
 def test_readelf_finds_nothing_to_warn_about(tmp_path, executable):
-    """binutils reads headers, symbols and relocations of both kinds of files without a warning."""
+    """binutils' readelf reads headers, symbols and relocations of objects and executables without a warning."""
     obj = object_bytes(assemble(SOURCE, "x.s")[0])
     for name, data in (("x.elf", executable), ("x.o", obj)):
         (tmp_path / name).write_bytes(data)
@@ -116,7 +119,7 @@ def test_readelf_finds_nothing_to_warn_about(tmp_path, executable):
 
 
 def test_objects_and_executables_survive_reading_and_writing(executable, image):
-    """read(write(x)) writes the same bytes again."""
+    """read(write(x)) writes the same bytes again, for objects and executables."""
     obj = object_bytes(assemble(SOURCE, "x.s")[0])
     assert object_bytes(read_object(obj, "x.o")) == obj
     again = read_executable(executable, "x.elf")
@@ -125,7 +128,10 @@ def test_objects_and_executables_survive_reading_and_writing(executable, image):
 
 
 def test_damage_anywhere_in_an_object_is_an_error_or_harmless():
-    """Every byte set to a few hostile values, every length cut: ToolError or an object, nothing else."""
+    """Damage anywhere in an object gives a ToolError or a valid object.
+
+    Every byte is set to some critical values, and the file is truncated at every length.
+    """
     good = object_bytes(assemble(SOURCE, "x.s")[0])
     outcomes = set()
     for offset in range(len(good)):
@@ -153,7 +159,7 @@ def test_damage_anywhere_in_an_object_is_an_error_or_harmless():
     ],
 )  # fmt: skip
 def test_foreign_files_are_refused_by_what_they_are(change, message):
-    """The message has file and offset."""
+    """A file of another format is refused with a message that contains the file's name and the offset."""
     data = bytearray(object_bytes(assemble("nop\n", "x.s")[0]))
     data[change[0] : change[0] + len(change[1])] = change[1]
     with pytest.raises(ToolError, match=message) as error:
@@ -162,7 +168,7 @@ def test_foreign_files_are_refused_by_what_they_are(change, message):
 
 
 def test_rela_sections_are_refused():
-    """abi-elf.md §5: SHT_REL, addend in place."""
+    """SHT_RELA sections are refused: the addend is in the field, SHT_REL (abi-elf.md §5)."""
     data = bytearray(object_bytes(assemble("call x\n", "x.s")[0]))
     (table,) = struct.unpack_from("<I", data, 32)
     (count,) = struct.unpack_from("<H", data, 48)

@@ -1,4 +1,4 @@
-/* C11 atomics: values, and that an interrupt never sees or makes half an operation. */
+/* C11 atomics: results, and indivisibility against interrupts. */
 #include "exec.h"
 
 #include <dspic30f6014a.h>

@@ -15,7 +15,7 @@ extern int exec_failed_line;
             return;                         \
         }                                   \
     } while (0)
-/* The value as the compiler cannot know it. */
+/* Makes a value unknown to the compiler. */
 #define OPAQUE(type, value) (*(volatile type *)&(type){value})
 #define I(value) OPAQUE(int, value)
 #define U(value) OPAQUE(unsigned, value)

@@ -1,4 +1,4 @@
-/* Order of accesses to one object, and addresses of large locals chosen by a condition. */
+/* Order of accesses to an object, and conditionally chosen addresses of large locals. */
 #include "exec.h"
 
 struct rgb { unsigned char r, g, b; };

@@ -42,7 +42,7 @@ TEST(statement_expression, "GCC 6.1") { int r = ({ int t = I(3); t * t; }); CHEC
 TEST(case_ranges, "GCC 6.30") { int r = 0; switch (I(5)) { case 1 ... 4: r = 1; break; case 5 ... 9: r = 2; } CHECK(r == 2); }
 TEST(infinity_and_nan_builtins, "GCC 6.59") { CHECK(__builtin_isinff(F(1e30f) * 1e30f) && __builtin_isnanf(F(0) / F(0)) && !__builtin_isinfl(D(1))); }
 
-/* memmove of the library does not go through a memcpy that the program replaces. */
+/* The library's memmove must not call a memcpy that the program replaces; this counts its calls. */
 static volatile int copies;
 void *memcpy(void *restrict to, const void *restrict from, size_t n) { char *t = to; const char *f = from; copies++; while (n--) *t++ = *f++; return to; }
 TEST(own_memcpy_beside_memmove, "C11 7.24.2.2") { static char s[] = "abcdef"; copies = 0; memmove(s, s + 1, U(5)); CHECK(copies == 0 && strcmp(s, "bcdeff") == 0); memcpy(s, "xy", U(2)); CHECK(copies == 1 && s[0] == 'x'); }

@@ -1,4 +1,4 @@
-/* Interrupt functions: what they save, how they return, nesting. */
+/* Interrupt functions: saved registers, return, nesting. */
 #include "exec.h"
 
 #include <dspic30f6014a.h>
@@ -9,7 +9,7 @@ static volatile unsigned long long wide_product;
 static volatile int nested, order[4], at;
 static volatile float scaled;
 
-/* Set the flag and give the request time to be taken (isa.md §14.3). */
+/* Sets the flag and waits until the interrupt is taken (isa.md §14.3). */
 static void request(void) { IFS0bits.T1IF = 1; Nop(); Nop(); Nop(); Nop(); Nop(); Nop(); Nop(); Nop(); }
 
 OS_ISR(_T1Interrupt)
@@ -79,7 +79,7 @@ OS_ISR(_T5Interrupt)
 {
     IFS1bits.T5IF = 0;
     order[at++ & 3] = 5;
-    IFS1bits.T4IF = 1; /* higher priority: taken inside this handler */
+    IFS1bits.T4IF = 1; /* higher priority: nested in this handler */
     Nop(); Nop(); Nop(); Nop(); Nop(); Nop();
     order[at++ & 3] = 55;
     nested++;

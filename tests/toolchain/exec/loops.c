@@ -1,4 +1,4 @@
-/* Loops that run n times for every n, and divisions by constants for every kind of operand. */
+/* Loops with n iterations for every n, and divisions by constants for operands of every kind. */
 #include "exec.h"
 
 static int a[40], b[40];

@@ -88,7 +88,7 @@ static NOINLINE signed char narrow(int x) { return (signed char)x; }
 static NOINLINE unsigned char narrow_u(int x) { return (unsigned char)x; }
 static NOINLINE _Bool truth(long x) { return x != 0; }
 TEST(narrow_results_extend, "abi-elf.md 2.3") { CHECK(narrow(I(0x180)) == -128 && narrow_u(I(0x1FF)) == 255 && truth(L(0x10000)) == 1 && truth(L(0)) == 0); }
-static int total(); /* no prototype */
+static int total(); /* declared without prototype */
 TEST(call_without_prototype, "C11 6.5.2.2p6") { CHECK(total(1, 2L, 'c') == 102); }
 static int total(a, b, c) int a; long b; int c; { return a + (int)b + c; }
 TEST(snprintf_integers, "C11 7.21.6.5") { char s[40]; CHECK(snprintf(s, sizeof s, "%d|%5d|%-5d|%05d|%+d|% d", I(-42), 7, 7, 7, 7, 7) == 27 && strcmp(s, "-42|    7|7    |00007|+7| 7") == 0); }

@@ -1,4 +1,4 @@
-/* Volatile objects: what is written is there, what is read is current. */
+/* Volatile objects: every write is stored and every read is loaded. */
 #include "exec.h"
 
 volatile unsigned long tick;

@@ -37,7 +37,7 @@ TEST(array_of_64, "C11 6.5.2.1") { long long a[4]; for (int i = 0; i < 4; i++) a
 TEST(fnv_hash, "C11 6.2.5p9") { unsigned long long h = 0xCBF29CE484222325ull; for (const char *p = "foobar"; *p; p++) { h ^= (unsigned char)*p; h *= 0x100000001B3ull; } CHECK(h == 0x85944171F73967E8ull); }
 TEST(xorshift_sequence, "C11 6.5.7") { unsigned long long x = ULL(88172645463325252ull); for (int i = 0; i < 3; i++) { x ^= x << 13; x ^= x >> 7; x ^= x << 17; } CHECK(x == 0x2FEF107A27529AD0ull); }
 
-/* Where a function has its divisor as a constant, products may stand for DIV. */
+/* Defines functions that divide by a constant, for which the compiler may replace DIV by multiplications. */
 #define DIVIDED_BY(name, d) \
     NOINLINE unsigned long u_##name(unsigned long x, unsigned long *r) { *r = x % (d); return x / (d); } \
     NOINLINE long s_##name(long x, long *r) { *r = x % (long)(d); return x / (long)(d); }
@@ -80,7 +80,7 @@ TEST(divide_32_by_constants, "C11 6.5.5p6")
     }
 }
 
-/* Two selects of 64 bits by one condition, and more values than registers. */
+/* Two 64-bit selections by one condition, with more live values than registers. */
 static NOINLINE long long first_above(const long long *sorted, long long count, long long wanted)
 {
     long long low = 0, high = count;

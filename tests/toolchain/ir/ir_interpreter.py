@@ -10,7 +10,10 @@ FUEL = 200_000
 
 
 class Interpreter:
-    """One execution of one function. Memory is a dictionary of bytes; unwritten bytes depend on their address only."""
+    """One execution of one function.
+
+    Memory is a dictionary of bytes; the value of an unwritten byte depends only on its address.
+    """
 
     def __init__(self, f: Function, arguments: list[int]) -> None:
         self.f = f
@@ -18,7 +21,7 @@ class Interpreter:
         self.memory: dict[int, int] = {}
         self.values: dict[int, int] = {id(a): k for a, k in zip(f.args, arguments, strict=True)}
         self.next_slot = MEMORY_TOP
-        self.accesses: list[tuple[str, int, int]] = []  # volatile accesses: load or store, address, value
+        self.accesses: list[tuple[str, int, int]] = []  # volatile accesses as (load or store, address, value)
 
     def byte(self, at: int) -> int:
         return self.memory.get(at & 0xFFFF, (at * 37 + 11) & 0xFF)
@@ -35,7 +38,7 @@ class Interpreter:
         return self.values[id(v)]
 
     def run(self) -> tuple[int | None, dict[int, int]]:
-        """Execute the function; returns its result and the memory written outside of the frame."""
+        """Execute the function and return its result and the memory written outside of the frame."""
         name, before, fuel = self.f.blocks[0].name, "", FUEL
         while True:
             block = self.blocks[name]
@@ -69,7 +72,7 @@ class Interpreter:
         return i.blocks[cases.index(chosen) + 1] if chosen in cases else i.blocks[0]
 
     def divided(self, call: Instr, a: ConstInt, b: ConstInt) -> int:
-        """Result of a division function of the run-time library."""
+        """Return the result of a division function of the run-time library."""
         op = call.extra["divides"]
         x, d = (a.signed, b.signed) if op[0] == "s" else (a.value, b.value)
         quotient = abs(x) // abs(d) * (1 if (x < 0) == (d < 0) else -1)

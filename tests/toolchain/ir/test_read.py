@@ -1,4 +1,4 @@
-"""Reading LLVM IR text: values, layout, forward references, refusals."""
+"""Reader of LLVM IR text: values, layout, forward references, refused constructs."""
 
 from __future__ import annotations
 
@@ -49,7 +49,8 @@ attributes #0 = { nounwind optsize "no-builtins" }
 
 
 def test_a_function_is_read_with_its_blocks_phis_and_forward_references() -> None:
-    """LLVM LangRef: phi operands may be defined later."""
+    """A function is read with its blocks, phis and forward references: phi operands may be defined later (LLVM
+    LangRef)."""
     f = read_module(LOOP).functions["sum"]
     assert [b.name for b in f.blocks] == ["1", "head", "body", "done", "one", "two"]
     phi = f.blocks[1].instrs[0]
@@ -63,13 +64,13 @@ def test_a_function_is_read_with_its_blocks_phis_and_forward_references() -> Non
 
 
 def test_dump_of_what_was_read_reads_back_to_the_same_dump() -> None:
-    """engines.md §5: the IR prints and parses."""
+    """A dump of the IR is read back to the same dump (engines.md §5)."""
     text = dump(read_module(LOOP).functions["sum"])
     assert dump(read_module(text).functions["sum"]) == text
 
 
 def test_globals_keep_initialisers_of_every_kind() -> None:
-    """Strings, addresses with offsets, casts, labels, nested aggregates."""
+    """Globals keep initialisers of every kind: strings, addresses with offsets, casts, labels, nested aggregates."""
     m = read_module(
         r"""
 @s = private unnamed_addr constant [4 x i8] c"a\22\00b", align 1
@@ -113,7 +114,7 @@ here:
     ],
 )
 def test_struct_layout_is_xc16s(type_text: str, size: int, offsets: list[int]) -> None:
-    """abi-elf.md §1.2."""
+    """The layout of structs equals XC16's (abi-elf.md §1.2)."""
     m = read_module(f"%t = type {type_text}\n@g = external global %t")
     t = m.globals["g"].type
     assert size_of(t) == size
@@ -130,14 +131,14 @@ def test_struct_layout_is_xc16s(type_text: str, size: int, offsets: list[int]) -
     ],
 )
 def test_unknown_constructs_are_refused_by_name_with_the_line(line: str, what: str) -> None:
-    """engines.md §5: anything outside the grammar is an error, never a guess."""
+    """A construct outside the grammar is an error with its name and line (engines.md §5)."""
     with pytest.raises(UnsupportedError) as caught:
         read_module(f"define void @f() {{\n  {line}\n  ret void\n}}\n")
     assert what in str(caught.value)
 
 
 def test_violations_of_well_formedness_are_reported() -> None:
-    """The rules passes are checked against must themselves notice mistakes."""
+    """The checks of well-formedness report violations."""
     f = read_module(LOOP).functions["sum"]
     use, define = f.blocks[2].instrs[2], f.blocks[2].instrs[1]
     f.blocks[2].instrs[1:3] = [use, define]
@@ -158,7 +159,8 @@ define ptr @f(ptr %p, i16 %n) {{
 
 
 def test_assumptions_are_hints_and_other_bundles_are_refused() -> None:
-    """Operand bundles: those of llvm.assume say what may be relied on, any other would change what a call means."""
+    """Operand bundles of llvm.assume are accepted as hints; all others are refused, as they may change a call's
+    meaning."""
     module = read_module(ASSUMPTION.format(callee="llvm.assume"))
     f = module.functions["f"]
     assert check(f) == []

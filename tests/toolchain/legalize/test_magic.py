@@ -1,4 +1,4 @@
-"""Factors of divisions by constants (`legalize.magic`)."""
+"""Factors for dividing by constants with a multiplication (`legalize.magic`)."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from toolchain.legalize.magic import signed_factor, unsigned_factor
 
 
 def test_multiplication_divides_exactly() -> None:
-    """`magic` is exact for every dividend of small divisors, and for a sample of the others."""
+    """`magic` gives the exact quotient: for every dividend of small divisors, and for a sample of other divisors."""
     for d in [*range(3, 16), 100, 641, 1000, *range(17, 32768, 977), 32765, 32767]:
         if d & (d - 1) == 0:
             continue

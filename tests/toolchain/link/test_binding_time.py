@@ -1,4 +1,4 @@
-"""A value known to the assembler, known at the end of the file, or known to the linker gives the same word."""
+"""A value known to the assembler at once, at the end of the file, or to the linker only, gives the same word."""
 
 import pytest
 
@@ -37,7 +37,10 @@ def words(*sources):
 
 @pytest.mark.parametrize(("line", "values"), CASES)
 def test_early_late_and_linked_values_agree(line, values):
-    """Field places of abi-elf.md §5 against the bit patterns of isa.md §5, two independent descriptions."""
+    """Values bound early, late or at link time give equal words.
+
+    The fields of abi-elf.md §5 and the bit patterns of isa.md §5 are independent descriptions.
+    """
     body = f" .global __reset\n .section code,code,address(0x1000)\n__reset: {line}\n nop\n"
     for value in values:
         early = words(f"v = {value}\n{body}")
@@ -50,7 +53,7 @@ NEVER = [line for line, _ in CASES if "(" not in line and not line.startswith(".
 
 @pytest.mark.parametrize("line", NEVER)
 def test_a_value_that_never_fits_is_refused_at_each_time(line):
-    """Assembler and linker report the value instead of truncating it."""
+    """Assembler and linker report a value that is out of range instead of truncating it."""
     body = f" .global __reset\n .section code,code,address(0x1000)\n__reset: {line}\n nop\n"
     for sources in ((f"v = 0x7654320\n{body}",), (f"{body}\nv = 0x7654320\n",), (body, " .global v\nv = 0x7654320\n")):
         with pytest.raises(ToolError):
@@ -58,7 +61,7 @@ def test_a_value_that_never_fits_is_refused_at_each_time(line):
 
 
 def test_the_cases_cover_the_relocations_of_instructions():
-    """The cases have every relocation of instructions except branches, which have targets, and other operators."""
+    """The cases cover every instruction relocation except those of branches, whose operands are labels."""
     seen = set()
     for line, _ in CASES:
         seen |= {r.type for s in assemble(f" .section c,code\n {line}\n nop\n", "x.s")[0].sections for r in s.relocs}

@@ -23,7 +23,10 @@ c:  .byte 1, 2, 3
 
 
 def test_every_word_is_at_twice_its_address_with_a_zero_fourth_byte(image):
-    """Checked with an independent reader; RAM never appears, EEPROM at 0xFFE000, config at 0x1F00000."""
+    """Each word is at twice its address with a zero fourth byte, as an independent reader confirms.
+
+    RAM is omitted, EEPROM is at 0xFFE000, config words are at 0x1F00000.
+    """
     out = image(SOURCE)
     content = IntelHex(io.StringIO(hex_text(out.linked.image)))
     present, words = set(content.addresses()), {}
@@ -38,7 +41,11 @@ def test_every_word_is_at_twice_its_address_with_a_zero_fourth_byte(image):
 
 
 def test_records_are_those_of_microchips_converter(image):
-    """Types 00, 01, 04 only, 16 bytes each, lower case, a type-04 record before every section, `:00000001ff` last."""
+    """Records have the form of Microchip's converter.
+
+    Only types 00, 01 and 04 occur, with 16 bytes each, in lower case; a type-04 record precedes every section,
+    `:00000001ff` is last.
+    """
     lines = hex_text(image(SOURCE).linked.image).splitlines()
     assert lines[0] == ":020000040000fa"
     assert lines[-1] == ":00000001ff"

@@ -1,4 +1,4 @@
-"""Contents of a linked image: start, vectors, data initialisation, constants, handles, config words, EEPROM."""
+"""Contents of a linked image: reset, vectors, initialised data, constants, handles, config words, EEPROM."""
 
 import pytest
 
@@ -7,7 +7,7 @@ from toolchain.errors import ToolError
 
 
 def test_reset_goes_to_the_entry(image):
-    """abi-elf.md §7 item 6: word 0 = 0x040000 | (target & 0xFFFE), word 2 = target >> 16."""
+    """The reset vector is a GOTO to the entry: 0x040000 | (target & 0xFFFE), target >> 16 (abi-elf.md §7 item 6)."""
     out = image()
     target = out.symbols["__reset"]
     assert (out.flash[0], out.flash[2]) == (0x040000 | target, 0)
@@ -15,7 +15,10 @@ def test_reset_goes_to_the_entry(image):
 
 
 def test_every_vector_is_filled(image):
-    """abi-elf.md §2.7: `__X` in both tables, `__AltX` in the alternate one only, the default elsewhere."""
+    """Every vector is filled (abi-elf.md §2.7).
+
+    `__X` is entered in both tables, `__AltX` in the alternate one only, the default handler elsewhere.
+    """
     out = image(
         ".global __T1Interrupt, __AltT1Interrupt, __U1RXInterrupt\n__T1Interrupt: retfie\n"
         "__AltT1Interrupt: retfie\n__U1RXInterrupt: retfie\n"
@@ -31,7 +34,8 @@ def test_every_vector_is_filled(image):
 
 
 def test_the_default_handler_is_breakpoint_and_reset_unless_given(image):
-    """abi-elf.md §3.3: words 0xDA4000, 0xFE0000."""
+    """The default handler is breakpoint and RESET, 0xDA4000 and 0xFE0000, unless the program defines one (abi-elf.md
+    §3.3)."""
     assert image().words("__DefaultInterrupt", 2) == [0xDA4000, 0xFE0000]
     own = image(".global __DefaultInterrupt\n__DefaultInterrupt: nop\n")
     assert own.words("__DefaultInterrupt", 1) == [0]
@@ -39,14 +43,14 @@ def test_the_default_handler_is_breakpoint_and_reset_unless_given(image):
 
 
 def test_a_handler_no_vector_takes_is_refused_with_the_name_meant(image):
-    """abi-elf.md §2.7: names are fixed by the device."""
+    """A handler whose name fits no vector of the device is refused with a similar name (abi-elf.md §2.7)."""
     with pytest.raises(ToolError, match=r"__T1Interupt|did you mean __T1Interrupt") as error:
         image(".global __T11Interrupt\n__T11Interrupt: retfie\n")
     assert "did you mean __T1Interrupt?" in str(error.value)
 
 
 def decode_dinit(out):
-    """Return (address, bytes or length of zeros) of each record, in the format of abi-elf.md §3.2."""
+    """Return (address, bytes or number of zeros) of each record of .dinit (abi-elf.md §3.2)."""
     at = out.symbols["__dinit_tbloffset"] | out.symbols["__dinit_tblpage"] << 16
     records = []
     while address := out.flash[at] & 0xFFFF:
@@ -68,7 +72,10 @@ REFER = " mov #__dinit_tbloffset, w0\n mov #__dinit_tblpage, w1\n"
 
 @pytest.mark.parametrize("pack", [True, False])
 def test_dinit_clears_and_fills_ram(image, pack):
-    """abi-elf.md §3.2: header words, formats 0, 1, 2, even lengths, end word 0; relocated data included."""
+    """.dinit clears and fills RAM (abi-elf.md §3.2).
+
+    It has header words, formats 0, 1 and 2, even lengths and an end word 0; relocated data are included.
+    """
     text = (
         f"{REFER} .section .nbss,bss,near\nz: .space 5\n .section .ndata,data,near\nd: .byte 1,2,3,4,5\n"
         " .align 2\n .word d, handle(f)\n"
@@ -85,20 +92,24 @@ def test_dinit_clears_and_fills_ram(image, pack):
 
 
 def test_neighbouring_sections_share_one_record(image):
-    """Joined records are shorter and read the same (abi-elf.md §3.2)."""
+    """Neighbouring sections share one record, which is shorter and decodes to the same data (abi-elf.md §3.2)."""
     texts = [f".section .nbss,bss,near\n .space {2 * n}\n .section .ndata,data,near\n .word {n}\n" for n in (1, 2, 3)]
     records = decode_dinit(image(REFER, *texts))
     assert records == [(0x800, 12), (0x80C, bytes([1, 0, 2, 0, 3, 0]))]
 
 
 def test_initialised_data_is_in_the_file_for_information_only(image):
-    """abi-elf.md §6.3, §7 item 4: PROGBITS with NOLOAD, phantoms kept."""
+    """Initialised data is in the file for information only: PROGBITS with NOLOAD and phantoms (abi-elf.md §6.3, §7
+    item 4)."""
     (section,) = image(".section .ndata,data,near\n .byte 1,2\n").sections(".ndata")
     assert (section.flags, bytes(section.data)) == (0x01800003, bytes([1, 0, 2, 0]))
 
 
 def test_constants_are_read_through_the_psv_window(image):
-    """abi-elf.md §6.2, §6.4, §3.3: words b0 b1 upper 0, VMA = 0x8000 | LMA, page in __const_psvpage."""
+    """Constants are stored as b0 b1 0 with VMA = 0x8000 | LMA and their page in __const_psvpage.
+
+    Source: abi-elf.md §6.2, §6.4, §3.3.
+    """
     text = (
         ".section .const,psv,page\nc: .byte 0x11, 0x22, 0x33\n .text\n mov #c, w0\n"
         " mov #psvoffset(c), w1\n mov #__const_psvpage, w2\n mov #__const_length, w3\n"
@@ -114,7 +125,7 @@ def test_constants_are_read_through_the_psv_window(image):
 
 
 def test_all_constants_share_one_window_even_behind_much_code(image):
-    """abi-elf.md §1.4: one 32 KB window; §3.3 the allocator keeps PSV sections inside one."""
+    """All constants are in one 32 KB PSV window, also after much code (abi-elf.md §1.4, §3.3)."""
     code = ".section big{0},code,address({1})\n .pspace 0x{2:x}\n"
     block = code.format(0, 0x200, 0x7D00 // 2 * 3)
     out = image(block, ".section .const,psv,page\na: .space 0x300\n", ".section .const,psv,page\nb: .space 0x300\n")
@@ -123,7 +134,7 @@ def test_all_constants_share_one_window_even_behind_much_code(image):
 
 
 def test_too_many_constants_name_the_largest(image):
-    """The message has the missing bytes and the five largest symbols."""
+    """If the constants exceed the window, the message has the number of missing bytes and the five largest symbols."""
     text = (
         ".section .const,psv,page\n" + "".join(f"t{n}: .space {0x1000 * n}\n" for n in range(1, 6)) + "last: .space 2\n"
     )
@@ -134,7 +145,8 @@ def test_too_many_constants_name_the_largest(image):
 
 
 def test_handles_are_own_addresses_low_and_slots_high(image):
-    """abi-elf.md §1.5: own address below 0x10000, else a GOTO slot in .handle."""
+    """A handle is the function's address if that is below 0x10000, otherwise a GOTO slot in .handle (abi-elf.md
+    §1.5)."""
     text = """
     .section hi,code,address(0x12340)
  far: nop
@@ -155,7 +167,10 @@ def test_handles_are_own_addresses_low_and_slots_high(image):
 
 
 def test_pointers_that_reach_every_function_cost_no_flash(image):
-    """abi-elf.md §1.5: without slots, .handle only lists the functions whose address is taken."""
+    """If pointers can reach all functions, .handle needs no flash: it only lists functions with a taken address.
+
+    Source: abi-elf.md §1.5.
+    """
     out = image(".text\n near: nop\n user: mov #handle(near), w0\n")
     (handle,) = out.sections(".handle")
     assert not handle.is_code
@@ -163,7 +178,10 @@ def test_pointers_that_reach_every_function_cost_no_flash(image):
 
 
 def test_config_words_go_to_their_registers(image):
-    """abi-elf.md §6.6: sections __FOSC.sec ... to 0xF80000 ..., code flags; output sections without .sec."""
+    """Config words are placed at their registers: __FOSC.sec at 0xF80000 and so on (abi-elf.md §6.6).
+
+    The sections have code flags; the output sections lack .sec.
+    """
     text = (
         ".section __FOSC.sec,code\n .global __FOSC\n__FOSC: .pword 0xC106\n .section __FWDT.sec,code\n .word 0x003F\n"
     )
@@ -178,7 +196,7 @@ def test_config_words_go_to_their_registers(image):
 
 
 def test_eeprom_contents(image):
-    """abi-elf.md §6.4, §6.6: LMA 0x7FF000, VMA 0xF000, upper byte 0."""
+    """EEPROM data has LMA 0x7FF000, VMA 0xF000 and upper bytes 0 (abi-elf.md §6.4, §6.6)."""
     out = image(
         ".section .eedata,eedata\ne: .word 0x1234\n .byte 5\n .text\n mov #tbloffset(e), w0\n"
         " mov #tblpage(e), w1\nx: nop\n.global x\n"
@@ -191,7 +209,10 @@ def test_eeprom_contents(image):
 
 
 def test_user_init_calls_are_collected_and_closed_with_return(image):
-    """abi-elf.md §3.3: __user_init, __has_user_init; the linker appends RETURN."""
+    """User initialisation calls are collected in __user_init, and the linker appends RETURN (abi-elf.md §3.3).
+
+    __has_user_init is set.
+    """
     call = ".section .user_init,code\n rcall {0}\n .text\n{0}: return\n"
     use = " .weak __user_init, __has_user_init\nuse: mov #__has_user_init, w0\n call __user_init\n"
     out = image(use, call.format("one"), call.format("two"))
@@ -204,7 +225,7 @@ def test_user_init_calls_are_collected_and_closed_with_return(image):
 
 
 def test_section_limits_resolve(image):
-    """abi-elf.md §4.2 in address units."""
+    """Section limits resolve to address units (abi-elf.md §4.2)."""
     out = image(
         "u: mov #.startof.(.nbss), w0\n mov #.sizeof.(.nbss), w1\n mov #.endof.(.nbss), w2\n"
         " .section .nbss,bss,near\n .space 10\n"
@@ -213,7 +234,7 @@ def test_section_limits_resolve(image):
 
 
 def test_linker_and_device_symbols(image):
-    """abi-elf.md §3.3, both spellings of SFRs (§2.6)."""
+    """The linker defines its own symbols (abi-elf.md §3.3) and those of the device, SFRs in both spellings (§2.6)."""
     names = [
         "__DATA_BASE",
         "__DATA_LENGTH",
@@ -241,6 +262,6 @@ def test_linker_and_device_symbols(image):
 
 
 def test_an_object_may_define_a_device_symbol_itself(image):
-    """Definitions of the program take precedence over those of the device."""
+    """Definitions of the program take precedence over symbols of the device."""
     out = image(".global PORTD\nPORTD = 0x900\nu: mov PORTD, w0\n")
     assert out.words("u", 1) == [0x800000 | 0x900 << 3]

@@ -1,4 +1,4 @@
-"""Linked images run on the emulator: start-up, constants, function pointers above 64 K, EEPROM, interrupt vectors."""
+"""Linked images on the emulator: start-up, constants, function pointers above 64 K, EEPROM, interrupt vectors."""
 
 import subprocess
 import sys
@@ -83,14 +83,17 @@ def objects():
 @pytest.mark.parametrize("form", ["elf", "hex"])
 @pytest.mark.parametrize("pack", [True, False])
 def test_a_linked_program_starts_and_finds_everything(tmp_path, objects, form, pack):
-    """abi-elf.md §1.5, §2.7, §3.1, §3.2: handles, vectors, crt0, both .dinit formats; ELF and HEX behave alike."""
+    """A linked program starts with correct data, handles and vectors (abi-elf.md §1.5, §2.7, §3.1, §3.2).
+
+    Both .dinit formats are used; the ELF and the HEX file behave alike.
+    """
     linked = link(objects, [], LinkOptions(pack_data=pack))
     image = tmp_path / f"x.{form}"
     image.write_bytes(executable_bytes(linked.image) if form == "elf" else hex_text(linked.image).encode())
     at = {s.name: s.value for s in linked.image.symbols}
     machine = load(image)
     for address in range(0x800, 0x2800, 2):
-        machine.poke(address, 0xA5A5)  # RAM is not cleared by hardware
+        machine.poke(address, 0xA5A5)  # hardware does not clear RAM
     stop = machine.run(cycles=20_000)
     assert stop.reason == "halt", stop
     values = {name: machine.peek(at[name]) for name in ("sum", "seen", "from_psv", "from_ee", "ticks", "__exit_status")}
@@ -106,7 +109,10 @@ def test_a_linked_program_starts_and_finds_everything(tmp_path, objects, form, p
 
 
 def test_an_assembly_program_talks_on_uart1_from_the_timer_interrupt(tmp_path):
-    """Built and run by as, ld and emu run; 115,200 baud at 14.7456 MIPS is BRG 7, one character every 1500 Tcy."""
+    """An assembly program built with `as` and `ld` sends characters from the timer interrupt under `emu run`.
+
+    115,200 baud at 14.7456 MIPS is BRG 7, one character every 1500 Tcy.
+    """
     here = Path(__file__).parent
 
     def run(*words):

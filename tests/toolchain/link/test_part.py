@@ -1,4 +1,4 @@
-"""`--part`: a program that another image calls gets a range of program memory and one of RAM, and nothing else."""
+"""`ld --part`: a program that another image calls occupies one range of program memory and one of RAM only."""
 
 from __future__ import annotations
 
@@ -14,7 +14,10 @@ START = ".section .text,code\n.global __reset\n__reset: return\n"
 
 
 def test_everything_lies_in_the_part_and_nothing_elsewhere(image):
-    """No reset vector, no vectors, no default handler; RAM from the beginning of the range."""
+    """All code and data of a part are in its ranges; it has no vectors, reset vector or default handler.
+
+    RAM is allocated from the start of the range.
+    """
     out = image(START, ".global _v\n.section .nbss,bss,near\n_v: .space 4\n.text\n mov _v, w0\n", part=PART)
     loaded = {s.name: (s.load, s.load + s.units) for s in out.linked.image.sections if s.is_code}
     assert set(loaded) <= {".text", ".dinit"}
@@ -23,7 +26,7 @@ def test_everything_lies_in_the_part_and_nothing_elsewhere(image):
 
 
 def test_constants_are_initialised_data(image):
-    """The PSV window is the caller's: what is in .const gets RAM, and its value from .dinit."""
+    """Constants of a part are initialised data in RAM, because the PSV window belongs to the caller."""
     const = ".section .const,psv\n.global _c\n_c: .word 0x1234\n.text\n mov _c, w0\n"
     out = image(START, const, part=PART, pack_data=False)
     assert out.symbols["_c"] == 0x0800

@@ -1,4 +1,4 @@
-"""Where sections go, and what is said when they do not fit (abi-elf.md §1.4, §3.3)."""
+"""Placement of sections, and messages if they do not fit (abi-elf.md §1.4, §3.3)."""
 
 import itertools
 
@@ -11,7 +11,10 @@ PLACE = ".section {0},{1}\n{0}_: .space {2}\n"
 
 
 def test_the_stack_gets_the_largest_free_block(image):
-    """abi-elf.md §3.3: __SP_init first free even address, __SPLIM_init = end - guard = 0x27F0."""
+    """The stack gets the largest free block: __SP_init is its first even address, __SPLIM_init = end - guard = 0x27F0.
+
+    Source: abi-elf.md §3.3.
+    """
     out = image(" mov #__SP_init, w15\n mov #__SPLIM_init, w14\n .section .nbss,bss,near\n .space 0x101\n")
     assert (out.symbols["__SP_init"], out.symbols["__SPLIM_init"]) == (0x902, 0x27F0)
     assert image("nop\n", stack_guard=32).linked.stack == (0x800, 0x27E0)
@@ -20,10 +23,10 @@ def test_the_stack_gets_the_largest_free_block(image):
 
 
 def test_near_data_lies_low_and_far_data_spills_over(image):
-    """abi-elf.md §1.4: near limit 0x1FFF."""
+    """Near data is placed below the limit 0x1FFF, and far data fills the rest (abi-elf.md §1.4)."""
     out = image(PLACE.format("far", "bss", 0xA00) + PLACE.format("near", "bss,near", 0x1400))
     assert out.symbols["near_"] == 0x800
-    assert out.symbols["far_"] == 0x1C00  # across the near limit 0x2000
+    assert out.symbols["far_"] == 0x1C00  # spans the near limit 0x2000
     with pytest.raises(ToolError) as error:
         image(PLACE.format("near", "bss,near", 0x1400) + PLACE.format("more", "bss,near", 0x420))
     assert "near data memory 0x800..0x1fff overflows by 32 bytes" in str(error.value)
@@ -31,7 +34,8 @@ def test_near_data_lies_low_and_far_data_spills_over(image):
 
 
 def test_x_and_y_memory(image):
-    """abi-elf.md §3.3: Y sections from the top of RAM downward; isa.md §1.2 X 0x800-0x17FF."""
+    """Y sections are placed from the top of RAM downward (abi-elf.md §3.3), X sections in 0x800-0x17FF (isa.md
+    §1.2)."""
     out = image(PLACE.format("ys", "bss,ymemory", 0x100) + PLACE.format("xs", "bss,xmemory", 0x100))
     assert (out.symbols["ys_"], out.symbols["xs_"]) == (0x2700, 0x800)
     with pytest.raises(ToolError, match="overflows by 2 bytes"):
@@ -39,7 +43,7 @@ def test_x_and_y_memory(image):
 
 
 def test_fixed_aligned_and_reversed_sections(image):
-    """`address(n)`, `align(n)`, `reverse(n)`: the end + 1 of a reversed section is aligned (isa.md §3.6)."""
+    """`address(n)`, `align(n)` and `reverse(n)` are observed; reverse aligns the section's end + 1 (isa.md §3.6)."""
     text = (
         PLACE.format("fix", "bss,address(0x1000)", 4)
         + PLACE.format("ali", "bss,near,align(64)", 6)
@@ -57,7 +61,7 @@ def test_fixed_aligned_and_reversed_sections(image):
 
 
 def test_fixed_code_splits_the_rest_around_it(image):
-    """Free code fills the gaps; nothing overlaps."""
+    """Free code fills the gaps around code with fixed addresses, without overlap."""
     parts = [f".section s{n},code\n.global s{n}_\ns{n}_: .space 0x300\n" for n in range(4)]
     out = image(*parts, ".section fix,code,address(0x400)\nfix_: .space 0x300\n")
     spans = sorted((s.load, s.load + s.units) for s in out.linked.image.sections if s.is_code)
@@ -66,7 +70,7 @@ def test_fixed_code_splits_the_rest_around_it(image):
 
 
 def test_program_memory_overflow_counts_bytes_and_words(image):
-    """147,456 bytes of flash less vectors (isa.md §1.1)."""
+    """Program memory overflow is reported in bytes and words of 147,456 bytes less the vectors (isa.md §1.1)."""
     with pytest.raises(ToolError) as error:
         image(*(f"f{n}: .space 0x8000\n .space 0x7ffe\n" for n in range(2)))
     assert "program memory 0x100..0x17fff overflows by" in str(error.value)
@@ -74,7 +78,7 @@ def test_program_memory_overflow_counts_bytes_and_words(image):
 
 
 def test_what_is_kept_free_is_named_when_the_rest_has_no_room(image):
-    """A section that is never loaded keeps its place: code ends below, and the message says who is above."""
+    """A section that is never loaded reserves its range: code ends below, and the overflow message names it."""
     kept = ".section .kept,code,address(0x16000),noload\n.space 0x2000\n"
     out = image(kept, ".section much,code\n.space 0x15E00\n")
     used = [s for s in out.linked.image.sections if s.is_code and s.name != ".kept" and s.load < 0x18000]
@@ -84,7 +88,7 @@ def test_what_is_kept_free_is_named_when_the_rest_has_no_room(image):
 
 
 def test_common_symbols_merge_to_the_largest(image):
-    """ELF common symbols; a definition wins."""
+    """Common symbols merge to the largest one, and a definition replaces them (ELF)."""
     out = image(
         ".comm buf, 4\n mov buf, w0\n",
         ".comm buf, 20, 4\n",
@@ -97,13 +101,13 @@ def test_common_symbols_merge_to_the_largest(image):
 
 
 def test_a_stack_section_of_the_program_is_the_stack(image):
-    """abi-elf.md §4.3, section type `stack`."""
+    """A program's section of type `stack` becomes the stack (abi-elf.md §4.3)."""
     out = image(".section mystack,stack\n .space 256\n")
     assert out.linked.stack[1] - out.linked.stack[0] == 256 - 16
 
 
 def test_the_pool_keeps_windows_and_never_gives_the_same_place_twice():
-    """First fit; with a window a block never crosses a multiple of it."""
+    """The pool allocates first-fit without overlap; with a window no block crosses a multiple of it."""
     pool = Pool(0x100, 0x20000)
     taken = [(pool.allocate(size, 2, 0, 1 << 24, 0x8000), size) for size in (0x7000, 0x2000, 0x8000, 0xE00, 2)]
     assert taken[0][0] == 0x100

@@ -1,4 +1,4 @@
-"""Random programs: whatever is linked, sections never overlap and keep every rule of their kind (abi-elf.md §3.3)."""
+"""Sections of random programs never overlap and keep the rules of their kinds (abi-elf.md §3.3)."""
 
 import random
 from itertools import pairwise
@@ -48,7 +48,10 @@ def linked_or_refused(obj):
 
 @pytest.mark.parametrize("seed", range(40))
 def test_random_sections_keep_their_rules(seed):
-    """No overlap; alignment, near, X, Y, window and fixed addresses hold; .dinit covers all RAM that wants it."""
+    """Random sections keep alignment, near, X, Y, window and fixed addresses without overlap.
+
+    .dinit covers all RAM that needs initialisation.
+    """
     obj = assemble(program(random.Random(seed)), "r.s")[0]
     linked, refused = linked_or_refused(obj)
     if linked is None:
@@ -86,6 +89,6 @@ def check_rules(section, place):
 
 
 def test_most_random_programs_link():
-    """The test above would mean little if placement gave up early."""
+    """Most random programs link: proof that the test above examines placements."""
     results = [linked_or_refused(assemble(program(random.Random(seed)), "r.s")[0])[0] for seed in range(40)]
     assert sum(result is not None for result in results) >= 20

@@ -1,4 +1,4 @@
-"""Random legal instructions: text -> assembler -> linker gives the words the instruction table gives for that text."""
+"""Random legal instructions keep their words through disassembly text, assembler and linker."""
 
 import random
 
@@ -9,12 +9,12 @@ from toolchain.elf.write import object_bytes
 from toolchain.link.link import link
 from toolchain.link.options import LinkOptions
 
-START = 0x8000  # in reach of every absolute branch target this test keeps
+START = 0x8000  # within reach of every tested absolute branch
 COUNT = 4000
 
 
 def random_instruction(rng):
-    """A legal instruction other than REPEAT, which restricts what follows."""
+    """Return a legal instruction other than REPEAT, which restricts the next one."""
     while True:
         insn = codec.decode(rng.randrange(1 << 24), rng.randrange(1 << 7))
         if insn is not None and insn.row.mnemonic != "REPEAT":
@@ -22,7 +22,10 @@ def random_instruction(rng):
 
 
 def test_a_random_program_survives_text_object_and_link():
-    """Absolute branch targets become relocations 29 and 31 and are resolved by the linker (abi-elf.md §5)."""
+    """A random program keeps its words through text, object and link.
+
+    Absolute branch targets become relocations 29 and 31, which the linker resolves (abi-elf.md §5).
+    """
     rng = random.Random(30)
     lines, expected, pc = [], [], START
     while len(lines) < COUNT:

@@ -1,4 +1,5 @@
-"""Relocation formulas (abi-elf.md §5), on objects of ours and on fields as Microchip's assembler leaves them."""
+"""Relocation formulas (abi-elf.md §5), on this assembler's objects and on fields in the form of Microchip's
+assembler."""
 
 import pytest
 
@@ -12,7 +13,7 @@ CODE, DATA, NEAR_DATA, PSV = 6, 3, 0x01000003, 0x10000002
 
 
 def linked(reloc: str, word: int, target: Symbol, *sections: Section) -> list[int]:
-    """Link one two-word section with a relocation on its first word; return both words.  It lies at 0x104."""
+    """Link a section of two words at 0x104 with a relocation on its first word; return both words."""
     section = Section(".text", CODE, data=bytearray(word.to_bytes(4, "little") + bytes(4)))
     section.relocs.append(Reloc(0, RELOCATION_BY_NAME[reloc].number, target))
     reset = Symbol("__reset", Home.SECTION, section, 0, 0, Bind.GLOBAL)
@@ -28,7 +29,7 @@ def absolute(value: int) -> Symbol:
 
 
 def far_code(offset: int = 0) -> Symbol:
-    """A code symbol at 0x12340 + offset."""
+    """Return a code symbol at 0x12340 + offset."""
     section = Section("far", CODE | 0x40000000, data=bytearray(64), load=0x12340)
     return Symbol("far", Home.SECTION, section, offset)
 
@@ -60,12 +61,15 @@ def far_code(offset: int = 0) -> Symbol:
     ],
 )  # fmt: skip
 def test_each_type_computes_its_value_and_keeps_the_other_bits(reloc, word, value, expected):
-    """abi-elf.md §5, table: places and formulas; the addend is in the field, signed for branches and words."""
+    """Each relocation type computes its value and keeps all other bits (abi-elf.md §5, table).
+
+    The addend is in the field, signed for branches and words.
+    """
     assert linked(reloc, word, absolute(value))[0] == expected
 
 
 def test_code_targets_above_64k():
-    """abi-elf.md §5: verified there with a target above 0x10000."""
+    """Code targets above 64 K are resolved (abi-elf.md §5, verified there with a target above 0x10000)."""
     symbol = far_code(2)
     assert linked("WORD_TBLPAGE", 0x200000, symbol, symbol.section)[0] == 0x200010
     symbol = far_code(2)
@@ -73,7 +77,11 @@ def test_code_targets_above_64k():
 
 
 def test_calls_take_both_words_and_carry_an_addend():
-    """abi-elf.md §5, 32/33; Microchip's linker loses the carry of `call sym+8`, ours does not."""
+    """Relocations 32/33 of CALL fill both words and carry an addend; Microchip's linker loses the carry of `call
+    sym+8`.
+
+    Source: abi-elf.md §5.
+    """
     section = Section(".text", CODE, data=bytearray.fromhex("0800020000000000"))
     target = absolute(0xFFFC)
     section.relocs += [Reloc(0, 32, target), Reloc(4, 33, target)]
@@ -84,21 +92,21 @@ def test_calls_take_both_words_and_carry_an_addend():
 
 
 def test_relocations_against_a_section_symbol_use_the_field_as_offset():
-    """abi-elf.md §5: some use the section symbol with the offset in the field."""
+    """A relocation against a section symbol uses the field as offset (abi-elf.md §5)."""
     data = Section(".ndata", NEAR_DATA, data=bytearray(20))
     symbol = Symbol(".ndata", Home.SECTION, data, 0, type=3)
     assert linked("WORD", 0x200060, symbol, data)[0] == 0x208060
 
 
 def test_psv_symbols_are_worth_their_window_address():
-    """abi-elf.md §4.2: plain `mov #sym` to a PSV symbol gives the VMA."""
+    """A plain `mov #sym` of a PSV symbol gives its VMA in the window (abi-elf.md §4.2)."""
     psv = Section("const2", PSV, data=bytearray(8), load=0)
     symbol = Symbol("c", Home.SECTION, psv, 2)
     assert linked("WORD", 0x200000, symbol, psv)[0] >> 4 & 0xFFFF == 0x8000 | 0x106
 
 
 def test_undefined_weak_symbols_are_zero():
-    """abi-elf.md §5."""
+    """Undefined weak symbols have the value 0 (abi-elf.md §5)."""
     weak = Symbol("missing", Home.UNDEFINED, bind=Bind.WEAK)
     assert linked("WORD", 0x2FFFF0, weak)[0] == 0x2FFFF0
     assert linked("WORD_HANDLE", 0x200000, weak)[0] == 0x200000
@@ -117,7 +125,7 @@ def test_undefined_weak_symbols_are_zero():
     ],
 )  # fmt: skip
 def test_values_that_do_not_fit_are_errors_with_object_place_and_symbol(reloc, word, value, message):
-    """abi-elf.md §1.4, §5: nothing is ever truncated."""
+    """A value that does not fit is an error with object, offset and symbol, never truncated (abi-elf.md §1.4, §5)."""
     with pytest.raises(ToolError) as error:
         linked(reloc, word, absolute(value))
     assert message in str(error.value)
@@ -125,7 +133,7 @@ def test_values_that_do_not_fit_are_errors_with_object_place_and_symbol(reloc, w
 
 
 def test_a_near_access_to_far_data_is_explained():
-    """abi-elf.md §1.4: "Cannot access symbol ... Value must be less than 8192"."""
+    """A near access to far data is explained: "Value must be less than 8192" (abi-elf.md §1.4)."""
     far = Section("farbss", DATA | 0x40000000, 8, nobits_units=4, load=0x2100)
     symbol = Symbol("_g", Home.SECTION, far, 2)
     with pytest.raises(ToolError, match="_g: cannot access it at 0x2102 with near addressing"):
@@ -133,7 +141,7 @@ def test_a_near_access_to_far_data_is_explained():
 
 
 def test_code_addresses_do_not_fit_data_words():
-    """abi-elf.md §4.2: cannot reference executable symbol."""
+    """A code address in a data word is refused: cannot reference executable symbol (abi-elf.md §4.2)."""
     for reloc in ("WORD", "16"):
         symbol = far_code()
         with pytest.raises(ToolError, match="executable symbol"):
@@ -141,7 +149,7 @@ def test_code_addresses_do_not_fit_data_words():
 
 
 def test_operators_on_data_are_refused():
-    """abi-elf.md §4.2, allowed targets."""
+    """Address operators applied to data are refused (abi-elf.md §4.2, allowed targets)."""
     data = Section(".ndata", NEAR_DATA, data=bytearray(8))
     symbol = Symbol("_d", Home.SECTION, data, 0)
     with pytest.raises(ToolError, match="needs a program address"):
@@ -149,14 +157,14 @@ def test_operators_on_data_are_refused():
 
 
 def test_every_number_is_either_described_or_refused_with_a_reason():
-    """abi-elf.md §5 lists 0..94."""
+    """Each relocation number 0..94 of abi-elf.md §5 is either implemented or refused with a reason."""
     assert set(RELOCATIONS) | set(UNSUPPORTED_RELOCATIONS) == set(range(95))
     assert not set(RELOCATIONS) & set(UNSUPPORTED_RELOCATIONS)
 
 
 @pytest.mark.parametrize(("number", "message"), [(46, "DMA parts only"), (93, "ambiguous"), (200, "does not exist")])
 def test_unknown_relocations_are_refused(number, message):
-    """Objects for other cores or damaged ones."""
+    """Unknown relocation numbers, of other cores or damaged objects, are refused."""
     section = Section(".text", CODE, data=bytearray(8))
     section.relocs.append(Reloc(0, number, absolute(0)))
     reset = Symbol("__reset", Home.SECTION, section, 0, 0, Bind.GLOBAL)
@@ -165,7 +173,7 @@ def test_unknown_relocations_are_refused(number, message):
 
 
 def test_a_field_outside_its_section_is_refused():
-    """A damaged object cannot write elsewhere."""
+    """A relocation outside its section is refused: a damaged object cannot write elsewhere."""
     section = Section(".text", CODE, data=bytearray(4))
     section.relocs.append(Reloc(400, 8, absolute(0)))
     reset = Symbol("__reset", Home.SECTION, section, 0, 0, Bind.GLOBAL)

@@ -19,7 +19,7 @@ def member(name: str, text: str) -> ArchiveMember:
 
 
 def test_all_undefined_and_duplicate_symbols_are_listed_with_their_objects(image):
-    """One link reports every missing name with the position of the reference."""
+    """One link lists all undefined and duplicate symbols with their objects and references."""
     with pytest.raises(ToolError) as error:
         image("f: call one\n mov two, w0\n .global twice\ntwice: nop\n", " call one\n", ".global twice\ntwice: nop\n")
     lines = str(error.value).splitlines()
@@ -32,14 +32,14 @@ def test_all_undefined_and_duplicate_symbols_are_listed_with_their_objects(image
 
 
 def test_a_missing_entry_is_an_undefined_symbol():
-    """Without start-up code there is no image."""
+    """A missing entry is reported as an undefined symbol: without start-up code there is no image."""
     obj = assemble("nop\n", "x.s")[0]
     with pytest.raises(ToolError, match="undefined symbol __reset"):
         link([obj], [], LinkOptions())
 
 
 def test_weak_definitions_yield_and_strong_ones_win(image):
-    """ELF rules; the order of objects does not matter."""
+    """Strong definitions replace weak ones in any order of objects (ELF)."""
     weak, strong, use = ".weak f\nf: mov #1, w0\n", ".global f\nf: mov #2, w0\n", "use: call f\n"
     for sources in ((weak, strong, use), (use, strong, weak)):
         out = image(*sources)
@@ -47,7 +47,10 @@ def test_weak_definitions_yield_and_strong_ones_win(image):
 
 
 def test_archive_members_come_in_only_when_needed_and_bring_their_own_needs():
-    """One group, searched until nothing new is wanted (abi-elf.md §2.8); weak references pull nothing."""
+    """Archives form one group that is searched until no undefined symbol is found; weak references add no member.
+
+    Source: abi-elf.md §2.8.
+    """
     library = archive_bytes(
         [
             member("a.o", ".global a\na: call b\n"),
@@ -61,7 +64,7 @@ def test_archive_members_come_in_only_when_needed_and_bring_their_own_needs():
 
 
 def test_archives_round_trip_and_are_readable_by_gnu_ar():
-    """The common ar format with symbol index and long names; bytes repeat."""
+    """Archives in the common ar format, with symbol index and long names, are reproducible and readable by GNU ar."""
     members = [member("x.o", ".global x\nx: nop\n"), member("a_name_longer_than_fifteen.o", ".global y\ny: nop\n")]
     data = archive_bytes(members)
     assert data == archive_bytes(members)
@@ -72,7 +75,7 @@ def test_archives_round_trip_and_are_readable_by_gnu_ar():
 
 @pytest.mark.skipif(shutil.which("ar") is None, reason="GNU ar is not installed (Debian package binutils)")
 def test_gnu_ar_and_ours_read_each_others_archives(tmp_path):
-    """Same format both ways, symbol index and long names included."""
+    """GNU ar and this archiver read each other's archives, with symbol index and long names."""
     members = [member("x.o", ".global x\nx: nop\n"), member("a_name_longer_than_fifteen.o", ".global y\ny: nop\n")]
     (tmp_path / "ours.a").write_bytes(archive_bytes(members))
     for entry in members:
@@ -89,7 +92,7 @@ def test_gnu_ar_and_ours_read_each_others_archives(tmp_path):
 
 
 def test_an_archive_without_index_is_searched_too():
-    """The index is derived from the symbol tables of the members."""
+    """An archive without index is searched too: the index is derived from the members' symbol tables."""
     data = archive_bytes([member("x.o", ".global x\nx: nop\n")])
     size = int(data[8 + 48 : 8 + 58])
     bare = data[:8] + data[8 + 60 + size + (size & 1) :]
@@ -98,13 +101,16 @@ def test_an_archive_without_index_is_searched_too():
 
 @pytest.mark.parametrize("damage", [b"", b"!<arch>\n" + b"x" * 60, b"!<arch>\n" + b"y" * 10])
 def test_damaged_archives_are_refused(damage):
-    """Clear errors, no traceback."""
+    """Damaged archives are refused with a clear error."""
     with pytest.raises(ToolError):
         open_archive(damage, "l.a")
 
 
 def test_collection_keeps_what_the_roots_reach(image):
-    """--gc-sections: entry, vectors, fixed and EEPROM sections are roots; calls, tables and handles are edges."""
+    """--gc-sections keeps sections that the roots reach.
+
+    Roots: entry, vectors, fixed and EEPROM sections. Edges: calls, tables and handles.
+    """
     text = """
     .global __reset, __T1Interrupt
     .section .text.start,code
@@ -138,7 +144,7 @@ def test_collection_keeps_what_the_roots_reach(image):
 
 
 def test_collection_keeps_sections_whose_limits_are_asked_for(image):
-    """`.startof.(x)` is a use of section x."""
+    """--gc-sections keeps a section whose limits are used, as by `.startof.(x)`."""
     text = (
         ".global __reset\n__reset: mov #.startof.(mine), w0\n .section mine,bss,near\nkept: .space 4\n"
         " .section not,bss\nx: .space 2\n"
@@ -150,7 +156,7 @@ def test_collection_keeps_sections_whose_limits_are_asked_for(image):
 
 
 def test_undefined_names_in_discarded_sections_do_not_matter(image):
-    """Discarded sections may refer to undefined names."""
+    """Undefined names in discarded sections are not reported."""
     text = ".global __reset\n__reset: nop\n .section x,code\n call missing\n"
     image(text, gc_sections=True)
     with pytest.raises(ToolError, match="missing"):
@@ -158,7 +164,7 @@ def test_undefined_names_in_discarded_sections_do_not_matter(image):
 
 
 def test_linking_is_repeatable(image):
-    """Same inputs, same bytes."""
+    """Linking the same inputs gives the same bytes."""
     from toolchain.elf.write import executable_bytes
 
     texts = [f".global f{n}\nf{n}: call f{(n + 1) % 5}\n .section .nbss,bss,near\nv{n}: .space {n}\n" for n in range(5)]
@@ -167,7 +173,7 @@ def test_linking_is_repeatable(image):
 
 
 def test_the_map_lists_symbols_with_sizes_and_what_was_left_out(image):
-    """Per-symbol sizes, memory use, discarded sections, data records."""
+    """The map lists symbols with sizes, memory use, discarded sections and data records."""
     from toolchain.link.mapfile import map_text
 
     out = image(
@@ -183,7 +189,8 @@ def test_the_map_lists_symbols_with_sizes_and_what_was_left_out(image):
 
 
 def test_objects_for_another_part_are_mentioned():
-    """abi-elf.md §6.1: e_flags name the processor; generic ids fit."""
+    """Objects for another device cause a warning; e_flags name the device, and generic ids fit all (abi-elf.md
+    §6.1)."""
     obj = assemble(".global __reset\n__reset: nop\n", "x.s")[0]
     for processor, warned in ((0x1F, False), (0x18, False), (0, False), (90, False), (0x40, True)):
         obj.processor = processor

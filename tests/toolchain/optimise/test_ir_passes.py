@@ -1,4 +1,5 @@
-"""IR passes preserve behaviour: functions are interpreted before and after a pass on the same random arguments."""
+"""IR passes preserve behaviour: functions run in an interpreter before and after a pass, with equal random
+arguments."""
 
 from __future__ import annotations
 
@@ -76,7 +77,7 @@ TEXTS: dict[str, str] = {}
 
 
 def functions(level: str) -> list[Function]:
-    """New legal functions of SOURCE that the interpreter can execute."""
+    """Return fresh legal functions of SOURCE that the interpreter supports."""
     if level not in TEXTS:
         TEXTS[level] = llvm(SOURCE, level)
     module = read_module(TEXTS[level])
@@ -89,12 +90,12 @@ def functions(level: str) -> list[Function]:
 
 
 def divides(call: Instr) -> bool:
-    """Whether the interpreter supports the called function."""
+    """Whether the interpreter supports the called division function."""
     return call.type.bits == 32 and "divides" in call.extra
 
 
 def outcomes(f: Function, seed: int) -> list[object]:
-    """Results, memory and volatile accesses for 20 random argument lists."""
+    """Return results, memory and volatile accesses for 20 random argument lists."""
     rng = random.Random(seed)
     found: list[object] = []
     for _ in range(20):
@@ -107,7 +108,7 @@ def outcomes(f: Function, seed: int) -> list[object]:
 @pytest.mark.parametrize("level", ["0", "s", "2"])
 @pytest.mark.parametrize("name", list(PASSES))
 def test_a_pass_preserves_behaviour(name: str, level: str) -> None:
-    """Results, memory and volatile accesses are the same before and after the pass."""
+    """Each pass preserves results, memory and volatile accesses."""
     changed = functions(level)
     for seed, (plain, f) in enumerate(zip(functions(level), changed, strict=True)):
         PASSES[name](f)
@@ -116,7 +117,7 @@ def test_a_pass_preserves_behaviour(name: str, level: str) -> None:
 
 @pytest.mark.parametrize("level", ["s", "2"])
 def test_all_passes_in_order_preserve_behaviour(level: str) -> None:
-    """The passes in the order of the pipeline preserve behaviour."""
+    """All passes in the order of the pipeline preserve results, memory and volatile accesses."""
     for seed, (plain, f) in enumerate(zip(functions(level), functions(level), strict=True)):
         for name, step in PASSES.items():
             if name != "switches for speed":

@@ -1,4 +1,4 @@
-"""Machine passes preserve behaviour: random functions over real registers are executed before and after each pass."""
+"""Machine passes preserve behaviour: random functions over real registers run before and after each pass."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ class CpuModel:
         return {"cpseq": x == y, "cpsne": x != y, "cpslt": sx < sy, "cpsgt": sx > sy}[name]
 
     def run(self) -> tuple[int, dict[int, int]]:
-        """Execute the function; returns W0 and the memory written."""
+        """Execute the function and return W0 and the written memory."""
         name, fuel = self.order[0], 2000
         while True:
             block, skip = self.blocks[name], False
@@ -171,12 +171,12 @@ class CpuModel:
 
 
 def near(rng: random.Random) -> FileRegister:
-    """A near object in the memory that the pointers reach."""
+    """Return a near operand in the memory that the pointers reach."""
     return FileRegister(f"0x{DATA + 2 * rng.randrange(9):04X}", True)
 
 
 def instruction(rng: random.Random) -> list[MI]:
-    """A random piece of straight-line code; W3-W5 are pointers."""
+    """Return a random piece of straight-line code; W3-W5 are pointers."""
     a, b, d = (rng.randrange(3) + rng.choice((0, 5)) for _ in range(3))
     p = rng.randrange(3, 6)
     match rng.randrange(16):
@@ -219,7 +219,7 @@ def instruction(rng: random.Random) -> list[MI]:
 
 
 def generate(seed: int) -> MFunction:
-    """Six blocks with forward branches and different returns."""
+    """Return a function of six blocks with forward branches and different returns."""
     rng = random.Random(seed)
     m = MFunction("random")
     names = [f"b{k}" for k in range(6)] + ["out"]
@@ -242,7 +242,7 @@ def generate(seed: int) -> MFunction:
             insts.append(MI("bra", one, cc=rng.choice(("z", "nz", "lt", "ge", "gtu", "nn"))))
             m.blocks.append(MBlock(name, [*insts, MI("jump", two)], list(dict.fromkeys([one, two]))))
         else:
-            same = rng.random() < 0.6  # some endings are equal, for tail merging
+            same = rng.random() < 0.6  # equal endings for tail merging
             insts += [MI("add", 0, 1, 2), MI("mov", 2, Mem("ind", 3)), MI("com", 2, 0)] if same else []
             m.blocks.append(MBlock(name, [*insts, MI("jump", one)], [one]))
     return m
@@ -261,7 +261,7 @@ PASSES: dict[str, Callable[[MFunction], None]] = {
 
 
 def reachable(m: MFunction) -> MFunction:
-    """The function without unreachable blocks, like the output of selection."""
+    """Return the function without unreachable blocks, like the output of selection."""
     branches.thread_jumps(m)
     return m
 
@@ -286,7 +286,7 @@ def test_all_machine_passes_in_order_preserve_behaviour() -> None:
 
 
 def test_stalls_are_found_as_the_manual_lists_them() -> None:
-    """Stalls are those of the tables of isa.md §13.2."""
+    """Pipeline stalls are found for the cases of the tables in isa.md §13.2."""
     direct = MI("add", 0, 1, 2)
     assert not schedule.stalls(direct, MI("mov", 2, 3))
     assert schedule.stalls(direct, MI("mov", Mem("ind", 2), 3))

@@ -1,4 +1,4 @@
-/* One function for each kind of code that test_prove.py plants a fault in. */
+/* One function for each kind of code in which test_prove.py plants a fault. */
 struct pair { int first, second; };
 extern volatile unsigned first_port, second_port;
 extern volatile unsigned long wide_port;

@@ -1,6 +1,7 @@
-"""Symbolic execution of a function's code alone, with the symbolic machine of `toolchain.proof`.
+"""Symbolic execution of a function's code without its source, with the symbolic machine of `toolchain.proof`.
 
-`results(words)` runs loop-free code from its first word to RETURN. All registers but W15 start as free 16-bit values.
+`results(words)` runs loop-free code from its first word to RETURN. All registers except W15 start as free 16-bit
+values.
 """
 
 from __future__ import annotations
@@ -20,14 +21,15 @@ from toolchain.proof.terms import BITS, SymbolicInteger, holds, narrow, vector, 
 MOST_STEPS = 4000
 
 bounds: dict[str, tuple[Any, Any]] | None = None
-"""Unknowns that replace products, and their bounds, by factors; None: products are computed in bits."""
+"""Unknowns that replace products, by factors, with their bounds; None: products are computed in bits."""
 
 
 @contextmanager
 def unknown_products() -> Iterator[dict[str, tuple[Any, Any]]]:
-    """Within the context, a product is an arbitrary number within the bounds of its factors.
+    """Replace products by arbitrary numbers within their bounds, within the context.
 
-    A property of all such numbers holds for products, and the solver need not expand multipliers."""
+    A property of all such numbers also holds for products, and the solver need not expand multipliers.
+    """
     global bounds
     bounds, exact = {}, SymbolicInteger.__mul__
 
@@ -58,7 +60,7 @@ def times(a: Any, b: Any) -> Any:
 
 
 class Free(SymbolicMachine):
-    """A machine without a source: every pointer addresses memory, and words are at even addresses."""
+    """A symbolic machine without source information: pointers address memory, words are at even addresses."""
 
     def load(self, ea: Any, size: int, side: str = "src", ptr: int | None = None) -> Any:
         if isinstance(ea, int):

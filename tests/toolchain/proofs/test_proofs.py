@@ -1,6 +1,6 @@
 """The code of each rewrite rule is correct for all inputs: compiled, executed symbolically, proved by z3.
 
-A case is a C function, and its result as a z3 term over its parameters. To add one: a line in CASES.
+A case is a C function with its result as a z3 term over the parameters. To add a case, add a line to CASES.
 """
 
 from __future__ import annotations
@@ -26,58 +26,65 @@ LEVELS = ("-O1", "-Os", "-O2")
 
 
 def choose(c: Term, a: Term, b: Term) -> Term:
-    """c ? a : b."""
+    """Term of c ? a : b."""
     return z3.If(c, a, b)
 
 
 def bit(c: Term) -> Term:
-    """A truth value as an int."""
+    """Term of a truth value as int."""
     return z3.If(c, z3.BitVecVal(1, 16), z3.BitVecVal(0, 16))
 
 
 def smaller(a: Term, b: Term) -> Term:
-    """Signed minimum."""
+    """Term of the signed minimum."""
     return choose(a < b, a, b)
 
 
 def crc_step(c: Term, polynomial: int) -> Term:
-    """One bit of a right-shifting CRC."""
+    """Term of one bit step of a right-shifting CRC."""
     return choose(z3.Extract(0, 0, c) == 1, z3.LShR(c, 1) ^ polynomial, z3.LShR(c, 1))
 
 
 def quotient(a: Term, d: int) -> Term:
-    """Signed division as C has it, in 32 bits, where SDIV of the least number by -1 does not overflow."""
+    """Term of the signed 16-bit division of C.
+
+    It is computed in 32 bits, where SDIV of the minimum by -1 does not overflow.
+    """
     wide = z3.SignExt(16, a) / z3.BitVecVal(d, 32)
     return z3.Extract(15, 0, wide)
 
 
 def remainder(a: Term, d: int) -> Term:
-    """Remainder of the signed division."""
+    """Term of the remainder of the signed division."""
     return a - quotient(a, d) * d
 
 
 def word_at(address: Term) -> Term:
-    """A word of memory at entry."""
+    """Term of a memory word at function entry."""
     memory = start().memory.array
     return z3.Concat(z3.Select(memory, address + 1), z3.Select(memory, address))
 
 
 def low_byte(a: Term, signed: bool) -> Term:
-    """(char)a as an int."""
+    """Term of (char)a as int."""
     return (z3.SignExt if signed else z3.ZeroExt)(8, z3.Extract(7, 0, a))
 
 
 def long_by_word(a: Term, b: Term) -> Term:
-    """a * b for a long and a signed word, as h * 2^16 * b + l * b for the halves of a.
+    """Term of a * b for a long and a signed word: h * 2^16 * b + l * b with the halves h, l of a.
 
-    The identity holds in every ring, so the solver need not prove it in bits."""
+    The identity holds in every ring, so that the solver need not prove it in bits.
+    """
     low, high = z3.Extract(15, 0, a), z3.Extract(31, 16, a)
     product = z3.SignExt(16, b) * z3.ZeroExt(16, low)
     return z3.Concat(z3.Extract(31, 16, product) + high * b, low * b)
 
 
 def high_half(a: Term, m: int, signed: bool) -> Term:
-    """The upper two words of a * m from four products of words, in the sum that `test_upper_half` proves."""
+    """Term of the upper two words of a * m, from four products of words.
+
+    `test_upper_half` proves the sum.
+    """
     extend = z3.SignExt if signed else z3.ZeroExt
     low, high = z3.ZeroExt(32, z3.Extract(15, 0, a)), extend(32, z3.Extract(31, 16, a))
     m_low, m_high = z3.BitVecVal(m & 0xFFFF, 48), z3.BitVecVal(m >> 16, 48)
@@ -87,20 +94,23 @@ def high_half(a: Term, m: int, signed: bool) -> Term:
 
 
 def quotient32(a: Term, d: int) -> Term:
-    """a / d, unsigned, as a product; `test_products_divide` proves that it is the quotient."""
+    """Term of the unsigned quotient a / d as a product; `test_products_divide` proves it."""
     m, s = unsigned_factor(d, 32)
     return z3.LShR(high_half(a, m, False), s)
 
 
 def signed_quotient32(a: Term, d: int) -> Term:
-    """The same for signed numbers."""
+    """Term of the signed quotient a / d as a product; `test_products_divide` proves it."""
     m, s = signed_factor(abs(d), 32)
     q = (high_half(a, m, True) >> s) + z3.LShR(a, 31)
     return q if d > 0 else -q
 
 
 def branches() -> dict[str, tuple[str, str, str, Callable[..., Term]]]:
-    """Comparisons with constants of all sizes at a branch; an inline NOP prevents a conditional expression."""
+    """Cases of comparisons with constants of all sizes at a branch.
+
+    An inline NOP prevents a conditional expression.
+    """
     kinds: dict[str, tuple[str, str, Callable[[Term], Term], bool]] = {
         "int": ("i", "a", lambda a: a, True),
         "word": ("u", "a", lambda a: a, False),
@@ -129,7 +139,7 @@ def branches() -> dict[str, tuple[str, str, str, Callable[..., Term]]]:
     return found
 
 
-# name: (result type, parameter types, C expression over a, b, c, the same as a term). Types: i16, i32.
+# name: (result type, parameter types, C expression over a, b, c, term of the result). Types: keys of C_TYPES.
 CASES: dict[str, tuple[str, str, str, Callable[..., Term]]] = {
     # shifts of two words
     **{f"shl_{n}": ("long", "l", f"(long)((unsigned long)a << {n})", lambda a, n=n: a << n)
@@ -154,26 +164,26 @@ CASES: dict[str, tuple[str, str, str, Callable[..., Term]]] = {
     "abs32": ("long", "l", "a < 0 ? (long)(0ul - a) : a", lambda a: choose(a < 0, -a, a)),
     "hex_digit": ("int", "i", "(a & 15) < 10 ? '0' + (a & 15) : 'a' - 10 + (a & 15)",
                   lambda a: choose((a & 15) < 10, (a & 15) + 48, (a & 15) + 87)),
-    # operations under a skip
+    # instructions executed under a skip
     "add_if": ("unsigned", "uuu", "a < b ? a + c : a", lambda a, b, c: choose(z3.ULT(a, b), a + c, a)),
     "sub_if32": ("unsigned long", "LL", "a >= b ? a - b : a", lambda a, b: choose(z3.UGE(a, b), a - b, a)),
     "add_chosen32": ("unsigned long", "LLu", "a + (c ? b : 0)", lambda a, b, c: choose(c != 0, a + b, a)),
     "xor_const_if": ("unsigned", "uu", "b ? a ^ 0x1021 : a", lambda a, b: choose(b != 0, a ^ 0x1021, a)),
     "ior_const_if32": ("unsigned long", "Lu", "b ? a | 0x10000ul : a", lambda a, b: choose(b != 0, a | 0x10000, a)),
     "sub_const_if": ("unsigned", "uu", "b ? a - 300 : a", lambda a, b: choose(b != 0, a - 300, a)),
-    # the bit a shift loses
+    # the bit that a shift moves out
     "crc16_step": ("unsigned", "u", "a & 1 ? a >> 1 ^ 0xA001 : a >> 1", lambda a: crc_step(a, 0xA001)),
     "crc32_step": ("unsigned long", "L", "a & 1 ? a >> 1 ^ 0xEDB88320ul : a >> 1", lambda a: crc_step(a, 0xEDB88320)),
     "crc_left": ("unsigned", "u", "a & 0x8000 ? a << 1 ^ 0x1021 : a << 1",
                  lambda a: choose(z3.Extract(15, 15, a) == 1, a << 1 ^ 0x1021, a << 1)),
-    # a byte into a word
+    # conversion of a byte to a word
     "xor_byte": ("unsigned", "uu", "a ^ (unsigned char)b", lambda a, b: a ^ b & 255),
     "ior_byte32": ("unsigned long", "Lu", "a | (unsigned char)b", lambda a, b: a | z3.ZeroExt(16, b & 255)),
     # structs in registers
     "pair_sum": ("int", "P", "a.x + a.y", lambda a: z3.Extract(15, 0, a) + z3.Extract(31, 16, a)),
     "pair_bytes": ("int", "P", "((unsigned char *)&a)[1] + ((unsigned char *)&a)[2]",
                    lambda a: z3.ZeroExt(8, z3.Extract(15, 8, a)) + z3.ZeroExt(8, z3.Extract(23, 16, a))),
-    # division by constants; at -Os those that use DIV have no loop-free form here
+    # division by constants; at -Os divisions that use DIV have no loop-free code here
     **{f"sdiv_{n}{d}": ("int", "i", f"a / {s}{d}", lambda a, v=v: quotient(a, v))
        for n, s, d, v in (("", "", 8, 8), ("", "", 2, 2), ("minus_", "-", 4, -4))},
     "srem_8": ("int", "i", "a % 8", lambda a: remainder(a, 8)),
@@ -182,28 +192,28 @@ CASES: dict[str, tuple[str, str, str, Callable[..., Term]]] = {
     **{f"sdiv32_by_{n}{d}": ("long", "l", f"a / {v}", lambda a, v=v: a / z3.BitVecVal(v, 32))
        for n, d, v in (("", 2, 2), ("", 8, 8), ("minus_", 4096, -4096), ("", 131072, 131072))},
     "srem32_8": ("long", "l", "a % 8", lambda a: z3.SRem(a, z3.BitVecVal(8, 32))),
-    # two words by a signed one
+    # two words multiplied by a signed one
     "mul_long_int": ("long", "li", "a * b", long_by_word),
     "mul_int_long": ("long", "il", "a * b", lambda a, b: long_by_word(b, a)),
     "mul_long_char": ("long", "li", "a * (signed char)b", lambda a, b: long_by_word(a, low_byte(b, True))),
     "mul_long_minus_300": ("long", "l", "a * -300", lambda a: a * z3.BitVecVal(-300, 32)),
-    # an index that two addresses share
+    # an index shared by two addresses
     "shared_index": ("int", "uuu", "((const int *)a)[c] + ((const int *)b)[c]",
                      lambda a, b, c: word_at(a + 2 * c) + word_at(b + 2 * c)),
     **branches(),
 }  # fmt: skip
 DIVIDES = {"sdiv_8", "sdiv_minus_4", "srem_8"}
 FAST = {n for n in CASES if n.startswith(("udiv32_", "sdiv32_", "srem32_"))}
-"""Inline at -O2, calls at the other levels."""
+"""Cases that are inline code at -O2 and calls at the other levels."""
 PRODUCTS = FAST & {"udiv32_10", "udiv32_1000", "sdiv32_minus_7"}
-"""Those with products that the solver does not look into."""
+"""Cases with products that the solver treats as opaque values."""
 C_TYPES = {"i": "int", "u": "unsigned", "l": "long", "L": "unsigned long", "P": "struct pair"}
 PREFACE = "struct pair { int x, y; };\n"
 
 
 @cache
 def compiled(level: str, folder: Path) -> dict[str, list[int]]:
-    """Words of every case at one level, linked."""
+    """Return the linked program words of every case at one level."""
     text = PREFACE
     for name, (result, types, body, _) in CASES.items():
         parameters = ", ".join(f"{C_TYPES[t]} {v}" for t, v in zip(types, "abc", strict=False))
@@ -228,7 +238,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def arguments(types: str) -> list[Term]:
-    """Parameters as terms over their registers (abi-elf.md §2.2)."""
+    """Return the parameters as terms over their registers (abi-elf.md §2.2)."""
     w, free, out = start().w, list(range(8)), []
     for t in types:
         if t in "iu":
@@ -243,12 +253,12 @@ def arguments(types: str) -> list[Term]:
 
 PROOFS = [(name, level) for name in CASES
           for level in (("-Os",) if name in branches() else ("-O2",) if name in FAST else LEVELS)]  # fmt: skip
-"""One rule of selection makes the branches at every level."""
+"""(case, level) of each proof; branches are proved at one level, because one selection rule generates them at all."""
 
 
 @pytest.mark.parametrize(("name", "level"), PROOFS)
 def test_a_rule_holds_for_all_inputs(name: str, level: str, folder: Path) -> None:
-    """Code and C expression agree for every input, and callee-saved registers are preserved."""
+    """The code computes the C expression for every input and preserves callee-saved registers."""
     if level == "-Os" and name in DIVIDES:
         pytest.skip("DIV under REPEAT, which is not loop-free")
     result, types, _, meaning = CASES[name]
@@ -266,12 +276,15 @@ def test_a_rule_holds_for_all_inputs(name: str, level: str, folder: Path) -> Non
 
 
 def floor_product(x: Term, m: int, bits: int) -> Term:
-    """floor(x * m / 2^bits) of unbounded integers."""
+    """Return floor(x * m / 2^bits) over unbounded integers."""
     return x * m / z3.IntVal(1 << bits)
 
 
 def test_upper_half() -> None:
-    """The sum of four products, the middle ones 2^16 times and the top one 2^32 times as large, has this upper half."""
+    """The sum of four word products has the upper half that the rules use.
+
+    The middle products count 2^16 times, the top one 2^32 times.
+    """
     lowest, one, other, top = z3.Ints("lowest one other top")
     solver = z3.Solver()
     whole = lowest + 65536 * (one + other) + 65536 * 65536 * top
@@ -282,7 +295,10 @@ def test_upper_half() -> None:
 @pytest.mark.parametrize("bits", [16, 32])
 @pytest.mark.parametrize("d", [3, 5, 7, 10, 11, 60, 641, 1000, 32767, 65537, 1000000007])
 def test_products_divide(d: int, bits: int) -> None:
-    """For every dividend (`magic`); d is a constant, so all of this is linear."""
+    """Multiplication by the factor of `magic` gives the quotient for every dividend.
+
+    d is a constant, so that all terms are linear.
+    """
     if d >> bits - 1:
         return
     x, half = z3.Int("x"), 1 << bits - 1
@@ -299,7 +315,7 @@ def test_products_divide(d: int, bits: int) -> None:
 
 
 def test_a_factor_that_is_too_small_is_refuted() -> None:
-    """With a factor that is 1 too small, z3 finds a dividend with a wrong quotient."""
+    """A factor that is 1 too small is refuted: z3 finds a dividend with a wrong quotient."""
     x, (m, s) = z3.Int("x"), unsigned_factor(10, 32)
     solver = z3.Solver()
     solver.add(x >= 0, x < 1 << 32, floor_product(x, m - 1, 32 + s) != x / z3.IntVal(10))
@@ -321,7 +337,7 @@ WRONG: dict[str, tuple[str, Callable[..., Term]]] = {
 
 @pytest.mark.parametrize("name", WRONG)
 def test_a_wrong_rule_is_refuted(name: str, folder: Path) -> None:
-    """For a meaning that differs from the code, z3 finds an input."""
+    """A wrong rule is refuted: z3 finds an input for which term and code differ."""
     types, meaning = WRONG[name]
     wrong = []
     for state in results(compiled("-O2" if name in FAST else "-Os", folder)[name]):

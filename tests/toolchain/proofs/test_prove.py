@@ -119,7 +119,7 @@ PLANTED = {
     "one factor unsigned": ("product_of", "mul.ss w7,[w0++],w6", "mul.us w7,[w0++],w6"),
     "a round too few for the input": ("product_of", "bra ge,", "bra gt,"),
 }  # fmt: skip
-"""By kind of fault: the function, what its code at -Os says, and what is put there instead."""
+"""Planted faults by kind: the function, text of its code at -Os, and the faulty replacement."""
 
 LATE = {
     "a round too many": ("place_of", "cp w6,#8", "cp w6,#9"),
@@ -128,7 +128,7 @@ LATE = {
     "compared in a byte": ("pairs", "cp w11,w9", "cp.b w11,w9"),
     "an index of a byte": ("turned", "inc w6,w6", "inc.b w6,w6"),
 }
-"""Faults that only many rounds show."""
+"""Planted faults that only show after many loop iterations."""
 
 
 def planted(kind: str) -> Verdict:
@@ -162,12 +162,15 @@ def test_a_planted_fault_is_refuted(kind: str) -> None:
 
 @pytest.mark.parametrize("kind", LATE)
 def test_a_fault_of_many_rounds_is_not_proved(kind: str) -> None:
-    """A failed induction refutes nothing."""
+    """A fault that needs many iterations is not proved; a failed induction does not refute it either."""
     assert planted(kind).kind != "proved"
 
 
 def test_the_input_of_a_refutation_shows_it_on_the_emulator(tmp_path: Path) -> None:
-    """A maximum that returns the minimum: the emulator runs it with the counterexample."""
+    """The counterexample of a refutation shows the fault on the emulator.
+
+    The function for the maximum returns the minimum.
+    """
     made = compile_file([str(SAMPLE), "-Os", "-w"], lambda text: text.replace("cpsgt w0,w1", "cpslt w0,w1"))
     (verdict,) = verdicts(made, "larger")
     assert verdict.counterexample is not None
@@ -180,7 +183,10 @@ def test_the_input_of_a_refutation_shows_it_on_the_emulator(tmp_path: Path) -> N
 
 
 def test_memory_of_a_refutation_is_in_the_image(tmp_path: Path) -> None:
-    """A byte of a table is read from the wrong address."""
+    """The image of a counterexample contains the memory it assumes.
+
+    The faulty code reads a table byte from the wrong address.
+    """
     made = compile_file(
         [str(SAMPLE), "-Os", "-w"], lambda text: text.replace("mov.b [w0+1],w7\n\tse", "mov.b [w0+2],w7\n\tse")
     )
@@ -196,7 +202,7 @@ def test_memory_of_a_refutation_is_in_the_image(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("file", ["clock.c", "error.c", "fault.c", "init.c"])
 def test_nothing_of_the_kernel_is_refuted(file: str) -> None:
-    """Functions without loops are proved."""
+    """No kernel function is refuted, and functions without loops are proved."""
     made = compile_file([str(KERNEL / file), "-Os", "-w", "-std=gnu99", *(f"-I{SYSTEM / name}" for name in FOLDERS)])
     found = list(verdicts(made))
     assert not [v for v in found if v.kind == "refuted"]

@@ -1,4 +1,4 @@
-"""Register allocation preserves behaviour: random programs are executed before and after it."""
+"""Register allocation preserves behaviour: random programs run before and after it."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class MirMachine:
         return self.w[a]
 
     def run(self, fuel: int = 4000) -> list[int]:
-        """Execute the function; returns the values written to memory, in order."""
+        """Execute the function and return the values written to memory, in order."""
         name: str | None = self.order[0]
         while name is not None:
             block, name, skip = self.blocks[name], None, False
@@ -90,7 +90,7 @@ class MirMachine:
 
 
 def generate(seed: int, pressure: int, calls: bool) -> MFunction:
-    """A function with a loop and a conditional block, and about `pressure` values live at the same time."""
+    """Return a function with a loop and a conditional block, with about `pressure` values live at the same time."""
     rng = random.Random(seed)
     m = MFunction("random")
     live = [m.new_register() for _ in range(pressure)]
@@ -111,7 +111,7 @@ def generate(seed: int, pressure: int, calls: bool) -> MFunction:
 
 
 def body(rng: random.Random, m: MFunction, live: list[int], calls: bool) -> list[MI]:
-    """Straight-line code that redefines some of the live registers."""
+    """Return straight-line code that redefines some of the live registers."""
     out: list[MI] = []
     for _ in range(12):
         a, b, d = (rng.choice(live) for _ in range(3))
@@ -139,7 +139,8 @@ def body(rng: random.Random, m: MFunction, live: list[int], calls: bool) -> list
 @pytest.mark.parametrize("calls", [False, True], ids=["leaf", "with calls"])
 @pytest.mark.parametrize("pressure", [3, 10, 14, 22])
 def test_allocation_preserves_behaviour(pressure: int, calls: bool) -> None:
-    """Coalescing, pairs, conditional moves, calls, spilling and rematerialisation preserve behaviour."""
+    """Allocation preserves behaviour with coalescing, pairs, conditional moves, calls, spilling and
+    rematerialisation."""
     for seed in range(25):
         expected = MirMachine(generate(seed, pressure, calls)).run()
         m = generate(seed, pressure, calls)
@@ -149,7 +150,7 @@ def test_allocation_preserves_behaviour(pressure: int, calls: bool) -> None:
 
 
 def test_no_virtual_register_and_no_unaligned_pair_is_left() -> None:
-    """isa.md §5.6: the destination of MUL is an even register below W14."""
+    """After allocation there is no virtual register, and MUL writes an even register below W14 (isa.md §5.6)."""
     for seed in range(20):
         for block in allocate(generate(seed, 16, False), True).blocks:
             for mi in block.insts:
@@ -161,7 +162,7 @@ def test_no_virtual_register_and_no_unaligned_pair_is_left() -> None:
 
 
 def test_values_live_across_calls_avoid_scratch_registers() -> None:
-    """abi-elf.md §2.1: a callee may change W0-W7."""
+    """Values that are live across calls avoid W0-W7, which a callee may change (abi-elf.md §2.1)."""
     m = MFunction("across")
     kept = [m.new_register() for _ in range(3)]
     call = MI("call", "_f")

@@ -1,5 +1,5 @@
 /* Compares __format_double, strtod and strtof, compiled for the host, with the host's printf and strtod, byte for byte.
- * argv: random numbers per function, seed. Exit status 1 on any difference, with the number that shows it. */
+ * argv: number of random values per function, seed. On a difference it prints the value and exits with status 1. */
 #include "format.h"
 
 #include <math.h>
@@ -34,7 +34,7 @@ static uint64_t random64(void) /* xorshift64* */
 }
 static unsigned below(unsigned n) { return (unsigned)(random64() >> 33) % n; }
 
-/* Every exponent, short decimals, ties, whole numbers, subnormals. */
+/* Returns a random number: any exponent, short decimals, ties, integers, subnormals. */
 static double number(void)
 {
     uint64_t bits = random64();
@@ -91,10 +91,10 @@ static void some_text(char *text)
         "0x1.8p-1075", "0x1.8p-1074", "0x123456789abcdef123456789p-1100", "2.2250738585072011e-308", "4.9e-324",
         "2.4703282292062327e-324", "2.4703282292062328e-324", "1.7976931348623158e308", "1.7976931348623159e308"};
     double value = number();
-    if (below(2)) /* of single precision's range */
+    if (below(2)) /* within the range of float */
         value = ldexp(frexp(value, &(int){0}), (int)below(300) - 160);
     switch (below(6)) {
-    case 5: /* the middle between two floats, and a little above or below it */
+    case 5: /* the midpoint of two floats, or a little above or below it */
         value = isfinite(value) ? fabs((float)value) : 1;
         sprintf(text, "%.200g", (value + nextafterf((float)value, 0)) / 2);
         if (strchr(text, '.') && !strchr(text, 'e') && below(2))
@@ -103,7 +103,7 @@ static void some_text(char *text)
     case 0: sprintf(text, "%.*g", (int)below(20) + 1, value); break;
     case 1: sprintf(text, "%a", value); break;
     case 2: strcpy(text, odd[below(sizeof odd / sizeof *odd)]); break;
-    case 3: /* the middle between two neighbours, and a little above it */
+    case 3: /* the midpoint of two neighbouring doubles, or a little above it */
         value = isfinite(value) ? fabs(value) : 1;
         sprintf(text, "%.1100Lg", ((long double)value + nextafter(value, 0)) / 2);
         if (below(2) && strchr(text, '.') && !strchr(text, 'e'))

@@ -1,12 +1,14 @@
-"""Bit-exact model of the DSP library: the accumulator of isa.md §2.7 as a Python integer, each function by its
-difference equation.  Fractions are integers -32768 to 32767, an accumulator counts units of 2^-31."""
+"""Bit-exact model of the DSP library: each function as its difference equation.
+
+The accumulator of isa.md §2.7 is a Python integer in units of 2^-31; fractions are integers -32768 to 32767.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
 LIMIT = 1 << 39
-"""An accumulator saturates at 9.31."""
+"""Limit of an accumulator: it saturates at 9.31."""
 
 
 def acc(value: int) -> int:
@@ -30,12 +32,12 @@ def load(value: int, right: int = 0) -> int:
 
 
 def truncated(a: int) -> int:
-    """SAC."""
+    """Return the accumulator as a fraction, truncated (SAC)."""
     return fraction(a >> 16)
 
 
 def rounded(a: int, left: int = 0) -> int:
-    """SAC.R: round to nearest, ties to even."""
+    """Return the accumulator as a fraction, rounded to nearest, ties to even (SAC.R)."""
     a <<= left
     whole, rest = a >> 16, a & 0xFFFF
     return fraction(whole + (rest > 0x8000 or (rest == 0x8000 and bool(whole & 1))))
@@ -49,7 +51,10 @@ def dot(a: Sequence[int], b: Sequence[int]) -> int:
 
 
 def fir(x: Sequence[int], h: Sequence[int], past: list[int]) -> list[int]:
-    """`past` has the earlier samples, newest first, at least as many as `h`; it is updated."""
+    """Filter a block.
+
+    `past` has the earlier samples, newest first, at least as many as `h`; it is updated.
+    """
     out = []
     for sample in x:
         past.insert(0, sample)
@@ -83,7 +88,7 @@ def fir_lattice(x: Sequence[int], k: Sequence[int], before: list[int]) -> list[i
 def fir_lms(
     x: Sequence[int], h: list[int], past: list[int], reference: Sequence[int], mu: int, energy: list[int] | None = None
 ) -> list[int]:
-    """`h` adapts; with `energy` (one element) the gain is normalised."""
+    """Filter a block and adapt the coefficients `h`; with `energy` (one element) normalise the gain."""
     out = []
     for sample, wanted in zip(x, reference, strict=True):
         gain = mu
@@ -150,7 +155,7 @@ def bit_reversed(data: Sequence[tuple[int, int]]) -> list[tuple[int, int]]:
 
 
 def fft(data: list[tuple[int, int]], factors: Sequence[tuple[int, int]]) -> list[tuple[int, int]]:
-    """Decimation in frequency, halved in every stage; the result in bit-reversed order."""
+    """FFT by decimation in frequency, halved in every stage; return the result in bit-reversed order."""
     data = list(data)
     half, step = len(data) // 2, 1
     while half:

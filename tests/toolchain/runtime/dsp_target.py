@@ -1,4 +1,4 @@
-"""The DSP library on the emulator: call a function with words in W0-W7, read memory."""
+"""The DSP library on the emulator: functions are called with words in W0-W7, results are read from memory."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ FUNCTIONS = [
 
 
 class Target:
-    """A machine at `main` of a program with the whole library."""
+    """A machine at `main` of a program that contains the whole library."""
 
     def __init__(self, folder: Path) -> None:
         source = PROGRAM.replace("NAMES", ", ".join(FUNCTIONS))
@@ -65,7 +65,7 @@ class Target:
         return symbol.address
 
     def x(self, at: int, words: Sequence[int] = ()) -> int:
-        """Return the address of word `at` of the X buffer, after `words` have been stored there."""
+        """Store `words` in the X buffer from word `at` on; return their address."""
         return self.put(self._address("_in_x") + 2 * at, words)
 
     def y(self, at: int, words: Sequence[int] = ()) -> int:
@@ -80,7 +80,7 @@ class Target:
         return address
 
     def coefficients(self, words: Sequence[int], in_flash: bool) -> tuple[int, int]:
-        """Return base and page of coefficients, as arguments of filters."""
+        """Store coefficients; return base address and page as arguments of filters."""
         if not in_flash:
             return self.x(600, words), 0xFF00
         start = self.page << 15 | self.offset & 0x7FFF
@@ -92,7 +92,7 @@ class Target:
         return [(self.machine.peek(address + 2 * i) ^ 0x8000) - 0x8000 for i in range(n)]
 
     def call(self, name: str, *args: int) -> int:
-        """Call a function and return W0; `cycles` has the cycles of the call with RCALL and RETURN."""
+        """Call a function and return W0; set `cycles` to the cycles of the call with RCALL and RETURN."""
         machine = self.machine
         kept = [0x1111 * i for i in range(8, 15)]
         for i, value in enumerate([*args, *[0xDEAD] * (8 - len(args)), *kept]):
@@ -114,7 +114,7 @@ class Target:
         return (self.call(name, *args) ^ 0x8000) - 0x8000
 
     def filled(self, name: str, n: int, args: Sequence[int], dst: int) -> list[int]:
-        """Call a function that must return `dst`; return the n words there."""
+        """Call a function that must return `dst`; return the n words at `dst`."""
         assert self.call(name, *args) == dst, name
         return self.at(dst, n)
 

@@ -1,4 +1,4 @@
-/* Prints what the text functions answer for inputs that are the same here and on the host. */
+/* Prints results of text functions for inputs that are equal on the emulator and on the host. */
 #include <errno.h>
 #include <inttypes.h>
 #include <stdint.h>
@@ -7,7 +7,7 @@
 #include <string.h>
 
 static uint32_t state = 7216;
-static unsigned below(unsigned n) /* the upper half of a linear congruence */
+static unsigned below(unsigned n) /* returns the upper half of a linear congruential generator's state */
 {
     state = state * 1664525u + 1013904223u;
     return (unsigned)(state >> 16) % n;
@@ -65,7 +65,7 @@ static void floats(void)
         uint32_t bits;
         memcpy(&bits, &value, sizeof bits);
         if (value != value)
-            bits = 0x7fc00000; /* with any sign */
+            bits = 0x7fc00000; /* of either sign */
         printf("%s: %08lx %d\n", text, (unsigned long)bits, (int)(end - text));
     }
     long double same = strtold("0.1x", &end);

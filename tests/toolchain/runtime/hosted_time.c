@@ -1,4 +1,4 @@
-/* Prints what time.h says of moments that are the same here and on the host, which runs with TZ=UTC. */
+/* Prints results of time.h for times that are equal on the emulator and on the host, which runs with TZ=UTC. */
 #include <stdint.h>
 #include <stdio.h>
 #include <string.h>
@@ -18,7 +18,7 @@ int main(void)
     char text[240];
     for (int i = 0; i < 70; i++) {
         time_t moment = (int32_t)random32();
-        if (i < 40) /* around the turns of years, which are what weeks are about */
+        if (i < 40) /* around turns of the year, which are critical for week numbers */
             moment = (time_t)(i - 10) * 31557600 + (int32_t)(random32() % 800000) - 400000;
         struct tm *parts = gmtime(&moment);
         printf("%s", asctime(parts));

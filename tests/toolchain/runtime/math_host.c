@@ -1,5 +1,5 @@
 /* Compares the math sources, compiled for the host with an rt_ prefix, with the host's libm in units of the last place.
- * argv[1] = random arguments per function. Prints the largest error of each; exit status 1 above the stated bound. */
+ * argv[1]: random arguments per function. Prints the maximum error of each function; exits with 1 above its bound. */
 #include <math.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -62,7 +62,7 @@ static void report(const char *name, double bound)
     worst = 0;
 }
 
-/* Random numbers with exponents from 2^low to 2^high, and the special values. */
+/* Returns a random number with an exponent from 2^low to 2^high, or a special value. */
 static double sample(long i, int low, int high)
 {
     static const double special[] = {0.0, -0.0, 1, -1, 0.5, -0.5, 2, -2, 1.5, 2.5, 3, -3, 4, 10, INFINITY, -INFINITY, NAN};
@@ -95,7 +95,7 @@ static double sample(long i, int low, int high)
     }                                                                                                               \
     report(#f "f", boundf);
 
-/* What has results of several kinds or three arguments: all exactly as the host's. */
+/* Checks functions with several results or three arguments, which must equal the host's exactly. */
 static void check_exact(long n)
 {
     for (long i = 0; i < n; i++) {
@@ -126,7 +126,7 @@ static void check_exact(long n)
     report("remquo fma nexttoward scalbn lrint lround", 0);
 }
 
-/* The host's own is further from the root than the bound. */
+/* The host's cbrt has a larger error than the bound: its long double version is the reference. */
 #define cbrt(x) (double)cbrtl(x)
 
 int main(int argc, char **argv)
@@ -168,7 +168,7 @@ int main(int argc, char **argv)
     CHECK1(rint, -60, 60, 0, 0)
     CHECK1(nearbyint, -60, 60, 0, 0)
     CHECK1(logb, -1022, 1023, 0, 0)
-    CHECK2(nextafter, -3, 3, 0, HUGE_VAL) /* the neighbours among doubles are not those among floats */
+    CHECK2(nextafter, -3, 3, 0, HUGE_VAL) /* nextafter of doubles differs from that of floats */
     CHECK2(remainder, -20, 20, 0, 0)
     CHECK2(fdim, -60, 60, 0, 0)
     check_exact(n);

@@ -1,4 +1,4 @@
-/* Gives the run-time library's math functions an rt_ prefix, so that they link beside the host's libm. */
+/* Prefixes the run-time library's math functions with rt_, so that they can be linked together with the host's libm. */
 #define acos rt_acos
 #define acosf rt_acosf
 #define asin rt_asin

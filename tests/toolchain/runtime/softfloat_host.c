@@ -1,5 +1,5 @@
-/* Compares the soft-float sources, compiled for the host, with the host's floating-point hardware.
- * argv[1] = random pairs per operation. Prints one line per operation; exit status 1 when any result differs. */
+/* Compares the soft-float sources, compiled for the host, with the host's floating-point hardware. argv[1]: random
+ * pairs per operation. Prints one line per operation; exits with status 1 if any result differs. */
 #include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
@@ -46,7 +46,7 @@ static double as_double(uint64_t bits) { double d; memcpy(&d, &bits, 8); return 
 static uint32_t float_bits(float f) { uint32_t b; memcpy(&b, &f, 4); return b; }
 static uint64_t double_bits(double d) { uint64_t b; memcpy(&b, &d, 8); return b; }
 
-/* Magnitudes where rules change: zero, subnormal, smallest normal, around 1, integer limits, largest, infinity, NaN. */
+/* Magnitudes at limits: zero, subnormal, smallest normal, around 1, integer limits, largest, infinity, NaN. */
 static const uint32_t edge32[] = {
     0, 1, 2, 3, 0x400000, 0x7FFFFE, 0x7FFFFF, 0x800000, 0x800001, 0xFFFFFF, 0x1000000, 0x33800000, 0x34000000, 0x3EFFFFFF,
     0x3F000000, 0x3F000001, 0x3F7FFFFF, 0x3F800000, 0x3F800001, 0x3FC00000, 0x3FFFFFFF, 0x40000000, 0x40400000, 0x46FFFE00,
@@ -64,7 +64,8 @@ static const uint64_t edge64[] = {
     0x7FF0000000000000, 0x7FF0000000000001, 0x7FF8000000000000, 0x7FFFFFFFFFFFFFFF};
 #define COUNT(a) (sizeof(a) / sizeof(a)[0])
 
-/* A third random bits, a third with an exponent near another number's, a third few significant bits. */
+/* Returns one of: random bits; a number whose exponent is close to that of `near`; a number with few significant
+ * bits. */
 static uint32_t random_float(uint32_t near)
 {
     uint64_t r = random64();
@@ -156,7 +157,7 @@ ARITHMETIC(divdf3, 64, double, /)
 COMPARISONS(32, float, sf2)
 COMPARISONS(64, double, df2)
 
-/* Saturating reference for float -> integer; the C conversion is undefined outside the range. */
+/* Saturating reference of float -> integer, because the C conversion is undefined outside the range. */
 #define FIX(name, from_width, from, to, low, high)                                                                   \
     static void check_##name(uint##from_width##_t x, uint##from_width##_t unused)                                    \
     {                                                                                                                \
@@ -176,7 +177,7 @@ FIX(fixunsdfsi, 64, double, uint32_t, 0, UINT32_MAX)
 FIX(fixdfdi, 64, double, int64_t, INT64_MIN, INT64_MAX)
 FIX(fixunsdfdi, 64, double, uint64_t, 0, UINT64_MAX)
 
-/* Integers of every length: shift random bits right. */
+/* Tests integers of every length: random bits shifted right. */
 #define FROM_INTEGER(name, from, to)                                                                                 \
     static void check_##name(long n)                                                                                 \
     {                                                                                                                \
@@ -213,7 +214,7 @@ static void check_extendsfdf2(uint32_t x, uint32_t unused)
 }
 static void check_truncdfsf2(uint64_t x, uint64_t near)
 {
-    if (near & 1) /* most random doubles are far outside the range of float: bring the exponent into it */
+    if (near & 1) /* most random doubles exceed the range of float: reduce the exponent */
         x = (x & 0x800FFFFFFFFFFFFF) | (0x360 + (x >> 52) % 0x120) << 52;
     volatile double a = as_double(x);
     float want = (float)a, got = __truncdfsf2(as_double(x));

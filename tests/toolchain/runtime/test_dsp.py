@@ -1,4 +1,5 @@
-"""The DSP library on the emulator against an exact model (dsp_model.py): random vectors, lengths and coefficients."""
+"""The DSP library on the emulator, compared with the exact model dsp_model.py: random vectors, lengths,
+coefficients."""
 
 from __future__ import annotations
 
@@ -27,7 +28,7 @@ def rng(request: pytest.FixtureRequest) -> random.Random:
 
 
 def vector(rng: random.Random, n: int, size: int = 32768) -> list[int]:
-    """Random fractions, often at the ends of the range."""
+    """Return random fractions, many of them at the ends of the range."""
     return [rng.choice((-size, size - 1)) if rng.random() < 0.1 else rng.randrange(-size, size) for _ in range(n)]
 
 
@@ -74,7 +75,7 @@ def test_sums_of_products(places: str, target: Target, rng: random.Random) -> No
 
 
 def test_nothing_is_read_behind_the_end_of_memory(target: Target, rng: random.Random) -> None:
-    """Above Y RAM is no memory: an additional prefetch there is an address error."""
+    """The library reads nothing beyond its vectors: an additional prefetch above Y RAM would be an address error."""
     y_end = target.machine.chip.data["yram"].end
     for n in (1, 2, 8):
         a, b = vector(rng, n), vector(rng, n)
@@ -142,7 +143,7 @@ def test_matrices(target: Target, rng: random.Random) -> None:
 
 
 def fir_filter(target: Target, rng: random.Random, h: list[int], delay: int) -> int:
-    """A FIRStruct, coefficients in X RAM or in program memory."""
+    """Return a FIRStruct with coefficients in X RAM or in program memory."""
     base, page = target.coefficients(h, rng.random() < 0.5)
     at = target.filter
     target.call("FIRStructInit", at, len(h), base, page, target.y(512))
@@ -156,7 +157,7 @@ def test_fir_filters(target: Target, rng: random.Random) -> None:
         at = fir_filter(target, rng, h, taps)
         target.call("FIRDelayInit", at)
         past = [0] * 100
-        for _ in range(3):  # the state goes from call to call
+        for _ in range(3):  # each call continues with the state of the last
             n = rng.randrange(1, 30)
             x = vector(rng, n)
             dst = target.x(0)
@@ -175,7 +176,7 @@ def test_fir_rate_changers(target: Target, rng: random.Random) -> None:
             want = model.fir_decimate(x, h, past, rate)
             assert target.filled("FIRDecimate", n, (n, dst, target.x(300, x), at, rate), dst) == want
         at = fir_filter(target, rng, h, len(h))
-        # the delay of an interpolator has a word for every `rate` coefficients
+        # the delay line of an interpolator has one word for every `rate` coefficients
         target.call("FIRInterpDelayInit", at, rate)
         past = [0] * 100
         for _ in range(2):
@@ -356,7 +357,7 @@ TABLE = Path(model.__file__).parents[3] / "toolchain" / "runtime" / "dsp.md"
 
 
 def measured(target: Target, name: str, n: int, m: int, r: int, s: int) -> int:
-    """Cycles of one call with the parameters of the table."""
+    """Return the cycles of one call with the parameters of the table."""
     x, more, y, filter_ = target.x(0), target.x(300), target.y(0), target.filter
     if name.startswith("FIR"):
         target.call("FIRStructInit", filter_, m, target.x(600), 0xFF00, target.y(512))

@@ -1,4 +1,4 @@
-"""The heap on the emulator: alignment, and blocks that neither overlap nor get lost."""
+"""The heap on the emulator: alignment; blocks never overlap, and freed memory becomes available."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ int main(void)
 
 @pytest.mark.parametrize("level", ["-O0", "-Os"])
 def test_aligned_blocks(level: str, tmp_path: Path) -> None:
-    """C11 7.22.3.1; the bytes before an aligned block are free."""
+    """Aligned allocation (C11 7.22.3.1) works, and the bytes before an aligned block can be allocated."""
     (tmp_path / "a.c").write_text(ALIGNED_PROGRAM)
     built = build([tmp_path / "a.c"], tmp_path / "a.elf", level, "-Wall", "-Wl,--heap=2000")
     assert built.status == 0, built.messages

@@ -1,4 +1,4 @@
-"""Functions of the hosted library: on the emulator and with the host's library the same program must print the same."""
+"""Hosted library functions: one program must print the same on the emulator and with the host's library."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ PROGRAMS = ["hosted_text", "hosted_time"]
 @pytest.mark.parametrize("level", ["-O0", "-Os"])
 @pytest.mark.parametrize("name", PROGRAMS)
 def test_the_same_as_with_the_hosts_library(name: str, level: str, tmp_path: Path) -> None:
-    """C11 7.8.2, 7.22.1, 7.22.7, 7.24, 7.27."""
+    """Text and time functions print the same as the host's (C11 7.8.2, 7.22.1, 7.22.7, 7.24, 7.27)."""
     source = HERE / f"{name}.c"
     subprocess.run(["gcc", "-w", "-fno-builtin", source, "-o", tmp_path / "host", "-lm"], check=True)
     host = subprocess.run([tmp_path / "host"], capture_output=True, env={**os.environ, "TZ": "UTC"}, check=True)
@@ -54,7 +54,10 @@ void unused(void) { never(); }
      ("_Exit(3);", 3, ""), ("abort();", 134, "")],
 )  # fmt: skip
 def test_exit_calls_what_atexit_has_registered(way: str, status: int, said: str, tmp_path: Path) -> None:
-    """C11 7.22.4.2, 7.22.4.4: last registered first, also those that a handler registers; not for _Exit, abort."""
+    """exit calls the functions of atexit, last registered first, including those registered by a handler.
+
+    _Exit and abort do not (C11 7.22.4.2, 7.22.4.4).
+    """
     (tmp_path / "a.c").write_text(EXIT_PROGRAM.replace("WAY", way))
     assert build([tmp_path / "a.c"], tmp_path / "a.elf", "-Os").status == 0
     ran = run(tmp_path / "a.elf")
@@ -95,7 +98,10 @@ int main(void)
 
 
 def test_missing_features_of_the_chip_report_failure(tmp_path: Path) -> None:
-    """C11 7.6, 7.11, 7.14, 7.22.4: no files, no environment, one locale; an unhandled signal ends the program."""
+    """Functions of missing features report failure: no files, no environment, one locale (C11 7.6, 7.11, 7.14, 7.22.4).
+
+    An unhandled signal ends the program.
+    """
     (tmp_path / "a.c").write_text(SIGNAL_PROGRAM)
     built = build([tmp_path / "a.c"], tmp_path / "a.elf", "-Os", "-Wall")
     assert (built.status, built.messages) == (0, "")
@@ -121,7 +127,7 @@ INPUT = b"x first\nsecond\n -77, wordsmore"
 
 
 def test_standard_input_is_the_first_uart(tmp_path: Path) -> None:
-    """stdio.h: the library's own __getchar."""
+    """Standard input is UART1, through the library's own __getchar (stdio.h)."""
     (tmp_path / "a.c").write_text(INPUT_PROGRAM)
     built = build([tmp_path / "a.c"], tmp_path / "a.elf", "-Os")
     assert built.status == 0, built.messages

@@ -1,4 +1,5 @@
-"""The printf family on the emulator: its stack, and its digits against Python's, whose printf rules are C's."""
+"""The printf family on the emulator: its stack use, and its digits compared with Python's, whose printf rules are
+C's."""
 
 from __future__ import annotations
 
@@ -10,7 +11,7 @@ import emu
 from tests.toolchain.c_programs import build, run
 
 SNPRINTF_STACK = 56
-"""Issue B: bytes of stack snprintf may use for %u %d %lu %x %s %c, its return address included."""
+"""Issue B: maximum stack bytes of snprintf for %u %d %lu %x %s %c, including its return address."""
 
 STACK_PROGRAM = """
 #include <stdio.h>
@@ -34,7 +35,7 @@ int main(void)
 
 
 def stack_use(machine: emu.Machine, function: str) -> int:
-    """Bytes from the call of `function` to the highest W15 before it returns, return address included."""
+    """Return the bytes from the call of `function` to the highest W15 before it returns, with the return address."""
     image = machine.image
     assert image is not None
     symbol = image.symbols.find(function)
@@ -48,14 +49,14 @@ def stack_use(machine: emu.Machine, function: str) -> int:
 
 
 def test_snprintf_fits_into_its_stack_budget(tmp_path: Path) -> None:
-    """Measured on the emulator, instruction by instruction."""
+    """snprintf stays within its stack budget, measured at every instruction on the emulator."""
     (tmp_path / "a.c").write_text(STACK_PROGRAM)
     assert build([tmp_path / "a.c"], tmp_path / "a.elf", "-Os").status == 0
     assert stack_use(emu.load(tmp_path / "a.elf", engine="auto"), "_snprintf") <= SNPRINTF_STACK
 
 
 def outputs(calls: list[tuple[str, str]], folder: Path) -> list[str]:
-    """What printf prints for each (format, C expression)."""
+    """Return what printf prints for each (format, C expression)."""
     values = "\n".join(f"volatile __typeof__({value}) v{i} = {value};" for i, (_, value) in enumerate(calls))
     text = "\n".join(f'    printf("{form}\\n", v{i});' for i, (form, _) in enumerate(calls))
     (folder / "a.c").write_text(FORMAT_PROGRAM.format(values=values, calls=text))
@@ -67,7 +68,8 @@ def outputs(calls: list[tuple[str, str]], folder: Path) -> list[str]:
 
 
 def test_integers_in_every_form(tmp_path: Path) -> None:
-    """C11 7.21.6.1: flags, width, precision, length, for random values."""
+    """Integers are printed as C11 7.21.6.1 requires, for all flags, widths, precisions and lengths and random
+    values."""
     rng = random.Random(7216)
     calls, expected = [], []
     for _ in range(120):
@@ -90,7 +92,7 @@ def test_integers_in_every_form(tmp_path: Path) -> None:
             value += 1
         form = f"%{flags}{width}{precision}"
         calls.append((f"{form}{length}{conversion}", f"{value}{suffix if conversion == 'd' else 'u' + suffix}"))
-        if conversion == "o" and "#" in flags:  # C writes 0 in front, Python 0o
+        if conversion == "o" and "#" in flags:  # C prefixes 0, Python 0o
             form = form.replace("#", "")
             digits = f"{value:o}" if value else "0"
             digits = digits if digits.startswith("0") else "0" + digits
@@ -104,7 +106,10 @@ def test_integers_in_every_form(tmp_path: Path) -> None:
 
 
 def _python_integer(form: str, value: int) -> str:
-    """Python's % with C's two differences: precision 0 prints 0 as nothing, # does not change 0."""
+    """Format an integer with Python's %, corrected to C.
+
+    In C precision 0 prints 0 as no digits, and # does not change 0.
+    """
     if value == 0:
         form = form.replace("#", "")
         if ".0" in form and not re.search(r"\.0\d", form):
@@ -115,7 +120,7 @@ def _python_integer(form: str, value: int) -> str:
 
 
 def test_floating_point_digits_are_exact(tmp_path: Path) -> None:
-    """%f %e %g for values whose integer and fraction fit 64 bits: every digit as Python's, ties to even."""
+    """%f %e %g print every digit as Python does, ties to even, for values whose integer and fraction fit in 64 bits."""
     rng = random.Random(1999)
     values = [
         0.0,
@@ -151,7 +156,7 @@ def test_floating_point_digits_are_exact(tmp_path: Path) -> None:
 
 
 def test_special_floating_values(tmp_path: Path) -> None:
-    """C11 7.21.6.1p8: infinity, NaN, negative zero, very large and very small numbers."""
+    """Infinity, NaN, negative zero, very large and very small numbers are printed as C11 7.21.6.1p8 requires."""
     calls = [("%f", "__builtin_inf()"), ("%F", "-__builtin_inf()"), ("%5.1f|", "__builtin_nan(\"\")"), ("%f", "-0.0"),
              ("%08.1f", "__builtin_inf()"), ("%g", "1e300"), ("%g", "1e-300"), ("%.3e", "1.7976931348623157e308"),
              ("%.1f", "1e22"), ("%g", "1e-5"), ("%G", "1e-10"), ("%g", "100000.0"), ("%g", "1000000.0"),
@@ -183,7 +188,7 @@ int main(void)
 
 
 def test_characters_are_counted(tmp_path: Path) -> None:
-    """C11 7.21.6.1p8: %n stores as many bytes as its length modifier says, and counts truncated characters too."""
+    """%n stores as many bytes as its length modifier says, and counts truncated characters too (C11 7.21.6.1p8)."""
     (tmp_path / "a.c").write_text(COUNT_PROGRAM)
     assert build([tmp_path / "a.c"], tmp_path / "a.elf", "-Os", "-Wall").status == 0
     assert run(tmp_path / "a.elf", engine="auto").status == 0

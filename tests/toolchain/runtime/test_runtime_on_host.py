@@ -1,6 +1,7 @@
-"""The run-time library's C sources compiled for the host: soft float against the hardware, math against libm.
+"""The run-time library's C sources on the host: soft float compared with the hardware, math with libm.
 
-A million random pairs and all edge classes per operation; seconds, because the comparison itself is C.
+Each operation is compared for a million random pairs and all edge classes. The comparison itself is C, which makes
+it fast.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="no host C c
 
 
 def compile_host(output: Path, *words: object) -> None:
-    """gcc for the host; its diagnostics are part of a failure."""
+    """Compile with the host's gcc; on failure show its diagnostics."""
     command = [
         "gcc",
         "-std=gnu11",
@@ -43,7 +44,10 @@ def soft_float_sources() -> list[Path]:
 
 
 def test_soft_float_equals_the_hardware(tmp_path: Path) -> None:
-    """IEC 60559 (C11 annex F): + - * /, comparisons, conversions, in both precisions, bit for bit."""
+    """Soft float equals the hardware bit for bit: + - * /, comparisons and conversions, float and double.
+
+    Source: IEC 60559 (C11 annex F).
+    """
     program = tmp_path / "softfloat"
     compile_host(program, HERE / "softfloat_host.c", *soft_float_sources())
     done = subprocess.run([program, str(PAIRS)], capture_output=True, text=True, check=False, timeout=HANG)
@@ -54,7 +58,7 @@ def test_soft_float_equals_the_hardware(tmp_path: Path) -> None:
 
 
 def test_the_comparison_notices_a_wrong_rounding(tmp_path: Path) -> None:
-    """The test above detects ties rounded away from even."""
+    """The comparison with the hardware detects a wrong rounding of ties."""
     for source in soft_float_sources():
         text = source.read_text().replace("+ 0x3F +", "+ 0x40 +").replace("+ 0x1FF +", "+ 0x200 +")
         (tmp_path / source.name).write_text(text)
@@ -68,7 +72,7 @@ def test_the_comparison_notices_a_wrong_rounding(tmp_path: Path) -> None:
 
 
 def test_math_functions_stay_within_their_error_bounds(tmp_path: Path) -> None:
-    """C11 7.12; exact functions exactly, elementary ones within the bounds stated in math_host.c."""
+    """Math functions stay within the error bounds stated in math_host.c; exact functions are exact (C11 7.12)."""
     objects = []
     for name in ("round", "exact", "double", "hyperbolic", "single"):
         objects.append(tmp_path / f"math_{name}.o")
@@ -82,7 +86,7 @@ def test_math_functions_stay_within_their_error_bounds(tmp_path: Path) -> None:
 
 
 def digits_program(folder: Path, printing: Path = RUNTIME / "format_double.c") -> Path:
-    """Build the program that compares printing and reading of doubles with the host's."""
+    """Build the program that compares formatting and parsing of doubles with the host's."""
     objects = []
     reading = ["-Dstrtod=rt_strtod", "-Datof=rt_atof", "-Dstrtold=rt_strtold", "-Dstrtof=rt_strtof"]
     for source, words in ((printing, []), (RUNTIME / "strtod.c", reading), (RUNTIME / "strtof.c", reading)):
@@ -94,7 +98,7 @@ def digits_program(folder: Path, printing: Path = RUNTIME / "format_double.c") -
 
 
 def test_doubles_are_printed_and_read_exactly(tmp_path: Path) -> None:
-    """C11 7.21.6.1, 7.22.1.3: every digit of printf, every number of strtod and strtof, as on the host."""
+    """printf, strtod and strtof give every digit and every number as the host does (C11 7.21.6.1, 7.22.1.3)."""
     words = [digits_program(tmp_path), "100000", "7216"]
     done = subprocess.run(words, capture_output=True, text=True, check=False, timeout=HANG)
     assert done.returncode == 0, done.stdout + done.stderr
@@ -112,6 +116,9 @@ def test_the_comparison_of_digits_notices_a_wrong_last_digit(tmp_path: Path) -> 
 
 @pytest.mark.parametrize("source", [*soft_float_sources(), *sorted(RUNTIME.glob("math_*.c"))], ids=lambda p: p.name)
 def test_sources_compile_without_warnings(source: Path, tmp_path: Path) -> None:
-    """House rule: -Wall -Wextra -Werror. The helpers' names are gcc's own, whose prototypes differ on the host."""
+    """The sources compile with -Wall -Wextra -Werror.
+
+    The helpers have names of gcc's own functions, whose prototypes differ on the host.
+    """
     flags = ["-Wall", "-Wextra", "-Werror", "-Wno-builtin-declaration-mismatch", "-isystem", INCLUDE]
     compile_host(tmp_path / "x.o", *flags, "-c", source)

@@ -1,5 +1,8 @@
-"""A sample of the run-time library on the emulator, against values computed here: the assembly helpers, and the soft
-float as our own compiler translates it. The bulk runs on the host (`test_runtime_on_host.py`)."""
+"""A sample of the run-time library on the emulator: the assembly helpers, and soft float as this compiler translates
+it.
+
+Results are compared with values computed here. Most cases run on the host (`test_runtime_on_host.py`).
+"""
 
 from __future__ import annotations
 
@@ -45,7 +48,7 @@ def truncated(a: int, b: int) -> int:
 
 
 def integer(rng: random.Random, bits: int) -> int:
-    """Numbers of every length, and neighbours of powers of two."""
+    """Return a random integer of any length, often next to a power of two."""
     value = rng.getrandbits(rng.randint(1, bits))
     return value if rng.random() < 0.7 else ((1 << rng.randrange(bits)) + rng.choice((-1, 0, 1))) & (1 << bits) - 1
 
@@ -54,7 +57,7 @@ WIDTHS = {"si": (32, "int32_t", "uint32_t", "l"), "di": (64, "int64_t", "uint64_
 
 
 def integer_operation(name: str, bits: int, a: int, b: int) -> int:
-    """The exact result modulo 2^bits."""
+    """Return the exact result of an integer operation modulo 2^bits."""
     sa, sb = signed(a, bits), signed(b, bits)
     exact: dict[str, Callable[[], int]] = {
         "mul": lambda: a * b, "udiv": lambda: a // b, "umod": lambda: a % b, "div": lambda: truncated(sa, sb),
@@ -67,7 +70,10 @@ def integer_operation(name: str, bits: int, a: int, b: int) -> int:
 @pytest.mark.parametrize("mode", ["si", "di"])
 @pytest.mark.parametrize("name", ["mul", "udiv", "umod", "div", "mod", "ashl", "lshr", "ashr"])
 def test_integer_helper(name: str, mode: str, tmp_path: Path) -> None:
-    """abi-elf.md §2.8: multiply, divide, remainder, shift in 32 and 64 bits, called by name."""
+    """Integer helpers called by name give exact results in 32 and 64 bits (abi-elf.md §2.8).
+
+    They multiply, divide, compute remainders and shift.
+    """
     bits, _, unsigned_type, suffix = WIDTHS[mode]
     rng = random.Random(f"{SEED} {name} {mode}")
     shift = name.endswith(("shl", "shr"))
@@ -76,7 +82,7 @@ def test_integer_helper(name: str, mode: str, tmp_path: Path) -> None:
         a = integer(rng, bits)
         b = rng.randrange(bits) if shift else integer(rng, bits) or 1
         if name in ("div", "mod") and signed(a, bits) == -(1 << bits - 1) and signed(b, bits) == -1:
-            continue  # overflow, undefined
+            continue  # overflow: undefined in C
         rows.append(
             f"{{ {a}u{suffix}, {b}u{'' if shift else suffix}, {integer_operation(name, bits, a, b)}u{suffix} }}"
         )
@@ -88,7 +94,7 @@ def test_integer_helper(name: str, mode: str, tmp_path: Path) -> None:
 
 
 def float_bits(rng: random.Random, double: bool) -> int:
-    """Random bits, simple numbers and edges; exponents near each other often."""
+    """Return the bits of a random, simple or special number; two numbers often have close exponents."""
     width, mantissa, bias = (64, 52, 1023) if double else (32, 23, 127)
     kind = rng.randrange(4)
     if kind == 0:
@@ -119,7 +125,10 @@ def to_bits(value: float, double: bool) -> int:
 
 
 def float_operation(name: str, a: float, b: float) -> float:
-    """Correctly rounded in double; single results follow because double has more than twice their precision."""
+    """Return the correctly rounded result, computed in double.
+
+    It is exact for float too, because double has more than twice its precision.
+    """
     if name == "add":
         return a + b
     if name == "sub":
@@ -162,7 +171,7 @@ int main(void)
 @pytest.mark.parametrize("double", [False, True], ids=["float", "double"])
 @pytest.mark.parametrize("name", ["add", "sub", "mul", "div"])
 def test_floating_helper(name: str, double: bool, tmp_path: Path) -> None:
-    """C11 annex F.3: correctly rounded; the reference is the host's arithmetic."""
+    """Floating-point helpers round correctly (C11 annex F.3); the reference is the host's arithmetic."""
     rng = random.Random(f"{SEED} {name} {double}")
     rows = []
     for _ in range(CASES):
@@ -177,7 +186,7 @@ def test_floating_helper(name: str, double: bool, tmp_path: Path) -> None:
 
 
 def check(source: str, folder: Path) -> None:
-    """Compile, run, and name the first wrong case."""
+    """Compile and run the cases; fail with the first wrong one."""
     (folder / "test.c").write_text(source)
     built = build([folder / "test.c"], folder / "test.elf", "-Os", "-Wno-incompatible-library-redeclaration")
     assert built.status == 0, built.messages
@@ -231,7 +240,7 @@ int main(void)
 @pytest.mark.parametrize("own", [1, 2, 3])
 @pytest.mark.parametrize("level", ["-O0", "-Os", "-O2"])
 def test_a_program_may_divide_with_its_own_functions(level: str, own: int, tmp_path: Path) -> None:
-    """They replace the library's functions, on which no other library function depends."""
+    """A program may replace the library's division functions, on which no other library function depends."""
     (tmp_path / "a.c").write_text(OWN_DIVISION)
     built = build([tmp_path / "a.c"], tmp_path / "a.elf", level, f"-DOWN={own}")
     assert built.status == 0, built.messages

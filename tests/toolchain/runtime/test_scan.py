@@ -1,7 +1,7 @@
-"""The scanf family on the emulator: random formats and inputs against the host's sscanf, and scanf against sscanf.
+"""The scanf family on the emulator: sscanf compared with the host's for random formats and inputs, scanf with sscanf.
 
-The host's library takes the beginning of a number for one ("1e" for 1, "0x" for 0), which C11 7.21.6.2p10 forbids:
-these inputs have a test of their own.
+The host's library accepts an incomplete number ("1e" as 1, "0x" as 0), which C11 7.21.6.2p10 forbids. A separate
+test covers these inputs.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from tests.toolchain.c_programs import build, run
 CASES = 70
 LENGTHS = {"hh": ("hh", "int8_t"), "": ("h", "int16_t"), "h": ("h", "int16_t"), "l": ("", "int32_t"),
            "ll": ("ll", "int64_t"), "j": ("j", "int64_t")}  # fmt: skip
-"""Length modifier here, and of the host's type of the same size."""
+"""Length modifiers on the target, with those of host types of equal size."""
 INTEGERS = ["0", "1", "7", "42", "99", "123", "0x0", "0xab", "0X1F", "017", "08", "099", "-", "+", "x", "5x"]
 NUMBERS = [
     "1",
@@ -45,7 +45,7 @@ NUMBERS = [
     "nan",
 ]
 SETS = ["[a-z]", "[^a-z]", "[]x]", "[^]x]", "[abc-]", "[0-9a]", "[%-]", "[^ ]", "[-a]", "[^^]", "[x^]"]
-INCOMPLETE = {  # (format, input): the result by C11 7.21.6.2p10
+INCOMPLETE = {  # (format, input): result by C11 7.21.6.2p10
     ("%f", "100ergs"): 0, ("%f", "1e+"): 0, ("%f", "0x1.8p "): 0, ("%f", "infi"): 0, ("%f", "nan(1"): 0,
     ("%f", "nan(12)"): 1,
     ("%f", "0x"): 0,
@@ -80,7 +80,7 @@ int __getchar(void) { return *source ? (unsigned char)*source++ : EOF; }
 
 @dataclass
 class Case:
-    """One call: format here and there, its input, and the type and size of each object it stores."""
+    """One call: formats for target and host, its input, and type and size of each stored object."""
 
     ours: str = ""
     host: str = ""
@@ -139,7 +139,7 @@ def quoted(text: str) -> str:
 
 
 def program(cases: list[Case], functions: list[str], host: bool) -> str:
-    """Prints a line per case and function: what it returned and stored, 0x55 where it stored nothing."""
+    """Return a program that prints a line per case and function: result and stored bytes, 0x55 for bytes not stored."""
     bodies = []
     for number, case in enumerate(cases):
         for function in functions:
@@ -183,7 +183,10 @@ def answers(cases: list[Case], functions: list[str], folder: Path, level: str) -
 @pytest.mark.skipif(shutil.which("gcc") is None, reason="no host C compiler (Debian package gcc)")
 @pytest.mark.parametrize("level", ["-O0", "-Os"])
 def test_sscanf_stores_what_the_hosts_does(level: str, tmp_path: Path) -> None:
-    """C11 7.21.6.2: every conversion, length, width, suppression, set, %n and the result, byte for byte."""
+    """sscanf returns and stores the same bytes as the host's (C11 7.21.6.2).
+
+    The cases use every conversion, length, width, suppression, set and %n.
+    """
     rng = random.Random(f"scan {level}")
     cases = [random_case(rng) for _ in range(CASES)]
     (tmp_path / "host.c").write_text(program(cases, ["sscanf"], host=True))
@@ -196,7 +199,7 @@ def test_sscanf_stores_what_the_hosts_does(level: str, tmp_path: Path) -> None:
 
 
 def test_scanf_reads_from_its_stream_what_sscanf_reads_from_a_text(tmp_path: Path) -> None:
-    """The same conversions on a stream, incomplete numbers too."""
+    """scanf reads from a stream what sscanf reads from a string, incomplete numbers included."""
     rng = random.Random("stream")
     cases = [random_case(rng) for _ in range(CASES)]
     for form, text in INCOMPLETE:
@@ -208,7 +211,7 @@ def test_scanf_reads_from_its_stream_what_sscanf_reads_from_a_text(tmp_path: Pat
 
 
 def test_an_incomplete_number_is_no_number(tmp_path: Path) -> None:
-    """C11 7.21.6.2p10 and its example: "100ergs" holds no %f, because "100e" is not one."""
+    """An incomplete number does not match: "100ergs" contains no %f, because "100e" is no number (C11 7.21.6.2p10)."""
     cases = [
         Case(form, form, text, [("float", -1) if form.endswith("f") else ("char", 24)]) for form, text in INCOMPLETE
     ]

@@ -1,4 +1,4 @@
-"""Generated code: limits of size, idioms and loops."""
+"""Generated code: size limits, idioms and loops."""
 
 from __future__ import annotations
 
@@ -33,7 +33,10 @@ XC16_PRIMITIVES = {"add32": 3, "neg32": 3, "shl1": 3, "lt32": 8, "eq32": 8, "shl
 
 
 def test_the_five_sample_functions_are_no_larger_than_xc16s() -> None:
-    """abi-elf.md §8.2: in total at most XC16's size at -Os, none above 1.25 times its size."""
+    """Five sample functions are in total no larger than XC16's at -Os, and none is above 1.25 times XC16's (§8.2).
+
+    Source: abi-elf.md.
+    """
     text = assembly(SAMPLES)
     ours = {name: words(text, name) for name in XC16_WORDS}
     assert sum(ours.values()) <= sum(XC16_WORDS.values()), ours
@@ -41,14 +44,14 @@ def test_the_five_sample_functions_are_no_larger_than_xc16s() -> None:
 
 
 def test_primitive_functions_are_no_larger_than_xc16s() -> None:
-    """abi-elf.md §8.2, second table."""
+    """Primitive functions are no larger than XC16's (abi-elf.md §8.2, second table)."""
     text = assembly(PRIMITIVES)
     ours = {name: words(text, name) for name in XC16_PRIMITIVES}
     assert {n: w for n, w in ours.items() if w > XC16_PRIMITIVES[n]} == {}
 
 
 def test_the_public_set_is_small_at_os(tmp_path: Path) -> None:
-    """Functions of bench.codegen: the goal in total, none larger than XC16's, none larger than at -O1."""
+    """The functions of bench.codegen meet the total size goal; none is larger than XC16's or than at -O1."""
     small, fast = sizes("-Os", tmp_path), sizes("-O1", tmp_path)
     assert sum(small[n] for n in XC16_OS_WORDS) <= GOAL_TOTAL * sum(XC16_OS_WORDS.values())
     assert [n for n, most in XC16_OS_WORDS.items() if small[n] > most] == []
@@ -98,13 +101,13 @@ IDIOMS = [
 
 @pytest.mark.parametrize(("name", "source", "expected"), IDIOMS, ids=[i[0] for i in IDIOMS])
 def test_idiom(name: str, source: str, expected: list[str]) -> None:
-    """abi-elf.md §8.1."""
+    """Idioms of the source are compiled to the instructions of abi-elf.md §8.1."""
     text = assembly("extern volatile unsigned P; unsigned N; unsigned long T; " + source)
     assert body(text, "f") == expected
 
 
 def test_constants_are_in_the_one_section_microchips_linker_counts() -> None:
-    """abi-elf.md §1.4: `__const_length` is that of the section named .const."""
+    """Constants are in the section .const, whose size is `__const_length` (abi-elf.md §1.4)."""
     text = assembly('const int k[3] = {1, 2, 3}; const char *f(void){ return "text"; }')
     sections = [line for line in text.split("\n") if ".const" in line]
     assert sections
@@ -112,13 +115,13 @@ def test_constants_are_in_the_one_section_microchips_linker_counts() -> None:
 
 
 def test_quotient_and_remainder_share_one_division() -> None:
-    """isa.md §6.7: DIV leaves the quotient in W0 and the remainder in W1."""
+    """Quotient and remainder share one DIV, which leaves them in W0 and W1 (isa.md §6.7)."""
     text = assembly("unsigned f(unsigned a,unsigned b,unsigned*r){ *r=a%b; return a/b; }")
     assert sum(line.startswith("div.u") for line in body(text, "f")) == 1
 
 
 def test_dense_switches_use_a_branch_table() -> None:
-    """abi-elf.md §8.1: BRA Wn, one word per value."""
+    """Dense switches use a branch table: BRA Wn, one word per value (abi-elf.md §8.1)."""
     cases = "".join(f"case {k}: g({k * k}, {k} + h()); break;" for k in range(12))
     lines = body(assembly(f"void g(int,int); int h(void); void f(int x){{ switch(x){{ {cases} }} }}"), "f")
     at = lines.index("bra w0")
@@ -126,30 +129,30 @@ def test_dense_switches_use_a_branch_table() -> None:
 
 
 def test_block_copies_repeat_a_move() -> None:
-    """isa.md §15: REPEAT #n-1; MOV [Ws++],[Wd++]."""
+    """Block copies are a repeated move: REPEAT #n-1; MOV [Ws++],[Wd++] (isa.md §15)."""
     lines = body(assembly("struct s{int a[9];}; void f(struct s*a,struct s*b){ *a=*b; }"), "f")
     assert lines == ["repeat #8", "mov [w1++],[w0++]", "return"]
 
 
 def test_the_compiler_never_emits_do() -> None:
-    """abi-elf.md §2.1: the kernel need not save the DO registers."""
+    """The compiler never emits DO, so that the kernel need not save the DO registers (abi-elf.md §2.1)."""
     assert not any(line.startswith("do ") for line in assembly(SAMPLES, "2").replace("\t", "").split("\n"))
 
 
 def test_volatile_accesses_are_neither_merged_nor_dropped() -> None:
-    """C11 5.1.2.3p6."""
+    """Volatile accesses are neither merged nor removed (C11 5.1.2.3p6)."""
     lines = body(assembly("extern volatile unsigned P; void f(void){ P; P; P=1; P=1; }"), "f")
     assert sum("_P" in line for line in lines) == 4
 
 
 def test_a_minimal_interrupt_function_saves_nothing() -> None:
-    """abi-elf.md §2.5: a minimal handler is 2 words."""
+    """A minimal interrupt function has 2 words and saves no registers (abi-elf.md §2.5)."""
     source = "#include <dspic30f6014a.h>\nunsigned N; OS_ISR(_T1Interrupt) { N++; }"
     assert body(assembly(source), "_T1Interrupt") == ["inc _N", "retfie"]
 
 
 def test_an_interrupt_function_with_a_call_saves_all_scratch_registers() -> None:
-    """abi-elf.md §2.5, rules 2 and 3."""
+    """An interrupt function with a call saves all scratch registers (abi-elf.md §2.5, rules 2 and 3)."""
     source = "#include <dspic30f6014a.h>\nvoid g(void); OS_ISR(_T1Interrupt) { g(); }"
     lines = body(assembly(source), "_T1Interrupt")
     assert lines[:5] == ["push _RCOUNT", *(f"mov.d w{r},[w15++]" for r in (0, 2, 4, 6))]
@@ -157,7 +160,7 @@ def test_an_interrupt_function_with_a_call_saves_all_scratch_registers() -> None
 
 
 def test_auto_psv_loads_the_page_before_anything_else() -> None:
-    """abi-elf.md §2.5, rule 6: also when the body overwrites W0 at once."""
+    """An auto_psv function loads the page first, even if its body overwrites W0 at once (abi-elf.md §2.5, rule 6)."""
     source = "extern volatile unsigned char P; const int k = 3; volatile unsigned char Q; volatile unsigned N;"
     source += '__attribute__((annotate("os_isr:auto_psv"))) void _T2Interrupt(void) { Q = P; N = *(volatile int *)&k; }'
     lines = body(assembly(source), "_T2Interrupt")
@@ -168,7 +171,11 @@ def test_auto_psv_loads_the_page_before_anything_else() -> None:
 
 
 def test_stack_check_probes_only_frames_above_eight_bytes() -> None:
-    """kernel.md §4: a read through W15 above SPLIM traps at entry, before W15 moves: the trap's frame stays inside."""
+    """The stack check only probes frames above eight bytes (kernel.md §4).
+
+    Reading through W15 above SPLIM traps at entry, before W15 changes, so that the trap's frame stays inside the
+    stack.
+    """
     small = assembly("void g(char*); void f(void){ char b[4]; g(b); }", stack_check=True)
     large = assembly("void g(char*); void f(void){ char b[20]; g(b); }", stack_check=True)
     assert "[w15+" not in body(small, "f")[0]
@@ -176,21 +183,21 @@ def test_stack_check_probes_only_frames_above_eight_bytes() -> None:
 
 
 def test_every_function_and_variable_has_a_section_of_its_own() -> None:
-    """The linker's --gc-sections works on sections."""
+    """Every function and variable has its own section, which --gc-sections requires."""
     text = assembly("int a; int b=1; const int c=2; int f(void){return a+b;} int g(void){return c;}")
     for section in (".text._f,code", ".text._g,code", ".nbss._a,bss,near", ".ndata._b,data,near"):
         assert f"\t.section {section}\n" in text
 
 
 def test_function_pointers_are_handles() -> None:
-    """abi-elf.md §1.5."""
+    """Function pointers are handles (abi-elf.md §1.5)."""
     text = assembly("int g(void); int (*p)(void)=g; int (*f(void))(void){ return g; }")
     assert ".word handle(_g)" in text
     assert body(text, "f") == ["mov #handle(_g),w0", "return"]
 
 
 def test_a_loop_that_counts_to_n_needs_no_limit_of_its_own() -> None:
-    """DEC decides `i < n` for negative n, too, so that max(n, 0) is not computed before the loop."""
+    """A loop to n needs no max(n, 0) before it, because DEC also decides `i < n` for negative n."""
     lines = body(assembly("void f(int *p, int n){ for (int i = 0; i < n; i++) p[i] = 0; }"), "f")
     assert lines[1:] == ["clr [w0++]", "dec w1,w1", lines[3], "return"]
     assert lines[3].startswith("bra ge,")
@@ -257,19 +264,20 @@ LOOPS = [
 
 @pytest.mark.parametrize(("name", "level", "source", "expected"), LOOPS, ids=[i[0] for i in LOOPS])
 def test_inner_loop(name: str, level: str, source: str, expected: list[str]) -> None:
-    """Instructions of inner loops, without targets of branches."""
+    """Inner loops consist of the expected instructions (branch targets are ignored)."""
     lines = [line.split(",.L")[0] for line in body(assembly(source, level), "f")]
     starts = range(len(lines) - len(expected) + 1)
     assert any(lines[k : k + len(expected)] == expected for k in starts), lines
 
 
 def test_division_by_a_constant_multiplies_where_speed_counts() -> None:
-    """isa.md §6.7: DIV takes 19 cycles; at -Os its two words remain."""
+    """Division by a constant multiplies if speed counts; at -Os DIV remains, with two words and 19 cycles (isa.md
+    §6.7)."""
     source = "unsigned f(unsigned a){ return a / 10; } int g(int a){ return a % 7; }"
     assert "repeat" not in assembly(source, "2")
     assert "repeat" in assembly(source, "s")
 
 
 def test_a_pair_is_cleared_by_one_word() -> None:
-    """MUL.UU Wb, #0 (isa.md §6.5)."""
+    """One word clears a register pair: MUL.UU Wb, #0 (isa.md §6.5)."""
     assert "mul.uu w0,#0,w0" in body(assembly("long g(void); long f(int a){ return a > 3 ? g() : 0; }"), "f")

@@ -11,7 +11,7 @@ MEANING = {"add": lambda a, k: a + k, "and": lambda a, k: a & k, "or": lambda a,
 
 
 def machine(rule: ImmediateRule, a: int, literal: int, bits: int) -> int:
-    """Result of the instruction of a rule (isa.md §6)."""
+    """Return the result of a rule's instruction (isa.md §6)."""
     mask = (1 << bits) - 1
     unary = {"inc": a + 1, "inc2": a + 2, "dec": a - 1, "dec2": a - 2, "com": ~a, "ze": a & 0xFF}
     match rule.op.removesuffix("l") if rule.form == "tied" else rule.op:
@@ -39,7 +39,10 @@ def machine(rule: ImmediateRule, a: int, literal: int, bits: int) -> int:
 @pytest.mark.parametrize("bits", [8, 16])
 @pytest.mark.parametrize("op", sorted(IMMEDIATE))
 def test_a_constant_rule_computes_the_operation_within_its_literal_range(op: str, bits: int) -> None:
-    """isa.md §3.2: lit5 0..31, lit10 0..1023, bytes 0..255."""
+    """A constant rule computes its operation for every literal in range: lit5 0..31, lit10 0..1023, bytes 0..255.
+
+    Source: isa.md §3.2.
+    """
     mask = (1 << bits) - 1
     limits = {"lit5": LIT5_MAX, "tied": LIT10_BYTE_MAX if bits == 8 else LIT10_MAX, "bit": bits - 1}
     for k in range(mask + 1):
@@ -53,7 +56,7 @@ def test_a_constant_rule_computes_the_operation_within_its_literal_range(op: str
 
 
 def test_constants_that_fit_no_literal_need_a_register() -> None:
-    """No rule accepts a constant beyond the range of its literal."""
+    """No rule accepts a constant beyond the range of its literal, which then needs a register."""
     assert immediate_rule("add", 0x1234, 16) is None
     assert immediate_rule("and", 0x1234, 16) is None
     assert immediate_rule("add", 0x1234 & 0xFF, 8) is not None

@@ -1,6 +1,6 @@
-"""Volatile accesses have the number, order and width of the source, at every level (C11 5.1.2.3p6).
+"""Volatile accesses have the number, order and width of the source at every level (C11 5.1.2.3p6).
 
-An access of 32 or 64 bits is made word by word, low word first, and MOV.D counts as its two words; XC16 does the same.
+An access of 32 or 64 bits is made by words, low word first. MOV.D counts as two words. XC16 does the same.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ ORDERED = [
 
 
 def accesses(lines: list[str]) -> list[str]:
-    """Memory accesses of straight-line code in order: the address, followed by = if it is written."""
+    """Return the memory accesses of straight-line code in order: the address, followed by = for a write."""
     out: list[str] = []
     for line in lines:
         op, _, rest = line.partition(" ")
@@ -55,7 +55,7 @@ def accesses(lines: list[str]) -> list[str]:
 
 
 def _address_operand(operand: str) -> str:
-    """A memory operand without the number of its register; "" for other operands."""
+    """Return a memory operand without its register number, or "" for other operands."""
     if operand.startswith("[w") and not operand.startswith(("[w15", "[w14")):
         return "[w" + operand.lstrip("[w0123456789")
     return operand if operand.startswith("_") else ""
@@ -68,7 +68,7 @@ def _at_offset(place: str, words: str) -> str:
 @pytest.mark.parametrize("level", LEVELS)
 @pytest.mark.parametrize(("source", "expected"), [row[1:] for row in ORDERED], ids=[row[0] for row in ORDERED])
 def test_accesses_have_the_number_and_order_of_the_source(level: str, source: str, expected: list[str]) -> None:
-    """The sequence of accesses is the same at each level."""
+    """The sequence of volatile accesses equals the source's at each level."""
     assert accesses(body(assembly(DECLARED + source, level), "f")) == expected
 
 
@@ -99,7 +99,10 @@ BITS = [
 @pytest.mark.parametrize("level", LEVELS[1:])
 @pytest.mark.parametrize(("source", "expected"), [row[1:] for row in BITS], ids=[row[0] for row in BITS])
 def test_single_bit_writes_in_branches_are_one_instruction_each(level: str, source: str, expected: list[str]) -> None:
-    """isa.md §5.4: a store of the whole word would overwrite the change of an interrupt after the load."""
+    """A single-bit write in a branch is one instruction.
+
+    Storing the whole word would overwrite changes that an interrupt makes after the load (isa.md §5.4).
+    """
     lines = body(assembly(f"{DECLARED}\n{source}", level), "f")
     assert sorted(line for line in lines if line.startswith(("bset", "bclr", "btg"))) == expected
     assert not any(line.startswith("mov _A,") for line in lines)
@@ -107,7 +110,10 @@ def test_single_bit_writes_in_branches_are_one_instruction_each(level: str, sour
 
 @pytest.mark.parametrize("level", LEVELS)
 def test_bit_fields_are_set_and_cleared_by_one_instruction(level: str) -> None:
-    """The front end clears a field before it sets it; XC16 emits BSET at every level, and programs rely on it."""
+    """A bit-field is set and cleared by one instruction (BSET, BCLR), as programs for XC16 rely on.
+
+    The front end clears a field before it sets it.
+    """
     near = body(assembly(f"{DECLARED} void f(void) {{ F.a = 1; F.b = 0; F.b = 1; }}", level), "f")
     assert [line for line in near if "_F" in line] == ["bset _F,#0", "bclr _F,#1", "bset _F,#1"]
     assert not any(line.startswith("mov") for line in near)

@@ -1,4 +1,4 @@
-"""Worst-case stack from the call graph; expected bytes counted by hand from isa.md §3.5 and §7.4."""
+"""Worst-case stack from the call graph; the expected bytes are counted by hand from isa.md §3.5 and §7.4."""
 
 import json
 
@@ -46,12 +46,13 @@ def analyse(image, text: str, notes: str = "") -> dict:
     ],
 )
 def test_own_frame_of_a_function(image, lines, bytes_used):
-    """Pushes, LNK, arithmetic on W15, repeated pushes, skips, jump tables."""
+    """The frame of a function includes pushes, LNK, arithmetic on W15, repeated pushes, skips and jump tables."""
     assert analyse(image, func("_main", *lines))["_main"].frame == bytes_used
 
 
 def test_a_call_costs_its_return_address_at_the_depth_of_the_call(image):
-    """isa.md §7.4: CALL and RCALL push 4 bytes; a tail branch pushes none."""
+    """A call adds its return address at the present depth: CALL and RCALL push 4 bytes, a tail branch none (isa.md
+    §7.4)."""
     text = (
         func("_main", "push w8", "rcall _a", "pop w8", "call _b", "return")
         + func("_a", "push.d w0", "pop.d w0", "bra _c")
@@ -72,7 +73,10 @@ def test_a_call_costs_its_return_address_at_the_depth_of_the_call(image):
 
 
 def test_interrupts_threads_and_pointer_only_functions_are_entries(image, tmp_path, capsys, monkeypatch):
-    """An exception pushes 4 bytes (isa.md §7.4); --thread names a start of its own."""
+    """Interrupts, threads and functions called by pointer only are entries.
+
+    An exception pushes 4 bytes (isa.md §7.4); --thread names an additional entry.
+    """
     monkeypatch.chdir(tmp_path)
     text = (
         ".global __reset\n__reset: mov #__SP_init, w15\n rcall _main\n reset\n"
@@ -103,7 +107,7 @@ POINTER = (
 
 
 def test_recursion_is_named_and_can_be_bounded(image):
-    """n activations: n frames and n - 1 return addresses."""
+    """Recursion is reported and can be bounded: n activations have n frames and n - 1 return addresses."""
     free = analyse(image, RECURSIVE)
     assert any("recursion to _fib" in note for note in free["_main"].unknown)
     bounded = analyse(image, RECURSIVE, "recursion fib 5\n")
@@ -118,7 +122,7 @@ def test_recursion_is_named_and_can_be_bounded(image):
 
 
 def test_mutual_recursion_is_named_once_per_call(image):
-    """A cycle of two functions does not loop the analysis."""
+    """Mutual recursion is reported once per call, and the analysis ends."""
     text = (
         func("_main", "rcall _a", "return")
         + func("_a", "push w0", "rcall _b", "pop w0", "return")
@@ -130,7 +134,10 @@ def test_mutual_recursion_is_named_once_per_call(image):
 
 
 def test_pointer_calls_are_reported_and_can_be_annotated(image):
-    """`calls` in the annotation file lists their targets; `depth` replaces the analysis of a function."""
+    """Calls by pointer are reported.
+
+    In the annotation file `calls` lists their targets, `depth` replaces an analysis.
+    """
     free = analyse(image, POINTER)
     assert any("call through a pointer" in note for note in free["_main"].unknown)
     usage = analyse(image, POINTER, "# comment\ncalls main: big, _small\n")
@@ -141,7 +148,7 @@ def test_pointer_calls_are_reported_and_can_be_annotated(image):
 
 
 def test_unknown_stack_pointers_and_unbalanced_returns_are_named(image):
-    """A context switch replaces W15; a loop that pushes never ends."""
+    """Unknown stack pointers (a context switch) and unbalanced code (a loop that pushes) are reported."""
     text = (
         func("_main", "mov w0, w15", "return")
         + func("_odd", "push w0", "return")
@@ -154,7 +161,10 @@ def test_unknown_stack_pointers_and_unbalanced_returns_are_named(image):
 
 
 def test_a_handler_that_switches_stacks_reports_bytes_on_the_interrupted_one(image):
-    """Conditional switch as in a nestable handler: 4 bytes by hardware, 4 pushed, the rest on the handler's stack."""
+    """A handler that switches stacks is charged 4 bytes by hardware and 4 pushed bytes on the interrupted stack.
+
+    The rest is on the handler's own stack.
+    """
     text = func(
         "__T1Interrupt",
         *["push.d w0", "mov w15, w1", "mov #0x1000, w0", "cpslt w15, w0", "mov #0x900, w15", "push w1", "push.d w2"],
@@ -168,7 +178,10 @@ def test_a_handler_that_switches_stacks_reports_bytes_on_the_interrupted_one(ima
 
 
 def test_a_saved_stack_pointer_restores_the_depth(image):
-    """Variable-length arrays keep the base in a register (abi-elf.md §2.4); their length is unknown."""
+    """A saved stack pointer restores the known depth after a variable-length array (abi-elf.md §2.4).
+
+    The length of the array itself is unknown.
+    """
     lines = ["mov w15, w8", "push.d w0", "push.d w2", "mov w8, w15", "return"]
     found = analyse(image, func("_main", *lines))["_main"]
     assert (found.frame, found.unknown) == (8, [])
@@ -187,7 +200,10 @@ def test_a_saved_stack_pointer_restores_the_depth(image):
     ],
 )
 def test_only_an_unchanged_copy_of_the_stack_pointer_is_known(image, lines, known):
-    """alloca and arrays of computed length restore another value, callees overwrite W0 to W7."""
+    """Only an unchanged copy of the stack pointer restores the depth.
+
+    alloca and arrays of computed length restore other values, and callees overwrite W0 to W7.
+    """
     found = analyse(image, func("_main", *lines) + func("_leaf", "return"))
     assert any("unknown value" in note for note in found["_main"].unknown) != known
 
@@ -196,13 +212,13 @@ def test_only_an_unchanged_copy_of_the_stack_pointer_is_known(image, lines, know
     ("text", "message"), [("frob x 1\n", "notes:1"), ("\ndepth f x\n", "notes:2"), ("calls\n", "expected")]
 )
 def test_annotation_mistakes_name_file_and_line(text, message):
-    """The message has file and line of the annotation."""
+    """An invalid annotation is refused with file and line."""
     with pytest.raises(ToolError, match=message):
         read_annotations(text, "notes")
 
 
 def test_annotations_for_unknown_functions_are_refused(image):
-    """A misspelt name is an error."""
+    """An annotation for an unknown function is refused: a misspelt name is an error."""
     with pytest.raises(ToolError, match="no function is called missing"):
         Analysis(
             image(".global __reset\n__reset: call w0\n return\n").linked.image, Annotations(threads=["missing"])

@@ -1,4 +1,4 @@
-"""The machine verifier detects one planted bug of every class, and reports nothing in correct code."""
+"""The machine verifier detects planted bugs of every class and reports nothing in correct code."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ int f(int a, int b, long c, volatile unsigned *p) {
 }
 """
 PlantBug = Callable[[MFunction], bool]
-"""Introduces a bug into a function; returns False if the function has no suitable instruction."""
+"""Plants a bug in a function; returns False if the function has no suitable instruction."""
 
 
 def _each(m: MFunction) -> list[tuple[MBlock, int, MI]]:
@@ -201,13 +201,13 @@ CLASSES: list[tuple[str, str, PlantBug]] = [
 def damaged(
     run: Callable[[pipeline.FunctionContext], None], plant: PlantBug, planted: list[bool], c: pipeline.FunctionContext
 ) -> None:
-    """Run a pass, then introduce a bug."""
+    """Run a pass, plant a bug after it, and record in `planted` whether that was possible."""
     run(c)
     planted.append(plant(c.m))
 
 
 def compile_with(plant: PlantBug | None, after: str, monkeypatch: pytest.MonkeyPatch, level: str) -> bool:
-    """Compile SOURCE with a bug planted behind pass `after`; returns whether it could be planted."""
+    """Compile SOURCE with a bug planted after the pass `after`; return whether it could be planted."""
     planted: list[bool] = []
     passes = []
     for p in pipeline.FUNCTION_PASSES:
@@ -223,13 +223,13 @@ def compile_with(plant: PlantBug | None, after: str, monkeypatch: pytest.MonkeyP
 
 @pytest.mark.parametrize("level", ["0", "1", "s", "2"])
 def test_sound_code_passes(level: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Without a planted bug, the verifier reports nothing."""
+    """The verifier reports nothing in correct code."""
     assert not compile_with(None, "", monkeypatch, level)
 
 
 @pytest.mark.parametrize(("after", "plant"), [row[1:] for row in CLASSES], ids=[row[0] for row in CLASSES])
 def test_a_planted_bug_is_detected_after_its_pass(after: str, plant: PlantBug, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Each class of bug, at the first level at which it can be planted."""
+    """Each class of bug is detected after its pass, at the first level at which it can be planted."""
     for level in ("s", "2", "1", "0"):
         with monkeypatch.context() as patch:
             said = ""
@@ -244,7 +244,7 @@ def test_a_planted_bug_is_detected_after_its_pass(after: str, plant: PlantBug, m
 
 
 def test_a_wrong_colour_is_detected(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Two values that are live at the same time get one register."""
+    """The verifier detects two values that share a register while both are live."""
     choose = colouring.Colouring.run
 
     def confuse(self: colouring.Colouring, order: list[int]) -> None:
