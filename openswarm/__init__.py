@@ -1,5 +1,5 @@
-"""The command `openswarm`: project set-up, diagnosis of the installation, flashing, paths for build files.
+"""The command `openswarm`: creates projects, checks the installation, flashes robots, prints paths for builds.
 
-The folder also has CMake's toolchain file (`cmake/`), the files of a new project (`template/`) and, in a wheel, a copy
-of the kernel (`firmware/`).
+The folder also contains CMake's toolchain file (`cmake/`), the files of a new project (`template/`) and, in a wheel,
+a copy of the kernel (`firmware/`).
 """

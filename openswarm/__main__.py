@@ -1,4 +1,4 @@
-"""`python -m openswarm`."""
+"""Run the command line as `python -m openswarm`."""
 
 import sys
 

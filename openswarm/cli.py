@@ -1,6 +1,7 @@
 """The command line `openswarm`: finds the command's module, parses its options and runs it.
 
-A command is a module of `commands/` with `parser()` and `run(options) -> exit status`, imported only when it is used.
+A command is a module of `commands/` with `parser()` and `run(options) -> exit status`. It is imported only when it
+is used.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ example: openswarm new myrobot
 
 
 class Command(Protocol):
-    """Interface of a module of `commands/`."""
+    """Interface that each module of `commands/` implements."""
 
     @staticmethod
     def parser() -> ArgumentParser:

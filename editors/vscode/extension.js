@@ -6,7 +6,7 @@ const vscode = require('vscode');
 const TYPE = 'openswarm';
 const NO_VALUE = '';
 
-/** The command line of the adapter for a launch configuration: words after the interpreter. */
+/** Returns the command line arguments of the debug adapter for a launch configuration, without the interpreter. */
 function wordsOf(configuration) {
     if (!configuration.scene) {
         return ['-m', 'emu', 'debug'];
@@ -20,7 +20,7 @@ function wordsOf(configuration) {
     return [...words, ...(brain ? ['--brain', String(brain)] : []), ...more.map(String)];
 }
 
-/** A whole number of a launch configuration, which may be a text that was asked for. */
+/** Returns an integer of a launch configuration; an input prompt of VS Code yields it as text. */
 function whole(configuration, name, least, most) {
     const number = Number(configuration[name] === undefined ? least : configuration[name] === '' ? NaN : configuration[name]);
     if (!Number.isInteger(number) || number < least || number > most) {
@@ -29,7 +29,7 @@ function whole(configuration, name, least, most) {
     return number;
 }
 
-/** Where an attach configuration leads to: port and host. */
+/** Returns port and host of an attach configuration. */
 function addressOf(configuration) {
     if (configuration.port === undefined) {
         throw new Error('attach needs the port of `emu debug --port` or `arena debug --port`');
@@ -37,7 +37,7 @@ function addressOf(configuration) {
     return [whole(configuration, 'port', 1, 65535), configuration.host || '127.0.0.1'];
 }
 
-/** An adapter that cannot start ends a session without a word, so it is looked before whether this Python can. */
+/** Checks that this Python has the debugger: VS Code shows no error if an adapter cannot start. */
 function started(python, words, cwd) {
     return new Promise((resolve, reject) => execFile(python, [...words.slice(0, 3), '--help'], { cwd }, (error, _said, told) => {
         const why = error && (error.code === 'ENOENT' ? 'there is no such program' : told.trim().split('\n').pop() || error.message);
@@ -62,7 +62,7 @@ class Adapters {
 }
 
 class Configurations {
-    /** What a configuration lacks; F5 without any looks for the firmware where the template's Makefile puts it. */
+    /** Adds missing values; F5 without a configuration debugs the image that the template's Makefile builds. */
     resolveDebugConfiguration(_folder, configuration) {
         if (!configuration.type && !configuration.request) {
             Object.assign(configuration, { type: TYPE, request: 'launch', name: 'Debug the robot' });
@@ -74,7 +74,7 @@ class Configurations {
     }
 }
 
-/** Peripheral, register, bit field: what the request `sfrs` tells, asked for when it is looked at. */
+/** Tree of peripherals, registers and bit fields from the request `sfrs`, sent when the view is visible. */
 class Registers {
     constructor() {
         this.changed = new vscode.EventEmitter();
@@ -84,7 +84,7 @@ class Registers {
         this.now = new Map();
     }
 
-    /** The robot stands, goes on, or there is none any more. */
+    /** Updates the view after the robot has stopped, resumed or disconnected. */
     show(session) {
         this.session = session;
         this.before = this.now;
@@ -102,7 +102,7 @@ class Registers {
         try {
             return (await this.session.customRequest('sfrs')).groups;
         } catch {
-            return []; // the program is running
+            return []; // no values while the program runs
         }
     }
 
@@ -164,7 +164,7 @@ function activate(context) {
                     if (message.type === 'event' && message.event === 'stopped') {
                         stands(session).catch(gone);
                     } else if (message.type === 'event' && message.event === 'invalidated') {
-                        tick(session).catch(gone); // the robot did not move; its time is the present time now
+                        tick(session).catch(gone); // the robot's state is unchanged; its time is now the present
                     }
                 },
                 onWillStopSession: gone,

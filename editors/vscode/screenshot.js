@@ -15,7 +15,7 @@ const LINE = '13';
     const keys = async (...names) => {
         for (const name of names) {
             await page.keyboard.press(name);
-            await page.waitForTimeout(1000); // the editor swallows keys that come faster
+            await page.waitForTimeout(1000); // the editor drops keys that arrive faster
         }
     };
     await page.goto(url);

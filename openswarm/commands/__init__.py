@@ -6,7 +6,7 @@ import argparse
 
 
 def made_parser(command: str, description: str, example: str) -> argparse.ArgumentParser:
-    """Return a parser without options that prints the description verbatim and an example."""
+    """Return an argument parser without options whose help shows the description verbatim and an example."""
     return argparse.ArgumentParser(
         prog=f"openswarm {command}",
         description=description,

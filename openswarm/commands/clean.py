@@ -1,4 +1,4 @@
-"""`openswarm clean`: empties the cache. It removes only files that these tools have put there."""
+"""`openswarm clean`: empties the cache. It removes only files that this project's tools have written."""
 
 from __future__ import annotations
 

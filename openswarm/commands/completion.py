@@ -1,4 +1,4 @@
-"""`openswarm completion`: prints the shell completion of the commands and their options."""
+"""`openswarm completion`: prints the shell completion script for the project's commands and their options."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`openswarm doctor`: lists what is installed, what is missing and what that disables."""
+"""`openswarm doctor`: lists installed and missing packages and programs, with the features that depend on them."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ EXTRAS: Final = {
     "test": "this project's own tests",
     "docs": "this project's documentation site",
 }
-"""Features that need an extra."""
+"""Features that each optional extra of the package enables."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +68,7 @@ class Finding:
     kind: str
     name: str
     found: str
-    """Version or path; empty if it is missing."""
+    """Version or path; empty if the package or program is missing."""
     purpose: str
     remedy: str
     is_needed: bool
@@ -148,7 +148,7 @@ def programs() -> Iterator[Finding]:
 
 
 def cache() -> Finding:
-    """Return whether the cache is writable; without it everything works, but more slowly."""
+    """Return the finding whether the cache is writable; without a cache all features work, but more slowly."""
     folder = paths.cache()
     there = next(one for one in (folder, *folder.parents) if one.exists())
     is_open = there.is_dir() and os.access(there, os.W_OK | os.X_OK)
@@ -157,7 +157,7 @@ def cache() -> Finding:
 
 
 def trial() -> Finding:
-    """Compile, link and run one program."""
+    """Compile, link and run one program; return the finding whether that works."""
     with tempfile.TemporaryDirectory(prefix="openswarm-doctor-") as name:
         source, image = Path(name) / "main.c", Path(name) / "main.elf"
         source.write_text('#include <stdio.h>\nint main(void) { printf("%d", 6 * 7); return 3; }\n')

@@ -77,20 +77,20 @@ class _Job(Protocol):
     """One transfer of an image into a robot."""
 
     wanted: str
-    """The expected peer at the port, for messages."""
+    """Name of the peer at the serial port, for messages."""
     hint: str
-    """What the user can do to make the peer answer."""
+    """Action of the user that makes the peer answer, for messages."""
     keeps: str
-    """State of the robot after an interrupted transfer."""
+    """State of the robot after an interrupted transfer, for messages."""
 
     def converse(self, line: SerialPort, progress: Callable[[int, int], None]) -> None:
         """Transfer the image. Raises RobotError, or OSError of the port."""
 
     def facts(self) -> dict[str, object]:
-        """Return the result as data."""
+        """Return the result of the transfer as data, for JSON output."""
 
     def summary(self, seconds: float) -> str:
-        """Return the result as text."""
+        """Return the result of the transfer as text."""
 
 
 class _Loading:
@@ -178,7 +178,7 @@ def _with_robot(options: argparse.Namespace, job: _Job) -> int:
 
 
 class _Progress:
-    """Progress display: one line that is overwritten on a terminal, no output elsewhere."""
+    """Progress display: one line, overwritten on a terminal; no output otherwise."""
 
     def __init__(self) -> None:
         self._done = self._total = 0

@@ -1,4 +1,4 @@
-"""`openswarm new`: a project that builds with make and with CMake, runs on the emulator and has a test."""
+"""`openswarm new`: creates a project that builds with make and CMake, runs on the emulator and has a test."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from openswarm.commands import made_parser
 
 TEMPLATE: Final = Path(__file__).resolve().parents[1] / "template"
 HIDDEN: Final = {"vscode": ".vscode", "gitignore": ".gitignore"}
-"""Template files whose project name begins with a dot: build tools omit hidden files from packages."""
+"""Names of template files that are hidden files in a project: build tools omit hidden files from packages."""
 NAME: Final = "@PROJECT@"
 DESCRIPTION: Final = """\
 Set up a project in a new folder: an application of OpenSwarm in src/, a Makefile, CMakeLists.txt, a test that runs the

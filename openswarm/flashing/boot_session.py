@@ -1,9 +1,11 @@
 """Session with a boot loader: greeting, rows until each is acknowledged, start of the program.
 
 A loader cannot distinguish a lost byte from a pause, and its checksum does not detect rotated bytes. A loader that is
-one byte behind would accept a repeated block with its sum as part of the address. After a refusal or without an answer,
-the host therefore stays silent until the loader times out, greets it again and continues with the same row. A loader
-that times out starts the program, but the first row written makes the program's entry lead back into the loader.
+one byte behind would accept a repeated block with its checksum as part of the address.
+
+After a refusal or without an answer, the host therefore stays silent until the loader times out. It then greets the
+loader again and continues with the same row. A loader that times out starts the program, but the first row written
+makes the program's entry lead back into the loader.
 """
 
 from __future__ import annotations
@@ -17,23 +19,29 @@ from openswarm.flashing.rows import Row
 from openswarm.flashing.serial import Line
 
 HELLO_SECONDS: Final = 0.4
-"""Interval of greetings: two fall into the second in which a loader listens. It is longer than an answer over Bluetooth
-takes (20 to 100 ms), because the loader takes a superfluous greeting for the first byte of a block."""
+"""Seconds between greetings.
+
+Two greetings fall into the second in which a loader listens. The interval is longer than an answer takes over
+Bluetooth (20 to 100 ms), because the loader takes a superfluous greeting for the first byte of a block.
+"""
 ANSWER_SECONDS: Final = 4.0
-"""Time-out of a row: 8.8 ms on the wire, 4 ms to erase and to write, the radio, and an emulated robot on a busy
-computer. It is longer than the loader's time-out, so that a loader that does not answer has timed out."""
+"""Time-out of a row in seconds.
+
+It covers 8.8 ms on the wire, 4 ms to erase and to write, the radio, and an emulated robot on a busy computer. It is
+longer than the loader's time-out, so that a loader that does not answer has timed out.
+"""
 SILENCE_SECONDS: Final = PATIENCE_SECONDS + 0.4
 RETURN_SECONDS: Final = 5.0
-"""Time-out for a loader to return after a silence."""
+"""Maximum seconds until the loader answers again after the host's silence."""
 TRIES: Final = 5
-"""Attempts per row."""
+"""Maximum number of attempts per row."""
 
 
 ECHO: Final = "the line sends back what is written to it: switch its echo off, or take the loop-back away"
 
 
 class RobotError(Exception):
-    """The robot does not behave like a boot loader, or like firmware that receives programs."""
+    """The robot behaves neither like a boot loader nor like firmware that receives programs."""
 
 
 @dataclass(slots=True)
@@ -42,7 +50,7 @@ class SessionCounts:
 
     blocks: int = 0
     refused: int = 0
-    """Number of answers 'N'."""
+    """Number of rows that the loader refused with 'N'."""
     unanswered: int = 0
 
 
@@ -50,13 +58,13 @@ class BootSession:
     """Session with the robot at the other end of a line."""
 
     def __init__(self, line: Line, wait: float) -> None:
-        """Wait at most `wait` s for the loader to answer. Raises RobotError if none does."""
+        """Wait at most `wait` seconds for the loader to answer. Raises RobotError if no loader answers."""
         self.counts: Final = SessionCounts()
         self._line: Final = line
         self._wait: Final = wait
         self._holds_robot = False
-        """Write the first row, after which the robot always returns to its loader."""
-        self._be_silent(SILENCE_SECONDS)  # a loader inside an interrupted block times out
+        """Whether the first row is written, after which the robot returns to its loader at every start."""
+        self._be_silent(SILENCE_SECONDS)  # a loader that waits for the rest of an interrupted block times out
         self.loader: Final = self._greet(wait)
 
     def _greet(self, seconds: float) -> Loader:
@@ -68,7 +76,7 @@ class BootSession:
             heard = self._heard(HELLO_SECONDS)
             if heard[-1:] == DONE and heard[-2:-1]:
                 loader = LOADERS.get(heard[-2])
-                if loader is not None and HELLO in heard:  # with an echo, a 'K' in a row would pass for an answer
+                if loader is not None and HELLO in heard:  # an echoed 'K' of a row would pass for an answer
                     raise RobotError(ECHO)
                 if loader is not None:
                     return loader
@@ -81,7 +89,7 @@ class BootSession:
                 raise RobotError(f"no boot loader answered within {seconds:g} s{also}: press the robot's reset button")
 
     def _heard(self, seconds: float) -> bytes:
-        """Return the bytes received within a time, or until a known type and 'K'."""
+        """Return the bytes received within a time; return earlier after a known loader type and 'K'."""
         heard = b""
         limit = self._line.now() + seconds
         while (left := limit - self._line.now()) > 0:
@@ -91,7 +99,7 @@ class BootSession:
         return heard
 
     def write(self, rows: list[Row], progress: Callable[[int, int], None]) -> None:
-        """Write rows in order, reporting to `progress`. Raises RobotError if a row cannot be written."""
+        """Write rows in order and report each to `progress`. Raises RobotError if a row cannot be written."""
         for number, (address, words) in enumerate(rows):
             progress(number, len(rows))
             self._row(address, block(address, words))
@@ -124,7 +132,7 @@ class BootSession:
         return b""
 
     def _return(self, silence: float) -> None:
-        """Let the loader time out, and greet it again."""
+        """Stay silent until the loader times out, and greet it again."""
         self._be_silent(silence)
         if self._greet(RETURN_SECONDS if self._holds_robot else self._wait) != self.loader:
             raise RobotError("another boot loader answers than before")

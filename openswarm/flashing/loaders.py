@@ -1,7 +1,8 @@
 """Boot loaders of the tinybld family and their block format.
 
 The host sends 0xC1; the robot answers with its type and 'K'. A block has four bytes, the data of a row, and a byte that
-makes the sum of all bytes 0 (mod 256). The robot answers 'K' when the row is written and 'N' if the sum is wrong.
+makes the sum of all bytes 0 (mod 256). The robot answers 'K' after it has written the row, and 'N' if the sum is wrong.
+
 Sources: tinybld's published code for the dsPIC (C. Chiculita) and the e-puck's variant of it; unverified on a robot.
 """
 
@@ -15,48 +16,59 @@ DONE: Final = b"K"
 AGAIN: Final = b"N"
 ROW_WORDS: Final = 32
 ROW_UNITS: Final = 2 * ROW_WORDS
-"""PC units of a row."""
+"""Size of a row in PC units."""
 ROW_BYTES: Final = 3 * ROW_WORDS
-"""Bytes of a row in a block: three for each word, the lowest first."""
+"""Size of a row in a block in bytes: three for each word, the lowest first."""
 BAUD: Final = 115_200
 PATIENCE_SECONDS: Final = 1.4
-"""Time without a byte after which a loader starts the program: 1 s by its comments, up to 1.4 s by its instructions."""
+"""Seconds without a byte after which a loader starts the program.
+
+tinybld's comments say 1 s; its instructions take up to 1.4 s.
+"""
 
 ADDRESS_ORDER: Final = "little"
-"""UNVERIFIED on a robot: lowest byte first, by tinybld's source (its block is L, H, U, count). A loader with the
-opposite order would take the lowest byte, a multiple of 0x40, as the page. That is never page 1, where loaders are. The
-loader would stay intact, and the program would not start."""
+"""Byte order of the address in a block: lowest byte first. UNVERIFIED on a robot.
+
+tinybld's source defines the block as L, H, U, count. A loader with the opposite order would take the lowest byte, a
+multiple of 0x40, as the page. That is never page 1, which contains the loaders. The loader would stay intact, and
+the program would not start.
+"""
 _DATA_COMMAND: Final = ROW_BYTES
-"""Fourth byte of a block with data. tinybld expects the number of bytes; the e-puck's variant checks only for
-`_END_COMMAND`."""
+"""Fourth byte of a block with data.
+
+tinybld expects the number of bytes here; the e-puck's variant only compares it with `_END_COMMAND`.
+"""
 _END_COMMAND: Final = 0xFF
 _END_ADDRESS: Final = 1
-"""The e-puck's loader lights an LED for some 13 ms times the low half of this value before it starts the program, and
-for ever if the low half is 0."""
+"""Address field of the end block; its low half must not be 0.
+
+Before the e-puck's loader starts the program, it lights an LED for about 13 ms times this half, and for ever if that
+is 0.
+"""
 
 
 @dataclass(frozen=True, slots=True)
 class Loader:
-    """A boot loader in flash from `start` to the end.
+    """A boot loader that occupies flash from `start` to the end.
 
-    Word 0 jumps to the loader. It starts the program by a jump to `start` - 8, where the host has put the program's
-    GOTO.
+    Word 0 jumps to the loader. The loader starts the program by a jump to `start` - 8, where the host has put the
+    program's GOTO.
     """
 
     type: int
-    """Its answer to HELLO."""
+    """Type byte of the loader's answer to HELLO."""
     name: str
     start: int
-    """Program address of its first row."""
+    """Program address of the loader's first row."""
 
     @property
     def entry(self) -> int:
-        """Address of the program's GOTO: two words, followed by two unused ones."""
+        """Address of the program's GOTO, which has two words and is followed by two unused words."""
         return self.start - 8
 
     @property
     def entry_row(self) -> int:
-        """Address of the row with the entry. It precedes the loader; the image may use the rest of it."""
+        """Address of the row that contains the entry. It precedes the loader; the image may use the rest of the row."""
         return self.entry // ROW_UNITS * ROW_UNITS
 
 

@@ -1,7 +1,8 @@
 """Codec of update messages (eight bytes) and of their frames on a serial line.
 
-The peer is firmware/openswarm/io/update/spread.c, with io/framing.c for frames: COBS with a CRC-16/CCITT-FALSE, here
-between zeros. Damaged frames decode to nothing. tests/firmware/update/test_update.py compares both sides.
+The robot's counterpart is firmware/openswarm/io/update/spread.c, with io/framing.c for frames: COBS with a
+CRC-16/CCITT-FALSE, here enclosed in zeros. Damaged frames decode to no message. tests/firmware/update/test_update.py
+compares both implementations.
 """
 
 from __future__ import annotations
@@ -19,15 +20,18 @@ _ADVERTISEMENT, _REQUEST, _DATA = 0x80, 0xA0, 0xC0
 _IDENTITY: Final = 0x07FF
 _PART: Final = 5
 PARTS: Final = -(-ROW_BYTES // _PART)
-"""Parts of a row; the last one has one byte."""
+"""Number of parts of a row; the last part has one byte."""
 LONGEST_FRAME: Final = 255
-"""Maximum bytes of a frame. Longer input, such as a line of text without an end, is discarded."""
+"""Maximum number of bytes of a frame.
+
+Longer input, such as text without an end of line, is discarded.
+"""
 _CRC_START: Final = 0xFFFF
 
 
 @dataclass(frozen=True, slots=True)
 class Advertisement:
-    """The program that a robot advertises; version 0: none."""
+    """Advertisement of a robot's program; version 0 means that it has none."""
 
     version: int
     rows: int
@@ -42,7 +46,7 @@ class Advertisement:
 
 @dataclass(frozen=True, slots=True)
 class Request:
-    """A robot's request for the missing parts of a row: bit n is part n."""
+    """A robot's request for the missing parts of a row; bit n stands for part n."""
 
     version: int
     row: int
@@ -63,30 +67,32 @@ def read(message: bytes) -> Advertisement | Request | None:
 
 
 NOTHING: Final = Advertisement(0, 0, 0xFFFFFFFF, False)
-"""Advertisement of version 0, older than that of any robot, so that each robot answers with its own. It differs from
-that of a robot without a program."""
+"""Advertisement that makes every robot answer with its own, because version 0 is older than any program.
+
+It differs from the advertisement of a robot without a program, which does not answer an equal one.
+"""
 
 
 def identity(crc: int) -> int:
-    """Return the bits of the CRC by which requests and data distinguish programs of one version."""
+    """Return the bits of the CRC with which requests and data distinguish programs of one version."""
     return crc & _IDENTITY
 
 
 def data(program: Program, row: int, part: int) -> bytes:
-    """Return the message with one part of a row."""
+    """Return the data message with one part of a row."""
     own = identity(program.crc)
     head = bytes([_DATA | row, part << 3 | own >> 8, own & 0xFF])
     return head + program.rows[row][part * _PART : (part + 1) * _PART].ljust(_PART, b"\0")
 
 
 def framed(message: bytes) -> bytes:
-    """Return the frame of a message, between zeros."""
+    """Return the frame of a message, enclosed in zeros."""
     rest = message + binascii.crc_hqx(message, _CRC_START).to_bytes(2, "big")
     return b"\0" + b"".join(bytes([len(run) + 1]) + run for run in rest.split(b"\0")) + b"\0"
 
 
 def unframed(frame: bytes) -> bytes:
-    """Return the message of a frame without its zeros; empty if it is no frame, or damaged."""
+    """Return the message in a frame without its zeros; return no bytes if the frame is invalid or damaged."""
     out, at = b"", 0
     while at < len(frame):
         run = frame[at + 1 : at + frame[at]]

@@ -11,18 +11,18 @@ from emu.image.model import ERASED, Image
 from openswarm.flashing.loaders import ROW_BYTES, ROW_UNITS, ROW_WORDS
 
 SLOT: Final = Region("slot of programs", 0x00F800, 0x010000)
-"""Run slot in PC units: board/epuck/update/update_slots.h."""
+"""Run slot in program memory, in PC units (board/epuck/update/update_slots.h)."""
 RAM: Final = Region("RAM of programs", 0x0800, 0x0A00)
-"""RAM of the program in bytes: the same file."""
+"""RAM of a program, in bytes (board/epuck/update/update_slots.h)."""
 ROWS: Final = SLOT.size // ROW_UNITS
 VERSION_SYMBOL: Final = "__update_version"
-"""Absolute symbol of a program's image: its version."""
+"""Absolute symbol in the image of a program that holds its version."""
 LAST_VERSION: Final = 0xFFFF
 
 
 @dataclass(frozen=True, slots=True)
 class Program:
-    """A program as robots pass it on."""
+    """A program in the form in which robots transfer it."""
 
     version: int
     rows: tuple[bytes, ...]

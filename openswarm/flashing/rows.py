@@ -1,4 +1,4 @@
-"""Rows of flash to write for an image, in an order that keeps the boot loader reachable."""
+"""Selection and order of the flash rows that are written for an image. The order keeps the boot loader reachable."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from emu.image.model import ERASED, Image
 from openswarm.flashing.loaders import LOADERS, ROW_UNITS, ROW_WORDS, Loader
 
 _GOTO: Final = 0x04
-"""Upper byte of the first word of GOTO; the second word has the target's upper bits in 0x0000HH (dspic30f6014a.md)."""
+"""Upper byte of the first word of GOTO; the second word 0x0000HH holds the target's upper bits (dspic30f6014a.md)."""
 _ENTRY_WORDS: Final = 4
 
 Row = tuple[int, list[int]]
-"""Program address and `ROW_WORDS` words."""
+"""A row of flash: its program address and its `ROW_WORDS` words."""
 
 
 def goto(target: int) -> list[int]:
@@ -23,7 +23,7 @@ def goto(target: int) -> list[int]:
 
 
 def checked(image: Image) -> None:
-    """Raise ValueError for an image that no boot loader can start, or for a chip without a known loader."""
+    """Raise ValueError if no boot loader can start the image, or if none is known for its chip."""
     if not all(loader.start in image.chip.program["flash"] for loader in LOADERS.values()):
         raise ValueError(f"{image.path}: is for the {image.chip.name}, for which no boot loader is known")
     first, second = image.word(0), image.word(2)
@@ -37,11 +37,14 @@ def checked(image: Image) -> None:
 
 
 def rows(image: Image, loader: Loader) -> list[Row]:
-    """Return the rows to write, in order. Raises ValueError if the image has words where the loader is.
+    """Return the rows to write, in order. Raises ValueError if the image has words at the loader's addresses.
 
-    First the entry's row without the GOTO: its four erased words are NOPs that lead into the loader, so that a robot
-    which is cut off in the middle waits in its loader at every start. Then all others, the reset vector with a GOTO to
-    the loader. Last the entry's row whole.
+    1. The entry's row without the GOTO. Its four erased words are NOPs that lead into the loader, so that a robot whose
+    transfer is interrupted waits in its loader at every start.
+
+    2. All other rows; the reset vector is a GOTO to the loader.
+
+    3. The complete row of the entry.
     """
     checked(image)
     flash = image.chip.program["flash"]
@@ -67,7 +70,7 @@ def rows(image: Image, loader: Loader) -> list[Row]:
 
 
 def unwritten_parts(image: Image) -> Iterator[str]:
-    """Yield descriptions of the parts of an image that a boot loader does not write."""
+    """Yield descriptions of parts of an image that a boot loader does not write."""
     for name, text in (("config", "configuration words"), ("eedata", "words of data EEPROM"), ("unitid", "ID words")):
         count = image.used(image.chip.program[name])
         if count:

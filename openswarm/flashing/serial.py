@@ -1,6 +1,7 @@
-"""A serial port by its device: raw bytes, a time limit for reading, nothing else.
+"""Serial port: sends and receives raw bytes with a time limit.
 
-Python's `termios` is enough for that; a package such as pyserial would add Windows, on which nothing else here runs.
+Python's `termios` suffices. A package such as pyserial would add Windows, which the rest of this project does not
+support.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from types import TracebackType
 from typing import Final, Protocol
 
 _STUCK_SECONDS: Final = 10.0
-"""Time after which a port that accepts no byte counts as dead: a block takes 9 ms on the wire."""
+"""Seconds after which a port that accepts no byte is reported as failed; a block takes 9 ms on the wire."""
 
 
 class Line(Protocol):
@@ -32,7 +33,7 @@ class Line(Protocol):
         """Discard received bytes."""
 
     def now(self) -> float:
-        """Return the time in seconds from an arbitrary origin."""
+        """Return the time in seconds since an arbitrary origin."""
 
 
 class SerialPort:
@@ -45,7 +46,7 @@ class SerialPort:
         try:
             if not os.isatty(self._file):
                 raise ValueError(f"{device} is no serial port")
-            with contextlib.suppress(OSError):  # no other terminal has a process group that we may ask for
+            with contextlib.suppress(OSError):  # only a terminal of this session has a process group to read
                 os.tcgetpgrp(self._file)
                 raise ValueError(f"{device} is the terminal in which this runs, no serial port")
             self._set(baud)
@@ -75,7 +76,7 @@ class SerialPort:
 
     @contextlib.contextmanager
     def _named(self) -> Iterator[None]:
-        """Add the port's name to an error of the operating system."""
+        """Return an error of the operating system with the port's name added."""
         try:
             yield
         except BlockingIOError:
@@ -110,5 +111,5 @@ class SerialPort:
             termios.tcflush(self._file, termios.TCIFLUSH)
 
     def now(self) -> float:
-        """Return the monotonic clock."""
+        """Return the monotonic clock in seconds."""
         return time.monotonic()

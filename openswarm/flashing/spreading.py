@@ -1,7 +1,7 @@
-"""Transfer of a program to a running robot: the host acts as a neighbour at the other end of a serial line.
+"""Transfer of a program to a running robot: the host acts as a neighbour robot at the other end of a serial line.
 
-The transfer ends when the robot advertises the program, which it does after checking the CRC, or with a `RobotError`.
-Other output of the robot, such as text, is skipped.
+The transfer ends when the robot, after checking the CRC, advertises the program, or with a `RobotError`. Other
+output of the robot, such as text, is skipped.
 """
 
 from __future__ import annotations
@@ -27,12 +27,15 @@ from openswarm.flashing.program import LAST_VERSION, Program
 from openswarm.flashing.serial import Line
 
 GREETING_SECONDS: Final = 2.5
-"""Interval of the host's advertisements. A robot answers within 2 s an advertisement that differs from its own. It
-stays silent after one that equals its own, so the host must not advertise too often."""
+"""Seconds between the host's advertisements.
+
+A robot answers an advertisement that differs from its own within 2 s. It stays silent after one that equals its own,
+so that the host must not advertise too often.
+"""
 PACE_SECONDS: Final = 0.006
-"""Interval between parts: a robot processes its received messages every 20 ms and buffers fewer than 16."""
+"""Seconds between parts: a robot processes received messages every 20 ms and buffers fewer than 16."""
 MOST_RESETS: Final = 3
-"""Maximum number of restarts: a robot that restarts the transfer more often will do so for ever."""
+"""Maximum number of restarts of the transfer by the robot: beyond it, the robot is assumed to restart for ever."""
 
 
 @dataclass(slots=True)
@@ -49,7 +52,7 @@ class HostNeighbour:
     """The host as a neighbour of one robot."""
 
     def __init__(self, line: Line, program: Program, wait: float) -> None:
-        """The transfer fails if the robot makes no progress for `wait` seconds."""
+        """Create the neighbour. The transfer fails if the robot makes no progress for `wait` seconds."""
         self.counts: Final = TransferCounts()
         self._line: Final = line
         self._program: Final = program
@@ -70,7 +73,7 @@ class HostNeighbour:
             message, self._heard = unframed(self._heard), b""
             said = read(message) if message else None
             if said == NOTHING:
-                raise RobotError(ECHO)  # else the host would take its own messages for the robot's
+                raise RobotError(ECHO)  # otherwise the host would take its own messages for the robot's
             if said is not None:
                 yield said
 
@@ -88,8 +91,11 @@ class HostNeighbour:
             self._program.version, len(self._program.rows), self._program.crc)  # fmt: skip
 
     def give(self, progress: Callable[[int, int], None]) -> bool:
-        """Until the robot has it whole; whether it is activated. `progress` hears how many rows of how many the robot
-        has. Raises RobotError when it does not ask, does not get on, or cannot take it."""
+        """Send the program until the robot has all of it; return whether the robot has activated it.
+
+        `progress` is called with the number of received rows and the total. Raises RobotError if the robot requests
+        no rows, makes no progress, or cannot receive the program.
+        """
         total = len(self._program.rows)
         greets = True
         limit = self._line.now() + self._wait
@@ -114,7 +120,7 @@ class HostNeighbour:
                     return said.is_active
                 else:
                     self._check(said)
-                    greets = False  # the robot may have restarted
+                    greets = False  # a new greeting is only needed if the robot has restarted
                     break
                 if self._line.now() >= limit:
                     break
@@ -130,7 +136,7 @@ class HostNeighbour:
             raise RobotError(f"the robot has another program of version {said.version}: give this one a higher one")
 
     def _gets_on(self, request: Request) -> bool:
-        """Whether the robot has more than before, or restarts the transfer within the permitted number of times."""
+        """Whether the robot has made progress, or restarts the transfer within the permitted number of times."""
         before, self._asked = self._asked, request
         if before is None or request.row > before.row:
             return True
@@ -153,7 +159,7 @@ class HostNeighbour:
                 self._line.write(framed(data(self._program, request.row, part)))
                 self.counts.parts += 1
                 for _ in self._messages(self._line.now() + PACE_SECONDS):
-                    pass  # the robot repeats messages that arrive meanwhile
+                    pass  # skip: the robot repeats messages that arrive meanwhile
 
     def _silence(self, asks: bool) -> str:
         if self._asked is not None:
@@ -166,11 +172,11 @@ class HostNeighbour:
                 f" firmware/apps/spreading does")  # fmt: skip
 
     def activate(self) -> None:
-        """Wait until the robot advertises the activated program. Raises RobotError if it does not."""
+        """Wait until the robot advertises the program as activated. Raises RobotError if it does not."""
         limit = self._line.now() + self._wait
         while self._line.now() < limit:
             self._advertise(True)
-            self._greet()  # an advertisement equal to the robot's own would silence it; version 0 does not
+            self._greet()  # advertise version 0: after an advertisement equal to its own the robot stays silent
             for said in self._messages(self._line.now() + GREETING_SECONDS):
                 if isinstance(said, Advertisement) and self._is_it(said) and said.is_active:
                     return

@@ -1,1 +1,1 @@
-"""Firmware under pytest: a plugin with the fixtures `firmware` and `robot` (docs/testing.md)."""
+"""Tests of firmware with pytest: a plugin with the fixtures `firmware` and `robot` (docs/testing.md)."""

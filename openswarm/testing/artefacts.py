@@ -17,7 +17,7 @@ from emu.instruments.vcd import WaveformRecorder
 from openswarm.testing.robot import Robot
 
 STRETCH_MS: Final = 50
-"""Maximum length of the waveform."""
+"""Maximum length of the waveform in milliseconds."""
 
 
 def write(robot: Robot, folder: Path) -> str:

@@ -26,11 +26,11 @@ if TYPE_CHECKING:
     from openswarm.testing.robot import Robot
 
 ROBOTS: Final = pytest.StashKey[list[Any]]()
-"""Stash key: robots of a test."""
+"""Stash key of the robots that a test has created."""
 BUILT: Final = pytest.StashKey[dict[tuple[str, ...], Path]]()
-"""Stash key: images of this process by their source."""
+"""Stash key of the images that this process has built, by their source."""
 MADE: Final = "build/firmware.elf"
-"""Output of a project's Makefile (`openswarm new`)."""
+"""Path of the image that a project's Makefile builds (`openswarm new`)."""
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -52,7 +52,7 @@ def pytest_configure(config: pytest.Config) -> None:
 
 @pytest.fixture
 def firmware(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return the ELF file of this test: of its mark `firmware`, else of the ini value."""
+    """Return the ELF file of this test, given by its mark `firmware` or by the ini value."""
     config = request.config
     mark = request.node.get_closest_marker("firmware")
     if mark is not None and mark.args:
@@ -96,7 +96,8 @@ def _made(folder: Path) -> Path:
 
 @pytest.fixture
 def robot(request: pytest.FixtureRequest, firmware: Path) -> Robot:
-    """Return a robot with that firmware after power-on; the mark `robot` configures its surroundings."""
+    """Return a robot with the test's firmware after power-on; the mark `robot` configures the board and its
+    surroundings."""
     from openswarm.testing.robot import Robot
 
     around: dict[str, Any] = {}
@@ -121,7 +122,7 @@ def _artefacts(item: pytest.Item) -> Path:
 def pytest_runtest_makereport(
     item: pytest.Item, call: pytest.CallInfo[None]
 ) -> Generator[None, pytest.TestReport, pytest.TestReport]:
-    """Add properties for JUnit, and write the artefacts of a failure."""
+    """Add properties for the JUnit report, and write the artefacts of a failed test."""
     report = yield
     robots = item.stash.get(ROBOTS, [])
     if report.when != "call" or not robots:

@@ -1,6 +1,7 @@
-"""A robot in a test. It runs only inside the calls below, in simulated time, so time-outs do not depend on the host.
+"""An emulated robot in a test.
 
-A firmware fault fails the call in which it happens, with its whole report.
+It runs only within the calls below and in simulated time, so that time-outs do not depend on the host. A firmware
+fault fails the call in which it occurs, with the complete fault report.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ class FirmwareFault(AssertionError):
 
 
 class Line:
-    """A UART of the robot. `expect` also matches earlier output that no expectation has matched yet."""
+    """A UART of the robot. `expect` also matches earlier output that no previous expectation has matched."""
 
     def __init__(self, robot: Robot, uart: Uart) -> None:
         self._robot: Final = robot
@@ -55,7 +56,7 @@ class Line:
 
 @dataclass(frozen=True, slots=True)
 class Cycles:
-    """Times of a function's calls in Tcy, including callees, without interrupts, sleep and other threads."""
+    """Durations of a function's calls in Tcy, including callees, without interrupts, sleep and other threads."""
 
     calls: int
     total: int
@@ -64,7 +65,7 @@ class Cycles:
 
 
 class Measured:
-    """Result of a `Robot.measured` block; read it after the block."""
+    """Result of a `Robot.measured` block, available after the block."""
 
     def __init__(self, robot: Robot, profiler: Profiler, profile: Profile) -> None:
         self._robot: Final = robot
@@ -105,9 +106,12 @@ class Robot:
     """A robot after power-on. `machine` gives access to its whole state (`help(emu.Machine)`)."""
 
     def __init__(self, image: Path, **around: Any) -> None:
-        """Load an image. `around` has the arguments of `emu.load`, and `selector`, `sensor` (a camera type or None),
-        `camera` (a picture file), `stimulus` (a file of events). Raises the errors of `emu.load`, ValueError for a bad
-        file."""
+        """Load an image.
+
+        `around` has the arguments of `emu.load`, and also `selector`, `sensor` (a camera type or None), `camera` (a
+        picture file) and `stimulus` (a file of input events). Raises the errors of `emu.load`, and ValueError for a
+        bad file.
+        """
         from emu.boards.epuck.board import Epuck
         from emu.boards.picture import read_picture
 
@@ -130,7 +134,7 @@ class Robot:
 
     @property
     def camera(self) -> Any:
-        """Camera, or None: `show(picture)` takes a picture of shape (480, 640, 3)."""
+        """The camera, or None; `show(picture)` takes a picture of shape (480, 640, 3)."""
         return self.board.camera
 
     @property
@@ -144,13 +148,16 @@ class Robot:
         return stop
 
     def run_to(self, place: str, *, within_ms: float) -> None:
-        """Run to the next arrival at a function or label. Raises FirmwareFault, AssertionError if it is not reached."""
+        """Run until a function or label is next reached.
+
+        Raises FirmwareFault, and AssertionError if it is not reached.
+        """
         cycles = self.machine.cycles_in(within_ms / MILLISECONDS)
         stop = self.watched(lambda: self.machine.run(cycles, until=place))
         assert stop.reason == "until", f"{place} was not reached within {within_ms:g} ms: {stop.reason}"
 
     def watched(self, work: Any) -> Any:
-        """Call `work` and return its result. Raises FirmwareFault if it ends in one."""
+        """Call `work`, which runs the machine, and return its result. Raises FirmwareFault if a fault ends it."""
         from emu.peripherals.wait import ExpectError
 
         try:
@@ -168,12 +175,14 @@ class Robot:
         return self.fault
 
     def var(self, expression: str) -> Any:
-        """Return the value of a C expression."""
+        """Return the value of a C expression in the firmware."""
         return self.machine.var(expression)
 
     def stack(self, thread: str) -> Thread:
-        """Return an OpenSwarm thread by the name of its function; `.free`: stack bytes never written. Raises
-        KeyError."""
+        """Return an OpenSwarm thread by the name of its function; `.free` is its number of never written stack bytes.
+
+        Raises KeyError for an unknown name.
+        """
         for one in self.machine.threads():
             if one.name == thread:
                 return one
@@ -181,7 +190,7 @@ class Robot:
 
     @contextmanager
     def measured(self) -> Iterator[Measured]:
-        """Count every cycle inside the block; native code runs at more than half its speed."""
+        """Count all cycles within the `with` block; the JIT then runs at more than half its speed."""
         from emu.profile.cycle_shares import Profiler
 
         assert self.machine.image is not None

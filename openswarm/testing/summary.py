@@ -1,6 +1,7 @@
 """Markdown table of a JUnit file, for the summary of a CI job: `python -m openswarm.testing.summary results.xml`.
 
-Failed tests come with what the plugin said of their robot. Exit status 0, 2 for a file that is none.
+Failed tests are listed with the plugin's report on their robot. The exit status is 0, or 2 if the file is no JUnit
+file.
 """
 
 from __future__ import annotations
@@ -10,11 +11,11 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 CLOCK_HZ = 14_745_600
-"""Tcy per second of an e-puck (dspic30f6014a.md §3)."""
+"""Cycles (Tcy) per second of an e-puck (dspic30f6014a.md §3)."""
 
 
 def table(root: ElementTree.Element) -> list[str]:
-    """Return the lines of Markdown."""
+    """Return the lines of the Markdown table of a JUnit file."""
     lines = ["| test | result | simulated |", "|---|---|---|"]
     told = []
     for case in root.iter("testcase"):
@@ -32,7 +33,7 @@ def table(root: ElementTree.Element) -> list[str]:
 
 
 def main(arguments: list[str]) -> int:
-    """Exit status as the module says."""
+    """Run the command line; return the exit status of the module's docstring."""
     try:
         (name,) = arguments
         root = ElementTree.parse(name).getroot()

@@ -1,5 +1,8 @@
-"""`openswarm flash` against a boot loader in Python, whose line loses, damages and delays what the test says, on a
-clock of its own; the loader in C is met in tests/firmware/update/test_boot_on_target.py."""
+"""`openswarm flash` with a simulated boot loader on a simulated clock.
+
+The line to the loader can lose, damage and delay bytes. tests/firmware/update/test_boot_on_target.py tests the
+loader in C.
+"""
 
 from __future__ import annotations
 
@@ -31,14 +34,14 @@ BOOT = Path(__file__).parents[2] / "firmware" / "apps" / "boot"
 
 
 def image(*blocks: tuple[int, list[int]]) -> Image:
-    """An image with a reset vector to 0x100 and these words."""
+    """Return an image with a reset vector to 0x100 and the given (address, words) blocks."""
     made = [Block(0, array("I", goto(0x100)), "reset")]
     made += [Block(base, array("I", words), "test") for base, words in blocks]
     return Image("test.elf", "elf", chip_named(), tuple(made))
 
 
 class Robot:
-    """A loader as its source reads, behind a line: bytes arrive at once, a pause of a second ends a conversation."""
+    """Simulated tinybld loader and its line: bytes arrive at once, and a pause of a second ends a conversation."""
 
     def __init__(self, kind: int = 0x71) -> None:
         self.flash: dict[int, bytes] = {}
@@ -46,12 +49,12 @@ class Robot:
         self.heard_at = 0.0
         self.type = kind
         self.inbox = b""
-        """What the loader has of the block that is coming."""
+        """Received bytes of the current block."""
         self.greeted = False
         self.starts: list[int] = []
         self.outbox: list[tuple[float, bytes]] = []
         self.spoil: Callable[[int, bytes], bytes] = lambda number, data: data
-        """What arrives of the n-th piece the host writes."""
+        """Function that returns the received bytes of the n-th write of the host."""
         self.delay: Callable[[int], float] = lambda number: 0.0
         self.written = 0
 
@@ -127,7 +130,10 @@ def holds_what(robot: Robot) -> bool:
 
 @pytest.mark.parametrize("kind", LOADERS)
 def test_an_image_arrives_and_the_loader_keeps_what_is_its_own(kind):
-    """Reset leads to the loader, the loader's entry to the program; no row of the loader's is sent."""
+    """Flashing writes the image: reset leads to the loader, the loader's entry to the program.
+
+    No row of the loader itself is sent.
+    """
     robot = Robot(kind)
     talk = flashed(robot, WHAT)
     assert holds_what(robot)
@@ -136,13 +142,14 @@ def test_an_image_arrives_and_the_loader_keeps_what_is_its_own(kind):
 
 
 def test_the_entry_leads_into_the_loader_until_all_is_there():
-    """Who is cut off in the middle is found in its boot loader: the first row erases the entry, the last sets it."""
+    """An interrupted transfer leaves a robot that enters its boot loader: the first row erases the entry, the last
+    sets it."""
     order = rows(WHAT, TINYBLD)
     slot = (TINYBLD.entry - TINYBLD.entry_row) // 2
     assert order[0][0] == order[-1][0] == TINYBLD.entry_row
     assert order[0][1][slot : slot + 4] == [0xFFFFFF] * 4
     assert order[-1][1][slot : slot + 2] == goto(0x100)
-    assert TINYBLD.entry + 8 == TINYBLD.start  # what is erased are NOPs, and behind them the loader begins
+    assert TINYBLD.entry + 8 == TINYBLD.start  # the erased words are NOPs that lead into the loader
     assert [address for address, _ in order[1:-1]] == sorted({address for address, _ in order[1:-1]})
 
 
@@ -152,8 +159,11 @@ def test_the_image_keeps_what_lies_before_the_entry():
 
 
 def test_damaged_lost_and_doubled_bytes_cost_time_and_nothing_else():
-    """Piece 4 has a bit wrong, 7 loses bytes, 9 is gone. A greeting too many puts the first block out of step, in which
-    it would be accepted, rotated, when it was sent again at once."""
+    """Damaged, lost and duplicated bytes cost time only.
+
+    Write 4 has a wrong bit, write 7 loses bytes, write 9 is lost. A superfluous greeting shifts the first block by a
+    byte; if it were repeated at once, the loader would accept it in rotated form.
+    """
     robot = Robot()
 
     def spoil(number: int, data: bytes) -> bytes:
@@ -240,7 +250,7 @@ def test_what_cannot_be_flashed_is_one_line(tmp_path, capsys):
 
 @pytest.mark.parametrize("target", [0x101, 0x102, 0x018000, 0x7FFFFE])
 def test_a_goto_has_to_lead_to_a_program(target: int):
-    """To a word of the image, which is one of flash: not beside it, nor between two."""
+    """The reset GOTO must lead to a flash word of the image; other and odd targets are refused."""
     wrong = image((0x100, [0]))
     wrong.blocks[0].words[0] = 0x040000 | target & 0xFFFF
     wrong.blocks[0].words[1] = target >> 16
@@ -249,7 +259,7 @@ def test_a_goto_has_to_lead_to_a_program(target: int):
 
 
 def test_a_line_with_an_echo_acknowledges_nothing():
-    """A row with a 'K' in it would be taken for written, whatever the robot said."""
+    """An echo on the line is refused: the loader's 'K' could be an echoed byte of a row."""
     robot = Robot()
     heard = robot.write
 
@@ -264,14 +274,17 @@ def test_a_line_with_an_echo_acknowledges_nothing():
 
 
 def test_an_image_for_another_chip_is_refused():
-    """Its flash ends before the loaders begin."""
+    """An image for a chip whose flash ends before the known loaders is refused."""
     other = Image("small.elf", "elf", chip_named("dsPIC30F4013"), image().blocks)
     with pytest.raises(ValueError, match=r"small\.elf: is for the dsPIC30F4013, for which no boot loader is known"):
         rows(other, TINYBLD)
 
 
 def test_a_port_that_vanishes_or_takes_nothing_is_one_error(monkeypatch):
-    """Whatever is done next with it: `termios` has errors of its own."""
+    """A port that vanishes or accepts no bytes gives one error for every following operation.
+
+    `termios` raises its own exception type, which must be converted.
+    """
     monkeypatch.setattr("openswarm.flashing.serial._STUCK_SECONDS", 0.05)
     master, slave = pty.openpty()
     termios.tcflow(slave, termios.TCOOFF)
@@ -309,7 +322,7 @@ def test_what_ends_the_progress_has_a_line_of_its_own(monkeypatch, capsys):
 
 
 def test_the_terminal_of_the_command_is_no_port():
-    """It would be left in raw mode."""
+    """The controlling terminal is refused as a port, because it would remain in raw mode."""
     child, terminal = pty.fork()
     if child == 0:
         os.execv(sys.executable, [sys.executable, "-m", "openswarm", "flash", str(HELLO_HEX), "--port", "/dev/tty"])
@@ -337,7 +350,7 @@ def test_the_image_of_the_tests_has_a_reset_vector():
 
 
 def test_our_loader_lies_where_the_host_believes_it() -> None:
-    """Address and type stand in the loader's C and in loaders.py: neither can read the other."""
+    """Address and type of this project's loader are equal in its C source and in loaders.py."""
     (start,) = re.findall(r"#define BOOT_START (0x[0-9A-F]+)", (BOOT / "boot.h").read_text())
     (type_,) = re.findall(r"TYPE = (0x[0-9A-F]+)", (BOOT / "main.c").read_text())
     assert LOADERS[int(type_, 16)].start == int(start, 16)

@@ -1,5 +1,8 @@
-"""`openswarm flash` of programs against robots in Python, on a clock of their own: such as echo, stand still, begin
-anew, answer late, or vanish. The robot in C is met in tests/firmware/update/test_spreading_on_target.py."""
+"""`openswarm flash` of programs with simulated robots on a simulated clock.
+
+The robots echo, make no progress, restart the transfer, answer late or fall silent.
+tests/firmware/update/test_spreading_on_target.py tests the robot's implementation in C.
+"""
 
 from __future__ import annotations
 
@@ -43,7 +46,7 @@ WAIT = 30.0
 
 
 class Robot:
-    """One that takes a program as its firmware does, at the other end of a line."""
+    """Simulated robot at the other end of a line that receives a program as the firmware does."""
 
     def __init__(self, version: int = 0) -> None:
         self.time = 0.0
@@ -53,11 +56,11 @@ class Robot:
         self.says_at, self.asks_at = 1e9, 1e9
         self.outbox: list[tuple[float, bytes]] = []
         self.late: Callable[[], float] = lambda: 0.0
-        """Seconds that what it says is on its way."""
+        """Function that returns the delay of the robot's next message in seconds."""
         self.loses: Callable[[bytes], bool] = lambda message: False
-        """What of the host's does not arrive."""
+        """Function that returns whether a message of the host is lost."""
         self.at_row: Callable[[int], None] = lambda row: None
-        """Called when it asks for a row."""
+        """Callback for the start of a request, with the requested row."""
 
     def now(self) -> float:
         return self.time
@@ -94,7 +97,7 @@ class Robot:
             self.say(head + self.lacking.to_bytes(3, "little") + identity(self.wants.crc).to_bytes(2, "little"))
 
     def begin(self) -> None:
-        """From the first row on, as after a reset."""
+        """Restart the transfer from the first row, as after a reset."""
         self.row, self.lacking = 0, (1 << PARTS) - 1
 
     def write(self, frames: bytes) -> None:
@@ -143,7 +146,8 @@ def test_a_robot_takes_it_whatever_is_lost_and_however_late_it_speaks():
 
 
 def test_a_line_that_echoes_is_told_and_nothing_believed():
-    """The host's own word would be taken for that of a robot which has the program."""
+    """A line that echoes is refused: the host's own advertisement would pass for that of a robot that has the
+    program."""
 
     class Echo(Robot):
         def hear(self, message: bytes) -> None:
@@ -183,7 +187,10 @@ def built(folder: Path) -> Path:
 
 
 def test_a_robot_that_asks_and_does_not_get_on_is_given_up():
-    """It asks for one row for ever; or for others by turns, each time with something missing."""
+    """A robot that makes no progress is given up.
+
+    It requests one row for ever, or different rows in turn, always with a missing part.
+    """
     robot = Robot()
     robot.loses = lambda message: message[0] == 0xC2
     with pytest.raises(RobotError, match="the robot asks again and again for row 2: what it has stays there"):

@@ -1,4 +1,4 @@
-"""`openswarm new`: the project builds with make and with CMake, and its own test fails when the firmware is wrong."""
+"""`openswarm new`: the project builds with make and with CMake, and its test fails if the firmware is faulty."""
 
 from __future__ import annotations
 
@@ -45,7 +45,8 @@ def test_it_has_its_name_everywhere_and_no_hole(project):
 
 
 def test_make_builds_and_its_test_tells_right_from_wrong(project):
-    """A mistake in the C source is shown where VS Code's problem matcher finds it."""
+    """The project's test passes, and a mistake in the C source is reported in the format of VS Code's problem
+    matcher."""
     done = called(project, "make", "test")
     assert (done.returncode, "4 passed" in done.stdout) == (0, True), done.stdout + done.stderr
     source = project / "src" / "main.c"
@@ -66,7 +67,8 @@ def test_make_builds_and_its_test_tells_right_from_wrong(project):
 
 
 def test_the_editor_finds_the_line_of_a_fault(project):
-    """Faults as docs/debugging.md and docs/tour.md show them."""
+    """The problem matcher of the project's tasks finds the line of faults as printed in docs/debugging.md and
+    docs/tour.md."""
     task = json.loads((project / ".vscode" / "tasks.json").read_text())["tasks"][1]
     pattern = re.compile(task["problemMatcher"]["pattern"]["regexp"])
     pages = [(ROOT / "docs" / name).read_text(encoding="utf-8") for name in ("debugging.md", "tour.md")]
@@ -77,7 +79,7 @@ def test_the_editor_finds_the_line_of_a_fault(project):
 
 @pytest.mark.skipif(shutil.which("cmake") is None, reason="no CMake here (Debian package cmake)")
 def test_cmake_builds_it(project):
-    """Generators get the compiler identified; what comes out says the same as make's."""
+    """CMake identifies the compiler and builds a program with the same output as make's."""
     done = called(project, "cmake", "-B", "build/cmake")
     assert done.returncode == 0, done.stderr
     assert (project / "build/cmake/compile_commands.json").exists()

@@ -1,4 +1,4 @@
-"""The pages say what is so: links lead somewhere, examples are what the tools take, facts stand in one place."""
+"""Documentation pages: links are valid, examples are accepted by the tools, each fact is stated in one file only."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ CODE = re.compile(r"```.*?```|`[^`\n]*`", re.DOTALL)
 
 
 def anchors(page: Path) -> set[str]:
-    """The anchors of a page's headings, as GitHub makes them."""
+    """Return the anchors of a page's headings, as GitHub generates them."""
     heads = re.findall(r"^#+ (.*)$", page.read_text(encoding="utf-8"), re.MULTILINE)
     return {re.sub(r"[^\w\- ]", "", head.lower()).replace(" ", "-") for head in heads}
 
@@ -64,7 +64,7 @@ def test_the_scene_of_the_page_is_a_scene(tmp_path):
 
 
 def test_the_version_stands_in_one_place():
-    """`pyproject.toml`; the changelog and the citation follow it, no code repeats it."""
+    """The version is stated in `pyproject.toml`; changelog and citation agree with it, and no code repeats it."""
     version = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["version"]
     assert re.search(r"^## (\S+)", (ROOT / "CHANGELOG.md").read_text(), re.MULTILINE)[1] in (version, "Unreleased")
     assert f"version: {version}\n" in (ROOT / "CITATION.cff").read_text()

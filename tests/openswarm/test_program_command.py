@@ -1,4 +1,7 @@
-"""`openswarm`, and what the four command lines have in common: help with examples, versions, completion, statuses."""
+"""The command `openswarm`, and common features of the four command lines.
+
+They are help with examples, versions, completion and exit statuses.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +25,7 @@ PROGRAMS = ("emu", "toolchain", "arena", "openswarm")
 
 
 def ran(*words: str, **environment: str) -> subprocess.CompletedProcess[str]:
-    """A command line in a process of its own."""
+    """Run a command line in its own process."""
     return subprocess.run([sys.executable, "-m", *words], capture_output=True, text=True, timeout=HANG, check=False,
                           cwd=ROOT, env=os.environ | environment)  # fmt: skip
 
@@ -37,7 +40,7 @@ def test_every_program_tells_its_version_and_helps_with_an_example(program):
 
 @pytest.mark.parametrize("program", PROGRAMS)
 def test_every_program_completes_itself_in_bash(program, tmp_path):
-    """The script is asked what bash would ask it: which words may follow the program's name."""
+    """The completion script of every program returns the commands to bash."""
     script = ran(program, "completion", "bash").stdout
     (tmp_path / "script").write_text(script)
     asked = f'source {tmp_path}/script; COMP_WORDS=({program} comp); COMP_CWORD=1; $(complete -p {program} |' \
@@ -69,7 +72,7 @@ def test_the_cache_is_where_the_environment_says(monkeypatch, tmp_path):
 
 
 def test_a_command_may_have_a_cache_of_its_own(monkeypatch, tmp_path):
-    """`--cache DIR`, for this process and those it starts."""
+    """`--cache DIR` sets the cache of a command and of the processes that it starts."""
     monkeypatch.setenv("OPENSWARM_CACHE", str(tmp_path))
     for number, module in enumerate(("emu.commands.run", "emu.commands.profile", "arena.commands.run")):
         folder = tmp_path / str(number)
@@ -93,7 +96,7 @@ def test_clean_takes_what_is_ours_and_nothing_else(monkeypatch, tmp_path, capsys
 
 
 def test_doctor_names_what_a_missing_program_disables(tmp_path):
-    """With an empty PATH every program is missing; only make is needed."""
+    """`openswarm doctor` with an empty PATH reports every program as missing, and only make as required."""
     done = ran("openswarm", "doctor", "--json", PATH=str(tmp_path))
     told = json.loads(done.stdout)
     assert done.returncode == exit_status.FAULT
@@ -114,7 +117,8 @@ def test_doctor_tries_compiler_and_emulator():
 
 
 def test_the_arena_without_its_extra_names_it(tmp_path):
-    """One line and status 2, whichever of its packages is not there."""
+    """Without its extra, `arena` prints one line that names the extra and exits with 2, whichever package is
+    missing."""
     for package in ("pymunk", "scipy"):
         (tmp_path / package).mkdir()
         (tmp_path / package / f"{package}.py").write_text(f"raise ModuleNotFoundError(name={package!r})\n")
@@ -124,7 +128,7 @@ def test_the_arena_without_its_extra_names_it(tmp_path):
 
 
 def test_the_archiver_does_what_cmake_asks(tmp_path):
-    """`ar qc` and `ranlib`; a member that is appended twice is there twice, as with GNU ar."""
+    """`ar qc` and `ranlib` work as CMake calls them; a member that is appended twice is stored twice, as by GNU ar."""
     (tmp_path / "a.s").write_text(".global _a\n_a: return\n")
     bin_folder = Path(sys.executable).parent
     for words in ("as a.s -o a.o", "ar qc x.a a.o", "ar q x.a a.o", "ranlib x.a"):

@@ -1,4 +1,4 @@
-"""The program in the README builds without a warning and does what its comments say."""
+"""The program in the README compiles without a warning and does what its comments say."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ ROOT = Path(__file__).resolve().parents[2]
 
 
 def test_the_program_blinks_and_drives(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """The thread toggles the body LED; the handler drives when the selector is turned at 0.5 s."""
+    """The README's thread toggles the body LED, and its handler drives after the selector is turned at 0.5 s."""
     (program,) = re.findall(r"```c\n(.*?)```", (ROOT / "README.md").read_text(encoding="utf-8"), re.DOTALL)
     (tmp_path / "src").mkdir()
     (tmp_path / "src" / "main.c").write_text(program)

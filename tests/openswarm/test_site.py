@@ -1,4 +1,4 @@
-"""The documentation site builds without a warning, and every page of its contents is there."""
+"""The documentation site builds without a warning and contains every page of its table of contents."""
 
 from __future__ import annotations
 

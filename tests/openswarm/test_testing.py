@@ -1,4 +1,4 @@
-"""The pytest plugin: what it offers, what a failure leaves, from the wheel in an environment of its own; the action."""
+"""The pytest plugin: its fixtures, the artefacts of a failure, the installation from the wheel, and the CI action."""
 
 from __future__ import annotations
 
@@ -96,7 +96,7 @@ def test_a_failure_says_where_and_leaves_a_waveform(tests, how):
     assert (folder / "uart1.txt").read_bytes() == b"ready\r\ngot it\r\n"
     waves = VCDVCD(str(folder / "waves.vcd"))
     sent = [int(value, 2) for _, value in waves["uart1.tx"].tv]
-    assert bytes(sent[1:]) == b"\r\ngot it\r\n"  # since the last input
+    assert bytes(sent[1:]) == b"\r\ngot it\r\n"  # sent since the last input
     cases = {case.get("name"): case for case in ElementTree.parse(tests / "out.xml").getroot().iter("testcase")}
     properties = {one.get("name"): one.get("value") for one in cases["test_it_survives_an_answer"].iter("property")}
     assert properties["robot_artefacts"] == str(folder)
@@ -119,8 +119,10 @@ def test_a_compiler_s_message_reaches_the_report(tests):
 
 @pytest.mark.skipif(shutil.which("git") is None or not (ROOT / ".git").exists(), reason="not a clone, or no git")
 def test_the_action_s_steps_as_they_are_from_the_wheel(tmp_path):
-    """In an environment with nothing but the wheel: a new project passes; with a mistake in its C source, the summary
-    names thread and line, and there is a waveform."""
+    """The steps of the CI action work in an environment that contains only the wheel.
+
+    A new project passes. With a mistake in its C source, the summary names thread and line, and there is a waveform.
+    """
     action = yaml.safe_load((ROOT / "action.yml").read_text())
     environment = first_steps.installed(first_steps.built_wheel(tmp_path), tmp_path / "venv")
     subprocess.run(["openswarm", "new", "robot"], cwd=tmp_path, env=environment, check=True, capture_output=True)
@@ -132,12 +134,12 @@ def test_the_action_s_steps_as_they_are_from_the_wheel(tmp_path):
         for file in (outputs, summary):
             file.write_text("")
         for step in action["runs"]["steps"]:
-            if step["name"] == "Install":  # done above, without a network
+            if step["name"] == "Install":  # replaced by the installation above, which needs no network
                 continue
             values = {f"inputs.{name}": value for name, value in inputs.items()}
             told = dict(line.split("=", 1) for line in outputs.read_text().splitlines())
             values |= {f"steps.test.outputs.{name}": value for name, value in told.items()}
-            own = {name: values[text[4:-3]] for name, text in step.get("env", {}).items()}  # each is one ${{ }}
+            own = {name: values[text[4:-3]] for name, text in step.get("env", {}).items()}  # each is one expression ${{ }}
             assert step["shell"] == "bash"
             done = subprocess.run(
                 ["bash", "-e", "-o", "pipefail", "-c", step["run"]], cwd=tmp_path, check=False, capture_output=True,

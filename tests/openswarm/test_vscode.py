@@ -1,4 +1,4 @@
-"""The extension for Visual Studio Code: what it declares fits the debugger, new projects and the packaging tool."""
+"""The extension for Visual Studio Code: its declarations match the debugger, new projects and the packaging tool."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ FOLDER = ROOT / "editors" / "vscode"
 EXTENSION: dict[str, Any] = json.loads((FOLDER / "package.json").read_text(encoding="utf-8"))
 DEBUGGER: dict[str, Any] = EXTENSION["contributes"]["debuggers"][0]
 EVERYWHERE = ("type", "request", "name", "preLaunchTask", "presentation")
-"""What VS Code knows of every configuration."""
+"""Keys of a launch configuration that VS Code defines for every debugger."""
 VSCE = "@vscode/vsce@3"
 
 
 def matched(configuration: dict[str, Any]) -> None:
-    """Raises jsonschema.ValidationError unless the extension's own schema takes a launch configuration."""
+    """Validate a launch configuration against the extension's schema. Raises jsonschema.ValidationError."""
     assert configuration["type"] == DEBUGGER["type"]
     schema = DEBUGGER["configurationAttributes"][configuration["request"]]
     own = {name: value for name, value in configuration.items() if name not in EVERYWHERE}
@@ -39,7 +39,7 @@ def matched(configuration: dict[str, Any]) -> None:
 
 
 def plain(body: Any) -> Any:
-    """Return a snippet's body as inserted."""
+    """Return the body of a snippet as VS Code inserts it."""
     text = re.sub(r"\$\{\d:([^}]*)\}", r"\1", json.dumps(body))
     return json.loads(re.sub(r'"\^\\"(.*?)\\""', r'"\1"', text).replace("\\\\$", "$"))
 
@@ -54,7 +54,10 @@ def test_snippets_and_first_configurations_fit_the_schema() -> None:
 
 
 def test_a_new_project_fits_the_extension(tmp_path: Path) -> None:
-    """Its launch configurations and the problem matchers in its tasks, which work without the extension too."""
+    """The launch configurations of a new project match the extension.
+
+    The problem matchers in its tasks work without the extension too.
+    """
     assert main(["new", str(tmp_path / "robot")]) == 0
     launch = json.loads((tmp_path / "robot" / ".vscode" / "launch.json").read_text())
     for configuration in launch["configurations"]:
@@ -77,7 +80,7 @@ def test_it_is_of_this_version_and_licence() -> None:
 
 @pytest.mark.skipif(shutil.which("node") is None, reason="no node here (Debian package nodejs)")
 def test_the_command_lines_it_starts_are_understood() -> None:
-    """extension.js is run with a stand-in for the editor's interface."""
+    """The debugger accepts the command lines that extension.js starts, which runs here with a simulated editor API."""
     script = """
         require('module')._load = ((load) => (name, ...rest) => name === 'vscode' ? {} : load(name, ...rest))
             (require('module')._load);
@@ -95,8 +98,10 @@ def test_the_command_lines_it_starts_are_understood() -> None:
 
 @pytest.mark.skipif(shutil.which("node") is None, reason="no node here (Debian package nodejs)")
 def test_the_status_bar_follows_stops_and_the_present() -> None:
-    """The time is asked for again when the robot stands somewhere else, and when the present has come to where it is;
-    only the former makes values of before."""
+    """The status bar requests the time after a stop, and when the present reaches the robot's time.
+
+    Only a stop makes displayed register values outdated.
+    """
     script = """
         const seen = { trackers: [], clock: {}, trees: 0 }, nothing = () => ({});
         class EventEmitter { constructor() { this.event = nothing; } fire() { seen.trees += 1; } }
@@ -133,7 +138,7 @@ def test_the_status_bar_follows_stops_and_the_present() -> None:
 
 @pytest.mark.skipif(shutil.which("node") is None, reason="no node here (Debian package nodejs)")
 def test_a_python_without_the_debugger_is_told(tmp_path: Path) -> None:
-    """VS Code says nothing of an adapter that ends at once."""
+    """A Python without the debugger is reported, because VS Code shows no error if an adapter ends at once."""
     script = """
         require('module')._load = ((load) => (name, ...rest) => name === 'vscode' ? {} : load(name, ...rest))
             (require('module')._load);
@@ -181,7 +186,7 @@ def test_odd_values_of_a_configuration_are_refused_in_words() -> None:
 
 
 def test_it_is_packaged(tmp_path: Path) -> None:
-    """By VS Code's own tool; the package has the extension, its licence and nothing else."""
+    """VS Code's tool packages the extension, its licence and its README, and no other file."""
     npx = shutil.which("npx")
     if npx is None:
         pytest.skip("there is no npm (Debian packages nodejs, npm)")

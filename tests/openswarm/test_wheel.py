@@ -1,4 +1,4 @@
-"""The wheel: what is in it, that its bytes repeat, and that a newcomer gets as far as a swarm with it."""
+"""The wheel: its contents, reproducible bytes, and the first steps of a new user."""
 
 from __future__ import annotations
 
@@ -22,7 +22,10 @@ pytestmark = [
 
 
 def test_the_wheel_holds_everything_and_repeats(tmp_path):
-    """Kernel, headers, run-time library, scenes, template, licence; no build output; twice the same bytes."""
+    """The wheel contains kernel, headers, run-time library, scenes, template and licence, but no build output.
+
+    Building it twice gives the same bytes.
+    """
     wheels = []
     for name in ("one", "another"):
         (tmp_path / name).mkdir()
@@ -54,7 +57,7 @@ def test_the_wheel_holds_everything_and_repeats(tmp_path):
 
 
 def test_the_first_steps_say_what_happens(tmp_path):
-    """docs/first-steps.md, played from the wheel in an empty folder with an empty HOME; nothing lands beside them."""
+    """docs/first-steps.md works from the wheel in an empty folder with an empty HOME, and creates files only there."""
     script = ROOT / "docs" / "tools" / "first_steps.py"
     words = [sys.executable, str(script), "--check", "--keep", str(tmp_path / "first-steps")]
     done = subprocess.run(words, capture_output=True, text=True, check=False)

@@ -8,7 +8,7 @@ import pytest
 
 import emu
 
-pytestmark = pytest.mark.firmware("..")  # the folder with the Makefile
+pytestmark = pytest.mark.firmware("..")  # the folder that contains the Makefile
 
 
 def test_it_greets_every_second(robot):
@@ -16,7 +16,7 @@ def test_it_greets_every_second(robot):
     for _ in range(3):
         robot.uart.expect("hello from @PROJECT@\r\n", within_ms=1100)
         ends.append(robot.cycle)
-    assert ends[2] - ends[1] == pytest.approx(emu.FCY_HZ, rel=1e-3)  # cycles of a second
+    assert ends[2] - ends[1] == pytest.approx(emu.FCY_HZ, rel=1e-3)  # cycles per second
 
 
 def test_the_body_led_follows(robot):
