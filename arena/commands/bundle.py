@@ -9,7 +9,7 @@ from pathlib import Path
 from arena.campaign import bundle
 from arena.commands.arguments import count, removed_processes
 from arena.commands.trust import add_trust_options
-from arena.trial.json_numbers import json_text
+from arena.trial.strict_json import json_text
 
 DIFFERENT = 1
 

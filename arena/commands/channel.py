@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from arena.commands.run import with_overrides
 from arena.infrared.propagation import PUBLISHED, Optics, amplitude, distance_of
 from arena.scene.loader import Scene, load_scene
-from arena.trial.json_numbers import json_text
+from arena.trial.strict_json import json_text
 from arena.world.physics import Poses
 
 THRESHOLDS: Final = (10.0, 2.0)

@@ -14,7 +14,7 @@ from arena.campaign.campaign import Plan, locked_folder, open_folder, trial_path
 from arena.commands.arguments import count_or_none, port
 from arena.commands.run import add_plan, copy_inputs, plan_from
 from arena.debug.controlled_robot import TrialAbortedError
-from arena.debug.session import DebugSession, RemoteServer
+from arena.debug.trial_client import DebugSession, RemoteServer
 from arena.trial.manifest import note_host_time
 from arena.trial.record import RecordError
 from emu.dap.wire import Wire, wire_over

@@ -19,7 +19,7 @@ from arena.commands.arguments import count, count_or_none
 from arena.robots.images import image_for
 from arena.robots.reactive import SPEED_TABLES
 from arena.scene.loader import FCY
-from arena.trial.json_numbers import json_text
+from arena.trial.strict_json import json_text
 from emu.boards.epuck.board import Epuck
 
 SPEED_WORDS: Final = {"openswarm": "stepper_left", "bare": "left.0"}

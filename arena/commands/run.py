@@ -18,9 +18,9 @@ from arena.robots.images import image_for
 from arena.robots.reactive import SPEED_TABLES
 from arena.scene.loader import Scene, load_scene, scripted
 from arena.scene.schema import RobotGroup
-from arena.trial.json_numbers import json_text
 from arena.trial.manifest import note_host_time
 from arena.trial.record import EXPERIMENT, Trial, trials_in, write_bytes
+from arena.trial.strict_json import json_text
 from emu.host.paths import use_cache
 
 DEFAULT_BRAIN, DEFAULT_CONTROLLER = "openswarm", "A"

@@ -18,8 +18,8 @@ from arena.commands.run import folder_name, run_with_progress, with_overrides
 from arena.experiments import experiment_file, experiment_of
 from arena.robots.reactive import SPEED_TABLES
 from arena.scene.loader import load_scene, scripted
-from arena.trial.json_numbers import json_text
 from arena.trial.record import EXPERIMENT, trials_in, write_bytes, write_text
+from arena.trial.strict_json import json_text
 
 VARIANTS: Final = {
     "as registered": [],

@@ -11,8 +11,8 @@ import numpy as np
 
 from arena.analysis.comparison import series_by_seed
 from arena.commands import run as single
-from arena.trial.json_numbers import json_text
 from arena.trial.record import trials_in
+from arena.trial.strict_json import json_text
 
 EXAMPLE = "example: arena sweep clustering --brain scripted --vary camera.range_cm=100,150,inf --vary robots.count=3,5"
 
