@@ -18,9 +18,9 @@ from emu.host.command import CommandError, Parser, cycles, seconds
 from emu.host.exit_status import DONE, FAULT, FAULT_AS_STATUS, INTERRUPTED, LIMIT_AS_STATUS
 from emu.host.files import atomic_text_file
 from emu.image.model import Image
-from emu.run.console import SPECIFICATIONS, ConsolePort, open_port
 from emu.run.input_log import HEADER, TimestampedInput, read_input_log
 from emu.run.session import FOREVER, Session
+from emu.run.uart_backends import SPECIFICATIONS, ConsolePort, open_port
 
 if TYPE_CHECKING:
     from emu.api import Machine
