@@ -18,6 +18,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
+from emu.machine.stops import SLEEP_CYCLES
 from emu.system.events import NEVER
 
 if TYPE_CHECKING:
@@ -30,24 +31,27 @@ PERIOD: Final = 1 << 20
 MAX_STATES: Final = 4096
 """Maximum number of stored states. Beyond it, every other state of the older half is discarded."""
 FIRST_WINDOW, WIDER, WIDEST = 64, 16, 1 << 26
-"""Cycles that are stepped to find the previous step: initial value, growth factor while the CPU sleeps, and maximum."""
+"""Cycles replayed in single steps to find the previous step.
+
+The values are: initial number, growth factor while the CPU sleeps, maximum number.
+"""
 STACK_POINTER: Final = 15
 
 
 @dataclass(frozen=True, slots=True)
 class StoredState:
-    """A state of the machine, compressed without flash. Consecutive states share the flash while it does not change."""
+    """A compressed state of the machine without flash. Consecutive states share the flash until it changes."""
 
     cycle: int
     packed: bytes
     flash: bytes
     is_input: bool
-    """Whether the machine received input just before this state."""
+    """Whether the machine received input immediately before this state."""
 
 
 @dataclass(frozen=True, slots=True)
 class Write:
-    """A write to the observed bytes by the instruction at `pc`, which begins in `cycle`."""
+    """A write to the observed bytes by the instruction at `pc` whose first cycle is `cycle`."""
 
     cycle: int
     pc: int
@@ -56,17 +60,17 @@ class Write:
 
 
 def position(machine: Machine) -> tuple[int, int]:
-    """Return PC and stack pointer, which change when an interrupt is entered."""
+    """Return PC and stack pointer. The entry of an interrupt changes them."""
     return machine.pc, machine.w[STACK_POINTER]
 
 
 class History:
-    """Records `machine` from now on, provided that `advance` and `step` of this class run it."""
+    """Recorder of `machine`. From its creation on, `advance` and `step` of this class must run the machine."""
 
     def __init__(self, machine: Machine, *, period: int = PERIOD, max_states: int = MAX_STATES) -> None:
         self.machine: Final = machine
         self.environment: Environment | None = None
-        """The environment of the machine. It remains in the present while the machine alone goes back."""
+        """The machine's environment. It remains in the present while only the machine goes back."""
         self.period: Final = period
         self.max_states: Final = max_states
         self._flash: Final = slice(
@@ -76,7 +80,7 @@ class History:
         self._cycles: list[int] = []
         self._last_state = b""
         self._previous_steps: tuple[int, list[int]] = (-1, [])
-        """A cycle, and the cycles of the steps before it, oldest first, as the last step back found them."""
+        """A cycle and the (cycle, PC) list of steps before it, oldest first, as found by the last step back."""
         self.end = machine.cycle
         """The present: the latest cycle that the machine has reached."""
         self._store(machine.snapshot(), is_input=True)
@@ -93,7 +97,7 @@ class History:
 
     @property
     def read_only_reason(self) -> str:
-        """Why the machine must not be changed now; empty if it may be changed."""
+        """Why the machine must not be changed now; empty if changes are permitted."""
         return ""
 
     @property
@@ -126,39 +130,53 @@ class History:
         self._last_state = machine.snapshot()
         return stop
 
-    def step(self) -> Stop | None:
-        """Step as `Machine.step` does, except that the entry of an interrupt is a separate step."""
+    def step(self, limit: int | None = None) -> Stop | None:
+        """Step as `Machine.step` does, but treat the entry of an interrupt as a step of its own.
+
+        A sleep in the past continues into the present if nothing in the recording ends it.
+        """
         self._detect_change()
+        machine = self.machine
+        limit = machine.cycle + SLEEP_CYCLES if limit is None else limit
         following = self._cycles[-1] + self.period
-        if self.is_past:
-            with self._replaying():
-                stop = self._step_once()
-            self._replay_input()
-        else:
-            stop = self._step_present()
-            self._record_progress(following)
-        self._last_state = self.machine.snapshot()
+        while True:
+            was_past = self.is_past
+            if was_past:
+                with self._replaying():
+                    stop = self._step_once(min(limit, self.end, self._next_input()))
+                self._replay_input()
+            else:
+                stop = self._step_present(limit)
+                self._record_progress(following)
+            if not (was_past and stop is not None and stop.reason == "limit" and machine.cycle < limit):
+                break
+        self._last_state = machine.snapshot()
         return stop
+
+    def _next_input(self) -> int:
+        """Return the next recorded cycle at which the machine received input; NEVER if there is none."""
+        place = bisect_right(self._cycles, self.machine.cycle)
+        return next((stored.cycle for stored in self._states[place:] if stored.is_input), NEVER)
 
     def _advance_present(self, cycle: int) -> Stop | None:
         """Run from the present to `cycle`."""
         return self.machine.advance(cycle)
 
-    def _step_present(self) -> Stop | None:
-        """Step from the present."""
-        return self._step_once()
+    def _step_present(self, limit: int) -> Stop | None:
+        """Step from the present; a sleeping CPU sleeps at most to cycle `limit`."""
+        return self._step_once(limit)
 
-    def _step_once(self) -> Stop | None:
-        """Make one step. A sleeping CPU sleeps until an event wakes it."""
+    def _step_once(self, limit: int) -> Stop | None:
+        """Make one step. A sleeping CPU sleeps until an event wakes it, at most to cycle `limit`."""
         machine = self.machine
         start = position(machine)
-        stop = machine.service_boundary(NEVER)
+        stop = machine.service_boundary(limit)
         if stop is not None:
             return stop
-        return machine.run_until(machine.cycle) if position(machine) != start else machine.step()
+        return machine.run_until(machine.cycle) if position(machine) != start else machine.step(limit)
 
     def _replay_input(self) -> None:
-        """Restore the input that the machine received at this cycle."""
+        """Restore the state with the input that the machine received at this cycle."""
         stored = self._states[bisect_right(self._cycles, self.machine.cycle) - 1]
         if stored.is_input and stored.cycle == self.machine.cycle:
             with self._replaying():
@@ -172,7 +190,7 @@ class History:
                 self._store(self.machine.snapshot(), is_input=False)
 
     def _detect_change(self) -> None:
-        """Store a new state if the machine was changed since the last run, and make this cycle the present."""
+        """If the machine was changed since the last run, store a new state and make this cycle the present."""
         state = self.machine.snapshot()
         if state == self._last_state:
             return
@@ -244,9 +262,9 @@ class History:
         return True
 
     def _steps(self, begin: int, now: int) -> Iterator[tuple[int, int]]:
-        """Replay from `begin` to `now` and yield (cycle, PC) of every step.
+        """Replay from `begin` to `now`. Yield (cycle, PC) of every step.
 
-        A sleep that began before `begin` is no step of its own.
+        A sleep that began before `begin` does not count as a step.
         """
         machine = self.machine
         inputs = [stored for stored in self._states if stored.is_input and begin < stored.cycle < now]
@@ -259,14 +277,14 @@ class History:
                 if not began_asleep:
                     yield machine.cycle, machine.pc
                 began_asleep = False
-                self._step_once()
+                self._step_once(inputs[0].cycle if inputs else now)
                 if inputs and inputs[0].cycle <= machine.cycle:  # between two steps, or while the CPU sleeps
                     machine.restore_state(self._unpacked(inputs.pop(0)))
 
     def earlier_steps(self) -> Iterator[list[tuple[int, int]]]:
-        """Yield lists of (cycle, PC) of the steps before now, oldest first, each longer than the last.
+        """Yield ever longer lists of the steps before now, as (cycle, PC), oldest first.
 
-        The last list begins at the start of the recording. Only `seek` restores the machine afterwards.
+        The last list begins at the start of the recording. Call `seek` afterwards to restore the machine.
         """
         now = self.machine.cycle
         self._detect_change()
@@ -281,9 +299,9 @@ class History:
             window *= WIDER
 
     def run_back(self, places: Collection[int], condition: Callable[[], bool] | None = None) -> int | None:
-        """Go back to the last arrival at one of the program addresses `places` at which `condition` holds.
+        """Go back to the previous hit of one of the program addresses `places` at which `condition` holds.
 
-        Return its address. Without such an arrival return None; the machine is then at the start of the recording.
+        Return that address. If there is no hit, return None and leave the machine at the start of the recording.
         """
         now = self.machine.cycle
         self._detect_change()
@@ -296,11 +314,12 @@ class History:
         return None if last is None else self.machine.pc
 
     def last_write(self, address: int, size: int, *, changes: bool = True) -> Write | None:
-        """Go back to just before the last instruction that wrote to one of the bytes (with `changes`: that changed
-        one).
+        """Go back to just before the last instruction that wrote one of the bytes.
 
-        Return None and leave the machine where it is if there is none. Every instruction of the replay is
-        single-stepped.
+        With `changes`, only writes that changed a byte count.
+
+        If there is none, return None and leave the machine unchanged. The replay executes every instruction as a
+        single step.
         """
         now = self.machine.cycle
         self._detect_change()
@@ -313,8 +332,7 @@ class History:
         return None
 
     def _intervals_before(self, now: int) -> Iterator[tuple[StoredState, int]]:
-        """Yield stored states, from the latest before `now` backwards, each with the cycle at which its interval
-        ends."""
+        """Yield stored states backwards, from the latest one before `now`. Each comes with the end of its interval."""
         end = now
         for stored in reversed(self._states[: bisect_right(self._cycles, max(now - 1, self.start))]):
             yield stored, end
@@ -382,7 +400,7 @@ class History:
 
     @contextmanager
     def _replaying(self) -> Iterator[None]:
-        """Replay without observers inside the block. Pending pin edges are reported before it."""
+        """Replay without observers inside the block. Report pending pin edges before it."""
         self.machine.pins.flush()
         self.machine.peripherals.deliver_uart_output()
         events, held = self.machine.events, self.machine.save_host_state()

@@ -21,7 +21,17 @@ from emu.dspic30f.exceptions.faults import RESTART, Breakpoint, DeviceReset, Vio
 from emu.dspic30f.state.state import PC_MASK, RUN, W15_INITIALISED
 from emu.image.model import Image
 from emu.machine.state_access import MemoryObserver, NameOrAddress, StateAccess
-from emu.machine.stops import CHECKPOINT_CYCLES, RESET_LOOP, RESETS_KEPT, LastReset, RunCheckpoints, Stop, next_reset
+from emu.machine.stops import (
+    CHECKPOINT_CYCLES,
+    RESET_LOOP,
+    RESETS_KEPT,
+    SLEEP_CYCLES,
+    STILL_ASLEEP,
+    LastReset,
+    RunCheckpoints,
+    Stop,
+    next_reset,
+)
 from emu.peripherals import CpuSignals, Peripherals, build
 from emu.system.bus import Bus
 from emu.system.events import NEVER, Events
@@ -283,8 +293,8 @@ class Machine(StateAccess):
             if self.cycle >= checkpoint:
                 checkpoint = self.cycle + CHECKPOINT_CYCLES
                 self.checkpoints.take(self.cycle, self.save_state())
-            stop = self.step()
-            if stop is not None:
+            stop = self.step(limit)
+            if stop is not None and stop.reason != "limit":
                 return stop
             if until():
                 return self.stopped("until")
@@ -311,16 +321,20 @@ class Machine(StateAccess):
             return self.stopped("limit")
         return self.stopped("until") if stop.reason == "breakpoint" and stop.pc == address else stop
 
-    def step(self) -> Stop | None:
+    def step(self, limit: int | None = None) -> Stop | None:
         """Run one instruction, and first all that is due at the boundary before it. Return a stop, or None.
 
-        A sleeping CPU sleeps until an event wakes it.
+        A sleeping CPU sleeps until an event wakes it, at most to cycle `limit` (by default for SLEEP_CYCLES). If it
+        still sleeps then, no instruction runs, and the reason of the stop is "limit", or "interrupted".
         """
         state = self.state
         stop = None
+        limit = self.cycle + SLEEP_CYCLES if limit is None else limit
         try:
-            if not self.core.sequencer.boundary(NEVER):
+            if not self.core.sequencer.boundary(limit):
                 stop = self.stopped("halt")
+            elif self.is_asleep:
+                stop = self._still_asleep()
             else:
                 stop = self._call_hooks() if state.pc in self._pc_hooks else None
                 if stop is None:
@@ -332,6 +346,13 @@ class Machine(StateAccess):
         except Violation as what:
             stop = self._diagnosed(Stop("fault", what.pc, state.cycle, str(what)))
         return self._sync_devices() or stop
+
+    def _still_asleep(self) -> Stop:
+        """Return the stop of a step in which no event has woken the CPU."""
+        if self._interrupt:
+            self._interrupt = False
+            return self.stopped("interrupted")
+        return Stop("limit", self.pc, self.cycle, STILL_ASLEEP)
 
     def service_boundary(self, limit: int) -> Stop | None:
         """Handle all that is due before the next instruction: events, exception entry, sleep up to cycle `limit`.

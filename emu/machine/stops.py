@@ -11,6 +11,10 @@ from emu.machine.fault import FaultReport
 REASONS: Final = ("limit", "breakpoint", "halt", "fault", "until", "interrupted")
 CHECKPOINT_CYCLES: Final = 1 << 23
 """Longest interval between two checkpoints of a run, in Tcy (half a second of an e-puck)."""
+SLEEP_CYCLES: Final = 1 << 24
+"""Longest sleep within one step without a limit of its own, in Tcy (1.1 s of an e-puck)."""
+STILL_ASLEEP: Final = "the CPU still sleeps: no enabled interrupt has woken it"
+"""Detail of the stop of a step whose limit comes before an interrupt."""
 RESETS_KEPT: Final = 16
 """Length of `Machine.resets`."""
 RESET_LOOP: Final = 8
