@@ -55,7 +55,7 @@ def pack(folders: list[Path], target: Path, light: bool = False) -> str:
             raise RecordError(f"{folder}: no finished run (manifest.json and trial-*.parquet) here")
         for path in sorted(path for pattern in PATTERNS for path in folder.glob(pattern)):
             if path.is_symlink() or not path.is_file():
-                raise RecordError(f"{path}: is a link or no file, and a link may point to any file of yours; "
+                raise RecordError(f"{path}: not a regular file: a bundle packs no symbolic link and no folder; "
                                   "replace it by a copy")  # fmt: skip
             if light and path.match(RECORD):
                 digest = json.dumps(asdict(digest_of(path)), indent=0, sort_keys=True)

@@ -36,7 +36,7 @@ def test_a_link_in_a_run_is_not_packed(
     assert main(["bundle", str(tmp_path / "x.zip"), str(run)]) == 2
     error = capsys.readouterr().err
     assert error.count("\n") == 1
-    assert "firmware.bak: is a link or no file" in error
+    assert "firmware.bak: not a regular file" in error
     assert not (tmp_path / "x.zip").exists()
     (run / "firmware.bak").rmdir() if kind == "folder" else (run / "firmware.bak").unlink()
     assert main(["bundle", str(tmp_path / "x.zip"), str(run)]) == 0
