@@ -79,6 +79,8 @@ class History:
         self._states: list[StoredState] = []
         self._cycles: list[int] = []
         self._last_state = b""
+        self._fault_stops: dict[int, Stop] = {}
+        """Stops at faults by the cycle at which the machine stopped."""
         self._previous_steps: tuple[int, list[int]] = (-1, [])
         """A cycle and the (cycle, PC) list of steps before it, oldest first, as found by the last step back."""
         self.end = machine.cycle
@@ -124,8 +126,9 @@ class History:
                 with self._replaying():
                     stop = machine.run_until(min(target, self.end))
                 self._replay_input()
+                stop = self._recorded_stop(stop)
             else:
-                stop = self._advance_present(target)
+                stop = self._record_stop(self._advance_present(target))
                 self._record_progress(following)
         self._last_state = machine.snapshot()
         return stop
@@ -145,13 +148,24 @@ class History:
                 with self._replaying():
                     stop = self._step_once(min(limit, self.end, self._next_input()))
                 self._replay_input()
+                stop = self._recorded_stop(stop)
             else:
-                stop = self._step_present(limit)
+                stop = self._record_stop(self._step_present(limit))
                 self._record_progress(following)
             if not (was_past and stop is not None and stop.reason == "limit" and machine.cycle < limit):
                 break
         self._last_state = machine.snapshot()
         return stop
+
+    def _record_stop(self, stop: Stop | None) -> Stop | None:
+        """Keep the diagnosis of a fault at which the present run has stopped, and return `stop`."""
+        if stop is not None and stop.fault is not None:
+            self._fault_stops[self.machine.cycle] = stop
+        return stop
+
+    def _recorded_stop(self, stop: Stop | None) -> Stop | None:
+        """Return a stop of the replay as the original run reported it: replayed faults are not diagnosed."""
+        return stop if stop is None else self._fault_stops.get(self.machine.cycle, stop)
 
     def _next_input(self) -> int:
         """Return the next recorded cycle at which the machine received input; NEVER if there is none."""
@@ -199,6 +213,7 @@ class History:
         place = bisect_right(self._cycles, cycle)
         if self._last_state or cycle != self.start:
             del self._states[place:], self._cycles[place:]
+            self._fault_stops = {at: stop for at, stop in self._fault_stops.items() if at <= cycle}
             self.end = cycle
             self._store(state, is_input=True)
         self._last_state = state
