@@ -49,7 +49,7 @@ class TransferCounts:
 
 
 class HostNeighbour:
-    """The host as a neighbour of one robot."""
+    """Host side of a transfer: acts as a neighbour of one robot."""
 
     def __init__(self, line: Line, program: Program, wait: float) -> None:
         """Create the neighbour. The transfer fails if the robot makes no progress for `wait` seconds."""

@@ -1,7 +1,7 @@
 """pytest plugin: builds firmware, runs it on an emulated robot, and keeps the artefacts of failures.
 
     @pytest.mark.firmware("main.c")            # or a folder with a Makefile, or an ELF file; else the ini value
-    @pytest.mark.robot(selector=3)             # what is around the chip; see openswarm.testing.robot.Robot
+    @pytest.mark.robot(selector=3)             # board and surroundings: see openswarm.testing.robot.Robot
     def test_it_answers(robot):
         robot.uart.expect("ready", within_ms=50)
 
@@ -34,7 +34,7 @@ MADE: Final = "build/firmware.elf"
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """Add the plugin's options and ini values."""
+    """Add the plugin's command line options and ini settings."""
     group = parser.getgroup("openswarm", "firmware on an emulated robot")
     group.addoption(
         "--robot-artefacts", metavar="DIR", default="robot-artefacts",

@@ -37,7 +37,7 @@ class Line:
         self._robot: Final = robot
         self._uart: Final = uart
         self.said: Final = bytearray()
-        """All output so far."""
+        """All bytes that the UART has sent so far."""
         uart.listen(lambda byte, _cycle: self.said.append(byte & 0xFF), lazy=True)
         uart.expect(b"", within=0)  # starts the capture of output
 

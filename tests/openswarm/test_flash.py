@@ -108,7 +108,7 @@ def words_of(row: bytes) -> list[int]:
     return [int.from_bytes(row[i : i + 3], "little") for i in range(0, 96, 3)]
 
 
-def flashed(robot: Robot, what: Image) -> BootSession:
+def flash_image(robot: Robot, what: Image) -> BootSession:
     talk = BootSession(robot, 5.0)
     talk.write(rows(what, talk.loader), lambda done, total: None)
     talk.start()
@@ -135,7 +135,7 @@ def test_an_image_arrives_and_the_loader_keeps_what_is_its_own(kind):
     No row of the loader itself is sent.
     """
     robot = Robot(kind)
-    talk = flashed(robot, WHAT)
+    talk = flash_image(robot, WHAT)
     assert holds_what(robot)
     assert max(robot.flash) == talk.loader.entry_row < talk.loader.start
     assert (talk.counts.refused, talk.counts.unanswered) == (0, 0)
@@ -173,7 +173,7 @@ def test_damaged_lost_and_doubled_bytes_cost_time_and_nothing_else():
         return {4: wrong, 7: data[:60], 9: b""}.get(number, data)
 
     robot.spoil = spoil
-    counts = flashed(robot, WHAT).counts
+    counts = flash_image(robot, WHAT).counts
     assert holds_what(robot)
     assert counts.refused >= 2
     assert counts.unanswered >= 2
@@ -184,14 +184,14 @@ def test_every_byte_of_a_block_may_be_lost():
     for lost in range(101):
         robot = Robot()
         robot.spoil = lambda number, data, lost=lost: data[:lost] + data[lost + 1 :] if number == 3 else data
-        flashed(robot, WHAT)
+        flash_image(robot, WHAT)
         assert holds_what(robot), lost
 
 
 def test_slow_answers_are_waited_for():
     robot = Robot()
     robot.delay = lambda number: 0.9 if number > 1 else 0.0
-    assert flashed(robot, WHAT).counts.unanswered == 0
+    assert flash_image(robot, WHAT).counts.unanswered == 0
     assert holds_what(robot)
 
 
@@ -199,12 +199,12 @@ def test_a_row_that_is_refused_for_ever_ends_the_attempt():
     robot = Robot()
     robot.spoil = lambda number, data: data[:-1] + bytes([data[-1] ^ 1]) if data[:3] == bytes(3) else data
     with pytest.raises(RobotError, match=rf"refused the row at 0x000000 {TRIES} times"):
-        flashed(robot, WHAT)
+        flash_image(robot, WHAT)
     assert robot.starts == []
     robot = Robot()
     robot.spoil = lambda number, data: b"" if len(data) > 4 else data
     with pytest.raises(RobotError, match=f"did not acknowledge the row at 0x017f00 {TRIES} times"):
-        flashed(robot, WHAT)
+        flash_image(robot, WHAT)
 
 
 def test_nobody_answers_or_somebody_else():
@@ -270,7 +270,7 @@ def test_a_line_with_an_echo_acknowledges_nothing():
     robot.write = write  # type: ignore[method-assign]
     robot.spoil = lambda number, data: data if len(data) == 1 else b""
     with pytest.raises(RobotError, match="the line sends back what is written to it: switch its echo off"):
-        flashed(robot, image((0x100, [0x4B4B4B])))
+        flash_image(robot, image((0x100, [0x4B4B4B])))
 
 
 def test_an_image_for_another_chip_is_refused():

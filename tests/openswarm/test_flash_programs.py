@@ -126,7 +126,7 @@ class Robot:
                 self.has, self.wants, self.asks_at, self.says_at = self.wants, None, 1e9, self.time + 0.5
 
 
-def given(robot: Any, program: Program = PROGRAM, wait: float = WAIT) -> tuple[HostNeighbour, list[int]]:
+def give_program(robot: Any, program: Program = PROGRAM, wait: float = WAIT) -> tuple[HostNeighbour, list[int]]:
     rows: list[int] = []
     neighbour = HostNeighbour(robot, program, wait)
     if not neighbour.give(lambda done, total: rows.append(done)):
@@ -139,7 +139,7 @@ def test_a_robot_takes_it_whatever_is_lost_and_however_late_it_speaks():
         robot, draw = Robot(3), random.Random(4)
         robot.late = lambda late=late: late
         robot.loses = lambda message, draw=draw: draw.random() < 0.3
-        neighbour, rows = given(robot, wait=200.0)
+        neighbour, rows = give_program(robot, wait=200.0)
         assert robot.has == Advertisement(7, 5, PROGRAM.crc, True)
         assert rows[-1] == 5
         assert neighbour.counts.resets == 0
@@ -154,7 +154,7 @@ def test_a_line_that_echoes_is_told_and_nothing_believed():
             self.say(message)
 
     with pytest.raises(RobotError, match="the line sends back what is written to it"):
-        given(Echo())
+        give_program(Echo())
 
 
 def test_the_command_tells_an_echo(tmp_path, capsys):
@@ -194,13 +194,13 @@ def test_a_robot_that_asks_and_does_not_get_on_is_given_up():
     robot = Robot()
     robot.loses = lambda message: message[0] == 0xC2
     with pytest.raises(RobotError, match="the robot asks again and again for row 2: what it has stays there"):
-        given(robot)
+        give_program(robot)
     assert robot.time < 2 * WAIT
     robot = Robot()
     robot.loses = lambda message: message[0] == 0xC3 and message[1] >> 3 == robot.time // 5 % 2
     robot.at_row = lambda row: setattr(robot, "lacking", robot.lacking | 3 * (row == 3))
     with pytest.raises(RobotError, match="asks again and again for row 3"):
-        given(robot)
+        give_program(robot)
     assert robot.time < 3 * WAIT
 
 
@@ -208,11 +208,11 @@ def test_who_falls_silent_is_told_where():
     robot = Robot()
     robot.at_row = lambda row: row == 3 and setattr(robot, "asks_at", 1e9)
     with pytest.raises(RobotError, match="the robot fell silent at row 2: what it has stays there"):
-        given(robot)
+        give_program(robot)
     deaf = Robot()
     deaf.loses = lambda message: True
     with pytest.raises(RobotError, match="no robot answered within 30 s"):
-        given(deaf)
+        give_program(deaf)
     assert deaf.time < 2 * WAIT
 
 
@@ -230,10 +230,10 @@ def test_a_robot_that_begins_anew_is_followed_some_times(resets: int):
 
     robot.at_row = reset
     if resets <= MOST_RESETS:
-        assert given(robot)[0].counts.resets == resets
+        assert give_program(robot)[0].counts.resets == resets
     else:
         with pytest.raises(RobotError, match=rf"begun anew {resets} times, at last from row 3: it resets meanwhile"):
-            given(robot)
+            give_program(robot)
 
 
 @pytest.mark.parametrize(("version", "says"), [
@@ -243,7 +243,7 @@ def test_a_robot_that_begins_anew_is_followed_some_times(resets: int):
 ])  # fmt: skip
 def test_what_is_not_newer_is_refused_with_what_would_be(version: int, says: str):
     with pytest.raises(RobotError, match=says):
-        given(Robot(version))
+        give_program(Robot(version))
 
 
 def test_the_last_version_is_taken():

@@ -26,7 +26,7 @@ def project(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def called(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
+def run_command(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
     environment = os.environ | {"PATH": f"{BIN}{os.pathsep}{os.environ['PATH']}"}
     return subprocess.run(words, cwd=folder, env=environment, capture_output=True, text=True, timeout=HANG, check=False)
 
@@ -47,15 +47,15 @@ def test_it_has_its_name_everywhere_and_no_hole(project):
 def test_make_builds_and_its_test_tells_right_from_wrong(project):
     """The project's test passes, and a mistake in the C source is reported in the format of VS Code's problem
     matcher."""
-    done = called(project, "make", "test")
+    done = run_command(project, "make", "test")
     assert (done.returncode, "4 passed" in done.stdout) == (0, True), done.stdout + done.stderr
     source = project / "src" / "main.c"
     right = source.read_text()
     source.write_text(right.replace("Sys_Sleep(1000)", "Sys_Sleep(900)"))
-    done = called(project, "make", "test")
+    done = run_command(project, "make", "test")
     assert (done.returncode, "1 failed" in done.stdout or "2 failed" in done.stdout) == (2, True), done.stdout
     source.write_text(right.replace("Sys_Sleep(1000)", "Sys_Slep(1000)"))
-    done = called(project, "make")
+    done = run_command(project, "make")
     assert done.returncode == 2
     task = json.loads((project / ".vscode" / "tasks.json").read_text())["tasks"][0]
     pattern = re.compile(task["problemMatcher"]["pattern"]["regexp"])
@@ -80,16 +80,16 @@ def test_the_editor_finds_the_line_of_a_fault(project):
 @pytest.mark.skipif(shutil.which("cmake") is None, reason="no CMake here (Debian package cmake)")
 def test_cmake_builds_it(project):
     """CMake identifies the compiler and builds a program with the same output as make's."""
-    done = called(project, "cmake", "-B", "build/cmake")
+    done = run_command(project, "cmake", "-B", "build/cmake")
     assert done.returncode == 0, done.stderr
     assert (project / "build/cmake/compile_commands.json").exists()
-    done = called(project, "cmake", "--build", "build/cmake", "-j2")
+    done = run_command(project, "cmake", "--build", "build/cmake", "-j2")
     assert done.returncode == 0, done.stdout + done.stderr
-    done = called(project, str(BIN / "emu"), "run", "build/cmake/firmware.hex", "--seconds", "1.5")
+    done = run_command(project, str(BIN / "emu"), "run", "build/cmake/firmware.hex", "--seconds", "1.5")
     assert done.stdout.splitlines() == ["hello from my-robot"] * 2
     wrong = project / "CMakeLists.txt"
     wrong.write_text(wrong.read_text().replace("SOURCES ${sources}", "SOURCES ${sources} DEVICES warp-drive"))
-    done = called(project, "cmake", "-B", "build/cmake")
+    done = run_command(project, "cmake", "-B", "build/cmake")
     assert "DEVICES warp-drive: neither in" in " ".join(done.stderr.split())
 
 

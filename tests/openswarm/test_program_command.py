@@ -24,7 +24,7 @@ ROOT = Path(__file__).resolve().parents[2]
 PROGRAMS = ("emu", "toolchain", "arena", "openswarm")
 
 
-def ran(*words: str, **environment: str) -> subprocess.CompletedProcess[str]:
+def run_command(*words: str, **environment: str) -> subprocess.CompletedProcess[str]:
     """Run a command line in its own process."""
     return subprocess.run([sys.executable, "-m", *words], capture_output=True, text=True, timeout=HANG, check=False,
                           cwd=ROOT, env=os.environ | environment)  # fmt: skip
@@ -32,16 +32,16 @@ def ran(*words: str, **environment: str) -> subprocess.CompletedProcess[str]:
 
 @pytest.mark.parametrize("program", PROGRAMS)
 def test_every_program_tells_its_version_and_helps_with_an_example(program):
-    assert ran(program, "--version").stdout == f"{program} {version('openswarm')}\n"
-    told = ran(program, "--help")
+    assert run_command(program, "--version").stdout == f"{program} {version('openswarm')}\n"
+    told = run_command(program, "--help")
     assert (told.returncode, "example: " in told.stdout) == (0, True)
-    assert ran(program, "no-such-command").returncode == exit_status.BAD_INPUT
+    assert run_command(program, "no-such-command").returncode == exit_status.BAD_INPUT
 
 
 @pytest.mark.parametrize("program", PROGRAMS)
 def test_every_program_completes_itself_in_bash(program, tmp_path):
     """The completion script of every program returns the commands to bash."""
-    script = ran(program, "completion", "bash").stdout
+    script = run_command(program, "completion", "bash").stdout
     (tmp_path / "script").write_text(script)
     asked = f'source {tmp_path}/script; COMP_WORDS=({program} comp); COMP_CWORD=1; $(complete -p {program} |' \
             f" sed 's/.*-F \\([^ ]*\\).*/\\1/'); echo \"${{COMPREPLY[@]}}\""  # fmt: skip
@@ -51,7 +51,7 @@ def test_every_program_completes_itself_in_bash(program, tmp_path):
 
 @pytest.mark.parametrize("name", COMMANDS)
 def test_every_command_explains_itself(name):
-    told = ran("openswarm", name, "--help")
+    told = run_command("openswarm", name, "--help")
     assert told.returncode == 0
     assert f"example: openswarm {name}" in told.stdout or "$(openswarm path" in told.stdout
     assert command(name).parser().prog == f"openswarm {name}"
@@ -97,7 +97,7 @@ def test_clean_takes_what_is_ours_and_nothing_else(monkeypatch, tmp_path, capsys
 
 def test_doctor_names_what_a_missing_program_disables(tmp_path):
     """`openswarm doctor` with an empty PATH reports every program as missing, and only make as required."""
-    done = ran("openswarm", "doctor", "--json", PATH=str(tmp_path))
+    done = run_command("openswarm", "doctor", "--json", PATH=str(tmp_path))
     told = json.loads(done.stdout)
     assert done.returncode == exit_status.FAULT
     lacking = {one["name"]: one for one in told["findings"] if not one["found"]}
@@ -111,7 +111,7 @@ def test_doctor_names_what_a_missing_program_disables(tmp_path):
 
 
 def test_doctor_tries_compiler_and_emulator():
-    done = ran("openswarm", "doctor", "--try")
+    done = run_command("openswarm", "doctor", "--try")
     assert done.returncode == 0, done.stdout
     assert re.search(r"ok +compile and run +works", done.stdout)
 
@@ -122,7 +122,7 @@ def test_the_arena_without_its_extra_names_it(tmp_path):
     for package in ("pymunk", "scipy"):
         (tmp_path / package).mkdir()
         (tmp_path / package / f"{package}.py").write_text(f"raise ModuleNotFoundError(name={package!r})\n")
-        done = ran("arena", "compare", "x", "y", PYTHONPATH=str(tmp_path / package))
+        done = run_command("arena", "compare", "x", "y", PYTHONPATH=str(tmp_path / package))
         assert done.returncode == exit_status.BAD_INPUT
         assert done.stderr == f"arena: {package} is not installed: pip install 'openswarm[arena]'\n"
 

@@ -73,7 +73,7 @@ def tests(tmp_path: Path) -> Path:
     return folder
 
 
-def called(folder: Path, *words: str) -> str:
+def run_pytest(folder: Path, *words: str) -> str:
     done = subprocess.run(
         [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", "-q", *words],
         cwd=folder, capture_output=True, text=True, check=False,
@@ -84,7 +84,7 @@ def called(folder: Path, *words: str) -> str:
 
 @pytest.mark.parametrize("how", [(), ("-n", "2", "--dist", "load")], ids=["one process", "xdist"])
 def test_a_failure_says_where_and_leaves_a_waveform(tests, how):
-    said = called(tests, "--junitxml", "out.xml", "-o", "junit_family=xunit1", *how)
+    said = run_pytest(tests, "--junitxml", "out.xml", "-o", "junit_family=xunit1", *how)
     assert "2 failed, 3 passed" in said
     assert "FirmwareFault: UART1 did not send b'alive' within 50 ms; it sent" in said
     assert re.search(r"address error trap: writing 2 bytes at 0x3001.*\(store\+0x\w+, .*main\.c:3\)", said)
@@ -109,12 +109,12 @@ def test_a_failure_says_where_and_leaves_a_waveform(tests, how):
 
 def test_without_firmware_it_says_what_to_write(tests):
     (tests / "test_it.py").write_text("def test_it(robot): pass\n")
-    assert "no firmware: mark the test @pytest.mark.firmware(...) or set `firmware` in pytest.ini" in called(tests)
+    assert "no firmware: mark the test @pytest.mark.firmware(...) or set `firmware` in pytest.ini" in run_pytest(tests)
 
 
 def test_a_compiler_s_message_reaches_the_report(tests):
     (tests / "main.c").write_text("int main(void) { return nothing; }\n")
-    assert re.search(r"main\.c:1:25: error: use of undeclared identifier", called(tests))
+    assert re.search(r"main\.c:1:25: error: use of undeclared identifier", run_pytest(tests))
 
 
 @pytest.mark.skipif(shutil.which("git") is None or not (ROOT / ".git").exists(), reason="not a clone, or no git")
@@ -139,7 +139,7 @@ def test_the_action_s_steps_as_they_are_from_the_wheel(tmp_path):
             values = {f"inputs.{name}": value for name, value in inputs.items()}
             told = dict(line.split("=", 1) for line in outputs.read_text().splitlines())
             values |= {f"steps.test.outputs.{name}": value for name, value in told.items()}
-            own = {name: values[text[4:-3]] for name, text in step.get("env", {}).items()}  # each is one expression ${{ }}
+            own = {name: values[text[4:-3]] for name, text in step.get("env", {}).items()}  # each is one ${{ }}
             assert step["shell"] == "bash"
             done = subprocess.run(
                 ["bash", "-e", "-o", "pipefail", "-c", step["run"]], cwd=tmp_path, check=False, capture_output=True,

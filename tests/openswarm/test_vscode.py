@@ -30,7 +30,7 @@ EVERYWHERE = ("type", "request", "name", "preLaunchTask", "presentation")
 VSCE = "@vscode/vsce@3"
 
 
-def matched(configuration: dict[str, Any]) -> None:
+def validate(configuration: dict[str, Any]) -> None:
     """Validate a launch configuration against the extension's schema. Raises jsonschema.ValidationError."""
     assert configuration["type"] == DEBUGGER["type"]
     schema = DEBUGGER["configurationAttributes"][configuration["request"]]
@@ -46,11 +46,11 @@ def plain(body: Any) -> Any:
 
 def test_snippets_and_first_configurations_fit_the_schema() -> None:
     for configuration in DEBUGGER["initialConfigurations"]:
-        matched(configuration)
+        validate(configuration)
     for snippet in DEBUGGER["configurationSnippets"]:
-        matched(plain(snippet["body"]))
+        validate(plain(snippet["body"]))
     with pytest.raises(jsonschema.ValidationError, match="selektor"):
-        matched({"type": "openswarm", "request": "launch", "selektor": 3})
+        validate({"type": "openswarm", "request": "launch", "selektor": 3})
 
 
 def test_a_new_project_fits_the_extension(tmp_path: Path) -> None:
@@ -61,7 +61,7 @@ def test_a_new_project_fits_the_extension(tmp_path: Path) -> None:
     assert main(["new", str(tmp_path / "robot")]) == 0
     launch = json.loads((tmp_path / "robot" / ".vscode" / "launch.json").read_text())
     for configuration in launch["configurations"]:
-        matched(configuration)
+        validate(configuration)
     tasks = json.loads((tmp_path / "robot" / ".vscode" / "tasks.json").read_text())["tasks"]
     patterns = {one["name"]: one for one in EXTENSION["contributes"]["problemPatterns"]}
     for task in tasks[:2]:

@@ -68,7 +68,7 @@ def test_cpu_load_of_capture_and_classification_is_printed(image: Build, capsys,
 FRAME_TCY = 1_600_000
 
 
-def sighted(machine: Machine, frames: int = 3) -> str:
+def classification(machine: Machine, frames: int = 3) -> str:
     """Return the class that the firmware assigns to the scene, derived from the wheel speeds of the three classes."""
     machine.run(cycles=frames * FRAME_TCY)
     before = machine.board.motors.left.steps, machine.board.motors.right.steps
@@ -79,7 +79,7 @@ def sighted(machine: Machine, frames: int = 3) -> str:
     return min(expected, key=lambda name: sum(abs(a - b) for a, b in zip(expected[name], rates, strict=True)))
 
 
-def shaded(colour: tuple[int, int, int], brightness: float, deviation: float = 0.0) -> np.ndarray:
+def scene_picture(colour: tuple[int, int, int], brightness: float, deviation: float = 0.0) -> np.ndarray:
     """Return a scene with the sensor's noise (sigma 2-4 of 255) and with corners darkened by 30 % (epuck.md §7.6)."""
     y, x = np.mgrid[0:480, 0:640]
     corner = ((x - 319.5) ** 2 + (y - 239.5) ** 2) / (319.5**2 + 239.5**2)
@@ -96,10 +96,10 @@ def test_automatic_exposure_keeps_colours_apart_in_any_light(image: Build, progr
     Exposure converges within 5 to 10 frames. Noise and vignetting are enabled.
     """
     machine = robot(image(program), selector=START)
-    machine.board.camera.show(shaded(SCENES[scene], 1.0, deviation=4.0))
+    machine.board.camera.show(scene_picture(SCENES[scene], 1.0, deviation=4.0))
     for lamp in (1.0, 0.125, 100.0, 0.3, 5.0, 1.0):
         machine.board.camera.lamp = lamp
-        assert sighted(machine, frames=12) == scene, lamp
+        assert classification(machine, frames=12) == scene, lamp
 
 
 @pytest.mark.parametrize(
@@ -115,8 +115,8 @@ def test_colours_stay_apart_while_exposure_has_not_followed(
     """
     machine = robot(image("clustering"), selector=START)
     for brightness in np.geomspace(max(darkest, 0.05), brightest, 6):
-        machine.board.camera.show(shaded(SCENES[scene], brightness, deviation=2.0))
-        assert sighted(machine) == scene, brightness
+        machine.board.camera.show(scene_picture(SCENES[scene], brightness, deviation=2.0))
+        assert classification(machine) == scene, brightness
 
 
 def test_the_light_at_which_white_and_green_are_lost_is_that_of_the_distances(image: Build) -> None:
@@ -132,4 +132,4 @@ def test_the_light_at_which_white_and_green_are_lost_is_that_of_the_distances(im
         ((24, 16, 16), "object"),
     ):
         machine.board.camera.show(plain(colour))
-        assert sighted(machine) == seen, colour
+        assert classification(machine) == seen, colour

@@ -17,10 +17,10 @@ from tests.firmware.drivers.test_drivers_on_target import START
 from tests.fuzz.emulator.fuzz_reverse import APPS, walk
 
 
-def walked(
+def record_run(
     machine: emu.Machine, rng: random.Random, stretches: int
 ) -> tuple[History, dict[int, bytes], dict[int, int]]:
-    """Return a recording with input, the states before single steps, and the cycle that each of those steps led to."""
+    """Record a run with input; return it with the states before single steps and the end cycle of each step."""
     history = History(machine, period=300_000)
     states: dict[int, bytes] = {}
     follows: dict[int, int] = {}
@@ -43,7 +43,7 @@ def test_every_state_is_restored_to_the_bit(image: Build, engine: str) -> None:
     assert machine.board.camera is not None
     machine.board.camera.show(np.full((480, 640, 3), (200, 20, 20), np.uint8))
     rng = random.Random(20)
-    history, states, follows = walked(machine, rng, 12)
+    history, states, follows = record_run(machine, rng, 12)
     present = machine.snapshot()
     end = machine.cycle
     for cycle in rng.sample(sorted(states), 25):

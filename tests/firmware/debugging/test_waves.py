@@ -79,7 +79,7 @@ def test_threads_priorities_and_variables_are_watched(image: Build, tmp_path: Pa
     plain.hook_pc("cpu_clock_isr", lambda: ticks.append(plain.cycle))
     plain.run(cycles=FCY // 50)
     changed = [time for time, _ in phases if time > picoseconds(ticks[0])]
-    # every tick adds to it and takes away again what makes a cycle
+    # each tick adds its fraction of a cycle to clock_phase and subtracts whole cycles
     latest = [max(tick for tick in ticks if picoseconds(tick) < time) for time in changed]
     assert sorted(set(latest)) == ticks
     assert all(time - picoseconds(tick) < picoseconds(60) for time, tick in zip(changed, latest, strict=True))

@@ -14,7 +14,7 @@ extern bool own_light;
 extern uint16 fixed_number; /* the robot's number, set before it starts */
 
 void scan_isr(void);
-void scan_with(uint8 sensor, uint16 depth); /* light lowers a reading by depth; 4,096 scans are 1 s */
+void scan_with(uint8 sensor, uint16 depth); /* one scan; light lowers the reading by depth; 4,096 scans/s */
 void scans_in_the_dark(unsigned n);
 void begin_link(void);
 

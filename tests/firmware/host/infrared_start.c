@@ -51,7 +51,7 @@ TEST(an_event_before_the_number_is_drawn_is_its_senders, "openswarm_remote.h: ea
     CHECK_EQ(Sys_Get_RobotNumber(), 0);
     send_alarm('x');
     record(&early);
-    record(&passed_on); /* the first beacon */
+    record(&passed_on); /* skips the first beacon */
     CHECK(alarms == 1 && Sys_Set_RobotNumber(ME));
     receive_alarm_of(0, 2, 1, 'x');
     Sys_Yield();

@@ -335,7 +335,7 @@ TEST(bug_15_system_time_has_32_bits_and_counts_each_tick, "§7.15: 1.1 ms ticks 
     for (long i = 0; i < MANY_TICKS; i++) {
         host_tick();
     }
-    CHECK(Sys_Get_SystemTime() >= MANY_TICKS && Sys_Get_SystemTime() < MANY_TICKS + 5000); /* real time passes on robots */
+    CHECK(Sys_Get_SystemTime() >= MANY_TICKS && Sys_Get_SystemTime() < MANY_TICKS + 5000); /* robot: real time */
 }
 
 TEST(bug_17_the_newest_motor_speed_of_a_slot_wins, "§7.17: motor handlers used the oldest value")

@@ -17,14 +17,14 @@
 #include <string.h>
 
 #ifdef __dsPIC30F__
-#define MANY_TICKS 3000L /* fewer: emulation is slower than a host */
+#define MANY_TICKS 3000L /* in ms; fewer, because emulation is slower than a host */
 #define TEST(identifier, statement) static void __attribute__((unused)) identifier(void)
 #define CHECK(condition) ((condition) ? (void)0 : Sys_Assertion_Failed(#condition, __LINE__))
 #define CHECK_EQ(got, wanted) CHECK((long)(got) == (long)(wanted))
 #else
 #include <unistd.h>
 
-#define MANY_TICKS 70000L /* more than 16 bits hold */
+#define MANY_TICKS 70000L /* more than a 16-bit counter can count */
 
 typedef struct test {
     const char *name, *says;

@@ -30,7 +30,7 @@ def listen(machine: Machine) -> bytearray:
     return heard
 
 
-def finished(machine: Machine, heard: bytearray, seconds: float = 4.0) -> bytes:
+def self_test_report(machine: Machine, heard: bytearray, seconds: float = 4.0) -> bytes:
     """Return the self-test's report; the test fails if the report does not end."""
     end = machine.cycle + round(seconds * FCY)
     while b"end\r\n" not in heard:
@@ -52,7 +52,7 @@ def test_a_camera_pulled_out_while_it_is_programmed_costs_only_the_camera(image:
     machine = robot(image("selftest"))
     heard = listen(machine)
     machine.board.stimulus.play(parse(machine.board, f"{microseconds}us camera unplug"))
-    report = finished(machine, heard)
+    report = self_test_report(machine, heard)
     assert b"i2c 2 0 0 FAIL" in report  # I2C_NO_ACK
     assert b"motors done" in report
     assert steps(machine) == pytest.approx((1000, 1000), abs=2)
@@ -113,7 +113,7 @@ def test_a_low_battery_is_reported(image: Build, volts: float, word: bytes) -> N
 # -- UART --------------------------------------------------------------------------------------------------------------
 
 
-def counted(machine: Machine, heard: bytearray) -> tuple[int, int, int]:
+def uart_counts(machine: Machine, heard: bytearray) -> tuple[int, int, int]:
     """Return UART1's counts of refused, lost and damaged messages."""
     heard.clear()
     machine.board.bluetooth.feed(b"\rU\r")
@@ -129,12 +129,12 @@ def test_framing_errors_and_breaks_are_counted_and_the_next_line_is_right(image:
     """
     machine = robot(image("selftest"))
     heard = listen(machine)
-    finished(machine, heard)
-    assert counted(machine, heard) == (0, 0, 0)
+    self_test_report(machine, heard)
+    assert uart_counts(machine, heard) == (0, 0, 0)
     for errors in (FRAMING_ERROR, FRAMING_ERROR, BREAK):
         machine.board.bluetooth.feed(b"x", errors=errors)
     machine.run(cycles=FCY // 50)
-    assert counted(machine, heard) == (0, 3, 0)
+    assert uart_counts(machine, heard) == (0, 3, 0)
     machine.board.bluetooth.feed(b"C\r")
     heard.clear()
     machine.run(cycles=FCY // 50)
@@ -148,7 +148,7 @@ def test_an_overrun_is_counted_and_reception_goes_on(image: Build) -> None:
     """
     machine = robot(image("selftest"))
     heard = listen(machine)
-    finished(machine, heard)
+    self_test_report(machine, heard)
     enabled = machine.peek("IEC0")
     machine.write("IEC0", enabled & ~(1 << 9))  # disables the receive interrupt: the characters stay in the FIFO
     machine.board.bluetooth.feed(b"D,1000,1000\r")
@@ -157,7 +157,7 @@ def test_an_overrun_is_counted_and_reception_goes_on(image: Build) -> None:
     machine.write("IEC0", machine.peek("IEC0") | 1 << 9)
     machine.run(cycles=FCY // 50)
     assert not machine.peek("U1STA") & 1 << 1
-    lost = counted(machine, heard)[1]
+    lost = uart_counts(machine, heard)[1]
     assert 1 <= lost <= 2
     before = steps(machine)
     machine.run(cycles=FCY // 10)
@@ -175,7 +175,7 @@ def test_every_device_failing_at_once_ends_in_a_report(image: Build) -> None:
     machine.board.battery.volts = 3.0
     for tenth in range(30):
         machine.board.bluetooth.feed(b"\0", cycle=tenth * FCY // 10, errors=BREAK)
-    report = finished(machine, heard)
+    report = self_test_report(machine, heard)
     assert b"camera 0000 FAIL" in report
     assert b"i2c 5 0 0 FAIL" in report  # I2C_STUCK
     assert b"battery low" in report

@@ -189,9 +189,9 @@ static int fails_twice(const cells *before, uint16 old, int first, int first_mod
     check(version == old || version == new, "the old or the new one runs");
     check(is_cut || version == new, "an update without a failure arrives");
     Sys_Confirm_Update();
-    receive(new); /* the update can be completed afterwards, */
+    receive(new); /* the interrupted update can be completed */
     check(start() == new, "the update can be finished");
-    receive(new + 1); /* and so can the following one */
+    receive(new + 1); /* the following update can be completed too */
     check(start() == new + 1, "the next update arrives");
     return is_cut + is_cut_again;
 }

@@ -1,4 +1,4 @@
-"""Relocation numbers, places and addends (abi-elf.md §5)."""
+"""Relocation numbers, fields and addends of assembled objects (abi-elf.md §5)."""
 
 import pytest
 

@@ -29,7 +29,7 @@ int main(void) { return pairs[1].f ? pairs[1].f(1, 2) : pairs[0].a; }
 
 
 def test_a_shift_by_a_number_from_memory_has_a_bound(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """The set of counts contains negative numbers, by which the instruction shifts in the other direction."""
+    """A shift by an unknown count has a bound, although a negative count shifts in the other direction."""
     source, image = tmp_path / "shift.s", tmp_path / "shift.elf"
     source.write_text(SHIFT)
     assert main(["as", str(source), "-o", str(tmp_path / "shift.o")]) == 0
@@ -60,7 +60,7 @@ def image(tmp_path_factory: pytest.TempPathFactory) -> bytes:
     return (folder / "main.elf").read_bytes()
 
 
-def damaged(image: bytes, folder: Path, name: str, change: dict[int, int]) -> Path:
+def with_damage(image: bytes, folder: Path, name: str, change: dict[int, int]) -> Path:
     """Write the image with some octets of a section changed."""
     path = folder / "damaged.elf"
     path.write_bytes(image)
@@ -78,7 +78,7 @@ def test_debug_information_without_abbreviations_is_one_line(
     image: bytes, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """The reader's exception becomes one line and status 2."""
-    path = damaged(image, tmp_path, ".debug_abbrev", dict.fromkeys(range(4), 0))
+    path = with_damage(image, tmp_path, ".debug_abbrev", dict.fromkeys(range(4), 0))
     assert main(["bounds", str(path)]) == 2
     error = capsys.readouterr().err
     assert error.count("\n") == 1
@@ -92,6 +92,6 @@ def test_random_damage_never_ends_in_an_exception(image: bytes, tmp_path: Path, 
     found = set()
     for _ in range(20):
         change = {draw.randrange(1 << 16): draw.randrange(256) for _ in range(3)}
-        found.add(main(["bounds", str(damaged(image, tmp_path, name, change))]))
+        found.add(main(["bounds", str(with_damage(image, tmp_path, name, change))]))
     assert found <= {0, 2}
     assert 2 in found

@@ -90,7 +90,7 @@ def images(folder: Path, text: str, annotated: tuple[int, int], actual: tuple[in
     return folder / "p.elf"
 
 
-def said_of(image: Path, function: str = "main") -> BoundsReport:
+def analyse(image: Path, function: str = "main") -> BoundsReport:
     """Return the report of `bounds` on an image."""
     executable = read_executable(image.read_bytes(), str(image))
     return report_of(Program(executable, Annotations(), read_annotation_section(executable, {})), [function])
@@ -117,7 +117,7 @@ def test_no_response_and_no_stack_is_above_its_bound(tmp_path: Path, name: str) 
     """
     text, *levels = PROGRAMS[name]
     image = images(tmp_path, text, (levels[0], levels[1]), (levels[0], levels[1]))
-    seen, report = watched(image, ["T1Interrupt", "T2Interrupt"], PHASES, CYCLES), said_of(image)
+    seen, report = watched(image, ["T1Interrupt", "T2Interrupt"], PHASES, CYCLES), analyse(image)
     compare(seen, report)
     (high,) = (one for one in report.responses if one.name == "_T1Interrupt")
     assert high.cycles is not None
@@ -127,7 +127,7 @@ def test_no_response_and_no_stack_is_above_its_bound(tmp_path: Path, name: str) 
 def test_what_holds_interrupts_back_for_ever_leaves_no_response(tmp_path: Path, capsys) -> None:
     """An endless loop entered at IPL 4 leaves lower interrupts without a response bound; the command names the loop."""
     image = images(tmp_path, "bset 0x42,#7\n" + LOOP + T1 + T2, (4, 5), (4, 5))
-    report = said_of(image)
+    report = analyse(image)
     assert {one.name: one.cycles is None for one in report.responses} == {"_T1Interrupt": True, "_T2Interrupt": False}
     assert main(["bounds", str(image)]) == 0
     assert "p.s:6 (_main+0x6): an endless loop in which levels up to 4 are held back" in capsys.readouterr().out
@@ -139,13 +139,13 @@ def test_a_round_of_an_endless_loop_that_may_stay_masked(tmp_path: Path) -> None
     Here a variable decides.
     """
     text = "1: bset 0x42,#7\n btss _out,#0\n bra 1b\n bclr 0x42,#7\n bra 1b\n"
-    assert [one.cycles for one in said_of(images(tmp_path, text + T1 + T2, (4, 4), (4, 4))).responses] == [None, None]
+    assert [one.cycles for one in analyse(images(tmp_path, text + T1 + T2, (4, 4), (4, 4))).responses] == [None, None]
 
 
 def test_sleep_leaves_no_response(tmp_path: Path, capsys) -> None:
     """Sleep mode leaves no response bound, because the start-up time of the oscillator is unknown."""
     image = images(tmp_path, "1: pwrsav #0\n bra 1b\n" + T1 + T2, (4, 4), (4, 4))
-    assert [one.cycles for one in said_of(image).responses] == [None, None]
+    assert [one.cycles for one in analyse(image).responses] == [None, None]
     assert main(["bounds", str(image)]) == 0
     assert "p.s:5 (_main+0x4): stops the clock (PWRSAV #0)" in capsys.readouterr().out
 
@@ -155,7 +155,7 @@ def test_a_stopped_machine_holds_nothing_back(tmp_path: Path) -> None:
     text = (
         "btsc _out,#0\n bra 2f\n" + LOOP + "2: bset 0x42,#7\n clr 0x8c\n clr 0x8e\n clr 0x90\n3: pwrsav #1\n bra 3b\n"
     )
-    assert None not in [one.cycles for one in said_of(images(tmp_path, text + T1 + T2, (4, 4), (4, 4))).responses]
+    assert None not in [one.cycles for one in analyse(images(tmp_path, text + T1 + T2, (4, 4), (4, 4))).responses]
 
 
 def test_a_level_that_contradicts_its_annotation_is_reported(tmp_path: Path) -> None:
@@ -166,7 +166,7 @@ def test_a_level_that_contradicts_its_annotation_is_reported(tmp_path: Path) -> 
     image = images(tmp_path, LOOP + T1 + SLOW, (4, 2), (4, 5))
     seen = watched(image, ["T1Interrupt"], PHASES, CYCLES)
     assert seen.handlers["T1Interrupt"].late > 200
-    report = said_of(image)
+    report = analyse(image)
     ((place, why),) = report.contradictions.items()
     assert "c.c:9 " in place
     assert why.endswith("T2: 5")
@@ -178,7 +178,7 @@ def test_main_counts_whatever_is_asked_for(tmp_path: Path) -> None:
     """Code outside the analysed function counts for response bounds: it can delay an interrupt."""
     text = "1: bset 0x42,#7\n repeat #300\n nop\n bclr 0x42,#7\n bra 1b\n"
     image = images(tmp_path, text + T1 + T2, (4, 2), (4, 2))
-    compare(watched(image, ["T1Interrupt", "T2Interrupt"], PHASES, CYCLES), said_of(image, "nothing"))
+    compare(watched(image, ["T1Interrupt", "T2Interrupt"], PHASES, CYCLES), analyse(image, "nothing"))
 
 
 @pytest.mark.parametrize("seed", [3, 15])

@@ -168,7 +168,7 @@ def _registers(machine: Machine) -> tuple[int, ...]:
     return (*(machine.w[r] for r in range(16)), machine.record.u16[RCOUNT_AT >> 1])
 
 
-def walked(image: Path) -> tuple[int, int]:
+def compare_frames(image: Path) -> tuple[int, int]:
     """Unwind at every instruction from `main` on and compare; return the numbers of instructions and of frames."""
     machine, table = emu.load(image, engine="auto"), FrameTable(image)
     machine.run(until="main", cycles=1_000_000)
@@ -216,7 +216,7 @@ def test_frames_of_a_program_with_nested_interrupts(tmp_path: Path, level: str) 
     (tmp_path / "own.c").write_text(OWN)
     built = build([tmp_path / "own.c"], tmp_path / "own.elf", "-g", *level.split())
     assert built.status == 0, built.messages
-    instructions, frames = walked(tmp_path / "own.elf")
+    instructions, frames = compare_frames(tmp_path / "own.elf")
     assert instructions > STEPS * 3 // 4
     assert frames > 2 * instructions
 
@@ -233,6 +233,6 @@ def test_frames_of_the_execution_tests(tmp_path: Path, name: str, level: str) ->
     image = tmp_path / "image.elf"
     built = build([FOLDER / f"{name}.c", tmp_path / "main.c"], image, "-g", "-std=gnu11", f"-I{FOLDER}", *level.split())
     assert built.status == 0, built.messages
-    instructions, frames = walked(image)
+    instructions, frames = compare_frames(image)
     assert instructions > 250
     assert frames > 100

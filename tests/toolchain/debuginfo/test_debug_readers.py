@@ -53,7 +53,7 @@ _in_assembly:
 """
 
 
-def made(folder: Path, *options: str) -> Path:
+def debug_image(folder: Path, *options: str) -> Path:
     """Return an image with debug information, linked from a C and an assembly file."""
     (folder / "main.c").write_text(MAIN)
     (folder / "low.s").write_text(ASSEMBLY)
@@ -72,7 +72,7 @@ def test_readelf_and_dwarfdump_report_no_errors(tmp_path: Path, options: tuple[s
 
     Discarded functions leave no gaps and do not end lists.
     """
-    image = made(tmp_path, *options)
+    image = debug_image(tmp_path, *options)
     for view in READELF_VIEWS:
         said = subprocess.run(["readelf", view, str(image)], capture_output=True, text=True, check=True)
         found = [line for line in (said.stdout + said.stderr).splitlines() if any(word in line for word in COMPLAINTS)]
@@ -91,9 +91,9 @@ def test_debug_phantoms_are_stored_on_request_and_both_forms_are_readable(tmp_pa
 
     Both forms are readable.
     """
-    plain = made(tmp_path, "-Os")
+    plain = debug_image(tmp_path, "-Os")
     doubled = plain.rename(tmp_path / "plain.elf")
-    plain, doubled = doubled, made(tmp_path, "-Os", "-Wl,--debug-phantoms")
+    plain, doubled = doubled, debug_image(tmp_path, "-Os", "-Wl,--debug-phantoms")
 
     def sections(image: Path) -> dict[str, tuple[str, bytes]]:
         with image.open("rb") as file:

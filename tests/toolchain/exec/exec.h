@@ -1,4 +1,4 @@
-/* Frame of the execution tests. TEST(name, "paragraph") defines one case; the harness calls every case of a file and
+/* Macros of the execution tests. TEST(name, "paragraph") defines one case; the harness calls every case of a file and
  * reads one line per case from UART1. Values pass through volatile objects so that nothing is computed at compile time. */
 #ifndef EXEC_H
 #define EXEC_H

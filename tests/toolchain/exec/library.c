@@ -1,4 +1,4 @@
-/* string.h, ctype.h, stdlib.h, setjmp.h. */
+/* Functions of string.h, ctype.h, stdlib.h and setjmp.h. */
 #include "exec.h"
 
 #include <ctype.h>

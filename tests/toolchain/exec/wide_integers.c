@@ -1,4 +1,4 @@
-/* 64-bit integers. */
+/* 64-bit integers: arithmetic, comparison, shifts, conversion. */
 #include "exec.h"
 
 #include <limits.h>

@@ -141,7 +141,7 @@ def branches() -> dict[str, tuple[str, str, str, Callable[..., Term]]]:
 
 # name: (result type, parameter types, C expression over a, b, c, term of the result). Types: keys of C_TYPES.
 CASES: dict[str, tuple[str, str, str, Callable[..., Term]]] = {
-    # shifts of two words
+    # shifts of two-word values
     **{f"shl_{n}": ("long", "l", f"(long)((unsigned long)a << {n})", lambda a, n=n: a << n)
        for n in (1, 2, 3, 4, 5, 8, 12)},
     **{f"shr_{n}": ("unsigned long", "L", f"a >> {n}", lambda a, n=n: z3.LShR(a, n)) for n in (1, 4, 8, 9)},

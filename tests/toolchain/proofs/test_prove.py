@@ -131,7 +131,7 @@ LATE = {
 """Planted faults that only show after many loop iterations."""
 
 
-def planted(kind: str) -> Verdict:
+def verdict_on_fault(kind: str) -> Verdict:
     """Return the verdict on a function with a planted fault."""
     function, right, wrong = (PLANTED | LATE)[kind]
 
@@ -156,14 +156,14 @@ def test_right_code_is_proved(level: str) -> None:
 
 @pytest.mark.parametrize("kind", PLANTED)
 def test_a_planted_fault_is_refuted(kind: str) -> None:
-    verdict = planted(kind)
+    verdict = verdict_on_fault(kind)
     assert verdict.kind == "refuted", verdict
 
 
 @pytest.mark.parametrize("kind", LATE)
 def test_a_fault_of_many_rounds_is_not_proved(kind: str) -> None:
     """A fault that needs many iterations is not proved; a failed induction does not refute it either."""
-    assert planted(kind).kind != "proved"
+    assert verdict_on_fault(kind).kind != "proved"
 
 
 def test_the_input_of_a_refutation_shows_it_on_the_emulator(tmp_path: Path) -> None:

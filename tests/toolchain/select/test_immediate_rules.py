@@ -1,4 +1,4 @@
-"""Immediate rules: every rule computes its operation for every constant that it accepts."""
+"""Selection rules with immediate operands compute their operation for every constant that they accept."""
 
 from __future__ import annotations
 

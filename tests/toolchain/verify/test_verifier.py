@@ -198,7 +198,7 @@ CLASSES: list[tuple[str, str, PlantBug]] = [
 ]
 
 
-def damaged(
+def plant_after(
     run: Callable[[pipeline.FunctionContext], None], plant: PlantBug, planted: list[bool], c: pipeline.FunctionContext
 ) -> None:
     """Run a pass, plant a bug after it, and record in `planted` whether that was possible."""
@@ -213,7 +213,7 @@ def compile_with(plant: PlantBug | None, after: str, monkeypatch: pytest.MonkeyP
     for p in pipeline.FUNCTION_PASSES:
         run = p.run
         if p.name == after and plant is not None:
-            run = functools.partial(damaged, p.run, plant, planted)
+            run = functools.partial(plant_after, p.run, plant, planted)
         passes.append(pipeline.Pass(p.name, run, p.levels, p.needs, p.gives))
     monkeypatch.setattr(pipeline, "FUNCTION_PASSES", passes)
     module = read_module(llvm(SOURCE, level))

@@ -28,7 +28,7 @@ static void spin(void *unused)
 static void spend(uint16 ms)
 {
     uint32 before = Sys_Get_SystemTime();
-    for (uint16 i = 0; i < 60000 && Sys_Get_SystemTime() - before < ms; i++) { /* on some hosts time stands in sections */
+    for (uint16 i = 0; i < 60000 && Sys_Get_SystemTime() - before < ms; i++) { /* on some hosts time stops in section */
     }
 }
 
