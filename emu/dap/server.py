@@ -249,7 +249,10 @@ class Server(RewindingSession):
     def _run_action(self, action: Callable[[], StopEvent]) -> None:
         self._references.clear()
         self._pause = False
-        event = self._rewind_if_followed(action())
+        try:
+            event = self._rewind_if_followed(action())
+        except REQUEST_ERRORS as error:  # the response is sent already, so the stop reports the failure
+            event = StopEvent("pause", f"the request failed: {error}")
         if not self._is_over:
             self._report_stop(event)
 

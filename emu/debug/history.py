@@ -318,13 +318,12 @@ class History:
 
         Return that address. If there is no hit, return None and leave the machine at the start of the recording.
         """
-        now = self.machine.cycle
-        self._detect_change()
-        last: int | None = None
-        for begin, end in self._intervals_before(now):
-            last = self._last_arrival(begin, end, places, condition)
-            if last is not None:
-                break
+        with self._searching() as now:
+            last: int | None = None
+            for begin, end in self._intervals_before(now):
+                last = self._last_arrival(begin, end, places, condition)
+                if last is not None:
+                    break
         self._goto(self.start if last is None else last)
         return None if last is None else self.machine.pc
 
@@ -336,15 +335,25 @@ class History:
         If there is none, return None and leave the machine unchanged. The replay executes every instruction as a
         single step.
         """
-        now = self.machine.cycle
-        self._detect_change()
-        for begin, end in self._intervals_before(now):
-            found = self._last_write(begin, end, address, size, changes)
-            if found is not None:
-                self._goto(found.cycle)
-                return found
-        self._goto(now)
+        with self._searching() as now:
+            for begin, end in self._intervals_before(now):
+                found = self._last_write(begin, end, address, size, changes)
+                if found is not None:
+                    self._goto(found.cycle)
+                    return found
+            self._goto(now)
         return None
+
+    @contextmanager
+    def _searching(self) -> Iterator[int]:
+        """Search the recording before the current cycle, which is yielded. The machine returns there on an error."""
+        self._detect_change()
+        now = self.machine.cycle
+        try:
+            yield now
+        except Exception:
+            self._goto(now)
+            raise
 
     def _intervals_before(self, now: int) -> Iterator[tuple[StoredState, int]]:
         """Yield stored states backwards, from the latest one before `now`. Each comes with the end of its interval."""
