@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* C11 7.2. A failed assertion prints through __putchar and ends the program as abort() does. */
+/* C11 7.2. A failed assertion prints a message through __putchar and ends the program like abort(). */
 #undef assert
 #ifdef NDEBUG
 #define assert(condition) ((void)0)

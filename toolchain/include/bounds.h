@@ -2,7 +2,7 @@
 /* Annotations for `python -m toolchain bounds`.  Each is a declaration without code and data: it becomes a line of the
  * section .note.bounds of the image.
  *
- * Numbers are expressions of integers, names, + - * / and min(...).  A name gets its value on the command line (--let n=4).
+ * Numbers are expressions of integers, names, + - * / and min(...).  The command line defines values of names (--let n=4).
  * Arguments of min(...) without a value are ignored.
  */
 #ifndef _BOUNDS_H_
@@ -34,7 +34,7 @@
 /* Before a call of `callee` that is not inlined: one call of `function` makes it at most `times` times, counting all copies
  * of the call and all calls of `callee` in that line. */
 #define CALL_SHARE(callee, function, times) _BOUNDS_NOTE("often", callee function times)
-/* Before a call of `callee`: it is made only if `expression` is not 0. */
+/* Before a call of `callee`: the call is executed only if `expression` is not 0. */
 #define CALL_IF(callee, expression) _BOUNDS_NOTE("if", callee expression)
 /* Anywhere: if the function is analysed as an entry, register Wn is at most `most`. */
 #define ARGUMENT_BOUND(function, n, most) _BOUNDS_NOTE("argument", function n most)
@@ -54,8 +54,8 @@
 #define OUTSIDE_ONLY(...) _BOUNDS_NOTE("outside", __VA_ARGS__)
 /* Anywhere: this variable or register has this value at every entry. */
 #define KNOWN_VALUE(variable, value) _BOUNDS_NOTE("known", variable value)
-/* In a file: pointers that its code loads from memory point to RAM, so that following them costs no PSV cycles.
- * With a name it applies to that file of the same folder, which may be assembly. */
+/* In a file: pointers that its code loads from memory point to RAM, so that dereferencing them costs no PSV cycles.
+ * With a name, it applies to that file in the same folder, which may be assembly. */
 #define LINKS_IN_RAM(...) _BOUNDS_NOTE("ram", . __VA_ARGS__)
 
 #define _BOUNDS_NOTE(kind, ...) _BOUNDS_LINE(__COUNTER__, __LINE__, kind, __VA_ARGS__)

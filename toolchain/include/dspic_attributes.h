@@ -1,14 +1,14 @@
 /* SPDX-License-Identifier: MIT */
-/* XC16's attributes (abi-elf.md §1.4, §2.5) in clang's words. Inside `__attribute__((...))` only, so that a program may
- * use `space` or `interrupt` as names: each attribute is looked up as a macro __dspic_a_NAME; those that have none stay as
- * they are. Attributes of definitions become annotations, those of declarations sections. toolchain/emit/data.py and
- * isr.py read them. Constants, variables and functions cannot share a section, hence the counters. */
+/* Translation of XC16's attributes (abi-elf.md §1.4, §2.5) to clang's. It acts inside `__attribute__((...))` only, so that
+ * programs may use `space` or `interrupt` as names. Attribute NAME is replaced by the macro __dspic_a_NAME, if it exists.
+ * Attributes of definitions become annotations, those of declarations sections; toolchain/emit/data.py and isr.py read
+ * them. Constants, variables and functions cannot share a section, so counters make section names unique. */
 #ifndef DSPIC_ATTRIBUTES_H
 #define DSPIC_ATTRIBUTES_H
 #pragma GCC system_header
 
 #define __attribute__(list) __attribute__((__dspic_each list))
-#define __dspic_each(...) __dspic_1(__VA_ARGS__, ) /* ISO C wants an argument for the dots */
+#define __dspic_each(...) __dspic_1(__VA_ARGS__, ) /* ISO C requires an argument for the dots */
 #define __dspic_1(a, ...) __dspic_one(a) __VA_OPT__(, __dspic_2(__VA_ARGS__))
 #define __dspic_2(a, ...) __dspic_one(a) __VA_OPT__(, __dspic_3(__VA_ARGS__))
 #define __dspic_3(a, ...) __dspic_one(a) __VA_OPT__(, __dspic_4(__VA_ARGS__))
@@ -16,14 +16,14 @@
 #define __dspic_5(a, ...) __dspic_one(a) __VA_OPT__(, __dspic_6(__VA_ARGS__))
 #define __dspic_6(a, ...) __dspic_one(a) __VA_OPT__(, __VA_ARGS__)
 #define __dspic_one(a) __dspic_pick(__dspic_a_##a, (a))
-/* A mapped attribute is `~, (replacement)`, so the second argument is the replacement; else it is the attribute. */
+/* A mapped attribute expands to `~, (replacement)`: the second argument is the replacement, else the attribute itself. */
 #define __dspic_pick(...) __dspic_second(__VA_ARGS__, )
 #define __dspic_second(first, second, ...) __dspic_open second
 #define __dspic_open(...) __VA_ARGS__
 #define __dspic_text(x) #x
 #define __dspic_number(x) __dspic_text(x)
 
-/* `interrupt`, or `interrupt(irq(N), save(a, b), preprologue("text"))`: in front of a parenthesis the last word is a macro. */
+/* `interrupt`, or `interrupt(irq(N), save(a, b), preprologue("text"))`: before a parenthesis the last word is a macro. */
 #define __dspic_a_interrupt ~, (__annotate__("interrupt"), __used__)
 #define __used__(...) __used__, __dspic_i1(__VA_ARGS__, )
 #define __dspic_i1(a, ...) __dspic_i_##a __VA_OPT__(, __dspic_i2(__VA_ARGS__))
@@ -53,10 +53,10 @@
 #define __dspic_a_keep ~, (__used__, __retain__)
 #define __dspic_a_reverse(number) ~, (__annotate__("reverse(" __dspic_text(number) ")"))
 #define __dspic_a_user_init ~, (__constructor__)
-#define __dspic_a_unordered ~, () /* where a variable lies within its section, which is the linker's choice anyway */
-/* Attributes for other parts, or without support here, would change the placement: an error, not a warning. */
+#define __dspic_a_unordered ~, () /* position in the section, which the linker chooses in any case */
+/* Attributes of other chips and unsupported ones would change the placement, so they are errors, not warnings. */
 #define __dspic_refused(text) __aligned__(sizeof(struct { int i; _Static_assert(0, text " is not supported"); }))
-#define __unused__(...) __unused__ /* takes what follows in parentheses, as `__used__` does above */
+#define __unused__(...) __unused__ /* discards an argument list, like `__used__` above */
 #define __dspic_a_sfr ~, (__dspic_refused("attribute sfr"), __unused__)
 #define __dspic_a_boot ~, (__dspic_refused("attribute boot"), __unused__)
 #define __dspic_a_secure ~, (__dspic_refused("attribute secure"), __unused__)

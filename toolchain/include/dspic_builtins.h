@@ -16,14 +16,14 @@ extern "C" {
 #define __builtin_disi(cycles) __asm__ volatile("disi #%0" ::"i"(cycles) : "memory")
 #define __builtin_software_breakpoint() __asm__ volatile(".pword 0xDA4000" ::: "memory")
 
-/* Arguments lie one below the other, rounded to words (abi-elf.md §2.4). The front end's own version takes the address of
- * a struct for the struct. */
+/* Each argument is below the previous one, rounded to words (abi-elf.md §2.4). Clang's own version reads the address of a
+ * struct instead of the struct. */
 #define __builtin_va_arg(list, type) (*(__typeof__(type) *)((list) -= (sizeof(type) + 1) & ~1u))
 
-/* There is no cache; the front end's own version of this builtin does not fit a 16-bit int. */
+/* No code, because there is no cache; clang's version of this builtin does not support a 16-bit int. */
 #define __builtin_prefetch(address, ...) ((void)(address))
 
-/* Names that GCC has and the front end lacks. */
+/* Names of GCC that clang does not define. */
 #define __builtin_isinff(x) __builtin_isinf(x)
 #define __builtin_isinfl(x) __builtin_isinf(x)
 #define __builtin_isnanf(x) __builtin_isnan(x)
@@ -35,7 +35,7 @@ __attribute__((__noreturn__)) void __dspic_exit(int status) __asm__("exit");
 int __dspic_puts(const char *text) __asm__("puts");
 #define __builtin_puts __dspic_puts
 
-/* GCC's buffer is five words, ours ten: it holds the address of ours, which lives as long as the function does. */
+/* GCC's buffer has five words, jmp_buf ten: the former holds the address of a jmp_buf in the function's frame. */
 int __dspic_setjmp(unsigned int *environment) __asm__("setjmp") __attribute__((__returns_twice__));
 __attribute__((__noreturn__)) void __dspic_longjmp(unsigned int *environment, int value) __asm__("longjmp");
 #define __builtin_setjmp(buffer) \
@@ -85,7 +85,7 @@ __attribute__((__noreturn__)) void __dspic_longjmp(unsigned int *environment, in
 #define __builtin_mulsu(a, b) ((long)(int)(a) * (long)(unsigned int)(b))
 #define __builtin_mulus(a, b) ((long)(unsigned int)(a) * (long)(int)(b))
 
-/* 32/16-bit divides in hardware; results are meaningless when the quotient does not fit 16 bits (isa.md §6.7). */
+/* Hardware divisions of 32 by 16 bits; the result is undefined if the quotient does not fit 16 bits (isa.md §6.7). */
 int __dspic_divsd(long dividend, int divisor);
 unsigned int __dspic_divud(unsigned long dividend, unsigned int divisor);
 int __dspic_modsd(long dividend, int divisor);
@@ -106,7 +106,7 @@ int __dspic_divf(int numerator, int denominator);
     __asm__ volatile("btg [%0],#%1" ::"r"(object), "i"(bit) : "memory");                    \
   } while (0)
 
-/* One instruction each (isa.md §6): first one from the left, from the right, and the place of the first bit unlike the sign. */
+/* One instruction each (isa.md §6): first one from the left, from the right, position of the first bit unlike the sign. */
 #define __dspic_find(instruction, value)                                             \
   (__extension__({                                                                   \
     int __place;                                                                     \

@@ -13,7 +13,7 @@
 #define DSPIC_CONFIG(section_name, variable, value) \
   int __attribute__((space(prog), section(section_name))) variable = (value)
 #define OS_PERSISTENT __attribute__((persistent))
-/* Working registers as the clobber list of an asm statement spells them. */
+/* Working registers as spelled in the clobber list of an asm statement. */
 #define OS_W0 "w0"
 #define OS_W1 "w1"
 #define OS_W2 "w2"
@@ -32,7 +32,7 @@
 
 #else
 
-/* The linker gives registers their addresses; the section name tells the compiler that they are near. */
+/* The linker assigns the addresses of registers; the section name marks them as near for the compiler. */
 #define DSPIC_SFR __attribute__((__section__("sfr")))
 #define OS_ISR(name) __attribute__((__used__, __annotate__("interrupt"), __annotate__("no_auto_psv"))) void name(void)
 #define OS_ISR_AUTO_PSV(name) \
@@ -40,7 +40,7 @@
 #define OS_ISR_SHADOW(name)                                                                     \
   __attribute__((__used__, __annotate__("interrupt"), __annotate__("no_auto_psv"), __annotate__("shadow"))) void name( \
       void)
-#ifdef __clang__ /* sources end it with a semicolon or without */
+#ifdef __clang__ /* a semicolon may follow or not */
 #define DSPIC_CONFIG_END ;
 #else
 #define DSPIC_CONFIG_END
@@ -66,7 +66,7 @@
 
 #endif
 
-/* Everything a C function may change (abi-elf.md §2.1), for asm statements that call one. */
+/* All registers that a C function may change (abi-elf.md §2.1), for asm statements that call one. */
 #define OS_CALL_CLOBBERS OS_W0, OS_W1, OS_W2, OS_W3, OS_W4, OS_W5, OS_W6, OS_W7, "memory", "cc"
 
 #ifndef _ISR
@@ -85,8 +85,8 @@
 #define _EEDATA(N) __attribute__((space(eedata), aligned(N)))
 #endif
 
-/* Configuration words by name, as in Microchip's device headers: _FOSC(CSW_FSCM_OFF & XT_PLL8), semicolon or none;
- * field codes: dspic30f6014a.md §2. The word's name is never an argument: programs have macros called FOSC. */
+/* Configuration words by name, as in Microchip's device headers: _FOSC(CSW_FSCM_OFF & XT_PLL8), semicolon optional;
+ * field codes: dspic30f6014a.md §2. The word's name is never a macro argument: programs define macros called FOSC. */
 #define _FOSC(value) DSPIC_CONFIG("__FOSC.sec", _FOSC, value)
 #define _FWDT(value) DSPIC_CONFIG("__FWDT.sec", _FWDT, value)
 #define _FBORPOR(value) DSPIC_CONFIG("__FBORPOR.sec", _FBORPOR, value)

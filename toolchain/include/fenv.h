@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* C11 7.6 for an arithmetic without flags or modes: it rounds to nearest and raises no flags (annex F.3 allows the
- * macros of missing features to be undefined). */
+/* C11 7.6 for arithmetic without flags or modes: it rounds to nearest and raises no flags. Macros of missing features are
+ * undefined, as annex F.3 allows. */
 #ifndef FENV_H
 #define FENV_H
 

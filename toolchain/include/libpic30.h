@@ -7,7 +7,7 @@
 extern "C" {
 #endif
 
-/* Waits for that many instruction cycles, or up to 3 more, call and return included; at least 9. */
+/* Wait for the given number of instruction cycles, or up to 3 more, including call and return; at least 9. */
 void __delay32(unsigned long cycles);
 
 #define __delay_ms(milliseconds) __delay32((unsigned long)((milliseconds) * (FCY) / 1000ULL))

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Input and output (C11 7.21). Conversions of printf: d i u x X o c s p n % with flags - 0 + space #, width, precision, *, and
- * lengths hh h l ll z t j; f F e E g G are there when a program that uses them calls the _float variants.
+ * lengths hh h l ll z t j; f F e E g G are linked if a program uses them.
  * There are no files: stdout and stderr both go to the hook __putchar, stdin is the hook __getchar, and fopen fails. */
 #ifndef STDIO_H
 #define STDIO_H
@@ -31,19 +31,19 @@ typedef struct __stream FILE;
 #define stdin ((FILE *)3)
 typedef long fpos_t;
 
-/* Hook that printf, puts and putchar send characters to. The library's own sends to UART1, which it enables if need be;
+/* Hook that receives the output of printf, puts and putchar. The default sends it to UART1, which it enables if necessary;
  * a program that defines this function replaces it. Returns the character. */
 int __putchar(int character);
 
-/* Hook that getchar, gets and scanf receive from. The library's own waits for one of UART1, which it enables if need be
- * (UNVERIFIED: that XC16's library does the same); a program that defines this function replaces it. Returns the character,
- * or EOF, which is stdin's end until clearerr. */
+/* Hook that reads a character for getchar, gets and scanf. The default waits for one from UART1, which it enables if
+ * necessary (UNVERIFIED: that XC16's library does the same); a program that defines this function replaces it. Returns
+ * the character, or EOF, which marks the end of stdin until clearerr. */
 int __getchar(void);
 
 int getchar(void);
 int fgetc(FILE *stream);
 int getc(FILE *stream);
-int ungetc(int character, FILE *stream); /* one character */
+int ungetc(int character, FILE *stream); /* at most one character */
 char *gets(char *to);
 char *fgets(char *__restrict to, int size, FILE *__restrict stream);
 size_t fread(void *__restrict to, size_t size, size_t count, FILE *__restrict stream);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* C11 7.22: conversions, division, random numbers, sorting, end of program. The heap is as large
- * as the linker option -Wl,--heap=BYTES sets it; there is no environment, and multibyte characters are single bytes. */
+/* C11 7.22: conversions, division, random numbers, sorting, end of program. The linker option
+ * -Wl,--heap=BYTES sets the size of the heap; there is no environment, and multibyte characters are single bytes. */
 #ifndef STDLIB_H
 #define STDLIB_H
 
@@ -57,12 +57,12 @@ void qsort(void *base, size_t count, size_t size, int (*compare)(const void *, c
 void *bsearch(const void *key, const void *base, size_t count, size_t size,
               int (*compare)(const void *, const void *));
 
-/* The status is left in __exit_status and W0; the processor then sleeps with interrupts masked. */
+/* End the program: the status is in __exit_status and W0, and the processor sleeps with interrupts masked. */
 _Noreturn void exit(int status);
 _Noreturn void _Exit(int status);
 _Noreturn void abort(void);
-int atexit(void (*handler)(void)); /* at most 32; exit and the end of main call them, the last one first */
-char *getenv(const char *name);    /* NULL */
+int atexit(void (*handler)(void)); /* at most 32 functions; exit and the end of main call them, the last one first */
+char *getenv(const char *name);    /* always NULL */
 int system(const char *command);   /* -1; 0 for NULL */
 
 int mblen(const char *text, size_t limit);

@@ -31,7 +31,7 @@ struct tm *gmtime(const time_t *seconds);
 struct tm *localtime(const time_t *seconds);
 char *asctime(const struct tm *calendar); /* "Sun Nov 22 11:15:27 2026\n" */
 char *ctime(const time_t *seconds);
-/* Returns the length, or 0 when it does not fit; all conversions of C11 7.27.3.5 in the "C" locale, %Z is "UTC". */
+/* Return the length, or 0 if the text does not fit; all conversions of C11 7.27.3.5 in the "C" locale, %Z is "UTC". */
 size_t strftime(char *__restrict to, size_t size, const char *__restrict format, const struct tm *__restrict calendar)
     __attribute__((__format__(__strftime__, 3, 0)));
 

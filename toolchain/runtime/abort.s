@@ -1,5 +1,5 @@
 ; SPDX-License-Identifier: MIT
-; abort(): status 134, as a shell reports SIGABRT; functions of atexit are not called.
+; abort(): ends the program with status 134, as a shell reports SIGABRT; functions of atexit are not called.
         .section .text._abort,code
         .global _abort
 _abort:

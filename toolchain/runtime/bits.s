@@ -1,6 +1,6 @@
 ; SPDX-License-Identifier: MIT
-; Bit counting behind __builtin_clz, ctz, ffs, popcount, parity (abi-elf.md §2.8). Arguments from W0 up, result in W0.
-; clz and ctz of 0 are undefined in C; here they give the width.
+; Functions of __builtin_clz, ctz, ffs, popcount, parity (abi-elf.md §2.8). Arguments from W0 up, result in W0.
+; clz and ctz of 0 are undefined in C; these functions return the width.
 
         .section .text.___clzhi2,code
         .global ___clzhi2

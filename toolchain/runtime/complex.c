@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: MIT */
-/* Products and quotients of complex numbers, under the names that compilers call. Infinities and NaN follow the plain
- * formulas, not annex G of C11. */
+/* Products and quotients of complex numbers, under the names that compilers call. Infinities and NaN follow from the
+ * plain formulas, not from annex G of C11. */
 #include <float.h>
 #include <math.h>
 
 /* Division (M. Baudin, R. L. Smith, "A robust complex division in Scilab", 2012): the larger part of the divisor is
- * divided out; where that ratio is too small to be exact the products are reordered; operands close to the ends of the
- * exponent range are moved away from them first. */
+ * divided out. If that ratio is too small to be exact, the products are reordered. Operands close to the limits of the
+ * exponent range are scaled first. */
 #define COMPLEX_ARITHMETIC(type, multiply, divide, part, larger, scale, exponent, smallest, lowest, highest)     \
     type _Complex multiply(type a, type b, type c, type d);                                                      \
     type _Complex divide(type a, type b, type c, type d);                                                        \

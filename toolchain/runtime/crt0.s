@@ -1,6 +1,6 @@
 ; SPDX-License-Identifier: MIT
 ; C start-up, abi-elf.md §3.1: stack, PSV window, initialised data, user_init, main; then the end of the program.
-; exit_handlers.s includes it once more, for programs that register functions with atexit.
+; exit_handlers.s includes this file, for programs that register functions with atexit.
 
         .section .init,code
         .global __reset
@@ -10,7 +10,7 @@ __resetPRI:
         mov     #__SP_init,w15
         mov     #__SPLIM_init,w14
         mov     w14,_SPLIM
-        nop                             ; a stack access may not directly follow a write to SPLIM
+        nop                             ; a stack access must not directly follow a write to SPLIM
         rcall   __psv_init
         mov     #__dinit_tbloffset,w0
         mov     #__dinit_tblpage,w1
@@ -21,7 +21,7 @@ __resetPRI:
         call    __user_init
 1:      call    _main
 
-; exit(status), _Exit(status): W0 keeps the status, which is also stored where a debugger finds it.
+; exit(status), _Exit(status): the status is in W0 and, for debuggers, in __exit_status.
         .global _exit
         .global __Exit
 _exit:
@@ -32,10 +32,10 @@ _exit:
 .endif
 __Exit:
         mov     w0,__exit_status
-        bset    _SR,#7                  ; IPL 7: only traps run from here on (isa.md §2.3)
+        bset    _SR,#7                  ; IPL 7: only traps are served from here on (isa.md §2.3)
         bset    _SR,#6
         bset    _SR,#5
-2:      btss    _U1STA,#8               ; sleeping stops the UARTs: let their last characters out (TRMT)
+2:      btss    _U1STA,#8               ; sleep stops the UARTs: wait for their last characters (TRMT)
         bra     2b
 3:      btss    _U2STA,#8
         bra     3b
@@ -54,7 +54,7 @@ __psv_init:
         bset    _CORCON,#2
 5:      return
 
-; Walk the .dinit table (abi-elf.md §3.2). W1:W0 = program address of its first word.
+; Initialise RAM from the .dinit table (abi-elf.md §3.2). W1:W0 = program address of its first word.
         .global __data_init
 __data_init:
         rcall   read_word
@@ -87,7 +87,7 @@ copy_word:                              ; 2 or, in format 2, 3 bytes from each p
         bra     nz,copy_word_rest
         bra     __data_init
 
-copy_word_rest:                         ; an odd number of bytes is left after an upper byte
+copy_word_rest:                         ; one byte is left after an upper byte
         cp      w3,#1
         bra     nz,copy_word
         mov     w1,_TBLPAG

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Functions that C++ code calls implicitly (Itanium C++ ABI, 3.3 and 5.1.5): new and delete on the C heap, which the linker
- * option --heap=BYTES creates. There are no exceptions, so plain `new` without memory ends the program. */
+ * option --heap=BYTES creates. There are no exceptions: plain `new` ends the program if memory is exhausted. */
 #include <stdlib.h>
 
 void *_Znwj(size_t size)
@@ -55,7 +55,7 @@ void __cxa_pure_virtual(void)
     abort();
 }
 
-/* libc++: a failed check that would throw, std::__libcpp_verbose_abort(char const *, ...). */
+/* std::__libcpp_verbose_abort(char const *, ...), which libc++ calls instead of throwing an exception. */
 void _ZNSt3__122__libcpp_verbose_abortEPKcz(const char *format, ...)
 {
     (void)format;

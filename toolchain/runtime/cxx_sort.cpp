@@ -1,4 +1,4 @@
-// std::sort of arithmetic types: libc++'s header expects these in the library. Heap sort: small, no recursion.
+// std::sort of arithmetic types: libc++'s header expects these instances in the library. Heap sort: small, no recursion.
 #include <algorithm>
 
 _LIBCPP_BEGIN_NAMESPACE_STD

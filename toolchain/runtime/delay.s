@@ -1,6 +1,6 @@
 ; SPDX-License-Identifier: MIT
 ; __delay32 (libpic30.h): W1:W0 instruction cycles. Around the loop: RCALL 2, first subtraction 2, branch 1 or 2, RETURN 3.
-; The loop takes 4 cycles a round and 3 the last time: from `cycles` to `cycles` + 3 in all, at least 9.
+; The loop takes 4 cycles per iteration, 3 in the last: `cycles` to `cycles` + 3 in total, at least 9.
 
         .section .text.___delay32,code
         .global ___delay32

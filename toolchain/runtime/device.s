@@ -1,5 +1,5 @@
 ; SPDX-License-Identifier: MIT
-; Bodies of XC16's divide builtins and of the interrupt-priority builtins (abi-elf.md §2.9, dspic_builtins.h).
+; Functions of XC16's divide builtins and interrupt-priority builtins (abi-elf.md §2.9, dspic_builtins.h).
 ; Dividend in W1:W0, divisor in W2; DIV leaves the quotient in W0, the remainder in W1 (isa.md §6.7).
 
         .section .text.___dspic_divsd,code
@@ -48,7 +48,7 @@ ___dspic_divmodud:
         mov     w1,[w3]
         return
 
-; Fractional quotient of W0 / W1, |W0| < |W1|.
+; Return the fractional quotient of W0 / W1, |W0| < |W1|.
         .section .text.___dspic_divf,code
         .global ___dspic_divf
 ___dspic_divf:
@@ -57,7 +57,7 @@ ___dspic_divf:
         divf    w0,w2
         return
 
-; SR.IPL = W0. Bits 7-5 of SR only; DISI covers the read-modify-write.
+; Set SR.IPL (bits 7-5 of SR) to W0; DISI protects the read-modify-write.
         .section .text.___dspic_set_isr_state,code
         .global ___dspic_set_isr_state
 ___dspic_set_isr_state:

@@ -1,6 +1,6 @@
 ; SPDX-License-Identifier: MIT
 ; dsp.h: fast Fourier transforms of N = 2^log2n complex Q15 values {real, imag}, decimation in frequency, each stage halved:
-; the result is 1/N of the sum. The data lie in Y RAM, the factors in X RAM or program memory.
+; the result is 1/N of the sum. The data are in Y RAM, the factors in X RAM or program memory.
 
         .include "dsp.inc"
 
@@ -34,13 +34,13 @@ _FFTComplexIP:
         add     w1,w14,w14              ; end of the data
         sl      w3,w9                   ; bytes from the upper to the lower half of a group
         lsr     w3,w3
-        dec     w3,w3                   ; butterflies of a group less 1
+        dec     w3,w3                   ; number of butterflies of a group minus 1
         mov     #4,w12                  ; bytes from factor to factor
         bra     z,5f
 1:      mov     w1,w13
 2:      mov     w2,w8
         mov     w13,w10                 ; upper half
-        add     w10,w9,w11              ; lower half, and where it is written
+        add     w10,w9,w11              ; read pointer and write pointer of the lower half
         mov     w11,w13
         movsac  A,[w8]+=2,w6,[w11]+=2,w4
         movsac  A,[w8],w7,[w11]+=2,w5
@@ -54,7 +54,7 @@ _FFTComplexIP:
         mac     w5*w6,A,[w8]+=2,w6,[w11]+=2,w5,[w13]+=2
         sac.r   A,[w13++]
 3:      add     w8,w12,w8
-        halves                          ; the last one, with nothing to read behind it
+        halves                          ; the last butterfly, without prefetch
         mpy     w4*w6,B
         msc     w5*w7,B
         mpy     w4*w7,A
@@ -83,8 +83,8 @@ _FFTComplexIP:
         popall
         return
 
-; fractcomplex *BitReverseComplex(int log2n, fractcomplex *data). From i-1 to i the low bits up to the lowest one of i
-; change; the same bits of the reversed number are its high ones. Bit-reversed addressing would act on code that interrupts.
+; fractcomplex *BitReverseComplex(int log2n, fractcomplex *data). From i-1 to i, the bits up to the lowest 1 of i change; in
+; the reversed number these are the high bits. Bit-reversed addressing is not used: it would affect interrupt handlers.
         .section .text._BitReverseComplex,code
         .global _BitReverseComplex
 _BitReverseComplex:
@@ -120,7 +120,7 @@ _BitReverseComplex:
         return
 
 ; fractcomplex *FFTComplex(int log2n, fractcomplex *dst, fractcomplex *src, fractcomplex *factors, int page), from natural
-; to natural order. IFFTComplex is the same with conjugate factors, which the caller gives.
+; to natural order. IFFTComplex is the same with conjugate factors from the caller.
         .section .text._FFTComplex,code
         .global _FFTComplex
         .global _IFFTComplex
@@ -169,7 +169,7 @@ _SquareMagnitudeCplx:
         mpy     w4*w4,A,[w10]+=2,w5
         mac     w5*w5,A,[w10]+=2,w4
 1:      sac.r   A,[w2++]
-2:      mpy     w4*w4,A,[w10]+=2,w5     ; nothing is read behind the last one
+2:      mpy     w4*w4,A,[w10]+=2,w5     ; the last element, without prefetch
         mac     w5*w5,A
         sac.r   A,[w2++]
         pop     _CORCON

@@ -1,8 +1,8 @@
 ; SPDX-License-Identifier: MIT
 ; dsp.h: FIR filters. A FIRStruct is {int numCoeffs; coeffsBase, coeffsEnd; int coeffsPage; delayBase, delayEnd, delay}.
-; The delay is in Y RAM and circular: its pointer is at the oldest sample, which the next one replaces, and every older
-; one lies above. Y modulo addressing acts on nothing but the Y reads of MAC; X modulo addressing would also change W8 of
-; any code that interrupts, so coefficients are walked without it.
+; The delay is a circular buffer in Y RAM. Its pointer is at the oldest sample, which the next one replaces; older samples
+; are above newer ones. Y modulo addressing affects only the Y reads of MAC. X modulo addressing is not used for the
+; coefficients, because it would also change accesses through W8 in interrupt handlers.
 
         .include "dsp.inc"
 
@@ -49,8 +49,8 @@ _FIRInterpDelayInit:
         clr     [w2++]
         return
 
-; Common to the filters: W0 = samples less 1, W9 = coefficients, W10 = delay pointer, circular in Y between delayBase
-; and W5 bytes on. Changes W4-W7.
+; Common entry of the filters: W0 = samples minus 1, W9 = coefficients, W10 = delay pointer, circular in Y from delayBase to
+; W5 bytes after it. Changes W4-W7.
         .macro  circular filter,bytes
         push    _MODCON
         push    _YMODSRT
@@ -69,7 +69,7 @@ _FIRInterpDelayInit:
         pop     _MODCON
         .endm
 
-; fractional *FIR(int n, fractional *dst, fractional *src, FIRStruct *filter): a cycle a tap and 5 a sample
+; fractional *FIR(int n, fractional *dst, fractional *src, FIRStruct *filter): 1 cycle per tap and 5 per sample
         .section .text._FIR,code
         .global _FIR
 _FIR:
@@ -84,7 +84,7 @@ _FIR:
         mov     [w3+2],w9
         mov     [w3+12],w10
         dec     w0,w0
-        sub     w6,#3,w6                ; REPEAT's count: all taps but the first and the last two
+        sub     w6,#3,w6                ; count of REPEAT: all taps except the first and the last two
         bra     n,2f
         do      w0,1f
         mov     w9,w8
@@ -122,7 +122,7 @@ _FIR:
 _FIRDecimate:
         pushall
         mov     w1,[w15++]
-        dec     w4,w12                  ; rate less 1
+        dec     w4,w12                  ; rate minus 1
         fractional w4
         mov     [w3+6],w5
         paged   w5,w4
@@ -135,13 +135,13 @@ _FIRDecimate:
         dec     w0,w0
 1:      do      w12,2f
         mov     [w2++],[w10]
-2:      movsac  A,[w10]-=2,w5           ; the oldest sample lies below
+2:      movsac  A,[w10]-=2,w5           ; the oldest sample is below
         movsac  A,[w10]+=2,w5           ; the newest: W5 = the oldest, W10 at the newest
         mov     w9,w8
         clr     A,[w8]+=2,w4,[w10]+=2,w5
         repeat  w6
         mac     w4*w5,A,[w8]+=2,w4,[w10]+=2,w5
-        movsac  A,[w10]-=2,w5           ; one too far, and from the newest to the oldest
+        movsac  A,[w10]-=2,w5           ; undo the last step, and from the newest to the oldest
         movsac  A,[w10]-=2,w5
         sac.r   A,[w1++]
         dec     w0,w0
@@ -151,7 +151,7 @@ _FIRDecimate:
         finished
 
 ; fractional *FIRInterpolate(int n, fractional *dst, fractional *src, FIRStruct *filter, int rate): n*rate outputs;
-; output n*rate+r is the sum of h[r+k*rate] and sample n-k. 3 cycles a product.
+; output n*rate+r is the sum of h[r+k*rate] * sample n-k. 3 cycles per product.
         .section .text._FIRInterpolate,code
         .global _FIRInterpolate
 _FIRInterpolate:
@@ -194,7 +194,7 @@ _FIRInterpolate:
         finished
 
 ; fractional *FIRLattice(int n, fractional *dst, fractional *src, FIRStruct *filter): M coefficients, M words of delay,
-; not circular. f0 = g0 = x; f[m+1] = f[m] - k[m] * g[m] of the sample before; g[m+1] = g[m] of the sample before - k[m] *
+; not circular. f0 = g0 = x; f[m+1] = f[m] - k[m] * g'[m], g' of the previous sample; g[m+1] = g'[m] - k[m] *
 ; f[m]; y = f[M].
         .section .text._FIRLattice,code
         .global _FIRLattice
@@ -215,7 +215,7 @@ _FIRLattice:
         mov     w5,w12                  ; g
         do      w13,2f
         mov     [w8++],w4
-        mov     [w10],w6                ; g before
+        mov     [w10],w6                ; g of the previous sample
         mov     w12,[w10++]
         lac     w5,A
         msc     w4*w6,A
@@ -229,7 +229,7 @@ _FIRLattice:
         finished
 
 ; fractional *FIRLMS(int n, fractional *dst, fractional *src, FIRStruct *filter, fractional *reference, fractional mu):
-; each coefficient, in RAM, gains mu * (reference - y) * its sample.
+; mu * (reference - y) * its sample is added to each coefficient, in RAM.
 ; fractional *FIRLMSNorm(..., fractional *energy): the gain is mu / (mu + E), E the energy of the samples in the delay.
         .macro  adaptive name,normalised
         .section .text.\name,code
@@ -249,7 +249,7 @@ _FIRLattice:
         circular w3,w5
         mov     [w3+2],w9
         mov     [w3+12],w10
-        dec     w6,w12                  ; taps less 1
+        dec     w6,w12                  ; taps minus 1
 1:      mov     w9,w8
         .if     \normalised
         mov     [w10],w4                ; E - oldest^2 + newest^2
@@ -279,7 +279,7 @@ _FIRLattice:
         add     [w13],A
         sac     A,w5                    ; mu + E, saturated
         mov     #0x7FFF,w6
-        cpsgt   w5,w7                   ; no energy: a gain of 1
+        cpsgt   w5,w7                   ; energy 0: the gain is 1
         bra     2f
         repeat  #17
         divf    w7,w5
@@ -295,7 +295,7 @@ _FIRLattice:
         lac     [w8],A
         mac     w5*w6,A,[w10]+=2,w5
 3:      sac.r   A,[w8++]
-        movsac  A,[w10]-=2,w5           ; one too far, and the oldest
+        movsac  A,[w10]-=2,w5           ; undo the last step, and the oldest
         movsac  A,[w10]-=2,w5
         dec     w0,w0
         bra     nz,1b

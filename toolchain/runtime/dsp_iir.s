@@ -1,5 +1,5 @@
 ; SPDX-License-Identifier: MIT
-; dsp.h: IIR filters. Coefficients are half of what the difference equation says, so that they fit Q15; sums are doubled
+; dsp.h: IIR filters. Coefficients are half of those of the difference equation, so that they fit Q15; sums are doubled
 ; when they are stored.
 
         .include "dsp.inc"
@@ -39,7 +39,7 @@ _IIRLatticeInit:
 
 ; fractional *IIRCanonic(int n, fractional *dst, fractional *src, IIRCanonicStruct *filter): direct form II.
 ; {int sections less 1; coeffsBase {a2, a1, b2, b1, b0}; int coeffsPage; delayBase {w[-2], w[-1]}, in Y; int initialGain,
-; finalShift}. The accumulator carries the sum from section to section. 9 cycles a section.
+; finalShift}. The accumulator passes the sum from section to section. 9 cycles per section.
         .section .text._IIRCanonic,code
         .global _IIRCanonic
 _IIRCanonic:
@@ -48,13 +48,13 @@ _IIRCanonic:
         fractional w4
         mov     [w3+4],w5
         paged   w5,w4
-        mov     [w3++],w12              ; sections less 1
+        mov     [w3++],w12              ; sections minus 1
         mov     [w3++],w11              ; coefficients
         inc2    w3,w3
         mov     [w3++],w13              ; delay
         mov     [w3++],w9               ; gain
         mov     [w3],w3
-        neg     w3,w3                   ; SFTAC's sign: right is positive
+        neg     w3,w3                   ; sign of SFTAC: positive shifts right
         dec     w0,w0
 1:      mov     w11,w8
         mov     w13,w10
@@ -78,8 +78,8 @@ _IIRCanonic:
         finished
 
 ; fractional *IIRTransposed(int n, fractional *dst, fractional *src, IIRTransposedStruct *filter): transposed form II.
-; {int sections less 1; coeffsBase {b0, b1, a1, b2, a2}; int coeffsPage; delayBase1, delayBase2, a word a section each; int
-; finalShift}. 11 cycles a section.
+; {int sections less 1; coeffsBase {b0, b1, a1, b2, a2}; int coeffsPage; delayBase1, delayBase2, 1 word per section; int
+; finalShift}. 11 cycles per section.
         .section .text._IIRTransposed,code
         .global _IIRTransposed
 _IIRTransposed:

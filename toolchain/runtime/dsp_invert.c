@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* dsp.h: inverse of a matrix, by Gauss-Jordan elimination with full pivoting (Golub and Van Loan, Matrix Computations,
- * section 3.4). Work space comes from the caller. */
+ * section 3.4). The caller provides the work space. */
 #include <dsp.h>
 #include <math.h>
 #include <stddef.h>

@@ -1,6 +1,6 @@
 ; SPDX-License-Identifier: MIT
 ; dsp.h: PID controller. tPID is {fractional *abcCoefficients, *controlHistory, controlOutput, measuredOutput,
-; controlReference}: output += a * e[0] + b * e[1] + c * e[2], e[0] = reference - measured. Everything saturates.
+; controlReference}: output += a * e[0] + b * e[1] + c * e[2], e[0] = reference - measured. All results saturate.
 
         .include "dsp.inc"
 

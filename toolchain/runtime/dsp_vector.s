@@ -1,6 +1,6 @@
 ; SPDX-License-Identifier: MIT
-; dsp.h: vectors and matrices of Q15 fractions, 1 element or more. Arguments in W0..., the destination returned in W0.
-; Each section names the cycles of a call, with the RCALL and the RETURN, for vectors in RAM.
+; dsp.h: vectors and matrices of Q15 fractions, 1 element or more. Arguments are in W0...; the destination is returned in
+; W0. Comments state the cycles of a call, with RCALL and RETURN, for vectors in RAM.
 
         .include "dsp.inc"
 
@@ -105,7 +105,7 @@ _VectorWindow:
         pop     _CORCON
         return
 
-; fractional VectorPower(int n, fractional *src): 2 cycles an element
+; fractional VectorPower(int n, fractional *src): 2 cycles per element
         .section .text._VectorPower,code
         .global _VectorPower
 _VectorPower:
@@ -120,17 +120,17 @@ _VectorPower:
         return
 
 ; fractional VectorDotProduct(int n, fractional *a, fractional *b)
-; One vector wholly in X RAM and the other in Y RAM: MAC reads both, a cycle an element. Otherwise 3 cycles.
+; If one vector is in X RAM and the other in Y RAM, MAC reads both in 1 cycle per element. Otherwise 3 cycles.
         .section .text._VectorDotProduct,code
         .global _VectorDotProduct
 _VectorDotProduct:
         fractional w3
         mov     #__YDATA_BASE,w4
-        cp      w2,w4                   ; the second in Y, or exchange them
+        cp      w2,w4                   ; exchange the vectors unless the second is in Y
         bra     geu,1f
         exch    w1,w2
 1:      add     w0,w0,w3
-        add     w1,w3,w3                ; end of the one that ought to be in X
+        add     w1,w3,w3                ; end of the vector that must be in X
         cp      w3,w4
         bra     gtu,2f
         cp      w2,w4
@@ -146,7 +146,7 @@ _VectorDotProduct:
         bra     n,4f
         repeat  w0
         mac     w4*w5,A,[w8]+=2,w4,[w10]+=2,w5
-4:      mac     w4*w5,A                 ; nothing is read behind the last one
+4:      mac     w4*w5,A                 ; the last element, without prefetch
         mov     [--w15],w10
         mov     [--w15],w8
         sac.r   A,w0
@@ -162,12 +162,12 @@ _VectorDotProduct:
         pop     _CORCON
         return
 
-; fractional VectorMax(int n, fractional *src, int *index), VectorMin: of equal ones the last
+; fractional VectorMax(int n, fractional *src, int *index), VectorMin: the last of equal elements
         .macro  extreme name,skip
         .section .text.\name,code
         .global \name
 \name:
-        mov     [w1++],w4               ; W5:W4 index and value of the best, W7:W6 of the next
+        mov     [w1++],w4               ; W5:W4 index and value of the extreme, W7:W6 of the next element
         clr     w5
         mov     #1,w7
         sub     w0,#2,w0
@@ -185,7 +185,7 @@ _VectorDotProduct:
         extreme _VectorMin,cpslt
 
 ; fractional *VectorConvolve(int n, int m, fractional *dst, fractional *x, fractional *h), m <= n:
-; dst[i] is the sum of x[k] * h[i-k], i < n+m-1. VectorCorrelate: of x[k] * y[k+m-1-i]. 3 cycles a product.
+; dst[i] is the sum of x[k] * h[i-k], i < n+m-1. VectorCorrelate: sum of x[k] * y[k+m-1-i]. 3 cycles per product.
         .macro  sliding name,toward,partner
         .section .text.\name,code
         .global \name
@@ -232,7 +232,7 @@ _VectorDotProduct:
         sliding _VectorCorrelate,sub,w8++
 
 ; MatrixAdd, MatrixSubtract (int rows, int columns, fractional *dst, fractional *a, fractional *b), and MatrixScale
-; (..., fractional *src, fractional factor) are those of vectors.
+; (..., fractional *src, fractional factor) call the vector functions.
         .macro  elementwise name,vector
         .section .text.\name,code
         .global \name
@@ -248,7 +248,7 @@ _VectorDotProduct:
         elementwise _MatrixScale,_VectorScale
 
 ; fractional *MatrixMultiply(int rows, int inner, int columns, fractional *dst, fractional *a, fractional *b):
-; dst is neither a nor b. 4 cycles a product.
+; dst is neither a nor b. 4 cycles per product.
         .section .text._MatrixMultiply,code
         .global _MatrixMultiply
 _MatrixMultiply:
@@ -257,7 +257,7 @@ _MatrixMultiply:
         mov     w3,[w15++]
         mov     w4,w6                   ; row of a
         mov     w5,w7                   ; b
-        dec     w1,w9                   ; products of a sum less 1
+        dec     w1,w9                   ; products of a sum minus 1
         add     w1,w1,w10               ; bytes of a row of a
         dec     w2,w11
         add     w2,w2,w12               ; bytes of a row of b
@@ -300,9 +300,9 @@ _MatrixTranspose:
         bra     nz,1b
         mov     [--w15],w0
         return
-3:      sub     w0,#2,w0                ; exchanges of the first row less 1
+3:      sub     w0,#2,w0                ; exchanges of the first row minus 1
         bra     n,6f
-4:      mov     w2,w5                   ; along the row, and down the column, from the diagonal
+4:      mov     w2,w5                   ; pointers along the row and down the column, from the diagonal
         mov     w2,w3
         do      w0,5f
         add     w3,w4,w3

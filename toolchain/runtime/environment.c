@@ -32,7 +32,7 @@ struct lconv *localeconv(void)
         ".",      "",       "",       "",       "",       "",       "",       "",       "",       "",
         CHAR_MAX, CHAR_MAX, CHAR_MAX, CHAR_MAX, CHAR_MAX, CHAR_MAX, CHAR_MAX, CHAR_MAX, CHAR_MAX, CHAR_MAX,
         CHAR_MAX, CHAR_MAX, CHAR_MAX, CHAR_MAX};
-    return (struct lconv *)&c_locale; /* which the program must not write to (C11 7.11.2.1p8) */
+    return (struct lconv *)&c_locale; /* the program must not write to it (C11 7.11.2.1p8) */
 }
 
 static void (*handlers[SIGTERM + 1])(int);
@@ -60,7 +60,7 @@ int raise(int number)
     if (handler == SIG_IGN)
         return 0;
     if (handler == SIG_DFL)
-        _Exit(128 + number); /* the status that a shell reports */
+        _Exit(128 + number); /* the status that a shell reports for a signal */
     handlers[number] = SIG_DFL;
     handler(number);
     return 0;
@@ -109,7 +109,7 @@ int setvbuf(FILE *restrict stream, char *restrict buffer, int mode, size_t size)
     (void)stream;
     (void)buffer;
     (void)size;
-    return mode == _IONBF ? 0 : -1; /* nothing is ever buffered */
+    return mode == _IONBF ? 0 : -1; /* only the unbuffered mode exists */
 }
 
 int fseek(FILE *stream, long offset, int from)

@@ -1,6 +1,6 @@
 ; SPDX-License-Identifier: MIT
-; atexit (C11 7.22.4.2) and a start-up code whose exit calls the functions registered, the last one first. A program without
-; atexit has crt0.s, which calls no handlers: the linker replaces it by this one (link/resolve.py).
+; atexit (C11 7.22.4.2), and start-up code whose exit calls the registered functions, the last one first. The linker uses
+; it instead of crt0.s, which calls no handlers, if a program uses atexit (link/resolve.py).
 
         .equ    EXIT_HANDLERS,1
         .include "crt0.s"
@@ -14,7 +14,7 @@ handlers:
 
         .section .text._atexit,code
         .global _atexit
-_atexit:                                ; int atexit(void (*handler)(void)): 0, or 1 when there is no room
+_atexit:                                ; int atexit(void (*handler)(void)): 0, or 1 if the table is full
         mov     #count,w1
         mov     #MOST,w3
         mov     [w1],w2
@@ -28,7 +28,7 @@ _atexit:                                ; int atexit(void (*handler)(void)): 0, 
 1:      retlw   #1,w0
 
         .section .text.run_handlers,code
-run_handlers:                           ; until none is left; a handler may register more
+run_handlers:                           ; call all handlers; a handler may register more
 1:      mov     #count,w1
         mov     [w1],w2
         cp0     w2

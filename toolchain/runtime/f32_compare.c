@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Single-precision comparisons. Results are compared with 0 by the caller; NaN answers so that the test fails
+/* Single-precision comparisons. The caller compares the result with 0. For NaN the result makes that comparison false
  * (abi-elf.md §2.8). */
 #include "softfloat.h"
 
@@ -11,7 +11,7 @@ int __gtsf2(float left, float right);
 int __gesf2(float left, float right);
 int __unordsf2(float left, float right);
 
-/* -1, 0, 1; `unordered` when one is NaN. */
+/* Return -1, 0 or 1; `unordered` if an operand is NaN. */
 static int compare(uint32_t x, uint32_t y, int unordered)
 {
     uint32_t x_magnitude = x & ~F32_SIGN, y_magnitude = y & ~F32_SIGN;

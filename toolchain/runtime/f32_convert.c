@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Conversions between single precision and integers. To integer: toward zero, saturating; NaN gives 0. */
+/* Conversions between single precision and integers. To integer: rounded toward zero, saturated; NaN becomes 0. */
 #include "softfloat.h"
 
 int32_t __fixsfsi(float value);
@@ -78,7 +78,7 @@ static float from_wide_magnitude(uint32_t sign, uint64_t magnitude)
     uint32_t high = (uint32_t)(magnitude >> 32);
     if (high == 0)
         return from_magnitude(sign, (uint32_t)magnitude);
-    int16_t shift = (int16_t)(33 - __f32_leading_zeros(high)); /* leading one to bit 30 */
+    int16_t shift = (int16_t)(33 - __f32_leading_zeros(high)); /* moves the leading one to bit 30 */
     uint64_t kept = magnitude >> shift;
     uint32_t significand = (uint32_t)kept;
     if (kept << shift != magnitude)

@@ -4,7 +4,7 @@
 
 float __divsf3(float left, float right);
 
-/* One digit of remainder * 2^16 / divisor; remainder < divisor, divisor's bit 31 is set. Updates *remainder. */
+/* Return one digit of remainder * 2^16 / divisor and update *remainder; remainder < divisor, bit 31 of divisor is set. */
 static uint16_t next_digit(uint32_t *remainder, uint32_t divisor)
 {
     uint16_t divisor_high = (uint16_t)(divisor >> 16), divisor_low = (uint16_t)divisor;

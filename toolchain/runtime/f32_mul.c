@@ -9,7 +9,7 @@ static uint32_t product(uint16_t left, uint16_t right)
     return (uint32_t)left * right;
 }
 
-/* Upper 32 bits of the 64-bit product; the lowest bit is sticky. */
+/* Return the upper 32 bits of the 64-bit product; the lowest bit is sticky. */
 static uint32_t multiply_high(uint32_t left, uint32_t right)
 {
     uint16_t left_high = (uint16_t)(left >> 16), left_low = (uint16_t)left;

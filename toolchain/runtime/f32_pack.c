@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Packing, shifting and counting for single precision; the contract is in softfloat.h. */
+/* Packing, shifting and counting for single precision; softfloat.h defines the unpacked form. */
 #include "softfloat.h"
 
 int16_t __f32_leading_zeros(uint32_t value)
@@ -30,7 +30,7 @@ uint32_t __f32_pack(uint32_t sign, int16_t exponent, uint32_t significand)
         exponent = 1;
     }
     uint32_t rounded = (significand + 0x3F + ((significand >> 7) & 1)) >> 7;
-    /* The leading one, where there is one, adds the last 1 to the exponent; so does a carry out of rounding. */
+    /* A leading one increments the exponent, as does a carry out of rounding. */
     return sign | (((uint32_t)(uint16_t)(exponent - 1) << 23) + rounded);
 }
 

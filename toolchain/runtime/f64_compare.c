@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Double-precision comparisons. Results are compared with 0 by the caller; NaN answers so that the test fails
+/* Double-precision comparisons. The caller compares the result with 0. For NaN the result makes that comparison false
  * (abi-elf.md §2.8). */
 #include "softfloat.h"
 
@@ -11,7 +11,7 @@ int __gtdf2(double left, double right);
 int __gedf2(double left, double right);
 int __unorddf2(double left, double right);
 
-/* -1, 0, 1; `unordered` when one is NaN. */
+/* Return -1, 0 or 1; `unordered` if an operand is NaN. */
 static int compare(uint64_t x, uint64_t y, int unordered)
 {
     uint64_t x_magnitude = x & ~F64_SIGN, y_magnitude = y & ~F64_SIGN;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Conversions between double precision, single precision and integers. To integer: toward zero, saturating; NaN
- * gives 0. */
+/* Conversions between double precision, single precision and integers. To integer: rounded toward zero,
+ * saturated; NaN becomes 0. */
 #include "softfloat.h"
 
 int32_t __fixdfsi(double value);
@@ -114,7 +114,7 @@ float __truncdfsf2(double value)
     int16_t exponent = (int16_t)((int16_t)(bits >> 52) - (F64_BIAS - F32_BIAS));
     if (exponent >= 255)
         return f32_value(sign | F32_INF);
-    if (exponent < -30) /* below half the smallest subnormal; also zero */
+    if (exponent < -30) /* below half of the smallest subnormal, or zero */
         return f32_value(sign);
     uint32_t significand = (uint32_t)(bits >> 22) & (F32_TOP - 1);
     if (bits & 0x3FFFFF)

@@ -4,8 +4,8 @@
 
 double __divdf3(double left, double right);
 
-/* One digit of remainder * 2^16 / divisor (Knuth, TAOCP 2, 4.3.1 algorithm D). `rest` has DIGITS + 1 digits: on entry
- * remainder * 2^16 with remainder < divisor, on return the new remainder in the lower DIGITS ones. */
+/* Return one digit of remainder * 2^16 / divisor (Knuth, TAOCP 2, 4.3.1 algorithm D). `rest` has DIGITS + 1 digits: on
+ * entry remainder * 2^16 with remainder < divisor, on return the new remainder in the lower DIGITS digits. */
 static uint16_t next_digit(uint16_t *rest, const uint16_t *divisor)
 {
     uint16_t top = divisor[DIGITS - 1];
@@ -21,7 +21,7 @@ static uint16_t next_digit(uint16_t *rest, const uint16_t *divisor)
     }
     uint32_t difference = (uint32_t)rest[DIGITS] - carry - borrow;
     rest[DIGITS] = (uint16_t)difference;
-    while (rest[DIGITS]) { /* the estimate was too large, by 2 at most: add the divisor back until the sign is lost */
+    while (rest[DIGITS]) { /* the estimate was at most 2 too large: add the divisor until the sum overflows */
         digit--;
         carry = 0;
         for (uint16_t i = 0; i < DIGITS; i++) {
@@ -34,7 +34,7 @@ static uint16_t next_digit(uint16_t *rest, const uint16_t *divisor)
     return digit;
 }
 
-/* dividend * 2^64 / divisor with a sticky lowest bit; dividend < divisor, divisor's bit 63 is set. */
+/* Return dividend * 2^64 / divisor with a sticky lowest bit; dividend < divisor, bit 63 of divisor is set. */
 static uint64_t divide_fraction(uint64_t dividend, uint64_t divisor)
 {
     uint16_t rest[DIGITS + 1], digits[DIGITS], quotient[DIGITS];

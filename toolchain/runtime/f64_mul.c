@@ -4,7 +4,7 @@
 
 double __muldf3(double left, double right);
 
-/* Upper 64 bits of the 128-bit product; the lowest bit is sticky. */
+/* Return the upper 64 bits of the 128-bit product; the lowest bit is sticky. */
 static uint64_t multiply_high(uint64_t left, uint64_t right)
 {
     uint16_t x[DIGITS], y[DIGITS], sum[2 * DIGITS] = {0};

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Packing, shifting and counting for double precision; the contract is in softfloat.h. */
+/* Packing, shifting and counting for double precision; softfloat.h defines the unpacked form. */
 #include "softfloat.h"
 
 int16_t __f64_leading_zeros(uint64_t value)
@@ -25,7 +25,7 @@ uint64_t __f64_pack(uint64_t sign, int16_t exponent, uint64_t significand)
         exponent = 1;
     }
     uint64_t rounded = (significand + 0x1FF + ((significand >> 10) & 1)) >> 10;
-    /* The leading one, where there is one, adds the last 1 to the exponent; so does a carry out of rounding. */
+    /* A leading one increments the exponent, as does a carry out of rounding. */
     return sign | (((uint64_t)(uint16_t)(exponent - 1) << 52) + rounded);
 }
 

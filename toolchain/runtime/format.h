@@ -22,17 +22,17 @@ typedef struct {
     int precision; /* -1: none given */
 } spec_t;
 
-/* Runs `format` into `sink`; returns the count. In format.s, which knows the layout of both structures. */
+/* Write the formatted text to `sink`; return the count. format.s depends on the layout of both structures. */
 int __format(sink_t *sink, const char *format, va_list arguments);
 
-/* Emits prefix, zeros and digits padded to the field width. `digits` are in reverse order; `prefix` holds up to two
+/* Write prefix, zeros and digits, padded to the field width. `digits` are in reverse order; `prefix` contains up to two
  * characters, the first one in the low byte, 0 for none. */
 void __format_field(sink_t *sink, const spec_t *spec, unsigned prefix, const char *digits, int count);
 
 void __format_pad(sink_t *sink, char character, int count);
 
-/* The conversions that need 64-bit integers and doubles. The driver links them when a format string of the program
- * mentions them; until then they are null. */
+/* Conversions of 64-bit integers and doubles. The driver links them if a format string of the program contains
+ * them; otherwise their addresses are null. */
 void __format_wide(sink_t *sink, const spec_t *spec, unsigned long long value, int negative);
 void __format_double(sink_t *sink, const spec_t *spec, double value);
 

@@ -1,7 +1,7 @@
 ; SPDX-License-Identifier: MIT
 ; The core of the printf family (C11 7.21.6.1): int __format(sink_t *sink, const char *format, va_list arguments).
-; In assembly for its stack: a call of snprintf with integer, string and character conversions takes 50 bytes, return
-; address included. 64-bit and floating conversions are C functions (format.h), linked when a format string needs them.
+; It is in assembly to save stack: a call of snprintf with integer, string and character conversions takes 50 bytes with
+; return address. 64-bit and floating conversions are C functions (format.h), linked if a format string needs them.
 ;
 ; W8 sink, W9 format, W10 arguments (va_arg subtracts first, abi-elf.md §2.4), W11 width, W12 precision, W13 = flags in
 ; the low byte (enum in format.h), conversion or prefix in the high byte, W14 digits or text.
@@ -86,7 +86,7 @@ width:  cp      w1,#'*'-0x20
         rcall   fetch
         btss    w11,#15
         bra     precision
-        neg     w11,w11                 ; a negative width is a - flag and a width
+        neg     w11,w11                 ; a negative width means the - flag
         bset    w13,#LEFT
 precision:
         cp      w1,#'.'-0x20
@@ -134,7 +134,7 @@ length: add     #0x20,w1
 4:      rcall   fetch
         bra     length
 
-number: clr     w2                      ; decimal number from W1 on; W1 ends after it
+number: clr     w2                      ; read a decimal number at W1; W1 becomes its end
 1:      sub     w1,#'0'-0x20,w3
         cp      w3,#10
         bra     geu,2f
@@ -170,7 +170,7 @@ conversion:
         cp      w1,w2
         bra     z,unsigned
         mov     #16,w4
-        ior     #0x20,w1                ; X like x, E like e
+        ior     #0x20,w1                ; convert X to x, E to e
         mov     #'x',w2
         cp      w1,w2
         bra     z,unsigned
@@ -185,7 +185,7 @@ conversion:
         mov     #'n',w2
         cp      w1,w2
         bra     z,count
-        rcall   put                     ; any other character is printed
+        rcall   put                     ; print any other character
         bra     next
 
 count:  dec2    w10,w10                 ; number of characters so far, in the size of the length modifier
@@ -263,10 +263,10 @@ signed: btsc    w13,#WIDE
 
 ; W1:W0 in base W4 with prefix W2: a sign, or x or X for 0x.
 integer:
-        mov     [w15+ROOM],w14          ; too short a stack traps here (-fstack-check)
+        mov     [w15+ROOM],w14          ; traps here if the stack is too short (-fstack-check)
         add     w15,#ROOM,w15
         sub     w15,#ROOM,w14
-        lsr     w13,#8,w5               ; what turns 10 into the letter of this conversion
+        lsr     w13,#8,w5               ; distance from 10 to the letter of this conversion
         and     #0x20,w5
         add     #'A'-10,w5
         ze      w13,w13
@@ -275,7 +275,7 @@ integer:
         ior     w0,w1,w2
         bra     nz,2f
         cp0     w12
-        bra     z,4f                    ; precision 0 prints 0 as nothing
+        bra     z,4f                    ; with precision 0, the value 0 has no digits
         mov     #'0',w1
         mov.b   w1,[w14++]
         bra     5f
@@ -315,7 +315,7 @@ integer:
         dec     w11,w11                 ; or 0x
 6:      btss    w13,#ZERO
         bra     7f
-        btss    w12,#15                 ; the 0 flag counts without precision and without -
+        btss    w12,#15                 ; the 0 flag applies without precision and without -
         bra     7f
         btsc    w13,#LEFT
         bra     7f
@@ -323,7 +323,7 @@ integer:
         btsc    w2,#15
         clr     w2
 7:      mov     w2,w12
-        sub     w11,w12,w11             ; what is left for spaces
+        sub     w11,w12,w11             ; number of spaces
         btss    w13,#LEFT
         rcall   pad
         lsr     w13,#8,w1
@@ -361,7 +361,7 @@ string: dec2    w10,w10
         mov     [w10],w14
         mov     w14,w3
         clr     w2
-1:      cp      w2,w12                  ; no precision is 0xFFFF, which no string reaches
+1:      cp      w2,w12                  ; without precision it is 0xFFFF, more than any length
         bra     z,text
         cp0.b   [w3++]
         bra     z,text
@@ -403,7 +403,7 @@ wide_signed:
 floating:
         rcall   argument64
         mov     #handle(___format_double),w3
-large:  cp0     w3                      ; not linked: the program builds its formats at run time
+large:  cp0     w3                      ; null if not linked: the format was built at run time
         bra     z,next
         mov     w13,[w15++]             ; a spec_t
         mov     w11,[w15++]

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
-/* %f %e %g (C11 7.21.6.1): a double as decimal digits, each of them exact, rounded to nearest, ties to even.
+/* %f %e %g (C11 7.21.6.1): prints a double as exact decimal digits, rounded to nearest, ties to even.
  *
- * Every double is an integer of 16-bit limbs plus a fraction of such limbs. The integer is divided into groups of four
- * decimal digits, the fraction gives the next group when it is multiplied by 10^4. Both are on the stack, with a length
-  * that depends on the exponent: 30 bytes below 2^64, 300 for 1e308. */
+ * A double is an integer plus a fraction, both in 16-bit limbs. Divisions split the integer into groups of four decimal
+ * digits; multiplying the fraction by 10^4 yields its next group. Both are on the stack, with a length that depends on
+ * the exponent: 30 bytes below 2^64, 300 for 1e308. */
 #include "format.h"
 #include "softfloat.h"
 #include "stack_room.h"
@@ -13,20 +13,20 @@
 #include <string.h>
 
 #define SIGNIFICAND_BITS 53
-#define BIAS 1075 /* of the exponent of the significand's last bit */
+#define BIAS 1075 /* of the exponent, for a significand that is an integer */
 #define LIMB 16
 #define GROUP 10000u
-#define MOST_DIGITS 1100 /* no double has more decimals than 1074 */
+#define MOST_DIGITS 1100 /* maximum number of decimals printed; a double has at most 1074 */
 
-/* The digits of a number from the first to the last. */
+/* Generator of the digits of a number, first digit first. */
 typedef struct {
-    const uint16_t *groups; /* of the integer, lowest first */
-    uint16_t *fraction;     /* limbs, lowest first */
-    int left, low, limbs;   /* groups to come; limbs below `low` are zero */
-    uint16_t group, power;  /* rest of the current group, weight of its next digit or 0 */
+    const uint16_t *groups; /* digit groups of the integer, lowest first */
+    uint16_t *fraction;     /* limbs of the fraction, lowest first */
+    int left, low, limbs;   /* groups left; lowest limb that is not 0; number of limbs */
+    uint16_t group, power;  /* remaining digits of the current group; weight of the next digit, or 0 */
 } digits_t;
 
-/* fraction *= 10^4; returns the carry into the integer. */
+/* Multiply the fraction by 10^4; return the carry out of it. */
 static uint16_t next_group(digits_t *d)
 {
     uint16_t carry = 0;
@@ -60,7 +60,7 @@ static int anything_left(const digits_t *d)
     return d->group || d->low < d->limbs;
 }
 
-/* significand * 2^shift into `limbs` limbs that begin with zeros; shift >= 0. */
+/* Store significand * 2^shift in `limbs` limbs, which are 0 before; shift >= 0. */
 static void place(uint16_t *limbs, uint64_t significand, int shift)
 {
     uint16_t *at = limbs + shift / LIMB;
@@ -68,11 +68,11 @@ static void place(uint16_t *limbs, uint64_t significand, int shift)
     uint64_t rest = significand << shift;
     for (int i = 0; i < 4; i++, rest >>= LIMB)
         *at++ = (uint16_t)rest;
-    if (shift) /* bits shifted out of the 64 bits */
+    if (shift) /* bits shifted out of the low 64 bits */
         *at = (uint16_t)(significand >> (64 - shift));
 }
 
-/* Divides the integer of `count` limbs into groups of four digits; returns their number. */
+/* Split the integer of `count` limbs into groups of four digits; return the number of groups. */
 static int into_groups(uint16_t *integer, int count, uint16_t *groups)
 {
     int made = 0;
@@ -91,7 +91,7 @@ static int into_groups(uint16_t *integer, int count, uint16_t *groups)
     }
 }
 
-/* Rounds `count` digits by those that follow. Returns 1 if all are 0 now and a 1 must precede them. */
+/* Round `count` digits by the following ones. Return 1 if all have become 0 and a 1 must precede them. */
 static int round_off(char *digits, int count, digits_t *rest)
 {
     char next = next_digit(rest);
@@ -120,7 +120,7 @@ static int put_exponent(char *to, int exponent, char letter)
     return length;
 }
 
-/* `padding` characters precede the sign, are zeros between sign and number, or follow the number. */
+/* Print a field: `padding` characters precede the sign, are zeros after the sign, or follow the number. */
 static void put_sign(sink_t *sink, unsigned char flags, char sign, int padding)
 {
     if (!(flags & (LEFT | ZERO)))
@@ -142,7 +142,7 @@ static void put_infinite(sink_t *sink, const spec_t *spec, char sign, double x)
         __format_pad(sink, ' ', padding);
 }
 
-/* `count` digits, the first of weight 10^exponent: in fixed or scientific form with `places` decimals. */
+/* Print `count` digits, the first of weight 10^exponent, in fixed or scientific form with `places` decimals. */
 static void put_number(sink_t *sink, const spec_t *spec, char sign, const char *digits, int count, int exponent,
                        int places, int scientific)
 {
@@ -200,7 +200,7 @@ void __format_double(sink_t *sink, const spec_t *spec, double value)
     while (source.low < limbs && !fraction[source.low])
         source.low++;
 
-    /* The first digit that is not 0, and its weight. */
+    /* Find the first digit that is not 0, and its weight. */
     int exponent = 4 * source.left - 1, zero = !significand;
     char first = zero ? 0 : next_digit(&source);
     for (; !first && !zero; exponent--)
@@ -220,7 +220,7 @@ void __format_double(sink_t *sink, const spec_t *spec, double value)
         digits[0] = first;
         for (int i = 1; i < kept; i++)
             digits[i] = next_digit(&source);
-    } else { /* the first digit decides rounding */
+    } else { /* no digit is printed; the first one decides rounding */
         source.group += first * (source.power ? source.power * 10 : 1);
         source.power = source.power ? source.power * 10 : 1;
     }

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Field output shared by the C conversions of the printf family; format.s has its own, for its stack. */
+/* Output of fields for the conversions of printf that are in C; format.s has its own, which needs less stack. */
 #include "format.h"
 
 void __format_pad(sink_t *sink, char character, int count)

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: MIT */
-/* %lld and its relatives: 64-bit integers in bases 8, 10 and 16. */
+/* Conversions of printf with length ll: 64-bit integers in bases 8, 10 and 16. */
 #include "format.h"
 
 void __format_wide(sink_t *sink, const spec_t *spec, unsigned long long value, int negative)
 {
-    char digits[23]; /* 64 bits in octal and a leading 0 */
+    char digits[23]; /* 22 octal digits and a leading 0 */
     int count = 0;
     unsigned prefix = negative ? '-' : spec->flags & PLUS ? '+' : spec->flags & SPACE ? ' ' : 0;
     unsigned base = spec->conversion == 'o' ? 8 : (spec->conversion | 0x20) == 'x' ? 16 : 10;

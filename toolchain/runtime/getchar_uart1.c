@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The library's own __getchar: waits for a character of UART1, enabled on first use as by __putchar. */
+/* Default __getchar of the library: waits for a character from UART1, which it enables on first use like __putchar. */
 #include <dspic30f6014a.h>
 #include <stdio.h>
 

@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: MIT */
 /* malloc, calloc, aligned_alloc, realloc, free (C11 7.22.3) in the linker's heap (-Wl,--heap=BYTES; without it malloc fails).
- * First fit over one list of blocks in address order; neighbours join when a block is freed. 2 bytes per block. */
+ * First fit over one list of blocks in address order; free neighbours are joined. Overhead: 2 bytes per block. */
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 
 extern char _heap[], _eheap[]; /* linker symbols __heap and __eheap, both 0 without a heap */
 
-/* A block's header: bytes to the next header, even; bit 0 is set while the block is in use. */
+/* Header of a block: even number of bytes to the next header; bit 0 is set while the block is in use. */
 typedef unsigned int header_t;
 #define USED 1u
 #define HEADER ((size_t)sizeof(header_t))
@@ -68,12 +68,12 @@ void *calloc(size_t count, size_t size)
     return memory ? memset(memory, 0, (size_t)bytes) : NULL;
 }
 
-/* The part before the first aligned address that has room for a block becomes a free block. */
+/* The part before the first aligned address becomes a free block, so it must have room for one. */
 void *aligned_alloc(size_t alignment, size_t size)
 {
     if (!alignment || alignment & (alignment - 1) || alignment > LARGEST / 2 || size > LARGEST / 2)
         return NULL;
-    if (alignment <= HEADER) /* alignment of every block */
+    if (alignment <= HEADER) /* every block has this alignment */
         return malloc(size);
     char *memory = malloc(size + alignment + 2 * HEADER);
     if (!memory || !((uintptr_t)memory & (alignment - 1)))

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Input from stdin, which is __getchar (stdio.h), and its end. */
+/* Input from stdin, which reads through __getchar (stdio.h), and its end-of-file state. */
 #include <errno.h>
 #include <stdio.h>
 #include <string.h>

@@ -11,8 +11,8 @@ ___mulsi3:
         add     w1,w6,w1
         return
 
-; Unsigned quotient in W1:W0, remainder in W5:W4. Division by zero takes the math error trap, like DIV itself. The others
-; call it by the name for both results: a ___udivsi3 of the program leaves no remainder.
+; Unsigned quotient in W1:W0, remainder in W5:W4. Division by zero causes the math error trap, as with DIV. The other
+; functions call it by the name for both results, because a ___udivsi3 of the program returns no remainder.
         .section .text.___udivsi3,code
         .global ___udivsi3
         .global ___udivmodsi4
@@ -20,7 +20,7 @@ ___udivsi3:
 ___udivmodsi4:
         cp0     w3
         bra     nz,divisor_32
-        mov     w0,w4                   ; two digits of 16 bits, high one first
+        mov     w0,w4                   ; divide two digits of 16 bits, the high one first
         repeat  #17
         div.uw  w1,w2
         mov     w0,w5
@@ -31,14 +31,14 @@ ___udivmodsi4:
         mov     w5,w1
         clr     w5
         return
-; The quotient has 16 bits. Estimate it from the divisor's top 16 bits; the estimate is exact or one too small
+; The quotient has 16 bits. Estimate it by the upper 16 bits of the divisor; the estimate is exact or one too small
 ; (H. S. Warren, Hacker's Delight, 2nd edition, section 9-5: doubleword from word division).
 divisor_32:
         ff1l    w3,w4
         dec     w4,w4                   ; s = leading zeros of the divisor
         sl      w3,w4,w5
         subr    w4,#16,w6
-        lsr     w2,w6,w6                ; a count of 16 gives 0 (isa.md §6.3)
+        lsr     w2,w6,w6                ; 0 for a count of 16 (isa.md §6.3)
         ior     w5,w6,w6                ; divisor << s, upper 16 bits
         mov.d   w0,[w15++]
         lsr     w1,w1
@@ -93,7 +93,7 @@ ___modsi3:
         bra     ___negsi2
         return
 
-; W1:W0 and W3:W2 become their magnitudes.
+; Replace W1:W0 and W3:W2 by their magnitudes.
         .section .text.___absolutesi2,code
         .global ___absolutesi2
 ___absolutesi2:

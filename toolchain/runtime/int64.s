@@ -39,7 +39,7 @@ ___muldi3:
         mov.d   [--w15],w8
         return
 
-; Unsigned quotient in W3..W0, remainder in W7..W4. Division by zero takes the math error trap.
+; Unsigned quotient in W3..W0, remainder in W7..W4. Division by zero causes the math error trap.
         .section .text.___udivmoddi4_,code
         .global ___udivmoddi4_
 ___udivmoddi4_:
@@ -48,7 +48,7 @@ ___udivmoddi4_:
         ior     w5,w6,w8
         ior     w8,w7,w8
         bra     nz,wide_divisor
-        mov.d   w0,w8                   ; divisor of 16 bits: four hardware divisions, top digit first
+        mov.d   w0,w8                   ; divisor of 16 bits: four hardware divisions, highest digit first
         mov     w2,w10
         repeat  #17
         div.uw  w3,w4
@@ -75,7 +75,7 @@ wide_divisor:
         mul.uu  w8,#0,w8                ; remainder in W11..W8
         mul.uu  w10,#0,w10
         mov     #64,w12
-1:      cp0     w3                      ; leading zero words of the dividend give no quotient bits
+1:      cp0     w3                      ; skip leading zero words of the dividend
         bra     nz,2f
         mov     w2,w3
         mov     w1,w2
@@ -92,7 +92,7 @@ wide_divisor:
         addc    w9,w9,w9
         addc    w10,w10,w10
         addc    w11,w11,w11
-        bra     c,3f                    ; 65 bits: larger than any divisor
+        bra     c,3f                    ; the remainder has 65 bits: larger than any divisor
         cp      w8,w4
         cpb     w9,w5
         cpb     w10,w6
@@ -147,7 +147,7 @@ ___moddi3:
         bra     ___negdi2
         return
 
-; Both arguments become their magnitudes.
+; Replace both arguments by their magnitudes.
         .section .text.___absolutedi2,code
         .global ___absolutedi2
 ___absolutedi2:
@@ -204,7 +204,7 @@ ___ashrdi3:
         asr     w3,#15,w7
         bra     ___shrdi3_
 
-; Right shift with W7 as the words shifted in.
+; Right shift; W7 is the value of words shifted in.
         .section .text.___shrdi3_,code
         .global ___shrdi3_
 ___shrdi3_:

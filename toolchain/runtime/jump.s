@@ -30,6 +30,6 @@ _longjmp:
         mov     w3,[w15++]
         cp0     w1
         bra     nz,1f
-        mov     #1,w1                   ; setjmp never returns 0 the second time
+        mov     #1,w1                   ; setjmp must not return 0 after longjmp
 1:      mov     w1,w0
         return

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Elementary functions in double precision (C11 7.12.4-7.12.7). Polynomials are Chebyshev interpolants computed for
- * these intervals with 60 digits; errors stay below 4 units in the last place for |x| < 1e5 in the trigonometric
- * functions, whose argument reduction uses 99 bits of pi/2. */
+ * these intervals with 60 digits. Errors are below 4 units in the last place; in the trigonometric functions, whose
+ * argument reduction uses 99 bits of pi/2, for |x| < 1e5. */
 #include "softfloat.h"
 
 #include <math.h>
@@ -15,7 +15,7 @@ static double polynomial(const double *c, int count, double z)
     return sum;
 }
 
-/* pi/2 and ln 2 in parts whose products with small integers are exact. */
+/* pi/2 and ln 2, each split into parts whose products with small integers are exact. */
 #define PIO2_1 1.5707963267341256
 #define PIO2_2 6.077100506303966e-11
 #define PIO2_3 2.0222662487959506e-21
@@ -29,7 +29,7 @@ static const double sine[] = {-0.16666666666666666,    0.0083333333333309185,   
 static const double cosine[] = {0.041666666666666664,    -0.0013888888888887378, 2.4801587298736822e-05,
                                 -2.7557317256781059e-07, 2.087614315748681e-09,  -1.1382408611707654e-11};
 
-/* x = quadrant * pi/2 + *rest, |*rest| <= pi/4; returns quadrant mod 4. */
+/* Split x = quadrant * pi/2 + *rest, |*rest| <= pi/4; return quadrant mod 4. */
 static int reduce(double x, double *rest)
 {
     if (fabs(x) <= M_PI_4) {
@@ -41,7 +41,7 @@ static int reduce(double x, double *rest)
     return (int)fmod(turns, 4) & 3;
 }
 
-/* sin(x + quadrant * pi/2) for |x| <= pi/4. */
+/* Return sin(x + quadrant * pi/2) for |x| <= pi/4. */
 static double sine_of(double x, int quadrant)
 {
     double z = x * x;
@@ -84,7 +84,7 @@ static const double arc[] = {-0.33333333333333331,  0.19999999999995505,   -0.14
                              -0.090909045663502733, 0.076921829173827644,  -0.066645075966273781, 0.058581154692669106,
                              -0.050852747691745775, 0.039226604671811355,  -0.019170699464250367};
 
-/* tan(pi/8): below it the polynomial holds; between it and its inverse, atan x = pi/4 + atan((x-1)/(x+1)). */
+/* tan(pi/8): the polynomial is used below it; between it and its inverse, atan x = pi/4 + atan((x-1)/(x+1)). */
 #define TAN_PI_8 0.41421356237309503
 
 double atan(double x)
@@ -144,13 +144,13 @@ static const double exponential[] = {0.5,
                                      2.5105337244665209e-08,
                                      2.0914772832237191e-09};
 
-/* exp(x) - 1 for |x| <= (ln 2) / 2. */
+/* Return exp(x) - 1 for |x| <= (ln 2) / 2. */
 static double less_one(double x)
 {
     return x + x * x * polynomial(exponential, 11, x);
 }
 
-/* exp(x + tail) for a tail below one unit in the last place of x. */
+/* Return exp(x + tail) for a tail below one unit in the last place of x. */
 static double exponential_of(double x, double tail)
 {
     if (isnan(x))
@@ -171,10 +171,10 @@ double exp(double x)
 
 double expm1(double x)
 {
-    if (isnan(x) || x == 0) /* -0 stays */
+    if (isnan(x) || x == 0) /* the result for -0 is -0 */
         return x;
     if (x > 40)
-        return exp(x); /* the 1 is below half a unit in the last place */
+        return exp(x); /* subtracting 1 changes less than half a unit in the last place */
     if (x < -40)
         return -1;
     double twos = round(x * ONE_OVER_LN2);
@@ -197,13 +197,13 @@ double exp2(double x)
 static const double logarithm[] = {0.66666666666666696, 0.39999999999899311, 0.28571428626063622, 0.22222211120421034,
                                    0.18182890171914962, 0.15331686825116089, 0.14616879374036285};
 
-/* The upper 26 bits, so that products of two such numbers are exact. */
+/* Return the upper 26 bits, so that products of two results are exact. */
 static double upper(double x)
 {
     return f64_value(f64_bits(x) & ~0x7FFFFFFULL);
 }
 
-/* log(x) = result + *tail for finite x > 0; with s = f / (2 + f), log(1 + f) = 2 atanh(s) = 2 s + s^3 (...). */
+/* Return log(x) as result + *tail for finite x > 0; with s = f / (2 + f), log(1 + f) = 2 atanh(s) = 2 s + s^3 (...). */
 static double logarithm_of(double x, double *tail)
 {
     int twos;
@@ -251,19 +251,19 @@ double log2(double x)
         m *= 2;
         twos--;
     }
-    return twos + logarithm_of(m, &tail) * ONE_OVER_LN2; /* the whole part is exact */
+    return twos + logarithm_of(m, &tail) * ONE_OVER_LN2; /* the integer part is exact */
 }
 
-/* 1 + x loses low bits of x; the result is scaled by the exact ratio. */
+/* 1 + x loses low bits of x, so the result is scaled by x / (sum - 1). */
 double log1p(double x)
 {
     volatile double sum = 1 + x;
-    if (sum == 1 || sum == HUGE_VAL) /* -0 stays */
+    if (sum == 1 || sum == HUGE_VAL) /* the result for -0 is -0 */
         return x;
     return sum > 0 ? log(sum) * x / (sum - 1) : log(sum);
 }
 
-/* 2 for even integers, 1 for odd ones, 0 for other numbers. */
+/* Return 2 for even integers, 1 for odd integers, 0 for other numbers. */
 static int parity(double y)
 {
     if (fmod(y, 1) != 0 || isinf(y))
@@ -300,7 +300,7 @@ double pow(double x, double y)
                    (y - y_high) * (high - log_high);
     double power = exponential_of(product, error + y * tail);
     if (y > 0 && power < 9007199254740992.0 && trunc(x) == x && trunc(y) == y)
-        power = round(power); /* an integer to the power of an integer is an integer, and it is representable */
+        power = round(power); /* the exact result is an integer and representable */
     return copysign(power, sign);
 }
 

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Further functions of math.h that are exact or correctly rounded: rounding to integers in the current mode, scaling,
- * neighbours, remainders, fused products (C11 7.12.6, 7.12.9-7.12.13), in both precisions. The one rounding direction
+ * neighbours, remainders, fused products (C11 7.12.6, 7.12.9-7.12.13), in both precisions. The only rounding mode
  * is to nearest. */
 #include "softfloat.h"
 
@@ -8,7 +8,7 @@
 #include <limits.h>
 #include <math.h>
 
-/* The lowest double and float from which on all are integers. */
+/* Least double and float from which on all values are integers. */
 #define WHOLE 4503599627370496.0
 #define WHOLE_F 8388608.0f
 
@@ -86,7 +86,7 @@ double logb(double x)
 {
     if (x == 0)
         return -HUGE_VAL;
-    return isfinite(x) ? ilogb(x) : x * x; /* infinite for both infinities */
+    return isfinite(x) ? ilogb(x) : x * x; /* +infinity for both infinities, NaN for NaN */
 }
 
 float logbf(float x)
@@ -121,7 +121,7 @@ float scalblnf(float x, long exponent)
     return ldexpf(x, as_int(exponent));
 }
 
-/* Bit patterns of one sign count up away from 0. */
+/* For one sign, bit patterns increase with the magnitude. */
 double nextafter(double x, double towards)
 {
     uint64_t bits = f64_bits(x);
@@ -163,7 +163,7 @@ double remquo(double x, double y, int *quotient)
     *quotient = 0;
     if (isnan(y) || !isfinite(x) || y == 0)
         return f64_value(F64_NAN);
-    if (divisor <= DBL_MAX / 8) /* beyond it the quotient is below 8 anyway */
+    if (divisor <= DBL_MAX / 8) /* for larger divisors the quotient is below 8 */
         rest = fmod(rest, 8 * divisor);
     for (int times = 4; times > 1; times /= 2)
         if (divisor <= DBL_MAX / times && rest >= times * divisor) {
@@ -174,7 +174,7 @@ double remquo(double x, double y, int *quotient)
         rest -= divisor;
         whole++;
     }
-    double missing = divisor - rest; /* where it is not exact, it is far from `rest` */
+    double missing = divisor - rest; /* exact, or far from `rest` */
     if (rest > missing || (rest == missing && whole & 1)) {
         rest = -missing;
         whole++;
@@ -186,7 +186,7 @@ double remquo(double x, double y, int *quotient)
 
 float remquof(float x, float y, int *quotient)
 {
-    return (float)remquo(x, y, quotient); /* exact in double, and the result fits single */
+    return (float)remquo(x, y, quotient); /* double is exact, and float can represent the result */
 }
 
 double remainder(double x, double y)
@@ -223,7 +223,7 @@ float nanf(const char *payload)
     return f32_value(F32_NAN);
 }
 
-/* A significand of 128 bits, its leading one in bit 126 of them, and the biased exponent. */
+/* Number with a 128-bit significand, whose leading one is bit 126, and a biased exponent. */
 typedef struct {
     uint64_t high, low;
     int16_t exponent;
@@ -238,7 +238,7 @@ static void shift_left(wide_t *a, int16_t count)
     }
 }
 
-/* Bits lost set the lowest bit. */
+/* Shift right; bits shifted out set the lowest bit. */
 static void shift_right(wide_t *a, int16_t count)
 {
     a->exponent = (int16_t)(a->exponent + count);
@@ -252,7 +252,7 @@ static void shift_right(wide_t *a, int16_t count)
     }
 }
 
-/* |x| * |y| for finite numbers that are not 0: exact, because both have 11 low bits that are 0. */
+/* Return |x| * |y| for finite numbers that are not 0: exact, because the low 11 bits of both are 0. */
 static wide_t product_of(uint64_t x, uint64_t y)
 {
     int16_t left, right;
@@ -266,7 +266,7 @@ static wide_t product_of(uint64_t x, uint64_t y)
     return p;
 }
 
-/* One rounding of the exact x * y + z. */
+/* Return x * y + z, computed exactly and rounded once. */
 double fma(double x, double y, double z)
 {
     if (!isfinite(x) || !isfinite(y) || x == 0 || y == 0)
@@ -304,8 +304,8 @@ double fma(double x, double y, double z)
     return f64_value(__f64_pack(sign, large.exponent, large.high | (large.low != 0)));
 }
 
-/* The product is exact in double. Its sum with z is rounded to odd there, after which rounding to single is right:
- * double has more than two bits beyond it. */
+/* The product is exact in double. The sum with z is rounded to odd in double and then to single. The result is correct,
+ * because double has more than two additional bits. */
 float fmaf(float x, float y, float z)
 {
     double product = (double)x * y, sum = product + z;

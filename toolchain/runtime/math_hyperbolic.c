@@ -1,14 +1,14 @@
 /* SPDX-License-Identifier: MIT */
-/* Hyperbolic functions and their inverses (C11 7.12.5), and the cube root. Single precision goes through double. */
+/* Hyperbolic functions and their inverses (C11 7.12.5), and the cube root. Single precision uses the double functions. */
 #include "softfloat.h"
 
 #include <math.h>
 
-#define ONLY_EXP 22     /* beyond it, exp(-x) is below half a unit in the last place of exp(x) */
-#define ONLY_LOG 0x1p28 /* beyond it, sqrt(x*x + 1) is x */
-#define NEAR_END 709    /* a little below where exp overflows */
+#define ONLY_EXP 22     /* above it, exp(-x) is below half a unit in the last place of exp(x) */
+#define ONLY_LOG 0x1p28 /* above it, sqrt(x*x + 1) is x */
+#define NEAR_END 709    /* slightly below the argument at which exp overflows */
 
-/* exp(x) / 2 where exp(x) alone may overflow. */
+/* Return exp(x) / 2, also if exp(x) overflows. */
 static double half_exp(double x)
 {
     if (x < NEAR_END)
@@ -98,13 +98,13 @@ double cbrt(double x)
     double m = frexp(fabs(x), &exponent);
     for (; exponent % 3; exponent++)
         m *= 0.5;
-    /* m is in [1/8, 1); a linear estimate, then steps that each triple the correct digits (Halley) */
+    /* m is in [1/8, 1); a linear estimate, then Halley steps, each of which triples the correct digits */
     double root = 0.4 + 0.61 * m;
     for (int i = 0; i < 2; i++) {
         double cube = root * root * root;
         root *= (cube + 2 * m) / (2 * cube + m);
     }
-    root = f64_value(f64_bits(root) & ~0x7FFFFFFULL); /* so that its square is exact */
+    root = f64_value(f64_bits(root) & ~0x7FFFFFFULL); /* short enough for an exact square */
     double other = m / (root * root);
     root += root * ((other - root) / (2 * root + other));
     return copysign(ldexp(root, exponent / 3), x);

@@ -15,7 +15,7 @@ double copysign(double magnitude, double sign)
     return f64_value((f64_bits(magnitude) & ~F64_SIGN) | (f64_bits(sign) & F64_SIGN));
 }
 
-/* Mask of the fraction bits of x; all ones when |x| < 1, none when x is an integer, infinite or NaN. */
+/* Return the mask of the fraction bits of x: all ones if |x| < 1, 0 if x has no fraction bits, is infinite or NaN. */
 static uint64_t fraction_mask(uint64_t bits)
 {
     int16_t exponent = (int16_t)((int16_t)(bits >> 52 & 0x7FF) - F64_BIAS);
@@ -95,7 +95,7 @@ double ldexp(double x, int exponent)
         return x;
     int16_t biased;
     uint64_t significand = __f64_unpack(magnitude, &biased);
-    if (exponent > 4400) /* beyond the whole range of double, and far from int16_t's end */
+    if (exponent > 4400) /* more than the range of double, and no overflow of int16_t */
         exponent = 4400;
     if (exponent < -4400)
         exponent = -4400;
@@ -135,7 +135,7 @@ double fmod(double x, double y)
     return f64_value(__f64_pack(sign, (int16_t)(exponent - shift), rest << shift));
 }
 
-/* Correctly rounded, one result bit per step. */
+/* Square root, correctly rounded; each step computes one bit of the result. */
 double sqrt(double x)
 {
     uint64_t bits = f64_bits(x);
@@ -150,7 +150,7 @@ double sqrt(double x)
         exponent--;
     else
         rest >>= 1;
-    /* rest / 2^60 is in [1, 4); its root, times 2^61, is found from the top bit down. */
+    /* rest / 2^60 is in [1, 4); the loop computes its root times 2^61, highest bit first. */
     uint64_t root = 0;
     for (uint64_t bit = F64_TOP >> 1; bit >= 0x80; bit >>= 1) {
         uint64_t trial = root + (bit >> 1);

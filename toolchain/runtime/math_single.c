@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* math.h in single precision. Elementary functions have polynomials of their own, so that a program that uses only
- * float links no double arithmetic; powf, fmodf, exp2f, log2f, expm1f and log1pf go through double. Errors stay below 4 units in the last place for
- * |x| < 5000 in the trigonometric functions. */
+/* math.h in single precision. Elementary functions have their own polynomials, so that programs that use only float link
+ * no double arithmetic; powf, fmodf, exp2f, log2f, expm1f and log1pf use the double functions. Errors are below 4 units
+ * in the last place; in the trigonometric functions for |x| < 5000. */
 #include "softfloat.h"
 
 #include <math.h>
@@ -14,7 +14,7 @@ static float polynomial(const float *c, int count, float z)
     return sum;
 }
 
-/* pi/2 and ln 2 in parts whose products with small integers are exact. */
+/* pi/2 and ln 2, each split into parts whose products with small integers are exact. */
 #define PIO2_1 1.5703125f
 #define PIO2_2 0.0004837512969970703f
 #define PIO2_3 7.549533620476723e-08f
@@ -100,7 +100,7 @@ float ldexpf(float x, int exponent)
         return x;
     int16_t biased;
     uint32_t significand = __f32_unpack(magnitude, &biased);
-    if (exponent > 600) /* beyond the whole range of float */
+    if (exponent > 600) /* more than the range of float */
         exponent = 600;
     if (exponent < -600)
         exponent = -600;
@@ -119,10 +119,10 @@ float fmaxf(float x, float y)
 
 float fmodf(float x, float y)
 {
-    return (float)fmod(x, y); /* exact in double, and the result fits single */
+    return (float)fmod(x, y); /* double is exact, and float can represent the result */
 }
 
-/* Correctly rounded, one result bit per step; see sqrt. */
+/* Correctly rounded; each step computes one bit of the result, as in sqrt. */
 float sqrtf(float x)
 {
     uint32_t bits = f32_bits(x);

@@ -1,10 +1,10 @@
 ; SPDX-License-Identifier: MIT
-; memcpy, memmove, memset, memcmp (C11 7.24): one REPEAT per call, words where both pointers are even.
+; memcpy, memmove, memset, memcmp (C11 7.24): one REPEAT per call, by words if both pointers are even.
 ; REPEAT counts to 16384, more than the data space holds.
 
         .section .text._memcpy,code
         .global _memcpy
-        .global ___memcpy_upwards       ; for memmove, even if the program has a memcpy of its own
+        .global ___memcpy_upwards       ; for memmove, even if the program defines a memcpy
 _memcpy:
 ___memcpy_upwards:
         mov     w0,w3
@@ -29,7 +29,7 @@ ___memcpy_upwards:
         .global _memmove
 _memmove:
         cp      w0,w1
-        bra     leu,___memcpy_upwards   ; copying upwards is safe
+        bra     leu,___memcpy_upwards   ; an upward copy is correct
         add     w1,w2,w1
         add     w0,w2,w3
         ior     w1,w3,w4

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Multibyte characters of the "C" locale (C11 7.22.7, 7.22.8): each is one byte, and its wide character has its value. */
+/* Multibyte characters of the "C" locale (C11 7.22.7, 7.22.8): each is one byte, whose value is that of its wide character. */
 #include <stdlib.h>
 
 int mblen(const char *text, size_t limit)

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* printf, vprintf, puts, putchar: all through __putchar (stdio.h). */
+/* printf, vprintf, puts, putchar; all output is written by __putchar (stdio.h). */
 #include "format.h"
 
 #include <stdio.h>

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The library's own __putchar: blocking output on UART1, enabled on first use at the highest rate (U1BRG 0). */
+/* Default __putchar of the library: blocking output on UART1, which it enables on first use at the highest rate (U1BRG 0). */
 #include <dspic30f6014a.h>
 #include <stdio.h>
 

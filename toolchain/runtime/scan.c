@@ -5,7 +5,7 @@
 #include <stdarg.h>
 #include <stdio.h>
 
-/* %c %s %[: the end of the field from `at`, which is at most `width` long; NULL when the field is empty or too short. */
+/* Return the end of the field at `at` for %c %s %[, at most `width` long; NULL if the field is empty or too short. */
 static const char *text_field(const char *at, char conversion, const char *set, unsigned width)
 {
     const char *from = at, *ignored;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* %f, %e, %g, %a of scanf. */
+/* Conversions %f, %e, %g, %a of scanf. */
 #include "scan.h"
 #include "stack_room.h"
 
@@ -9,7 +9,7 @@
 
 static const char decimal[] = "0123456789";
 
-/* Length of the longest prefix of a number (C11 7.21.6.2p9). */
+/* Return the length of the longest text that is a prefix of a number (C11 7.21.6.2p9). */
 static unsigned longest(const char *text)
 {
     static const char *const words[] = {"infinity", "nan"};
@@ -52,11 +52,11 @@ const char *__scan_double(const char *at, const char *stop, double *value)
 {
     unsigned length = (unsigned)(stop - at);
     STACK_ROOM(length + 1);
-    char text[length + 1]; /* strtod takes no width */
+    char text[length + 1]; /* a copy, because strtod has no parameter for the width */
     memcpy(text, at, length);
     text[length] = 0;
     char *end;
     *value = strtod(text, &end);
     length = longest(text);
-    return end == text || end != text + length ? NULL : at + length; /* "1e" is not 1: its exponent is missing */
+    return end == text || end != text + length ? NULL : at + length; /* a prefix such as "1e" is no number */
 }

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* One integer of a width-limited text (C11 7.21.6.2p10): SCAN_INTEGER(NAME, TYPE) defines a function that reads into TYPE.
- * Unlike for strtol, 0x without a digit is not 0: it is the prefix of an incomplete number. */
+/* Integers in a text of limited width (C11 7.21.6.2p10): SCAN_INTEGER(NAME, TYPE) defines a function that reads into TYPE.
+ * Unlike in strtol, 0x without a digit is not 0 but the prefix of an incomplete number. */
 #ifndef SCAN_INTEGER_H
 #define SCAN_INTEGER_H
 

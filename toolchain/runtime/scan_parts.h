@@ -11,7 +11,7 @@
 
 static SCAN_INTEGER(scan_long, unsigned long)
 
-/* Size of the object that a conversion stores into. */
+/* Return the size of the object into which a conversion stores. */
 enum { INT, CHAR, SHORT, LONG, WIDE };
 
 static const char *read_length(const char *format, int *length)
@@ -58,7 +58,7 @@ static void store_count(void *to, int length, unsigned count)
     store(to, length, count);
 }
 
-/* Whether the set after `%[` contains the character; *end becomes the position after its `]`. */
+/* Return whether the set after `%[` contains the character; *end becomes the position after its `]`. */
 static int in_set(const char *set, char character, const char **end)
 {
     int inverted = *set == '^', found = 0;

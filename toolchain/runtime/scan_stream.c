@@ -1,18 +1,18 @@
 /* SPDX-License-Identifier: MIT */
-/* scanf, fscanf and relatives: sscanf's conversions on a stream with one character of push-back. */
+/* scanf, fscanf, vscanf, vfscanf: the conversions of sscanf on a stream with one character of push-back. */
 #include "scan_parts.h"
 
 #include <stdarg.h>
 #include <stdio.h>
 
-#define MOST 64 /* characters of a number; a longer one ends here */
+#define MOST 64 /* maximum number of characters of a number */
 
 typedef struct {
     unsigned count; /* characters read */
     unsigned width; /* characters left in the field */
 } input_t;
 
-/* The next character, not consumed; EOF at the end of the input or of the field. */
+/* Return the next character without consuming it; EOF at the end of the input or of the field. */
 static int peek(const input_t *in)
 {
     if (!in->width)
@@ -37,7 +37,7 @@ static void skip_space(input_t *in)
         take(in);
 }
 
-/* Consumes the next character if `characters` contains it; returns whether it does. */
+/* Consume the next character if `characters` contains it; return whether it does. */
 static int accept(input_t *in, char *field, unsigned *length, const char *characters)
 {
     int next = peek(in);
@@ -54,7 +54,7 @@ static void accept_all(input_t *in, char *field, unsigned *length, const char *c
     }
 }
 
-/* The longest prefix of an integer (C11 7.21.6.2p9). */
+/* Read the longest text that is a prefix of an integer (C11 7.21.6.2p9). */
 static unsigned integer_field(input_t *in, char *field, char conversion)
 {
     static const char digits[] = "0123456789abcdefABCDEF";
@@ -75,7 +75,7 @@ static unsigned integer_field(input_t *in, char *field, char conversion)
     return length;
 }
 
-/* The longest prefix of a floating-point number. */
+/* Read the longest text that is a prefix of a floating-point number. */
 static unsigned floating_field(input_t *in, char *field)
 {
     static const char *const words[] = {"infinity", "nan"};
@@ -111,7 +111,7 @@ static unsigned floating_field(input_t *in, char *field)
     return length;
 }
 
-/* %c %s %[ into `to`, if that is not NULL; returns whether the field matched. */
+/* Read a field for %c %s %[ into `to`, if that is not NULL; return whether the field matched. */
 static int text_field(input_t *in, char conversion, const char *set, char *to)
 {
     unsigned wanted = in->width;

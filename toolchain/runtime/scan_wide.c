@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* %lld and its relatives of scanf. */
+/* Conversions of scanf with length ll: 64-bit integers. */
 #include "scan.h"
 #include "scan_integer.h"
 

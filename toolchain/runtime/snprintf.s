@@ -1,6 +1,6 @@
 ; SPDX-License-Identifier: MIT
 ; snprintf, sprintf, vsnprintf, vsprintf (C11 7.21.6): a sink_t (format.h) on the stack around one call of __format.
-; The last named argument and what follows are on the stack, the named ones before it in registers (abi-elf.md §2.2
+; The last named argument and all later ones are on the stack, the earlier ones in registers (abi-elf.md §2.2
 ; rule 5).
 
         .section .text._snprintf,code
@@ -15,7 +15,7 @@ _snprintf:
 _sprintf:
         mov     [w15-6],w2
         sub     w15,#6,w3
-        com     w0,w1                   ; as much as lies above the buffer
+        com     w0,w1                   ; size: all addresses above the buffer
         bra     _vsnprintf
 
         .section .text._vsprintf,code
@@ -32,13 +32,13 @@ _vsnprintf:
         mov     #handle(store),w4
         mov     w4,[w15++]              ; put
         sub     w15,#2,w5
-        cp0     w1                      ; size 0: nothing may be written, so point at this sink itself
+        cp0     w1                      ; size 0: no character may be stored, so let `at` point to this sink
         bra     nz,1f
         mov     w5,w0
         mov     #1,w1
 1:      mov     w0,[w15++]              ; at
         add     w0,w1,w0
-        dec     w0,[w15++]              ; end: the place of the last 0
+        dec     w0,[w15++]              ; end: the position of the final 0
         clr     [w15++]                 ; count
         mov     w5,w0
         mov     w2,w1
@@ -49,7 +49,7 @@ _vsnprintf:
         sub     w15,#8,w15
         return
 
-store:  add     w0,#6,w2                ; count every character, keep those that fit
+store:  add     w0,#6,w2                ; count every character, store those that fit
         inc     [w2],[w2]
         mov     [w0+2],w2
         mov     [w0+4],w3

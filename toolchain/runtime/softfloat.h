@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: MIT */
-/* Shared by the soft-float sources: bit patterns of IEC 60559 single and double, and the packing contract.
+/* Common to the soft-float sources: bit patterns of IEC 60559 single and double, and the unpacked form of numbers.
  *
- * An unpacked number is sign, exponent and significand. The significand's leading one is at bit 30 (single) or 62
- * (double); the 7 or 10 bits below the last kept bit are guard bits, the lowest of them sticky (set when anything
- * nonzero was shifted out). The exponent is the biased one. With exponent 1 the leading one may be missing: that is
- * how subnormal numbers look. */
+ * An unpacked number consists of sign, biased exponent and significand. The leading one of the significand is bit 30
+ * (single) or 62 (double). The 7 or 10 bits below the last kept bit are guard bits; the lowest of them is sticky: it is
+ * set if a bit that was shifted out was not 0. With exponent 1 the leading one may be missing, as in subnormal
+ * numbers. */
 #ifndef SOFTFLOAT_H
 #define SOFTFLOAT_H
 
@@ -62,24 +62,24 @@ static inline double f64_value(uint64_t bits)
     return pun.value;
 }
 
-/* Round to nearest even, handle overflow and underflow, join. `sign` is 0 or the sign bit. */
+/* Round to nearest even, handle overflow and underflow, pack. `sign` is 0 or the sign bit. */
 uint32_t __f32_pack(uint32_t sign, int16_t exponent, uint32_t significand);
 uint64_t __f64_pack(uint64_t sign, int16_t exponent, uint64_t significand);
 
-/* Shift right; bits lost set the lowest bit. Any count from 0 up. */
+/* Shift right by any count >= 0; bits shifted out set the lowest bit. */
 uint32_t __f32_shift_sticky(uint32_t significand, int16_t count);
 uint64_t __f64_shift_sticky(uint64_t significand, int16_t count);
 
-/* Leading zeros of a nonzero number. */
+/* Return the number of leading zeros of a nonzero number. */
 int16_t __f32_leading_zeros(uint32_t value);
 int16_t __f64_leading_zeros(uint64_t value);
 
-/* Significand of a finite nonzero magnitude with its leading one in the top bit (31 or 63); *exponent becomes the
+/* Return the significand of a finite nonzero magnitude, leading one in the top bit (31 or 63); *exponent becomes the
  * biased exponent, below 1 for subnormal numbers. */
 uint32_t __f32_unpack(uint32_t magnitude, int16_t *exponent);
 uint64_t __f64_unpack(uint64_t magnitude, int16_t *exponent);
 
-/* dividend / divisor where the quotient fits 16 bits: one hardware division on the target. */
+/* Return dividend / divisor if the quotient fits 16 bits: one hardware division on the target. */
 #ifdef __dsPIC30F__
 unsigned int __dspic_divud(unsigned long dividend, unsigned int divisor);
 static inline uint16_t divide_32_16(uint32_t dividend, uint16_t divisor)

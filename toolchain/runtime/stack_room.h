@@ -1,14 +1,14 @@
 /* SPDX-License-Identifier: MIT */
-/* Arrays of variable length on a stack with a limit: -fstack-check tests a frame before it is entered, without their
- * sizes. */
+/* Stack check for arrays of variable length: -fstack-check probes a frame at function entry, without the sizes of these
+ * arrays. */
 #ifndef STACK_ROOM_H
 #define STACK_ROOM_H
 
 #include <stdint.h>
 
 #ifdef __dsPIC30F__
-/* Traps here, with W15 still within the limit, if the stack has no room for so many bytes. The two instructions that may
- * run after the read are harmless. */
+/* Trap, with W15 still within the limit, if the stack has no room for this number of bytes. The CPU may execute two more
+ * instructions after the read, which are harmless. */
 #define STACK_ROOM(bytes)                                                                         \
     do {                                                                                          \
         uint16_t room_ = (uint16_t)(((bytes) + 1u) & ~1u);                                        \

@@ -88,7 +88,7 @@ long long atoll(const char *text)
     return (long long)(negative ? 0 - value : value);
 }
 
-/* The generator of C11 7.22.2.2's example. */
+/* The random number generator in the example of C11 7.22.2.2. */
 static unsigned long random_state = 1;
 
 int rand(void)

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Output to stdout and stderr, which both go to __putchar (stdio.h). */
+/* Output to stdout and stderr, both of which are written by __putchar (stdio.h). */
 #include <stdio.h>
 
 int vfprintf(FILE *restrict stream, const char *restrict format, va_list arguments)

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* strftime in the "C" locale (C11 7.27.3.5); E and O change nothing there. */
+/* strftime in the "C" locale (C11 7.27.3.5); the modifiers E and O have no effect in it. */
 #include <string.h>
 #include <time.h>
 
@@ -7,7 +7,7 @@ static const char days[] = "Sunday\0Monday\0Tuesday\0Wednesday\0Thursday\0Friday
 static const char months[] = "January\0February\0March\0April\0May\0June\0July\0August\0September\0October\0November\0December\0";
 
 typedef struct {
-    char *at, *end; /* end: limit of characters, which leaves room for the 0 */
+    char *at, *end; /* position of the next character; limit, without the final 0 */
     const struct tm *calendar;
 } writer_t;
 
@@ -16,7 +16,7 @@ static void put(writer_t *w, char character)
     if (w->at != w->end)
         *w->at++ = character;
     else
-        w->end = w->at = NULL; /* too long; the rest is discarded too */
+        w->end = w->at = NULL; /* too long: discard this and all further characters */
 }
 
 static void text(writer_t *w, const char *names, int index, int length)
@@ -45,7 +45,7 @@ static void number(writer_t *w, long value, int width, char fill)
         put(w, digits[--count]);
 }
 
-/* Week of the ISO 8601 year, which begins with the week of January 4th; *year becomes that year. */
+/* Return the week of the ISO 8601 year, whose week 1 contains January 4th; *year becomes that year. */
 static int iso_week(const struct tm *calendar, long *year)
 {
     int monday_based = (calendar->tm_wday + 6) % 7;
@@ -55,10 +55,10 @@ static int iso_week(const struct tm *calendar, long *year)
         --*year;
         int before = (monday_based - calendar->tm_yday + 371) % 7; /* weekday of January 1st, Monday 0 */
         int leap = *year % 4 == 0 && (*year % 100 != 0 || *year % 400 == 0);
-        return before == 4 || (before == 5 && leap) ? 53 : 52; /* the year before began on a Thursday, or ended on one */
+        return before == 4 || (before == 5 && leap) ? 53 : 52; /* 53 if the previous year began or ended on a Thursday */
     }
     int leap = *year % 4 == 0 && (*year % 100 != 0 || *year % 400 == 0);
-    if (week == 53 && calendar->tm_yday - monday_based + 3 >= 365 + leap) { /* its Thursday lies in the next year */
+    if (week == 53 && calendar->tm_yday - monday_based + 3 >= 365 + leap) { /* the Thursday of this week is in the next year */
         ++*year;
         return 1;
     }

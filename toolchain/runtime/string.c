@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* String functions in C (C11 7.24); string.s and memory.s have those in assembly. */
+/* String functions in C (C11 7.24); string.s and memory.s contain the ones in assembly. */
 #include <string.h>
 
 void *memchr(const void *in, int value, size_t count)
@@ -65,7 +65,7 @@ char *strstr(const char *in, const char *what)
     return (char *)in;
 }
 
-/* Length of the prefix whose characters are (wanted 1) or are not (wanted 0) in `set`. */
+/* Return the length of the longest prefix whose characters are (wanted 1) or are not (wanted 0) in `set`. */
 static size_t span(const char *in, const char *set, int wanted)
 {
     size_t length = 0;

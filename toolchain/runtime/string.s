@@ -16,7 +16,7 @@ _strlen:
 _strcpy:
         mov     w0,w2
 1:      cp0.b   [w1]
-        mov.b   [w1++],[w2++]           ; leaves the flags alone
+        mov.b   [w1++],[w2++]           ; changes no flags
         bra     nz,1b
         return
 

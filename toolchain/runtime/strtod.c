@@ -4,14 +4,14 @@
 #define BITS_T uint64_t
 #define WIDTH 64
 #define PRECISION 53
-#define LOWEST_POWER (-1074) /* of two: the smallest subnormal */
-#define EXACT_POWER 22       /* 10^22 < 2^53 * 2^22, so it is a double */
-#define EXACT_POWERS 5       /* of POWERS_OF_TEN make all up to it */
+#define LOWEST_POWER (-1074) /* exponent of two of the smallest subnormal */
+#define EXACT_POWER 22       /* greatest power of ten that a double represents: 10^22 < 2^53 * 2^22 */
+#define EXACT_POWERS 5       /* number of entries of POWERS_OF_TEN whose products are 10^0 to 10^22 */
 #define EXACT_DIGITS 15
 #define GUESSED_DIGITS 18
 #define POWERS_OF_TEN 1e1, 1e2, 1e4, 1e8, 1e16, 1e32, 1e64, 1e128, 1e256
-#define MOST_DIGITS 770      /* more cannot change the result, but that they are not all 0 */
-#define LARGEST_POWER 310    /* 10^310 overflows, whatever the digits */
+#define MOST_DIGITS 770      /* of further digits, only whether one is not 0 affects the result */
+#define LARGEST_POWER 310    /* 10^310 overflows with any digits */
 #define SMALLEST_POWER (-327)
 #define HUGE_NUMBER HUGE_VAL
 #define SCALE ldexp

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: MIT */
-/* Body of strtod and strtof (C11 7.22.1.3): the number of a format nearest to the one in the text, ties to even. The
- * including file describes the format: NUMBER and BITS_T are its type and an integer of its size, the rest constants.
+/* Body of strtod and strtof (C11 7.22.1.3): converts a text to the nearest number of a format, ties to even. The
+ * including file describes the format: NUMBER is its type, BITS_T an integer of its size, the others are constants.
  *
- * Few digits and small powers of ten are one exact multiplication or division. Any other number is compared, as an
- * exact integer, with the midpoint between a guess and its neighbour, until the guess is right. The integers are on the
-  * stack, with a length that depends on the number. */
+ * Few digits with a small power of ten take one exact multiplication or division. For other numbers the function makes
+ * an estimate and compares the exact value with the midpoint to the next number, until the estimate is the nearest
+ * number. The exact integers are on the stack, with a length that depends on the number. */
 #include "stack_room.h"
 
 #include <ctype.h>
@@ -15,14 +15,14 @@
 #include <string.h>
 
 #define LIMB 16
-#define MIDDLE_BIT_BIAS (2 - LOWEST_POWER) /* exponent of half the last bit of a subnormal */
+#define MIDDLE_BIT_BIAS (2 - LOWEST_POWER) /* exponent of half of the last bit of a subnormal */
 
 typedef struct {
     uint16_t *limbs; /* lowest first */
     int count;
 } integer_t;
 
-/* x = x * factor + addend */
+/* Compute x = x * factor + addend. */
 static void multiply(integer_t *x, uint16_t factor, uint16_t addend)
 {
     uint16_t carry = addend;
@@ -62,7 +62,7 @@ static int compare(const integer_t *a, const integer_t *b)
     return 0;
 }
 
-/* Sign of digits * 10^power - (midpoint between the number of these bits and the next larger one). */
+/* Return the sign of digits * 10^power - (midpoint between the number with the given bits and the next larger one). */
 static int against_middle(const char *digits, int count, int power, int more, BITS_T bits)
 {
     int exponent = (int)(bits >> (PRECISION - 1));
@@ -96,7 +96,7 @@ static NUMBER from_bits(BITS_T bits)
     return value;
 }
 
-/* The number nearest to digits * 10^power; `more` tells that digits behind them are not all 0. */
+/* Return the number nearest to digits * 10^power; `more`: omitted digits after them are not all 0. */
 static NUMBER nearest(const char *digits, int count, int power, int more)
 {
     static const NUMBER powers[] = {POWERS_OF_TEN};
@@ -123,7 +123,7 @@ static NUMBER nearest(const char *digits, int count, int power, int more)
     memcpy(&bits, &guess, sizeof bits);
     if (!isfinite(guess))
         bits--; /* the largest number */
-    for (;;) { /* down while the number is below the lower midpoint of the guess, up while it is above the upper one */
+    for (;;) { /* down while the number is below the lower midpoint of the estimate, up while above the upper one */
         int over = against_middle(digits, count, power, more, bits);
         if (over > 0 || (over == 0 && bits & 1)) {
             bits++;
@@ -148,7 +148,7 @@ static int hexadecimal(char character)
     return character >= 'a' && character <= 'f' ? character - 'a' + 10 : -1;
 }
 
-/* Decimal exponent behind the letter at `at`, or nothing; returns where the number ends. */
+/* Read a decimal exponent after the letter at `at`, if any; return the end of the number. */
 static const char *read_power(const char *at, char letter, long *power)
 {
     if ((*at | 0x20) != letter)
@@ -167,7 +167,7 @@ static const char *read_power(const char *at, char letter, long *power)
     return from;
 }
 
-/* What follows 0x: hexadecimal digits with a point, power of two. NULL when there is no digit. */
+/* Read the text after 0x: hexadecimal digits with a point, power of two. Return NULL if there is no digit. */
 static const char *read_hexadecimal(const char *at, NUMBER *value)
 {
     BITS_T significand = 0;
@@ -182,7 +182,7 @@ static const char *read_hexadecimal(const char *at, NUMBER *value)
             continue;
         }
         any = 1;
-        if (significand >> (WIDTH - 6)) { /* full: what follows only decides ties */
+        if (significand >> (WIDTH - 6)) { /* full: further digits only decide ties */
             significand |= digit != 0;
             power += point ? 0 : 4;
         } else {
@@ -223,13 +223,13 @@ static int same_word(const char *text, const char *word)
     return length;
 }
 
-/* Digits, point and exponent at `at`; NULL when there is no digit. */
+/* Read digits, point and exponent at `at`; return NULL if there is no digit. */
 static const char *read_decimal(const char *at, NUMBER *value)
 {
     long power = 0;
     int count = 0, more = 0, any = 0, point = 0;
     const char *first = at;
-    for (;; at++) { /* number of digits from the first that is not 0 */
+    for (;; at++) { /* count the digits from the first that is not 0 */
         if (*at == '.' && !point) {
             point = 1;
             continue;
@@ -247,7 +247,7 @@ static const char *read_decimal(const char *at, NUMBER *value)
     if (!any)
         return NULL;
     const char *end = read_power(at, 'e', &power);
-    while (count && at > first && (at[-1] == '0' || at[-1] == '.')) { /* trailing zeros are power */
+    while (count && at > first && (at[-1] == '0' || at[-1] == '.')) { /* trailing zeros increase the power */
         if (*--at == '0') {
             count--;
             power++;
@@ -290,7 +290,7 @@ NUMBER STRING_TO_NUMBER(const char *restrict text, char **restrict end)
     } else if (same_word(at, "nan")) {
         value = (NUMBER)NAN;
         after = at + 3;
-        if (*after == '(') { /* n-char-sequence, which is ignored */
+        if (*after == '(') { /* n-char-sequence of NaN, which is ignored */
             const char *inside = after + 1;
             while (isalnum((unsigned char)*inside) || *inside == '_')
                 inside++;

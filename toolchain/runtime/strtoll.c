@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* 64-bit integers of a text (C11 7.22.1.4, 7.8.2.3), and the other functions of inttypes.h. */
+/* Conversions of text to 64-bit integers (C11 7.22.1.4, 7.8.2.3), and the other functions of inttypes.h. */
 #include "text_integer.h"
 
 #include <errno.h>
@@ -7,7 +7,7 @@
 #include <limits.h>
 #include <stdlib.h>
 
-/* Only if the highest six bits are not all 0 can another digit overflow: few numbers cost a division. */
+/* Another digit can overflow only if the highest six bits are not all 0, so the division is rarely needed. */
 TEXT_INTEGER(unsigned long long, value >> 58 ? (ULLONG_MAX - digit) / (unsigned)base : value)
 
 unsigned long long strtoull(const char *restrict text, char **restrict end, int base)

@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: MIT */
-/* The integer at the beginning of a text (C11 7.22.1.4): TEXT_INTEGER(TYPE, MOST) defines magnitude() for an unsigned type.
- * MOST is the largest `value` that `digit` may follow in `base`. */
+/* Integers at the start of a text (C11 7.22.1.4): TEXT_INTEGER(TYPE, MOST) defines magnitude() for an unsigned type.
+ * MOST is the largest `value` to which `digit` can be appended in `base` without overflow. */
 #ifndef TEXT_INTEGER_H
 #define TEXT_INTEGER_H
 
 #include <ctype.h>
 
-/* Value of a digit in any base up to 36, or 99. */
+/* Return the value of a digit in any base up to 36, or 99. */
 static unsigned digit_value(char character)
 {
     if (isdigit(character))
@@ -14,7 +14,7 @@ static unsigned digit_value(char character)
     return isalpha(character) ? (unsigned)(tolower(character) - 'a' + 10) : 99;
 }
 
-/* Magnitude of the number at `text`; *negative is its sign, *overflow whether it does not fit. */
+/* Return the magnitude of the number at `text`; *negative becomes its sign, *overflow whether it does not fit. */
 #define TEXT_INTEGER(TYPE, MOST)                                                                                  \
     static TYPE magnitude(const char *text, char **end, int base, int *negative, int *overflow)                   \
     {                                                                                                             \

@@ -4,12 +4,12 @@
 
 #define SECONDS_PER_DAY 86400L
 #define DAYS_PER_ERA 146097L /* 400 years */
-#define DAYS_0000_TO_1970 719468L /* from 0000-03-01, so that leap days end their years */
+#define DAYS_0000_TO_1970 719468L /* from 0000-03-01: years that begin in March end with the leap day */
 
 static struct tm broken_down;
 static char text[26];
 
-/* The program replaces these if it has a clock. */
+/* Weak defaults, which a program with a clock replaces. */
 clock_t clock(void)
 {
     return -1;
@@ -27,7 +27,7 @@ double difftime(time_t end, time_t start)
     return (double)end - (double)start;
 }
 
-/* Days since 1970-01-01 of a date; month 0-11 and day 1-31. */
+/* Return the days from 1970-01-01 to a date; month 0-11, day 1-31. */
 static long days_of(long year, int month, long day)
 {
     if (month < 2)

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* libc++'s headers ask for this type by this name. There are no multibyte conversions here. */
+/* Type that libc++'s headers require; this library has no conversions with a multibyte state. */
 #ifndef BITS_MBSTATE_T_H
 #define BITS_MBSTATE_T_H
 
