@@ -63,7 +63,7 @@ PROGRAMS: Final = (
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One line of the report."""
+    """Result of one check; one or two lines of the report."""
 
     kind: str
     name: str

@@ -97,12 +97,12 @@ def test_stress_neither_leaks_nor_traps(image: Build) -> None:
     assert all(int(n) >= 64 for n in re.findall(r"kernel stack left (\d+)", text))
 
 
-# ---- Setting up -----------------------------------------------------------------------------------------------------
+# ---- Results of set-up calls ----------------------------------------------------------------------------------------
 
 SETS_UP = re.compile(
     r"^\s*(?:\(void\))?(?:Sys_Subscribe_to_Event|Sys_Start_Process(?:With)?|Sys_Connect_Motors)\(", re.MULTILINE
 )
-"""Pattern of a statement that discards the result of a subscribing or registering call."""
+"""Pattern of a statement that discards the result of subscribing, starting a thread or connecting the motors."""
 
 
 @pytest.mark.parametrize("app", ["clustering", "hello", "listing1", "processors", "selftest", "spi"])
@@ -133,7 +133,7 @@ int main(void) {
     assert "firmware fault: the kernel stopped the system" in said.err
 
 
-# ---- On a host -----------------------------------------------------------------------------------------------------
+# ---- Applications on a host ----------------------------------------------------------------------------------------
 
 
 @pytest.fixture(scope="module")

@@ -339,7 +339,7 @@ def test_ambient_light_does_not_change_the_distance(image: Build) -> None:
         assert all(abs(machine.peek(at + 2 * sensor) - 857) <= 1 for sensor in range(8)), ambient
 
 
-# -- engines --
+# -- interpreter and JIT --
 
 
 @pytest.mark.parametrize("program", PROGRAMS)

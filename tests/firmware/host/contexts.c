@@ -173,7 +173,7 @@ TEST(an_isr_may_not_clear_a_result, "openswarm.h: Sys_Clear_EventData")
     CHECK(strcmp(trace, "c") == 0);
 }
 
-/* ---- Clearing the error ---------------------------------------------------------------------------------- */
+/* ---- Clearing event data ------------------------------------------------------------------------------------ */
 
 static bool clears_its_data(uint16 pid, uint16 id, sys_event_data *data)
 {

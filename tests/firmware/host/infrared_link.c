@@ -118,7 +118,7 @@ TEST(a_message_arrives_from_far_and_near, "openswarm_infrared.h: source, sensor,
     begin_link();
     CHECK(Sys_Subscribe_to_Event(SYS_NEIGHBOUR_MESSAGE, 0, hear, NULL));
     say("hello", 321, &r);
-    CHECK_EQ(r.length, 3 * (7 + 7 * CODE_BITS) + 1); /* 9 bytes: 7 code words; 1: the last, dark scan */
+    CHECK_EQ(r.length, 3 * (7 + 7 * CODE_BITS) + 1); /* 9 bytes: 7 code words; 1: its last scan */
     CHECK(Sys_Set_RobotNumber(5));
     for (unsigned i = 0; i < sizeof depths / sizeof *depths; i++) {
         play(&r, (uint8)i, depths[i]);

@@ -78,7 +78,7 @@ TEST(a_thread_may_die_during_a_delivery_to_it, "kernel.md §2: also while a drai
     victim = Sys_Start_Process(wait_and_be_killed);
     Sys_Start_Process(wait_and_be_killed);
     Sys_Yield();
-    Sys_Send_IntEvent(E1, 1); /* the first waiter's condition kills it; the kernel must then find the second waiter */
+    Sys_Send_IntEvent(E1, 1); /* the first waiter's condition kills the first waiter; the second's finds it ended */
     Sys_Yield();
     CHECK_EQ(trace[0], '\0');
     CHECK_EQ(Sys_Get_ProcessState(victim), SYS_UNKNOWN);

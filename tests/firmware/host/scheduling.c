@@ -112,7 +112,7 @@ TEST(an_event_preempts_a_lower_priority_thread_at_once, "openswarm_scheduler.h: 
     CHECK(strcmp(trace, "<H>") == 0);
 }
 
-/* ---- Real time ------------------------------------------------------------------------------------------------ */
+/* ---- Preemption in real time ---------------------------------------------------------------------------------- */
 
 static volatile unsigned long spins[2];
 static void spin(void *which)
@@ -136,7 +136,7 @@ TEST(a_signal_preempts_threads_that_never_call_the_kernel, "port/posix/README.md
     CHECK(Sys_Get_SystemTime() > 0);
 }
 
-/* ---- The slice ------------------------------------------------------------------------------------------------ */
+/* ---- Time slices ---------------------------------------------------------------------------------------------- */
 
 static void tick_for_ever(void *c)
 {

@@ -59,7 +59,7 @@ def said_by_epuck2(image: Path, text: bytes) -> bytes:
         pytest.skip(str(missing))
 
 
-# ---- The conformance suite: one text --------------------------------------------------------------------------------
+# ---- Conformance suite ----------------------------------------------------------------------------------------------
 
 
 def check_conforms(said: bytes, checks: int = CHECKS) -> None:
@@ -317,7 +317,7 @@ def test_seven_threads_of_128_bytes_run_on_the_kilobot(tmp_path: Path) -> None:
     assert len(ran) == 7
 
 
-# ---- Building -------------------------------------------------------------------------------------------------------
+# ---- Build errors ---------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(

@@ -76,7 +76,7 @@ def pair(image: Path, distance: float = 50.0) -> list[Robot]:
     return [Robot(image, 0, number=11), Robot(image, distance, number=2047, on_at=0.0042)]
 
 
-# ---- Two of them ----------------------------------------------------------------------------------------------------
+# ---- Two robots -----------------------------------------------------------------------------------------------------
 
 
 def test_two_exchange_messages(image: Path, swarm: Open) -> None:
@@ -166,7 +166,7 @@ def test_who_is_silent_is_lost(image: Path, swarm: Open) -> None:
     assert (peek(left, "sightings"), peek(left, "last_seen")) == (2, 2047)
 
 
-# ---- Three ----------------------------------------------------------------------------------------------------------
+# ---- Three robots ---------------------------------------------------------------------------------------------------
 
 
 def talk(together: Kilobots, speakers: Sequence[int], rounds: int, seconds: float) -> None:
@@ -219,7 +219,7 @@ def test_numbers_are_drawn(image: Path, swarm: Open) -> None:
     assert [peek(robot, "sightings") for robot in heap.robots] == [2, 2, 2]
 
 
-# ---- Damage ---------------------------------------------------------------------------------------------------------
+# ---- Damaged frames -------------------------------------------------------------------------------------------------
 
 
 def frame_begins(both: Kilobots, listener: Kilobot) -> None:
@@ -279,7 +279,7 @@ def test_stray_light_begins_nothing(image: Path, swarm: Open) -> None:
     assert message(both.robots[1])[4] == b"still"
 
 
-# ---- The same run ---------------------------------------------------------------------------------------------------
+# ---- Reproducible runs ----------------------------------------------------------------------------------------------
 
 
 def test_the_same_run_twice(image: Path, swarm: Open) -> None:

@@ -57,7 +57,7 @@ bool Sys_Raw_Tx(const uint8 *message, uint16 size, sys_put put_byte)
     (void)message;
     (void)size;
     (void)put_byte;
-    return false; /* never called: every message is sent as a frame */
+    return false; /* unused here: every message is sent as a frame */
 }
 
 static bool put(uint8 byte)

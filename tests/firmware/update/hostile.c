@@ -162,7 +162,7 @@ static void pushed(void)
     check(kinds[REQUESTED] == 1, "until another robot advertises it");
 }
 
-/* Worn flash is neither requested for nor written without end; the other store is used. */
+/* The robot neither requests rows for worn flash nor writes it without end; it uses the other store. */
 static void worn_out(void)
 {
     worn_stores = 1;
@@ -230,8 +230,8 @@ static void stuck_bits(void)
     stuck_flags = 0;
 }
 
-/* While a program is on trial the robot begins no transfer, for however long and whatever it hears; afterwards it
- * does. */
+/* While a program is on trial the robot begins no transfer, however long the trial lasts and whatever the robot hears.
+ * Afterwards it begins one. */
 static void long_trial(void)
 {
     take(0);

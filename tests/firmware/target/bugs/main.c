@@ -11,7 +11,7 @@ volatile uint16 chosen __attribute__((used));
 static void (*const tests[])(void) = {TESTS};
 static void (*device_isr)(void);
 
-/* ---- host.h with real interrupts ---------------------------------------------------------------------------------- */
+/* ---- Functions of host.h implemented with real interrupts --------------------------------------------------------- */
 
 void host_use_virtual_time(void)
 {
@@ -58,7 +58,7 @@ int16_t host_right(void)
     return (sint16)(stepper_right.rate / 5);
 }
 
-/* ---- Stops for the test ------------------------------------------------------------------------------------------- */
+/* ---- Functions at which the test stops ---------------------------------------------------------------------------- */
 
 __attribute__((noinline, used)) void begin(void)
 {

@@ -13,7 +13,7 @@ static void expect(bool holds)
     isr_wrong += !holds;
 }
 
-/* ---- May be made ------------------------------------------------------------------------------------------------ */
+/* ---- Calls that an interrupt may make --------------------------------------------------------------------------- */
 
 static void sends_an_event(void)
 {
@@ -69,7 +69,7 @@ static void switches_devices(void)
     (void)Sys_Set_SelectorProcessor(NULL);
 }
 
-/* ---- Must be refused -------------------------------------------------------------------------------------------- */
+/* ---- Calls that the kernel must refuse -------------------------------------------------------------------------- */
 
 static void nothing(void)
 {

@@ -213,7 +213,7 @@ static void devices(void)
     Sys_Yield();
 }
 
-/* ---- The round ----------------------------------------------------------------------------------------------------- */
+/* ---- Round of all scenes ------------------------------------------------------------------------------------------- */
 
 static void (*const scenes[])(void) = {threads,   periodic,      registration, sending,   waiting,
                                        unregistering, time_out, questions,    devices};

@@ -28,7 +28,7 @@ static void spin(void *unused)
 static void spend(uint16 ms)
 {
     uint32 before = Sys_Get_SystemTime();
-    for (uint16 i = 0; i < 60000 && Sys_Get_SystemTime() - before < ms; i++) { /* on some hosts time stops in section */
+    for (uint16 i = 0; i < 60000 && Sys_Get_SystemTime() - before < ms; i++) { /* on some hosts sections stop time */
     }
 }
 
@@ -63,7 +63,7 @@ static void mutexes_refuse_what_they_cannot_do(void)
     CHECK(Sys_Lock_Mutex(&mutex) && refused_as(Sys_Lock_Mutex(&mutex), SYS_ERROR_PROCESS));
     Sys_Start_CriticalSection();
     CHECK(refused_as(Sys_Lock_Mutex(&second), SYS_ERROR_CONTEXT));
-    CHECK(Sys_Unlock_Mutex(&mutex)); /* and may unlock it */
+    CHECK(Sys_Unlock_Mutex(&mutex)); /* unlocking is permitted */
     Sys_End_CriticalSection();
     CHECK(Sys_Get_Statistics()->refused == refused + 1u && Sys_Lock_Mutex(&second) && Sys_Unlock_Mutex(&second));
 }

@@ -32,7 +32,7 @@ static void expect(bool condition)
     failures += !condition;
 }
 
-/* ---- What the victim does ------------------------------------------------------------------------------------------ */
+/* ---- Scenes of the victim thread ----------------------------------------------------------------------------------- */
 
 static const uint8 id_register[1] = {0}, some_bytes[3] = {1, 2, 3};
 
