@@ -51,7 +51,7 @@ DSPIC30F4013: Final = Chip(
     program=program_space(flash_end=0x8000, eeprom_bytes=0x400),
     device_id=0x0141,
     revision=0x1002,  # UNVERIFIED
-    processors=(0x0C,),
+    processors=(0x0E, 0x0C),  # XC16 writes the first; version 0.2 of this toolchain wrote the second
     ports=("A", "B", "C", "D", "F"),
     change_pins=("RC14", "RC13", *(f"RB{bit}" for bit in range(6)), *[""] * 9, "RF4", "RF5"),
     external_pins=(("RA11", 0), ("RD8", 16), ("RD9", 23)),

@@ -79,6 +79,13 @@ def test_a_program_runs_in_every_engine(chip: Chip) -> None:
     assert states[0] == states[1]
 
 
+def test_the_30f4013_has_the_processor_id_that_xc16_writes() -> None:
+    """Public XC16 files for the 30F4013 carry 0x0E. The assembler and the linker write the first id of a chip."""
+    found = chip_of(0x0E)
+    assert found is not None
+    assert (found.name, found.processors[0]) == ("dsPIC30F4013", 0x0E)
+
+
 def test_chips_are_found_by_name_and_by_processor_id() -> None:
     """Chips are found by the names that command lines use and by the processor ids in the flags of ELF files."""
     for chip in CHIPS:
