@@ -40,7 +40,7 @@ ALTERNATIVES: dict[str, dict[str, str]] = {
     r"U\dTXREG": {"UTXREG8": "UTX8"},
     r"U\dRXREG": {"URXREG8": "URX8"},
 }  # fmt: skip
-"""Registers (pattern) -> bits with a second name in XC16's headers: name of the data sheet -> second name."""
+"""Second names of bits in XC16's headers, by pattern of the register name and by name in the data sheet."""
 C_TYPES = {1: "unsigned char", 2: "unsigned int"}
 
 
@@ -63,7 +63,7 @@ def bit_fields(fields: Mapping[str, tuple[int, int]], only_bits: bool = False) -
 
 
 def second_names(sfr: Sfr) -> dict[str, tuple[int, int]]:
-    """Second name of a field of the register -> (lowest bit, width)."""
+    """(lowest bit, width) of each field of the register with a second name, by that name."""
     for pattern, names in ALTERNATIVES.items():
         if re.fullmatch(pattern, sfr.name):
             return {new: sfr.fields[old] for old, new in names.items() if old in sfr.fields and new not in sfr.fields}
@@ -149,7 +149,7 @@ def folder_of(chip_name: str) -> Path:
 
 
 def _version() -> str:
-    """Hash of this module and the chips' tables: what the text of a header depends on."""
+    """Hash of all inputs of a header: this module and the tables of the chips."""
     digest = hashlib.sha256(Path(__file__).read_bytes())
     for path in sorted(CHIPS.rglob("*")):
         if path.suffix in (".py", ".csv"):
@@ -158,7 +158,7 @@ def _version() -> str:
 
 
 def _write(target: Path, text: str) -> None:
-    """Write a header whole or not at all. Raises OSError."""
+    """Write a header atomically. Raise OSError on failure."""
     make_private(target.parent)
     handle, temporary = tempfile.mkstemp(prefix=".header.", dir=target.parent)
     with os.fdopen(handle, "w", encoding="utf-8") as stream:

@@ -81,7 +81,7 @@ def _directive(asm: Assembler, word: str, operands: str) -> None:
     if handler is not None:
         handler(asm, operands)
     elif word in CONDITIONALS:
-        asm.conditionals.obey(word, operands, asm.source.place, asm)
+        asm.conditionals.process(word, operands, asm.source.place, asm)
     elif (instead := rejection(word)) is not None:
         raise ExprError(f"directive {word} does not exist in this assembler: {instead}")
     else:
@@ -92,7 +92,7 @@ def _skip(asm: Assembler, line: str) -> None:
     """Process a line inside a false conditional: only conditionals have an effect."""
     match = _STATEMENT.match(line)
     if match and match[1][0] == "." and match[1].lower() in CONDITIONALS:
-        asm.conditionals.obey(match[1].lower(), match[2], asm.source.place, asm)
+        asm.conditionals.process(match[1].lower(), match[2], asm.source.place, asm)
 
 
 def _call_macro(asm: Assembler, macro: Macro, operands: str) -> None:

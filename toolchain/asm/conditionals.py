@@ -18,14 +18,14 @@ CONDITIONALS = frozenset(_COMPARISONS + _TESTS + _PARTS)
 
 
 class ConditionContext(Protocol):
-    """State of the assembler that conditions depend on."""
+    """Interface of the assembler to conditions: the state on which they depend."""
 
     symbols: dict[str, AsmSymbol]
     declared: set[str]
     registers: dict[str, str]
 
     def constant(self, text: str, what: str = "expression") -> int:
-        """Return the value of `text`, which must be a number at this point."""
+        """Return the value of `text`; raise `ExprError` if it is not yet a number."""
 
 
 @dataclass(slots=True)
@@ -65,7 +65,7 @@ class Conditionals:
     def _update(self) -> None:
         self.active = all(level.active for level in self._levels[-1:])
 
-    def obey(self, word: str, operands: str, place: SourceLocation, context: ConditionContext) -> None:
+    def process(self, word: str, operands: str, place: SourceLocation, context: ConditionContext) -> None:
         """Process one conditional directive."""
         if word in (".else", ".elsec"):
             level = self._top(word)

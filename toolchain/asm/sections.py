@@ -122,7 +122,7 @@ class AsmSection(LabelledSection):
         return Label(self.piece, len(self.piece.data) // 2 - 2)
 
     def put_word(self, word: int) -> int:
-        """Append one program word, aligned; return its octet offset in the current piece."""
+        """Append one program word at the next word boundary; return its octet offset in the current piece."""
         if self._data_bytes or self._packed_bytes:
             self.align_word()
         data = self.piece.data

@@ -103,7 +103,7 @@ class CallContexts(ABC):
         return None
 
     def call(self, entry: int, state: AbstractState, one_of_many: bool) -> tuple[FunctionResult, bool]:
-        """Return the result of a called function, and whether it is that of the general context.
+        """Return the result of a called function, and whether the general context was used.
 
         The general context covers all calls.  It is used for functions with many contexts, and for `one_of_many`
         targets of a pointer.  If it has no bound but separate contexts have, the call's own context is analysed.

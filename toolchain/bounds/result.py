@@ -90,7 +90,7 @@ class FunctionResult:
             self.switch_time = max(self.switch_time or 0, start + other.switch_time)
 
     def relocated(self, stack: int, distance: int) -> FunctionResult:
-        """Return the same result for an entry `distance` bytes higher on a stack."""
+        """Return this result for an entry with W15 `distance` bytes higher on a stack."""
         peak = {k: (top + distance if k[0] == stack else top, chain) for k, (top, chain) in self.peak.items()}
         return replace(self, peak=peak)
 

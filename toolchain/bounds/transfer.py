@@ -45,7 +45,7 @@ NSTDIS = 1 << 15
 COUNTS = 0x3FFF
 """Greatest value of DCOUNT and DISICNT."""
 ENABLES = {register("MODCON"): 0xC000, register("XBREV"): 0x8000}
-"""MODCON and XBREV: the bits that turn modulo and bit-reversed addressing on (isa.md §8)."""
+"""By register (MODCON, XBREV): the bits that enable modulo and bit-reversed addressing (isa.md §8)."""
 EDT = 1 << 11
 """Bit of CORCON that ends a DO loop early (isa.md §7.6)."""
 IPL3 = TRAP = 8
@@ -287,7 +287,7 @@ class TransferFunctions:
         return mem.get(~ea, BYTE)
 
     def _core_register(self, ea: int) -> Value | None:
-        """Return the value of SR or DISICNT, or within a DO loop of CORCON or a loop register; None for others."""
+        """Return the value of SR or DISICNT, and within a DO loop of CORCON and the loop registers; None for others."""
         state = self.state
         if ea == SR:
             return self._status()
@@ -303,7 +303,7 @@ class TransferFunctions:
         return (count, start & 0xFFFF, start >> 16, end & 0xFFFF, end >> 16)[LOOP_REGISTERS.index(ea)]
 
     def _status(self) -> Value:
-        """Return the value of SR, in which the bits that all possible priorities share are known."""
+        """Return the value of SR; priority bits are known if all possible priorities agree on them."""
         low, high = self.state.ipl
         agree = ~(low ^ high) << 5 & IPL_BITS
         return Interval(0, 0xFFFF, ~0xFFFF | agree, low << 5 & agree)

@@ -185,7 +185,7 @@ check_order(FUNCTION_PASSES)
 
 
 def source_position(info: DebugMetadata, f: Function, line: str | None) -> str:
-    """ "file:line" of a !dbg reference or of the function; the function's name without debug information."""
+    """ "file:line" of a !dbg reference or else of the function; without debug information, the function's name."""
     found = info.position(line) or info.position(f.dbg)
     return f"{found[0]}:{found[1]}" if found is not None else f"in function '{f.name}'"
 

@@ -44,7 +44,7 @@ def library(compile_one: Compile, jobs: int = 0) -> bytes:
     if stored is not None:
         return stored
     content = build(compile_one, jobs)
-    if fingerprint() == key:  # the compiler has not been edited meanwhile
+    if fingerprint() == key:  # the compiler's sources have not changed during the build
         _store(cached, content)
     return content
 
@@ -94,7 +94,7 @@ def _member(compile_one: Compile, source: Path) -> bytes:
         inputs=[item],
         stage="assemble",
         level=LEVEL,
-        stack_check=True,  # checks of a program need checks in the functions that it calls
+        stack_check=True,  # with -fstack-check, the library functions that a program calls must check, too
         runtime=False,
         clang=["-std=c11" if item.language == "c" else "-std=c++17", "-ffreestanding", "-Wall"],
     )

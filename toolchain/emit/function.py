@@ -75,7 +75,7 @@ class FunctionEmitter:
         return f".L{self.prefix}_{self.numbers[block]}"
 
     def fresh(self) -> str:
-        """A new local label inside a block."""
+        """Return a new, unique local label for use inside a block."""
         self.serial += 1
         return f".L{self.prefix}_i{self.serial}"
 

@@ -1,6 +1,6 @@
 """XC16's register names in inline assembly: `"w0"` as a clobber and `asm("w4")` of a register variable.
 
-Clang knows the register names of the MSP430, r0-r15 for W0-W15, and refuses others. `respell` replaces the names in
+Clang accepts only the register names of the MSP430, r0-r15 for W0-W15. `respell` replaces the names in
 preprocessed C; templates of instructions are not changed.
 """
 

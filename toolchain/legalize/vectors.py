@@ -84,7 +84,7 @@ def extractelement(lz: MemoryLegalizer, i: Instr) -> Value:
 
 
 def insertelement(lz: MemoryLegalizer, i: Instr) -> list[Value]:
-    """The vector with one lane replaced."""
+    """Return the lanes of the vector with one lane replaced."""
     lanes, new, index = list(lz.legal_leaves(i.args[0])), lz.legal(i.args[1]), i.args[2]
     if isinstance(index, ConstInt):
         if index.value < len(lanes):

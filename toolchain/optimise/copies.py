@@ -94,7 +94,7 @@ def _constant(mi: MI) -> KnownConstant | None:
 def _rewrite(b: MBlock, facts: RegisterFacts) -> bool:
     """Rewrite one block with the facts at its start; return whether it changed."""
     out: list[MI] = []
-    made: RegisterFacts = {}  # originals are replaced only within a block: longer live ranges cost more than they save
+    made: RegisterFacts = {}  # facts of this block only: longer live ranges of originals cost more than they save
     changed = False
     for mi in b.insts:
         if _is_redundant(mi, facts):

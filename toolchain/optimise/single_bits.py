@@ -38,7 +38,7 @@ class BitChoice:
     mask: int
     first: BitChange
     second: BitChange
-    own: frozenset[int]  # ids of the load and of the instructions that compute the value from it
+    own: frozenset[int]  # ids of the load, and of the instructions that compute the value
 
 
 def run(f: Function, is_near: IsNear) -> None:

@@ -100,7 +100,7 @@ def plain(text: str) -> str:
 
 
 def templates(module: Module) -> set[str]:
-    """Return the templates of all statements with text."""
+    """Return the templates of all assembly statements that are not empty."""
     codes = [i.args[-1] for f in module.functions.values() for b in f.blocks for i in b.instrs if i.op == "call"]
     return {plain(code.text) for code in codes if isinstance(code, InlineAsm) and code.text.strip()}
 

@@ -35,7 +35,7 @@ from toolchain.proof.solver import Refuted, Undecided, budget, check, feasible, 
 from toolchain.proof.terms import Term, narrow, vector
 
 MAX_RUNS: Final = 8
-"""Greatest number of sample runs that candidates are derived from."""
+"""Greatest number of sample runs from which candidates are derived."""
 MAX_RUN_FORKS: Final = 3
 """Greatest number of input-dependent branches of one block in a sample run."""
 MAX_ATTEMPTS: Final = 6
@@ -46,7 +46,7 @@ MAX_PASSES: Final = 12
 MAX_EXTRA_VISITS: Final = 3
 """Greatest number of times the machine passes a loop-head address while the source is not at a loop head."""
 RANDOM_REGISTERS: Final = 6
-"""Entry registers that get random values one by one where feasible; the others get them together."""
+"""Number of entry registers that receive random values one by one, if feasible; the others receive them together."""
 SEED: Final = 30
 
 
@@ -61,7 +61,7 @@ class LoopHead:
     invariants: list[Invariant]
     orders: list[OrderInvariant]
     places: set[int]
-    """Frame bytes that may have been written."""
+    """Addresses of frame bytes that may have been written."""
 
 
 @dataclass
@@ -155,7 +155,7 @@ class Induction:
                 return
         raise failure
 
-    # -- what may hold -----------------------------------------------------------------------------------------------
+    # -- candidates --------------------------------------------------------------------------------------------------
 
     def _sample_runs(self) -> Iterator[SampleRun]:
         chance = random.Random(SEED)
@@ -224,7 +224,7 @@ class Induction:
                 work += made[id(value)].args if id(value) in made else []
         return [*found, *self.entry]
 
-    # -- what does hold ----------------------------------------------------------------------------------------------
+    # -- induction ---------------------------------------------------------------------------------------------------
 
     def _induct(self, heads: dict[str, LoopHead]) -> None:
         """Drop invariants that are not inductive and prove all segments; raises Refuted, Undecided."""

@@ -108,7 +108,7 @@ class SymbolicMemory:
 
 
 def concat(parts: list[Term]) -> Term:
-    """Concatenate bytes, the lowest first; the bytes of one vector give that vector again."""
+    """Concatenate bytes, the lowest first; for all bytes of one vector, return that vector itself."""
     if len(parts) == 1:
         return parts[0]
     return z3.simplify(z3.Concat(*reversed(parts)))

@@ -51,16 +51,16 @@ class Path:
     assumptions: list[Term] = field(default_factory=list)
     """Assumptions that exclude undefined behaviour."""
     preferences: list[Term] = field(default_factory=list)
-    """Preferences for readable counterexamples, such as pointers into RAM."""
+    """Conditions preferred for readable counterexamples, such as pointers into RAM."""
     events: list[Event] = field(default_factory=list)
     visits: dict[str, int] = field(default_factory=dict)
     forks: dict[str, int] = field(default_factory=dict)
     behind_barrier: bool = False
     """Whether the last point that stores may not cross was a compiler barrier."""
     pending_stores: list[tuple[Term, Term]] = field(default_factory=list)
-    """Stores since that point."""
+    """Stores since that point, as (address, value)."""
     movable_events: list[tuple[int, SymbolicMemory]] = field(default_factory=list)
-    """Events since that point, by number, with the memory at each."""
+    """Events since that point: (number of the event, memory at the event)."""
     result: Any = None
     end_kind: str = ""
     """How the path ends: ret, unreachable, or loop (at a loop head)."""

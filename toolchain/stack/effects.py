@@ -26,7 +26,7 @@ class Successor(Enum):
     BRANCH = "branch or next"
     JUMP = "jump"
     CALL = "call, then next"
-    SKIP = "next or the one behind it"
+    SKIP = "next or the one after it"
     TABLE = "computed branch"
     CALL_POINTER = "call through a register"
     JUMP_POINTER = "jump through a register"

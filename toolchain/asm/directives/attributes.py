@@ -44,7 +44,7 @@ _RESERVED: dict[str, str] = {
     ".dconst": "data",
     ".ndconst": "data,near",
     ".eedata": "eedata",
-    ".const": "psv,page",  # Microchip's assembler gives a bare .const another, wrong type (§4.3)
+    ".const": "psv,page",  # pic30-as assigns a wrong type to a bare .const (§4.3)
 }
 _OTHER_PARTS = frozenset(("eds", "dma", "boot", "secure", "auxflash", "packedflash", "memory"))
 

@@ -54,7 +54,7 @@ def file_argument(text: str, directive: str) -> str:
 
 
 def string_argument(text: str, directive: str) -> str:
-    """Return the text of the single quoted string in `text`."""
+    """Return the content of the quoted string that is the only argument in `text`."""
     match = re.fullmatch(r'\s*"((?:\\.|[^"\\])*)"\s*', text)
     if match is None:
         raise ExprError(f"{directive} expects one string in double quotes")
@@ -267,7 +267,7 @@ DATA_DIRECTIVES: dict[str, Handler] = {
     ".short": _integers(2),
     ".2byte": _integers(2),
     ".long": _integers(4),
-    ".int": _integers(4),  # four bytes, although int of C has two (§4.3)
+    ".int": _integers(4),  # four bytes in pic30-as, although int of C has two (§4.3)
     ".4byte": _integers(4),
     ".dc": _integers(2),
     ".dc.b": _integers(1),

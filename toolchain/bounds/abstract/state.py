@@ -28,7 +28,7 @@ class AbstractState:
 
     mem           tracked data: word address -> word, ~byte address -> byte; any other location has an unknown value
     ipl           least and greatest CPU priority; 8 is added while a trap is served (IPL3)
-    masked_since  by level, the time since which interrupts of that level are masked; None if they are not
+    masked_since  by level, the time at which masking of interrupts of that level began; None if not masked
     disi_end      time until which DISI blocks interrupts at instruction boundaries (isa.md §12)
     do_loops      active DO loops, outermost first: (start, end, remaining iterations)
     repeat        count of a REPEAT directly before the next instruction, None without one

@@ -58,7 +58,7 @@ class Interval:
     __rmul__ = __mul__
 
     def __and__(self, other: Value) -> Value:
-        if isinstance(other, int) and other >= 0 and not other & (other + 1):  # a mask of the low bits
+        if isinstance(other, int) and other >= 0 and not other & (other + 1):  # `other` is a mask of the low bits
             if self.lo >= 0 and self.hi <= other:
                 return self
             width = other.bit_length()

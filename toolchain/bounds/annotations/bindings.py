@@ -138,7 +138,7 @@ class AnnotationBindings:
     # -- calls -------------------------------------------------------------------------------------------------------
 
     def call_counts(self, pc: int, target: int) -> dict[int, tuple[str, int]]:
-        """Return the CALL_SHAREs of a call, by function: source call, and its number in one call of the function."""
+        """Return the CALL_SHAREs of a call, by function: source call, and its number per call of the function."""
         found = {}
         for annotation in self._calls["often"].get((pc, target), ()):
             for address, _, number in self._function_values([annotation], skip=1):

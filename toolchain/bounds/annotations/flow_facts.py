@@ -50,7 +50,7 @@ class FlowFacts:
     is_single_loop: Callable[[FunctionGraph, Loop], bool] = lambda _code, _loop: True
     """Whether a loop is a single loop of the source, so that its annotations apply."""
     call_counts: Callable[[int, int], dict[int, tuple[str, int]]] = lambda _pc, _target: {}
-    """By function: source call that a call at an address belongs to, and its number in one call of the function."""
+    """By function: source call of the call at an address, and how often one call of the function makes it."""
     is_never_called: Callable[[int, int], bool] = lambda _pc, _target: False
     """Whether the call of a function at an address is excluded."""
     excluded: frozenset[int] = frozenset()

@@ -85,7 +85,7 @@ class SymbolicMachine:
         self.page: Final = page
         """Value of PSVPAG for constants."""
         self.before: Final = {at: z3.BitVec(name, 16) for at, name in CORE.items()} | {PSVPAG: entry}
-        """Registers of CORE at entry."""
+        """Values of the registers of CORE at entry, by address."""
         self.frame: Final = frame
         self.events: Final = events
         self.assumptions: Final = assumed
@@ -327,7 +327,7 @@ class SymbolicMachine:
         self.state.accessed_bytes = frozenset()
 
     def _event(self, kind: str, at: Any, size: int, value: Term | None = None) -> Term | None:
-        """Execute an access as the source's next volatile access; return its value, None if it is another one."""
+        """Execute an access as the source's next volatile access; return its value, None if the accesses differ."""
         e = self.expected()
         if e is None or e.kind != kind:
             return None

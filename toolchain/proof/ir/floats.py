@@ -17,7 +17,7 @@ from toolchain.proof.terms import Term, one_bit, vector
 MODES: Final = {32: "sf", 64: "df"}
 SUMS: Final = {"fadd": "add", "fsub": "sub", "fmul": "mul", "fdiv": "div"}
 ORDERED: Final = {"oeq": "eq", "une": "ne", "olt": "lt", "ole": "le", "ogt": "gt", "oge": "ge"}
-"""By predicate: comparison function, whose result relates to 0 as its operands to each other; false for NaN."""
+"""By predicate: comparison function. Its result relates to 0 as the operands to each other; NaN yields false."""
 NEGATED: Final = {"ult": "oge", "ule": "ogt", "ugt": "ole", "uge": "olt"}
 
 
