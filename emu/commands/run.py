@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from emu.machine.stops import Stop
 
 EXIT_SYMBOL: Final = "__exit_status"
-"""Symbol at which the start-up code stores the result of main, before it sleeps forever."""
+"""Symbol of the variable in which the start-up code stores main's result before it sleeps forever."""
 
 STATISTICS: Final = "os_statistics"
 REFUSED: Final = 6
@@ -99,7 +99,7 @@ def parser() -> Parser:
 
 @dataclass(frozen=True, slots=True)
 class RunResult:
-    """End of a run: the stop, the host time, bytes lost by each UART, and captured UART output."""
+    """Result of a run: the stop, the host time, the bytes that each UART lost, and captured UART output."""
 
     stop: Stop
     host_seconds: float
@@ -108,7 +108,7 @@ class RunResult:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Exit status as DESCRIPTION says."""
+    """Run the command. Return the exit status as listed in DESCRIPTION."""
     image = image_of(options)
     _print_warnings(image)
     machine = _machine(options, image)
@@ -132,7 +132,7 @@ def _print_warnings(image: Image) -> None:
 def _run_session(
     options: argparse.Namespace, machine: Machine, image: Image, replay: list[TimestampedInput], stack: ExitStack
 ) -> RunResult:
-    """Open the files and ports of the run in `stack`, and run to the end."""
+    """Open the files and ports of the run in `stack`, and run until a stop."""
     captured: dict[int, bytearray] = {}
     ports = _ports(options, stack, captured)
     advance = _instruments(options, machine, image, stack)
@@ -155,7 +155,7 @@ def _run_session(
 
 
 def _instruments(options: argparse.Namespace, machine: Machine, image: Image, stack: ExitStack) -> Any:
-    """Open trace and waveform files in `stack`. Return the function that runs the machine, None without instruments."""
+    """Open trace and waveform files in `stack`. Return the function that runs the machine; None without instruments."""
     advance = None
     if options.trace:
         advance = _tracer(machine, image, stack.enter_context(atomic_text_file(options.trace)))
@@ -181,14 +181,14 @@ def _checked_start(machine: Machine, image: Image, stop: Stop) -> Stop:
 
 
 def _status(options: argparse.Namespace, machine: Machine, image: Image, stop: Stop) -> int:
-    """Return the exit status, as DESCRIPTION says."""
+    """Return the exit status as listed in DESCRIPTION."""
     if options.exit_code:
         return exit_status(machine, image, stop)
     return FAULT if stop.reason == "fault" else DONE
 
 
 def _report(options: argparse.Namespace, machine: Machine, image: Image, result: RunResult, status: int) -> None:
-    """Print how the run ended: text on standard error, or one JSON object on standard output."""
+    """Print why the run ended: text on standard error, or one JSON object on standard output."""
     facts = _facts(machine, image, result.stop, result.host_seconds)
     if options.stats:
         facts["stats"] = _statistics(machine, result.host_seconds)
@@ -204,7 +204,7 @@ def _report(options: argparse.Namespace, machine: Machine, image: Image, result:
 def _native_address(machine: Machine, text: str) -> int:
     """Return the address for --dump-native.
 
-    Raises CommandError for an unknown one, or an engine without native code.
+    Raises CommandError for an unknown address, or for an engine without native code.
     """
     from emu.dspic30f.jit.engine import JitEngine
 
@@ -247,7 +247,7 @@ def _refused_before_start(machine: Machine, image: Image) -> int:
 
 
 def _machine(options: argparse.Namespace, image: Image) -> Machine:
-    """Construct the machine: image loaded, breakpoints set, accesses to unmodelled registers reported."""
+    """Return the machine with the image loaded and breakpoints set. It reports accesses to unmodelled registers."""
     from emu.api import Machine
 
     try:
@@ -293,7 +293,7 @@ def _replay(options: argparse.Namespace, machine: Machine) -> list[TimestampedIn
 
 
 def _ports(options: argparse.Namespace, stack: ExitStack, captured: dict[int, bytearray]) -> dict[int, ConsolePort]:
-    """Open both UARTs' ports; with --json, capture output for standard output."""
+    """Open the ports of both UARTs. With --json, capture their output for standard output."""
     texts = [options.trace, options.record]
     places = {1: options.uart1 or ("none" if "-" in texts else "-"), 2: options.uart2}
     if [*places.values(), *texts].count("-") + (options.json and "-" in texts) > 1:
@@ -356,7 +356,7 @@ def exit_status(machine: Machine, image: Image, stop: Stop) -> int:
 
 
 def _facts(machine: Machine, image: Image, stop: Stop, host_seconds: float) -> dict[str, Any]:
-    """Return the content of the last line as data."""
+    """Return the content of the summary line as data."""
     seconds = machine.peripherals.seconds(stop.cycle)
     facts: dict[str, Any] = {
         "reason": stop.reason,
@@ -374,7 +374,7 @@ def _facts(machine: Machine, image: Image, stop: Stop, host_seconds: float) -> d
 
 
 def _statistics(machine: Machine, host_seconds: float) -> dict[str, Any]:
-    """Return the engine's counters, the number of resets, and the host time by activity."""
+    """Return the engine's counters, the number of resets, and the host time per activity."""
     runner = machine.runner
     counts = getattr(runner, "counts", None)
     facts = {"engine": machine.engine, "resets": len(machine.resets), **(asdict(counts) if counts else {})}
@@ -400,7 +400,7 @@ def _where(place: dict[str, Any]) -> str:
 
 
 def _print_end(facts: dict[str, Any], stop: Stop) -> None:
-    """Print the fault, if any, and the last line."""
+    """Print the fault, if any, and the summary line."""
     sys.stdout.flush()
     if stop.fault is not None:
         print(f"emu run: {stop.fault.report()}", file=sys.stderr)

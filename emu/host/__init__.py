@@ -1,1 +1,1 @@
-"""Host services of the commands: files, cache paths, exit statuses, option parsing, shell completion."""
+"""Host services for commands: files, cache paths, exit statuses, option parsing, shell completion."""

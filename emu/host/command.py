@@ -1,4 +1,4 @@
-"""Common parts of the commands of `python -m emu`: option parser, argument types, error class."""
+"""Parts common to the commands of `python -m emu`: option parser, argument types, error class."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from typing import Final, NoReturn
 from emu.host.exit_status import BAD_INPUT, BAD_INPUT_AS_STATUS
 
 TEN_YEARS: Final = 10 * 366 * 24 * 3600
-"""Longest simulated time a command accepts, in seconds."""
+"""Maximum simulated time that a command accepts, in s."""
 
 
 class CommandError(Exception):
-    """A user error, reported in one line."""
+    """Error made by the user, reported in one line."""
 
 
 class Parser(argparse.ArgumentParser):
-    """An argument parser that keeps the layout of descriptions and exits with 126 on errors under `--exit-code`."""
+    """Argument parser that keeps the layout of descriptions. Under `--exit-code` it exits with 126 on errors."""
 
     def __init__(self, command: str, description: str, example: str) -> None:
         super().__init__(
@@ -40,7 +40,7 @@ class Parser(argparse.ArgumentParser):
 
 
 def seconds(text: str) -> Fraction:
-    """Parse a time above 0 s and up to ten years, like `5`, `0.25` or `1/3`, exactly. Raises ArgumentTypeError."""
+    """Parse a time of more than 0 s and at most ten years exactly: `5`, `0.25` or `1/3`. Raises ArgumentTypeError."""
     if re.fullmatch(r"\d{1,12}(\.\d{0,12})?|\.\d{1,12}|\d{1,12}/\d{1,12}", text):
         with contextlib.suppress(ZeroDivisionError):
             value = Fraction(text)
@@ -50,7 +50,7 @@ def seconds(text: str) -> Fraction:
 
 
 def count(text: str) -> int:
-    """Parse a count, 0 or more. Raises ArgumentTypeError."""
+    """Parse a whole number of 0 or more. Raises ArgumentTypeError."""
     if re.fullmatch(r"\d{1,9}", text, re.ASCII):
         return int(text)
     raise argparse.ArgumentTypeError(f"expected a number, 0 or more, not {text!r}")
@@ -64,7 +64,7 @@ def port(text: str) -> int:
 
 
 def cycles(text: str) -> int:
-    """Parse a number of instruction cycles above 0, decimal or 0x. Raises ArgumentTypeError."""
+    """Parse a number of instruction cycles of 1 or more, decimal or 0x. Raises ArgumentTypeError."""
     if re.fullmatch(r"\d{1,18}|0x[0-9a-fA-F]{1,15}", text):
         value = int(text, 16 if text.startswith("0x") else 10)
         if value:

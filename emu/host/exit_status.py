@@ -1,6 +1,6 @@
 """Exit statuses of all commands of the project, and the handling of closed output streams.
 
-The module imports nothing of the project. The table in the documentation is `table()`. 124 and 130 follow `timeout` of
+The module imports nothing of the project. `table()` is the table in the documentation. 124 and 130 follow `timeout` of
 GNU coreutils and the shells.
 """
 
@@ -45,9 +45,9 @@ def table() -> str:
 
 
 def _open_standard() -> None:
-    """Open the null device for closed standard streams (`<&-`).
+    """Open the null device for each closed standard stream (`<&-`).
 
-    Python would use None for such a stream, and the next opened file would get its descriptor.
+    Otherwise Python would set the stream to None, and the next file opened would get its descriptor.
     """
     for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
         if getattr(sys, name) is None:
@@ -55,14 +55,14 @@ def _open_standard() -> None:
 
 
 def _drop_output() -> None:
-    """Discard buffered standard output, which Python would flush at exit."""
+    """Discard buffered standard output, which Python would otherwise flush at exit."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def ignore_unread_output(main: Callable[P, int]) -> Callable[P, int]:
-    """Wrap a command's `main`: a closed output pipe (`| head`) is not an error, a full disk is reported in one line.
+    """Wrap a command's `main`: a closed output pipe (`| head`) is no error, a full disk is reported in one line.
 
-    The wrapper flushes standard output, because a write error may only show when Python flushes after `main` or
+    The wrapper flushes standard output, because a write error may appear only when Python flushes it after `main` or
     `--help`.
     """
 

@@ -1,6 +1,6 @@
-"""File access by name: `-` is standard input or output, and files are written atomically.
+"""File access by name. `-` is standard input or output; files are written atomically.
 
-All commands of the project read and write the files named on their command lines through this module.
+All commands of the project use this module to read and write the files named on their command lines.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ MAX_OCTETS: Final = 1 << 28
 """Largest input that is read whole, in octets."""
 PIECE_OCTETS: Final = 1 << 20
 MAX_NAME_CHARACTERS: Final = 60
-"""Characters kept of a name in a temporary name: at four octets each they fit the limit of 255 octets."""
+"""Number of characters of a name used in a temporary name; at four octets each they fit the limit of 255 octets."""
 
 
 def is_standard(path: str | os.PathLike[str]) -> bool:
-    """Whether a name means standard input or output."""
+    """Whether a name denotes standard input or output."""
     return os.fspath(path) == STANDARD
 
 
@@ -64,7 +64,7 @@ def _contents(stream: BinaryIO, name: str) -> bytes:
 
 @cache
 def _standard_input() -> bytes:
-    """Read standard input once; a command may read its image twice."""
+    """Return the contents of standard input, which is read only once: a command may read its image twice."""
     return _contents(sys.stdin.buffer, STANDARD)
 
 
@@ -103,7 +103,7 @@ def atomic_text_file(path: str | os.PathLike[str]) -> Iterator[TextIO]:
 def atomic_file(path: str | os.PathLike[str]) -> Iterator[Path]:
     """Create an empty file beside `path` that replaces it when the block ends without an exception.
 
-    For standard output, a pipe or a device the content is copied instead. Raises OSError as `open` does.
+    For standard output, a pipe or a device, the content is copied to it instead. Raises OSError as `open` does.
     """
     copied = is_standard(path) or is_opened(path)
     part = _temporary(path) if copied else temporary_beside(path)
@@ -131,7 +131,7 @@ def temporary_beside(path: str | os.PathLike[str]) -> Path:
 
 
 def replace_file(part: Path, path: str | os.PathLike[str]) -> None:
-    """Replace `path` by a file of `temporary_beside`, keeping the permissions of an existing file. Raises OSError."""
+    """Replace `path` by a file from `temporary_beside` and keep an existing file's permissions. Raises OSError."""
     target = _followed(path)
     try:
         mode = stat.S_IMODE(target.stat().st_mode)
@@ -144,12 +144,12 @@ def replace_file(part: Path, path: str | os.PathLike[str]) -> None:
 
 
 def _followed(path: str | os.PathLike[str]) -> Path:
-    """Return the path that `open` would write, with symbolic links resolved."""
+    """Return the path that `open` would write, that is, with symbolic links resolved."""
     return Path(os.path.realpath(path))
 
 
 def _temporary(path: str | os.PathLike[str], folder: Path | None = None) -> Path:
-    """Create a temporary file whose name begins with that of `path`, truncated to a valid length."""
+    """Create a temporary file whose name begins with that of `path`, shortened to a valid length."""
     handle, name = tempfile.mkstemp(dir=folder, prefix=f"{Path(path).name[:MAX_NAME_CHARACTERS]}.", suffix=".part")
     os.close(handle)
     return Path(name)

@@ -1,4 +1,4 @@
-"""Locations of the user's cache and of the files installed with the package.
+"""Paths of the user's cache and of the files installed with the package.
 
 The module imports nothing of the project. Its functions create no files or folders.
 """
@@ -10,13 +10,14 @@ from pathlib import Path
 from typing import Final
 
 _ROOT: Final = Path(__file__).resolve().parents[2]
-"""The checkout, or the folder of installed packages."""
+"""The checkout's folder, or the folder of installed packages."""
 
 
 def cache() -> Path:
     """Return the cache folder: `$OPENSWARM_CACHE`, else `openswarm` in the user's cache folder.
 
-    The user's cache folder is `$XDG_CACHE_HOME` or `~/.cache`, and the platform's standard on macOS and Windows.
+    The user's cache folder is `$XDG_CACHE_HOME` or `~/.cache`; on macOS and Windows it is the platform's standard
+    folder.
     """
     own = os.environ.get("OPENSWARM_CACHE")
     if own:
@@ -33,22 +34,22 @@ def use_cache(folder: str) -> Path:
 
 
 def native_code() -> Path:
-    """Return the cache folder of native code compiled from firmware; at most 128 MB."""
+    """Return the cache folder of native code compiled from firmware, which is at most 128 MB large."""
     return cache() / "jit"
 
 
 def runtime_libraries() -> Path:
-    """Return the cache folder of the target C library: one archive per compiler version, at most eight."""
+    """Return the cache folder of the target's C library. It holds one archive per compiler version, at most eight."""
     return cache() / "toolchain"
 
 
 def headers() -> Path:
-    """Return the cache folder of generated device headers: one folder per version of the chips' tables."""
+    """Return the cache folder of generated device headers. It has one folder per version of the chips' tables."""
     return cache() / "headers"
 
 
 def images() -> Path:
-    """Return the cache folder of `firmware/apps` images that `arena run` builds from an installed package."""
+    """Return the cache folder of the `firmware/apps` images that `arena run` builds for an installed package."""
     return cache() / "firmware"
 
 
@@ -60,7 +61,7 @@ def history() -> Path:
 
 
 def in_checkout() -> bool:
-    """Whether this code runs from a checkout and not from an installed package."""
+    """Whether this code runs from a checkout, not from an installed package."""
     return (_ROOT / "firmware" / "Makefile").is_file()
 
 

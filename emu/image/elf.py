@@ -1,6 +1,7 @@
-"""Reader of dsPIC30F ELF executables: program words, sections and symbols, as abi-elf.md §6.8 specifies.
+"""Reader of dsPIC30F ELF executables: program words, sections and symbols, as specified by abi-elf.md §6.8.
 
-Input: contents of a file written by this project's linker, XC16 or C30. Output: an `Image`. Content comes from section
+Input: contents of a file written by this project's linker, XC16 or C30. Output: an `Image`. The contents come from
+section
 headers; program headers only translate the addresses of psv and EEPROM sections (abi-elf.md §6.4).
 """
 
@@ -23,7 +24,7 @@ PT_LOAD = 1
 SHN_UNDEF, SHN_LORESERVE, SHN_ABS = 0, 0xFF00, 0xFFF1
 STB_LOCAL = 0
 INITIAL_DATA: Final = ".dinit"
-"""Section with code flags but without instructions: the table from which crt0 initialises RAM (abi-elf.md §3.2)."""
+"""Section that has code flags but no instructions: the table from which crt0 initialises RAM (abi-elf.md §3.2)."""
 STT_KINDS: Final = {0: "label", 1: "object", 2: "function"}
 
 _HEADER: Final = struct.Struct("<16sHHIIIIIHHHHHH")
@@ -33,7 +34,7 @@ _SYMBOL: Final = struct.Struct("<IIIBBH")
 
 _MACHINES: Final = {2: "SPARC", 3: "x86", 8: "MIPS", 40: "ARM", 62: "x86-64", 83: "AVR", 105: "MSP430", 183: "AArch64",
                     204: "PIC18", 243: "RISC-V"}  # fmt: skip
-"""Machine names for the error message (ELF e_machine registry)."""
+"""Machine names by ELF e_machine number, for the error message."""
 
 
 class _Header(NamedTuple):
@@ -61,7 +62,7 @@ class _Segment(NamedTuple):
 
 
 class _Reader:
-    """A file being read; every access is checked against the file's length."""
+    """File being read. Every access is checked against the file's length."""
 
     def __init__(self, data: bytes, path: str) -> None:
         self.data: Final = data
@@ -80,16 +81,16 @@ class _Reader:
         return self.data[offset : offset + size]
 
     def table(self, row: struct.Struct, offset: int, count: int, size: int, what: str) -> list[tuple[int, ...]]:
-        """Return the rows of a header table. Raises LoadError if the entry size `size` is not that of the format."""
+        """Return the rows of a header table. Raises LoadError if the entry size `size` does not match the format."""
         if count and size != row.size:
             raise self.fail(f"{what} entries have {size} octets, expected {row.size}")
         return list(row.iter_unpack(self.piece(offset, count * row.size, what)))
 
 
 def read_elf(data: bytes, path: str, chip: Chip | None) -> Image:
-    """Read the contents of an ELF file, for `chip` or else for the one it was built for.
+    """Read the contents of an ELF file for `chip`; with None, for the chip named in the file.
 
-    Raises LoadError when it is not a complete dsPIC30F executable.
+    Raises LoadError if it is not a complete dsPIC30F executable.
     """
     reader = _Reader(data, path)
     (_, _, _, _, entry, phoff, shoff, e_flags, _, phentsize, phnum, shentsize, shnum, shstrndx) = _identify(reader)
@@ -137,7 +138,7 @@ def _strings(reader: _Reader, headers: list[_Header], index: int) -> bytes:
 
 
 def _name(strings: bytes, offset: int) -> str:
-    """Return the NUL-terminated name at `offset`, empty if it lies outside."""
+    """Return the NUL-terminated name at `offset`, empty if `offset` is outside the table."""
     end = strings.find(b"\0", offset)
     return strings[offset : end if end >= 0 else len(strings)].decode("latin-1")
 
@@ -173,7 +174,7 @@ def _section(reader: _Reader, header: _Header, name: str, segments: list[_Segmen
 
 
 def _load_address(reader: _Reader, header: _Header, name: str, segments: list[_Segment]) -> int:
-    """Return the program address of a psv or EEPROM section from the program header covering it (abi-elf.md §6.4)."""
+    """Return the program address of a psv or EEPROM section, from its program header (abi-elf.md §6.4)."""
     for segment in segments:
         if (
             segment.type == PT_LOAD

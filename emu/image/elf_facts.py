@@ -1,8 +1,8 @@
 """ELF constants of the dsPIC30F: machine number, flag bits, relocation table, octet rule.
 
-Pure data for the emulator's loader and for `toolchain.elf`, `toolchain.asm` and `toolchain.link`.
-Units: an *address unit* is a PC step of 1 in code (an instruction is 2) and a byte in data; an *octet* is a byte
-of the file.  Source of everything here: abi-elf.md §5 and §6, cited line by line.
+Pure data for the emulator's loader and for `toolchain.elf`, `toolchain.asm` and `toolchain.link`. Units: an *address
+unit* is a PC step of 1 in code (an instruction is 2) and a byte in data; an *octet* is a byte of the file. All facts
+come from abi-elf.md §5 and §6, cited at each line.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ EM_DSPIC30F = 118  # abi-elf.md §6.1
 PROCESSOR_MASK = 0xFFFF  # e_flags low 16 bits = processor id, §6.1
 GENERIC_PROCESSORS = (0, 90, 91)  # 30Fxxxx, any 16-bit, any DSP part (§6.1)
 
-OCTETS_PER_UNIT = 2  # §6.2: the rule for *every* section
+OCTETS_PER_UNIT = 2  # §6.2: this holds for *every* section
 OCTETS_PER_WORD = 4  # one program word: low, middle, upper, phantom 0
 UNITS_PER_WORD = 2
 
@@ -75,7 +75,7 @@ def content_kind(flags: int, executable: bool) -> Content:
 
 
 class Formula(Enum):
-    """Formula of a relocation's value from S (address), L (load address), A (addend), P (place); §5."""
+    """Formula for a relocation's value from S (symbol address), L (load address), A (addend), P (place); §5."""
 
     NONE = "none"
     ADDRESS = "S+A"
@@ -109,8 +109,8 @@ class RelocatedField(Enum):
 class RelocationType:
     """One row of the relocation table (abi-elf.md §5).
 
-    `lsb` and `width` are in bits: within the 24-bit word for `RelocatedField.WORD`, else `width` counts data bits.
-    `low`..`high` is the accepted value; `even` demands bit 0 of the value to be 0.
+    `lsb` and `width` are in bits. For `RelocatedField.WORD` they select bits of the 24-bit word; otherwise `width` is
+    the number of data bits. Values in `low`..`high` are accepted; `even` requires bit 0 to be 0.
     """
 
     number: int
@@ -126,7 +126,7 @@ class RelocationType:
 
 _W, _D, _P = RelocatedField.WORD, RelocatedField.DATA, RelocatedField.PDATA
 _F = Formula
-_WORD_RANGE = (-0x8000, 0xFFFF)  # abi-elf.md §4.1: a word literal accepts both readings
+_WORD_RANGE = (-0x8000, 0xFFFF)  # abi-elf.md §4.1: a word literal may be signed or unsigned
 _ANY32 = (-0x80000000, 0xFFFFFFFF)
 _ANY24 = (-0x800000, 0xFFFFFF)
 _BRANCH_RANGE = (-0x8000, 0x7FFF)  # isa.md §3.2 Slit16, instruction words
@@ -185,8 +185,8 @@ _ROWS: tuple[tuple[int, str, RelocatedField, int, int, Formula, tuple[int, int],
     (62, "EDSOFFSET", _D, 0, 16, _F.EDSOFFSET, (0, 0xFFFF), False),
     (63, "P_EDSOFFSET", _P, 0, 24, _F.EDSOFFSET, (0, 0xFFFF), False),
     (64, "WORD_EDSOFFSET", _W, 4, 16, _F.EDSOFFSET, (0, 0xFFFF), False),
-    # 72-80: lit10 of an instruction is in bits 13-4 (isa.md §5); §5 of abi-elf.md quotes 9-0 from a table that was
-    # never tested.  UNVERIFIED against Microchip's linker.
+    # 72-80: lit10 of an instruction is in bits 13-4 (isa.md §5). abi-elf.md §5 says 9-0, from a table that was never
+    # tested. UNVERIFIED against Microchip's linker.
     (72, "UNSIGNED_10_TBLOFFSET", _W, 4, 10, _F.TBLOFFSET, (0, 1023), False),
     (73, "UNSIGNED_10_PSVOFFSET", _W, 4, 10, _F.PSVOFFSET, (0, 1023), False),
     (74, "UNSIGNED_10_TBLPAGE", _W, 4, 10, _F.TBLPAGE, (0, 1023), False),
@@ -200,8 +200,8 @@ _ROWS: tuple[tuple[int, str, RelocatedField, int, int, Formula, tuple[int, int],
     (94, "WORD_ADDR_HI", _W, 4, 16, _F.ADDR_HIGH, (0, 0xFFFF), False),
 )
 
-# Numbers that exist but serve other cores, obsolete PSVPTR groups or CodeGuard, or (92, 93) whose order is
-# swapped inside Microchip's own table, so that no reading is safe (abi-elf.md §5).
+# Numbers that are defined for other cores, obsolete PSVPTR groups or CodeGuard. Microchip's own table swaps 92
+# and 93, so that no interpretation of them is safe (abi-elf.md §5).
 UNSUPPORTED_RELOCATIONS: dict[int, str] = {
     **dict.fromkeys((46, 47, 48, 69, 70, 71, 77, 78), "DMA parts only"),
     **dict.fromkeys((49, 50, 51, 52, 81), "obsolete PSVPTR"),

@@ -1,7 +1,7 @@
-"""Static memory of an image: the symbol and source file of every ROM word and RAM byte.
+"""Static memory use of an image: the symbol and source file of every ROM word and RAM byte.
 
 Input: an image, preferably with symbols and DWARF. Output: `Piece`s whose sizes add up to the totals of `emu info`. A
-piece without a symbol has its section's name, one without source `UNKNOWN`.
+piece without a symbol has its section's name; a piece without a source file has `UNKNOWN`.
 """
 
 from __future__ import annotations
@@ -18,15 +18,15 @@ UNKNOWN: Final = "(no source)"
 START_UP: Final = frozenset(
     ("__reset", "__resetPRI", "__resetALT", "__psv_init", "__data_init", "_exit", "__Exit", "__exit_status")
 )
-"""Symbols of crt0 (abi-elf.md §3.1) and exit."""
+"""Names of the symbols of crt0 (abi-elf.md §3.1) and of exit."""
 START_UP_SECTIONS: Final = frozenset((".reset", ".dinit", ".init"))
 PRINTF: Final = ("printf", "_format", "putchar", "_puts", "__fout")
-"""Symbol substrings that identify formatted output."""
+"""Substrings of symbols that belong to formatted output."""
 
 
 @dataclass(frozen=True, slots=True)
 class Piece:
-    """`rom` bytes of flash or `ram` bytes of data memory under one name. `kind`: code, const, table, data."""
+    """`rom` bytes of flash or `ram` bytes of data memory of one symbol. `kind` is code, const, table or data."""
 
     name: str
     module: str
@@ -82,10 +82,10 @@ def _program_pieces(image: Image, section: Section) -> list[Piece]:
         shift = section.load_address - section.address
         first = (
             start + start % 2
-        )  # constants may begin at odd addresses: a word belongs to the symbol of its first byte
+        )  # constants may begin at odd addresses; a word belongs to the symbol of its first byte
         for address in range(first + shift, end + shift, 2):
             line = image.lines.find(address) if kind == "code" else None
-            is_named = symbol is not None and address - shift < named  # unnamed strings follow a named constant
+            is_named = symbol is not None and address - shift < named  # unnamed strings may follow a named constant
             file = line.file if line else image.lines.files.get(start, UNKNOWN) if is_named else UNKNOWN
             words[symbol.name if symbol and is_named else section.name, file] += 1
     if section.name in START_UP_SECTIONS or section.name in (".ivt", ".aivt"):
@@ -94,7 +94,7 @@ def _program_pieces(image: Image, section: Section) -> list[Piece]:
 
 
 def _data_pieces(image: Image, section: Section) -> list[Piece]:
-    """Split a RAM section at its symbols; bytes without a symbol get the section's name."""
+    """Split a RAM section at its symbols. Bytes without a symbol get the section's name."""
     found = []
     for symbol, start, end in _cuts(image, section, "data"):
         named = min(end - start, symbol.size or end - start) if symbol else 0
@@ -106,7 +106,10 @@ def _data_pieces(image: Image, section: Section) -> list[Piece]:
 
 
 def _cuts(image: Image, section: Section, space: str) -> list[tuple[Symbol | None, int, int]]:
-    """Return (symbol, start, end) of the ranges of a section, in its own addresses; the first may have no symbol."""
+    """Return (symbol, start, end) of each range of a section, in its own addresses.
+
+    The first range may lack a symbol.
+    """
     end = section.address + section.size
     names: dict[int, Symbol] = {}
     for symbol in image.symbols.all:

@@ -1,7 +1,7 @@
-"""Reader of Intel HEX: byte address = 2 x PC, four bytes per word, the fourth a phantom (abi-elf.md §6.8).
+"""Reader of Intel HEX files: byte address = 2 x PC, four bytes per word, the fourth a phantom (abi-elf.md §6.8).
 
 Input: file contents. Output: an `Image` without symbols. Missing bytes of a word read as erased. The package intelhex,
-with which the tests compare, does not keep the line of a byte, which the error messages need.
+which the tests use for comparison, does not record the line of a byte, which error messages need.
 """
 
 from __future__ import annotations
@@ -13,13 +13,13 @@ from emu.image.elf_facts import OCTETS_PER_WORD, UNITS_PER_WORD
 from emu.image.model import ERASED, LOADABLE, Block, Image, LoadError, check_blocks
 
 DATA, END, SEGMENT, START_SEGMENT, LINEAR, START_LINEAR = range(6)
-"""Record types. Microchip's tools never write 02, 03 and 05, but they are part of the format."""
+"""Numbers of record types. Microchip's tools never write 02, 03 and 05, but they are part of the format."""
 
 _LENGTHS = {END: 0, SEGMENT: 2, START_SEGMENT: 4, LINEAR: 2, START_LINEAR: 4}
 
 
 def read_hex(data: bytes, path: str, chip: Chip) -> Image:
-    """Read the contents of an Intel HEX file. Raises LoadError with the line number of the first mistake."""
+    """Read the contents of an Intel HEX file. Raises LoadError with the line number of the first error."""
     octets, warnings = _collect(data, path, chip)
     words = _words(octets)
     blocks = check_blocks(path, chip, _blocks(words))
@@ -63,7 +63,7 @@ def _collect(data: bytes, path: str, chip: Chip) -> tuple[dict[int, int], tuple[
 
 
 def _check_place(first: int, length: int, chip: Chip, where: str, path: str) -> None:
-    """Raise LoadError if `length` octets from byte address `first` leave the chip's program memory."""
+    """Raise LoadError if `length` octets from byte address `first` are not all in the chip's program memory."""
     for place in (first, first + max(length, 1) - 1):
         address = place // OCTETS_PER_WORD * UNITS_PER_WORD
         if not any(address in chip.program[name] for name in LOADABLE):
@@ -100,7 +100,7 @@ def _wanted(record: bytes) -> int:
 
 
 def _words(octets: dict[int, int]) -> dict[int, int]:
-    """Return 24-bit words by program address; missing bytes of a word are erased (0xFF)."""
+    """Return 24-bit words by program address. Missing bytes of a word count as erased (0xFF)."""
     words: dict[int, int] = {}
     for place, octet in octets.items():
         address, lane = place // OCTETS_PER_WORD * UNITS_PER_WORD, place % OCTETS_PER_WORD * 8

@@ -1,7 +1,7 @@
 """Source lines of program addresses, from DWARF (abi-elf.md §6.7).
 
-Input: the raw octets of debug sections. Output: file and line per address. Microchip's tools store every DWARF byte as
-two octets (byte, phantom 0); this project's tools do so in objects and on request. Plain DWARF is accepted too.
+Input: raw octets of debug sections. Output: file and line per address. Microchip's tools store every DWARF byte as
+two octets (byte, phantom 0); this project's tools do so in objects and on request. Plain DWARF is also accepted.
 Unreadable debug information causes a warning, never an error.
 """
 
@@ -20,15 +20,15 @@ if TYPE_CHECKING:
 _NEEDED: Final = (".debug_info", ".debug_abbrev", ".debug_line")
 _TEXT_SECTIONS: Final = (".debug_info", ".debug_abbrev")
 DW_OP_ADDR: Final = 0x03
-"""DWARF 2 §7.7.1: a fixed address, 4 bytes here."""
+"""Operation DW_OP_addr: a fixed address, 4 bytes here (DWARF 2 §7.7.1)."""
 _DOUBLED_SHARE: Final = 0.9
-"""Minimum share of zero odd octets in a doubled section. It is below 1 because one attribute of assembler units has its
-high byte in the phantom (abi-elf.md §6.7)."""
+"""Minimum share of zeros among the odd octets of a doubled section. It is below 1 because one attribute of assembler
+units has its high byte in the phantom (abi-elf.md §6.7)."""
 
 
 @dataclass(frozen=True, slots=True)
 class SourceLine:
-    """Program addresses `start`..`end` (exclusive, PC units) come from `line` of `file`."""
+    """Program addresses `start`..`end` (exclusive, in PC units), compiled from `line` of `file`."""
 
     start: int
     end: int
@@ -40,10 +40,10 @@ class SourceLine:
 
 
 def remove_phantom_octets(sections: Mapping[str, bytes]) -> dict[str, bytes]:
-    """Return debug sections by name, without phantom octets if they have any.
+    """Return debug sections by name, without phantom octets if there are any.
 
-    The decision uses the sections with names and strings only: a plain list of small addresses has zeros at odd octets
-    too.
+    Only the sections with names and strings decide this, because a plain list of small addresses also has zeros at odd
+    octets.
     """
     phantoms = b"".join(sections.get(name, b"")[1::2] for name in _TEXT_SECTIONS)
     if phantoms and phantoms.count(0) >= _DOUBLED_SHARE * len(phantoms):
@@ -52,12 +52,12 @@ def remove_phantom_octets(sections: Mapping[str, bytes]) -> dict[str, bytes]:
 
 
 class LineTable:
-    """Line table of an image. `broken` counts the compilation units that could not be read."""
+    """Line table of an image. `broken` is the number of compilation units that could not be read."""
 
     def __init__(self, sections: Mapping[str, bytes]) -> None:
         self.broken = 0
         self.files: Final[dict[int, str]] = {}
-        """Source file of variables by address."""
+        """Source file of each variable, by data address."""
         self.rows: Final[list[SourceLine]] = []
         if all(sections.get(name) for name in _NEEDED):
             self._read(sections)
@@ -75,7 +75,7 @@ class LineTable:
         return None
 
     def _read(self, sections: Mapping[str, bytes]) -> None:
-        # pyelftools raises many unrelated exception types for damaged input; each unit is read on its own.
+        # pyelftools raises many unrelated exceptions for damaged input, so each unit is read separately.
         try:
             dwarf = dwarf_of(sections)
             units = dwarf.iter_CUs()
@@ -98,7 +98,7 @@ class LineTable:
 
 
 def dwarf_of(sections: Mapping[str, bytes]) -> DWARFInfo:
-    """Return a pyelftools view of debug sections, doubled or plain."""
+    """Return a pyelftools view of debug sections, whether doubled or plain."""
     from elftools.dwarf.dwarfinfo import DebugSectionDescriptor, DwarfConfig, DWARFInfo
 
     plain = remove_phantom_octets({name: octets for name, octets in sections.items() if name.startswith(".debug_")})
@@ -134,7 +134,7 @@ def _unit_rows(dwarf: DWARFInfo, unit: Any) -> list[SourceLine]:
 
 
 def _variables(dwarf: DWARFInfo, unit: Any) -> dict[int, str]:
-    """Return the declaring file of a unit's variables at fixed addresses, by address."""
+    """Return the declaring source file of each variable of a unit with a fixed address, by address."""
     program = dwarf.line_program_for_CU(unit)
     names = file_names(program.header) if program is not None else []
     found = {}
@@ -150,7 +150,7 @@ def _variables(dwarf: DWARFInfo, unit: Any) -> dict[int, str]:
 
 
 def file_names(header: Any) -> list[str]:
-    """Return the path of every file number of a line program; DWARF before version 5 counts files from 1."""
+    """Return the paths of a line program's files by file number. Before DWARF 5, numbers start at 1."""
     folders = [folder.decode("utf-8", "replace") for folder in header["include_directory"]]
     names = [] if header["version"] >= 5 else ["?"]
     for entry in header["file_entry"]:

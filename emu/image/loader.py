@@ -1,4 +1,4 @@
-"""Loader of firmware files: ELF (this project's, XC16's and C30's) and Intel HEX.
+"""Loader of firmware files: ELF (from this project, XC16 and C30) and Intel HEX.
 
 Input: a path. Output: an `Image`, or a `LoadError` that says what the file is and what to use instead.
 """
@@ -15,27 +15,27 @@ from emu.host.files import read_file
 from emu.image.model import Image, LoadError
 
 MAX_OCTETS: Final = 32 << 20
-"""Largest accepted file. A full image with debug information is a few megabytes."""
+"""Maximum size of a file in octets. A complete image with debug information has a few megabytes."""
 
 COFF_MAGIC: Final = b"\x36\x12"
-"""File magic 0x1236 of Microchip's COFF, little endian (abi-elf.md §6.8, COFF)."""
+"""File magic 0x1236 of Microchip's COFF, little-endian (abi-elf.md §6.8, COFF)."""
 
 EXPECTED: Final = "expected an ELF executable for dsPIC30F or an Intel HEX file"
 
 
 def load_image(path: str | os.PathLike[str], chip: Chip | None = None) -> Image:
-    """Read the firmware file at `path`, ELF or Intel HEX by content, for `chip`.
+    """Read the firmware file at `path` for `chip`; the content decides whether it is ELF or Intel HEX.
 
-    Without `chip`, an ELF file is for the chip named in its flags, a HEX file for the dsPIC30F6014A.
+    Without `chip`, an ELF file is loaded for the chip named in its flags, a HEX file for the dsPIC30F6014A.
 
-    Raises LoadError for anything that is not a usable image, OSError never.
+    Raises LoadError for a file that is not a usable image; never raises OSError.
     """
     name = os.fspath(path)
     return parse_image(_contents(name), name, chip)
 
 
 def parse_image(data: bytes, name: str, chip: Chip | None = None) -> Image:
-    """Like `load_image`, for file contents already in memory; `name` is used in messages."""
+    """Parse file contents that are already in memory, as `load_image` does; messages use `name`."""
     if data.startswith(b"\x7fELF"):
         from emu.image.elf import read_elf
 

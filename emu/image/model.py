@@ -20,17 +20,17 @@ if TYPE_CHECKING:
     from emu.image.symbols import Symbol, Symbols
 
 BYTES_PER_WORD: Final = 3
-"""Flash bytes of one program word, as data sheets count them."""
+"""Flash bytes per program word, as counted in data sheets."""
 
 ERASED: Final = 0xFFFFFF
 """Value of a program word that the file does not define (abi-elf.md §6.8 step 6)."""
 
 LOADABLE: Final = ("flash", "eedata", "unitid", "config")
-"""Regions of program space an image may define (abi-elf.md §6.8 step 4)."""
+"""Regions of program space that an image may define (abi-elf.md §6.8 step 4)."""
 
 
 class LoadError(ValueError):
-    """The file cannot be loaded. The message gives path, location, finding and expectation."""
+    """The file cannot be loaded. The message says path, location, what was found and what was expected."""
 
     def __init__(self, path: str, message: str) -> None:
         super().__init__(f"{path}: {message}")
@@ -38,14 +38,17 @@ class LoadError(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class Block:
-    """Consecutive 24-bit program words from the even address `base` (PC units)."""
+    """Consecutive 24-bit program words, starting at the even address `base` (PC units)."""
 
     base: int
     words: array[int]
     origin: str
-    """Source of the words, for messages: a section or a line."""
+    """Section or line that the words come from, for messages."""
     is_code: bool = True
-    """False for constants and tables; always True for HEX files, which do not distinguish them."""
+    """Whether the words are code;
+
+    False for constants and tables. HEX files do not distinguish, so always True there.
+    """
 
     @property
     def end(self) -> int:
@@ -59,28 +62,28 @@ class Section:
 
     name: str
     kind: str
-    """"code", "psv", "eedata", "data", "bss" or "info"."""
+    """Kind of section: "code", "psv", "eedata", "data", "bss" or "info"."""
     address: int
     size: int
     flags: int
     load_address: int | None
-    """Program address of the words, None for sections that are not loaded."""
+    """Program address of the words; None if the section is not loaded."""
     octets: bytes
     """Raw file content (empty for bss)."""
 
     @property
     def program_words(self) -> int:
-        """Program words the section occupies, 0 if it is not loaded."""
+        """Number of program words that the section occupies, 0 if it is not loaded."""
         return 0 if self.load_address is None else -(-self.size // 2)
 
 
 @dataclass(eq=False)
 class Image:
-    """Result of `emu.image.loader.load_image`: `blocks` are sorted and disjoint, each inside one loadable region."""
+    """A loaded firmware image. `blocks` are sorted and disjoint, each inside one loadable region."""
 
     path: str
     kind: str
-    """"elf" or "hex"."""
+    """File format: "elf" or "hex"."""
     chip: Chip
     blocks: tuple[Block, ...]
     sections: tuple[Section, ...] = ()
@@ -90,7 +93,7 @@ class Image:
     warnings: tuple[str, ...] = field(default=())
 
     def words(self, region: Region | None = None) -> Iterator[tuple[int, int]]:
-        """Yield (address, word) of every defined program word in address order, of one region or of all."""
+        """Yield (address, word) of every defined program word, in address order, in one region or in all."""
         for block in self.blocks:
             if region is None or block.base in region:
                 yield from zip(range(block.base, block.end, 2), block.words, strict=True)
@@ -118,7 +121,7 @@ class Image:
 
     @cached_property
     def register_names(self) -> dict[int, str]:
-        """Names of the special function registers' bytes, by data address."""
+        """Names of the bytes of special function registers, by data address."""
         names = {}
         for sfr in self.chip.sfrs.values():
             names[sfr.address] = sfr.name
@@ -135,14 +138,14 @@ class Image:
 
     @cached_property
     def lines(self) -> LineTable:
-        """Source lines by program address; empty when the image has no DWARF or it cannot be read."""
+        """Source lines by program address; empty if the image has no DWARF or it cannot be read."""
         from emu.image.lines import LineTable
 
         return LineTable({section.name: section.octets for section in self.sections if section.kind == "info"})
 
 
 def check_blocks(path: str, chip: Chip, blocks: list[Block]) -> tuple[Block, ...]:
-    """Return the blocks in address order. Raises LoadError if two overlap or one exceeds the program memory."""
+    """Return the blocks in address order. Raises LoadError if two overlap or one is not within program memory."""
     regions = [chip.program[name] for name in LOADABLE]
     blocks = sorted(blocks, key=lambda block: block.base)
     for block in blocks:

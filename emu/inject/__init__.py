@@ -1,4 +1,4 @@
-"""Fault injection:
+"""Fault injection campaigns.
 
-`campaign` reads the configuration, `faults` injects, `trial` runs and classifies, `report` counts.
+`campaign` reads the configuration, `faults` injects, `trial` runs and classifies, `report` computes statistics.
 """

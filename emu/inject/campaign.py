@@ -1,4 +1,4 @@
-"""Campaign files: run, faults and detection patterns, in TOML. Errors are reported with file and line.
+"""Campaign files in TOML: run, faults and detection patterns. Errors are reported with file and line.
 
 seed = 1                      # determines the faults
 trials = 400
@@ -6,7 +6,7 @@ trials = 400
 seconds = 1.0                 # duration whose output is compared
 start = 0.1                   # earliest time of a fault (default 0)
 selector = 0                  # of the robot (default 0)
-hang = 2.0                    # a hang: output incomplete after this multiple of `seconds` (default 2)
+hang = 2.0                    # incomplete output after this multiple of `seconds` counts as a hang (default 2)
 [input]                       # bytes for the UARTs (default none), each with its time in s
 uart1 = [[0.2, "go\\r"], [0.5, "stop\\r"]]
 [detect]
@@ -45,12 +45,12 @@ _KEYS: Final[dict[str, tuple[str, ...]]] = {
 
 
 class CampaignError(ValueError):
-    """A campaign file is invalid; the message names file, line and expectation."""
+    """Invalid campaign file. The message names the file, the line and what was expected."""
 
 
 @dataclass(frozen=True)
 class Campaign:
-    """Content of a campaign file. Times in s."""
+    """Content of a campaign file. Times are in s."""
 
     seed: int
     trials: int
@@ -76,7 +76,7 @@ class _Reader:
             raise CampaignError(f"{name}:{where}: {error}") from None
 
     def fail(self, section: str, key: str, expected: str) -> CampaignError:
-        """Return an error at the line of a key, or of its section."""
+        """Return an error that names the line of a key, or of its section if the key is missing."""
         here, found = "", 0
         for number, line in enumerate(self.text.splitlines(), 1):
             if match := re.match(r"\s*\[([^\]]+)\]", line):

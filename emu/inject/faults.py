@@ -1,4 +1,4 @@
-"""Faults: random choice of kind, time and location, and injection at an instruction boundary.
+"""Faults: random choice of kind, time and location; injection at an instruction boundary.
 
 ram       a bit of RAM flips                          register  a bit of W0 to W15 flips
 flash     a bit of an instruction flips permanently     skip      an instruction is not executed
@@ -27,24 +27,24 @@ REGISTERS: Final = 16
 WORD_BITS, BYTE_BITS, CODE_BITS, SENSORS = 16, 8, 24, 8
 NEAREST_MM, FURTHEST_MM = 5.0, 100.0
 MOST_LOST: Final = 32
-"""Maximum number of RAM bits that a brown-out flips."""
+"""Maximum number of RAM bits that a brown-out changes."""
 
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """One fault: at the first instruction boundary at or after `cycle`."""
+    """One fault, injected at the first instruction boundary at or after `cycle`."""
 
     number: int
     kind: str
     cycle: int
     place: int
-    """Data address, register, program address, UART, sensor; number of bits for a brown-out; 0 for a skip."""
+    """Location: data address, register, program address, UART, sensor; number of bits for a brown-out; 0 for a skip."""
     value: int
-    """Bit, distance in tenths of a mm, or the seed of the bits that a brown-out flips."""
+    """Detail: bit number, distance in tenths of a mm, or the seed that selects a brown-out's bits."""
 
 
 def choose_fault(number: int, seed: int, shares: Mapping[str, int], image: Image, first: int, last: int) -> Fault:
-    """Choose fault `number` of a campaign, in cycles `first` to `last`; it depends on seed and number only."""
+    """Choose fault `number` of a campaign in cycles `first` to `last`. It depends only on the seed and the number."""
     rng = random.Random(f"{seed}:{number}")
     kind = rng.choices(KINDS, [shares[kind] for kind in KINDS])[0]
     cycle = rng.randrange(first, last)
@@ -95,7 +95,7 @@ def inject_fault(fault: Fault, machine: Machine) -> str:
 
 
 def _skip(machine: Machine) -> str:
-    """Skip the next instruction; in a sleeping CPU, the second one after the wake-up."""
+    """Skip the next instruction. In a sleeping CPU, skip the second one after the wake-up."""
     while machine.is_asleep or machine.state.repeat != NOT_REPEATING:
         if machine.step() is not None:
             return "no instruction to skip"

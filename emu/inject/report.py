@@ -1,4 +1,4 @@
-"""Counts of outcomes, with Wilson intervals (scipy)."""
+"""Statistics of outcomes with Wilson intervals (scipy)."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ CONFIDENCE: Final = 0.95
 
 
 def summary(outcomes: Iterable[Outcome]) -> dict[str, dict[str, Any]]:
-    """Return the statistics by fault kind, and for "all".
+    """Return the statistics by fault kind, and for all kinds under "all".
 
-    They contain the number of trials and, for every outcome, number, share and 95 % Wilson interval. Raises ImportError
-    without scipy.
+    They contain the number of trials and, for every outcome, its count, share and 95 % Wilson interval. Raises
+    ImportError without scipy.
     """
     from scipy.stats import binomtest
 

@@ -1,7 +1,7 @@
 """The golden run without faults, and trials that start from its last checkpoint before the fault.
 
-Input: an image and a campaign. Output: an `Outcome` for every fault number, independent of order and process. The
-output that is compared is that of the UARTs.
+Input: an image and a campaign. Output: an `Outcome` for every fault number, independent of order and process. Outcomes
+compare the output of the UARTs:
 
     masked    the output is equal                     detected  the firmware reports it (`[detect]`, a kernel stop)
     silent    the output differs, or is late          hang      output incomplete after `hang` times the duration
@@ -26,10 +26,10 @@ if TYPE_CHECKING:
 
 OUTCOMES: Final = ("masked", "detected", "silent", "hang", "trap")
 CHECKPOINTS: Final = 64
-"""Number of checkpoints of the golden run."""
+"""Number of checkpoints in the golden run."""
 MAX_REASON_LENGTH: Final = 160
 KERNEL_STOPPED: Final = "the kernel stopped"
-"""Start of the explanation of a fault that the kernel detected itself (emu/debug/fault_report.py)."""
+"""Beginning of the description of a fault that the kernel detected (emu/debug/fault_report.py)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,26 +42,26 @@ class Outcome:
     what: str
     """Description of the injected fault."""
     outcome: str
-    """One of OUTCOMES."""
+    """Classification: one of OUTCOMES."""
     latent: bool
-    """Masked, but the final state differs from that of the golden run."""
+    """Whether the outcome is "masked" but the final state differs from the golden run's."""
     end: int
-    """Cycle in which the outcome was determined."""
+    """Cycle in which the outcome became known."""
     why: str
 
 
 @dataclass(slots=True)
 class GoldenRun:
-    """The run without faults: checkpoints and output."""
+    """The run without faults: its checkpoints and its output."""
 
     states: list[tuple[int, bytes, tuple[int, ...]]] = field(default_factory=list)
-    """Checkpoints: cycle, snapshot, and the number of bytes each UART had sent."""
+    """Checkpoints: cycle, snapshot, and number of bytes that each UART had sent."""
     output: dict[int, bytes] = field(default_factory=dict)
     stop: Stop | None = None
 
 
 class Trials:
-    """Runs the trials of a campaign. Raises ValueError if the golden run ends early."""
+    """Runner of a campaign's trials. Raises ValueError if the golden run ends early."""
 
     def __init__(self, image: Image, campaign: Campaign) -> None:
         from emu.boards.epuck.board import Epuck
@@ -120,7 +120,10 @@ class Trials:
         return Outcome(number, fault.kind, fault.cycle, what, outcome, latent, machine.cycle, why)
 
     def _classify(self, place: int) -> tuple[str, str, bool]:
-        """Run on and classify the outcome. A state equal to the golden run's at a checkpoint ends the trial."""
+        """Continue the run and classify its outcome.
+
+        If the state equals the golden run's at a checkpoint, the trial ends.
+        """
         machine, golden = self._machine, self.golden
         for cycle, state, counts in golden.states[place:]:
             stop = machine.advance(cycle)
@@ -156,7 +159,7 @@ class Trials:
         return ("silent", "late", False) if self._is_complete() else ("hang", "no more output", False)
 
     def _is_complete(self) -> bool:
-        """Whether every UART has sent the complete output of the golden run."""
+        """Whether every UART has sent the golden run's complete output."""
         return all(self._output[number].startswith(said) for number, said in self.golden.output.items())
 
     def _classify_stop(self, stop: Stop) -> tuple[str, str, bool]:
@@ -169,7 +172,7 @@ class Trials:
         return "hang", stop.reason, False
 
     def _detected(self) -> str:
-        """Return a report of the firmware that does not occur in the golden run, "" if none."""
+        """Return a message of the firmware about a fault that the golden run does not contain; "" if there is none."""
         for number, patterns in self._campaign.detect.items():
             for pattern in patterns:
                 wanted = pattern.encode("latin-1")
@@ -189,5 +192,5 @@ class Trials:
 
 
 def _compatible(said: bytearray, expected: bytes) -> bool:
-    """Whether one output is a prefix of the other."""
+    """Whether one of the two outputs is a prefix of the other."""
     return expected.startswith(said) or said.startswith(expected)

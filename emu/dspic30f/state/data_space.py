@@ -1,7 +1,8 @@
-"""Data space of an instruction: W registers, SFRs, RAM and the PSV window (isa.md §1.2, §7.8).
+"""Data space as seen by an instruction: W registers, SFRs, RAM and the PSV window (isa.md §1.2, §7.8).
 
-Reads and writes never refuse. The caller first checks for an address error with `faulty`, because a faulting
-instruction writes nothing (isa.md §14.4), and advances the devices to the cycle of the access (`Events.arrive`).
+Reads and writes never raise errors. Before an access, the caller checks for an address error with `faulty`, because a
+faulting instruction writes nothing (isa.md §14.4), and advances the devices to the cycle of the access
+(`Events.arrive`).
 """
 
 from __future__ import annotations
@@ -35,7 +36,7 @@ class DataSpace:
         self._y: Final = chip.data["yram"]
 
     def in_window(self, ea: int) -> bool:
-        """Return whether a read at `ea` comes from program memory."""
+        """Return whether a read at `ea` accesses program memory."""
         return ea >= WINDOW and bool(self._u16[self._corcon] & PSV)
 
     def faulty(self, ea: int, size: int) -> bool:
@@ -45,7 +46,7 @@ class DataSpace:
         return ea >= self._ram_end and not self.in_window(ea)
 
     def read(self, ea: int, size: int) -> int:
-        """Return the byte or aligned word at `ea`; 0 where nothing is implemented."""
+        """Return the byte or aligned word at `ea`; 0 for an unimplemented address."""
         if ea < self.sfr_end:
             word = self._u16[ea >> 1] if ea < W_END else self._bus.read(ea & ~1)
         elif ea < self._ram_end:
@@ -59,15 +60,18 @@ class DataSpace:
         return word >> 8 if ea & 1 else word & 0xFF
 
     def read_x(self, ea: int) -> int:
-        """Return a word as the X prefetch of MAC-class instructions reads it: 0 from Y RAM (isa.md §1.2)."""
+        """Return a word as read by the X prefetch of MAC-class instructions: 0 from Y RAM (isa.md §1.2)."""
         return 0 if ea in self._y else self.read(ea, 2)
 
     def read_y(self, ea: int) -> int:
-        """Return a word as the Y prefetch reads it: 0 outside Y RAM (isa.md §1.2)."""
+        """Return a word as read by the Y prefetch: 0 outside Y RAM (isa.md §1.2)."""
         return self._u16[ea >> 1] if ea in self._y else 0
 
     def write(self, ea: int, value: int, size: int) -> None:
-        """Store the low byte or word of `value` at `ea`. A write where nothing can be written is lost (isa.md §7.8)."""
+        """Store the low byte or word of `value` at `ea`.
+
+        A write to an address that cannot be written is lost (isa.md §7.8).
+        """
         if ea < W_END:
             self._write_w(ea, value, size)
         elif ea < self.sfr_end:
@@ -84,7 +88,10 @@ class DataSpace:
                 self._u8[ea] = value & 0xFF
 
     def _write_w(self, ea: int, value: int, size: int) -> None:
-        """Write a memory-mapped W register. It causes a stall (isa.md §13.2); a word write initialises it (§2.2)."""
+        """Write a memory-mapped W register.
+
+        The write can cause a stall (isa.md §13.2); a word initialises it (§2.2).
+        """
         number = ea >> 1
         if size == 2:
             self._state.set_w(number, value)

@@ -1,6 +1,6 @@
-"""Processor modes: the registers that decide the meaning of an instruction, and so which translation of it is valid.
+"""Processor modes: registers that determine the meaning of instructions, and hence which translations are valid.
 
-Every engine that translates keeps its code by `Modes.key`, and leaves it after a write to one of REGISTERS.
+An engine that translates stores its code by `Modes.key`, and leaves that code after a write to one of REGISTERS.
 """
 
 from __future__ import annotations
@@ -16,30 +16,30 @@ REGISTERS: Final = (
 )  # fmt: skip
 CORCON_MODES: Final = IF | RND | PSV | ACCSAT | SATDW | SATB | SATA | US
 TRAP_ENABLES: Final = 7 << 8
-"""OVATE, OVBTE and COVTE in INTCON1 (isa.md §14.4)."""
+"""Bits OVATE, OVBTE and COVTE of INTCON1 (isa.md §14.4)."""
 
 
 class Key(NamedTuple):
-    """The current modes, packed as they are stored."""
+    """The current modes, packed as they are stored in the record."""
 
     corcon: int
     modcon: int
     reverses: int
-    """XBREV.BREN."""
+    """Bit XBREV.BREN."""
     trap_enables: int
     limit_armed: int
     initialised: int
     loop: tuple[int, int] | None
-    """First and last instruction of the active DO loop; None if there is none."""
+    """Addresses of the active DO loop's first and last instruction; None if no loop is active."""
 
     @property
     def context(self) -> Context:
-        """Return the modes that a row may depend on."""
+        """Return the modes on which rows may depend."""
         return context_of(self.corcon, self.modcon, self.reverses, self.trap_enables)
 
 
 class Modes:
-    """Reader of the modes of one CPU."""
+    """Reader of one CPU's modes."""
 
     def __init__(self, state: State) -> None:
         self._state: Final = state
@@ -57,7 +57,7 @@ class Modes:
 
     @property
     def context(self) -> Context:
-        """Return the modes that the row of the next instruction may depend on."""
+        """Return the modes on which the row of the next instruction may depend."""
         u16 = self._state.u16
         corcon, modcon, xbrev, intcon1 = self._at[:4]
         return context_of(u16[corcon] & CORCON_MODES, u16[modcon], u16[xbrev] >> 15, u16[intcon1] & TRAP_ENABLES)
@@ -65,7 +65,7 @@ class Modes:
 
 @lru_cache(maxsize=4096)
 def context_of(corcon: int, modcon: int, bren: int, intcon1: int) -> Context:
-    """Return the modes that a translation may depend on, from the stored registers (isa.md §2.4, §2.5, §14.4)."""
+    """Return the modes on which translations may depend, from register values (isa.md §2.4, §2.5, §14.4)."""
     return Context(
         us=corcon >> 12 & 1,
         if_=corcon & 1,

@@ -1,7 +1,7 @@
-"""Core registers with side effects: what reading or writing them does (isa.md §2).
+"""Core registers whose reads or writes have side effects (isa.md §2).
 
-They are hooked on the bus like the registers of a device. Engines read the stored words of CORCON, MODCON and XBREV
-directly, so these need no read hooks.
+They are hooked on the bus like device registers. Engines read the stored values of CORCON, MODCON and XBREV directly,
+so these registers need no read hooks.
 """
 
 from __future__ import annotations
@@ -14,9 +14,9 @@ from emu.system.bus import Bus
 from emu.system.events import Events
 
 NSTDIS: Final = 1 << 15
-"""INTCON1<15> (isa.md §14.4)."""
+"""NSTDIS bit, INTCON1<15> (isa.md §14.4)."""
 GUARD_SIGN: Final = 0x80
-"""Bit 39 of an accumulator within ACCxU."""
+"""Bit 39 of an accumulator, as a bit of ACCxU."""
 
 
 class CoreRegisters:
@@ -42,11 +42,11 @@ class CoreRegisters:
             bus.on_write[state.at[name]] = partial(self._made_odd, state.at[name])
 
     def disicnt(self) -> int:
-        """Return the cycles for which DISI still blocks, as read in the current cycle (isa.md §12)."""
+        """Return the number of cycles for which DISI still blocks, as read in the current cycle (isa.md §12)."""
         return max(0, self._state.disi_end - self._events.now)
 
     def _disicnt_written(self, _old: int, new: int, lanes: int) -> None:
-        """Handle a write of DISICNT. A 0 ends the block at once: the next boundary accepts (isa.md §12)."""
+        """Handle a write of DISICNT. Writing 0 ends the blocking, so that the next boundary accepts (isa.md §12)."""
         state = self._state
         count = (self.disicnt() & ~lanes | new & lanes) & 0x3FFF
         now = self._events.now
@@ -64,7 +64,7 @@ class CoreRegisters:
         self._events.kick()
 
     def _corcon_written(self, _old: int, new: int, _lanes: int) -> None:
-        """Handle a write of CORCON. EDT goes to hidden state and reads 0 (isa.md §2.4). IPL3 may have been cleared."""
+        """Handle a write of CORCON, which may clear IPL3. EDT is stored as hidden state and reads 0 (isa.md §2.4)."""
         if new & EDT:
             self._state.corcon = new & ~EDT
             if self._state.sr & DA and not self._state.edt:
@@ -72,7 +72,7 @@ class CoreRegisters:
         self._events.kick()
 
     def _limit_written(self, _old: int, _new: int, lanes: int) -> None:
-        """Arm the stack limit at the first word write of SPLIM (isa.md §10.2)."""
+        """Enable the stack limit at the first word write of SPLIM (isa.md §10.2)."""
         if lanes == 0xFFFF:
             self._state.limit_armed = 1
 
@@ -81,5 +81,5 @@ class CoreRegisters:
         return (self._u16[index] & 0xFF ^ GUARD_SIGN) - GUARD_SIGN & 0xFFFF
 
     def _made_odd(self, index: int, _old: int, _new: int, _lanes: int) -> None:
-        """Set bit 0 of XMODEND or YMODEND, which always reads 1 (isa.md §2.1)."""
+        """Set bit 0 of XMODEND or YMODEND, which always reads as 1 (isa.md §2.1)."""
         self._u16[index] |= 1

@@ -1,7 +1,7 @@
-"""CPU state: everything the CPU remembers, as named fields of the state record.
+"""CPU state: the complete state of the CPU as named fields of the state record.
 
-Registers with a data address (W0..W15, SR, CORCON, RCOUNT, ...) lie at that address (isa.md §2.1), which comes from the
-table of the chip. Hidden state, which no instruction can address, is reserved after the data space.
+Registers with a data address (W0..W15, SR, CORCON, RCOUNT, ...) are stored at that address (isa.md §2.1), which the
+chip's table gives. Hidden state, which instructions cannot address, is stored after the data space.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ C, Z, OV, N, RA, IPL0, DC, DA = (1 << bit for bit in (0, 1, 2, 3, 4, 5, 8, 9))
 SAB, OAB, SB, SA, OB, OA = (1 << bit for bit in range(10, 16))
 IPL_MASK: Final = 7 * IPL0
 FLAGS: Final = {"C": 0, "Z": 1, "OV": 2, "N": 3, "DC": 8, "SB": 12, "SA": 13, "OB": 14, "OA": 15}
-"""Bit numbers of the flags a row may read or write."""
+"""Bit numbers of the flags that rows may read or write."""
 
 # CORCON bits, isa.md §2.4
 IF, RND, PSV, IPL3, ACCSAT, SATDW, SATB, SATA = (1 << bit for bit in range(8))
@@ -28,7 +28,7 @@ RUN, IDLE, SLEEP = range(3)
 """Values of `State.mode`."""
 
 NOT_REPEATING, FIRST, MIDDLE, LAST = range(4)
-"""Values of `State.repeat`: the next iteration of a REPEAT target, on which PSV cycles depend (isa.md §13.3)."""
+"""Values of `State.repeat`: kind of a REPEAT target's next iteration, which determines PSV cycles (isa.md §13.3)."""
 
 STACK_POINTER: Final = 15
 W15_INITIALISED: Final = 1 << STACK_POINTER
@@ -50,7 +50,7 @@ class _Register:
 
 
 class _Hidden:
-    """Descriptor of a reserved scalar of the record."""
+    """Descriptor of a scalar reserved in the record."""
 
     def __init__(self, name: str, kind: str) -> None:
         self.name: Final = name
@@ -64,7 +64,10 @@ class _Hidden:
 
 
 class State:
-    """CPU part of a record, with attributes for registers and hidden state. `at` maps their names to indices."""
+    """The CPU's part of a record: attributes for registers and hidden state.
+
+    `at` maps their names to record indices.
+    """
 
     sr = _Register("SR")
     corcon = _Register("CORCON")
@@ -86,9 +89,9 @@ class State:
     """1 if SPLIM has been written since reset (isa.md §10.2), else 0."""
     repeat = _Hidden("cpu.repeat", "H")
     edt = _Hidden("cpu.edt", "H")
-    """0, or 1 + instructions completed since CORCON.EDT was written, at most 3 (isa.md §7.6)."""
+    """0, or 1 + the number of instructions completed since CORCON.EDT was written, at most 3 (isa.md §7.6)."""
     disi_end = _Hidden("cpu.disi_end", "Q")
-    """First cycle in which DISI does not block; DISICNT is computed from it (isa.md §12)."""
+    """First cycle that DISI does not block; DISICNT is computed from it (isa.md §12)."""
 
     def __init__(self, record: Record, chip: Chip) -> None:
         self.record: Final = record
@@ -114,8 +117,7 @@ class State:
             self.at[name] = self.at["cpu.shadow"] + number
         self._reset_stack: Final = chip.data["ram"].start
         self.check_pointers = True
-        """Whether a reset leaves W0..W14 uninitialised, so that their use as pointers resets the device (isa.md
-        §2.2)."""
+        """Whether a reset leaves W0..W14 uninitialised; using one as a pointer then resets the device (isa.md §2.2)."""
 
     @property
     def ipl(self) -> int:
@@ -128,12 +130,12 @@ class State:
         self.sr = self.sr & ~IPL_MASK | (level & 7) << 5
 
     def pair(self, low: str) -> int:
-        """Return a program address that is stored in two registers, `low` and the next one (DOSTART, DOEND)."""
+        """Return a program address that is stored in register `low` and the register after it (DOSTART, DOEND)."""
         index = self.at[low]
         return self.u16[index] | self.u16[index + 1] << 16
 
     def set_w(self, number: int, value: int) -> None:
-        """Write a W register as an instruction does: bit 0 of W15 stays 0, and the register counts as initialised."""
+        """Write a W register as an instruction does. Bit 0 of W15 stays 0, and the register becomes initialised."""
         self.u16[number] = value & (0xFFFE if number == STACK_POINTER else 0xFFFF)
         self.initialised |= 1 << number
 
@@ -142,7 +144,7 @@ class State:
         self.u8[2 * number] = value & (0xFE if number == STACK_POINTER else 0xFF)
 
     def reset(self) -> None:
-        """Reset W registers and hidden state, after any cause of reset (isa.md §9)."""
+        """Reset the W registers and hidden state, after any cause of reset (isa.md §9)."""
         for number in range(STACK_POINTER):
             self.u16[number] = 0
         self.u16[STACK_POINTER] = self._reset_stack  # isa.md §2.1

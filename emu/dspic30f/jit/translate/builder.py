@@ -1,8 +1,8 @@
-"""The builder that translates an instruction row to LLVM IR (contract: isa/builder.py).
+"""Builder that translates an instruction row to LLVM IR (contract: isa/builder.py).
 
-An instruction commits its effects only after all of its addresses were checked. A check that fails, and an access that
-only Python can make, leave through the *slow exit* of the instruction. The machine is then as it was before the
-instruction, and the interpreter runs it.
+An instruction commits its effects only after all its addresses have been checked. If a check fails, or an access needs
+Python, native code leaves through the *slow exit* of the instruction. The machine is then in its state before the
+instruction, which the interpreter executes.
 """
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ from emu.dspic30f.state.state import FLAGS, SA, SAB, SB, STACK_POINTER
 from emu.system.device import flag_row
 
 CALLING_CONVENTION: Final = "preserve_mostcc"
-"""Calling convention of the function for indirect SFR access: the callee saves registers, since its calls are rare."""
+"""Calling convention of the helper for indirect SFR access. The callee saves registers, because calls are rare."""
 
 
 class NeedsInterpreter(Exception):
-    """The instruction has no native translation; the interpreter runs it."""
+    """The instruction has no native translation, so the interpreter executes it."""
 
 
 class LlvmBuilder:
@@ -42,32 +42,36 @@ class LlvmBuilder:
         self.context: Final = context
         self.pc = 0
         self.now: Number = 0
-        """Cycle of the data access of the instruction being translated."""
+        """Cycle in which the instruction being translated accesses data."""
         self.psv_cycles: int | None = 2
         self.deferred = DeferredEffects()
         self.repeating: Number | None = None
-        """RCOUNT as a REPEAT target reads it; None outside of one."""
+        """Value of RCOUNT that a REPEAT target reads; None outside a REPEAT target."""
         self.left_count: Number | None = None
-        """Count of a REPEAT whose state is not in the record; None if it is in the record."""
+        """Count of a REPEAT whose state is not stored in the record; None if it is."""
         self.dsp_region = False
-        """Whether an instruction of the function writes accumulator flags, so that SR in the record may lack them."""
+        """Whether the function contains a write of accumulator flags; SR in the record may then lack them."""
         self.before_slow: Callable[[], None] = lambda: None
-        """Emits the beginning of a slow exit."""
+        """Function that emits the beginning of a slow exit."""
         self.reach: Callable[[Number], Number] | None = None
-        """reach(waited): whether no event is due up to an indirect SFR access that is delayed by `waited` cycles. None:
-        the interpreter makes such an access."""
+        """reach(waited): returns whether no event is due up to an indirect SFR access delayed by `waited` cycles.
+
+        None means that the interpreter performs such an access.
+        """
         self.loads_ahead = 0
-        """Number of loads of the instruction after the next one: each is made a cycle later (engines.md §4.2)."""
+        """Number of the instruction's loads that follow the next one. Each is one cycle later (engines.md §4.2)."""
         self.several_stores = False
-        """Whether the instruction has several stores. The interpreter then makes a store to an SFR, since native code
-        cannot undo the others."""
+        """Whether the instruction has several stores.
+
+        The interpreter then performs a store to an SFR, because native code cannot undo the others.
+        """
         self._slow: str | None = None
 
     # -- instruction frame ------------------------------------------------------------------------------------------
     def begin(self, pc: int, psv_cycles: int | None) -> None:
-        """Begin the instruction at `pc`. `psv_cycles` are the additional cycles of a PSV read (isa.md §13.3).
+        """Begin the instruction at `pc`. `psv_cycles` is the number of additional cycles of a PSV read (isa.md §13.3).
 
-        None marks a REPEAT target, whose PSV reads are left to the interpreter. The caller then sets `repeating`.
+        None marks a REPEAT target, whose PSV reads the interpreter performs. The caller then sets `repeating`.
         """
         self.pc = pc
         self.psv_cycles = psv_cycles
@@ -76,7 +80,7 @@ class LlvmBuilder:
         self._slow = None
 
     def commit(self) -> None:
-        """Emit the deferred effects: all addresses have been checked."""
+        """Emit the deferred effects after all addresses have been checked."""
         p = self.deferred
         if p.indirect_store is not None:
             self._store_indirect(p.indirect_store)
@@ -128,7 +132,7 @@ class LlvmBuilder:
         return self.e.select(c, a, b)
 
     def let(self, v: Number) -> Number:
-        """Return `v` itself: every SSA value has a name."""
+        """Return `v` itself, because every SSA value already has a name."""
         return v
 
     def div_trunc(self, a: Number, b: Number) -> Number:
@@ -172,7 +176,7 @@ class LlvmBuilder:
         self.deferred.w[n] = (self.w(n) & 0xFF00) | (v & (0xFE if n == STACK_POINTER else 0xFF))
 
     def ptr(self, n: int, side: Side) -> Number:
-        """Return Wn as address pointer. The interpreter makes the reset of an uninitialised one."""
+        """Return Wn as address pointer. The interpreter performs the reset that an uninitialised one causes."""
         if not (self.layout.initialised | self.deferred.initialises) >> n & 1:
             flags = self.e.load(pointer(self.e, self.layout.offset["cpu.initialised"]), 16)
             self.guard((flags & (1 << n)) != 0)
@@ -197,8 +201,7 @@ class LlvmBuilder:
         return self._load_indirect(ea, size, in_ram, window, self.now - ahead)
 
     def _in_ram(self, ea: Value, size: int, ptr: int | None) -> Value:
-        """Return whether an address is aligned, in RAM and, for the stack pointer, not above SPLIM (engines.md
-        §4.3)."""
+        """Return whether an address is aligned, in RAM and, for the stack pointer, not above SPLIM (engines.md §4.3)."""
         first, end = self.layout.ram
         half = self.e.let(f"trunc i64 {wide(ea - first)} to i16").text
         if size == 2:
@@ -211,7 +214,7 @@ class LlvmBuilder:
         return ok
 
     def _load_indirect(self, ea: Value, size: Size, in_ram: Value, window: bool, now: Number) -> Value:
-        """Emit a read from RAM, from the PSV window if it is open, or from an SFR in cycle `now`."""
+        """Emit a read at cycle `now` from RAM, from the PSV window if `window`, or from an SFR."""
         e = self.e
         ram, other, done = (e.fresh(s) for s in ("ram", "other", "done"))
         e.end(f"br i1 {truth(in_ram)}, label %{ram}, label %{other}, !prof !0")
@@ -239,8 +242,10 @@ class LlvmBuilder:
         return e.let(f"phi i64 {', '.join(f'[ {value}, %{label} ]' for value, label in found)}")
 
     def _load_window(self, ea: Value, size: Size) -> tuple[str, str, str]:
-        """Emit a read of the PSV window. Return the value, the label of the reading block, and the label of the block
-        for addresses outside the window."""
+        """Emit a read of the PSV window.
+
+        Return the value, the label of the reading block, and the label of the block for addresses outside the window.
+        """
         e = self.e
         window, elsewhere = e.fresh("psv"), e.fresh("elsewhere")
         fits = (ea & 0x8000) != 0
@@ -264,7 +269,7 @@ class LlvmBuilder:
         return e.let(f"call {CALLING_CONVENTION} i64 {function}(ptr %rec, {numbers}) cold nounwind {effect}")
 
     def waited(self) -> Number:
-        """Return the cycles that reads of the PSV window add to the instruction (isa.md §13.3)."""
+        """Return by how many cycles the instruction's PSV window reads delay it (isa.md §13.3)."""
         if not self.deferred.psv_reads or self.psv_cycles is None:
             return 0
         any_window: Number = 0
@@ -273,7 +278,7 @@ class LlvmBuilder:
         return self.select(any_window, self.psv_cycles, 0)
 
     def _load_static(self, ea: int, size: Size) -> Number:
-        """Emit a read of a static address: from memory, or a word or byte of another source."""
+        """Emit a read of a static address: directly from memory, or from the word that another source provides."""
         if size == 2 and ea & 1:
             raise NeedsInterpreter
         address = ea & ~1
@@ -285,7 +290,7 @@ class LlvmBuilder:
         return word if size == 2 else (word >> 8 if ea & 1 else word & 0xFF)
 
     def _static_source(self, address: int, size: Size) -> Callable[[LlvmBuilder, int], Number] | None:
-        """Return the function that reads the word at `address`; None if the record holds it as an instruction sees it.
+        """Return the function that reads the word at `address`; None if the record holds the value to read.
 
         Raises NeedsInterpreter for an address that only the interpreter can read.
         """
@@ -334,7 +339,7 @@ class LlvmBuilder:
         return word
 
     def _static_accumulator(self, address: int) -> Number:
-        """Read 16 bits of an accumulator: block code keeps accumulators out of the record."""
+        """Read 16 bits of an accumulator. Block code keeps accumulators in variables, not in the record."""
         part = self.layout.accumulator_at(address)
         assert part is not None
         accumulator, shift = part
@@ -353,7 +358,7 @@ class LlvmBuilder:
         self.deferred.stores.append(lambda: self.e.store(pointer(self.e, target), v, 8 * size))
 
     def _store_indirect(self, s: IndirectStore) -> None:
-        """Emit a store to RAM or to an SFR. The SFR access is the last check of the instruction that may fail."""
+        """Emit a store to RAM or to an SFR. The SFR access is the last check of the instruction that can fail."""
         assert self.reach is not None
         e = self.e
         ram, device, done = (e.fresh(name) for name in ("ram", "device", "done"))
@@ -386,10 +391,10 @@ class LlvmBuilder:
             self._store_sfr(address, v << 8 if lanes == 0xFF00 else v, lanes)
 
     def _store_sfr(self, address: int, placed: Number, lanes: int) -> None:
-        """Defer a write of the bits `lanes` of an SFR: by its rule if it has one, else by its kind of access."""
+        """Defer a write of the bits `lanes` of an SFR, by the SFR's rule if it has one, else by its kind of access."""
         self.deferred.touches_sfr = True
         rule = self.layout.rules.get(address)
-        if rule is not None and self.deferred.read_effect:  # the rule would see the device as it was before the read
+        if rule is not None and self.deferred.read_effect:  # the rule would use the device's state before the read
             raise NeedsInterpreter
         if rule is not None and rule.writes is not None and self.repeating is None:
             if not rule.writes(AccessEmitter(self), rule.operands, placed, lanes):
@@ -412,7 +417,7 @@ class LlvmBuilder:
             self.deferred.stores.append(lambda: self._store_masked(address, placed, free))
 
     def _store_sr(self, placed: Number, free: int) -> None:
-        """Defer a data write to SR; with saturation flags or NSTDIS set, the interpreter makes it."""
+        """Defer a data write to SR. With saturation flags or NSTDIS set, the interpreter performs it."""
         old = self.sr_word()
         nstdis = self.e.load(pointer(self.e, self.layout.offset["INTCON1"]), 16) & NSTDIS
         self.guard(((old & (SA | SB | SAB)) | nstdis) == 0)
@@ -420,21 +425,23 @@ class LlvmBuilder:
         self.deferred.check_interrupts = True
 
     def _store_flags(self, address: int, placed: Number, free: int) -> None:
-        """Defer the record of the cycle in which software sets an interrupt flag; at most one may be set."""
+        """Defer the record of the cycle in which software sets an interrupt flag; at most one flag may be set."""
         old = self.e.load(pointer(self.e, address), 16)
         rises = placed & free & (old ^ 0xFFFF)
         self.guard((rises & (rises - 1)) == 0)
         self.deferred.stores.append(lambda: self._rise(address, rises))
 
     def _rise(self, address: int, rises: Number) -> None:
-        """Emit the cycle of a flag that software sets: it is first 1 in the next cycle. At most one flag is set."""
+        """Emit the request cycle of a flag that software sets: the next cycle. At most one flag is set."""
         bit = self.ctz16(rises | 0x8000)
         since = pointer(self.e, (bit << 3) + self.layout.offset["irq.since"] + 8 * flag_row(address))
         self.e.store(since, self.select(rises == 0, self.e.load(since, 64), self.now + 1), 64)
 
     def _store_accumulator(self, i: int, shift: int, v: Number, free: int) -> None:
-        """Defer a data write to 16 bits of accumulator `i`, or to the 8 implemented bits of its upper word (isa.md
-        §2.1)."""
+        """Defer a data write to 16 bits of accumulator `i`.
+
+        In the upper word only 8 bits are implemented (isa.md §2.1).
+        """
         kept = self.acc(i) & (0xFF_FFFF_FFFF ^ (free << shift))
         self.deferred.acc[i] = ((kept | ((v & free) << shift)) ^ (1 << 39)) - (1 << 39)
 
@@ -444,7 +451,7 @@ class LlvmBuilder:
         self.e.store(place, (old & (0xFFFF & ~free)) | (v & free), 16)
 
     def _store_w(self, n: int, odd: int, v: Number, size: Size) -> None:
-        """Defer a data write to a memory-mapped W register, which overrides a pointer update (isa.md §2.2)."""
+        """Defer a data write to a memory-mapped W register. It overrides a pointer update (isa.md §2.2)."""
 
         def now() -> None:
             keep = 0xFFFE if n == STACK_POINTER else 0xFFFF
@@ -461,7 +468,7 @@ class LlvmBuilder:
             self.deferred.initialises |= 1 << n
 
     def xload(self, ea: Number, ptr: int) -> Number:
-        """Emit a MAC X prefetch, which reads 0 from Y RAM. The interpreter makes PSV prefetches."""
+        """Emit a MAC X prefetch, which reads 0 from Y RAM. The interpreter performs PSV prefetches."""
         assert isinstance(ea, Value)
         self.guard(self._in_ram(ea, 2, None))
         return self.select(ea < self.layout.y_ram, self.e.load(pointer(self.e, ea), 16), 0)
@@ -474,13 +481,16 @@ class LlvmBuilder:
 
     # -- program memory ---------------------------------------------------------------------------------------------
     def prog(self, address: Number) -> Number:
-        """Emit a table read from flash. The interpreter reads other program memory."""
+        """Emit a table read from flash. The interpreter reads the rest of program memory."""
         word = address >> 1
         self.guard(word < self.layout.flash_words)
         return self.e.load(pointer(self.e, (word << 2) + self.layout.offset["flash"]), 32)
 
     def table_write(self, address: Number, byte_mask: Number, v: Number) -> None:
-        """Defer a table write: merge bytes into a programming latch. The interpreter makes it under REPEAT."""
+        """Defer a table write, which merges bytes into a programming latch.
+
+        Under REPEAT the interpreter performs it.
+        """
         if self.repeating is not None:
             raise NeedsInterpreter
         to, (first, end) = self.layout.latches, self.layout.latches.eeprom_range
@@ -512,7 +522,7 @@ class LlvmBuilder:
         self.deferred.flags.update(flags)
 
     def sr_word(self) -> Value:
-        """Emit SR as an instruction reads it: flags from the variables, other bits from the record."""
+        """Emit SR as an instruction reads it, with flags from the variables and other bits from the record."""
         if self.dsp_region or self.repeating is not None:
             raise NeedsInterpreter
         word: Number = self.e.load(pointer(self.e, self.layout.offset["SR"]), 16)
@@ -551,12 +561,12 @@ class LlvmBuilder:
         self.deferred.acc[i] = v
 
     def when(self, c: Number, fn: Callable[[], None]) -> None:
-        """Run `fn` if the condition is a constant that holds. Other conditions are not native."""
+        """Run `fn` if the condition is a true constant. A condition known only at run time needs the interpreter."""
         if not isinstance(c, int):
             raise NeedsInterpreter
         if c:
             fn()
 
     def trap_math(self, c: Number) -> None:
-        """Leave to the interpreter if a math trap is requested."""
+        """Leave to the interpreter if the condition of a math trap holds."""
         self.guard(c == 0)

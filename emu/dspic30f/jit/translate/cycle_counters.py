@@ -1,7 +1,7 @@
 """Cycle accounting in native code (emu/dspic30f/cycle_accounting.py): adds cycles to cells and logs calls.
 
-The translator sums the cycles of a block per source line and emits one addition per line at the end of the block. An
-exit from the middle of a block first adds the cycles up to there. Without accounting, `CycleCounter` emits nothing.
+The translator sums the cycles of a block per source line and emits one addition per line at the block's end. An exit
+from the middle of a block first adds the cycles up to that point. Without accounting, `CycleCounter` emits nothing.
 """
 
 from __future__ import annotations
@@ -25,23 +25,23 @@ from emu.dspic30f.jit.translate.values import Emitter, Number, Value, wide
 from emu.dspic30f.state.state import IPL3, IPL_MASK
 
 RowOf = Callable[[int], int]
-"""Returns the first program address of the source line that contains an instruction."""
+"""Function that returns the first program address of the source line that contains an instruction."""
 
 
 class CycleCounter:
-    """Counter of a translated function that emits nothing: the interface of `AccountingCounter`."""
+    """Null counter of a translated function: emits nothing. `AccountingCounter` has the same interface."""
 
     unsettled: tuple[object, ...] = ()
-    """Cycles that an exit would add. Exits that add different cycles need different blocks."""
+    """Cycles that an exit would have to add. Exits that add different cycles need different blocks."""
 
     def begin(self, emitter: Emitter, offset: Mapping[str, int]) -> None:
-        """Prepare for a function that `emitter` writes."""
+        """Prepare for the function that `emitter` writes."""
 
     def prologue(self, head: Emitter) -> None:
-        """Emit the preparation into the first block of the function."""
+        """Emit the preparation of the counter into the first block of the function."""
 
     def spend(self, pc: int, cycles: Number) -> None:
-        """Account `cycles` to the instruction at `pc`."""
+        """Account for `cycles` of the instruction at `pc`."""
 
     def settle(self) -> None:
         """Emit the additions at the end of a block."""
@@ -50,21 +50,23 @@ class CycleCounter:
         """Emit the additions at an exit from the middle of a block."""
 
     def level_changed(self) -> None:
-        """Select the cells of the new CPU priority after a write of SR."""
+        """Select the cells of the new CPU priority, after a write of SR."""
 
     def called(self, site: int, target: Number, stack: Number, cycle: Number) -> None:
         """Log the call at `site`, whose return address lies at `stack`."""
 
     def returned(self, site: int, target: Number, stack: Number, cycle: Number) -> None:
-        """Log the return at `site`, whose return address lay at `stack`."""
+        """Log the return at `site`, whose return address was at `stack`."""
 
     def take_back_cycle(self, pc: int) -> None:
-        """Subtract the third cycle of the RETFIE at `pc`, which an exception may replace."""
+        """Subtract the third cycle of the RETFIE at `pc`, because an exception may replace it."""
 
 
 class AccountingCounter(CycleCounter):
-    """Counter that emits cycle accounting. `words` is the number of cells per CPU priority, `tail` the offset of the
-    words behind the cells."""
+    """Counter that emits cycle accounting.
+
+    `words` is the number of cells per CPU priority, `tail` the offset of the words after the cells.
+    """
 
     def __init__(self, words: int, tail: int, row_of: RowOf) -> None:
         self._level_bytes: Final = 8 * words
@@ -73,7 +75,7 @@ class AccountingCounter(CycleCounter):
         self._spent: Final[dict[int, Number]] = {}
 
     def begin(self, emitter: Emitter, offset: Mapping[str, int]) -> None:
-        """Prepare for a function that `emitter` writes."""
+        """Prepare for the function that `emitter` writes."""
         self._e, self._offset = emitter, offset
 
     @property
@@ -82,7 +84,7 @@ class AccountingCounter(CycleCounter):
         return tuple((row, n.text if isinstance(n, Value) else n) for row, n in self._spent.items())
 
     def prologue(self, head: Emitter) -> None:
-        """Emit a variable for the cells of the current CPU priority."""
+        """Emit a variable with the address of the current CPU priority's cells."""
         head.line("%x.cells = alloca ptr")
         self._select_level(head)
 
@@ -113,23 +115,23 @@ class AccountingCounter(CycleCounter):
         return cell
 
     def spend(self, pc: int, cycles: Number) -> None:
-        """Sum the cycles until the block ends."""
+        """Add the cycles to the block's sums."""
         row = self._row_of(pc)
         self._spent[row] = self._spent.get(row, 0) + cycles
 
     def settle(self) -> None:
-        """Emit the additions and reset the sums."""
+        """Emit the additions and clear the sums."""
         self.store()
         self._spent.clear()
 
     def store(self) -> None:
-        """Emit the additions and keep the sums for the rest of the block."""
+        """Emit the additions; keep the sums for the rest of the block."""
         for row, cycles in self._spent.items():
             cell = self._cell(row)
             self._e.store(cell, self._e.load(cell, 64) + cycles, 64)
 
     def level_changed(self) -> None:
-        """Account the cycles so far to the old CPU priority, and select the cells of the new one."""
+        """Account the cycles so far to the old CPU priority, then select the new priority's cells."""
         self.settle()
         self._select_level(self._e)
 
@@ -155,7 +157,7 @@ class AccountingCounter(CycleCounter):
         e.store(count_word, count + 1, 64)
 
     def take_back_cycle(self, pc: int) -> None:
-        """Subtract the third cycle, and store the address of its cell for `AccountingBoundaryCounter.third_cycle`."""
+        """Subtract the third cycle, and store its cell's address for `AccountingBoundaryCounter.third_cycle`."""
         e, cell, word = self._e, self._cell(self._row_of(pc)), self._e.name()
         e.store(cell, e.load(cell, 64) - 1, 64)
         e.line(f"{word} = getelementptr i8, ptr {self._accounting(e)}, i64 {self._tail + 8 * RETFIE_CELL}")
@@ -163,32 +165,36 @@ class AccountingCounter(CycleCounter):
 
 
 class BoundaryCounter:
-    """Counter of native boundaries that emits nothing: the interface of `AccountingBoundaryCounter`."""
+    """Null counter of native boundaries: emits nothing. `AccountingBoundaryCounter` has the same interface."""
 
     def idle(self, prefix: str, until: str) -> str:
-        """Return IR that accounts the cycles from %cycle to `until` as Idle. `prefix` makes its names unique."""
+        """Return IR that accounts for the cycles from %cycle to `until` as Idle. `prefix` makes its names unique."""
         return ""
 
     def entered(self, start: str, handler: str, site: str, stack: str, level: str, since: str) -> str:
-        """Return IR that accounts the cycles from %cycle to `start` to `handler` at `level`. `site` was pushed at
-        `stack`; the interrupt was requested in cycle `since`."""
+        """Return IR that accounts for the cycles from %cycle to `start` as entry of `handler` at CPU priority `level`.
+
+        `site` was pushed at `stack`; the interrupt was requested in cycle `since`.
+        """
         return ""
 
     def third_cycle(self) -> str:
-        """Return IR that accounts a cycle to the RETFIE that ran last. Its log entry is the last one."""
+        """Return IR that adds a cycle to the RETFIE that ran last, whose log entry is the last one."""
         return ""
 
 
 class AccountingBoundaryCounter(BoundaryCounter):
-    """Counter of native boundaries with cycle accounting. It finds the cells relative to %entered, a word of the
-    environment."""
+    """Counter of native boundaries with cycle accounting.
+
+    It locates the cells relative to the environment word %entered.
+    """
 
     def __init__(self, words: int, tail: int) -> None:
         self._level_bytes: Final = 8 * words
         self._tail: Final = tail
 
     def _log(self, p: str, kind: str, words: tuple[str, str, str]) -> str:
-        """Return IR that appends a log entry. `kind` is its second word, `words` are the other three."""
+        """Return IR that appends a log entry. `kind` is its second word; `words` are the three others."""
         return f"""  %{p}.np = getelementptr i64, ptr %{p}.tail, i64 {LOG_COUNT}
   %{p}.n = load i64, ptr %{p}.np
   %{p}.n1 = add i64 %{p}.n, 1

@@ -1,4 +1,4 @@
-"""Deferred effects of the instruction being translated: they are committed after all of its addresses were checked."""
+"""Deferred effects of the instruction being translated, committed after all its addresses have been checked."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class IndirectStore(NamedTuple):
 
 @dataclass
 class DeferredEffects:
-    """Effects that the instruction will commit, and what they imply for the code behind it."""
+    """Effects that the instruction will commit, and their consequences for the code after it."""
 
     w: dict[int, Number] = field(default_factory=dict)
     flags: dict[str, Number] = field(default_factory=dict)
@@ -30,19 +30,19 @@ class DeferredEffects:
     stores: list[Callable[[], None]] = field(default_factory=list)
     initialises: int = 0
     psv_reads: list[Value] = field(default_factory=list)
-    """One truth value per load: whether it read the PSV window."""
+    """For each load, a truth value: whether it read the PSV window."""
     check_interrupts: bool = False
-    """An interrupt may have become acceptable at the next boundary."""
+    """Whether an interrupt may have become acceptable at the next boundary."""
     deadline_moved: bool = False
-    """The deadline may have moved nearer, so the function must be left."""
+    """Whether the deadline may have moved nearer, so that native code must leave the function."""
     touches_sfr: bool = False
-    """The instruction accesses an SFR that events may change, or whose writes a device observes."""
+    """Whether the instruction accesses an SFR that events may change, or whose writes a device observes."""
     read_effect: bool = False
-    """A read changes the state of a device."""
+    """Whether a read changes a device's state."""
     sr: tuple[Number, int] | None = None
-    """Value and mask of a data write to SR."""
+    """Value and bit mask of a data write to SR."""
     indirect_store: IndirectStore | None = None
     sfr_written: Value | None = None
-    """Truth value: the indirect store went to an SFR, so the function must be left."""
+    """Truth value: whether the indirect store hit an SFR, so that native code must leave the function."""
     mapped_w: int = 0
-    """W registers written through their data addresses: they cause stalls like any written register."""
+    """W registers written through their data addresses. They cause stalls like any written register."""

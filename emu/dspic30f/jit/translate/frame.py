@@ -15,10 +15,11 @@ from emu.dspic30f.jit.translate.variables import MemoryVariables, Variables
 
 
 class FunctionFrame:
-    """State and helpers that all parts of the translator share while they write one function.
+    """State and helpers shared by all parts of the translator of one function.
 
-    With `exact`, every instruction can be entered and checks the deadline before it runs, and registers stay in the
-    record. Such code compiles quickly. It runs cold code and the few instructions before an event.
+    With `exact`, every instruction can be entered and checks the deadline before it executes, and registers stay in the
+    record. Such code compiles quickly. It is used for rarely executed code and for the last instructions before an
+    event.
     """
 
     def __init__(
@@ -34,15 +35,15 @@ class FunctionFrame:
         self.counter.begin(self.e, layout.offset)
         self.b.before_slow = self.counter.store
         self.at = 0
-        """Address of the instruction to which passing cycles are accounted."""
+        """Address of the instruction to which the passing cycles are accounted."""
         self.labels: Final[dict[int, str]] = {}
         """Labels of blocks by the address of their first instruction."""
         self.unwritten: Final[list[int]] = []
-        """Addresses whose blocks have a label but no code yet."""
+        """Addresses of blocks that have a label but no code yet."""
         self._exits: Final[dict[tuple[object, ...], str]] = {}
 
     def label(self, pc: int) -> str:
-        """Return the label of the block at `pc`, or of an exit to `pc` if it lies outside the region."""
+        """Return the label of the block at `pc`; for an address outside the region, of an exit to `pc`."""
         if pc not in self.region.steps:
             return self.exit(pc, NEXT)
         if pc not in self.labels:
@@ -51,7 +52,7 @@ class FunctionFrame:
         return self.labels[pc]
 
     def exit(self, pc: int, reason: int) -> str:
-        """Return the label of a block that leaves the function for `reason` with PC = `pc`."""
+        """Return the label of a block that leaves the function with exit reason `reason` and PC = `pc`."""
         key = (pc, reason, *self.counter.unsettled)
         if key not in self._exits:
             label = f"out{reason}.{pc:x}" + (f".{len(self._exits)}" if len(key) > 2 else "")
@@ -64,18 +65,18 @@ class FunctionFrame:
         return self._exits[key]
 
     def jump(self, pc: int) -> None:
-        """End the block with a jump to `pc`. Exact code leaves the function where block code may exist."""
+        """End the block with a jump to `pc`. In exact code, leave the function if block code may exist for `pc`."""
         self.counter.settle()
         leaves = self.exact and pc in self.region.leaders
         self.e.end(f"br label %{self.exit(pc, NEXT) if leaves else self.label(pc)}")
 
     def fits(self, cost: Number, start: Number | None = None) -> Value:
-        """Return whether `cost` cycles from `start` (default: now) end before the cycle of the deadline."""
+        """Return whether `cost` cycles from cycle `start` (default: now) end before the deadline."""
         begun = self.v.get("cycle") if start is None else start
         return self.e.let(f"icmp ult i64 {wide(begun + cost)}, %stop", bit=True)
 
     def advance(self, cycles: Number, mask: int) -> None:
-        """Let `cycles` pass. `mask` holds the W registers that the instruction writes on its destination side."""
+        """Let `cycles` pass. `mask` selects the W registers that the instruction writes on its destination side."""
         self.v.set("cycle", self.v.get("cycle") + cycles)
         self.v.set("stall", mask)
         self.counter.spend(self.at, cycles)

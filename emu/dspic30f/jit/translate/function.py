@@ -1,8 +1,8 @@
 """Translation of a region to one LLVM function: the rules of the sequencer (isa.md §7, §13) as control flow.
 
-A block of block code first checks that all of it fits before the next deadline. If it does not, the function returns
-and exact code runs instead. So no event is due inside a block, and every cycle in it is a constant or one of two.
-An instruction that is not native (see `LlvmBuilder`) leaves the function before it has had an effect.
+At its start, block code checks that the whole block ends before the next deadline. If it does not, the function returns
+and exact code runs instead. So no event is due inside a block, and every cycle count in it is a constant or one of two.
+For an instruction that is not native (see `LlvmBuilder`), native code leaves the function before any effect of it.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ define i64 @entry(ptr noalias %rec, ptr noalias %env) {
 """
 EPILOGUE: Final = '\n}\n!0 = !{!"branch_weights", i32 2000, i32 1}\n!1 = !{}\n'
 NATIVE_FLOWS: Final = (type(None), Goto, Branch, Call, Return, Skip, Disi, ClearWatchdog)
-"""Flows that native code implements, besides Repeat and Sleep to Idle."""
+"""Flows that native code implements, in addition to Repeat and Sleep to Idle."""
 
 
 class Translator(FunctionFrame):
@@ -64,17 +64,17 @@ class Translator(FunctionFrame):
         self._psv: Final = bool(context.psv)
         self._repeats: Final = RepeatTranslator(self)
         self._early_exception: Value | None = None
-        """Whether an interrupt may be accepted in front of the third cycle of the return being translated."""
+        """Whether an interrupt may be accepted before the third cycle of the return being translated."""
         self._polling: Final = {} if exact else empty_loops(region, layout, context)
         self._heads: Final = {loop.head for loop in self._polling.values()}
         self._polled: Final = {pc for loop in self._polling.values() for pc, _ in loop.costs}
         self._barriers: Final = set(region.steps) if exact else self._heads | set(layout.hooks)
-        """Instructions that must begin a block, because the deadline, a polling loop or a hook is checked there."""
+        """Addresses at which a block must begin, because a deadline, polling loop or hook is checked there."""
         self._skipped: tuple[Step, ...] = ()
-        """Instructions that the branch being translated skips within its block."""
+        """Instructions of the current block that the branch being translated skips."""
 
     def text(self) -> str:
-        """Return the LLVM IR of the module."""
+        """Return the LLVM IR of the region as a module."""
         self.v.touch("pc", "stall", "cycle")
         for pc in sorted(self.region.steps if self.exact else self.region.leaders):
             self.label(pc)
@@ -90,12 +90,12 @@ class Translator(FunctionFrame):
         return PROLOGUE + body + EPILOGUE
 
     def _entry_block(self) -> Emitter:
-        """Return the first block, which loads the variables and dispatches on PC. It is written last."""
+        """Return the first block, which loads the variables and dispatches on PC. It is generated last."""
         entries = " ".join(f"i64 {pc}, label %{label}" for pc, label in self.labels.items())
         head = Emitter(self.e.last_name)
         head.start("first")
         here = head.load(pointer(head, self.layout.offset["cpu.pc"]), 32)
-        if self.exact:  # an odd number: in the middle of a REPEAT
+        if self.exact:  # an odd address means: inside a REPEAT
             entries += "".join(f" i64 {pc + 1}, label %{label}" for pc, label in self._repeats.resumes.items())
             here = here + (head.load(pointer(head, self.layout.offset["cpu.repeat"]), 16) != NOT_REPEATING)
         self.v.prologue(head)
@@ -111,7 +111,7 @@ class Translator(FunctionFrame):
         return head
 
     def _deadline(self, head: Emitter) -> None:
-        """Define %stop: no instruction may start in that cycle or later before the boundary was handled."""
+        """Define %stop: the first cycle in which no instruction may start before the boundary is handled."""
         due = head.load(pointer(head, self.layout.offset["events.deadline"]), 64)
         limit = head.let("load i64, ptr %env, align 8")
         head.line(f"%before = call i64 @llvm.umin.i64(i64 {due.text}, i64 {NEVER - 2})")
@@ -124,8 +124,11 @@ class Translator(FunctionFrame):
         return sorted(self.labels)
 
     def _jump_back(self, back: int, pc: int) -> None:
-        """End the block with a jump to `pc`. At the end of an empty loop that has run once, first skip the iterations
-        before the last one that ends before the deadline."""
+        """End the block with a jump to `pc`.
+
+        At the end of an empty loop that has run once, first skip all iterations except the last one that ends before
+        the deadline.
+        """
         loop = self._polling.get(back)
         if loop is not None:
             e = self.e
@@ -142,7 +145,7 @@ class Translator(FunctionFrame):
 
     # -- blocks -----------------------------------------------------------------------------------------------------
     def _cost(self, items: Sequence[TraceItem]) -> int:
-        """Return an upper bound of the cycles of a block, without REPEATs, which have a check of their own."""
+        """Return an upper bound of a block's cycles, without REPEATs, which check the deadline themselves."""
         total = 0
         for item in items:
             total += self._most(item.step)
@@ -153,7 +156,7 @@ class Translator(FunctionFrame):
         return total
 
     def _most(self, step: Step) -> int:
-        """Return an upper bound of the cycles of an instruction without flow, or whose branch is not taken."""
+        """Return an upper bound of the cycles of an instruction that has no flow or a branch that is not taken."""
         window = step.facts.window_cycles if self._psv and step.facts.loads else 0
         return step.insn.row.cycles + (step.facts.source_pointers != 0) + window
 
@@ -186,7 +189,7 @@ class Translator(FunctionFrame):
         self.jump(items[-1].next_pc)
 
     def _block_fits(self, items: Sequence[TraceItem]) -> Value:
-        """Return whether the block may run now: all of it in block code, its first instruction in exact code."""
+        """Return whether the block, or in exact code its first instruction, may run before the deadline."""
         if not self.exact:
             return self.fits(self._cost(items))
         fits = self.e.let(f"icmp ult i64 {wide(self.v.get('cycle'))}, %stop", bit=True)
@@ -194,10 +197,10 @@ class Translator(FunctionFrame):
         return fits | arrived if isinstance(arrived, Value) else fits
 
     def _arrived(self, step: Step) -> Number:
-        """Return whether the events that are due before the access of this instruction have fired.
+        """Return whether the events due before this instruction's data access have fired.
 
-        The check exists for instructions of one cycle that read an SFR by its address: a loop that waits for a flag
-        often makes its access in the cycle of the event.
+        The check exists for one-cycle instructions that read an SFR by its address: a loop that waits for a flag often
+        accesses it in the cycle of the event.
         """
         if step.insn.row.cycles != 1 or step.facts.flow not in (None, Skip) or step.pc in self.layout.hooks:
             return 0
@@ -211,7 +214,7 @@ class Translator(FunctionFrame):
         return word
 
     def _arrive(self, step: Step, in_time: Value) -> None:
-        """Leave unless `in_time` holds, so that the events that are due before the access fire."""
+        """Leave native code unless `in_time` holds, so that the events due before the data access fire."""
         e, b = self.e, self.b
         ready, late = e.fresh("ready"), e.fresh("late")
         e.end(f"br i1 {in_time.text}, label %{ready}, label %{late}, !prof !0")
@@ -222,7 +225,7 @@ class Translator(FunctionFrame):
         e.start(ready)
 
     def _stop_for_hook(self, pc: int) -> None:
-        """Leave in front of the hooked address `pc`, unless Python has just called its hook."""
+        """Leave native code before the hooked address `pc`, unless Python has just called its hook."""
         e = self.e
         word, seen = e.name(), e.fresh("seen")
         e.line(f"{word} = getelementptr i64, ptr %env, i64 {RESUME}")
@@ -233,8 +236,10 @@ class Translator(FunctionFrame):
 
     # -- instructions -----------------------------------------------------------------------------------------------
     def _instruction(self, step: Step, written: Number) -> tuple[bool, Number]:
-        """Translate one instruction. Return whether the block has ended, and the W registers that the instruction has
-        written on its destination side. `written` are those of the instruction before it."""
+        """Translate one instruction. `written` is the set of W registers that the previous instruction wrote.
+
+        Return whether the block has ended, and the W registers that this instruction writes on its destination side.
+        """
         stall = flow_rules.stall(written, step.facts.source_pointers)
         start = self.v.get("cycle")
         self._prepare_builder(step, stall, start)
@@ -261,18 +266,18 @@ class Translator(FunctionFrame):
         return True, mask
 
     def _prepare_builder(self, step: Step, stall: Number, start: Value) -> None:
-        """Begin the instruction at `step`, which starts in cycle `start`."""
+        """Begin the instruction `step`, which starts in cycle `start`."""
         b, row = self.b, step.insn.row
         b.begin(step.pc, step.facts.window_cycles)
         self.at = step.pc
         b.now = start + stall + step.facts.access
         b.several_stores = step.facts.stores > 1
         b.loads_ahead = max(step.facts.loads - 1, 0)
-        if step.pc not in self._polled:  # iterations that are skipped may not read what changes with time
+        if step.pc not in self._polled:  # skipped iterations may not read state that changes with time
             b.reach = lambda waited: self.fits(row.cycles + stall + waited, start) if self.exact else 1
 
     def _prepare_flow(self, step: Step, flow: Flow) -> None:
-        """Emit the checks and device rules of a flow, before the instruction is committed.
+        """Emit the checks and device rules of a flow before the instruction is committed.
 
         Raises NeedsInterpreter for a flow that is not native.
         """
@@ -290,7 +295,7 @@ class Translator(FunctionFrame):
             self._check_retfie(flow)
 
     def _check_events(self, step: Step, stall: Number) -> None:
-        """In exact code, leave before an SFR access if events are due up to its cycle."""
+        """In exact code, leave before an SFR access if events are due by its cycle."""
         if not (self.exact and self.b.deferred.touches_sfr):
             return
         fits, arrived = self.fits(step.insn.row.cycles + stall), self._arrived(step)
@@ -300,7 +305,7 @@ class Translator(FunctionFrame):
             self.b.guard(fits)
 
     def _end_instruction(self, step: Step, cycles: Number, mask: int) -> bool:
-        """End an instruction without flow. Return whether the block ends with it."""
+        """End an instruction without flow. Return whether the block ends here too."""
         deferred = self.b.deferred
         self.advance(cycles, mask)
         if deferred.sr is not None:
@@ -326,7 +331,7 @@ class Translator(FunctionFrame):
             self.jump(pc)
 
     def _leave_after_sfr_write(self, pc: int) -> None:
-        """Leave if an indirect store has written an SFR."""
+        """Leave native code if the indirect store of the instruction has written an SFR."""
         written = self.b.deferred.sfr_written
         if written is not None:
             on = self.e.fresh("on")
@@ -334,7 +339,10 @@ class Translator(FunctionFrame):
             self.e.start(on)
 
     def _end_of_loop(self, step: Step) -> None:
-        """End the instruction at DOEND. The sequencer handles EDT; the end of the loop leaves this translation."""
+        """End the instruction at DOEND.
+
+        The sequencer handles EDT. At the end of the loop, native code leaves the function.
+        """
         flow = self.layout.flow
         self.counter.settle()
 
@@ -351,8 +359,10 @@ class Translator(FunctionFrame):
 
     # -- flow -------------------------------------------------------------------------------------------------------
     def _convert_branch(self, step: Step, flow: Branch | Skip, cycles: Number, mask: int) -> Value:
-        """Translate a branch over a few instructions so that both paths join in the block (if-conversion). Return the
-        W registers written last on either path."""
+        """Translate a branch over a few instructions so that both paths join in the block (if-conversion).
+
+        Return the W registers written last on either path.
+        """
         e, v, skipped = self.e, self.v, self._skipped
         taken, through, join = e.fresh("taken"), e.fresh("through"), e.fresh("join")
         self.advance(cycles, mask)
@@ -368,7 +378,7 @@ class Translator(FunctionFrame):
         try:
             for one in skipped:
                 ended, written = self._instruction(one, written)
-                if ended:  # it may have made an interrupt acceptable
+                if ended:  # the instruction may have made an interrupt acceptable
                     break
             else:
                 self.counter.settle()
@@ -433,8 +443,11 @@ class Translator(FunctionFrame):
             self.v.leave(target & PC_MASK, NEXT)
 
     def _return(self, step: Step, flow: Return) -> None:
-        """Leave the function for the return address. If an exception may be accepted after two cycles of the return,
-        leave before its third: the boundary decides."""
+        """Leave the function for the return address.
+
+        If an exception may be accepted after two cycles of the return, leave before the third: the boundary decides
+        whether it happens.
+        """
         e = self.e
         if self._early_exception is not None:
             some, none = e.fresh("some"), e.fresh("none")
@@ -454,13 +467,13 @@ class Translator(FunctionFrame):
 
     # -- watchdog and Idle ------------------------------------------------------------------------------------------
     def _apply_rule(self, rule: Rule) -> None:
-        """Emit the effect of the instruction on devices."""
+        """Emit the instruction's effect on devices by `rule`."""
         if rule.fires is None:
             raise NeedsInterpreter
         rule.fires(AccessEmitter(self.b), rule.operands)
 
     def _idle(self, next_pc: int) -> None:
-        """Stop the CPU; the next boundary lets time pass."""
+        """Stop the CPU in Idle; the next boundary lets time pass."""
         e, offset = self.e, self.layout.offset
         e.store(pointer(e, offset["cpu.mode"]), IDLE, 16)
         e.store(pointer(e, offset["cpu.slept"]), self.v.get("cycle") - 1, 64)
@@ -469,7 +482,7 @@ class Translator(FunctionFrame):
 
     # -- interrupts -------------------------------------------------------------------------------------------------
     def _check_interrupts(self, next_pc: int) -> None:
-        """Leave for the boundary if any enabled interrupt is requested, else continue at `next_pc`."""
+        """Leave native code for the boundary if an enabled interrupt is requested, else continue at `next_pc`."""
         e = self.e
         self.counter.settle()
         some = e.fresh("some")
@@ -479,7 +492,7 @@ class Translator(FunctionFrame):
         e.end(f"br label %{self.exit(next_pc, BOUNDARY_WORK)}")
 
     def _check_retfie(self, flow: Return) -> None:
-        """Leave RETFIE to the interpreter if a trap is involved (isa.md §14.3), else emit its rule."""
+        """Leave RETFIE to the interpreter if a trap is active or requested (isa.md §14.3), else emit its rule."""
         b, e = self.b, self.e
         corcon = e.load(pointer(e, self.layout.offset["CORCON"]), 16)
         traps = e.load(pointer(e, self.layout.offset["INTCON1"]), 16) & self.layout.trap_flags

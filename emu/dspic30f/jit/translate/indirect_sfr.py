@@ -1,12 +1,12 @@
-"""Indirect SFR access: one native helper for SFR addresses that are known only at run time.
+"""Indirect SFR access: a native helper for SFR addresses that are known only at run time.
 
-Input: how native code accesses each SFR (`MachineLayout`) and the rules of devices. Output: the IR of
-`i64 entry(rec, now, address, lanes, value)`. Translated code calls it through a word of the environment, for addresses
-below RAM, which are rare. The helper holds the code of all direct accesses once, instead of once per instruction.
+Inputs: the access kind of each SFR (`MachineLayout`) and the rules of devices. Output: the IR of
+`i64 entry(rec, now, address, lanes, value)`. Translated code calls it through a word of the environment for addresses
+below RAM, which are rare. All access code exists once in the helper instead of once per instruction.
 
-With `lanes` = 0 the helper reads the word at an even address. It returns the word, or -1 if Python must read it.
-Otherwise it writes these lanes of `value`. It returns 1, or 0 without any effect if Python must write it. Registers
-that translated code keeps in variables are left to Python.
+If `lanes` is 0, the helper reads the word at an even address. It returns the word, or -1 if Python must read it.
+Otherwise it writes the bits `lanes` of `value`. It returns 1, or 0 without any effect if Python must write it. Python
+accesses the registers that translated code keeps in variables.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ from emu.system.rules import Cell, Rule
 
 LANES: Final = (0xFFFF, 0x00FF, 0xFF00)
 SLOW, PLAIN, INTERRUPT_CONTROL, FLAGS, FIRST_RULE = range(5)
-"""Kinds of access to a word: by Python; as memory; as memory that may make an interrupt acceptable; interrupt flags,
-which native code only clears; numbers from FIRST_RULE on: by a rule."""
+"""Kinds of access to a word: by Python; as memory; as memory that may make an interrupt acceptable; as interrupt flags,
+which native code only clears. Numbers from FIRST_RULE on mean access by a rule."""
 _KINDS: Final[Mapping[SfrAccess, int]] = {"plain": PLAIN, "irq": INTERRUPT_CONTROL, "flags": FLAGS}
 
 DECLARED: Final = "declare i64 @llvm.umin.i64(i64, i64)"
@@ -52,7 +52,7 @@ def indirect_sfr_text(core: Core, layout: MachineLayout) -> str:
 
 
 def _switch(e: Emitter, m: BoundaryEmitter, kinds: list[int], word: Number, rules: list[Rule], plain: str) -> None:
-    """Branch by the kind of the word: to the block `plain`, or to the block `plain`.number of its rule."""
+    """Branch on the kind of the word: to block `plain`, or to block `plain`.number of its rule."""
     cases = " ".join(f"i64 {FIRST_RULE + number}, label %{plain}.{number}" for number in range(len(rules)))
     simple = " ".join(f"i64 {kind}, label %{plain}" for kind in (PLAIN, INTERRUPT_CONTROL, FLAGS))
     e.end(f"switch i64 {wide(m.table(tuple(kinds), word))}, label %slow [ {simple} {cases} ]")
@@ -113,7 +113,10 @@ def _write(
 
 
 def _lane_blocks(e: Emitter, m: BoundaryEmitter, rule: Rule, value: Value) -> dict[int, str]:
-    """Emit a block that writes by the rule for each combination of lanes that it supports. Return their labels."""
+    """Emit, for each combination of lanes that the rule supports, a block that writes by the rule.
+
+    Return the labels.
+    """
     labels = {}
     writes: Callable[..., bool] | None = rule.writes
     assert writes is not None
@@ -129,12 +132,12 @@ def _lane_blocks(e: Emitter, m: BoundaryEmitter, rule: Rule, value: Value) -> di
 
 
 def _in_variables(layout: MachineLayout, address: int) -> bool:
-    """Return whether translated code may keep the register in variables."""
+    """Return whether translated code may keep the register at `address` in variables."""
     return address == layout.offset["SR"] or layout.accumulator_at(address) is not None
 
 
 def interrupt_requested(e: Emitter, layout: MachineLayout) -> Value:
-    """Return whether any enabled interrupt is requested."""
+    """Return whether an enabled interrupt is requested."""
     total: Number = 0
     for flags, enables in layout.flag_words:
         total = total | (e.load(pointer(e, flags), 16) & e.load(pointer(e, enables), 16))

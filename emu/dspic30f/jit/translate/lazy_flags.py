@@ -1,8 +1,8 @@
-"""Lazy flags: native code keeps a word from which a flag is computed where it is read.
+"""Lazy flags: native code keeps a word per flag and computes the flag from it only where it is read.
 
-Most flags are overwritten before an instruction reads them. The five flags of a sum would cost more than the sum. So a
-variable holds the sum itself (C, N, Z), or the word of which overflow and half carry are a bit. Code computes the flag
-where an instruction reads it and where the function is left.
+Most flags are overwritten before an instruction reads them, and the five flags of a sum would cost more than the sum.
+Therefore a variable holds the sum itself (for C, N, Z), or a word with overflow or half carry as one of its bits. Code
+computes the flag where an instruction reads it and where native code leaves the function.
 """
 
 from __future__ import annotations
@@ -14,11 +14,11 @@ from emu.dspic30f.jit.translate.values import Emitter, Number, Value, truth, wid
 FLAG_ENCODING: Final[dict[str, tuple[Literal["zero", "bit", "above"], int]]] = {
     "C": ("above", 16), "Z": ("zero", 0), "OV": ("bit", 15), "N": ("above", 15), "DC": ("bit", 8),
 }  # fmt: skip
-"""Property of a flag's word that means the flag is set (`values.Origin`)."""
+"""Property of a flag's word for which the flag counts as set (`values.Origin`)."""
 
 
 def encode_flag(emitter: Emitter, name: str, value: Number) -> str:
-    """Return the word that encodes a flag with the truth of `value`, as operand text."""
+    """Return, as operand text, a word that encodes a flag equal to the truth of `value`."""
     kind, bit = FLAG_ENCODING[name]
     origin = value.origin if isinstance(value, Value) else None
     if origin is not None and origin.kind == kind and origin.bit <= bit:
@@ -30,7 +30,7 @@ def encode_flag(emitter: Emitter, name: str, value: Number) -> str:
 
 
 def decode_flag(name: str, word: Value) -> Value:
-    """Return the flag that `word` encodes."""
+    """Return the flag that `word` encodes, as a truth value."""
     kind, bit = FLAG_ENCODING[name]
     if kind == "zero":
         return word == 0

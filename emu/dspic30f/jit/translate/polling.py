@@ -1,8 +1,8 @@
-"""Polling loops: loops that wait for a change that only an event or an interrupt can make.
+"""Polling loops: loops that wait for a change which only an event or an interrupt can make.
 
-A loop is empty if each iteration leaves the state that the iteration before it left. It stores nothing, reads nothing
-that changes with time, and computes nothing from its own results. Then all iterations before the next deadline are
-alike, and native code skips whole ones by adding their cycles.
+A loop is empty if every iteration leaves the same state as the previous one. It stores nothing, reads nothing that
+changes with time, and computes nothing from its own results. All its iterations before the next deadline are equal, so
+native code skips whole iterations by adding their cycles.
 """
 
 from __future__ import annotations
@@ -20,21 +20,21 @@ from emu.dspic30f.jit.translate.values import Emitter, Number, Value
 from emu.dspic30f.jit.translate.variables import Variables
 
 MAX_LOOP: Final = 12
-"""Most instructions in a loop that is examined: polling loops are short."""
+"""Maximum number of instructions in a loop that is examined; polling loops are short."""
 
 
 @dataclass(frozen=True)
 class EmptyLoop:
-    """An empty loop. It is entered at `head`; its last instruction, at `back`, branches to `head`."""
+    """An empty loop, entered at `head`. Its last instruction, at `back`, branches to `head`."""
 
     head: int
     back: int
     costs: tuple[tuple[int, int], ...]
-    """Addresses of its instructions, each with its cycles (Tcy)."""
+    """(address, cycles) of each instruction, in Tcy."""
 
     @property
     def cycles(self) -> int:
-        """Return the cycles of an iteration, in Tcy."""
+        """Return the cycles of one iteration in Tcy."""
         return sum(cycles for _, cycles in self.costs)
 
 
@@ -57,7 +57,7 @@ def _empty_loop(region: Region, back: Step, layout: MachineLayout, context: Cont
         return None
     inside = range(head + 1, back.pc + 1)
     if any(step.target in inside for step in region.steps.values()):
-        return None  # it can be entered in the middle
+        return None  # the loop can be entered in the middle
     try:
         costs = _costs(path, layout, context)
     except NeedsInterpreter:
@@ -66,7 +66,7 @@ def _empty_loop(region: Region, back: Step, layout: MachineLayout, context: Cont
 
 
 def _path(region: Region, head: int, back: int) -> list[Step] | None:
-    """Return the instructions from `head` to `back` in address order, or None if that path is interrupted."""
+    """Return the instructions from `head` to `back` in address order; None if they are not one straight path."""
     path: list[Step] = []
     pc = head
     while pc <= back and len(path) < MAX_LOOP:
@@ -79,8 +79,10 @@ def _path(region: Region, head: int, back: int) -> list[Step] | None:
 
 
 def _costs(path: list[Step], layout: MachineLayout, context: Context) -> tuple[tuple[int, int], ...]:
-    """Return address and cycles of each instruction of an iteration. Raises NeedsInterpreter if iterations may
-    differ."""
+    """Return (address, cycles) of each instruction in an iteration.
+
+    Raises NeedsInterpreter if iterations may differ.
+    """
     probe = _LoopProbe(layout, context)
     costs, written = [], path[-1].facts.writes
     for step in path:
@@ -98,28 +100,28 @@ def _costs(path: list[Step], layout: MachineLayout, context: Context) -> tuple[t
 
 
 class _RecordingVariables(Variables):
-    """Variables that record their reads before writes, and their writes."""
+    """Variables that record which of them are read before written, and which are written."""
 
     def __init__(self, emitter: Emitter, layout: MachineLayout) -> None:
         super().__init__(emitter, layout.offset)
         self.read_first: Final[set[str]] = set()
-        """Variables that were read before they were written."""
+        """Names of variables that were read before they were written."""
         self.written: Final[set[str]] = set()
 
     def get(self, name: str) -> Value:
-        """Record a read."""
+        """Return a variable and record the read."""
         if name not in self.written:
             self.read_first.add(name)
         return super().get(name)
 
     def set(self, name: str, value: Number) -> None:
-        """Record a write."""
+        """Assign a variable and record the write."""
         self.written.add(name)
         super().set(name, value)
 
 
 class _LoopProbe(LlvmBuilder):
-    """Builder that translates a loop into a scratch block, to find out what the loop accesses."""
+    """Builder that translates a loop into a scratch block to determine what the loop accesses."""
 
     def __init__(self, layout: MachineLayout, context: Context) -> None:
         emitter = Emitter()
@@ -138,10 +140,10 @@ class _LoopProbe(LlvmBuilder):
         return flow
 
     def store(self, ea: Number, v: Number, size: Size, ptr: int | None = None) -> None:
-        """Refuse: a loop with a store is not empty."""
+        """Raise NeedsInterpreter, because a loop with a store is not empty."""
         raise NeedsInterpreter
 
     def table_write(self, address: Number, byte_mask: Number, v: Number) -> None:
-        """Refuse: a loop that writes latches is not empty."""
+        """Raise NeedsInterpreter, because a loop that writes latches is not empty."""
 
         raise NeedsInterpreter

@@ -1,7 +1,7 @@
-"""Regions: the instructions that are translated together, reachable from one address through static successors.
+"""Regions: sets of instructions that are translated together, reachable from one address through static successors.
 
-Calls, returns and computed jumps leave the region. Its leaders are the addresses at which native code can be entered. A
-block runs from a leader to the next one.
+Calls, returns and computed jumps leave the region. Leaders are the addresses at which native code can be entered. A
+block extends from one leader to the next.
 """
 
 from __future__ import annotations
@@ -17,39 +17,39 @@ from emu.dspic30f.isa.row import Insn
 from emu.dspic30f.state.state import PC_MASK
 
 LIMIT: Final = 150
-"""Most instructions in a region: compile time per instruction grows in larger ones (engines.md §4.3, measured)."""
+"""Maximum number of instructions in a region. Larger regions compile more slowly per instruction (engines.md §4.3)."""
 
 Fetch = Callable[[int], Insn | None]
-"""Returns the decoded instruction at a program address, or None if there is no legal one."""
+"""Function that returns the decoded instruction at a program address, None if there is no legal one."""
 
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """One instruction of a region, with its address and the addresses that may follow it inside the region."""
+    """One instruction of a region: its address, and the addresses inside the region that may follow it."""
 
     pc: int
     insn: Insn
     facts: Facts
     next_pc: int
     target: int | None
-    """Static target of a branch or jump, or the address after the instruction that a skip skips; None if computed."""
+    """Target of a branch or jump, or the address after a skipped instruction; None if it is computed at run time."""
 
 
 @dataclass
 class Region:
-    """Steps by address, and the leaders among them."""
+    """Instructions by address, and the leaders among their addresses."""
 
     start: int
     steps: dict[int, Step] = field(default_factory=dict)
     leaders: set[int] = field(default_factory=set)
 
     def words(self) -> list[tuple[int, int, int]]:
-        """Return (address, word 1, word 2) of each instruction: the program words that the translation depends on."""
+        """Return (address, word 1, word 2) of each instruction; these program words determine the translation."""
         return [(pc, step.insn.word1, step.insn.word2) for pc, step in sorted(self.steps.items())]
 
 
 def static_target(pc: int, insn: Insn, fetch: Fetch) -> int | None:
-    """Return the target of a branch, jump or skip if the instruction itself encodes it; None if it is computed."""
+    """Return the target of a branch, jump or skip that the instruction encodes; None if it is computed at run time."""
     flow = flow_of(insn, pc)
     if isinstance(flow, Skip):
         skipped = fetch((pc + 2) & PC_MASK)
@@ -60,12 +60,14 @@ def static_target(pc: int, insn: Insn, fetch: Fetch) -> int | None:
 
 
 ENDS: Final = (Goto, Call, Return, Reset, Sleep)
-"""Flows that never continue with the next word."""
+"""Flows after which execution never continues with the next word."""
 
 
 def discover(start: int, fetch: Fetch, known: Container[int] = (), hooks: Container[int] = ()) -> Region:
-    """Return the region entered at `start`. It ends at addresses in `known`, which have code already. Addresses in
-    `hooks` become leaders, because native code leaves and is entered there."""
+    """Return the region entered at `start`. It ends at addresses in `known`, which already have code.
+
+    Addresses in `hooks` become leaders, because native code is left and entered there.
+    """
 
     region = Region(start)
     work = [start]

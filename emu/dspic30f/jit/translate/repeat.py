@@ -1,8 +1,8 @@
-"""Native REPEAT and its target (isa.md §7.5).
+"""Native code for REPEAT and its target (isa.md §7.5).
 
-In block code, REPEAT and its target are one counted loop that must fit before the deadline. In exact code, every
-iteration is a boundary of its own, and the state of the loop is in the record as the sequencer keeps it. So exact code
-can enter the loop in the middle, after an interrupt.
+In block code, REPEAT and its target form a counted loop that must end before the deadline. In exact code, a boundary
+follows every iteration, and the record holds the loop's state as the sequencer keeps it. Exact code can therefore enter
+the loop in the middle, after an interrupt.
 """
 
 from __future__ import annotations
@@ -22,19 +22,22 @@ from emu.dspic30f.jit.translate.variables import MemoryVariables
 from emu.dspic30f.state.state import RA
 
 DIVIDE_COUNT: Final = 17
-"""RCOUNT of a divide: 18 iterations (isa.md §6.7)."""
+"""RCOUNT for a divide, which has 18 iterations (isa.md §6.7)."""
 
 
 class RepeatTranslator:
-    """Translates the REPEATs of one function."""
+    """Translator of the REPEATs in one function."""
 
     def __init__(self, frame: FunctionFrame) -> None:
         self._f: Final = frame
         self.resumes: Final[dict[int, str]] = {}
-        """Labels at which exact code continues a REPEAT, by address of the target."""
+        """Labels at which exact code continues a REPEAT, by the target's address."""
 
     def translate(self, step: Step, flow: Repeat, stall: Number) -> None:
-        """Translate the REPEAT at `step`. Raises NeedsInterpreter before any emission if its target is not native."""
+        """Translate the REPEAT `step`.
+
+        Raises NeedsInterpreter, before it emits anything, if the target is not native.
+        """
         f, e = self._f, self._f.e
         target = f.region.steps.get(step.next_pc)
         if target is None or not self._is_native(target):
@@ -54,11 +57,11 @@ class RepeatTranslator:
                 f.jump(step.next_pc)
 
     def _is_native(self, target: Step) -> bool:
-        """Return whether an instruction can be repeated natively: translate it into a scratch block and discard it."""
+        """Return whether an instruction can be repeated natively. To find out, translate it into a scratch block."""
         last_of_loop = target.pc == self._f.layout.do_end
         if target.facts.flow is not None or not target.insn.row.repeat_ok or last_of_loop:
             return False
-        if target.pc in self._f.layout.hooks:  # the hook must be called in every iteration
+        if target.pc in self._f.layout.hooks:  # Python must call the hook in every iteration
             return False
         scratch = Emitter()
         scratch.start("scratch")
@@ -75,7 +78,7 @@ class RepeatTranslator:
 
     # -- block code ---------------------------------------------------------------------------------------------------
     def _whole_loop(self, step: Step, target: Step, count: Number, stall: Number) -> None:
-        """Run all iterations at once, if they fit before the deadline."""
+        """Emit code that runs all iterations at once if they end before the deadline."""
         f, e = self._f, self._f.e
         again = int(flow_rules.stall(target.facts.writes, target.facts.source_pointers))
         cycles = target.insn.row.cycles
@@ -93,8 +96,8 @@ class RepeatTranslator:
         f.jump(target.next_pc)
 
     def _divide(self, target: Step) -> None:
-        """Emit a divide: of its 18 iterations only the first (zero check) and the last (result) have an effect
-        (isa.md §6.7)."""
+        """Emit a divide. Of its 18 iterations, only the first (zero check) and the last (result) have an effect (isa.md
+        §6.7)."""
         f, b = self._f, self._f.b
         b.begin(target.pc, None)
         b.left_count = b.repeating = DIVIDE_COUNT
@@ -107,7 +110,10 @@ class RepeatTranslator:
         f.advance(DIVIDE_COUNT + 1, target.facts.writes)
 
     def _counted_loop(self, target: Step, count: Number, cycles: int, again: int) -> None:
-        """Emit a counted loop. An iteration that cannot be native leaves with the REPEAT state of that iteration."""
+        """Emit a counted loop.
+
+        For an iteration that cannot be native, it leaves with the REPEAT state of that iteration.
+        """
         f, e, b = self._f, self._f.e, self._f.b
         f.counter.settle()
         before, loop, done = e.fresh("before"), e.fresh("loop"), e.fresh("done")
@@ -136,7 +142,7 @@ class RepeatTranslator:
 
     # -- exact code ---------------------------------------------------------------------------------------------------
     def _begin(self, step: Step, target: Step, stall: Number, again: bool) -> None:
-        """End the REPEAT instruction itself, and continue with the loop of its target."""
+        """End the REPEAT instruction itself, then continue with the loop of its target."""
         f, e = self._f, self._f.e
         f.advance(stall + 1, step.facts.writes)
         f.counter.settle()
@@ -150,7 +156,7 @@ class RepeatTranslator:
             self._iterations(target, label)
 
     def _iterations(self, target: Step, label: str) -> None:
-        """Emit one iteration at a time, each followed by a boundary. REPEAT and callers enter at `label`."""
+        """Emit a loop of single iterations, each followed by a boundary. REPEAT and callers enter it at `label`."""
         f, e, b, flow = self._f, self._f.e, self._f.b, self._f.layout.flow
         e.start(label)
         f.v.new_block()
@@ -162,7 +168,7 @@ class RepeatTranslator:
         stall = flow_rules.stall(f.v.get("stall"), target.facts.source_pointers)
         paths = LlvmRulePaths(e, on_path=f.v.new_block)
         b.begin(target.pc, None)
-        b.repeating = paths.get(flow.rcount)  # a native target does not change it
+        b.repeating = paths.get(flow.rcount)  # a native target does not change RCOUNT
         target.insn.row.does(b, target.insn.x)  # type: ignore[arg-type]
         b.commit()
         b.repeating = None

@@ -1,7 +1,7 @@
-"""Builders of rules that emit LLVM IR (contract: emu/system/rules.py, emu/dspic30f/interpreter/flow_rules.py).
+"""Rule builders that emit LLVM IR (contract: emu/system/rules.py, emu/dspic30f/interpreter/flow_rules.py).
 
-A requirement that does not hold leaves before the rule has had an effect. An access leaves through its slow exit, and
-the sequencer makes it; work at a boundary is left to Python.
+If a requirement of a rule does not hold, native code leaves before the rule has any effect. For an access it leaves
+through the slow exit, and the sequencer performs the access; at a boundary Python does the work.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 class RuleEmitter:
-    """Operations that all emitters of rules share."""
+    """Operations that all rule emitters share."""
 
     def __init__(self, e: Emitter) -> None:
         self.e: Final = e
@@ -54,7 +54,7 @@ class RuleEmitter:
 
 
 class AccessContext(Protocol):
-    """The part of a builder that rules of accesses need."""
+    """The part of a builder that rules of accesses use."""
 
     @property
     def e(self) -> Emitter: ...
@@ -74,8 +74,7 @@ class AccessContext(Protocol):
 
 
 class AccessEmitter(RuleEmitter):
-    """Emits the rule of one access of the instruction being translated; its stores are committed with the
-    instruction."""
+    """Emitter for the rule of one access of the instruction being translated. The instruction commits its stores."""
 
     def __init__(self, b: AccessContext) -> None:
         super().__init__(b.e)
@@ -83,7 +82,7 @@ class AccessEmitter(RuleEmitter):
         self.now: Final = b.now
 
     def get(self, cell: Cell, index: Number = 0) -> Value:
-        """Emit a load; SR is assembled from flag variables."""
+        """Emit a load from the record; SR is composed from the flag variables."""
         return self._b.sr_word() if cell == self._b.layout.flow.sr else super().get(cell, index)
 
     def put(self, cell: Cell, value: Number, index: Number = 0) -> None:
@@ -95,18 +94,18 @@ class AccessEmitter(RuleEmitter):
         self._b.deferred.stores.append(lambda: e.store(pointer(e, offset), value, cell.bits))
 
     def require(self, condition: Number) -> None:
-        """Leave before the instruction unless `condition` holds."""
+        """Leave native code before the instruction unless `condition` holds."""
         self._b.guard(condition)
 
     def table(self, values: tuple[int, ...], index: Number) -> Number:
-        """Emit a chain of selections: tables of accesses are short."""
+        """Emit a chain of selections, because tables of accesses are short."""
         found: Number = values[-1]
         for number, value in enumerate(values[:-1]):
             found = self.select(index == number, value, found)
         return found
 
     def post(self, slot: EventSlot, due: Number) -> None:
-        """Defer the posting of an event. The deadline may move nearer, so the function ends after the instruction."""
+        """Defer the posting of an event. The deadline may move nearer, so native code leaves after the instruction."""
         deadline = self.get(slot.deadline)
         self.put(slot.due, due)
         self.put(slot.deadline, self.least(deadline, due))
@@ -114,8 +113,10 @@ class AccessEmitter(RuleEmitter):
 
 
 class LlvmRulePaths(RulePaths):
-    """Emits flow rules behind an instruction. RA and DA of SR are always in the record. `known` is as for `RulePaths`;
-    `on_path()` is called at the start of each path."""
+    """Emitter of flow rules that run after an instruction. RA and DA of SR are always in the record.
+
+    `known` is as for `RulePaths`. `on_path()` is called at the start of each path.
+    """
 
     def __init__(
         self, e: Emitter, known: Mapping[Cell, int] = MappingProxyType({}), on_path: Callable[[], None] = lambda: None
@@ -147,21 +148,22 @@ class LlvmRulePaths(RulePaths):
 
 
 class BoundaryEmitter(RuleEmitter):
-    """Emits rules of events and exceptions, and rules of indirect accesses. Effects are emitted in the order of the
-    rule."""
+    """Emitter for rules of events, exceptions and indirect accesses. It emits effects in the order of the rule."""
 
     def __init__(
         self, core: Core, e: Emitter, now: Number, otherwise: str, tables: dict[tuple[int, ...], str] | None = None
     ) -> None:
-        """`otherwise` is the label of the block that leaves the work to Python. `tables` shares the constants of
-        another emitter of the same module."""
+        """`otherwise` is the label of the block that leaves the work to Python.
+
+        `tables` shares the constants of another emitter for the same module.
+        """
         super().__init__(e)
         self.now: Final = now
         self._core: Final = core
         self._otherwise: Final = otherwise
         self.tables: Final[dict[tuple[int, ...], str]] = tables if tables is not None else {}
         self.posted: Final[set[EventSlot]] = set()
-        """Slots that were posted."""
+        """Event slots that a rule has posted."""
 
     def put(self, cell: Cell, value: Number, index: Number = 0) -> None:
         """Emit a store to the record."""
@@ -180,7 +182,7 @@ class BoundaryEmitter(RuleEmitter):
         self.posted.add(slot)
 
     def push(self, low: Number, high: Number, _cycle: Number) -> None:
-        """Emit a push of two words; Python handles a push that does not fit into the stack."""
+        """Emit a push of two words. Python handles a push that does not fit on the stack."""
         state, ram = self._core.state, self._core.chip.data["ram"]
         top, limit = Cell(2 * STACK_POINTER, 16), Cell(2 * state.at["SPLIM"], 16)
         ea = self.get(top)
@@ -191,7 +193,7 @@ class BoundaryEmitter(RuleEmitter):
         self.put(top, ea + 4)
 
     def handler(self, vector: Number) -> Value:
-        """Emit a load of a word of flash."""
+        """Emit a load of the handler address from a vector in flash."""
         return self.e.load(pointer(self.e, (vector << 1) + self._core.program.flash_offset), 32)
 
     def table(self, values: tuple[int, ...], index: Number) -> Value:
@@ -202,11 +204,11 @@ class BoundaryEmitter(RuleEmitter):
         return self.e.let(f"load i64, ptr {element}")
 
     def can_call(self, code: Number) -> Number:
-        """Return whether host code is there: native code can call it."""
+        """Return whether the address of host code is not 0, so that native code can call it."""
         return code != 0
 
     def call(self, code: Number, data: Number, *numbers: Number) -> Value:
-        """Emit a call of host code; everything it reads has been stored before."""
+        """Emit a call of host code. Everything that it reads has already been stored."""
         address = self.e.name()
         self.e.line(f"{address} = inttoptr i64 {wide(code)} to ptr")
         passed = "".join(f", i64 {wide(number)}" for number in (data, *numbers))
@@ -221,7 +223,7 @@ class BoundaryEmitter(RuleEmitter):
     def lazy_select(
         self, condition: Number, costly: Callable[[], tuple[Number, ...]], *others: Number
     ) -> tuple[Number, ...]:
-        """Emit a branch around the computation of `costly`."""
+        """Emit a branch that skips the computation of `costly` unless `condition` holds."""
         e, texts = self.e, [wide(value) for value in others]
         start, yes, done = e.block, e.fresh("yes"), e.fresh("done")
         e.end(f"br i1 {truth(condition)}, label %{yes}, label %{done}")
@@ -233,7 +235,7 @@ class BoundaryEmitter(RuleEmitter):
                      for value, other in zip(found, texts, strict=True))  # fmt: skip
 
     def loop(self, count: Number, body: Callable[..., tuple[Number, ...]], *carried: Number) -> tuple[Number, ...]:
-        """Emit a loop with its test behind the body."""
+        """Emit a loop whose test follows the body."""
 
         def iteration(number: Value, *values: Value) -> tuple[Value, tuple[Number, ...], Number]:
             after = body(number, *values)
@@ -242,7 +244,7 @@ class BoundaryEmitter(RuleEmitter):
         return self._emit_loop(iteration, 0, *carried)
 
     def scan(self, bits: Number, body: Callable[..., tuple[Number, ...]], *carried: Number) -> tuple[Number, ...]:
-        """Emit a loop over the bits that are set; `bits` is not 0."""
+        """Emit a loop over the set bits of `bits`, which is not 0."""
 
         def iteration(left: Value, *values: Value) -> tuple[Value, tuple[Number, ...], Number]:
             after = body(self.e.let(f"call i64 @llvm.cttz.i64(i64 {left.text}, i1 true)"), *values)
@@ -254,8 +256,10 @@ class BoundaryEmitter(RuleEmitter):
     def _emit_loop(
         self, iteration: Callable[..., tuple[Value, tuple[Number, ...], Number]], *before: Number
     ) -> tuple[Number, ...]:
-        """Emit a loop over values of which the first controls it. iteration(*values) returns the next control value,
-        the next other values, and whether to continue."""
+        """Emit a loop over values, of which the first controls the loop.
+
+        iteration(*values) returns the next control value, the next other values, and whether to continue.
+        """
         e = self.e
         entry, texts = e.block, [wide(value) for value in before]
         loop, done = e.fresh("loop"), e.fresh("done")

@@ -1,7 +1,7 @@
-"""Trace blocks: the instructions of one block, including branches that skip only a few register instructions.
+"""Trace blocks: instructions of one block, including branches that skip only a few register instructions.
 
-Such a branch or skip does not end its block: both paths join behind it. There is no deadline check between them, so
-LLVM turns the paths into selections, and a host that mispredicts the branch loses no time.
+Such a branch or skip does not end its block: both paths join after the skipped instructions. No deadline check lies
+between them, so LLVM converts the paths to selections, and the host cannot mispredict the branch.
 """
 
 from __future__ import annotations
@@ -15,26 +15,26 @@ from emu.dspic30f.isa.flow import Branch, Skip
 from emu.dspic30f.jit.translate.region import Region, Step
 
 MAX_SKIPPED: Final = 4
-"""Most instructions that a branch within a block may skip: a selection always costs both paths."""
+"""Maximum number of instructions that a branch within a block may skip; a selection always costs both paths."""
 MAX_BRANCHES: Final = 4
-"""Most branches within a block: the code behind them is translated again for other predecessors."""
+"""Maximum number of branches within a block; code after them is translated again for other predecessors."""
 
 
 @dataclass(frozen=True, slots=True)
 class TraceItem:
-    """An instruction of a block. `skipped` are the instructions that it skips, if it is a branch within the block."""
+    """An instruction of a block. For a branch within the block, `skipped` holds the instructions that it skips."""
 
     step: Step
     skipped: tuple[Step, ...] = ()
 
     @property
     def next_pc(self) -> int:
-        """Return the address at which the block continues."""
+        """Return the address at which the block continues after the item."""
         return self.step.target if self.skipped and self.step.target is not None else self.step.next_pc
 
 
 def taken_cost(step: Step) -> int:
-    """Return the additional cycles of a branch or skip that is taken (isa.md §13.1)."""
+    """Return the additional cycles of a branch or skip if it is taken (isa.md §13.1)."""
     assert step.target is not None
     return flow_rules.TAKEN if step.facts.flow is Branch else (step.target - step.next_pc) // 2
 
@@ -42,8 +42,12 @@ def taken_cost(step: Step) -> int:
 def trace_block(
     region: Region, start: int, ends: Container[int], barriers: Container[int], last: int
 ) -> list[TraceItem]:
-    """Return the block at `start`. It ends with a flow, with the instruction at `last`, or before an address in `ends`.
-    A branch does not skip an instruction in `barriers`."""
+    """Return the block at `start`.
+
+    It ends with a flow, with the instruction at `last`, or before an address in `ends`. A branch within it does not
+    skip
+    an instruction in `barriers`.
+    """
     items: list[TraceItem] = []
     pc, branches, joined = start, 0, start
     while (step := region.steps.get(pc)) is not None and (pc == joined or pc not in ends):
@@ -58,7 +62,7 @@ def trace_block(
 
 
 def _skipped(region: Region, branch: Step, barriers: Container[int], last: int) -> Iterator[Step]:
-    """Yield the instructions that a branch or skip skips; none if the branch must end its block."""
+    """Yield the instructions that a branch or skip skips; nothing if the branch must end its block."""
     target = branch.target
     if branch.facts.flow not in (Branch, Skip) or target is None or target not in region.steps or target in barriers:
         return

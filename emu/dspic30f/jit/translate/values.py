@@ -1,7 +1,7 @@
-"""Values of generated code: the operands of instruction rows during translation.
+"""Values in generated code: the operands of instruction rows during translation.
 
-A `Value` is a 64-bit integer or a truth value of one bit in LLVM IR. Each operator emits one line of IR into the
-current block. Python ints are constants. Rows treat both kinds alike.
+A `Value` is a 64-bit integer or a one-bit truth value in LLVM IR. Each operator emits one line of IR into the current
+block. Python ints are constants. Rows treat both kinds equally.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from typing import Final, Literal
 
 
 class Block:
-    """Basic block under construction: a label and its lines."""
+    """Basic block under construction: its label and its lines of IR."""
 
     __slots__ = ("ended", "label", "lines")
 
@@ -35,7 +35,7 @@ class Emitter:
         return f"%v{self.last_name}"
 
     def start(self, label: str) -> Block:
-        """Begin the block `label`, into which the following lines are written."""
+        """Begin the block `label`; subsequent lines are written into it."""
         self.block = Block(label)
         self.blocks.append(self.block)
         return self.block
@@ -46,7 +46,7 @@ class Emitter:
         return f"{stem}.{self.last_name}"
 
     def line(self, text: str) -> None:
-        """Write a line that has no result."""
+        """Write a line of IR that has no result."""
         self.block.lines.append(text)
 
     def end(self, text: str) -> None:
@@ -55,7 +55,7 @@ class Emitter:
         self.block.ended = True
 
     def let(self, text: str, bit: bool = False) -> Value:
-        """Write a line with a result of 64 bits, or of 1 bit if `bit`. Return the result."""
+        """Write a line with a result of 1 bit if `bit`, else of 64 bits. Return the result."""
         name = self.name()
         self.block.lines.append(f"{name} = {text}")
         return Value(self, name, bit)
@@ -88,7 +88,7 @@ class Emitter:
         self.block.lines.append(f"store i{bits} {raw}, ptr {pointer}, align 1")
 
     def text(self) -> str:
-        """Return the text of all blocks, in order."""
+        """Return the IR of all blocks in order."""
         parts: list[str] = []
         for block in self.blocks:
             parts.append(block.label + ":")
@@ -98,8 +98,11 @@ class Emitter:
 
 @dataclass(frozen=True, slots=True)
 class Origin:
-    """Source of a truth value: whether `word` is zero ("zero"), has the bit `bit` set ("bit"), or is not zero after a
-    shift right by `bit` ("above")."""
+    """Origin of a truth value.
+
+    It is true if `word` is zero ("zero"), has bit `bit` set ("bit"), or is not zero after a shift right by `bit`
+    ("above").
+    """
 
     kind: Literal["zero", "bit", "above"]
     word: Value
@@ -107,7 +110,7 @@ class Origin:
 
 
 class Value:
-    """Value that is known only at run time. `origin` is the source of its truth, where that is known."""
+    """Value that is known only at run time. `origin` describes how its truth follows from a word, None if unknown."""
 
     __slots__ = ("bit", "emitter", "origin", "text")
 
@@ -223,7 +226,7 @@ Number = int | Value
 
 
 def wide(value: Number) -> str:
-    """Return a value as operand text of type i64."""
+    """Return a value as IR operand of type i64."""
     if isinstance(value, int):
         return str(int(value))
     if value.bit:
@@ -232,7 +235,7 @@ def wide(value: Number) -> str:
 
 
 def truth(value: Number) -> str:
-    """Return the truth of a value (value != 0) as operand text of type i1."""
+    """Return the truth of a value (value != 0) as IR operand of type i1."""
 
     if isinstance(value, int):
         return "true" if value else "false"

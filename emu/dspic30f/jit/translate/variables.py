@@ -1,7 +1,7 @@
-"""Variables of translated code: the registers and flags of the machine, kept outside the record while a function runs.
+"""Variables of translated code: registers and flags of the machine, kept outside the record while a function runs.
 
-Each variable is an `alloca` that LLVM turns into host registers. The prologue loads the variables that a region uses
-from the record. The exit block stores those that it writes and assembles SR. Arithmetic flags are lazy (lazy_flags.py).
+Each variable is an `alloca` that LLVM converts to host registers. The prologue loads the variables that a region uses
+from the record. The exit block stores those that it writes and composes SR. Arithmetic flags are lazy (lazy_flags.py).
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ BITS: Final = FLAGS | {"OAB": OAB.bit_length() - 1, "SAB": SAB.bit_length() - 1}
 
 
 class Variables:
-    """Variables of one function in block code. `offset` holds byte offsets in the record by name."""
+    """Variables of one function in block code. `offset` holds the byte offsets of record fields by name."""
 
     def __init__(self, emitter: Emitter, offset: Mapping[str, int]) -> None:
         self._emitter: Final = emitter
@@ -29,18 +29,20 @@ class Variables:
         self._known: dict[str, Value] = {}
 
     def new_block(self) -> None:
-        """Forget the known SSA values of variables: a new block may have several predecessors."""
+        """Discard the known SSA values of variables, because a new block may have several predecessors."""
         self._known.clear()
 
     def touch(self, *names: str) -> None:
-        """Load and store back the variables `names` even if no instruction uses them."""
+        """Load the variables `names` and store them at the exit even if no instruction uses them."""
         for name in names:
             self._used.setdefault(name)
             self._written.add(name)
 
     def get(self, name: str) -> Value:
-        """Return the current value of "W0".."W15", a flag of `state.FLAGS`, accumulator "A0" or "A1", "cycle", "stall"
-        or "pc"."""
+        """Return the current value of a variable.
+
+        Names are "W0".."W15", the flags of `state.FLAGS`, accumulators "A0" and "A1", "cycle", "stall" and "pc".
+        """
         self._used.setdefault(name)
         if name not in self._known:
             self._known[name] = self._loaded(self._emitter, name)
@@ -66,13 +68,13 @@ class Variables:
         self._known[name] = Value(self._emitter, text, bit)
 
     def leave(self, pc: Number, reason: int) -> None:
-        """End the block: leave the function for `reason` with the given PC."""
+        """End the block: leave the function with exit reason `reason` and the given PC."""
         self._emitter.line(f"store i64 {wide(pc)}, ptr %x.pc")
         self._emitter.line(f"store i64 {reason}, ptr %x.reason")
         self._emitter.end("br label %exit")
 
     def set_flags(self, flags: Mapping[str, Number]) -> None:
-        """Assign several flags, and the summary flags that depend on them."""
+        """Assign several flags and the summary flags computed from them."""
         for name, value in flags.items():
             self.set(name, value)
         if any(name in ACCUMULATOR_FLAGS for name in flags):
@@ -80,7 +82,7 @@ class Variables:
             self.set("SAB", self.get("SA") | self.get("SB"))
 
     def prologue(self, emitter: Emitter) -> None:
-        """Declare and load all variables that are used, in the function's first block, which is written last."""
+        """Declare and load all used variables in the function's first block, which is generated last."""
         for name in self._used:
             emitter.line(f"%x.{name} = alloca {'i1' if name in BITS and name not in FLAG_ENCODING else 'i64'}")
         sr = emitter.load(pointer(emitter, self._offset["SR"]), 16) if any(n in BITS for n in self._used) else None
@@ -100,7 +102,7 @@ class Variables:
                 emitter.line(f"store i64 {emitter.load(pointer(emitter, offset), bits).text}, ptr %x.{name}")
 
     def write_back(self, emitter: Emitter) -> None:
-        """Store all variables that were written, in the function's exit block."""
+        """Store all written variables, in the function's exit block."""
         flags = [name for name in BITS if name in self._written]
         if flags:
             self._write_sr(emitter, flags)
@@ -133,7 +135,7 @@ class Variables:
 
 
 class MemoryVariables(Variables):
-    """Variables of exact code: they stay in the record, because the code may leave after every instruction."""
+    """Variables of exact code. They stay in the record, because native code may leave after every instruction."""
 
     def get(self, name: str) -> Value:
         """Emit a load from the record."""
@@ -160,7 +162,7 @@ class MemoryVariables(Variables):
             emitter.store(pointer(emitter, offset), value, bits)
 
     def set_flags(self, flags: Mapping[str, Number]) -> None:
-        """Change several SR bits with one load and one store."""
+        """Write several SR bits with one load and one store."""
         emitter = self._emitter
         place = pointer(emitter, self._offset["SR"])
         word: Number = emitter.load(place, 16) & (0xFFFF & ~sum(1 << FLAGS[name] for name in flags))
@@ -171,16 +173,16 @@ class MemoryVariables(Variables):
         emitter.store(place, word, 16)
 
     def leave(self, pc: Number, reason: int) -> None:
-        """End the block: set PC and return `reason`."""
+        """End the block: set PC and return exit reason `reason`."""
         self.set("pc", pc)
         self._emitter.end(f"ret i64 {reason}")
 
     def write_back(self, emitter: Emitter) -> None:
-        """Do nothing: the record is up to date."""
+        """Do nothing, because the record is always up to date."""
 
 
 def _with_sums(emitter: Emitter, word: Number) -> Number:
-    """Return SR with OAB = OA | OB and SAB = SA | SB."""
+    """Return an SR value with OAB = OA | OB and SAB = SA | SB."""
     overflow = Value(emitter, truth(word & (1 << FLAGS["OA"] | 1 << FLAGS["OB"])), True)
     sticky = Value(emitter, truth(word & (1 << FLAGS["SA"] | 1 << FLAGS["SB"])), True)
     return word | (overflow << OAB.bit_length() - 1) | (sticky << SAB.bit_length() - 1)
