@@ -20,12 +20,12 @@ MASK40 = (1 << 40) - 1
 
 
 class Engine(Protocol):
-    """Runner of vectors."""
+    """Interface of a runner of vectors."""
 
     name: str
 
     def prepare(self, vector: dict[str, Any]) -> None:
-        """Load program, registers and memory; everything not listed is 0, unlisted program words are NOP."""
+        """Load program, registers and memory. Values that are not listed are 0, and unlisted program words are NOP."""
 
     def step(self) -> None:
         """Run one instruction, or one iteration of a REPEAT target."""
@@ -93,22 +93,22 @@ class Rows:
 
 
 class NoCache(ObjectCache):
-    """A cache that is always empty, so that the JIT compiles every vector."""
+    """Cache that is always empty, so that the JIT compiles the code of every vector."""
 
     def get(self, key: str) -> bytes | None:
         return None
 
     def put(self, key: str, code: bytes) -> None:
-        """Discard the code."""
+        """Ignore the code."""
 
 
 class OnMachine:
-    """A whole machine with one of its engines. Flash words that no vector sets are 0 (NOP)."""
+    """A machine with one of its engines. Flash words that no vector sets are 0 (NOP)."""
 
     def __init__(self, name: str) -> None:
         self.name = name
         self.machine = Machine(engine=name)
-        if isinstance(self.machine.runner, JitEngine):  # every instruction compiled before it runs
+        if isinstance(self.machine.runner, JitEngine):  # compiles every instruction before it runs it
             self.machine.runner.threshold, self.machine.runner.wait = 1, True
             self.machine.runner.compiler = Compiler(NoCache())
         for half in range(len(self.machine.program.flash)):
@@ -129,8 +129,8 @@ class OnMachine:
         for address, word in program.items():
             m.program.flash[address >> 1] = word
         self.used = list(program)
-        m.program.announce_all()  # once per vector: engines discard their code at each announcement
-        for part, content in zip(self.state, self.clean, strict=True):  # all but flash, which is large
+        m.program.announce_all()  # once per vector: engines discard their code at each call
+        for part, content in zip(self.state, self.clean, strict=True):  # all parts except flash, which is large
             m.record.bytes[part] = content
         for n, value in enumerate(state["W"]):
             m.w[n] = value

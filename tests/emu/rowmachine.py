@@ -1,7 +1,7 @@
-"""Minimal machine that runs rows of the instruction table: ints, a bytearray and a program dictionary.
+"""Minimal machine that executes rows of the instruction table, with ints, a bytearray and a program dictionary.
 
-No devices, traps, stalls, cycles or stack checks: it tests what ``does`` says, not what the CPU adds. The engines of
-``emu`` run the same vectors through ``Machine``.
+It has no devices, traps, stalls, cycles or stack checks, so it tests ``does`` of each row without the additions of the
+CPU. The engines of ``emu`` run the same vectors through ``Machine``.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Folders of the cache: private at every level; folders that other users can write are not used."""
+"""Cache folders are private at every level; folders that other users can write are not used."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ ARCHIVE = b"!<arch>\n" + bytes(100)
 
 @pytest.fixture(params=[0o022, 0o002, 0o000])
 def umask(request: pytest.FixtureRequest) -> Iterator[int]:
-    """Set the umask of this process; 002 is usual for users with a group of their own."""
+    """Set the umask of this process; 002 is common for users with a private group."""
     before = os.umask(request.param)
     yield request.param
     os.umask(before)
@@ -31,7 +31,7 @@ def umask(request: pytest.FixtureRequest) -> Iterator[int]:
 
 @pytest.fixture
 def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Return the missing folder of an empty cache."""
+    """Return the path of an empty cache, whose folder does not exist yet."""
     folder = tmp_path / "new" / "cache"
     monkeypatch.setenv("OPENSWARM_CACHE", str(folder))
     return folder
@@ -50,7 +50,7 @@ def fill(cache: Path) -> ObjectCache:
 
 @pytest.mark.usefixtures("umask")
 def test_all_new_folders_are_private(cache: Path) -> None:
-    """Every folder from the first missing one to the shelves of objects has mode 0700."""
+    """Every new folder, from the first missing one to the shelves of objects, has mode 0700."""
     objects = fill(cache)
     folders = [cache.parent, cache, *(path for path in cache.rglob("*") if path.is_dir())]
     assert {path.name for path in folders} >= {"new", "cache", "jit", "00", "toolchain", "headers"}
@@ -63,7 +63,7 @@ def test_all_new_folders_are_private(cache: Path) -> None:
 def test_a_folder_that_others_can_write_is_not_used(
     cache: Path, place: str, mode: int, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Its content is not read, nothing is written into it, and one sentence names it."""
+    """A folder that others can write is neither read nor written, and one sentence names it."""
     fill(cache)
     (cache / place).chmod(mode)
     before = sorted(cache.rglob("*"))
@@ -81,7 +81,7 @@ def test_a_folder_that_others_can_write_is_not_used(
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="only root can give a folder away")
 def test_a_folder_of_another_user_is_not_used(cache: Path) -> None:
-    """The owner of a folder could replace its content at any time."""
+    """A folder of another user is not used, because its owner could replace its content."""
     objects = fill(cache)
     os.chown(cache / "jit", 65534, -1)
     assert danger(cache / "jit") == "it belongs to another user (uid 65534)"
@@ -89,7 +89,7 @@ def test_a_folder_of_another_user_is_not_used(cache: Path) -> None:
 
 
 def test_a_command_works_without_an_unsafe_cache(cache: Path, tmp_path: Path) -> None:
-    """`toolchain cc -c` finds its headers, and reports the cache in one line."""
+    """`toolchain cc -c` works with an unsafe cache: it finds its headers and reports the cache in one line."""
     source = tmp_path / "main.c"
     source.write_text("#include <xc.h>\nint main(void) { return LATB; }\n")
     cache.mkdir(parents=True)
@@ -106,7 +106,7 @@ def test_a_command_works_without_an_unsafe_cache(cache: Path, tmp_path: Path) ->
     "damaged", [(b"", 0, 80), (b"", 0, 0), (b"X", 0, None), (b"", 1, None)], ids=["half", "empty", "longer", "shifted"]
 )
 def test_a_damaged_runtime_library_counts_as_absent(cache: Path, damaged: tuple[bytes, int, int | None]) -> None:
-    """The checksum finds a truncated, empty, extended or shifted file."""
+    """A truncated, empty, extended or shifted run-time library fails its checksum and is ignored."""
     fill(cache)
     (archive,) = (cache / "toolchain").iterdir()
     assert runtime_archive._stored(archive) == ARCHIVE
@@ -117,7 +117,7 @@ def test_a_damaged_runtime_library_counts_as_absent(cache: Path, damaged: tuple[
 
 @pytest.mark.slow
 def test_a_program_links_although_the_cached_library_is_damaged(cache: Path, tmp_path: Path) -> None:
-    """The compiler builds the library again and stores it."""
+    """If the cached library is damaged, the compiler builds and stores it again, and the program links."""
     archive = runtime_libraries() / f"libdspic-{runtime_archive.fingerprint()}.a"
     runtime_archive._store(archive, ARCHIVE)
     archive.write_bytes(archive.read_bytes()[:-1])

@@ -1,6 +1,6 @@
-"""Every `++` and `--` of every row moves its pointer by the size of the access, in every engine (isa.md §3.1, §8.1).
+"""In every engine, `++` and `--` of every row change the pointer by the size of the access (isa.md §3.1, §8.1).
 
-What moves is read from the assembly text of the instruction, which knows nothing of what the row does.
+The expected change is read from the assembly text of the instruction, independently of the row's code.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ from emu.dspic30f.isa.table import ROWS
 
 PC = 0x1000
 MODES = {"p": range(6), "q": range(6), "g": range(7), "h": range(7), "i": range(16), "j": range(16), "a": range(3)}
-"""Fields that select the use of a pointer, with their values."""
+"""Fields that select a pointer mode, with their values."""
 FIXED = {"s": 2, "d": 6, "w": 9, "x": 2, "y": 3}
-"""Registers that do not overlap: W2 to W6, W7, offset W9; prefetched W6 and W7."""
+"""Registers of the other fields, chosen so that they do not overlap: W2 to W6, W7, offset W9; prefetched W6 and W7."""
 POINTERS = [0x900 + 0x40 * n for n in range(10)] + [0x1A00, 0x1A40, 4, 0xC40, 0, 0x800]
-"""W10 and W11 point into Y memory, W12 is the offset of prefetches."""
+"""Initial values of W0 to W15. W10 and W11 point into Y memory, W12 is the offset of prefetches."""
 STEPS = 3
 BRA_SELF = 0x37FFFF
 BYTES = ("se", "ze")
@@ -34,7 +34,8 @@ PREFETCH = re.compile(r"\[w(\d+)\]([+-])=(\d)")
 
 
 def instructions() -> list[Insn]:
-    """Yield every mode of every operand of every row, word and byte; modes of several operands change together."""
+    """Return instructions with every pointer mode of every row, as word and byte; the modes of several operands
+    change together."""
     found: dict[tuple[int, ...], Insn] = {}
     for row in ROWS:
         modes = [letter for letter in MODES if letter in row.fields]
@@ -61,7 +62,7 @@ def _encoded(row: Row, chosen: dict[str, int]) -> Insn | None:
 
 
 def moves(insn: Insn) -> dict[int, int]:
-    """Return the change of each pointer register by one run of the instruction, according to its text."""
+    """Return the expected change of each pointer register by one execution of the instruction, as its text states."""
     said = text.format(insn, PC)
     mnemonic = said.split()[0]
     size = 4 if mnemonic == "mov.d" else 1 if mnemonic.endswith(".b") or mnemonic in BYTES else 2
@@ -75,7 +76,7 @@ def moves(insn: Insn) -> dict[int, int]:
 
 
 def run(engine: Any, words: list[int], instructions_run: int) -> None:
-    """Run a program from PC, followed by a branch to itself."""
+    """Run words from PC, followed by a branch to itself."""
     data = {"W": POINTERS, "SR": 0, "CORCON": 0x20, "mem": {}}
     engine.prepare({"pc": PC, "op": [f"{word:06x}" for word in (*words, BRA_SELF)], "in": data})
     if isinstance(engine, OnMachine):
@@ -87,17 +88,17 @@ def run(engine: Any, words: list[int], instructions_run: int) -> None:
 
 @pytest.fixture(params=sorted(ENGINES), scope="module")
 def engine(request: pytest.FixtureRequest) -> Any:
-    """Every engine, and the table without a machine, move the pointers."""
+    """Return each engine, and the instruction table without a machine."""
     return ENGINES[request.param]()
 
 
 def test_pointers_move_by_the_size_of_the_access(engine: Any) -> None:
-    """The pointers move once, and three times under REPEAT."""
+    """Pointers change by the size of the access, once, and three times under REPEAT."""
     (again,) = codec.encode(next(row for row in ROWS if row.syntax == "REPEAT #lit14"), {"k": STEPS - 1})
     wrong = []
     for insn in instructions():
         wanted = moves(insn)
-        program, times = [insn.word1, 0], 1  # a NOP: some of them skip
+        program, times = [insn.word1, 0], 1  # a NOP for the instructions that skip
         if insn.row.repeat_ok:
             program += [again, insn.word1]
             times += STEPS
@@ -110,7 +111,7 @@ def test_pointers_move_by_the_size_of_the_access(engine: Any) -> None:
 
 
 def test_the_instructions_of_the_test_are_all_there_are() -> None:
-    """The cases include every row with a pointer and every pointer mode."""
+    """The instructions include every row with a pointer and every pointer mode."""
     met = {(insn.row.id, letter, getattr(insn.x, letter)) for insn in instructions() for letter in MODES
            if letter in insn.row.fields}  # fmt: skip
     for row in ROWS:

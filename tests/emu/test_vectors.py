@@ -1,7 +1,8 @@
-"""Recorded vectors: single instructions and short programs, compared with their outcome word by word.
+"""Recorded vectors: single instructions and short programs, whose result is compared with the recorded one word by
+word.
 
-``pytest tests/emu --vectors DIR`` runs another folder of the same format, ``--engine NAME`` one engine only.
-Formats: ``tests/vectors/README.md``. The engine "rows" is the instruction table alone, on the builder of rowmachine.py.
+``pytest tests/emu --vectors DIR`` runs another folder of the same format, ``--engine NAME`` one engine only. Formats:
+``tests/vectors/README.md``. The engine "rows" is the instruction table alone, on the builder of rowmachine.py.
 """
 
 from __future__ import annotations
@@ -23,24 +24,24 @@ from emu.dspic30f.isa import codec, text
 RAM_START = 0x0800
 NATIVE_STRIDE = 199
 PARTS = 4  # tests per engine, which pytest-xdist can run in parallel
-STEP_LIMIT = 100_000  # instructions after which a program that does not reach its end has failed
-CALL_WN_ROWS = {159: "goto", 161: "rcall"}  # a known defect of the disassembler that wrote the vectors
+STEP_LIMIT = 100_000  # number of instructions after which a program that has not reached its end fails
+CALL_WN_ROWS = {159: "goto", 161: "rcall"}  # known defect of the disassembler that wrote the vectors
 
 
 RECORDED = Path(__file__).resolve().parents[1] / "vectors"
-SEMANTIC_VECTORS, ENCODINGS, ASSEMBLED = 51_730, 8_298, 5_967  # of tests/vectors; other sets have their own numbers
+SEMANTIC_VECTORS, ENCODINGS, ASSEMBLED = 51_730, 8_298, 5_967  # for tests/vectors; other sets have other numbers
 OPENERS = {".xz": lzma.open, ".gz": gzip.open}
 
 
 def semantic_lines(folder: Path) -> Iterator[str]:
-    """Lines of all files of semantic vectors, one vector each."""
+    """Return the lines of all files of semantic vectors, one vector each."""
     for file in sorted(folder.glob("semantics*.jsonl.*")):
         with OPENERS[file.suffix](file, "rt") as lines:
             yield from lines
 
 
 def differences(engine: Engine, vector: dict[str, Any]) -> list[str]:
-    """Run one vector and return what differs from its recorded outcome."""
+    """Run one vector and return the differences from its recorded result."""
     before, after = vector["in"], vector["out"]
     engine.prepare(vector)
     ram = bytearray(engine.ram())
@@ -86,7 +87,7 @@ def report(capsys: pytest.CaptureFixture[str], message: str) -> None:
 
 
 def test_the_recorded_set_is_complete() -> None:
-    """tests/vectors/README.md: the numbers of vectors and of encodings."""
+    """tests/vectors/README.md: the recorded set has the stated numbers of vectors and of encodings."""
     assert sum(1 for _ in semantic_lines(RECORDED)) == SEMANTIC_VECTORS
     rows = encodings(RECORDED)
     assert (len(rows), sum(row["assembles"] == "yes" for row in rows)) == (ENCODINGS, ASSEMBLED)
@@ -96,7 +97,8 @@ def test_the_recorded_set_is_complete() -> None:
 def test_every_semantic_vector_gives_its_recorded_state(
     engine: Engine, part: int, vectors: Path, request: pytest.FixtureRequest, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Vectors README; isa.md §6-§8. Each part takes one vector in PARTS and prints the count.
+    """Vectors README; isa.md §6-§8: every semantic vector gives its recorded state. Each part takes one vector in
+    PARTS and prints the count.
 
     The JIT engine compiles every vector, so it runs one in NATIVE_STRIDE; ``--engine jit`` runs all of them.
     """
@@ -127,7 +129,7 @@ def failures(rows: list[dict[str, str]], check: Callable[[dict[str, str]], str |
 
 
 def test_every_encoding_decodes_to_its_recorded_text(vectors: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Vectors README, encodings.csv."""
+    """Vectors README: every row of encodings.csv decodes to its recorded text."""
 
     def check(row: dict[str, str]) -> str | None:
         words = words_of(row)
@@ -148,7 +150,7 @@ def test_every_encoding_decodes_to_its_recorded_text(vectors: Path, capsys: pyte
 
 
 def test_every_encoding_marked_yes_assembles_to_its_words(vectors: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Vectors README, encodings.csv, column assembles."""
+    """Vectors README: every row of encodings.csv with "yes" in the column assembles is assembled to its words."""
 
     def check(row: dict[str, str]) -> str | None:
         try:

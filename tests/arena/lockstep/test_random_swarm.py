@@ -29,9 +29,9 @@ def test_the_campaign_detects_a_difference(tmp_path: Path, monkeypatch: pytest.M
     records are compared."""
     trial, run = Trial(104, tmp_path), Trial.run
 
-    def pushed(self: Trial, way: str, tally: Counter[str]) -> list[list[object]]:
-        seen = run(self, way, tally)
-        if way == "1 thread":
+    def pushed(self: Trial, mode: str, tally: Counter[str]) -> list[list[object]]:
+        seen = run(self, mode, tally)
+        if mode == "1 thread":
             seen[-1][-1][0] += 1e-9
         return seen
 

@@ -21,7 +21,7 @@ SOURCE = Path(__file__).parent / "program.c"
 
 
 def line_of(text: str) -> int:
-    """Return the number of the line of the program that contains `text`."""
+    """Return the number of the program's line that contains `text`."""
     return next(n for n, line in enumerate(SOURCE.read_text().splitlines(), 1) if text in line)
 
 
@@ -305,7 +305,8 @@ def test_invalid_launch_arguments_are_named(client: Client) -> None:
 
 
 def test_registers_are_listed_by_peripheral_and_bit_field(stopped: Callable[..., Client]) -> None:
-    """Custom request `sfrs`: every path is an expression, and reading has no side effect."""
+    """The custom request `sfrs` lists registers by peripheral and bit field. Every path is an expression, and reading
+    has no side effect."""
     client = stopped("total = sum;")
     groups = {one["name"]: one["parts"] for one in client.ask("sfrs")["groups"]}
     assert {"CPU core", "UART 1", "Timer 1", "I/O ports", "CAN 2"} <= set(groups)
@@ -341,7 +342,8 @@ INVALID_REQUESTS: list[tuple[str, dict[str, Any], str]] = [
 
 
 def test_invalid_requests_are_refused_with_a_reason(stopped: Callable[..., Client]) -> None:
-    """A reference of an earlier stop is refused and does not denote the innermost frame."""
+    """Invalid requests are refused with a reason; a variable reference of an earlier stop does not denote the
+    innermost frame."""
     client = stopped("total = sum;")
     frame = client.top()["id"]
     for command, arguments, words in INVALID_REQUESTS:
@@ -374,7 +376,7 @@ def framed(command: str, **arguments: Any) -> bytes:
     ("sent", "replies", "words"),
     [
         (b"", 0, ""),
-        (framed("restart") + framed("terminate"), 3, ""),  # the event "terminated"
+        (framed("restart") + framed("terminate"), 3, ""),  # the event "terminated" ends the session
         (b"GET / HTTP/1.1\r\nHost: x\r\n\r\n", 0, "an HTTP request, perhaps from a web page; this port is for editors"),
         (b"POST /content-length:71 HTTP/1.1\r\nHost: x\r\nContent-Length: 71\r\n\r\n" + framed("initialize")[-71:],
          0, "an HTTP request"),
@@ -394,7 +396,8 @@ def framed(command: str, **arguments: Any) -> bytes:
     ],
 )  # fmt: skip
 def test_a_protocol_error_ends_the_server_with_a_message(sent: bytes, replies: int, words: str) -> None:
-    """Valid input gives status 0 and no error text; a restart before the launch is refused."""
+    """A protocol error ends the server with status 2 and a message; valid input ends with status 0 and no error text.
+    A restart before the launch is refused."""
     done = subprocess.run([sys.executable, "-m", "emu", "debug"], input=sent, capture_output=True, timeout=HANG)
     assert done.stdout.count(b"Content-Length") == replies
     assert done.returncode == (2 if words else 0), done.stderr
@@ -415,7 +418,7 @@ def test_after_a_lost_connection_the_port_serves_the_next_client(program: str, t
     assert server.stderr is not None
     try:
         port = int(server.stderr.readline().rsplit(":", 1)[1])
-        for reset in (b"\1\0\0\0\0\0\0\0", b"\0" * 8):  # with and without discarding unread data
+        for reset in (b"\1\0\0\0\0\0\0\0", b"\0" * 8):  # SO_LINGER, with and without discarding unread data
             with socket.create_connection(("127.0.0.1", port), timeout=HANG) as gone:
                 gone.sendall(framed("launch", program=str(image)) + framed("configurationDone"))
                 seen = b""

@@ -16,11 +16,12 @@ from toolchain.driver import driver
 
 ROOT = Path(__file__).resolve().parents[3]
 SITE = Path("/usr/share/emacs/site-lisp/elpa-src")
-"""Folder of Emacs packages on Debian."""
+"""Folder of Emacs packages in Debian."""
 
 
 def test_a_session_in_emacs(tmp_path: Path) -> None:
-    """Breakpoint, locals, step, step back, continue, step out, reverse continue, disconnect."""
+    """dap-mode can set a breakpoint, show locals, step forward and back, continue forward and in reverse, step out,
+    and disconnect."""
     emacs = shutil.which("emacs")
     if emacs is None or not list(SITE.glob("dap-mode-*")):
         pytest.skip("Emacs with dap-mode is not installed (Debian packages emacs-nox, elpa-dap-mode)")

@@ -1,4 +1,4 @@
-"""`emu inject`: effect of every kind of fault, classification of outcomes, output independent of --jobs."""
+"""`emu inject`: effect of every kind of fault, classification of outcomes, output that is independent of --jobs."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def trials(firmware):
 
 
 def judged(trials, monkeypatch, place: str, bit: int, cycle: int = 60_000):
-    """Return the outcome of a flipped bit of a variable."""
+    """Return the outcome of a flipped bit in a variable."""
     address = load_image(trials._image.path).symbols.find(f"_{place}").address
     fault = Fault(0, "ram", cycle, address, bit)
     monkeypatch.setattr("emu.inject.trial.choose_fault", lambda *_: fault)
@@ -84,7 +84,8 @@ def judged(trials, monkeypatch, place: str, bit: int, cycle: int = 60_000):
 
 
 def test_outcomes_are_classified(trials, monkeypatch):
-    """Faults in variables with known effect: a total with its copy, a mode that hangs or traps, unused RAM."""
+    """Faults in variables with known effect have the expected outcomes: a total with a copy, a mode that hangs or
+    traps, unused RAM."""
     one = partial(judged, trials, monkeypatch)
     assert (one("unused", 0).outcome, one("unused", 0).latent) == ("masked", True)
     assert one("total", 1).outcome == "detected"
@@ -134,7 +135,7 @@ def test_every_fault_has_its_documented_effect(firmware):
 
 
 def test_output_does_not_depend_on_the_number_of_jobs(firmware, capsys):
-    """The same holds when the campaign continues from half of its state file."""
+    """The output is the same for any --jobs, also if the campaign continues from half of its state file."""
     written = []
     for name, jobs in (("one", 1), ("two", 2)):
         words = ["--campaign", firmware / "campaign.toml", "--jobs", jobs, "--out", firmware / f"{name}.csv"]
@@ -167,7 +168,7 @@ def test_choices_follow_from_seed_and_number_and_keep_the_shares(firmware):
 
 
 def test_intervals_are_wilson_s():
-    """12 of 1,000: 0.69 to 2.09 % (Wilson, 1927)."""
+    """Wilson's interval of 12 in 1,000 is 0.69 to 2.09 % (Wilson, 1927)."""
     found = summary(
         [SimpleNamespace(kind="ram", outcome="silent")] * 12 + [SimpleNamespace(kind="ram", outcome="masked")] * 988
     )

@@ -18,7 +18,7 @@ def random_insn(row: Row, generator: random.Random) -> Insn:
         ]
         if "z" in row.fields:
             words[0] &= ~sum(run.mask << run.shift for run in row.fields["z"].runs)
-        if "t" in row.fields and "v" in row.fields:  # t = v + 1 is too rare to wait for
+        if "t" in row.fields and "v" in row.fields:  # t = v + 1 would be too rare at random
             v = generator.randrange(0, 14, 2)
             x = Operands(**{f.letter: f.get(*words) for f in row.pattern.fields} | {"v": v, "t": v + 1})
             if not row.broken(x):

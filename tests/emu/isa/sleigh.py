@@ -1,7 +1,7 @@
 """Comparison with an independent decoder: Ghidra's SLEIGH description of the dsPIC30F, through pypcode.
 
-``disagreement`` names the class of a word on which both differ; ``docs/census.md`` explains every class. Differences of
-pure notation (case, spaces, radix, ACCA for A, signed targets) are removed before comparing.
+``disagreement`` classifies a word for which the texts differ; ``docs/census.md`` explains every class. Differences in
+notation (case, spaces, radix, ACCA for A, signed targets) are removed before the comparison.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ PC = 0x1000
 NUMBER = re.compile(r"(?<!\w)([+-]?)(0x[0-9a-f]+|\d+)")
 CONTEXT = pypcode.Context(LANGUAGE)
 
-# Classes of texts that differ, by row of the table.
+# Classes of differing texts, by row of the table.
 BIT_FORMS = {116, 118, 120, 122, 127, 130, 132}
 ROW_CLASSES = (
     ("word notation of f-bit forms", BIT_FORMS),
@@ -34,7 +34,7 @@ ROW_CLASSES = (
 
 
 def theirs(word1: int, word2: int = 0) -> str | None:
-    """Return SLEIGH's text of an instruction at PC, or None if it does not decode."""
+    """Return SLEIGH's text of an instruction at PC, or None if SLEIGH does not decode it."""
     octets = word1.to_bytes(4, "little") + word2.to_bytes(4, "little")
     try:
         found = CONTEXT.disassemble(octets, base_address=2 * PC, max_instructions=1).instructions

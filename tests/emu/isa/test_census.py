@@ -1,4 +1,5 @@
-"""The whole space of first words: which are legal, and that no two rows claim the same one (isa.md §4, §4.1)."""
+"""The space of all first words: the legal ones are those of the reference, and no two rows claim the same word
+(isa.md §4, §4.1)."""
 
 from __future__ import annotations
 
@@ -19,7 +20,7 @@ REFERENCE = Path(__file__).resolve().parents[2] / "vectors"
 
 
 def claimed(row: Row, words: np.ndarray) -> np.ndarray:
-    """Return which words belong to the row: fixed bits and rules match."""
+    """Return the words that belong to a row: fixed bits and rules match."""
     mine = (words & row.pattern.mask[0]) == row.pattern.value[0]
     for clause in row.clauses:
         mine &= clause.holds(lambda letter: row.fields[letter].get(words))
@@ -28,7 +29,7 @@ def claimed(row: Row, words: np.ndarray) -> np.ndarray:
 
 @cache
 def census() -> tuple[np.ndarray, dict[int, int]]:
-    """Return the rows per first word, and the words per row."""
+    """Return the number of rows for each first word, and the number of words for each row."""
     rows_per_word = np.zeros(1 << 24, dtype=np.uint8)
     words_per_row: Counter[int] = Counter()
     for byte, bucket in enumerate(BY_BYTE):
@@ -41,12 +42,12 @@ def census() -> tuple[np.ndarray, dict[int, int]]:
 
 
 def test_the_number_of_legal_first_words_is_that_of_the_reference() -> None:
-    """isa.md §4: exhaustive enumeration of 2**24 words."""
+    """isa.md §4: the number of legal first words among all 2**24 is that of the reference."""
     assert int((census()[0] > 0).sum()) == LEGAL_WORDS
 
 
 def test_no_word_is_claimed_by_two_rows() -> None:
-    """isa.md §4."""
+    """isa.md §4: no first word belongs to two rows."""
     doubled = np.flatnonzero(census()[0] > 1)
     assert not len(doubled), [f"{word:06x}" for word in doubled[:10]]
 
@@ -65,7 +66,8 @@ def test_decode_agrees_with_the_census() -> None:
 
 
 def test_legal_words_per_opcode_byte_are_those_of_the_reference() -> None:
-    """isa.md §4, legal_words.csv: ranges of opcode bytes, and how many of the 65,536 words of each byte are legal."""
+    """isa.md §4, legal_words.csv: the number of legal words among the 65,536 of each opcode byte is that of the
+    reference."""
     checked = 0
     with open(REFERENCE / "legal_words.csv", newline="") as lines:
         for line in csv.DictReader(lines):
@@ -89,14 +91,14 @@ def fixed_bits(pattern: str) -> tuple[int, int]:
 
 
 def test_the_table_has_the_rows_of_the_reference() -> None:
-    """isa.csv: 226 base forms of 83 mnemonics."""
+    """isa.csv: the table has the 226 base forms and 83 mnemonics of the reference."""
     assert set(BY_ID) == set(reference_rows())
     assert len(ROWS) == 226
 
 
 @pytest.mark.parametrize("row", ROWS, ids=lambda row: f"{row.id}-{row.mnemonic}")
 def test_bits_cycles_flags_and_repeat_are_those_of_the_reference(row: Row) -> None:
-    """isa.csv, columns word1, word2, words, cycles, repeat, psv_extra and the flags."""
+    """isa.csv: columns word1, word2, words, cycles, repeat, psv_extra and the flags equal those of the table."""
     reference = reference_rows()[row.id]
     masks, values = zip(fixed_bits(reference["word1"]), fixed_bits(reference["word2"]), strict=True)
     zeros = sum(run.mask << run.shift for run in row.fields["z"].runs) if "z" in row.fields else 0
@@ -108,6 +110,6 @@ def test_bits_cycles_flags_and_repeat_are_those_of_the_reference(row: Row) -> No
     if reference["psv_extra"][:1] in ("1", "2"):
         assert row.psv_class == ("mov" if reference["psv_extra"][0] == "1" else "other")
     flags = [f if reference[f] != "s" else f"{f}=s" for f in ("DC", "N", "OV", "Z", "C") if reference[f] != "-"]
-    sticky_too = row.mnemonic == "MPY.N"  # flags as MPY: isa.md §22 item 20
+    sticky_too = row.mnemonic == "MPY.N"  # MPY.N has the flags of MPY: isa.md §22 item 20
     flags += [f for f in ("OA", "OB", "SA", "SB") if reference[f] != "-" or sticky_too]
     assert row.flags.split() == flags

@@ -1,4 +1,4 @@
-"""The builder contract (isa/builder.py), which every ``does`` must keep with any builder."""
+"""The builder contract (isa/builder.py), which ``does`` of every row must keep with any builder."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ READ_OPERANDS, FORM_ADDRESSES, LOAD, WRITE = range(4)
 
 
 class Opaque:
-    """An opaque value: rows must not inspect it."""
+    """Opaque value: rows must not depend on it."""
 
     def _same(self, *_: object) -> Opaque:
         return self
@@ -105,7 +105,7 @@ EDGES = (0, 1, 2, 0x7FFF, 0x8000, 0x8001, 0xFFFE, 0xFFFF, 0x1000, 0x1800, 0x27FE
 
 
 class Anything(RowMachine):
-    """A machine in a random state that accepts trap requests."""
+    """Machine in a random state that accepts trap requests."""
 
     def __init__(self, insn: Insn, generator: random.Random) -> None:
         super().__init__({})
@@ -131,7 +131,8 @@ class Anything(RowMachine):
 
 @pytest.mark.parametrize("row", ROWS, ids=lambda row: f"{row.id}-{row.mnemonic}")
 def test_a_row_stays_within_its_values_in_any_state(row: Row) -> None:
-    """Addresses and pointers are 16 bits, accumulators 40, flags one, whatever the registers and modes hold."""
+    """In any state of registers and modes, a row's addresses and pointers have 16 bits, accumulators 40, and flags
+    one."""
     generator = random.Random(1000 + row.id)
     for _ in range(RUNS):
         insn = random_insn(row, generator)
@@ -153,7 +154,8 @@ def run(insn: Insn, context: Context) -> Watcher:
 
 @pytest.mark.parametrize("row", ROWS, ids=lambda row: f"{row.id}-{row.mnemonic}")
 def test_a_row_is_straight_line_in_phases_and_changes_only_its_flags(row: Row) -> None:
-    """isa/builder.py: operands, addresses, loads, writes; no branch on a value. Flags: column of the table."""
+    """isa/builder.py: a row executes its phases in order (operands, addresses, loads, writes), never branches on a
+    value, and changes only the flags in its column of the table."""
     generator = random.Random(row.id)
     listed = {flag.removesuffix("=s") for flag in row.flags.split()}
     for _ in range(SAMPLES):

@@ -1,4 +1,4 @@
-"""Words to fields to words, and text to fields to text, are identities."""
+"""Conversions from words to fields and back, and from text to fields and back, are identities."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ SAMPLES = 60
 
 
 def tidied(insn: Insn) -> Insn:
-    """Return the same instruction with unused fields as an assembler writes them."""
+    """Return the instruction with unused fields as an assembler writes them."""
     values = {letter: getattr(insn.x, letter) for letter in insn.row.fields} | idle_fields(insn)
     again = codec.decode(*codec.encode(insn.row, values))
     assert again is not None
@@ -26,7 +26,7 @@ def tidied(insn: Insn) -> Insn:
 
 
 def check_words(insn: Insn) -> None:
-    """decode∘encode is the identity on fields, encode∘decode on all bits that are not ignored."""
+    """Check that decode∘encode is the identity on fields, and encode∘decode on all bits that are not ignored."""
     words = codec.encode(insn.row, insn.x)
     assert codec.decode(*words) == insn
     given_words = (insn.word1, insn.word2)[: insn.words]
@@ -38,7 +38,7 @@ def check_words(insn: Insn) -> None:
 
 
 def check_text(insn: Insn, pc: int) -> None:
-    """parse∘format is the identity on instructions, format∘parse on texts."""
+    """Check that parse∘format is the identity on instructions, and format∘parse on texts."""
     plain = tidied(insn)
     written = text.format(plain, pc, source=True)
     words = text.parse(written).encode(pc)
@@ -49,12 +49,12 @@ def check_text(insn: Insn, pc: int) -> None:
 
 @pytest.mark.parametrize("row", ROWS, ids=lambda row: f"{row.id}-{row.mnemonic}")
 def test_random_instructions_of_each_row_survive_both_round_trips(row: Row) -> None:
-    """Every row is sampled, however few words it has."""
+    """Random instructions of every row, however few words it has, survive both round trips."""
     generator = random.Random(row.id)
     for _ in range(SAMPLES):
         insn = random_insn(row, generator)
         if row.mnemonic == "DO" and insn.x.n in (-2, -1, 0):
-            continue  # legal as a word, refused in text: isa.md §7.6
+            continue  # legal as a word, but refused as text: isa.md §7.6
         check_words(insn)
         check_text(insn, generator.randrange(0, 0x18000, 2))
 
@@ -62,7 +62,7 @@ def test_random_instructions_of_each_row_survive_both_round_trips(row: Row) -> N
 @settings(max_examples=2000, deadline=None)
 @given(st.integers(0, (1 << 24) - 1), st.integers(0, 0xFFFF), st.integers(0, 0xBFFF))
 def test_any_legal_word_survives_both_round_trips(word1: int, word2: int, slot: int) -> None:
-    """isa.md §4: over the whole space of first words."""
+    """isa.md §4: any legal first word survives both round trips."""
     insn = codec.decode(word1, word2)
     if insn is None or (insn.row.mnemonic == "DO" and insn.x.n in (-2, -1, 0)):
         return
@@ -73,7 +73,7 @@ def test_any_legal_word_survives_both_round_trips(word1: int, word2: int, slot: 
 @settings(max_examples=500, deadline=None)
 @given(st.sampled_from(ROWS), st.data())
 def test_encode_refuses_values_that_do_not_fit_their_field(row: Row, data: st.DataObject) -> None:
-    """Encoding raises an error for a value that does not fit."""
+    """`encode` raises an error for a value that does not fit its field."""
     if not row.fields:
         return
     field = row.fields[data.draw(st.sampled_from(sorted(row.fields)))]

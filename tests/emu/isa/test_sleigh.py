@@ -1,4 +1,4 @@
-"""Two independent descriptions of the instruction set, compared word by word (docs/census.md)."""
+"""Word-by-word comparison of two independent descriptions of the instruction set (docs/census.md)."""
 
 from __future__ import annotations
 
@@ -22,12 +22,13 @@ PER_ROW = 40
 
 
 def explained() -> set[str]:
-    """Return the classes in the table of docs/census.md."""
+    """Return the classes of disagreement in the table of docs/census.md."""
     return set(re.findall(r"^\| ([^|]+?) \| [\d,]+ \|", PAGE.read_text(), re.MULTILINE))
 
 
 def test_random_words_disagree_only_as_the_page_explains() -> None:
-    """All 2**24 words were compared once (tests/fuzz/emulator/census_sleigh.py); this is a sample."""
+    """In a sample of random words, all disagreements are of classes in docs/census.md. The campaign census_sleigh.py
+    in tests/fuzz/emulator compares all 2**24 words."""
     generator = random.Random(30)
     known = explained()
     for word in (generator.getrandbits(24) for _ in range(RANDOM_WORDS)):
@@ -37,7 +38,8 @@ def test_random_words_disagree_only_as_the_page_explains() -> None:
 
 @pytest.mark.parametrize("row", ROWS, ids=lambda row: f"{row.id}-{row.mnemonic}")
 def test_instructions_of_each_row_disagree_only_as_the_page_explains(row: Row) -> None:
-    """Both words of two-word instructions are compared."""
+    """Disagreements on random instructions of each row, with both words of two-word instructions, are of classes in
+    docs/census.md."""
     generator = random.Random(row.id)
     known = explained()
     for _ in range(PER_ROW):
@@ -47,5 +49,5 @@ def test_instructions_of_each_row_disagree_only_as_the_page_explains(row: Row) -
 
 
 def test_no_word_is_legal_here_and_unknown_there() -> None:
-    """docs/census.md: SLEIGH decodes every legal word."""
+    """docs/census.md: SLEIGH decodes every word that is legal in the table."""
     assert "not decoded by SLEIGH" not in explained()

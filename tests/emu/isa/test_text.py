@@ -1,4 +1,4 @@
-"""Parsing of assembly statements, and messages for wrong ones."""
+"""Parsing of assembly statements, and messages for invalid ones."""
 
 from __future__ import annotations
 
@@ -52,14 +52,14 @@ from emu.dspic30f.isa import codec, text
     ],
 )
 def test_aliases_and_spellings_mean_the_same_words(written: str, same: str) -> None:
-    """isa.md §16."""
+    """isa.md §16: aliases and alternative spellings assemble to the same words."""
     assert text.parse(written).encode(0x1000) == text.parse(same).encode(0x1000)
 
 
 @pytest.mark.parametrize(
     ("written", "word"),
     [
-        ("mov WREG, 0x800", 0xB7A800),  # MOV WREG,f is not MOV W0,f
+        ("mov WREG, 0x800", 0xB7A800),  # MOV WREG,f and MOV W0,f are different rows
         ("mov w0, 0x800", 0x884000),
         ("mov 0x800, WREG", 0xBF8800),
         ("mov 0x800, w0", 0x804000),
@@ -74,7 +74,7 @@ def test_aliases_and_spellings_mean_the_same_words(written: str, same: str) -> N
     ],
 )
 def test_look_alikes_keep_their_own_encodings(written: str, word: int) -> None:
-    """isa.md §16, §8.1."""
+    """isa.md §8.1, §16: similar statements keep their own encodings."""
     assert text.parse(written).encode(0) == (word,)
 
 
@@ -121,7 +121,7 @@ def test_look_alikes_keep_their_own_encodings(written: str, word: int) -> None:
     ],
 )
 def test_wrong_statements_are_refused_with_the_reason(statement: str, complaint: str) -> None:
-    """isa.md §3.2, §5, §7.6, §16."""
+    """isa.md §3.2, §5, §7.6, §16: an invalid statement is refused with the reason."""
     with pytest.raises(text.StatementError) as caught:
         text.parse(statement).encode(0x1000)
     assert complaint in str(caught.value)
@@ -129,7 +129,7 @@ def test_wrong_statements_are_refused_with_the_reason(statement: str, complaint:
 
 @dataclass
 class Later:
-    """An expression whose value is known only at link time."""
+    """Expression whose value is known only at link time."""
 
     name: str
     value: int | None = None
@@ -160,7 +160,7 @@ class Later:
     ],
 )
 def test_open_operands_become_slots_with_their_relocation(statement: str, relocations: list[str], words: int) -> None:
-    """abi-elf.md §5."""
+    """abi-elf.md §5: operands with unknown values become slots with their relocation type."""
     parsed = text.parse(statement, Later)
     assert [slot.relocation for slot in parsed.slots] == relocations
     assert [slot.expression.name for slot in parsed.slots] == ["sym" if r else "+sym" for r in relocations]
@@ -168,7 +168,7 @@ def test_open_operands_become_slots_with_their_relocation(statement: str, reloca
 
 
 def test_a_slot_takes_its_value_later() -> None:
-    """The value of a slot is the target address, not an offset."""
+    """A slot is filled with the target address, not with an offset."""
     parsed = text.parse("bra Z, there", Later)
     assert parsed.encode(0x1000) == (0x320000,)
     assert parsed.encode(0x1000, {0: 0x1006}) == (0x320002,)
@@ -177,7 +177,7 @@ def test_a_slot_takes_its_value_later() -> None:
 
 
 def test_a_word_bit_above_7_adds_one_to_the_symbol() -> None:
-    """isa.md §16: BSET f, #8..15 is a bit of the byte after f."""
+    """isa.md §16: BSET f, #8..15 is a bit of the byte after f, so 1 is added to the symbol."""
 
     def expr(source: str) -> Later:
         return Later(source, None if source == "PORTB" else int(source))
@@ -188,7 +188,7 @@ def test_a_word_bit_above_7_adds_one_to_the_symbol() -> None:
 
 
 def test_no_expression_is_parsed_for_a_form_that_does_not_fit() -> None:
-    """Forms that are tried and rejected create no symbols."""
+    """The parser does not parse expressions for forms that do not match, so these forms create no symbols."""
     asked: list[str] = []
 
     def expr(source: str) -> Later:
@@ -201,7 +201,8 @@ def test_no_expression_is_parsed_for_a_form_that_does_not_fit() -> None:
 
 
 def test_symbols_replace_addresses_where_the_caller_knows_them() -> None:
-    """Branch targets are program addresses, file registers data addresses."""
+    """If the caller knows symbols, they replace addresses: program addresses in branches, data addresses in file
+    registers."""
 
     def symbol(address: int, space: str) -> str | None:
         return {(0x200, "code"): "_main", (0x42, "data"): "_SR"}.get((address, space))
@@ -213,14 +214,15 @@ def test_symbols_replace_addresses_where_the_caller_knows_them() -> None:
 
 
 def test_operands_are_split_outside_brackets_and_character_literals() -> None:
-    """A comma may be quoted or in parentheses."""
+    """Operands are split at commas outside of brackets and character literals."""
     assert text.split_operands("#',', w1") == ["#','", "w1"]
     assert text.split_operands(r"#'\'', [w1 + (2,3)]") == [r"#'\''", "[w1 + (2,3)]"]
     assert text.split_operands("") == []
 
 
 def test_rules_the_cpu_does_not_enforce_leave_words_executable_but_not_legal() -> None:
-    """isa.md §3.1, §3.3, §5.1, §8.5; other broken rules are illegal opcodes (§4.1)."""
+    """isa.md §3.1, §3.3, §5.1, §8.5: words that break rules the CPU does not enforce are executable but not legal;
+    words that break other rules are illegal opcodes (§4.1)."""
     for word in (0xB42843, 0xC80060, 0x780070, 0xEF0001):  # add.w 0x843; sftac A, #-32; mov mode 7; clr WREG with f
         assert codec.decode(word) is None
         assert codec.decode_for_execution(word) is not None
@@ -229,6 +231,6 @@ def test_rules_the_cpu_does_not_enforce_leave_words_executable_but_not_legal() -
 
 
 def test_the_second_word_must_fit_its_pattern() -> None:
-    """isa.md §5.7: CALL's second word holds 7 address bits and zeros."""
+    """isa.md §5.7: the second word of CALL must have 7 address bits and zeros."""
     assert codec.decode(0x020200, 0x00007F) is not None
     assert codec.decode(0x020200, 0x000080) is None

@@ -1,7 +1,7 @@
-"""Two machines with different engines in lockstep: native code against the plain interpreter, with coverage counts.
+"""Two machines with different engines in lockstep: native code is compared with the plain interpreter, and counted.
 
-`Tally` counts only what was compared afterwards without a difference. Native execution is not assumed: instructions
-that the native machine gave to Python are counted there and subtracted.
+`Tally` counts only what was compared without a difference. Instructions that the native machine left to Python are
+counted and subtracted.
 """
 
 from __future__ import annotations
@@ -30,13 +30,14 @@ from emu.dspic30f.state.state import DA, NOT_REPEATING, RA
 from emu.machine.machine import Machine
 
 MODE_BITS = 0x10F7
-"""CORCON bits that are processor modes (isa.md §2.4)."""
+"""CORCON bits that select processor modes (isa.md §2.4)."""
 NO_WATCHDOG = 0x7FFF
 """FWDT with FWDTEN clear (dspic30f6014a.md §17)."""
 LOST = 6000
-"""Cycles without a new address after which a straight program is reset by its pin."""
+"""Number of cycles without a new address after which the rig resets a straight program by the reset pin."""
 FRUITLESS = 30
-"""Consecutive resets without a new address after which a pass is abandoned: its data may make it loop for ever."""
+"""Number of consecutive resets without a new address after which a pass is abandoned, because its data may make it
+loop for ever."""
 
 
 class Difference(Exception):
@@ -45,27 +46,28 @@ class Difference(Exception):
 
 @dataclass
 class Tally:
-    """Counts of what was executed and found equal."""
+    """Counts of executed items that were equal in both engines."""
 
     programs: Counter[str] = field(default_factory=Counter)
     instructions: Counter[str] = field(default_factory=Counter)
-    """Number of programs by campaign."""
+    """Number of executed instructions, by campaign."""
     stops: int = 0
     exchanges: int = 0
-    """Stops at which each machine continued from the snapshot of the other."""
+    """Number of stops at which each machine continued from the snapshot of the other."""
     hooks: int = 0
-    """Arrivals at hooked addresses."""
+    """Number of arrivals at hooked addresses."""
     entries: Counter[str] = field(default_factory=Counter)
-    """Exceptions entered, by campaign."""
+    """Number of exception entries, by campaign."""
     places: Counter[str] = field(default_factory=Counter)
-    """Exceptions entered in one step, by the kinds of place that they interrupted; one may count for several kinds."""
+    """Number of exception entries in single steps, by the kinds of place that they interrupted; one entry may count
+    for several kinds."""
     rows: Counter[str] = field(default_factory=Counter)
     native_rows: Counter[str] = field(default_factory=Counter)
     seen: set[int] = field(default_factory=set)
     native: set[int] = field(default_factory=set)
-    """(word, modes) pairs that were executed; `native`: that native code executed."""
+    """(word, modes) pairs that were executed. `native`: executed by native code."""
     both: set[int] = field(default_factory=set)
-    """Pairs executed by block code or exact code, and again by exact code alone."""
+    """Pairs that both block code and exact code have executed."""
 
     def executed(self) -> int:
         """Return the number of instructions of all campaigns."""
@@ -99,7 +101,7 @@ class Tally:
         return {name: array("Q", getattr(self, name)).tobytes() for name in ("seen", "native", "both")}
 
     def unpack(self, counts: dict[str, Any], sets: dict[str, bytes]) -> None:
-        """Set everything from `as_json` and `packed`."""
+        """Restore a tally from the results of `as_json` and `packed`."""
         for name in ("programs", "instructions", "entries", "places", "rows", "native_rows"):
             setattr(self, name, Counter(counts[name]))
         self.stops, self.exchanges, self.hooks = counts["stops"], counts["exchanges"], counts.get("hooks", 0)
@@ -110,7 +112,7 @@ class Tally:
 
 
 class _NoCache:
-    """Cache that stores nothing, so that no two programs share code."""
+    """Cache that stores nothing, so that programs share no code."""
 
     stores = hits = 0
 
@@ -128,11 +130,11 @@ class _NoCache:
 
 
 class QuickCompiler(Compiler):
-    """Compiler that works in this process and compiles block code at a given LLVM level. It shares no objects."""
+    """Compiler in this process that compiles block code at a given LLVM level and shares no objects."""
 
     backend: ClassVar[Backend] = Backend()
     dispatchers: ClassVar[dict[str, bytes]] = {}
-    """Objects of dispatch loops, by their text."""
+    """Compiled dispatch loops, by their source text."""
 
     def __init__(self, block_level: int) -> None:
         super().__init__(_NoCache())  # type: ignore[arg-type]
@@ -147,12 +149,12 @@ class QuickCompiler(Compiler):
 
 
 class InstructionObserver:
-    """Counts the instructions of a plain machine, and the instructions of the native machine that Python runs."""
+    """Counter of the instructions of a plain machine, and of those of the native machine that Python executes."""
 
     def __init__(self, plain: Machine, native: Machine) -> None:
         self.plain = plain
         self.ran: Counter[int] = Counter()
-        """Executions by `(PC, modes)`."""
+        """Number of executions by `(PC, modes)`."""
         self.python: Counter[int] = Counter()
         self.addresses: set[int] = set()
         self.instructions = 0
@@ -227,12 +229,12 @@ class InstructionObserver:
             return None
 
     def native_now(self) -> set[int]:
-        """Return the keys of `ran` that have run natively at least once."""
+        """Return the keys of `ran` that native code has executed at least once."""
         python = self.python
         return {key for key, count in self.ran.items() if count > python[key]}
 
     def close(self, campaign: str) -> Tally:
-        """Return all counts of this observer. Call it when no difference was found."""
+        """Return all counts of this observer. Called after a comparison without a difference."""
         tally, steps = self.tally, {}
         tally.programs[campaign] += 1
         tally.instructions[campaign] += self.instructions
@@ -268,7 +270,8 @@ class Hooks:
                 machine.hook_pc(address, lambda m=machine, s=seen: s.append((m.pc, m.cycle)))  # type: ignore[misc]
 
     def compare(self, tally: Tally) -> None:
-        """Compare the arrivals since the last call: same addresses in the same cycles. Raises Difference."""
+        """Compare the arrivals since the last call: both machines have the same addresses in the same cycles. Raises
+        Difference."""
         one, other = self._arrivals
         if one != other:
             raise Difference(f"arrivals at hooks {one[-3:]} {other[-3:]}")
@@ -280,7 +283,7 @@ class Hooks:
 def engine_pair(
     firmware: Firmware, ipl_slip: int, block_level: int, chip: Chip = DSPIC30F6014A
 ) -> tuple[Machine, Machine]:
-    """Return a plain machine, and a native one that compiles each address before it runs it."""
+    """Return a plain machine, and a native machine that compiles each address before it runs it."""
     plain, native = (Machine(chip, engine=engine, ipl_slip=ipl_slip) for engine in ("plain", "jit"))
     runner = native.runner
     assert isinstance(runner, JitEngine)
@@ -342,7 +345,7 @@ def check_straight(seed: int, shape: Shape | None = None) -> Tally:
 
 
 def check_wild(seed: int, stops: int = 20, chip: Chip = DSPIC30F6014A) -> Tally:
-    """Check a short program with jumps, traps and mode changes at random places; every third one has hooks."""
+    """Check a short program with jumps, traps and mode changes at random places; one program in three has hooks."""
     generator = random.Random(seed)
     plain, native = engine_pair(random_firmware(seed, chip), seed & 1, 2 if seed % 4 == 1 else 0, chip)
     watch = InstructionObserver(plain, native)

@@ -1,10 +1,10 @@
-"""Short programs of instructions that write flags and instructions that read them, with runs that end in every cycle.
+"""Short programs (drills) of instructions that write flags and instructions that read them, cut at every cycle.
 
-The table says which rows write the flags C, Z, OV, N and DC; a machine that notes it, which rows read them. A drill is
-two pairs of them, whose turn it is, and some more in any order, on words and bytes, in registers and memory, with
-branches and skips round some of them, and now and then something that leaves native code in the middle. `check` runs an
-image of drills on all engines: from many contents of registers and SR, cut behind every number of cycles, with
-interrupts and hooks.
+The instruction table states which rows write the flags C, Z, OV, N and DC; a builder that records accesses finds the
+rows that read them. A drill has two pairs of a writer and a reader, taken from the list of all pairs in turn, and
+more such instructions in random order. They use words and bytes, registers and memory. Branches and skips jump over
+some of them, and some instructions leave native code. `check` runs an image of drills on all engines, with many
+values of registers and SR, a cut after every number of cycles, interrupts and hooks.
 """
 
 from __future__ import annotations
@@ -31,15 +31,15 @@ from emu.machine.machine import Machine
 ENGINES: Final = ("plain", "jit")
 FLAGS: Final = ("C", "Z", "OV", "N", "DC")
 DRILLS: Final = 24
-"""Number of drills of one image."""
+"""Number of drills per image."""
 FIRST, ROOM = 0x400, 0x40
-"""Program address of the first drill, and bytes of program memory for each."""
+"""Program address of the first drill, and program addresses reserved for each drill."""
 HANDLER, TRAP = 0x200, 0x280
 IFS0, TMR1, PORTD = 0x84, 0x100, 0x2D2
 NO_WATCHDOG: Final = 0x7FFF
 VALUES: Final = (0, 1, 0x0F, 0x10, 0x7F, 0x80, 0x99, 0xFF, 0x100, 0x7FFF, 0x8000, 0x80FF, 0xFF00, 0xFFFF)
 DATA, POINTERS, ELSEWHERE = range(8), range(8, 13), 13
-"""Registers by their contents: numbers, addresses in RAM, a random address."""
+"""Registers by use: numbers, addresses in RAM, a random address."""
 LEFT_OUT: Final = ("RETFIE", "RETURN", "RETLW", "RESET", "PWRSAV", "DO", "CALL", "RCALL", "GOTO", "LNK", "ULNK")
 
 BY_NUMBER: Final = {row.id: row for row in ROWS}
@@ -66,7 +66,7 @@ class _Noting(RowMachine):
 
 
 def asked(insn: Insn) -> frozenset[str]:
-    """Return the flags that an instruction reads, as bits or through the address of SR."""
+    """Return the flags that an instruction reads, from the flag bits or from SR as data."""
     machine = _Noting(insn.word1)
     machine.pc = 0x1000
     insn.row.does(machine, insn.x)  # type: ignore[arg-type]
@@ -79,13 +79,13 @@ def written(insn: Insn) -> frozenset[str]:
 
 
 def kind(insn: Insn) -> Kind:
-    """Return the fields of an instruction that affect flags."""
+    """Return the number of the row, and whether it is the byte form."""
     return insn.row.id, getattr(insn.x, "B", 0)
 
 
 def instruction(draw: random.Random, row: Row, size: int | None = None) -> Insn:
-    """A legal instruction of a row, its byte form for `size` 1; its pointers lead to RAM, its file operands mostly,
-    else to W registers or SR."""
+    """Return a legal instruction of a row, in byte form if `size` is 1. Its pointers lead to RAM, and its file
+    operands to RAM, W registers or SR."""
     while True:
         x = Operands(**{f.letter: f.get(draw.getrandbits(24), draw.getrandbits(24)) for f in row.pattern.fields})
         for mode, register in (("p", "s"), ("g", "s"), ("q", "d"), ("h", "d")):
@@ -118,7 +118,8 @@ def instruction(draw: random.Random, row: Row, size: int | None = None) -> Insn:
 
 @cache
 def rows() -> tuple[list[Row], list[Row], list[Row]]:
-    """Return the rows that write a flag, those that read one without SR, and the other rows without flow."""
+    """Return three lists of rows without control flow: those that write a flag, those that read one other than
+    through SR, and all others."""
     writers, readers, others = [], [], []
     draw = random.Random(0)
     for row in ROWS:
@@ -135,8 +136,8 @@ def rows() -> tuple[list[Row], list[Row], list[Row]]:
 
 
 def away(draw: random.Random) -> list[int]:
-    """Something that may leave native code in the middle: a read of an address that may be no RAM, a shadow register,
-    a device, a repeated instruction."""
+    """Return instructions that may leave native code: a read of an address that may not be RAM, a shadow register, a
+    device register, a repeated instruction."""
     return draw.choice((
         words_of("MOV{.B} Ws, Wd", B=draw.randrange(2), s=ELSEWHERE, g=1, d=draw.choice(DATA), h=0, w=0),
         words_of("MOV{.W} f, Wnd", f=draw.choice((SR, TMR1, PORTD, IFS0)), d=draw.choice(DATA)),
@@ -148,15 +149,15 @@ def away(draw: random.Random) -> list[int]:
 
 @dataclass
 class Tally:
-    """Counts of what was run and found equal."""
+    """Counts of executed items that were equal in all engines."""
 
     runs: int = 0
     pairs: Counter[tuple[Kind, str, Kind]] = field(default_factory=Counter)
-    """Drills by writer, flag and reader."""
+    """Number of drills, by writer, flag and reader."""
     python: int = 0
-    """Instructions of the native machine that Python ran."""
+    """Number of instructions of the native machine that Python executed."""
     executed: int = 0
-    """Instructions of the plain machine."""
+    """Number of instructions that the plain machine executed."""
 
     def add(self, other: Tally) -> None:
         """Add the counts of another tally."""
@@ -168,8 +169,8 @@ class Tally:
 
 @cache
 def all_pairs() -> tuple[tuple[Kind, str, Kind], ...]:
-    """Return every pair of a row that writes a flag and a row that reads it, on words and bytes, in mixed order. Reads
-    of SR by its address are excluded."""
+    """Return every pair of a row that writes a flag and a row that reads it, as words and bytes, in random order.
+    Reads through the address of SR are excluded."""
     draw = random.Random(0)
     ends: dict[bool, set[tuple[str, Kind]]] = {True: set(), False: set()}
     for is_writer, among in zip((True, False), rows()[:2], strict=True):
@@ -184,16 +185,16 @@ def all_pairs() -> tuple[tuple[Kind, str, Kind], ...]:
 
 
 def drill(draw: random.Random, turn: int) -> tuple[list[int], list[Insn]]:
-    """Return the words and the instructions of a drill, which ends by itself and holds the pairs of one turn."""
+    """Return the words and the instructions of a drill that contains the given pairs and ends by itself."""
     among = all_pairs()
     words: list[int] = []
     for writer, _, reader in (among[2 * turn % len(among)], among[(2 * turn + 1) % len(among)]):
         words += [instruction(draw, BY_NUMBER[number], size).word1 for number, size in (writer, reader)]
     for _ in range(draw.randrange(4)):
         some = draw.choices(rows(), (4, 4, 1))[0]
-        at = draw.choice((0, 2, 4))  # between two pairs
+        at = draw.choice((0, 2, 4))  # a place between two pairs
         words[at:at] = away(draw) if draw.random() < 0.3 else [instruction(draw, draw.choice(some)).word1]
-    words += [0, 0, 0, *words_of("BRA Expr", n=-1)]  # branches lead into the NOPs at most
+    words += [0, 0, 0, *words_of("BRA Expr", n=-1)]  # branches at the end lead into the NOPs
     insns = [codec.decode_for_execution(word, 0) for word in words[:-4]]
     return words, [insn for insn in insns if insn is not None]
 
@@ -221,7 +222,7 @@ def image(seed: int) -> tuple[dict[int, int], list[tuple[int, list[Insn]]]]:
     put(0x100, words_of("BRA Expr", n=-1))
     for vector in range(0x04, 0x14, 2):
         put(vector, [TRAP])
-    put(0x1A, [HANDLER])  # timer 1
+    put(0x1A, [HANDLER])  # vector of timer 1
     put(TRAP, words_of("CLR{.B} f", B=0, f=0x80) + words_of("BRA Expr", n=-1))
     writers, readers, _ = rows()
     body = [instruction(draw, draw.choice(draw.choice((writers, readers)))).word1 for _ in range(3)]

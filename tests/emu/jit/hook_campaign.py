@@ -11,22 +11,22 @@ from emu.dspic30f.jit.engine import JitEngine
 from emu.machine.machine import Machine
 
 PEEKED = ("TMR1", "TMR2", "TMR3", "IFS0", "IFS1", "PORTD", "PORTF", "U1STA", "U1RXREG", "ADCON1", "INTTREG")
-"""Registers whose values depend on the devices' time."""
+"""Registers whose values depend on device time."""
 WRITTEN = (
     "TMR1", "TMR2", "PR1", "PR2", "PR3", "T1CON", "T2CON", "LATD", "TRISD", "IFS0", "IEC0", "IPC0", "U1MODE", "U1STA",
     "U1TXREG", "U1BRG", "OC1CON", "OC1R", "ADCON1",
 )  # fmt: skip
 HOOKED_ADDRESSES = 6
 NEVER_REACHED = 1 << 60
-"""Threshold of translation at which all code stays cold."""
+"""Threshold of translation that no code reaches, so that all code is interpreted."""
 
 
 class ActingHooks:
-    """Hooks of one machine that observe and change its devices. Equal seeds and equal runs give equal actions."""
+    """Hooks of one machine that read and write its devices. Equal seeds and equal runs give equal actions."""
 
     def __init__(self, machine: Machine, seed: int) -> None:
         self.seen: list[tuple[int, int, tuple[int, ...]]] = []
-        """PC, cycle and observed values of each arrival."""
+        """PC, cycle and values read, for each arrival."""
         self._machine = machine
         self._generator = random.Random(seed)
         for address in self._generator.sample(range(CODE, CODE + 2 * BODY_WORDS, 2), HOOKED_ADDRESSES):
@@ -50,7 +50,7 @@ class ActingHooks:
 def check_acting_hooks(seed: int, stops: int, cold: bool = False) -> int:
     """Run one random program with acting hooks in both engines, and return the number of arrivals.
 
-    With `cold` the native engine has no code yet. Raises Difference if the hooks see different values or the whole
+    With `cold` the native engine has no code yet. Raises Difference if the hooks read different values or the
     snapshots differ at a stop.
     """
     generator = random.Random(seed)

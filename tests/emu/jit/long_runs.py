@@ -1,7 +1,8 @@
-"""Long runs: loops for millions of instructions in native code, counted exactly and compared.
+"""Long runs: loops of millions of instructions in native code, which are counted exactly and compared.
 
-Block code as the engine likes it runs beside exact code alone, which stays in the record after every instruction and
-counts. At random points the plain interpreter, which counts too, runs beside them from the same snapshot.
+A machine with the engine's default block code runs beside one with exact code alone. Exact code updates the record
+after every instruction and counts instructions. At random points the plain interpreter, which also counts, runs
+beside both from the same snapshot.
 """
 
 from __future__ import annotations
@@ -23,11 +24,11 @@ from emu.dspic30f.jit.translate.values import Number
 from emu.machine.machine import Machine
 
 EXECUTED: Final = ENV_WORDS - 1
-"""Word of the native environment in which instructions are counted."""
+"""Index of the word in the native environment in which native code counts instructions."""
 
 
 class CountedInterpreter:
-    """Counts the instructions that a machine with the plain engine executes."""
+    """Counter of the instructions that a machine with the plain engine executes."""
 
     def __init__(self, machine: Machine) -> None:
         self.executed = 0
@@ -41,7 +42,7 @@ class CountedInterpreter:
 
 
 class CountingTranslator(Translator):
-    """Translator of exact code that counts instructions: it calls `advance` once for each."""
+    """Translator of exact code that counts instructions in `advance`, which it calls once per instruction."""
 
     def advance(self, cycles: Number, mask: int) -> None:
         super().advance(cycles, mask)
@@ -53,7 +54,7 @@ class CountingTranslator(Translator):
 
 
 class CountedExact:
-    """Makes a native machine run only exact code, and counts its instructions."""
+    """Wrapper of a native machine that makes it run only exact code and counts its instructions."""
 
     def __init__(self, machine: Machine) -> None:
         runner = machine.runner
@@ -98,7 +99,8 @@ def native_machine(ipl_slip: int) -> Machine:
 
 
 def check_long(seed: int, instructions: int, share: float = 0.003) -> Tally:
-    """Check a program with loops for about `instructions`, of which the interpreter runs `share`. Raises Difference."""
+    """Check a program with loops for about `instructions`; the interpreter runs the share `share` of them. Raises
+    Difference."""
     shape = Shape(instructions=300, periods=(1500, 9000), loops=(20, 300), calm=True)
     firmware = straight_firmware(seed, shape)
     generator = random.Random(seed)
@@ -133,7 +135,7 @@ def beside(
     count: CountedExact,
     cycles: int,
 ) -> None:
-    """Run the interpreter and the native machines from one snapshot and compare them. Raises Difference."""
+    """Run the interpreter and the native machines from one snapshot and compare their states. Raises Difference."""
     interpreted.restore(blocks.snapshot())
     before = interpreter.executed, count.executed
     stops = [machine.run(cycles) for machine in (interpreted, blocks, exact)]

@@ -1,6 +1,6 @@
-"""Random firmware: legal instructions of every row in a loop, with interrupts at odd moments, traps and all modes.
+"""Random firmware: legal instructions of every row in a loop, with interrupts at random times, traps and all modes.
 
-Two machines with different engines run it side by side; their whole records are compared at random stops.
+Two machines with different engines run it in parallel; their whole records are compared at random stops.
 """
 
 from __future__ import annotations
@@ -19,25 +19,26 @@ CODE, ISR, HANDLER, LEAF = 0x200, 0x1000, 0x1100, 0x1180
 """Program addresses of the body, the interrupt handlers, the trap handler and a callee."""
 BODY_WORDS = 60
 STACK = 0x2000
-"""Data addresses, on chips whose RAM includes them."""
+"""Data address of the stack, for chips whose RAM includes it."""
 TRAP_COUNT = 0x1FF0
-"""Word in RAM: after 32 traps the trap handler restarts the program instead of returning, in case PC is wrong."""
+"""Address of a counter in RAM. After 32 traps the trap handler restarts the program instead of returning, in case PC
+is wrong."""
 
 FLOWS = ("BRA", "CALL", "GOTO", "RCALL", "DO", "REPEAT", "RETURN", "RETFIE", "RETLW")
 LEFT_OUT = ("RESET", "PWRSAV")
-"""Rows that end the run or only wait; they have tests of their own."""
+"""Rows that end the run or only wait; other tests cover them."""
 
 DEVICE_REGISTERS = (
     "TMR1", "TMR2", "TMR3", "PR1", "PR2", "PR3", "LATA", "LATD", "LATF", "PORTA", "PORTB", "PORTD", "TRISD",
 )  # fmt: skip
-"""Registers with native accesses, and one that changes their meaning."""
+"""Registers with native accesses, and registers that change how these are accessed."""
 
 ROWS = [row for row in table.ROWS if row.mnemonic not in LEFT_OUT]
 BY_SYNTAX = {row.syntax: row for row in table.ROWS}
 
 
 def words_of(syntax: str, **fields: int) -> list[int]:
-    """Return the words of one instruction, given the syntax of its row."""
+    """Return the words of one instruction with the given syntax and fields."""
     return list(codec.encode(BY_SYNTAX[syntax], Operands(**fields)))
 
 
@@ -53,14 +54,14 @@ def to_sfr(name: str, value: int, chip: Chip = DSPIC30F6014A) -> list[int]:
 
 @dataclass
 class Firmware:
-    """Program words by address, and the seed that generated them."""
+    """Program words by address, and the seed from which they are generated."""
 
     seed: int
     flash: dict[int, int] = field(default_factory=dict)
     end: int = -1
-    """Address at which a pass through the program ends; -1 if there is none."""
+    """Address at which a pass through the program ends, or -1 if there is none."""
     ram: dict[int, int] = field(default_factory=dict)
-    """Words of RAM that are not random at the beginning."""
+    """Words of RAM with fixed initial values; all others are random."""
 
     def put(self, address: int, words: list[int]) -> int:
         """Place words. Return the address after them."""
@@ -100,7 +101,7 @@ def random_words(row: Row, generator: random.Random, at: int, end: int, ram: ran
 
 
 def timer_bits(chip: Chip, kind: str) -> list[tuple[int, int]]:
-    """Data address of the byte and bit of "flag" or "enable" of timers 1 to 3."""
+    """Return the data address and bit of "flag" or "enable" of timers 1 to 3."""
     bits = [getattr(chip.interrupts[timer.irq], kind) for timer in chip.timers[:3]]
     return [(chip.sfrs[name].address + bit // 8, bit % 8) for name, bit in bits]
 
@@ -140,7 +141,8 @@ def mode_words(generator: random.Random, chip: Chip = DSPIC30F6014A) -> list[int
 
 
 def core_words(generator: random.Random, chip: Chip = DSPIC30F6014A) -> list[int]:
-    """Return an access to a register that controls flow, at the end of a DO loop, under REPEAT or elsewhere."""
+    """Return an access to a register that controls execution, to be placed at the end of a DO loop, under REPEAT or
+    elsewhere."""
     name = generator.choice(("DCOUNT", "DCOUNT", "RCOUNT", "SR", "CORCON", "DOSTARTL", "DOENDL"))
     address = chip.sfrs[name].address
     one = generator.choice((
@@ -154,7 +156,7 @@ def core_words(generator: random.Random, chip: Chip = DSPIC30F6014A) -> list[int
 
 
 def _enabled(chip: Chip, generator: random.Random) -> list[tuple[str, int]]:
-    """Return register values that enable interrupts of timers 1 to 3, at random priorities."""
+    """Return register values that enable the interrupts of timers 1 to 3 at random priorities."""
     sources = [chip.interrupts[timer.irq] for timer in chip.timers[:3]]
     groups = sorted({source.priority[0] for source in sources})
     enables: dict[str, int] = {}
@@ -164,7 +166,7 @@ def _enabled(chip: Chip, generator: random.Random) -> list[tuple[str, int]]:
 
 
 def random_firmware(seed: int, chip: Chip = DSPIC30F6014A) -> Firmware:
-    """Return a program that ends only through a reset by a fault."""
+    """Return a program that ends only through a reset after a fault."""
     generator = random.Random(seed)
     firmware = Firmware(seed)
     whole, y = chip.data["ram"], chip.data["yram"].start
@@ -253,7 +255,7 @@ def load(machine: Machine, firmware: Firmware) -> None:
 
 
 def difference(one: Machine, other: Machine) -> str:
-    """Return the differences between the states of two machines; empty if there are none."""
+    """Return the differences between the states of two machines, empty if there are none."""
     a, b = one.snapshot(), other.snapshot()
     if a == b:
         return ""

@@ -1,7 +1,8 @@
-"""The body of a long straight program: stretches of ordinary instructions among arrangements that need company.
+"""The body of a long straight program: sections of ordinary instructions, and sequences for instructions that need
+context.
 
-Each stretch has its own split of W0..W14 into pointers into RAM (or the PSV window), an index and data registers, so
-that most accesses succeed natively while destinations, modes and registers stay random.
+Each section assigns W0..W14 in another way to pointers into RAM (or the PSV window), an index and data registers. Most
+accesses therefore succeed natively, while destinations, modes and registers are random.
 """
 
 from __future__ import annotations
@@ -29,9 +30,10 @@ from emu.dspic30f.isa.row import Row
 
 BODY, BODY_END = 0x2000, 0xE000
 LEAVES, LEAF_WORDS, LEAF_COUNT = 0x1200, 8, 16
-"""Callees: a few instructions and RETURN or RETLW."""
+"""Callees of a few instructions and RETURN or RETLW: address of the first, words of each, number."""
 PROGRESS = 0x27FC
-"""Word in RAM: address at which the program continues after a reset, the section after the current one."""
+"""Address of a word in RAM that holds the program address at which execution continues after a reset: the section
+after the current one."""
 MODE_CORCON = 0x10F7
 """CORCON bits that programs change: all but IPL3, the DO level and EDT (isa.md §2.4)."""
 
@@ -50,12 +52,12 @@ SEPARATE = (
     "PWRSAV",
     "DISI",
 )
-"""Mnemonics, besides flows, that need surrounding code."""
+"""Mnemonics that need surrounding code; rows with control flow also need it."""
 ORDINARY = [row for row in table.ROWS if row.mnemonic not in FLOWS + SEPARATE]
 PLAIN = [row for row in ORDINARY if not row.mnemonic.startswith(("CPS", "BTSS", "BTSC"))]
-"""Rows without flow."""
+"""Rows without control flow."""
 COMPUTING = [row for row in PLAIN if not set("pqghofi") & set(row.fields)]
-"""Rows that mostly access only registers."""
+"""Rows that usually access only registers."""
 DIVIDES = [row for row in table.ROWS if row.mnemonic.startswith("DIV")]
 BRANCHES = [row for row in table.ROWS if row.mnemonic == "BRA" and "n" in row.fields]
 BYTE_POINTERS = ("SE", "ZE")
@@ -67,13 +69,13 @@ class Shape:
     """Parameters of a random program."""
 
     instructions: int = 5000
-    """Approximate number of instructions of a pass."""
+    """Approximate number of instructions per pass."""
     periods: tuple[int, int] = (25, 150)
-    """Tcy between the matches of one timer."""
+    """Minimum and maximum Tcy between the matches of one timer."""
     loops: tuple[int, int] = (0, 5)
-    """Repetitions of DO loops, fewest and most."""
+    """Minimum and maximum number of repetitions of DO loops."""
     calm: bool = False
-    """Whether the program avoids work of Python, except DO, for long runs."""
+    """Whether the program avoids instructions that Python executes, except DO, for long runs."""
 
 
 class BodyWriter:
@@ -83,7 +85,7 @@ class BodyWriter:
         self.firmware, self.generator, self.shape = firmware, generator, shape
         self.at = BODY
         self.good = 0
-        """Registers that hold usable even pointers."""
+        """Bit mask of registers that hold valid even pointers."""
         self.psv_reads = corcon >> 2 & 1
         self.split()
 
@@ -91,7 +93,7 @@ class BodyWriter:
         self.at = self.firmware.put(self.at, words)
 
     def split(self) -> None:
-        """Begin a new section: choose registers as pointers, index and data."""
+        """Begin a new section: select registers for pointers, index and data."""
         registers = list(range(15))
         self.generator.shuffle(registers)
         if self.generator.random() < 0.6:
@@ -115,7 +117,7 @@ class BodyWriter:
         self.good |= 1 << n
 
     def file(self, scale: int) -> int:
-        """Return an address for a file operand: mostly RAM, also W registers and random ones."""
+        """Return an address for a file operand: mostly in RAM, sometimes a W register or random."""
         chance = self.generator.random()
         if chance < 0.9 or self.shape.calm:
             return self.generator.randrange(0x800, 0x1F00) & -scale
@@ -157,7 +159,7 @@ class BodyWriter:
         return None if row.broken(x) else x
 
     def note(self, row: Row, x: Operands, words: list[int]) -> None:
-        """Forget pointers that the instruction overwrites or makes odd."""
+        """Update the set of valid pointers: remove those that the instruction overwrites or makes odd."""
         insn = codec.decode(*words)
         assert insn is not None
         spoilt = facts_of(insn).writes
@@ -212,12 +214,13 @@ class BodyWriter:
             self.one(PLAIN)
 
     def gone_round(self, count: int) -> None:
-        """Emit the instructions that a branch or skip skips: often on registers only, which stay in one block."""
+        """Emit the instructions that a branch or skip jumps over: often only register operations, which stay in one
+        block."""
         rows = COMPUTING if self.generator.random() < 0.5 else PLAIN
         for _ in range(count):
             self.one(rows)
 
-    # -- arrangements -----------------------------------------------------------------------------------------------
+    # -- sequences -----------------------------------------------------------------------------------------------------
     def branch(self) -> None:
         """Emit a forward branch over some of the following instructions."""
         row = self.generator.choice(BRANCHES)
@@ -302,7 +305,7 @@ class BodyWriter:
         self.put(words_of("ULNK"))
 
     def loop(self, depth: int = 0) -> None:
-        """Emit DO with a body without exits; its last instruction has no flow."""
+        """Emit a DO loop with a body without exits; its last instruction has no control flow."""
         fewest, most = self.shape.loops
         count = self.generator.randrange(fewest, most + 1)
         start, by_register = self.at, self.generator.random() < 0.5
@@ -319,7 +322,7 @@ class BodyWriter:
             self.generator.choice((self.branch, self.skip, self.repeat, self.divide, lambda: self.plain(3)))()
         if not self.shape.calm and self.generator.random() < 0.1:
             self.end_early()
-        self.put([0])  # NOP: no skip reaches over the end
+        self.put([0])  # a NOP, so that no skip reaches beyond the end
         self.one(PLAIN)
         while facts_of(codec.decode(self.firmware.flash[self.at - 2], 0)).flow is not None:  # type: ignore[arg-type]
             self.one(PLAIN)
@@ -360,7 +363,7 @@ class BodyWriter:
         self.leap()
 
     def extra(self) -> None:
-        """Emit an instruction that Python runs, or that changes interrupts."""
+        """Emit an instruction that Python executes, or one that changes interrupts."""
         kind = self.generator.randrange(4)
         if kind == 0:
             self.put(words_of("DISI #lit14", k=self.generator.randrange(12)))
@@ -374,7 +377,7 @@ class BodyWriter:
         self.good &= ~0x81
 
     def clock(self) -> None:
-        """Emit a new period of a timer, and restore the interrupt registers."""
+        """Emit code that sets a new timer period and restores the interrupt registers."""
         timer = self.generator.choice("123")
         self.put(to_sfr(f"PR{timer}", self.generator.randrange(*self.shape.periods)) + to_sfr(f"T{timer}CON", 0x8000))
         self.put(to_sfr("IEC0", 0x00C8) + to_sfr("SR", 0))

@@ -1,7 +1,9 @@
-"""Random firmware that is long, mostly straight and keeps its pointers: thousands of distinct legal instructions.
+"""Long random firmware that is mostly straight and keeps its pointers valid: thousands of distinct legal
+instructions.
 
-Control flow goes forward: branches, skips, calls of leaves, computed jumps, DO and REPEAT; a pass ends where it began.
-Timers interrupt at changing periods. Traps are acknowledged and returned from; after a reset the next stretch is run.
+Control flow is forward: branches, skips, calls of leaf functions, computed jumps, DO and REPEAT. A pass ends where it
+began. Timers interrupt at changing periods. Trap handlers clear the trap and return; after a reset the next section
+runs.
 """
 
 from __future__ import annotations

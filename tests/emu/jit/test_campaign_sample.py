@@ -19,7 +19,8 @@ SHORT = Shape(instructions=250)
 
 @pytest.mark.parametrize("seed", range(4))
 def test_straight_programs_run_equally_in_blocks_and_in_exact_code(seed: int) -> None:
-    """engines.md §4.3; most distinct instructions are native, in both kinds of code."""
+    """engines.md §4.3: straight programs give equal states in block code, in exact code and in the interpreter;
+    native code executes most distinct instructions in both kinds of code."""
     tally = check_straight(seed, SHORT)
     assert len(tally.seen) > 150
     assert len(tally.native) > 0.8 * len(tally.seen)
@@ -28,20 +29,22 @@ def test_straight_programs_run_equally_in_blocks_and_in_exact_code(seed: int) ->
 
 @pytest.mark.parametrize("seed", range(4))
 def test_wild_programs_run_equally(seed: int) -> None:
-    """engines.md §4.3, with jumps, traps and mode changes at random places."""
+    """engines.md §4.3: wild programs, with jumps, traps and mode changes at random places, give equal states."""
     assert check_wild(seed, stops=8).stops == 8
 
 
 @pytest.mark.parametrize("seed", [1])
 def test_long_runs_end_equally_and_with_equal_counts_of_instructions(seed: int) -> None:
-    """Block code, exact code and the interpreter, from one snapshot."""
+    """Long runs of block code, exact code and the interpreter from one snapshot have equal final states and
+    instruction counts."""
     tally = check_long(seed, 200_000, share=0.3)
     assert tally.instructions["of these beside the interpreter"] > 50_000
     assert tally.entries["long"] > 30
 
 
 def test_interrupts_hit_repeats_loops_and_stalls() -> None:
-    """The tally counts exceptions by the kind of place that they interrupt."""
+    """Interrupts occur in REPEAT, in loops and in stalls; the tally counts exceptions by the kind of place that they
+    interrupted."""
     tally = Tally()
     for seed in (37, 39):
         tally.add(check_straight(seed, SHORT))
@@ -50,7 +53,7 @@ def test_interrupts_hit_repeats_loops_and_stalls() -> None:
 
 
 def test_a_difference_is_found_and_what_python_ran_does_not_count_as_native() -> None:
-    """The comparison finds a wrong bit."""
+    """A wrong bit is reported as a difference, and instructions that Python executed do not count as native."""
     plain, native = engine_pair(straight_firmware(1, SHORT), 0, 0)
     watch = InstructionObserver(plain, native)
     advance(plain, native, 500, Tally())

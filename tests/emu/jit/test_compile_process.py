@@ -1,4 +1,4 @@
-"""Deaths of the compile process, and bounds of the objects on disk and in memory."""
+"""Failures of the compile process, and limits of the objects on disk and in memory."""
 
 from __future__ import annotations
 
@@ -29,12 +29,12 @@ IR = "define i64 @entry(ptr %rec, ptr %env) {{\n  ret i64 {}\n}}\n"
 
 @pytest.fixture
 def compiler(tmp_path: Path) -> Compiler:
-    """Return a compiler with a cache of its own."""
+    """Return a compiler with an empty cache."""
     return Compiler(ObjectCache(tmp_path))
 
 
 def collect(compiler: Compiler, count: int) -> dict[object, LoadedCode]:
-    """Collect objects until there are `count`, for at most ten seconds."""
+    """Collect compiled objects until there are `count`."""
     found: dict[object, LoadedCode] = {}
     end = time.monotonic() + HANG
     while len(found) < count and time.monotonic() < end:
@@ -50,7 +50,8 @@ def ask(compiler: Compiler, count: int) -> None:
 
 
 def test_a_process_that_is_killed_is_replaced(compiler: Compiler, capfd: pytest.CaptureFixture[str]) -> None:
-    """The process dies while it compiles and while it is idle; all objects arrive."""
+    """If the compile process is killed, while it compiles or while it is idle, it is replaced, and all objects
+    arrive."""
     ask(compiler, 6)
     assert compiler._process is not None
     os.kill(compiler._process.pid, signal.SIGKILL)
@@ -90,7 +91,7 @@ assert os.waitpid(child, 0)[1] == 0
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="this system copies no processes")
 def test_a_copy_of_the_process_has_a_compile_process_of_its_own(tmp_path: Path) -> None:
-    """After a fork with requests in flight, both processes get all objects, each from its own compile process."""
+    """After a fork with requests in flight, both processes receive all objects, each from its own compile process."""
     words = [sys.executable, "-c", COPIED, str(tmp_path)]
     done = subprocess.run(words, capture_output=True, text=True, timeout=HANG, check=False)
     assert (done.returncode, done.stderr) == (0, "")
@@ -100,7 +101,8 @@ def test_a_copy_of_the_process_has_a_compile_process_of_its_own(tmp_path: Path) 
 def test_without_any_process_the_run_goes_on_interpreted_with_one_warning(
     compiler: Compiler, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str], command: str
 ) -> None:
-    """Same state as the plain interpreter, one line on standard error."""
+    """If no compile process can run, the run continues in the interpreter with the state of the plain engine and one
+    line on standard error."""
     monkeypatch.setattr(compiler_module.sys, "executable", command)
     firmware = straight_firmware(3, Shape(instructions=100))
     machines = [Machine(engine=engine) for engine in ("plain", "jit")]
@@ -125,7 +127,7 @@ def test_without_any_process_the_run_goes_on_interpreted_with_one_warning(
 
 
 def test_a_piece_wanted_by_many_is_compiled_once_and_is_in_memory_as_long_as_one_holds_it(compiler: Compiler) -> None:
-    """Machines share loaded objects, and objects that no machine uses are unloaded."""
+    """An object that several machines request is compiled and loaded once; it is unloaded when no machine uses it."""
     for tag in ("first", "second"):
         compiler.request(IR.format(1), 0, compiler.key(0, b"piece"), (4,), tag)
     found = collect(compiler, 2)
@@ -146,7 +148,7 @@ def test_a_piece_wanted_by_many_is_compiled_once_and_is_in_memory_as_long_as_one
 
 
 def test_the_code_of_a_machine_goes_with_it(compiler: Compiler) -> None:
-    """Two machines share code; a change of hooks translates it again."""
+    """The code of two machines is shared, and it is unloaded when both machines are deleted."""
     machines = []
     for _ in range(2):
         machines.append(Machine(engine="jit"))
@@ -169,7 +171,7 @@ def test_the_code_of_a_machine_goes_with_it(compiler: Compiler) -> None:
 
 
 def test_code_arrives_while_no_address_is_missed(compiler: Compiler) -> None:
-    """Exact code of a loop arrives before its block code, and covers all of its instructions."""
+    """Compiled code becomes available during a run that reaches no uncompiled address."""
     machine = Machine(engine="jit")
     runner = machine.runner
     assert isinstance(runner, JitEngine)
@@ -214,7 +216,8 @@ print([scaled(2.0, number) for number in range(4)])
 
 @pytest.mark.skipif(sys.platform != "linux", reason="builds its address space with Linux's mmap")
 def test_a_fragmented_process_can_load_native_code(tmp_path: Path) -> None:
-    """The linker places code and its constants together."""
+    """Native code can be loaded into a process with a fragmented address space, because the linker places code and
+    constants together."""
     source = tmp_path / "scaled.c"
     source.write_text("""
 static const double factors[] = {1.5, 2.5, 3.5, 4.5};
@@ -227,7 +230,7 @@ double scaled(double value, long which) { calls++; return value * factors[which 
 
 
 def test_the_folder_keeps_what_was_used_last(tmp_path: Path) -> None:
-    """One shelf with room for ten objects of some 1,000 bytes."""
+    """A shelf of the cache with room for ten objects of about 1,000 bytes keeps the objects that were used last."""
     cache = ObjectCache(tmp_path, limit=10_000 * SHELVES)
     keys = [f"00{number:062x}" for number in range(40)]
     for number, key in enumerate(keys):
@@ -243,7 +246,7 @@ def test_the_folder_keeps_what_was_used_last(tmp_path: Path) -> None:
 
 
 def test_an_object_larger_than_a_shelf_is_kept_alone(tmp_path: Path) -> None:
-    """An object that was read recently is not evicted."""
+    """An object larger than a shelf is stored and evicts all others."""
     cache = ObjectCache(tmp_path, limit=10)
     for key in ("00a", "00b"):
         cache.put(key, bytes(5_000))

@@ -22,7 +22,7 @@ from emu.dspic30f.isa.row import Insn
 
 @pytest.mark.parametrize("seed", range(3))
 def test_drills_end_equally_in_every_cycle(seed: int) -> None:
-    """engines.md §4.3; most instructions are native."""
+    """engines.md §4.3: drills give equal states when cut at every cycle; native code executes most instructions."""
     tally = Tally()
     assert check(seed, tally) is None
     turns = {all_pairs()[(2 * 24 * seed + turn) % len(all_pairs())] for turn in range(48)}
@@ -33,7 +33,7 @@ def test_drills_end_equally_in_every_cycle(seed: int) -> None:
 
 
 def test_readers_and_writers_of_flags_are_told_from_the_table() -> None:
-    """isa.md §5, §6: well-known examples."""
+    """isa.md §5, §6: the rows that read and write flags are found from the table, which well-known examples show."""
     writers, readers, others = ({row.mnemonic for row in some} for some in rows())
     assert {"ADD", "RLC", "CP0", "DAW.B", "FBCL", "DIV.S", "BTST.C", "BTSTS", "POP.S", "ZE"} <= writers
     assert {"ADDC", "SUBBR", "CPB", "RRC", "BSW.Z", "BRA", "DAW.B", "PUSH.S"} <= readers
@@ -41,14 +41,14 @@ def test_readers_and_writers_of_flags_are_told_from_the_table() -> None:
 
 
 def of(syntax: str, **fields: int) -> Insn:
-    """Return an instruction by the syntax of its row."""
+    """Return an instruction with the given syntax and fields."""
     insn = codec.decode(*codec.encode(BY_SYNTAX[syntax], Operands(**fields)))
     assert insn is not None
     return insn
 
 
 def test_a_pair_is_a_flag_that_is_written_and_read_with_no_other_writer_between() -> None:
-    """The campaign counts pairs of writer and reader."""
+    """A pair of writer and reader is counted only if no other instruction writes the flag between them."""
     add, shift = of("ADD{.B} #lit10, Wn", B=0, k=1, d=1), of("SL{.B} Ws, Wd", B=1, s=1, p=0, d=1, q=0)
     borrow, status = of("SUBB{.B} #lit10, Wn", B=0, k=1, d=1), of("MOV{.W} f, Wnd", f=SR, d=2)
     assert written(shift) == {"C", "Z", "N"}
@@ -64,7 +64,8 @@ STORING = [row for row in rows()[0] if row.syntax.endswith("{.B} f") and not row
 
 @pytest.mark.parametrize("row", STORING, ids=lambda row: row.mnemonic)
 def test_an_instruction_that_sets_flags_may_write_sr_or_a_byte_of_it(row: object) -> None:
-    """Flags outside of the data write come from the result: N and Z of COM.B SRH (isa.md §2.3)."""
+    """isa.md §2.3: if an instruction's destination is SR or a byte of it, the flags outside of the written byte come
+    from the result: N and Z of COM.B SRH."""
     for size, address in ((0, SR), (1, SR), (1, SR + 1)):
         firmware = Firmware(2)
         firmware.put(0, words_of("GOTO Expr", n=0x100))

@@ -12,7 +12,8 @@ from random_firmware import Firmware, difference, literal, load, to_sfr, words_o
 
 
 def test_a_hooked_repeat_that_never_fits_before_the_next_event_goes_on() -> None:
-    """engines.md §4.3: the block checks the whole loop behind the hook; then exact code has to run it."""
+    """engines.md §4.3: a hooked REPEAT that does not fit before the next event makes progress. The block checks the
+    whole loop after the hook; exact code then runs it."""
     firmware = Firmware(0)
     firmware.put(0, words_of("GOTO Expr", n=0x100))
     firmware.put(0x1A, [0x1000])
@@ -39,7 +40,7 @@ def test_a_hooked_repeat_that_never_fits_before_the_next_event_goes_on() -> None
 
 
 def test_each_iteration_of_a_hooked_target_is_an_arrival() -> None:
-    """Every iteration is a boundary (isa.md §7.5), so the hook is called in each."""
+    """A hook on a REPEAT target is called in every iteration, because each is a boundary (isa.md §7.5)."""
     firmware = Firmware(0)
     firmware.put(0, words_of("GOTO Expr", n=0x100))
     at = firmware.put(0x100, literal(0, 2) + words_of("REPEAT #lit14", k=5))

@@ -12,7 +12,8 @@ from random_firmware import Firmware, difference, literal, load, to_sfr, words_o
 
 
 def test_a_timer_that_stops_in_idle_goes_on_behind_it() -> None:
-    """dspic30f6014a.md §4: TSIDL stops timer 2 during Idle only, also when native code is woken from it."""
+    """dspic30f6014a.md §4: TSIDL stops timer 2 only during Idle; it counts again when native code continues after the
+    wake-up."""
     firmware = Firmware(2)
     firmware.put(0, words_of("GOTO Expr", n=0x100))
     firmware.put(0x1A, [0x1000])

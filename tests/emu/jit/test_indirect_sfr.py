@@ -1,4 +1,4 @@
-"""Indirect SFR access: native where a direct access is, and left to Python elsewhere."""
+"""Indirect SFR access: native if a direct access is native, otherwise left to Python."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ NATIVE = {
     "enables": ("IEC2", ["mov w1, [w8]", "btg [w8], #5", "mov.b [w8+1], w2"]),
     "results": ("ADCBUF0", ["mov [w8++], w2", "mov [w8++], [w9++]", "mov.b [w8], w3", "mov.d [w8], w4"]),
 }  # fmt: skip
-"""Targets of W8 and the accesses through it. W9 points to RAM."""
+"""Registers to which W8 points, and the accesses through it. W9 points to RAM."""
 PYTHONS = {
     "the settings of a timer": ("T2CON", "mov w7, [w8]"),
     "a wrong address": ("TMR2", "mov [w8+w3], w2"),
@@ -40,8 +40,7 @@ PYTHONS = {
 
 
 def machines(lines: list[str], corcon: str) -> tuple[Machine, Machine]:
-    """Return machines with both engines that will run `lines` in a loop, with a timer that matches every 187 Tcy, and
-    the ADC."""
+    """Return machines with both engines that run `lines` in a loop, with the ADC on and a timer match every 187 Tcy."""
     head = [f"mov #{corcon}, w0", "mov w0, 0x44", "mov #0x900, w15", "mov #0x8001, w7", f"mov w7, {AT['T1CON']}"]
     for name, value in (("PR1", 186), ("PR2", 0xFFFF), ("T2CON", 0x8000), ("ADCSSL", 0x30), ("ADCON2", 0x404),
                         ("ADCON3", 0x1F3F), ("ADCON1", 0x80E4)):  # fmt: skip
@@ -58,7 +57,8 @@ def machines(lines: list[str], corcon: str) -> tuple[Machine, Machine]:
 
 
 def compare(plain: Machine, native: Machine) -> int:
-    """Run both machines to random stops. Return the instructions that Python ran at the end, per thousand Tcy."""
+    """Run both machines to random stops and compare them. Return the instructions that Python executes per thousand
+    Tcy at the end."""
     assert isinstance(native.runner, JitEngine)
     for length in (*range(1, 30), 997):
         assert plain.run(length) == native.run(length)
@@ -71,8 +71,8 @@ def compare(plain: Machine, native: Machine) -> int:
 
 @pytest.mark.parametrize(("name", "accesses"), NATIVE.values(), ids=NATIVE)
 def test_accesses_by_pointer_are_native_where_direct_ones_are(name: str, accesses: list[str]) -> None:
-    """Words and bytes, read and written, with the PSV window open or not. An access in the very cycle of an event is
-    Python's: there is a match every 187 Tcy."""
+    """Reads and writes of words and bytes by pointer are native, with the PSV window on or off. Python only handles
+    accesses in the cycle of an event, such as the timer match every 187 Tcy."""
     corcon = "0x24" if name.startswith(("ADC", "LAT")) else "0x20"
     plain, native = machines([f"mov #{AT[name]}, w8", "mov #0x1000, w9", *accesses], corcon)
     assert compare(plain, native) < 6
@@ -80,8 +80,8 @@ def test_accesses_by_pointer_are_native_where_direct_ones_are(name: str, accesse
 
 @pytest.mark.parametrize("name", ["LATD", "TMR2", "PR2", "IFS0"])
 def test_a_constant_reaches_a_register_when_the_window_has_been_read(name: str) -> None:
-    """isa.md §13.3: reading the PSV window takes one or two cycles more, and the store comes behind them: what is due
-    in them happens before it."""
+    """isa.md §13.3: a read of the PSV window takes one or two extra cycles before the store, so events due in these
+    cycles happen before the store."""
     lines = [f"mov #{AT[name]}, w8", "mov #0x8200, w6", "mov [w6++], [w8]", "ior w1, [w6], [w8]", "mov.b [w6], [w8]"]
     plain, native = machines(lines, "0x24")
     compare(plain, native)
@@ -89,20 +89,22 @@ def test_a_constant_reaches_a_register_when_the_window_has_been_read(name: str) 
 
 @pytest.mark.parametrize(("name", "access"), PYTHONS.values(), ids=PYTHONS)
 def test_what_a_direct_access_leaves_to_python_a_pointer_leaves_too(name: str, access: str) -> None:
-    """Devices without a rule, traps, modes, and two writes of which the second may be refused."""
+    """Python handles accesses by pointer to registers without a rule, traps, mode registers, and two writes of which
+    the second may be refused."""
     plain, native = machines([f"mov #{AT[name]}, w8", "mov #1, w3", access], "0x20")
     assert compare(plain, native) > 20
 
 
 def test_a_loop_that_waits_for_the_time_by_pointer_is_not_skipped() -> None:
-    """A loop that polls through a pointer is not empty, since the pointer may lead to an SFR."""
+    """A loop that polls a timer through a pointer is not skipped as empty, because the pointer may lead to an SFR."""
     lines = [f"mov #{AT['TMR2']}, w8", "mov #7, w2", "wait: mov [w8], w3", "cp w3, w2", "bra nz, wait"]
     plain, native = machines(lines, "0x20")
     assert compare(plain, native) > 20
 
 
 def test_the_converter_restarts_and_changes_its_channels_natively() -> None:
-    """Drivers restart the ADC like this: switch it off by a word write, select other channels, switch it on."""
+    """The sequence with which drivers restart the ADC is native: switch it off by a word write, select other
+    channels, switch it on."""
     lines = ["mov #0x00E4, w2", f"mov w2, {AT['ADCON1']}", "and w1, #3, w3", "bset w3, #4",
              f"mov w3, {AT['ADCSSL']}", "mov #0x80E4, w2", f"mov w2, {AT['ADCON1']}", "repeat #400", "nop"]  # fmt: skip
     plain, native = machines(lines, "0x20")

@@ -1,4 +1,4 @@
-"""Native code against the plain interpreter: the whole record, at random stops, on random firmware."""
+"""Native code on random firmware: the whole record equals that of the plain interpreter at random stops."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from emu.machine.machine import Machine
 
 @pytest.fixture(autouse=True)
 def own_cache(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Use an empty cache instead of the user's."""
+    """Use an empty cache instead of the user's cache."""
     monkeypatch.setenv("OPENSWARM_CACHE", str(tmp_path_factory.getbasetemp() / "objects"))
 
 
@@ -43,7 +43,7 @@ def pair(firmware: Firmware, ipl_slip: int = 0) -> Iterator[Machine]:
 
 @pytest.mark.parametrize("seed", range(24))
 def test_random_firmware_gives_equal_records_at_random_stops(seed: int) -> None:
-    """engines.md §4.3: same seed, same bytes, same cycle in both engines."""
+    """engines.md §4.3: the same seed gives the same bytes in the same cycle in both engines."""
     plain, native = pair(random_firmware(seed), ipl_slip=seed % 2)
     generator = random.Random(seed)
     for _ in range(10):
@@ -56,7 +56,7 @@ def test_random_firmware_gives_equal_records_at_random_stops(seed: int) -> None:
 
 
 def test_a_snapshot_of_one_engine_goes_on_in_the_other() -> None:
-    """A snapshot of one engine continues in the other: all state is in the record."""
+    """A snapshot of one engine continues in the other with the same result, because all state is in the record."""
     plain, native = pair(random_firmware(3))
     native.run(700)
     plain.restore(native.snapshot())
@@ -68,7 +68,7 @@ def test_a_snapshot_of_one_engine_goes_on_in_the_other() -> None:
 
 
 def counting_firmware() -> Firmware:
-    """An endless loop that counts in W1, with a T1 interrupt every 100 Tcy that counts in W2."""
+    """Return an endless loop that counts in W1, with a T1 interrupt every 100 Tcy that counts in W2."""
     firmware = Firmware(0)
     firmware.put(0, words_of("GOTO Expr", n=0x100))
     firmware.put(0x1A, [0x1000])
@@ -85,7 +85,7 @@ def counting_firmware() -> Firmware:
 
 
 def test_interrupts_are_entered_and_left_without_python() -> None:
-    """engines.md §4.3: exception entry, RETFIE and acceptance are native."""
+    """engines.md §4.3: acceptance of an interrupt, exception entry and RETFIE are native."""
     plain, native = pair(counting_firmware())
     for machine in (plain, native):
         machine.run(50_000)
@@ -96,7 +96,8 @@ def test_interrupts_are_entered_and_left_without_python() -> None:
 
 
 def test_returns_in_which_an_event_is_due_are_native() -> None:
-    """RETURN and RETFIE end after two cycles if an interrupt is accepted then (isa.md §7.4): the boundary decides."""
+    """RETURN and RETFIE with an event due in their last cycle are native. They take two cycles if an interrupt is
+    then accepted (isa.md §7.4), which the boundary decides."""
     firmware = counting_firmware()
     at = next(a for a in range(0x100, 0x400, 2) if firmware.flash.get(a) == words_of("BRA Expr", n=-2)[0])
     firmware.put(at, words_of("RCALL Expr", n=1) + words_of("BRA Expr", n=-2) + words_of("RETURN"))
@@ -111,7 +112,8 @@ def test_returns_in_which_an_event_is_due_are_native() -> None:
 
 @pytest.mark.parametrize("bit", [0, 7, 15])
 def test_flags_that_software_sets_are_native(bit: int) -> None:
-    """A request made by BSET is first visible in the next cycle (isa.md §14.3), whether it is enabled or not."""
+    """isa.md §14.3: an interrupt request by BSET is native, and is visible from the next cycle on, whether it is
+    enabled or not."""
     firmware = counting_firmware()
     at = next(a for a in range(0x100, 0x400, 2) if firmware.flash.get(a) == words_of("BRA Expr", n=-2)[0])
     byte, place = 0x84 + bit // 8, bit % 8
@@ -134,7 +136,8 @@ def test_flags_that_software_sets_are_native(bit: int) -> None:
 
 @pytest.mark.parametrize("watchdog", [False, True])
 def test_clearing_the_watchdog_blocking_and_table_writes_are_native(watchdog: bool) -> None:
-    """A boot loader's loop stays in native code while the watchdog is off; latches and NVMADR have the right values."""
+    """A boot loader's loop with CLRWDT, DISI and table writes is native while the watchdog is off; latches and NVMADR
+    have the right values."""
     firmware = counting_firmware()
     at = next(a for a in range(0x100, 0x400, 2) if firmware.flash.get(a) == words_of("BRA Expr", n=-2)[0])
     loop = [*words_of("CLRWDT"), *words_of("DISI #lit14", k=3), *to_sfr("TBLPAG", 0x7F), *literal(0xF000, 4)]
@@ -156,7 +159,7 @@ def test_clearing_the_watchdog_blocking_and_table_writes_are_native(watchdog: bo
 
 @pytest.mark.parametrize("seed", range(6))
 def test_hooks_are_called_at_each_arrival_and_the_code_around_them_is_native(seed: int) -> None:
-    """Translated regions call the same hooks in the same cycles and leave the same records."""
+    """Hooks in translated code are called in the same cycles as in the interpreter and leave the same records."""
     firmware = random_firmware(seed)
     generator = random.Random(seed)
     hooked = generator.sample(sorted(firmware.flash), 40)
@@ -176,7 +179,7 @@ def test_hooks_are_called_at_each_arrival_and_the_code_around_them_is_native(see
 
 
 def test_a_hook_in_a_loop_leaves_its_instruction_native() -> None:
-    """Python is called per arrival, but interprets nothing."""
+    """A hook in a loop costs one call of Python per arrival; the hooked instruction itself is native."""
     seen: list[list[int]] = []
     for machine in pair(counting_firmware()):
         calls: list[int] = []
@@ -190,18 +193,18 @@ def test_a_hook_in_a_loop_leaves_its_instruction_native() -> None:
 
 
 def test_reprogrammed_flash_is_translated_anew() -> None:
-    """Self-programming discards native code."""
+    """Self-programming discards native code, and the new code is translated."""
     plain, native = pair(counting_firmware())
     for machine in (plain, native):
         machine.run(3_000)
         machine.program.put_flash(0x1000, words_of("DEC{.B} Ws, Wd", B=0, s=2, p=0, d=2, q=0))
         machine.run(3_000)
     assert not difference(plain, native)
-    assert native.w[2] == 0xFFFF  # 29 up, 30 down
+    assert native.w[2] == 0xFFFF  # 29 increments, 30 decrements
 
 
 def test_a_damaged_object_on_disk_counts_as_absent(tmp_path: Path) -> None:
-    """A damaged object fails its checksum and is compiled again."""
+    """A damaged object on disk fails its checksum and is compiled again."""
     cache = ObjectCache(tmp_path)
     key = cache.key(b"one")
     cache.put(key, b"some code")
@@ -215,7 +218,7 @@ def test_a_damaged_object_on_disk_counts_as_absent(tmp_path: Path) -> None:
 
 
 def test_a_folder_that_cannot_be_written_only_costs_the_cache(tmp_path: Path) -> None:
-    """A cache that cannot be written stores nothing and raises no error."""
+    """If the cache folder cannot be written, nothing is stored and no error is raised."""
     blocked = tmp_path / "file"
     blocked.write_text("in the way")
     cache = ObjectCache(blocked)
@@ -225,7 +228,7 @@ def test_a_folder_that_cannot_be_written_only_costs_the_cache(tmp_path: Path) ->
 
 
 def test_vectors_are_not_executed_as_instructions() -> None:
-    """A jump into vector space is an address error in native code too (isa.md §14.4, cause 5)."""
+    """isa.md §14.4, cause 5: a jump into vector space is an address error in native code too."""
     firmware = counting_firmware()
     firmware.put(0x08, [0x1100])
     firmware.put(0x1100, words_of("CLR{.B} f", B=0, f=0x80) + words_of("BRA Expr", n=-1))
@@ -240,7 +243,8 @@ def test_vectors_are_not_executed_as_instructions() -> None:
 
 
 def test_accumulators_are_one_thing_by_name_and_by_address() -> None:
-    """isa.md §2.1: DSP instructions and data accesses in one block, words and bytes, of all six words."""
+    """isa.md §2.1: DSP instructions and data accesses to all six accumulator words, as words and bytes, agree in one
+    block."""
     firmware = Firmware(0)
     firmware.put(0, words_of("GOTO Expr", n=0x100))
     at = 0x100
@@ -272,7 +276,8 @@ def test_accumulators_are_one_thing_by_name_and_by_address() -> None:
 
 
 def test_registers_of_a_module_that_goes_off_and_on_are_its_own_again() -> None:
-    """dspic30f6014a.md §4: with T2MD set PR2 reads 0 and cannot be written; the same instructions meet both."""
+    """dspic30f6014a.md §4: while T2MD is set, PR2 reads 0 and ignores writes; afterwards the same native instructions
+    access it again."""
     firmware = Firmware(0)
     firmware.put(0, words_of("GOTO Expr", n=0x100))
     at = 0x100
@@ -294,7 +299,7 @@ def test_registers_of_a_module_that_goes_off_and_on_are_its_own_again() -> None:
 
 
 def test_machines_with_one_program_share_what_was_translated() -> None:
-    """Machines share translations; a machine that programs its flash gets translations of its own."""
+    """Machines with the same program share translations; a machine that programs its flash has its own translations."""
     first, second, third = eager(), eager(), eager()
     for machine in (first, second, third):
         load(machine, counting_firmware())

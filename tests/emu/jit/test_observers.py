@@ -1,4 +1,4 @@
-"""Observers of a run: hooks, conditions, traces and waveforms see every device in its present state."""
+"""Observers of a run (hooks, conditions, traces, waveforms) read every device in its current state."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ IDLE_WITH_TIMER = """
 
 @pytest.fixture(params=WAYS)
 def machine(request: pytest.FixtureRequest, tmp_path: Path) -> Machine:
-    """The timer loop in each engine, and in the native engine with and without code."""
+    """Return a machine with the timer loop in each engine; the native engine is tested with and without code."""
     path = tmp_path / "loop.elf"
     path.write_bytes(executable(TIMER_LOOP))
     engine, _, warmth = request.param.partition(", ")
@@ -78,7 +78,8 @@ def machine(request: pytest.FixtureRequest, tmp_path: Path) -> Machine:
 
 
 def test_a_hook_sees_the_timer_that_the_hooked_instruction_reads(machine: Machine) -> None:
-    """`peek` and `read` in a hook agree with an access of the hooked instruction, which falls in the same cycle."""
+    """`peek` and `read` in a hook return the timer value that the hooked instruction reads, because both are in the
+    same cycle."""
     in_hooks: list[tuple[int, int]] = []
     by_firmware: list[int] = []
     machine.hook_pc(MARK, lambda: in_hooks.append((machine.peek("TMR1"), machine.read("TMR1"))))
@@ -89,7 +90,7 @@ def test_a_hook_sees_the_timer_that_the_hooked_instruction_reads(machine: Machin
 
 
 def test_a_write_in_a_hook_acts_like_a_write_of_an_instruction(machine: Machine) -> None:
-    """A hook that clears the timer determines what the hooked instruction reads."""
+    """If a hook clears the timer, the hooked instruction reads the cleared timer."""
     read: list[int] = []
     machine.hook_pc(MARK, lambda: machine.write("TMR1", 0))
     machine.hook_pc(AFTER, lambda: read.append(machine.w[5]))
@@ -99,7 +100,8 @@ def test_a_write_in_a_hook_acts_like_a_write_of_an_instruction(machine: Machine)
 
 
 def test_a_hook_that_feeds_input_is_called_once_per_arrival(machine: Machine) -> None:
-    """Input makes the next boundary check for interrupts, but the hooked instruction runs first."""
+    """A hook that feeds input is called once per arrival: the next boundary checks for interrupts, but the hooked
+    instruction runs first."""
     arrivals: list[int] = []
 
     def feed() -> None:
@@ -112,7 +114,8 @@ def test_a_hook_that_feeds_input_is_called_once_per_arrival(machine: Machine) ->
 
 
 def test_a_conditional_breakpoint_compares_the_present_value_of_a_register(machine: Machine) -> None:
-    """The condition `TMR1 > 2000` holds at the first arrival after cycle 2,000, also while the history replays."""
+    """The condition `TMR1 > 2000` is true at the first arrival after cycle 2,000, also during a replay of the
+    history."""
     inspector = Inspector(machine)
     point = Breakpoint(1, "instruction", (MARK,), condition="TMR1 > 2000")
 
@@ -151,7 +154,7 @@ def _watched(machine: Machine, cycle: int) -> Stop | None:
 def test_a_trace_does_not_change_a_run_that_ends_asleep(
     tmp_path: Path, advance: Callable[[Machine, int], Stop | None]
 ) -> None:
-    """Output, timer and snapshot equal those of a run without observers."""
+    """A trace does not change output, timer and snapshot of a run that ends in Sleep."""
     path = tmp_path / "idle.elf"
     path.write_bytes(executable(IDLE_WITH_TIMER))
     results = []
@@ -170,5 +173,5 @@ def test_a_trace_does_not_change_a_run_that_ends_asleep(
 @pytest.mark.parametrize("cold", [False, True])
 @pytest.mark.parametrize("seed", [5, 9, 14, 21])
 def test_random_programs_with_acting_hooks_run_equally(seed: int, cold: bool) -> None:
-    """Hooks that read and write device registers leave equal whole snapshots in both engines."""
+    """Random programs with hooks that read and write device registers leave equal snapshots in both engines."""
     assert check_acting_hooks(seed, stops=8, cold=cold) > 0

@@ -1,4 +1,4 @@
-"""Polling loops: only empty loops are skipped, and the state equals that of loops that run."""
+"""Polling loops: native code skips iterations of empty loops only, and reaches the state of loops that run."""
 
 from __future__ import annotations
 
@@ -44,7 +44,8 @@ START = 0x200
 
 
 def polling_firmware(loop: list[int]) -> Firmware:
-    """T1 matches every 97 Tcy; its handler changes FLAG from 0 to 1 and back. After the loop, W1 counts."""
+    """Return firmware with a polling loop. T1 matches every 97 Tcy; its handler toggles FLAG. W1 counts after the
+    loop."""
     firmware = Firmware(0)
     firmware.put(0, words_of("GOTO Expr", n=0x100))
     firmware.put(0x1A, [0x1000])
@@ -81,19 +82,21 @@ def loops_of(words: list[int]) -> int:
 
 @pytest.mark.parametrize("words", EMPTY.values(), ids=EMPTY)
 def test_a_loop_that_only_waits_is_empty(words: list[int]) -> None:
-    """engines.md §4.3: no store, no read that time changes, nothing computed from an iteration's own results."""
+    """engines.md §4.3: a loop is empty if it has no store, no read of a value that time changes, and no computation
+    from the results of an earlier iteration."""
     assert loops_of(words) == 1
 
 
 @pytest.mark.parametrize("words", BUSY.values(), ids=BUSY)
 def test_a_loop_that_does_something_is_not(words: list[int]) -> None:
-    """Loops that break one of the conditions are not empty."""
+    """A loop that breaks one of the conditions is not empty."""
     assert loops_of(words) == 0
 
 
 @pytest.mark.parametrize("words", (EMPTY | BUSY).values(), ids=EMPTY | BUSY)
 def test_skipped_iterations_leave_what_run_ones_leave(words: list[int]) -> None:
-    """The whole records are equal at stops in every phase of the loop and of the interrupt."""
+    """Skipped iterations leave the record of executed ones, at stops in every phase of the loop and of the
+    interrupt."""
     plain, native = pair(polling_firmware(words))
     for length in (*range(1, 120), 997, 5003):
         assert plain.run(length) == native.run(length)
@@ -101,6 +104,7 @@ def test_skipped_iterations_leave_what_run_ones_leave(words: list[int]) -> None:
 
 
 def test_a_loop_that_is_entered_behind_its_head_is_run() -> None:
-    """A loop that is entered in the middle runs once before iterations are skipped: its registers may differ."""
-    skip_in = words_of("BRA Expr", n=1)  # enters at the comparison
+    """A loop that is entered in the middle runs once before iterations are skipped, because its registers may
+    differ."""
+    skip_in = words_of("BRA Expr", n=1)  # enters the loop at the comparison
     assert loops_of(skip_in + EMPTY["wait for a variable"]) == 0

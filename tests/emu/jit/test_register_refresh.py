@@ -1,4 +1,4 @@
-"""Registers that a device refreshes for native code, and accesses that must not refresh them."""
+"""Registers that a device refreshes before native reads, and accesses that must not refresh them."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from emu.machine.machine import Machine
 
 LOOP = 0x200
 CYCLES = 400_000
-"""A quarter of a frame of the PO6030K."""
+"""Length of the run: a quarter of a frame of the PO6030K."""
 
 
 class Number:
@@ -25,7 +25,7 @@ class Number:
 
 
 def machine(engine: str, program: str, lines: list[int]) -> Machine:
-    """Return a robot whose camera records the rows it renders, and which will run `program` for ever."""
+    """Return a robot that will run `program` for ever, and whose camera records the rows it renders."""
 
     def row(y: int, columns: np.ndarray, _cycle: int) -> np.ndarray:
         lines.append(y)
@@ -70,7 +70,8 @@ LATCHES = """
     mov 0x2D4, w3
     btg 0x2D6, #4
 """
-"""TRISC is 0x2CC, PORTC, LATC behind it; TRISD 0x2D2, PORTD 0x2D4, LATD 0x2D6."""
+"""Reads and changes of latches. TRISC is at 0x2CC, followed by PORTC and LATC; TRISD is at 0x2D2, PORTD 0x2D4, LATD
+0x2D6."""
 
 
 @pytest.mark.parametrize(
@@ -78,8 +79,8 @@ LATCHES = """
     [(WRITES, 0, False), (WRITES, 0xFF00, False), (READS, 0xFF00, True), (LATCHES, 0xFF00, True)],
 )
 def test_engines_render_the_same_lines_and_leave_the_same_state(program: str, inputs: int, rendered: bool) -> None:
-    """A write of PORTD does not look at the picture; a read does; a latch that changes the pins disturbs what a
-    waveform promised, in native code as in the device (emu/peripherals/pins.py)."""
+    """A write of PORTD does not render the camera line, a read does. A latch write that changes pins invalidates the
+    published waveform, in native code as in the device (emu/peripherals/pins.py)."""
     lines: dict[str, list[int]] = {"plain": [], "jit": []}
     machines = {engine: machine(engine, program, seen) for engine, seen in lines.items()}
     for made in machines.values():

@@ -1,4 +1,4 @@
-"""`Machine.run_past` gives the stops and the state of runs to each limit, in every engine."""
+"""`Machine.run_past` gives the same stops and state as runs to each limit, in every engine."""
 
 from __future__ import annotations
 
@@ -30,7 +30,8 @@ def machine(engine: str, seed: int) -> Machine:
 @pytest.mark.parametrize("engine", ["plain", "jit"])
 @pytest.mark.parametrize("seed", range(3))
 def test_cuts_are_where_runs_would_have_ended(engine: str, seed: int) -> None:
-    """Random firmware with interrupts, sleep and faults: in many runs, and in one."""
+    """For random firmware with interrupts, Sleep and faults, `run_past` reports the cycles at which separate runs
+    end."""
     stepwise, once = machine(engine, seed), machine(engine, seed)
     first, period, last = 700, 311, 9_000
     ended, cuts = [], []
@@ -70,13 +71,15 @@ compare: bclr IFS0, #2
 retfie
 trap: retfie
 """
-"""Python sets the flag of OC1; native code handles timer 1. Some values of COMPARE set the flag during its entry."""
+"""Program in which Python sets the flag of OC1 and native code handles timer 1. Some values of COMPARE set the flag
+during the entry of timer 1's exception."""
 
 
 @pytest.mark.parametrize("engine", ["plain", "jit"])
 @pytest.mark.parametrize("compare", range(30, 38))
 def test_a_limit_among_exceptions_counts_behind_the_last(engine: str, compare: int) -> None:
-    """The entry of an exception is followed by a boundary: both count as one, wherever the limit lies."""
+    """If several exceptions are entered in a row, the run ends after the last entry, wherever the limit is among
+    them."""
     text = ONE_UPON_ANOTHER.replace("COMPARE", str(compare))
     for name in ("OC1R", "IPC0", "IEC0", "PR1", "OC1CON", "T2CON", "T1CON", "IFS0"):
         text = text.replace(name, f"{DSPIC30F6014A.sfrs[name].address:#x}")

@@ -1,4 +1,4 @@
-"""Trace blocks: which branches stay within a block, and that states and cycles do not change."""
+"""Trace blocks: the branches that stay within a block, and unchanged states and cycles."""
 
 from __future__ import annotations
 
@@ -32,13 +32,13 @@ WIDE = words_of("MOV{.W} #lit16, Wnd", k=7, d=6)
 
 
 def over(*skipped: list[int]) -> list[int]:
-    """BRA NC over `skipped`."""
+    """Return BRA NC over `skipped`."""
     words = [word for one in skipped for word in one]
     return words_of("BRA NC, Expr", n=len(words)) + words
 
 
 def past(words: list[int]) -> list[int]:
-    """BTSC over the next instruction, by a bit of a register that changes."""
+    """Return BTSC, which tests a bit of a changing register, and the instruction that it may skip."""
     return words_of("BTSC{.W} Ws, #bit4", s=3, p=0, b=0) + words
 
 
@@ -60,7 +60,8 @@ BODIES = {
 
 
 def firmware_of(body: list[int], corcon: int = 0) -> Firmware:
-    """Return a program that repeats `body`. T1 matches every 97 Tcy; its handler changes the operands of the body."""
+    """Return a program that repeats `body`. T1 matches every 97 Tcy, and its handler changes the operands of the
+    body."""
     firmware = Firmware(0)
     firmware.put(0, words_of("GOTO Expr", n=0x100))
     firmware.put(0x1A, [0x1000])
@@ -100,12 +101,13 @@ def arms(body: list[int], barriers: set[int] | None = None, last: int = -1) -> l
     ("round a load", []), ("round a store", []), ("one behind the other", [1] * MAX_BRANCHES), ("before a call", [1]),
 ])  # fmt: skip
 def test_a_block_goes_past_what_only_computes(name: str, lengths: list[int]) -> None:
-    """A block has at most MAX_BRANCHES branches over at most MAX_SKIPPED instructions."""
+    """A block continues over branches that skip only computations: at most MAX_BRANCHES branches over at most
+    MAX_SKIPPED instructions."""
     assert arms(BODIES[name]) == lengths
 
 
 def test_a_block_ends_where_something_is_looked_at() -> None:
-    """Hooks within or behind the skipped instructions, and the end of a DO loop, end a block."""
+    """A hook within or after the skipped instructions, or the end of a DO loop there, ends the block."""
     skipped, behind = START + 4, START + 6
     body = BODIES["a branch round one"]
     assert arms(body) == [1]
@@ -114,7 +116,7 @@ def test_a_block_ends_where_something_is_looked_at() -> None:
 
 @pytest.mark.parametrize("body", BODIES.values(), ids=BODIES)
 def test_whole_records_are_equal_wherever_a_run_stops(body: list[int]) -> None:
-    """States are equal at stops in every phase of the loop and of the interrupt."""
+    """Both engines have equal states at stops in every phase of the loop and of the interrupt."""
     plain, native = pair(firmware_of(body))
     for length in (*range(1, 130), 997, 5003):
         assert plain.run(length) == native.run(length)
@@ -123,7 +125,8 @@ def test_whole_records_are_equal_wherever_a_run_stops(body: list[int]) -> None:
 
 @pytest.mark.parametrize("at", range(START, START + 2 * len(BODIES["one behind the other"]), 2))
 def test_hooks_are_met_as_often(at: int) -> None:
-    """Hooks on a branch, on the skipped instructions and behind them are called."""
+    """Hooks on a branch, on skipped instructions and after them are called as often, and in the same cycles, in both
+    engines."""
     arrivals: list[list[int]] = []
     machines = list(pair(firmware_of(BODIES["one behind the other"])))
     for machine in machines:
@@ -138,7 +141,7 @@ def test_hooks_are_met_as_often(at: int) -> None:
 
 @pytest.mark.parametrize("name", ["one behind the other", "round what changes SR"])
 def test_cycles_are_counted_on_both_ways(name: str) -> None:
-    """Cycle accounting gives equal cycles by address in both engines."""
+    """Cycle accounting gives equal cycles by address in both engines, on both paths of a branch."""
     counted = []
     for machine in pair(firmware_of(BODIES[name])):
         accounting = CycleAccounting(machine.core, lambda _at, _count: None)

@@ -1,4 +1,4 @@
-"""Builds ELF files the way XC16's linker lays them out (abi-elf.md §6), and damaged ones, for the loader's tests."""
+"""ELF files with the layout of XC16's linker (abi-elf.md §6), valid and damaged, for tests of the loader."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ PROGBITS, SYMTAB, STRTAB, NOTE, NOBITS = 1, 2, 3, 7, 8
 
 
 def words(*values: int) -> bytes:
-    """Program words as four octets each: low, middle, upper, phantom 0."""
+    """Return program words as four octets each: low, middle, upper, phantom 0."""
     return b"".join(struct.pack("<I", value) for value in values)
 
 
 def doubled(data: bytes) -> bytes:
-    """Bytes with a phantom octet behind each, as data and debug sections are stored."""
+    """Return bytes with a phantom octet after each, as data and debug sections are stored."""
     return b"".join(bytes((octet, 0)) for octet in data)
 
 
 @dataclass
 class SampleSection:
-    """A section to write. `load_address` makes a program header of its own, as psv and EEPROM need."""
+    """Section of a sample. `load_address` gives it a program header, as psv and EEPROM sections need."""
 
     name: str
     address: int
@@ -40,7 +40,7 @@ class SampleSection:
 
 @dataclass
 class Name:
-    """A symbol to write; `section` is an index into the parts, or None for an absolute symbol."""
+    """Symbol of a sample. `section` is an index into the parts, or None for an absolute symbol."""
 
     text: str
     value: int
@@ -52,7 +52,7 @@ class Name:
 
 @dataclass
 class ElfSample:
-    """An executable of `parts` and `names`; fields of the header can be overridden for negative tests."""
+    """Executable of `parts` and `names`. Header fields can be changed for negative tests."""
 
     parts: list[SampleSection] = field(default_factory=list)
     names: list[Name] = field(default_factory=list)
@@ -63,7 +63,7 @@ class ElfSample:
     ident: bytes = b"\x7fELF\x01\x01\x01" + bytes(9)
 
     def build(self) -> bytes:
-        """The file: header, program headers, contents, section header table, symbols behind it (§6.4)."""
+        """Return the file: header, program headers, contents, section header table, then symbols (§6.4)."""
         segments = [part for part in self.parts if part.kind == PROGBITS and part.flags & SectionFlag.ALLOC]
         place = 52 + 32 * len(segments)
         body, programs, headers = b"", b"", [bytes(40)]
@@ -105,7 +105,8 @@ class ElfSample:
 
 
 def xc16_like() -> ElfSample:
-    """One of everything a real XC16 executable holds (abi-elf.md §6.3): several sections share a name."""
+    """Return an executable with one section of every kind in an XC16 executable (abi-elf.md §6.3); several sections
+    share a name."""
     return ElfSample(
         parts=[
             SampleSection(".reset", 0x000000, words(0x040100, 0x000000)),

@@ -1,4 +1,4 @@
-"""Source lines from phantom-doubled DWARF."""
+"""Source lines from DWARF with phantom bytes."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def image_with(parts):
 
 @pytest.mark.parametrize("plain", [False, True])
 def test_addresses_map_to_file_and_line(plain):
-    """abi-elf.md §6.7; standard, un-doubled DWARF is understood too."""
+    """abi-elf.md §6.7: addresses map to file and line, for DWARF with phantom bytes and for standard DWARF."""
     parts = debug_sections()
     if plain:
         parts = [dataclasses.replace(part, content=part.content[::2]) for part in parts]
@@ -37,14 +37,16 @@ def test_an_image_without_dwarf_has_no_lines():
 
 
 def test_one_value_in_a_phantom_does_not_stop_the_un_doubling():
-    """abi-elf.md §6.7: DW_AT_language of assembler units has its high byte in the phantom."""
+    """abi-elf.md §6.7: phantom bytes are removed although one is not 0: that of DW_AT_language in assembler units
+    holds its high byte."""
     octets = bytearray(doubled(bytes(range(1, 200))))
     octets[9] = 0x80
     assert remove_phantom_octets({".debug_info": bytes(octets)})[".debug_info"] == bytes(range(1, 200))
 
 
 def test_plain_lists_of_small_addresses_are_not_taken_for_doubled_ones():
-    """Only the sections with text decide how all are stored."""
+    """Lists of small addresses in standard DWARF are not taken for data with phantom bytes, because only sections
+    with text decide."""
     sections = {".debug_info": b"\1main.c\0main\0", ".debug_ranges": bytes([2, 0, 4, 0, 0, 0, 0, 0])}
     assert remove_phantom_octets(sections) == sections
 

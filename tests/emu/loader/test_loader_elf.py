@@ -1,4 +1,4 @@
-"""ELF executables as images: words, addresses, names, and what is refused."""
+"""ELF executables as images: words, addresses, names, and refused files."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def refusal(data: bytes) -> str:
 
 
 def test_code_words_drop_the_phantom_octet_and_sit_at_their_pc_address():
-    """abi-elf.md §6.8 step 3."""
+    """abi-elf.md §6.8 step 3: code words are stored at their PC address, without the phantom octet."""
     image = parsed(xc16_like())
     assert image.word(0x000000) == 0x040100
     assert image.word(0x000104) == 0xDA4000
@@ -31,7 +31,8 @@ def test_code_words_drop_the_phantom_octet_and_sit_at_their_pc_address():
 
 
 def test_psv_and_eeprom_words_sit_at_the_load_address_of_their_program_header():
-    """abi-elf.md §6.4: sh_addr is the window address, p_paddr the program address."""
+    """abi-elf.md §6.4: psv and EEPROM words are stored at p_paddr, the program address; sh_addr is the window
+    address."""
     image = parsed(xc16_like())
     assert image.word(0x010180) == 0x00BBAA
     assert image.word(0x7FF000) == 0x001234
@@ -39,14 +40,15 @@ def test_psv_and_eeprom_words_sit_at_the_load_address_of_their_program_header():
 
 
 def test_data_sections_marked_noload_define_no_program_words():
-    """abi-elf.md §6.3: their real image is in .dinit."""
+    """abi-elf.md §6.3: data sections with the NOLOAD flag define no program words, because their initial values are
+    in .dinit."""
     image = parsed(xc16_like())
     assert image.word(0x000800) is None
     assert [section.kind for section in image.sections if section.name == ".ndata"] == ["data"]
 
 
 def test_flash_is_erased_where_no_section_defines_it():
-    """abi-elf.md §6.8 step 6."""
+    """abi-elf.md §6.8 step 6: flash that no section defines is erased."""
     flash = parsed(xc16_like()).flash()
     assert len(flash) == 0xC000
     assert flash[0x102 // 2] == 0x200021
@@ -59,7 +61,7 @@ def test_config_words_are_found_in_their_region():
 
 
 def test_symbols_are_found_by_object_name_and_by_c_name():
-    """abi-elf.md §2.6."""
+    """abi-elf.md §2.6: symbols are found by object name and by C name."""
     symbols = parsed(xc16_like()).symbols
     main = symbols.find("main")
     assert main is symbols.find("_main")
@@ -70,7 +72,7 @@ def test_symbols_are_found_by_object_name_and_by_c_name():
 
 
 def test_an_address_is_named_by_function_or_global_label_never_by_compiler_labels():
-    """abi-elf.md §6.5."""
+    """abi-elf.md §6.5: an address is named by a function or global label, never by a label of the compiler."""
     symbols = parsed(xc16_like()).symbols
     assert symbols.text(0x106) == "_main+0x2"
     assert symbols.text(0x100) == "__reset"
@@ -87,7 +89,7 @@ def test_a_data_address_is_named_only_inside_the_variable():
 
 
 def test_an_unusual_processor_id_is_a_warning():
-    """abi-elf.md §6.8 step 1."""
+    """abi-elf.md §6.8 step 1: an unusual processor id is a warning."""
     sample = xc16_like()
     sample.flags = 0x5A
     image = parsed(sample)
@@ -102,7 +104,7 @@ def test_a_phantom_octet_that_is_not_zero_is_a_warning_and_ignored():
 
 
 def test_ram_data_without_noload_is_a_warning_and_not_loaded():
-    """abi-elf.md §6.8 step 2: it appears only in objects."""
+    """abi-elf.md §6.8 step 2: RAM data without NOLOAD, which only objects contain, are a warning and not loaded."""
     sample = xc16_like()
     sample.parts.append(SampleSection(".data", 0x900, words(1), DATA_COPY & ~0x0080_0000))
     assert any("RAM" in warning for warning in parsed(sample).warnings)
@@ -126,7 +128,8 @@ def test_a_file_for_something_else_is_refused_by_name(change, expected):
 
 
 def test_every_truncation_is_refused_and_says_so():
-    """The section header table is last, so any missing octet is detected."""
+    """Every truncation of a file is refused with a message. The section header table is last, so any missing octet is
+    detected."""
     whole = xc16_like().build()
     for length in range(4, len(whole), 97):
         assert "truncated" in refusal(whole[:length])

@@ -33,14 +33,16 @@ def refusal(text: str | bytes) -> str:
 
 
 def test_a_word_sits_at_half_its_byte_address():
-    """abi-elf.md §6.8: byte address = 2 x PC; lower-case digits as bin2hex writes them."""
+    """abi-elf.md §6.8: a word's address is half its byte address; lower-case digits, as bin2hex writes them, are
+    accepted."""
     image = parsed(GOTO + record(0x200, words(0xABCDEF)) + END)
     assert list(image.words()) == [(0, 0x040100), (2, 0), (0x100, 0xABCDEF)]
     assert image.kind == "hex"
 
 
 def test_config_words_and_eeprom_use_extended_addresses():
-    """abi-elf.md §6.8: config at 0x01F00000, EEPROM at 0x00FFE000."""
+    """abi-elf.md §6.8: configuration words are at byte address 0x01F00000 and EEPROM at 0x00FFE000, by extended
+    addresses."""
     image = parsed(
         upper(0x01F00000) + record(0, words(0xC706)) + upper(0x00FFE000) + record(0xE000, words(0x1234)) + END
     )

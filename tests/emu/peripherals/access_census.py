@@ -1,4 +1,4 @@
-"""Counts register accesses by kind, as executed by the plain engine."""
+"""Counts of register accesses by kind, on a machine with the plain engine."""
 
 from __future__ import annotations
 
@@ -9,18 +9,18 @@ from emu.dspic30f.state.state import DA, NOT_REPEATING, RA
 from emu.machine.machine import Machine
 
 WAYS: Final = ("address", "pointer", "REPEAT", "DO", "handler", "event")
-"""Bit n of a key's last part: by address, by pointer, under REPEAT, in DO, with IPL above 0 in a handler, in the very
-cycle in which an event is due."""
+"""Names of access modes. Bit n of a key's last part stands for mode n: by address, by pointer, under REPEAT, in DO,
+in an interrupt handler, in the cycle in which an event is due."""
 
 
 class Census:
-    """Accesses of one plain machine's instructions to SFRs while `open`, by (address, is write, size, modes)."""
+    """Counter of a plain machine's accesses to SFRs while `open` is true, by (address, is write, size, modes)."""
 
     def __init__(self, machine: Machine) -> None:
         self.counts: Final[Counter[tuple[int, bool, int, int]]] = Counter()
         self.open = False
         self.handlers = range(0)
-        """Program addresses of handlers."""
+        """Program addresses of interrupt handlers."""
         core = machine.core
         self._state: Final = core.state
         self._sequencer: Final = core.sequencer
@@ -61,7 +61,8 @@ class Census:
 
 
 def modes_of(accesses: Counter[tuple[str, int, bool, int, int]]) -> Counter[tuple[str, int, bool, int, str]]:
-    """Counts by chip, address of the word, is write, size and each way by name: an access may go several modes."""
+    """Return counts by chip, word address, is write, size and mode name. An access counts once for each of its
+    modes."""
     found: Counter[tuple[str, int, bool, int, str]] = Counter()
     for (chip, ea, is_write, size, modes), count in accesses.items():
         for bit, name in enumerate(WAYS):

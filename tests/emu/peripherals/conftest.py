@@ -14,11 +14,11 @@ from emu.system.program import ProgramMemory
 from emu.system.record import Record
 
 XT_PLL8 = 0xFFE6
-"""FOSC of the e-puck (§2): Fcy = 14.7456 MHz."""
+"""Configuration word FOSC of the e-puck (§2): Fcy = 14.7456 MHz."""
 
 
 class Rig:
-    """Devices on a bus. Only `at` advances time; all other methods act in the current cycle."""
+    """Devices on a bus, without a CPU. Only `at` advances time; all other methods act in the current cycle."""
 
     def __init__(self, fosc: int = XT_PLL8, fwdt: int = 0x7FFF) -> None:
         self.record = Record(DSPIC30F6014A.data["ram"].end)
@@ -32,7 +32,7 @@ class Rig:
         self.dev.reset("POR")
 
     def at(self, cycle: int) -> Rig:
-        """Make `cycle` the cycle of the next access."""
+        """Advance time so that the next access is in `cycle`."""
         assert cycle >= self.events.now
         assert self.events.next_due() > self.events.now or self.events.next_due() == self.events.now == 0
         self.events.arrive(cycle)
@@ -56,7 +56,7 @@ class Rig:
         return self.peek(register) >> lsb & (1 << width) - 1
 
     def flag(self, source: str) -> int:
-        """Interrupt flag by its name, for example "T1IF"."""
+        """Return the interrupt flag with this name, for example "T1IF"."""
         return next(
             self.field(word, source) for word in ("IFS0", "IFS1", "IFS2") if source in DSPIC30F6014A.sfrs[word].fields
         )

@@ -1,9 +1,9 @@
-"""Drills: very short random programs, many to one image, that access device registers in every way there is.
+"""Drills: very short random programs, many per image, that access device registers in all modes of access.
 
-A drill is a few instructions that touch registers by address or by pointer, as words and bytes, plainly, under REPEAT,
-in a DO loop or around Idle, and a branch to itself. Handlers do the same. Every row of the instruction table that
-reads or writes data memory takes part. Where pointers point is not in the code but in the W registers a run begins
-with, so one piece of native code reaches many registers. All follows from seed and chip.
+A drill has a few instructions and a branch to itself. They access registers by address or by pointer, as words and
+bytes, plainly, under REPEAT, in a DO loop or around Idle. Interrupt handlers do the same. Every row of the
+instruction table that reads or writes data memory is used. The targets of pointers are in the W registers at the
+start of a run, so the same native code accesses many registers. Seed and chip determine everything.
 """
 
 from __future__ import annotations
@@ -29,14 +29,14 @@ from .device_scenes import SCENES, Scene
 
 CODE: Final = 0x200
 DRILLS: Final = 40
-"""Drills of an image."""
+"""Number of drills per image."""
 KINDS: Final = {"plain": 4, "REPEAT": 3, "DO": 4, "handler": 4, "stack": 2, "nap": 1, "program": 0.3}
-"""Kinds of drill and their shares."""
+"""Kinds of drills, with their weights."""
 HANDLERS: Final = 4
 ROW: Final = 64
-"""Program addresses of a row of flash (dspic30f6014a.md §16)."""
+"""Program addresses per row of flash (dspic30f6014a.md §16)."""
 MODES: Final = ("CORCON", "MODCON", "XBREV", "SPLIM", "INTCON1", "SR", "DOSTARTL", "DOENDL")
-"""Drawn less often: every value makes native code of its own."""
+"""Registers drawn less often, because every value of a processor mode needs separate native code."""
 CONTROL: Final = ("OSCCON", "RCON", "NVMCON", "PMD1", "PMD2", "PMD3")
 """Registers drawn less often, because they stop, reset or disable all other devices."""
 _FLOWS: Final = ("BRA", "CALL", "GOTO", "RCALL", "DO", "REPEAT", "RETURN", "RETFIE", "RETLW", "RESET", "PWRSAV", "LNK",
@@ -48,41 +48,41 @@ BY_POINTER: Final = [row for row in MEMORY if "f" not in row.fields and "i" not 
 PREFETCHING: Final = [row for row in MEMORY if "i" in row.fields]
 PLAIN: Final = [row for row in BY_ADDRESS + BY_POINTER if not row.mnemonic.startswith(("BTSS", "BTSC"))]
 _REGISTERS_FIRST: Final = 0x20
-"""First data address behind the memory-mapped W registers (isa.md §1.2)."""
+"""First data address after the memory-mapped W registers (isa.md §1.2)."""
 
 
 @cache
 def registers_of(chip: str) -> list[Any]:
-    """Return every register of a chip, CPU registers included, W registers excluded."""
+    """Return all registers of a chip, including those of the CPU, without W registers."""
     return [sfr for sfr in CHIPS[chip].sfrs.values() if sfr.size == 2 and sfr.address >= _REGISTERS_FIRST]
 
 
 @dataclass
 class Image:
-    """Program words by address, where the drills are, and what W registers are for."""
+    """Program words by address, addresses of the drills, and uses of the W registers."""
 
     chip: Chip
     words: dict[int, int] = field(default_factory=dict)
     drills: list[tuple[int, str]] = field(default_factory=list)
-    """First address and kind."""
+    """Start address and kind of each drill."""
     rest: int = 0
-    """A branch to itself."""
+    """Address of a branch to itself."""
     handlers: range = range(0)
     """Program addresses of the interrupt handlers."""
     end: int = 0
     row: int = 0
-    """A row of flash with code that drills reprogram and call."""
+    """Address of a flash row whose code the drills reprogram and call."""
     scenes: list[Scene] = field(default_factory=list)
-    """Devices at work, one scene or several to a base state."""
+    """Settings of active devices; a base state uses one or more of them."""
     pool: list[Any] = field(default_factory=list)
-    """Registers the image is about."""
+    """Registers that the image accesses most."""
     pointers: list[int] = field(default_factory=list)
     index: int = 0
     data: list[int] = field(default_factory=list)
-    """W registers by use."""
+    """W registers that hold data."""
 
     def stretches(self) -> dict[int, list[int]]:
-        """The words in runs of consecutive ones, by first address."""
+        """Return consecutive words as lists, by first address."""
         found: dict[int, list[int]] = {}
         start = -2
         for address in sorted(self.words):
@@ -94,7 +94,7 @@ class Image:
 
 
 class ImageWriter:
-    """Writes one image."""
+    """Generator of one image."""
 
     def __init__(self, seed: int, chip: Chip) -> None:
         self.draw: Final = random.Random(f"{seed} drills")
@@ -110,7 +110,7 @@ class ImageWriter:
         choice = draw.random()
         if choice < 0.5:
             image.pool = [sfr for sfr in everything if family(sfr.name) in about] or everything
-        elif choice < 0.6:  # W registers as memory
+        elif choice < 0.6:  # accesses W registers as memory
             image.pool = [sfr for sfr in chip.sfrs.values() if sfr.address < _REGISTERS_FIRST]
         registers = list(range(15))
         draw.shuffle(registers)
@@ -119,7 +119,7 @@ class ImageWriter:
         image.pointers, image.index, image.data = registers[:7], registers[7], registers[8:]
 
     def register(self) -> Any:
-        """A register an instruction names."""
+        """Return a random register for an instruction."""
         draw = self.draw
         while True:
             sfr = draw.choice(self.image.pool if draw.random() < 0.8 else registers_of(self.image.chip.name))
@@ -128,13 +128,13 @@ class ImageWriter:
             return sfr
 
     def put(self, words: list[int]) -> None:
-        """The next words."""
+        """Append words at the current address."""
         for word in words:
             self.image.words[self.at] = word
             self.at += 2
 
     def access(self, rows: list[Row] | None = None, repeated: bool = False) -> list[int]:
-        """One instruction that reads or writes data memory, as words."""
+        """Return the words of one instruction that reads or writes data memory."""
         draw = self.draw
         while True:
             kind = draw.random()
@@ -147,7 +147,7 @@ class ImageWriter:
                 return list(codec.encode(row, x))
 
     def operands(self, row: Row) -> Operands | None:
-        """Random fields of `row`, pointers where it wants addresses; None if they turn out illegal."""
+        """Return random fields of `row`, with pointers for its addresses; None if the fields are illegal."""
         draw, image, fields = self.draw, self.image, row.fields
         x = Operands(**{f.letter: f.get(*[draw.getrandbits(24) for _ in row.pattern.mask]) for f in row.pattern.fields})
         if "z" in fields:
@@ -157,7 +157,7 @@ class ImageWriter:
             where = draw.random()
             address = self.register().address if where < 0.95 else draw.randrange(0, 32)
             x.f = address & ~1 | (draw.randrange(2) if byte else 0)
-        if draw.random() < 0.07:  # registers for several things at once, the stack pointer too
+        if draw.random() < 0.07:  # also the stack pointer, and one register in several roles
             return None if row.broken(x) else x
         for letter in "pqgh":
             if letter in fields and draw.random() < 0.2:
@@ -177,11 +177,11 @@ class ImageWriter:
         return None if row.broken(x) else x
 
     def loop_end(self) -> None:
-        """An access that may be the last instruction of a DO loop."""
+        """Append an access that may be the last instruction of a DO loop."""
         self.put(self.access(PLAIN))
 
     def drill(self) -> None:
-        """One drill of a random kind."""
+        """Append one drill of a random kind."""
         draw, start = self.draw, self.at
         kind = draw.choices(*zip(*KINDS.items(), strict=True))[0]
         if kind == "plain":
@@ -205,7 +205,7 @@ class ImageWriter:
             self.put(self.access())
             self.put(words_of("PWRSAV #lit1", k=int(draw.random() < 0.8)))
             self.put(self.access())
-        else:  # the handlers do the accesses
+        else:  # the interrupt handlers make the accesses
             self.put(words_of("NOP") * draw.randrange(3))
             self.put(words_of("DISI #lit14", k=draw.randrange(6)) if draw.random() < 0.3 else [])
             self.put(self.access())
@@ -214,7 +214,7 @@ class ImageWriter:
         self.image.drills.append((start, kind))
 
     def loop(self) -> None:
-        """A DO loop of accesses; the last instruction is one."""
+        """Append a DO loop of accesses, also as its last instruction."""
         draw, start = self.draw, self.at
         self.put([0, 0])
         for _ in range(draw.randrange(1, 4)):
@@ -231,7 +231,8 @@ class ImageWriter:
             start += 2
 
     def programming(self) -> None:
-        """The key and WR, mostly as they should be, and a call into the row (dspic30f6014a.md §16)."""
+        """Append a key sequence and a write of WR, sometimes wrong, and a call into the flash row (dspic30f6014a.md
+        §16)."""
         draw, sfrs = self.draw, self.image.chip.sfrs
         w = draw.choice(self.image.data)
         for key in (0x55, 0xAA):
@@ -247,7 +248,8 @@ class ImageWriter:
         self.put(self.access(PLAIN))
 
     def programmed_row(self) -> None:
-        """A row of accesses and literals that ends in a return, erased or not."""
+        """Append a flash row of accesses and literals that ends in RETURN, and a RETURN after it for the case that
+        the row is erased."""
         while self.at % ROW:
             self.put(words_of("NOP"))
         self.image.row = self.at
@@ -261,7 +263,7 @@ class ImageWriter:
         self.put(words_of("RETURN"))
 
     def stacking(self) -> list[int]:
-        """One use of the stack: pushes, pops, calls and frames of every form (isa.md §10)."""
+        """Return one use of the stack: pushes, pops, calls and frames of every form (isa.md §10)."""
         draw = self.draw
         w, even = draw.randrange(15), draw.randrange(0, 14, 2)
         leaf = draw.choice(self.leaves)
@@ -286,7 +288,7 @@ class ImageWriter:
         ))()  # fmt: skip
 
     def leaf(self) -> int:
-        """A callee; its address."""
+        """Append a callee and return its address."""
         start = self.at
         self.put(self.access(PLAIN))
         end = self.draw.choice(("RETURN", "RETLW{.B} #lit10, Wn", "RETFIE"))
@@ -294,7 +296,8 @@ class ImageWriter:
         return start
 
     def handler(self, number: int) -> int:
-        """Accesses, flags cleared if `number` is even, and back; its address."""
+        """Append an interrupt handler that makes accesses and, for even `number`, clears all flags. Return its
+        address."""
         start = self.at
         for _ in range(self.draw.randrange(1, 4)):
             if self.draw.random() < 0.15:
@@ -309,7 +312,7 @@ class ImageWriter:
         return start
 
     def write(self) -> Image:
-        """The whole image."""
+        """Generate the whole image."""
         image, chip = self.image, self.image.chip
         image.words |= {0: 0x040000 | CODE, 2: 0}
         image.rest = self.at
@@ -334,5 +337,5 @@ class ImageWriter:
 
 
 def image_of(seed: int, chip: Chip) -> Image:
-    """The image of a seed."""
+    """Return the image of a seed."""
     return ImageWriter(seed, chip).write()

@@ -1,9 +1,10 @@
-"""Random programs that do little else than access device registers, and their comparison between engines.
+"""Random programs that mainly access device registers, and their comparison between engines.
 
-Every register of every device is touched: words and bytes, by address and by pointer, read, written and both, plainly,
-under REPEAT, in DO loops (also as their last instruction), in handlers, with the module on or switched off, awake,
-after Idle and Sleep. Timers with short periods let their events fall on every cycle of these accesses. A robot is
-around the chip or not; bytes, edges, levels and light come from outside at odd cycles. All follows from seed and chip.
+Every register of every device is accessed: as words and bytes, by address and by pointer, read, written and modified.
+The accesses are plain, under REPEAT, in DO loops (also as their last instruction), or in handlers. They occur with
+the module on or off, and after Idle and Sleep. Short timer periods place events on every cycle of the accesses. The
+chip is bare or on a robot. External bytes, edges, levels and light arrive at random cycles. Seed and chip determine
+everything.
 """
 
 from __future__ import annotations
@@ -38,20 +39,22 @@ from emu.peripherals.i2c.slave import ExternalMaster
 from .device_scenes import SCENES
 
 LENGTH = 45
-"""Statements in the loop of a program."""
+"""Number of statements in the loop of a program."""
 CHUNKS = 14
-"""Looks at the machines, some hundred to a few thousand Tcy apart."""
+"""Number of comparisons of the machines, some hundred to a few thousand Tcy apart."""
 REGIONS = 40
-"""Compiled pieces after which a program is left: it goes through processor modes, each of which has code of its own."""
+"""Number of compiled regions after which a program is abandoned: it changes processor modes, and each mode needs
+separate code."""
 BUFFER = 0x1000
 _CONTROL = ("OSCCON", "RCON", "NVMCON", "PMD1", "PMD2", "PMD3")
 """Registers drawn less often, because they stop, reset or disable all other devices."""
 _FAMILIES = ({"TMR", "PR", "T"}, {"PORT", "LAT", "TRIS", "CNEN", "CNPU"}, {"IFS", "IEC", "IPC", "INTCON"},
              {"ADCON", "ADCBUF", "ADCHS", "ADCSSL", "ADPCFG"}, {"NVMCON", "NVMADR", "NVMADRU", "NVMKEY"},
              {"DCICON", "DCISTAT", "TSCON", "RSCON", "RXBUF", "TXBUF"})  # fmt: skip
-"""Registers of one device whose names begin differently; those of others share the letters in front of the number."""
+"""Name stems of registers that belong to one device. The registers of other devices have the letters before the
+number in common."""
 HOT = 14
-"""Registers a program is about."""
+"""Number of registers that a program accesses most."""
 CORE = ("DCOUNT", "DCOUNT", "DCOUNT", "RCOUNT", "RCOUNT", "SR", "SR", "CORCON", "DOSTARTL", "DOENDL", "DOENDH",
         "PSVPAG", "TBLPAG")  # fmt: skip
 """CPU registers that control execution, repeated according to their weight."""
@@ -61,45 +64,45 @@ _INPUTS = ("RD4", "RF6", "RC3", "RC14", "RA12", "RA13", "RD8", "RD9", "RF2", "RF
 
 @cache
 def words_of(chip: str) -> list[Any]:
-    """The registers of all devices of one of CHIPS."""
+    """Return the 16-bit registers of all devices of a chip in CHIPS."""
     first = CHIPS[chip].sfrs["INTCON1"].address
     return [sfr for sfr in CHIPS[chip].sfrs.values() if sfr.size == 2 and sfr.address >= first]
 
 
 def stack_of(chip: Chip) -> int:
-    """Where the stack of a program begins: the last eighth of RAM."""
+    """Return the start address of a program's stack: the last eighth of RAM."""
     ram = chip.data["ram"]
     return ram.end - (ram.end - ram.start) // 8
 
 
 @dataclass
 class Writer:
-    """Writes the statements of one program and counts the ways in which it touches registers."""
+    """Generator of the statements of one program; it counts the modes in which they access registers."""
 
     draw: random.Random
     chip: Chip
     pool: list[Any]
     touched: Counter[tuple[str, str]] = field(default_factory=Counter)
-    """By register and way."""
+    """Number of accesses by register and mode."""
     loops: int = 0
 
     def sfr(self) -> Any:
-        """A register, mostly of the devices this program is about."""
+        """Return a random register, mostly one of the devices that this program uses."""
         everything = words_of(self.chip.name)
         chosen = self.draw.choice(self.pool if self.draw.random() < 0.85 else everything)
         return self.draw.choice(everything) if chosen.name in _CONTROL and self.draw.random() < 0.9 else chosen
 
     def note(self, sfr: Any, way: str) -> str:
-        """Its address as text, noted as touched."""
+        """Count an access to a register and return its address as text."""
         self.touched[sfr.name, way] += 1
         return f"{sfr.address:#x}"
 
     def data(self) -> str:
-        """A register of the main program that holds data."""
+        """Return a random W register of the main program that holds data."""
         return f"w{self.draw.randrange(8)}"
 
     def direct(self, place: str) -> str:
-        """One one-word instruction with a register by its address."""
+        """Return a one-word instruction that accesses a register by address."""
         draw, sfr, w = self.draw, self.sfr(), self.data()
         odd = draw.randrange(2)
         bit, bit8 = draw.randrange(16), draw.randrange(8)
@@ -117,7 +120,7 @@ class Writer:
         return draw.choice(forms)
 
     def pointer(self, place: str, p: str = "w8", q: str = "w9") -> list[str]:
-        """A pointer to a register and one instruction through it."""
+        """Return instructions that load a pointer to a register and access the register through it."""
         draw, sfr, w = self.draw, self.sfr(), self.data()
         start = draw.choice((0, 0, 2, -2))
         moved = {0: f"[{p}]", 2: draw.choice((f"[--{p}]", f"[{p}-2]")), -2: f"[++{p}]"}[start]
@@ -142,9 +145,9 @@ class Writer:
         return [f"mov #{sfr.address + start:#x}, {p}", f"mov #{target:#x}, {q}", draw.choice(forms)]
 
     def core(self, place: str) -> str:
-        """One one-word instruction with a register of the CPU.
+        """Return a one-word instruction with a register of the CPU.
 
-        Counts mostly decrease, so that the program continues.
+        Counts mostly decrease, so that the program makes progress.
         """
         draw, name, w = self.draw, self.draw.choice(CORE), self.data()
         word = self.note(self.chip.sfrs[name], f"{place} core")
@@ -158,7 +161,7 @@ class Writer:
         return draw.choice(forms)
 
     def repeated(self, place: str) -> list[str]:
-        """REPEAT and an access, by address or walking along registers."""
+        """Return REPEAT and an access, by address or through an incremented pointer."""
         draw, sfr, count = self.draw, self.sfr(), self.draw.choice((0, 1, 2, 3, 7, 15))
         if draw.random() < 0.15:
             return [f"repeat #{count}", self.core(f"{place} REPEAT")]
@@ -173,7 +176,8 @@ class Writer:
         return [f"mov #{sfr.address:#x}, w8", f"mov #{BUFFER + 0x100:#x}, w9", head, form]
 
     def loop(self) -> list[str]:
-        """A DO loop; its last instruction is an access too, by address, by pointer or of the loop's own registers."""
+        """Return a DO loop. Its last instruction is an access too: by address, by pointer, or to the loop's own
+        registers."""
         self.loops += 1
         label = f"end{self.loops}"
         body = [line for _ in range(self.draw.randrange(1, 4)) for line in self.statement("DO", plain=True)]
@@ -185,7 +189,7 @@ class Writer:
         return [f"do #{self.draw.choice((0, 1, 2, 5))}, {label}", *body, *before, "nop", f"{label}: {last}"]
 
     def statement(self, place: str = "", plain: bool = False) -> list[str]:
-        """One of the things a program does."""
+        """Return one random statement as lines."""
         draw, kind = self.draw, self.draw.random()
         if kind < 0.42:
             return [self.direct(place)]
@@ -230,7 +234,7 @@ class Writer:
         return [*wake, "pwrsav #0" if self.draw.random() < 0.04 else "pwrsav #1"]
 
     def clock(self) -> list[str]:
-        """A byte of OSCCON behind its key: another source, another Tcy (§3)."""
+        """Return a write of OSCCON with its key, which may select another clock source and Tcy (§3)."""
         low, high = f"{self.note(self.chip.sfrs['OSCCON'], 'keyed'):s}", f"{self.chip.sfrs['OSCCON'].address + 1:#x}"
         address, first, second = self.draw.choice(((low, 0x46, 0x57), (low, 0x46, 0x57), (high, 0x78, 0x9A)))
         value = self.draw.choice((0, 1, 1, 0x40, 0x41, 0x80, 0x02))
@@ -238,7 +242,7 @@ class Writer:
                 "mov.b w0, [w8]", "mov.b w1, [w8]", "mov.b w2, [w8]"]  # fmt: skip
 
     def setting(self) -> list[str]:
-        """A device is put to work."""
+        """Return code that sets up a random device."""
         return self.written(SCENES[self.draw.choice(sorted(SCENES))](self.draw))
 
     def written(self, settings: list[tuple[str, int]]) -> list[str]:
@@ -250,11 +254,12 @@ class Writer:
         return lines
 
     def at(self, name: str) -> str:
-        """The address of a register as text."""
+        """Return the address of a register as text."""
         return f"{self.chip.sfrs[name].address:#x}"
 
     def handler(self, number: int) -> list[str]:
-        """Touches devices with registers of its own and clears all flags, by word or one byte at a time."""
+        """Return a handler that accesses devices through its own W registers and clears all flags, by words or
+        bytes."""
         lines = [f"handler{number}: inc w11, w11"]
         for _ in range(self.draw.randrange(4)):
             way = self.draw.random()
@@ -272,7 +277,7 @@ class Writer:
 
 
 def family(name: str) -> frozenset[str]:
-    """The devices a register belongs to, by the letters its name begins with."""
+    """Return the family of devices to which a register belongs, by the letters at the beginning of its name."""
     letters = "".join(takewhile(str.isalpha, name)) if not name.startswith(("PORT", "LAT", "TRIS")) else name[:-1]
     return frozenset(next((one for one in _FAMILIES if letters in one), {letters}))
 
@@ -311,7 +316,7 @@ def program(seed: int, chip: Chip = DSPIC30F6014A) -> tuple[str, Writer]:
 
 @dataclass
 class Subject:
-    """One machine with a program, and what was heard from it."""
+    """Machine with a program, and its recorded outputs."""
 
     machine: Machine
     heard: list[tuple[int, int, int]] = field(default_factory=list)
@@ -321,7 +326,7 @@ class Subject:
 
 @dataclass
 class Scribe(I2cDevice):
-    """An I2C device that acknowledges some bytes and records all."""
+    """I2C device that acknowledges some bytes and records all events."""
 
     subject: Subject
 
@@ -342,7 +347,7 @@ class Scribe(I2cDevice):
 
 
 def flash(text: str, chip: Chip = DSPIC30F6014A) -> dict[int, list[int]]:
-    """Stretches of program words by address, vectors included."""
+    """Return consecutive program words by address, including vectors."""
     words, labels = assemble(text)
     words |= {0: 0x040000 | START, 2: 0}
     for irq in chip.interrupts:
@@ -360,7 +365,8 @@ def flash(text: str, chip: Chip = DSPIC30F6014A) -> dict[int, list[int]]:
 
 
 def subject(seed: int, engine: str, stretches: dict[int, list[int]], chip: Chip = DSPIC30F6014A) -> Subject:
-    """A machine about to run the program: bare, or a robot whose camera notes what it renders, if its chip fits one."""
+    """Return a machine about to run the program: a bare chip, or a robot, if the chip fits one, whose camera records
+    the rendered lines."""
     draw = random.Random(seed ^ 0x5EED)
     robot = draw.random() < 0.6 and chip is DSPIC30F6014A
     camera = draw.choice(("PO6030K", "PO8030D", "PO3030K", None))
@@ -374,7 +380,7 @@ def subject(seed: int, engine: str, stretches: dict[int, list[int]], chip: Chip 
     if draw.random() < 0.9:
         machine.program.put(0xF80002, 0x7FFF)  # FWDT: no watchdog
     if draw.random() < 0.4:
-        machine.program.put(0xF80000, draw.choice((0x7FE6, 0x3FE6)))  # FCKSM: clocks can be switched
+        machine.program.put(0xF80000, draw.choice((0x7FE6, 0x3FE6)))  # FCKSM: clock switching is enabled
     machine.reset("POR")
     if not robot and machine.peripherals.i2c is not None:
         machine.peripherals.i2c.wire.attach(0x6E, Scribe(made))
@@ -395,7 +401,7 @@ def subject(seed: int, engine: str, stretches: dict[int, list[int]], chip: Chip 
 
 
 def invalidate(draw: random.Random, subject: Subject) -> None:
-    """Apply a random external input, now or soon."""
+    """Apply a random external input, at once or soon."""
     machine = subject.machine
     kind, cycle, board = draw.randrange(14), machine.cycle, machine.board
     if machine.is_asleep:
@@ -436,7 +442,7 @@ def invalidate(draw: random.Random, subject: Subject) -> None:
 
 
 def run(machine: Machine, cycles: int, cuts: random.Random | None) -> Stop:
-    """Run like `Machine.run`, in random pieces if `draw` is given; the cuts must have no effect."""
+    """Run like `Machine.run`, but in random pieces if `cuts` is given; the pieces must have no effect."""
     limit = machine.cycle + cycles
     stop = machine.run(cycles if cuts is None else min(cycles, cuts.randrange(1, 400)))
     while cuts is not None and stop.reason == "limit" and machine.cycle < limit:
@@ -451,8 +457,8 @@ def difference(
     chip: Chip = DSPIC30F6014A,
     tally: Counter[tuple[str, str]] | None = None,
 ) -> str | None:
-    """Run engines side by side with the plain one, with bytes, edges and levels from outside, each of them in pieces in
-    every third seed; what differs first."""
+    """Run engines beside the plain one, with external bytes, edges and levels. In one of three seeds an engine runs
+    in random pieces. Return the first difference, or None."""
     text, writer = program(seed, chip)
     stretches = flash(text, chip)
     subjects = [subject(seed, engine, stretches, chip) for engine in ("plain", *engines)]
@@ -488,7 +494,7 @@ def difference(
 
 
 def _named(place: str, chip: Chip) -> str:
-    """A data address with the register that is there."""
+    """Return a data address together with the name of its register."""
     if place.startswith("data "):
         names = {sfr.address: sfr.name for sfr in words_of(chip.name)}
         return f"{place} {names.get(int(place.split()[1], 0) & ~1, '')}".strip()

@@ -6,7 +6,7 @@ import random
 
 Scene = list[tuple[str, int]]
 _STANDS = (0, 0x2000, 0x2000)
-"""xSIDL of every control register: the device's clock stops in Idle."""
+"""xSIDL bit of control registers, or 0: the device's clock stops in Idle."""
 
 
 def _timer(draw: random.Random) -> Scene:
@@ -98,7 +98,8 @@ def _bus(draw: random.Random) -> Scene:
 
 
 def _codec(draw: random.Random) -> Scene:
-    """In any order: what is chosen last may be what the port has waited for."""
+    """Return the settings of the codec interface in random order, because any of them may be the last that the port
+    waits for."""
     settings = [
         ("DCICON3", draw.randrange(16)),
         ("TSCON", draw.randrange(0x10000)),
@@ -158,7 +159,7 @@ def _camera(draw: random.Random) -> Scene:
 
 
 def _programming(draw: random.Random) -> Scene:
-    """Without the key nothing happens; with it an EEPROM row changes."""
+    """Return settings that write an EEPROM row with the key sequence, or without it, which has no effect."""
     key = [("NVMKEY", 0x55), ("NVMKEY", 0xAA)] if draw.random() < 0.7 else []
     return [
         ("NVMADR", 0xF000 | draw.randrange(0x1000)),
@@ -170,7 +171,7 @@ def _programming(draw: random.Random) -> Scene:
 
 
 def _off_and_on(draw: random.Random) -> Scene:
-    """Modules are switched off while they work, and on again (§17)."""
+    """Return settings that switch active modules off and on again (§17)."""
     name = draw.choice(("PMD1", "PMD2"))
     return [
         *SCENES[draw.choice(("timer", "pair", "compare", "capture", "uart", "spi", "bus", "codec", "can"))](draw),

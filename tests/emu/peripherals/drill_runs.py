@@ -1,8 +1,9 @@
-"""Drills on all engines: one machine to an engine for all images, each run from a base state that is put back.
+"""Runs of drills on all engines: one machine per engine for all images, and each run starts from a restored base
+state.
 
-A run puts back a base state (devices at work, somewhere in the middle of things, processor modes on), sets the W
-registers, flags, interrupt requests and timers whose matches fall on the next cycles, and runs a drill for some tens of
-Tcy, cut anywhere. Afterwards records, stops and sent bytes are compared.
+A run restores a base state, in which devices are active and processor modes are set. It sets the W registers, flags,
+interrupt requests, and timers that match in the next cycles. Then it runs a drill for some tens of Tcy, divided at
+random cycles. Finally records, stops and sent bytes are compared.
 """
 
 from __future__ import annotations
@@ -38,13 +39,13 @@ from .device_programs import words_of as sfrs_of
 
 ENGINES: Final = ("plain", "jit")
 BASES: Final = 3
-"""Base states of an image."""
+"""Number of base states per image."""
 ROUNDS: Final = 30
-"""Runs of each drill."""
+"""Number of runs of each drill."""
 REGIONS: Final = 260
-"""Compiled pieces after which an image is left: every processor mode has code of its own."""
+"""Number of compiled regions after which an image is abandoned, because every processor mode needs separate code."""
 SLEPT: Final = 40_000
-"""Tcy after which a machine that nothing wakes is left."""
+"""Number of Tcy after which the run of a sleeping machine ends."""
 VALUES: Final = (0, 1, 2, 5, 0x00FF, 0x7FFF, 0x8000, 0xA000, 0xFFFF)
 _INPUTS: Final = ("RD4", "RF6", "RC3", "RC14", "RA12", "RA13", "RD8", "RD9", "RG2", "RC1", "RC2", "RF7", "RB5")
 NO_WATCHDOG: Final = 0x7FFF
@@ -52,11 +53,11 @@ NO_WATCHDOG: Final = 0x7FFF
 
 
 Kept = tuple[bytes, Callable[[], None]]
-"""A machine's record, and how to put back what is not in it."""
+"""A machine's record, and a function that restores its state outside of the record."""
 
 
 class Crew:
-    """Machines of one kind, one to an engine, and what was heard from each."""
+    """Machines of one kind, one per engine, and the bytes that each has sent."""
 
     def __init__(self, chip: Chip, robot: bool, slip: int, engines: tuple[str, ...] = ENGINES) -> None:
         self.chip: Final = chip
@@ -77,11 +78,11 @@ class Crew:
 
     @property
     def regions(self) -> int:
-        """Pieces of native code made so far."""
+        """Return the number of regions of native code compiled so far."""
         return sum(m.runner.counts.regions for m in self.machines if isinstance(m.runner, JitEngine))
 
     def load(self, image: Image, watched: bool, switching: bool) -> None:
-        """Power-on state with an image in flash."""
+        """Reset all machines to power-on state with an image in flash."""
         self.census.handlers = image.handlers
         for machine, (state, put_back) in zip(self.machines, self.clean, strict=True):
             machine.restore(state)
@@ -93,18 +94,18 @@ class Crew:
                 machine.program.put_flash(address, words)
 
     def keep(self) -> list[Kept]:
-        """Keep the current state of all machines."""
+        """Return the current state of all machines."""
         return [(machine.snapshot(), machine.save_host_state()) for machine in self.machines]
 
     def back(self, kept: list[Kept]) -> None:
-        """Restore all machines to the kept state."""
+        """Restore all machines to a state returned by `keep`."""
         for machine, heard, (state, put_back) in zip(self.machines, self.heard, kept, strict=True):
             machine.restore_state(state)
             put_back()
             heard.clear()
 
     def compare(self) -> str:
-        """Return the difference of a machine from the first one, empty if there is none."""
+        """Return the difference between the first machine and another one, or "" if there is none."""
         first, *others = self.machines
         state = first.snapshot()
         for machine, name, heard in zip(others, self.engines[1:], self.heard[1:], strict=True):
@@ -124,21 +125,21 @@ class Crew:
 
 @dataclass
 class Tally:
-    """What was run and found equal."""
+    """Counts of executed items that were equal in all engines."""
 
     images: int = 0
     runs: int = 0
     programs: int = 0
-    """Different ones: other instructions, or other contents of W registers."""
+    """Number of different programs: they differ in their instructions or in the contents of W registers."""
     cycles: int = 0
     left: int = 0
-    """Images that were left early."""
+    """Number of images that were abandoned early."""
     kinds: Counter[str] = field(default_factory=Counter)
     accesses: Counter[tuple[str, int, bool, int, int]] = field(default_factory=Counter)
-    """By chip and what `Census` tells apart."""
+    """Number of accesses, by chip and by the keys of `Census`."""
 
     def add(self, other: Tally) -> None:
-        """Take over what another tally counted."""
+        """Add the counts of another tally."""
         for name in ("images", "runs", "programs", "cycles", "left"):
             setattr(self, name, getattr(self, name) + getattr(other, name))
         self.kinds.update(other.kinds)
@@ -147,12 +148,12 @@ class Tally:
 
 @cache
 def crew_of(chip: str, robot: bool, slip: int, engines: tuple[str, ...]) -> Crew:
-    """Machines of one kind, made once."""
+    """Return the machines of one kind, which are constructed once."""
     return Crew(CHIPS[chip], robot, slip, engines)
 
 
 def pointed(draw: random.Random, machine: Machine, image: Image) -> int:
-    """A data address: a register or a neighbour of one, rarely something else."""
+    """Return a random data address: usually a register or the word beside one."""
     ram, kind = image.chip.data["ram"], draw.random()
     window = machine.peek("CORCON") & PSV
     if kind < 0.04 + (0.25 if window else 0):
@@ -170,7 +171,8 @@ def pointed(draw: random.Random, machine: Machine, image: Image) -> int:
 
 
 def modes(draw: random.Random, machine: Machine, image: Image) -> None:
-    """Processor modes, pages and a stack limit: what native code depends on (isa.md §2.4, §2.5, §7.7, §7.8, §10.2)."""
+    """Set processor modes, pages and a stack limit, on which native code depends (isa.md §2.4, §2.5, §7.7, §7.8,
+    §10.2)."""
     ram = image.chip.data["ram"]
     machine.write("CORCON", draw.choice((0x0020, 0x0024, 0x0024, draw.randrange(0x10000) & 0x10F7)))
     if draw.random() < 0.6:
@@ -204,7 +206,7 @@ def outside(draw: random.Random, machine: Machine) -> None:
 
 
 def base(seed: int, number: int, machine: Machine, image: Image) -> None:
-    """Devices are put to work, and some time passes."""
+    """Set up devices and run for some time, which gives base state `number`."""
     draw = random.Random(f"{seed} base {number}")
     machine.core.state.initialised = 0xFFFF
     machine.pc = image.rest
@@ -221,7 +223,8 @@ def base(seed: int, number: int, machine: Machine, image: Image) -> None:
 
 
 def prepare(draw: random.Random, machine: Machine, image: Image, start: int, kind: str) -> tuple[int, ...]:
-    """W registers, flags, requests, and timers that will match in the next cycles; what W holds."""
+    """Set W registers, flags, requests, and timers that match in the next cycles. Return the contents of the W
+    registers."""
     chip, state = image.chip, machine.state
     ram = chip.data["ram"]
     held = [0] * 16
@@ -260,7 +263,7 @@ def prepare(draw: random.Random, machine: Machine, image: Image, start: int, kin
 
 
 def program(draw: random.Random, machine: Machine, image: Image) -> None:
-    """A row of flash or EEPROM is chosen, and latches that leave some of its instructions as they are."""
+    """Select a row of flash or EEPROM, and fill the latches so that some instructions of the row are kept."""
     machine.write("NVMCON", draw.choice((0x4041, 0x4001, 0x4001, 0x4045, 0x4005, 0x4004, 0x4044, 0x0001)))
     eeprom = image.chip.program["eedata"].start
     address = draw.choice((image.row, image.row, image.row + 6, eeprom, draw.randrange(0x1000000) & ~1))
@@ -271,8 +274,8 @@ def program(draw: random.Random, machine: Machine, image: Image) -> None:
 
 
 def run(draw: random.Random, machine: Machine, cycles: int) -> list[Stop | int | None]:
-    """So many Tcy, in one piece, cut or with limits in passing; longer while it sleeps, and as long again behind a row
-    of flash. Returns how pieces ended, and where limits fell."""
+    """Run for `cycles` Tcy: in one piece, divided, or with `run_past`. A sleeping machine runs longer, and as long
+    again after a flash row was programmed. Return how the pieces ended and the cycles of the cuts."""
     end, way = machine.cycle + cycles, draw.random()
     ended: list[Stop | int | None] = []
     if way < 0.4:
@@ -291,7 +294,7 @@ def run(draw: random.Random, machine: Machine, cycles: int) -> list[Stop | int |
 
 
 def based(seed: int, crew: Crew, image: Image) -> Iterator[list[Kept] | str]:
-    """Base states of an image one by one, on all machines, or what differs."""
+    """Yield each base state of an image, set up on all machines, or the first difference."""
     loaded = crew.keep()
     for number in range(BASES):
         crew.back(loaded)
@@ -312,7 +315,8 @@ def check(
     drills: int = DRILLS,
     rounds: int = ROUNDS,
 ) -> str | None:
-    """The first drills of one image on `engines`, `rounds` times each; what differs first, None if nothing does."""
+    """Run the first `drills` drills of an image `rounds` times each on `engines`. Return the first difference, or
+    None."""
     tally = Tally() if tally is None else tally
     draw = random.Random(f"{seed} kind")
     image = image_of(seed, chip)

@@ -15,12 +15,12 @@ OFF, WAITING, SAMPLING, CONVERTING = range(4)
 ADON, ADSIDL, SSRC, ASAM, SAMP, DONE = 0x8000, 0x2000, 7 << 5, 4, 2, 1
 CSCNA, BUFS, BUFM, ALTS, ADRC = 0x400, 0x80, 2, 1, 0x80
 RC_TAD = 44
-"""1.5 us at 14.7456 MHz in half Tcy."""
+"""TAD of the internal oscillator: 1.5 us at 14.7456 MHz, in half Tcy."""
 CYCLES = 1500
 
 
 class Plain:
-    """One converter. `half` counts half Tcy; what is written in a cycle begins to act with the next one."""
+    """Reference model of the converter. `half` counts half Tcy; a write takes effect in the cycle after it."""
 
     def __init__(self, level: Callable[[int, int], int]) -> None:
         self.word = dict.fromkeys(("ADCON1", "ADCON2", "ADCON3", "ADCHS", "ADCSSL"), 0)
@@ -73,14 +73,15 @@ class Plain:
             self._sample()
 
     def _end_states(self) -> None:
-        """Also those that last no time. One that a write has made too short ends with the cycle behind it."""
+        """End the current state if its time is over, repeatedly, because a state may have no duration. A state that a
+        write has shortened below its age ends in the cycle after the write."""
         while (limit := self._duration) is not None and self._age >= limit:
             if self._age > limit and self._half < self._free_from:
                 break
             self._convert() if self._state == SAMPLING else self._finish()
 
     def live(self, cycle: int, int0: bool) -> None:
-        """On to a cycle, which is the next one; `int0`: its edge is seen in it, before a conversion ends."""
+        """Advance to `cycle`, the next cycle. `int0`: an edge of INT0 is detected in it, before a conversion ends."""
         is_triggered = int0 and (SAMPLING in (self._state, self._begins)) and not self.is_stopped
         while self._half < 2 * cycle:
             self._half += 1
@@ -97,7 +98,7 @@ class Plain:
             self._convert()
 
     def write(self, name: str, value: int, lanes: int) -> None:
-        """In the present cycle."""
+        """Write a register in the current cycle."""
         old = self.word[name]
         new = self.word[name] = old & ~lanes | value & lanes
         self._free_from = self._half + 2
@@ -126,7 +127,7 @@ class Plain:
 
 
 def _value(draw: random.Random, name: str) -> int:
-    """A setting, mostly one that converts."""
+    """Return a random value of a register, usually one with which the ADC converts."""
     if name == "ADCON1":
         on, idle = draw.choice((0, ADON, ADON, ADON, ADON)), draw.choice((0, ADSIDL))
         return on | idle | draw.randrange(4) << 8 | draw.choice((0, 7, 7, 7, 1, 1, 5)) << 5 | draw.randrange(8)
@@ -140,7 +141,7 @@ def _value(draw: random.Random, name: str) -> int:
 
 
 def difference(seed: int) -> str | None:
-    """Both converters through the same; what differs first, and after what."""
+    """Apply the same inputs to both converters. Return the first difference and the last inputs, or None."""
     draw, rig = random.Random(seed), Rig()
     adc, levels = rig.dev.adc, [draw.randrange(0x10000) for _ in range(16)]
     moving = set(draw.sample(range(16), 5))

@@ -18,7 +18,8 @@ def code(rig, channel, value):
 
 
 def test_polled_conversion_of_the_library_takes_133_cycles(rig):
-    """§13: ADCS = 18, TAD 9.5 Tcy, 14 TAD = 133 Tcy from the end of sampling; DONE and ADIF rise together."""
+    """§13: a polled conversion with ADCS = 18 (TAD 9.5 Tcy) takes 14 TAD = 133 Tcy from the end of sampling; DONE and
+    ADIF rise together."""
     code(rig, 9, 1234)
     rig.write("ADCHS", 9)
     rig.write("ADCON3", 18)
@@ -35,7 +36,8 @@ def test_polled_conversion_of_the_library_takes_133_cycles(rig):
 
 @pytest.mark.parametrize(("adcs", "channels"), [(39, 0x001C), (23, 0x111C), (19, 0x00FC)])
 def test_scans_of_the_epuck_take_900_cycles(rig, adcs, channels):
-    """§13: SAMC = 1; 3 x 15 x 20, 5 x 15 x 12, 6 x 15 x 10 Tcy; buffers in ascending channel order."""
+    """§13: with SAMC = 1, the e-puck's scans of 3, 5 and 6 channels take 900 Tcy: 3 x 15 x 20, 5 x 15 x 12, 6 x 15 x
+    10. Buffers are in ascending channel order."""
     scanned = [number for number in range(16) if channels >> number & 1]
     for number in range(16):
         code(rig, number, 100 * number)
@@ -52,7 +54,7 @@ def test_scans_of_the_epuck_take_900_cycles(rig, adcs, channels):
 
 
 def test_buffer_fills_while_the_scan_runs(rig):
-    """§13: each result is in its buffer as soon as its conversion ends: 300 Tcy per channel."""
+    """§13: each result is in its buffer at the end of its conversion, every 300 Tcy during the scan."""
     code(rig, 2, 22)
     code(rig, 3, 33)
     rig.write("ADCSSL", 0x000C)
@@ -66,7 +68,8 @@ def test_buffer_fills_while_the_scan_runs(rig):
 
 
 def test_half_cycle_tad_adds_up_without_drift(rig):
-    """§13: ADCS = 0, SAMC = 1: 7.5 Tcy a conversion, so every second one ends in a full cycle."""
+    """§13: with ADCS = 0 and SAMC = 1 a conversion takes 7.5 Tcy, so every second one ends in the middle of a cycle,
+    without drift."""
     rig.write("ADCON3", 0x0100)
     rig.write("ADCON1", ADON | ASAM | AUTO)
     seen = []
@@ -83,7 +86,7 @@ def test_half_cycle_tad_adds_up_without_drift(rig):
     [(0, [0, 0x800, 0xFFF]), (1, [0xF800, 0, 0x7FF]), (2, [0, 0x8000, 0xFFF0]), (3, [0x8000, 0, 0x7FF0])],
 )
 def test_result_formats(rig, form, results):
-    """§13 FORM: unsigned, signed, fractional, signed fractional."""
+    """§13: FORM selects unsigned, signed, fractional and signed fractional results."""
     rig.write("ADCON3", 1)
     for value, expected in zip((0, 2048, 4095), results, strict=True):
         code(rig, 0, value)
@@ -95,7 +98,7 @@ def test_result_formats(rig, form, results):
 
 
 def test_alternating_inputs(rig):
-    """§13 ALTS: A, B, A, B."""
+    """§13: ALTS alternates between multiplexers A and B."""
     code(rig, 3, 3)
     code(rig, 12, 12)
     rig.write("ADCHS", 0x0C03)
@@ -107,7 +110,7 @@ def test_alternating_inputs(rig):
 
 
 def test_buffer_halves_take_turns(rig):
-    """§13 BUFM: 0..7, then 8..F; BUFS tells the half being filled."""
+    """§13: with BUFM, results alternate between buffers 0..7 and 8..F; BUFS reads which half is being filled."""
     rig.write("ADCON2", 0x0006)  # SMPI = 1
     rig.write("ADCON3", 0x0101)
     rig.write("ADCON1", ADON | ASAM | AUTO)
@@ -121,7 +124,7 @@ def test_buffer_halves_take_turns(rig):
 
 
 def test_timer_3_match_ends_sampling(rig):
-    """§13 SSRC = 010: T3 flag in cycle 101, conversion 7 (ADCS + 1) = 70 Tcy."""
+    """§13: with SSRC = 010, the T3 flag in cycle 101 ends sampling; the conversion takes 7 (ADCS + 1) = 70 Tcy."""
     rig.write("PR3", 99)
     rig.write("ADCON3", 9)
     rig.write("ADCON1", ADON | ASAM | TIMER3)
@@ -134,7 +137,7 @@ def test_timer_3_match_ends_sampling(rig):
 
 
 def test_timer_2_and_3_as_a_pair_trigger_too(rig):
-    """§7: T2:T3 match."""
+    """§7, §13: a match of the 32-bit pair T2:T3 ends sampling."""
     rig.write("PR2", 99)
     rig.write("PR3", 0)
     rig.write("ADCON3", 9)
@@ -144,7 +147,7 @@ def test_timer_2_and_3_as_a_pair_trigger_too(rig):
 
 
 def test_int0_edge_ends_sampling(rig):
-    """§13 SSRC = 001: edge 100, flag 101, result 171."""
+    """§13: with SSRC = 001, an INT0 edge in cycle 100 sets the flag in 101 and gives a result in 171."""
     rig.write("ADCON3", 9)
     rig.write("ADCON1", ADON | ASAM | INT0)
     rig.at(100).dev.pins.set("RF6", 1)
@@ -153,7 +156,7 @@ def test_int0_edge_ends_sampling(rig):
 
 
 def test_switching_off_aborts_and_restarts_the_pointers(rig):
-    """§13: no result; the next ADON begins with buffer 0; ADCBUF is kept."""
+    """§13: switching off aborts a conversion without a result and keeps ADCBUF; the next ADON starts with buffer 0."""
     code(rig, 0, 77)
     rig.write("ADCON2", 2 << 2)
     rig.write("ADCON3", 0x0101)
@@ -168,7 +171,7 @@ def test_switching_off_aborts_and_restarts_the_pointers(rig):
 
 
 def test_negative_input_an1_is_subtracted(rig):
-    """§13 CH0NA; negative differences clip to 0."""
+    """§13: with CH0NA the level of AN1 is subtracted; negative differences are clipped to 0."""
     code(rig, 5, 1000)
     code(rig, 1, 400)
     rig.write("ADCHS", 0x15)
@@ -179,7 +182,7 @@ def test_negative_input_an1_is_subtracted(rig):
 
 
 def test_external_references_scale_the_result(rig):
-    """§13 VCFG = 011: code = floor(4096 (V - VREF-) / (VREF+ - VREF-))."""
+    """§13: with VCFG = 011 the result is floor(4096 (V - VREF-) / (VREF+ - VREF-))."""
     rig.dev.adc.set_references(0x4000, 0xC000)
     rig.dev.adc.set_input(0, 0x6000)
     rig.write("ADCON2", 3 << 13)
@@ -190,7 +193,7 @@ def test_external_references_scale_the_result(rig):
 
 
 def test_analog_pins_read_0_on_the_port(rig):
-    """§6: ADPCFG = 0 is the reset state."""
+    """§6: pins configured as analog read 0 on the port; ADPCFG = 0 is the reset state."""
     rig.dev.pins.set("RB4", 1)
     assert rig.at(3).read("PORTB") == 0
     rig.write("ADPCFG", 0x0010)
@@ -198,7 +201,8 @@ def test_analog_pins_read_0_on_the_port(rig):
 
 
 def test_source_is_evaluated_at_the_end_of_each_sampling(rig):
-    """§13: sampling ends SAMC TAD after it began: cycles 21, 321 for SAMC = 1, TAD 20."""
+    """§13: a source is evaluated at the end of each sampling, SAMC TAD after its start: in cycles 21 and 321 for SAMC
+    = 1 and TAD 20."""
     seen = []
     rig.dev.adc.source[0] = lambda cycle: seen.append(cycle) or 0
     rig.write("ADCON2", 4)
@@ -209,7 +213,7 @@ def test_source_is_evaluated_at_the_end_of_each_sampling(rig):
 
 
 def test_idle_with_adsidl_waits(rig):
-    """§17."""
+    """§17: with ADSIDL, the ADC stops during Idle and then continues."""
     rig.write("ADCON3", 9)
     rig.write("ADCON1", ADON | 0x2000 | SAMP)
     rig.at(10).write("ADCON1", ADON | 0x2000)
@@ -221,7 +225,7 @@ def test_idle_with_adsidl_waits(rig):
 
 @pytest.mark.parametrize("seed", range(10))
 def test_reads_do_not_change_conversions(seed):
-    """Conversions are computed on access: polling every cycle and never polling give the same results."""
+    """Polling in every cycle and not polling give the same results, because conversions are computed on access."""
     outcomes = []
     for polls in (False, True):
         draw, rig, seen = random.Random(seed), Rig(), []
@@ -250,7 +254,8 @@ def test_reads_do_not_change_conversions(seed):
 
 
 def test_the_scan_starts_again_behind_every_interrupt(rig):
-    """§13: five inputs, three results an interrupt: always the first three."""
+    """§13: a scan restarts after every interrupt: with five inputs and three results per interrupt, always the first
+    three are converted."""
     for number in range(16):
         rig.dev.adc.set_input(number, 100 * number << 4)
     rig.write("ADCSSL", 0x1F00)
@@ -265,7 +270,8 @@ def test_the_scan_starts_again_behind_every_interrupt(rig):
 
 @pytest.mark.parametrize("mode", [1, 2])
 def test_levels_may_change_while_the_converter_is_stopped(rig, mode):
-    """§17: neither Idle with ADSIDL nor Sleep converts anything, whatever happens outside: two results of 15 TAD."""
+    """§17: in Idle with ADSIDL, or in Sleep, the ADC converts nothing, whatever the levels do; later results take 15
+    TAD each."""
     rig.write("ADCON2", 4)
     rig.write("ADCON3", 0x0109)
     rig.write("ADCON1", ADON | 0x2000 | ASAM | AUTO)
@@ -281,7 +287,8 @@ def test_levels_may_change_while_the_converter_is_stopped(rig, mode):
 
 
 def test_a_shorter_setting_ends_sampling_but_not_in_the_past(rig):
-    """§13: sampling by hand for 1000 Tcy, then automatic: one conversion of 14 TAD begins, there was none before."""
+    """§13: if manual sampling has lasted 1000 Tcy when automatic mode is set, one conversion of 14 TAD starts at that
+    time, none before."""
     rig.write("ADCON3", 0x0109)
     rig.write("ADCON1", ADON | ASAM)
     rig.at(1000).write("ADCON1", ADON | ASAM | SAMP | AUTO)
@@ -297,8 +304,8 @@ def test_a_shorter_setting_ends_sampling_but_not_in_the_past(rig):
 @pytest.mark.parametrize(("cycle", "done"), [(75, 0), (76, DONE), (80, DONE), (81, 0)])
 @pytest.mark.parametrize("lanes", [0xFFFF, 0xFF00])
 def test_done_in_a_write_is_what_it_was_in_that_cycle(rig, looks, cycle, done, lanes):
-    """§13: SAMC = 1, TAD 5 Tcy, so the first result is there from cycle 76 to 81 and sampling lasts 5. Writing 1 keeps
-    DONE as it is, and so does a byte write above it, looked at before or not."""
+    """§13: writing 1 to DONE, or a byte write above it, keeps the value of DONE in that cycle, whether it was read
+    before or not. With SAMC = 1 and TAD 5 Tcy, the first result is there from cycle 76 to 81."""
     rig.write("ADCON2", 15 << 2)
     rig.write("ADCON3", 0x0109)
     rig.write("ADCON1", ADON | ASAM | AUTO)
@@ -311,8 +318,8 @@ def test_done_in_a_write_is_what_it_was_in_that_cycle(rig, looks, cycle, done, l
 
 @pytest.mark.parametrize(("fosc", "post"), [(0xFFE6, 3), (0xFCE6, 3), (0xFAE6, 0), (0xF8E6, 0)])
 def test_own_oscillator_at_slow_clocks(fosc, post):
-    """§13 ADRC: 1.5 us are less than half a Tcy at 230 kHz and below, where a TAD is half a Tcy; the clock changes in
-    the middle of a conversion."""
+    """§13: the ADRC oscillator's 1.5 us are less than half a Tcy at 230 kHz and below, where a TAD is half a Tcy. The
+    clock changes in the middle of a conversion."""
     rig = Rig(fosc=fosc)
     rig.write("ADCON3", 0x0180)
     rig.write("ADCON1", ADON | ASAM | AUTO)
@@ -329,5 +336,6 @@ def test_own_oscillator_at_slow_clocks(fosc, post):
 
 @pytest.mark.parametrize("seed", range(20))
 def test_the_converter_equals_the_reference_model(seed):
-    """Both agree in every half Tcy, for any setting changed at any time, in Sleep or not, read often or rarely."""
+    """The converter equals the reference model in every half Tcy, for settings changed at any time, in Sleep or not,
+    read often or rarely."""
     assert difference(seed) is None

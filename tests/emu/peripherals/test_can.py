@@ -10,7 +10,7 @@ NORMAL, LOOPBACK = 0, 2
 
 
 def configure(rig, mode=LOOPBACK, *, can=1):
-    """Fcan = Fcy, BRP 0, eight quanta a bit: 16 Tcy; then the mode."""
+    """Configure CAN1 for Fcan = Fcy, BRP 0 and eight quanta (16 Tcy) per bit, then set the mode."""
     rig.write(f"C{can}CFG1", 0)
     rig.write(f"C{can}CFG2", 2 | 1 << 3 | 1 << 8)
     rig.write(f"C{can}CTRL", mode << 8 | 0x800)
@@ -34,31 +34,32 @@ def load(rig, buffer, identifier, data, *, can=1, priority=0, extended=False):
 
 
 def test_reset_state_is_configuration_mode(rig):
-    """§15: 0x0480."""
+    """§15: after reset the module is in configuration mode (0x0480)."""
     assert rig.read("C1CTRL") == 0x0480
 
 
 def test_mode_follows_the_request_after_a_few_cycles(rig):
-    """§15."""
+    """§15: the mode changes a few cycles after the request."""
     rig.at(10).write("C1CTRL", 0x0200)
     assert rig.field("C1CTRL", "OPMODE") == 4
     assert rig.at(15).field("C1CTRL", "OPMODE") == 2
 
 
 def test_stuffing_of_a_frame_of_zeros():
-    """CAN 2.0: the CRC of zeros is 0, so 34 zero bits take a stuff bit after every five: 6 of them."""
+    """CAN 2.0: the CRC of zeros is 0, so a frame of zeros has 34 zero bits and a stuff bit after every five: 6 stuff
+    bits."""
     assert CanFrame(0, False, False, 0, b"").wire_bits() == 19 + 15 + 13 + 6
 
 
 def test_crc_has_the_published_check_value():
-    """CRC-15/CAN of the digits 1 to 9 is 0x059E."""
+    """The CRC-15/CAN of the digits 1 to 9 is 0x059E, the published check value."""
     assert _crc("".join(f"{byte:08b}" for byte in b"123456789")) == 0x059E
 
 
 @pytest.mark.parametrize("extended", [False, True])
 @pytest.mark.parametrize("length", range(9))
 def test_frame_length_lies_between_no_and_most_stuffing(length, extended):
-    """CAN 2.0: 34 or 54 stuffable bits plus data, at most one stuff bit in four behind the first."""
+    """CAN 2.0: a frame has 34 or 54 stuffable bits plus data, and between none and (n - 1) / 4 stuff bits."""
     stuffable = (54 if extended else 34) + 8 * length
     for seed in range(50):
         frame = CanFrame(
@@ -68,7 +69,8 @@ def test_frame_length_lies_between_no_and_most_stuffing(length, extended):
 
 
 def test_loopback_delivers_through_the_filters(rig):
-    """§15: TXREQ falls, TXB0IF and RXB0IF rise, C1IF when enabled; 16 Tcy a bit."""
+    """§15: in loopback a frame passes the filters at 16 Tcy per bit; TXREQ falls, TXB0IF and RXB0IF rise, and C1IF if
+    enabled."""
     configure(rig)
     rig.write("C1INTE", 1)
     start = rig.events.now
@@ -87,7 +89,7 @@ def test_loopback_delivers_through_the_filters(rig):
 
 
 def test_extended_identifier_survives_the_trip(rig):
-    """§15: SID, EID17_6, EID5_0."""
+    """§15: an extended identifier is received as sent, in SID, EID17_6 and EID5_0."""
     configure(rig)
     load(rig, 1, 0x1ABCDEF5, b"", extended=True)
     rig.at(5000)
@@ -97,7 +99,8 @@ def test_extended_identifier_survives_the_trip(rig):
 
 
 def test_masks_and_filters_choose_the_buffer(rig):
-    """§15: filters 0-1 with mask 0 for RXB0, 2-5 with mask 1 for RXB1; FILHIT names the filter."""
+    """§15: filters 0-1 with mask 0 accept frames for RXB0, filters 2-5 with mask 1 for RXB1; FILHIT is the number of
+    the filter."""
     rig.write("C1RXM0SID", 0x7FF << 2)
     rig.write("C1RXM1SID", 0x7FF << 2)
     rig.write("C1RXF0SID", 0x100 << 2)
@@ -113,7 +116,7 @@ def test_masks_and_filters_choose_the_buffer(rig):
 
 
 def test_full_buffer_overflows_or_spills_into_the_second(rig):
-    """§15 DBEN, RXB0OVFL."""
+    """§15: a frame for the full RXB0 goes to RXB1 if DBEN is set, otherwise it sets RXB0OVFL."""
     configure(rig)
     load(rig, 0, 1, b"a")
     rig.at(3000)
@@ -127,7 +130,7 @@ def test_full_buffer_overflows_or_spills_into_the_second(rig):
 
 
 def test_higher_priority_goes_first(rig):
-    """§15 TXPRI, then the buffer number."""
+    """§15: pending buffers are sent in the order of TXPRI, and with equal TXPRI in the order of their numbers."""
     order = []
     rig.dev.can[1].on_frame = lambda frame, cycle: order.append(frame.identifier) or True
     configure(rig, NORMAL)
@@ -139,7 +142,7 @@ def test_higher_priority_goes_first(rig):
 
 
 def test_unacknowledged_frame_stays_pending_and_counts_errors(rig):
-    """§15: a node alone on the bus."""
+    """§15: a frame of a node alone on the bus is not acknowledged, stays pending and increments the error count."""
     configure(rig, NORMAL)
     load(rig, 0, 0x10, b"")
     rig.at(20000)
@@ -149,7 +152,7 @@ def test_unacknowledged_frame_stays_pending_and_counts_errors(rig):
 
 
 def test_frames_from_other_nodes_are_received_in_normal_mode_only(rig):
-    """§15."""
+    """§15: frames from other nodes are received only in normal mode."""
     frame = CanFrame(0x77, False, False, 2, b"hi")
     assert not rig.dev.can[2].receive(frame)
     configure(rig, NORMAL, can=2)

@@ -20,7 +20,8 @@ def pulse(rig, pin, *cycles):
     [(1, [101, 201, 301, 401]), (2, [201, 401]), (3, [101, 301])],
 )
 def test_edges_are_captured_two_cycles_late(rig, mode, captured):
-    """§8: every edge, falling, rising; timer 2 counts from cycle 1, so an edge in 100 captures 101."""
+    """§8: every edge, falling or rising edges are captured two cycles late. Timer 2 counts from cycle 1, so an edge
+    in 100 captures 101."""
     rig.write("T2CON", TON)
     rig.write("IC1CON", 0x80 | mode)
     pulse(rig, "RD8", 100, 200, 300, 400)
@@ -32,7 +33,7 @@ def test_edges_are_captured_two_cycles_late(rig, mode, captured):
 
 
 def test_flag_rises_with_the_capture(rig):
-    """§8."""
+    """§8: the flag rises together with the capture."""
     rig.write("IC3CON", 3)
     pulse(rig, "RD10", 100)
     assert not rig.at(101).flag("IC3IF")
@@ -41,7 +42,7 @@ def test_flag_rises_with_the_capture(rig):
 
 @pytest.mark.parametrize(("mode", "every"), [(4, 4), (5, 16)])
 def test_prescaled_captures(rig, mode, every):
-    """§8: every 4th or 16th rising edge, counted from the enabling."""
+    """§8: prescaled modes capture every 4th or 16th rising edge, counted from the enabling."""
     rig.write("T3CON", TON)
     rig.write("IC2CON", mode)
     for number in range(1, 33):
@@ -51,7 +52,7 @@ def test_prescaled_captures(rig, mode, every):
 
 
 def test_interrupt_every_nth_capture(rig):
-    """§8 ICI = 2: every third."""
+    """§8: ICI = 2 interrupts at every third capture."""
     rig.write("IC1CON", 2 << 5 | 3)
     flags = []
     for number in range(1, 4):
@@ -61,7 +62,7 @@ def test_interrupt_every_nth_capture(rig):
 
 
 def test_fifth_capture_overflows_until_all_four_are_read(rig):
-    """§8."""
+    """§8: a fifth unread capture is lost and sets ICOV until all four are read."""
     rig.write("T3CON", TON)
     rig.write("IC1CON", 3)
     for number in range(1, 6):
@@ -75,7 +76,7 @@ def test_fifth_capture_overflows_until_all_four_are_read(rig):
 
 
 def test_switching_off_empties_the_fifo(rig):
-    """§8 ICM = 0."""
+    """§8: ICM = 0 empties the FIFO."""
     rig.write("IC1CON", 1)
     pulse(rig, "RD8", 100)
     rig.at(110).write("IC1CON", 0)
@@ -83,7 +84,7 @@ def test_switching_off_empties_the_fifo(rig):
 
 
 def test_mode_7_is_an_interrupt_pin_while_the_cpu_sleeps(rig):
-    """§8."""
+    """§8: mode 7 makes the pin an interrupt input while the CPU sleeps."""
     rig.write("IC8CON", 7)
     pulse(rig, "RD15", 100, 150)
     assert not rig.at(160).flag("IC8IF")
@@ -96,7 +97,7 @@ def test_mode_7_is_an_interrupt_pin_while_the_cpu_sleeps(rig):
 
 
 def edges(rig, pin, end):
-    """(cycle, level) of every change of a chip-driven pin up to `end`."""
+    """Return (cycle, level) of every change of a chip-driven pin up to `end`."""
     seen = []
     rig.dev.pins.watch(pin, lambda cycle, changed, levels: seen.append((cycle, int(bool(levels & changed)))))
     rig.at(end)
@@ -105,7 +106,7 @@ def edges(rig, pin, end):
 
 @pytest.mark.parametrize(("mode", "level"), [(1, 1), (2, 0)])
 def test_single_compare_changes_the_pin_once(rig, mode, level):
-    """§9: TMR2 = 50 in cycle 51, pin 52, flag 54."""
+    """§9: a single compare changes the pin once: TMR2 = 50 in cycle 51, pin in 52, flag in 54."""
     rig.write("OC1R", 50)
     rig.write("OC1CON", mode)
     rig.write("T2CON", TON)
@@ -118,7 +119,7 @@ def test_single_compare_changes_the_pin_once(rig, mode, level):
 
 
 def test_toggle_mode_repeats_every_period(rig):
-    """§9: period 100: matches in 51, 151, 251."""
+    """§9: toggle mode changes the pin in every period: with period 100, matches in 51, 151, 251."""
     rig.write("PR2", 99)
     rig.write("OC2R", 50)
     rig.write("OC2CON", 3)
@@ -127,7 +128,8 @@ def test_toggle_mode_repeats_every_period(rig):
 
 
 def test_single_pulse_lies_between_the_two_registers(rig):
-    """§9: up one cycle after OCxR, down one cycle after OCxRS; flag two cycles later."""
+    """§9: a single pulse rises one cycle after OCxR and falls one cycle after OCxRS; the flag rises two cycles
+    later."""
     rig.write("PR2", 199)
     rig.write("OC5R", 20)
     rig.write("OC5RS", 21)
@@ -140,7 +142,7 @@ def test_single_pulse_lies_between_the_two_registers(rig):
 
 
 def test_continuous_pulses(rig):
-    """§9, on timer 3."""
+    """§9: continuous pulses repeat in every period, here on timer 3."""
     rig.write("PR3", 99)
     rig.write("OC3R", 10)
     rig.write("OC3RS", 40)
@@ -150,7 +152,8 @@ def test_continuous_pulses(rig):
 
 
 def test_pwm_duty_changes_with_the_next_period(rig):
-    """§9: period 100 Tcy, 30 high; OCxRS written in 150 counts from 201 on. TyIF, not OCxIF."""
+    """§9: a new PWM duty cycle is effective from the next period on: with 100 Tcy, of which 30 are high, OCxRS
+    written in 150 counts from 201 on. TyIF rises, not OCxIF."""
     rig.write("PR2", 99)
     rig.write("OC1R", 30)
     rig.write("OC1RS", 30)
@@ -165,7 +168,7 @@ def test_pwm_duty_changes_with_the_next_period(rig):
 
 @pytest.mark.parametrize(("duty", "expected"), [(0, []), (100, [(101, 1)]), (500, [(101, 1)])])
 def test_pwm_extremes(rig, duty, expected):
-    """§9: 0 stays low, more than PR stays high."""
+    """§9: a PWM with duty 0 stays low, and one with a duty above PR stays high."""
     rig.write("PR2", 99)
     rig.write("OC1RS", duty)
     rig.write("OC1CON", 6)
@@ -174,7 +177,7 @@ def test_pwm_extremes(rig, duty, expected):
 
 
 def test_duty_in_force_is_read_only(rig):
-    """§9: OCxR while OCM = 6."""
+    """§9: OCxR, which holds the current duty, is read-only while OCM = 6."""
     rig.write("OC1R", 5)
     rig.write("OC1CON", 6)
     rig.write("OC1R", 9)
@@ -182,7 +185,7 @@ def test_duty_in_force_is_read_only(rig):
 
 
 def test_fault_pin_floats_the_output_until_the_mode_is_written_again(rig):
-    """§9: OCFA = RB6, active low."""
+    """§9: the fault input OCFA (RB6, active low) floats the output until the mode is written again."""
     rig.write("ADPCFG", 0xFFFF)
     rig.dev.pins.set("RB6", 1)
     rig.at(2).write("PR2", 99)
@@ -202,7 +205,7 @@ def test_fault_pin_floats_the_output_until_the_mode_is_written_again(rig):
 
 
 def test_switching_off_gives_the_pin_back(rig):
-    """§6, §9: OCM = 0: the pin follows LAT again."""
+    """§6, §9: after OCM = 0 the pin follows LAT again."""
     rig.write("TRISD", 0)
     rig.write("LATD", 1)
     rig.write("OC1CON", 1)
@@ -212,7 +215,7 @@ def test_switching_off_gives_the_pin_back(rig):
 
 
 def test_new_compare_value_moves_the_match(rig):
-    """§9."""
+    """§9: a new compare value moves the next match."""
     rig.write("OC1R", 50)
     rig.write("OC1CON", 1)
     rig.write("T2CON", TON)
@@ -221,7 +224,8 @@ def test_new_compare_value_moves_the_match(rig):
 
 
 def test_externally_clocked_timer_drives_the_compare_too(rig):
-    """§9 with T2 as counter: third edge in 300 counted in 301, pin 302."""
+    """§9: a timer with an external clock drives the compare too: its third edge in 300 is counted in 301 and changes
+    the pin in 302."""
     rig.write("OC1R", 3)
     rig.write("OC1CON", 1)
     rig.write("T2CON", TON | 2)

@@ -8,7 +8,7 @@ DCIEN, DLOOP, UNFM = 0x8000, 0x800, 0x80
 
 
 def epuck(rig, con1=0x40, blen=3):
-    """The e-puck's set-up: 16 slots of 16 bits, 8 Tcy a bit, one slot used."""
+    """Set up the DCI as on the e-puck: 16 slots of 16 bits, 8 Tcy per bit, one slot used."""
     rig.write("DCICON1", con1)
     rig.write("DCICON2", blen << 10 | 0x01EF)
     rig.write("DCICON3", 3)
@@ -17,7 +17,8 @@ def epuck(rig, con1=0x40, blen=3):
 
 
 def test_interrupt_of_the_epuck_comes_every_8192_cycles(rig):
-    """§14: 2048 Tcy a frame, four frames; the first slot ends 128 Tcy after the frame began."""
+    """§14: the e-puck's interrupt comes every four frames of 2048 Tcy; the first slot ends 128 Tcy after the start of
+    the frame."""
     epuck(rig)
     rig.at(10).write("DCICON1", DCIEN | 0x40)
     first = 11 + 3 * 2048 + 128
@@ -29,7 +30,7 @@ def test_interrupt_of_the_epuck_comes_every_8192_cycles(rig):
 
 
 def test_words_go_out_in_order_and_come_in(rig):
-    """§14: TXBUF to shadow at each exchange; TMPTY and RFUL tell."""
+    """§14: each exchange copies TXBUF to the shadow registers and received words to RXBUF; TMPTY and RFUL show it."""
     sent = []
     rig.dev.dci.on_word = lambda word, slot, cycle: sent.append((word, slot))
     rig.dev.dci.source = lambda slot, cycle: 0x1000 + len(sent)
@@ -49,7 +50,7 @@ def test_words_go_out_in_order_and_come_in(rig):
 
 @pytest.mark.parametrize(("unfm", "second"), [(0, 0), (UNFM, 0xA000)])
 def test_underflow_sends_zeros_or_the_last_words(rig, unfm, second):
-    """§14 UNFM, TUNF."""
+    """§14: if TXBUF was not written, TUNF is set, and UNFM selects whether zeros or the last words are sent."""
     sent = []
     rig.dev.dci.on_word = lambda word, slot, cycle: sent.append(word)
     epuck(rig, con1=unfm, blen=0)
@@ -61,7 +62,7 @@ def test_underflow_sends_zeros_or_the_last_words(rig, unfm, second):
 
 
 def test_unread_words_overflow(rig):
-    """§14 ROV."""
+    """§14: words that are not read before the next exchange set ROV."""
     epuck(rig, blen=0)
     rig.at(10).write("DCICON1", DCIEN)
     assert rig.at(200).field("DCISTAT", "ROV") == 0
@@ -69,7 +70,7 @@ def test_unread_words_overflow(rig):
 
 
 def test_loopback_returns_the_words_sent(rig):
-    """§14 DLOOP."""
+    """§14: DLOOP returns the sent words."""
     epuck(rig, blen=0)
     rig.write("TXBUF0", 0x5A5A)
     rig.at(10).write("DCICON1", DCIEN | DLOOP)
@@ -77,7 +78,7 @@ def test_loopback_returns_the_words_sent(rig):
 
 
 def test_several_slots_and_short_words(rig):
-    """§14: slots 0 and 2 of 3, 8-bit words left-aligned; BCG 0 + 1 ... Fcsck = Fcy / 4."""
+    """§14: slots 0 and 2 of 3 carry left-aligned 8-bit words, here with Fcsck = Fcy / 4."""
     sent = []
     rig.dev.dci.on_word = lambda word, slot, cycle: sent.append((word, slot, cycle))
     rig.write("DCICON2", 1 << 10 | 2 << 5 | 7)
@@ -92,14 +93,14 @@ def test_several_slots_and_short_words(rig):
 
 
 def test_slot_counter_shows_the_slot_on_the_wire(rig):
-    """§14 DCISTAT<11:8>: 128 Tcy a slot."""
+    """§14: DCISTAT<11:8> is the number of the current slot; a slot lasts 128 Tcy."""
     epuck(rig)
     rig.at(10).write("DCICON1", DCIEN)
     assert rig.at(11 + 5 * 128 + 3).field("DCISTAT", "SLOT") == 5
 
 
 def test_switching_off_ends_with_the_frame(rig):
-    """§14."""
+    """§14: after DCIEN = 0 the module stops at the end of the frame."""
     sent = []
     rig.dev.dci.on_word = lambda word, slot, cycle: sent.append(cycle)
     epuck(rig)
@@ -110,7 +111,7 @@ def test_switching_off_ends_with_the_frame(rig):
 
 
 def test_generator_stands_with_bcg_0(rig):
-    """§14."""
+    """§14: with BCG = 0 the bit clock generator is stopped."""
     epuck(rig)
     rig.write("DCICON3", 0)
     rig.write("DCICON1", DCIEN)
@@ -118,7 +119,7 @@ def test_generator_stands_with_bcg_0(rig):
 
 
 def test_switching_off_without_a_clock_ends_at_once(rig):
-    """§14: BCG = 0 while a frame was under way."""
+    """§14: if BCG was set to 0 during a frame, DCIEN = 0 stops the module at once."""
     epuck(rig)
     rig.at(10).write("DCICON1", DCIEN)
     rig.at(100).write("DCICON3", 0)

@@ -1,4 +1,4 @@
-"""Devices disabled and enabled, configured in an unusual order, or interrupted during operation (§9-§17)."""
+"""Devices that are disabled and enabled, configured in an unusual order, or interrupted during operation (§9-§17)."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ OWNERS = {
 
 @pytest.mark.parametrize("module", OWNERS)
 def test_a_module_that_is_switched_off_gives_its_pins_back(module):
-    """§6, §17: LAT and TRIS hold again."""
+    """§6, §17: the pins of a module that is switched off follow LAT and TRIS again."""
     settings, register, bit, letter = OWNERS[module]
     rig = Rig()
     rig.write("TRIS" + letter, 0)
@@ -41,7 +41,7 @@ def test_a_module_that_is_switched_off_gives_its_pins_back(module):
 
 @pytest.mark.parametrize("late", ["DCICON3", "TSCON", "RSCON", "DCICON1"])
 def test_the_codec_port_starts_whatever_is_set_up_last(late):
-    """§14: the bit clock and the slots may be chosen behind DCIEN."""
+    """§14: the codec port starts after the last setting, also if that is the bit clock or the slots after DCIEN."""
     settings = {"DCICON2": 0x00EF, "DCICON3": 3, "TSCON": int(late != "RSCON"), "RSCON": int(late == "RSCON")}
     rig = Rig()
     first = {**settings, late: 0} if late != "DCICON1" else settings
@@ -54,7 +54,7 @@ def test_the_codec_port_starts_whatever_is_set_up_last(late):
 
 
 def test_a_codec_port_that_never_ran_gives_its_pins_back():
-    """§14: without a bit clock DCIEN = 0 ends it at once."""
+    """§14: a codec port without a bit clock never runs, so DCIEN = 0 ends it at once and its pins follow LAT."""
     rig = Rig()
     rig.write("DCICON1", 0x8000)
     rig.at(100).write("DCICON1", 0)
@@ -66,7 +66,7 @@ def test_a_codec_port_that_never_ran_gives_its_pins_back():
 
 
 def test_the_pin_sends_in_loopback_too():
-    """§10: only the receive pin is cut off."""
+    """§10: in loopback the transmit pin still sends; only the receive pin is disconnected."""
     rig, sent = Rig(), []
     rig.dev.uart[1].on_byte = lambda byte, _start: sent.append(byte)
     rig.write("U1MODE", 0x8040)
@@ -77,7 +77,7 @@ def test_the_pin_sends_in_loopback_too():
 
 
 def test_a_break_is_heard_in_loopback():
-    """§10: UTXBRK forces the line low: zeros with a framing error."""
+    """§10: UTXBRK in loopback forces the line low, which is received as zeros with a framing error."""
     rig = Rig()
     rig.write("U1MODE", 0x8040)
     rig.write("U1STA", 0x0C00)
@@ -89,7 +89,8 @@ def test_a_break_is_heard_in_loopback():
 
 @pytest.mark.parametrize(("before", "after"), [(7, 0), (0, 7), (3, 3)])
 def test_the_rate_changes_in_the_middle_of_a_character(before, after):
-    """§10: writing BRG restarts the baud counter: the bit on the line lasts one more bit time, the rest follow."""
+    """§10: writing BRG during a character restarts the baud counter: the current bit lasts one more bit time, then
+    the others follow at the new rate."""
     rig = Rig()
     rig.write("U1BRG", before)
     rig.write("U1MODE", 0x8000)
@@ -109,7 +110,8 @@ def test_the_rate_changes_in_the_middle_of_a_character(before, after):
 
 
 def test_nothing_is_lost_in_loopback_when_the_rate_rises_in_the_middle():
-    """§10: the receiver hears the sender's own bits."""
+    """§10: if the rate rises during a character in loopback, no byte is lost, because the receiver samples the
+    transmitter's own bits."""
     rig = Rig()
     rig.write("U1BRG", 7)
     rig.write("U1MODE", 0x8040)
@@ -138,7 +140,8 @@ class Notes(I2cDevice):
 @pytest.mark.parametrize(("cut", "heard"), [(1200, []), (1359, [0x12])])
 @pytest.mark.parametrize("off", ["I2CCON", "PMD1"])
 def test_a_byte_that_is_cut_off_does_not_reach_the_slave(cut, heard, off):
-    """§11: a slave has a byte with its eighth clock (8 x 151 Tcy), not with the first."""
+    """§11: a slave receives a byte at its eighth clock (8 x 151 Tcy), so a byte that is cut off before does not reach
+    it."""
     rig, slave = Rig(), Notes()
     rig.dev.i2c.wire.attach(0x6E, slave)
     rig.write("I2CBRG", 150)
@@ -152,14 +155,14 @@ def test_a_byte_that_is_cut_off_does_not_reach_the_slave(cut, heard, off):
 
 
 def test_the_high_byte_of_i2ctrn_sends_nothing(rig):
-    """§11, §18: a byte write changes that byte only, and there is nothing in it."""
+    """§11, §18: a write of the high byte of I2CTRN, which has no function, starts no transfer."""
     rig.write("I2CCON", 0x9000)
     rig.at(5).write("I2CTRN", 0x1200, 0xFF00)
     assert rig.field("I2CSTAT", "TBF") == 0
 
 
 def test_software_releases_the_clock_but_holds_it_only_with_stren(rig):
-    """§11: SCLREL may only be set while STREN = 0."""
+    """§11: software may set SCLREL at any time, but may clear it only if STREN = 1."""
     rig.write("I2CCON", 0x8000)
     assert rig.read("I2CCON") == 0x9000
     rig.write("I2CCON", 0x8040)
@@ -168,7 +171,7 @@ def test_software_releases_the_clock_but_holds_it_only_with_stren(rig):
 
 @pytest.mark.parametrize("off", [{}, {"I2CCON": 0x9000, "PMD1": 1 << 7}])
 def test_a_slave_that_is_off_does_not_answer(rig, off):
-    """§11: an address means nothing to it."""
+    """§11: a slave that is off does not acknowledge its address."""
     rig.write("I2CADD", 0x2A)
     for name, value in off.items():
         rig.write(name, value)
@@ -184,7 +187,7 @@ def test_a_slave_that_is_off_does_not_answer(rig, off):
 
 
 def test_a_threshold_above_the_supply_is_noticed(rig):
-    """§17: 3 V are enough for LVDL = 1 and too little for LVDL = 14."""
+    """§17: a supply of 3 V is above the threshold of LVDL = 1 and below that of LVDL = 14, which sets the flag."""
     rig.write("RCON", 0x1103)
     rig.at(1000).dev.lvd.set_supply(3000)
     assert rig.at(1001).flag("LVDIF") == 0
@@ -192,7 +195,7 @@ def test_a_threshold_above_the_supply_is_noticed(rig):
     assert rig.at(1002).flag("LVDIF") == 1
 
 
-# -- what has no model -------------------------------------------------------------------------------------------------
+# -- settings without a model ------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -217,7 +220,7 @@ def test_settings_without_a_model_are_reported_once(rig, settings, what):
 
 
 def test_the_crystal_of_timer_one_is_reported(rig):
-    """§3: LPOSCEN, behind its key."""
+    """§3: LPOSCEN, which turns on timer 1's crystal and is written with the key, is reported as not modelled."""
     notes = []
     rig.bus.note = notes.append
     for byte in (0x46, 0x57, 0x02):
@@ -228,7 +231,8 @@ def test_the_crystal_of_timer_one_is_reported(rig):
 
 @pytest.mark.parametrize(("begin", "end"), [(0, 1), (1, 2), (0, 2), (1, 3), (2, 3)])
 def test_a_listener_and_a_switch_do_not_lose_each_other(begin, end):
-    """§17: a register listener is added and removed while PMD1 disables (step 1) and enables (step 2) timer 1."""
+    """§17: PMD1 disables timer 1 (step 1) and enables it (step 2) while a register listener is added and removed;
+    neither change is lost."""
     machine = Machine(engine="plain")
     machine.reset("POR")
     bus, at = machine.bus, machine.chip.sfrs

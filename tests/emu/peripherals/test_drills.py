@@ -1,4 +1,5 @@
-"""A sample of tests/fuzz/emulator/fuzz_drills.py: engines agree, every kind of access is made, differences show."""
+"""A sample of tests/fuzz/emulator/fuzz_drills.py: engines agree, every kind of access is made, and a difference is
+found."""
 
 from __future__ import annotations
 
@@ -18,7 +19,8 @@ REAL, MADE_UP = CHIPS
 
 @pytest.mark.parametrize(("seed", "chip"), [(1, REAL), (2, REAL), (3, MADE_UP)])
 def test_engines_agree_on_drills(seed: int, chip: str) -> None:
-    """engines.md §4: same state in the same cycle; registers in every way, events in the very cycle of an access."""
+    """engines.md §4: engines have the same state in the same cycle after register accesses in all modes, also in the
+    cycle of an event."""
     tally = Tally()
     assert check(seed, CHIPS[chip], tally, drills=14, rounds=8) is None
     assert tally.programs > 0.9 * 14 * 8
@@ -26,7 +28,7 @@ def test_engines_agree_on_drills(seed: int, chip: str) -> None:
 
 @pytest.fixture(scope="module")
 def made() -> Counter[tuple[str, int, bool, int, str]]:
-    """What a seeded sample of drills does to registers, counted where the plain engine does it."""
+    """Return the counts of register accesses in a seeded sample of drills, made by the plain engine."""
     tally = Tally()
     for seed in range(100, 116):
         assert check(seed, CHIPS[REAL], tally, engines=("plain",), rounds=8) is None
@@ -34,14 +36,15 @@ def made() -> Counter[tuple[str, int, bool, int, str]]:
 
 
 FLOORS = {"address": 0.37, "pointer": 0.90, "REPEAT": 0.52, "DO": 0.50, "handler": 0.78, "event": 0.62}
-"""Shares of registers, a tenth below the least that was measured over sizes, reads and writes."""
+"""Required shares of accessed registers by mode of access: a tenth below the minimum measured over sizes, reads and
+writes."""
 
 
 @pytest.mark.parametrize("way", WAYS)
 @pytest.mark.parametrize("size", [1, 2])
 @pytest.mark.parametrize("write", [False, True])
 def test_a_sample_of_drills_reaches_most_registers(made, way: str, size: int, write: bool) -> None:
-    """Every register of every device, read and written, byte and word, each way: the share a small sample has."""
+    """A sample accesses the required share of all registers in each mode, by reads and writes of bytes and words."""
     registers = registers_of(REAL)
     reached = sum(bool(made[REAL, sfr.address, write, size, way]) for sfr in registers)
     assert reached >= FLOORS[way] * len(registers), [
@@ -50,14 +53,14 @@ def test_a_sample_of_drills_reaches_most_registers(made, way: str, size: int, wr
 
 
 def late(machine: Machine) -> None:
-    """Events due in the cycle of an access happen behind it."""
+    """Delay events that are due in the cycle of an access until after the access."""
     events = machine.core.events
     arrive = events.arrive
     events.arrive = lambda cycle: arrive(cycle - 1)  # type: ignore[method-assign]
 
 
 def narrow(machine: Machine) -> None:
-    """Byte writes of registers lose their upper bit."""
+    """Drop the upper bit of byte writes to registers."""
     bus = machine.bus
     write = bus.write
     bus.write = lambda address, value, lanes=0xFFFF: write(address, value & (lanes >> 1 | 0x80), lanes)  # type: ignore[method-assign]
@@ -65,7 +68,7 @@ def narrow(machine: Machine) -> None:
 
 @pytest.mark.parametrize("defect", [late, narrow])
 def test_a_defect_of_one_machine_is_found(defect) -> None:
-    """The comparison can fail, and tells which drill did it."""
+    """A defect in one machine is found and reported with its drill."""
     crew_of.cache_clear()
     seeds = iter(range(200, 206))
     try:

@@ -1,6 +1,6 @@
 """Every interrupt source of the chip, raised by its own device on its own pins (dspic30f6014a.md §5.2, §6.1).
 
-The other files test one device of a kind thoroughly; here every copy shows that it has its own pins, registers, flag.
+The other files test one device of a kind thoroughly. Here every instance has its own pins, registers and flag.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ def external(number: int, pin: str) -> Callable[[Rig], None]:
 
 
 def capture(number: int) -> Callable[[Rig], None]:
-    """IC1-IC8 on RD8-RD15 (§8), timer 2 at 1:1: an edge in cycle 100 captures 101."""
+    """Capture by IC1-IC8 on RD8-RD15 (§8) with timer 2 at 1:1: an edge in cycle 100 captures 101."""
 
     def cause(rig: Rig) -> None:
         rig.write("T2CON", TON)
@@ -40,7 +40,7 @@ def capture(number: int) -> Callable[[Rig], None]:
 
 
 def compare(number: int) -> Callable[[Rig], None]:
-    """OC1-OC8 on RD0-RD7 (§9): high from the match with OCxR on."""
+    """Compare by OC1-OC8 on RD0-RD7 (§9): the pin is high from the match with OCxR on."""
 
     def cause(rig: Rig) -> None:
         rig.write("T3CON", TON)
@@ -53,7 +53,7 @@ def compare(number: int) -> Callable[[Rig], None]:
 
 
 def timer(number: int) -> Callable[[Rig], None]:
-    """§7."""
+    """Match of a timer (§7)."""
 
     def cause(rig: Rig) -> None:
         rig.write(f"PR{number}", 20)
@@ -64,7 +64,7 @@ def timer(number: int) -> Callable[[Rig], None]:
 
 
 def received(number: int) -> Callable[[Rig], None]:
-    """§10.2."""
+    """Character received by a UART (§10.2)."""
 
     def cause(rig: Rig) -> None:
         rig.write(f"U{number}BRG", 7)
@@ -77,7 +77,7 @@ def received(number: int) -> Callable[[Rig], None]:
 
 
 def sent(number: int) -> Callable[[Rig], None]:
-    """§10.1: also when the transmitter is first enabled."""
+    """Character sent by a UART (§10.1); the flag also rises when the transmitter is first enabled."""
 
     def cause(rig: Rig) -> None:
         rig.write(f"U{number}MODE", TON)
@@ -88,7 +88,7 @@ def sent(number: int) -> Callable[[Rig], None]:
 
 
 def serial_port(number: int) -> Callable[[Rig], None]:
-    """§12."""
+    """Word exchanged by an SPI port (§12)."""
 
     def cause(rig: Rig) -> None:
         rig.write(f"SPI{number}CON", 0x003A)
@@ -100,7 +100,7 @@ def serial_port(number: int) -> Callable[[Rig], None]:
 
 
 def can_bus(number: int) -> Callable[[Rig], None]:
-    """§15: loopback."""
+    """Frame received in loopback by a CAN module (§15)."""
 
     def cause(rig: Rig) -> None:
         configure(rig, can=number)
@@ -113,14 +113,14 @@ def can_bus(number: int) -> Callable[[Rig], None]:
 
 
 def converter(rig: Rig) -> None:
-    """§13."""
+    """Conversion of the ADC (§13)."""
     rig.write("ADCON3", 0x0109)
     rig.write("ADCON1", TON | 0x00E4)
     rig.at(200)
 
 
 def memory(rig: Rig) -> None:
-    """§16: a word of EEPROM is erased."""
+    """Erase of an EEPROM word (§16)."""
     rig.write("NVMADRU", 0x7F)
     rig.write("NVMADR", 0xF000)
     rig.at(10).write("NVMKEY", 0x55)
@@ -130,7 +130,7 @@ def memory(rig: Rig) -> None:
 
 
 def bus_master(rig: Rig) -> None:
-    """§11: a start."""
+    """Start condition of the I2C master (§11)."""
     rig.write("I2CBRG", 10)
     rig.write("I2CCON", 0x9000)
     rig.at(5).write("I2CCON", 0x9001)
@@ -138,7 +138,7 @@ def bus_master(rig: Rig) -> None:
 
 
 def bus_slave(rig: Rig) -> None:
-    """§11: the address matches."""
+    """Address match of the I2C slave (§11)."""
     rig.write("I2CADD", 0x42)
     rig.write("I2CCON", 0x9000)
     ExternalMaster(rig.dev.i2c.slave, rig.events).transfer([0x84])
@@ -146,14 +146,14 @@ def bus_slave(rig: Rig) -> None:
 
 
 def change_notice(rig: Rig) -> None:
-    """§6.2: CN0 is RC14."""
+    """Change notification on CN0, which is RC14 (§6.2)."""
     rig.write("CNEN1", 1)
     rig.at(10).dev.pins.set("RC14", 1)
     rig.at(13)
 
 
 def codec(rig: Rig) -> None:
-    """§14."""
+    """Frames of the codec interface (§14)."""
     rig.write("DCICON2", 0x00EF)
     rig.write("DCICON3", 3)
     rig.write("TSCON", 1)
@@ -162,7 +162,7 @@ def codec(rig: Rig) -> None:
 
 
 def supply(rig: Rig) -> None:
-    """§17."""
+    """Low supply voltage (§17)."""
     rig.write("RCON", 0x1503)
     rig.at(400)
     rig.dev.lvd.set_supply(2000)
@@ -200,7 +200,8 @@ def test_every_source_of_the_chip_is_here():
 
 @pytest.mark.parametrize("name", sorted(SOURCES, key=SOURCES.__getitem__))
 def test_device_raises_its_own_flag_and_no_other(rig, name):
-    """§5.2; T2 and T3 may run as time bases, but have no match here."""
+    """§5.2: a device raises its own interrupt flag and no other. T2 and T3 may run as time bases, but have no match
+    here."""
     rig.dev.pins.set("RF2", 1)
     rig.dev.pins.set("RF4", 1)
     for pin in EXTERNAL.values():
@@ -214,7 +215,8 @@ def test_device_raises_its_own_flag_and_no_other(rig, name):
 @pytest.mark.parametrize("alternate", [False, True])
 @pytest.mark.parametrize("name", sorted(SOURCES, key=SOURCES.__getitem__))
 def test_flag_leads_through_its_own_vector(name, alternate):
-    """§5: vector at 0x14 + 2 irq, with ALTIVT at 0x94 + 2 irq; enable and priority bits of the same source."""
+    """§5: an interrupt uses the vector at 0x14 + 2 irq, with ALTIVT at 0x94 + 2 irq, and the enable and priority bits
+    of its source."""
     machine = Machine(engine="plain")
     source, irq = DSPIC30F6014A.interrupts[SOURCES[name]], SOURCES[name]
     for address in range(0x100, 0x110, 2):

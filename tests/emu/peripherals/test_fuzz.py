@@ -1,4 +1,4 @@
-"""Random accesses to every register at random times: no device fails, nothing is lost in a snapshot."""
+"""Random accesses to every register at random times raise no exception, and snapshots lose nothing."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ ENABLES = [(sfr.name, bit) for sfr in WORDS for bit in (15, 0, 1, 3) if sfr.mask
 
 
 def keyed(rig: Rig, draw: random.Random) -> None:
-    """A byte of OSCCON behind its key (§3): other sources, other Tcy."""
+    """Write a byte of OSCCON with its key (§3), which may change the clock source and Tcy."""
     shift, lanes, keys = draw.choice(((0, 0x00FF, (0x46, 0x57)), (8, 0xFF00, (0x78, 0x9A))))
     for byte in (*keys, draw.choice((0, 1, 0x41, 0x81, 0xC1, draw.randrange(256)))):
         rig.at(rig.events.now + 1).write("OSCCON", byte << shift, lanes)
 
 
 def owners(rig: Rig) -> dict[int, int]:
-    """Pins by port that some module which is on may own."""
+    """Return the pins, by port, that an enabled module may own."""
     dev = rig.dev
     pins = dict.fromkeys(dev.ports, 0)
 
@@ -69,7 +69,7 @@ def contradictions(rig: Rig) -> list[str]:
 
 
 def act(rig: Rig, draw: random.Random) -> None:
-    """One random access, pin change, byte or power change."""
+    """Make one random access, pin change, byte input or power change."""
     kind = draw.random()
     if kind < 0.55:
         sfr = draw.choice(WORDS)
@@ -105,7 +105,7 @@ def act(rig: Rig, draw: random.Random) -> None:
 
 @pytest.mark.parametrize("seed", range(8))
 def test_random_accesses_never_fail_and_keep_to_the_masks(seed):
-    """What is stored stays inside each register's implemented bits."""
+    """Random accesses raise no exception, and the stored values are within each register's implemented bits."""
     rig, draw = Rig(fosc=0x7FE6 if seed % 2 else 0xFFE6), random.Random(seed)
     for step in range(4000):
         act(rig, draw)
@@ -116,7 +116,7 @@ def test_random_accesses_never_fail_and_keep_to_the_masks(seed):
 
 @pytest.mark.parametrize("seed", range(8))
 def test_restored_snapshots_continue_exactly_as_the_original(seed):
-    """Hidden state is in the record: the same actions after a restore give the same record."""
+    """After a restore the same actions give the same record, because all hidden state is in it."""
     rig, draw = Rig(), random.Random(100 + seed)
     for _ in range(600):
         act(rig, draw)
@@ -134,6 +134,6 @@ def test_restored_snapshots_continue_exactly_as_the_original(seed):
 
 
 def test_chip_of_the_fuzz_is_the_one_under_test():
-    """The lists above are not empty by accident."""
+    """The lists above are not empty."""
     assert DSPIC30F6014A.name == "dsPIC30F6014A"
     assert len(WORDS) > 290

@@ -1,4 +1,4 @@
-"""I2C master and slave (dspic30f6014a.md §11). BRG = 150: a bit is 151 Tcy, Tbrg 75.5 Tcy."""
+"""I2C master and slave (dspic30f6014a.md §11). With BRG = 150 a bit is 151 Tcy and Tbrg is 75.5 Tcy."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ BASE = I2CEN | SCLREL
 
 
 class Memory(I2cDevice):
-    """256 registers behind a pointer, like the camera."""
+    """I2C device with 256 registers behind an address pointer, like the camera."""
 
     def __init__(self):
         self.registers = bytearray(range(256))
@@ -57,7 +57,7 @@ def bus(rig):
 
 
 def wait(rig, limit=10000):
-    """Cycle of the next MI2CIF, which is cleared."""
+    """Return the cycle of the next MI2CIF and clear the flag."""
     cycle = rig.first_cycle(lambda: rig.flag("MI2CIF"), rig.events.now + 1, rig.events.now + limit)
     rig.clear_flags()
     return cycle
@@ -74,14 +74,14 @@ def send(rig, byte):
 
 
 def test_enabling_on_a_free_bus_reads_as_a_stop(rig):
-    """§11: the e-puck's start routine refuses to run unless P = 1."""
+    """§11: after enabling on a free bus, P reads 1, which the e-puck's start-up code requires."""
     assert rig.field("I2CSTAT", "P") == 0
     rig.write("I2CCON", BASE)
     assert (rig.field("I2CSTAT", "P"), rig.field("I2CSTAT", "S")) == (1, 0)
 
 
 def test_port_drives_the_lines_again_when_the_module_is_off(rig):
-    """§11: on the e-puck both latches are 0 outputs."""
+    """§11: after disabling the module, the port drives the lines; on the e-puck both latches are 0 and outputs."""
     rig.write("TRISG", 0xF3C3)
     assert rig.at(2).dev.pins.get("RG2") == 0
     rig.write("I2CCON", BASE)
@@ -91,7 +91,8 @@ def test_port_drives_the_lines_again_when_the_module_is_off(rig):
 
 
 def test_start_takes_two_half_bits(bus):
-    """§11: written in 10, begins in 11, SDA falls in 86, SCL in 162 = completion."""
+    """§11: a Start takes two Tbrg: written in cycle 10, it begins in 11; SDA falls in 86, SCL in 162, which completes
+    it."""
     bus.at(10).write("I2CCON", BASE | SEN)
     assert bus.at(85).dev.pins.get("RG3") == 1
     assert bus.at(86).dev.pins.get("RG3") == 0
@@ -102,7 +103,7 @@ def test_start_takes_two_half_bits(bus):
 
 
 def test_byte_takes_nine_bits_and_tbf_falls_with_the_eighth(bus):
-    """§11: 18 Tbrg = 1359 Tcy; TBF = 0 after 16 Tbrg = 1208 Tcy."""
+    """§11: a byte takes nine bits, 18 Tbrg = 1359 Tcy; TBF falls with the eighth, after 16 Tbrg = 1208 Tcy."""
     bus.dev.i2c.wire.attach(0x6E, Memory())
     step(bus, SEN)
     start = bus.events.now
@@ -117,7 +118,8 @@ def test_byte_takes_nine_bits_and_tbf_falls_with_the_eighth(bus):
 
 
 def test_register_write_and_read_back(bus):
-    """§11: start, address, register, value, stop; start, address, register, restart, address, read, nack, stop."""
+    """§11: a register can be written and read back: start, address, register, value, stop; start, address, register,
+    restart, address, read, nack, stop."""
     memory = Memory()
     bus.dev.i2c.wire.attach(0x6E, memory)
     step(bus, SEN)
@@ -144,7 +146,7 @@ def test_register_write_and_read_back(bus):
 
 
 def test_absent_device_is_not_acknowledged_and_reads_ff(bus):
-    """§11, epuck.md §2: the bus floats high."""
+    """§11, epuck.md §2: an absent device does not acknowledge and reads 0xFF, because the bus floats high."""
     step(bus, SEN)
     send(bus, 0x3D)
     assert bus.field("I2CSTAT", "ACKSTAT") == 1
@@ -153,14 +155,14 @@ def test_absent_device_is_not_acknowledged_and_reads_ff(bus):
 
 
 def test_transmission_without_a_start_is_carried_out(bus):
-    """§11: the e-puck library does it on its first failed attempt."""
+    """§11: a transmission without a Start is executed; the e-puck library does this after its first failed attempt."""
     begun = bus.events.now
     assert send(bus, 0x55) == begun + 1 + 1359
     assert bus.field("I2CSTAT", "ACKSTAT") == 1
 
 
 def test_write_during_a_sequence_is_a_write_collision(bus):
-    """§11 IWCOL: ignored and flagged; software clears the flag."""
+    """§11: a write to I2CTRN during a sequence is ignored and sets IWCOL, which software clears."""
     bus.write("I2CCON", BASE | SEN)
     bus.at(20).write("I2CTRN", 0x12)
     assert bus.field("I2CSTAT", "IWCOL") == 1
@@ -170,7 +172,7 @@ def test_write_during_a_sequence_is_a_write_collision(bus):
 
 
 def test_requests_during_a_sequence_are_ignored(bus):
-    """§11: only with all five low bits 0."""
+    """§11: a request is accepted only while all five low bits of I2CCON are 0."""
     bus.write("I2CCON", BASE | SEN)
     bus.at(20).write("I2CCON", BASE | SEN | PEN)
     assert bus.read("I2CCON") == BASE | SEN
@@ -180,14 +182,14 @@ def test_requests_during_a_sequence_are_ignored(bus):
 
 
 def test_status_bits_of_hardware_survive_a_write_of_0(bus):
-    """§11: writing I2CSTAT = 0 does not change S, P, TBF, RBF, ACKSTAT."""
+    """§11: writing I2CSTAT = 0 does not change the hardware bits S, P, TBF, RBF and ACKSTAT."""
     step(bus, SEN)
     bus.write("I2CSTAT", 0)
     assert bus.field("I2CSTAT", "S") == 1
 
 
 def test_start_on_a_line_that_is_held_low_collides(bus):
-    """§11 BCL."""
+    """§11: a Start while SDA or SCL is held low sets BCL."""
     bus.dev.i2c.wire.hold(sda=True)
     bus.write("I2CCON", BASE | SEN)
     bus.at(11)
@@ -197,7 +199,8 @@ def test_start_on_a_line_that_is_held_low_collides(bus):
 
 
 def test_released_bit_found_low_collides(bus):
-    """§11: 0x20: the third bit is the first 1; SCL rises after 5 Tbrg = 377 Tcy."""
+    """§11: if SDA is held low during a 1 bit, BCL is set when SCL rises. The first 1 in 0x20 is its third bit, whose
+    SCL rises after 5 Tbrg = 377 Tcy."""
     step(bus, SEN)
     bus.dev.i2c.wire.hold(sda=True)
     begun = bus.events.now
@@ -207,7 +210,7 @@ def test_released_bit_found_low_collides(bus):
 
 
 def test_stretched_clock_delays_the_byte(bus):
-    """§11: the generator waits for SCL."""
+    """§11: clock stretching by a slave delays the byte, because the baud rate generator waits for SCL."""
     memory = Memory()
     bus.dev.i2c.wire.attach(0x6E, memory)
     step(bus, SEN)
@@ -218,7 +221,7 @@ def test_stretched_clock_delays_the_byte(bus):
 
 
 def test_clock_held_low_stalls_until_it_is_released(bus):
-    """§11."""
+    """§11: while SCL is held low, a transfer waits; it continues in the cycle after SCL is released."""
     step(bus, SEN)
     bus.dev.i2c.wire.hold(scl=True)
     bus.write("I2CTRN", 0xDC)
@@ -229,7 +232,8 @@ def test_clock_held_low_stalls_until_it_is_released(bus):
 
 
 def test_stuck_slave_is_clocked_free_through_the_port(rig):
-    """Recovery by hand: nine pulses on RG2 with the module off."""
+    """A slave that holds SDA low releases it after nine clock pulses, which software makes on RG2 with the module
+    off."""
     wire = rig.dev.i2c.wire
     wire.hold(sda=True, clocks=9)
     rig.write("LATG", 0)
@@ -242,7 +246,7 @@ def test_stuck_slave_is_clocked_free_through_the_port(rig):
 
 
 def test_unread_byte_overflows(bus):
-    """§11 I2COV: the new byte is lost."""
+    """§11: a byte that arrives before the last one was read is lost and sets I2COV."""
     memory = Memory()
     bus.dev.i2c.wire.attach(0x6E, memory)
     memory.pointer = 5
@@ -256,7 +260,8 @@ def test_unread_byte_overflows(bus):
 
 
 def test_odd_brg_values_round_each_edge_down(rig):
-    """§11: BRG = 4: Tbrg 2.5 Tcy; 18 of them are 45 Tcy."""
+    """§11: with an odd number of half Tcy, each edge is rounded down: BRG = 4 gives Tbrg = 2.5 Tcy, so 18 Tbrg are 45
+    Tcy."""
     rig.write("I2CBRG", 4)
     rig.write("I2CCON", BASE)
     rig.at(10).write("I2CTRN", 0)
@@ -265,8 +270,8 @@ def test_odd_brg_values_round_each_edge_down(rig):
 
 @pytest.mark.parametrize("brg", [1, 2, 3, 4, 13, 72, 73, 149, 150, 367, 510, 511])
 def test_clock_pulses_last_exactly_brg_plus_one_tcy(rig, brg):
-    """§11: on the SCL pin, for nine bits: the n-th falls n (BRG + 1) Tcy behind the beginning, and rises half a bit
-    earlier, rounded down. Issue 6, Must show 3: bus frequency exact."""
+    """§11: on the SCL pin, the n-th of nine clock pulses falls n (BRG + 1) Tcy after the beginning. It rises half a
+    bit earlier, rounded down, so the bus frequency is exact."""
     rig.write("I2CBRG", brg)
     rig.write("I2CCON", BASE)
     rig.at(5).write("I2CCON", BASE | SEN)
@@ -283,7 +288,7 @@ def test_clock_pulses_last_exactly_brg_plus_one_tcy(rig, brg):
 
 
 def test_every_setting_sends_a_byte_in_nine_bits(rig):
-    """§11: all 512 values of BRG, to the Tcy."""
+    """§11: for all 512 values of BRG, a byte takes exactly nine bits."""
     for brg in range(512):
         rig.write("I2CBRG", brg)
         rig.write("I2CCON", BASE)
@@ -296,7 +301,7 @@ def test_every_setting_sends_a_byte_in_nine_bits(rig):
 
 
 def test_waveform_shows_clock_and_data_of_a_byte(bus):
-    """§11: MSB first, data stable while SCL is high."""
+    """§11: the waveform of a byte has the MSB first, and SDA is stable while SCL is high."""
     step(bus, SEN)
     start = bus.events.now + 1
     bus.write("I2CTRN", 0xA5)
@@ -310,7 +315,7 @@ def test_waveform_shows_clock_and_data_of_a_byte(bus):
 
 
 def test_disabling_in_the_middle_forgets_the_operation(bus):
-    """§11."""
+    """§11: disabling the module during an operation discards the operation."""
     bus.write("I2CCON", BASE | SEN)
     bus.at(50).write("I2CCON", 0)
     bus.at(1000)
@@ -337,7 +342,7 @@ def slave(rig):
 
 
 def test_slave_receives_address_and_data(slave):
-    """§11: SI2CIF at each ninth clock; D_A tells address from data."""
+    """§11: the slave raises SI2CIF at each ninth clock; D_A distinguishes address and data."""
     seen = []
     master = ExternalMaster(slave.dev.i2c.slave, slave.events)
     result = master.transfer([0x84, 0x11, 0x22])
@@ -348,7 +353,7 @@ def test_slave_receives_address_and_data(slave):
 
 
 def test_slave_ignores_other_addresses(slave):
-    """§11."""
+    """§11: the slave ignores other addresses."""
     master = ExternalMaster(slave.dev.i2c.slave, slave.events)
     result = master.transfer([0x86, 0x11])
     run_slave(slave, lambda: pytest.fail("not addressed"))
@@ -356,7 +361,7 @@ def test_slave_ignores_other_addresses(slave):
 
 
 def test_slave_refuses_a_byte_while_its_register_is_full(slave):
-    """§11 I2COV: nothing was read."""
+    """§11: while its receive register is full, the slave does not acknowledge a byte and sets I2COV."""
     master = ExternalMaster(slave.dev.i2c.slave, slave.events)
     result = master.transfer([0x84, 0x11])
     run_slave(slave, lambda: None)
@@ -365,7 +370,8 @@ def test_slave_refuses_a_byte_while_its_register_is_full(slave):
 
 
 def test_slave_sends_and_stretches_until_it_is_ready(slave):
-    """§11: SCLREL = 0 after a read address and after each acknowledged byte."""
+    """§11: the slave stretches the clock (SCLREL = 0) after a read address and after each acknowledged byte, until
+    its data are ready."""
     answers = iter((0x99, 0x77))
 
     def service():
@@ -384,7 +390,7 @@ def test_slave_sends_and_stretches_until_it_is_ready(slave):
 
 
 def test_slave_answers_the_general_call_only_with_gcen(slave):
-    """§11 GCEN, GCSTAT."""
+    """§11: the slave answers the general call only with GCEN, and then sets GCSTAT."""
     master = ExternalMaster(slave.dev.i2c.slave, slave.events)
     assert not any(master.transfer([0x00]).acknowledged)
     slave.at(5000).write("I2CCON", BASE | 0x80)
@@ -396,7 +402,7 @@ def test_slave_answers_the_general_call_only_with_gcen(slave):
 
 
 def test_slave_matches_ten_bit_addresses(slave):
-    """§11 A10M, ADD10."""
+    """§11: with A10M the slave matches ten-bit addresses and sets ADD10."""
     slave.write("I2CADD", 0x2A5)
     slave.write("I2CCON", BASE | 0x400)
     master = ExternalMaster(slave.dev.i2c.slave, slave.events)
@@ -408,7 +414,7 @@ def test_slave_matches_ten_bit_addresses(slave):
 
 
 def sniff(rig, cycles):
-    """What a logic analyser on RG2 and RG3 decodes: S, P and (byte, acknowledged)."""
+    """Return what a logic analyser on RG2 and RG3 decodes: S, P and (byte, acknowledged)."""
     seen, bits = [], []
     pins = rig.dev.pins
     before = pins.get("RG2"), pins.get("RG3")
@@ -434,7 +440,8 @@ def sniff(rig, cycles):
 
 
 def test_a_logic_analyser_decodes_the_transaction_from_the_pins(bus):
-    """§11: start, address, register, repeated start, address, data with NACK, stop; the slave stretches each byte."""
+    """§11: the pins show a transaction with start, address, register, repeated start, address, data with NACK, stop;
+    the slave stretches each byte."""
     memory = Memory()
     memory.delay = 700
     bus.dev.i2c.wire.attach(0x6E, memory)
@@ -452,7 +459,7 @@ def test_a_logic_analyser_decodes_the_transaction_from_the_pins(bus):
 
 
 def test_a_logic_analyser_sees_the_missing_acknowledge(bus):
-    """§11: no device acknowledges at 0x3C."""
+    """§11: the pins show the missing acknowledge of address 0x3C, which no device has."""
     bus.pending = [("I2CTRN", 0x3C), ("I2CCON", BASE | PEN)]
     bus.write("I2CCON", BASE | SEN)
     assert sniff(bus, 5_000) == ["S", (0x3C, False), "P"]

@@ -1,4 +1,4 @@
-"""Every register has a model or is on the list of plain registers with a reason."""
+"""Every register has a model, or is in the list of plain registers with a reason."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ LIST = Path(__file__).parents[3] / "docs" / "plain-registers.md"
 
 
 def test_every_register_is_modelled_or_listed_as_plain():
-    """A register is modelled when the CPU or a device has claimed it on the bus."""
+    """Every register is claimed on the bus by the CPU or a device, or is listed as plain."""
     machine = Machine(engine="plain")
     unclaimed = {
         sfr.name
@@ -22,7 +22,7 @@ def test_every_register_is_modelled_or_listed_as_plain():
 
 
 def test_plain_registers_are_reported_once_and_store_their_bits():
-    """`Bus`: an access to a register without a model behaves as a plain masked register."""
+    """A register without a model stores its implemented bits, and its first access is reported once."""
     machine = Machine(engine="plain")
     seen = []
     machine.bus.report = lambda address, is_write: seen.append((machine.bus.name[address >> 1], is_write))
@@ -32,6 +32,6 @@ def test_plain_registers_are_reported_once_and_store_their_bits():
 
 
 def test_printed_list_is_up_to_date():
-    """docs/plain-registers.md equals the generated report."""
+    """docs/plain-registers.md equals the report that the code generates."""
     machine = Machine(engine="plain")
     assert LIST.read_text() == report(machine.chip, machine.bus)

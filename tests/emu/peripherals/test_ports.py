@@ -12,7 +12,7 @@ from .conftest import Rig
 
 
 def test_output_pin_follows_the_latch_in_the_next_cycle(rig):
-    """§18: output pins change in the cycle behind the write."""
+    """§18: an output pin changes in the cycle after the write of its latch."""
     changes = []
     rig.dev.pins.watch("RD5", lambda cycle, changed, levels: changes.append((cycle, changed, levels & changed)))
     rig.at(10).write("TRISD", 0xFFDF)
@@ -21,7 +21,7 @@ def test_output_pin_follows_the_latch_in_the_next_cycle(rig):
 
 
 def test_port_read_right_behind_a_latch_write_sees_the_old_pin(rig):
-    """§6: insert one NOP."""
+    """§6: a port read in the cycle after a latch write reads the old pin; a NOP between them is needed."""
     rig.write("TRISD", 0)
     rig.at(20).write("LATD", 0x20)
     assert rig.at(21).read("PORTD") == 0
@@ -30,7 +30,7 @@ def test_port_read_right_behind_a_latch_write_sees_the_old_pin(rig):
 
 
 def test_port_write_goes_to_the_latch_and_reads_come_from_the_pins(rig):
-    """§6: input pins read what the outside applies."""
+    """§6: a port write goes to the latch, and a port read returns the external levels of input pins."""
     rig.write("PORTF", 0x0AA)
     assert rig.read("LATF") == 0x0AA
     rig.dev.pins.set("RF1", 1)
@@ -39,21 +39,22 @@ def test_port_write_goes_to_the_latch_and_reads_come_from_the_pins(rig):
 
 
 def test_byte_write_to_a_port_keeps_the_other_half_of_the_latch(rig):
-    """§18."""
+    """§18: a byte write to a port keeps the other half of the latch."""
     rig.write("LATD", 0x1234)
     rig.write("PORTD", 0xAB00, lanes=0xFF00)
     assert rig.read("LATD") == 0xAB34
 
 
 def test_read_modify_write_on_the_port_copies_pins_to_latches(rig):
-    """§6: the well-known hazard: LATD bit 0 was 1 on an input pin that is low."""
+    """§6: a read-modify-write on the port copies pin levels to latches: LATD bit 0 was 1 on an input pin that is
+    low."""
     rig.write("LATD", 0x0001)
     rig.at(5).write("PORTD", rig.read("PORTD") | 0x0100)
     assert rig.read("LATD") == 0x0100
 
 
 def test_unimplemented_port_bits_read_0(rig):
-    """§6: port C has bits 1-4 and 13-15."""
+    """§6: unimplemented bits of a port read 0; port C has bits 1-4 and 13-15."""
     rig.dev.pins.set_port(2, 0xFFFF, 0xFFFF)
     assert rig.at(3).read("TRISC") == 0xE01E
     rig.write("LATC", 0xFFFF)
@@ -62,13 +63,13 @@ def test_unimplemented_port_bits_read_0(rig):
 
 @pytest.mark.parametrize("name", ["RD16", "RH1", "D3", "RA"])
 def test_bad_pin_names_are_refused(name):
-    """Pins are named like RC14."""
+    """Names of pins have the form RC14; others are refused."""
     with pytest.raises(ValueError, match="not a pin name"):
         parse_pin(name)
 
 
 def test_change_notice_rises_one_cycle_behind_either_edge_of_an_enabled_input(rig):
-    """§6.2: CN13 = RD4."""
+    """§6.2: an edge on an enabled change notification input, here CN13 = RD4, sets the flag one cycle later."""
     rig.write("CNEN1", 1 << 13)
     rig.at(100).dev.pins.set("RD4", 1)
     assert not rig.at(100).flag("CNIF")
@@ -79,7 +80,7 @@ def test_change_notice_rises_one_cycle_behind_either_edge_of_an_enabled_input(ri
 
 
 def test_change_notice_ignores_outputs_and_disabled_pins(rig):
-    """§6.2: only enabled pins with TRIS = 1; enabling raises nothing."""
+    """§6.2: change notification ignores outputs and disabled pins; enabling an input raises no flag."""
     rig.write("TRISD", 0xFFEF)
     rig.dev.pins.set("RD5", 1)
     rig.at(1).write("CNEN1", 0xFFFF & ~(1 << 14))
@@ -93,7 +94,7 @@ CN_PINS = "RC14 RC13 RB0 RB1 RB2 RB3 RB4 RB5 RG6 RG7 RG8 RG9 RB15 RD4 RD5 RD6 RD
 
 @pytest.mark.parametrize(("number", "pin"), list(enumerate(CN_PINS.split())))
 def test_every_change_notice_input_sits_on_its_pin(rig, number, pin):
-    """§6.2 CN map."""
+    """§6.2: every change notification input is on the pin of the reference's table."""
     register, bit = ("CNEN1", number) if number < 16 else ("CNEN2", number - 16)
     rig.write("ADPCFG", 0xFFFF)
     rig.dev.pins.analog[1] = 0
@@ -103,7 +104,7 @@ def test_every_change_notice_input_sits_on_its_pin(rig, number, pin):
 
 
 def test_pull_up_lifts_a_pin_nothing_drives(rig):
-    """§6.2: CNPU."""
+    """§6.2: CNPU pulls up a pin that is not driven."""
     assert rig.at(2).read("PORTG") & 0x40 == 0
     rig.write("CNPU1", 1 << 8)
     assert rig.at(4).read("PORTG") & 0x40
@@ -115,7 +116,8 @@ def test_pull_up_lifts_a_pin_nothing_drives(rig):
 
 @pytest.mark.parametrize(("number", "pin"), list(enumerate(["RF6", "RA12", "RA13", "RA14", "RA15"])))
 def test_external_interrupt_takes_the_edge_intcon2_chooses(rig, number, pin):
-    """§5.5: 0 = rising, 1 = falling; the flag rises one cycle behind the edge."""
+    """§5.5: INTCON2 selects the edge of an external interrupt, 0 for rising and 1 for falling; the flag rises one
+    cycle after the edge."""
     name = f"INT{number}IF"
     rig.at(10).dev.pins.set(pin, 1)
     assert rig.at(11).flag(name)
@@ -130,7 +132,7 @@ def test_external_interrupt_takes_the_edge_intcon2_chooses(rig, number, pin):
 
 
 def test_external_interrupt_detects_edges_driven_by_the_chip(rig):
-    """§5.5: detection works on the pin whatever drives it."""
+    """§5.5: external interrupts also detect edges that the chip itself drives on the pin."""
     rig.write("TRISA", 0)
     rig.at(10).write("LATA", 1 << 12)
     assert not rig.at(11).flag("INT1IF")
@@ -138,7 +140,7 @@ def test_external_interrupt_detects_edges_driven_by_the_chip(rig):
 
 
 def test_uart_owns_its_pins_while_enabled(rig):
-    """§6: TX overrides LAT and TRIS while UARTEN and UTXEN are set."""
+    """§6: while UARTEN and UTXEN are set, the UART drives TX instead of LAT and TRIS."""
     rig.write("TRISF", 0)
     rig.at(5)
     assert rig.dev.pins.get("RF3") == 0
@@ -150,7 +152,7 @@ def test_uart_owns_its_pins_while_enabled(rig):
 
 
 def native_latch_write(rig, letter, value):
-    """Model of a native LATx write, from record fields alone. Return False if native code would call Python."""
+    """Apply a native LATx write to the record fields. Return False if native code would call Python."""
     index = "ABCDEFG".index(letter)
     record, fields = rig.record, rig.record.fields
     view = {"H": record.u16, "Q": record.u64, "B": record.u8}
@@ -189,7 +191,8 @@ def native_latch_write(rig, letter, value):
 
 
 def test_native_latch_writes_give_the_same_state_and_edges():
-    """README: native and Python paths agree for any sequence of latch writes, TRIS in between."""
+    """README: native and Python paths give the same state and edges for any sequence of latch writes, with TRIS
+    writes between them."""
     rigs, seen = [Rig(), Rig()], [[], []]
     for rig, edges in zip(rigs, seen, strict=True):
         rig.dev.pins.watch_port(3, 0x00FF, lambda *edge, edges=edges: edges.append(edge), lazy=True)
@@ -214,7 +217,8 @@ def test_native_latch_writes_give_the_same_state_and_edges():
 
 
 def test_edge_log_sees_every_change_while_it_is_on(rig):
-    """While edges are logged every pin is eager, so native code leaves latch writes to Python."""
+    """While edges are logged, all pins are eager, so native code leaves latch writes to Python and the log has every
+    change."""
     rig.write("TRISD", 0)
     rig.dev.pins.edges = []
     assert rig.dev.pins.eager[3] == 0xFFFF

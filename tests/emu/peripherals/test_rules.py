@@ -1,4 +1,4 @@
-"""Rules of devices: a rule and the register's hooks give the same record."""
+"""Rules of devices: a rule and the register's hooks leave the same record."""
 
 from __future__ import annotations
 
@@ -15,14 +15,15 @@ RULED = ("TMR", "PR", "LAT", "PORT", "ADC", "U1", "U2", "SPI")
 
 
 def test_every_device_with_rules_has_them_on_the_bus(rig: Rig) -> None:
-    """Timers, ports and the converter."""
+    """Timers, ports and the converter have their rules on the bus."""
     named = {rig.bus.name[word] or f"{2 * word:#x}" for word, rule in enumerate(rig.bus.rules) if rule is not None}
     assert len(named) >= 5 + 5 + 7 + 7 + 18 - 4
 
 
 @pytest.mark.parametrize("seed", range(4))
 def test_hooks_alone_give_the_same_record_as_rules(seed: int) -> None:
-    """The same random accesses with and without rules on the bus. Native pin changes are flushed first."""
+    """The same random accesses with and without rules give the same record. Native pin changes are flushed before the
+    comparison."""
     rigs = [Rig(), Rig()]
     rigs[1].bus.rules[:] = [None] * len(rigs[1].bus.rules)
     hot = [sfr for sfr in WORDS if sfr.name.startswith(RULED)]
@@ -39,7 +40,7 @@ def test_hooks_alone_give_the_same_record_as_rules(seed: int) -> None:
                 act(rig, draw)
             rig.dev.pins.flush()
             rig.dev.deliver_uart_output()
-            rig.record.u64[rig.events.deadline_index] = 0  # derived
+            rig.record.u64[rig.events.deadline_index] = 0  # derived state
         one, other = (rig.record.snapshot() for rig in rigs)
         assert one == other, (step, _places(rigs[0], one, other))
 
@@ -49,7 +50,8 @@ def _places(rig: Rig, one: bytes, other: bytes) -> set[str]:
 
 
 def test_a_failed_condition_leaves_the_record_unchanged(rig: Rig) -> None:
-    """The register's hooks then handle the access."""
+    """A rule whose condition is false leaves the record unchanged, so that the register's hooks can handle the
+    access."""
 
     def writes(m, place, value, lanes):
         m.require(value < 10)

@@ -1,4 +1,4 @@
-"""UART and SPI under programs that use them continuously: the same state and output in every engine."""
+"""Programs that use UART and SPI continuously have the same state and output in every engine."""
 
 from __future__ import annotations
 
@@ -41,7 +41,8 @@ UART = """
     inc w2, w2
     bra loop
 """
-"""What comes is added up; the sum is sent, whether there is room or not. Some characters are taken by pointer."""
+"""Program that adds up received characters and sends the sum, whether the FIFO has room or not. It reads some
+characters by pointer."""
 
 SPI = """
     mov #{con}, w0
@@ -67,7 +68,8 @@ SPI = """
     bclr {SPI1STAT}, #6
     bra loop
 """
-"""Words are sent, every second one without waiting for the one before; one instruction reads and writes the buffer."""
+"""Program that sends words, every second one without waiting for the previous one. One instruction reads and writes
+the buffer."""
 
 
 def machine(engine: str, text: str, **settings: object) -> Rig:
@@ -95,7 +97,8 @@ def history(rig: Rig, seed: int, lazy: bool) -> list[object]:
 
 @pytest.mark.parametrize("seed", range(4))
 def test_engines_agree_on_a_uart_that_sends_and_receives(seed: int) -> None:
-    """8 and 9 bits, parity, one or two stop bits, all interrupt modes, overruns on both sides, wrong frames."""
+    """Engines agree on a UART with 8 and 9 bits, parity, one or two stop bits, all interrupt modes, overruns in both
+    directions and invalid frames."""
     draw = random.Random(f"uart {seed}")
     settings = {
         "brg": draw.choice((0, 1, 7)),
@@ -111,7 +114,8 @@ def test_engines_agree_on_a_uart_that_sends_and_receives(seed: int) -> None:
 
 @pytest.mark.parametrize("seed", range(4))
 def test_engines_agree_on_an_spi_master(seed: int) -> None:
-    """All clocks, 8 and 16 bits, both buffers full; SDI changes, and a device is connected for a while."""
+    """Engines agree on an SPI master with all clocks, 8 and 16 bits and full buffers, while SDI changes and a device
+    is connected for a while."""
     draw = random.Random(f"spi {seed}")
     settings = {
         "con": 0x20 | draw.randrange(0x20) | draw.choice((1, 2, 3)) | draw.choice((0, 0x400, 0x400)),
@@ -131,7 +135,8 @@ def test_engines_agree_on_an_spi_master(seed: int) -> None:
 
 
 def test_lazy_listeners_receive_the_same_bytes_as_eager_ones() -> None:
-    """Lazy listeners are called in order before the run ends, eager ones in the cycle of the stop bit's end."""
+    """Lazy listeners receive the same bytes as eager ones. They are called in order before the run ends, eager ones
+    in the cycle in which the stop bit ends."""
     settings = {"brg": 1, "mode": 0x8000, "status": 0x0400, "pause": 2, "RX": int(A["U1RXREG"], 16)}
     rig = machine("jit", UART, **settings)
     lazy, prompt = [], []
@@ -163,7 +168,7 @@ POLL = """
 
 
 def test_a_poll_that_hits_the_cycle_of_its_event_stays_native() -> None:
-    """Words of 64 Tcy end in cycles in which SPIRBF is read."""
+    """A poll of SPIRBF in the very cycle in which a word of 64 Tcy ends stays native."""
     rig = machine("jit", POLL)
     rig.machine.run(cycles=100_000)
     before = rig.machine.runner.counts.interpreted

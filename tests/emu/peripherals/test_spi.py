@@ -12,7 +12,7 @@ SPIEN, MSTEN, MODE16, CKE, CKP, SSEN = 0x8000, 0x20, 0x400, 0x100, 0x40, 0x80
     [(3, 6, 0, 16), (2, 7, 0, 32), (1, 7, 0, 128), (0, 0, 0, 4096), (2, 4, MODE16, 256)],
 )
 def test_transfer_takes_bits_times_both_prescalers(rig, ppre, spre, mode16, cycles):
-    """§12: written in 10, shifting from 11; Fsck = Fcy / (primary x secondary)."""
+    """§12: a transfer takes bits x primary x secondary prescale Tcy; written in cycle 10, it shifts from 11 on."""
     rig.write("SPI1CON", MSTEN | mode16 | spre << 2 | ppre)
     rig.write("SPI1STAT", SPIEN)
     rig.at(10).write("SPI1BUF", 0x5A)
@@ -22,7 +22,7 @@ def test_transfer_takes_bits_times_both_prescalers(rig, ppre, spre, mode16, cycl
 
 
 def test_words_are_exchanged_with_the_device(rig):
-    """§12: reading BUF clears SPIRBF."""
+    """§12: master and device exchange words; reading SPI1BUF clears SPIRBF."""
     asked = []
     rig.dev.spi[2].exchange = lambda word, bits: asked.append((word, bits)) or 0xC3
     rig.write("SPI2CON", MSTEN | 0x1A)
@@ -35,10 +35,10 @@ def test_words_are_exchanged_with_the_device(rig):
 
 
 def test_second_word_waits_and_a_third_is_lost(rig):
-    """§12: double buffering, SPITBF; back-to-back transfers have no gap."""
+    """§12: a second word waits in the buffer (SPITBF) and follows without a gap; a third word is lost."""
     asked = []
     rig.dev.spi[1].exchange = lambda word, bits: asked.append((rig.events.now, word)) or 0
-    rig.write("SPI1CON", MSTEN | 6 << 2 | 2)  # 4 x 2 = 8 Tcy a bit
+    rig.write("SPI1CON", MSTEN | 6 << 2 | 2)  # 4 x 2 = 8 Tcy per bit
     rig.write("SPI1STAT", SPIEN)
     for offset, word in enumerate((1, 2, 3)):
         rig.at(10 + 2 * offset).write("SPI1BUF", word)
@@ -48,7 +48,8 @@ def test_second_word_waits_and_a_third_is_lost(rig):
 
 
 def test_unread_word_overflows_and_blocks_reception(rig):
-    """§12: SPIROV, RXB unchanged until it is cleared."""
+    """§12: a word that arrives before the last one was read sets SPIROV; SPI1BUF keeps the old word until SPIROV is
+    cleared."""
     words = iter((0x11, 0x22, 0x33, 0x44))
     rig.dev.spi[1].exchange = lambda word, bits: next(words)
     rig.write("SPI1CON", MSTEN | 6 << 2 | 2)
@@ -64,7 +65,7 @@ def test_unread_word_overflows_and_blocks_reception(rig):
 
 
 def test_slave_exchanges_when_the_master_clocks_and_selects_it(rig):
-    """§12: SSEN listens to SS1 = RB2 (active low)."""
+    """§12: a slave with SSEN exchanges words only while the master selects it by SS1 = RB2, which is active low."""
     out = []
     rig.write("ADPCFG", 0xFFFF)
     rig.dev.spi[1].on_slave_word = lambda word, cycle: out.append((word, cycle))
@@ -82,7 +83,8 @@ def test_slave_exchanges_when_the_master_clocks_and_selects_it(rig):
 
 @pytest.mark.parametrize(("mode", "clock"), [(0, [1, 0]), (CKP, [0, 1]), (CKE, [0, 1]), (CKP | CKE, [1, 0])])
 def test_clock_and_data_levels(rig, mode, clock):
-    """§12: CKP = 1 idles high; CKE = 0 clocks in the first half of a bit; MSB first."""
+    """§12: with CKP = 1 the clock idles high, with CKE = 0 its active edge is in the first half of a bit; the MSB is
+    first."""
     rig.write("SPI1CON", MSTEN | 6 << 2 | 2 | mode)
     rig.write("SPI1STAT", SPIEN)
     rig.at(10).write("SPI1BUF", 0xA0)
@@ -91,7 +93,7 @@ def test_clock_and_data_levels(rig, mode, clock):
 
 
 def test_switching_off_clears_buffers_and_flags(rig):
-    """§12."""
+    """§12: switching the module off clears buffers and flags."""
     rig.write("SPI1CON", MSTEN | 6 << 2 | 2)
     rig.write("SPI1STAT", SPIEN)
     rig.at(10).write("SPI1BUF", 1)

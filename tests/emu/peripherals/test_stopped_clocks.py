@@ -1,4 +1,4 @@
-"""Devices stopped in Idle or Sleep while others run; delays in seconds while the Tcy changes."""
+"""Devices stopped in Idle or Sleep while others run, and delays in seconds during changes of Tcy."""
 
 from __future__ import annotations
 
@@ -10,23 +10,24 @@ LOW, HIGH = 0x00FF, 0xFF00
 
 
 def unlock(rig: Rig, start: int, byte: int, lanes: int) -> None:
-    """Key and byte for one half of OSCCON in three consecutive cycles (§3)."""
+    """Write the keys and a byte of OSCCON in three consecutive cycles (§3)."""
     shift, keys = (8, (0x78, 0x9A)) if lanes == HIGH else (0, (0x46, 0x57))
     for step, value in enumerate((*keys, byte)):
         rig.at(start + step).write("OSCCON", value << shift, lanes)
 
 
 def nap(rig: Rig, start: int, end: int, mode: int = 1) -> None:
-    """Execute PWRSAV so that clocks are stopped from `start` to `end`."""
+    """Execute PWRSAV, so that clocks are stopped from `start` to `end`."""
     rig.at(start).dev.sleep(mode, start)
     rig.at(end).dev.wake(end)
 
 
-# -- timers and those that live by them --------------------------------------------------------------------------------
+# -- timers, and devices that use them ---------------------------------------------------------------------------------
 
 
 def test_an_output_compare_waits_for_a_stopped_timer():
-    """§7, §9: TSIDL stops the time base in Idle: no match, no edge; TMR2 = 19 when it resumes in cycle 200."""
+    """§7, §9: TSIDL stops the time base of an output compare in Idle, without match or edge; TMR2 is 19 when it
+    resumes in cycle 200."""
     rig = Rig()
     for name, value in (("PR2", 99), ("OC1R", 50), ("OC1CON", 3), ("T2CON", 0xA000)):
         rig.write(name, value)
@@ -38,7 +39,7 @@ def test_an_output_compare_waits_for_a_stopped_timer():
 
 
 def test_a_stopped_output_compare_follows_its_timer_after_resuming():
-    """§9: OCSIDL stops the channel only: it resumes with the next match of the running timer."""
+    """§9: OCSIDL stops only the output compare; it resumes with the next match of its running timer."""
     rig = Rig()
     for name, value in (("PR2", 99), ("OC1R", 50), ("OC1CON", 0x2003), ("T2CON", 0x8000)):
         rig.write(name, value)
@@ -50,7 +51,7 @@ def test_a_stopped_output_compare_follows_its_timer_after_resuming():
 @pytest.mark.parametrize("late", [0, 1])
 @pytest.mark.parametrize("mode", [1, 2])
 def test_a_match_of_the_cycle_in_which_both_stop_still_moves_the_pin(mode, late):
-    """§9: the pin changes one Tcy behind the match; a match in the last cycle before Idle or Sleep is not lost."""
+    """§9: the pin changes one Tcy after the match, also if the match is in the last cycle before Idle or Sleep."""
     rig = Rig()
     for name, value in (("PR2", 99), ("OC1R", 50), ("OC1CON", 0x2003), ("T2CON", 0xA000)):
         rig.write(name, value)
@@ -62,7 +63,7 @@ def test_a_match_of_the_cycle_in_which_both_stop_still_moves_the_pin(mode, late)
 @pytest.mark.parametrize("start", [110, 129, 130, 131, 199, 200, 201])
 @pytest.mark.parametrize("tsidl", [0, 0x2000])
 def test_pwm_stops_with_its_timer(start, tsidl):
-    """§9: a PWM has no edges while the time base is stopped."""
+    """§9: a PWM has no edges while its time base is stopped."""
     rig = Rig()
     for name, value in (("PR2", 99), ("OC1R", 30), ("OC1RS", 30), ("OC1CON", 6 | tsidl), ("T2CON", 0xA000)):
         rig.write(name, value)
@@ -75,7 +76,7 @@ def test_pwm_stops_with_its_timer(start, tsidl):
 
 
 def test_a_capture_takes_the_count_of_a_stopped_timer():
-    """§8: the count at which TSIDL stopped timer 2."""
+    """§8: a capture stores the count at which TSIDL stopped timer 2."""
     rig = Rig()
     rig.write("IC1CON", 0x83)
     rig.write("T2CON", 0xA000)
@@ -87,7 +88,8 @@ def test_a_capture_takes_the_count_of_a_stopped_timer():
 
 @pytest.mark.parametrize("start", [20, 63, 64, 65, 100])
 def test_a_prescaler_keeps_its_count_while_the_timer_is_stopped(start):
-    """§7: 64 Tcy of running time make a count, however long the timer was stopped in between."""
+    """§7: the prescaler keeps its count while the timer is stopped: 64 Tcy of running time make a count, however long
+    the stop was."""
     rig = Rig()
     rig.write("T3CON", 0xA020)
     nap(rig, start, 1000)
@@ -98,7 +100,7 @@ def test_a_prescaler_keeps_its_count_while_the_timer_is_stopped(start):
 
 @pytest.mark.parametrize(("before", "after"), [(1, 0), (0, 1)])
 def test_a_gate_change_while_the_timer_was_stopped(before, after):
-    """§7: a gated timer counts while its gate is high, whatever the gate did in between."""
+    """§7: after a stop, a gated timer counts while its gate is high, whatever the gate did during the stop."""
     rig = Rig()
     rig.dev.pins.set("RC1", before)
     rig.write("T2CON", 0xA040)
@@ -111,7 +113,7 @@ def test_a_gate_change_while_the_timer_was_stopped(before, after):
 
 @pytest.mark.parametrize(("register", "value"), [("PR2", 77), ("TMR2", 7), ("T2CON", 0x8050), ("T2CON", 0x8040)])
 def test_a_closing_gate_interrupts_whatever_is_written_in_its_cycle(register, value):
-    """§7: the flag comes with the falling edge of the gate."""
+    """§7: the falling edge of the gate sets the flag, whatever is written to the timer in the same cycle."""
     rig = Rig()
     rig.dev.pins.set("RC1", 1)
     rig.write("T2CON", 0x8040)
@@ -121,7 +123,7 @@ def test_a_closing_gate_interrupts_whatever_is_written_in_its_cycle(register, va
 
 
 def test_timer_three_is_on_its_own_when_its_partner_is_switched_off():
-    """§17, §7: without timer 2 there is no pair; T3CON holds again."""
+    """§7, §17: if timer 2 is disabled there is no 32-bit pair, and timer 3 follows T3CON."""
     rig = Rig()
     rig.write("T3CON", 0x8000)
     rig.write("T2CON", 0x8008)
@@ -131,7 +133,7 @@ def test_timer_three_is_on_its_own_when_its_partner_is_switched_off():
 
 
 def test_an_output_compare_has_no_match_when_its_timer_is_disabled():
-    """§17: a timer that is off reaches no match."""
+    """§17: an output compare has no match if its timer is disabled."""
     rig = Rig()
     for name, value in (("PR2", 99), ("OC1R", 50), ("OC1CON", 3), ("T2CON", 0x8000)):
         rig.write(name, value)
@@ -139,11 +141,12 @@ def test_an_output_compare_has_no_match_when_its_timer_is_disabled():
     assert rig.at(400).dev.pins.get("RD0") == 0
 
 
-# -- seconds -----------------------------------------------------------------------------------------------------------
+# -- delays in seconds -------------------------------------------------------------------------------------------------
 
 
 def test_the_watchdog_keeps_its_seconds_when_the_tcy_changes():
-    """§4: 2 ms of the LPRC, which no postscaler divides."""
+    """§4: a change of Tcy does not change the watchdog's period of 2 ms, because it counts the LPRC, which no
+    postscaler divides."""
     rig = Rig(fwdt=0x8000)
     expired = []
     rig.cpu_signals.reset = lambda _cause: expired.append(rig.dev.seconds(rig.events.now))
@@ -153,7 +156,7 @@ def test_the_watchdog_keeps_its_seconds_when_the_tcy_changes():
 
 
 def test_programming_takes_its_seconds_when_the_tcy_changes():
-    """§16: 2 ms of the array's own timer."""
+    """§16: a change of Tcy does not change the programming time of 2 ms, which the memory's own timer measures."""
     rig = Rig()
     for cycle, name, value in ((1, "NVMADRU", 0x7F), (2, "NVMADR", 0xF000), (3, "NVMCON", 0x4044),
                                (4, "NVMKEY", 0x55), (5, "NVMKEY", 0xAA), (6, "NVMCON", 0xC044)):  # fmt: skip
@@ -164,7 +167,8 @@ def test_programming_takes_its_seconds_when_the_tcy_changes():
 
 
 def test_the_cpu_stalls_until_flash_is_programmed_when_the_tcy_changes():
-    """§16, §3: a switch to the crystal ends while a row is erased: the rest takes an eighth of the Tcy."""
+    """§3, §16: the CPU stalls until flash is programmed. If a switch to the crystal ends during an erase, the rest
+    takes an eighth of the Tcy."""
     rig, held = switching(), []
     rig.cpu_signals.stall_until = held.append
     for cycle, name, value in ((31, "NVMADRU", 0), (32, "NVMADR", 0x4000), (33, "NVMCON", 0x4041),
@@ -176,7 +180,8 @@ def test_the_cpu_stalls_until_flash_is_programmed_when_the_tcy_changes():
 
 
 def test_a_slower_tcy_does_not_delay_a_clock_switch():
-    """§3: 1024 periods of the crystal and the lock, 0.159 ms, divided by 64 in between."""
+    """§3: dividing Tcy by 64 during a clock switch does not delay it: 1024 periods of the crystal and the lock take
+    0.159 ms."""
     rig = Rig(fosc=0x4106)
     unlock(rig, 10, 0x07, HIGH)
     unlock(rig, 20, 0xC1, LOW)
@@ -185,7 +190,7 @@ def test_a_slower_tcy_does_not_delay_a_clock_switch():
 
 
 def test_a_watchdog_faster_than_the_cpu_ends_idle_at_once():
-    """§3, §4: 32 kHz through 64: a Tcy is 7.8 ms, the time-out 2 ms."""
+    """§3, §4: if a Tcy (32 kHz through 64: 7.8 ms) is longer than the watchdog's 2 ms, Idle ends in the next cycle."""
     rig, woken = Rig(fosc=0x4006, fwdt=0x8000), []
     rig.cpu_signals.wake = lambda: woken.append(rig.events.now)
     unlock(rig, 5, 0xC0, LOW)
@@ -196,7 +201,7 @@ def test_a_watchdog_faster_than_the_cpu_ends_idle_at_once():
 
 
 def test_a_watchdog_that_software_switched_on_ends_with_a_reset():
-    """§4: SWDTEN is 0 after every reset; FWDTEN is not software's."""
+    """§4: every reset clears SWDTEN and so stops a watchdog that software enabled; software cannot change FWDTEN."""
     rig, expired = Rig(fwdt=0x0000), []
     rig.cpu_signals.reset = expired.append
     rig.at(10).write("RCON", 0x0520)
@@ -206,7 +211,7 @@ def test_a_watchdog_that_software_switched_on_ends_with_a_reset():
     assert not expired
 
 
-# -- clock switches that something cuts short --------------------------------------------------------------------------
+# -- interrupted clock switches ----------------------------------------------------------------------------------------
 
 
 def switching(fosc: int = 0x7FE6) -> Rig:
@@ -219,7 +224,7 @@ def switching(fosc: int = 0x7FE6) -> Rig:
 
 
 def test_a_reset_leaves_a_pending_switch_to_end():
-    """§3, §4: a reset that keeps the clock selection keeps the request, too: it ends by itself."""
+    """§3, §4: a reset that keeps the clock selection does not abort a pending clock switch."""
     rig = switching()
     rig.dev.reset("SWR")
     assert rig.at(40).read("OSCCON") == 0x7321
@@ -227,28 +232,28 @@ def test_a_reset_leaves_a_pending_switch_to_end():
 
 
 def test_sleep_abandons_a_pending_switch():
-    """§3: the old clock stays, OSWEN falls."""
+    """§3: Sleep aborts a pending clock switch: the old clock is kept and OSWEN falls."""
     rig = switching()
     rig.dev.sleep(2, 30)
     assert rig.at(10_000).read("OSCCON") == 0x7320
 
 
 def test_a_clock_failure_abandons_a_pending_switch():
-    """§3: the monitor takes the FRC and clears OSWEN."""
+    """§3: a clock failure aborts a pending clock switch: the fail-safe monitor selects the FRC and clears OSWEN."""
     rig = switching(0x3FE6)
     rig.dev.oscillator.fail()
     assert rig.at(10_000).read("OSCCON") == 0x1308
 
 
 def test_a_switch_to_the_current_clock_ends_at_once():
-    """§3: nothing has to start."""
+    """§3: a switch to the current clock ends at once, because no oscillator has to start."""
     rig = Rig(fosc=0x7FE6)
     unlock(rig, 10, 0x01, LOW)
     assert rig.at(13).read("OSCCON") == 0x7720
 
 
 def test_a_brown_out_takes_the_clock_of_the_configuration():
-    """§3, §4: as after power-on; elapsed seconds continue."""
+    """§3, §4: a brown-out selects the clock of the configuration word, as power-on does; elapsed seconds continue."""
     rig = Rig(fosc=0x7FE6)
     unlock(rig, 10, 0x01, HIGH)
     unlock(rig, 20, 0x81, LOW)
@@ -264,7 +269,7 @@ def test_a_brown_out_takes_the_clock_of_the_configuration():
 
 
 def test_sleep_cuts_a_reception_off():
-    """§10: the receiver's clock is gone in the middle of the character."""
+    """§10: Sleep stops the receiver's clock and so discards a character that is being received."""
     rig = Rig()
     rig.write("U1BRG", 7)
     rig.write("U1MODE", 0x8000)
@@ -279,7 +284,8 @@ def test_sleep_cuts_a_reception_off():
 
 @pytest.mark.parametrize("freed", [200, 400])
 def test_an_i2c_clock_released_while_the_module_is_stopped(freed):
-    """§11: the Start that waits for SCL begins when the module runs again, in the cycle behind the later of both."""
+    """§11: a transfer that waits for SCL while the module is stopped starts in the cycle after SCL is released and
+    the module runs again, whichever is later."""
     rig = Rig()
     rig.write("I2CBRG", 150)
     rig.write("I2CCON", 0xB000)
@@ -297,7 +303,7 @@ def test_an_i2c_clock_released_while_the_module_is_stopped(freed):
 
 
 def test_a_master_does_not_resume_a_word_aborted_by_sleep():
-    """§12: the word being sent is lost, the one in TXB is sent afterwards."""
+    """§12: Sleep aborts the word that a master is sending; the word in TXB is sent after the wake-up."""
     rig = Rig()
     sent = []
     rig.dev.spi[1].exchange = lambda word, _bits: sent.append(word) or 0
@@ -312,7 +318,7 @@ def test_a_master_does_not_resume_a_word_aborted_by_sleep():
 
 @pytest.mark.parametrize("mode", [1, 2])
 def test_a_slave_works_on_the_outside_clock_while_the_chip_sleeps(mode):
-    """§12: SCK comes from outside, so a word arrives in Sleep and wakes the chip by its flag."""
+    """§12: a slave is clocked by SCK, so it receives a word in Sleep, and its flag wakes the chip."""
     rig = Rig()
     rig.write("SPI1STAT", 0xA000)
     rig.at(20).dev.sleep(mode, 20)
@@ -322,7 +328,7 @@ def test_a_slave_works_on_the_outside_clock_while_the_chip_sleeps(mode):
 
 
 class Square:
-    """A waveform on RC3: rises every 100 Tcy, from 100 on."""
+    """Waveform on RC3 that rises every 100 Tcy, starting at 100."""
 
     def bits(self, cycle: int) -> int:
         return 8 if cycle % 100 < 50 else 0
@@ -339,7 +345,7 @@ class Square:
 
 @pytest.mark.parametrize("start", [350, 299, 300, 301, 302])
 def test_a_stopped_counter_misses_edges_of_a_waveform(start):
-    """§7: edges between PWRSAV and the wake-up are not counted; the match comes with the fourth counted edge."""
+    """§7: edges between PWRSAV and the wake-up are not counted; the match is at the fourth counted edge."""
     rig = Rig()
     rig.dev.pins.attach(2, 8, Square())
     rig.write("PR4", 4)

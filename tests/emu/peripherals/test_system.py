@@ -32,21 +32,21 @@ def unlock_low(rig, cycle, value):
     ],
 )
 def test_clock_follows_the_configuration_word(fosc, fcy, osccon):
-    """§2, §3: Fcy = Fosc / 4; OSCCON shows the source and the lock."""
+    """§2, §3: the configuration word selects the clock, with Fcy = Fosc / 4; OSCCON shows the source and the lock."""
     rig = Rig(fosc=fosc)
     assert rig.dev.fcy == pytest.approx(fcy, rel=1e-12)
     assert rig.read("OSCCON") == osccon
 
 
 def test_osccon_accepts_a_byte_right_behind_its_two_keys(rig):
-    """§3: POST = 01 makes Tcy four times as long."""
+    """§3: OSCCON accepts a byte directly after its two keys: POST = 01 makes Tcy four times as long."""
     unlock_low(rig, 10, 0x40)
     assert rig.at(20).read("OSCCON") == 0x7760
     assert rig.dev.fcy == 14_745_600 / 4
 
 
 def test_osccon_ignores_a_byte_one_instruction_late(rig):
-    """§3: any other instruction between leaves OSCCON unchanged."""
+    """§3: OSCCON ignores a byte if another instruction is between it and the keys."""
     rig.at(10).write("OSCCON", 0x46, LOW)
     rig.at(11).write("OSCCON", 0x57, LOW)
     rig.at(13).write("OSCCON", 0x40, LOW)
@@ -58,7 +58,7 @@ def test_osccon_ignores_a_byte_one_instruction_late(rig):
 
 
 def test_osccon_ignores_words_wrong_keys_and_a_second_write(rig):
-    """§3: byte writes only, one per key."""
+    """§3: OSCCON ignores word writes, wrong keys and a second byte after the same keys."""
     rig.at(10).write("OSCCON", 0x7740)
     assert rig.read("OSCCON") == 0x7720
     for step, byte in enumerate((0x46, 0x58, 0x40)):
@@ -70,7 +70,7 @@ def test_osccon_ignores_words_wrong_keys_and_a_second_write(rig):
 
 
 def test_clock_switch_is_ignored_unless_fcksm_allows_it(rig):
-    """§3: FCKSM = 1x on the e-puck: OSWEN reads 0, COSC stays."""
+    """§3: a clock switch is ignored with FCKSM = 1x, as on the e-puck: OSWEN reads 0 and COSC is unchanged."""
     unlock_high(rig, 10, 0x01)
     unlock_low(rig, 20, 0x01)
     assert rig.at(100000).read("OSCCON") == 0x7120
@@ -78,7 +78,8 @@ def test_clock_switch_is_ignored_unless_fcksm_allows_it(rig):
 
 
 def test_clock_switch_to_the_frc():
-    """§3: FCKSM = 01: OSWEN falls and COSC follows NOSC; seconds stay continuous."""
+    """§3: with FCKSM = 01 a clock switch to the FRC clears OSWEN and copies NOSC to COSC; elapsed seconds are
+    continuous."""
     rig = Rig(fosc=0x7FE6)
     unlock_high(rig, 10, 0x01)
     unlock_low(rig, 20, 0x01)
@@ -88,7 +89,7 @@ def test_clock_switch_to_the_frc():
 
 
 def test_tuning_does_not_change_the_seconds_that_have_passed():
-    """§3: OSCTUN = 7 makes the internal oscillator 10.5 % faster from now on."""
+    """§3: OSCTUN = 7 makes the internal oscillator 10.5 % faster from now on and does not change elapsed seconds."""
     rig = Rig(fosc=0x79E6)
     before = rig.at(1_842_500).dev.seconds(1_842_501)
     rig.write("OSCTUN", 7)
@@ -97,7 +98,8 @@ def test_tuning_does_not_change_the_seconds_that_have_passed():
 
 
 def test_clock_switch_back_to_the_pll_waits_for_crystal_and_lock():
-    """§3: 1024 crystal periods and 20 us, counted in Tcy of the FRC: 0.15889 ms x 1.8425 MHz = 293 Tcy."""
+    """§3: a clock switch to the PLL waits for 1024 crystal periods and 20 us for the lock, counted in Tcy of the FRC:
+    0.15889 ms x 1.8425 MHz = 293 Tcy."""
     rig = Rig(fosc=0x4106 | 0x0100)
     assert rig.read("OSCCON") == 0x1100
     unlock_high(rig, 10, 0x07)
@@ -107,7 +109,7 @@ def test_clock_switch_back_to_the_pll_waits_for_crystal_and_lock():
 
 
 def test_pending_clock_switch_is_aborted_by_clearing_oswen():
-    """§3."""
+    """§3: clearing OSWEN aborts a pending clock switch."""
     rig = Rig(fosc=0x4106)
     unlock_high(rig, 10, 0x07)
     unlock_low(rig, 20, 0x01)
@@ -116,7 +118,7 @@ def test_pending_clock_switch_is_aborted_by_clearing_oswen():
 
 
 def test_clock_failure_with_the_monitor_runs_from_the_frc_and_traps():
-    """§3: FCKSM = 00."""
+    """§3: with FCKSM = 00 a clock failure switches to the FRC and traps."""
     rig = Rig(fosc=0x07E6)
     traps = []
     rig.cpu_signals.trap = traps.append
@@ -132,7 +134,7 @@ def test_clock_failure_with_the_monitor_runs_from_the_frc_and_traps():
 
 
 def test_power_on_sets_por_and_bor(rig):
-    """§4: RCON 0x0503 with LVDL = 0101."""
+    """§4: power-on sets POR and BOR: RCON reads 0x0503 with LVDL = 0101."""
     assert rig.read("RCON") == 0x0503
 
 
@@ -140,7 +142,8 @@ def test_power_on_sets_por_and_bor(rig):
     ("cause", "bit"), [("EXTR", 7), ("SWR", 6), ("WDTO", 4), ("BOR", 1), ("TRAPR", 15), ("IOPUWR", 14)]
 )
 def test_other_resets_add_their_bit_and_keep_the_rest(rig, cause, bit):
-    """§4: the demo firmware clears POR, executes RESET and must find POR = 0, SWR = 1."""
+    """§4: other resets set their bit in RCON and keep the rest; the demo firmware clears POR, executes RESET and must
+    find POR = 0, SWR = 1."""
     rig.write("RCON", 0x0500)
     rig.write("PR1", 5)
     rig.at(50).dev.reset(cause)
@@ -150,7 +153,7 @@ def test_other_resets_add_their_bit_and_keep_the_rest(rig, cause, bit):
 
 
 def test_reset_stops_every_device(rig):
-    """§4: nothing that was under way happens after a reset."""
+    """§4: a reset stops every device; operations in progress have no effect afterwards."""
     rig.write("PR1", 100)
     rig.write("T1CON", 0x8000)
     rig.write("U1MODE", 0x8000)
@@ -164,7 +167,7 @@ def test_reset_stops_every_device(rig):
 
 
 def test_unknown_reset_cause_is_refused(rig):
-    """§4."""
+    """An unknown reset cause is refused (§4)."""
     with pytest.raises(ValueError, match="not a reset cause"):
         rig.dev.reset("NAP")
 
@@ -175,7 +178,7 @@ TWO_MS = 29_491  # 2 ms x 14.7456 MHz
 
 
 def test_watchdog_resets_the_running_chip():
-    """§4: 2 ms x 1 x 1."""
+    """§4: the watchdog resets the running chip after 2 ms x 1 x 1."""
     rig = Rig(fwdt=0x8000)
     causes = []
     rig.cpu_signals.reset = causes.append
@@ -187,13 +190,13 @@ def test_watchdog_resets_the_running_chip():
 
 @pytest.mark.parametrize(("word", "factor"), [(0x8010, 8), (0x8020, 64), (0x8003, 4), (0x803F, 512 * 16)])
 def test_watchdog_prescalers(word, factor):
-    """§4: A in 1, 8, 64, 512; B = 1..16; at most 16.384 s."""
+    """§4: watchdog prescaler A is 1, 8, 64 or 512, B is 1..16; the longest period is 16.384 s."""
     rig = Rig(fwdt=word)
     assert rig.dev.watchdog.period == round(0.002 * factor * 14_745_600)
 
 
 def test_clrwdt_restarts_the_watchdog_and_clears_wdto():
-    """§4."""
+    """§4: CLRWDT restarts the watchdog and clears WDTO."""
     rig = Rig(fwdt=0x8000)
     causes = []
     rig.cpu_signals.reset = causes.append
@@ -207,7 +210,7 @@ def test_clrwdt_restarts_the_watchdog_and_clears_wdto():
 
 
 def test_watchdog_wakes_the_sleeping_chip_without_reset():
-    """§4: WDTO and SLEEP are set."""
+    """§4: the watchdog wakes the sleeping chip without a reset and sets WDTO and SLEEP."""
     rig = Rig(fwdt=0x8000)
     woken, causes = [], []
     rig.cpu_signals.wake = lambda: woken.append(rig.events.now)
@@ -220,7 +223,7 @@ def test_watchdog_wakes_the_sleeping_chip_without_reset():
 
 
 def test_software_enables_the_watchdog_with_swdten(rig):
-    """§4: FWDTEN = 0, prescalers 512 and 16 in the e-puck's word: 16.384 s."""
+    """§4: with FWDTEN = 0, SWDTEN enables the watchdog; the e-puck's prescalers 512 and 16 give 16.384 s."""
     causes = []
     rig.cpu_signals.reset = causes.append
     rig.at(1000).write("RCON", 0x0523)
@@ -232,7 +235,7 @@ def test_software_enables_the_watchdog_with_swdten(rig):
 
 
 def test_low_voltage_interrupt_needs_a_stable_band_gap(rig):
-    """§17, §4: BGST 20 us (295 Tcy) after LVDEN."""
+    """§4, §17: the low-voltage interrupt needs a stable band gap: BGST rises 20 us (295 Tcy) after LVDEN."""
     rig.write("RCON", 0x1503)
     assert rig.at(295).field("RCON", "BGST") == 0
     assert rig.at(296).field("RCON", "BGST") == 1
@@ -246,7 +249,7 @@ def test_low_voltage_interrupt_needs_a_stable_band_gap(rig):
 
 
 def test_disabled_module_reads_0_and_ignores_writes(rig):
-    """§17: PMD1 T1MD."""
+    """§17: the registers of a module that PMD1 (T1MD) disables read 0 and ignore writes."""
     rig.write("PR1", 7)
     rig.write("PMD1", 1 << 11)
     assert rig.read("PR1") == 0
@@ -256,7 +259,7 @@ def test_disabled_module_reads_0_and_ignores_writes(rig):
 
 
 def test_disabled_timer_stops_counting(rig):
-    """§17."""
+    """§17: a disabled timer stops counting."""
     rig.write("PR1", 100)
     rig.write("T1CON", 0x8000)
     rig.at(50).write("PMD1", 1 << 11)
@@ -266,7 +269,8 @@ def test_disabled_timer_stops_counting(rig):
 
 
 def test_module_switches_follow_a_restored_snapshot(rig):
-    """Derived state: what is off follows from PMD1 in the record."""
+    """After a restore, the modules that PMD1 in the record disables are off, although this state is not stored
+    itself."""
     rig.write("PR1", 7)
     before = rig.record.snapshot()
     rig.write("PMD1", 1 << 11)
@@ -279,7 +283,7 @@ def test_module_switches_follow_a_restored_snapshot(rig):
 
 
 def test_pwrsav_sets_the_status_bit_of_its_mode(rig):
-    """§4, §17."""
+    """§4, §17: PWRSAV sets the status bit IDLE or SLEEP of its mode."""
     rig.at(10).dev.sleep(1, 10)
     rig.at(20).dev.wake(20)
     assert (rig.field("RCON", "IDLE"), rig.field("RCON", "SLEEP")) == (1, 0)
@@ -289,7 +293,7 @@ def test_pwrsav_sets_the_status_bit_of_its_mode(rig):
 
 
 def test_uart_with_usidl_waits_in_idle(rig):
-    """§17: the frame that would end in 1409 ends 1000 cycles later."""
+    """§17: a UART with USIDL stops in Idle: a frame that would end in cycle 1409 ends 1000 cycles later."""
     sent = []
     rig.dev.uart[1].on_byte = lambda byte, start: sent.append(rig.events.now)
     rig.write("U1BRG", 7)

@@ -1,4 +1,4 @@
-"""Timers 1-5. Sections are those of the chip reference (dspic30f6014a.md §7)."""
+"""Timers 1-5. Sections are those of dspic30f6014a.md; rules are those of its §7."""
 
 from __future__ import annotations
 
@@ -15,7 +15,8 @@ TON, TSIDL, TGATE, TCS, T32 = 0x8000, 0x2000, 0x40, 0x02, 0x08
 
 @pytest.mark.parametrize(("tckps", "prescale"), [(0, 1), (1, 8), (2, 64), (3, 256)])
 def test_first_count_comes_one_full_prescaled_clock_after_ton(rig, tckps, prescale):
-    """§7 rule 7; a write in cycle t acts from t + 1 (engines.md §4.2)."""
+    """§7 rule 7: the first count comes one full prescaled clock after TON; a write in cycle t acts from t + 1
+    (engines.md §4.2)."""
     rig.at(10).write("T1CON", TON | tckps << 4)
     assert rig.at(11 + prescale - 1).read("TMR1") == 0
     assert rig.at(11 + prescale).read("TMR1") == 1
@@ -23,7 +24,8 @@ def test_first_count_comes_one_full_prescaled_clock_after_ton(rig, tckps, presca
 
 
 def test_flag_of_an_unprescaled_timer_rises_when_the_count_reads_0_again(rig):
-    """§7 rules 1 and 2: TMR = PR in cycle 110, flag and 0 in 111; the period is PR + 1 = 100."""
+    """§7 rules 1 and 2: the flag of an unprescaled timer rises when the count is 0 again: TMR = PR in cycle 110, flag
+    and 0 in 111; the period is PR + 1 = 100."""
     rig.write("PR1", 99)
     rig.at(10).write("T1CON", TON)
     assert rig.at(110).read("TMR1") == 99
@@ -36,7 +38,8 @@ def test_flag_of_an_unprescaled_timer_rises_when_the_count_reads_0_again(rig):
 
 
 def test_flag_of_a_prescaled_timer_comes_with_the_match_not_with_the_rollover(rig):
-    """§7 rule 2: with prescale 64, TMR becomes 3 in cycle 1 + 192; flag in 194, roll-over in 257."""
+    """§7 rule 2: the flag of a prescaled timer rises after the match, not at the roll-over: with prescale 64, TMR
+    becomes 3 in cycle 1 + 192; flag in 194, roll-over in 257."""
     rig.write("PR2", 3)
     rig.write("T2CON", TON | 2 << 4)
     assert rig.at(192).read("TMR2") == 2
@@ -48,7 +51,8 @@ def test_flag_of_a_prescaled_timer_comes_with_the_match_not_with_the_rollover(ri
 
 
 def test_cleared_flag_is_not_set_again_while_the_count_stays_at_the_period(rig):
-    """§7 rule 3: the flag is an edge event; the next one is a whole period (4 x 64) later."""
+    """§7 rule 3: a cleared flag is set again only at the next match, a whole period (4 x 64) later, although the
+    count is still equal to PR."""
     rig.write("PR2", 3)
     rig.write("T2CON", TON | 2 << 4)
     rig.at(195).write("IFS0", 0)
@@ -57,18 +61,19 @@ def test_cleared_flag_is_not_set_again_while_the_count_stays_at_the_period(rig):
 
 
 def test_writing_the_period_value_into_the_count_does_not_raise_the_flag(rig):
-    """§7 rule 3: only counting does; the next clock rolls over."""
+    """§7 rule 3: writing PR's value to TMR does not set the flag, because only counting does; the next clock rolls
+    over."""
     rig.write("PR1", 50)
     rig.at(10).write("T1CON", TON)
     rig.at(20).write("TMR1", 50)
     assert rig.at(21).read("TMR1") == 50
     assert rig.at(22).read("TMR1") == 0
     assert not rig.at(72).flag("T1IF")
-    assert rig.at(73).flag("T1IF")  # 0 in 22, 50 in 72
+    assert rig.at(73).flag("T1IF")  # TMR is 0 in cycle 22 and 50 in 72
 
 
 def test_period_0_holds_the_timer_at_0_without_interrupts(rig):
-    """§7 rule 4."""
+    """§7 rule 4: PR = 0 holds the timer at 0 without interrupts."""
     rig.write("PR1", 0)
     rig.write("T1CON", TON)
     assert rig.at(70000).read("TMR1") == 0
@@ -76,7 +81,7 @@ def test_period_0_holds_the_timer_at_0_without_interrupts(rig):
 
 
 def test_count_above_the_period_runs_to_the_top_and_wraps_silently(rig):
-    """§7 rule 5: 0xFFF0 in cycle 1, 0 in 17, 10 in 27."""
+    """§7 rule 5: a count above PR runs to the top and wraps without a flag: 0xFFF0 in cycle 1, 0 in 17, 10 in 27."""
     rig.write("TMR1", 0xFFF0)
     rig.write("PR1", 10)
     rig.write("T1CON", TON)
@@ -87,7 +92,7 @@ def test_count_above_the_period_runs_to_the_top_and_wraps_silently(rig):
 
 
 def test_writing_the_count_clears_the_prescaler(rig):
-    """§7 rule 6: 7 of 8 clocks are forgotten."""
+    """§7 rule 6: writing TMR clears the prescaler; here 7 of 8 clocks are lost."""
     rig.at(0).write("T1CON", TON | 1 << 4)
     rig.at(8).write("TMR1", 100)
     assert rig.at(16).read("TMR1") == 100
@@ -95,16 +100,16 @@ def test_writing_the_count_clears_the_prescaler(rig):
 
 
 def test_byte_write_to_the_count_keeps_the_other_byte_as_counted(rig):
-    """§18: byte writes change only that byte; the count is 0x0131 when its high byte becomes 0x02."""
+    """§18: a byte write to TMR changes only that byte; the count is 0x0131 when its high byte becomes 0x02."""
     rig.write("T1CON", TON)
     rig.at(1 + 0x131).write("TMR1", 0x0200, lanes=0xFF00)
     assert rig.at(2 + 0x131).read("TMR1") == 0x0231
 
 
 def test_clearing_ton_freezes_the_count_and_empties_the_prescaler(rig):
-    """§7 rules 6 and 10."""
+    """§7 rules 6 and 10: clearing TON stops the count and clears the prescaler."""
     rig.write("T1CON", TON | 1 << 4)
-    rig.at(30).write("T1CON", 1 << 4)  # counts 8, 16, 24 and 6 clocks more
+    rig.at(30).write("T1CON", 1 << 4)  # counts at 8, 16 and 24, then 6 more clocks
     assert rig.at(1000).read("TMR1") == 3
     rig.write("T1CON", TON | 1 << 4)
     assert rig.at(1008).read("TMR1") == 3
@@ -112,17 +117,19 @@ def test_clearing_ton_freezes_the_count_and_empties_the_prescaler(rig):
 
 
 def test_rewriting_the_same_control_word_does_not_disturb_the_count(rig):
-    """§7 rule 6 (choice): only a change of the clock empties the prescaler."""
+    """§7 rule 6 (choice): rewriting the same value to TxCON keeps count and prescaler; only a change of the clock
+    source or prescale clears the prescaler."""
     rig.write("PR1", 3)
     rig.write("T1CON", TON | 1 << 4)
     rig.at(5).write("T1CON", TON | 1 << 4)
-    rig.at(24).write("T1CON", TON | 1 << 4)  # TMR becomes 3 in the very next cycle
+    rig.at(24).write("T1CON", TON | 1 << 4)  # TMR becomes 3 in the next cycle
     assert rig.at(25).read("TMR1") == 3
     assert rig.at(26).flag("T1IF")
 
 
 def test_match_of_the_cycle_in_which_the_timer_is_stopped_still_counts(rig):
-    """§7 rule 10: TMR = PR in cycle 11; TON = 0 written in 11 leaves the flag of cycle 12."""
+    """§7 rule 10: a match in the cycle in which TON is cleared still sets the flag: TMR = PR and the write are in
+    cycle 11, the flag rises in 12."""
     rig.write("PR1", 10)
     rig.write("T1CON", TON)
     rig.at(11).write("T1CON", 0)
@@ -131,7 +138,8 @@ def test_match_of_the_cycle_in_which_the_timer_is_stopped_still_counts(rig):
 
 
 def test_new_period_applies_from_the_next_cycle(rig):
-    """§7: PR 100 -> 20 while the count is 10; 20 comes in cycle 21, the flag in 22."""
+    """§7: a new period is effective from the next cycle on: PR changes from 100 to 20 while the count is 10; 20 is
+    reached in cycle 21, the flag rises in 22."""
     rig.write("PR1", 100)
     rig.write("T1CON", TON)
     rig.at(11).write("PR1", 20)
@@ -141,7 +149,8 @@ def test_new_period_applies_from_the_next_cycle(rig):
 
 
 def test_external_clock_counts_rising_edges_one_cycle_later(rig):
-    """§7 rule 9: edge in cycle 100, counted in 101; falling edges do nothing."""
+    """§7 rule 9: with an external clock, a rising edge in cycle 100 is counted in 101; falling edges are not
+    counted."""
     rig.write("T4CON", TON | TCS)
     rig.at(100).dev.pins.set("RC3", 1)
     assert rig.at(100).read("TMR4") == 0
@@ -152,7 +161,8 @@ def test_external_clock_counts_rising_edges_one_cycle_later(rig):
 
 
 def test_counter_with_period_1_interrupts_once_per_edge_only_if_the_handler_clears_it(rig):
-    """§7 rule 2, the camera drivers: from 0 the first edge matches; without TMR = 0 every second edge is missed."""
+    """§7 rule 2: with PR = 1, as in the camera drivers, the first edge from 0 matches. If the handler does not clear
+    TMR, every second edge is missed."""
 
     def pulse(cycle):
         rig.at(cycle).dev.pins.set("RC4", 1)
@@ -167,14 +177,15 @@ def test_counter_with_period_1_interrupts_once_per_edge_only_if_the_handler_clea
     pulse(200)
     assert rig.flag("T5IF")
     rig.clear_flags()
-    pulse(300)  # 1 -> 0: no match
+    pulse(300)  # from 1 to 0: no match
     assert not rig.at(310).flag("T5IF")
     pulse(400)
     assert rig.at(410).flag("T5IF")
 
 
 def test_counter_flag_rises_two_cycles_behind_the_edge(rig):
-    """§7 rules 2 and 9: edge 100, count 101, flag 102."""
+    """§7 rules 2 and 9: the flag of a counter rises two cycles after the edge: edge in 100, count in 101, flag in
+    102."""
     rig.write("PR5", 1)
     rig.write("T5CON", TON | TCS)
     rig.at(100).dev.pins.set("RC4", 1)
@@ -183,7 +194,7 @@ def test_counter_flag_rises_two_cycles_behind_the_edge(rig):
 
 
 def test_counter_prescaler_counts_edges(rig):
-    """§7: prescale 8: eight rising edges make one count."""
+    """§7: with prescale 8, eight rising edges make one count."""
     rig.write("T4CON", TON | TCS | 1 << 4)
     for edge in range(17):
         rig.at(100 + 20 * edge).dev.pins.set("RC3", 1)
@@ -192,7 +203,8 @@ def test_counter_prescaler_counts_edges(rig):
 
 
 def test_gated_timer_counts_while_the_pin_is_high_and_flags_the_falling_edge(rig):
-    """§7 gated mode: high from 100 to 180 = 80 counts; flag from the falling edge, not from the match with PR."""
+    """§7 gated mode: the timer counts while the pin is high, 80 counts from 100 to 180. The falling edge sets the
+    flag, not the match with PR."""
     rig.write("PR1", 40)
     rig.write("T1CON", TON | TGATE)
     assert rig.at(100).read("TMR1") == 0
@@ -205,7 +217,7 @@ def test_gated_timer_counts_while_the_pin_is_high_and_flags_the_falling_edge(rig
 
 
 def test_wide_timer_counts_32_bits_and_interrupts_with_the_odd_timer(rig):
-    """§7 32-bit: TMR3:TMR2 with PR3:PR2; T3IF, not T2IF."""
+    """§7: a 32-bit timer counts in TMR3:TMR2 up to PR3:PR2 and sets T3IF, not T2IF."""
     rig.write("PR2", 0x0005)
     rig.write("PR3", 0x0001)
     rig.write("T2CON", TON | T32)
@@ -218,7 +230,7 @@ def test_wide_timer_counts_32_bits_and_interrupts_with_the_odd_timer(rig):
 
 
 def test_reading_the_low_word_of_a_wide_timer_latches_the_high_word(rig):
-    """§7, §18: TMR3HLD keeps the upper half of the moment TMR2 was read."""
+    """§7, §18: reading TMR2 of a 32-bit timer latches the upper half of the count in TMR3HLD."""
     rig.write("PR2", 0xFFFF)
     rig.write("T2CON", TON | T32)
     assert rig.at(0x10000).read("TMR2") == 0xFFFF
@@ -229,7 +241,7 @@ def test_reading_the_low_word_of_a_wide_timer_latches_the_high_word(rig):
 
 
 def test_writing_the_low_word_of_a_wide_timer_takes_the_high_word_from_the_holding_register(rig):
-    """§7: write TMR3HLD first, then TMR2."""
+    """§7: writing TMR2 of a 32-bit timer also writes TMR3HLD to the upper half of the count."""
     rig.write("T2CON", TON | T32)
     rig.write("TMR3HLD", 0x1234)
     rig.at(50).write("TMR2", 0x5678)
@@ -238,7 +250,7 @@ def test_writing_the_low_word_of_a_wide_timer_takes_the_high_word_from_the_holdi
 
 
 def test_odd_control_register_is_ignored_in_wide_mode(rig):
-    """§7."""
+    """§7: T3CON is ignored in 32-bit mode."""
     rig.write("T3CON", TON)
     rig.write("T2CON", TON | T32)
     rig.at(10).write("T3CON", 0)
@@ -246,7 +258,7 @@ def test_odd_control_register_is_ignored_in_wide_mode(rig):
 
 
 def test_timer_with_tsidl_stops_in_idle_and_the_others_do_not(rig):
-    """§7 Idle: T1 loses the cycles from 100 to 600, T2 does not."""
+    """§7: a timer with TSIDL stops in Idle, others do not: T1 does not count from cycle 100 to 600, T2 does."""
     rig.write("PR1", 149)
     rig.write("T1CON", TON | TSIDL)
     rig.write("T2CON", TON)
@@ -259,7 +271,7 @@ def test_timer_with_tsidl_stops_in_idle_and_the_others_do_not(rig):
 
 
 def test_only_timer_1_as_asynchronous_counter_runs_in_sleep(rig):
-    """§7 Sleep: TSYNC = 0 counts on, T4 as counter does not."""
+    """§7: in Sleep only timer 1 as asynchronous counter (TSYNC = 0) counts; T4 as counter does not."""
     rig.write("PR1", 2)
     rig.write("T1CON", TON | TCS)
     rig.write("T4CON", TON | TCS)
@@ -276,7 +288,7 @@ def test_only_timer_1_as_asynchronous_counter_runs_in_sleep(rig):
 
 
 def test_native_description_reproduces_the_count(rig):
-    """README: base, tick and period are enough to compute the count and to fire the match."""
+    """README: the record fields base, tick and period determine the count and the time of the match."""
     rig.write("PR1", 999)
     rig.write("T1CON", TON | 1 << 4)
     rig.at(4321)
@@ -288,7 +300,7 @@ def test_native_description_reproduces_the_count(rig):
 
 
 class Pulse:
-    """A waveform clock: a rising edge in every cycle that is a multiple of `every`."""
+    """Waveform clock with a rising edge in every cycle that is a multiple of `every`."""
 
     def __init__(self, every):
         self.every = every
@@ -304,7 +316,8 @@ class Pulse:
 
 
 def test_described_clock_is_counted_without_an_event_per_edge(rig):
-    """§7 rule 9 on a waveform: edges every 100 cycles; the 7th after cycle 1 is in 700, flag in 702."""
+    """§7 rule 9: a timer counts a waveform clock without an event per edge. With edges every 100 cycles, the 7th edge
+    after cycle 1 is in 700, the flag in 702."""
     rig.dev.pins.attach(2, 1 << 3, Pulse(100))
     rig.write("PR4", 7)
     rig.at(1).write("T4CON", TON | TCS)
@@ -316,7 +329,7 @@ def test_described_clock_is_counted_without_an_event_per_edge(rig):
 
 
 def test_a_waveform_clock_can_change(rig):
-    """Edges before an announced change of the waveform stay counted."""
+    """When a waveform announces a change, the edges before the change stay counted."""
     wave = Pulse(100)
     rig.dev.pins.attach(2, 1 << 3, wave)
     rig.write("PR4", 7)
@@ -335,7 +348,8 @@ def test_a_waveform_clock_can_change(rig):
 @settings(max_examples=300, deadline=None)
 @given(st.integers(0, 20), st.integers(0, 20), st.integers(0, 60))
 def test_closed_form_of_the_count_agrees_with_counting(start, period, counts):
-    """§7 rules 1, 4, 5 for a counter whose top is 15."""
+    """§7 rules 1, 4, 5: the closed form of the count equals step-by-step counting, for a counter whose maximum is
+    15."""
     top = 15
     start, period = start & top, period & top
     value, seen = start, [start]
@@ -351,7 +365,8 @@ def test_closed_form_of_the_count_agrees_with_counting(start, period, counts):
 
 
 def test_only_plain_16_bit_matches_are_offered_to_native_code(rig):
-    """README: period 0 = call Python: wide, gated, stopped, and PR = 0."""
+    """README: native code handles only plain 16-bit matches. The period field is 0, which calls Python, for a 32-bit,
+    gated or stopped timer and for PR = 0."""
     period = rig.record.fields["t2.period"].index
 
     def offered():
@@ -371,7 +386,7 @@ def test_only_plain_16_bit_matches_are_offered_to_native_code(rig):
 
 
 class Ticking:
-    """Reference model of a timer: one step per Tcy, written from the rules of §7."""
+    """Reference model of a timer that makes one step per Tcy, written from the rules of §7."""
 
     def __init__(self):
         self.count = self.prescaler = 0
@@ -379,7 +394,7 @@ class Ticking:
         self.coming = self.flag = False
 
     def step(self, writes):
-        """One cycle; `writes` were made in it and act from the next on."""
+        """Advance one cycle; `writes` made in it are effective from the next cycle on."""
         control, period = writes.get("CON", self.control), writes.get("PR", self.period)
         clocks = (1, 8, 64, 256)
         stepped = False
@@ -400,7 +415,7 @@ class Ticking:
 
 @pytest.mark.parametrize("seed", range(12))
 def test_computed_timer_agrees_with_a_ticking_one_under_any_writes(rig, seed):
-    """§7 rules 1-8, 10: count in every cycle and flag in every cycle, writes at random."""
+    """§7 rules 1-8, 10: for random writes, count and flag equal those of the reference model in every cycle."""
     draw, model = random.Random(seed), Ticking()
     for cycle in range(4000):
         rig.at(cycle)

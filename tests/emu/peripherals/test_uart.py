@@ -1,4 +1,4 @@
-"""UART1/2. Sections are those of the chip reference (dspic30f6014a.md §10)."""
+"""UART1/2. Sections are those of dspic30f6014a.md."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ UTXISEL, UTXBRK, UTXEN, ADDEN, OERR = 0x8000, 0x800, 0x400, 0x20, 2
 
 
 def enable(rig, cycle=0, brg=7, mode=0, sta=0, number=1):
-    """UARTEN written in `cycle`, UTXEN in the next: the baud generator starts from 0 in cycle + 1."""
+    """Write UARTEN in `cycle` and UTXEN in the next one; the baud generator starts from 0 in cycle + 1."""
     rig.at(cycle).write(f"U{number}BRG", brg)
     rig.write(f"U{number}MODE", UARTEN | mode)
     rig.at(cycle + 1).write(f"U{number}STA", UTXEN | sta)
@@ -29,7 +29,8 @@ def collect(rig, number=1):
 
 @pytest.mark.parametrize(("written", "start"), [(50, 129), (128, 129), (129, 257), (300, 385)])
 def test_start_bit_begins_at_the_next_edge_of_the_free_running_bit_clock(rig, written, start):
-    """§10.1: BRG 7, bit 128 Tcy; the clock started in cycle 1, so its edges are in 129, 257, 385, ..."""
+    """§10.1: a start bit begins at the next edge of the free-running bit clock. With BRG 7 a bit is 128 Tcy; the
+    clock started in cycle 1, so its edges are in 129, 257, 385, ..."""
     enable(rig)
     sent = collect(rig)
     rig.at(written).write("U1TXREG", 0x55)
@@ -40,7 +41,7 @@ def test_start_bit_begins_at_the_next_edge_of_the_free_running_bit_clock(rig, wr
 
 
 def test_frames_follow_each_other_without_a_gap(rig):
-    """§10.1: five characters in flight, 10 bits of 128 Tcy each."""
+    """§10.1: frames follow each other without a gap: five characters in flight have 10 bits of 128 Tcy each."""
     enable(rig)
     sent = collect(rig)
     rig.at(10).write("U1TXREG", 1)
@@ -52,7 +53,7 @@ def test_frames_follow_each_other_without_a_gap(rig):
 
 
 def test_write_to_a_full_fifo_is_dropped(rig):
-    """§10.1."""
+    """§10.1: a write to a full transmit FIFO is ignored."""
     enable(rig)
     sent = collect(rig)
     rig.at(10)
@@ -63,7 +64,7 @@ def test_write_to_a_full_fifo_is_dropped(rig):
 
 
 def test_levels_on_the_pin_are_start_data_lsb_first_and_stop(rig):
-    """§10.1: 0x53 = 1 1 0 0 1 0 1 0 from bit 0."""
+    """§10.1: the pin sends a start bit, data with the LSB first, and a stop bit; 0x53 is 1 1 0 0 1 0 1 0."""
     enable(rig)
     rig.at(10).write("U1TXREG", 0x53)
     levels = [rig.at(129 + 128 * bit + 64).dev.pins.get("RF3") for bit in range(10)]
@@ -72,7 +73,7 @@ def test_levels_on_the_pin_are_start_data_lsb_first_and_stop(rig):
 
 @pytest.mark.parametrize(("mode", "bits"), [(0, 10), (1, 11), (2, 11), (4, 11), (3, 12), (6, 11)])
 def test_frame_length_follows_parity_and_stop_bits(rig, mode, bits):
-    """§10: PDSEL and STSEL; TRMT rises at the end of the last stop bit."""
+    """§10: PDSEL and STSEL determine the frame length; TRMT rises at the end of the last stop bit."""
     enable(rig, mode=mode)
     rig.at(10).write("U1TXREG", 0x41)
     assert rig.at(129 + bits * 128 - 1).field("U1STA", "TRMT") == 0
@@ -81,14 +82,15 @@ def test_frame_length_follows_parity_and_stop_bits(rig, mode, bits):
 
 @pytest.mark.parametrize(("mode", "parity"), [(2, 0), (4, 1)])
 def test_parity_bit(rig, mode, parity):
-    """§10: 01 even, 10 odd; 0x41 has two ones."""
+    """§10: PDSEL = 01 sends even parity, 10 odd parity; 0x41 has two ones."""
     enable(rig, mode=mode)
     rig.at(10).write("U1TXREG", 0x41)
     assert rig.at(129 + 9 * 128 + 64).dev.pins.get("RF3") == parity
 
 
 def test_transmit_interrupt_with_every_transfer_or_with_the_last(rig):
-    """§10.1: UTXISEL = 0: at each FIFO to TSR transfer; 1: when it leaves the FIFO empty."""
+    """§10.1: with UTXISEL = 0 the interrupt comes at each transfer from FIFO to TSR, with 1 when a transfer empties
+    the FIFO."""
     enable(rig, sta=UTXISEL)
     rig.at(10).write("U1TXREG", 1)
     assert rig.at(11).flag("U1TXIF") == 1  # the first write to an idle transmitter empties the FIFO at once
@@ -100,7 +102,7 @@ def test_transmit_interrupt_with_every_transfer_or_with_the_last(rig):
 
 
 def test_transmit_interrupt_when_the_sender_is_first_enabled(rig):
-    """§10.1: UTXEN 0 -> 1 with UARTEN = 1, either order."""
+    """§10.1: the transmit flag rises when UTXEN and UARTEN are first both set, in either order."""
     rig.write("U1MODE", UARTEN)
     assert rig.flag("U1TXIF") == 0
     rig.at(5).write("U1STA", UTXEN)
@@ -108,7 +110,8 @@ def test_transmit_interrupt_when_the_sender_is_first_enabled(rig):
 
 
 def test_data_loaded_before_utxen_starts_from_a_cleared_baud_clock(rig):
-    """§10.1: UTXEN written in 1000, clock from 1001, start bit one bit later in 1129."""
+    """§10.1: data loaded before UTXEN start from a cleared baud clock: UTXEN is written in 1000, the clock runs from
+    1001, and the start bit begins one bit later in 1129."""
     rig.write("U1BRG", 7)
     rig.write("U1MODE", UARTEN)
     rig.at(10).write("U1TXREG", 0x41)
@@ -119,7 +122,7 @@ def test_data_loaded_before_utxen_starts_from_a_cleared_baud_clock(rig):
 
 
 def test_disabling_the_sender_aborts_and_flushes(rig):
-    """§10.1."""
+    """§10.1: clearing UTXEN aborts the current character and empties the FIFO."""
     enable(rig)
     sent = collect(rig)
     rig.at(10).write("U1TXREG", 1)
@@ -131,7 +134,7 @@ def test_disabling_the_sender_aborts_and_flushes(rig):
 
 
 def test_disabling_the_uart_clears_flags_and_keeps_mode_and_brg(rig):
-    """§10.1."""
+    """§10.1: clearing UARTEN clears the status flags and keeps U1MODE and U1BRG."""
     enable(rig, mode=6)
     rig.at(10).write("U1TXREG", 1)
     rig.at(500).write("U1MODE", 6)
@@ -141,14 +144,14 @@ def test_disabling_the_uart_clears_flags_and_keeps_mode_and_brg(rig):
 
 
 def test_break_holds_the_line_low(rig):
-    """§10.1."""
+    """§10.1: UTXBRK holds the line low."""
     enable(rig)
     rig.at(10).write("U1STA", UTXEN | UTXBRK)
     assert rig.at(12).dev.pins.get("RF3") == 0
 
 
 def test_drain_delivers_what_the_stopped_program_left_in_the_transmitter(rig):
-    """The UART keeps sending after the program has stopped."""
+    """`drain` returns the characters that remain in the transmitter when the program stops."""
     enable(rig)
     sent = collect(rig)
     for value in (1, 2, 3):
@@ -158,7 +161,8 @@ def test_drain_delivers_what_the_stopped_program_left_in_the_transmitter(rig):
 
 
 def test_edge_log_shows_every_bit_of_a_frame(rig):
-    """Pins: 0x55 alternates, so all ten bits are edges 128 Tcy apart, but for the idle line before."""
+    """The edge log has every bit of a frame: 0x55 alternates, so its ten bits are edges 128 Tcy apart after the idle
+    line."""
     enable(rig)
     rig.dev.pins.edges = []
     rig.at(10).write("U1TXREG", 0x55)
@@ -170,7 +174,8 @@ def test_edge_log_shows_every_bit_of_a_frame(rig):
 
 
 def test_received_character_is_complete_in_the_middle_of_the_stop_bit(rig):
-    """§10.2: 9.5 bits = 1216 Tcy behind the start edge, plus up to 1/16 bit: edge 1000, sampled in 1001."""
+    """§10.2: a received character is complete in the middle of the stop bit, 9.5 bits = 1216 Tcy after the start edge
+    plus up to 1/16 bit: edge in 1000, sampled in 1001."""
     enable(rig)
     rig.dev.uart[1].feed(b"A", cycle=1000)
     assert rig.at(999).field("U1STA", "RIDLE") == 1
@@ -184,7 +189,7 @@ def test_received_character_is_complete_in_the_middle_of_the_stop_bit(rig):
 
 
 def test_bytes_arrive_back_to_back_at_line_rate(rig):
-    """§10: 1280 Tcy per frame."""
+    """§10: bytes are received back to back at line rate, 1280 Tcy per frame."""
     enable(rig)
     rig.dev.uart[1].feed(b"ab", cycle=1001)
     assert rig.at(2217).read("U1RXREG") == 0x61
@@ -194,7 +199,7 @@ def test_bytes_arrive_back_to_back_at_line_rate(rig):
 
 @pytest.mark.parametrize(("sel", "counts"), [(0, [1, 2, 3, 4]), (1, [1, 2, 3, 4]), (2, [3]), (3, [4])])
 def test_receive_interrupt_modes(rig, sel, counts):
-    """§10.2: URXISEL 0x every character, 10 at three, 11 at four."""
+    """§10.2: URXISEL = 0x interrupts at every character, 10 at three characters, 11 at four."""
     enable(rig, sta=sel << 6)
     rig.dev.uart[1].feed(b"wxyz", cycle=1001)
     seen = []
@@ -207,7 +212,7 @@ def test_receive_interrupt_modes(rig, sel, counts):
 
 
 def test_fifth_character_overruns_and_clearing_oerr_flushes(rig):
-    """§10.2."""
+    """§10.2: a fifth character sets OERR, and clearing OERR empties the FIFO."""
     enable(rig)
     rig.dev.uart[1].feed(b"123456", cycle=1001)
     assert rig.at(1001 + 1280 * 4).field("U1STA", "OERR") == 0
@@ -217,7 +222,7 @@ def test_fifth_character_overruns_and_clearing_oerr_flushes(rig):
     assert [rig.read("U1RXREG") for _ in range(3)] == [0x32, 0x33, 0x34]
     rig.dev.uart[1].feed(b"7", cycle=20001)
     rig.at(22000)
-    assert rig.field("U1STA", "URXDA") == 0  # no transfers until OERR is cleared
+    assert rig.field("U1STA", "URXDA") == 0  # the receiver is blocked until OERR is cleared
     rig.write("U1STA", UTXEN)
     rig.dev.uart[1].feed(b"8", cycle=22001)
     rig.at(24000)
@@ -225,7 +230,7 @@ def test_fifth_character_overruns_and_clearing_oerr_flushes(rig):
 
 
 def test_clearing_oerr_throws_unread_characters_away(rig):
-    """§10.2: only the change 1 -> 0 does."""
+    """§10.2: clearing OERR, from 1 to 0, discards unread characters."""
     enable(rig)
     rig.dev.uart[1].feed(b"12345", cycle=1001)
     rig.at(9000).write("U1STA", UTXEN)
@@ -233,7 +238,7 @@ def test_clearing_oerr_throws_unread_characters_away(rig):
 
 
 def test_writing_oerr_0_when_it_is_0_changes_nothing(rig):
-    """§10.2: the e-puck receive handler does it on every entry."""
+    """§10.2: writing 0 to OERR while it is 0 changes nothing; the e-puck's receive handler does this in every call."""
     enable(rig)
     rig.dev.uart[1].feed(b"12", cycle=1001)
     rig.at(9000).write("U1STA", rig.read("U1STA") & ~OERR)
@@ -241,14 +246,14 @@ def test_writing_oerr_0_when_it_is_0_changes_nothing(rig):
 
 
 def test_software_cannot_set_oerr_or_receive_flags(rig):
-    """§10: OERR is clear-only, URXDA, FERR, PERR, RIDLE, TRMT, UTXBF belong to hardware."""
+    """§10: software can clear OERR but not set it; URXDA, FERR, PERR, RIDLE, TRMT and UTXBF are read-only."""
     enable(rig)
     rig.at(10).write("U1STA", 0xFFFF & ~UTXBRK)
     assert rig.read("U1STA") == 0x8000 | UTXEN | 0xC0 | ADDEN | 0x110
 
 
 def test_framing_error_belongs_to_the_character_at_the_top(rig):
-    """§10.2: the character is still pushed."""
+    """§10.2: FERR belongs to the character at the top of the FIFO; a character with a framing error is stored too."""
     enable(rig)
     uart = rig.dev.uart[1]
     uart.feed(b"\x81", cycle=1001, errors=FRAMING_ERROR)
@@ -261,7 +266,7 @@ def test_framing_error_belongs_to_the_character_at_the_top(rig):
 
 
 def test_parity_error(rig):
-    """§10.2."""
+    """§10.2: a character with wrong parity sets PERR."""
     enable(rig, mode=2)
     rig.dev.uart[1].feed(b"\x01", cycle=1001, errors=PARITY_ERROR)
     rig.at(9000)
@@ -270,7 +275,7 @@ def test_parity_error(rig):
 
 
 def test_break_is_received_as_0_with_a_framing_error(rig):
-    """§10.2."""
+    """§10.2: a break is received as 0 with a framing error."""
     enable(rig)
     rig.dev.uart[1].feed(b"\xff", cycle=1001, errors=BREAK)
     rig.at(9000)
@@ -280,7 +285,8 @@ def test_break_is_received_as_0_with_a_framing_error(rig):
 
 @pytest.mark.parametrize(("baud", "clean"), [(115200, True), (118600, True), (111800, True), (130000, False)])
 def test_senders_at_another_rate_are_sampled_as_the_16_fold_clock_sees_them(rig, baud, clean):
-    """§10.2: samples 7, 8, 9 of each bit; about 5 % of error is the limit for ten bits."""
+    """§10.2: characters at another bit rate are sampled as by the 16-fold clock, samples 7, 8, 9 of each bit; for ten
+    bits the limit is about 5 % of error."""
     enable(rig)
     rig.dev.uart[1].feed(b"\x55", cycle=1001, baud=baud)
     rig.at(9000)
@@ -292,7 +298,7 @@ def test_senders_at_another_rate_are_sampled_as_the_16_fold_clock_sees_them(rig,
 
 
 def test_nine_bit_address_detection_drops_data(rig):
-    """§10.2 ADDEN: only characters with bit 8 set are pushed."""
+    """§10.2: with ADDEN, only characters with bit 8 set are stored."""
     enable(rig, mode=6, sta=ADDEN)
     rig.dev.uart[1].feed([0x055, 0x1AA], cycle=1001)
     rig.at(9000)
@@ -301,7 +307,7 @@ def test_nine_bit_address_detection_drops_data(rig):
 
 
 def test_loopback_receives_its_own_frames_and_not_the_pin(rig):
-    """§10.2 LPBACK."""
+    """§10.2: with LPBACK the receiver receives the transmitter's frames and not the pin."""
     enable(rig, mode=LPBACK)
     sent = collect(rig)
     rig.dev.uart[1].feed(b"z", cycle=100)
@@ -314,7 +320,7 @@ def test_loopback_receives_its_own_frames_and_not_the_pin(rig):
 
 
 def test_disabled_receiver_loses_timed_bytes_and_untimed_ones_wait(rig):
-    """Timed frames do not wait for UARTEN; `feed` without a cycle does."""
+    """A disabled receiver loses bytes that are fed for a cycle; bytes fed without a cycle wait until UARTEN is set."""
     rig.dev.uart[1].feed(b"a", cycle=100)
     rig.at(5000)
     rig.dev.uart[1].feed(b"b")
@@ -325,7 +331,7 @@ def test_disabled_receiver_loses_timed_bytes_and_untimed_ones_wait(rig):
 
 
 def test_wake_raises_the_interrupt_at_the_start_edge_in_sleep(rig):
-    """§10.2 WAKE."""
+    """§10.2: with WAKE, a start edge in Sleep raises the interrupt."""
     enable(rig, mode=WAKE)
     rig.at(100).dev.sleep(2, 100)
     rig.dev.uart[1].feed(b"x", cycle=500)
@@ -336,7 +342,7 @@ def test_wake_raises_the_interrupt_at_the_start_edge_in_sleep(rig):
 
 @pytest.mark.parametrize(("baud", "bit"), [(0, 128), (57600, 256), (230400, 64), (100000, 147.456)])
 def test_autobaud_lets_the_capture_module_time_the_senders_bits(rig, baud, bit):
-    """§10 ABAUD: IC1 captures every edge of 0x55 against timer 3, whatever rate the sender has."""
+    """§10: with ABAUD, IC1 captures every edge of 0x55 against timer 3, for any bit rate of the sender."""
     enable(rig, mode=ABAUD)
     rig.write("T3CON", 0x8000)
     rig.write("IC1CON", 1)
@@ -347,7 +353,7 @@ def test_autobaud_lets_the_capture_module_time_the_senders_bits(rig, baud, bit):
 
 
 def test_long_feeds_do_not_lose_bytes(rig):
-    """The line holds any number of frames."""
+    """`feed` accepts any number of bytes, and all are received."""
     enable(rig)
     rig.dev.uart[1].feed(bytes(range(256)) * 5)
     received = []
@@ -361,7 +367,8 @@ def test_long_feeds_do_not_lose_bytes(rig):
 
 
 def test_snapshot_in_the_middle_of_a_frame_continues_identically(rig):
-    """Hidden state is in the record: the same bytes at the same cycles after a restore."""
+    """A snapshot in the middle of a frame continues with the same bytes at the same cycles, because hidden state is
+    in the record."""
     enable(rig)
     sent = collect(rig)
     rig.at(10).write("U1TXREG", 0x41)
@@ -379,7 +386,8 @@ def test_snapshot_in_the_middle_of_a_frame_continues_identically(rig):
 
 
 def test_reading_a_character_with_errors_returns_its_data(rig):
-    """FERR is in UxSTA, not in UxRXREG; a debugger's read removes nothing from the FIFO."""
+    """Reading U1RXREG returns the data of a character with errors, because FERR is in U1STA; a debugger's read
+    removes nothing from the FIFO."""
     enable(rig)
     rig.dev.uart[1].feed(b"A", 100, errors=FRAMING_ERROR)
     rig.at(3000)

@@ -28,7 +28,7 @@ def engine(request):
 
 
 def run(text, engine, cycles=100_000, **w):
-    """Run a program, register names in braces, until it stops at `end: bra end`."""
+    """Run a program, with register names in braces, until it stops at `end: bra end`."""
     rig = Rig(text.format(**A), engine, **w)
     rig.machine.program.put(0xF80000, 0xFFE6)
     rig.machine.peripherals.oscillator.power_up(power_on=True)
@@ -39,7 +39,7 @@ def run(text, engine, cycles=100_000, **w):
 
 
 def test_three_byte_moves_in_a_row_unlock_the_oscillator(engine):
-    """§3: keys and data by consecutive MOV.B through a pointer."""
+    """§3: keys and data in consecutive MOV.B through a pointer unlock OSCCON."""
     rig = run(
         """
         mov #{OSCCON}, w1
@@ -57,7 +57,7 @@ def test_three_byte_moves_in_a_row_unlock_the_oscillator(engine):
 
 
 def test_an_instruction_between_the_keys_keeps_the_oscillator_locked(engine):
-    """§3."""
+    """§3: an instruction between the keys keeps OSCCON locked."""
     rig = run(
         """
         mov #{OSCCON}, w1
@@ -76,7 +76,7 @@ def test_an_instruction_between_the_keys_keeps_the_oscillator_locked(engine):
 
 
 def test_reading_the_port_right_behind_the_latch_needs_a_nop(engine):
-    """§6: MOV w0, LATD; MOV PORTD, w1 sees the old pins, one NOP later the new ones."""
+    """§6: MOV PORTD, w1 directly after MOV w0, LATD reads the old pins; after a NOP it reads the new ones."""
     rig = run(
         """
         clr {TRISD}
@@ -92,7 +92,8 @@ def test_reading_the_port_right_behind_the_latch_needs_a_nop(engine):
 
 
 def test_bset_on_the_port_copies_pins_and_on_the_latch_does_not(engine):
-    """§6: read-modify-write on PORTD reads the low input pin 0 and clears its latch bit (bytes: isa.md §6.5)."""
+    """§6: BSET on PORTD reads the low input pin 0 and clears its latch bit (bytes: isa.md §6.5); BSET on LATD does
+    not."""
     rig = run(
         """
         mov #0x00FF, w0
@@ -113,7 +114,7 @@ def test_bset_on_the_port_copies_pins_and_on_the_latch_does_not(engine):
 
 
 def test_a_timer_read_by_the_program_counts_every_cycle(engine):
-    """§7: BSET T1CON in cycle 0 of the sequence; TMR1 read 1, 2 and 6 cycles later is 0, 1 and 5."""
+    """§7: a timer counts every cycle: after BSET T1CON in cycle 0, TMR1 read 1, 2 and 6 cycles later is 0, 1 and 5."""
     rig = run(
         """
         bset {T1CON}, #15
@@ -131,7 +132,8 @@ def test_a_timer_read_by_the_program_counts_every_cycle(engine):
 
 
 def test_a_wide_timer_is_read_consistently_through_its_holding_register(engine):
-    """§7: the carry from TMR2 to TMR3 between the two reads does not tear the value."""
+    """§7: reading a 32-bit timer through its holding register is consistent, also if TMR2 carries into TMR3 between
+    both reads."""
     rig = run(
         """
         mov #0xFFFF, w0
@@ -159,7 +161,7 @@ def test_a_wide_timer_is_read_consistently_through_its_holding_register(engine):
 
 
 def test_polling_the_converter_takes_the_time_of_the_conversion(engine):
-    """§13: SAMP cleared by BCLR; DONE is seen by the first poll behind 133 Tcy; BTSS + BRA loop 3 Tcy."""
+    """§13: after BCLR of SAMP, the first poll after 133 Tcy reads DONE; the loop of BTSS and BRA takes 3 Tcy."""
     rig = Rig(
         """
         mov #18, w0
@@ -182,14 +184,15 @@ def test_polling_the_converter_takes_the_time_of_the_conversion(engine):
     rig.note("convert")
     rig.note("done", stop=True)
     rig.machine.run(2000)
-    # BCLR in c; the result is there from c + 1 + 133; polls read in c + 1, c + 4, ...; the skip takes one cycle more
+    # BCLR in cycle c; the result is there from c + 1 + 133; polls in c + 1, c + 4, ...; the skip takes one cycle more
     assert rig.first("done") - rig.first("convert") == 1 + 135 + 2
     rig.machine.run(5)
     assert rig.machine.w[1] == 777
 
 
 def test_an_input_that_changes_in_the_cycle_of_its_interrupt_does_not_take_it(engine):
-    """§13, §17: levels set between two runs of a CPU in Idle, at any cycle, do not delay an interrupt."""
+    """§13, §17: an input level that is set between two runs of a CPU in Idle, at any cycle, does not delay an
+    interrupt."""
     program = """
         mov #0x001C, w0
         mov w0, {ADCSSL}
@@ -219,7 +222,8 @@ def test_an_input_that_changes_in_the_cycle_of_its_interrupt_does_not_take_it(en
 
 
 def test_uart_bytes_written_by_polling_follow_without_gaps(engine):
-    """§10.1: UTXBF keeps the FIFO full: frames start every 1280 Tcy on the bit clock begun by UARTEN."""
+    """§10.1: bytes written by polling UTXBF follow without gaps: frames start every 1280 Tcy on the bit clock that
+    UARTEN started."""
     rig = Rig(
         """
         mov #7, w0
@@ -250,7 +254,8 @@ def test_uart_bytes_written_by_polling_follow_without_gaps(engine):
 
 
 def test_change_notice_wakes_from_sleep_once_the_oscillator_runs(engine):
-    """§6.2, §17: CN13 = RD4; RCON.SLEEP tells. §3: 1,024 periods of 7.3728 MHz and 20 us of lock: 2,048 + 295 Tcy."""
+    """§3, §6.2, §17: an edge on CN13 = RD4 wakes the CPU from Sleep and RCON.SLEEP is set. The oscillator starts in
+    1,024 periods of 7.3728 MHz and locks in 20 us: 2,048 + 295 Tcy."""
     rig = Rig(
         """
         bset {CNEN1}, #13
@@ -264,7 +269,7 @@ def test_change_notice_wakes_from_sleep_once_the_oscillator_runs(engine):
     )
     rig.at(5000, lambda: rig.machine.pins.set("RD4", 1))
     rig.note("end", stop=True)
-    rig.machine.state.sr = 0xE0  # CPU priority 7: execution continues behind PWRSAV
+    rig.machine.state.sr = 0xE0  # CPU priority 7: execution continues after PWRSAV
     rig.machine.run(20_000)
     assert rig.machine.w[1] == 1
     assert 5000 + 2343 < rig.machine.cycle < 5020 + 2343
@@ -272,7 +277,7 @@ def test_change_notice_wakes_from_sleep_once_the_oscillator_runs(engine):
 
 
 def test_watchdog_wakes_from_idle_and_the_program_goes_on(engine):
-    """§4: WDTO without a reset; 2 ms of 14.7456 MHz."""
+    """§4: the watchdog wakes the CPU from Idle after 2 ms at 14.7456 MHz and sets WDTO without a reset."""
     rig = Rig("pwrsav #1\nmov #1, w1\nend: bra end", engine, w1=0)
     rig.machine.program.put(0xF80000, 0xFFE6)
     rig.machine.program.put(0xF80002, 0x8000)
@@ -285,7 +290,7 @@ def test_watchdog_wakes_from_idle_and_the_program_goes_on(engine):
 
 
 def test_sleep_stops_timers_and_idle_does_not(engine):
-    """§17: T2 does not count during Sleep."""
+    """§17: timer 2 counts during Idle and stops during Sleep."""
     counts = []
     for mode in (0, 1):
         rig = Rig(
@@ -309,7 +314,7 @@ def test_sleep_stops_timers_and_idle_does_not(engine):
 
 
 def test_eeprom_write_goes_on_while_the_program_counts_and_interrupts_at_its_end(engine):
-    """§16: key sequence with literal loads in between; NVMIF after 2 ms; the word reads back by TBLRDL."""
+    """§16: during an EEPROM write the program runs on; after 2 ms NVMIF interrupts, and TBLRDL reads the word back."""
     rig = Rig(
         """
         mov #0x7F, w0
@@ -348,7 +353,7 @@ def test_eeprom_write_goes_on_while_the_program_counts_and_interrupts_at_its_end
 
 
 def test_an_interrupt_between_the_keys_breaks_the_sequence(engine):
-    """§16: T1's handler runs between 0x55 and 0xAA."""
+    """§16: if the handler of T1 runs between the keys 0x55 and 0xAA, no write starts."""
     rig = Rig(
         """
         mov #0x4044, w0
@@ -373,7 +378,7 @@ def test_an_interrupt_between_the_keys_breaks_the_sequence(engine):
 
 
 def test_reset_instruction_keeps_rcon_and_brings_the_devices_down(engine):
-    """epuck.md §2: POR cleared by software, RESET executed once, then POR = 0 and SWR = 1."""
+    """epuck.md §2: RESET keeps POR, which software has cleared, sets SWR, and resets the devices."""
     rig = Rig(
         """
         btss {RCON}, #0
@@ -396,7 +401,7 @@ def test_reset_instruction_keeps_rcon_and_brings_the_devices_down(engine):
 
 
 def test_i2c_polled_write_takes_the_bus_time(engine):
-    """§11: start 2 Tbrg, three bytes of 18, stop 3: 59 Tbrg of 75.5 Tcy and the polls between them."""
+    """§11: a polled write takes 59 Tbrg of 75.5 Tcy, plus the polls: start 2 Tbrg, three bytes of 18, stop 3."""
     rig = Rig(
         """
         mov #150, w0
@@ -450,7 +455,7 @@ def test_i2c_polled_write_takes_the_bus_time(engine):
 @pytest.mark.parametrize(("seed", "chip"), [*((seed, "dsPIC30F6014A") for seed in range(6)), (100, "dsPIC30F0000")])
 @pytest.mark.parametrize("other", ENGINES[1:])
 def test_engines_agree_on_programs_that_access_device_registers(seed, chip, other):
-    """engines.md §4: same seed, same bytes, same cycle in every engine.
+    """engines.md §4: programs that access device registers give the same bytes in the same cycle in every engine.
 
     `tests/fuzz/emulator/fuzz_devices.py` runs more seeds.
     """

@@ -38,7 +38,7 @@ def program(tmp_path_factory: pytest.TempPathFactory) -> str:
 
 @pytest.fixture
 def play(program: str, capsys: pytest.CaptureFixture[str]) -> type:
-    """Runs scripts in this process: `play(*lines)` has output, errors and exit status."""
+    """Return a function that runs a script in this process: `play(*lines)` has output, errors and exit status."""
 
     class Played:
         def __init__(self, *lines: str) -> None:
@@ -72,7 +72,8 @@ def test_a_script_stops_inspects_and_goes_back(play: type) -> None:
 
 
 def test_a_breakpoint_at_a_function_is_after_the_prologue(play: type) -> None:
-    """Parameters are stored there, also for a condition. Before, they are shown as not set."""
+    """A breakpoint at a function is after its prologue, where its parameters are stored; before it they are shown as
+    not set. This holds for conditions too."""
     played = play("break add if a == 3", "run", "info locals", "reverse-stepi", "info locals", "delete",
                   f"break {line_of('int twice(int n)') + 1} if n == 2", "restart", "run", "info locals", "step",
                   "backtrace", "info locals")  # fmt: skip
@@ -143,7 +144,8 @@ def test_a_script_that_ends_at_a_fault_has_its_status(play: type) -> None:
 
 
 def test_breakpoints_are_numbered_and_can_be_changed(play: type) -> None:
-    """A breakpoint keeps its hit count when another one is set. Conditions, hit counts and states can be changed."""
+    """Breakpoints are numbered, and conditions, hit counts and states can be changed; a breakpoint keeps its hit
+    count when another one is set."""
     total = line_of("total = sum;")
     played = play(
         f"b program.c:{total}", "hits 1 4", "log program.c:12 a is {a}", "disable 2", "run", "p a + b", "hits 1",
@@ -199,7 +201,7 @@ def test_reverse_finish_goes_to_the_call(program: str) -> None:
 
 
 def test_reverse_step_goes_into_functions(play: type) -> None:
-    """Back from the second call of `add` through the end of the first call into its caller."""
+    """`reverse-step` from the second call of `add` goes through the end of the first call into its caller."""
     last = line_of("return add(once, n);")
     played = play(f"break program.c:{last} if n == 2", "run", *["reverse-step"] * 7)
     assert played.status == 0, played.err
@@ -327,7 +329,8 @@ class Terminal:
 
 
 def test_at_a_terminal(program: str, tmp_path: Path) -> None:
-    """Completion, repetition by an empty line, an error, a fault, and the history file."""
+    """At a terminal the prompt has completion, repetition by an empty line, error and fault messages, and a history
+    file."""
     terminal = Terminal(tmp_path, "emu", "debug", "--tui", program)
     terminal.expect("(emu)")
     terminal.type("break twi\t")
