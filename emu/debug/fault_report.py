@@ -265,7 +265,8 @@ def _wild_jump(inspector: Inspector, case: _Case, trace: ExecutionTrace | None) 
         return next((one for one in reversed(trace.branches) if one.target == 0), None)
     if inspector.is_code(trace.last if trace.last is not None else case.pc):
         return None
-    return next((one for one in reversed(trace.branches) if inspector.is_code(one.source)), None)
+    last = next((one for one in reversed(trace.branches) if inspector.is_code(one.source)), None)
+    return None if last is None or inspector.is_code(last.target) else last  # else execution ran past the end of code
 
 
 def _jump_text(machine: Machine, jump: TakenBranch, cause: str) -> str:
