@@ -14,7 +14,7 @@ from toolchain.errors import ToolError
 VECTOR_FUNCTIONS = frozenset(
     ["_DefaultInterrupt", *(prefix + vector.name for vector in SLOTS for prefix in ("_", "_Alt"))]
 )
-"""C names of handlers that the linker enters into the vector tables."""
+"""C names of interrupt handlers, which the linker stores in the vector tables."""
 
 IRQ_PREFIX = {"irq": "", "altirq": "Alt"}
 """Prefix of a handler's name, by the keyword of `interrupt(irq(N))` or `interrupt(altirq(N))`."""

@@ -6,7 +6,7 @@ from toolchain.ir.model import Module
 
 
 def symbol(module: Module, name: str) -> str:
-    """Assembler name of a global: x -> _x, names given by asm("...") unchanged, private globals as local labels."""
+    """Assembler name of a global: _x for x, the name itself for asm("..."), a local label for private globals."""
     if name.startswith("\x01"):
         return name[1:]
     var = module.globals.get(name)

@@ -16,7 +16,7 @@ def attribute_section(section: str) -> str:
 
 
 def is_near(module: Module, name: str) -> bool:
-    """Whether the object lies below 0x2000, where file-register instructions reach it (abi-elf.md §1.4).
+    """Whether the object is below 0x2000, so that file-register instructions can access it (abi-elf.md §1.4).
 
     The definition and every declaration agree, because only type, section and -mlarge-data decide. The exception is an
     `address(N)` beyond near memory, which only the module with the definition knows.

@@ -19,8 +19,8 @@ WORD_OFFSET = (-1024, 1022)  # least and greatest offset of a word access [Wn+Sl
 BYTE_OFFSET = (-512, 511)
 LNK_MAX = 16382  # greatest frame size of LNK in bytes (isa.md §5.8)
 NEAR_BYTES = 64  # greatest size of an object in near RAM; near RAM (below 0x2000, abi-elf.md §1.4) is scarce
-NEAR_END = DSPIC30F6014A.data["near"].end  # first address that file-register instructions do not reach
-RETURN_ADDRESS_BYTES = 4  # CALL pushes two words (isa.md §7.4)
+NEAR_END = DSPIC30F6014A.data["near"].end  # first address that file-register instructions cannot access
+RETURN_ADDRESS_BYTES = 4  # bytes that CALL pushes, two words (isa.md §7.4)
 
 _DATA = DSPIC30F6014A.data
 W_END = 0x20  # first address after W0-W15, which start at address 0 (isa.md §2.1)

@@ -1,1 +1,1 @@
-"""Assembler: pic30-as source text to relocatable objects."""
+"""Assembler: translates source text in the syntax of pic30-as to relocatable objects."""

@@ -43,7 +43,7 @@ class Name:
 
 @dataclass(frozen=True, slots=True)
 class Here:
-    """`.` or `$`, the current location."""
+    """Expression `.` or `$`: the current location."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,7 +120,7 @@ def _number(text: str) -> int:
 
 
 class _Parser:
-    """Precedence climbing over the token list."""
+    """Parser of one expression by precedence climbing over its tokens."""
 
     def __init__(self, text: str) -> None:
         self.text = text
@@ -211,7 +211,7 @@ class _Parser:
 
 @lru_cache(maxsize=16384)
 def parse(text: str) -> Tree:
-    """Return the tree of `text`; raise `ExprError` when it is no expression."""
+    """Return the tree of `text`; raise `ExprError` if `text` is no expression."""
     parser = _Parser(text)
     tree = parser.binary(1)
     if parser.next < len(parser.tokens):

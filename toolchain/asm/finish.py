@@ -148,7 +148,7 @@ class _Finisher:
         raise ExprError(f"{value.op}() needs a program address, {value.add.name} is in data section {target.name}")
 
     def _without_addend(self, symbol: AsmSymbol, addend: int) -> AsmSymbol:
-        """Return a symbol for symbol + addend: the second word of CALL and GOTO has no addend (§5, 33)."""
+        """Return a new symbol for symbol + addend, because the second word of CALL and GOTO has no addend (§5, 33)."""
         if addend == 0:
             return symbol
         if not isinstance(symbol.place, Label):

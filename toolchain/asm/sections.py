@@ -15,7 +15,7 @@ from toolchain.elf import constants as c
 from toolchain.errors import SourceLocation
 
 CODE_LIMIT = 1 << 24  # PC units: no program address is longer than 24 bits (isa.md §1.1)
-DATA_LIMIT = 1 << 16  # data space is 64 KB (isa.md §1.2)
+DATA_LIMIT = 1 << 16  # bytes; data space is 64 KB (isa.md §1.2)
 INFO_LIMIT = 1 << 24  # bytes; debug sections are in no address space, the limit stops an unintended .space
 
 
@@ -33,7 +33,7 @@ class Fixup:
 
 @dataclass(slots=True, eq=False)
 class SectionPiece(Frag):
-    """A fragment with its content: octets in code, plain bytes elsewhere."""
+    """A fragment with its content, which is in octets in code and in bytes in other sections."""
 
     section: AsmSection
     data: bytearray = field(default_factory=bytearray)
@@ -187,7 +187,7 @@ class AsmSection(LabelledSection):
             raise ExprError(f"section {self.name} grows beyond {self.limit:#x} address units")
 
     def default_fill(self, packed: bool) -> int:
-        """Return the fill byte of a directive without one; it is 0 in data sections."""
+        """Return the default fill byte of a directive; it is 0 in data sections."""
         return self.packed_fill_value if packed else self.fill_value
 
     def skip(self, units: int, fill: int, packed: bool = False) -> None:

@@ -46,7 +46,7 @@ _NUMERIC_LABEL = re.compile(r"(\d+)([fb])$")
 
 @dataclass(slots=True, kw_only=True)
 class Options:
-    """Options of an assembly."""
+    """Options of one run of the assembler."""
 
     include: list[str] = field(default_factory=list)
     define: dict[str, int] = field(default_factory=dict)
@@ -65,7 +65,7 @@ class Options:
 
 
 class Assembler:
-    """One assembly: state shared by directives and instructions."""
+    """State of one run of the assembler, shared by directives and instructions."""
 
     def __init__(self, text: str, file: str, options: Options) -> None:
         self.options = options
@@ -96,7 +96,7 @@ class Assembler:
             (".data", data, c.SHT_PROGBITS),
             (".bss", data, c.SHT_NOBITS),
         ):
-            self.sections[name] = AsmSection(name, flags, kind, place)  # always emitted, even if empty (§7 item 8)
+            self.sections[name] = AsmSection(name, flags, kind, place)  # emitted even if empty (§7 item 8)
         self.section = self.previous = self.sections[".text"]
         for name in device_symbols(options.chip):
             self.symbols[name] = AsmSymbol(name, 1)
@@ -209,7 +209,7 @@ class Assembler:
         symbol.place = value
 
     def with_registers(self, operands: str) -> str:
-        """Return `operands` with the register names that equates define replaced by the registers."""
+        """Return `operands` with names that .equ or .set defines for registers replaced by the registers."""
         if not self.registers:
             return operands
         return _WORD.sub(lambda word: self.registers.get(word[0], word[0]), operands)

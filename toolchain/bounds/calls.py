@@ -125,7 +125,7 @@ class CallExecution(InstructionExecution):
             self.result.exclude_iteration(*share, cycles)
             for end in ends:
                 end.shift(-cycles)
-        for end in ends:  # W8-W14 are preserved (abi-elf.md §2.1)
+        for end in ends:  # the callee preserves W8-W14 (abi-elf.md §2.1)
             if not tail and level is None:
                 end.w[8:15] = before.w[8:15]
             end.shift(start)
@@ -198,7 +198,7 @@ class CallExecution(InstructionExecution):
             del state.mem[key]
         state.w[4:8], state.flags = AbstractState().w[4:8], AbstractState().flags  # not preserved (abi-elf.md §2.1)
         if is_constant(top) and state.lowest_leak >= top:
-            state.lowest_leak = NO_ADDRESS  # the frame that leaked no longer exists
+            state.lowest_leak = NO_ADDRESS  # the frame whose address leaked no longer exists
         result = state.w[0]
         shown = result if is_constant(result) and result in RESULTS else None
         end = self.result.return_states.get(shown)

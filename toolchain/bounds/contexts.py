@@ -44,7 +44,7 @@ class CallContexts(ABC):
         """By function: number of contexts, and of those with a bound."""
         self.call_stack: list[int] = []
         self.steps = 0
-        """Instructions executed."""
+        """Number of instructions executed so far."""
 
     @abstractmethod
     def execute(self, code: FunctionGraph, state: AbstractState) -> FunctionResult:
@@ -83,7 +83,7 @@ class CallContexts(ABC):
         return entry, tuple(dict.fromkeys(around)), state.key()
 
     def sharing_scope(self, code: FunctionGraph, loop: Loop, total: int | None) -> tuple[Scope, int] | None:
-        """Return the scope a loop shares iterations in, and their number: an active call, or the whole analysis."""
+        """Return the scope (active call or whole analysis) in which a loop shares iterations, and their number."""
         if not self.sharing or len(loop.heads) != 1:
             return None
         shared = self.flow_facts.shared_iterations(code, loop)
@@ -94,7 +94,7 @@ class CallContexts(ABC):
         return None if total is None else ((None, str(loop.head)), total)
 
     def call_share(self, pc: int, target: int) -> tuple[Scope, int] | None:
-        """Return the scope of the call of `target` at `pc` by CALL_SHARE, and how often it is made there."""
+        """Return the CALL_SHARE scope of the call of `target` at `pc`, and the number of such calls in the scope."""
         times = self.flow_facts.call_counts(pc, target) if self.sharing else {}
         for entry in self.call_stack:
             if entry in times:
@@ -106,7 +106,7 @@ class CallContexts(ABC):
         """Return the result of a called function, and whether the general context was used.
 
         The general context covers all calls.  It is used for functions with many contexts, and for `one_of_many`
-        targets of a pointer.  If it has no bound but separate contexts have, the call's own context is analysed.
+        targets of a pointer.  If it has no bound but separate contexts do, the context of the call is analysed.
         """
         key = self._key(entry, state)
         if entry in self.call_stack:

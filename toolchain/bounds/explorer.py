@@ -1,7 +1,7 @@
 """Abstract execution of functions on all their inputs at once (Gustafsson et al., "Automatic derivation of loop bounds
 and infeasible paths for WCET analysis using abstract execution", 2006).
 
-States are joined where paths meet, and the join takes the greater time: the time at a return is the worst case.
+States are joined where paths meet. The join has the greater time, so the time at a return is the worst case.
 Loops are executed iteration by iteration.  This derives iteration counts from constants and excludes infeasible
 branches and calls.  A loop whose state repeats runs for as many iterations as its annotation allows.
 """
@@ -91,7 +91,7 @@ class _FunctionExecution(CallExecution):
     def _arrive(self, target: int, state: AbstractState) -> None:
         block = self.code.blocks[target]
         if block.steps[-1].flow is Return and len(block.steps) <= MAX_RETURN_BLOCK and target not in self.code.heads:
-            self._block(block, state)  # not joined, to keep return states by result
+            self._block(block, state)  # states are not joined, so that return states stay separate by result
             return
         waiting = self.pending.get(target)
         if waiting is not None and self._enters_other_do_loop(target, waiting, state):
@@ -146,9 +146,9 @@ class _FunctionExecution(CallExecution):
             pending.pop(head, None)
 
     def _annotated_bound(self, loop: Loop) -> tuple[int | None, tuple[Scope, int] | None]:
-        """Return the annotated bound of a loop and the scope it shares iterations in.
+        """Return the annotated bound of a loop, and the scope in which it shares iterations.
 
-        Neither applies if the loop may be two loops of the source.
+        Both are None if the loop may be two loops of the source.
         """
         explorer = self.explorer
         bound, total = (

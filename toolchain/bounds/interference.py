@@ -43,13 +43,13 @@ class Response:
 
 @dataclass(slots=True)
 class BoundsReport:
-    """Bounds of one image."""
+    """Bounds of the entries of one image, and the interference between them."""
 
     calls: list[Bound]
     threads: list[Bound]
     interrupts: list[Bound]
     on_second_stack: list[Bound]
-    """The same interrupts, entered on the second stack (STACK_AREA)."""
+    """Bounds of the interrupts, entered on the second stack (STACK_AREA)."""
     main: Bound | None = None
     """Bound of main, which runs before threads or without them; computed for every report."""
     responses: list[Response] = field(default_factory=list)
@@ -164,7 +164,7 @@ def _stacks(report: BoundsReport, analysis: BoundAnalysis) -> None:
 
 
 def _on_top(interrupts: list[Bound], level: int) -> int:
-    """Return the greatest bytes that nested interrupts above a level use, each at most once.
+    """Return the greatest number of bytes used by nested interrupts above a level, each of which occurs at most once.
 
     An interrupt nests in one of lower priority, or in one that has lowered its own priority.
     """

@@ -226,7 +226,7 @@ class Program:
         return None
 
     def switches_stack(self, entry: int) -> bool:
-        """Whether a function may switch stacks: the image has stack-switch annotations and it is not longjmp."""
+        """Whether a function may switch stacks: it is not longjmp, and the image has stack-switch annotations."""
         annotated = any(self.annotations.of(kind) for kind in ("stack", "back", "resumed"))
         return annotated and entry != self.address("_longjmp")
 

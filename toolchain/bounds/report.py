@@ -173,7 +173,7 @@ class BoundAnalysis:
         return result
 
     def _time(self, result: Bound, contexts: list[FunctionResult], shared: list[FunctionResult]) -> None:
-        """Set the cycles of a bound: the longest path in any context.
+        """Set the cycles of a bound to those of the longest path in any context.
 
         PRIVATE_VALUEs hold for threads outside critical sections only.  Shared iterations are counted in two ways: at
         each loop with its own limit, or once for all loops at the cost of the longest.  The smaller sum is the bound.

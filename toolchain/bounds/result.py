@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from toolchain.bounds.abstract.state import INHERITED, AbstractState
 
 Scope = tuple[int | None, str]
-"""Scope of shared iterations: function whose calls they are counted in (None: whole analysis), and annotation text."""
+"""Scope of shared iterations: the function per whose call they count (None: whole analysis), and annotation text."""
 
 
 @dataclass(slots=True)
@@ -33,7 +33,7 @@ class FunctionResult:
     reads_caller_stack: bool = False
     """Whether the function reads its caller's part of the stack."""
     visited: set[int] = field(default_factory=set)
-    """Functions executed."""
+    """Functions executed within the call."""
     waits: set[int] = field(default_factory=set)
     """Addresses of PWRSAV on paths to a stack switch; those on paths to a return are in the return states."""
     clock_stops: set[int] = field(default_factory=set)
@@ -53,7 +53,7 @@ class FunctionResult:
         """Exclude one iteration from the times and record it in its scope.
 
         total   number of iterations in the scope
-        cycles  cost of this one
+        cycles  cycles of the excluded iteration
         """
         most = self.shared_iterations.get(scope, (0, 0))
         self.shared_iterations[scope] = max(most[0], cycles), max(most[1], total)

@@ -16,7 +16,7 @@ LONGEST_CHAIN = 1000
 
 
 class Signatures:
-    """`functions`: signature by address; `types`: by name of a typedef of a function or of a pointer to one."""
+    """Signatures of functions by address (`functions`), and of typedefs of functions or pointers by name (`types`)."""
 
     def __init__(self, sections: Mapping[str, bytes]) -> None:
         self.functions: dict[int, Signature] = {}

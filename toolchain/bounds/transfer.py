@@ -2,7 +2,7 @@
 
 In: an abstract state and an instruction.  Out: the state after it, and its cycles (isa.md §13).  A read through an
 unknown pointer counts as a PSV window read, one or two cycles longer, unless the pointer is known to address RAM.
-A store through an unknown pointer spares the stack as long as no stack address is in an untracked location.
+A store through an unknown pointer is assumed not to change the stack, unless an untracked location holds a stack address.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ ANY_IPL = (0, 7)
 
 @dataclass(slots=True)
 class ImageModel:
-    """Facts of the image that no instruction changes: code, constants, and which data is tracked."""
+    """Facts of the image that no instruction changes: code, constants, and the set of tracked data."""
 
     stack_areas: StackAreas
     program_words: dict[int, int]

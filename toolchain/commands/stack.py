@@ -105,7 +105,7 @@ def _total(entry: Entry) -> int:
 
 
 def _check(report: StackReport, limits: list[str]) -> int:
-    """Compare with the --limit options; the total of an entry takes precedence over that of a function."""
+    """Compare totals with the --limit options; return the exit status. An entry has precedence over a function."""
     status = DONE
     for limit in limits:
         name, equals, value = limit.partition("=")

@@ -175,7 +175,7 @@ def bytes_of(v: ConstInt) -> bytes:
 
 
 def root(address: Instr) -> Instr:
-    """The instruction that an address is computed from by getelementptr."""
+    """The instruction at the start of the getelementptr chain that computes an address."""
     while address.op == "getelementptr" and isinstance(address.args[0], Instr):
         address = address.args[0]
     return address

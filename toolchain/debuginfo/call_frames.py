@@ -194,7 +194,7 @@ class FrameSection:
         self.functions: list[tuple[str, str, CallFrames]] = []
 
     def add(self, name: str, end: str, frames: CallFrames) -> None:
-        """Add a function between two labels."""
+        """Add the entry of a function, whose code is between two labels."""
         self.functions.append((name, end, frames))
 
     def text(self) -> list[str]:
@@ -269,7 +269,7 @@ def _bytes(data: list[str]) -> str:
 
 
 def _record(label: str, lines: list[str], size: int) -> list[str]:
-    """An entry: length, content of `size` bytes, and NOPs up to a multiple of 4 bytes."""
+    """Lines of one entry: length, content of `size` bytes, and NOPs up to a multiple of 4 bytes."""
     padding = -size % 4
     out = [f"{label}:", f"\t.4byte {size + padding}", *lines]
     return [*out, _bytes(["0"] * padding)] if padding else out

@@ -80,7 +80,7 @@ class DebugMetadata:
         return self.position(self.node(ref).get("var", ref) if ref is not None else None)
 
     def marker(self, ref: str | None) -> list[str]:
-        """Line marker in assembly for the code of a DISubprogram or the data of a variable."""
+        """Line marker of the assembly text for the code of a DISubprogram or the data of a variable."""
         position = self.declared(ref)
         return [f'# {position[1]} "{position[0]}"'] if position is not None else []
 

@@ -60,7 +60,7 @@ def verified_locations(m: MFunction) -> dict[int, tuple[VariableLocation, ...]]:
 
 
 def _verified(values: RegisterValues, words: tuple[int, ...], wanted: tuple[int, ...]) -> tuple[int, ...]:
-    """The words of a claim; OPTIMISED_OUT for registers that do not contain the wanted values."""
+    """The words of a claim; OPTIMISED_OUT for registers that do not contain the claimed values."""
     return tuple(
         w if w < 0 or w >= OPTIMISED_OUT or values.get(w) == value else OPTIMISED_OUT
         for w, value in zip(words, wanted, strict=True)

@@ -64,7 +64,7 @@ def main(argv: list[str], cxx: bool = False, front: FrontEnd | None = None) -> i
 
 
 def _with_source_positions(options: CcOptions, error: ToolError, scratch: Path) -> ToolError:
-    """`error` with source positions; compiles again with debug information if they are missing."""
+    """`error` with source positions; the sources are compiled again with debug information if it has none."""
     from toolchain.driver.source_positions import concerns_generated_code, with_positions
 
     if not concerns_generated_code(error) or not any(item.language in IR_SOURCES for item in options.inputs):

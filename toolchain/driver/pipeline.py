@@ -219,7 +219,7 @@ class LineTableRows:
         self.rows.append((name, f.dbg, line))
 
     def mark(self, ref: str | None) -> str:
-        """Label line for an instruction that starts a new row of the line table; "" for any other."""
+        """Label line for an instruction that starts a new row of the line table; "" for other instructions."""
         position = self.info.position(ref)
         if position is None or ref is None:
             return ""
@@ -294,7 +294,7 @@ class ModuleCompiler:
         return "\n".join(self.lines) + "\n"
 
     def declared(self, name: str) -> str:
-        """ "file:line" of the declaration of a function or variable; its name without debug information."""
+        """ "file:line" of the declaration of a function or variable; without debug information, its name."""
         found = self.module.functions.get(name) or self.module.globals.get(name)
         position = self.dwarf.info.declared(found.dbg) if found is not None else None
         kind = "function" if name in self.module.functions else "variable"

@@ -22,7 +22,7 @@ NO_INSTRUCTIONS = frozenset((".ivt", ".aivt", ".dinit"))
 
 @dataclass(frozen=True, slots=True)
 class CodeItem:
-    """One or two words at `address`; `insn` is None for a word that is no instruction."""
+    """One instruction (one or two words) at `address`; `insn` is None for a word that is no instruction."""
 
     address: int
     words: tuple[int, ...]

@@ -10,7 +10,7 @@ class FieldError(Exception):
 
 
 def positions(kind: RelocationType, offset: int, code: bool) -> list[int]:
-    """Return the octet positions, low byte first, of a data field at `offset` (§5: which octets are skipped)."""
+    """Return the octet positions, low byte first, of a data field at `offset`; some octets are skipped (§5)."""
     count = (kind.width + 7) // 8
     if not code:
         return [offset + 2 * i for i in range(count)]

@@ -1,4 +1,4 @@
-"""Queries on symbol tables, for several tools."""
+"""Queries on symbol tables that several tools use."""
 
 from __future__ import annotations
 

@@ -51,7 +51,7 @@ def far_objects(notes: dict[str, set[str]], locate: Callable[[str], str]) -> fro
 
 
 class DataEmitter:
-    """Writes all variables of a module."""
+    """Writer of the definitions of all variables of a module."""
 
     def __init__(self, module: Module, notes: dict[str, set[str]], used: frozenset[str], info: DebugMetadata) -> None:
         self.module = module

@@ -55,7 +55,7 @@ def operand_text(a: Operand) -> str:
 
 
 class FunctionEmitter:
-    """Writes one function."""
+    """Writer of the assembly text of one function."""
 
     def __init__(
         self, m: MFunction, prefix: str, large_code: bool, position: Callable[[str | None], tuple[str, int] | None]

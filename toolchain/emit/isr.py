@@ -45,7 +45,7 @@ def _text(module: Module, v: Value) -> str:
 def interrupt_kind(notes: set[str], position: str) -> str:
     """ "" for ordinary functions, else "no_auto_psv" or "auto_psv", with ",shadow" appended (abi-elf.md §2.5).
 
-    Raises UnsupportedError at `position` for both at once.
+    Raises UnsupportedError at `position` if a function has both.
     """
     words = {w for n in notes for w in n.removeprefix(PREFIX).split(",")} & WORDS
     if not any(n.startswith(PREFIX) for n in notes) and "interrupt" not in words:

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from toolchain.errors import ToolError
 
 REFUSED = re.compile(rb"unknown register name '[ABab]' in asm")
-"""Error message of clang for a source that needs the rewrite."""
+"""Pattern of clang's error message for a source that needs `rewrite`."""
 
 _TOKEN = re.compile(
     r'(?P<marker>^#[^\n]*)|(?P<text>"(?:[^"\\\n]|\\.)*"|\'(?:[^\'\\\n]|\\.)*\')|(?P<name>[A-Za-z_]\w*)'
@@ -130,7 +130,7 @@ class _Rewriter:
         self.copied = at
 
     def assignment(self, i: int, skip: int = 0) -> int:
-        """Rewrite `a = __builtin_...(...)`, the only use of an accumulator outside of arguments."""
+        """Rewrite `a = __builtin_...(...)`; all other uses of accumulators are arguments."""
         target = self.accumulator(self.tokens[i].text)
         follows = i + 1 + skip
         if self.tokens[follows].text != "=":

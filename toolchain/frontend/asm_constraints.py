@@ -1,4 +1,4 @@
-"""XC16's register classes as constraint letters in inline assembly (`"=a"(x)`), which clang does not know.
+"""XC16's register classes as constraint letters in inline assembly (`"=a"(x)`), which clang does not support.
 
 `respell` replaces the letters in preprocessed C by `r` and adds a mark with the letter of each operand to the start of
 the template. `select.asm_inline` removes the mark and assigns registers of the classes.
@@ -16,7 +16,7 @@ CLASSES = {
 write-back of accumulators, X and Y prefetch, MAC factors. Classes W1-W14 and W2-W14 have the caller-saved ones only."""
 
 REFUSED = re.compile(rb"invalid (?:in|out)put constraint '[=+&%]*[abcdevxyz]' in asm")
-"""Error message of clang for a source that needs `respell`."""
+"""Pattern of clang's error message for a source that needs `respell`."""
 
 MARK = re.compile(r"\x01((?:\d+[a-z] )+)\x01")
 

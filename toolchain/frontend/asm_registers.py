@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 
 REFUSED = re.compile(rb"unknown register name 'w\d+' in asm")
-"""Error message of clang for a source that needs `respell`."""
+"""Pattern of clang's error message for a source that needs `respell`."""
 
 _TOKEN = re.compile(
     r'(?P<asm>\b(?:asm|__asm|__asm__)\b)|"(?P<register>[wW](?:1[0-5]|\d))"'

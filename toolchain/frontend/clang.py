@@ -120,7 +120,7 @@ def front_end_flags(options: CcOptions, language: str = "c") -> list[str]:
                (builtin_include_dir(), "clang/include"))  # fmt: skip
         flags += ["-g", "-gdwarf-2", *(f"-fdebug-prefix-map={path}={name}" for path, name in own)]
     if any(word.startswith("-fsanitize=") for word in options.clang):
-        flags.append("-fsanitize-trap=all")  # there is no sanitizer run-time library
+        flags.append("-fsanitize-trap=all")  # checks trap, because there is no sanitizer run-time library
     named = any(word.startswith("-std=") or word == "-ansi" for word in options.clang)
     if is_cxx(language):
         flags += CXX_FLAGS if named else [*CXX_FLAGS, "-std=gnu++17"]

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 MISSING = re.compile(rb"fatal error: .*'[^'\n]+\.[hH]' file not found")
-"""Error message of clang for a missing header."""
+"""Pattern of clang's error message for a missing header."""
 
 FOLDER_OPTIONS = ("-I", "-iquote", "-isystem", "-idirafter")
 MAX_FILES = 20_000  # maximum number of files in the overlay; lookup of further files remains case-sensitive

@@ -160,7 +160,7 @@ class CcOptions:
 
 
 class _ArgumentCursor:
-    """Argument list with a cursor, so that options can take the following word."""
+    """Argument list with a cursor, so that options can consume the following word."""
 
     def __init__(self, words: list[str]) -> None:
         self.words = words

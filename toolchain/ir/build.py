@@ -58,7 +58,7 @@ def evaluate(op: str, a: ConstInt, b: ConstInt) -> int | None:
 
 
 def compare(pred: str, a: ConstInt, b: ConstInt) -> bool:
-    """Value of icmp on constants."""
+    """Result of icmp on constants."""
     x, y = (a.signed, b.signed) if pred[0] == "s" else (a.value, b.value)
     match pred[-2:]:
         case "eq":

@@ -89,7 +89,7 @@ def align_of(t: Type) -> int:
 
 
 def store_size(t: Type) -> int:
-    """Bytes that a load or store of the type accesses."""
+    """Number of bytes that a load or store of the type accesses."""
     return (t.bits + 7) // 8 if t.kind in ("int", "float", "ptr") else size_of(t)
 
 
@@ -277,12 +277,12 @@ class InlineAsm(Value):
 class InstrExtra(TypedDict, total=False):
     """Fields that only some operations have."""
 
-    pred: str  # icmp, fcmp
+    pred: str  # icmp, fcmp: predicate
     type: Type  # getelementptr: source element type; alloca: type of the object
-    align: int  # load, store, alloca
-    ordering: str  # atomic load and store, fence, cmpxchg, atomicrmw
-    kind: str  # atomicrmw: its operation
-    indices: list[int]  # extractvalue, insertvalue
+    align: int  # load, store, alloca: alignment in bytes
+    ordering: str  # atomic load and store, fence, cmpxchg, atomicrmw: memory ordering
+    kind: str  # atomicrmw: the operation, such as "add"
+    indices: list[int]  # extractvalue, insertvalue: indices of the member
     cases: list[int]  # switch: one value per successor after the default
     assign: str  # store: DIAssignID that links the store to a debug record
     attrs: list[ParameterAttributes]  # call, asm: attributes of every argument

@@ -29,7 +29,7 @@ def _no_code(lz: MemoryLegalizer, i: Instr, name: str) -> LegalResult:
 
 
 def _first_operand(lz: MemoryLegalizer, i: Instr, name: str) -> LegalResult:
-    """The first operand, for intrinsics that return it."""
+    """Return the first operand as the result, for intrinsics that return it."""
     return lz.legal(i.args[0])
 
 
@@ -59,7 +59,7 @@ def _abs(lz: MemoryLegalizer, i: Instr, name: str) -> LegalResult:
 
 
 def _overflow(lz: MemoryLegalizer, i: Instr, name: str) -> LegalResult:
-    """{s,u}{add,sub,mul}.with.overflow: result and overflow flag."""
+    """Build {s,u}{add,sub,mul}.with.overflow: result and overflow flag."""
     signed, op, bits = name[0] == "s", name[1:4], i.args[0].type.bits
     extend = lz.sign_extended if signed else lz.zero_extended
     a, b = extend(i.args[0]), extend(i.args[1])
@@ -67,7 +67,7 @@ def _overflow(lz: MemoryLegalizer, i: Instr, name: str) -> LegalResult:
 
 
 def _checked(lz: MemoryLegalizer, op: str, signed: bool, bits: int, a: Value, b: Value) -> tuple[Value, Value]:
-    """Result and overflow flag of an operation on values extended from `bits` bits."""
+    """Build result and overflow flag of an operation on values extended from `bits` bits."""
     t = a.type
     if op == "mul" or bits != t.bits:
         wide = legal_type(int_type(bits * 2 if op == "mul" else bits + 1))
@@ -105,7 +105,7 @@ def _saturating(lz: MemoryLegalizer, i: Instr, name: str) -> LegalResult:
 
 
 def _funnel(lz: MemoryLegalizer, i: Instr, name: str) -> LegalResult:
-    """fshl and fshr: the double-width value a:b shifted by n modulo the width."""
+    """Build fshl or fshr: the double-width value a:b shifted by n modulo the width."""
     bits = i.type.bits
     a, b, n = lz.zero_extended(i.args[0]), lz.zero_extended(i.args[1]), lz.zero_extended(i.args[2])
     t = a.type
@@ -128,7 +128,7 @@ def _funnel(lz: MemoryLegalizer, i: Instr, name: str) -> LegalResult:
 
 
 def _count_zeros(lz: MemoryLegalizer, i: Instr, name: str) -> LegalResult:
-    """ctlz and cttz by words: FF1L and FF1R return positions from 1, and 0 for a zero word (isa.md §6.4)."""
+    """Build ctlz or cttz by words: FF1L and FF1R return positions from 1, and 0 for a zero word (isa.md §6.4)."""
     bits = i.type.bits
     leading = name.startswith("ctlz")
     v = lz.zero_extended(i.args[0])
@@ -148,7 +148,7 @@ def _count_zeros(lz: MemoryLegalizer, i: Instr, name: str) -> LegalResult:
 
 
 def _popcount(lz: MemoryLegalizer, i: Instr, name: str) -> LegalResult:
-    """ctpop: sum of the counts of the words, each by a library function (abi-elf.md §2.8)."""
+    """Build ctpop: the sum of the counts of the words, each by a library function (abi-elf.md §2.8)."""
     v = lz.zero_extended(i.args[0])
     t = v.type
     if t.bits < 16:
@@ -177,7 +177,7 @@ def _bswap(lz: MemoryLegalizer, i: Instr, name: str) -> LegalResult:
 
 
 def _bitreverse(lz: MemoryLegalizer, i: Instr, name: str) -> LegalResult:
-    """Swap groups of 1, 2, 4, ... bits."""
+    """Build bitreverse by swapping adjacent groups of 1, 2, 4, ... bits."""
     bits = i.type.bits
     if bits & (bits - 1):
         raise UnsupportedError(f"bit reversal of i{bits}")
@@ -192,7 +192,7 @@ def _bitreverse(lz: MemoryLegalizer, i: Instr, name: str) -> LegalResult:
 
 
 def _memory(lz: MemoryLegalizer, i: Instr, name: str) -> LegalResult:
-    """memcpy, memmove, memset: block operations for constant sizes, library calls otherwise."""
+    """Build memcpy, memmove, memset: block operations for constant sizes, library calls otherwise."""
     dst, src, size = (lz.legal(a) for a in i.args[:3])
     if size.type.bits != 16:
         size = lz.b.cast("trunc" if size.type.bits > 16 else "zext", size, I16)
@@ -248,7 +248,7 @@ def _stackrestore(lz: MemoryLegalizer, i: Instr, name: str) -> LegalResult:
 
 
 def _entry_word(lz: MemoryLegalizer, i: Instr, name: str) -> LegalResult:
-    """__builtin_return_address and __builtin_frame_address; 0 for outer functions, which GCC allows."""
+    """Build __builtin_return_address and __builtin_frame_address; 0 for outer functions, which GCC allows."""
     level = i.args[0]
     if not isinstance(level, ConstInt) or level.value:
         return const(I16, 0)
@@ -279,7 +279,7 @@ def _round_to_int(lz: MemoryLegalizer, i: Instr, name: str) -> LegalResult:
 
 
 def _fpclass(lz: MemoryLegalizer, i: Instr, name: str) -> LegalResult:
-    """llvm.is.fpclass: the classes of the mask (order of LangRef), tested on the bits of the value."""
+    """Build llvm.is.fpclass: the classes of the mask (order of LangRef), tested on the bits of the value."""
     a, mask = lz.legal(i.args[0]), i.args[1]
     assert isinstance(mask, ConstInt)
     t, bits = a.type, a.type.bits
@@ -308,7 +308,7 @@ def _fpclass(lz: MemoryLegalizer, i: Instr, name: str) -> LegalResult:
 
 
 def _fptoint_sat(lz: MemoryLegalizer, i: Instr, name: str) -> LegalResult:
-    """Saturating conversion: library conversions saturate at 32 and 64 bits (abi-elf.md §2.8), others are clamped."""
+    """Build a saturating conversion; the library saturates 32 and 64 bits (abi-elf.md §2.8), others are clamped."""
     signed = name.startswith("fptosi")
     bits = i.type.bits
     wide = int_type(64 if bits > 32 else 32)

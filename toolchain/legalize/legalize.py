@@ -1,6 +1,6 @@
 """Legalisation of a function: only i1, i8, i16 and multiples of 16 bits; pointers are i16, floats are their bits.
 
-Needs: a function as read. Ensures: no getelementptr, aggregate, float or wide division remains. They become address
+Needs: a function as parsed. Ensures: no getelementptr, aggregate, float or wide division remains. They become address
 arithmetic, several values, or calls of the run-time library (abi-elf.md §2.8). An integer of another width is stored in
 the next legal container with undefined upper bits; operations that read these bits clear or sign-extend them first.
 """

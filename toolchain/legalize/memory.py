@@ -31,7 +31,7 @@ class MemoryLegalizer(LegalizationContext):
     # -- memory -------------------------------------------------------------------------------------------------------
 
     def gep(self, i: Instr) -> Value:
-        """Address arithmetic: base + scaled indices + one constant."""
+        """Build the address of a getelementptr: base + scaled indices + one constant."""
         t = i.extra["type"]
         address, offset = self.legal(i.args[0]), 0
         for k, index in enumerate(i.args[1:]):
@@ -123,7 +123,7 @@ class MemoryLegalizer(LegalizationContext):
         return value
 
     def load_bits(self, t: Type, size: int, p: Value, even: bool, volatile: bool) -> Value:
-        """Load `size` bytes into the low end of a legal type."""
+        """Build a load of `size` bytes into the low end of a legal type."""
         if t is I1:
             return self.b.load(I8, p, volatile)
         if even and size * 8 == t.bits:
@@ -165,7 +165,7 @@ class MemoryLegalizer(LegalizationContext):
             self.end_atomic()
 
     def store_bits(self, v: Value, size: int, p: Value, even: bool, volatile: bool) -> None:
-        """Store the low `size` bytes of a legal value."""
+        """Build a store of the low `size` bytes of a legal value."""
         if even and size * 8 == v.type.bits:
             self.b.store(v, p, volatile)
             return
@@ -198,7 +198,7 @@ class MemoryLegalizer(LegalizationContext):
             self.store_bits(part, store_size(t), q, self.even(q, 1 if at & 1 else align), volatile)
 
     def va_arg(self, i: Instr) -> Value:
-        """Decrement the argument pointer by the rounded size, then load (abi-elf.md §2.4)."""
+        """Build va_arg: decrement the argument pointer by the rounded size, then load (abi-elf.md §2.4)."""
         if i.type.kind not in ("int", "float", "ptr"):
             raise UnsupportedError(f"va_arg of type {i.type}")
         pp = self.legal(i.args[0])
@@ -211,7 +211,7 @@ class MemoryLegalizer(LegalizationContext):
     # -- atomics ------------------------------------------------------------------------------------------------------
 
     def atomicrmw(self, i: Instr) -> Value:
-        """Read, modify and write in an atomic section."""
+        """Build atomicrmw: read, modify and write in an atomic section."""
         kind = str(i.extra["kind"])
         p, v = self.legal(i.args[0]), self.legal(i.args[1])
         t = legal_type(i.type)

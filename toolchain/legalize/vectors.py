@@ -95,7 +95,7 @@ def insertelement(lz: MemoryLegalizer, i: Instr) -> list[Value]:
 
 
 def shufflevector(lz: MemoryLegalizer, i: Instr) -> list[Value]:
-    """Lanes of two vectors, selected by a constant mask."""
+    """Return lanes of two vectors, selected by a constant mask."""
     lanes = lz.legal_leaves(i.args[0]) + lz.legal_leaves(i.args[1])
     out: list[Value] = []
     for index in lz.legal_leaves(i.args[2]):
@@ -104,7 +104,7 @@ def shufflevector(lz: MemoryLegalizer, i: Instr) -> list[Value]:
 
 
 def bitcast(lz: MemoryLegalizer, i: Instr) -> LegalResult:
-    """Vector to integer, integer to vector, or vector to vector: the same bits, first lane lowest."""
+    """Build a bitcast to or from a vector: the same bits, first lane lowest."""
     source = i.args[0]
     return lz.bitcast_to_vector(source, i.type) if i.type.kind == "vector" else lz.packed(source)
 

@@ -1,4 +1,4 @@
-"""Intel HEX as Microchip's bin2hex writes it (abi-elf.md §6.8): byte address = 2 x PC, four bytes per word."""
+"""Intel HEX as Microchip's bin2hex writes it (abi-elf.md §6.8): byte address = 2 x PC, four bytes per program word."""
 
 from __future__ import annotations
 

@@ -106,7 +106,7 @@ class _Handles:
 
 @dataclass(slots=True)
 class _Placement:
-    """Sections with addresses: all of them in input order, the `.dinit` table (None without one) and its records."""
+    """Result of placement: all sections in input order, the `.dinit` section (or None) and its records."""
 
     layout: Layout
     order: list[Section]

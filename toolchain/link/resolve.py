@@ -77,7 +77,7 @@ def resolve(
     roots: list[str],
     instead: dict[int, ArchiveMember] | None = None,
 ) -> Resolution:
-    """Add all `objects`, then archive members as long as one defines a wanted name (one group, abi-elf.md §2.8).
+    """Add all `objects`, then repeatedly archive members that define undefined names (one group, abi-elf.md §2.8).
 
     `roots` begins with the start symbol.  If a needed member defines the start symbol too, as the library's `atexit`
     does, resolution is repeated with that member as start-up code: `instead` maps the id of the replaced member to it.

@@ -169,7 +169,7 @@ OPS: dict[str, OpInfo] = {
     **{n: OpInfo("bs", LOGIC) for n in ("andf", "iorf", "xorf")},
     **{n: OpInfo("sb", LOGIC) for n in ("andw", "iorw", "xorw")},
     "btstf": OpInfo("sn", "z"),
-    # blocks of memory: the pointers are registers
+    # copies and fills of memory blocks, with pointers in registers
     "repmov": OpInfo("nbb", words=2, memory="rw"),
     "repfill": OpInfo("nbs", words=2, memory="w"),
     "repclr": OpInfo("nb", words=2, memory="w"),
@@ -214,13 +214,13 @@ CC_INVERSE = {
 class MI:
     """One machine instruction.
 
-    byte    byte-sized form
+    byte    whether it is the byte-sized form
     cc      condition of bra and skip
     pred    conditional: executed only if the skip before it is not taken; its results are therefore also inputs
     also_uses, also_defs   implicit registers (calls, DIV, inline assembly)
     late    indices of the operands that are read after the results are written (DIV divisor)
     tail    of a call: the callee does not access this frame, and only the epilogue follows
-    epilogue        inserted before RETURN by the frame pass
+    epilogue        whether the frame pass has inserted it before RETURN
     claims          locations of source variables before the instruction
     written_values  for each register that it writes, the number of the value that the register then contains
     values_before   the same for copies before it that allocation removed
@@ -289,7 +289,7 @@ class MI:
         return str(self.args[0])
 
     def uses(self) -> list[int]:
-        """Registers read."""
+        """Registers that the instruction reads."""
         out = list(self.also_uses)
         for role, a in zip(self.info.roles, self.args, strict=False):
             if a.__class__ is int:
@@ -304,7 +304,7 @@ class MI:
         return out
 
     def defs(self) -> list[int]:
-        """Registers written."""
+        """Registers that the instruction writes."""
         out = list(self.also_defs)
         for role, a in zip(self.info.roles, self.args, strict=False):
             if a.__class__ is int:
@@ -377,11 +377,11 @@ class MI:
         return any(role in roles and isinstance(a, MEMORY) for role, a in zip(self.info.roles, self.args, strict=False))
 
     def reads_memory(self) -> bool:
-        """Whether it reads memory."""
+        """Whether the instruction reads memory."""
         return "r" in self.info.memory or self._memory("sSbB")
 
     def writes_memory(self) -> bool:
-        """Whether it writes memory."""
+        """Whether the instruction writes memory."""
         return "w" in self.info.memory or self._memory("dDbB")
 
     def has_effect(self) -> bool:
@@ -397,7 +397,7 @@ class MI:
         return made
 
     def is_copy(self) -> bool:
-        """Whether it is an unconditional word move between registers."""
+        """Whether the instruction is an unconditional word move between registers."""
         return (
             self.op == "mov"
             and self.args[0].__class__ is int
@@ -540,7 +540,7 @@ class MFunction:
         return {b.name: b for b in self.blocks}
 
     def dump(self) -> str:
-        """Readable listing."""
+        """Text of the function for debugging."""
         out = [f"function {self.name}"]
         for b in self.blocks:
             out.append(f"{b.name}:  -> {', '.join(b.succs)}")

@@ -13,7 +13,7 @@ KnownConstant = tuple[str, object]
 RegisterFacts = dict[int, int | KnownConstant]
 """By register: the register of which it is a copy, or the constant that it contains."""
 Transfer = tuple[int, int, KnownConstant | None, int]
-"""Registers that an instruction writes; source of a copy (-1: none), loaded constant, destination of either (-1)."""
+"""Mask of written registers; source of a copy (-1: none), loaded constant, and destination of either (-1: none)."""
 
 
 def run(m: MFunction) -> bool:

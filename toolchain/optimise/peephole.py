@@ -117,7 +117,7 @@ def _repeated(b: MBlock, at: int) -> bool:
 
 
 def compare_while_copying(b: MBlock) -> bool:
-    """Replace MOV Wa,Wb beside CP0 of either register by SUB Wa,#0,Wb, which sets the same flags (isa.md §6.2)."""
+    """Replace MOV Wa,Wb next to CP0 of either register by SUB Wa,#0,Wb, which sets the same flags (isa.md §6.2)."""
     k, before = 0, len(b.insts)
     while k + 1 < len(b.insts):
         one, two = b.insts[k : k + 2]
@@ -269,7 +269,7 @@ def merge_pairs(b: MBlock) -> bool:
 
 
 def _merged(first: MI, second: MI) -> MI | None:
-    """The MOV.D with the effect of two moves; None if there is none."""
+    """The MOV.D with the effect of two moves; None if MOV.D cannot express them."""
     if first.op != "mov" or second.op != "mov" or first.byte or second.byte or first.pred or second.pred:
         return None
     a, b = first.args

@@ -42,7 +42,7 @@ def _ending(b: MBlock) -> tuple[object, ...] | None:
 
 
 def _best_group(m: MFunction) -> tuple[list[MBlock], int, bool] | None:
-    """The merge that saves most words: blocks, length of the common ending without a jump, whether it returns."""
+    """The merge that saves the most words: blocks, length of the common ending without jump, whether it returns."""
     endings: dict[tuple[object, ...], list[MBlock]] = {}
     for b in m.blocks:
         key = _ending(b)

@@ -253,7 +253,7 @@ class Induction:
         """Return a path at a loop head: phis, memory, and earlier loads and call results are unknown."""
         path = self.begin()
         path.memory = SymbolicMemory(z3.Array("memory.loop", z3.BitVecSort(16), z3.BitVecSort(BYTE)))
-        path.behind_barrier = True  # conservative: no store may be moved over it
+        path.behind_barrier = True  # conservative: no store may cross the loop head
         for name, block in self.blocks.items():
             if name in self.dominators[head.name]:
                 for i in block.phis() if name == head.name else block.instrs:

@@ -63,7 +63,7 @@ class Path:
     """Events since that point: (number of the event, memory at the event)."""
     result: Any = None
     end_kind: str = ""
-    """How the path ends: ret, unreachable, or loop (at a loop head)."""
+    """Kind of the path's end: ret, unreachable, or loop (at a loop head)."""
     head: str = ""
     """Loop head at which the path ends."""
     loop_visits: list[tuple[str, dict[int, Any], int]] = field(default_factory=list)
@@ -78,7 +78,7 @@ class Path:
         )  # fmt: skip
 
     def write(self, address: Term, value: Term) -> None:
-        """Execute a store, which may be moved up to the next barrier."""
+        """Execute a store, which may move between the previous and the next barrier."""
         self.memory.write(address, value)
         self.pending_stores.append((address, value))
 

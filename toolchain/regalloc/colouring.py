@@ -159,7 +159,7 @@ class InterferenceGraph:
         return significant < self.limit(a)
 
     def _harmless(self, a: int, b: int) -> bool:
-        """George's test: whether every neighbour of b interferes with a, too, or always finds a colour."""
+        """George's test: whether every neighbour of b also interferes with a, or can always be coloured."""
         trouble = self.adjacent[b] & ~self.adjacent[a]
         if a >= FIRST_VIRTUAL and trouble & REAL:
             return False

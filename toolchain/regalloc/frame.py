@@ -26,7 +26,7 @@ def wants_frame_pointer(m: MFunction) -> bool:
 
 
 class FrameBuilder:
-    """Lays out the frame of one function and rewrites the function."""
+    """Builder of one function's frame: computes its layout and rewrites the function."""
 
     def __init__(self, m: MFunction, stack_check: bool) -> None:
         self.m = m

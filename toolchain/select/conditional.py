@@ -60,7 +60,7 @@ def _assign(s: SelectionContext, v: Value, d: tuple[int, ...]) -> None:
 
 
 def _group(s: SelectionContext, i: Instr) -> list[Instr]:
-    """`i` and the needed selects directly before it that share its condition and do not depend on each other."""
+    """`i`, and the used selects directly before it with the same condition that do not depend on each other."""
     group = [i]
     for j in reversed(s.block.instrs[: s.block.instrs.index(i)]):
         same = j.op == "select" and j.args[0] is i.args[0] and not any(isinstance(a, Undef) for a in j.args)
@@ -221,7 +221,7 @@ def _shifted_out(s: SelectionContext, i: Instr, when: bool) -> str | None:
 
 
 def _only_bit(masked: Value, x: Value, bit: int) -> bool:
-    """Whether a value is x & 1 << bit, or that of the low word of x."""
+    """Whether a value is x & 1 << bit, or (low word of x) & 1 << bit."""
     if not isinstance(masked, Instr) or masked.op != "and":
         return False
     a, mask = masked.args

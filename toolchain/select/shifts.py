@@ -104,7 +104,7 @@ def _shift_wide_constant(s: SelectionContext, op: str, a: tuple[int, ...], n: in
 
 
 def _shift_by_product(s: SelectionContext, a: tuple[int, ...], bits: int, d: tuple[int, ...]) -> None:
-    """Shift two words left: the upper word of the product low * 2^bits contains the bits that cross over."""
+    """Shift two words left: the upper word of the product low * 2^bits contains the bits that move to the next word."""
     upper, crossing, p = s.temp(), s.temp(), s.m.new_pair()
     s.emit("sl", a[1], Imm(bits), upper)
     s.emit("mul.uu", a[0], Imm(1 << bits), p)

@@ -120,7 +120,7 @@ class Analysis:
     def targets(self, call: CallSite) -> list[int]:
         """Return the functions that a call site may reach: its target, or the annotated targets of a pointer call."""
         if call.target is not None:
-            return [call.target] if call.target else []  # 0: a weak function that is not linked
+            return [call.target] if call.target else []  # address 0: an undefined weak function
         owner = self.name(call.address).partition("+")[0]
         names = self.annotations.calls.get(owner) or self.annotations.calls.get(owner.removeprefix("_")) or []
         if not names and self.annotations.any_handle:

@@ -7,7 +7,7 @@ the recorded facts, raises MachineError, and records the new facts. The verifier
 rule                                                                                     module
 blocks end in their successors; branches have targets                                    form.py
 a skip covers conditional instructions, and every conditional instruction has a skip     form.py
-pairs are even, words are words, near bytes move through W0                              form.py
+pairs are even-aligned, word operands no pairs, near bytes move through W0               form.py
 every reader of a flag gets it from the same kind of instruction as before               flags.py
 a pass makes no register undefined at a read; callee-saved registers are saved           registers.py
 every instruction reads the value that it read before allocation                         allocation.py

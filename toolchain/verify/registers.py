@@ -27,7 +27,7 @@ def compare(before: int, after: int) -> None:
 
 
 def summary(b: MBlock) -> tuple[int, int, int, int]:
-    """Registers of a block: read before they are written, written, pushed, and written outside of an epilogue."""
+    """Register sets of a block: read before written, written, pushed, and written outside of an epilogue."""
     reads = kill = pushed = written = 0
     for mi in reversed(b.insts):
         u, d = mi.register_sets()

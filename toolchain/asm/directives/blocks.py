@@ -1,4 +1,4 @@
-"""Directives that read further lines: macros, repeats, include files (abi-elf.md §4.3)."""
+"""Directives that consume the following lines or another file: macros, repeats, includes (abi-elf.md §4.3)."""
 
 from __future__ import annotations
 

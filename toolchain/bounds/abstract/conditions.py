@@ -30,9 +30,9 @@ _DIFFERENCES = {
 
 @dataclass(frozen=True, slots=True)
 class FlagResult:
-    """The result that set the flags and that is in a register: a member of lo..hi, modulo 2**16.
+    """The result that set the flags and that a register still contains: a member of lo..hi, modulo 2**16.
 
-    borrows  whether the result is a difference, so that it is negative where C is clear
+    borrows  whether the result is a difference, which is negative if C is clear
     """
 
     register: int

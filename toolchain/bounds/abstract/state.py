@@ -103,7 +103,7 @@ class StackAreas:
         self.ranges = ranges
 
     def contains(self, address: int) -> bool:
-        """Whether an address lies on a stack."""
+        """Whether an address is in a stack."""
         return any(lo <= address < hi for lo, hi in self.ranges)
 
     def points_into(self, value: Value) -> bool:
@@ -159,15 +159,15 @@ class StackAreas:
 
 
 def is_unknown_address(value: Value) -> bool:
-    """Whether a set is too wide to serve as an address; stores to such an address are assumed to spare the stack."""
+    """Whether a set is too wide to serve as an address; stores to it are assumed not to change the stack."""
     lo, hi = extremes(value)
     return hi - lo >= 0x8000
 
 
 def earliest_masking(time: int, *paths: tuple[int | None, int]) -> int | None:
-    """Return when masking began if, at `time`, it has lasted as long as on the worst of the paths.
+    """Return the start of masking for which, at `time`, it has lasted as long as on the worst of the paths.
 
-    paths  begin of masking (None: not masked) and time at the end of each path
+    paths  start of masking (None: not masked) and time at the end of each path
     """
     if any(since == INHERITED for since, _ in paths):
         return INHERITED

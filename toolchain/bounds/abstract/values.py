@@ -12,7 +12,7 @@ Value = Any  # int | Interval
 
 
 class Interval:
-    """The integers in lo..hi whose bits under `mask` are `bits`; `ram`: each is a RAM address or no address at all."""
+    """The integers in lo..hi whose bits under `mask` are `bits`; `ram`: members used as addresses are in RAM."""
 
     __slots__ = ("bits", "hi", "lo", "mask", "ram")
 

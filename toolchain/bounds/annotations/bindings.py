@@ -19,9 +19,10 @@ CALLS = ("often", "if")
 
 
 class AnnotationBindings:
-    """Annotations by loop and by call.
+    """Annotations of an image by the loops and calls to which they apply.
 
-    Raises `ToolError` for an annotation after all code of its function, or one without a call of the function it names.
+    Raises `ToolError` for an annotation after all code of its function, and for one whose line has no call of the
+    function that it names.
     """
 
     def __init__(

@@ -1,4 +1,4 @@
-"""Flow facts: what annotations state about loops, calls and stack switches, as queries of the abstract execution."""
+"""Flow facts: statements of annotations about loops, calls and stack switches, as queries of the abstract execution."""
 
 from __future__ import annotations
 
@@ -33,14 +33,14 @@ STACK_STILL_BOUNDED: Final = frozenset((UNBOUNDED_LOOP, LONG_LOOP, MERGED_LOOPS,
 
 @dataclass(slots=True)
 class FlowFacts:
-    """Queries that annotations answer; the defaults are those of a program without annotations."""
+    """Queries of the abstract execution about annotations; the defaults are those of a program without annotations."""
 
     loop_bound: Callable[[FunctionGraph, Loop], int | None] = lambda _code, _loop: None
     """Greatest number of iterations of a loop per entry, not counting the first."""
     total_iterations: Callable[[FunctionGraph, Loop], int | None] = lambda _code, _loop: None
     """Greatest number of iterations of a loop over all its entries."""
     shared_iterations: Callable[[FunctionGraph, Loop], dict[int, tuple[str, int]]] = lambda _code, _loop: {}
-    """By function: annotation text that loops have in common, and iterations that they share in one call of it."""
+    """By function: annotation text common to several loops, and the iterations that they share in one call of it."""
     sharing_scopes: frozenset[int] = frozenset()
     """Functions that shared loop bounds and call counts refer to."""
     merged_loops: Callable[[FunctionGraph], set[int]] = lambda _code: set()

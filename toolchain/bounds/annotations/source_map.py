@@ -72,7 +72,7 @@ class SourceMap:
         return [file for file, count in matches.items() if count == most] if most else []
 
     def file_of(self, annotation: Annotation) -> str | None:
-        """Return the file of an annotation, None if the image has no code of it; raises `ToolError` if ambiguous."""
+        """Return the file of an annotation, None if the image has no code of it; raise `ToolError` if ambiguous."""
         files = self.matching_files(annotation.file)
         if annotation.function:
             files = [file for file in files if annotation.function in self._first_lines.get(file, {}).values()]

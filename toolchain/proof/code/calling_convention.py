@@ -1,6 +1,6 @@
 """Checks of the calling convention: calls, returns, and memory contents at them (abi-elf.md §2.1, §2.2).
 
-In: a machine state and the corresponding event of one path of the source.  Out: nothing, or Refuted.
+In: a machine state and the corresponding event of one path of the source.  A violation raises Refuted.
 """
 
 from __future__ import annotations
