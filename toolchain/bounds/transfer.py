@@ -2,7 +2,7 @@
 
 In: an abstract state and an instruction.  Out: the state after it, and its cycles (isa.md §13).  A read through an
 unknown pointer counts as a PSV window read, one or two cycles longer, unless the pointer is known to address RAM.
-A store through an unknown pointer is assumed not to change the stack, unless an untracked location holds a stack address.
+A store through an unknown pointer is assumed not to change the stack, unless an untracked location has a stack address.
 """
 
 from __future__ import annotations
