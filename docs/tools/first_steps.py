@@ -29,7 +29,7 @@ EPOCH = "1767225600"
 build."""
 
 
-def built_wheel(folder: Path) -> Path:
+def build_wheel(folder: Path) -> Path:
     """Return a wheel that is built from an sdist of the tracked files, outside the checkout."""
     source = folder / "source"
     listed = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
@@ -46,7 +46,7 @@ def built_wheel(folder: Path) -> Path:
     return next(folder.glob("*.whl"))
 
 
-def installed(wheel: Path, folder: Path) -> dict[str, str]:
+def install_wheel(wheel: Path, folder: Path) -> dict[str, str]:
     """Install the wheel in a new virtual environment and return the environment variables of a shell that uses it."""
     subprocess.run([sys.executable, "-m", "venv", "--without-pip", folder], check=True)
     python = folder / "bin" / "python"
@@ -111,7 +111,7 @@ def main() -> int:
     with tempfile.TemporaryDirectory(prefix="newcomer-") as scratch:
         folder = (wanted.keep or Path(scratch)).resolve()
         folder.mkdir(parents=True, exist_ok=True)
-        environment = installed(built_wheel(folder), folder / "venv")
+        environment = install_wheel(build_wheel(folder), folder / "venv")
         before = listing(folder / "venv")
         (folder / "work").mkdir()
         old = PAGE.read_text(encoding="utf-8")

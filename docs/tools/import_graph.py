@@ -61,7 +61,7 @@ def heights(graph: Graph) -> dict[str, int]:
     return found
 
 
-def reduced(graph: Graph) -> Graph:
+def transitive_reduction(graph: Graph) -> Graph:
     """Return the graph without edges that a longer path implies (transitive reduction)."""
     below: Graph = {}
 
@@ -100,7 +100,7 @@ def width_of(parts: list[str]) -> float:
     return sum(map(box_width, parts)) + GAP * (len(parts) - 1)
 
 
-def drawn(package: str) -> str:
+def draw(package: str) -> str:
     """Return the picture of a package as SVG."""
     graph = imports_of(package)
     rows = rows_of(graph)
@@ -115,7 +115,7 @@ def drawn(package: str) -> str:
             boxes.append(_box(package, part, left, top, width))
             left += width + GAP
     lines = []
-    for part, others in sorted(reduced(graph).items()):
+    for part, others in sorted(transitive_reduction(graph).items()):
         for other in sorted(others):
             (x, y), (to_x, to_y) = centre[part], centre[other]
             start, middle = y + BOX, (y + BOX + to_y) / 2
@@ -156,7 +156,7 @@ def page(folder: Path) -> str:
              "type imports count. A line that a longer path implies is left out.\n"]  # fmt: skip
     for package in PACKAGES:
         picture = folder / f"imports-{package}.svg"
-        picture.write_text(drawn(package), encoding="utf-8")
+        picture.write_text(draw(package), encoding="utf-8")
         parts.append(f"## {package}\n\n![Modules of {package}, each above what it imports]({picture.name})\n")
     return "\n".join(parts)
 

@@ -29,7 +29,7 @@ OURS, THEIRS, OTHERS = "tab:blue", "tab:red", "tab:green"
 UNSURE = (0, (4, 2))
 
 
-def measured(path: Path) -> list[tuple[Job, Found]]:
+def read_runs(path: Path) -> list[tuple[Job, Found]]:
     """Return the runs in a data file of infrared_link.py."""
     with path.open(newline="", encoding="utf-8") as file:
         return [
@@ -42,7 +42,7 @@ def measured(path: Path) -> list[tuple[Job, Found]]:
         ]  # fmt: skip
 
 
-def published(path: Path, system: str, what: str) -> list[float]:
+def published_values(path: Path, system: str, what: str) -> list[float]:
     """Return the values that a system has published of a quantity."""
     with path.open(newline="", encoding="utf-8") as file:
         return [float(one["value"]) for one in csv.DictReader(file) if (one["system"], one["what"]) == (system, what)]
@@ -89,10 +89,10 @@ def draw_throughput(axes: Any, runs: list[tuple[Job, Found]], data: Path, reach:
     for senders, mark, name in ((1, "o-", "ours, one sends"), (2, "o:", "ours, both send, sum")):
         found = [(cm, throughput(job, one)) for cm, job, one in by_distance(runs, senders)]
         axes.plot(*zip(*found, strict=True), mark, color=OURS, mfc="none" if senders == 2 else OURS, label=name)
-    for rate, name in zip(published(data, "SwarmCom", "payload rate"), ("fast", "slow"), strict=True):
+    for rate, name in zip(published_values(data, "SwarmCom", "payload rate"), ("fast", "slow"), strict=True):
         axes.axhline(rate, color=THEIRS, lw=1)
         axes.text(69, rate + 12, f"SwarmCom, {name}: {rate:g}", color=THEIRS, ha="right", fontsize=8)
-    for rate in published(data, "libIrcom", "payload rate"):
+    for rate in published_values(data, "libIrcom", "payload rate"):
         axes.plot([10, reach], [rate, rate], color=OTHERS, lw=1.4)
         axes.plot([reach], [rate], "|", color=OTHERS, ms=9)
         axes.text(reach + 5, rate - 8, f"libIrcom: {rate:g}", color=OTHERS, fontsize=8)
@@ -115,9 +115,9 @@ def draw_angle(axes: Any, runs: list[tuple[Job, Found]]) -> None:
 
 def draw_ratios(axes: Any, runs: list[tuple[Job, Found]], data: Path, reach: float) -> None:
     best = max(throughput(job, one) for _, job, one in by_distance(runs, 1))
-    rates = published(data, "libIrcom", "payload rate")
-    errors = published(data, "SwarmCom", "bit error rate over libIrcom's")
-    (far,), (fast,) = (published(data, "SwarmCom", f"{one} over libIrcom's") for one in ("range", "throughput"))
+    rates = published_values(data, "libIrcom", "payload rate")
+    errors = published_values(data, "SwarmCom", "bit error rate over libIrcom's")
+    (far,), (fast,) = (published_values(data, "SwarmCom", f"{one} over libIrcom's") for one in ("range", "throughput"))
     axes.barh([2.18, 1.18], [far, fast], 0.34, color="none", edgecolor=THEIRS, ls=UNSURE, label="SwarmCom, up to")
     axes.barh([0], [errors[1] - errors[0]], 0.34, left=errors[0], color="none", edgecolor=THEIRS, ls=UNSURE)
     axes.barh([1.82], [our_range(runs) / reach], 0.34, color=OURS, label="ours, over its nominal values")
@@ -135,7 +135,10 @@ def draw(path: Path, runs: list[tuple[Job, Found]], data: Path) -> None:
     matplotlib.use("Agg")
     import matplotlib.pyplot as plt
 
-    (reach,), (factor,) = published(data, "libIrcom", "range"), published(data, "SwarmCom", "range over libIrcom's")
+    (reach,), (factor,) = (
+        published_values(data, "libIrcom", "range"),
+        published_values(data, "SwarmCom", "range over libIrcom's"),
+    )
     figure, ((errors, speed), (angle, ratios)) = plt.subplots(2, 2, figsize=(11, 8), layout="constrained")
     draw_errors(errors, runs, reach, factor)
     draw_throughput(speed, runs, data, reach)
@@ -155,14 +158,14 @@ def main() -> None:
     parser.add_argument("--published", type=Path, default=HERE / "results" / "infrared-published.csv")
     parser.add_argument("--figure", type=Path, default=HERE / "figures" / "infrared-link.png")
     chosen = parser.parse_args()
-    runs = measured(chosen.measured)
+    runs = read_runs(chosen.measured)
     draw(chosen.figure, runs, chosen.published)
-    (reach,) = published(chosen.published, "libIrcom", "range")
+    (reach,) = published_values(chosen.published, "libIrcom", "range")
     best = max(throughput(job, one) for _, job, one in by_distance(runs, 1))
     print(f"range {our_range(runs):.1f} cm, {our_range(runs) / reach:.2f} times libIrcom's nominal one")
     print(f"{best:.0f} bit/s of payload at most", *(
         f"{best / rate:.2f} times the {rate:g} of libIrcom's protocol"
-        for rate in published(chosen.published, "libIrcom", "payload rate")), sep=", ")  # fmt: skip
+        for rate in published_values(chosen.published, "libIrcom", "payload rate")), sep=", ")  # fmt: skip
 
 
 if __name__ == "__main__":

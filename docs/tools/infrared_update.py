@@ -46,7 +46,7 @@ FILLING = """\
 """
 
 
-def built(folder: Path, rows: int) -> Path:
+def build_image(folder: Path, rows: int) -> Path:
     """Build the application with a program of `rows` flash rows and return its image."""
     app, out = folder / APP, folder / "build"
     shutil.copytree(paths.firmware() / "apps" / APP, app)
@@ -108,7 +108,7 @@ def main() -> int:
     parser.add_argument("--noise", type=float, default=2.0, metavar="COUNTS")
     chosen = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
-        image = built(Path(folder), chosen.rows)
+        image = build_image(Path(folder), chosen.rows)
         has, calls = measure(image, chosen.robots, chosen.lost, chosen.most, chosen.noise)
     for what, seconds in (("have it whole", has), ("restarted and call it", calls)):
         known = seconds or [math.nan]

@@ -46,7 +46,7 @@ def tracked() -> list[str]:
     return [name for name in listed.split("\0") if name and (ROOT / name).is_file()]
 
 
-def copied(source: Path) -> None:
+def copy_pages(source: Path) -> None:
     """Copy the repository's pages and the files they link to, at their own paths below `source`."""
     for name in tracked():
         path = ROOT / name
@@ -114,7 +114,7 @@ def main() -> int:
     with tempfile.TemporaryDirectory(prefix="site-") as scratch:
         source = Path(scratch) / "pages"
         source.mkdir()
-        copied(source)
+        copy_pages(source)
         reference(source)
         settings = Path(scratch) / "mkdocs.yml"
         settings.write_text(f"INHERIT: {ROOT / 'docs' / 'mkdocs.yml'}\ndocs_dir: {source}\n", encoding="utf-8")

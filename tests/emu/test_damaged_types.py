@@ -1,4 +1,4 @@
-"""Values of types from damaged debug information: an error that ends a request, not the session."""
+"""Values of types from damaged debug information: an error fails one request and not the session."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ FLOAT = Type("float", "float", 4)
     ],
 )
 def test_a_type_beyond_its_data_is_an_error_of_the_request(kind: Type, data: bytes) -> None:
-    """Members outside their struct and numbers of absurd size are errors that the debug server reports."""
+    """Members outside of their struct, and numbers of absurd size, are errors that the debug server reports."""
     with pytest.raises(ValueError, match="the debug information is damaged") as error:
         decode(kind, data)
     assert isinstance(error.value, REQUEST_ERRORS)
 
 
 def test_whole_values_are_decoded() -> None:
-    """Data may be longer than the type."""
+    """A value is decoded from data that are longer than its type."""
     assert decode(INT, b"\xfe\xff\x00") == -2 & 0xFFFF or decode(INT, b"\xfe\xff\x00") == -2
     assert decode(FLOAT, b"\0\0\x80\x3f\0") == 1.0

@@ -1,4 +1,4 @@
-"""Files of `emu run` on a full disk: one line that names the file, status 2, and no incomplete file."""
+"""Output files of `emu run` on a full disk: one line that names the file, status 2, and no incomplete file."""
 
 from __future__ import annotations
 
@@ -25,14 +25,15 @@ def image(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def limit_files() -> None:
-    """Limit the size of files, as on a disk that becomes full."""
+    """Limit the size of files, which has the effect of a disk that becomes full."""
     resource.setrlimit(resource.RLIMIT_FSIZE, (LARGEST_FILE, LARGEST_FILE))
 
 
 @pytest.mark.parametrize("option", ["--vcd", "--trace"])
 @pytest.mark.parametrize("target", ["/dev/full", "file"])
 def test_a_full_disk_under_a_waveform_is_one_line(option: str, target: str, image: Path, tmp_path: Path) -> None:
-    """The error comes while the machine runs, and the writer is not used after it."""
+    """If the disk becomes full while a waveform is written, the error is raised during the run, and the writer is not
+    used afterwards."""
     if not Path(target).is_absolute():
         target = str(tmp_path / target)
     elif not Path(target).exists():

@@ -115,7 +115,7 @@ def test_verdicts_on_another_compiler_or_of_another_campaign_are_refused(
     Book(log, "made up").put(Verdict(1, "agreed"))
     with pytest.raises(LogError, match="not a file of the campaign 'other'"):
         Book(log, "other")
-    monkeypatch.setattr(verdicts, "judged", lambda: "0123")
+    monkeypatch.setattr(verdicts, "source_hash", lambda: "0123")
     with pytest.raises(LogError, match="another compiler or emulator; begin another file"):
         Book(log, "made up")
 

@@ -59,7 +59,7 @@ class LogError(Exception):
     """A file of verdicts cannot be resumed."""
 
 
-def judged() -> str:
+def source_hash() -> str:
     """Return a hash of the sources of compiler, run-time library and emulator."""
     digest = hashlib.sha256()
     for folder in JUDGED:
@@ -77,7 +77,7 @@ class Book:
         """Read the file. Raises LogError if it belongs to another campaign or compiler, or is damaged."""
         self.path = path
         self.verdicts: dict[int, Verdict] = {}
-        self._head = {"campaign": campaign, "judged": judged() if path is not None else ""}
+        self._head = {"campaign": campaign, "judged": source_hash() if path is not None else ""}
         self._read_to = 0
         if path is None:
             return

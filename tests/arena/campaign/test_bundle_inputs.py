@@ -25,7 +25,7 @@ def run(tmp_path: Path) -> Path:
 def test_a_link_in_a_run_is_not_packed(
     kind: str, run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The target of a link is a private file that the run does not contain."""
+    """A link in a run is not packed, because its target may be a private file outside of the run."""
     secret = tmp_path / "secret"
     if kind == "link":
         secret.write_text("private")
@@ -43,7 +43,7 @@ def test_a_link_in_a_run_is_not_packed(
 
 
 def test_an_index_of_blanks_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """A small archive can unpack to an index of gigabytes; it is refused by its size, before it is read."""
+    """An index of blanks, which a small archive can unpack to gigabytes, is refused by its size before it is read."""
     path = tmp_path / "blank.zip"
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("bundle.json", " " * INDEX_LIMIT + json.dumps({"files": {}}))
@@ -53,6 +53,6 @@ def test_an_index_of_blanks_is_refused(tmp_path: Path, capsys: pytest.CaptureFix
 
 @pytest.mark.parametrize("name", ["/dev/zero", "nothing.zip"])
 def test_what_is_no_file_is_refused(name: str, capsys: pytest.CaptureFixture[str]) -> None:
-    """A device and a missing file are one line and status 2."""
+    """A device and a missing file are refused with one line and status 2."""
     assert main(["verify", name]) == 2
     assert f"{name}: not a bundle: no such file" in capsys.readouterr().err

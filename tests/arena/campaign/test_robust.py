@@ -29,7 +29,7 @@ ROOT = Path(__file__).resolve().parents[3]
 SHORT = ["run", "clustering", "--brain", "scripted", "--minutes", "0.05", "--trials", "1", "--jobs", "1"]
 
 
-def started(*arguments: object) -> subprocess.Popen[str]:
+def start_arena(*arguments: object) -> subprocess.Popen[str]:
     """Start `arena` in another process and return the process."""
     command = [sys.executable, "-m", "arena", *map(str, arguments)]
     return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=ROOT)
@@ -115,10 +115,10 @@ def test_a_sweep_cannot_choose_a_folder_by_its_values(tmp_path: Path) -> None:
 def test_two_runs_do_not_share_a_folder(tmp_path: Path) -> None:
     """The second run ends with status 3 and changes nothing; the first run is unaffected."""
     long = ["run", "clustering", "--brain", "scripted", "--minutes", "2", "--trials", "3", "--jobs", "1"]
-    first = started(*long, "--out", tmp_path)
+    first = start_arena(*long, "--out", tmp_path)
     wait_for(tmp_path / "manifest.json")
     first.send_signal(signal.SIGSTOP)  # keeps it running when the second one starts
-    second = started(*SHORT, "--seed", 99, "--out", tmp_path)
+    second = start_arena(*SHORT, "--seed", 99, "--out", tmp_path)
     output = second.communicate(timeout=HANG)[1]
     first.send_signal(signal.SIGCONT)
     assert second.returncode == 3
@@ -133,7 +133,7 @@ def test_two_runs_do_not_share_a_folder(tmp_path: Path) -> None:
 def test_a_killed_run_leaves_the_folder_free(tmp_path: Path) -> None:
     """The lock of a folder is released when its process is killed."""
     long = ["run", "clustering", "--brain", "scripted", "--minutes", "60", "--trials", "1", "--jobs", "1"]
-    first = started(*long, "--out", tmp_path / "run")
+    first = start_arena(*long, "--out", tmp_path / "run")
     wait_for(tmp_path / "run" / "manifest.json")
     first.kill()
     first.wait()
@@ -188,7 +188,7 @@ def test_a_trial_that_ends_takes_its_lock_away(tmp_path: Path) -> None:
 
 def test_progress_without_a_terminal_is_plain_lines(tmp_path: Path) -> None:
     """Without a terminal, progress is printed as plain lines."""
-    run = started(*SHORT[:-4], "--trials", 3, "--jobs", 1, "--out", tmp_path)
+    run = start_arena(*SHORT[:-4], "--trials", 3, "--jobs", 1, "--out", tmp_path)
     out, output = run.communicate(timeout=HANG)
     assert run.returncode == 0
     lines = output.splitlines()
@@ -264,7 +264,7 @@ def test_a_scheduler_that_dies_is_one_line_and_what_is_finished_stays(tmp_path: 
     try:
         run = None
         for _ in range(20):  # until the scheduler listens
-            run = started(*arguments, "--scheduler", f"tcp://127.0.0.1:{port}")
+            run = start_arena(*arguments, "--scheduler", f"tcp://127.0.0.1:{port}")
             time.sleep(3)
             if run.poll() is None:
                 break

@@ -80,7 +80,7 @@ def test_a_script_comment_from_a_robot_does_not_stop_the_page(trial: Path, tmp_p
     """`<!--<script>` in a robot's text opens a state of the HTML parser in which </script> does not end a script."""
     record = read_trial(trial)
     record.columns["log"][0] = [{"robot": 0, "cycle": 1, "text": HOSTILE}]
-    found = browsed(page(record).replace("</html>", PROBE % SAMPLE), tmp_path)
+    found = run_probe(page(record).replace("</html>", PROBE % SAMPLE), tmp_path)
     assert found["samples"] == len(record.times)
 
 
@@ -88,7 +88,7 @@ def test_a_script_comment_from_a_robot_does_not_stop_the_page(trial: Path, tmp_p
 def test_the_page_loads_scrubs_and_plays_in_a_browser(trial: Path, tmp_path: Path) -> None:
     """The page loads the trial, seeks to a time and plays in a browser."""
     main(["replay", str(trial)])
-    found = browsed(trial.with_suffix(".html").read_text().replace("</html>", PROBE % SAMPLE), tmp_path)
+    found = run_probe(trial.with_suffix(".html").read_text().replace("</html>", PROBE % SAMPLE), tmp_path)
     record = read_trial(trial)
     assert (found["before"], found["samples"]) == (0, len(record.times))
     assert found["scrubbed"] == SAMPLE
@@ -123,7 +123,7 @@ def test_the_page_shows_strips_leds_and_what_was_said(trial: Path, tmp_path: Pat
                                         {"robot": 0, "cycle": 49_153_000, "leds": 0}]  # fmt: skip
     record.columns["r0_strip"][SAMPLE] = bytes([90, 14, 14] * 10 + [10, 48, 14] * 5 + [112, 100, 100] * 5)
     record.columns["r0_seen"] = np.full(len(record.times), -1)
-    found = browsed(page(record).replace("</html>", SHOWN % SAMPLE), tmp_path)
+    found = run_probe(page(record).replace("</html>", SHOWN % SAMPLE), tmp_path)
     assert found["strip"] == [[90, 14, 14], [10, 48, 14], [112, 100, 100]]
     assert found["later"] == 256
     assert found["front"] == pytest.approx([255, 187, 0], abs=20)  # the edge of the disc is antialiased
@@ -172,7 +172,7 @@ document.getElementById("result").textContent = JSON.stringify(found);
 @pytest.mark.parametrize("size", ["1280,720", "700,900"])
 def test_everything_can_be_reached_by_hand_and_key(trial: Path, tmp_path: Path, size: str) -> None:
     """All controls and views fit on the screen, keys and clicks work, and robots are interpolated between samples."""
-    found = browsed(page(read_trial(trial)).replace("</html>", LAYOUT), tmp_path, size)
+    found = run_probe(page(read_trial(trial)).replace("</html>", LAYOUT), tmp_path, size)
     width, height = found["inner"]
     for name, (left, top, right, bottom) in found["boxes"].items():
         assert (left >= 0, top >= 0, right <= width, bottom <= height) == (True,) * 4, (name, size, found["inner"])
@@ -191,7 +191,7 @@ def test_everything_can_be_reached_by_hand_and_key(trial: Path, tmp_path: Path, 
     assert found["sought"] == pytest.approx(0.5, abs=0.05)
 
 
-def browsed(text: str, folder: Path, size: str = "1280,720") -> Any:
+def run_probe(text: str, folder: Path, size: str = "1280,720") -> Any:
     """Open a page that ends in a probe script, and return the result of the probe."""
     path = folder / "probed.html"
     path.write_text(text)

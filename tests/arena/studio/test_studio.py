@@ -54,7 +54,7 @@ def studio_of(plan: Plan) -> Iterator[Studio]:
         made.close()
 
 
-def settled(studio: Studio, state: str = "paused") -> dict[str, Any]:
+def wait_for_state(studio: Studio, state: str = "paused") -> dict[str, Any]:
     """Wait until the trial is in `state` or over, and return its status."""
     for _ in range(1200):
         now = studio.ask("status")
@@ -66,7 +66,7 @@ def settled(studio: Studio, state: str = "paused") -> dict[str, Any]:
 
 def do(studio: Studio, name: str, *arguments: Any) -> dict[str, Any]:
     studio.ask(name, *arguments)
-    return settled(studio)
+    return wait_for_state(studio)
 
 
 def test_a_stepped_trial_has_the_rows_of_run_trial() -> None:
@@ -78,7 +78,7 @@ def test_a_stepped_trial_has_the_rows_of_run_trial() -> None:
         for quanta in (1, 7, 100, 33):
             do(studio, "step", quanta)
         studio.ask("run", 1000.0)
-        assert settled(studio, "over")["state"] == "over"
+        assert wait_for_state(studio, "over")["state"] == "over"
         assert studio.ask("trial").columns == whole.rows.columns
 
 
@@ -127,21 +127,21 @@ def test_commands_during_a_rewind_discard_later_actions() -> None:
         moved(studio)
         with pytest.raises(CommandRefusedError, match="rewinding; pause it first"):
             during_rewind(studio, 400, "move", "object", 0, 50.0, 50.0)
-        settled(studio)
+        wait_for_state(studio)
         during_rewind(studio, 390, "pause")
         do(studio, "step", 400)
         assert studio.ask("digest") == last
     with studio_of(plan) as studio:
         moved(studio)
         during_rewind(studio, 400, "step", 1)
-        assert settled(studio)["tick"] == 1
+        assert wait_for_state(studio)["tick"] == 1
         assert studio.ask("digest") == first
         do(studio, "step", 399)
         assert studio.ask("digest") == last
     with studio_of(plan) as studio:
         moved(studio)
         during_rewind(studio, 400, "rewind", 10)
-        assert settled(studio)["tick"] == 10
+        assert wait_for_state(studio)["tick"] == 10
         do(studio, "step", 390)
         assert studio.ask("digest") == last, "later actions are discarded"
 
@@ -181,7 +181,7 @@ def test_a_checkpoint_restores_the_state_to_the_byte(clustering_image: Path, mon
         assert do(studio, "rewind", 900)["breakpoints"] == ["1 main", "1 Sys_Send_Event"]
         assert studio.ask("digest") == seen[900][0]
         studio.ask("run", 1000.0)
-        assert settled(studio, "at a breakpoint")["hit"] == "robot 1 is at Sys_Send_Event"
+        assert wait_for_state(studio, "at a breakpoint")["hit"] == "robot 1 is at Sys_Send_Event"
     assert len(closed) == 9
     assert all(closed), "four checkpoints, four abandoned processes, and the last one"
 
@@ -216,7 +216,7 @@ def test_a_breakpoint_pauses_the_whole_world(clustering_image: Path) -> None:
         with pytest.raises(CommandRefusedError, match="robot 0"):
             studio.ask("toggle_breakpoint", 0, "no_such_function")
         studio.ask("run", 1000.0)
-        now = settled(studio, "at a breakpoint")
+        now = wait_for_state(studio, "at a breakpoint")
         assert now["hit"] == "robot 1 is at Sys_Send_Event"
         inside = studio.ask("inspect", 1)
         assert inside["place"] == "_Sys_Send_Event"
@@ -228,7 +228,7 @@ def test_a_breakpoint_pauses_the_whole_world(clustering_image: Path) -> None:
         assert studio.ask("status")["tick"] == now["tick"]
         studio.ask("toggle_breakpoint", 1, "Sys_Send_Event")
         studio.ask("run", 1000.0)
-        settled(studio, "over")
+        wait_for_state(studio, "over")
         assert studio.ask("trial").columns == whole.rows.columns
 
 
@@ -398,7 +398,7 @@ const still = async () => { await rest(100); await until(() => d.studio.now.stat
 def test_the_page_controls_the_trial(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The page can step, run, pause, drag an object, rewind, inspect a robot, and show why a command is refused."""
     with serving(replace(scripted_plan(), seconds=600.0)) as one:  # long enough to be paused
-        found = browsed(one, PROBE, tmp_path, monkeypatch)
+        found = run_probe(one, PROBE, tmp_path, monkeypatch)
     assert (found["first"], found["stepped"]) == (0, 1)
     assert found["ran"] > 10
     assert found["backTick"] == found["ran"]
@@ -408,7 +408,7 @@ def test_the_page_controls_the_trial(tmp_path: Path, monkeypatch: pytest.MonkeyP
     assert "robot 1 is scripted" in found["refused"]
 
 
-def browsed(one: StudioServer, probe: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
+def run_probe(one: StudioServer, probe: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
     """Open the studio's page with a probe script, and return the result of the probe.
 
     The browser's timers run in virtual time; requests do not."""

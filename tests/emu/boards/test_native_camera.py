@@ -19,7 +19,7 @@ DARK = [(0, 0xD4, 0x2C)]
 """Register writes for manual exposure of a PO3030K."""
 
 
-def rendered(robot: Robot, camera: Camera, cycle: int, pixels: np.ndarray) -> tuple[bool, bool]:
+def render_both(robot: Robot, camera: Camera, cycle: int, pixels: np.ndarray) -> tuple[bool, bool]:
     """Render a line in Python and in native code and compare the records. Return for each whether it rendered the
     line."""
     record, href = robot.machine.record, c_int64()
@@ -58,7 +58,7 @@ def test_native_and_python_lines_are_equal(sensor: str, writes: list[tuple[int, 
     for _ in range(300):
         line = draw.randrange(course.lines)
         cycle = camera.scan.href(line, draw.randrange(9)) + draw.randrange(-course.byte_tcy, course.line_tcy)
-        by_python, by_code = rendered(robot, camera, cycle, pixels)
+        by_python, by_code = render_both(robot, camera, cycle, pixels)
         assert by_code <= by_python
         steady = lamp == 1.0 or writes[-1:] == DARK
         assert by_code == (by_python and steady)

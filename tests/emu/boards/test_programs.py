@@ -37,7 +37,7 @@ def captured(machine: Machine) -> np.ndarray:
     return decode(bytes(machine.record.bytes[address : address + 800]), "rgb565").reshape(20, 20, 3)
 
 
-def shown() -> np.ndarray:
+def expected_capture() -> np.ndarray:
     """Return the expected capture: 160 x 160 centred, zoom 8, in RGB565."""
     return picture()[160:320:8, 240:400:8] & np.array([0xF8, 0xFC, 0xF8], np.uint8)
 
@@ -52,7 +52,7 @@ def test_camera_driver_captures_every_pixel(program):
     machine.board.camera.show(picture())
     assert machine.run(cycles=4_000_000).reason == "halt"
     assert machine.peek("id") == 0x6030
-    assert np.array_equal(captured(machine), shown())
+    assert np.array_equal(captured(machine), expected_capture())
 
 
 def test_handler_reads_the_bus_16_to_18_tcy_behind_href_and_frames_come_every_1600000(program):
@@ -128,7 +128,7 @@ def test_snapshot_in_the_middle_of_a_line_continues_alike(program):
     other.board.camera.show(picture())
     other.restore(state)
     assert other.run(cycles=4_000_000).cycle == machine.run(cycles=4_000_000).cycle
-    assert np.array_equal(captured(other), shown())
+    assert np.array_equal(captured(other), expected_capture())
 
 
 def test_unplugged_camera_does_not_hang_the_program(program):

@@ -18,7 +18,8 @@ FLASH_END = 0x018000
 
 
 def test_no_jump_is_blamed_when_execution_runs_through_erased_flash(tmp_path: Path) -> None:
-    """The fault is the fetch behind flash; the last branch led into the program, so it is not the cause."""
+    """If execution runs through erased flash, the fault is the fetch beyond flash, and no jump is named as its cause,
+    because the last branch led into the program."""
     source = tmp_path / "off.s"
     source.write_text(SOURCE)
     image = emu.build(source, flags=("-nostdlib", "-nostartfiles"), output=tmp_path / "off.elf")

@@ -109,7 +109,7 @@ def nested(tmp_path_factory):
     return compiled(tmp_path_factory.mktemp("nested"), NESTED)
 
 
-def stepped(image, until: int):
+def single_step_counts(image, until: int):
     """Return cycles by function and level, cycles in Sleep, and calls by function, counted with single steps."""
     machine = Machine(image.chip, engine="plain")
     machine.load(image)
@@ -146,7 +146,7 @@ def test_native_counts_equal_single_stepping(nested):
     """Functions, levels, sleep and calls of 200,000 cycles with two nested interrupts equal the counts of single
     steps. If both interrupts are entered at one boundary, single steps cannot separate their cycles, so the sum is
     compared."""
-    functions, levels, idle, calls = stepped(nested, 200_000)
+    functions, levels, idle, calls = single_step_counts(nested, 200_000)
     profile = counted(nested, "jit", 200_000)
     assert profile.cycles == profile.end - profile.start
     assert idle > 1_000

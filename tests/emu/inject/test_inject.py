@@ -75,7 +75,7 @@ def trials(firmware):
     return Trials(load_image(firmware / "main.elf"), read(firmware / "campaign.toml"))
 
 
-def judged(trials, monkeypatch, place: str, bit: int, cycle: int = 60_000):
+def outcome_of_flip(trials, monkeypatch, place: str, bit: int, cycle: int = 60_000):
     """Return the outcome of a flipped bit in a variable."""
     address = load_image(trials._image.path).symbols.find(f"_{place}").address
     fault = Fault(0, "ram", cycle, address, bit)
@@ -86,7 +86,7 @@ def judged(trials, monkeypatch, place: str, bit: int, cycle: int = 60_000):
 def test_outcomes_are_classified(trials, monkeypatch):
     """Faults in variables with known effect have the expected outcomes: a total with a copy, a mode that hangs or
     traps, unused RAM."""
-    one = partial(judged, trials, monkeypatch)
+    one = partial(outcome_of_flip, trials, monkeypatch)
     assert (one("unused", 0).outcome, one("unused", 0).latent) == ("masked", True)
     assert one("total", 1).outcome == "detected"
     monkeypatch.setattr(trials, "_campaign", SimpleNamespace(**(vars(trials._campaign) | {"detect": {}})))

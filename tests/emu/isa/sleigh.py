@@ -33,7 +33,7 @@ ROW_CLASSES = (
 )
 
 
-def theirs(word1: int, word2: int = 0) -> str | None:
+def sleigh_text(word1: int, word2: int = 0) -> str | None:
     """Return SLEIGH's text of an instruction at PC, or None if SLEIGH does not decode it."""
     octets = word1.to_bytes(4, "little") + word2.to_bytes(4, "little")
     try:
@@ -53,7 +53,7 @@ def plain(assembly: str) -> str:
 
 def disagreement(word1: int, word2: int = 0) -> str | None:
     """Return the name of the class of disagreement, or None if both agree."""
-    ours, other = codec.decode(word1, word2), theirs(word1, word2)
+    ours, other = codec.decode(word1, word2), sleigh_text(word1, word2)
     if ours is None and other is None:
         return None
     if other is None:

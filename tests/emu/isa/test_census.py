@@ -19,7 +19,7 @@ LEGAL_WORDS = 11_165_253  # isa.md §4
 REFERENCE = Path(__file__).resolve().parents[2] / "vectors"
 
 
-def claimed(row: Row, words: np.ndarray) -> np.ndarray:
+def words_of_row(row: Row, words: np.ndarray) -> np.ndarray:
     """Return the words that belong to a row: fixed bits and rules match."""
     mine = (words & row.pattern.mask[0]) == row.pattern.value[0]
     for clause in row.clauses:
@@ -35,7 +35,7 @@ def census() -> tuple[np.ndarray, dict[int, int]]:
     for byte, bucket in enumerate(BY_BYTE):
         words = np.arange(byte << 16, byte + 1 << 16, dtype=np.int64)
         for row in bucket:
-            mine = claimed(row, words)
+            mine = words_of_row(row, words)
             rows_per_word[byte << 16 : byte + 1 << 16] += mine
             words_per_row[row.id] += int(mine.sum())
     return rows_per_word, dict(words_per_row)

@@ -17,7 +17,7 @@ from emu.dspic30f.isa.table import ROWS
 SAMPLES = 60
 
 
-def tidied(insn: Insn) -> Insn:
+def with_default_fields(insn: Insn) -> Insn:
     """Return the instruction with unused fields as an assembler writes them."""
     values = {letter: getattr(insn.x, letter) for letter in insn.row.fields} | idle_fields(insn)
     again = codec.decode(*codec.encode(insn.row, values))
@@ -39,7 +39,7 @@ def check_words(insn: Insn) -> None:
 
 def check_text(insn: Insn, pc: int) -> None:
     """Check that parse∘format is the identity on instructions, and format∘parse on texts."""
-    plain = tidied(insn)
+    plain = with_default_fields(insn)
     written = text.format(plain, pc, source=True)
     words = text.parse(written).encode(pc)
     again = codec.decode(*words)

@@ -213,7 +213,7 @@ class BodyWriter:
         for _ in range(count):
             self.one(PLAIN)
 
-    def gone_round(self, count: int) -> None:
+    def skipped_code(self, count: int) -> None:
         """Emit the instructions that a branch or skip jumps over: often only register operations, which stay in one
         block."""
         rows = COMPUTING if self.generator.random() < 0.5 else PLAIN
@@ -227,7 +227,7 @@ class BodyWriter:
         start = self.at
         self.put([0])
         good = self.good
-        self.gone_round(self.generator.randrange(1, 6))
+        self.skipped_code(self.generator.randrange(1, 6))
         self.good &= good
         targets = range(start + 2, self.at + 2, 2)
         self.firmware.put(start, list(codec.encode(row, Operands(n=(self.generator.choice(targets) - start - 2) // 2))))
@@ -235,7 +235,7 @@ class BodyWriter:
     def skip(self) -> None:
         self.one([row for row in ORDINARY if row not in PLAIN])
         good = self.good
-        self.gone_round(1) if self.generator.random() < 0.8 else self.call(2)
+        self.skipped_code(1) if self.generator.random() < 0.8 else self.call(2)
         self.good &= good
 
     def call(self, kinds: int = 4) -> None:

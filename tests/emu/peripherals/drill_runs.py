@@ -152,7 +152,7 @@ def crew_of(chip: str, robot: bool, slip: int, engines: tuple[str, ...]) -> Crew
     return Crew(CHIPS[chip], robot, slip, engines)
 
 
-def pointed(draw: random.Random, machine: Machine, image: Image) -> int:
+def random_address(draw: random.Random, machine: Machine, image: Image) -> int:
     """Return a random data address: usually a register or the word beside one."""
     ram, kind = image.chip.data["ram"], draw.random()
     window = machine.peek("CORCON") & PSV
@@ -231,7 +231,7 @@ def prepare(draw: random.Random, machine: Machine, image: Image, start: int, kin
     for number in image.data:
         held[number] = draw.choice(VALUES) if draw.random() < 0.6 else draw.randrange(0x10000)
     for number in image.pointers:
-        held[number] = pointed(draw, machine, image)
+        held[number] = random_address(draw, machine, image)
     held[image.index] = draw.choice((0, 0, 2, 2, 4, 0xFFFE, 1))
     held[15] = ram.end - (ram.end - ram.start) // 8
     if draw.random() < (0.6 if kind == "stack" else 0.05):
@@ -293,7 +293,7 @@ def run(draw: random.Random, machine: Machine, cycles: int) -> list[Stop | int |
     return ended
 
 
-def based(seed: int, crew: Crew, image: Image) -> Iterator[list[Kept] | str]:
+def base_states(seed: int, crew: Crew, image: Image) -> Iterator[list[Kept] | str]:
     """Yield each base state of an image, set up on all machines, or the first difference."""
     loaded = crew.keep()
     for number in range(BASES):
@@ -326,7 +326,7 @@ def check(
     crew.census.counts.clear()
     before, programs = crew.regions, set()
     bases = []
-    for kept in based(seed, crew, image):
+    for kept in base_states(seed, crew, image):
         if isinstance(kept, str):
             return kept
         bases.append(kept)

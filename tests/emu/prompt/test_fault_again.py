@@ -1,4 +1,4 @@
-"""A fault of the recording is reported again when the debugger runs to it again."""
+"""A recorded fault is reported again when the debugger runs to it again."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ PROGRAM = """
 def test_a_fault_is_reported_again_after_going_back(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], way: str
 ) -> None:
-    """The second report equals the first one, and the script ends with the status of a fault."""
+    """After going back, a run to the fault prints the same report, and the script ends with the status of a fault."""
     path = tmp_path / "fault.elf"
     path.write_bytes(executable(PROGRAM))
     machine = emu.load(path, board=None)

@@ -1,4 +1,4 @@
-"""Steps while the CPU waits in Idle for input and a timer runs: they end, and they can be interrupted."""
+"""Steps while the CPU waits in Idle for input and a timer runs: they end at a limit, and they can be interrupted."""
 
 from __future__ import annotations
 
@@ -44,14 +44,15 @@ ASLEEP_AT = 100_000
 
 @pytest.fixture
 def machine(tmp_path: Path) -> emu.Machine:
-    """A program that sleeps in Idle until UART1 receives a byte; timer 2 runs without an interrupt."""
+    """Return a machine whose program waits in Idle until UART1 receives a byte; timer 2 runs without an interrupt."""
     path = tmp_path / "idle.elf"
     path.write_bytes(executable(PROGRAM, {"U1RXInterrupt": "receive"}))
     return emu.load(path, board=None)
 
 
 def test_a_step_of_a_sleeping_machine_ends_at_its_limit(machine: emu.Machine) -> None:
-    """The stop says why; the CPU sleeps on and wakes when a byte arrives."""
+    """A step of a sleeping machine ends at its limit, which the stop states; the CPU stays in Idle and wakes when a
+    byte arrives."""
     machine.run(cycles=ASLEEP_AT)
     stop = machine.step(ASLEEP_AT + 5_000)
     assert stop is not None
@@ -65,7 +66,7 @@ def test_a_step_of_a_sleeping_machine_ends_at_its_limit(machine: emu.Machine) ->
 
 
 def test_an_interrupted_step_executes_nothing(machine: emu.Machine) -> None:
-    """`Machine.interrupt`, as a signal handler calls it, ends the step; the CPU still sleeps."""
+    """`Machine.interrupt`, as a signal handler calls it, ends the step; the CPU stays in Idle."""
     machine.run(cycles=ASLEEP_AT)
     machine.interrupt()
     pc = machine.pc
@@ -75,13 +76,14 @@ def test_an_interrupted_step_executes_nothing(machine: emu.Machine) -> None:
 
 
 def test_a_condition_is_not_waited_for_beyond_the_limit_of_the_run(machine: emu.Machine) -> None:
-    """A run with a condition single-steps; asleep it ends at its last cycle."""
+    """A run with a condition single-steps, and in Idle it ends at its last cycle."""
     stop = machine.run(cycles=ASLEEP_AT, until=lambda: False)
     assert (stop.reason, machine.cycle) == ("limit", ASLEEP_AT)
 
 
 def test_a_step_back_from_a_sleep_leads_to_its_start(machine: emu.Machine) -> None:
-    """The sleep is one step; the step before it is the instruction that began it."""
+    """A step back from Idle leads to its start, because the Idle period is one step; the step before it is the PWRSAV
+    instruction."""
     history = History(machine)
     history.advance(ASLEEP_AT)
     assert history.step_back()
@@ -92,7 +94,8 @@ def test_a_step_back_from_a_sleep_leads_to_its_start(machine: emu.Machine) -> No
 
 
 def test_a_step_in_the_past_sleeps_until_the_recorded_input(machine: emu.Machine) -> None:
-    """The replay of a sleep receives the input that ended it, and enters the handler in the same cycle."""
+    """In a replay, a step in Idle receives the recorded input that ended it, and enters the handler in the same
+    cycle."""
     history = History(machine)
     history.advance(ASLEEP_AT)
     machine.uart[1].feed(b"x")
@@ -108,7 +111,7 @@ def test_a_step_in_the_past_sleeps_until_the_recorded_input(machine: emu.Machine
 
 
 def test_a_step_of_the_past_continues_in_the_present(machine: emu.Machine) -> None:
-    """A sleep that the recording does not end lasts as long as one in the present."""
+    """An Idle period that the recording does not end lasts as long as one without a recording."""
     history = History(machine)
     history.advance(ASLEEP_AT)
     history.seek(1_000)
@@ -121,17 +124,18 @@ def test_a_step_of_the_past_continues_in_the_present(machine: emu.Machine) -> No
 def test_steps_of_the_prompt_end_with_a_sentence(
     machine: emu.Machine, command: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The first step by instruction executes PWRSAV, the second one waits; so does a step by lines, without lines."""
+    """Steps of the prompt end with a message: the first step by instruction executes PWRSAV, the second one waits,
+    and so does a step by lines in a program without lines."""
     prompt = Prompt("emu debug", lambda client: Server(client, lambda _launch: machine))
     script = f"break *{WAIT:#x}\nrun\n{command}\n{command}\nreverse-stepi\ntime\n"
     assert prompt.serve({}, io.StringIO(script)) == 0
     out = capsys.readouterr().out
     assert f"pause: {STILL_ASLEEP}" in out
-    assert out.splitlines()[-1].startswith("cycle 11, ")  # the start of the sleep
+    assert out.splitlines()[-1].startswith("cycle 11, ")  # start of the Idle period
 
 
 def test_a_client_pauses_a_step_that_waits(machine: emu.Machine) -> None:
-    """A pause, as Ctrl-C requests it, is answered after one slice."""
+    """A pause request, as Ctrl-C makes it, ends a waiting step after one slice."""
     polls: list[int] = []
 
     def is_stop_requested() -> bool:
@@ -147,6 +151,6 @@ def test_a_client_pauses_a_step_that_waits(machine: emu.Machine) -> None:
 
 
 def test_a_fault_that_skips_an_instruction_of_a_sleeping_machine_ends(machine: emu.Machine) -> None:
-    """No instruction follows, so none is skipped."""
+    """A fault that skips an instruction of a sleeping machine has no effect, because no instruction follows."""
     machine.run(cycles=ASLEEP_AT)
     assert inject_fault(Fault(0, "skip", ASLEEP_AT, 0, 0), machine) == "no instruction to skip"

@@ -1,4 +1,4 @@
-"""An error within one request of the debugger is the failure of that request; the session continues."""
+"""An error within one debugger request fails that request; the session continues."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ PROGRAM = """
 
 @pytest.fixture
 def machine(tmp_path: Path) -> emu.Machine:
-    """A program that writes the last word of RAM."""
+    """Return a machine with a program that writes the last word of RAM."""
     path = tmp_path / "last.elf"
     path.write_bytes(executable(PROGRAM))
     return emu.load(path, engine="plain", board=None)
@@ -45,14 +45,14 @@ def _play(machine: emu.Machine, script: str) -> int:
 def test_the_last_write_to_the_last_word_of_ram_is_found(
     machine: emu.Machine, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The place ends where RAM ends."""
+    """The last write to the last word of RAM is found, although the address range ends with RAM."""
     assert _play(machine, "cycle 50\nlastwrite *(int *)0x27fe\n") == 0
     assert "last write: 0000 -> 0500" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("place", ["*(long *)0x27fe", "*(int *)0x2800", "*(int *)0x7ffe"])
 def test_a_place_beyond_ram_is_refused(machine: emu.Machine, capsys: pytest.CaptureFixture[str], place: str) -> None:
-    """A script ends with a sentence and its status, as for any command that fails."""
+    """A range beyond RAM is refused with a message and the status of a failed command."""
     assert _play(machine, f"cycle 50\nlastwrite {place}\n") == BAD_INPUT
     assert "it ends at 0x2800" in capsys.readouterr().err
 
@@ -60,7 +60,8 @@ def test_a_place_beyond_ram_is_refused(machine: emu.Machine, capsys: pytest.Capt
 def test_an_error_while_the_machine_moves_is_reported_and_the_session_continues(
     machine: emu.Machine, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The machine is where it was, in its unchanged recording."""
+    """After an error during a run, the error is reported, and the machine is at the same cycle with its recording
+    unchanged."""
 
     def fail(*_arguments: Any) -> None:
         machine.run_until(machine.cycle + 3)

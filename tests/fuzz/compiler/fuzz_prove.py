@@ -1,9 +1,8 @@
-"""Prove random firmware-like C (`c_shapes.py`): `python tests/fuzz/compiler/fuzz_prove.py [--files N] [--functions
-N]`.
+"""Prove random firmware-like C (`c_shapes.py`) equivalent to its IR.
 
-Each try proves some functions of one file of a program at one level (`--functions 0`: all). A refutation is a fault
-of the compiler or of the proof; `toolchain prove` shows its input. A proof covers all inputs, so it can find faults
-that the runs of `fuzz_compiler.py` do not reach.
+`python tests/fuzz/compiler/fuzz_prove.py [--files N] [--functions N]`. Each try proves some functions of one file of a
+program at one level (`--functions 0`: all). A refutation is a fault of the compiler or of the proof; `toolchain prove`
+shows its input. A proof covers all inputs, so it can find faults that the runs of `fuzz_compiler.py` do not reach.
 """
 
 from __future__ import annotations
