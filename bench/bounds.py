@@ -220,7 +220,7 @@ def rows_of(app: str, path: Path, values: dict[str, int], seconds: float) -> lis
     annotations = Annotations()
     add_symbols(annotations, image.symbols)
     bare = Program(image, annotations, read_annotation_section(image, values))
-    names = [*bare.interesting("_Sys_"), *(name for name in ALSO if bare.address(name) in bare.calls.entries)]
+    names = [*bare.default_functions("_Sys_"), *(name for name in ALSO if bare.address(name) in bare.calls.entries)]
     meter = measure(path, bare, names, seconds)
     seen = meter.worst
     there = [name for name in (ITSELF, *APART) if bare.address(name) in bare.calls.entries]

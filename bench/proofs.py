@@ -50,7 +50,7 @@ def options_of(part: str, level: str) -> list[str]:
 def prove_file(level: str, work: tuple[str, Path]) -> tuple[str, str, list[dict[str, Any]]]:
     """Return part, file and verdicts of one file; no verdicts if it cannot be compiled separately."""
     from toolchain.errors import ToolError
-    from toolchain.frontend.clang import CompileError
+    from toolchain.frontend.clang import ClangError
     from toolchain.proof.problem import compile_file
     from toolchain.proof.prove import verdicts
 
@@ -58,7 +58,7 @@ def prove_file(level: str, work: tuple[str, Path]) -> tuple[str, str, list[dict[
     name = file.relative_to(ROOT).as_posix()
     try:
         return part, name, [asdict(v) for v in verdicts(compile_file([str(file), *options_of(part, level)]))]
-    except (ToolError, CompileError) as error:
+    except (ToolError, ClangError) as error:
         print(f"{name}: {error}", file=sys.stderr)
         return part, name, []
 
