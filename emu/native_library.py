@@ -1,6 +1,6 @@
 """C code for the host: inner loops of boards and of the arena, compiled on first use and cached on disk.
 
-Input: a C file that needs no library but libm and declares libm's functions itself. Output: callable functions. The
+Input: a C file that uses no library except libm, whose functions it declares itself. Output: callable functions. The
 compiler is the clang of the `ziglang` package, without contraction of multiplications and additions. Results are
 therefore bit-identical on every host and equal to those of Python's arithmetic.
 """
@@ -23,10 +23,10 @@ FLAGS: Final = ("-std=c11", "-O2", "-march=native", "-ffp-contract=off", "-fno-m
                 "-fno-stack-protector", "-Wall", "-Wextra", "-Werror")  # fmt: skip
 DOUBLE, INT, ADDRESS = ctypes.c_double, ctypes.c_int64, ctypes.c_void_p
 Signatures = Mapping[str, tuple[Any, Sequence[Any]]]
-"""Result type and argument types of functions, by name."""
+"""Result type and argument types of each function, by name."""
 
 _libraries: Final[list[Any]] = []
-"""Loaded libraries; dropping the object would unload the code."""
+"""Loaded libraries. They must stay referenced, because deleting one unloads its code."""
 
 
 class HostCodeError(RuntimeError):
@@ -34,7 +34,7 @@ class HostCodeError(RuntimeError):
 
 
 def functions(source: Path, signatures: Signatures) -> dict[str, Callable[..., Any]]:
-    """Return the functions of a C file. They hold the GIL, so each must be short. Raises HostCodeError."""
+    """Return the functions of a C file. They hold the GIL, so each call must be short. Raises HostCodeError."""
     import llvmlite.binding as llvm
 
     compiler = shared_compiler()

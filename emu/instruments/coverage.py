@@ -1,7 +1,8 @@
 """Coverage from exact counts of executed instructions and taken branches.
 
-Input: a machine with the plain engine. Output: `Counts`, and from them lcov and Cobertura reports. The code in the
-image is measured, optimised or not; functions that the linker removed are not in the reports.
+Input: a machine with the plain engine. Outputs: `Counts`, and lcov and Cobertura reports made from them. Coverage
+refers
+to the code in the image, optimised or not. Functions that the linker removed are not in the reports.
 """
 
 from __future__ import annotations
@@ -25,12 +26,12 @@ if TYPE_CHECKING:
     from emu.machine.machine import Machine
 
 EXCLUDED: Final = re.compile(r"LCOV_EXCL_(LINE|START|STOP)")
-"""Comments that exclude lines from a report, as in lcov's own tools."""
+"""Comments that exclude source lines from a report, as in lcov's own tools."""
 
 
 @dataclass(slots=True)
 class Counts:
-    """Executions by program address, and how often each conditional branch or skip was taken."""
+    """Number of executions by program address, and how often each conditional branch or skip was taken."""
 
     executed: Counter[int] = field(default_factory=Counter)
     taken: Counter[int] = field(default_factory=Counter)
@@ -41,7 +42,7 @@ class Counts:
         self.taken.update(other.taken)
 
     def facts(self, image: Image) -> dict[str, Any]:
-        """Return the counts as plain data, with the fingerprint of the image."""
+        """Return the counts as plain data together with the image's fingerprint."""
         return {
             "image": fingerprint(image),
             "executed": {str(pc): count for pc, count in sorted(self.executed.items())},
@@ -50,7 +51,7 @@ class Counts:
 
     @classmethod
     def of(cls, facts: Any, image: Image) -> Counts:
-        """Create counts from the data of `facts`. Raises ValueError for invalid data or another image."""
+        """Create counts from data returned by `facts`. Raises ValueError for invalid data or another image."""
         if not isinstance(facts, dict) or not {"image", "executed", "taken"} <= facts.keys():
             raise ValueError("expected counts of an earlier run")
         if facts["image"] != fingerprint(image):
@@ -70,9 +71,9 @@ def fingerprint(image: Image) -> str:
 
 
 def count_executions(machine: Machine, counts: Counts) -> Callable[[], None]:
-    """Count the instructions that `machine` executes. Return a function that stops counting.
+    """Start to count the instructions that `machine` executes. Return a function that stops counting.
 
-    Raises ValueError for another engine than plain.
+    Raises ValueError for an engine other than plain.
     """
     if machine.engine != "plain":
         raise ValueError(f"counting needs the plain engine, not {machine.engine!r}")
@@ -104,7 +105,7 @@ def count_executions(machine: Machine, counts: Counts) -> Callable[[], None]:
 
 
 def _following(machine: Machine, pc: int) -> int:
-    """Return the fall-through address of a conditional instruction, 0 for any other."""
+    """Return the fall-through address of a conditional instruction; 0 for any other instruction."""
     program = machine.program
     insn = decode_for_execution(program.word(pc), program.word(pc + 2))
     return pc + 2 * insn.words if insn is not None and is_conditional(program.word(pc), program.word(pc + 2), pc) else 0
@@ -123,13 +124,13 @@ class FileCoverage:
 
     lines: dict[int, int] = field(default_factory=dict)
     branches: dict[int, list[tuple[int, int]]] = field(default_factory=dict)
-    """(not taken, taken) of every conditional instruction of a line; (0, 0) if it never ran."""
+    """(not taken, taken) counts of each conditional instruction of a line; (0, 0) if it never executed."""
     functions: dict[str, tuple[int, int]] = field(default_factory=dict)
-    """Line and count."""
+    """(line, count) of each function."""
 
 
 class CoverageReport:
-    """Coverage by source file. `path_of` maps a file of the line table to a path, to read exclusion comments."""
+    """Coverage by source file. `path_of` returns the path of a file in the line table, to read exclusion comments."""
 
     def __init__(self, inspector: Inspector, counts: Counts, path_of: Callable[[str], Path]) -> None:
         self.files: Final[dict[str, FileCoverage]] = {}
@@ -148,7 +149,10 @@ class CoverageReport:
         return self.files.setdefault(name, FileCoverage())
 
     def _lines(self) -> None:
-        """Count lines: the maximum over a line's address ranges in one copy, summed over inlined copies."""
+        """Count lines.
+
+        A line's count is the maximum over its address ranges in one copy, summed over inlined copies.
+        """
         copies: dict[tuple[str, int], dict[object, int]] = defaultdict(dict)
         for row in self._inspector.image.lines.rows:
             if not row.line or not self._inspector.is_code(row.start):
@@ -188,7 +192,7 @@ class CoverageReport:
                 self._file(one.file).functions[one.name] = (one.line, self._counts.executed[one.ranges[0][0]])
 
     def lcov(self, path_of: Callable[[str], Path]) -> Iterator[str]:
-        """Yield the lines of an lcov tracefile."""
+        """Yield the text lines of an lcov tracefile."""
         for name, one in sorted(self.files.items()):
             yield "TN:"
             yield f"SF:{path_of(name)}"
@@ -212,7 +216,7 @@ class CoverageReport:
             yield "end_of_record"
 
     def cobertura(self, path_of: Callable[[str], Path]) -> str:
-        """Return a Cobertura document. Its timestamp is 0, so equal runs give equal files."""
+        """Return a Cobertura document. Its timestamp is 0, so that equal runs give equal files."""
         found = sum(len(one.lines) for one in self.files.values())
         hit = sum(count > 0 for one in self.files.values() for count in one.lines.values())
         top = ElementTree.Element("coverage", {
@@ -250,7 +254,7 @@ def _rate(part: int, whole: int) -> str:
 
 
 def excluded_lines(path: Path) -> set[int]:
-    """Return the lines that comments in a source file exclude; none if it cannot be read."""
+    """Return the line numbers that comments in a source file exclude; none if the file cannot be read."""
     try:
         text = path.read_text(encoding="utf-8", errors="replace")
     except OSError:

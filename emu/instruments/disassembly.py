@@ -22,7 +22,10 @@ class Item:
 
 
 def instruction(image: Image, pc: int, word1: int, word2: int = 0) -> Item | None:
-    """Disassemble the instruction at `pc`; None if the words are not one. Operands use the image's symbols."""
+    """Disassemble the instruction at `pc`, with the image's symbols.
+
+    Return None if the words are not an instruction.
+    """
     insn = codec.decode(word1, word2)
     if insn is None:
         return None
@@ -31,7 +34,7 @@ def instruction(image: Image, pc: int, word1: int, word2: int = 0) -> Item | Non
 
 
 def items(image: Image, start: int, end: int) -> Iterator[Item]:
-    """Yield all items that the image defines in flash from `start` up to `end`."""
+    """Yield all items defined by the image in flash, from `start` up to `end`."""
     flash = image.chip.program["flash"]
     vectors = {table: vector.name for vector in image.chip.vectors for table in (vector.ivt, vector.aivt)}
     for block in image.blocks:
@@ -45,7 +48,7 @@ def items(image: Image, start: int, end: int) -> Iterator[Item]:
 
 
 def _item(image: Image, block: Block, address: int, vectors: dict[int, str]) -> Item:
-    """Return the item at `address` inside `block`."""
+    """Return the item at `address`, which is in `block`."""
     index = (address - block.base) // 2
     word = block.words[index]
     if address in vectors:
@@ -59,7 +62,7 @@ def _item(image: Image, block: Block, address: int, vectors: dict[int, str]) -> 
 
 
 def _name(image: Image, address: int, space: str) -> str | None:
-    """Return the symbol name of an operand's target, None if it has none."""
+    """Return the symbol of an operand's target address, None if there is none."""
     if space == "code":
         return image.symbols.text(address) if image.symbols.code(address) else None
     if address in image.chip.data["sfr"]:

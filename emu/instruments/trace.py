@@ -1,4 +1,4 @@
-"""Instruction trace: cycle, PC, disassembly, changed registers. The machine runs one step at a time.
+"""Instruction trace: cycle, PC, disassembly and changed registers. The machine runs in single steps.
 
 Input: a machine, its image, a stream. Output: one line per instruction or exception entry.
 """
@@ -17,13 +17,13 @@ if TYPE_CHECKING:
 CORE_END: Final = 0x0054
 """First data address after the core's registers (isa.md §2.1)."""
 SILENT: Final = frozenset({"PCL", "PCH", "DISICNT"})
-"""Core registers omitted from the trace: the PC has its own column, and DISICNT changes in every cycle."""
+"""Core registers omitted from the trace: PC has its own column, and DISICNT changes in every cycle."""
 
 HEADER: Final = "#      cycle      pc  instruction                                   changed registers"
 
 
 class Tracer:
-    """Writes a trace of the instructions run by `advance` to `stream`."""
+    """Writes a trace of the instructions that `advance` executes to `stream`."""
 
     def __init__(self, machine: Machine, image: Image, stream: TextIO) -> None:
         self.machine: Final = machine
@@ -39,7 +39,7 @@ class Tracer:
         print(HEADER, file=stream)
 
     def advance(self, until: int) -> Stop | None:
-        """Run to cycle `until` like `Machine.run_until`, and write a line per step."""
+        """Run to cycle `until` as `Machine.run_until` does, and write a line for each step."""
         machine = self.machine
         while machine.cycle < until:
             cycle, pc, before = machine.cycle, machine.pc, self._core.tolist()
@@ -59,7 +59,7 @@ class Tracer:
         return None
 
     def _write(self, cycle: int, text: str, before: list[int]) -> None:
-        """Write a line, with the registers that differ from `before`."""
+        """Write a line that lists the registers whose values differ from `before`."""
         changed = [
             f"{self._names[word]}={value:04X}"
             for word, (old, value) in enumerate(zip(before, self._core.tolist(), strict=True))
@@ -68,7 +68,7 @@ class Tracer:
         self.stream.write(f"{cycle:12} {text:54}  {' '.join(changed)}".rstrip() + "\n")
 
     def _text(self, pc: int) -> str:
-        """Disassemble the instruction at `pc` in the machine's memory, which the firmware may have reprogrammed."""
+        """Disassemble the instruction at `pc` from the machine's memory, which the firmware may have reprogrammed."""
         program = self.machine.program
         key = (pc, program.word(pc), program.word(pc + 2))
         if key not in self._items:

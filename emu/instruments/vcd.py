@@ -1,8 +1,8 @@
 """Waveforms of a run as a VCD file, for GTKWave and similar viewers, written by pyvcd.
 
-Input: a machine, a stream, names to watch. Output: changes of pins, bytes of UARTs and, if watched, the CPU's priority,
-sleep, the running OpenSwarm thread and variables. Watching makes the machine single-step; pins and bytes do not. Each
-time is computed from the cycle and the initial clock, rounded to 1 ps, so rounding errors do not accumulate.
+Input: a machine, a stream, names to watch. Output: changes of pins and bytes of UARTs. If watched, also the CPU's
+priority, sleep, the running OpenSwarm thread and variables. Watching makes the machine single-step; pins and bytes do
+not. Each time is computed from the cycle and the initial clock, rounded to 1 ps, so rounding errors do not accumulate.
 """
 
 from __future__ import annotations
@@ -23,15 +23,15 @@ if TYPE_CHECKING:
 
 PICOSECONDS: Final = 10**12
 FLUSH_CYCLES: Final = 1_000_000
-"""Longest run between two writes of the collected changes."""
+"""Maximum length of a run between two writes of the collected changes, in Tcy."""
 CPU: Final = ("ipl", "asleep", "thread")
-"""CPU states that can be watched, besides variables."""
+"""Names of CPU states that can be watched, in addition to variables."""
 
 
 class WaveformRecorder:
-    """Records `machine` while `advance` runs it. `watch`: names of CPU, or expressions that name a variable.
+    """Records `machine` while `advance` runs it. `watch` lists names of CPU, or expressions that denote a variable.
 
-    With `again` it also records replayed cycles, of which other listeners are not notified. Raises ValueError for a
+    With `again` it also records replayed cycles, for which other listeners are not called. Raises ValueError for a
     name that cannot be watched.
     """
 
@@ -57,7 +57,7 @@ class WaveformRecorder:
         self._edges: list[tuple[int, int, int]] = []
         self._frames: list[tuple[int, int, int, int, int, int]] = []
         self._pending: list[tuple[int, Any, Any]] = []
-        """Changes by cycle that are not written yet: a frame is known before its last bit."""
+        """Changes by cycle that are not yet written. A UART frame is known before its last bit has been sent."""
         self._transmit: Final = [0] * len(PORTS)
         for uart in machine.uart.values():
             port, mask = parse_pin(uart.site.tx_pin)
@@ -95,7 +95,7 @@ class WaveformRecorder:
         return found
 
     def _watch(self, name: str) -> tuple[Any, Callable[[], Any]]:
-        """Return the variable in the file, and a function that reads its value."""
+        """Return the VCD variable for a watched name, and a function that reads its value."""
         machine, state = self._machine, self._machine.state
         if name == "ipl":
             return self._writer.register_var("cpu", name, "reg", size=4, init=0), lambda: state.ipl
@@ -135,7 +135,7 @@ class WaveformRecorder:
     # Running
 
     def advance(self, cycle: int) -> Stop | None:
-        """Run like `Machine.advance`, and write the changes."""
+        """Run as `Machine.advance` does, and write the changes."""
         machine, stop = self._machine, None
         while stop is None and machine.cycle < cycle:
             stop = self._step(cycle) if self._watched else self._advance(min(cycle, machine.cycle + FLUSH_CYCLES))
@@ -145,7 +145,7 @@ class WaveformRecorder:
         return stop
 
     def _step(self, limit: int) -> Stop | None:
-        """Process due events, then one instruction, and sample the watched values after each."""
+        """Process the due events, then one instruction, and sample the watched values after each of both."""
         stop = self._machine.service_boundary(limit)
         self._sample()
         if stop is None and self._machine.cycle < limit:
@@ -162,7 +162,7 @@ class WaveformRecorder:
                 self._pending.append((now, variable, value))
 
     def _write(self, until: int) -> None:
-        """Write all changes up to cycle `until` in order."""
+        """Write all changes up to cycle `until`, sorted by cycle."""
         for cycle, port, levels in self._edges:
             changed = (levels ^ self._levels[port]) & ~self._transmit[port]
             self._levels[port] = levels
@@ -202,7 +202,7 @@ class WaveformRecorder:
 
 
 def _board_names(machine: Machine) -> dict[str, str]:
-    """Return the names of the robot's parts by pin."""
+    """Return the names of the robot's parts by pin name."""
     if machine.board is None:
         return {}
     from emu.boards.epuck.simple import LED_PINS

@@ -1,1 +1,1 @@
-"""Measurements of the OpenSwarm kernel, using symbols of the `footprint`, `latency` and `options` applications."""
+"""Measurements of the OpenSwarm kernel, by means of the applications `footprint`, `latency` and `options`."""

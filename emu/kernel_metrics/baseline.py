@@ -1,7 +1,7 @@
-"""Exact numbers kept in the repository: written by --update, compared by --check. Any increase is a regression.
+"""Baselines: exact numbers kept in the repository. --update writes them, --check compares; any increase fails.
 
-Input: numbers by name, each with its distribution over source lines. Output: `Row`s of a table, and a JSON file that
-names a source line by file and code text, so that moved lines and changed comments do not count as changes.
+Input: numbers by name, each with its distribution over source lines. Outputs: `Row`s of a table, and a JSON file. The
+file identifies a source line by file and code text, so that moved lines and changed comments do not count as changes.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from typing import Any, Final
 from emu.host.files import atomic_text_file, read_file
 
 GREW_SHOWN: Final = 4
-"""Number of source lines shown for a number that grew."""
+"""Maximum number of source lines shown for a number that grew."""
 
 C_COMMENT: Final = re.compile(r"/\*.*?(\*/|$)|//.*")
 ASSEMBLY_COMMENT: Final = re.compile(r"/\*.*?(\*/|$)|//.*|;.*")
@@ -33,7 +33,7 @@ class Number:
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """One line of a comparison; `old` is None for a new number, `new` for one that is no longer measured."""
+    """One row of a comparison. `old` is None for a new number, `new` for a number that is no longer measured."""
 
     name: str
     old: int | None
@@ -42,12 +42,12 @@ class Row:
 
     @property
     def is_worse(self) -> bool:
-        """Whether this row fails a check: the number grew, or is no longer measured."""
+        """Whether this row makes a check fail: the number grew, or is no longer measured."""
         return self.new is None or (self.old is not None and self.new > self.old)
 
 
 class Sources:
-    """Names of source lines for the baseline: file below `firmware/`, and the code of the line if it can be read."""
+    """Names of source lines in the baseline: file below `firmware/`, and the line's code if it can be read."""
 
     def __init__(self, image_path: str) -> None:
         self._roots: Final = [Path(), Path("firmware"), *Path(image_path).resolve().parents[:4]]
@@ -64,7 +64,7 @@ class Sources:
         return f"{short(file)}: {code or f'line {number}'}"
 
     def names(self, where: Mapping[str, int]) -> dict[str, int]:
-        """Return the same counts by name instead of by line number."""
+        """Return the counts with names instead of line numbers as keys."""
         named: Counter[str] = Counter()
         for place, count in where.items():
             named[self.name(place)] += count
@@ -84,7 +84,7 @@ class Sources:
 
 
 def without_comments(line: str, file: str) -> str:
-    """Return the code of a source line: comments removed, white space normalised."""
+    """Return the code of a source line without comments and with normalised white space."""
     comment = ASSEMBLY_COMMENT if file.endswith((".s", ".S")) else C_COMMENT
     return " ".join(comment.sub("", line).split())
 
@@ -107,7 +107,7 @@ def save(path: str, numbers: Mapping[str, Number]) -> None:
 
 
 def load(path: str) -> dict[str, Number]:
-    """Read a baseline. Raises ValueError if it is not one, OSError if it cannot be read."""
+    """Read a baseline. Raises ValueError if the file is not a baseline, OSError if it cannot be read."""
     try:
         table: dict[str, Any] = json.loads(read_file(path))
         return {
@@ -119,7 +119,7 @@ def load(path: str) -> dict[str, Number]:
 
 
 def compare(old: Mapping[str, Number], new: Mapping[str, Number]) -> list[Row]:
-    """Return one row per name, in the order of `new`, then the names that only `old` has."""
+    """Return one row per name: first in the order of `new`, then the names that are only in `old`."""
     rows = []
     for name, number in new.items():
         before = old.get(name)

@@ -1,8 +1,8 @@
-"""Cycles of the kernel's operations: the list of measures and their measurement.
+"""Cycles of the kernel's operations: the list of measurements and their execution.
 
-The `latency` application runs a scenario. The emulator counts cycles between symbols, without instrumentation in the
-firmware. Each measure uses the first undisturbed occurrence after the scenario has settled. The numbers are exact and
-repeat exactly.
+The `latency` application runs a scenario. The emulator counts cycles between symbols; the firmware has no
+instrumentation. Each measurement uses the first undisturbed occurrence after the scenario has settled. The numbers are
+exact, and every run gives the same ones.
 """
 
 from __future__ import annotations
@@ -18,28 +18,28 @@ from emu.kernel_metrics.target import MeasureError, Target
 from emu.system.events import NEVER
 
 APPLICATION: Final = "latency_wanted"
-"""Symbol that identifies the application."""
+"""Symbol by which the application is recognised."""
 DEVICE_LEVEL: Final = 4
 """Priority of C device interrupts (kernel.md §4)."""
 ATTEMPTS: Final = 50
-"""Maximum number of windows examined for one without another interrupt."""
+"""Maximum number of windows examined to find one without another interrupt."""
 SETTLING: Final = 5
-"""Windows skipped until every thread has yielded once."""
+"""Number of windows skipped, until every thread has yielded once."""
 CALL_CYCLES: Final = 2
 """Cycles of CALL and RCALL (isa.md §13.1)."""
 MASK_STEPS: Final = 150_000
-"""Instructions examined for the longest masked window."""
+"""Number of instructions examined for the longest window with masked interrupts."""
 JITTER_CYCLES: Final = 4_423_680
-"""Tcy examined for the jitter of the clock: 300 ms."""
+"""Tcy examined for the clock's jitter: 300 ms."""
 BYTE_CYCLES: Final = 1280
 """Tcy of a byte at 115,200 baud (epuck.md §2)."""
 DISI_LEVEL: Final = 6
-"""DISI masks priorities up to 6 (isa.md §12)."""
+"""Highest priority that DISI masks (isa.md §12)."""
 
 
 @dataclass(frozen=True, slots=True)
 class Scenario:
-    """Request to the application, in the order of its fields."""
+    """Request to the application; the fields are in the order of its request words."""
 
     threads: int = 0
     yielders: int = 0
@@ -55,7 +55,7 @@ MeasureFunction = Callable[[Meter], Window]
 
 @dataclass(frozen=True, slots=True)
 class Measure:
-    """One row of the table: name, scenario and measuring function."""
+    """One row of the table: name, scenario and function that measures it."""
 
     name: str
     scenario: Scenario
@@ -63,7 +63,7 @@ class Measure:
 
 
 def measures() -> Iterator[Measure]:
-    """Yield all measures of a window between two points, in the order of the table."""
+    """Yield all measurements of a window between two points, in table order."""
     for ready in (2, 4, 8):
         yield Measure(f"preemptive switch, {ready} ready threads", Scenario(threads=ready), preemption(ready))
     yield Measure("Sys_Yield to a yielded thread", Scenario(yielders=2), yield_switch("latency_yield"))
@@ -89,7 +89,7 @@ def measures() -> Iterator[Measure]:
 
 
 def run_measures(image: Image, engine: str = "auto") -> dict[str, Window]:
-    """Take all measures. Raises MeasureError if a scenario does not behave as expected."""
+    """Perform all measurements. Raises MeasureError if a scenario does not behave as expected."""
     target = Target(image, "latency_begin", engine)
     taken = {}
     for measure in measures():
@@ -100,7 +100,7 @@ def run_measures(image: Image, engine: str = "auto") -> dict[str, Window]:
             raise MeasureError(f"{measure.name}: {error}") from None
     busy = Scenario(threads=1, yielders=1, subscribers=4, waiters=1, payload=24, sender=1)
     taken.update(masked(_start(target, busy)))
-    busy = Scenario(yielders=1, subscribers=4, waiters=1, payload=24, sender=1)  # without a spinning thread
+    busy = Scenario(yielders=1, subscribers=4, waiters=1, payload=24, sender=1)  # no thread spins
     taken["1 ms clock: worst jitter, busy kernel"] = jitter(_start(target, busy), b"")
     traffic = bytes(range(256)) * (JITTER_CYCLES // BYTE_CYCLES // 256 + 1)
     taken["1 ms clock: worst jitter, busy kernel and UART traffic"] = jitter(_start(target, busy), traffic)
@@ -119,7 +119,7 @@ def _running(meter: Meter) -> int:
 
 
 def _undisturbed(take: MeasureFunction) -> MeasureFunction:
-    """Wrap a measuring function: return the first window without an interrupt in it."""
+    """Wrap a measuring function so that it returns the first window without an interrupt in it."""
 
     def taken(meter: Meter) -> Window:
         for _ in range(ATTEMPTS):
@@ -132,7 +132,7 @@ def _undisturbed(take: MeasureFunction) -> MeasureFunction:
 
 
 def preemption(ready: int) -> MeasureFunction:
-    """Measure from T2IF to the first instruction of the next thread, once every thread has been preempted."""
+    """Measure from T2IF to the first instruction of the next thread, after every thread has been preempted once."""
 
     def take(meter: Meter) -> Window:
         target = meter.target
@@ -149,7 +149,7 @@ def preemption(ready: int) -> MeasureFunction:
 
 
 def yield_switch(into: str) -> MeasureFunction:
-    """Measure from the call of Sys_Yield to the first instruction of another thread in `into`."""
+    """Measure from the call of Sys_Yield to the first instruction of another thread, inside function `into`."""
 
     @_undisturbed
     def take(meter: Meter) -> Window:
@@ -171,14 +171,14 @@ def yield_switch(into: str) -> MeasureFunction:
 
 
 def _to_send(meter: Meter) -> None:
-    """Run to the first instruction of Sys_Send_Event, called by the application."""
+    """Run to the first instruction of Sys_Send_Event when the application calls it."""
     meter.target.run_to("latency_send")
     meter.target.run_to("Sys_Send_Event")
 
 
 @_undisturbed
 def send_call(meter: Meter) -> Window:
-    """Measure from the first instruction of Sys_Send_Event to the one after its call."""
+    """Measure from the first instruction of Sys_Send_Event to the instruction after its call."""
     _to_send(meter)
     return meter.measure_until(meter.returned())
 
@@ -192,21 +192,21 @@ def _interrupt(meter: Meter) -> None:
 
 @_undisturbed
 def send_call_from_isr(meter: Meter) -> Window:
-    """Measure Sys_Send_Event called from a C interrupt function."""
+    """Measure a call of Sys_Send_Event from a C interrupt function."""
     _interrupt(meter)
     _to_send(meter)
     return meter.measure_until(meter.returned())
 
 
 def isr_entry(meter: Meter) -> Window:
-    """Measure from the interrupt flag to the first instruction of the C function."""
+    """Measure from the rise of the interrupt flag to the first instruction of the C function."""
     _interrupt(meter)
     return meter.measure_until(meter.inside("latency_isr"), meter.rise("INT1"))
 
 
 @_undisturbed
 def isr_exit(meter: Meter) -> Window:
-    """Measure from the C function's return to the next instruction of the interrupted thread."""
+    """Measure from the return of the C function to the next instruction of the interrupted thread."""
     _interrupt(meter)
     meter.target.run_to("latency_isr")
     meter.release("INT1")
@@ -216,7 +216,7 @@ def isr_exit(meter: Meter) -> Window:
 
 
 def send_until_entry(name: str) -> MeasureFunction:
-    """Measure from the first instruction of Sys_Send_Event to that of the function `name`."""
+    """Measure from the first instruction of Sys_Send_Event to the first one of the function `name`."""
 
     @_undisturbed
     def take(meter: Meter) -> Window:
@@ -227,7 +227,7 @@ def send_until_entry(name: str) -> MeasureFunction:
 
 
 def clock_interrupt(irq: str, vector: str, back: str = "latency_spin") -> MeasureFunction:
-    """Measure from an interrupt's flag to the next instruction of the function it interrupted, or woke."""
+    """Measure from an interrupt's flag to the next instruction of the function that it interrupted or woke."""
 
     def take(meter: Meter) -> Window:
         for _ in range(2):
@@ -241,7 +241,7 @@ def clock_interrupt(irq: str, vector: str, back: str = "latency_spin") -> Measur
 
 
 def jitter(meter: Meter, traffic: bytes) -> Window:
-    """Measure the variation of the time from the clock's flag to its interrupt, while UART1 receives `traffic`."""
+    """Measure how the time from the clock's flag to its interrupt varies while UART1 receives `traffic`."""
     machine = meter.machine
     late: list[int] = []
 
@@ -259,7 +259,7 @@ def jitter(meter: Meter, traffic: bytes) -> Window:
 
 
 def masked(meter: Meter) -> dict[str, Window]:
-    """Measure the longest time in which interrupts of priority 1..7 are masked, in the busiest scenario."""
+    """Measure the longest time for which interrupts of each priority 1..7 are masked, in the busiest scenario."""
     machine = meter.machine
     longest = {level: Window(0, False) for level in range(1, 8)}
     since: dict[int, tuple[int, str]] = {}

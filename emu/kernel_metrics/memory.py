@@ -1,8 +1,8 @@
 """Measurement of the memory equation: RAM = A + B n + C m + D s + sum over pending messages of (E + d).
 
 The `footprint` application builds a load of n threads, m events, s subscriptions and messages of d bytes. The emulator
-reads the heap: used memory is the capacity minus the reserve and the free blocks (kernel/memory.c). The allocator's own
-count must agree.
+reads the heap. Used memory is the capacity minus the reserve and the free blocks (kernel/memory.c). It must equal the
+count kept by the allocator.
 """
 
 from __future__ import annotations
@@ -18,37 +18,37 @@ from emu.kernel_metrics.owners import DEVICES, KERNEL, sizes_by_owner
 from emu.kernel_metrics.target import WORD, MeasureError, Target
 
 APPLICATION: Final = "footprint_wanted"
-"""Symbol that identifies the application."""
+"""Symbol by which the application is recognised."""
 
 PAPER: Final = {"A": 1142, "B": 146, "C": 6}
-"""Eq. (1) of the paper (Trenkwalder et al., IROS 2016); it has no term for subscriptions."""
+"""Coefficients of Eq. (1) in the paper (Trenkwalder et al., IROS 2016), which has no term for subscriptions."""
 ORIGINAL: Final = {"B": 228, "C": 12, "D": 24, "E": 26}
-"""Bytes that the original's allocator takes: 28 per pending message of 2 (openswarm-original.md §4.6)."""
+"""Bytes that the original's allocator uses: 28 per pending message of 2 bytes (openswarm-original.md §4.6)."""
 
 PAPER_ROM: Final = 12 * 1024
-"""ROM of the paper, with motors, UART and remote control (openswarm-original.md §1)."""
+"""ROM bytes in the paper, including motors, UART and remote control (openswarm-original.md §1)."""
 ORIGINAL_ROM: Final = {"kernel": 9072, "devices": 12288}
-"""ROM of the original, decoded from the authors' image (openswarm-original.md §1)."""
+"""ROM bytes of the original, decoded from the authors' image (openswarm-original.md §1)."""
 
 _APPLICATION: Final = ("_footprint_wanted", "_footprint_now", "_pids", "_any")
-"""Variables of the application itself, which do not count for the kernel."""
+"""Variables of the measuring application itself, which do not count as kernel memory."""
 OF_DEVICES: Final = ("device", "UART")
-"""Substrings that identify the parts of A that belong to devices."""
+"""Substrings of names of those parts of A that belong to devices."""
 KERNEL_EVENTS: Final = (0x01, 0x07)
-"""Events Sys_Init_Kernel registers for itself: termination and 1 ms (openswarm.h)."""
+"""Number of events that Sys_Init_Kernel registers for itself: termination and 1 ms (openswarm.h)."""
 EVENT: Final = 6
-"""Bytes of a registered event (kernel.h)."""
+"""Size of a registered event in bytes (kernel.h)."""
 _PIECES: Final = (("reserve_begin", "reserve_end"), ("free_run", "free_run_end"))
-"""Variables with the ends of free ranges outside the free blocks: the reserve, and the block being freed."""
+"""Variables that hold the ends of free ranges outside the free blocks: the reserve, and the block being freed."""
 _SIZE: Final = 4
-"""Offset of the size in a free block (kernel/memory.c)."""
+"""Offset of the size field in a free block (kernel/memory.c)."""
 _RESULT_WORDS: Final = 6
 _LONGEST_LIST: Final = 4096
 
 
 @dataclass(frozen=True, slots=True)
 class Load:
-    """Load that the application is to build."""
+    """Load that the application has to build."""
 
     threads: int = 0
     events: int = 0
@@ -58,43 +58,43 @@ class Load:
 
     @property
     def payload_bytes(self) -> int:
-        """Bytes of all payloads as stored: the allocator hands out whole words."""
+        """Stored size of all payloads in bytes; the allocator rounds up to whole words."""
         return self.messages * (self.payload + self.payload % WORD)
 
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """A load and its memory, as read from the heap and as counted by the allocator."""
+    """A load and its memory use, as read from the heap and as counted by the allocator."""
 
     load: Load
     taken: int
     counted: int
     left: int
-    """Bytes still allocated after everything was freed, minus those of the empty kernel."""
+    """Bytes still allocated after everything was freed, minus those of the empty kernel; not 0 means a leak."""
 
 
 @dataclass(frozen=True, slots=True)
 class Equation:
-    """Coefficients in bytes, with the largest difference between equation and measurement."""
+    """Coefficients in bytes, and the largest difference between equation and measurement."""
 
     coefficients: dict[str, Fraction]
     constant: dict[str, int]
     """Parts of A, in bytes."""
     sizes: dict[str, dict[str, int]]
-    """ROM and A of the kernel alone and of the kernel with its devices, in bytes."""
+    """ROM and A in bytes, for the kernel alone and for the kernel with its devices."""
     heap: int
-    """Capacity of the heap, which is not part of A."""
+    """Capacity of the heap in bytes, which is not part of A."""
     residual: Fraction
     cases: list[Case]
 
 
 class Heap:
-    """The kernel's heap read from memory."""
+    """The kernel's heap, read from the machine's memory."""
 
     def __init__(self, target: Target) -> None:
         self._target: Final = target
         self.capacity: Final = self.free() + target.words("os_statistics", 1)[0]
-        """Bytes of the whole heap: free bytes plus those that the kernel had allocated at the first read."""
+        """Size of the whole heap in bytes: free bytes plus those already allocated at the first read."""
 
     def free(self) -> int:
         """Return the bytes of the reserve and of all free blocks."""
@@ -103,7 +103,7 @@ class Heap:
         return free + sum(target.word(hole + _SIZE) for hole in self._holes())
 
     def _holes(self) -> Iterator[int]:
-        """Yield the addresses of the free blocks. Raises MeasureError if their tree is not a heap by size."""
+        """Yield the addresses of the free blocks. Raises MeasureError if their tree is not a heap ordered by size."""
         found = [self._target.word(self._target.address("holes"))]
         no_hole = self._target.address("no_hole")
         seen = 0
@@ -131,7 +131,7 @@ class Heap:
                 yield target.word(event)
 
     def _list(self, block: int, link: int = 0) -> Iterator[int]:
-        """Yield the addresses of a list whose elements are linked at offset `link`."""
+        """Yield the addresses of a linked list's elements; the link is at offset `link` of an element."""
         for _ in range(_LONGEST_LIST):
             if not block:
                 return
@@ -141,7 +141,7 @@ class Heap:
 
 
 def measure(image: Image, engine: str = "auto") -> Equation:
-    """Run all loads and fit the equation. Raises MeasureError if the application or the counts do not agree."""
+    """Run all loads and fit the equation. Raises MeasureError if the application misbehaves or the counts differ."""
     target = Target(image, "footprint_begin", engine)
     heap = Heap(target)
     target.run_to("footprint_empty")
@@ -179,7 +179,7 @@ def _case(target: Target, heap: Heap, load: Load, empty: int) -> Case:
 
 
 def _constant(target: Target, heap: Heap, empty: int, own: int) -> dict[str, int]:
-    """Return the parts of A: RAM in use before the first thread, without the heap and the application's variables."""
+    """Return the parts of A: RAM in use before the first thread, without heap and application variables."""
     parts = {
         "kernel stack": target.size("os_memory") - heap.capacity,
         "kernel events": own,
@@ -194,7 +194,7 @@ def _constant(target: Target, heap: Heap, empty: int, own: int) -> dict[str, int
 
 
 def _roms(image: Image) -> dict[str, int]:
-    """Return the ROM of the kernel alone and with its devices."""
+    """Return the ROM bytes of the kernel alone and with its devices."""
     owned = sizes_by_owner(image)
     return {KERNEL: owned[KERNEL].rom, DEVICES: owned[KERNEL].rom + owned[DEVICES].rom}
 
@@ -207,7 +207,7 @@ def _part_of(module: str) -> str:
 
 
 def _fit(cases: list[Case], parts: dict[str, int], roms: dict[str, int], capacity: int) -> Equation:
-    """Fit the equation: slopes from single-parameter loads; the residual covers all loads."""
+    """Fit the equation. Slopes come from loads with one parameter; the residual covers all loads."""
     by_load = {case.load: case.taken for case in cases}
 
     def slope(many: Load, few: Load, difference: int) -> Fraction:

@@ -1,6 +1,6 @@
-"""Exact cycles between two points of a running kernel, by source line.
+"""Exact cycles between two points of a running kernel, with their distribution over source lines.
 
-Input: a `Target` stopped at the first point. Output: a `Window`. The machine single-steps within a window only.
+Input: a `Target` stopped at the first point. Output: a `Window`. The machine single-steps only within a window.
 """
 
 from __future__ import annotations
@@ -15,31 +15,31 @@ from emu.system.device import flag_since
 from emu.system.events import NEVER
 
 MAX_WINDOW_CYCLES: Final = 100_000
-"""Tcy after which the end of a window counts as unreachable."""
+"""Tcy after which the end of a window counts as not reachable."""
 STACK_POINTER: Final = 15
 CALL_BYTES: Final = 4
-"""Bytes that a call pushes (isa.md §7.4)."""
+"""Number of bytes that a call pushes (isa.md §7.4)."""
 
 
 @dataclass(slots=True)
 class Window:
-    """`cycles` from the beginning to the end; `where` has the cycles by source line (or symbol)."""
+    """Interval between two points. `where` distributes its `cycles` over source lines (or symbols)."""
 
     cycles: int
     interrupted: bool
-    """Whether an exception was entered in between."""
+    """Whether an exception was entered during the window."""
     where: Counter[str] = field(default_factory=Counter)
 
 
 class Meter:
-    """Measures windows by running a machine from instruction to instruction."""
+    """Measures windows by running a machine in single steps."""
 
     def __init__(self, target: Target) -> None:
         self.target: Final = target
         self.machine: Final = target.machine
 
     def measure_until(self, end: Callable[[], bool], start: int | None = None) -> Window:
-        """Step until `end()` is true at an instruction boundary. `start`: first counted cycle (default: now)."""
+        """Step until `end()` is true at an instruction boundary. `start` is the first counted cycle (default: now)."""
         machine = self.machine
         begin = machine.cycle if start is None else start
         window = Window(0, False)
@@ -63,25 +63,25 @@ class Meter:
             window.where[place] += machine.cycle - cycle
 
     def place(self, pc: int) -> str:
-        """Return the source line of an address, or its symbol."""
+        """Return the source line of an address, or its symbol if it has no line."""
         line = self.target.image.lines.find(pc)
         return str(line) if line else self.target.image.symbols.text(pc).split("+")[0]
 
     def inside(self, name: str) -> Callable[[], bool]:
-        """Return a condition: the next instruction belongs to the function `name`."""
+        """Return a function that tells whether the next instruction belongs to the function `name`."""
         first = self.target.address(name)
         last = first + (self.target.size(name) or 2)
         return lambda: first <= self.machine.pc < last
 
     def returned(self) -> Callable[[], bool]:
-        """Return a condition: the function whose first instruction is next has returned."""
+        """Return a function that tells whether the function about to be entered has returned."""
         machine = self.machine
         stack = machine.w[STACK_POINTER] - CALL_BYTES
         back = (machine.peek(stack + 2) & 0x7F) << 16 | machine.peek(stack)
         return lambda: machine.pc == back and machine.w[STACK_POINTER] == stack
 
     def rise(self, irq_name: str) -> int:
-        """Return the cycle in which an interrupt flag last rose."""
+        """Return the cycle of an interrupt flag's last rise."""
         chip, record = self.machine.chip, self.machine.record
         source = next(s for s in chip.interrupts.values() if s.name == irq_name)
         register, bit = source.flag
@@ -94,7 +94,7 @@ class Meter:
         return int(self.machine.peek(group)) >> shift & 7
 
     def request(self, irq_name: str, priority: int) -> None:
-        """Enable an interrupt at `priority` and set its flag, as a device would."""
+        """Enable an interrupt at `priority` and set its flag, as a device does."""
         machine = self.machine
         source = next(s for s in machine.chip.interrupts.values() if s.name == irq_name)
         group, shift = source.priority
@@ -103,7 +103,7 @@ class Meter:
             machine.write(register, machine.peek(register) | 1 << bit)
 
     def release(self, irq_name: str) -> None:
-        """Clear an interrupt's flag, as its handler would."""
+        """Clear an interrupt's flag, as its handler does."""
         machine = self.machine
         source = next(s for s in machine.chip.interrupts.values() if s.name == irq_name)
         register, bit = source.flag

@@ -1,7 +1,7 @@
-"""Cost of the kernel's options: cycles of their calls, bytes of code, variables and objects.
+"""Cost of the kernel's options: cycles of their calls; bytes of their code, variables and objects.
 
-The `options` application plays a scene. The emulator counts cycles between symbols, as in `latency`. Every number is
-exact and repeats exactly.
+The `options` application runs scenes. The emulator counts cycles between symbols, as in `latency`. The numbers are
+exact, and every run gives the same ones.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from emu.kernel_metrics.owners import handles
 from emu.kernel_metrics.target import MeasureError, Target
 
 APPLICATION: Final = "options_wanted"
-"""Symbol that identifies the application."""
+"""Symbol by which the application is recognised."""
 SCENES: Final = (
     *("LOCK", "LOCK_SECOND", "LOCK_TAKEN", "UNLOCK", "UNLOCK_SECOND", "UNLOCK_ONE_WAITS", "UNLOCK_TWO_WAIT"),
     *("UNLOCK_SECOND_ONE_WAITS", "UNLOCK_PRIORITIES", "UNLOCK_TO_BETTER", "START", "START_JOINABLE"),
@@ -37,21 +37,21 @@ SCENES: Final = (
 )
 """Scenes in the order of the enumeration in firmware/apps/options/options.h."""
 OPTIONS: Final = ("mutex", "join", "cleanup", "quota", "service", "woken_first")
-"""Options by their files in firmware/openswarm/option."""
+"""Options by the names of their files in firmware/openswarm/option."""
 KERNEL_PARTS: Final = {"_os_call_in_section": "cleanup", "_event_bucket": "quota"}
-"""Kernel functions that are linked for one option only."""
+"""Kernel functions that are linked only for one option."""
 OBJECTS: Final = {"sys_mutex": "mutex", "sys_cleanup": "cleanup", "sys_quota": "quota", "sys_service": "service"}
-"""Object types, and the suffix of the application's variable `options_NAME` of that type."""
+"""Object types by the suffix of the application's variable `options_NAME` of that type."""
 HEAP: Final = (("a quota", "LIMIT", "options_done"), ("a zombie", "JOIN_ZOMBIE", "options_done"))
-"""(what, scene, stop): heap changes measured between `options_ready` and another stop of a scene."""
+"""(name, scene, stop): heap changes between the stop `options_ready` and another stop of a scene."""
 _ENDS_LATER: Final = ("END", "END_JOINED", "END_CLEANED", "TICK", "TICK_SERVICE")
-"""Scenes whose window begins after a delay."""
+"""Scenes in which the measured window begins after a delay."""
 
 MeasureFunction = Callable[[Meter], Window]
 
 
 def until_return(call: str) -> MeasureFunction:
-    """Measure from the first instruction of a call to the one after it."""
+    """Measure from the first instruction of a function to the instruction after its call."""
 
     def take(meter: Meter) -> Window:
         meter.target.run_to(call)
@@ -61,7 +61,7 @@ def until_return(call: str) -> MeasureFunction:
 
 
 def until_entry(call: str, place: str) -> MeasureFunction:
-    """Measure from the first instruction of a call to the entry of a function, or to a thread's resumption in it."""
+    """Measure from the first instruction of a call to a function's entry, or to the resumption of a thread in it."""
 
     def take(meter: Meter) -> Window:
         meter.target.run_to(call)
@@ -72,7 +72,7 @@ def until_entry(call: str, place: str) -> MeasureFunction:
 
 
 def measures() -> Iterator[tuple[str, str, MeasureFunction]]:
-    """Yield (name, scene, measuring function) of every row, in the order of the table."""
+    """Yield (name, scene, measuring function) of every row, in table order."""
     lock, unlock, send = "Sys_Lock_Mutex", "Sys_Unlock_Mutex", "Sys_Send_Event"
     yield f"{lock}", "LOCK", until_return(lock)
     yield f"{lock}, another thread owns another", "LOCK_SECOND", until_return(lock)
@@ -114,7 +114,7 @@ def measures() -> Iterator[tuple[str, str, MeasureFunction]]:
 
 
 def until_entry_on_kernel_stack(place: str) -> MeasureFunction:
-    """Measure from the end of a thread to the entry of a function that runs on the kernel stack."""
+    """Measure from the end of a thread to the entry of a function that runs on the kernel's stack."""
 
     def take(meter: Meter) -> Window:
         meter.target.run_to("os_thread_returned")
@@ -140,7 +140,7 @@ def _play(target: Target, scene: str, stop: str = "options_ready") -> Meter:
 
 
 def run_measures(image: Image, engine: str = "auto") -> dict[str, Window]:
-    """Take all measures. Raises MeasureError if a scene does not behave as expected."""
+    """Perform all measurements. Raises MeasureError if a scene does not behave as expected."""
     target = Target(image, "options_begin", engine)
     taken: dict[str, Window] = {}
     for name, scene, take in measures():
@@ -156,7 +156,7 @@ def run_measures(image: Image, engine: str = "auto") -> dict[str, Window]:
 
 
 def sizes(image: Image, engine: str = "auto") -> dict[str, int]:
-    """Return bytes by name: ROM and RAM of each option and of its objects, and its heap use."""
+    """Return bytes by name: ROM and RAM of each option, of its objects, and its heap use."""
     target = Target(image, "options_begin", engine)
     found: dict[str, int] = {}
     parts = pieces(image)

@@ -1,9 +1,11 @@
-"""Memory by owner (kernel, devices, application), from the folder of the source file.
+"""Memory by owner (kernel, devices, application), determined by the folder of the source file.
 
-Input: an image built with -g. Output: bytes of ROM and RAM by owner. Start-up code and vectors have no owner, because a
-program without a kernel has them too. Header code belongs to the owner of the function it was inlined into. A slot of
-`.handle` (function pointers, abi-elf.md §1.5) belongs to the owner of its target. Library code and strings belong to
-the kernel.
+Input: an image built with -g. Output: bytes of ROM and RAM by owner.
+
+- Start-up code and vectors have no owner, because a program without a kernel has them too.
+- Code from a header belongs to the owner of the function into which it was inlined.
+- A slot of `.handle` (function pointers, abi-elf.md §1.5) belongs to the owner of its target.
+- Library code and strings belong to the kernel.
 """
 
 from __future__ import annotations
@@ -37,7 +39,7 @@ class OwnerSize:
 
 
 def sizes_by_owner(image: Image) -> dict[str, OwnerSize]:
-    """Return the bytes by owner; RAM includes the array of heap and kernel stack."""
+    """Return the bytes by owner. RAM includes the array that holds heap and kernel stack."""
     found = [piece for piece in pieces(image) if piece.name not in _WITHOUT_OWNER]
     homes = _homes(found)
     rom: Counter[str] = Counter()
@@ -59,7 +61,7 @@ def _owner(module: str) -> str:
 
 
 def _homes(found: list[Piece]) -> dict[str, str]:
-    """Return the owner of each symbol: the one with most of its code, header code excluded."""
+    """Return the owner of each symbol: the owner of most of its code, without code from headers."""
     sizes: dict[str, Counter[str]] = {}
     for piece in found:
         if piece.module != UNKNOWN and not piece.module.endswith(".h"):
@@ -68,7 +70,7 @@ def _homes(found: list[Piece]) -> dict[str, str]:
 
 
 def handles(image: Image) -> list[tuple[str, int]]:
-    """Return (source file of the target, bytes) of every slot of `.handle`."""
+    """Return (source file of the target, bytes) for every slot of `.handle`."""
     symbol = image.symbols.find(_HANDLES)
     section = next((s for s in image.sections if s.name == _HANDLES), None)
     start, size = (section.address, section.size) if section else (symbol.address, symbol.size) if symbol else (0, 0)

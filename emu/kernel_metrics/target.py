@@ -14,7 +14,7 @@ from emu.machine.machine import Machine
 
 WORD: Final = 2
 STOP_TIMEOUT_CYCLES: Final = 50_000_000
-"""Tcy after which a stop counts as unreachable."""
+"""Tcy after which a stop counts as not reachable."""
 
 
 class MeasureError(Exception):
@@ -22,7 +22,7 @@ class MeasureError(Exception):
 
 
 class Target:
-    """A machine with a measuring application. `begin` is the symbol of the stop at which requests are set."""
+    """A machine that runs a measuring application. `begin` is the symbol of the stop at which requests are written."""
 
     def __init__(self, image: Image, begin: str, engine: str) -> None:
         self.image: Final = image
@@ -32,7 +32,7 @@ class Target:
         self._start: Final = self.machine.snapshot()
 
     def restart(self) -> None:
-        """Return to the `begin` stop."""
+        """Restore the state of the stop `begin`."""
         self.machine.restore(self._start)
 
     def address(self, name: str) -> int:
@@ -43,7 +43,7 @@ class Target:
         return symbol.address
 
     def size(self, name: str) -> int:
-        """Return the size of a symbol in its own units; without a recorded size, the distance to the next symbol."""
+        """Return the size of a symbol in its own units. If none is recorded, return the distance to the next symbol."""
         symbol = self.image.symbols.find(name)
         if symbol is None or symbol.size:
             return symbol.size if symbol is not None else 0
@@ -66,7 +66,7 @@ class Target:
             self.machine.poke(address + WORD * index, value)
 
     def run_to(self, name: str) -> None:
-        """Run until the program counter reaches a symbol. Raises MeasureError if it does not."""
+        """Run until the PC reaches a symbol. Raises MeasureError if it does not."""
         address = self.address(name)
         remove = self.machine.hook_pc(address, lambda: True)
         try:

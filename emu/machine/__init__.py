@@ -1,1 +1,1 @@
-"""One microcontroller: record, bus, CPU and peripherals wired together, its run loop, and its stops."""
+"""One microcontroller: connected record, bus, CPU and peripherals, its run loop, and its stops."""

@@ -8,19 +8,19 @@ from itertools import groupby
 from typing import Any, Final
 
 MAX_FRAMES_SHOWN: Final = 12
-"""Entries of the call stack in the text of a report."""
+"""Maximum number of call stack entries in the text of a report."""
 
 
 @dataclass(frozen=True, slots=True)
 class TakenBranch:
-    """A taken branch or exception entry: control passed from the instruction at `source` to `target`."""
+    """A taken branch or exception entry, by which control passed from the instruction at `source` to `target`."""
 
     source: int
     target: int
     cycle: int
-    """Cycle in which the instruction at `source` began; for an exception, its handler's first instruction."""
+    """First cycle of the instruction at `source`; for an exception, of its handler's first instruction."""
     kind: str
-    """"branch" or "exception"."""
+    """Kind of transfer: "branch" or "exception"."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,36 +32,38 @@ class StackEntry:
     line: str | None
     kind: str
     variables: tuple[tuple[str, str], ...] = ()
-    """Names and values of parameters and locals; only the innermost entries have them."""
+    """Names and values of parameters and locals; only for the innermost entries."""
 
 
 @dataclass(frozen=True, slots=True)
 class FaultReport:
-    """What went wrong and where. `pc` is the faulty instruction, or the best estimate of it."""
+    """Description of a firmware fault. `pc` is the faulty instruction, or the best estimate of it."""
 
     cause: str
     pc: int
     cycle: int
     where: str = ""
-    """`pc` with function and source line."""
+    """`pc` as text with function and source line."""
     symbol: str | None = None
     line: str | None = None
     thread: str | None = None
-    """`thread 1 (worker)` of an OpenSwarm firmware."""
+    """Running thread of an OpenSwarm firmware, as text `thread 1 (worker)`."""
     frames: tuple[StackEntry, ...] = ()
     """The call stack at `pc`, innermost first, through interrupts."""
     branches: tuple[TakenBranch, ...] = ()
-    """The last branches before the fault, oldest first. Empty unless `run`, `advance` or the command line ran the
-    machine."""
+    """The last branches before the fault, oldest first.
+
+    Empty unless `run`, `advance` or the command line ran the machine.
+    """
     branch_texts: tuple[str, ...] = ()
 
     @property
     def function(self) -> str | None:
-        """The function that contains `pc`, None outside the program."""
+        """Name of the function that contains `pc`, None outside the program."""
         return self.frames[0].function if self.frames else None
 
     def report(self) -> str:
-        """Return the whole report as text lines."""
+        """Return the complete report as lines of text."""
         return "\n".join(self._lines())
 
     def _lines(self) -> Iterator[str]:

@@ -1,7 +1,7 @@
-"""Access to the memory and registers of a machine by name and by address, and hooks on register accesses.
+"""Access to a machine's memory and registers by name or address, and hooks on register accesses.
 
-Inputs: names of the loaded image and the chip, addresses, values. Outputs: numbers and bytes. No function of this
-module runs an instruction.
+Inputs: names of the loaded image and the chip, addresses, values. Outputs: numbers and bytes. Nothing in this module
+runs an instruction.
 """
 
 from __future__ import annotations
@@ -19,18 +19,18 @@ from emu.image.model import Image
 from emu.system.bus import Tap, tap
 
 NameOrAddress = str | int
-"""A name of the loaded image or chip, or an address."""
+"""Name in the loaded image or of the chip, or an address."""
 SfrHook = Callable[[bool, int], object]
 
 
 class MemoryObserver(Protocol):
-    """Observer of changes that no instruction makes."""
+    """Observer of memory changes that no instruction makes."""
 
     def on_power_on(self) -> None:
-        """Handle a power-on reset: RAM is uninitialised."""
+        """Handle a power-on reset, after which RAM is uninitialised."""
 
     def on_external_write(self, address: int, size: int) -> None:
-        """Handle a write of `size` bytes at data address `address` by a caller of `poke`."""
+        """Handle a write of `size` bytes at data address `address` by `poke`."""
 
 
 class StateAccess:
@@ -53,7 +53,7 @@ class StateAccess:
         self._sfr_hooks: Final[dict[int, Tap]] = {}
 
     def program_address(self, place: NameOrAddress) -> int:
-        """Return the program address of a function or label of the loaded image, or check an address.
+        """Return the program address of a function or label by name. An address is checked and returned.
 
         Raises KeyError for an unknown name, ValueError for an address at which no instruction can start.
         """
@@ -82,14 +82,14 @@ class StateAccess:
         return symbol.address
 
     def read(self, place: NameOrAddress, size: int = 2) -> int:
-        """Read a byte or an aligned word of data space as an instruction does, with side effects.
+        """Read a byte or an aligned word of data space as an instruction does, including side effects.
 
-        Raises ValueError for another size or an odd word address, KeyError for an unknown name.
+        Raises ValueError for another size or a word at an odd address, KeyError for an unknown name.
         """
         return self.core.data.read(self._accessed(place, size), size)
 
     def write(self, place: NameOrAddress, value: int, size: int = 2) -> None:
-        """Write a byte or an aligned word of data space as an instruction does, with side effects.
+        """Write a byte or an aligned word of data space as an instruction does, including side effects.
 
         Raises as `read`.
         """
@@ -104,7 +104,8 @@ class StateAccess:
     def peek(self, place: NameOrAddress, size: int = 2) -> int:
         """Return the unsigned little-endian number in `size` bytes of data space, without side effects.
 
-        `place` is a register (`U1STA`, `W3`), a variable, or any address; from 0x8000 on it lies in the PSV window.
+        `place` is a register (`U1STA`, `W3`), a variable, or any address; addresses from 0x8000 on are in the PSV
+        window.
         Raises KeyError for an unknown name, ValueError for unimplemented addresses or less than one byte.
         """
         address = self.address_of(place)
@@ -132,7 +133,7 @@ class StateAccess:
         return self.program.word(self.record.u16[self.core.state.at["PSVPAG"]] << 15 | address & 0x7FFE) & 0xFFFF
 
     def poke(self, place: NameOrAddress, value: int, size: int = 2) -> None:
-        """Store the low `size` bytes of `value` at `place` in data space, without side effects and hooks.
+        """Store the low `size` bytes of `value` at `place` in data space, without side effects or hook calls.
 
         Raises as `peek`. Constants in program memory cannot be changed.
         """
@@ -146,8 +147,8 @@ class StateAccess:
     def hook_sfr(self, place: NameOrAddress, hook: SfrHook) -> Callable[[], None]:
         """Call hook(is_write, word) after every access of an instruction to a register.
 
-        Returns a function that removes the hook. Raises KeyError for an unknown name, ValueError for an address that
-        is no register.
+        Returns a function that removes the hook. Raises KeyError for an unknown name, ValueError for an address that is
+        not a register.
         """
         address = self.address_of(place)
         if not 0 <= address < self.bus.end:

@@ -1,4 +1,4 @@
-"""All peripherals of a chip, connected to each other. The machine builds them, resets them and puts them to sleep."""
+"""All peripherals of a chip, connected to each other. The machine builds and resets them and stops their clocks."""
 
 from __future__ import annotations
 
@@ -29,16 +29,18 @@ from emu.system.bus import Bus
 from emu.system.program import ProgramMemory
 
 CRYSTAL_HZ: Final = 7_372_800
-"""Default crystal of a bare chip in Hz: UARTs derive exact baud rates from it."""
+"""Default crystal frequency of a bare chip in Hz, from which UARTs derive exact baud rates."""
 CONFIG: Final[Mapping[str, int]] = MappingProxyType({"FWDT": 0x7FFF})
-"""Default configuration words of a bare chip, for images without any: watchdog off. In an erased word the watchdog is
-on, and a program that sleeps would be woken forever."""
+"""Default configuration words of a bare chip, for images without any: watchdog off.
+
+An erased word enables the watchdog, which would wake a sleeping program forever.
+"""
 
 _CHANGE_NOTICE_IRQ: Final = "CN"
 
 
 class Peripherals:
-    """All devices of a chip. The order of construction is the priority of events that are due in the same cycle."""
+    """All devices of a chip. Devices constructed earlier have priority if events are due in the same cycle."""
 
     def __init__(self, context: ChipContext) -> None:
         self.context: Final = context
@@ -101,12 +103,12 @@ class Peripherals:
         self.all: Final[tuple[Peripheral, ...]] = tuple(part for part in parts if part is not None)
         self._stopped: Final = StateCell(context.bus.record, "power.stopped", "B")
         self.config: Mapping[int, int] = {}
-        """Configuration words used if the image contains none, by program address."""
+        """Configuration words by program address, used if the image contains none."""
         self.configure(crystal=context.crystal)
         self.on_restored: Final[list[Callable[[], None]]] = []
-        """Callbacks of board parts that must rebuild state derived from the record."""
+        """Callbacks of board parts, to rebuild state derived from the record."""
         self.on_synchronize: Final[list[Callable[[], None]]] = []
-        """Callbacks of board parts that evaluate pin changes lazily."""
+        """Callbacks of board parts that process pin changes lazily."""
 
     def _modules(self) -> dict[str, Peripheral]:
         """Return the peripherals by the name of their PMD bit."""
@@ -141,7 +143,7 @@ class Peripherals:
         for word in range(first, len(bus.reset_value)):
             bus.record.u16[word] = bus.reset_value[word]
         self.resets.record_cause(cause, kept)
-        if cause not in ("POR", "BOR"):  # the clock selection survives (§4)
+        if cause not in ("POR", "BOR"):  # other resets keep the clock selection (§4)
             self.oscillator.con.value = osccon
         self._stopped.value = 0
         for device in self.all:
@@ -165,7 +167,7 @@ class Peripherals:
                 device.freeze(cycle, mode)
 
     def wake(self, cycle: int) -> None:
-        """Handle the wake-up of the CPU; `cycle` is the first in which the stopped clocks tick."""
+        """Handle the CPU's wake-up. `cycle` is the first in which the stopped clocks run again."""
         self.watchdog.power_mode(0)
         if not self._stopped.value:
             return
@@ -179,12 +181,12 @@ class Peripherals:
         self.watchdog.clear(cycle)
 
     def deliver_uart_output(self) -> None:
-        """Deliver the characters that native code has sent to the UARTs' lazy listeners."""
+        """Call the UARTs' lazy listeners for the characters that native code has sent."""
         for uart in self.uart.values():
             uart.deliver_sent()
 
     def synchronize(self) -> None:
-        """Evaluate all lazily evaluated board state, so that the record does not depend on earlier reads."""
+        """Process all pending lazy board state, so that the record does not depend on earlier reads."""
         for listener in self.on_synchronize:
             listener()
 
@@ -206,7 +208,7 @@ class Peripherals:
 
 
 def configure_bus(chip: Chip, bus: Bus) -> None:
-    """Enter the implemented bits, the writable bits and the reset value of every register into the bus."""
+    """Copy the implemented bits, writable bits and reset value of every register to the bus."""
     for sfr in chip.sfrs.values():
         if sfr.size != 2:
             continue

@@ -1,8 +1,8 @@
 """Base class of the peripherals, their context (chip, bus, pins, CPU signals) and their cells in the record.
 
-A device keeps its state only in cells of the record, so a snapshot is complete. Cells that hold a cycle number are
-*timestamps*. When a device's clock stops (Sleep, or Idle with its SIDL bit set) and resumes, `thaw` shifts its
-timestamps and pending events by the time lost.
+A device keeps its state only in record cells, so a snapshot is complete. Cells that hold a cycle number are called
+*timestamps*. If a device's clock stops (Sleep, or Idle with its SIDL bit set) and resumes, `thaw` shifts its timestamps
+and pending events by the lost time.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ SLEEP: Final = 2
 
 
 def _ignore(*_arguments: object) -> None:
-    """Ignore a signal: the default of every callback."""
+    """Ignore a signal. Every callback has this default."""
 
 
 @dataclass
@@ -37,12 +37,14 @@ class CpuSignals:
     reset: Callable[[str], None] = _ignore
     """reset(cause): a peripheral resets the chip; cause is an RCON bit name, for example "WDTO"."""
     wake: Callable[[], None] = _ignore
-    """The watchdog ran out while the CPU slept: execution continues (§4)."""
+    """Called when the watchdog expires while the CPU sleeps: execution continues (§4)."""
     stall_until: Callable[[int], None] = _ignore
-    """stall_until(cycle): the CPU starts no instruction before that cycle while flash is programmed (§16)."""
+    """stall_until(cycle): the CPU starts no instruction before that cycle, while flash is programmed (§16)."""
     run: Callable[[int], Any] = _ignore
-    """run(cycles): run the machine for at most that many cycles; only for callers outside the machine. Returns a
-    `Stop`."""
+    """run(cycles): run the machine for at most that many cycles and return a `Stop`.
+
+    Only for callers outside the machine.
+    """
     end_run: Callable[[], None] = _ignore
     """End the current `run` at the next instruction boundary."""
     trap: Callable[[str], None] = _ignore
@@ -59,11 +61,11 @@ class StateCell:
         self._view: Final = {"B": record.u8, "H": record.u16, "I": record.u32, "Q": record.u64, "q": record.s64}[kind]
         self._view[self.index] = initial
         self.cell: Final = cell_of(record, name)
-        """Operand for rules."""
+        """The scalar as an operand for rules."""
 
     @property
     def value(self) -> int:
-        """The stored number, in the range of its kind."""
+        """The stored number, within the range of its kind."""
         return self._view[self.index]
 
     @value.setter
@@ -77,7 +79,7 @@ class StateCell:
 
 @dataclass
 class ChipContext:
-    """Context of the peripherals: the shared objects that a device may use."""
+    """Shared objects that a device may use."""
 
     chip: Chip
     bus: Bus
@@ -87,18 +89,18 @@ class ChipContext:
     crystal: int
     """Frequency at OSC1 in Hz."""
     fcy: Callable[[], float] = lambda: 0.0
-    """Tcy per second at the current clock; set by the oscillator."""
+    """Tcy per second at the current clock. The oscillator sets it."""
     power_mode: Callable[[], int] = lambda: 0
-    """0 while the CPU runs, else IDLE or SLEEP; set by the watchdog."""
+    """0 while the CPU runs, else IDLE or SLEEP. The watchdog sets it."""
     in_seconds: list[int] = field(default_factory=list)
-    """Event slots whose delay is a time in seconds: the oscillator reschedules them when it changes the Tcy."""
+    """Event slots whose delay is a time in seconds. The oscillator reschedules them when it changes the Tcy."""
 
 
 class Peripheral(Device):
     """Base class of the peripherals: registers, interrupt lines, cells and event slots by name."""
 
     idle_bit: tuple[Register, str] | None = None
-    """Control register and name of the bit (xSIDL) that stops the device in Idle."""
+    """Control register and bit name (xSIDL) of the bit that stops the device in Idle."""
 
     def __init__(self, name: str, context: ChipContext) -> None:
         super().__init__(name, context.bus)
@@ -118,25 +120,25 @@ class Peripheral(Device):
         return Irq(self.record, self.events, self.context.chip.sfrs[flag].address, bit)
 
     def cell(self, purpose: str, kind: str = "I", initial: int = 0) -> StateCell:
-        """Reserve a scalar of hidden state under `<device>.<purpose>`."""
+        """Reserve a scalar of hidden state, named `<device>.<purpose>`."""
         return StateCell(self.record, f"{self.name}.{purpose}", kind, initial)
 
     def array(self, purpose: str, kind: str, count: int) -> memoryview[int]:
-        """Reserve `count` elements of hidden state ("B", "H", "I" or "Q") under `<device>.<purpose>`."""
+        """Reserve `count` elements of hidden state ("B", "H", "I" or "Q"), named `<device>.<purpose>`."""
         field = self.record.reserve(f"{self.name}.{purpose}", kind, count)
         view = {"B": self.record.u8, "H": self.record.u16, "I": self.record.u32, "Q": self.record.u64}[kind]
         return view[field.index : field.index + count]
 
     def timestamp(self, purpose: str, initial: int = 0) -> StateCell:
-        """Reserve a timestamp: a cell that holds a cycle number of this device's own clock."""
+        """Reserve a timestamp: a cell that holds a cycle number of this device's clock."""
         cell = self.cell(purpose, "Q", initial)
         self._timestamps.append(cell)
         return cell
 
     def slot(self, purpose: str, fire: Callable[[int], None], *, in_seconds: bool = False) -> int:
-        """Reserve an event slot on this device's clock.
+        """Reserve an event slot that runs on this device's clock.
 
-        `in_seconds`: its delay does not depend on the length of a Tcy.
+        `in_seconds`: the delay is a time in seconds and does not depend on the length of a Tcy.
         """
         slot = self.events.slot(f"{self.name}.{purpose}", fire)
         self._slots.append((slot, self.cell(f"{purpose}.held", "Q", NEVER)))
@@ -145,12 +147,12 @@ class Peripheral(Device):
         return slot
 
     def set_event_rule(self, slot: int, rule: Rule) -> None:
-        """Let `rule` handle the events of `slot` wherever its conditions hold."""
+        """Let `rule` handle the events of `slot` if its conditions hold."""
         self.events.set_rule(slot, rule, self.bus.integers.fire)
 
     @property
     def clock(self) -> int:
-        """The device's own time: the current cycle, or the cycle its clock stopped at."""
+        """The device's own time: the current cycle, or the cycle at which its clock stopped."""
         return min(self.events.now, self._frozen.value)
 
     def power_up(self, power_on: bool) -> None:
@@ -162,20 +164,20 @@ class Peripheral(Device):
         self.reset(power_on)
 
     def remaining_delay(self, slot: int) -> int:
-        """Return the remaining delay of `slot` in Tcy when the device's clock stopped, NEVER if it was not pending."""
+        """Return the delay in Tcy that `slot` had left when the clock stopped; NEVER if it was not pending."""
         held = next(cell.value for one, cell in self._slots if one == slot)
         return NEVER if held == NEVER else held - self._frozen.value
 
     def restart(self) -> None:
-        """Reset this device alone after PMD has cleared its registers."""
+        """Reset only this device, after PMD has cleared its registers."""
         self.power_up(power_on=False)
         self.release_pins()
 
     def release_pins(self) -> None:
-        """Return the device's pins to LAT and TRIS. A chip reset does that through the ports (§6)."""
+        """Return the device's pins to LAT and TRIS. At a chip reset, the ports do this (§6)."""
 
     def before_disable(self) -> None:
-        """Prepare for PMD clearing the device's registers."""
+        """Prepare the device before PMD clears its registers."""
 
     def stops_in(self, mode: int) -> bool:
         """Whether the device's clock stops in power mode `mode`."""
@@ -191,7 +193,7 @@ class Peripheral(Device):
             self.events.cancel(slot)
 
     def thaw(self, cycle: int) -> None:
-        """Resume the device's clock in `cycle`; shift timestamps and pending events by the time lost."""
+        """Resume the device's clock at `cycle`. Shift timestamps and pending events by the lost time."""
         lost = cycle - self._frozen.value
         self._frozen.value = NEVER
         for cell in self._timestamps:
@@ -208,4 +210,4 @@ class Peripheral(Device):
         return self._frozen.value != NEVER
 
     def restored(self) -> None:
-        """Rebuild state derived from the record after a snapshot replaced it."""
+        """Rebuild state derived from the record, after a snapshot was restored."""

@@ -1,7 +1,7 @@
-"""The request lines of a chip's interrupt controller (§5).
+"""The request lines to a chip's interrupt controller (§5).
 
-A device sets the flags, which are otherwise plain storage. The CPU handles priorities and the controller's other
-registers. A line requested by a register write becomes visible one cycle later (see `emu.system.device.Irq`).
+Devices set the flags, which are otherwise plain storage. The CPU handles priorities and the controller's other
+registers. A request made by a register write becomes visible one cycle later (see `emu.system.device.Irq`).
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from emu.system.device import Irq
 
 
 class Interrupts:
-    """Request lines, one per implemented source."""
+    """Request lines, one for each implemented interrupt source."""
 
     def __init__(self, context: ChipContext) -> None:
         sfrs = context.chip.sfrs

@@ -1,18 +1,18 @@
-"""The package pins: the interface between the chip and its environment.
+"""The package's pins: the interface between the chip and its environment.
 
-All levels are arrays in the record with one word per port (A..G = 0..6), so a simulation reads and writes levels
+All levels are arrays in the record with one word per port (A..G = 0..6), so that a simulation reads and writes levels
 without a call per pin:
 
-- `input`: level applied from outside; `open`: 1 where nothing outside drives the pin, so that a pull-up can lift it;
+- `input`: level applied from outside; `open`: 1 if nothing outside drives the pin, so that a pull-up can raise it;
 - `drive`, `output`: pins driven by the chip, and their levels;
 - `level`: levels at the digital input buffers (0 where the pin is analog).
 
 A simulation that writes `input` calls `apply(port, cycle)` once afterwards, or uses `set`. A fast input (a pixel bus)
-is attached as a `Waveform`, a function of the cycle, instead of being written edge by edge.
+is not written edge by edge but attached as a `Waveform`, a function of the cycle.
 
 Eager watchers (interrupts, clocks, gates) are called at the edge. Lazy watchers (motors, LEDs) are called in order, but
-later. Native code may write a latch by itself as long as only lazy pins change: it appends the new levels to `ring`,
-and `flush` calls the watchers. Call `flush` before reading a result that a lazy watcher computes.
+later. If only lazy pins change, native code may write a latch itself: it appends the new levels to `ring`, and `flush`
+calls the watchers. Call `flush` before reading a result that a lazy watcher computes.
 """
 
 from __future__ import annotations
@@ -26,35 +26,35 @@ from emu.system.rules import Cell, Number
 
 PORTS: Final = "ABCDEFG"
 RING: Final = 256
-"""Capacity of the ring: changes that native code can store before it must call Python."""
+"""Capacity of the ring: number of changes that native code can store before it must call Python."""
 
 RingReader = Callable[[int, int], None]
-"""reader(address, count): processes `count` entries of `Pins.ring`, of any port."""
+"""reader(address, count): processes `count` entries of `Pins.ring`, which may be of any port."""
 Watcher = Callable[[int, int, int], None]
-"""watcher(cycle, changed, levels): pins in `changed` have the given levels from `cycle` on."""
+"""watcher(cycle, changed, levels): the pins in `changed` have the given levels from `cycle` on."""
 
 
 class Waveform(Protocol):
-    """Levels of some pins of one port as a function of the cycle."""
+    """Levels of some pins of a port as a function of the cycle."""
 
     def bits(self, cycle: int) -> int:
-        """Return the levels of the port's pins in `cycle`; only bits of the attached mask count."""
+        """Return the levels of the port's pins at `cycle`. Only bits of the attached mask count."""
 
     def rises(self, mask: int, after: int, until: int) -> int:
-        """Return the number of rising edges of the one pin in `mask` in cycles after < c <= until."""
+        """Return the number of rising edges of the single pin in `mask` in cycles after < c <= until."""
 
     def nth_rise(self, mask: int, after: int, count: int) -> int:
-        """Return the cycle of the `count`-th rising edge (1 = next) of the pin in `mask` after `after`, or NEVER."""
+        """Return the cycle of the `count`-th rising edge after `after` (1 = next) of the one pin in `mask`, or NEVER."""
 
     def constant_until(self, cycle: int) -> int:
-        """Return the first cycle after `cycle` in which `bits` may change, unless `Pins.invalidate` is called.
+        """Return the first cycle after `cycle` at which `bits` may change, unless `Pins.invalidate` is called.
 
-        Return `cycle` itself if the waveform gives no guarantee.
+        Return `cycle` itself if the waveform promises nothing.
         """
 
 
 class RuleWaveform(Protocol):
-    """A waveform whose rising edges are also available as a rule (emu/system/rules.py)."""
+    """A waveform that can also compute its rising edges by a rule (emu/system/rules.py)."""
 
     def nth_rise_rule(self, m: Any, mask: int, after: Number, count: Number) -> Number:
         """Return `Waveform.nth_rise` as a rule expression."""
@@ -84,56 +84,60 @@ class Pins:
         self.level: Final = words("level")
         self.pullup: Final = words("pullup")
         self.described: Final[dict[tuple[int, int], tuple[RuleWaveform, Cell]]] = {}
-        """Rule waveforms by port and mask of one pin; see `describe`."""
+        """Rule waveforms by port and single-pin mask; see `describe`."""
         for port in range(len(PORTS)):
-            self.open[port] = 0xFFFF  # nothing is connected yet
+            self.open[port] = 0xFFFF  # no pin is connected yet
         self.analog: Final = words("analog")
         self.before: Final = words("before")
-        """Previous levels: PORT reads return them in the cycle after the chip changed its outputs (§6)."""
+        """Previous levels. PORT reads return them in the cycle after the chip changed its outputs (§6)."""
         first = record.reserve("pins.changed", "Q", len(PORTS)).index
         self.changed: Final = record.u64[first : first + len(PORTS)]
-        """First cycle of the newest output levels."""
+        """First cycle of the latest output levels."""
         self.eager: Final = words("eager")
-        """Pins with eager watchers: native code must call Python for their changes."""
+        """Pins with eager watchers. Native code must call Python when they change."""
         self.lazy: Final = words("lazy")
-        """Pins with lazy watchers only: native code may store their changes in `ring`."""
+        """Pins that have only lazy watchers. Native code may store their changes in `ring`."""
         self.waveform_pins: Final = words("waveform_pins")
         """Pins whose levels come from an attached waveform."""
         self.constant_levels: Final = words("constant_levels")
-        """Levels of the waveform pins, valid before the cycle in `constant_until`; native code reads them."""
+        """Levels of the waveform pins, valid before the cycle in `constant_until`. Native code reads them."""
         first = record.reserve("pins.constant_until", "Q", len(PORTS)).index
         self.constant_until: Final = record.u64[first : first + len(PORTS)]
         self._reported: Final = words("reported")
-        """Levels last reported to the lazy watchers."""
+        """Levels that were last reported to the lazy watchers."""
         ring = record.reserve("pins.ring", "Q", RING).index
         self.ring: Final = record.u64[ring : ring + RING]
-        """Changes made by native code, each as cycle << 24 | port << 16 | levels."""
+        """Ring of changes made by native code, each encoded as cycle << 24 | port << 16 | levels."""
         self._u64: Final = record.u64
         self._count: Final = record.reserve("pins.ring_count", "Q").index
         self._edges: list[tuple[int, int, int]] | None = None
         self.frames: list[tuple[int, int, int, int, int, int]] | None = None
-        """Set to a list to log UART frames there instead of as edges. Entries: first cycle, port, pin mask, levels from
-        bit 0 on, number of levels, cycles per level."""
+        """Log of UART frames if set to a list; frames are then not logged as edges.
+
+        An entry has: first cycle, port, pin mask, levels from bit 0 on, number of levels, cycles per level.
+        """
         self._eager_before_log: list[int] = []
         self._watchers: Final[list[list[tuple[int, Watcher]]]] = [[] for _ in PORTS]
         self._lazy_watchers: Final[list[list[tuple[int, Watcher]]]] = [[] for _ in PORTS]
         self._ring_watchers: Final[list[list[tuple[int, Watcher]]]] = [[] for _ in PORTS]
-        """Lazy watchers without a ring reader: `flush` calls them for each ring entry."""
+        """Lazy watchers without a ring reader, which `flush` calls for each ring entry."""
         self._readers: Final[list[RingReader]] = []
         self._clean: Final = memoryview(bytes(8 * RING)).cast("Q")
         self._ring_address: Final = record.address + 8 * ring
         self.ring_addresses: Final = tuple(
             record.address + record.fields[f"pins.{name}"].offset for name in ("ring", "ring_count", "reported")
         )
-        """Host addresses for a native ring reader: `ring`, the number of its entries, and the reported levels of each
-        port. Such a reader must clear the ring as `flush` does."""
+        """Host addresses for a native ring reader: `ring`, the number of its entries, and each port's reported levels.
+
+        Such a reader must clear the ring as `flush` does.
+        """
         self._ports_with_ring_watchers = 0
         self._waveforms: Final[list[list[tuple[int, Waveform]]]] = [[] for _ in PORTS]
         self._on_waveform: Final[list[tuple[Callable[[int], None], Callable[[], None]]]] = []
 
     @property
     def edges(self) -> list[tuple[int, int, int]] | None:
-        """Log of pin changes: a list that receives (cycle, port, levels), or None."""
+        """Log of pin changes: a list that receives (cycle, port, levels); None if changes are not logged."""
         return self._edges
 
     @edges.setter
@@ -149,7 +153,7 @@ class Pins:
         self._edges = log
 
     def watch(self, name: str, watcher: Watcher, *, lazy: bool = False) -> None:
-        """Call `watcher` for every edge on one pin; `lazy`: possibly later."""
+        """Call `watcher` for every edge on one pin. With `lazy`, the call may happen later."""
         port, mask = parse_pin(name)
         self.watch_port(port, mask, watcher, lazy=lazy)
 
@@ -166,7 +170,7 @@ class Pins:
         """Call `watcher` for every edge on the pins in `mask` of a port.
 
         `inputs_only`: the watcher ignores pins that the port drives, so latch writes need not call it. A lazy watcher
-        may have a `reader`, which processes the ring entries instead.
+        may have a `reader` that processes the ring entries instead.
         """
         (self._lazy_watchers if lazy else self._watchers)[port].append((mask, watcher))
         if lazy:
@@ -180,11 +184,11 @@ class Pins:
         table[port] |= 0 if inputs_only else mask
 
     def watched_ports(self, readers: int) -> int:
-        """Return a bit mask of the ports whose ring entries have consumers besides `readers` ring readers."""
+        """Return a mask of the ports whose ring entries have consumers other than `readers` ring readers."""
         return self._ports_with_ring_watchers if len(self._readers) == readers else -1
 
     def flush(self) -> None:
-        """Report the changes in the ring to the lazy watchers, then clear the ring to its initial state."""
+        """Report the changes in the ring to the lazy watchers, then empty the ring."""
         count = self._u64[self._count]
         if not count:
             return
@@ -215,7 +219,7 @@ class Pins:
             self._update_waveform_pins(port)
 
     def describe(self, port: int, mask: int, waveform: RuleWaveform, attached: Cell) -> None:
-        """Register a rule waveform for the pins in `mask`; it is in force while the number at `attached` is not 0."""
+        """Register a rule waveform for the pins in `mask`. It applies while the number in cell `attached` is not 0."""
         for bit in range(16):
             if mask >> bit & 1:
                 self.described[port, 1 << bit] = (waveform, attached)
@@ -235,7 +239,7 @@ class Pins:
             self.invalidate(port)
 
     def waveform(self, port: int, mask: int) -> Waveform | None:
-        """Return the waveform attached to the pins in `mask`, if any."""
+        """Return the waveform attached to the pins in `mask`, None if there is none."""
         return next((wave for pins, wave in self._waveforms[port] if pins & mask), None)
 
     def on_waveform_change(self, before: Callable[[int], None], after: Callable[[], None]) -> None:
@@ -243,7 +247,7 @@ class Pins:
         self._on_waveform.append((before, after))
 
     def change_waveform(self, cycle: int, change: Callable[[], None]) -> None:
-        """Run `change`, which alters an attached waveform from `cycle` on; timers clocked by it keep their counts."""
+        """Run `change`, which alters an attached waveform from `cycle` on. Timers clocked by it keep their counts."""
         for before, _ in self._on_waveform:
             before(cycle)
         change()
@@ -253,7 +257,7 @@ class Pins:
             after()
 
     def invalidate(self, port: int) -> None:
-        """Discard the cached levels of `port` after its waveforms, or the state they depend on, have changed."""
+        """Discard the cached levels of `port`, after its waveforms or the state on which they depend changed."""
         self.constant_until[port] = 0
 
     def set(self, name: str, level: int, cycle: int | None = None) -> None:
@@ -262,7 +266,7 @@ class Pins:
         self.set_port(port, mask, mask if level else 0, cycle)
 
     def set_port(self, port: int, mask: int, levels: int, cycle: int | None = None) -> None:
-        """Drive the pins in `mask` of a port from outside."""
+        """Drive the pins in `mask` of a port from outside, from `cycle` on (default: now)."""
         self.input[port] = self.input[port] & ~mask | levels & mask
         self.open[port] &= ~mask
         self.apply(port, self._events.now if cycle is None else cycle)
@@ -280,7 +284,7 @@ class Pins:
         return int(bool(self.levels(port, self._events.now) & mask))
 
     def levels(self, port: int, cycle: int) -> int:
-        """Return the digital levels of a port in `cycle` (the current one; for waveforms, any)."""
+        """Return the digital levels of a port at `cycle`: the current one; any cycle for waveform pins."""
         return self._with_waveforms(port, cycle, self.level[port])
 
     def _with_waveforms(self, port: int, cycle: int, level: int) -> int:
@@ -289,7 +293,7 @@ class Pins:
         return level
 
     def read_port(self, port: int, cycle: int) -> int:
-        """Return what an instruction reads from PORT in `cycle`: outputs appear one cycle late (§6)."""
+        """Return the value that an instruction reads from PORT at `cycle`; outputs appear one cycle late (§6)."""
         level = (self.before if cycle <= self.changed[port] else self.level)[port]
         from_waveform = self.waveform_pins[port]
         if not from_waveform:
@@ -308,7 +312,7 @@ class Pins:
         return level & ~from_waveform | waved
 
     def apply(self, port: int, cycle: int, by_chip: bool = False) -> None:
-        """Recompute a port's levels after any of the arrays changed; the new levels hold from `cycle` on."""
+        """Recompute a port's levels after a change of any of the arrays. The new levels apply from `cycle` on."""
         outside = self.input[port] | self.pullup[port] & self.open[port]
         drive = self.drive[port]
         level = (self.output[port] & drive | outside & ~drive) & ~self.analog[port]

@@ -34,17 +34,17 @@ from emu.system.events import NEVER
 from emu.system.rules import Rule, cell_of, event_slot
 
 FULL_SCALE: Final = 0x10000
-"""AVDD in units of analog level."""
+"""Analog level that corresponds to AVDD."""
 _SETTINGS_CACHE_SIZE: Final = 64
-"""Number of decoded register settings in the cache; firmware uses a handful."""
+"""Maximum number of decoded register settings in the cache; firmware uses only a few."""
 _RC_TAD_SECONDS: Final = 1.5e-6  # UNVERIFIED: 1.2 to 1.5 us (§13)
 
 _MANUAL, _INT0, _TIMER3, _AUTO = 0, 1, 2, 7
-"""SSRC: what ends sampling (§13)."""
+"""Values of SSRC, which selects what ends sampling (§13)."""
 
 
 class Adc(Peripheral):
-    """One sample-and-hold behind two input multiplexers."""
+    """The ADC: one sample-and-hold amplifier after two input multiplexers."""
 
     def __init__(self, site: AdcSite, context: ChipContext, interrupts: Interrupts, timers: dict[int, Timer]) -> None:
         super().__init__("adc", context)
@@ -61,7 +61,7 @@ class Adc(Peripheral):
             register.computed(partial(self._read, register))
         word = self.con1.address >> 1
         self._clear_only: Final = self.bus.clear_only[word]
-        self.bus.writable[word] |= self._clear_only  # the value of DONE is known after `catch_up`
+        self.bus.writable[word] |= self._clear_only  # `catch_up` must run before the value of DONE is known
         self.bus.clear_only[word] = 0
         self.con1.written_by(self._con1_written)
         for register in (self.con2, self.con3, self.chs, self.cssl):
@@ -69,8 +69,10 @@ class Adc(Peripheral):
         self.pcfg.written_by(lambda _old, _new, _lanes: self._route(self.now + 1))
         self._port: Final = parse_pin(site.pins[0])[0]
         self.source: Final = AnalogInputs(self, CHANNELS)
-        """Analog source of each channel: a function of the cycle that replaces its level. Call `catch_up` before the
-        function changes."""
+        """Analog source of each channel: a function of the cycle that replaces the channel's level.
+
+        Call `catch_up` before the function changes.
+        """
         self.input: Final = self.source.level
         """Analog level of each channel; change it through `set_input`."""
         self._published: Final = PublishedSettings(self, CHANNELS)
@@ -78,7 +80,7 @@ class Adc(Peripheral):
         self._vref_low: Final = self.cell("vref_low", "I", 0)
         self._state: Final = self.cell("state", "B")
         self._mark: Final = self.timestamp("mark")
-        """Cycle the present state began at or before (plus `half` half Tcy)."""
+        """Start of the current state, in cycles; `half` adds half a Tcy."""
         self._half: Final = self.cell("half", "B")
         self._held: Final = self.cell("held", "H")
         self._scan: Final = self.cell("scan", "B")
@@ -86,7 +88,7 @@ class Adc(Peripheral):
         self._next: Final = self.cell("next", "B")
         self._count: Final = self.cell("count", "B")
         self._stands: Final = self.timestamp("constant_until", FOREVER)
-        """First cycle in which ADCBUFx, ADCON1 and ADCON2 may differ from what is stored."""
+        """First cycle in which ADCBUFx, ADCON1 and ADCON2 may differ from their stored values."""
         self._step: Final = self.slot("step", self._due)
         sfrs = context.chip.sfrs
         self._settings: Final = tuple(
@@ -94,7 +96,7 @@ class Adc(Peripheral):
             for register, owned in (
                 (self.con1, ("SAMP", "DONE")), (self.con2, ("BUFS",)), (self.con3, ()), (self.chs, ()), (self.cssl, ()))
         )  # fmt: skip
-        """Record words and masks on which the conversion settings depend."""
+        """Indices and masks of the registers that determine the conversion settings."""
         self._settings_cache: Final[dict[tuple[int, ...], ConversionSettings]] = {}
         for register in (*self._buffers, self.con2):
             register.set_rule(Rule(StableRegister(register.cell, self._stands.cell), read_stable))
@@ -142,12 +144,12 @@ class Adc(Peripheral):
         return self._mark.value if self._state.value > WAITING and not self.is_frozen else None
 
     def set_references(self, low: int, high: int) -> None:
-        """Levels on VREF- and VREF+ (0..65536 of AVDD), used when VCFG selects them."""
+        """Set the levels on VREF- and VREF+ (0..65536 of AVDD), which are used if VCFG selects them."""
         self.catch_up(self.now)
         self._vref_low.value, self._vref_high.value = low, high
 
     def _current_settings(self) -> ConversionSettings:
-        """The current settings, cached by the register contents."""
+        """Return the current settings, cached by the register contents."""
         u16 = self.record.u16
         key = tuple([u16[word] & bits for word, bits in self._settings])
         settings = self._settings_cache.get(key)
@@ -157,7 +159,7 @@ class Adc(Peripheral):
             settings = self._settings_cache[key] = self._decode_settings()
         return (
             settings if not self.con3["ADRC"] else self._decode_settings()
-        )  # these also depend on Fcy, which is not part of the key
+        )  # such settings also depend on Fcy, which is not part of the key
 
     def _decode_settings(self) -> ConversionSettings:
         tad = max(round(2 * _RC_TAD_SECONDS * self.context.fcy()), 1) if self.con3["ADRC"] else self.con3["ADCS"] + 1
@@ -178,14 +180,14 @@ class Adc(Peripheral):
     def _references(self, vcfg: int) -> tuple[int, int]:
         """Return the low and high reference level.
 
-        VCFG (§13): bit 0 selects VREF+, bit 1 VREF-; 1xx are the supplies.
+        Bit 0 of VCFG selects VREF+, bit 1 VREF-; 1xx selects the supplies (§13).
         """
         if vcfg & 4:
             return 0, FULL_SCALE
         return self._vref_low.value if vcfg & 2 else 0, self._vref_high.value if vcfg & 1 else FULL_SCALE
 
     def _sample(self, settings: ConversionSettings, channel: int, negative: int, cycle: int) -> int:
-        """Return the conversion result for an input in `cycle`, 0..4095."""
+        """Return the conversion result, 0..4095, for an input sampled at `cycle`."""
         low, high = self._references(settings.references)
         zero = self.source.at(1, cycle) if negative else low
         return min(max((self.source.at(channel, cycle) - zero) * 4096 // max(high - low, 1), 0), 4095)
@@ -193,7 +195,7 @@ class Adc(Peripheral):
     # -- time --------------------------------------------------------------------------------------------------------
 
     def _duration(self, settings: ConversionSettings, state: int) -> int:
-        """Return the duration of a state in half Tcy, NEVER if the state waits for a trigger or for software."""
+        """Return the duration of a state in half Tcy; NEVER if it ends by a trigger or by software."""
         if state == CONVERTING:
             return settings.conversion
         return settings.sampling if state == SAMPLING else NEVER
@@ -212,16 +214,20 @@ class Adc(Peripheral):
             self._held.value = self._sample(settings, channel, negative, halves + 1 >> 1)
 
     def catch_up(self, cycle: int) -> None:
-        """Complete every conversion that ends at or before `cycle`, except the one that raises the interrupt.
+        """Complete every conversion that ends at or before `cycle`, except the one that requests the interrupt.
 
-        The event handler completes that one; it has not run yet if the event is due now. Nothing ends while the
-        converter's clock is stopped.
+        The event handler completes that one; if the event is due now, it has not run yet. While the converter's clock
+        is
+        stopped, no conversion ends.
         """
         if not self.is_frozen:
             self._convert_by(min(cycle, self.events.due(self._step) - 1))
 
     def _convert_by(self, cycle: int) -> bool:
-        """Complete every conversion that ends at or before `cycle`. Return whether one of them raised the interrupt."""
+        """Complete every conversion that ends at or before `cycle`.
+
+        Return whether one of them requested the interrupt.
+        """
         state = self._state.value
         if state <= WAITING:
             return False
@@ -254,7 +260,7 @@ class Adc(Peripheral):
         return interrupted
 
     def _store(self, settings: ConversionSettings, code: int) -> bool:
-        """Store a result and advance the buffer pointer. Return True after every SMPI + 1 results."""
+        """Store a result and advance the buffer pointer. Return True after each SMPI + 1 results."""
         value = code - 2048 if settings.form & 1 else code
         place = self._next.value
         self._buffers[place].value = value << 4 if settings.form & 2 else value
@@ -281,7 +287,7 @@ class Adc(Peripheral):
             self._stands.value = FOREVER
             return
         end = 2 * self._mark.value + self._half.value + duration
-        if end + 1 >> 1 <= self.now:  # the new setting is shorter: the state ends in the next cycle
+        if end + 1 >> 1 <= self.now:  # the new setting makes the state shorter, so it ends in the next cycle
             end = 2 * (self.now + 1)
             self._mark.value, self._half.value = end - duration >> 1, end - duration & 1
         self._stands.value = end + 1 >> 1
@@ -302,7 +308,7 @@ class Adc(Peripheral):
         return register.value
 
     def _catch_up_now(self) -> None:
-        """Bring the registers up to the current cycle. The interrupt itself is left to its event."""
+        """Bring the registers up to the current cycle. The interrupt is requested by its own event."""
         if self._state.value > WAITING:
             self.catch_up(self.now)
 
@@ -330,9 +336,9 @@ class Adc(Peripheral):
         self._plan()
 
     def _end_sampling_by_software(self, start: int) -> None:
-        """Handle SAMP = 0: with SSRC = 0 it starts the conversion.
+        """Handle a write of SAMP = 0. With SSRC = 0 it starts the conversion.
 
-        UNVERIFIED: otherwise it only ends sampling (§13).
+        UNVERIFIED: with other values of SSRC it only ends sampling (§13).
         """
         if self.con1["SSRC"] == _MANUAL:
             self._enter(CONVERTING, start)
@@ -354,7 +360,7 @@ class Adc(Peripheral):
     def _settle(self, register: Register, old: int, new: int, lanes: int) -> int:
         """Complete earlier conversions with the old register value, then apply the write.
 
-        Return the value that the register held before the write; bits outside `lanes` keep it.
+        Return the register's value before the write, in which bits outside `lanes` remain.
         """
         register.value = old
         self._catch_up_now()
@@ -364,7 +370,7 @@ class Adc(Peripheral):
         return left
 
     def int0(self, due: int) -> None:
-        """Handle the INT0 flag rising in cycle `due`: a conversion trigger if SSRC selects it."""
+        """Handle the rise of the INT0 flag in cycle `due`: it is a conversion trigger if SSRC selects it."""
         if self.con1["SSRC"] == _INT0:
             self._start_conversion(due)
 
@@ -383,17 +389,17 @@ class Adc(Peripheral):
             self._plan()
 
     def clock_changes(self) -> None:
-        """Complete conversions before the clock frequency changes. After a reset ADON is 0 and nothing is pending."""
+        """Complete conversions before the clock frequency changes. After a reset, ADON is 0 and none is pending."""
         if self.con1["ADON"]:
             self.catch_up(self.now)
 
     def clock_changed(self) -> None:
-        """Reschedule after a change of Fcy: the TAD of the internal RC oscillator is a different number of Tcy."""
+        """Reschedule after a change of Fcy: the TAD of the internal RC oscillator then takes another number of Tcy."""
         if self.con1["ADON"] and self.con3["ADRC"] and not self.is_frozen:
             self._plan()
 
     def _route(self, cycle: int) -> None:
-        """Apply ADPCFG: a 0 bit makes a pin analog, and its digital input reads 0 (§6)."""
+        """Apply ADPCFG: a 0 bit makes a pin analog, so that its digital input reads 0 (§6)."""
         self.context.pins.analog[self._port] = ~self.pcfg.value & 0xFFFF
         self.context.pins.apply(self._port, cycle)
 
@@ -408,7 +414,7 @@ class Adc(Peripheral):
         self._plan()
 
     def stops_in(self, mode: int) -> bool:
-        """Whether the converter stops: with its own RC oscillator it runs in Sleep."""
+        """Whether the converter stops. With its own RC oscillator it runs in Sleep."""
         return not self.con3["ADRC"] if mode == SLEEP else super().stops_in(mode)
 
     def freeze(self, cycle: int, mode: int) -> None:
@@ -417,7 +423,7 @@ class Adc(Peripheral):
         super().freeze(cycle, mode)
 
     def restored(self) -> None:
-        """Subscribe to timer 3 only while it triggers conversions: a timer with listeners has no native match rule."""
+        """Listen to timer 3 only while it triggers conversions: a timer with listeners has no native match rule."""
         wanted = self.con1["SSRC"] == _TIMER3 and bool(self.con1["ADON"])
         self._timers[3].listen(self._timer_matched, wanted)
         self._timers[2].listen(self._wide_timer_matched, wanted)

@@ -1,4 +1,4 @@
-"""Rules of the 12-bit ADC (§13): reads of stable registers, ADON, ADCSSL and whole conversion sequences."""
+"""Rules of the 12-bit ADC (§13): reads of stable registers, ADON, ADCSSL and complete conversion sequences."""
 
 from __future__ import annotations
 
@@ -12,21 +12,21 @@ from emu.system.rules import Cell, EventSlot, InterruptLine, Number, RuleBuilder
 BUFFERS: Final = 16
 """Number of result buffers."""
 CHANNELS: Final = 16
-"""Positions of the multiplexer. UNVERIFIED: positions without a pin read 0."""
+"""Number of inputs of the multiplexer. UNVERIFIED: inputs without a pin read 0."""
 OFF, WAITING, SAMPLING, CONVERTING = range(4)
-"""States: ADON = 0; on and idle; SAMP = 1; converting."""
+"""States of the converter: off (ADON = 0), idle, sampling (SAMP = 1), converting."""
 
 
 @dataclass(frozen=True, slots=True)
 class StableRegister:
-    """A register that the converter changes by itself, but not before the cycle stored at `until`."""
+    """A register that the converter changes, but not before the cycle stored in the cell `until`."""
 
     register: Cell
     until: Cell
 
 
 def read_stable(m: RuleBuilder, p: StableRegister) -> Number:
-    """Read the stored value, which is valid before cycle `until`."""
+    """Return the stored value, which is valid before cycle `until`."""
     m.require(m.now < m.get(p.until))
     return m.get(p.register)
 
@@ -45,7 +45,7 @@ class AdcOperands:
     bufs: int
     cssl: Cell
     scannable: int
-    """Implemented bits of ADCSSL."""
+    """Mask of the implemented bits of ADCSSL."""
     cscna: int
     native: Cell
     frozen: Cell
@@ -53,7 +53,7 @@ class AdcOperands:
     conversion: Cell
     results: Cell
     halves: Cell
-    """BUFM: whether every interrupt switches to the other half of the result buffer."""
+    """BUFM: whether each interrupt switches to the other half of the result buffer."""
     state: Cell
     mark: Cell
     half: Cell
@@ -64,25 +64,25 @@ class AdcOperands:
     held: Cell
     length: Cell
     channels: Cell
-    """First element of the scan sequence."""
+    """Cell of the scan sequence's first element."""
     level: Cell
-    """Level of channel 0; the other channels follow."""
+    """Cell of the level of channel 0; the other channels' cells follow."""
     level_from: Cell
-    """First cycle from which `level` of channel 0 is valid; the other channels follow."""
+    """Cell of the first cycle in which `level` of channel 0 is valid; the other channels' cells follow."""
     native_source: Cell
-    """Native source of channel 0: function address, then its data pointer; the other channels follow."""
+    """Cell of the native source of channel 0: function address, then data pointer. The other channels' cells follow."""
     buffer: Cell
-    """ADCBUF0."""
+    """Cell of ADCBUF0."""
     done: int
     step: EventSlot
     line: InterruptLine
 
 
 def write_con1(m: RuleBuilder, p: AdcOperands, value: Number, lanes: int) -> bool:
-    """Write ADCON1 when only ADON changes.
+    """Write ADCON1 if only ADON changes.
 
-    On: sampling starts in the next cycle with the first channel. Off: a running conversion is lost. The converter sets
-    SAMP in both cases.
+    On: sampling of the first channel starts in the next cycle. Off: a running conversion is lost. In both cases the
+    converter sets SAMP.
     """
     old = m.get(p.register)
     free, kept = p.writable & lanes, p.clear_only & lanes
@@ -106,7 +106,7 @@ def write_con1(m: RuleBuilder, p: AdcOperands, value: Number, lanes: int) -> boo
 
 
 def write_scan(m: RuleBuilder, p: AdcOperands, value: Number, lanes: int) -> bool:
-    """Write ADCSSL while the converter is off: rebuild the scan sequence."""
+    """Write ADCSSL while the converter is off, and rebuild the scan sequence."""
     if lanes != 0xFFFF:
         return False
     chosen = value & p.scannable
@@ -124,7 +124,7 @@ def write_scan(m: RuleBuilder, p: AdcOperands, value: Number, lanes: int) -> boo
 def fire_round(m: RuleBuilder, p: AdcOperands) -> None:
     """Complete all conversions up to the interrupt that is due.
 
-    Conditions: automatic sampling, one multiplexer, and inputs that are constant or have a native source.
+    Required: automatic sampling, one multiplexer, and inputs that are constant or have a native source.
     """
     sampling, results, length = m.get(p.sampling), m.get(p.results), m.get(p.length)
     step, scan, count, following = sampling + m.get(p.conversion), m.get(p.scan), m.get(p.count), m.get(p.next)

@@ -1,6 +1,6 @@
-"""Decoded settings of the ADC's control registers, and their copy in the record for native code.
+"""Decoded settings from the ADC's control registers, and their copy in the record for native code.
 
-Native code completes a whole conversion sequence by itself if `adc.native` is set. That requires automatic sampling
+Native code completes a whole conversion sequence itself if `adc.native` is set. That requires automatic sampling
 and conversion, one multiplexer, the supplies as references, and unsigned integer results.
 """
 
@@ -16,12 +16,12 @@ from emu.system.rules import Cell
 
 CONVERSION_TAD: Final = 14
 SHORTEST_SAMPLING: Final = 2
-"""Shortest sampling time for native code, in half Tcy. Below it two conversions could fall into one cycle."""
+"""Minimum sampling time for native code, in half Tcy. A shorter one could put two conversions into one cycle."""
 FOREVER: Final = 1 << 62
-"""A cycle that never comes. Unlike NEVER it is positive as a signed 64-bit number."""
+"""A cycle that is never reached. Unlike NEVER, it is positive as a signed 64-bit number."""
 
 AnalogSource = Callable[[int], int]
-"""Analog level 0..65535 as a function of the cycle."""
+"""Function that returns the analog level, 0..65535, for a cycle."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,31 +30,31 @@ class ConversionSettings:
 
     tad: int
     sampling: int
-    """From the start of sampling to the conversion; NEVER if software or a trigger ends sampling."""
+    """Time from the start of sampling to the conversion; NEVER if software or a trigger ends sampling."""
     auto_sample: bool
-    """ASAM: sampling restarts after every conversion."""
+    """ASAM: whether sampling restarts after every conversion."""
     scanned: tuple[int, ...]
-    """Scan sequence of multiplexer A; empty without scan."""
+    """Scan sequence of multiplexer A; empty if scanning is off."""
     inputs: tuple[tuple[int, int], tuple[int, int]]
     """(positive channel, CH0N) of multiplexers A and B."""
     alternates: bool
-    """ALTS: multiplexers A and B alternate."""
+    """ALTS: whether multiplexers A and B alternate."""
     results: int
-    """Conversions per interrupt."""
+    """Number of conversions per interrupt."""
     in_halves: bool
-    """BUFM: the result buffer is split into two halves."""
+    """BUFM: whether the result buffer is split into two halves."""
     form: int
     references: int
-    """VCFG."""
+    """Value of VCFG, which selects the references."""
 
     @property
     def conversion(self) -> int:
-        """Duration of a conversion: from the end of sampling to the result."""
+        """Duration of a conversion, from the end of sampling to the result."""
         return CONVERSION_TAD * self.tad
 
     @property
     def channels(self) -> tuple[int, ...]:
-        """AnalogInputs in turn, multiplexer A."""
+        """Channels converted in turn by multiplexer A."""
         return self.scanned or (self.inputs[0][0],)
 
     def next_input(self, scan: int, use_b: int) -> tuple[int, int, int, int]:
@@ -75,12 +75,12 @@ class ConversionSettings:
 class AnalogInputs:
     """Analog inputs: levels in the record, or sources (functions of the cycle) that replace them.
 
-    The owner of a source may predict a constant level; native code then reads that level without calling the source.
+    The owner of a source may predict a constant level. Native code then uses that level without calling the source.
     """
 
     def __init__(self, device: Peripheral, channels: int) -> None:
         self.level: Final = device.array("input", "H", channels)
-        """0..65535 of AVDD; for a channel with a source, its predicted level."""
+        """Level of each channel, 0..65535 of AVDD; for a channel with a source, its predicted level."""
         self._holds_from: Final = device.array("level_from", "Q", channels)
         """First cycle from which `level` is valid; FOREVER while the level is unknown."""
         self.native_source: Final = Cell(device.record.reserve_addresses(2 * channels), 64)
@@ -99,9 +99,9 @@ class AnalogInputs:
         self._native_sources[2 * channel] = 0
 
     def predict(self, channel: int, source: AnalogSource, level: int | None, cycle: int = 0) -> None:
-        """Declare that `source` returns `level` in every cycle from `cycle` on (None: unknown).
+        """Declare that `source` returns `level` in every cycle from `cycle` on; None means unknown.
 
-        Has no effect if the channel has a different source by now.
+        The call has no effect if the channel has a different source by now.
         """
         if self._source[channel] != source:
             return
@@ -112,21 +112,22 @@ class AnalogInputs:
     def set_native(self, channel: int, source: AnalogSource, code: int, data: int) -> None:
         """Set the native equivalent of `source`: int64 code(record, data, channel, cycle); address 0 removes it.
 
-        It must be valid for all cycles that native code may reach. Has no effect if the channel has a different source
-        by now.
+        It must be valid for all cycles that native code may reach. The call has no effect if the channel has a
+        different
+        source by now.
         """
         if self._source[channel] == source:
             self._native_sources[2 * channel], self._native_sources[2 * channel + 1] = code, data
 
     def at(self, channel: int, cycle: int) -> int:
-        """Return the level of a channel in a cycle."""
+        """Return the level of a channel at a cycle."""
         source = self._source[channel]
         known = source is None or self._holds_from[channel] <= cycle
         return self.level[channel] if known else source(cycle)  # type: ignore[misc]
 
 
 class PublishedSettings:
-    """The settings as record cells:
+    """The settings in record cells:
 
     `adc.native` (u8), `adc.sampling` and `adc.conversion` (u32, half Tcy), `adc.results`, `adc.halves`, `adc.length`
     (u8) and `adc.channels` (u8 each).
@@ -144,7 +145,7 @@ class PublishedSettings:
     def publish(self, settings: ConversionSettings, changes_by_itself: bool) -> None:
         """Store the settings for native code.
 
-        `changes_by_itself`: they depend on Fcy, so native code must not use them.
+        `changes_by_itself`: the settings depend on Fcy, so native code must not use them.
         """
         plain = settings.is_plain and not changes_by_itself
         self._native.value = plain

@@ -1,9 +1,9 @@
 """CAN1/2 (§15): modes, transmit buffers, filters and masks, receive buffers, interrupts, loopback.
 
-The environment exchanges frames: `on_frame(frame, cycle)` returns True to acknowledge a sent frame, `receive(frame)`
-delivers one. Without a listener no frame is acknowledged, as for a node alone on the bus: TXERR is set, TEC rises to
-128 and the message stays pending until the next write to the module's registers. Deliberate limits: no arbitration with
-other nodes, no error frames, no bus-off.
+The environment exchanges frames: `on_frame(frame, cycle)` returns True to acknowledge a sent frame; `receive(frame)`
+delivers a frame to the node. Without a listener no frame is acknowledged, as for a node alone on the bus: TXERR is set,
+TEC rises to 128, and the message stays pending until the next write to the module's registers. Not modelled:
+arbitration with other nodes, error frames, bus-off.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ from emu.peripherals.ports.ports import Port
 from emu.system.events import NEVER
 
 _NORMAL, _DISABLE, _LOOPBACK, _LISTEN, _CONFIGURE, _LISTEN_ALL = 0, 1, 2, 3, 4, 7
-"""REQOP and OPMODE (§15)."""
+"""Values of REQOP and OPMODE (§15)."""
 _MODE_DELAY: Final = 4  # UNVERIFIED: "a few Tcy" (§15)
 _ALONE_TEC: Final = 128
-"""Transmit error count of a node whose frames are not acknowledged: it stays error-passive."""
+"""Transmit error count of a node whose frames no other node acknowledges; it stays error-passive."""
 _ICODES: Final = (("ERRIF", 1), ("WAKIF", 7), ("TXB0IF", 4), ("TXB1IF", 3), ("TXB2IF", 2), ("RXB0IF", 6), ("RXB1IF", 5))
-"""ICODE by pending interrupt, highest priority first. UNVERIFIED order."""
+"""ICODE values by pending interrupt, highest priority first. UNVERIFIED order."""
 _FILTERS: Final = {0: (0, 1), 1: (2, 3, 4, 5)}
-"""Filter numbers of each receive buffer; mask n belongs to buffer n (§15)."""
+"""Numbers of the filters of each receive buffer; mask n belongs to buffer n (§15)."""
 
 
 class Can(Peripheral):
@@ -51,7 +51,7 @@ class Can(Peripheral):
         port, self._tx_pin = parse_pin(site.tx_pin)
         self._tx_port: Final = ports[port]
         self._sending: Final = self.cell("sending", "B")
-        """1 + number of the transmit buffer being sent, 0 = none."""
+        """1 + number of the transmit buffer that is being sent; 0 if none is."""
         self._wire: Final = self.slot("wire", self._sent)
         self._mode: Final = self.slot("mode", self._mode_changed)
 
@@ -59,7 +59,7 @@ class Can(Peripheral):
 
     @property
     def bit_time(self) -> float:
-        """Bit time in Tcy. Fcan is Fcy with CANCKS = 1, else 4 Fcy (§15)."""
+        """Bit time in Tcy. Fcan is Fcy if CANCKS = 1, else 4 Fcy (§15)."""
         cfg1, cfg2 = self._r["CFG1"], self._r["CFG2"]
         quantum = 2 * (cfg1["BRP"] + 1) / (1 if self.ctrl["CANCKS"] else 4)
         return quantum * (1 + cfg2["PRSEG"] + 1 + cfg2["SEG1PH"] + 1 + cfg2["SEG2PH"] + 1)
@@ -73,13 +73,13 @@ class Can(Peripheral):
             self.events.set(self._mode, self.now + 1 + _MODE_DELAY)
 
     def _mode_changed(self, due: int) -> None:
-        """Enter the requested mode, after the frame being sent has ended."""
+        """Enter the requested mode after the current frame has been sent."""
         if self._sending.value:
             self.events.set(self._mode, self.events.due(self._wire) + _MODE_DELAY)
             return
         mode = self.ctrl["REQOP"]
         self.ctrl["OPMODE"] = mode
-        if mode in (_NORMAL, _LOOPBACK):  # the module drives CiTX, recessive while idle
+        if mode in (_NORMAL, _LOOPBACK):  # the module drives CiTX; the idle level is recessive
             self._tx_port.own_now(self._tx_pin, drive=True, level=1)
         else:
             self._tx_port.release(self._tx_pin)
@@ -92,7 +92,7 @@ class Can(Peripheral):
             self._start_next(self.now + 1)
 
     def _start_next(self, cycle: int) -> None:
-        """Start sending the pending buffer with the highest TXPRI; among equals the highest number."""
+        """Start to send the pending buffer with the highest TXPRI; among equal ones, the highest number."""
         if self.ctrl["OPMODE"] not in (_NORMAL, _LOOPBACK) or self.is_frozen:
             return
         pending = [number for number in range(3) if self._r[f"TX{number}CON"]["TXREQ"]]
@@ -140,7 +140,7 @@ class Can(Peripheral):
             self._raise("ERRIF")
 
     def _abort_all(self) -> None:
-        """Handle ABAT: drop pending messages except the one being sent."""
+        """Handle ABAT: discard the pending messages except the one that is being sent."""
         for number in range(3):
             con = self._r[f"TX{number}CON"]
             if con["TXREQ"] and self._sending.value != number + 1:
@@ -151,7 +151,7 @@ class Can(Peripheral):
     # -- receive -----------------------------------------------------------------------------------------------------
 
     def receive(self, frame: CanFrame) -> bool:
-        """Receive a frame of another node. Return whether this node acknowledged it."""
+        """Receive a frame from another node. Return whether this node acknowledged it."""
         mode = self.ctrl["OPMODE"]
         if mode not in (_NORMAL, _LISTEN, _LISTEN_ALL) or self.is_frozen:
             return False
@@ -175,7 +175,7 @@ class Can(Peripheral):
         return not (frame.extended and (frame.identifier ^ self._eid(f"RXF{number}")) & self._eid(f"RXM{mask}"))
 
     def _eid(self, name: str) -> int:
-        """Return the extended identifier bits 17:0 of a filter or mask."""
+        """Return bits 17:0 of the extended identifier of a filter or mask."""
         return self._r[name + "EIDH"].value << 6 | self._r[name + "EIDL"]["EID5_0"]
 
     def _store(self, frame: CanFrame, buffer: int, number: int) -> None:
@@ -215,7 +215,7 @@ class Can(Peripheral):
         self._signal(1 << self.context.chip.sfrs[self.intf.name].fields[flag][0])
 
     def _signal(self, flags: int) -> None:
-        """Raise CiIF for flags whose enable bit is set (§15)."""
+        """Set CiIF for those `flags` whose enable bit is set (§15)."""
         self._show_icode()
         if flags & self.inte.value:
             self._line.request()

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from typing import Final
 
 _POLYNOMIAL: Final = 0x4599
-"""CRC-15 generator of CAN 2.0."""
+"""Generator polynomial of CRC-15 in CAN 2.0."""
 _TAIL_BITS: Final = 1 + 1 + 1 + 7 + 3
-"""CRC delimiter, ACK slot, ACK delimiter, end of frame and intermission; these bits are never stuffed."""
+"""Number of bits after the CRC: CRC delimiter, ACK slot and delimiter, end of frame, intermission. Never stuffed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,11 +19,11 @@ class CanFrame:
     extended: bool
     remote: bool
     length: int
-    """DLC as sent, 0..15; more than 8 means 8 bytes."""
+    """DLC as sent, 0..15. Values above 8 mean 8 bytes."""
     data: bytes
 
     def wire_bits(self) -> int:
-        """Return the bit times from the start of frame to the end of the intermission, stuff bits included."""
+        """Return the number of bits from start of frame to the end of intermission, including stuff bits."""
         bits = self._header()
         if not self.remote:
             bits += "".join(f"{byte:08b}" for byte in self.data)
@@ -31,7 +31,7 @@ class CanFrame:
         return len(bits) + _stuff_bits(bits) + _TAIL_BITS
 
     def _header(self) -> str:
-        """Return the bits from the start of frame to the DLC; dominant bits are 0."""
+        """Return the bits from start of frame to DLC; a dominant bit is 0."""
         remote = "1" if self.remote else "0"
         if not self.extended:
             return f"0{self.identifier & 0x7FF:011b}{remote}00{self.length:04b}"
@@ -50,7 +50,7 @@ def _crc(bits: str) -> int:
 
 
 def _stuff_bits(bits: str) -> int:
-    """Count the stuff bits: a complementary bit after five equal ones, which counts for the next run."""
+    """Return the number of stuff bits. A stuff bit follows five equal bits and counts for the next run of bits."""
     count, run, last = 0, 0, ""
     for bit in bits:
         run = run + 1 if bit == last else 1

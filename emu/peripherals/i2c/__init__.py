@@ -1,1 +1,1 @@
-"""The I2C module as master and slave, and the two-wire bus with the slaves of the board."""
+"""The I2C module as master and slave, and the I2C bus with the board's slaves."""

@@ -1,6 +1,6 @@
-"""The I2C bus outside the chip: slaves with addresses, and lines held low.
+"""The I2C bus outside the chip: slaves with addresses, and lines that are held low.
 
-Slaves answer byte by byte. A slave whose state must be part of snapshots keeps it in the record, as the boards do.
+Slaves answer byte by byte. A slave whose state must be part of snapshots keeps it in the record, as board parts do.
 """
 
 from __future__ import annotations
@@ -12,33 +12,33 @@ from emu.system.events import Events
 
 
 class I2cDevice:
-    """Base class of slaves. The defaults acknowledge everything and send 0xFF."""
+    """Base class of slaves. The default methods acknowledge every byte and send 0xFF."""
 
     def start(self, read: bool, cycle: int) -> bool:
-        """Handle being addressed for reading or writing. Return True to acknowledge."""
+        """Handle the slave's address, for reading or writing. Return True to acknowledge it."""
         return True
 
     def write(self, byte: int, cycle: int) -> bool:
-        """Handle a byte from the master. Return True to acknowledge."""
+        """Handle a byte that the master wrote. Return True to acknowledge it."""
         return True
 
     def read(self, cycle: int) -> int:
-        """Return the next byte for the master."""
+        """Return the next byte that the master reads."""
         return 0xFF
 
     def acknowledged(self, more: bool, cycle: int) -> None:
-        """Handle the master's ACK (`more`) or NACK after a byte it read."""
+        """Handle the master's ACK (`more` is true) or NACK after a byte that it read."""
 
     def stop(self, cycle: int) -> None:
-        """Handle the end of the transaction: Stop, or the Start of another one."""
+        """Handle the end of the transaction, by a Stop or by the Start of another one."""
 
     def stretch(self, cycle: int) -> int:
-        """Return the Tcy by which the device delays the first clock of the next byte."""
+        """Return by how many Tcy the slave delays the first clock of the next byte."""
         return 0
 
 
 class I2cBus:
-    """Slaves on the bus, and lines held low from outside. Both lines have pull-ups."""
+    """Slaves on the bus, and lines that the environment holds low. Both lines have pull-ups."""
 
     def __init__(self, pins: Pins, events: Events, sda_pin: str, scl_pin: str) -> None:
         self._pins: Final = pins
@@ -61,16 +61,16 @@ class I2cBus:
 
     @property
     def sda_high(self) -> bool:
-        """Level of SDA, the chip's own driver included."""
+        """Level of SDA, including the chip's own driver."""
         return bool(self._pins.level[self.port] & self.sda)
 
     @property
     def scl_high(self) -> bool:
-        """Level of SCL, the chip's own driver included."""
+        """Level of SCL, including the chip's own driver."""
         return bool(self._pins.level[self.port] & self.scl)
 
     def hold(self, *, sda: bool = False, scl: bool = False, clocks: int = 0) -> None:
-        """Hold lines low from outside; with `clocks`, release SDA after that many SCL pulses."""
+        """Hold lines low from outside. If `clocks` is not 0, release SDA after that many SCL pulses."""
         self._stuck_clocks = clocks if sda else 0
         mask = self.sda | self.scl
         free = (0 if sda else self.sda) | (0 if scl else self.scl)
@@ -81,13 +81,13 @@ class I2cBus:
         self.hold()
 
     def pulses(self, count: int) -> None:
-        """Count `count` clock pulses of the chip's master towards the release of a held SDA."""
+        """Count `count` clock pulses made by the chip's master towards the release of a held SDA."""
         if self._stuck_clocks:
             self._stuck_clocks = max(self._stuck_clocks - count, 0)
             if not self._stuck_clocks:
                 self.release()
 
     def _clocked(self, _cycle: int, _changed: int, levels: int) -> None:
-        """Count an SCL pulse made through the port: software recovers a held bus this way."""
+        """Count an SCL pulse that software makes through the port, which is how it recovers a held bus."""
         if levels & self.scl:
             self.pulses(1)

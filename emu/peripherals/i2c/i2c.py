@@ -1,6 +1,6 @@
-"""I2C master and slave (§11). Times are multiples of Tbrg, half a bit: (BRG + 1) / 2 Tcy, rounded down per edge.
+"""I2C master (§11). Times are multiples of Tbrg, half a bit: (BRG + 1) / 2 Tcy, rounded down per edge.
 
-UNVERIFIED: the pin-filter delay of silicon (about 0.9 us per bit) is omitted, as §11 recommends: a bit is BRG + 1 Tcy.
+UNVERIFIED: the pin-filter delay of silicon (about 0.9 us per bit) is omitted, as §11 recommends. A bit is BRG + 1 Tcy.
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ _NONE, _START, _RESTART, _STOP, _RECEIVE, _ACK, _SEND = range(7)
 """Master operations."""
 _BITS: Final = {_START: "SEN", _RESTART: "RSEN", _STOP: "PEN", _RECEIVE: "RCEN", _ACK: "ACKEN"}
 _LENGTH: Final = {_START: 2, _RESTART: 3, _STOP: 3, _RECEIVE: 16, _ACK: 2, _SEND: 18}
-"""Duration in Tbrg (§11)."""
+"""Duration of each operation in Tbrg (§11)."""
 _EIGHTH_EDGE: Final = 16
 _SEQUENCE: Final = 0x1F
-"""SEN, RSEN, PEN, RCEN and ACKEN."""
+"""Control bits that start an operation: SEN, RSEN, PEN, RCEN and ACKEN."""
 
 
 class I2c(Peripheral):
@@ -42,19 +42,19 @@ class I2c(Peripheral):
         self._port: Final = ports[self.wire.port]
         self._operation: Final = self.cell("operation", "B")
         self._begun: Final = self.timestamp("begun", NEVER)
-        """Cycle in which the operation began, clock stretching by a slave included."""
+        """Start cycle of the current operation, after any clock stretching by a slave."""
         self._half_bit: Final = self.cell("half_bit", "H")
-        """BRG + 1 of the operation: Tbrg in half Tcy."""
+        """BRG + 1 as used by the current operation; it equals Tbrg in half Tcy."""
         self._byte: Final = self.cell("byte", "B")
         self._collides: Final = self.cell("collides", "B")
-        """1 + Tbrg at which the operation ends in a collision, 0 for none."""
+        """1 + the time in Tbrg after the start at which the operation will end in a bus collision; 0 if it will not."""
         self._ack: Final = self.cell("ack", "B")
         self._address_next: Final = self.cell("address_next", "B")
         self._selected: Final = self.cell("selected", "B")
-        """1 + address of the slave in the current transaction, 0 for none."""
+        """1 + address of the slave in the current transaction; 0 if there is none."""
         self._reading: Final = self.cell("reading", "B")
         self._owns: Final = self.cell("owns", "B")
-        """Whether a transaction is open (between Start and Stop): SCL idles low."""
+        """Whether a transaction is open, that is, between Start and Stop. SCL then idles low."""
         self._stalled: Final = self.cell("stalled", "B")
         self._step: Final = self.slot("step", self._due)
         context.pins.watch(site.scl_pin, self._scl_changed)
@@ -66,7 +66,7 @@ class I2c(Peripheral):
     # -- lines -------------------------------------------------------------------------------------------------------
 
     def _edge(self, count: int) -> int:
-        """Return the cycle that lies `count` Tbrg after the start of the operation."""
+        """Return the cycle that is `count` Tbrg after the start of the operation."""
         return self._begun.value + count * self._half_bit.value // 2
 
     def _device(self) -> I2cDevice | None:
@@ -80,7 +80,7 @@ class I2c(Peripheral):
         return outside & ((self.wire.scl if scl else 0) | (self.wire.sda if sda else 0))
 
     def _own_levels(self, cycle: int) -> tuple[int, int]:
-        """Return (SCL, SDA) as driven by the master; 1 = released."""
+        """Return the levels (SCL, SDA) driven by the master; 1 means released."""
         operation = self._operation.value
         if operation == _NONE or self._stalled.value or cycle < self._begun.value:
             return (0, 1) if self._owns.value else (1, 1)
@@ -98,19 +98,19 @@ class I2c(Peripheral):
         return (passed & 1, wire >> 8 - bit & 1)
 
     def rises(self, mask: int, after: int, until: int) -> int:
-        """No other device is clocked by these pins."""
+        """Report no rising edges, because no other device is clocked by these pins."""
         return 0
 
     def nth_rise(self, mask: int, after: int, count: int) -> int:
-        """No other device is clocked by these pins."""
+        """Report no rising edges, because no other device is clocked by these pins."""
         return NEVER
 
     def constant_until(self, cycle: int) -> int:
-        """Between operations the lines are constant."""
+        """Return how long the lines stay constant: between operations, without limit."""
         return NEVER if self._operation.value == _NONE or self._stalled.value else cycle
 
     def restored(self) -> None:
-        """Attach the waveform to the pins while the module is on."""
+        """Attach the waveform to the pins if the module is on, otherwise detach it."""
         if self.con["I2CEN"]:
             self.context.pins.attach(self.wire.port, self.wire.sda | self.wire.scl, self)
         else:
@@ -143,7 +143,7 @@ class I2c(Peripheral):
     def _enabled(self, on: bool) -> None:
         """Handle a change of I2CEN: take or return the pins.
 
-        Both lines high count as a Stop (§11; e-puck firmware needs it).
+        If both lines are high, this counts as a Stop (§11; e-puck firmware needs it).
         """
         lines = self.wire.sda | self.wire.scl
         self._abort()
@@ -182,7 +182,7 @@ class I2c(Peripheral):
         self._begin(_SEND)
 
     def _begin(self, operation: int) -> None:
-        """Start an operation in the next cycle; a line held low from outside may end it at once."""
+        """Start an operation in the next cycle. A line that is held low from outside may end it immediately."""
         lines = self.wire
         self._invalidate_pins()
         self._operation.value = operation
@@ -212,7 +212,7 @@ class I2c(Peripheral):
         self._log_edges(0, end)
 
     def _first_collision(self) -> int:
-        """Return 1 + Tbrg at which the module releases SDA but reads it low, 0 if it never releases SDA (§11)."""
+        """Return 1 + the Tbrg at which the module releases SDA but reads it low; 0 if this does not happen (§11)."""
         operation = self._operation.value
         if operation == _SEND:
             ones = [bit for bit in range(8) if self._byte.value >> 7 - bit & 1]
@@ -222,12 +222,12 @@ class I2c(Peripheral):
         return {_RESTART: 2, _STOP: 4}.get(operation, 0)
 
     def _read_from_slave(self, cycle: int) -> int:
-        """Return the next byte of the addressed slave, 0xFF if no slave is addressed."""
+        """Return the next byte from the addressed slave; 0xFF if no slave is addressed."""
         device = self._device()
         return device.read(cycle) & 0xFF if device is not None and self._reading.value else 0xFF
 
     def _deliver_byte(self, cycle: int) -> bool:
-        """Deliver a complete byte to the addressed slave. Return whether it acknowledges."""
+        """Deliver a complete byte to the addressed slave. Return whether the slave acknowledges it."""
         byte = self._byte.value
         if self._address_next.value:
             self._address_next.value = 0
@@ -245,7 +245,7 @@ class I2c(Peripheral):
         if self._collides.value:
             self._collision()
         elif operation == _SEND and self.stat["TBF"]:
-            self.stat["TBF"] = 0  # the eighth falling edge; the ninth ends it
+            self.stat["TBF"] = 0  # at the eighth falling edge; the operation ends at the ninth
             self._ack.value = not self.wire.sda_high or self._deliver_byte(due)
             self.events.set(self._step, self._edge(_LENGTH[_SEND]))
             self._log_edges(_EIGHTH_EDGE, _LENGTH[_SEND])
@@ -307,14 +307,14 @@ class I2c(Peripheral):
         self._line.request()
 
     def _scl_changed(self, cycle: int, _changed: int, levels: int) -> None:
-        """Continue a stalled operation when SCL is released."""
+        """Continue a stalled operation after SCL is released."""
         if levels & self.wire.scl and self._stalled.value and not self.is_frozen:
             self._stalled.value = 0
             self._invalidate_pins()
             self._run(cycle + 1)
 
     def _log_edges(self, first: int, end: int) -> None:
-        """Write the edges of the operation from Tbrg `first` on to the log of pin changes."""
+        """Write the operation's edges, from Tbrg `first` on, to the log of pin changes."""
         log = self.context.pins.edges
         if log is None:
             return
@@ -327,7 +327,7 @@ class I2c(Peripheral):
     # -- power and reset ---------------------------------------------------------------------------------------------
 
     def thaw(self, cycle: int) -> None:
-        """Resume the clock; SCL may have been released meanwhile."""
+        """Resume the clock. SCL may have been released while it was stopped."""
         super().thaw(cycle)
         self._scl_changed(cycle, 0, self.wire.scl if self.wire.scl_high else 0)
 
@@ -336,7 +336,7 @@ class I2c(Peripheral):
         self._port.disown(self.wire.sda | self.wire.scl)
 
     def reset(self, power_on: bool) -> None:
-        """Reset to off; the port has already released the lines."""
+        """Reset to off. The port has already released the lines."""
         self._abort()
         self.slave.reset()
         self.restored()

@@ -1,4 +1,4 @@
-"""The I2C module as slave (§11), and an external master to drive it.
+"""The I2C module as slave (§11), and an external master that accesses it.
 
 All effects occur at the ninth falling clock edge of a byte: address match, acknowledge, flags, SI2CIF.
 """
@@ -16,12 +16,12 @@ from emu.system.events import Events
 
 _IDLE, _ADDRESS, _LOW_ADDRESS, _RECEIVING, _TRANSMITTING = range(5)
 _TEN_BIT: Final = 0b11110
-"""Upper bits of the first byte of a 10-bit address."""
+"""Fixed upper bits in the first byte of a 10-bit address."""
 
 
 @dataclass(frozen=True, slots=True)
 class I2cRegisters:
-    """Registers shared by the master half and the slave half of the module."""
+    """Registers shared by the module's master half and slave half."""
 
     rcv: Register
     trn: Register
@@ -31,16 +31,16 @@ class I2cRegisters:
 
 
 class I2cSlave:
-    """The slave half of the I2C module: it handles bytes from an external master."""
+    """The I2C module's slave half, which handles bytes from an external master."""
 
     def __init__(self, registers: I2cRegisters, line: Irq, state: StateCell, ten_bit: StateCell) -> None:
         self._r: Final = registers
         self._line: Final = line
         self._state: Final = state
         self._ten_bit: Final = ten_bit
-        """The 10-bit address has matched in this transaction: a repeated Start may turn it into a read."""
+        """Whether the 10-bit address has matched in this transaction; a repeated Start may then begin a read."""
         self.on_release: Callable[[], None] | None = None
-        """Called when SCLREL is set: the external master may continue."""
+        """Called when SCLREL is set, after which the external master may continue."""
 
     @property
     def is_enabled(self) -> bool:
@@ -49,21 +49,21 @@ class I2cSlave:
 
     @property
     def transmits(self) -> bool:
-        """Whether a master reads from this module: a write to I2CTRN loads the byte to send."""
+        """Whether a master reads from this module; a write to I2CTRN then loads the byte to send."""
         return self._state.value == _TRANSMITTING
 
     @property
     def stretches(self) -> bool:
-        """Whether the module stretches the clock: it holds SCL low until software sets SCLREL."""
+        """Whether the module stretches the clock, that is, holds SCL low until software sets SCLREL."""
         return self._state.value != _IDLE and not self._r.con["SCLREL"]
 
     def reset(self) -> None:
-        """Return to the idle state: not addressed."""
+        """Return to the idle state, in which the module is not addressed."""
         self._state.value = _IDLE
         self._ten_bit.value = 0
 
     def control_written(self, old: int, _new: int) -> None:
-        """Handle a write to I2CCON: SCLREL 0 -> 1 releases the clock."""
+        """Handle a write to I2CCON. A change of SCLREL from 0 to 1 releases the clock."""
         con = self._r.con
         was_released = old >> 12 & 1
         if not was_released and con["SCLREL"] and self.on_release is not None:
@@ -87,7 +87,7 @@ class I2cSlave:
         stat["GCSTAT"] = stat["ADD10"] = 0
 
     def byte(self, value: int) -> bool:
-        """Handle a byte from the master. Return whether it is acknowledged."""
+        """Handle a byte from the master. Return whether the module acknowledges it."""
         state = self._state.value
         if state == _ADDRESS:
             return self._first_byte(value)
@@ -98,12 +98,15 @@ class I2cSlave:
         return False
 
     def answer(self) -> int:
-        """Return the byte that the module sends; software has loaded it and set SCLREL."""
+        """Return the byte that the module sends. Software has loaded it and set SCLREL."""
         self._r.stat["TBF"] = 0
         return self._r.trn.value & 0xFF
 
     def answered(self, more: bool) -> None:
-        """Handle the master's ACK (`more`) or NACK of a sent byte. After an ACK the module stretches the clock."""
+        """Handle the master's ACK (`more` is true) or NACK of a sent byte.
+
+        After an ACK, the module stretches the clock.
+        """
         self._r.stat["ACKSTAT"] = not more
         if more:
             self._r.con["SCLREL"] = 0
@@ -167,7 +170,7 @@ class I2cSlave:
 
 @dataclass
 class Transfer:
-    """Result of an external master's transfer: acknowledge bits, bytes read, and whether it has ended."""
+    """Result of an external master's transfer: acknowledge bits, bytes read, and whether the transfer has ended."""
 
     acknowledged: list[bool] = field(default_factory=list)
     received: list[int] = field(default_factory=list)
@@ -175,9 +178,9 @@ class Transfer:
 
 
 class ExternalMaster:
-    """Another master on the bus, for tests and for extension boards that poll the dsPIC.
+    """External master on the bus, for tests and for extension boards that poll the dsPIC.
 
-    Its state is not in snapshots.
+    Snapshots do not contain its state.
     """
 
     def __init__(self, slave: I2cSlave, events: Events, bit_tcy: int = 151) -> None:
@@ -192,7 +195,9 @@ class ExternalMaster:
     def transfer(self, first: list[int], read_first: list[int] | None = None, count: int = 0) -> Transfer:
         """Start a transfer and return its result object.
 
-        Send `first`; with `read_first`, repeat the Start, send it and read `count` bytes; then send Stop.
+        It sends `first`. With `read_first`, it repeats the Start, sends `read_first` and reads `count` bytes. Then it
+        sends
+        Stop.
         """
         self._transfer = result = Transfer()
         self._script.clear()

@@ -15,13 +15,13 @@ from emu.system.rules import Rule, cell_of
 
 
 class Port(Peripheral):
-    """One port: TRIS, PORT and LAT, and the pins that other peripherals own."""
+    """One port: TRIS, PORT and LAT, and the pins that other peripherals use."""
 
     def __init__(self, letter: str, context: ChipContext) -> None:
         super().__init__("port" + letter, context)
         self.index: Final = PORTS.index(letter)
         self.mask: Final = context.chip.sfrs["TRIS" + letter].mask
-        context.pins.analog[self.index] = ~self.mask & 0xFFFF  # pins missing on the package read 0
+        context.pins.analog[self.index] = ~self.mask & 0xFFFF  # pins that the package lacks read 0
         self.tris: Final = self.register("TRIS" + letter)
         self.port: Final = self.register("PORT" + letter)
         self.lat: Final = self.register("LAT" + letter)
@@ -35,7 +35,7 @@ class Port(Peripheral):
         self._set_rules()
 
     def _set_rules(self, byte_stream: ByteStream | None = None) -> None:
-        """Set the rules of PORT and LAT; `byte_stream`: bytes that an external device outputs on the pins."""
+        """Set the rules of PORT and LAT. `byte_stream` describes bytes that an external device outputs on the pins."""
         record = self.record
         arrays = ("output", "level", "drive", "analog", "eager", "lazy", "before", "waveform_pins", "constant_levels",
                   "constant_until", "changed")  # fmt: skip
@@ -55,35 +55,41 @@ class Port(Peripheral):
         self.port.set_rule(Rule(operands, read_port, write_port))
 
     def attach_byte_stream(self, byte_stream: ByteStream, refresh: Callable[[int], bool]) -> None:
-        """Let rules read the bytes of an attached waveform from the record; `refresh`: see `Bus.refresh`."""
+        """Let rules read the bytes of an attached waveform from the record. For `refresh` see `Bus.refresh`."""
         self._set_rules(byte_stream)
         self.bus.refresh[self.port.address >> 1] = refresh
 
     def stops_in(self, mode: int) -> bool:
-        """Never stops: latches and pin watchers work in every power mode."""
+        """Return False: latches and pin watchers work in every power mode."""
         return False
 
     def reset(self, power_on: bool) -> None:
-        """Reset: all pins are inputs (TRIS = ones), no peripheral owns a pin. LAT is unaffected but undefined."""
+        """Reset: all pins become inputs (TRIS = ones) and return to the port.
+
+        LAT does not change; its value is undefined.
+        """
         self._owned.value = 0
         self._own_drive.value = 0
         self._own_level.value = 0
         self._drive(self.now)
 
     def own(self, mask: int, drive: bool, level: int) -> None:
-        """Take pins for a peripheral from the next cycle on: drive them with `level`, or leave them undriven."""
+        """Take pins for a peripheral from the next cycle on.
+
+        Drive them with `level` if `drive`, else leave them undriven.
+        """
         self._owned.value |= mask
         self._own_drive.value = self._own_drive.value & ~mask | (mask if drive else 0)
         self._own_level.value = self._own_level.value & ~mask | (mask if level else 0)
         self._drive(self.now + 1)
 
     def release(self, mask: int) -> None:
-        """Return pins to LAT and TRIS in the current cycle; called by events."""
+        """Return pins to LAT and TRIS in the current cycle. Events call this."""
         self._owned.value &= ~mask
         self._drive(self.now)
 
     def own_now(self, mask: int, drive: bool, level: int) -> None:
-        """Take pins for a peripheral in the current cycle; called by events."""
+        """Take pins for a peripheral in the current cycle. Events call this."""
         self._owned.value |= mask
         self._own_drive.value = self._own_drive.value & ~mask | (mask if drive else 0)
         self._own_level.value = self._own_level.value & ~mask | (mask if level else 0)
@@ -95,7 +101,7 @@ class Port(Peripheral):
         self._drive(self.now + 1)
 
     def _port_written(self, _old: int, new: int, lanes: int) -> None:
-        """Handle a write to PORT: it writes LAT. Read-modify-write instructions so copy pin levels to LAT (§6)."""
+        """Handle a write to PORT, which writes LAT. Read-modify-write instructions thus copy pin levels to LAT (§6)."""
         self.lat.value = (self.lat.value & ~lanes | new & lanes) & self.mask
         self._drive(self.now + 1)
 
@@ -111,7 +117,7 @@ class Port(Peripheral):
 
 
 class ChangeNotice(Peripheral):
-    """CN0-CN23: CNIF rises one cycle after any enabled input pin changes (§6.2); pull-ups for open pins."""
+    """CN0-CN23: CNIF rises one cycle after an enabled input pin changes (§6.2). Controls the pull-ups of open pins."""
 
     def __init__(self, context: ChipContext, irq: int) -> None:
         super().__init__("cn", context)
@@ -128,7 +134,7 @@ class ChangeNotice(Peripheral):
             context.pins.watch_port(port, mask, partial(self._edge, port), inputs_only=True)
 
     def stops_in(self, mode: int) -> bool:
-        """Never stops: change notification wakes from Sleep."""
+        """Return False: change notification can wake the chip from Sleep."""
         return False
 
     def reset(self, power_on: bool) -> None:
@@ -136,9 +142,9 @@ class ChangeNotice(Peripheral):
         self._pull(0, 0, 0)
 
     def _edge(self, port: int, cycle: int, changed: int, _levels: int) -> None:
-        """Schedule CNIF for a change of an enabled input pin.
+        """Post the rise of CNIF for a change of an enabled input pin.
 
-        UNVERIFIED: silicon compares with the level at the last PORT read; here with the level one Tcy earlier.
+        UNVERIFIED: silicon compares with the level at the last PORT read, this model with the level one Tcy earlier.
         """
         inputs = changed & self.record.u16[self._tris[port]]
         enabled = self._enables[0].value | self._enables[1].value << 16
@@ -158,7 +164,7 @@ class ChangeNotice(Peripheral):
 
 
 class ExternalInterrupts(Peripheral):
-    """INT0-INT4: the flag rises one cycle after the selected edge on the pin, whatever drives it (§5.5)."""
+    """INT0-INT4: a flag rises one cycle after the selected edge on its pin, whatever drives the pin (§5.5)."""
 
     def __init__(self, context: ChipContext, interrupts: Interrupts) -> None:
         super().__init__("int", context)
@@ -168,16 +174,16 @@ class ExternalInterrupts(Peripheral):
         self._flag: Final = self.slot("flag", self._raise)
         self._irqs: Final = [irq for _, irq in context.chip.external_pins]
         self.on_int0: Callable[[int], None] | None = None
-        """Called with the cycle in which the INT0 flag rises: an ADC trigger (§13)."""
+        """Called with the cycle in which the INT0 flag rises, which is an ADC trigger (§13)."""
         for number, (pin, _) in enumerate(context.chip.external_pins):
             context.pins.watch(pin, partial(self._edge, number))
 
     def stops_in(self, mode: int) -> bool:
-        """Never stops: external interrupts wake from Sleep."""
+        """Return False: external interrupts can wake the chip from Sleep."""
         return False
 
     def reset(self, power_on: bool) -> None:
-        """Reset: no edge is pending."""
+        """Reset: discard pending edges."""
         self._waiting.value = 0
 
     def _edge(self, number: int, cycle: int, changed: int, levels: int) -> None:

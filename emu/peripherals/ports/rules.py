@@ -1,4 +1,4 @@
-"""Rules of a port (§6): LAT and PORT written while no eager watcher is affected, PORT read."""
+"""Rules of a port (§6): writes of LAT and PORT that affect no eager watcher, and reads of PORT."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from emu.system.rules import Cell, Number, RuleBuilder
 
 @dataclass(frozen=True, slots=True)
 class ByteStream:
-    """Bytes of the record output on pins of one port: byte k from cycle `begin` + k * `width` on."""
+    """Bytes in the record that appear on pins of one port: byte k from cycle `begin` + k * `width` on."""
 
     mask: int
     shift: int
@@ -21,7 +21,7 @@ class ByteStream:
 
 @dataclass(frozen=True, slots=True)
 class PortOperands:
-    """Operands of a port's rules: its registers and its words in the arrays of `pins.py`."""
+    """Operands of a port's rules: its registers, and its words in the arrays of `pins.py`."""
 
     number: int
     implemented: int
@@ -46,7 +46,7 @@ class PortOperands:
 
 
 def read_port(m: RuleBuilder, p: PortOperands) -> Number:
-    """Read the pin levels; outputs appear one cycle late. Waveforms must be constant or a byte stream."""
+    """Return the pin levels; outputs appear one cycle late. Waveforms must be constant or a byte stream."""
     levels = m.select(m.now <= m.get(p.changed), m.get(p.before), m.get(p.level))
     waveform_pins = m.get(p.waveform_pins)
     is_constant = m.below(m.now, m.get(p.constant_until)) | (waveform_pins == 0)
@@ -64,7 +64,7 @@ def read_port(m: RuleBuilder, p: PortOperands) -> Number:
 
 
 def _write(is_port: bool, m: RuleBuilder, p: PortOperands, value: Number, lanes: int) -> bool:
-    """Write the latch: the new levels hold from the next cycle on; changes of lazy pins go to the ring."""
+    """Write the latch. The new levels apply from the next cycle on; changes of lazy pins are added to the ring."""
     free = p.implemented & lanes
     new = (m.get(p.lat) & (0xFFFF & ~free)) | (value & free)
     own, drive, level, waveform_pins = m.get(p.owned), m.get(p.drive), m.get(p.level), m.get(p.waveform_pins)

@@ -1,1 +1,1 @@
-"""Synchronous serial interfaces: SPI1, SPI2 and the data converter interface."""
+"""Synchronous serial interfaces: SPI1, SPI2 and the data converter interface (DCI)."""

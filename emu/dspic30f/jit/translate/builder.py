@@ -201,7 +201,7 @@ class LlvmBuilder:
         return self._load_indirect(ea, size, in_ram, window, self.now - ahead)
 
     def _in_ram(self, ea: Value, size: int, ptr: int | None) -> Value:
-        """Return whether an address is aligned, in RAM and, for the stack pointer, not above SPLIM (engines.md §4.3)."""
+        """Return whether an address is aligned, in RAM and, as stack pointer, not above SPLIM (engines.md §4.3)."""
         first, end = self.layout.ram
         half = self.e.let(f"trunc i64 {wide(ea - first)} to i16").text
         if size == 2:
