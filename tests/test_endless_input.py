@@ -1,4 +1,4 @@
-"""Inputs without end: every command refuses them in one line, within a limited address space."""
+"""Endless inputs: every command refuses them in one line, within a limited address space."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def limit_memory() -> None:
     ],
 )
 def test_an_endless_file_is_one_line_and_status_2(line: str, tmp_path: Path) -> None:
-    """The file is refused once it exceeds the limit."""
+    """An endless file is refused with one line and status 2 when it exceeds the size limit."""
     image = tmp_path / "image.hex"
     image.write_text(":04000000FFFF3700C7\n:00000001FF\n")
     words = [str(image) if word == "IMAGE" else word for word in line.split()]
@@ -47,7 +47,7 @@ def test_an_endless_file_is_one_line_and_status_2(line: str, tmp_path: Path) -> 
 
 
 def test_a_file_up_to_the_limit_is_read(tmp_path: Path) -> None:
-    """The limit is far above the largest image; a file of some pieces is read whole."""
+    """A file of several read blocks below the limit, which is far above the largest image, is read completely."""
     path = tmp_path / "file"
     path.write_bytes(bytes(range(256)) * (3 * files.PIECE_OCTETS // 256) + b"end")
     assert files.read_file(path) == path.read_bytes()

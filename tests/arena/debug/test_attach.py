@@ -18,7 +18,7 @@ from arena.studio.process import Studio
 from arena.studio.session import CommandRefusedError
 from arena.trial.trial import run_trial
 from tests.arena.browser import needs_browser
-from tests.arena.studio.test_studio import browsed, do, scene_of, scripted_plan, serving, settled, studio_of
+from tests.arena.studio.test_studio import do, run_probe, scene_of, scripted_plan, serving, studio_of, wait_for_state
 from tests.emu.dap.client import Client
 
 SECONDS = 2.0
@@ -75,9 +75,9 @@ def test_a_robot_can_be_debugged_from_the_present_on(clustering_image: Path) -> 
         assert not refused["success"]
         assert "the other robots have seen what came of it" in refused["message"]
         client.ask("disconnect")
-        assert settled(studio)["debugger"] is None
+        assert wait_for_state(studio)["debugger"] is None
         studio.ask("run", 1000.0)
-        settled(studio, "over")
+        wait_for_state(studio, "over")
         assert studio.ask("trial").columns == whole.rows.columns
         with pytest.raises(CommandRefusedError, match="the trial is over"):
             studio.ask("debug", 0)
@@ -141,7 +141,7 @@ def test_the_page_attaches_and_detaches_a_debugger(
             client.ask("configurationDone")
 
         threading.Thread(target=debugs, daemon=True).start()
-        found = browsed(one, PROBE, tmp_path, monkeypatch)
+        found = run_probe(one, PROBE, tmp_path, monkeypatch)
     assert (found["button"], found["none"]) == ("Attach debugger", "select a robot first")
     assert found["back"] == "Detach debugger"
     assert found["waits"].endswith(f"waits for a client of the Debug Adapter Protocol on 127.0.0.1:{found['port']}")
