@@ -44,7 +44,7 @@ class Waveform(Protocol):
         """Return the number of rising edges of the single pin in `mask` in cycles after < c <= until."""
 
     def nth_rise(self, mask: int, after: int, count: int) -> int:
-        """Return the cycle of the `count`-th rising edge after `after` (1 = next) of the one pin in `mask`, or NEVER."""
+        """Return the cycle of the `count`-th rising edge (1 = next) after `after` of the pin in `mask`, or NEVER."""
 
     def constant_until(self, cycle: int) -> int:
         """Return the first cycle after `cycle` at which `bits` may change, unless `Pins.invalidate` is called.

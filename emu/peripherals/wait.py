@@ -1,6 +1,6 @@
 """Wait for output of the firmware, in simulated time.
 
-Input: a pattern and a time limit. Output: the match, at the cycle in which its last byte has left the pin. The wait is
+Input: a pattern and a time limit. Output: the match, at the cycle in which its last byte has left the pin. Waiting is
 deterministic: the same firmware and input give the same cycle.
 """
 
@@ -14,11 +14,11 @@ from emu.peripherals.base import CpuSignals
 
 Pattern = str | bytes | re.Pattern[bytes]
 QUOTED_BYTES: Final = 200
-"""Number of received bytes that an error message quotes."""
+"""Maximum number of received bytes that an error message quotes."""
 
 
 class ExpectError(AssertionError):
-    """The expected output did not arrive in time; the message quotes what arrived instead."""
+    """The expected output did not arrive in time. The message quotes the output received instead."""
 
 
 class OutputMatcher:
@@ -33,10 +33,10 @@ class OutputMatcher:
         self.received: Final = bytearray()
         """All bytes received since the matcher was created."""
         self.position = 0
-        """Offset behind the last match; the next search starts here."""
+        """Offset after the last match, where the next search starts."""
 
     def on_byte(self, byte: int, _cycle: int) -> None:
-        """Append a received byte; end the run if the pattern matches."""
+        """Append a received byte. If the pattern matches, end the run."""
         self.received.append(byte & 0xFF)
         if self._pattern is not None and self._pattern.search(self.received, self.position):
             self._wires.end_run()
@@ -72,7 +72,7 @@ class OutputMatcher:
 
 
 def compile_pattern(pattern: Pattern) -> re.Pattern[bytes]:
-    """Return a regular expression: text and bytes match literally, compiled patterns are used as they are."""
+    """Return a regular expression. Text and bytes match literally; a compiled pattern is returned unchanged."""
     if isinstance(pattern, re.Pattern):
         return pattern
     return re.compile(re.escape(pattern.encode("latin-1") if isinstance(pattern, str) else bytes(pattern)))

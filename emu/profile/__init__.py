@@ -1,1 +1,1 @@
-"""Profiling: `cycle_shares` counts cycles, `call_graph` reconstructs calls, the other modules write viewer files."""
+"""Profiling. `cycle_shares` counts cycles, `call_graph` reconstructs calls, other modules write files for viewers."""

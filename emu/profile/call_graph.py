@@ -1,6 +1,6 @@
-"""Call graph of a run, across interrupts and threads, computed by call_graph.c.
+"""Call graph of a run, across interrupts and threads; call_graph.c computes it.
 
-Input: records of the cycle accounting. Output: `CallEdge`s, one per call site and callee, and optionally `CallEvent`s
+Input: records of the cycle accounting. Output: one `CallEdge` per call site and callee, and optionally all `CallEvent`s
 in order.
 """
 
@@ -18,9 +18,9 @@ import numpy as np
 from emu.native_library import ADDRESS, INT, functions
 
 OPEN, CLOSE, SWITCH, SLEEP = range(1, 5)
-"""Kinds of call events: a function or handler begins or ends, the stack changes, the CPU has slept."""
+"""Kinds of call events: entry to a function or handler, its end, a change of stack, the end of a sleep."""
 NOWHERE: Final = 0xFFFFFF
-"""Call site of handlers and of a stack's first function, which no instruction calls."""
+"""Call site for handlers and for a stack's first function, which no instruction calls."""
 _EDGE_WORDS, _MOST_EDGES, _STACKS = 6, 1 << 16, 128
 _EVENT_TYPE: Final = np.dtype([
     ("cycle", "<u8"), ("since", "<u8"), ("what", "<u4"), ("stack", "<u4"), ("raised", "<u4"), ("entry", "<u4"),
@@ -47,7 +47,7 @@ class CallEdge:
     """Calls from one call site to one function. Handlers and a stack's first function have no call site."""
 
     site: int | None
-    """Program address of the call instruction, None for handlers and a stack's first function."""
+    """Program address of the call instruction; None for handlers and a stack's first function."""
     entry: int
     calls: int
     cycles: int
@@ -58,13 +58,13 @@ class CallEdge:
 
 
 class CallEvent(NamedTuple):
-    """A call event in `cycle`. A named tuple, because constructing one takes half the time of a dataclass."""
+    """A call event at `cycle`. It is a named tuple, whose construction takes half the time of a dataclass's."""
 
     cycle: int
     since: int
     """Cycle in which the handler's interrupt was requested."""
     what: int
-    """OPEN, CLOSE, SWITCH or SLEEP."""
+    """Kind of event: OPEN, CLOSE, SWITCH or SLEEP."""
     stack: int
     """Number of the current stack."""
     raised: int
@@ -73,11 +73,11 @@ class CallEvent(NamedTuple):
     site: int
     """Program address of the call, or of the interrupted instruction."""
     length: int
-    """Tcy of a sleep that ends in `cycle`."""
+    """Length in Tcy of a sleep that ends at `cycle`."""
 
 
 class CallGraph:
-    """Builds the call graph from accounting records; the program is at `entry` in `cycle`. `timed` keeps the events."""
+    """Builds the call graph from accounting records. The program is at `entry` at `cycle`. `timed` keeps the events."""
 
     def __init__(self, cycle: int, entry: int, timed: bool = False) -> None:
         self._code: Final = _code()
@@ -85,7 +85,7 @@ class CallGraph:
         self._at: Final = ctypes.addressof(self._memory)
         self._parts: Final[list[Any]] = []
         self._room = np.empty(0, dtype=_EVENT_TYPE)
-        """Reused buffer for events: allocating it each time would take longer than filling it."""
+        """Reused buffer for events; allocating one for each call would take longer than filling it."""
         self._timed: Final = timed
         self._code["call_graph_begin"](self._at, cycle, entry)
 
@@ -101,11 +101,11 @@ class CallGraph:
         self._parts.append(self._room[:made].copy())
 
     def clear(self, cycle: int) -> None:
-        """Restart counting in `cycle`, with the current stacks."""
+        """Restart counting at `cycle`, with the current stacks."""
         self._code["call_graph_clear"](self._at, cycle)
 
     def end(self, cycle: int) -> list[CallEdge]:
-        """End the run in `cycle` and return all edges. Raises OverflowError if a table of call_graph.c is full."""
+        """End the run at `cycle` and return all edges. Raises OverflowError if a table of call_graph.c is full."""
         self._code["call_graph_end"](self._at, cycle)
         if self._code["call_graph_lost"](self._at):
             raise OverflowError(f"more than {_MOST_EDGES - 1} call edges, or calls nested deeper than the tables allow")

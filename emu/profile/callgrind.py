@@ -1,7 +1,7 @@
-"""A profile in Callgrind's format, for callgrind_annotate and KCachegrind.
+"""Output of a profile in Callgrind's format, for callgrind_annotate and KCachegrind.
 
 Format: "Callgrind Format Specification" of the Valgrind documentation, version 1, positions "instr line", absolute.
-Costs are Tcy. Inlined code keeps its file (fi/fe). Sleep is not included: the sum is the busy time of the CPU.
+Costs are Tcy. Inlined code keeps its file (fi/fe). Sleep is not included, so the sum is the busy time of the CPU.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from emu.profile.cycle_shares import CodeLocation, Profile
 
 
 def lines(profile: Profile, image: str, location_of: Callable[[int], CodeLocation]) -> Iterator[str]:
-    """Yield the lines of the file."""
+    """Yield the text lines of the file."""
     yield "# callgrind format"
     yield "version: 1"
     yield "creator: emu profile"

@@ -1,6 +1,6 @@
-"""Exact cycle counts by instruction, function, interrupt level and Idle, with the call graph.
+"""Exact cycle counts by instruction, function, interrupt level and Idle, together with the call graph.
 
-Input: a machine with its image. Output: a `Profile`, whose numbers add up to the cycles run. Exception entry (the
+Input: a machine with its image. Output: a `Profile`, whose numbers add up to the total of cycles. Exception entry (the
 forced NOPs and pushes, isa.md §14.2) counts for the handler, at its level.
 """
 
@@ -26,15 +26,15 @@ if TYPE_CHECKING:
     from emu.machine.stops import Stop
 
 CodeLocation = tuple[str, str, int]
-"""Function, source file and line; "" and 0 for code without lines."""
+"""(function, source file, line) of code; "" and 0 for code without line information."""
 
 
 @dataclass(slots=True)
 class Profile:
-    """Cycles of a run by address, function, line and priority, with the call graph."""
+    """Cycles of a run by address, function, line and priority; call graph."""
 
     entry: int = 0
-    """Program counter at the start."""
+    """Program address at the start of the profile."""
     start: int = 0
     """First counted cycle."""
     end: int = 0
@@ -49,9 +49,9 @@ class Profile:
     edges: list[CallEdge] = field(default_factory=list)
     """Call graph: call sites, callees, numbers and cycles of calls."""
     events: Iterable[CallEvent] = ()
-    """Call events in order, if `timed`; an iterable that can be consumed once."""
+    """Call events in order, if `timed`. The iterable can be consumed only once."""
     stop: Stop | None = None
-    """Why the run ended early, None if it did not."""
+    """Stop that ended the run early; None if there was none."""
 
     @property
     def functions(self) -> Counter[str]:
@@ -60,7 +60,7 @@ class Profile:
 
     @property
     def files(self) -> Counter[str]:
-        """Cycles by source file; "" is code without lines."""
+        """Cycles by source file; "" stands for code without line information."""
         return self._summed(1)
 
     def _summed(self, part: int) -> Counter[str]:
@@ -76,7 +76,7 @@ class Profile:
 
     @property
     def cycles(self) -> int:
-        """All cycles."""
+        """Total number of cycles."""
         return self.busy + self.idle
 
     def group(self, patterns: list[str]) -> int:
@@ -84,7 +84,7 @@ class Profile:
         return sum(cycles for place, cycles in self.locations.items() if _matches(place, patterns))
 
     def matched(self, pattern: str) -> bool:
-        """Whether a pattern matches any executed code."""
+        """Return whether a pattern matches any executed code."""
         return any(_matches(place, [pattern]) for place in self.locations)
 
 
@@ -93,9 +93,9 @@ def _matches(place: CodeLocation, patterns: list[str]) -> bool:
 
 
 class Profiler:
-    """Profiles `machine`, whose engine must be jit or plain. `timed` also keeps the call events.
+    """Profiler of `machine`, whose engine must be jit or plain. `timed` also keeps the call events.
 
-    Raises ValueError for another engine.
+    Raises ValueError for any other engine.
     """
 
     def __init__(self, machine: Machine, image: Image, timed: bool = False) -> None:
@@ -112,14 +112,14 @@ class Profiler:
         self._inside: Final[dict[int, frozenset[str]]] = {}
         self._locations: Final[dict[int, CodeLocation]] = {}
         self.hz: Final = machine.hz
-        """Cycles in a second."""
+        """Cycles per second."""
 
     @cached_property
     def _inspector(self) -> Inspector:
         return Inspector(self._machine)
 
     def run(self, until: int, skip: int = 0) -> Profile:
-        """Run to cycle `until`, counting from cycle `skip` on; a stop of the machine ends the run early."""
+        """Run to cycle `until` and count from cycle `skip` on. A stop of the machine ends the run early."""
         machine, accounting, entry = self._machine, self._accounting, self._machine.pc
         close = self._open()
         try:
@@ -136,7 +136,7 @@ class Profiler:
 
     @contextmanager
     def counting(self) -> Iterator[Profile]:
-        """Count the cycles run inside the block; the profile is complete after it."""
+        """Count the cycles that run inside the block. The profile is complete after the block."""
         profile = Profile(self._machine.pc, self._machine.cycle)
         close = self._open()
         try:
@@ -146,7 +146,7 @@ class Profiler:
             self._read(profile)
             profile.idle = (
                 profile.end - profile.start - profile.busy
-            )  # a sleep may be skipped in one step without a record
+            )  # a step may skip a whole sleep without a record
 
     def _open(self) -> Callable[[], None]:
         if self._native is not None:
@@ -155,7 +155,7 @@ class Profiler:
         return self._accounting.stop
 
     def _advance(self, until: int) -> Stop | None:
-        self._machine.events.kick()  # make native code account every cycle
+        self._machine.events.kick()  # makes native code account for every cycle
         return self._machine.advance(until)
 
     def _read(self, profile: Profile) -> None:
@@ -177,7 +177,7 @@ class Profiler:
             profile.events = self._call_graph.events()
 
     def row_of(self, pc: int) -> int:
-        """Return the first address of the code range around `pc` with the same function and line."""
+        """Return the first address of the code range that contains `pc` and has one function and line."""
         row = self._rows.get(pc)
         if row is None:
             line, symbol = self._image.lines.find(pc), self._image.symbols.code(pc)
@@ -188,7 +188,7 @@ class Profiler:
         return row
 
     def inside(self, pc: int) -> frozenset[str]:
-        """Return the functions that contain an instruction, inlined ones included, from the debug information."""
+        """Return the functions that contain an instruction, including inlined ones, from the debug information."""
         known = self._inside.get(pc)
         if known is None:
             function = self._inspector.debug.function(pc)

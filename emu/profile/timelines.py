@@ -1,9 +1,9 @@
-"""Timelines of a profile for speedscope and for Perfetto, as the text of their files.
+"""Timelines of a profile for speedscope and Perfetto, as the text of their files.
 
-speedscope: its file-format-schema, evented profiles in Tcy, one for every thread and interrupt level. Perfetto: the
-"Trace Event Format" of Chrome: slices on a track per thread and level, and flows. Flows lead from interrupt requests to
-their handlers, and from the sending of an OpenSwarm event to the first listener of its delivery round. Times are in µs
-with fractions; the exact cycle is in `args`.
+speedscope: its file-format-schema, with evented profiles in Tcy, one per thread and interrupt level. Perfetto: the
+"Trace Event Format" of Chrome, with slices on a track per thread and level, and flows. Flows lead from an interrupt
+request to its handler, and from the sending of an OpenSwarm event to the first listener of its delivery round. Times
+are in µs with fractions; the exact cycle is in `args`.
 """
 
 from __future__ import annotations
@@ -19,15 +19,15 @@ SENDS: Final = ("Sys_Send_Event", "Sys_Send_IntEvent")
 DELIVERIES: Final = frozenset({"run_handlers", "evaluate_conditions"})
 """Kernel functions, inlined or not, that call the listeners of an event (firmware/openswarm/kernel/event.c)."""
 ROBOT: Final = 1
-"""Process number of the one robot."""
+"""Process number of the single robot."""
 LEVEL_TRACKS: Final = 10
-"""Thread number of level 0; the numbers of threads follow those of levels."""
+"""Thread number of interrupt level 0. Numbers of threads follow those of the levels."""
 
 
 def speedscope(
     tracks: Tracks, location_of: Callable[[int], CodeLocation], name: str, start: int, end: int
 ) -> Iterator[str]:
-    """Yield the parts of a speedscope file."""
+    """Yield the text of a speedscope file in parts."""
     frames: list[dict[str, Any]] = []
     known: dict[int, int] = {}
     profiles: dict[Track, list[str]] = {}
@@ -70,9 +70,9 @@ def perfetto(
     hz: float,
     inside: Callable[[int], frozenset[str]],
 ) -> Iterator[str]:
-    """Yield the parts of a file in the Trace Event Format.
+    """Yield the text of a file in the Trace Event Format in parts.
 
-    `hz`: cycles per second; `inside(pc)`: the functions that contain an address, inlined ones included.
+    `hz`: cycles per second. `inside(pc)`: returns the functions that contain an address, including inlined ones.
     """
     whole = dumps({"traceEvents": [], "displayTimeUnit": "ns", "otherData": {"cycles_per_second": hz}})
     first, last = whole.split("]", 1)
@@ -93,7 +93,7 @@ def _events(
     tracks: Tracks, location_of: Callable[[int], CodeLocation], hz: float, inside: Callable[[int], frozenset[str]],
     seen: set[Track],
 ) -> Iterator[str]:  # fmt: skip
-    """Yield the events as text, because a second has tens of thousands. `seen` receives their tracks."""
+    """Yield the events one by one as text, because a second has tens of thousands. Add their tracks to `seen`."""
     sent: list[str] = []
     flows = 0
     texts: dict[int, tuple[str, str, str]] = {}

@@ -1,6 +1,6 @@
-"""Tracks of a timeline: one per stack of the firmware and one per interrupt level.
+"""Tracks of a timeline: one per firmware stack and one per interrupt level.
 
-Input: call events. Output: `TrackEvent`s in order of time. While a track is suspended, no function is open on it; its
+Input: call events. Output: `TrackEvent`s sorted by time. While a track is suspended, no function is open on it; its
 functions are reopened when it resumes. The open time of all tracks is therefore the busy time of the CPU.
 """
 
@@ -15,22 +15,22 @@ from emu.profile.call_graph import CLOSE, OPEN, SLEEP, SWITCH, CallEvent
 THREAD_START: Final = "_os_thread_start"
 """Assembly function that calls a thread's function (firmware/openswarm/port/dspic30f/switch.S)."""
 MAIN: Final = (0, 0)
-"""The track of the first stack."""
+"""Track of the first stack."""
 Track = tuple[int, int]
 """(stack, number of earlier threads on it); for a handler (-1, CPU priority)."""
 
 
 class TrackEvent(NamedTuple):
-    """Begin or end of a function on a track."""
+    """Begin or end of a function's slice on a track."""
 
     cycle: int
     track: Track
     begins: bool
     entry: int
     is_new: bool
-    """True for a call or return, False for a resumption or suspension."""
+    """Whether the cause is a call or return; False for a resumption or suspension of the track."""
     since: int = 0
-    """For the entry of a handler: the cycle of the request."""
+    """For the entry of a handler: cycle of the interrupt request."""
     site: int = 0
     """Program address of the call."""
 
@@ -38,8 +38,8 @@ class TrackEvent(NamedTuple):
 class Tracks:
     """Converts call events to track events.
 
-    `name_of(pc)`: the function that contains an address. Track events cover the cycles from `start` to `end`; the
-    program began at `entry`.
+    `name_of(pc)` returns the function that contains an address. Track events cover the cycles from `start` to `end`.
+    The program began at `entry`.
     """
 
     def __init__(
@@ -47,16 +47,16 @@ class Tracks:
     ) -> None:
         self._name_of: Final = name_of
         self._stacks: Final[dict[int, list[tuple[int, int | None]]]] = {0: [(entry, None)]}
-        """Frames by stack: entry, and the level of a handler."""
+        """Open frames by stack: entry address, and the level if it is a handler."""
         self._times: Final[Counter[int]] = Counter()
         """Number of threads that have started on a stack."""
         self._current = 0
         self._names: Final[dict[Track, str]] = {MAIN: "main"}
         self.events: Final = list(self._track_events(events, start, end))
-        """All track events in order of time."""
+        """All track events sorted by time."""
 
     def title(self, track: Track) -> str:
-        """Return the name of a track: that of the thread's function, or `level 4`."""
+        """Return the title of a track: the name of the thread's function, or `level 4`."""
         if track[0] < 0:
             return f"level {track[1]}"
         return self._names.get(track, f"stack {track[0]}")
@@ -98,7 +98,7 @@ class Tracks:
                 yield from self._resume(event.cycle)
 
     def _track(self) -> Track:
-        """Return the track of the highest interrupt level on the current stack, or of its thread."""
+        """Return the track of the highest interrupt level on the current stack; without interrupts, of its thread."""
         stack = self._stacks[self._current]
         for _, level in reversed(stack):
             if level is not None:

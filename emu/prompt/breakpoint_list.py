@@ -1,4 +1,4 @@
-"""Numbered breakpoints of a prompt. The server receives them as complete lists of each kind."""
+"""Numbered breakpoints of a prompt. For each kind, the server receives the complete list."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ REQUESTS: Final = {
 
 @dataclass(eq=False, slots=True)
 class PromptBreakpoint:
-    """One breakpoint of the user."""
+    """One breakpoint, as set by the user."""
 
     number: int
     list: str
-    """Name of its list: a key of REQUESTS, or the path of a source file."""
+    """Key of the list that contains the breakpoint: a key of REQUESTS, or the path of a source file."""
     row: Row
-    """The breakpoint in the form of the protocol."""
+    """Arguments of the breakpoint for the debug protocol's request."""
     text: str
-    """The location as the user wrote it."""
+    """Location as typed by the user."""
     is_temporary: bool = False
     is_enabled: bool = True
     facts: Row = field(default_factory=dict)
@@ -63,7 +63,7 @@ class BreakpointList:
         return made
 
     def send(self, kinds: Iterable[str]) -> None:
-        """Send the lists of the given kinds to the server."""
+        """Send the complete lists of the given kinds to the server."""
         for kind in set(kinds):
             selected = [one for one in self.all if one.list == kind and one.is_enabled]
             more = {} if kind in REQUESTS else {"source": {"path": kind}}
@@ -73,7 +73,7 @@ class BreakpointList:
                 one.facts = facts
 
     def find(self, text: str) -> PromptBreakpoint:
-        """Return the breakpoint with a number. Raises CommandRefusedError."""
+        """Return the breakpoint whose number is `text`. Raises CommandRefusedError if there is none."""
         found = next((one for one in self.all if text == str(one.number)), None)
         if found is None:
             raise CommandRefusedError(f"there is no breakpoint {text or 'without a number'}")
@@ -86,7 +86,7 @@ class BreakpointList:
         self.send(one.list for one in breakpoints)
 
     def take_hit(self, ids: list[int]) -> list[PromptBreakpoint]:
-        """Return the breakpoints that ended a run, and delete the temporary ones among them."""
+        """Return the breakpoints whose hit ended a run, and delete the temporary ones among them."""
         hit = [one for one in self.all if one.is_enabled and one.facts.get("id") in ids]
         self.delete([one for one in hit if one.is_temporary])
         return hit

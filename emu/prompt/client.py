@@ -1,4 +1,4 @@
-"""Synchronous client of a debug server: a call returns when the request is answered and the machine is paused."""
+"""Synchronous client of a debug server. A call returns when the request is answered and the machine is paused."""
 
 from __future__ import annotations
 
@@ -16,25 +16,25 @@ Row = dict[str, Any]
 
 
 class CommandRefusedError(Exception):
-    """The server has refused a command. The text is for the user."""
+    """The server has refused a command. The text is shown to the user."""
 
 
 class DebugServer(Protocol):
-    """A server in this or another process, for example `emu.dap.server.Server`."""
+    """Debug server in this or another process, for example `emu.dap.server.Server`."""
 
     @property
     def is_over(self) -> bool:
         """Whether the client has disconnected."""
 
     def handle_request(self, message: Message) -> None:
-        """Respond to one request and return when the machine is paused."""
+        """Respond to one request, and return when the machine is paused."""
 
     def release(self) -> None:
         """Detach from the debuggee."""
 
 
 class Client:
-    """Client of the server that `make_server` creates. `say(text)` prints output of the firmware and of the server."""
+    """Client of the server created by `make_server`. `say(text)` prints output of the firmware and the server."""
 
     def __init__(self, make_server: Callable[[Channel], DebugServer], say: Callable[[str], None]) -> None:
         self.inbox: Final[SimpleQueue[Message | None]] = SimpleQueue()
@@ -44,10 +44,10 @@ class Client:
         self._reply: Message = {}
         self._stop_event: Row = {}
         self.result_text = ""
-        """Text of the response to the last `resume`, empty if it had none."""
+        """Text of the response to the last `resume`; empty if it had none."""
 
     def send(self, message: Message) -> None:
-        """Handle a message of the server."""
+        """Handle a message from the server."""
         if message["type"] == "response":
             if message["request_seq"] == self._seq:
                 self._reply = message
@@ -57,7 +57,7 @@ class Client:
             self._stop_event = message["body"]
 
     def ask(self, command: str, **arguments: Any) -> Row:
-        """Send a request and return the body of the response. Raises CommandRefusedError."""
+        """Send a request and return the response's body. Raises CommandRefusedError."""
         self._seq += 1
         with self._interruptible():
             self.server.handle_request(
@@ -69,14 +69,17 @@ class Client:
         return body
 
     def resume(self, command: str, **arguments: Any) -> Row:
-        """Send a request that moves the machine and return the body of the stop event. Raises CommandRefusedError."""
+        """Send a request that runs, steps or rewinds the machine. Return the stop event's body.
+
+        Raises CommandRefusedError.
+        """
         self._stop_event = {}
         self.result_text = str(self.ask(command, **arguments).get("result", ""))
         return self._stop_event
 
     @contextmanager
     def _interruptible(self) -> Iterator[None]:
-        """Let Ctrl-C pause the machine instead of ending the program."""
+        """Make Ctrl-C pause the machine inside the block instead of ending the program."""
         if threading.current_thread() is not threading.main_thread():
             yield
             return
@@ -86,5 +89,5 @@ class Client:
             yield
         finally:
             signal.signal(signal.SIGINT, before)
-            while not self.inbox.empty():  # the machine may have stopped at the same moment
+            while not self.inbox.empty():  # the machine may have stopped just before Ctrl-C
                 self.inbox.get()

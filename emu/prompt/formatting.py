@@ -1,4 +1,4 @@
-"""Responses of the server formatted for a terminal."""
+"""Formatting of the server's responses for a terminal."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from typing import Any, Final
 from emu.prompt.client import CommandRefusedError, Row
 
 PER_ROW: Final = 8
-"""Registers or units of memory in one line."""
+"""Number of registers or memory units per line."""
 ROW_BYTES: Final = 16
 INTEGER: Final = re.compile(r"0x[0-9a-fA-F]+|-?\d+")
 FORMATS: Final = "xdutca"
 
 
 def frame(row: Row) -> str:
-    """Return a frame as text: `add at program.c:12`."""
+    """Return a frame as text such as `add at program.c:12`."""
     if row.get("source"):
         return f"{row['name']} at {row['source']['name']}:{row['line']}"
     return f"{row['name']} at {row['instructionPointerReference']}"
@@ -31,7 +31,7 @@ def backtrace(frames: Sequence[Row], at: int) -> str:
 
 
 def source(path: str, first: int, last: int, here: int = 0) -> str:
-    """Return lines of a file with their numbers and mark line `here`. Raises CommandRefusedError if there are none."""
+    """Return numbered lines of a file and mark line `here`. Raises CommandRefusedError if there are none."""
     try:
         lines = Path(path).read_text(encoding="utf-8", errors="replace").splitlines()
     except OSError as error:
@@ -44,7 +44,7 @@ def source(path: str, first: int, last: int, here: int = 0) -> str:
 
 
 def number(text: str, form: str) -> str:
-    """Return the number at the beginning of a value in format `form`. Raises CommandRefusedError.
+    """Return the number at the start of a value's text, in format `form`. Raises CommandRefusedError.
 
     The formats are hexadecimal (x), signed (d) and unsigned (u) decimal, binary (t), character (c) and address (a).
     """
@@ -67,7 +67,7 @@ def number(text: str, form: str) -> str:
 
 
 def registers(rows: Sequence[Row]) -> str:
-    """Return the working registers in lines of eight, then the others."""
+    """Return the working registers, eight per line, then the other registers."""
     texts = [(one["name"], f"{int(one['value']):#06x}" if one["value"].isdecimal() else one["value"]) for one in rows]
     working = [f"{name}={value}" for name, value in texts if name.startswith("W")]
     lines = ["  ".join(f"{one:<11}" for one in working[at : at + PER_ROW]) for at in range(0, len(working), PER_ROW)]
@@ -96,7 +96,7 @@ def sfrs(groups: Sequence[Row], requested: str) -> str:
 
 
 def memory(row: Row, size: int, form: str) -> str:
-    """Return units of `size` bytes in lines of 16 bytes; with form "s" a string."""
+    """Return memory as units of `size` bytes, 16 bytes per line; with form "s" as a string."""
     data = base64.b64decode(row.get("data", ""))
     address = int(row["address"], 16)
     if form == "s":
@@ -114,7 +114,7 @@ def memory(row: Row, size: int, form: str) -> str:
 
 
 def disassembly(rows: Sequence[Row], here: int) -> str:
-    """Return one instruction per line, with source lines and function names where they begin."""
+    """Return one instruction per line. A source line or function name precedes its first instruction."""
     lines = []
     for row in rows:
         if row.get("presentationHint") == "invalid":

@@ -1,4 +1,4 @@
-"""Command input: from a terminal with history and completion, or from a script with one command per line."""
+"""Command input, from a terminal with history and completion, or from a script with one command per line."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ if TYPE_CHECKING:
     from emu.dap.wire import Channel
 
 LOCATION_COMMANDS: Final = ("break", "tbreak", "until", "list", "log", "disassemble")
-"""Commands with a location as argument."""
+"""Commands that take a location as argument."""
 
 
 class Prompt:
-    """Prompt for the server that `make_server` creates. `program` is the command's name in error messages."""
+    """Prompt for the server created by `make_server`. `program` is the command's name in error messages."""
 
     def __init__(self, program: str, make_server: Callable[[Channel], DebugServer]) -> None:
         self._program: Final = program
@@ -35,9 +35,9 @@ class Prompt:
         self.session: Final = DebugSession(self.client, self._write)
 
     def serve(self, launch: Row, source: TextIO) -> int:
-        """Execute commands to the end and return the exit status.
+        """Execute commands until the input ends or the user quits. Return the exit status.
 
-        It is DONE; for a script also FAULT if the script ends at a fault, and BAD_INPUT if a command fails.
+        The status is DONE. For a script it is FAULT if the script ends at a fault, and BAD_INPUT if a command fails.
         """
         at_terminal = source.isatty()
         try:
@@ -84,7 +84,7 @@ class Prompt:
         return DONE
 
     def _print_output(self, text: str) -> None:
-        """Print output of the firmware unchanged."""
+        """Print the firmware's output unchanged."""
         sys.stdout.write(text)
         sys.stdout.flush()
         self._column = 0 if text.endswith("\n") else 1
@@ -104,7 +104,7 @@ def execute(session: DebugSession, line: str) -> Command:
 
 
 def split(line: str) -> tuple[str, str]:
-    """Divide a line into command and arguments, also in the form `x/8xb buffer`."""
+    """Split a line into command and arguments. The form `x/8xb buffer` is accepted too."""
     words = line.strip().split(maxsplit=1)
     word, rest = words[0], words[1] if len(words) > 1 else ""
     name, slash, form = word.partition("/")
@@ -112,7 +112,7 @@ def split(line: str) -> tuple[str, str]:
 
 
 def candidates(session: DebugSession, text: str) -> Iterator[tuple[str, int, str]]:
-    """Yield completions of a line: the name, the number of last characters that it replaces, and its kind."""
+    """Yield completions of a line: name, number of trailing characters that it replaces, and kind."""
     word, space, rest = text.lstrip().partition(" ")
     if not space:
         yield from ((one.name, len(word), "command") for one in TABLE if one.name.startswith(word))
@@ -136,7 +136,7 @@ def candidates(session: DebugSession, text: str) -> Iterator[tuple[str, int, str
 
 
 def _editor(session: DebugSession) -> PromptSession[str]:
-    """Return a line editor with completion by Tab. It keeps its history in a file if that can be written."""
+    """Return a line editor with Tab completion. It keeps its history in a file if that file can be written."""
     from prompt_toolkit import PromptSession
     from prompt_toolkit.completion import Completer, Completion
     from prompt_toolkit.history import FileHistory, InMemoryHistory

@@ -1,4 +1,4 @@
-"""Commands that move the machine: forward, back, to a cycle."""
+"""Commands that run, step or rewind the machine."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def _count(text: str) -> int:
 
 
 def _repeat(session: DebugSession, text: str, request: str, **more: str) -> None:
-    """Send a step request several times, until a stop for another reason."""
+    """Send a step request repeatedly, until the machine stops for another reason."""
     for _ in range(_count(text)):
         if session.resume(request, **more) != "step":
             return

@@ -1,4 +1,4 @@
-"""State of a prompt: the current stop, the selected thread and frame, and the meaning of locations."""
+"""State of a prompt: current stop, selected thread and frame; parsing of locations."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from emu.prompt.breakpoint_list import BreakpointList
 from emu.prompt.client import Client, CommandRefusedError, Row
 
 LISTING_LINES: Final = 10
-"""Lines of a listing, and instructions of a disassembly."""
+"""Number of lines in a source listing, and of instructions in a disassembly."""
 
 
 class DebugSession:
-    """The state that commands act on. `write(text)` prints a line."""
+    """State on which the commands act. `write(text)` prints a line."""
 
     def __init__(self, client: Client, write: Callable[[str], None]) -> None:
         self.client: Final = client
         self.breakpoints: Final = BreakpointList(client)
         self.at_fault = False
-        """Whether the machine is at a fault of the firmware."""
+        """Whether the machine has stopped at a firmware fault."""
         self.write: Final = write
         self.frames: list[Row] = []
         self.at = 0
@@ -42,18 +42,21 @@ class DebugSession:
         return self.frames[self.at] if self.frames else None
 
     def time(self) -> str:
-        """Return cycle, seconds, and the distance to the present as text."""
+        """Return as text the cycle, the seconds, and the distance to the present."""
         return str(self.client.ask("evaluate", expression="/time", context="repl")["result"])
 
     def resume(self, request: str, **arguments: Any) -> str:
-        """Send a request that moves the machine, report the stop, and return its reason. Raises CommandRefusedError."""
+        """Send a request that runs, steps or rewinds the machine; report the stop and return its reason.
+
+        Raises CommandRefusedError.
+        """
         event = self.client.resume(request, threadId=self.thread, **arguments)
         self.has_run = request != "restart"
         self.report_stop(event)
         return str(event["reason"])
 
     def run_console_command(self, text: str) -> None:
-        """Execute a command of the server's console. Raises CommandRefusedError."""
+        """Execute a console command of the server. Raises CommandRefusedError."""
         event = self.client.resume("evaluate", expression=text, context="repl")
         if event:
             self.has_run = True
@@ -62,7 +65,7 @@ class DebugSession:
             self.write(self.client.result_text)
 
     def disconnect(self, terminate_debuggee: bool) -> None:
-        """End the session; with `terminate_debuggee` also the debuggee."""
+        """End the session. With `terminate_debuggee`, also end the debuggee."""
         self.client.ask("disconnect", terminateDebuggee=terminate_debuggee)
 
     def report_stop(self, event: Row) -> None:
@@ -106,14 +109,14 @@ class DebugSession:
         return self.client.ask("evaluate", expression=text, context="watch", **frame)
 
     def number(self, text: str) -> int:
-        """Return the value of an expression, for an array its address. Raises CommandRefusedError."""
+        """Return an expression's value; for an array, its address. Raises CommandRefusedError."""
         found = self.evaluate(text)
         if found.get("type", "").endswith("]"):
             return int(found["memoryReference"], 16)
         return int(formatting.number(found["result"], "d"))
 
     def scope(self, name: str) -> list[Row]:
-        """Return the variables of a scope of the selected frame. Raises CommandRefusedError."""
+        """Return the variables in a scope of the selected frame. Raises CommandRefusedError."""
         if self.frame is None:
             raise CommandRefusedError("there is no frame")
         scopes = self.client.ask("scopes", frameId=self.frame["id"])["scopes"]
@@ -124,7 +127,7 @@ class DebugSession:
     # Locations
 
     def source_location(self, text: str) -> tuple[str, int]:
-        """Return path and line of a location. Raises CommandRefusedError."""
+        """Return the path and line of a location. Raises CommandRefusedError."""
         kind, row = self.location(text)
         if kind not in ("function", "instruction"):
             return kind, int(row["line"])
@@ -135,7 +138,7 @@ class DebugSession:
         return first["location"]["path"], int(first["line"])
 
     def location(self, text: str) -> tuple[str, Row]:
-        """Return the breakpoint list of a location and its row there. Raises CommandRefusedError."""
+        """Return the breakpoint list for a location, and its entry in that list. Raises CommandRefusedError."""
         if not text:
             raise CommandRefusedError("expected FUNCTION, LINE, FILE:LINE or *ADDRESS")
         if text.startswith("*"):
@@ -146,7 +149,10 @@ class DebugSession:
         return self.path(file if colon else ""), {"line": int(line)}
 
     def path(self, file: str) -> str:
-        """Return the path of a source by its name, or that of the selected frame. Raises CommandRefusedError."""
+        """Return the path of the source called `file`; if empty, of the selected frame's.
+
+        Raises CommandRefusedError.
+        """
         if not file:
             if self.list_position[0]:
                 return self.list_position[0]

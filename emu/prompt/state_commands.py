@@ -1,4 +1,4 @@
-"""Commands that show or change the state of the paused machine."""
+"""Commands that show or change the paused machine's state."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ TOPICS: Final = {
 
 
 def _formatted(text: str) -> tuple[int, str, str]:
-    """Return count, letters and rest of `/COUNTLETTERS REST`."""
+    """Split `/COUNTLETTERS REST` and return count, letters and rest."""
     match = FORMAT.fullmatch(text)
     return (int(match[1] or 1), match[2], match[3].strip()) if match is not None else (1, "", text)
 

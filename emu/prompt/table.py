@@ -21,11 +21,11 @@ class Command:
     handler: Handler
     aliases: tuple[str, ...] = ()
     repeats: bool = False
-    """Whether an empty line at a terminal repeats it."""
+    """Whether an empty line at a terminal repeats the command."""
 
     @property
     def name(self) -> str:
-        """First word of the usage."""
+        """Name of the command, the first word of its usage."""
         return self.usage.split()[0].split("[")[0]
 
 
@@ -33,7 +33,7 @@ TABLE: Final[list[Command]] = []
 
 
 def command(usage: str, text: str, *aliases: str, repeats: bool = False) -> Callable[[Handler], Handler]:
-    """Register a function as a command."""
+    """Return a decorator that registers a function as a command."""
 
     def enter(handler: Handler) -> Handler:
         TABLE.append(Command(usage, text, handler, aliases, repeats))

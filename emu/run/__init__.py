@@ -1,1 +1,1 @@
-"""A run from the command line: session, UART consoles and the log of timestamped input."""
+"""Runs from the command line: session, host ports of the UARTs, and the log of timestamped input."""

@@ -1,6 +1,6 @@
-"""Log of input with the cycle of its arrival, written by a live session and read by a replay.
+"""Log of input with the cycles of its arrival. A live session writes it, and a replay reads it.
 
-The file is text, one line per arrival, `CYCLE UART HEX`, in order of time; lines that start with # are comments.
+The file is text with one line per arrival, `CYCLE UART HEX`, sorted by time. Lines that begin with # are comments.
 """
 
 from __future__ import annotations
@@ -15,19 +15,19 @@ HEADER: Final = "# input stamps: cycle, UART, bytes in hex"
 
 @dataclass(frozen=True, slots=True)
 class TimestampedInput:
-    """`data` began to arrive at UART number `uart` at `cycle` (Tcy since power-on)."""
+    """Input `data` that began to arrive at UART number `uart` at `cycle` (Tcy since power-on)."""
 
     cycle: int
     uart: int
     data: bytes
 
     def write(self, stream: TextIO) -> None:
-        """Append the entry to an input log."""
+        """Append this entry to an input log."""
         stream.write(f"{self.cycle} {self.uart} {self.data.hex()}\n")
 
 
 def read_input_log(path: str, uarts: tuple[int, ...]) -> list[TimestampedInput]:
-    """Read an input log. Raises ValueError with the line of the first error, OSError if unreadable."""
+    """Read an input log. Raises ValueError with the line of the first error, OSError if it cannot be read."""
     stamps: list[TimestampedInput] = []
     for number, line in enumerate(read_file(path).decode("ascii", "replace").splitlines(), start=1):
         if not line.strip() or line.startswith("#"):

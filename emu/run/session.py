@@ -1,7 +1,7 @@
-"""Interactive run of a machine: time slices, live or recorded input, pacing, a clean stop.
+"""Interactive run of a machine: time slices, live or recorded input, pacing, controlled stop.
 
-Input: a machine, ports, timestamped input, limits. Output: a `Stop`. Slices do not affect the firmware: input has the
-cycle of its delivery as timestamp, and equal timestamped input gives an equal run.
+Inputs: a machine, ports, timestamped input, limits. Output: a `Stop`. Slices do not affect the firmware: input is
+timestamped with the cycle of its delivery, and equal timestamped input gives an equal run.
 """
 
 from __future__ import annotations
@@ -21,20 +21,20 @@ if TYPE_CHECKING:
     from emu.machine.stops import Stop
 
 SLICE_SECONDS: Final = 0.02
-"""Target host time of a slice, and so the longest delay of output and Ctrl-C."""
+"""Target host time of a slice in s, which is the maximum delay of output and Ctrl-C."""
 FIRST_SLICE, SHORTEST_SLICE, LONGEST_SLICE = 20_000, 2_000, 100_000_000
-"""Lengths of slices in Tcy."""
+"""Initial, minimum and maximum length of a slice in Tcy."""
 PACED_SLICES_PER_SECOND: Final = 200
 POLL_SECONDS: Final = 0.1
-"""Longest wait for input without a check for Ctrl-C."""
+"""Maximum time in s of a wait for input before Ctrl-C is checked."""
 STUCK_SECONDS: Final = 3.0
-"""Host time after which a run that does not end on Ctrl-C is aborted."""
+"""Host time in s after Ctrl-C at which a run that has not ended is aborted."""
 FOREVER: Final = 1 << 62
 """Limit in Tcy if the user gives none: 10,000 years."""
 
 
 class Session:
-    """Runs a machine with its UARTs connected to `ports` (UART number to port)."""
+    """Runner of a machine whose UARTs are connected to `ports` (UART number to port)."""
 
     def __init__(
         self,
@@ -50,9 +50,9 @@ class Session:
     ) -> None:
         """Connect the machine's UARTs to `ports`.
 
-        `limit`: last cycle. `realtime`: not faster than the wall clock. `advance(cycle)` replaces the machine's
-        `run_until`, for traces. `links`: devices between a UART's pins and its port, by UART number; they have `listen`
-        and `feed` like a UART.
+        `limit`: last cycle. `realtime`: run no faster than the wall clock. `advance(cycle)` replaces the machine's
+        `run_until`, for traces. `links`: devices between a UART's pins and its port, by UART number; like a UART they
+        have `listen` and `feed`.
         """
         self.machine: Final = machine
         self.ports: Final = ports
@@ -70,7 +70,7 @@ class Session:
         self._removals: Final = [self._links[number].listen(self._collector(number), lazy=True) for number in ports]
 
     def run(self) -> tuple[Stop, float]:
-        """Run to the end. Return the stop and the host time in seconds."""
+        """Run until a stop. Return the stop and the host time in seconds."""
         earlier = [(number, signal.signal(number, self._on_signal)) for number in (signal.SIGINT, signal.SIGTERM)]
         self._start = time.perf_counter()
         try:
@@ -111,7 +111,7 @@ class Session:
     def _on_signal(self, number: int, frame: FrameType | None) -> None:
         """Handle Ctrl-C and SIGTERM: end the run at the next boundary.
 
-        The second signal, or `STUCK_SECONDS` without an end, aborts the run at once.
+        The second signal, or `STUCK_SECONDS` without an end, aborts the run immediately.
         """
         if self.interrupted:
             raise KeyboardInterrupt
@@ -137,7 +137,7 @@ class Session:
         return self._replay[-1].cycle if self._replay else FOREVER
 
     def _take_input(self, cycle: int) -> bool:
-        """Deliver the input that has arrived by now, with timestamp `cycle`. Return whether there was any."""
+        """Deliver the input that has arrived, with timestamp `cycle`. Return whether there was any."""
         taken = False
         while self._replay and self._replay[-1].cycle <= cycle:
             self._deliver(self._replay.pop())
@@ -150,20 +150,20 @@ class Session:
         return taken
 
     def _deliver(self, stamp: TimestampedInput) -> None:
-        """Deliver input to the UART: now, waiting for an enabled receiver, or at its future cycle."""
+        """Deliver input to the UART: at its future cycle, or now, waiting until the receiver is enabled."""
         late = stamp.cycle > self.machine.cycle
         self._links[stamp.uart].feed(stamp.data, stamp.cycle if late else None)
         if self._record is not None:
             stamp.write(self._record)
 
     def _wall_cycle(self) -> int:
-        """Return the cycle that a real robot, started together with this run, would have reached."""
+        """Return the cycle that a real robot would have reached if it had started together with this run."""
         return self._first_cycle + round((time.perf_counter() - self._start) * self._hz)
 
     def _wait_for_wakeup(self, stop: Stop) -> Stop | None:
-        """Wait for input that wakes a machine without internal wake-up source.
+        """Wait for input that can wake a machine which has no internal wake-up source.
 
-        Return None if it arrives, else the stop.
+        Return None when such input arrives, otherwise the stop.
         """
         machine = self.machine
         if self._replay:
@@ -182,7 +182,7 @@ class Session:
         return stop
 
     def _can_wake(self, number: int) -> bool:
-        """Whether a byte for this UART would wake the CPU: receiver enabled, its interrupt enabled above priority 0."""
+        """Whether a byte for this UART would wake the CPU: receiver on, interrupt enabled with a priority above 0."""
         machine = self.machine
         uart = machine.uart[number]
         source = machine.chip.interrupts[uart.site.rx_irq]
@@ -192,7 +192,7 @@ class Session:
 
 
 def _adapted(cycles: int, seconds: float) -> int:
-    """Return the length of the next slice after one of `cycles` took `seconds`."""
+    """Return the length of the next slice, given that one of `cycles` took `seconds`."""
     if seconds < SLICE_SECONDS / 2:
         return min(2 * cycles, LONGEST_SLICE)
     if seconds > SLICE_SECONDS * 2:

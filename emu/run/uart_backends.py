@@ -1,7 +1,7 @@
-"""The host end of the emulated UARTs: standard streams, files, pseudo terminals, TCP connections.
+"""Host ports of the emulated UARTs: standard streams, files, pseudo terminals, TCP connections.
 
 Input: a specification from the command line (`-`, FILE, `pty`, `tcp:PORT`, `none`). Output: bidirectional
-`ConsolePort`s. Files and standard output get every byte. A terminal or peer that does not read loses bytes, which
+`ConsolePort`s. Files and standard output receive every byte. A terminal or peer that does not read loses bytes, which
 `ConsolePort.lost` counts.
 """
 
@@ -21,7 +21,7 @@ SPECIFICATIONS: Final = "-, FILE, pty, tcp:PORT or none"
 
 
 class ConsolePort:
-    """Host connection of one UART. `out_fd` or `in_fd` is None if that direction does not exist or has ended."""
+    """Host port of one UART. `out_fd` or `in_fd` is None if that direction does not exist or has ended."""
 
     def __init__(
         self, out_fd: int | None, in_fd: int | None, close: Callable[[], None] | None = None, blocking: bool = True
@@ -30,14 +30,14 @@ class ConsolePort:
         self.in_fd = in_fd
         self.blocking: Final = blocking
         self.capture: bytearray | None = None
-        """If set, collects the firmware's output instead of sending it."""
+        """Collects the firmware's output instead of sending it, unless None."""
         self.lost = 0
-        """Bytes sent by the firmware that the host side did not accept."""
+        """Number of bytes sent by the firmware that the host side did not accept."""
         self._discards: Final = out_fd is None
         self._close: Final = close
 
     def write(self, data: bytes) -> None:
-        """Write output of the firmware. Raises BrokenPipeError if the reader has closed standard output."""
+        """Write the firmware's output. Raises BrokenPipeError if the reader of standard output has closed it."""
         if self.capture is not None:
             self.capture += data
             return
@@ -58,7 +58,7 @@ class ConsolePort:
             self.lost += len(data)
 
     def read(self) -> bytes:
-        """Return the input that is available now, without waiting; at end of input set `in_fd` to None."""
+        """Return the input that is available now, without waiting. At the end of input, set `in_fd` to None."""
         if self.in_fd is None or not select.select([self.in_fd], [], [], 0)[0]:
             return b""
         try:
@@ -72,7 +72,7 @@ class ConsolePort:
         return data
 
     def close(self) -> None:
-        """Close the resources that the port has opened."""
+        """Close the resources opened for the port."""
         if self._close is not None:
             self._close()
 
@@ -80,7 +80,7 @@ class ConsolePort:
 def open_port(specification: str, uart: int, with_input: bool = True) -> ConsolePort:
     """Open the port for UART number `uart`.
 
-    Raises ValueError for a bad specification, OSError if it cannot be opened.
+    Raises ValueError for an invalid specification, OSError if the port cannot be opened.
     """
     if specification == "none":
         return ConsolePort(None, None)
@@ -103,7 +103,7 @@ def _is_open(fd: int) -> bool:
 
 
 def _open_pty(uart: int, with_input: bool) -> ConsolePort:
-    """Open a pseudo terminal in raw mode, so that the firmware's output is not echoed back to it."""
+    """Open a pseudo terminal in raw mode, so that it does not echo the firmware's output back."""
     import pty
     import tty
 
@@ -114,13 +114,13 @@ def _open_pty(uart: int, with_input: bool) -> ConsolePort:
 
     def close() -> None:
         os.close(master)
-        os.close(slave)  # kept open until now: without a reader the terminal would report end of file
+        os.close(slave)  # open until now, because the terminal would report end of file without a reader
 
     return ConsolePort(master, master if with_input else None, close, blocking=False)
 
 
 def _open_tcp(specification: str, uart: int, with_input: bool) -> ConsolePort:
-    """Wait for one connection on the loopback interface. PORT 0 selects a free port; the number is printed."""
+    """Wait for one connection on the loopback interface. PORT 0 selects a free port, whose number is printed."""
     text = specification.removeprefix("tcp:")
     if not text.isdecimal() or int(text) > 0xFFFF:
         raise ValueError(f"{specification!r}: expected tcp:PORT with a number up to 65535")
@@ -140,6 +140,6 @@ def _open_tcp(specification: str, uart: int, with_input: bool) -> ConsolePort:
 
 
 def wait_for_input(ports: list[ConsolePort], seconds: float) -> bool:
-    """Wait at most `seconds` until a port has input or has ended. Return whether one has."""
+    """Wait at most `seconds` until a port has input or has ended. Return whether this happened."""
     sources = [port.in_fd for port in ports if port.in_fd is not None]
     return bool(select.select(sources, [], [], max(seconds, 0.0))[0])

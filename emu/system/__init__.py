@@ -1,1 +1,1 @@
-"""Substrate of every machine: state record, event clock, bus, program memory, device base, rule language."""
+"""Basis of every machine: state record, event schedule, bus, program memory, device base class, rule language."""

@@ -1,8 +1,8 @@
-"""The bus: SFR bits that exist, and dispatch of register reads and writes to the hooks and rules of devices.
+"""The bus: implemented SFR bits, and dispatch of register accesses to the hooks and rules of devices.
 
-Input: masks and reset values of a chip, and hooks of devices. Output: `read` and `write` of SFR words for the engines,
-`peek` and `poke` for tools. Engines access plain memory directly in the record. The CPU hooks its own registers like
-any device.
+Inputs: masks and reset values of a chip, and hooks of devices. Outputs: `read` and `write` of SFR words for engines,
+`peek` and `poke` for tools. Engines access plain memory directly in the record. The CPU hooks its own registers as a
+device does.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from emu.system.rules import Rule, RuleInterpreter
 
 ReadHook = Callable[[], int]
 WriteHook = Callable[[int, int, int], None]
-"""hook(old, new, lanes), called after the new word is in the record; `lanes` is 0xFFFF, 0x00FF or 0xFF00."""
+"""hook(old, new, lanes): called after the new word is stored in the record. `lanes` is 0xFFFF, 0x00FF or 0xFF00."""
 
 
 @dataclass(frozen=True, slots=True)
 class RegisterWiring:
-    """Wiring of a register on the bus: its entries in the tables of `Bus`."""
+    """Wiring of one register: its entries in the tables of `Bus`."""
 
     writable: int
     clear_only: int
@@ -33,13 +33,13 @@ class RegisterWiring:
 
 
 class Tap:
-    """Observers of all accesses of instructions to one register; see `tap`."""
+    """Observers of all accesses that instructions make to one register; see `tap`."""
 
     def __init__(self, remove: Callable[[], None], wiring: RegisterWiring) -> None:
         self.hooks: tuple[Callable[[bool, int], object], ...] = ()
         self.remove: Final = remove
         self.wiring = wiring
-        """Wiring of the register without the tap."""
+        """Wiring of the register as it is without the tap."""
 
     def __bool__(self) -> bool:
         return bool(self.hooks)
@@ -60,8 +60,10 @@ class Tap:
 
 
 class Bus:
-    """SFR space, below the address `end`. The tables are indexed by address >> 1. Unimplemented bits read 0 and ignore
-    writes."""
+    """SFR space, below the address `end`. The tables are indexed by address >> 1.
+
+    Unimplemented bits read 0 and ignore writes.
+    """
 
     def __init__(self, record: Record, events: Events, end: int) -> None:
         self.record: Final = record
@@ -70,39 +72,41 @@ class Bus:
         """First data address after the SFRs (isa.md §1.2)."""
         words = end // 2
         self.writable: Final = [0] * words
-        """Bits that software can set and clear."""
+        """Mask of the bits that software can both set and clear."""
         self.clear_only: Final = [0] * words
-        """Bits that software can only clear."""
+        """Mask of the bits that software can only clear."""
         self.reset_value: Final = [0] * words
         self.name: Final = [""] * words
         self.compute: Final[list[ReadHook | None]] = [None] * words
-        """Read hooks of registers that are a function of the cycle and of device state, without side effects."""
+        """Read hooks without side effects; they compute a register from the cycle and device state."""
         self.refresh: Final[dict[int, Callable[[int], bool]]] = {}
-        """By register: refresh(cycle) updates the cells that its rule reads, if native code waits for them in `cycle`;
-        it returns False if not."""
+        """refresh(cycle) of each register: updates the cells that the register's rule reads.
+
+        It is called when native code waits for them in `cycle`, and returns False if it cannot update them.
+        """
         self.on_read: Final[list[ReadHook | None]] = [None] * words
-        """Read hooks of registers whose read changes the state of a device; they return the word."""
+        """Read hooks that change a device's state; they return the word."""
         self.on_write: Final[list[WriteHook | None]] = [None] * words
         self.rules: Final[list[Rule | None]] = [None] * words
-        """Rules of registers; the hooks handle the accesses that a rule does not cover."""
+        """Rules of registers. Hooks handle the accesses that a rule does not cover."""
         self.integers: Final = RuleInterpreter(record, events)
         self.modelled: Final = [False] * words
-        """Whether a device or the CPU implements a register. Other registers are reported at their first access."""
+        """Whether a device or the CPU implements a register. For others, the first access is reported."""
         self.off: frozenset[int] = frozenset()
-        """Registers of disabled modules: they read 0 and ignore writes."""
+        """Registers of disabled modules, which read 0 and ignore writes."""
         self.taps: Final[dict[int, Tap]] = {}
         """Taps by register; see `tap`."""
         self.watched: Final[set[int]] = set()
-        """Registers with a tap: all their accesses go through Python."""
+        """Registers with a tap. All accesses to them go through Python."""
         self.report: Callable[[int, bool], None] | None = None
-        """report(address, is_write), called at the first access to a register that is not modelled."""
+        """report(address, is_write): called at the first access to a register that is not modelled."""
         self._reported: set[int] = set()
         self.note: Callable[[str], None] | None = None
-        """note(what), called the first time that firmware uses a function without a model."""
+        """note(what): called when firmware first uses a function that is not modelled."""
         self._noted: set[str] = set()
 
     def read(self, address: int) -> int:
-        """Return the word at the even SFR `address` as an instruction reads it, with side effects."""
+        """Return the word at the even SFR `address` as read by an instruction, with side effects."""
         word = address >> 1
         rule = self.rules[word]
         if rule is not None and (shown := self.integers.read(rule)) is not None:
@@ -144,7 +148,7 @@ class Bus:
         self.record.u16[address >> 1] = value & 0xFFFF
 
     def access(self, word: int) -> RegisterWiring:
-        """Return the wiring of the register with index `word`, without its tap."""
+        """Return the wiring of the register with index `word` as it is without its tap."""
         wiring = self.taps[word].wiring if word in self.taps else None
         return wiring or RegisterWiring(
             self.writable[word], self.clear_only[word], self.compute[word], self.on_read[word], self.on_write[word],
@@ -152,7 +156,7 @@ class Bus:
         )  # fmt: skip
 
     def rewire(self, word: int, wiring: RegisterWiring) -> None:
-        """Replace the wiring of the register with index `word`; its tap stays."""
+        """Replace the wiring of the register with index `word` and keep its tap."""
         self.writable[word], self.clear_only[word], self.compute[word] = (
             wiring.writable, wiring.clear_only, wiring.compute)  # fmt: skip
         if word in self.taps:
@@ -161,7 +165,7 @@ class Bus:
             self.on_read[word], self.on_write[word], self.rules[word] = wiring.on_read, wiring.on_write, wiring.rule
 
     def lacks(self, what: str) -> None:
-        """Report once that firmware uses `what`, which has no model: register, field and the behaviour instead."""
+        """Report once that firmware uses `what`, which is not modelled: register, field and the behaviour instead."""
         if what not in self._noted and not self.events.quiet:
             self._noted.add(what)
             if self.note is not None:
@@ -174,7 +178,7 @@ class Bus:
 
 
 def tap(bus: Bus, word: int) -> Tap:
-    """Insert a `Tap` between instructions and the register with index `word`, until its `remove` is called."""
+    """Insert a `Tap` between instructions and the register with index `word`. Its `remove` ends this."""
     u16, events = bus.record.u16, bus.events
 
     def remove() -> None:

@@ -1,7 +1,7 @@
-"""Device base: what every peripheral is built from, namely registers, interrupt lines and event slots.
+"""Base class of devices, and their parts: registers, interrupt lines and event slots.
 
-A device never ticks. It computes its state on access, posts the cycle of its next event, and raises interrupt flags.
-It knows neither the CPU nor other devices; `emu.machine.machine` connects them by registers, lines and signals.
+A device has no periodic tick. It computes its state on access, posts the cycle of its next event, and sets interrupt
+flags. It knows neither the CPU nor other devices; `emu.machine.machine` connects them.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from emu.system.rules import Cell, InterruptLine, Rule, cell_of
 
 
 class Register:
-    """One SFR of a device. Its word lies in the record at the address of the register."""
+    """One SFR of a device. Its word is in the record at the register's address."""
 
     __slots__ = ("_fields", "_u16", "_word", "address", "bus", "name")
 
@@ -48,20 +48,20 @@ class Register:
         self._u16[self._word] = self._u16[self._word] & ~(ones << lsb) & 0xFFFF | (number & ones) << lsb
 
     def set_rule(self, rule: Rule) -> None:
-        """Use `rule` for the accesses that it covers."""
+        """Set the rule for the accesses that it covers."""
         self.bus.rules[self._word] = rule
 
     @property
     def cell(self) -> Cell:
-        """Return the cell of the word, for rules."""
+        """Return the cell of the register's word, for rules."""
         return Cell(self.address, 16)
 
     def computed(self, hook: ReadHook) -> None:
-        """Let reads return `hook()`, a function of the cycle and of device state without side effects."""
+        """Make reads return `hook()`, a function of the cycle and of device state without side effects."""
         self.bus.compute[self._word] = hook
 
     def read_by(self, hook: ReadHook) -> None:
-        """Let reads by instructions return `hook()`, which may change device state."""
+        """Make reads by instructions return `hook()`, which may change device state."""
         self.bus.on_read[self._word] = hook
 
     def written_by(self, hook: WriteHook) -> None:
@@ -70,7 +70,7 @@ class Register:
 
 
 FLAG_WORDS: Final = 4
-"""Most flag registers of a chip; they are consecutive."""
+"""Maximum number of flag registers of a chip; they are consecutive."""
 
 
 def flag_row(flag_address: int) -> int:
@@ -79,7 +79,7 @@ def flag_row(flag_address: int) -> int:
 
 
 def flag_since(record: Record, flag_address: int, flag_bit: int) -> int:
-    """Return the index in `record.u64` of the cycle in which an interrupt flag was first 1: c of isa.md §14.3."""
+    """Return the index in `record.u64` of the cycle in which an interrupt flag became 1: c of isa.md §14.3."""
     table = record.fields.get("irq.since") or record.reserve("irq.since", "Q", 16 * FLAG_WORDS)
     return table.index + flag_row(flag_address) + flag_bit
 
@@ -99,12 +99,12 @@ class Irq:
         self.line: Final = InterruptLine(
             Cell(flag_address, 16), self._bit, Cell(8 * self._since, 64), cell_of(record, "events.deadline")
         )
-        """Cells of the line, for rules."""
+        """Cells of the request line, for rules."""
 
     def request(self) -> None:
-        """Set the interrupt flag. Called by an event, the flag first reads 1 in the cycle of the event.
+        """Set the interrupt flag. If an event calls this, the flag first reads 1 in the cycle of the event.
 
-        Called by the hook of an access, the flag first reads 1 one cycle after the access (engines.md §4.2).
+        If the hook of an access calls this, the flag first reads 1 one cycle after the access (engines.md §4.2).
         """
         if not self._u16[self._word] & self._bit:
             self._u16[self._word] |= self._bit
@@ -118,7 +118,7 @@ class Irq:
 
 
 class Device:
-    """Base class of all peripherals. It holds the record, the event schedule and the name of the device."""
+    """Base class of all peripherals. It holds the record, the event schedule and the device's name."""
 
     def __init__(self, name: str, bus: Bus) -> None:
         self.name: Final = name
@@ -132,4 +132,4 @@ class Device:
         return self.events.now
 
     def reset(self, power_on: bool) -> None:
-        """Set hidden state to its reset value. SFRs have been reset already, and event slots are idle."""
+        """Set hidden state to its reset value. The SFRs have already been reset, and the event slots are idle."""

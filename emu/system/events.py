@@ -1,8 +1,8 @@
-"""Event schedule: fixed slots of due cycles in the state record (engines.md §4.2). It is the only clock of a machine.
+"""Event schedule: fixed slots of due cycles in the state record (engines.md §4.2). It is a machine's only clock.
 
-Time is one integer: Tcy since power-on. A slot belongs to one purpose of one device. Slots are numbered in the order of
-construction, and the number breaks ties. There is no heap and no serial number, so a copy of the record is a copy of
-the schedule.
+Time is one integer: Tcy since power-on. A slot serves one purpose of one device. Slots are numbered in the order of
+their construction, and the number breaks ties. There is no heap and no serial number, so a copy of the record is a copy
+of the schedule.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ SLOTS: Final = 96
 
 
 class Events:
-    """Schedule of a machine. `deadline` is the earliest cycle at which an engine must handle a boundary.
+    """Event schedule of a machine. `deadline` is the earliest cycle at which an engine must handle a boundary.
 
-    The engine keeps `now` at the cycle of its current access, so hooks need no time argument.
+    The engine sets `now` to the cycle of its current access, so that hooks need no time argument.
     """
 
     def __init__(self, record: Record) -> None:
@@ -32,13 +32,13 @@ class Events:
         self._deadline: Final = self.deadline_index
         self._first = record.reserve("events.due", "Q", SLOTS).index
         self.firing = False
-        """Whether an event is being handled, as opposed to an access of an instruction or a call of a tool."""
+        """Whether an event is being handled; False during an instruction's access or a tool's call."""
         self.quiet = False
-        """Whether a recorded span is replayed: its observers were called before and are not called again."""
+        """Whether recorded cycles are replayed; their observers have already been called and are not called again."""
         self.names: Final[list[str]] = []
         self._fire: Final[list[Callable[[int], None]]] = []
         self.rules: Final[dict[int, Any]] = {}
-        """Rules of events by slot (emu/system/rules.py)."""
+        """Rules of events, by slot (emu/system/rules.py)."""
         self._due = record.u64[self._first : self._first + SLOTS]
         for slot in range(SLOTS):
             self._due[slot] = NEVER
@@ -59,7 +59,7 @@ class Events:
         return self._u64[self._deadline]
 
     def slot(self, name: str, fire: Callable[[int], None]) -> int:
-        """Allocate the next slot. `fire(due)` gets the cycle for which it was posted, so periods cannot drift."""
+        """Allocate the next slot. `fire(due)` receives the posted cycle, so that periods cannot drift."""
         if len(self.names) == SLOTS:
             raise ValueError(f"no event slot left for {name!r}")
         self.names.append(name)
@@ -67,20 +67,22 @@ class Events:
         return len(self.names) - 1
 
     def set_rule(self, slot: int, rule: Any, runs: Callable[[Any], bool]) -> None:
-        """Handle the events of a slot by `rule`. `runs(rule)` returns False if the slot's own function must handle
-        one."""
+        """Handle the events of a slot by `rule`.
+
+        `runs(rule)` returns False if the slot's own function must handle one.
+        """
         fire = self._fire[slot]
         self.rules[slot] = rule
         self._fire[slot] = lambda due: None if runs(rule) else fire(due)
 
     def set(self, slot: int, due: int) -> None:
-        """Post `slot` for the cycle `due`; it replaces an earlier posting."""
+        """Post `slot` for the cycle `due`, replacing an earlier posting."""
         self._due[slot] = due
         if due < self._u64[self._deadline]:
             self._u64[self._deadline] = due
 
     def cancel(self, slot: int) -> None:
-        """Make `slot` idle. The deadline may stay too early, which costs one superfluous check."""
+        """Make `slot` idle. The deadline may remain too early, which costs one unnecessary check."""
         self._due[slot] = NEVER
 
     def due(self, slot: int) -> int:
@@ -88,21 +90,21 @@ class Events:
         return self._due[slot]
 
     def next_due(self) -> int:
-        """Return the earliest due cycle of all slots, NEVER if all are idle."""
+        """Return the earliest due cycle of all slots; NEVER if all are idle."""
         return min(self._due[: len(self._fire)].tolist(), default=NEVER)
 
     def kick(self) -> None:
-        """Make the engine check for interrupts at the next boundary: a flag, an enable or a priority has changed."""
+        """Make the engine check for interrupts at the next boundary, because a flag, enable or priority has changed."""
         self._u64[self._deadline] = 0
 
     def fire_until(self, cycle: int) -> None:
-        """Fire all events due at or before `cycle`, in order of (due, slot). An earlier `kick` stays in force."""
+        """Fire all events due at or before `cycle`, sorted by (due, slot). An earlier `kick` stays in effect."""
         first = self._fire_until(cycle)
         if self._u64[self._deadline]:
             self._u64[self._deadline] = first
 
     def settle(self, cycle: int) -> None:
-        """As `fire_until`, and clear a `kick`: the deadline becomes the earliest due cycle."""
+        """Fire events as `fire_until` does, and clear a `kick`: the deadline becomes the earliest due cycle."""
         self._u64[self._deadline] = self._fire_until(cycle)
 
     def arrive(self, cycle: int) -> None:

@@ -1,6 +1,6 @@
-"""C ABI of a machine: the handle `Native`, by which other compiled code runs a machine without Python.
+"""C ABI of a machine: the handle `Native`, through which other compiled code runs a machine without Python.
 
-Its C twin is `struct native` in arena/lockstep/lockstep.c. The handle holds host addresses. They are valid as long as
+Its C twin is `struct native` in arena/lockstep/lockstep.c. The host addresses in the handle are valid as long as
 the machine exists.
 """
 
@@ -13,7 +13,7 @@ from typing import Final
 Call = Callable[[int, int], int]
 """call(record, env): runs native code from the current state of the machine and returns the exit reason."""
 Run = Callable[[Call, int, int], int]
-"""run(call, record, env): replaces `call`. It may call `call` itself."""
+"""run(call, record, env): is called instead of `call` and may call `call` itself."""
 
 FRESH_ROOM: Final = 8
 """Capacity of `Native.fresh`, including the terminating 0."""
@@ -27,7 +27,7 @@ class Native(Structure):
             "entry", "record", "env",
             "begins",  # uint64: whether a call begins with the boundary before PC
             "limit", "last",  # uint64: cycles at which native code returns (`Engine.pass_limits`)
-            "noted", "notes",  # uint64: number and cycles of the limits that were passed (`Engine.passed`)
+              "noted", "notes",  # uint64: number and cycles of the passed limits (`Engine.passed`)
             "fresh",  # uint64 [FRESH_ROOM]: instructions that read a register that a device refreshes, then 0:
                       # PC + (index of the register << 32)
             "cycle", "now", "deadline",  # uint64: cycle of the CPU, of the devices, of the earliest event

@@ -1,7 +1,7 @@
 """Observer lists: callbacks that can be added and removed.
 
-Parts of a board are always called. Tools are not called while a recorded span is replayed (`Events.quiet`), because
-they were called for it before. A *lazy* listener only collects: its calls may come later, in order.
+Board parts are always called. Tools are not called while recorded cycles are replayed (`Events.quiet`), because they
+have already been called for them. A *lazy* listener only collects: its calls may come later, in order.
 """
 
 from __future__ import annotations
@@ -15,14 +15,14 @@ What = ParamSpec("What")
 
 
 def _ignore(_urgent: bool) -> None:
-    """Ignore whether a listener is urgent."""
+    """Ignore a change of urgency."""
 
 
 class Listeners(Generic[What]):
-    """List of listeners. Calling it calls all listeners, in the order of `add`."""
+    """List of listeners. Calling it calls all of them, in the order of `add`."""
 
     def __init__(self, events: Events, urgency: Callable[[bool], object] = _ignore) -> None:
-        """`urgency(urgent)` is called after each change with the value of `self.urgent`."""
+        """`urgency(urgent)` is called with the value of `self.urgent` after each change."""
         self._events: Final = events
         self._urgency: Final = urgency
         self._urgent = 0
@@ -36,7 +36,7 @@ class Listeners(Generic[What]):
 
     @property
     def urgent(self) -> bool:
-        """Return whether any listener must be called at once."""
+        """Return whether any listener is eager, that is, must be called immediately."""
         return self._urgent > 0
 
     def _count(self, change: int) -> None:
@@ -44,7 +44,7 @@ class Listeners(Generic[What]):
         self._urgency(self._urgent > 0)
 
     def add(self, listener: Callable[What, object], *, part: bool = False, lazy: bool = False) -> Callable[[], None]:
-        """Add a listener and return a function that removes it. A `part` of the board is called during replay too."""
+        """Add a listener and return a function that removes it. During replay, only a `part` of the board is called."""
         self._count(not lazy)
         self._all = (*self._all, listener)
         if part:
@@ -63,7 +63,7 @@ class Listeners(Generic[What]):
 
     @property
     def assigned(self) -> Callable[What, object] | None:
-        """Return the listener set by assignment. A new assignment replaces it; listeners of `add` stay."""
+        """Return the listener set by assignment. A new assignment replaces it; listeners added by `add` remain."""
         return self._assigned
 
     @assigned.setter
@@ -80,6 +80,6 @@ class Listeners(Generic[What]):
 def _without(
     listeners: tuple[Callable[What, object], ...], one: Callable[What, object]
 ) -> tuple[Callable[What, object], ...]:
-    """Return the listeners without the first that equals `one`."""
+    """Return the listeners without the first one that equals `one`."""
     index = listeners.index(one)
     return listeners[:index] + listeners[index + 1 :]

@@ -1,7 +1,7 @@
-"""Program memory: flash, data EEPROM, unit and configuration words, and the latches of table writes.
+"""Program memory: flash, data EEPROM, unit ID and configuration words, and the latches of table writes.
 
-Input: words of a loader, table writes of the CPU, programming by the NVM device. Output: 24-bit words. Addresses are PC
-units: even, two per 24-bit word (isa.md §1.1). All storage lies in the state record.
+Inputs: words from a loader, table writes of the CPU, programming by the NVM device. Output: 24-bit words. Addresses are
+PC units: even, two per 24-bit word (isa.md §1.1). All storage is in the state record.
 """
 
 from __future__ import annotations
@@ -13,17 +13,17 @@ from emu.chips.chip import Chip
 from emu.system.record import Record
 
 ERASED_WORD: Final = 0xFFFFFF
-"""An erased flash word; it executes as NOPR (isa.md §4.1)."""
+"""Value of an erased flash word, which executes as NOPR (isa.md §4.1)."""
 ERASED_HALF: Final = 0xFFFF
 
 FLASH_LATCHES: Final = 32
-"""Instruction words of one flash row (dspic30f6014a.md §16)."""
+"""Number of instruction words per flash row (dspic30f6014a.md §16)."""
 EEPROM_LATCHES: Final = 16
-"""Words of one EEPROM row (dspic30f6014a.md §16)."""
+"""Number of words per EEPROM row (dspic30f6014a.md §16)."""
 
 
 class ProgramMemory:
-    """All of program space. `flash` is a view of the record; native code reads the same memory."""
+    """The whole program space. `flash` is a view of the record; native code reads the same memory."""
 
     def __init__(self, record: Record, chip: Chip) -> None:
         regions = chip.program
@@ -48,20 +48,20 @@ class ProgramMemory:
         self.flash_latch, _ = words("program.flash_latch", "I", FLASH_LATCHES)
         self.eeprom_latch, _ = words("program.eeprom_latch", "H", EEPROM_LATCHES)
         self.changed: Final[list[Callable[[int, int], None]]] = []
-        """Listeners fn(start, end), called after flash words in [start, end) changed: their translations are stale."""
+        """Listeners fn(start, end), called after flash words in [start, end) changed: translations are now invalid."""
         self._u16: Final = record.u16
         self.captured_in: tuple[int, int] | None = None
-        """Data addresses of the registers that capture the address of each table write, low word and upper byte
+        """Data addresses of the registers that store the address of each table write, low word and upper byte
         (dspic30f6014a.md §16)."""
         self.erase()
 
     @property
     def eeprom_range(self) -> tuple[int, int]:
-        """Return the first address of data EEPROM and the first one after it."""
+        """Return the start and end address of data EEPROM."""
         return self._eeprom.start, self._eeprom.end
 
     def erase(self) -> None:
-        """Set all program memory and latches to ones, the state of a new chip."""
+        """Set all program memory and latches to ones, as in a new chip."""
         for words, erased in (
             (self.flash, ERASED_WORD), (self.eeprom, ERASED_HALF), (self.config, ERASED_HALF), (self.unit, ERASED_WORD)
         ):  # fmt: skip
@@ -70,14 +70,14 @@ class ProgramMemory:
         self._announce(0, self._flash_end)
 
     def clear_latches(self) -> None:
-        """Set all latches to ones, their state after a programming operation (dspic30f6014a.md §16)."""
+        """Set all latches to ones, as after a programming operation (dspic30f6014a.md §16)."""
         for word in range(FLASH_LATCHES):
             self.flash_latch[word] = ERASED_WORD
         for word in range(EEPROM_LATCHES):
             self.eeprom_latch[word] = ERASED_HALF
 
     def word(self, address: int) -> int:
-        """Return the 24-bit word at the even `address`; 0 where nothing is implemented (isa.md §1.1)."""
+        """Return the 24-bit word at the even `address`; 0 for unimplemented memory (isa.md §1.1)."""
         if address < self._flash_end:
             return self.flash[address >> 1]
         if address in self._eeprom:
@@ -91,7 +91,7 @@ class ProgramMemory:
         return 0
 
     def setting(self, name: str) -> int:
-        """Return the stored configuration word called `name`. Raises KeyError if the chip has none of that name."""
+        """Return the stored configuration word called `name`. Raises KeyError if the chip has no such word."""
         return self.word(self._words[name].address)
 
     def executable(self, address: int) -> bool:
@@ -100,7 +100,10 @@ class ProgramMemory:
         return address < start or end <= address < self._flash_end
 
     def put(self, address: int, value: int) -> None:
-        """Set the word at the even `address` (loading, programming). Raises ValueError where nothing is implemented."""
+        """Set the word at the even `address`, for loading and programming.
+
+        Raises ValueError for unimplemented memory.
+        """
         if address < self._flash_end:
             self.flash[address >> 1] = value & ERASED_WORD
             self._announce(address, address + 2)
@@ -114,14 +117,14 @@ class ProgramMemory:
             raise ValueError(f"no program memory at {address:#08x}")
 
     def put_flash(self, address: int, words: list[int]) -> None:
-        """Set consecutive flash words from the even `address` on. Listeners are called once."""
+        """Set consecutive flash words from the even `address` on, and call the listeners once."""
         first = address >> 1
         for index, value in enumerate(words):
             self.flash[first + index] = value & ERASED_WORD
         self._announce(address, address + 2 * len(words))
 
     def table_write(self, address: int, byte_mask: int, value: int) -> None:
-        """Merge bytes of `value` into the latch of `address` (bit i of `byte_mask`: byte i; isa.md §7.7).
+        """Merge bytes of `value` into the latch of `address`. Bit i of `byte_mask` selects byte i (isa.md §7.7).
 
         Flash latches are numbered by address bits 5:1, EEPROM latches by bits 4:1 (dspic30f6014a.md §16).
         """
@@ -138,7 +141,7 @@ class ProgramMemory:
             self._u16[low >> 1], self._u16[upper >> 1] = address & 0xFFFF, address >> 16 & 0xFF
 
     def announce_all(self) -> None:
-        """Call the listeners for all of flash, after a snapshot was restored."""
+        """Call the listeners for all of flash after a snapshot was restored."""
         self._announce(0, self._flash_end)
 
     def _announce(self, start: int, end: int) -> None:

@@ -1,8 +1,8 @@
-"""The state record: one flat buffer that holds every bit of a machine's state.
+"""The state record: one flat buffer that contains a machine's complete state.
 
-Input: names, element kinds and counts, reserved once while a machine is built. Output: byte offsets for native code and
-typed views for Python. Byte offset 0 is data address 0: working registers, SFRs and RAM lie in the record at their own
-data addresses (isa.md §1.2). A snapshot is one copy, and two machines are compared with one comparison.
+Inputs: names, element kinds and counts, reserved once while a machine is built. Outputs: byte offsets for native code
+and typed views for Python. Byte offset 0 is data address 0: working registers, SFRs and RAM are in the record at their
+data addresses (isa.md §1.2). A snapshot is one copy; one comparison compares two machines.
 """
 
 from __future__ import annotations
@@ -12,16 +12,16 @@ from dataclasses import dataclass
 from typing import Final
 
 CAPACITY: Final = 0x80000
-"""Size of a record in bytes; `Record.used` of them are reserved."""
+"""Size of a record in bytes, of which `Record.used` are reserved."""
 HOSTS: Final = 0x1000
-"""Bytes at the end of a record for host addresses."""
+"""Number of bytes at the end of a record for host addresses."""
 
 SIZES: Final = {"B": 1, "H": 2, "I": 4, "Q": 8, "q": 8}
 
 
 @dataclass(frozen=True, slots=True)
 class Field:
-    """A named array in the record: byte `offset`, element `kind` (struct letter) and `count`."""
+    """A named array in the record: byte `offset`, element `kind` (letter of the struct module) and `count`."""
 
     name: str
     offset: int
@@ -30,7 +30,7 @@ class Field:
 
     @property
     def index(self) -> int:
-        """Return the index of the first element in the view of this kind."""
+        """Return the index of the first element in the view for this kind."""
         return self.offset // SIZES[self.kind]
 
 
@@ -39,7 +39,7 @@ class Record:
 
     def __init__(self, data_end: int) -> None:
         self.data_end: Final = data_end
-        """First data address after SFRs and RAM (isa.md §1.2)."""
+        """End of SFRs and RAM in data addresses (isa.md §1.2)."""
         self._memory = (ctypes.c_uint8 * CAPACITY)()
         self.address: Final = ctypes.addressof(self._memory)
         self.bytes: Final = memoryview(self._memory).cast("B")
@@ -53,9 +53,9 @@ class Record:
         self._hosts = CAPACITY
 
     def reserve(self, name: str, kind: str, count: int = 1) -> Field:
-        """Reserve `count` elements of `kind` ("B", "H", "I", "Q" unsigned, "q" signed) under `name`, zeroed.
+        """Reserve `count` zeroed elements of `kind` ("B", "H", "I", "Q" unsigned, "q" signed) under `name`.
 
-        Raises ValueError if the name is reserved already or the record is full.
+        Raises ValueError if the name is already reserved or the record is full.
         """
         if name in self.fields:
             raise ValueError(f"record field {name!r} is reserved already")
@@ -69,7 +69,7 @@ class Record:
         return field
 
     def reserve_addresses(self, count: int) -> int:
-        """Reserve `count` zeroed 64-bit words for host addresses and return the byte offset of the first.
+        """Reserve `count` zeroed 64-bit words for host addresses. Return the byte offset of the first.
 
         They are not part of the state, so snapshots exclude them. Raises ValueError if the record is full."""
         if self._hosts - 8 * count < CAPACITY - HOSTS:
@@ -78,17 +78,17 @@ class Record:
         return self._hosts
 
     def snapshot(self) -> bytes:
-        """Return a copy of the whole state."""
+        """Return a copy of the complete state."""
         return bytes(self.bytes[: self.used])
 
     def restore(self, state: bytes) -> None:
-        """Restore a `snapshot` of an equally built machine. Raises ValueError if the size differs."""
+        """Restore a `snapshot` of an equally built machine. Raises ValueError for another size."""
         if len(state) != self.used:
             raise ValueError(f"snapshot has {len(state)} bytes, this machine's record {self.used}")
         self.bytes[: self.used] = state
 
     def field_at(self, offset: int) -> str:
-        """Return the name of the field at a byte offset, for reports of differences between two records."""
+        """Return the name of the field at a byte offset, for reports of differences between records."""
         if offset < self.data_end:
             return f"data {offset:#06x}"
         for field in self.fields.values():

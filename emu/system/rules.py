@@ -1,9 +1,9 @@
 """Rule language: device rules as straight-line functions that are interpreted on ints or compiled to native code.
 
-A `Rule` describes one access to a register, or one event. It is written against a `RuleBuilder`: it gets cells of the
-record, computes, states its requirements, then puts cells. Nothing is put before the last `require`. If a requirement
-does not hold, the rule has had no effect, and the hooks of the device handle the access in every engine alike. So
-engines cannot disagree on a rule, and rare cases stay in Python. Entering an exception is such a function too
+A `Rule` describes one access to a register, or one event. It is written against a `RuleBuilder`: it reads cells of the
+record, computes, states its requirements, then stores into cells. It stores nothing before the last `require`. If a
+requirement does not hold, the rule has had no effect, and the device's hooks handle the access in every engine. So
+engines cannot disagree on a rule, and rare cases remain in Python. The entry of an exception is such a function too
 (dspic30f/exceptions/exceptions.py).
 """
 
@@ -17,17 +17,17 @@ from emu.system.events import Events
 from emu.system.record import SIZES, Record
 
 Number = Any
-"""An int, or the value type of a builder. Rules use + - * & | ^ << >> and signed 64-bit comparisons, never `if`."""
+"""An int, or a builder's value type. Rules use + - * & | ^ << >> and signed 64-bit comparisons, never `if`."""
 
 
 @dataclass(frozen=True, slots=True)
 class Cell:
-    """An unsigned number in the record: its byte offset and its width (8, 16, 32 or 64 bits)."""
+    """Location of an unsigned number in the record: byte offset and width (8, 16, 32 or 64 bits)."""
 
     offset: int
     bits: int
     index: int = field(init=False, repr=False)
-    """Index in the view of the record with that width."""
+    """Index in the record's view for that width."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "index", self.offset * 8 // self.bits)
@@ -35,7 +35,7 @@ class Cell:
 
 @dataclass(frozen=True, slots=True)
 class EventSlot:
-    """Cells of an event slot: its due cycle, and the deadline of all slots."""
+    """Cells of an event slot: its due cycle, and the common deadline of all slots."""
 
     due: Cell
     deadline: Cell
@@ -49,14 +49,13 @@ def cell_of(record: Record, name: str, index: int = 0) -> Cell:
 
 
 def event_slot(record: Record, number: int) -> EventSlot:
-    """Return the cells of the event slot with that number."""
+    """Return the cells of the event slot with number `number`."""
     return EventSlot(cell_of(record, "events.due", number), cell_of(record, "events.deadline"))
 
 
 @dataclass(frozen=True, slots=True)
 class InterruptLine:
-    """Cells of an interrupt request line: its flag, the cycle in which the flag was first 1, and the deadline of all
-    slots."""
+    """Cells of an interrupt request line: its flag, the cycle in which the flag became 1, and the common deadline."""
 
     flags: Cell
     bit: int
@@ -65,8 +64,7 @@ class InterruptLine:
 
 
 def request(m: RuleBuilder, line: InterruptLine, cycle: Number, when: Number = True) -> None:
-    """If `when` holds, set the interrupt flag from `cycle` on unless it is set already, and request a boundary
-    check."""
+    """If `when` holds, set the interrupt flag, unless already set, from `cycle` on; request a boundary check."""
     word = m.get(line.flags)
     m.put(line.since, m.select(((word & line.bit) == 0) & when, cycle, m.get(line.since)))
     m.put(line.flags, m.select(when, word | line.bit, word))
@@ -74,48 +72,53 @@ def request(m: RuleBuilder, line: InterruptLine, cycle: Number, when: Number = T
 
 
 class RuleBuilder(Protocol):
-    """Operations that a rule may use. Each engine implements them."""
+    """Operations that rules may use. Each engine implements them."""
 
     @property
     def now(self) -> Number:
         """Return the cycle of the access or event."""
 
     def get(self, cell: Cell, index: Number = 0) -> Number:
-        """Return the number in a cell, or in the cell `index` cells behind it."""
+        """Return the number in a cell, or in the cell that is `index` cells after it."""
 
     def put(self, cell: Cell, value: Number, index: Number = 0) -> None:
-        """Store the low bits of a number, after the whole rule has been evaluated."""
+        """Store the low bits of a number in a cell, after the whole rule has been evaluated."""
 
     def require(self, condition: Number) -> None:
-        """Leave the access to the hooks of the device unless `condition` holds."""
+        """Leave the access to the device's hooks unless `condition` holds."""
 
     def select(self, condition: Number, a: Number, b: Number) -> Number:
-        """Return `a` if `condition`, else `b`."""
+        """Return `a` if `condition` holds, else `b`."""
 
     def below(self, a: Number, b: Number) -> Number:
-        """Return a < b as unsigned numbers, so that NEVER is above every cycle."""
+        """Return a < b as unsigned numbers, for which NEVER is greater than every cycle."""
 
     def div(self, a: Number, b: Number) -> Number:
-        """Return the unsigned quotient; b is not 0."""
+        """Return the unsigned quotient; b must not be 0."""
 
     def mod(self, a: Number, b: Number) -> Number:
-        """Return the unsigned remainder; b is not 0."""
+        """Return the unsigned remainder; b must not be 0."""
 
     def table(self, values: tuple[int, ...], index: Number) -> Number:
-        """Return values[index] of a constant table."""
+        """Return values[index] from a constant table."""
 
     def can_call(self, code: Number) -> Number:
-        """Return whether `code`, the address of host code in the record (`Record.reserve_addresses`), can be called: it
-        is not 0, and the rule runs in native code. Other engines leave the access to the hooks of the device."""
+        """Return whether host code can be called.
+
+        `code` is its address in the record (`Record.reserve_addresses`). It can be called if the address is not 0 and
+        the rule runs in native code. Other engines leave the access to the device's hooks.
+        """
 
     def call(self, code: Number, data: Number, *numbers: Number) -> Number:
-        """Call host code: int64 code(record, data, numbers...). It changes nothing that a rule reads."""
+        """Call host code: int64 code(record, data, numbers...). It must not change anything that a rule reads."""
 
     def lazy_select(
         self, condition: Number, costly: Callable[[], tuple[Number, ...]], *others: Number
     ) -> tuple[Number, ...]:
-        """Return costly() if `condition`, else `others`. costly() is evaluated only if needed; it neither puts nor
-        requires."""
+        """Return costly() if `condition` holds, else `others`.
+
+        costly() is evaluated only if it is needed. It must not store or require.
+        """
 
     def loop(self, count: Number, body: Callable[..., tuple[Number, ...]], *carried: Number) -> tuple[Number, ...]:
         """Repeat `carried = body(iteration, *carried)` `count` times, at least once. Return the last `carried`."""
@@ -129,18 +132,20 @@ class RuleBuilder(Protocol):
 
 @dataclass(frozen=True)
 class Rule:
-    """Rule of the accesses to one register, or of an event slot. None: that kind of access has no rule."""
+    """Rules of the accesses to one register, or of an event slot. None: there is no rule for that kind of access."""
 
     operands: Any
     reads: Callable[[Any, Any], Number] | None = None
-    """reads(builder, operands) returns the word that an instruction reads."""
+    """reads(builder, operands): returns the word that an instruction reads."""
     writes: Callable[[Any, Any, Number, int], bool] | None = None
-    """writes(builder, operands, value, lanes) writes the register. It returns False if it has no rule for these lanes.
-    `lanes` is 0xFFFF, 0x00FF or 0xFF00 and is constant; the value need not be."""
+    """writes(builder, operands, value, lanes): writes the register. Returns False if it has no rule for these lanes.
+
+    `lanes` is 0xFFFF, 0x00FF or 0xFF00 and constant; the value need not be constant.
+    """
     fires: Callable[[Any, Any], None] | None = None
-    """fires(builder, operands) handles the event. The slot is idle already; the rule may post it again."""
+    """fires(builder, operands): handles the event. The slot is already idle; the rule may post it again."""
     reads_with_effect: Callable[[Any, Any], Number] | None = None
-    """As `reads`, for a read that changes the state of the device."""
+    """As `reads`, for a read that changes the device's state."""
 
     def __repr__(self) -> str:
         functions = (self.reads, self.reads_with_effect, self.writes, self.fires)
@@ -153,7 +158,7 @@ class RuleNotApplicable(Exception):
 
 
 class IntegerOperations:
-    """The computing operations of a builder on ints; they need no machine."""
+    """Computing operations of a builder on ints, which need no machine."""
 
     def select(self, condition: Number, a: Number, b: Number) -> Number:
         return a if condition else b
@@ -195,7 +200,7 @@ INTEGER_OPERATIONS: Final[Any] = IntegerOperations()
 
 
 class RuleInterpreter(IntegerOperations):
-    """The builder on ints: runs rules on the record of a machine."""
+    """Builder on ints: executes rules on a machine's record."""
 
     def __init__(self, record: Record, events: Events) -> None:
         self._events: Final = events
@@ -203,7 +208,7 @@ class RuleInterpreter(IntegerOperations):
         self._masks: Final = {bits: (1 << bits) - 1 for bits in self._views}
 
     def read(self, rule: Rule) -> int | None:
-        """Return the word that a read by `rule` gives, or None if the hooks must handle it."""
+        """Return the word that `rule` reads; None if the hooks must handle the access."""
         reads = rule.reads or rule.reads_with_effect
         if reads is None:
             return None
@@ -213,7 +218,7 @@ class RuleInterpreter(IntegerOperations):
             return None
 
     def write(self, rule: Rule, value: int, lanes: int) -> bool:
-        """Write by `rule`. Return False if the hooks must handle the write."""
+        """Write by `rule`. Return False if the hooks must handle the access."""
         if rule.writes is None:
             return False
         try:
@@ -222,7 +227,7 @@ class RuleInterpreter(IntegerOperations):
             return False
 
     def fire(self, rule: Rule) -> bool:
-        """Handle an event by `rule`. Return False if the hooks must handle it."""
+        """Handle an event by `rule`. Return False if the slot's function must handle it."""
         if rule.fires is None:
             return False
         try:

@@ -1,9 +1,9 @@
-"""Data converter interface (§14): bit clock, frames, word slots, buffering, interrupts; enough for a codec.
+"""Data converter interface (§14): bit clock, frames, word slots, buffering, interrupts, as far as a codec needs them.
 
-The environment exchanges words: `on_word(word, slot, cycle)` for each transmitted one, `source(slot, cycle)` for each
-received one, both left-aligned in 16 bits as in TXBUF and RXBUF. As clock slave (CSCKD = 1) it transfers nothing,
-because no external clock exists; AC-Link modes are framed like the multichannel mode. UNVERIFIED: TXBUF moves to the
-shadow registers when DCIEN is set, without an interrupt.
+The environment exchanges words, left-aligned in 16 bits as in TXBUF and RXBUF: `on_word(word, slot, cycle)` receives
+each transmitted word, `source(slot, cycle)` returns each received one. As clock slave (CSCKD = 1) the module transfers
+nothing, because there is no external clock. AC-Link modes are framed like the multichannel mode. UNVERIFIED: TXBUF is
+copied to the shadow registers when DCIEN is set, without an interrupt.
 """
 
 from __future__ import annotations
@@ -51,20 +51,20 @@ class Dci(Peripheral):
         self._tx_shadow: Final = self.array("tx_shadow", "H", _BUFFERS)
         self._rx_shadow: Final = self.array("rx_shadow", "H", _BUFFERS)
         self._place: Final = self.cell("place", "B")
-        """Words transferred since the last buffer exchange."""
+        """Number of words transferred since the last buffer exchange."""
         self._slot: Final = self.cell("slot", "B")
-        """Slot whose word is complete at the posted event."""
+        """Slot whose word will be complete at the posted event."""
         self._frame: Final = self.timestamp("frame", NEVER)
         """First cycle of the frame that contains the posted event."""
         self._stop: Final = self.timestamp("stop", NEVER)
-        """First cycle after the last frame, once DCIEN was cleared."""
+        """Cycle after the last frame, once DCIEN has been cleared."""
         self._word_event: Final = self.slot("word", self._word_done)
 
     # -- time --------------------------------------------------------------------------------------------------------
 
     @property
     def bit_time(self) -> int:
-        """Bit clock period in Tcy, 0 while the generator is stopped (BCG = 0 or an external clock is selected)."""
+        """Bit clock period in Tcy; 0 while the generator is stopped (BCG = 0 or external clock selected)."""
         return 0 if self.con1["CSCKD"] or not self.con3["BCG"] else 2 * (self.con3["BCG"] + 1)
 
     @property
@@ -77,7 +77,7 @@ class Dci(Peripheral):
         return self._slot_time * (self.con2["COFSG"] + 1)
 
     def _post(self, frame: int, first: int) -> None:
-        """Post the end of the first enabled slot from number `first` of the frame that began in cycle `frame`."""
+        """Post the end of the first enabled slot numbered `first` or above in the frame that began at cycle `frame`."""
         enabled = self.tscon.value | self.rscon.value
         slots = self.con2["COFSG"] + 1
         if not self.frame_time or not enabled & (1 << slots) - 1:
@@ -98,7 +98,7 @@ class Dci(Peripheral):
         self.events.set(self._word_event, max(frame + (slot + 1) * self._slot_time, self.now + 1))
 
     def _word_done(self, due: int) -> None:
-        """Handle the end of a slot: one word was sent, one received."""
+        """Handle the end of a slot, in which one word was sent and one received."""
         slot, place = self._slot.value, self._place.value
         mask = ~((1 << 15 - self.con2["WS"]) - 1) & 0xFFFF
         out = self._tx_shadow[place] & mask
@@ -124,7 +124,10 @@ class Dci(Peripheral):
         self._line.request()
 
     def _load(self) -> None:
-        """Copy TXBUF to the shadow registers. Without new data it is an underflow: send zeros, or repeat (UNFM)."""
+        """Copy TXBUF to the shadow registers.
+
+        If there is no new data, this is an underflow: send zeros or repeat (UNFM).
+        """
         if self.stat["TMPTY"]:
             self.stat["TUNF"] = 1
             if not self.con1["UNFM"]:
@@ -166,7 +169,7 @@ class Dci(Peripheral):
             self._settings_written()
 
     def _settings_written(self) -> None:
-        """Apply new clock or slot settings: start or stop transfers; other changes hold from the next word on."""
+        """Apply new clock or slot settings: start or stop transfers. Other changes apply from the next word on."""
         if not self.con1["DCIEN"]:
             return
         if self._frame.value == NEVER:
@@ -188,14 +191,14 @@ class Dci(Peripheral):
         self._post(self.now + 1, 0)
 
     def _finish_frame(self) -> None:
-        """Handle DCIEN = 0: the current frame is the last (§14); without a clock it ends at once."""
+        """Handle DCIEN = 0: the current frame is the last one (§14); without a clock it ends immediately."""
         if not self.frame_time or self._frame.value == NEVER:
             self._frame.value = NEVER
             self._release()
             return
         behind = max(self.now + 1 - self._frame.value, 0)
         self._stop.value = self._frame.value + -(-behind // self.frame_time) * self.frame_time
-        if self._frame.value >= self.now + 1:  # the posted word belongs to a frame that is not sent
+        if self._frame.value >= self.now + 1:  # the posted word belongs to a frame that will not be sent
             self._frame.value = NEVER
             self.events.cancel(self._word_event)
             self._release()
@@ -210,6 +213,6 @@ class Dci(Peripheral):
             self._ports[port].disown(pin)
 
     def reset(self, power_on: bool) -> None:
-        """Reset to off; the flags were reset with DCISTAT."""
+        """Reset to off. The flags have already been reset with DCISTAT."""
         self._frame.value = self._stop.value = NEVER
         self._place.value = 0

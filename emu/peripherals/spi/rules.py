@@ -1,4 +1,4 @@
-"""Rules of an SPI module (§12). `spi.py` handles exchanges with a connected device."""
+"""Rules of an SPI module (§12). `spi.py` handles transfers with a connected device."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from emu.system.events import NEVER
 from emu.system.rules import Cell, EventSlot, InterruptLine, Number, RuleBuilder, request
 
 _PRIMARY: Final = (64, 16, 4, 1)
-"""Primary prescale for PPRE = 0..3; the secondary is 8 - SPRE (§12)."""
+"""Primary prescale ratio for PPRE = 0..3; the secondary ratio is 8 - SPRE (§12)."""
 
 
 @dataclass(frozen=True, slots=True)
 class SpiOperands:
-    """Operands of the rules: registers and cells of one module."""
+    """Operands of the rules: registers and cells of one SPI module."""
 
     stat: Cell
     con: Cell
@@ -23,7 +23,7 @@ class SpiOperands:
     bit: Mapping[str, int]
     """Masks of the fields of SPIxSTAT and SPIxCON, which have different names."""
     spre: int
-    """Lowest bit of SPRE; PPRE is in bits 1:0."""
+    """Position of SPRE; PPRE is in bits 1:0."""
     waiting: Cell
     shift: Cell
     received: Cell
@@ -31,16 +31,16 @@ class SpiOperands:
     start: Cell
     bit_tcy: Cell
     has_device: Cell
-    """Whether a device is connected, which Python must call."""
+    """Whether a device is connected, for which Python must be called."""
     level: Cell
-    """Pin levels of the port of SDI."""
+    """Pin levels of the port that has SDI."""
     sdi: int
     step: EventSlot
     line: InterruptLine
 
 
 def word_bits(m: RuleBuilder, s: SpiOperands) -> Number:
-    """Return the word length, 8 or 16 (MODE16)."""
+    """Return the word length in bits, 8 or 16 (MODE16)."""
     return m.select((m.get(s.con) & s.bit["MODE16"]) != 0, 16, 8)
 
 
@@ -55,7 +55,7 @@ def _word(m: RuleBuilder, s: SpiOperands, number: Number) -> Number:
 
 
 def push(m: RuleBuilder, s: SpiOperands, value: Number, lanes: int) -> bool:
-    """Write BUF; a word written while TXB is full is lost (§12)."""
+    """Write BUF. A word written while TXB is full is lost (§12)."""
     stat, busy, due = m.get(s.stat), m.get(s.busy) != 0, m.get(s.step.due)
     word = (m.get(s.buf) & (0xFFFF & ~lanes)) | (value & lanes)
     taken = (stat & (s.bit["SPIEN"] | s.bit["SPITBF"])) == s.bit["SPIEN"]
@@ -74,7 +74,7 @@ def take(m: RuleBuilder, s: SpiOperands) -> Number:
 
 
 def begin(m: RuleBuilder, s: SpiOperands, cycle: Number, bit: Number, when: Number = True) -> None:
-    """Start a transfer if `when` is true: move TXB to the shift register, clocked from `cycle` on."""
+    """If `when` holds, start a transfer: move TXB to the shift register, which is clocked from `cycle` on."""
     stat, shift = m.get(s.stat), m.get(s.shift)
     waits = when & ((stat & s.bit["SPITBF"]) != 0)
     m.put(s.shift, m.select(waits, _word(m, s, m.get(s.waiting)), shift))
@@ -85,7 +85,7 @@ def begin(m: RuleBuilder, s: SpiOperands, cycle: Number, bit: Number, when: Numb
 
 
 def finish(m: RuleBuilder, s: SpiOperands, number: Number, when: Number = True) -> None:
-    """Complete a transfer if `when` is true: the low bits of `number` were received; they are lost if RXB is full."""
+    """If `when` holds, complete a transfer that received the low bits of `number`. They are lost if RXB is full."""
     word, stat = _word(m, s, number), m.get(s.stat)
     is_new = when & ((stat & s.bit["SPIROV"]) == 0)
     full = (stat & s.bit["SPIRBF"]) != 0
@@ -97,7 +97,7 @@ def finish(m: RuleBuilder, s: SpiOperands, number: Number, when: Number = True) 
 
 
 def open_end(m: RuleBuilder, s: SpiOperands) -> Number:
-    """Return the word a master reads without a connected device: the level of SDI in every bit."""
+    """Return the word that a master reads without a connected device: every bit is the level of SDI."""
     return m.select((m.get(s.level) & s.sdi) != 0, 0xFFFF, 0)
 
 
@@ -107,7 +107,7 @@ def waits_to_begin(m: RuleBuilder, s: SpiOperands) -> Number:
 
 
 def fire(m: RuleBuilder, s: SpiOperands) -> None:
-    """Handle the end of a master's word, and start the next one."""
+    """Handle the end of a word sent by a master, and start the next one."""
     m.require(((m.get(s.con) & s.bit["MSTEN"]) != 0) & (m.get(s.has_device) == 0))
     finish(m, s, open_end(m, s), m.get(s.busy) != 0)
     begin(m, s, m.now, bit_time(m, s), waits_to_begin(m, s))

@@ -1,8 +1,8 @@
 """SPI1/2 (§12): master and slave, 8 and 16 bits, double-buffered.
 
-The environment exchanges words. As master, the module calls `exchange(word, bits)` at the end of each transfer; as
-slave, an external master calls `clock_word(word, bit_tcy)`. SCK and SDO levels are functions of the cycle. The module's
-logic is in `rules.py`.
+The environment exchanges words. As master, the module calls `exchange(word, bits)` at the end of each transfer. As
+slave, it is clocked by an external master, which calls `clock_word(word, bit_tcy)`. The levels of SCK and SDO are
+functions of the cycle. The module's logic is in `rules.py`.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ class Spi(Peripheral):
         self._exchange: Callable[[int, int], int] | None = None
         self._has_device: Final = self.cell("has_device", "B")
         self.on_slave_word: Callable[[int, int], None] | None = None
-        """on_slave_word(word, cycle): called with each word that an external master has clocked out of this module."""
+        """on_slave_word(word, cycle): called for each word that an external master has clocked out of this module."""
         self._pins: Final = {role: parse_pin(getattr(site, f"{role}_pin")) for role in ("sck", "sdi", "sdo", "ss")}
         self._ports: Final = ports
         self._waiting: Final = self.cell("waiting", "H")
@@ -87,7 +87,7 @@ class Spi(Peripheral):
 
     @property
     def exchange(self) -> Callable[[int, int], int] | None:
-        """exchange(word, bits) -> word: the connected device, while this module is master."""
+        """exchange(word, bits) -> word: the connected device, used while this module is master."""
         return self._exchange
 
     @exchange.setter
@@ -102,7 +102,7 @@ class Spi(Peripheral):
 
     @property
     def bit_time(self) -> int:
-        """Bit time as master in Tcy."""
+        """Bit time in Tcy as master."""
         return int(bit_time(self.bus.integers, self._operands))
 
     # -- transfers ---------------------------------------------------------------------------------------------------
@@ -137,7 +137,7 @@ class Spi(Peripheral):
     # -- pins --------------------------------------------------------------------------------------------------------
 
     def _take_pins(self) -> None:
-        """Take or return the pins as SPIEN says: SCK, SDI and, unless DISSDO, SDO (§12)."""
+        """Take or return the pins as SPIEN requires: SCK, SDI and, unless DISSDO is set, SDO (§12)."""
         if not self.stat["SPIEN"]:
             for port, pin in self._pins.values():
                 self._ports[port].disown(pin)
@@ -152,9 +152,9 @@ class Spi(Peripheral):
         self.restored()
 
     def bits(self, cycle: int) -> int:
-        """Return the levels of SCK and SDO (§12:
+        """Return the levels of SCK and SDO (§12).
 
-        CKP idle level, CKE 1 = data changes on the edge from active to idle).
+        CKP is the idle level; CKE = 1 means that data changes on the edge from active to idle.
         """
         idle = self.con["CKP"]
         clock, data = idle, 0
@@ -166,19 +166,19 @@ class Spi(Peripheral):
         return (self._pins["sck"][1] if clock else 0) | (self._pins["sdo"][1] if data else 0)
 
     def rises(self, mask: int, after: int, until: int) -> int:
-        """No other device is clocked by SCK."""
+        """Report no rising edges, because no other device is clocked by SCK."""
         return 0
 
     def nth_rise(self, mask: int, after: int, count: int) -> int:
-        """No other device is clocked by SCK."""
+        """Report no rising edges, because no other device is clocked by SCK."""
         return NEVER
 
     def constant_until(self, cycle: int) -> int:
-        """No guarantee: idle levels follow control bits that are plain storage."""
+        """Promise nothing, because idle levels depend on control bits that are plain storage."""
         return cycle
 
     def restored(self) -> None:
-        """Attach the waveform to SCK (as master) and SDO while the module is on."""
+        """Attach the waveform to SDO and, as master, to SCK while the module is on."""
         self._has_device.value = self._exchange is not None
         port = self._pins["sck"][0]
         self.context.pins.detach(port, self)
@@ -202,7 +202,7 @@ class Spi(Peripheral):
             self._take_pins()
 
     def _clear(self) -> None:
-        """Clear buffers and flags, as SPIEN = 0 does (§12)."""
+        """Clear buffers and flags, as a write of SPIEN = 0 does (§12)."""
         for flag in ("SPITBF", "SPIRBF", "SPIROV"):
             self.stat[flag] = 0
         self._busy.value = 0
@@ -210,25 +210,25 @@ class Spi(Peripheral):
         self.events.cancel(self._step)
 
     def release_pins(self) -> None:
-        """Return all pins to LAT and TRIS; SPIEN is 0."""
+        """Return all pins to LAT and TRIS, because SPIEN is 0."""
         self._take_pins()
 
     def stops_in(self, mode: int) -> bool:
-        """Whether the clock stops: a slave is clocked externally and continues.
+        """Whether the clock stops. A slave has an external clock and continues.
 
         UNVERIFIED: §12 does not cover Sleep.
         """
         return bool(self.con["MSTEN"]) and super().stops_in(mode)
 
     def freeze(self, cycle: int, mode: int) -> None:
-        """Abort the current word; the word in TXB waits. UNVERIFIED: §12 does not cover Sleep."""
+        """Abort the current word; keep the word in TXB. UNVERIFIED: §12 does not cover Sleep."""
         self._busy.value = 0
         self._start.value = NEVER
         self.events.cancel(self._step)
         super().freeze(cycle, mode)
 
     def thaw(self, cycle: int) -> None:
-        """Resume the clock and send the waiting word."""
+        """Resume the clock and send the word in TXB."""
         super().thaw(cycle)
         if self.stat["SPITBF"]:
             self.events.set(self._step, cycle + 1)

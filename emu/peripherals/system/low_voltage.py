@@ -12,13 +12,13 @@ from emu.system.events import NEVER
 THRESHOLD_MV: Final = (  # UNVERIFIED: §17 gives only the order of the codes
     1800, 2000, 2200, 2400, 2600, 2800, 2900, 3100, 3400, 3600, 3700, 3900, 4100, 4300, 4600, 1200,
 )  # fmt: skip
-"""Trip points for LVDL = 0..14 in mV of supply; code 15 compares the LVDIN pin with the band gap."""
+"""Trip points in mV of the supply for LVDL = 0..14. Code 15 compares the LVDIN pin with the band gap."""
 _BAND_GAP_SECONDS: Final = 20e-6
-"""The band gap is stable 20 us after LVDEN (§4)."""
+"""Time in s after LVDEN until the band gap is stable: 20 us (§4)."""
 
 
 class LowVoltageDetect(Peripheral):
-    """Low-voltage detect:
+    """Low-voltage detect.
 
     LVDIF rises when the supply falls below the selected threshold. LVDEN and LVDL are in RCON.
     """
@@ -41,16 +41,16 @@ class LowVoltageDetect(Peripheral):
         rcon.written_by(written)
 
     def stops_in(self, mode: int) -> bool:
-        """Never stops: it compares the supply in every power mode."""
+        """Return False: the supply is compared in every power mode."""
         return False
 
     def set_supply(self, millivolts: int) -> None:
-        """Change the supply voltage now (0..65535 mV; LVDIN when LVDL = 15)."""
+        """Change the supply voltage now, 0..65535 mV; with LVDL = 15, the voltage of LVDIN."""
         self._supply.value = millivolts
         self._compare()
 
     def _compare(self) -> None:
-        """Compare the supply with the threshold after either changed; request LVDIF on the transition to low."""
+        """Compare the supply with the threshold after a change of either. On the transition to low, request LVDIF."""
         low = self._is_low
         if low and not self._below.value:
             self._line.request()
@@ -75,6 +75,6 @@ class LowVoltageDetect(Peripheral):
         self._compare()
 
     def reset(self, power_on: bool) -> None:
-        """Reset; every reset but power-on keeps RCON, and so an enabled band gap."""
+        """Reset. Every reset except power-on keeps RCON, and thus an enabled band gap."""
         self._below.value = self._is_low
         self._enable_changed()

@@ -12,7 +12,7 @@ _PREFIXES: Final = {
     "ADC": ("ADCBUF", "ADCON", "ADCHS", "ADCSSL"),
     "DCI": ("DCI", "TSCON", "RSCON", "RXBUF", "TXBUF"),
 }
-"""Prefixes of registers whose names do not start with the module's name."""
+"""Name prefixes of registers that do not begin with their module's name."""
 
 
 def _zero() -> int:
@@ -23,7 +23,7 @@ _OFF: Final = RegisterWiring(0, 0, _zero, None, None, None)
 
 
 class ModuleDisable(Peripheral):
-    """PMD1 and PMD2. The registers determine which modules are off, so `restored` suffices after a snapshot."""
+    """PMD1 and PMD2. Their values determine which modules are off, so `restored` suffices after a snapshot."""
 
     def __init__(self, context: ChipContext, modules: dict[str, Peripheral]) -> None:
         super().__init__("pmd", context)
@@ -31,7 +31,7 @@ class ModuleDisable(Peripheral):
         self._off: Final[dict[int, RegisterWiring]] = {}
         self._bits: Final[list[tuple[Callable[[], int], str]]] = []
         self._words: Final[dict[str, list[int]]] = {}
-        """Word indices of each module's registers."""
+        """Indices of each module's registers."""
         for name in ("PMD1", "PMD2"):
             register = self.register(name)
             register.written_by(lambda _old, _new, _lanes: self._written())
@@ -42,7 +42,7 @@ class ModuleDisable(Peripheral):
             self.register("PMD3")
 
     def stops_in(self, mode: int) -> bool:
-        """Never stops: the device has no clock."""
+        """Return False: this device has no clock."""
         return False
 
     def _words_of(self, module: str) -> list[int]:
@@ -74,7 +74,7 @@ class ModuleDisable(Peripheral):
             device.restart()
 
     def restored(self) -> None:
-        """Connect or disconnect the registers of each module as its PMD bit says."""
+        """Connect or disconnect each module's registers according to its PMD bit."""
         for is_off, module in self._bits:
             off = bool(is_off())
             for word in self._words[module]:
@@ -84,7 +84,7 @@ class ModuleDisable(Peripheral):
                     self._reconnect(word)
 
     def reset(self, power_on: bool) -> None:
-        """Reset: all modules are enabled."""
+        """Reset: enable all modules."""
         self.restored()
 
     def _disconnect(self, word: int) -> None:

@@ -14,22 +14,22 @@ from emu.peripherals.interrupt_lines import Interrupts
 from emu.system.program import EEPROM_LATCHES, ERASED_HALF, ERASED_WORD, FLASH_LATCHES
 
 BUSY_SECONDS: Final = 2e-3
-"""Typical time of every operation (§16)."""
+"""Typical duration of every operation in s (§16)."""
 _KEY: Final = (0x55, 0xAA)
 _WINDOW: Final = 3
 """Maximum Tcy between two steps of the key sequence.
 
 UNVERIFIED: the manual requires consecutive instructions, with at most a literal load between the two keys. An interrupt
-in between takes longer than this limit, so it breaks the sequence as on silicon (§16).
+between them takes longer than this limit, so it breaks the sequence as on silicon (§16).
 """
 
 ERASE_FLASH_ROW, PROGRAM_FLASH_ROW = 0x41, 0x01
 ERASE_WORD, ERASE_ROW, ERASE_ALL = 0x44, 0x45, 0x46
 PROGRAM_WORD, PROGRAM_ROW = 0x04, 0x05
 WRITE_CONFIG: Final = 0x08
-"""PROGOP codes (§16)."""
+"""PROGOP codes of the operations (§16)."""
 _ERASING: Final = 0x40
-"""Bit that is set in the codes of erase operations."""
+"""PROGOP bit that is set in all erase operations."""
 _FLASH: Final = (ERASE_FLASH_ROW, PROGRAM_FLASH_ROW)
 _EEPROM: Final = (ERASE_WORD, ERASE_ROW, ERASE_ALL, PROGRAM_WORD, PROGRAM_ROW)
 
@@ -57,7 +57,7 @@ class Nvm(Peripheral):
         context.program.captured_in = self.adr.address, self.adru.address
 
     def stops_in(self, mode: int) -> bool:
-        """Never stops: the memory array times the operation."""
+        """Return False: the memory array times the operation itself."""
         return False
 
     def reset(self, power_on: bool) -> None:
@@ -66,7 +66,7 @@ class Nvm(Peripheral):
             if not self._operation.value & _ERASING:
                 self._operation.value = 0
             else:
-                self._apply()  # a partly erased row reads as erased
+                self._apply()  # a partly erased row then reads as erased
             self.con["WRERR"] = 1
         self._operation.value = 0
         self._stage.value = 0
@@ -85,7 +85,7 @@ class Nvm(Peripheral):
         self._stage_cycle.value = self.now
 
     def _con_written(self, old: int, new: int, _lanes: int) -> None:
-        if old & self._wr:  # software cannot end an operation
+        if old & self._wr:  # software cannot end an operation early
             self.con.value = old | self._wr
             return
         unlocked = self._stage.value == len(_KEY) and self.now - self._stage_cycle.value <= _WINDOW
@@ -111,7 +111,7 @@ class Nvm(Peripheral):
             self.context.cpu_signals.stall_until(end)
 
     def clock_changed(self) -> None:
-        """Adjust the CPU stall of a flash operation to the rescheduled end of the operation."""
+        """Adjust the CPU stall of a flash operation to the operation's rescheduled end."""
         if self.is_busy and self._operation.value in _FLASH:
             self.context.cpu_signals.stall_until(self.events.due(self._done))
 
@@ -134,7 +134,7 @@ class Nvm(Peripheral):
             self.context.program.clear_latches()
 
     def _apply_flash(self, operation: int, row: int) -> None:
-        """Erase or program a flash row. Rows outside the array are ignored; programming only clears bits (§16)."""
+        """Erase or program a flash row. Rows outside flash are ignored. Programming can only clear bits (§16)."""
         program = self.context.program
         if row not in self.context.chip.program["flash"]:
             return

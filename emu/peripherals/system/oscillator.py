@@ -13,16 +13,16 @@ from emu.peripherals.base import ChipContext, Peripheral
 from emu.system.events import NEVER
 
 FRC_HZ: Final = 7_370_000
-"""Internal fast RC oscillator, untuned (§3)."""
+"""Frequency in Hz of the internal fast RC oscillator (FRC), untuned (§3)."""
 LPRC_HZ: Final = 512_000
-"""Internal low-power RC oscillator (§3)."""
+"""Frequency in Hz of the internal low-power RC oscillator (LPRC) (§3)."""
 LP_HZ: Final = 32_768
-"""Secondary oscillator on SOSCI/SOSCO (§2)."""
+"""Frequency in Hz of the secondary oscillator on SOSCI/SOSCO (§2)."""
 
 _LP, _FRC, _LPRC, _EXTERNAL, _PLL = 0, 1, 2, 3, 7
-"""FOS, NOSC and COSC codes (§2)."""
+"""Source codes in FOS, NOSC and COSC (§2)."""
 _START_PERIODS: Final = 1024
-"""Periods the oscillator start-up timer counts (§3)."""
+"""Number of periods that the oscillator start-up timer counts (§3)."""
 _LOCK_SECONDS: Final = 20e-6  # UNVERIFIED: typical lock time, up to 50 us (§3)
 _TUNE: Final = 0.015  # UNVERIFIED: relative change of the FRC per OSCTUN step (§3)
 _POST: Final = (1, 4, 16, 64)
@@ -46,10 +46,10 @@ _MULTIPLIERS: Final = {  # FPR with FOS = 7: (source, multiplier of its frequenc
 }
 
 _UNPROGRAMMED: Final = ("crystal", 8.0)
-"""Setting for reserved FPR codes and for images without configuration words: as the e-puck's library sets it (§2)."""
+"""Setting for reserved FPR codes and for images without configuration words: that of the e-puck's library (§2)."""
 
 _KEYS: Final = {0xFF00: (0x78, 0x9A), 0x00FF: (0x46, 0x57)}
-"""Unlock bytes for OSCCONH and OSCCONL, by byte lane (§3)."""
+"""Unlock bytes for OSCCONH and OSCCONL, by byte lane mask (§3)."""
 
 _PS: Final = 10**12
 
@@ -65,7 +65,7 @@ class Oscillator(Peripheral):
         self._free: Final = sfr.writable
         self._flags: Final = sfr.clear_only
         word = sfr.address >> 1
-        self.bus.writable[word] = 0xFFFF  # the hook sees the raw key bytes
+        self.bus.writable[word] = 0xFFFF  # the hook needs the raw key bytes
         self.bus.clear_only[word] = 0
         self.con.written_by(self._con_written)
         self.tun.written_by(lambda _old, _new, _lanes: self._rate_changed(self.now + 1))
@@ -73,18 +73,18 @@ class Oscillator(Peripheral):
         self._key_count: Final = self.cell("key_count", "B")
         self._key_cycle: Final = self.cell("key_cycle", "Q")
         self._since: Final = self.cell("since", "Q")
-        """Cycle in which the current length of a Tcy came into force."""
+        """Cycle from which the current length of a Tcy applies."""
         self._elapsed: Final = self.cell("elapsed", "Q")
         """Picoseconds from power-on to that cycle."""
         self._tcy_fs: Final = self.cell("tcy", "Q")
-        """Length of a Tcy in femtoseconds, for reports; `fcy` is exact."""
+        """Length of a Tcy in femtoseconds, for reports only; `fcy` is exact."""
         self._current: Final = self.cell("current", "Q")
-        """Current clock selection: COSC, POST and OSCTUN packed, so that `fcy` is a function of the record."""
+        """Current clock selection, packed from COSC, POST and OSCTUN, so that `fcy` is a function of the record."""
         self._switch: Final = self.slot("switch", self._switched, in_seconds=True)
         self.on_change: Final[list[Callable[[], None]]] = []
-        """Callbacks after a change of `fcy`."""
+        """Callbacks called after a change of `fcy`."""
         self.before_change: Final[list[Callable[[], None]]] = []
-        """Callbacks before a change of `fcy`."""
+        """Callbacks called before a change of `fcy`."""
         context.fcy = self.fcy
 
     # -- rates -------------------------------------------------------------------------------------------------------
@@ -105,7 +105,7 @@ class Oscillator(Peripheral):
         return self._source_hz(packed >> 2 & 7, packed >> 5) / 4 / _POST[packed & 3]
 
     def seconds(self, cycle: int) -> float:
-        """Return the seconds from power-on to `cycle`, which must not lie before the last clock change."""
+        """Return the seconds from power-on to `cycle`, which must not precede the last clock change."""
         return self._elapsed.value / _PS + (cycle - self._since.value) / self.fcy()
 
     def _rate_changed(self, cycle: int) -> None:
@@ -121,7 +121,7 @@ class Oscillator(Peripheral):
             callback()
 
     def _reschedule(self, cycle: int, factor: float) -> None:
-        """Scale the remaining delay of slots timed in seconds: `factor` times as many Tcy from `cycle` on."""
+        """Scale the remaining delays of slots timed in seconds, from `cycle` on, by `factor`."""
         if factor == 1:
             return
         for slot in self.context.in_seconds:
@@ -132,7 +132,7 @@ class Oscillator(Peripheral):
     # -- OSCCON ------------------------------------------------------------------------------------------------------
 
     def _con_written(self, old: int, new: int, lanes: int) -> None:
-        """Handle writes to OSCCON: only a byte write directly after its two key bytes has an effect (§3)."""
+        """Handle a write to OSCCON. Only a byte write immediately after its two key bytes has an effect (§3)."""
         self.con.value = old
         if lanes not in _KEYS:
             self._key_count.value = 0
@@ -163,14 +163,17 @@ class Oscillator(Peripheral):
             self._rate_changed(self.now + 1)
 
     def _request_switch(self) -> None:
-        """Start a clock switch. With FCKSM = 1x, or for the current source, OSWEN reads 0 at once (§3). UNVERIFIED."""
+        """Start a clock switch.
+
+        UNVERIFIED: with FCKSM = 1x, or for the current source, OSWEN reads 0 immediately (§3).
+        """
         if self._config("FCKSM") & 2 or self.con["NOSC"] == self.con["COSC"]:
             self.con["OSWEN"] = 0
             return
         self.events.set(self._switch, self.now + 1 + self._start_tcy(self.con["NOSC"]))
 
     def _start_tcy(self, code: int) -> int:
-        """Return the start-up time of a source in current Tcy: start-up timer of crystals, then the PLL lock (§3)."""
+        """Return the start-up time of a source in current Tcy: start-up timer for crystals, then PLL lock (§3)."""
         wait = 0.0
         if code in (_LP, _EXTERNAL, _PLL):
             wait = _START_PERIODS / (LP_HZ if code == _LP else self.context.crystal)
@@ -179,7 +182,7 @@ class Oscillator(Peripheral):
         return round(wait * self.fcy())
 
     def wake_tcy(self) -> int:
-        """Return the Tcy from the end of Sleep to the first instruction cycle: the current source restarts (§17)."""
+        """Return the Tcy from the end of Sleep to the first instruction cycle, for the source's restart (§17)."""
         return self._start_tcy(self.con["COSC"])
 
     def _switched(self, due: int) -> None:
@@ -192,7 +195,7 @@ class Oscillator(Peripheral):
         self._rate_changed(cycle)
 
     def abandon_switch(self) -> None:
-        """Abort a running clock switch (Sleep, clock monitor); the current source stays (§3)."""
+        """Abort a running clock switch (Sleep, clock monitor); keep the current source (§3)."""
         self.events.cancel(self._switch)
         self.con["OSWEN"] = 0
 
@@ -212,20 +215,20 @@ class Oscillator(Peripheral):
     # -- power and reset ---------------------------------------------------------------------------------------------
 
     def stops_in(self, mode: int) -> bool:
-        """Never stops: it is the clock source."""
+        """Return False: this device is the clock source."""
         return False
 
     def power_up(self, power_on: bool) -> None:
-        """Reset; a reset that keeps OSCCON also keeps a running clock switch (§4)."""
+        """Reset. A reset that keeps OSCCON also keeps a running clock switch (§4)."""
         pending = self.events.due(self._switch)
         super().power_up(power_on)
         if self.con["OSWEN"] and pending != NEVER:
             self.events.set(self._switch, pending)
 
     def reset(self, power_on: bool) -> None:
-        """Reset: power-on selects the source in FOSC; other resets keep it (§4).
+        """Reset. Power-on selects the source in FOSC; other resets keep the current one (§4).
 
-        Emulation starts with the PLL locked.
+        The emulation starts with the PLL locked.
         """
         code = self._config("FOS") if power_on else self._current.value >> 2 & 7
         if power_on:

@@ -1,4 +1,4 @@
-"""Registers that are plain masked storage without a modelled function, with reasons; `report` prints the list."""
+"""Registers that are masked storage without a modelled function, with the reasons. `report` prints the list."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ PLAIN: Final[Mapping[str, str]] = MappingProxyType(
         "PMD3": "reserved address, no bits on this part",
     }
 )
-"""Reason by register name. The CPU or a device reads, writes or computes every other register of a chip's table."""
+"""Reason by register name. Every other register in a chip's table is used or computed by the CPU or a device."""
 
 
 def kind(bus: Bus, word: int) -> str:
@@ -29,7 +29,7 @@ def kind(bus: Bus, word: int) -> str:
 
 
 def report(chip: Chip, bus: Bus) -> str:
-    """Return the list as Markdown: plain registers with reasons, then how each other register is modelled."""
+    """Return the list as Markdown: plain registers with reasons, then how every other register is modelled."""
     plain, groups = [], dict[str, list[str]]()
     for sfr in chip.sfrs.values():
         if sfr.size != 2:

@@ -1,4 +1,4 @@
-"""Rules of Idle and CLRWDT (§4, §17), for a disabled watchdog and no device that stops in Idle."""
+"""Rules of Idle and CLRWDT (§4, §17). They require a disabled watchdog and no device that stops in Idle."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ from emu.system.rules import Cell, Number, RuleBuilder, event_slot
 
 @dataclass(frozen=True, slots=True)
 class PowerOperands:
-    """Operands of the rules: words of the record, and bits in them."""
+    """Operands of the rules: register cells and masks of bits in them."""
 
     rcon: Cell
     idle: int
     wdto: int
     enables: tuple[tuple[Cell, int], ...]
-    """The watchdog is enabled while one of these bits is set."""
+    """Bits of which any enables the watchdog."""
     stops: tuple[tuple[Cell, int], ...]
-    """A device stops in Idle if one of these bits is set."""
+    """Bits of which any makes a device stop in Idle."""
     timeout: Cell
     """Due cycle of the watchdog's event."""
     mode: Cell
-    """0 while the CPU runs, IDLE or SLEEP."""
+    """Power mode of the CPU: 0 while it runs, else IDLE or SLEEP."""
 
 
 def power_operands(record: Record, chip: Chip, timeout: int, mode: Cell) -> PowerOperands:
@@ -55,14 +55,14 @@ def any_bit(m: RuleBuilder, words: tuple[tuple[Cell, int], ...]) -> Number:
 
 
 def clear_watchdog(m: RuleBuilder, p: PowerOperands) -> None:
-    """Execute CLRWDT: clear WDTO (UNVERIFIED: the family manual says so, §4); no time-out is pending."""
+    """Execute CLRWDT without a pending time-out: clear WDTO (UNVERIFIED: the family manual says so, §4)."""
     m.require(any_bit(m, p.enables) == 0)
     m.put(p.rcon, m.get(p.rcon) & (0xFFFF & ~p.wdto))
     m.put(p.timeout, NEVER)
 
 
 def idle(m: RuleBuilder, p: PowerOperands) -> None:
-    """Execute PWRSAV #1: set IDLE in RCON; all devices continue."""
+    """Execute PWRSAV #1: set IDLE in RCON. All devices continue."""
     m.require(any_bit(m, p.stops) == 0)
     m.require(any_bit(m, p.enables) == 0)
     m.put(p.rcon, (m.get(p.rcon) & (0xFFFF & ~p.wdto)) | p.idle)

@@ -1,4 +1,4 @@
-"""RCON and the watchdog (§4)."""
+"""Register RCON and the watchdog (§4)."""
 
 from __future__ import annotations
 
@@ -10,30 +10,30 @@ from emu.system.events import NEVER
 from emu.system.rules import Rule
 
 WDT_HZ: Final = 128_000
-"""The LPRC divided by 4 clocks the watchdog's 8-bit counter (§4)."""
+"""Prescaler of the watchdog's 8-bit counter, which is clocked by the LPRC (§4)."""
 _COUNTER: Final = 256
 _PRESCALE_A: Final = (1, 8, 64, 512)
 
 CAUSES: Final = ("TRAPR", "IOPUWR", "EXTR", "SWR", "WDTO", "BOR", "POR")
-"""RCON bits that name a reset (§4)."""
+"""RCON bits that name the cause of a reset (§4)."""
 
 
 class Resets(Peripheral):
-    """RCON: flags of reset causes and of Sleep and Idle. They stay set until software clears them."""
+    """RCON: flags of reset causes and of Sleep and Idle. Only software clears them."""
 
     def __init__(self, context: ChipContext) -> None:
         super().__init__("rcon", context)
         self.rcon: Final = self.register("RCON")
 
     def stops_in(self, mode: int) -> bool:
-        """Never stops: the device has no clock."""
+        """Return False: this device has no clock."""
         return False
 
     def record_cause(self, cause: str, kept: int) -> None:
-        """Set RCON after a reset by `cause`; `kept` is its value before. Power-on clears all other bits (§4)."""
+        """Set RCON after a reset by `cause`. `kept` is the previous value. Power-on clears all other bits (§4)."""
         if cause not in CAUSES:
             raise ValueError(f"{cause!r} is not a reset cause; expected one of {', '.join(CAUSES)}")
-        if cause == "POR":  # POR and BOR set, LVDL = 0101
+        if cause == "POR":  # the reset value sets POR and BOR, and LVDL = 0101
             self.rcon.value = self.context.chip.sfrs["RCON"].reset
             return
         self.rcon.value = kept
@@ -42,7 +42,7 @@ class Resets(Peripheral):
 
 
 class Watchdog(Peripheral):
-    """Watchdog timer, clocked by the LPRC: resets a running chip, wakes a sleeping one."""
+    """Watchdog timer, clocked by the LPRC. It resets a running chip and wakes a sleeping one."""
 
     def __init__(self, context: ChipContext, resets: Resets) -> None:
         super().__init__("wdt", context)
@@ -58,7 +58,7 @@ class Watchdog(Peripheral):
         self.idling: Final = Rule(self._operands, fires=idle)
 
     def stops_in(self, mode: int) -> bool:
-        """Never stops: the LPRC runs in every power mode."""
+        """Return False: the LPRC runs in every power mode."""
         return False
 
     @property
@@ -68,12 +68,12 @@ class Watchdog(Peripheral):
 
     @property
     def stops_devices(self) -> bool:
-        """Whether some device stops in Idle."""
+        """Whether any device is configured to stop in Idle."""
         return bool(any_bit(self.bus.integers, self._operands.stops))
 
     @property
     def period(self) -> int:
-        """Time-out in Tcy: 2 ms x A x B (§4). At least 1, because a Tcy may take 8 ms."""
+        """Time-out in Tcy: 2 ms x A x B (§4). It is at least 1, because a Tcy may last 8 ms."""
         word = self.context.chip.config["FWDT"]
         stored = self.context.program.setting("FWDT")
         counts = _COUNTER * _PRESCALE_A[word.field(stored, "FWPSA")] * (word.field(stored, "FWPSB") + 1)

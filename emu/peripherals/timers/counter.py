@@ -1,6 +1,6 @@
-"""The count of a timer (§7): a function of the cycle, the clock source and a few cells of the record.
+"""The count of a timer (§7), computed from the cycle, the clock source and a few record cells.
 
-The stored TMR word is the count at cycle `base`; one count takes `tick` Tcy.
+The stored TMR value is the count at cycle `base`; one count takes `tick` Tcy.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from emu.system.events import NEVER
 
 
 class Counter(Peripheral):
-    """TMR, PR and TxCON, and the computation of the count. 32 bits wide with T32 set and a type C partner."""
+    """TMR, PR and TxCON, and the computation of the count. It is 32 bits wide with T32 set and a type C partner."""
 
     def __init__(self, site: TimerSite, context: ChipContext) -> None:
         super().__init__(f"t{site.number}", context)
@@ -26,12 +26,12 @@ class Counter(Peripheral):
         self.con: Final = self.register(f"T{site.number}CON")
         self.idle_bit = (self.con, "TSIDL")
         self.lower: Counter | None = None
-        """For a type C timer: the type B timer that owns it while T32 is set."""
+        """For a type C timer, the type B timer that uses it while T32 is set."""
         self.upper: Counter | None = None
         self.base: Final = self.timestamp("base")
-        """Cycle at which the count equals the stored TMR word, with an empty prescaler if the source is Tcy."""
+        """Cycle at which the count equals the stored TMR value. If the source is Tcy, the prescaler is empty then."""
         self.tick: Final = self.cell("tick")
-        """Tcy per count; 0 while stopped or externally clocked."""
+        """Tcy per count; 0 while the timer is stopped or externally clocked."""
         self._source: Final = self.cell("source", "B")
         self._phase: Final = self.cell("phase", "H")
         self._before: Final = self.cell("before", "I")
@@ -59,27 +59,27 @@ class Counter(Peripheral):
 
     @property
     def limit(self) -> int:
-        """PR, 32 bits wide in 32-bit mode."""
+        """Period: the value of PR, 32 bits wide in 32-bit mode."""
         return self.pr.value | (self.upper.pr.value << 16 if self.upper is not None and self.is_wide else 0)
 
     @property
     def top(self) -> int:
-        """Largest count: 0xFFFF or 0xFFFF_FFFF."""
+        """Maximum count: 0xFFFF or 0xFFFF_FFFF."""
         return 0xFFFF_FFFF if self.is_wide else 0xFFFF
 
     def _ticks(self, cycle: int) -> int:
-        """Return the clocks (before the prescaler) from `base` to `cycle`."""
+        """Return the number of source clocks, before the prescaler, from `base` to `cycle`."""
         source, cycle = self._source.value, min(cycle, self._frozen.value)
         if source == TCY:
             return max(cycle - self.base.value, 0)
         if source == WAVEFORM:
             waveform = self.context.pins.waveform(self._port, self._pin)
-            if waveform is not None and cycle > self.base.value:  # an edge in cycle c is counted in c + 1 (§7 rule 9)
+            if waveform is not None and cycle > self.base.value:  # an edge in cycle c counts in c + 1 (§7 rule 9)
                 return waveform.rises(self._pin, self.base.value - 1, cycle - 1)
         return 0
 
     def count(self, cycle: int) -> int:
-        """Return the count in `cycle`, which must not lie before the last write to the timer."""
+        """Return the count at `cycle`, which must not precede the last write to the timer."""
         if self.is_taken:
             assert self.lower is not None
             return self.lower.count(cycle) >> 16
@@ -89,11 +89,11 @@ class Counter(Peripheral):
         return advance(self._start, clocks // self._prescale, self.limit, self.top)
 
     def read(self) -> int:
-        """Return TMR as an instruction reads it in the current cycle."""
+        """Return TMR as read by an instruction in the current cycle."""
         return self.count(self.clock) & 0xFFFF
 
     def next_cycle_at(self, target: int, after: int) -> int:
-        """Return the first cycle after `after` in which the count becomes `target`, or NEVER."""
+        """Return the first cycle after `after` at which the count becomes `target`, or NEVER."""
         if self.is_taken or self.is_frozen:
             return NEVER
         source = self._source.value
@@ -119,7 +119,7 @@ class Counter(Peripheral):
         return PRESCALE[self.con["TCKPS"]]
 
     def _fold(self, cycle: int, prescale: int, limit: int) -> None:
-        """Move the base to `cycle`, counting up to there with the given (old) prescaler and period."""
+        """Move the base to `cycle`; count up to there with the given (old) prescaler and period."""
         clocks = self._phase.value + self._ticks(cycle)
         self._start = advance(self._start, clocks // prescale, limit, self.top)
         self._phase.value = clocks % prescale

@@ -1,4 +1,4 @@
-"""Input capture 1-8 (§8): the count of timer 2 or 3 at edges of a pin, four values deep."""
+"""Input capture 1-8 (§8): stores the count of timer 2 or 3 at edges of a pin, in a FIFO of four values."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ _FIFO: Final = 4
 _LATENCY: Final = 2  # UNVERIFIED: Tcy from the edge to the capture (§8)
 
 _OFF, _EVERY_EDGE, _FALLING, _RISING, _FOURTH, _SIXTEENTH, _UNUSED, _WAKE = range(8)
-"""ICM (§8)."""
+"""Values of ICM, the capture mode (§8)."""
 _DIVIDE: Final = {_FOURTH: 4, _SIXTEENTH: 16}
 
 
 class Capture(Peripheral):
-    """One capture channel."""
+    """One input capture channel."""
 
     def __init__(
         self, site: CaptureSite, context: ChipContext, interrupts: Interrupts, timers: dict[int, Timer]
@@ -36,11 +36,11 @@ class Capture(Peripheral):
         self._fifo: Final = self.array("fifo", "H", _FIFO)
         self._count: Final = self.cell("count", "B")
         self._edges: Final = self.cell("edges", "B")
-        """Rising edges seen by the prescaler."""
+        """Number of rising edges counted by the prescaler."""
         self._captures: Final = self.cell("captures", "B")
-        """Captures since the last interrupt."""
+        """Number of captures since the last interrupt."""
         self._second: Final = self.timestamp("second", NEVER)
-        """Cycle of a second capture while the first is pending, else NEVER."""
+        """Cycle of a second capture while the first is still pending, else NEVER."""
         self._capture: Final = self.slot("capture", self._due)
         self.autobaud = False
         """Whether the UART's receive pin is connected instead of the channel's own pin."""
@@ -51,7 +51,7 @@ class Capture(Peripheral):
             self.edge(cycle, rising)
 
     def edge(self, cycle: int, rising: bool) -> None:
-        """Handle an edge of the pin in `cycle`."""
+        """Handle an edge of the channel's pin at `cycle`."""
         mode = self.con["ICM"]
         if mode == _WAKE and rising and self.context.power_mode():
             self._line.request()
@@ -76,7 +76,7 @@ class Capture(Peripheral):
             return  # no capture until software has emptied the FIFO (§8)
         every = self.con["ICM"] == _EVERY_EDGE
         if self._count.value == _FIFO:
-            if not every:  # UNVERIFIED: in mode 1 a value that finds the FIFO full is lost without a flag
+            if not every:  # UNVERIFIED: in mode 1, a value is lost without a flag if the FIFO is full
                 self.con["ICOV"] = 1
                 return
         else:
@@ -90,7 +90,7 @@ class Capture(Peripheral):
             self._line.request()
 
     def _read(self) -> int:
-        """Read ICxBUF, which removes a FIFO entry. UNVERIFIED: an empty FIFO returns the last value again."""
+        """Read ICxBUF, which removes an entry from the FIFO. UNVERIFIED: an empty FIFO returns the last value again."""
         value = self._fifo[0]
         count = self._count.value
         if count:

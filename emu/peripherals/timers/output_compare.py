@@ -1,4 +1,4 @@
-"""Output compare and PWM 1-8 (§9): a pin that changes when timer 2 or 3 reaches OCxR or OCxRS."""
+"""Output compare and PWM 1-8 (§9): changes a pin when timer 2 or 3 reaches OCxR or OCxRS."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from emu.peripherals.timers.timers import Timer
 from emu.system.events import NEVER
 
 _OFF, _SET_ONCE, _CLEAR_ONCE, _TOGGLE, _ONE_PULSE, _PULSES, _PWM, _PWM_FAULT = range(8)
-"""OCM (§9)."""
+"""Values of OCM, the compare mode (§9)."""
 _FLAG_DELAY: Final = 2
-"""OCxIF follows the pin by two Tcy (§9)."""
+"""Delay in Tcy from the change of the pin to OCxIF (§9)."""
 
 _RISE, _FALL, _DONE = range(3)
-"""Next pin change in the pulse modes and PWM."""
+"""Kinds of the next pin change in the pulse and PWM modes."""
 
 
 class Compare(Peripheral):
@@ -62,7 +62,7 @@ class Compare(Peripheral):
     # -- pin changes -------------------------------------------------------------------------------------------------
 
     def _plan(self) -> None:
-        """Post the next change of the pin, from the timer's next matches."""
+        """Post the next change of the pin, computed from the timer's next matches."""
         if self.con["OCM"] == _OFF or self.is_frozen:
             return
         if self.events.due(self._pin_event) == self.now + 1 and not (self._is_pwm and self._timer.is_frozen):
@@ -71,7 +71,7 @@ class Compare(Peripheral):
         self.events.set(self._pin_event, cycle) if cycle != NEVER else self.events.cancel(self._pin_event)
 
     def _next_change(self, after: int) -> int:
-        """Return the cycle of the next pin change, for a match after cycle `after`."""
+        """Return the cycle of the next pin change that follows from a match after cycle `after`."""
         timer, phase = self._timer, self._phase.value
         if phase == _DONE:
             return NEVER
@@ -126,7 +126,7 @@ class Compare(Peripheral):
         self._plan()
 
     def _con_written(self, _old: int, _new: int, _lanes: int) -> None:
-        """Handle a write to OCxCON: it restarts the module and sets the pin to its initial level (§9)."""
+        """Handle a write to OCxCON, which restarts the module and sets the pin to its initial level (§9)."""
         for event in (self._pin_event, self._flag_event):
             self.events.cancel(event)
         mode = self.con["OCM"]
@@ -149,7 +149,7 @@ class Compare(Peripheral):
             self._fault()
 
     def _fault(self) -> None:
-        """Handle a low fault pin: the output floats until the pin is high and software writes OCM again (§9)."""
+        """Handle a low fault pin: the output floats until the pin is high again and software writes OCM (§9)."""
         self.con["OCFLT"] = 1
         self._phase.value = _DONE
         self.events.cancel(self._pin_event)
@@ -163,9 +163,10 @@ class Compare(Peripheral):
         self.restored()
 
     def thaw(self, cycle: int) -> None:
-        """Resume the clock; the time base may have continued meanwhile.
+        """Resume the clock. The time base may have continued while it was stopped.
 
-        A change determined before the clock stopped still occurs (§9): with PWM in the cycle of the match, else one
+        A change determined before the clock stopped still happens (§9): with PWM in the cycle of the match, otherwise
+        one
         cycle later.
         """
         waiting = self.remaining_delay(self._pin_event)
@@ -178,7 +179,7 @@ class Compare(Peripheral):
         self._port.disown(self._pin)
 
     def restored(self) -> None:
-        """Listen to changes of the time base only while the channel is on."""
+        """Listen to changes of the time base if the channel is on, otherwise stop listening."""
         on, selected = self.con["OCM"] != _OFF, self._timer
         for number in (2, 3):
             timer = self._timers[number]

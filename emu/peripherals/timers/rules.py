@@ -1,7 +1,7 @@
-"""Rules of a 16-bit timer (§7): TMR read and written, PR and TON written, and the match.
+"""Rules of a 16-bit timer (§7): reads and writes of TMR, writes of PR and TON, and the match.
 
-The stored TMR word is the count at cycle `base`; one count takes `tick` Tcy. A match is posted for the cycle in which
-the flag is first 1. `timers.py` handles 32-bit and gated timers, those clocked by pin edges, and those with listeners.
+The stored TMR value is the count at cycle `base`; one count takes `tick` Tcy. A match is posted for the cycle in which
+the flag becomes 1. `timers.py` handles 32-bit and gated timers, timers clocked by pin edges, and those with listeners.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from emu.system.events import NEVER
 from emu.system.rules import Cell, EventSlot, InterruptLine, Number, RuleBuilder, request
 
 STOPPED, TCY, PIN, WAVEFORM = range(4)
-"""Clock sources: none, the instruction clock, edges written to a pin, edges of an attached waveform."""
+"""Clock sources: none, the instruction clock, edges of a pin, edges of an attached waveform."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,9 +26,9 @@ class TimerOperands:
     pr: Cell
     base: Cell
     tick: Cell
-    """Tcy per count; 0 unless a 16-bit timer counts Tcy."""
+    """Tcy per count; 0 unless this is a 16-bit timer that counts Tcy."""
     period: Cell
-    """Tcy between matches; 0 unless the timer interrupts periodically."""
+    """Tcy between two matches; 0 unless the timer interrupts periodically."""
     before: Cell
     phase: Cell
     clear_from: Cell
@@ -47,7 +47,7 @@ class TimerOperands:
 
 
 def read_count(m: RuleBuilder, t: TimerOperands) -> Number:
-    """Read TMR: (stored + ticks since base) modulo (PR + 1), if the stored count is not above PR."""
+    """Return TMR: (stored + ticks since base) modulo (PR + 1), if the stored count does not exceed PR."""
     tick, stored, top = m.get(t.tick), m.get(t.tmr), m.get(t.pr)
     m.require((tick != 0) & (stored <= top) & (m.get(t.frozen) == NEVER))
     passed = m.now - m.get(t.base)
@@ -56,10 +56,10 @@ def read_count(m: RuleBuilder, t: TimerOperands) -> Number:
 
 
 def write_count(m: RuleBuilder, t: TimerOperands, value: Number, lanes: int) -> bool:
-    """Write TMR: the count holds from the next cycle, with an empty prescaler (§7 rules 6, 8).
+    """Write TMR. The count applies from the next cycle on, with an empty prescaler (§7 rules 6, 8).
 
-    A timer clocked by a waveform supports only clearing, with a match that the device has predicted. A stopped timer
-    without a pending match supports every value.
+    For a timer clocked by a waveform, the rule supports only clearing, with a match that the device has predicted. For
+    a stopped timer without a pending match, it supports every value.
     """
     if lanes != 0xFFFF:
         return False
@@ -84,7 +84,7 @@ def write_count(m: RuleBuilder, t: TimerOperands, value: Number, lanes: int) -> 
 
 
 def write_period(m: RuleBuilder, t: TimerOperands, value: Number, lanes: int) -> bool:
-    """Write PR: count up to the next cycle with the old PR, then continue with the new one."""
+    """Write PR: count up to the next cycle with the old PR, from then on with the new one."""
     if lanes != 0xFFFF:
         return False
     limit, following, due = value & 0xFFFF, m.now + 1, m.get(t.match.due)
@@ -103,25 +103,25 @@ def write_period(m: RuleBuilder, t: TimerOperands, value: Number, lanes: int) ->
 
 @dataclass(frozen=True, slots=True)
 class ClockPin:
-    """Clock input of a timer."""
+    """Clock input pin of a timer."""
 
     pins: Mapping[tuple[int, int], tuple[RuleWaveform, Cell]]
     name: tuple[int, int]
 
     @property
     def described(self) -> tuple[RuleWaveform, Cell] | None:
-        """The rule waveform on the pin, and the number that says whether it is attached; None without one."""
+        """The rule waveform on the pin and the cell that says whether it is attached; None if there is none."""
         return self.pins.get(self.name)
 
     def __repr__(self) -> str:
-        """Return a text that is equal in every process: the key of cached native code contains it."""
+        """Return a text that is equal in every process, because the key of cached native code contains it."""
         wave = self.described
         return f"ClockPin({self.name}, {wave and (type(wave[0]).__name__, wave[1])})"
 
 
 @dataclass(frozen=True, slots=True)
 class MatchOperands:
-    """Operands of the match rule and of the TON rule."""
+    """Operands of the match rule and the TON rule."""
 
     timer: TimerOperands
     con: Cell
@@ -129,7 +129,7 @@ class MatchOperands:
     ton: int
     tcs: int
     tckps: int
-    """Lowest bit of TCKPS."""
+    """Position of TCKPS."""
     clock: ClockPin
     pin: int
 
@@ -158,10 +158,10 @@ def fire_match(m: RuleBuilder, p: MatchOperands) -> None:
 
 
 def next_edges(m: RuleBuilder, p: MatchOperands, nth_rise: Callable[[Number, Number], Number]) -> tuple[Number, ...]:
-    """Return the due cycle of the next match on a waveform clock, and a prediction for clearing TMR.
+    """Return the due cycle of the next match of a waveform clock, and a prediction for a write that clears TMR.
 
     Firmware that counts camera lines clears TMR after a match. The prediction has three parts: first cycle and end of
-    the interval in which clearing is covered, and the due cycle of the match it leads to.
+    the interval in which it holds, and the due cycle of the match after clearing TMR in that interval.
     """
     limit = m.get(p.timer.pr)
     prescale = m.table(PRESCALE, m.get(p.con) >> p.tckps & len(PRESCALE) - 1)
@@ -174,10 +174,10 @@ def next_edges(m: RuleBuilder, p: MatchOperands, nth_rise: Callable[[Number, Num
 
 
 def write_ton(m: RuleBuilder, p: MatchOperands, value: Number, lanes: int) -> bool:
-    """Write TxCON of a timer on a waveform clock when only TON changes, or nothing.
+    """Write TxCON of a timer with a waveform clock if at most TON changes.
 
-    Off: the count is known if no edge has occurred since the last write, or exactly those up to the match. On: counting
-    starts in the next cycle. The prescaler is empty in both cases (§7 rule 6).
+    Off: the count is known if, since the last write, either no edge has occurred or exactly those up to the match. On:
+    counting starts in the next cycle. In both cases the prescaler is empty (§7 rule 6).
     """
     t, clock = p.timer, p.clock.described
     if clock is None or not lanes & p.ton:
@@ -210,11 +210,11 @@ def write_ton(m: RuleBuilder, p: MatchOperands, value: Number, lanes: int) -> bo
 
 
 def _has_no_listener(m: RuleBuilder, t: TimerOperands) -> Number:
-    """Whether no device listens to the timer and its clock runs."""
+    """Return whether no device listens to the timer and its clock runs."""
     return (m.get(t.listeners) == 0) & (m.get(t.frozen) == NEVER)
 
 
 def _counts_until(m: RuleBuilder, start: Number, limit: Number) -> Number:
-    """Return the number of counts (at least 1) until the counter becomes `limit`, which is not 0."""
+    """Return the number of counts, at least 1, until the counter becomes `limit`, which is not 0."""
     behind = m.select(start < limit, limit - start, limit + 1)
     return m.select(start > limit, 0x10000 - start + limit, behind)

@@ -1,8 +1,8 @@
-"""Timers 1-5 (§7): timer, gated and counter modes, 32-bit pairs. TMR is computed on read, never ticked.
+"""Timers 1-5 (§7): timer, gated and counter modes, 32-bit pairs. TMR is computed when read, not incremented.
 
-`counter.py` computes the count; `rules.py` has the rules of the common cases. This module handles all other register
-writes, the clock sources and the match. A match posts one event, due in the cycle in which the interrupt flag first
-reads 1: one Tcy after TMR became equal to PR (§7 rule 2).
+`counter.py` computes the count; `rules.py` has the rules for the common cases. This module handles all other register
+writes, the clock sources and the match. A match posts one event. It is due in the cycle in which the interrupt flag
+first reads 1: one Tcy after TMR became equal to PR (§7 rule 2).
 """
 
 from __future__ import annotations
@@ -35,28 +35,28 @@ from emu.system.rules import Rule, cell_of, event_slot
 
 
 class Timer(Counter):
-    """A 16-bit timer or, with T32 set, a 32-bit timer that also owns its partner's registers."""
+    """A 16-bit timer. With T32 set, a 32-bit timer that also uses its partner's registers."""
 
     def __init__(self, site: TimerSite, context: ChipContext) -> None:
         super().__init__(site, context)
         self.line: Final = self.irq(site.irq)
         self.low: Timer | None = None
-        """For a type C timer: the type B timer that owns it while T32 is set."""
+        """For a type C timer, the type B timer that uses it while T32 is set."""
         self.high: Timer | None = None
         self._hold: Register | None = None
         self.period: Final = self.cell("period", "Q")
-        """Tcy from one match to the next; 0 if the event is not periodic."""
+        """Tcy between two matches; 0 if the event is not periodic."""
         self.clear_from: Final = self.timestamp("clear_from")
         self.clear_until: Final = self.timestamp("clear_until")
         self.clear_due: Final = self.timestamp("clear_due", NEVER)
-        """On a waveform clock: due cycle of the match if TMR is cleared in clear_from <= cycle < clear_until."""
+        """On a waveform clock: due cycle of the next match if TMR is cleared in clear_from <= cycle < clear_until."""
         self.closed: Final = self.timestamp("closed", NEVER)
-        """Due cycle of the flag for the gate's last falling edge."""
+        """Cycle in which the flag rises for the gate's last falling edge."""
         self._match: Final = self.slot("match", self._fire)
         self._on_match: Final[list[Callable[[int], None]]] = []
         self._on_change: Final[list[Callable[[], None]]] = []
         self._listeners: Final = self.cell("listeners", "B")
-        """Number of listeners in both lists."""
+        """Number of listeners in both lists together."""
         operands = self._rule_operands()
         self.tmr.set_rule(Rule(operands, read_count, write_count))
         self.pr.set_rule(Rule(operands, None, write_period))
@@ -103,7 +103,7 @@ class Timer(Counter):
         )
 
     def pair(self, high: Timer) -> None:
-        """Join with the type C partner (T2 with T3, T4 with T5)."""
+        """Join this timer with its type C partner (T2 with T3, T4 with T5)."""
         self.high, high.low = high, self
         self.upper, high.lower = high, self
         self._hold = self.register(f"TMR{high.site.number}HLD")
@@ -112,24 +112,24 @@ class Timer(Counter):
     # -- register writes ---------------------------------------------------------------------------------------------
 
     def _plan(self, rewritten: bool = False) -> None:
-        """Store tick and period for the rules, and post the next match after the current cycle."""
+        """Store `tick` and `period` for the rules, and post the next match after the current cycle."""
         self.clear_until.value = 0
         source = self._source.value
         simple = source == TCY and not self.is_taken
         if simple:
             self._empty_prescaler()
-        narrow = simple and not self.is_wide  # a wide timer reads and interrupts through its partner
+        narrow = simple and not self.is_wide  # a wide timer is read and interrupts through its partner
         self.tick.value = self._prescale if narrow else 0
         periodic = narrow and self.limit != 0 and not self._is_gated and not self._on_match
         self.period.value = (self.limit + 1) * self._prescale if periodic else 0
         if self._is_match_fixed(rewritten):
-            self.period.value = 0  # the match after it is not a period away: Python schedules it
+            self.period.value = 0  # the match after the next one is at another distance, so Python schedules it
         else:
             self._post(self.now)
         self._notify_change()
 
     def _empty_prescaler(self) -> None:
-        """Account the prescaler's content as an earlier base: rules compute the count from base and tick alone."""
+        """Convert the prescaler's content to an earlier `base`: rules compute the count from base and tick only."""
         self.base.value -= self._phase.value
         self._phase.value = 0
 
@@ -138,7 +138,7 @@ class Timer(Counter):
             listener()
 
     def _is_match_fixed(self, rewritten: bool) -> bool:
-        """Whether the current write cannot change the posted match: its count has already been reached."""
+        """Whether the current write cannot change the posted match, because its count has already been reached."""
         due = self.events.due(self._match)
         if due in (self.now + 1, self.closed.value) and due != NEVER:
             return True
@@ -166,12 +166,12 @@ class Timer(Counter):
         return TCY
 
     def _tmr_written(self, _old: int, new: int, lanes: int) -> None:
-        """Handle a write to TMR: the count holds from the next cycle; the prescaler restarts (§7 rules 6, 8)."""
+        """Handle a write to TMR. The count applies from the next cycle on; the prescaler restarts (§7 rules 6, 8)."""
         if self.is_taken:
             assert self.low is not None
             self.low.high_written(new, lanes)
             return
-        count = self.count(self.now)  # the stored word was replaced, but only in the written lanes
+        count = self.count(self.now)  # the write replaced the stored value, but only in the written lanes
         written = count & ~lanes & 0xFFFF | new & lanes
         if self.is_wide:
             assert self.high is not None
@@ -184,7 +184,7 @@ class Timer(Counter):
         self._plan(rewritten=True)
 
     def _post_edges(self, due: int) -> None:
-        """Post the next match on a waveform clock, and store the prediction for clearing TMR."""
+        """Post the next match on a waveform clock, and store the prediction for a write that clears TMR."""
         self.clear_until.value = 0
         waveform, pin = self.context.pins.waveform(self._port, self._pin), self._pin
         if waveform is None or self.is_wide or not self.limit or self._on_change:
@@ -197,14 +197,14 @@ class Timer(Counter):
             cell.value = value
 
     def high_written(self, new: int, lanes: int) -> None:
-        """Handle a direct write to the upper half of a 32-bit timer, which the manual does not use (§7)."""
+        """Handle a direct write to the upper half of a 32-bit timer, a case that the manual does not describe (§7)."""
         assert self.high is not None
         self._fold(self.now + 1, self._prescale, self.limit)
         self.high.tmr.value = self.high.tmr.value & ~lanes | new & lanes
         self._plan()
 
     def _period_written(self, old: int, new: int, _lanes: int) -> None:
-        """Handle a write to PR: counts up to the next cycle use the old PR."""
+        """Handle a write to PR. Counts up to the next cycle still use the old PR."""
         owner = self.low if self.is_taken and self.low is not None else self
         shift = 0 if owner is self else 16
         previous = owner.limit & ~(0xFFFF << shift) | old << shift
@@ -212,7 +212,7 @@ class Timer(Counter):
             owner.replan(previous)
 
     def replan(self, previous_limit: int) -> None:
-        """Count up to the next cycle with `previous_limit`, then schedule with the current registers."""
+        """Count up to the next cycle with `previous_limit`, then reschedule with the current registers."""
         self._fold(self.now + 1, self._prescale, previous_limit)
         self._plan()
 
@@ -229,7 +229,7 @@ class Timer(Counter):
         return 1 << self.context.chip.sfrs[self.con.name].fields["T32"][0] if self.high is not None else 0
 
     def _join_changed(self, old: int, new: int) -> None:
-        """Handle a change of T32: both halves keep the counts of the old configuration, then restart."""
+        """Handle a change of T32. Both halves keep their counts from the old configuration, then restart."""
         assert self.high is not None
         cycle = self.now + 1
         self.con.value = old
@@ -246,9 +246,9 @@ class Timer(Counter):
             half._plan()
 
     def _control_changed(self, old_con: int) -> None:
-        """Handle a change of TxCON. The prescaler empties when TON falls or the clock source changes (§7 rule 6).
+        """Handle a change of TxCON. The prescaler is cleared when TON falls or the clock source changes (§7 rule 6).
 
-        UNVERIFIED: the data sheet lists any write to TxCON as clearing it; here only those that change the clock.
+        UNVERIFIED: by the data sheet any write to TxCON clears it; here only writes that change the clock do.
         """
         present = self.con.value
         lsb, width = self.context.chip.sfrs[self.con.name].fields["TCKPS"]
@@ -277,7 +277,7 @@ class Timer(Counter):
             self._gate(cycle, rising)
 
     def _count_edge(self, cycle: int) -> None:
-        """Count a rising edge of `cycle`, which takes effect in the next cycle (§7 rule 9)."""
+        """Count a rising edge at `cycle`, which takes effect in the next cycle (§7 rule 9)."""
         self._before.value = self.count(cycle)
         self.base.value = cycle + 1
         phase = self._phase.value + 1
@@ -292,7 +292,7 @@ class Timer(Counter):
         self._notify_change()
 
     def _gate(self, cycle: int, opened: bool) -> None:
-        """Handle an edge of the gate: synchronised for one Tcy; the falling edge raises the flag (§7)."""
+        """Handle an edge of the gate, synchronised for one Tcy. The falling edge raises the flag (§7)."""
         self._fold(cycle + 1, self._prescale, self.limit)
         self._source.value = TCY if opened else STOPPED
         self._plan()
@@ -301,25 +301,28 @@ class Timer(Counter):
             self.events.set(self._match, cycle + 2)
 
     def _waveform_changes(self, cycle: int) -> None:
-        """Count up to `cycle` before the clock waveform changes."""
+        """Count up to `cycle`, before the clock waveform changes."""
         if self._source.value in (WAVEFORM, PIN) and not self.is_frozen:
             self._fold(cycle, self._prescale, self.limit)
 
     def _waveform_changed(self) -> None:
-        """Select the source again and reschedule after the clock waveform has changed."""
+        """Select the clock source again and reschedule, after the clock waveform has changed."""
         if self._source.value in (WAVEFORM, PIN):
             self._source.value = self._choose_source()
             self._plan()
 
     def listen(self, on_match: Callable[[int], None], wanted: bool) -> None:
-        """Add or remove (`wanted`) a listener on_match(due), called at each match (ADC trigger, §13)."""
+        """Add the listener on_match(due) if `wanted`, else remove it. It is called at each match (ADC trigger, §13)."""
         if wanted != (on_match in self._on_match):
             self._on_match.append(on_match) if wanted else self._on_match.remove(on_match)
             self._listeners.value = len(self._on_change) + len(self._on_match)
             self._plan()
 
     def listen_to_changes(self, on_change: Callable[[], None], wanted: bool) -> None:
-        """Add or remove (`wanted`) a listener called when future counts have changed (output compare, §9)."""
+        """Add a listener if `wanted`, else remove it.
+
+        It is called when future counts have changed (output compare, §9).
+        """
         if wanted != (on_change in self._on_change):
             self._on_change.append(on_change) if wanted else self._on_change.remove(on_change)
             self._listeners.value = len(self._on_change) + len(self._on_match)
@@ -341,13 +344,13 @@ class Timer(Counter):
     # -- power and reset ---------------------------------------------------------------------------------------------
 
     def reset(self, power_on: bool) -> None:
-        """Reset to stopped. In silicon the count survives every reset but power-on; here it reads 0."""
+        """Reset to stopped. On silicon the count survives every reset except power-on; here it reads 0."""
         for cell in (self.base, self.tick, self.period, self._source, self._phase, self._before):
             cell.value = 0
         self.closed.value = NEVER
 
     def stops_in(self, mode: int) -> bool:
-        """Whether the clock stops: only timer 1 as asynchronous counter runs in Sleep (§7)."""
+        """Whether the clock stops. Only timer 1 as asynchronous counter runs in Sleep (§7)."""
         if mode == SLEEP:
             return not (self.site.kind == "A" and self.con["TCS"] and not self.con["TSYNC"])
         owner = self.low if self.is_taken and self.low is not None else self
@@ -363,7 +366,7 @@ class Timer(Counter):
     def thaw(self, cycle: int) -> None:
         """Resume the clock. Gate and waveform clocks have continued, so their current state selects the source.
 
-        A match already counted when the clock stopped still raises its flag.
+        A match that was already counted when the clock stopped still raises its flag.
         """
         waiting = self.remaining_delay(self._match)
         super().thaw(cycle)
@@ -377,19 +380,19 @@ class Timer(Counter):
         self._notify_change()
 
     def before_disable(self) -> None:
-        """Split a 32-bit pair before its lower half is disabled."""
+        """Split a 32-bit pair, before its lower half is disabled."""
         if self.is_wide:
             joined = self.con.value
             self.con.value = joined & ~self._t32
             self._join_changed(joined, self.con.value)
 
     def restart(self) -> None:
-        """Reset, then notify the listeners: a disabled timer has no matches."""
+        """Reset, then notify the listeners, because a disabled timer has no matches."""
         super().restart()
         self._notify_change()
 
     def _read_and_latch(self) -> int:
-        """Read the lower half; in 32-bit mode this latches the upper half (§7)."""
+        """Return the lower half; in 32-bit mode also latch the upper half (§7)."""
         count = self.count(self.clock)
         if self._hold is not None and self.is_wide:
             self._hold.value = count >> 16
@@ -397,7 +400,7 @@ class Timer(Counter):
 
 
 def timers(context: ChipContext) -> dict[int, Timer]:
-    """Construct the timers of a chip, with pairs joined; return them by number."""
+    """Construct a chip's timers with joined pairs. Return them by number."""
     by_number = {site.number: Timer(site, context) for site in context.chip.timers}
     for site in context.chip.timers:
         if site.kind == "B":

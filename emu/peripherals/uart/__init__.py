@@ -1,1 +1,1 @@
-"""UART1 and UART2: registers and FIFOs, frames, the RX line and the TX pin."""
+"""UART1 and UART2: registers and FIFOs, frames, the queue towards RX, and the TX pin."""

@@ -1,6 +1,6 @@
-"""UART frames as bit patterns: start bit, data, parity, stop bits, and their sampling by a receiver (§10).
+"""UART frames as bit patterns: start bit, data, parity, stop bits, and how a receiver samples them (§10).
 
-The functions are rules (emu/system/rules.py) that use operators only. `mode` is UxMODE, whose bits 2:0 are PDSEL and
+The functions are rules (emu/system/rules.py) that use only operators. `mode` is UxMODE, whose bits 2:0 are PDSEL and
 STSEL.
 """
 
@@ -12,16 +12,16 @@ from emu.system.rules import Number
 
 PARITY_MARK: Final = 0x400
 FRAMING_MARK: Final = 0x200
-"""Errors of a received character, above its nine data bits."""
+"""Error bits of a received character, above its nine data bits."""
 
 
 def is_nine(mode: Number) -> Number:
-    """Whether a frame has nine data bits and no parity (PDSEL = 3)."""
+    """Return whether a frame has nine data bits and no parity (PDSEL = 3)."""
     return (mode & 6) == 6
 
 
 def has_parity(mode: Number) -> Number:
-    """Whether a frame has a parity bit: PDSEL = 1 (even) or 2 (odd)."""
+    """Return whether a frame has a parity bit: PDSEL = 1 (even) or 2 (odd)."""
     return ((mode & 6) == 2) | ((mode & 6) == 4)
 
 
@@ -46,20 +46,20 @@ def length(mode: Number) -> Number:
 
 
 def parity(mode: Number, data: Number) -> Number:
-    """Return the parity bit of a character, 0 without parity."""
+    """Return the parity bit of a character; 0 without parity."""
     nibbles = (data ^ data >> 4) & 0xF
     pairs = nibbles ^ nibbles >> 2
     return (((mode & 6) == 4) ^ (pairs ^ pairs >> 1) & 1) & has_parity(mode)
 
 
 def pack(mode: Number, word: Number) -> Number:
-    """Return the levels of a frame, start bit in bit 0."""
+    """Return the levels of a frame; bit 0 is the start bit."""
     data = data_of(mode, word)
     return data << 1 | parity(mode, data) << 9 | (1 | (mode & 1) << 1) << first_stop(mode)
 
 
 def judge(mode: Number, sampled: Number) -> Number:
-    """Return data and error marks of a sampled frame. UNVERIFIED: with two stop bits the first one decides."""
+    """Return data and error bits of a sampled frame. UNVERIFIED: of two stop bits only the first is checked."""
     data = data_of(mode, sampled >> 1)
     broken = (sampled >> first_stop(mode) & 1) ^ 1
     wrong = (parity(mode, data) ^ sampled >> 9 & 1) & has_parity(mode)

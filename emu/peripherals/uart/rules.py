@@ -1,7 +1,7 @@
 """Rules of a UART (§10).
 
 The rules at the end handle the common cases. `uart.py` uses the same functions and adds the cases that need Python:
-eager listeners, loopback, autobaud, senders at a different baud rate, and the log of edges.
+eager listeners, loopback, autobaud, senders at another baud rate, and the log of edges.
 """
 
 from __future__ import annotations
@@ -17,15 +17,15 @@ from emu.system.events import NEVER
 from emu.system.rules import Cell, EventSlot, InterruptLine, Number, RuleBuilder, request
 
 FIFO: Final = 4
-"""Depth of the transmit and receive FIFOs (§10.1, §10.2)."""
+"""Depth of the transmit and receive FIFOs in characters (§10.1, §10.2)."""
 SENT: Final = 64
-"""Capacity of the buffer for sent characters whose listeners are called later."""
+"""Capacity of the buffer for sent characters of which listeners are notified later."""
 QUIET, COMING, SAMPLING = range(3)
-"""Receiver states: no frame, start bit posted (loopback), inside a frame."""
+"""Receiver states: no frame; start bit posted (loopback); inside a frame."""
 _FILL: Final = (0, 0, 3, 4)
-"""FIFO level that requests an interrupt, by URXISEL; 0: every character does."""
+"""FIFO level that requests an interrupt, by URXISEL; 0 means that every character does."""
 CHARACTER: Final = 0x1FF
-"""Data bits of an element of the receive FIFO."""
+"""Mask of the data bits in an element of the receive FIFO."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,9 +39,9 @@ class UartOperands:
     bit: Mapping[str, int]
     """Masks of the fields of UxMODE and UxSTA, which have different names."""
     urxisel: int
-    """Lowest bit of URXISEL."""
+    """Position of URXISEL."""
     writable: int
-    """Writable bits of UxTXREG."""
+    """Mask of the writable bits of UxTXREG."""
     clock: Cell
     tx: Cell
     tx_count: Cell
@@ -67,7 +67,7 @@ class UartOperands:
     sent: Cell
     sent_count: Cell
     watched: Cell
-    """Pins with eager watchers on the port of TX; TX is among them while edges are logged."""
+    """Pins with eager watchers on the port of TX. They include TX while edges are logged."""
     tx_pin: int
     line: RxQueueOperands
     send_slot: EventSlot
@@ -79,7 +79,7 @@ class UartOperands:
 
 # -- transmit --------------------------------------------------------------------------------------------------------
 def push(m: RuleBuilder, u: UartOperands, value: Number, lanes: int) -> bool:
-    """Write TXREG: a write to the low byte pushes the character; a full FIFO drops it (§10.1)."""
+    """Write TXREG. A write to the low byte pushes the character; a full FIFO drops it (§10.1)."""
     mode, status, count, due = m.get(u.mode), m.get(u.sta), m.get(u.tx_count), m.get(u.send_slot.due)
     free = u.writable & lanes
     word = (m.get(u.txreg) & (0xFFFF & ~free)) | (value & free)
@@ -101,13 +101,13 @@ def bit_time(m: RuleBuilder, u: UartOperands) -> Number:
 
 
 def edge(m: RuleBuilder, u: UartOperands, cycle: Number, step: Number) -> Number:
-    """Return the first edge of the baud clock with period `step` Tcy at or after `cycle`."""
+    """Return the first edge, at or after `cycle`, of the baud clock with a period of `step` Tcy."""
     clock = m.get(u.clock)
     return clock + m.div(cycle - clock + step - 1, step) * step
 
 
 def send_next(m: RuleBuilder, u: UartOperands, cycle: Number) -> None:
-    """Move the next FIFO entry to TSR: its start bit begins at the next bit clock edge (§10.1). Set TRMT if empty."""
+    """Move the next FIFO entry to TSR; its start bit begins at the next bit clock edge (§10.1). Set TRMT if empty."""
     mode, status, count, ended = m.get(u.mode), m.get(u.sta), m.get(u.tx_count), m.get(u.end)
     waits, data, bit = count != 0, m.get(u.tx), bit_time(m, u)
     free = m.select(ended == cycle, cycle, edge(m, u, cycle, bit))
@@ -133,7 +133,8 @@ def schedule_frame(
 ) -> None:
     """Schedule the reception of a frame whose start bit begins in cycle `start`.
 
-    `wave`: levels on the line; `sampled`: bits the receiver will sample; `bit_q8`: the sender's bit time in Tcy/256.
+    `wave`: levels on the line. `sampled`: bits that the receiver will sample. `bit_q8`: the sender's bit time in
+    Tcy/256.
     """
     mode, tick = m.get(u.mode), m.get(u.brg) + 1
     middle = edge(m, u, start, tick) + ((first_stop(mode) << 4) + 8) * tick  # middle of the first stop bit (§10.2)
@@ -145,14 +146,14 @@ def schedule_frame(
 
 
 def begin(m: RuleBuilder, u: UartOperands) -> None:
-    """Handle the beginning of the start bit."""
+    """Handle the start of a frame's start bit."""
     m.put(u.receiving, SAMPLING)
     m.put(u.sta, m.get(u.sta) & (0xFFFF & ~u.bit["RIDLE"]))
     m.post(u.receive_slot, m.get(u.done))
 
 
 def shown(u: UartOperands, status: Number, count: Number, top: Number) -> Number:
-    """Return `status` with URXDA, PERR and FERR of the character at the top of the FIFO (§10.2)."""
+    """Return `status` with URXDA, PERR and FERR of the character at the head of the FIFO (§10.2)."""
     bit, some = u.bit, count != 0
     others = status & (0xFFFF & ~(bit["URXDA"] | bit["PERR"] | bit["FERR"]))
     wrong = some & ((top & PARITY_MARK) != 0)
@@ -161,7 +162,7 @@ def shown(u: UartOperands, status: Number, count: Number, top: Number) -> Number
 
 
 def receive(m: RuleBuilder, u: UartOperands) -> None:
-    """Store a complete character in the FIFO, or in the shift register if the FIFO is full (§10.2)."""
+    """Store a complete character in the FIFO; if the FIFO is full, in the shift register (§10.2)."""
     bit, mode, count, character = u.bit, m.get(u.mode), m.get(u.rx_count), m.get(u.incoming)
     status = m.get(u.sta) | bit["RIDLE"]
     unaddressed = ((status & bit["ADDEN"]) != 0) & is_nine(mode) & ((character & 0x100) == 0)
@@ -181,7 +182,7 @@ def receive(m: RuleBuilder, u: UartOperands) -> None:
 
 
 def pop(m: RuleBuilder, u: UartOperands) -> Number:
-    """Read RXREG: remove and return the top of the FIFO; an empty FIFO returns the last character again."""
+    """Read RXREG: remove and return the FIFO's head. An empty FIFO returns the last character again."""
     count, data, before = m.get(u.rx_count), m.get(u.rx), m.get(u.sta)
     left = m.select(count == 0, 0, count - 1)
     elements = [m.get(u.rx, place) for place in range(FIFO)]
@@ -195,7 +196,7 @@ def pop(m: RuleBuilder, u: UartOperands) -> Number:
 
 # -- rules -----------------------------------------------------------------------------------------------------------
 def fire_send(m: RuleBuilder, u: UartOperands) -> None:
-    """Handle the end of a sent frame, or start sending a waiting character."""
+    """Handle the end of a sent frame, or start to send a waiting character."""
     mode, count, stored = m.get(u.mode), m.get(u.tx_count), m.get(u.sent_count)
     sent = m.get(u.shifting) != 0
     m.require((sent == 0) | ((m.get(u.end) <= m.now) & (m.get(u.at_once) == 0) & (stored < SENT)))
@@ -214,7 +215,7 @@ def fire_receive(m: RuleBuilder, u: UartOperands) -> None:
 
 
 def fire_line(m: RuleBuilder, u: UartOperands) -> None:
-    """Start a reception: a queued frame without errors, at the receiver's own baud rate."""
+    """Start the reception of a queued frame that has no errors and the receiver's own baud rate."""
     line, mode, count, head = u.line, m.get(u.mode), m.get(u.line.count), m.get(u.line.head)
     data, following = m.get(line.data, head), m.select(head + 1 == CAPACITY, 0, head + 1)
     plain = (mode & (u.bit["UARTEN"] | u.bit["LPBACK"] | u.bit["ABAUD"])) == u.bit["UARTEN"]

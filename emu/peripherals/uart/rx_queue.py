@@ -18,21 +18,21 @@ CAPACITY: Final = 1024
 _FRAME: Final = Struct("<QHI")
 """A frame of the backlog: its fields in the order of `QueuedFrame`."""
 _COMPACTED: Final = 1 << 16
-"""Bytes of removed frames at which the backlog is compacted."""
+"""Number of bytes of removed frames at which the backlog is compacted."""
 FRAMING_ERROR: Final = 0x200
-"""The stop bit is low."""
+"""Error mark: the stop bit is low."""
 PARITY_ERROR: Final = 0x400
-"""The parity bit is inverted."""
+"""Error mark: the parity bit is inverted."""
 BREAK: Final = 0x800
-"""The line is low for the whole frame."""
+"""Error mark: the line is low for the whole frame."""
 WAIT_FOR_RECEIVER: Final = 0x1000
-"""The frame waits until the receiver is enabled."""
+"""Mark: the frame waits until the receiver is enabled."""
 ERRORS: Final = FRAMING_ERROR | PARITY_ERROR | BREAK
 
 
 @dataclass(frozen=True, slots=True)
 class QueuedFrame:
-    """A queued frame: earliest start cycle, data with error marks, bit time in Tcy/256 (0 = the receiver's)."""
+    """A queued frame: earliest start cycle, data with marks, bit time in Tcy/256 (0 = the receiver's)."""
 
     earliest: int
     data: int
@@ -41,7 +41,7 @@ class QueuedFrame:
 
 @dataclass(frozen=True, slots=True)
 class RxQueueOperands:
-    """Operands of the rules: a ring of `CAPACITY` frames, and whether the backlog holds more."""
+    """Operands of the rules: a ring of `CAPACITY` frames, and whether the backlog has more."""
 
     earliest: Cell
     bit: Cell
@@ -52,7 +52,7 @@ class RxQueueOperands:
 
 
 class RxQueue:
-    """First-in, first-out queue of frames towards RX."""
+    """FIFO queue of frames towards the RX pin."""
 
     def __init__(self, record: Record, name: str) -> None:
         def reserve(purpose: str, kind: str, count: int = 1) -> int:
@@ -73,7 +73,7 @@ class RxQueue:
         self.operands: Final = RxQueueOperands(*operands)
         """Operands for rules."""
         self._backlog = bytearray()
-        """Packed frames that do not fit into the record yet, after `_first` bytes of removed frames."""
+        """Packed frames that do not yet fit into the record, after `_first` bytes of removed frames."""
         self._first = 0
 
     def __len__(self) -> int:
@@ -84,7 +84,7 @@ class RxQueue:
         return bytes(memoryview(self._backlog)[self._first :])
 
     def restore_backlog(self, saved: bytes) -> None:
-        """Replace the frames that do not fit into the record, which has been restored already."""
+        """Restore the frames that do not fit into the record. The record must already be restored."""
         self._backlog, self._first = bytearray(saved), 0
 
     def put(self, frames: Iterable[QueuedFrame]) -> None:
@@ -94,7 +94,7 @@ class RxQueue:
         self._top_up()
 
     def head(self) -> QueuedFrame | None:
-        """Return the next frame without removing it."""
+        """Return the next frame without removing it; None if the queue is empty."""
         if not self._u16[self._count]:
             return None
         index = self._u16[self._head]

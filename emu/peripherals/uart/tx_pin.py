@@ -10,7 +10,7 @@ from emu.system.events import NEVER
 
 
 class TxPin:
-    """A `Waveform` for the TX pin; `level(cycle)` returns the transmitter's level."""
+    """`Waveform` of the TX pin. `level(cycle)` returns the transmitter's level."""
 
     def __init__(self, pins: Pins, port: int, mask: int, level: Callable[[int], int]) -> None:
         self._pins: Final = pins
@@ -19,23 +19,26 @@ class TxPin:
         self._level: Final = level
 
     def bits(self, cycle: int) -> int:
-        """Return the pin's level in `cycle`."""
+        """Return the pin's level at `cycle`."""
         return self._mask if self._level(cycle) else 0
 
     def rises(self, mask: int, after: int, until: int) -> int:
-        """No device of the chip is clocked by TX."""
+        """Report no rising edges, because no device of the chip is clocked by TX."""
         return 0
 
     def nth_rise(self, mask: int, after: int, count: int) -> int:
-        """No device of the chip is clocked by TX."""
+        """Report no rising edges, because no device of the chip is clocked by TX."""
         return NEVER
 
     def constant_until(self, cycle: int) -> int:
-        """No guarantee: firmware rarely reads its own TX pin."""
+        """Promise nothing, because firmware rarely reads its own TX pin."""
         return cycle
 
     def log_frame(self, start: int, bits: int, length: int, bit: int) -> None:
-        """Write a frame to the log of pin changes, if there is one: `length` levels of `bit` Tcy from `start`."""
+        """Append a frame to the log of pin changes, if there is one:
+
+        `length` levels of `bit` Tcy each from `start` on.
+        """
         if self._pins.frames is not None:
             self._pins.frames.append((start, self._port, self._mask, bits, length, bit))
             return

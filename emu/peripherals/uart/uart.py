@@ -1,6 +1,6 @@
 """UART1/2 (§10): FIFOs, bit-exact line timing, error flags, interrupt modes, loopback, break, autobaud.
 
-The environment exchanges bytes with cycles: `on_byte(byte, start_cycle)` is called when a frame has left the pin,
+The environment exchanges bytes with cycles: `on_byte(byte, start_cycle)` is called when a frame has left the pin, and
 `feed(bytes)` queues frames that arrive at line rate. The level of the TX pin is a function of the cycle. `rules.py` has
 the common cases; this module handles all others.
 """
@@ -71,7 +71,7 @@ class Uart(Peripheral):
         self._at_once: Final = self.cell("at_once", "B")
         """Whether an eager listener must be called in the cycle in which a character has been sent."""
         self._sent: Final = self.array("sent", "Q", SENT)
-        """Sent characters not yet delivered to listeners: first cycle of the start bit << 16 | character."""
+        """Sent characters not yet reported to the listeners: start cycle of the start bit << 16 | character."""
         self._sent_count: Final = self.cell("sent_count", "B")
         self._listeners: Final[Listeners[[int, int]]] = Listeners(self.events, self._at_once.set)
         self._capture: Capture | None = None
@@ -82,22 +82,22 @@ class Uart(Peripheral):
         self._rx_port: Final = ports[rx_port]
 
         self._clock: Final = self.timestamp("clock")
-        """Cycle in which the baud generator last started from 0."""
+        """Cycle in which the baud rate generator last started from 0."""
         self._tx: Final = self.array("tx", "H", FIFO)
         self._tx_count: Final = self.cell("tx_count", "B")
         self._shifting: Final = self.cell("shifting", "B")
         self._frame: Final = self.cell("frame", "H")
         self._wave: Final = self.cell("wave", "H")
         self._start: Final = self.timestamp("start", NEVER)
-        """Cycle in which the start bit of the frame in TSR begins."""
+        """Start cycle of the start bit of the frame in TSR."""
         self._end: Final = self.timestamp("end", NEVER)
         self._bit_began: Final = self.timestamp("bit_began", NEVER)
-        """Cycle in which bit 0 of `wave` begins: the start bit, or the bit in which BRG was written."""
+        """Start cycle of bit 0 in `wave`: the start bit, or the bit during which BRG was written."""
         self._tx_event: Final = self.slot("tx", self._tx_due)
         self._pin: Final = TxPin(context.pins, tx_port, self._tx_pin, self._tx_level)
 
         self._rx: Final = self.array("rx", "H", FIFO + 1)
-        """Receive FIFO: data in bits 8:0, errors above. The last element is the character in the shift register."""
+        """Receive FIFO: data in bits 8:0, error bits above. The last element is the character in the shift register."""
         self._rx_count: Final = self.cell("rx_count", "B")
         self._held: Final = self.cell("held", "B")
         """Whether the shift register holds a character because the FIFO is full."""
@@ -114,7 +114,7 @@ class Uart(Peripheral):
 
         self.line: Final = RxQueue(self.record, self.name)
         self._line_free: Final = self.cell("line_free", "Q")
-        """First cycle in which the line is free for the next frame."""
+        """First cycle in which the line is free for another frame."""
         self._line_event: Final = self.events.slot(f"{self.name}.line", self._line_due)
         self._operands: Final = self._rule_operands()
         self._set_rules(self._operands)
@@ -145,7 +145,7 @@ class Uart(Peripheral):
         )
 
     def _set_rules(self, operands: UartOperands) -> None:
-        """Set the rules of registers and events. The register hooks run the same functions without rules on the bus."""
+        """Set the rules of registers and events. Register hooks run the same functions, not as rules of the bus."""
         integers = self.bus.integers
         self.txreg.set_rule(Rule(operands, writes=push))
         self.txreg.written_by(lambda _old, new, lanes: self._push(new, lanes))
@@ -158,16 +158,16 @@ class Uart(Peripheral):
     def listen(
         self, listener: Callable[[int, int], object], *, part: bool = False, lazy: bool = False
     ) -> Callable[[], None]:
-        """Call listener(byte, start_cycle) for every frame sent on TX; its start bit began in start_cycle.
+        """Call listener(byte, start_cycle) for every frame sent on TX. `start_cycle` is the start of its start bit.
 
-        Return a function that removes the listener. `part`: the listener is a part of the board, whose state depends
-        on the bytes. `lazy`: the call may come later than the frame's end, but before the run ends. A machine runs
-        faster if all listeners are lazy.
+        Return a function that removes the listener. `part`: the listener is a board part whose state depends on the
+        bytes. `lazy`: the call may come later than the end of the frame, but before the run ends. A machine runs faster
+        if all listeners are lazy.
         """
         return self._listeners.add(listener, part=part, lazy=lazy)
 
     def deliver_sent(self) -> None:
-        """Call the listeners for the sent characters stored in the record, and clear the store."""
+        """Call the listeners for the sent characters stored in the record, then clear the store."""
         count = self._sent_count.value
         if count:
             entries = self._sent[:count].tolist()
@@ -188,8 +188,10 @@ class Uart(Peripheral):
     def expect(self, pattern: Pattern, *, within: float) -> Match[bytes]:
         """Run the machine until `pattern` has been sent, for at most `within` ms of simulated time.
 
-        Text and bytes match literally, a compiled bytes pattern is searched. The search starts behind the last match;
-        the first call starts collecting. The machine stops in the cycle in which the match's last byte has left the
+        Text and bytes match literally; a compiled bytes pattern is searched. The search starts after the last match.
+        The
+        first call starts to collect output. The machine stops in the cycle in which the last byte of the match has left
+        the
         pin. Raises ExpectError (an AssertionError) with the output received instead, and with the fault if any.
         """
         if self._matcher is None:
@@ -197,7 +199,7 @@ class Uart(Peripheral):
                 self.name.upper().replace("U", "UART", 1), self.context.cpu_signals, self.context.fcy, lambda: self.now
             )
             self.listen(self._matcher.on_byte, lazy=True)
-        remove = self.listen(lambda _byte, _start: None)  # an eager listener: a match must end the run at once
+        remove = self.listen(lambda _byte, _start: None)  # an eager listener, so that a match ends the run immediately
         try:
             return self._matcher.expect(pattern, within, self.drain)
         finally:
@@ -230,12 +232,12 @@ class Uart(Peripheral):
         push(self.bus.integers, self._operands, value, lanes)
 
     def _tx_due(self, due: int) -> None:
-        """Handle the end of a sent frame, or start sending a waiting character."""
+        """Handle the end of a sent frame, or start to send a waiting character."""
         if self._shifting.value and due < self._end.value:
             return
         if self._shifting.value:
             self._shifting.value = 0
-            self.deliver_sent()  # loopback disconnects the receive pin only: the frame is sent on TX (§10)
+            self.deliver_sent()  # loopback disconnects only the receive pin; the frame is sent on TX (§10)
             self._listeners(0 if self.sta["UTXBRK"] else self._frame.value, self._start.value)
         waits = self._tx_count.value > 0
         send_next(self.bus.integers, self._operands, due)
@@ -246,7 +248,7 @@ class Uart(Peripheral):
                 self._receive_frame(start, self._frame.value | (BREAK if self.sta["UTXBRK"] else 0), 0)
 
     def _tx_level(self, cycle: int) -> int:
-        """Return the level of TX in `cycle`, 1 = idle."""
+        """Return the level of TX at `cycle`; 1 is idle."""
         if self.sta["UTXBRK"]:
             return 0
         if not self._shifting.value or cycle < self._start.value:
@@ -254,7 +256,7 @@ class Uart(Peripheral):
         return self._wave.value >> (cycle - self._bit_began.value) // self.bit_time & 1
 
     def drain(self) -> None:
-        """Send all characters left in the transmitter: a real UART keeps running after the program has stopped."""
+        """Send all characters left in the transmitter, as a real UART does after the program has stopped."""
         self.deliver_sent()
         while self._shifting.value or (self._tx_count.value and self.is_sending_enabled):
             self.events.cancel(self._tx_event)
@@ -265,8 +267,9 @@ class Uart(Peripheral):
     def feed(self, data: bytes | Iterable[int], cycle: int | None = None, *, errors: int = 0, baud: float = 0) -> None:
         """Queue frames that arrive back to back on RX, at this UART's own bit time or at `baud` bits per second.
 
-        With `cycle` the first start bit is not before that cycle, and a disabled receiver loses the frames. Without it
-        the sender waits until the receiver is enabled. `errors` may combine FRAMING_ERROR, PARITY_ERROR and BREAK.
+        If `cycle` is given, the first start bit is not before that cycle, and a disabled receiver loses the frames.
+        Otherwise the sender waits until the receiver is enabled. `errors` may combine FRAMING_ERROR, PARITY_ERROR and
+        BREAK.
         """
         bit = round(self.context.fcy() * 256 / baud) if baud else 0
         marks = errors | (WAIT_FOR_RECEIVER if cycle is None else 0)
@@ -294,7 +297,7 @@ class Uart(Peripheral):
         return True
 
     def _line_due(self, due: int) -> None:
-        """Handle a start bit on the RX pin."""
+        """Handle the start of a start bit on the RX pin."""
         frame = self.line.head()
         if frame is None:
             return
@@ -309,7 +312,7 @@ class Uart(Peripheral):
         self._plan_line()
 
     def _receive_frame(self, start: int, data: int, bit_q8: int) -> None:
-        """Sample a frame whose start bit begins in cycle `start`; `bit_q8` is the sender's bit time in Tcy/256."""
+        """Sample a frame whose start bit begins at cycle `start`. `bit_q8` is the sender's bit time in Tcy/256."""
         mode, rules, operands = self.mode.value, self.bus.integers, self._operands
         wave, bits, stop = pack(mode, data), length(mode), first_stop(mode)
         if data & PARITY_ERROR and has_parity(mode):
@@ -336,11 +339,11 @@ class Uart(Peripheral):
             self.events.set(self._edge_event, due)
 
     def _show_top(self) -> None:
-        """Set URXDA, PERR and FERR for the character at the top of the FIFO (§10.2)."""
+        """Set URXDA, PERR and FERR for the character at the head of the FIFO (§10.2)."""
         self.sta.value = int(shown(self._operands, self.sta.value, self._rx_count.value, self._rx[0]))
 
     def _edge_due(self, due: int) -> None:
-        """Pass the edges of the RX pin to the capture module (autobaud), starting with the start bit."""
+        """Report the edges of the RX pin, from the start bit on, to the capture module (autobaud)."""
         bit = self._edge_bit.value
         wave = self._rx_wave.value
         if self._capture is not None:
@@ -373,13 +376,13 @@ class Uart(Peripheral):
         utxen, oerr = (1 << fields[name][0] for name in ("UTXEN", "OERR"))
         if (old ^ new) & utxen and self.is_enabled:
             self._transmitter_switched(bool(new & utxen))
-        if old & oerr and not new & oerr:  # only a change 1 -> 0 flushes the FIFO (§10.2)
+        if old & oerr and not new & oerr:  # only a change from 1 to 0 flushes the FIFO (§10.2)
             self._rx_count.value = 0
             self._held.value = 0
             self._show_top()
 
     def _transmitter_switched(self, on: bool) -> None:
-        """Handle the transmitter being enabled or disabled: UARTEN and UTXEN both 1 (§10.1)."""
+        """Enable or disable the transmitter, which is on while UARTEN and UTXEN are both 1 (§10.1)."""
         self.restored()
         if on:
             self._tx_port.own(self._tx_pin, drive=True, level=1)
@@ -407,7 +410,7 @@ class Uart(Peripheral):
             self.sta[flag] = 0
 
     def _stop_receiving(self) -> None:
-        """Abort a reception; its character is lost."""
+        """Abort a reception, whose character is lost."""
         self._receiving.value = QUIET
         for slot in (self._rx_event, self._edge_event):
             self.events.cancel(slot)
@@ -419,9 +422,9 @@ class Uart(Peripheral):
         self._rx_port.disown(self._rx_pin)
 
     def _brg_written(self, old: int, _new: int, _lanes: int) -> None:
-        """Handle a write to BRG: the baud counter restarts (§10), so the current bit lasts one more bit time.
+        """Handle a write to BRG. The baud counter restarts (§10), so the current bit lasts one more bit time.
 
-        UNVERIFIED: a character being received keeps the rate it began with.
+        UNVERIFIED: a character that is being received keeps its initial rate.
         """
         following, before, bit = self.now + 1, 16 * (old + 1), self.bit_time
         self._clock.value = following
@@ -434,7 +437,7 @@ class Uart(Peripheral):
         if following > began:
             self._wave.value >>= passed
             self._bit_began.value = following
-        else:  # the start bit has not begun
+        else:  # the start bit has not begun yet
             self._start.value = self._bit_began.value = following + bit
         self._end.value = self._bit_began.value + bits * bit
         self.events.set(self._tx_event, self._end.value)
@@ -447,7 +450,7 @@ class Uart(Peripheral):
     # -- power and reset ---------------------------------------------------------------------------------------------
 
     def reset(self, power_on: bool) -> None:
-        """Reset: disabled and empty. Queued frames belong to the environment and stay."""
+        """Reset to disabled and empty. Queued frames belong to the environment and remain."""
         self.restored()
         self._tx_count.value = self._shifting.value = 0
         self._rx_count.value = self._held.value = self._receiving.value = 0
@@ -456,9 +459,9 @@ class Uart(Peripheral):
         self._plan_line()
 
     def freeze(self, cycle: int, mode: int) -> None:
-        """Stop the clock. Idle with USIDL suspends transfers; Sleep aborts them, and TX idles high.
+        """Stop the clock. Idle with USIDL suspends transfers. Sleep aborts them, and TX then idles high.
 
-        UNVERIFIED: §10 does not say what happens to a reception.
+        UNVERIFIED: §10 does not say what happens to a reception in progress.
         """
         if mode == SLEEP and (self._shifting.value or self._tx_count.value):
             self.events.cancel(self._tx_event)
@@ -481,6 +484,6 @@ class Uart(Peripheral):
             self._capture.autobaud = bool(self.mode["ABAUD"])
 
     def thaw(self, cycle: int) -> None:
-        """Resume the clock; frames that waited for the receiver may arrive."""
+        """Resume the clock. Frames that waited for the receiver may then arrive."""
         super().thaw(cycle)
         self._plan_line()
