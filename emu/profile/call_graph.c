@@ -1,9 +1,9 @@
-/* Call graph, built from the records of emu/dspic30f/cycle_accounting.py: one stack of frames for each stack of the
-   firmware, and for every call site the callee, the number of calls and their cycles.
+/* Call graph, built from the records of emu/dspic30f/cycle_accounting.py. It has one stack of frames for each stack of
+   the firmware and, for every call site, the callee, the number of calls and their cycles.
 
-   A return belongs to the call whose return address was stored at the address from which the return reads. A return into
-   another stack is therefore a thread switch, and frames above it are dropped. Time in Sleep, in interrupts and in other
-   threads is attributed to no function. */
+   A return belongs to the call that stored its return address where the return reads it. If that address is on another
+   stack, the return is a thread switch. The frames above it are dropped. Time in Sleep, in interrupts and in other threads
+   is attributed to no function. */
 typedef unsigned char u8;
 typedef unsigned short u16;
 typedef unsigned int u32;

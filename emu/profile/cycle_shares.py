@@ -144,9 +144,7 @@ class Profiler:
         finally:
             close()
             self._read(profile)
-            profile.idle = (
-                profile.end - profile.start - profile.busy
-            )  # a step may skip a whole sleep without a record
+            profile.idle = profile.end - profile.start - profile.busy  # a step may skip a whole sleep without a record
 
     def _open(self) -> Callable[[], None]:
         if self._native is not None:

@@ -17,7 +17,7 @@
      8.0s    i2c       sda 5           SDA is held low for 5 clocks (0: until `free`); or: scl, free
      0       noise     1               sensor noise: 1 = the reference's deviations, 0 = none
 
-Files called *.vcd and *.csv are waveforms, which waveform.py converts to the same events.
+Files called *.vcd and *.csv are waveforms, which stimulus_import.py converts to the same events.
 
 Times are in s, ms or us (`1.5s`) or cycles (`22118400`). Lines may be in any order; lines with equal times keep their
 order.
