@@ -10,8 +10,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any, Final
 
-LONGEST_TEXT: Final = 16
-"""Elements of an array shown in one line."""
+MAX_SHOWN_ELEMENTS: Final = 16
+"""Maximum number of array elements shown."""
 FLOATS: Final = {4: "<f", 8: "<d"}
 QUALIFIERS: Final = ("typedef", "const", "volatile")
 TAGGED: Final = ("struct", "union", "enum")
@@ -176,8 +176,8 @@ def _array(target: Type, values: list[Any]) -> str:
     if target.bare.kind == "char":
         octets = bytes(value & 0xFF for value in values)
         return repr(octets.rstrip(b"\0").decode("latin-1"))
-    shown = ", ".join(text_of(target, value) for value in values[:LONGEST_TEXT])
-    return "{" + shown + (", ..." if len(values) > LONGEST_TEXT else "") + "}"
+    shown = ", ".join(text_of(target, value) for value in values[:MAX_SHOWN_ELEMENTS])
+    return "{" + shown + (", ..." if len(values) > MAX_SHOWN_ELEMENTS else "") + "}"
 
 
 def parts_of(kind: Type) -> Iterator[Member]:
