@@ -2,8 +2,8 @@
    the firmware and, for every call site, the callee, the number of calls and their cycles.
 
    A return belongs to the call that stored its return address where the return reads it. If that address is on another
-   stack, the return is a thread switch. The frames above it are dropped. Time in Sleep, in interrupts and in other threads
-   is attributed to no function. */
+   stack, the return is a thread switch. The frames above it are dropped. Time in Sleep, in interrupts and in other
+   threads is attributed to no function. */
 typedef unsigned char u8;
 typedef unsigned short u16;
 typedef unsigned int u32;
@@ -69,7 +69,7 @@ static void push(CallGraph *t, u64 start, u32 site, u32 entry, u32 place, u32 le
     t->now = now;
 }
 
-/* End the top frame of the current stack. Inclusive time of recursion counts for the outermost call. */
+/* End the top frame of the current stack. The inclusive time of recursive calls counts only for the outermost one. */
 static void pop(CallGraph *t) {
     Stack *s = &t->stack[t->current];
     Frame *f = &s->frame[--s->depth];
@@ -105,7 +105,7 @@ static int find(const Stack *s, u32 place) {
     return -1;
 }
 
-/* Return an unused stack, else the one left the longest time ago. */
+/* Return an unused stack; if there is none, the least recently used one. */
 static u32 new_stack(CallGraph *t) {
     u32 best = t->current ? 0 : 1;
     for (u32 i = 0; i < STACKS; i++) {
@@ -143,7 +143,7 @@ static void close_all(CallGraph *t) {
 
 u64 call_graph_size(void) { return sizeof(CallGraph); }
 
-/* Start with the program at `entry` in cycle `now`. */
+/* Start the call graph: the program is at `entry` at cycle `now`. */
 void call_graph_begin(CallGraph *t, u64 now, u64 entry) {
     t->now = now;
     push(t, now, TOP, (u32)entry, ~0u, 0, 0);
