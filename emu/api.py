@@ -78,7 +78,7 @@ class Machine(BareMachine):
         self.diagnose = self._explain
 
     def _explain(self, stop: Stop) -> Stop:
-        from emu.debug.fault_report import explain  # most runs end without a fault
+        from emu.debug.fault_report import explain  # imported only here, because most runs end without a fault
 
         return explain(self, stop)
 

@@ -52,5 +52,5 @@ class Noise:
         x = _splitmix64(self._seed.value, channel, cycle)
         uniform = (
             sum(x >> shift & 0xFFFF for shift in (0, 16, 32, 48)) / 0x10000 - 2
-        )  # the sum of four uniform numbers of variance 1/12
+        )  # sum of four uniform random numbers, each with variance 1/12
         return uniform * 3**0.5 * deviation * self.strength

@@ -53,7 +53,7 @@ def console_command(target: Debuggee, text: str) -> str | Callable[[], StopEvent
         if at is None or not isinstance(place, Value):
             raise ValueError(f"{rest} is not in memory")
         size = place.type.bytes
-        machine.peek_bytes(at, size)  # refuses a place that is not in memory as a whole
+        machine.peek_bytes(at, size)  # raises ValueError for a range that is not all in memory
         return lambda: _last_write(target, at, size)
     return HELP
 

@@ -107,7 +107,7 @@ class Debuggee:
         extra = self._run_target is not None and pc in self._run_target[0] and self._run_target[1]()
         return bool(self._hit) or extra
 
-    # Forward
+    # Forward execution
 
     def resume(self) -> StopEvent:
         """Run until a stop."""
@@ -302,7 +302,7 @@ class Debuggee:
         return self.run_to([frames[1].pc], lambda: self.machine.w[STACK_POINTER] == top) or StopEvent("step")
 
     def goto(self, cycle: int) -> StopEvent:
-        """Go to a cycle. A cycle after the recording is run to, unless the machine stops earlier."""
+        """Go to a cycle. If it is after the recording, run to it unless the machine stops earlier."""
         history = self.history
         if cycle <= history.end:
             history.seek(max(cycle, history.start))
@@ -330,7 +330,7 @@ class Debuggee:
     def _line(self) -> SourceLine | None:
         return self.inspector.image.lines.find(self.machine.pc)
 
-    # Back
+    # Reverse execution
 
     def reverse_step_instruction(self) -> StopEvent:
         """Go back by one instruction."""
@@ -340,7 +340,7 @@ class Debuggee:
         """Go back to the start of the previous line of this function or its caller."""
         start = self.inspector.function_start(self.machine.pc)
         line = self._line()
-        if line is not None and line.start != self.machine.pc:  # from inside a line, the start of that line comes first
+        if line is not None and line.start != self.machine.pc:  # inside a line, first go back to its start
             line = SourceLine(-1, -1, line.file, -line.line)
         for positions in self.history.earlier_steps():
             for at, (cycle, pc) in reversed(list(enumerate(positions))):

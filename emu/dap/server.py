@@ -251,7 +251,7 @@ class Server(RewindingSession):
         self._pause = False
         try:
             event = self._rewind_if_followed(action())
-        except REQUEST_ERRORS as error:  # the response is sent already, so the stop reports the failure
+        except REQUEST_ERRORS as error:  # the stop reports the failure, because the response has been sent
             event = StopEvent("pause", f"the request failed: {error}")
         if not self._is_over:
             self._report_stop(event)

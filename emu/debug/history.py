@@ -108,7 +108,7 @@ class History:
         flash = {id(one.flash): len(one.flash) for one in self._states}
         return sum(len(one.packed) for one in self._states) + sum(flash.values())
 
-    # Forward
+    # Forward execution
 
     def advance(self, cycle: int) -> Stop | None:
         """Run as `Machine.advance` does. In the past, replay the recording with its input and without observers.
@@ -238,7 +238,7 @@ class History:
         rest = zlib.decompress(stored.packed)
         return rest[: self._flash.start] + stored.flash + rest[self._flash.start :]
 
-    # Back
+    # Reverse execution
 
     def seek(self, cycle: int) -> None:
         """Restore the machine to `cycle`, or to the first instruction boundary after it.
@@ -270,7 +270,7 @@ class History:
             behind = [cycle for cycle, _ in self._steps(begin, now)]
             if begin == self.start:
                 break
-            del behind[:1]  # the CPU may wake at `begin` to enter an interrupt, which is inside a step
+            del behind[:1]  # at `begin` the CPU may wake and enter an interrupt, which is inside a step
             window *= WIDER
         self._goto(behind.pop() if behind else self.start)
         self._previous_steps = (self.machine.cycle, behind)

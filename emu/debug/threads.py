@@ -114,7 +114,7 @@ class Threads:
         pid = _number(pcb, "pid")
         runs = self._dereferenced(RUNNING)
         is_running = runs is not None and runs.address == pcb.address
-        is_zombie = _number(pcb, "block") == pcb.address  # the kernel has freed its stack
+        is_zombie = _number(pcb, "block") == pcb.address  # the kernel has freed the stack of a zombie
         frames = () if is_zombie else tuple(self._frames(pcb, is_running))
         state = "running" if is_running and not blocked else "ready"
         if blocked:

@@ -94,7 +94,7 @@ def atomic_text_file(path: str | os.PathLike[str]) -> Iterator[TextIO]:
             with atomic_file(path) as part, part.open("w", encoding="utf-8") as stream:
                 yield stream
     except OSError as error:
-        if error.filename is None and error.errno in (errno.ENOSPC, errno.EFBIG):  # a write names no file
+        if error.filename is None and error.errno in (errno.ENOSPC, errno.EFBIG):  # errors of `write` name no file
             error.filename = os.fspath(path)
         raise
 

@@ -235,7 +235,7 @@ class Machine(StateAccess):
             runner.pass_limits(period, self._last)
             try:
                 stop = self.run_until(min(limit, self._last))
-            finally:  # a callback may raise; the limits belong to this run only
+            finally:  # also if a callback raises: the limits belong to this run only
                 runner.pass_limits(0, 0)
                 cuts += runner.passed()
             now = self.state.cycle

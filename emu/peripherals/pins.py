@@ -49,7 +49,7 @@ class Waveform(Protocol):
     def constant_until(self, cycle: int) -> int:
         """Return the first cycle after `cycle` at which `bits` may change, unless `Pins.invalidate` is called.
 
-        Return `cycle` itself if the waveform promises nothing.
+        Return `cycle` itself if the waveform gives no guarantee.
         """
 
 
@@ -143,7 +143,7 @@ class Pins:
     @edges.setter
     def edges(self, log: list[tuple[int, int, int]] | None) -> None:
         self.flush()
-        if log is not None and self._edges is None:  # every change must call Python
+        if log is not None and self._edges is None:  # for the log, every change must call Python
             self._eager_before_log = self.eager.tolist()
             for port in range(len(PORTS)):
                 self.eager[port] = 0xFFFF

@@ -172,7 +172,7 @@ u64 call_graph_open(const CallGraph *t) {
     return sum;
 }
 
-/* Process `count` records. `event` receives the call events: at most 2 * count, plus one for every open frame and stack. */
+/* Process `count` records. `event` receives at most 2 * count call events, plus one for every open frame and stack. */
 u64 call_graph_process(CallGraph *t, const u64 *record, u64 count, CallEvent *event) {
     t->event = event;
     t->events = 0;

@@ -25,7 +25,7 @@ class Native(Structure):
     _fields_ = [
         *((name, c_void_p) for name in (
             "entry", "record", "env",
-            "begins",  # uint64: whether a call begins with the boundary before PC
+            "begins",  # uint64: whether a call begins with the boundary before the instruction at PC
             "limit", "last",  # uint64: cycles at which native code returns (`Engine.pass_limits`)
               "noted", "notes",  # uint64: number and cycles of the passed limits (`Engine.passed`)
             "fresh",  # uint64 [FRESH_ROOM]: instructions that read a register that a device refreshes, then 0:
@@ -36,7 +36,7 @@ class Native(Structure):
         )),
         *((name, c_int64) for name in (
             "room",  # capacity of `notes`
-            "interpret", "service",  # exit reasons: an instruction needs Python; a boundary does, or limit reached
+            "interpret", "service",  # exit reasons: Python must do an instruction; or a boundary, or limit reached
             "awake",  # value of `mode` while the CPU runs
             "trap",  # bit of CORCON that is 1 while a trap is handled
         )),

@@ -13,7 +13,7 @@ CRYSTAL_HZ: Final = 7_372_800
 
 CONFIG: Final[Mapping[str, int]] = MappingProxyType(
     {
-        "FOSC": 0xFFE6,  # switching and monitor off, XT crystal with PLL x8
+        "FOSC": 0xFFE6,  # clock switching and clock monitor off; XT crystal with PLL x8
         "FWDT": 0x7FFF,  # watchdog off
         "FBORPOR": 0xFF7F,  # brown-out reset off, MCLR on, power-up timer 64 ms
         "FGS": 0xFFFF,  # no code protection

@@ -193,7 +193,7 @@ class _Evaluation:
                 self.simple = Piece("register", self._leb(False))
             case 0x92:  # bregx
                 stack.append(self._based(self._leb(False)))
-            case 0x91:  # FBREG
+            case 0x91:  # fbreg
                 stack.append(self.frame_base() + self._leb(True))
             case 0x9C:  # call_frame_cfa
                 stack.append(self.frame_base())

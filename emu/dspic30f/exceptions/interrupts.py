@@ -145,7 +145,7 @@ class Exceptions(RuleInterpreter):
                     return Accepted(trap.vector.level, trap.vector, self._u64[trap.since])
         u16 = self._u16
         if slip is None and not any(u16[flags] & u16[enables] for flags, enables in self._words):
-            return None  # the most frequent case
+            return None  # the most frequent case: no request
         bits = requested(self, self.operands, slip)
         number, level = accepted(self, self.operands, bits, last, slip)
         if number == NO_REQUEST:

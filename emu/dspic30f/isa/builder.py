@@ -30,15 +30,15 @@ Size = Literal[1, 2]
 class Context:
     """Processor modes that a translation may treat as constants (isa.md §2.4, §2.5, §14.4)."""
 
-    us: int = 0  # DSP multiply unsigned
-    if_: int = 0  # DSP multiply integer
-    rnd: int = 0  # conventional rounding
-    satdw: int = 1  # saturate accumulator stores
+    us: int = 0  # 1: DSP multiplies are unsigned
+    if_: int = 0  # 1: DSP multiplies are integer, else fractional
+    rnd: int = 0  # 1: conventional rounding, else convergent
+    satdw: int = 1  # 1: accumulator stores saturate
     sata: int = 0
     satb: int = 0
-    accsat: int = 0  # 9.31 saturation
+    accsat: int = 0  # 1: accumulators saturate in 9.31 format, else 1.31
     psv: int = 0
-    xmod: int = 0  # modulo enables
+    xmod: int = 0  # modulo addressing enabled for X and Y
     ymod: int = 0
     brev: int = 0
     xwm: int = 15  # registers selected by MODCON; 15 means none

@@ -13,7 +13,7 @@ from .fields import Clause, Operands
 from .row import Insn, Row
 from .table import BY_BYTE
 
-CACHE_WORDS = 1 << 17  # more than twice the flash of the chip
+CACHE_WORDS = 1 << 17  # number of cached words: more than twice the flash of the chip
 
 # Rules that the CPU does not enforce. A word-mode file register at an odd address causes an address error at run time
 # (isa.md §3.3), SFTAC by more than 16 a math error (§8.5). Mode 7 acts as mode 6 (§3.1), and f of CLR WREG is ignored

@@ -12,11 +12,11 @@ from .row import Does
 
 GUARD = 1 << 39  # an accumulator's range is -GUARD .. GUARD - 1
 LIMIT = 1 << 31  # its 1.31 range is -LIMIT .. LIMIT - 1
-MULTIPLICANDS = {0: (4, 5), 1: (4, 6), 2: (4, 7), 4: (5, 6), 5: (5, 7), 6: (6, 7)}  # mmm, isa.md §8.1
+MULTIPLICANDS = {0: (4, 5), 1: (4, 6), 2: (4, 7), 4: (5, 6), 5: (5, 7), 6: (6, 7)}  # by field mmm, §8.1
 NO_PREFETCH, WITH_OFFSET, OFFSET_REGISTER = 4, 12, 12
-PREFETCH_STEP = {0: 0, 1: 2, 2: 4, 3: 6, 5: -6, 6: -4, 7: -2}  # iiii<2:0>, jjjj<2:0>
+PREFETCH_STEP = {0: 0, 1: 2, 2: 4, 3: 6, 5: -6, 6: -4, 7: -2}  # pointer step in bytes by iiii<2:0> or jjjj<2:0>
 WRITE_BACK = 13
-WRITE_BACK_INDIRECT, NO_WRITE_BACK = 1, 2  # aa; 0 is W13 direct
+WRITE_BACK_INDIRECT, NO_WRITE_BACK = 1, 2  # values of field aa; 0 means W13 direct
 
 
 def plus(acc: Value, v: Value) -> Value:

@@ -168,7 +168,7 @@ class Compiler:
         request = (self._tickets, level, text.encode())
         if level:
             self._outbox.append(request)
-        else:  # it compiles quickly and replaces interpretation
+        else:  # exact code goes first: it compiles quickly and replaces interpretation
             self._outbox.appendleft(request)
         self._send()
 
@@ -298,7 +298,7 @@ class Compiler:
             atexit.unregister(process.kill)
             process.stdin.close()
             process.stdout.close()
-            process.returncode = 0  # the parent process waits for it
+            process.returncode = 0  # only the parent process may wait for this child
         self._received.clear()
         request, self._in_flight = self._in_flight, None
         if request is not None:

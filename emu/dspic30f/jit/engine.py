@@ -210,7 +210,7 @@ class JitEngine:
     def natively(self, limit: int) -> bool:
         """Implement `Engine.natively`. Calls are often short, so this function reads the record directly."""
         start = self._u64[self._now]
-        if self._dispatch is None or not start or self._u16[self._edt]:  # a native boundary needs an earlier cycle
+        if self._dispatch is None or not start or self._u16[self._edt]:  # a native boundary needs a preceding cycle
             return False
         if self.compiler.busy:
             self._collect()

@@ -106,7 +106,7 @@ class I2c(Peripheral):
         return NEVER
 
     def constant_until(self, cycle: int) -> int:
-        """Return how long the lines stay constant: between operations, without limit."""
+        """Return NEVER between operations, when the lines are constant; during one, `cycle` (no guarantee)."""
         return NEVER if self._operation.value == _NONE or self._stalled.value else cycle
 
     def restored(self) -> None:

@@ -213,7 +213,7 @@ class ExternalMaster:
 
     def _due(self, due: int) -> None:
         if self._slave.stretches:
-            return  # `_resume` continues
+            return  # `_resume` continues the transfer when the slave releases the clock
         if self._script:
             takes_bits = self._script.pop(0)()
             if self._script or not self._transfer.done:

@@ -174,7 +174,7 @@ class Spi(Peripheral):
         return NEVER
 
     def constant_until(self, cycle: int) -> int:
-        """Promise nothing, because idle levels depend on control bits that are plain storage."""
+        """Return `cycle` (no guarantee), because idle levels depend on control bits that are plain storage."""
         return cycle
 
     def restored(self) -> None:

@@ -97,7 +97,7 @@ class Counter(Peripheral):
         if self.is_taken or self.is_frozen:
             return NEVER
         source = self._source.value
-        if source == PIN:  # only an edge that has already occurred is known
+        if source == PIN:  # of the edges, only those that have already occurred are known
             arriving = after < self.base.value and self._before.value != target == self._start
             return self.base.value if arriving else NEVER
         if source not in (TCY, WAVEFORM):

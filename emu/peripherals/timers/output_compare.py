@@ -66,7 +66,7 @@ class Compare(Peripheral):
         if self.con["OCM"] == _OFF or self.is_frozen:
             return
         if self.events.due(self._pin_event) == self.now + 1 and not (self._is_pwm and self._timer.is_frozen):
-            return  # already determined in the current cycle
+            return  # the pin change was already determined in this cycle
         cycle = self._next_change(self.now)
         self.events.set(self._pin_event, cycle) if cycle != NEVER else self.events.cancel(self._pin_event)
 

@@ -31,7 +31,7 @@ class TxPin:
         return NEVER
 
     def constant_until(self, cycle: int) -> int:
-        """Promise nothing, because firmware rarely reads its own TX pin."""
+        """Return `cycle` (no guarantee), because firmware rarely reads its own TX pin."""
         return cycle
 
     def log_frame(self, start: int, bits: int, length: int, bit: int) -> None:

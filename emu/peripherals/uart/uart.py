@@ -441,7 +441,7 @@ class Uart(Peripheral):
             self._start.value = self._bit_began.value = following + bit
         self._end.value = self._bit_began.value + bits * bit
         self.events.set(self._tx_event, self._end.value)
-        if in_loopback:  # the receiver follows
+        if in_loopback:  # in loopback, the receiver follows the transmitter
             self._rx_start.value = self._start.value
             self._done.value = self._end.value - stops(self.mode.value) * bit + bit // 2
             is_coming = self._receiving.value == COMING

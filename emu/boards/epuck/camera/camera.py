@@ -215,7 +215,7 @@ class Camera(BoardPart, I2cDevice):
         return self._line[(cycle - u64[first]) // u64[self._byte.index]] << 8
 
     def constant_until(self, cycle: int) -> int:
-        """Return the start of the next line if `cycle` is between lines; within a line, promise nothing."""
+        """Return the start of the next line if `cycle` is between lines; within a line, `cycle` (no guarantee)."""
         u64 = self._u64
         in_line = u64[self._line_from.index] <= cycle < u64[self._line_to.index]
         return cycle if in_line else self.scan.next_line(cycle)

@@ -134,7 +134,7 @@ class Scan:
         return self.edge_cycle(mask, self.edges(mask, after) + count)
 
     def constant_until(self, cycle: int) -> int:
-        """Return the cycle of the next edge of a sync line. While PCLK runs, promise nothing."""
+        """Return the cycle of the next edge of a sync line; while PCLK runs, `cycle` itself (no guarantee)."""
         timing = self.timing
         frame, offset = self.place(cycle)
         if not self.running:
