@@ -50,7 +50,7 @@ class Region:
 
     @property
     def size(self) -> int:
-        """Length in the units of the space."""
+        """Length in bytes (data space) or PC units (program space)."""
         return self.end - self.start
 
 

@@ -48,7 +48,7 @@ def add_board_options(parser: argparse.ArgumentParser) -> None:
 
 
 def add_watch_option(parser: argparse.ArgumentParser) -> None:
-    """Add --watch."""
+    """Add the option --watch."""
     parser.add_argument(
         "--watch", metavar="LIST", type=_topics, default=[], help="report changes of: leds,motors,uart1,uart2,sound"
     )

@@ -11,7 +11,7 @@ from emu.image.model import Image
 
 
 def add_chip_option(parser: argparse.ArgumentParser) -> None:
-    """Add --chip."""
+    """Add the option --chip."""
     parser.add_argument(
         "--chip",
         metavar="NAME",

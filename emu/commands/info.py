@@ -113,7 +113,7 @@ def _config(image: Image) -> list[dict[str, Any]]:
 
 
 def text(facts: dict[str, Any]) -> str:
-    """Return the facts as text."""
+    """Return the output of `describe` as text."""
     kind = {"elf": "ELF executable", "hex": "Intel HEX"}[facts["format"]]
     lines = [f"{facts['path']}: {kind} for {facts['chip']}"]
     lines += [f"warning: {warning}" for warning in facts["warnings"]]

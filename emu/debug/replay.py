@@ -35,7 +35,7 @@ class ExecutionTrace:
     last: int | None
     """Address of the last instruction executed."""
     cycle: int
-    """First cycle of that instruction."""
+    """First cycle of the last instruction executed."""
     stack_pointer: int
     """Value of W15 after that instruction."""
     bad_access: tuple[int, int, bool] | None

@@ -43,7 +43,7 @@ class Symbol:
 
 
 class Symbols:
-    """All symbols of an image."""
+    """All symbols of an image, searchable by name and by address."""
 
     def __init__(self, symbols: Iterable[Symbol]) -> None:
         self.all: Final = tuple(symbols)

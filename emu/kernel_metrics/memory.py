@@ -79,7 +79,7 @@ class Equation:
 
     coefficients: dict[str, Fraction]
     constant: dict[str, int]
-    """Parts of A, in bytes."""
+    """Size of each part of the constant A, in bytes."""
     sizes: dict[str, dict[str, int]]
     """ROM and A in bytes, for the kernel alone and for the kernel with its devices."""
     heap: int

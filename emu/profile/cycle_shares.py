@@ -36,10 +36,10 @@ class Profile:
     entry: int = 0
     """Program address at the start of the profile."""
     start: int = 0
-    """First counted cycle."""
+    """First cycle that the profile counts."""
     end: int = 0
     idle: int = 0
-    """Cycles in Idle or Sleep."""
+    """Number of cycles in Idle or Sleep."""
     addresses: dict[int, int] = field(default_factory=dict)
     """Cycles by the first program address of a source line's code range."""
     locations: Counter[CodeLocation] = field(default_factory=Counter)

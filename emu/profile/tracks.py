@@ -32,7 +32,7 @@ class TrackEvent(NamedTuple):
     since: int = 0
     """For the entry of a handler: cycle of the interrupt request."""
     site: int = 0
-    """Program address of the call."""
+    """Program address of the call instruction."""
 
 
 class Tracks:

@@ -80,7 +80,7 @@ class BreakpointList:
         return found
 
     def delete(self, breakpoints: list[PromptBreakpoint]) -> None:
-        """Delete breakpoints."""
+        """Delete breakpoints and send the remaining ones to the server."""
         for one in breakpoints:
             self.all.remove(one)
         self.send(one.list for one in breakpoints)

@@ -13,7 +13,7 @@ from typing import Any, Final
 from emu.system.record import Record
 
 NEVER: Final = 0xFFFF_FFFF_FFFF_FFFF
-"""Due cycle of an idle slot."""
+"""Due cycle of an idle slot: it is later than every cycle."""
 
 SLOTS: Final = 96
 

@@ -15,7 +15,7 @@ What = ParamSpec("What")
 
 
 def _ignore(_urgent: bool) -> None:
-    """Ignore a change of urgency."""
+    """Ignore whether any listener is eager."""
 
 
 class Listeners(Generic[What]):

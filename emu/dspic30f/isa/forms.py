@@ -1,6 +1,6 @@
 """Operand forms: functions that make a row's ``does`` from an operation, in the phase order of builder.py.
 
-A form's name lists its operands and destination, as in the syntax column of the table. Its docstring is the effect.
+A form's name lists its operands and destination, as in the syntax column of the table.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ WREG = 0  # W0 is WREG of file-register instructions (isa.md §2.2)
 
 
 def f_and_wreg(op: Binary) -> Does:
-    """f <- f op WREG."""
+    """Return the function for f <- f op WREG."""
 
     def does(m: Builder, x: Operands) -> None:
         size = size_of(x)
@@ -26,7 +26,7 @@ def f_and_wreg(op: Binary) -> Does:
 
 
 def f_and_wreg_to_wreg(op: Binary) -> Does:
-    """WREG <- f op WREG."""
+    """Return the function for WREG <- f op WREG."""
 
     def does(m: Builder, x: Operands) -> None:
         size = size_of(x)
@@ -37,7 +37,7 @@ def f_and_wreg_to_wreg(op: Binary) -> Does:
 
 
 def f_with_wreg(op: Binary) -> Does:
-    """Set the flags of f op WREG."""
+    """Return the function that sets the flags of f op WREG."""
 
     def does(m: Builder, x: Operands) -> None:
         size = size_of(x)
@@ -48,7 +48,7 @@ def f_with_wreg(op: Binary) -> Does:
 
 
 def f_only(op: Unary) -> Does:
-    """f <- op f."""
+    """Return the function for f <- op f."""
 
     def does(m: Builder, x: Operands) -> None:
         size = size_of(x)
@@ -58,7 +58,7 @@ def f_only(op: Unary) -> Does:
 
 
 def f_to_wreg(op: Unary) -> Does:
-    """WREG <- op f."""
+    """Return the function for WREG <- op f."""
 
     def does(m: Builder, x: Operands) -> None:
         size = size_of(x)
@@ -68,7 +68,7 @@ def f_to_wreg(op: Unary) -> Does:
 
 
 def f_flags(op: Unary) -> Does:
-    """Set the flags of op f."""
+    """Return the function that sets the flags of op f."""
 
     def does(m: Builder, x: Operands) -> None:
         size = size_of(x)
@@ -78,7 +78,7 @@ def f_flags(op: Unary) -> Does:
 
 
 def wn_and_literal(op: Binary) -> Does:
-    """Wn <- Wn op lit10."""
+    """Return the function for Wn <- Wn op lit10."""
 
     def does(m: Builder, x: Operands) -> None:
         size = size_of(x)
@@ -88,7 +88,7 @@ def wn_and_literal(op: Binary) -> Does:
 
 
 def wb_and_literal(op: Binary) -> Does:
-    """Wd <- Wb op lit5."""
+    """Return the function for Wd <- Wb op lit5."""
 
     def does(m: Builder, x: Operands) -> None:
         size = size_of(x)
@@ -99,7 +99,7 @@ def wb_and_literal(op: Binary) -> Does:
 
 
 def wb_and_source(op: Binary) -> Does:
-    """Wd <- Wb op Ws."""
+    """Return the function for Wd <- Wb op Ws."""
 
     def does(m: Builder, x: Operands) -> None:
         size = size_of(x)
@@ -112,7 +112,7 @@ def wb_and_source(op: Binary) -> Does:
 
 
 def source_to_destination(op: Unary) -> Does:
-    """Wd <- op Ws."""
+    """Return the function for Wd <- op Ws."""
 
     def does(m: Builder, x: Operands) -> None:
         size = size_of(x)
@@ -124,7 +124,7 @@ def source_to_destination(op: Unary) -> Does:
 
 
 def wb_with_literal(op: Binary) -> Does:
-    """Set the flags of Wb op lit5."""
+    """Return the function that sets the flags of Wb op lit5."""
 
     def does(m: Builder, x: Operands) -> None:
         size = size_of(x)
@@ -134,7 +134,7 @@ def wb_with_literal(op: Binary) -> Does:
 
 
 def wb_with_source(op: Binary) -> Does:
-    """Set the flags of Wb op Ws."""
+    """Return the function that sets the flags of Wb op Ws."""
 
     def does(m: Builder, x: Operands) -> None:
         size = size_of(x)
@@ -145,7 +145,7 @@ def wb_with_source(op: Binary) -> Does:
 
 
 def source_flags(op: Unary) -> Does:
-    """Set the flags of op Ws."""
+    """Return the function that sets the flags of op Ws."""
 
     def does(m: Builder, x: Operands) -> None:
         size = size_of(x)
@@ -155,7 +155,7 @@ def source_flags(op: Unary) -> Does:
 
 
 def f_constant(bits: int) -> Does:
-    """f <- all zeros or all ones, without reading it."""
+    """Return the function for f <- all zeros or all ones, without reading it."""
 
     def does(m: Builder, x: Operands) -> None:
         size = size_of(x)
@@ -165,7 +165,7 @@ def f_constant(bits: int) -> Does:
 
 
 def wreg_constant(bits: int) -> Does:
-    """WREG <- all zeros or all ones."""
+    """Return the function for WREG <- all zeros or all ones."""
 
     def does(m: Builder, x: Operands) -> None:
         set_register(m, WREG, bits & ones(size_of(x)), size_of(x))
@@ -174,7 +174,7 @@ def wreg_constant(bits: int) -> Does:
 
 
 def destination_constant(bits: int) -> Does:
-    """Wd <- all zeros or all ones."""
+    """Return the function for Wd <- all zeros or all ones."""
 
     def does(m: Builder, x: Operands) -> None:
         size = size_of(x)

@@ -67,7 +67,7 @@ class Kind:
 
     @abstractmethod
     def write(self, x: Operands, at: Site, symbol: SymbolOf | None, source: bool) -> list[str]:
-        """Return the tokens of the operand."""
+        """Return the operand as tokens of assembly text."""
 
     def number(self, value: int, at: Site) -> dict[str, int]:
         """Return the fields of a numeric operand.

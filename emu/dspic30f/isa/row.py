@@ -63,7 +63,7 @@ class Row:
 
     @cached_property
     def fields(self) -> Mapping[str, Field]:
-        """Return the fields by letter."""
+        """Return the fields of the pattern by letter."""
         return {f.letter: f for f in self.pattern.fields}
 
     @cached_property

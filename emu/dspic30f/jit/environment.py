@@ -10,7 +10,7 @@ from typing import Final
 from emu.system.native_handle import FRESH_ROOM
 
 LIMIT: Final = 0
-"""Index of the word: cycle at which native code returns."""
+"""Cycle at which native code returns."""
 BLOCKS: Final = 1
 """Address of the block code table, indexed by program word."""
 STEPS: Final = 2
@@ -29,7 +29,7 @@ PERIOD: Final = 7
 LAST_LIMIT: Final = 8
 """Limit at which native code returns; 0 if limits are not passed."""
 PASSED_COUNT: Final = 9
-"""Number of entries in PASSED."""
+"""Number of entries in the list PASSED."""
 ARRIVED: Final = 10
 """Start cycle of the instruction before whose access all events have fired. While the exit reason is ARRIVE, the cycle
 of that access."""

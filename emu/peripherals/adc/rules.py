@@ -72,7 +72,7 @@ class AdcOperands:
     native_source: Cell
     """Cell of the native source of channel 0: function address, then data pointer. The other channels' cells follow."""
     buffer: Cell
-    """Cell of ADCBUF0."""
+    """Cell of ADCBUF0; the other result buffers follow."""
     done: int
     step: EventSlot
     line: InterruptLine

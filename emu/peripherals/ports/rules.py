@@ -91,7 +91,7 @@ def _write(is_port: bool, m: RuleBuilder, p: PortOperands, value: Number, lanes:
 
 
 def write_latch(m: RuleBuilder, p: PortOperands, value: Number, lanes: int) -> bool:
-    """Write LAT."""
+    """Write LAT, if no eager watcher is affected."""
     return _write(False, m, p, value, lanes)
 
 

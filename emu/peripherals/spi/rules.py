@@ -23,7 +23,7 @@ class SpiOperands:
     bit: Mapping[str, int]
     """Masks of the fields of SPIxSTAT and SPIxCON, which have different names."""
     spre: int
-    """Position of SPRE; PPRE is in bits 1:0."""
+    """Bit position of SPRE in SPIxCON; PPRE is in bits 1:0."""
     waiting: Cell
     shift: Cell
     received: Cell

@@ -129,7 +129,7 @@ class MatchOperands:
     ton: int
     tcs: int
     tckps: int
-    """Position of TCKPS."""
+    """Bit position of TCKPS in TxCON."""
     clock: ClockPin
     pin: int
 

@@ -39,7 +39,7 @@ class UartOperands:
     bit: Mapping[str, int]
     """Masks of the fields of UxMODE and UxSTA, which have different names."""
     urxisel: int
-    """Position of URXISEL."""
+    """Bit position of URXISEL in UxSTA."""
     writable: int
     """Mask of the writable bits of UxTXREG."""
     clock: Cell

@@ -88,7 +88,7 @@ class RxQueue:
         self._backlog, self._first = bytearray(saved), 0
 
     def put(self, frames: Iterable[QueuedFrame]) -> None:
-        """Append frames."""
+        """Append frames to the queue."""
         for frame in frames:
             self._backlog += _FRAME.pack(frame.earliest, frame.data, frame.bit)
         self._top_up()
@@ -101,7 +101,7 @@ class RxQueue:
         return QueuedFrame(self._earliest[index], self._data[index], self._bit[index])
 
     def drop(self) -> None:
-        """Remove the next frame."""
+        """Remove the next frame from the queue."""
         self._u16[self._head] = (self._u16[self._head] + 1) % CAPACITY
         self._u16[self._count] -= 1
         self._top_up()

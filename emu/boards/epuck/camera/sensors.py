@@ -50,7 +50,7 @@ class ImageSettings:
     flip_x: bool
     flip_y: bool
     gains: tuple[float, float, float]
-    """Factors on red, green and blue."""
+    """Gain factors of red, green and blue."""
     exposure: float | None
     """Exposure factor of the exposure registers, 1 = nominal; None with automatic exposure."""
 

@@ -189,7 +189,7 @@ class LlvmBuilder:
 
     # -- data memory ------------------------------------------------------------------------------------------------
     def load(self, ea: Number, size: Size, side: Side = "src", ptr: int | None = None) -> Number:
-        """Emit a data read."""
+        """Emit a read of data space."""
         ahead, self.loads_ahead = self.loads_ahead, max(self.loads_ahead - 1, 0)
         if isinstance(ea, int):
             return self._load_static(ea, size)

@@ -32,7 +32,7 @@ DECLARED: Final = "declare i64 @llvm.umin.i64(i64, i64)"
 
 
 def indirect_sfr_text(core: Core, layout: MachineLayout) -> str:
-    """Return the LLVM IR of the module."""
+    """Return the LLVM IR of the module with the helper."""
     e = Emitter()
     words = layout.ram[0] >> 1
     now, address, lanes, value = (Value(e, name, False) for name in ("%now", "%address", "%lanes", "%value"))
