@@ -16,7 +16,7 @@ from emu.peripherals.ports.ports import Port
 from emu.system.events import NEVER
 
 _NONE, _START, _RESTART, _STOP, _RECEIVE, _ACK, _SEND = range(7)
-"""Master operations."""
+"""Operations of the master; _NONE while it is idle."""
 _BITS: Final = {_START: "SEN", _RESTART: "RSEN", _STOP: "PEN", _RECEIVE: "RCEN", _ACK: "ACKEN"}
 _LENGTH: Final = {_START: 2, _RESTART: 3, _STOP: 3, _RECEIVE: 16, _ACK: 2, _SEND: 18}
 """Duration of each operation in Tbrg (§11)."""
