@@ -141,10 +141,12 @@ void heap_update_peak(void);
 void stack_paint(void *begin, const void *end); /* whole words */
 bool kernel_stack_is_intact(void); /* its last byte was never written; for CPUs without a stack limit trap */
 
-/* Hooks of option/: set by the options an application uses, else NULL. A later hook calls the one installed before
- * it. */
-typedef bool (*os_thread_end_function)(sys_pcb *p);
-extern os_thread_end_function os_thread_end_hook; /* slice locked; p is on no list. True: the hook freed the block */
+/* Hooks of option/: each belongs to one option, which sets it at its first use; else NULL. Hooks of the teardown run
+ * in this order, slice locked, when p has left the ring or the blocked list. */
+typedef void (*os_teardown_function)(sys_pcb *p);
+extern os_teardown_function os_release_mutexes, os_release_joins, os_release_service;
+extern os_teardown_function os_run_cleanups; /* calls process_free(p) when the cleanups of p have run */
+extern bool (*os_free_joinable)(sys_pcb *p); /* true: freed what is to be freed, or kept a zombie */
 extern event *(*os_send_hook)(uint16 id, const void *data, uint16 size); /* a sender's event, instead of event_find() */
 
 /* event.c */
@@ -168,6 +170,11 @@ void process_wake(sys_pcb *process, message *m); /* blocked list to the end of t
 void process_block(event *awaited, uint16 ms);   /* blocks the running thread; after os_enter_blocking() */
 sys_pcb *process_end_running(void);              /* kernel stack: ends the running thread, picks the next */
 HAL_NORETURN HAL_USED void os_thread_returned(void);
+void process_free(sys_pcb *p); /* last step of the teardown */
+/* Thread on whose stack cleanups of other threads run, with os_running set to the dying one; else NULL. If a cleanup
+ * kills it, it ends after them. */
+extern sys_pcb *os_cleanup_host;
+extern bool os_cleanup_host_ends;
 
 /* Cursor of the walk over the blocked list during which threads may be woken and killed; one walk at a time. */
 extern sys_pcb **process_scan;

@@ -4,17 +4,15 @@
 #include "openswarm_service.h"
 
 static sys_service *services; /* slice locked */
-static os_thread_end_function previous_hook;
-static bool hook_installed;
 
-static bool on_thread_end(sys_pcb *p)
+/* Teardown of a thread: supervise() restarts its service. */
+static void release_service(sys_pcb *p)
 {
     for (sys_service *s = services; s != NULL; s = s->next) {
         if (s->pid == p->pid) {
             s->pid = 0;
         }
     }
-    return previous_hook != NULL && previous_hook(p);
 }
 
 static void start(sys_service *s)
@@ -54,11 +52,7 @@ bool Sys_Start_Service(sys_service *s)
     if (known != NULL && s->pid != 0) {
         return os_leave(SYS_ERROR_PROCESS);
     }
-    if (!hook_installed) {
-        hook_installed = true;
-        previous_hook = os_thread_end_hook;
-        os_thread_end_hook = on_thread_end;
-    }
+    os_release_service = release_service;
     s->pid = 0;
     if (Sys_Subscribe_to_Event(SYS_1ms_TIMER, 0, supervise, NULL)) {
         start(s);

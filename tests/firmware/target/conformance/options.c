@@ -318,6 +318,104 @@ static void hostile_cleanups(void)
     }
 }
 
+/* ---- Teardown: leave every list, run the cleanups, free the memory ---------------------------------------------------- */
+
+static uint16 target_pid;
+static sys_cleanup hostile[2];
+
+static void kill_target(void *unused)
+{
+    (void)unused;
+    note(Sys_Get_ProcessID() == own_pid ? 'i' : '?');
+    note(Sys_Kill_Process(target_pid) ? 'k' : 'f');
+}
+
+static void kill_what_it_joins(void *unused)
+{
+    (void)unused;
+    own_pid = Sys_Get_ProcessID();
+    note(Sys_Push_Cleanup(&hostile[0], kill_target, NULL) ? '+' : '?');
+    (void)Sys_Join(target_pid);
+}
+
+static void kill_whom_it_awaits(void *unused)
+{
+    (void)unused;
+    own_pid = Sys_Get_ProcessID();
+    note(Sys_Push_Cleanup(&hostile[0], kill_target, NULL) ? '+' : '?');
+    (void)Sys_Lock_Mutex(&mutex);
+}
+
+static void cleanups_kill_what_their_thread_awaits(void)
+{
+    static void (*const targets[])(void *) = {spin, hold_for_ever};
+    static void (*const victims[])(void *) = {kill_what_it_joins, kill_whom_it_awaits};
+    uint16 heap = heap_now();
+    for (uint8 i = 0; i < 2; i++) {
+        target_pid = start(targets[i], NULL, 0);
+        Sys_Sleep(12);
+        forget();
+        uint16 victim = start(victims[i], NULL, 0);
+        Sys_Sleep(25);
+        CHECK(noted("+") && Sys_Kill_Process(victim) && noted("+ik"));
+        CHECK(Sys_Get_ProcessState(target_pid) == SYS_UNKNOWN && Sys_Get_ProcessState(victim) == SYS_UNKNOWN);
+        Sys_Sleep(12);
+        CHECK(heap_now() == heap && Sys_Lock_MutexTimeout(&mutex, 1) && Sys_Unlock_Mutex(&mutex));
+    }
+}
+
+static void use_what_is_the_killers(void *unused)
+{
+    (void)unused;
+    note(Sys_Unlock_Mutex(&mutex) ? '?' : 'u');
+    note(Sys_Pop_Cleanup(true) ? '?' : 'p');
+}
+
+static void push_that(void *unused)
+{
+    note(Sys_Push_Cleanup(&hostile[0], use_what_is_the_killers, NULL) ? '+' : '?');
+    spin(unused);
+}
+
+static void cleanups_own_nothing_of_the_killer(void)
+{
+    static const char letters[] = "x";
+    forget();
+    uint16 victim = start(push_that, NULL, 0);
+    CHECK(Sys_Lock_Mutex(&mutex) && Sys_Push_Cleanup(&hostile[1], tell, (void *)&letters[0]));
+    Sys_Sleep(12);
+    CHECK(Sys_Kill_Process(victim) && noted("+up"));
+    CHECK(Sys_Unlock_Mutex(&mutex) && Sys_Pop_Cleanup(true) && noted("+upx"));
+    CHECK(refused_as(Sys_Push_Cleanup(&hostile[0], NULL, NULL), SYS_ERROR_ARGUMENT));
+}
+
+static void push_kill(void *unused)
+{
+    own_pid = Sys_Get_ProcessID();
+    note(Sys_Push_Cleanup(&hostile[0], kill_target, NULL) ? '+' : '?');
+    spin(unused);
+}
+
+static void kill_and_be_killed(void *victim)
+{
+    static const char letters[] = "x";
+    target_pid = Sys_Get_ProcessID();
+    note(Sys_Push_Cleanup(&hostile[1], tell, (void *)&letters[0]) ? '+' : '?');
+    note(Sys_Kill_Process(*(const uint16 *)victim) ? '?' : '!'); /* it does not return */
+}
+
+static void a_cleanup_kills_the_killer(void)
+{
+    uint16 heap = heap_now();
+    forget();
+    uint16 victim = start(push_kill, NULL, 0);
+    Sys_Sleep(12);
+    uint16 killer = start(kill_and_be_killed, &victim, 0);
+    Sys_Sleep(25);
+    CHECK(noted("++ikx") && Sys_Get_ProcessState(killer) == SYS_UNKNOWN && Sys_Get_ProcessState(victim) == SYS_UNKNOWN);
+    CHECK(heap_now() == heap && Sys_Push_Cleanup(&hostile[0], kill_target, NULL) && Sys_Pop_Cleanup(false));
+}
+
 /* ---- Quota ------------------------------------------------------------------------------------------------------- */
 
 static sys_quota quota, quota_too;
@@ -464,6 +562,9 @@ void check_options(void)
     joiners_die();
     cleanups_run_whatever_ends_the_thread();
     hostile_cleanups();
+    cleanups_kill_what_their_thread_awaits();
+    cleanups_own_nothing_of_the_killer();
+    a_cleanup_kills_the_killer();
     quotas_bound_what_waits();
     quotas_come_and_go();
     a_handler_ends_its_limited_event();
