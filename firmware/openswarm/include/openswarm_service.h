@@ -26,7 +26,7 @@ typedef struct sys_service {
     uint16 bitten;                    /* kills by the watchdog; saturates */
 } sys_service;
 
-/* MTH | no | 336 more than Sys_Start_ProcessWith | 48 | MEMORY, PROCESS: the service is running.  Starts the thread
+/* MTH | no | 341 more than Sys_Start_ProcessWith | 48 | MEMORY, PROCESS: the service is running.  Starts the thread
  * and its supervision. A service without restarts left may be started again. */
 bool Sys_Start_Service(sys_service *service);
 /* T | no | 85, 8 more per service that began later | 22 | PROCESS: the caller is no service.  Resets the caller's

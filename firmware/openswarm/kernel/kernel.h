@@ -150,6 +150,7 @@ extern bool (*os_free_joinable)(sys_pcb *p); /* true: freed what is to be freed,
 extern event *(*os_send_hook)(uint16 id, const void *data, uint16 size); /* a sender's event, instead of event_find() */
 
 /* event.c */
+enum { OS_DRIVERS = 0xFFFF }; /* owner of the drivers' subscriptions: the PID of no thread */
 void event_init(void);
 event **event_bucket(uint16 id);        /* first link of the bucket of id; slice locked */
 void event_insert(event *e, uint16 id); /* at the head of the bucket of id */
@@ -164,6 +165,7 @@ extern message *event_queue; /* messages outside the delivery batch */
 
 /* process.c */
 void process_init(void);
+void section_start(void); /* after hal_start(): begins level thread, or postpones it to the end of main's open section */
 sys_pcb *process_find(uint16 pid);               /* any live thread; slice locked */
 sys_pcb *process_next(const sys_pcb *process);   /* iterates over live threads, from NULL to NULL; slice locked */
 void process_wake(sys_pcb *process, message *m); /* blocked list to the end of the ring; m: result of an event wait */

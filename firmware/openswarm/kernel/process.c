@@ -143,7 +143,7 @@ static uint16 unused_pid(void)
     do {
         newest_pid++;
         LOOP_BOUND(n);
-    } while (process_find(newest_pid) != NULL); /* PID 0 is always in use */
+    } while (newest_pid == OS_DRIVERS || process_find(newest_pid) != NULL); /* PID 0 is always in use */
     return newest_pid;
 }
 
@@ -275,6 +275,14 @@ void Sys_End_CriticalSection(void)
         if (depth == 1) {
             hal_unlock(before);
         }
+    }
+}
+
+void section_start(void)
+{
+    critical_before = HAL_THREAD_LEVEL;
+    if (critical_depth == 0) {
+        hal_unlock(HAL_THREAD_LEVEL);
     }
 }
 
