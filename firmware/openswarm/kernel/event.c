@@ -15,7 +15,7 @@ enum { BUCKETS = 8 };                        /* a power of two */
 static event *events[BUCKETS];               /* hash table indexed by the low bits of the identifier */
 message *event_queue;                        /* devices locked */
 message **queue_end;                         /* devices locked */
-static message *delivery_batch;              /* messages of the current delivery round not yet delivered */
+message *delivery_batch;                     /* messages of the current delivery round not yet delivered */
 event *(*os_send_hook)(uint16 id, const void *data, uint16 size);
 static subscription *const no_subscription;  /* an empty list */
 static subscription *const *delivery_cursor; /* link to the next subscriber; adjusted when subscriptions change */

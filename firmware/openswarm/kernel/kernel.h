@@ -108,7 +108,7 @@ static inline periodic *process_periodic(const sys_pcb *process) /* SYS_PERIODIC
 
 /* Bits of os_pending: why the next thread of the ring cannot run at once. The low byte, OS_WORK, is pending kernel work
  * and prevents idling; the high byte is set while a scheduler chooses. One word, so that a slice end tests it once. */
-enum { OS_MESSAGES = 0x01, OS_ALARM = 0x02, OS_WORK = 0xFF, OS_CHOICE = 0x100 };
+enum { OS_MESSAGES = 0x01, OS_ALARM = 0x02, OS_WATCH = 0x04, OS_WORK = 0xFF, OS_CHOICE = 0x100 };
 
 extern volatile uint16 os_pending;
 #define OS_HAS_WORK (*(const volatile uint8 *)&os_pending != 0) /* the low byte, which comes first */
@@ -147,6 +147,7 @@ typedef void (*os_teardown_function)(sys_pcb *p);
 extern os_teardown_function os_release_mutexes, os_release_joins, os_release_service;
 extern os_teardown_function os_run_cleanups; /* calls process_free(p) when the cleanups of p have run */
 extern bool (*os_free_joinable)(sys_pcb *p); /* true: freed what is to be freed, or kept a zombie */
+extern void (*os_watch)(void); /* kernel stack, slice level, after each tick; needs no heap */
 extern event *(*os_send_hook)(uint16 id, const void *data, uint16 size); /* a sender's event, instead of event_find() */
 
 /* event.c */
@@ -161,7 +162,7 @@ event *event_find(uint16 id);                /* any context */
 /* Link behind the last queued message; devices locked; set OS_MESSAGES after an insertion. A device may append a
  * block of its own with event NULL and its size: the kernel frees the block with the next messages. */
 extern message **queue_end;
-extern message *event_queue; /* messages outside the delivery batch */
+extern message *event_queue, *delivery_batch; /* messages sent since the current delivery round began; those before */
 
 /* process.c */
 void process_init(void);

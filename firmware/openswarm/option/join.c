@@ -62,14 +62,30 @@ uint16 Sys_Start_Joinable(const sys_process_config *config)
     return Sys_Start_ProcessWith(&joinable);
 }
 
+/* Returns the thread that a thread joins, or NULL. */
+static const sys_pcb *joined_by(const sys_pcb *thread)
+{
+    for (const joiner *j = joiners; j != NULL; j = j->next) {
+        if (j->thread == thread) {
+            return process_find(j->pid);
+        }
+    }
+    return NULL;
+}
+
 bool Sys_Join(uint16 pid)
 {
     if (os_enter_blocking() != SYS_OK) {
         return false;
     }
     const sys_pcb *p = process_find(pid);
-    if (p == NULL || p == &os_system || p == os_running) {
+    if (p == NULL || p == &os_system) {
         return os_leave(SYS_ERROR_PROCESS);
+    }
+    for (const sys_pcb *next = p; next != NULL; next = joined_by(next)) {
+        if (next == os_running) {
+            return os_leave(SYS_ERROR_PROCESS); /* it would wait for itself */
+        }
     }
     if ((p->status & OS_STATE) == SYS_ZOMBIE) {
         sys_pcb **link = &os_blocked;

@@ -21,11 +21,12 @@ static void start(sys_service *s)
     s->fed = clock_now();
 }
 
-static bool supervise(uint16 unused, uint16 event, sys_event_data *tick)
+/* Kills services whose watchdog has expired and restarts ended ones. No handler: a full heap loses its event. */
+static void supervise(void)
 {
-    (void)unused, (void)event;
+    uint16 now = clock_now();
     for (sys_service *s = services; s != NULL; s = s->next) {
-        if (s->pid != 0 && s->limit_ms != 0 && (sint16)(tick->value - s->fed - s->limit_ms) > 0) {
+        if (s->pid != 0 && s->limit_ms != 0 && (sint16)(now - s->fed - s->limit_ms) > 0) {
             (void)Sys_Kill_Process(s->pid);
             os_count(&s->bitten);
         }
@@ -36,7 +37,6 @@ static bool supervise(uint16 unused, uint16 event, sys_event_data *tick)
             }
         }
     }
-    return true;
 }
 
 bool Sys_Start_Service(sys_service *s)
@@ -53,12 +53,11 @@ bool Sys_Start_Service(sys_service *s)
         return os_leave(SYS_ERROR_PROCESS);
     }
     os_release_service = release_service;
+    os_watch = supervise;
     s->pid = 0;
-    if (Sys_Subscribe_to_Event(SYS_1ms_TIMER, 0, supervise, NULL)) {
-        start(s);
-    }
+    start(s);
     if (s->pid == 0) {
-        error = SYS_ERROR_MEMORY;
+        error = (sys_error)Sys_Get_LastError();
     } else if (known == NULL) {
         s->next = services;
         services = s;
@@ -73,7 +72,7 @@ bool Sys_Feed_Watchdog(void)
         return false;
     }
     for (sys_service *s = services; s != NULL; s = s->next) {
-        if (s->pid == os_running->pid && !os_in_kernel) {
+        if (s->pid == os_running->pid && s->pid != 0 && !os_in_kernel) { /* 0: an ended service */
             s->fed = clock_now();
             error = SYS_OK;
         }

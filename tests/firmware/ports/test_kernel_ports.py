@@ -18,7 +18,7 @@ from tests.firmware.conftest import FIRMWARE, TARGET_APPS, Build, run_make
 from tests.firmware.kernel.test_kernel_on_target import run_to
 
 CONFORMS = re.compile(rb"conforms: (\d+) checks")
-CHECKS, CHECKS_OF_OPTIONS = 282, 388
+CHECKS, CHECKS_OF_OPTIONS = 282, 417
 """Of the conformance suite and of its part about options; a check that is not reached would be missed otherwise."""
 OPTIONS = "DEFINES=-DSUITE_OF_OPTIONS"
 """For `make`: the second image."""
