@@ -34,7 +34,7 @@ from typing import TYPE_CHECKING, Any
 
 from emu.boards import board_named
 from emu.chips import chip_named
-from emu.chips.chip import Chip
+from emu.chips.chip import Chip, Vector
 from emu.chips.dspic30f6014a import DSPIC30F6014A
 from emu.image.loader import load_image
 from emu.machine.machine import Machine as BareMachine
@@ -76,11 +76,39 @@ class Machine(BareMachine):
         super().__init__(chip, engine=engine, ipl_slip=ipl_slip, board=board, observer=observer)
         self._inspector: Inspector | None = None
         self.diagnose = self._explain
+        self._stops_at_overflow = False
+        self._overflowed = False
+        """Whether a thread of OpenSwarm hit its stack limit in the current `advance`."""
 
     def _explain(self, stop: Stop) -> Stop:
         from emu.debug.fault_report import explain  # imported only here, because most runs end without a fault
 
         return explain(self, stop)
+
+    def advance(self, cycle: int) -> Stop | None:
+        """Run as in the base class. The stack overflow of an OpenSwarm thread is a fault too.
+
+        The kernel ends only that thread and continues. `stop_on_fault` False lets it do so.
+        """
+        self._overflowed, self._stops_at_overflow = False, self.stop_on_fault
+        try:
+            stop = super().advance(cycle)
+        finally:
+            self._stops_at_overflow = False
+        if not self._overflowed or stop is None or stop.reason != "interrupted":
+            return stop
+        from emu.debug.fault_report import thread_overflow
+
+        return thread_overflow(self, stop)
+
+    def _on_trap(self, vector: Vector) -> None:
+        super()._on_trap(vector)
+        if self._stops_at_overflow and vector.name == "StackError" and not self.events.quiet:
+            from emu.debug.fault_report import is_thread_overflow
+
+            if is_thread_overflow(self):
+                self._overflowed = True
+                self.interrupt()
 
     @property
     def inspector(self) -> Inspector:

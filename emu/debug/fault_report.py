@@ -3,7 +3,8 @@
 Inputs: a stopped machine and its checkpoints (`emu.machine.stops.RunCheckpoints`). Output: the `Stop` with a
 `FaultReport`, or the unchanged stop if the firmware ended regularly.
 
-- A handled trap is not a fault, unless the firmware never returns from its handler.
+- A handled trap is not a fault, unless the firmware never returns from its handler, or the handler ends a thread of
+  OpenSwarm (`thread_overflow`).
 - A kernel that stops the system is a fault.
 - An unhandled exception is recognised by a debugger word at the vector's target, where the linkers of XC16 and of this
   project put one (abi-elf.md §3.3).
@@ -50,6 +51,11 @@ REPORTING_FUNCTIONS: Final = frozenset(
 )
 """Functions that report a fault that their caller made."""
 TRAP_FUNCTION: Final = "os_trap"
+OVERFLOW_FUNCTION: Final = "_os_overflow"
+"""Function of OpenSwarm that ends a thread after its stack overflow (firmware/openswarm/kernel/fault.c)."""
+RUNNING_THREAD: Final = "_os_running"
+LARGEST_GUARD: Final = 128
+"""Bytes from a thread's stack limit to its control block, at most (firmware/openswarm/port/dspic30f/cpu.c)."""
 RESET_WORD: Final = 0xFE0000
 CHECKS: Final = {
     0: "integer overflow in an addition",
@@ -119,6 +125,28 @@ def never_started(machine: Machine, stop: Stop, refused: int) -> Stop:
     cause = f"the kernel was never started (Sys_Start_Kernel) and refused {calls} it to run; ended"
     case = _Case(cause, stop.pc, stop.cycle, is_exact=True)
     return replace(stop, reason="fault", fault=_diagnosed(machine, Inspector(machine), case))
+
+
+def is_thread_overflow(machine: Machine) -> bool:
+    """Whether a stack error trap that is about to be entered ends a thread of OpenSwarm, and not the whole system.
+
+    The stack limit in force is then that of the running thread: it lies just below the thread's control block.
+    """
+    symbols = None if machine.image is None else machine.image.symbols
+    running = None if symbols is None else symbols.find(RUNNING_THREAD)
+    if symbols is None or running is None or symbols.find(OVERFLOW_FUNCTION) is None:
+        return False
+    return 0 < machine.peek(running.address) - machine.state.splim <= LARGEST_GUARD
+
+
+def thread_overflow(machine: Machine, stop: Stop) -> Stop:
+    """Return `stop` as the fault of an OpenSwarm thread that overflowed its stack in the last trap."""
+    assert machine.checkpoints.trap is not None
+    case = _case_of_trap(machine, machine.checkpoints.trap)
+    report = _diagnosed(machine, Inspector(machine), case)
+    if not report.cause.startswith("stack overflow"):  # an access above the limit; W15 is still below
+        report = replace(report, cause=f"stack overflow ({report.cause.rstrip(',')}),")
+    return replace(stop, reason="fault", fault=report)
 
 
 def state_report(machine: Machine, cause: str) -> FaultReport:

@@ -83,7 +83,8 @@ enum {
 /* M | no | - | 60 | MEMORY.  Initialises kernel, board and devices; the caller becomes PID 0. Interrupts stay
  * disabled. */
 void Sys_Init_Kernel(void);
-/* M | no | - | 40 | none.  Enables clock, slices and devices. The caller continues as the system thread. */
+/* M | no | - | 40 | none.  Enables clock, slices and devices. The caller continues as the system thread, in its critical
+ * section if one is open. */
 void Sys_Start_Kernel(void);
 /* T (PID 0 only) | never returns | - | 30 | CONTEXT.  Retires the system thread: from now on the kernel idles
  * whenever no thread is ready, and the stack of main is no longer used. */
@@ -168,9 +169,10 @@ bool Sys_IsEventRegistered(uint16 event);
  * handler subscribed during a delivery gets the next message first, before the handlers that the current one has not
  * reached. */
 bool Sys_Subscribe_to_Event(uint16 event, uint16 pid, sys_handler handler, sys_condition condition);
-/* MTH | no | ~120 + 9 b + (15 + g) s | 34 | EVENT.  Unsubscribes all handlers of a thread; false: it had none. */
+/* MTH | no | ~120 + 9 b + (15 + g) s | 34 | EVENT, PROCESS: it had none.  Unsubscribes all handlers of a thread. PID 0
+ * is the system thread only: the drivers' handlers belong to no thread. */
 bool Sys_Unsubscribe_from_Event(uint16 event, uint16 pid);
-/* MTH | no | ~120 + 9 b + (15 + g) s | 34 | EVENT.  Unsubscribes one handler; false: it was not subscribed. */
+/* MTH | no | ~120 + 9 b + (15 + g) s | 34 | EVENT, PROCESS: it was not subscribed.  Unsubscribes one handler. */
 bool Sys_Unsubscribe_Handler(uint16 event, uint16 pid, sys_handler handler);
 /* MTHI | no | 95, or 124 + 10 b; 17 + d/2 more unless d = 2; 8 per waiting thread if there is no handler; 70 without
  * listeners; at most 460 more while memory is short | 32 | EVENT, MEMORY, ARGUMENT.  Copies the payload into a

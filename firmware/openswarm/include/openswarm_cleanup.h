@@ -17,15 +17,20 @@ typedef struct sys_cleanup {
     struct sys_cleanup *next;
     void (*run)(void *arg);
     void *arg;
-    uint16 pid;
+    struct sys_pcb *thread;
 } sys_cleanup;
 
-/* T | no | 99; 108 beside two of others | 28 | CONTEXT, ARGUMENT: the object is pushed already.  Makes the kernel
- * call run(arg) when the calling thread ends, the newest cleanup first. It runs as in a critical section, on the
- * stack of the context that ends the thread. The thread's memory still exists, its subscriptions and mutexes do not.
- * SYS_EVENT_TERMINATION follows. */
+/* T | no | 94; 106 beside two of others | 28 | CONTEXT, ARGUMENT: NULL, or the object is pushed already.  Makes the
+ * kernel call run(arg) when the calling thread ends, the newest cleanup first. SYS_EVENT_TERMINATION follows.
+ *
+ * Teardown has a fixed order. First the thread leaves every list of the kernel: it owns no subscription, message, mutex,
+ * join or service, and no call finds its PID. Then its cleanups run. Its memory exists until the last one has returned.
+ *
+ * A cleanup may call what a handler may call (H). Sys_Get_ProcessID returns the PID of the ending thread. The cleanup
+ * runs as in a critical section, on the stack of the context that ends the thread. If a cleanup ends other threads,
+ * their cleanups follow those of this thread. If it ends the thread on whose stack it runs, that thread ends last. */
 bool Sys_Push_Cleanup(sys_cleanup *cleanup, void (*run)(void *arg), void *arg);
-/* T | no | 101, 9 more per newer one of others, 54 and those of run if it is called | 24 and run's | CONTEXT,
+/* T | no | 99, 9 more per newer one of others, 54 and those of run if it is called | 24 and run's | CONTEXT,
  * PROCESS: the caller has none.  Removes the caller's newest cleanup; run: also calls it. */
 bool Sys_Pop_Cleanup(bool run);
 

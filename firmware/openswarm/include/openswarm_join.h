@@ -5,12 +5,13 @@
 
 #include "openswarm.h"
 
-/* MTH | no | 62 more than Sys_Start_ProcessWith | 52 | as that.  Starts a joinable thread. After its end it stays in
+/* MTH | no | 27 more than Sys_Start_ProcessWith | 52 | as that.  Starts a joinable thread. After its end it stays in
  * state SYS_ZOMBIE, with its PID and 18 bytes of the heap, until Sys_Join returns for it; if a thread already joins
  * it, it disappears at once. Sys_Kill_Process also removes a zombie, and sends its SYS_EVENT_TERMINATION again. */
 uint16 Sys_Start_Joinable(const sys_process_config *config);
-/* T | until the thread has ended | 786 for a zombie beside the events of the system; 271 to the next thread if it
- * blocks | 58 | CONTEXT, PROCESS: no such thread, or it is the caller or the system thread.  Waits for the end of any
+/* T | until the thread has ended | 803 for a zombie beside the events of the system; 242 to the next thread if it
+ * blocks | 60 | CONTEXT, PROCESS: no such thread, or it is the system thread, the caller, or joins the caller,
+ * directly or through others.  Waits for the end of any
  * thread, or removes a zombie. Several threads may join the same thread. */
 bool Sys_Join(uint16 pid);
 

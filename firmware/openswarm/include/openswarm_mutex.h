@@ -25,7 +25,7 @@ typedef struct sys_mutex {
 
 #define SYS_MUTEX(highest_priority) {NULL, NULL, NULL, (highest_priority), 0}
 
-/* T | while another thread owns it | 155, 9 more per mutex that others own; 241 to the next thread if it blocks | 50
+/* T | while another thread owns it | 149, 14 more per mutex that others own; 240 to the next thread if it blocks | 50
  * | CONTEXT, PROCESS: the caller owns it already, ARGUMENT: the caller's priority is above the ceiling.  Needs no
  * heap. An uncleared wait result stays. */
 bool Sys_Lock_Mutex(sys_mutex *mutex);

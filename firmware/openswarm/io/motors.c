@@ -42,7 +42,7 @@ static bool on_speed(uint16 pid, uint16 event, sys_event_data *data)
 
 bool Sys_Connect_Motors(uint16 event)
 {
-    return Sys_Subscribe_to_Event(event, 0, on_speed, NULL);
+    return Sys_Subscribe_to_Event(event, OS_DRIVERS, on_speed, NULL);
 }
 
 sys_motor_processor Sys_Set_MotorProcessor(sys_motor_processor wanted)

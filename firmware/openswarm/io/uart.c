@@ -300,7 +300,7 @@ void uart_init(uint8 uart)
     (void)Sys_Register_Event(send);
     (void)Sys_Register_Event(event_of(uart, SYS_UART1_RECEIVED));
     (void)Sys_Register_Event(event_of(uart, SYS_UART1_READY));
-    (void)Sys_Subscribe_to_Event(send, 0, on_send, NULL);
+    (void)Sys_Subscribe_to_Event(send, OS_DRIVERS, on_send, NULL);
 }
 
 void uart_start(uint8 uart)

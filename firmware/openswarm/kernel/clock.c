@@ -35,6 +35,9 @@ void os_clock_tick(void)
     if (now == alarm) {
         os_pending |= OS_ALARM;
     }
+    if (os_watch != NULL) {
+        os_pending |= OS_WATCH;
+    }
     if (OS_HAS_WORK) {
         os_preempt();
     }

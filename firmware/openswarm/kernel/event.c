@@ -15,7 +15,7 @@ enum { BUCKETS = 8 };                        /* a power of two */
 static event *events[BUCKETS];               /* hash table indexed by the low bits of the identifier */
 message *event_queue;                        /* devices locked */
 message **queue_end;                         /* devices locked */
-static message *delivery_batch;              /* messages of the current delivery round not yet delivered */
+message *delivery_batch;                     /* messages of the current delivery round not yet delivered */
 event *(*os_send_hook)(uint16 id, const void *data, uint16 size);
 static subscription *const no_subscription;  /* an empty list */
 static subscription *const *delivery_cursor; /* link to the next subscriber; adjusted when subscriptions change */
@@ -206,17 +206,17 @@ bool Sys_Subscribe_to_Event(uint16 id, uint16 pid, sys_handler handler, sys_cond
     }
     if (handler != NULL) {
         event *e = event_find(id);
-        error = e == NULL                   ? SYS_ERROR_EVENT
-                : process_find(pid) == NULL ? SYS_ERROR_PROCESS
-                                            : subscribe(e, pid, handler, condition);
+        error = e == NULL                                        ? SYS_ERROR_EVENT
+                : pid != OS_DRIVERS && process_find(pid) == NULL ? SYS_ERROR_PROCESS
+                                                                 : subscribe(e, pid, handler, condition);
     }
     return os_leave(error);
 }
 
 /* Removes subscriptions of a thread; handler NULL = all of them. Slice locked. */
-static bool unsubscribe(event *e, uint16 pid, sys_handler handler)
+static sys_error unsubscribe(event *e, uint16 pid, sys_handler handler)
 {
-    bool found = false;
+    sys_error error = SYS_ERROR_PROCESS;
     subscription **link = &e->subscribers;
     LOOP_BOUND(s); LOOP_TOTAL(min(t, m * s)); LOOP_SHARE(Sys_Unsubscribe_Handler, s); ONE_LOOP();
     while (*link != NULL) {
@@ -225,12 +225,12 @@ static bool unsubscribe(event *e, uint16 pid, sys_handler handler)
             CALL_SHARE(unlink_subscription, Sys_Unsubscribe_Handler, min(s, o));
             CALL_SHARE(unlink_subscription, process.c / end_thread, min(t, m * s, o));
             unlink_subscription(link);
-            found = true;
+            error = SYS_OK;
         } else {
             link = &(*link)->next;
         }
     }
-    return found;
+    return error;
 }
 
 bool Sys_Unsubscribe_Handler(uint16 id, uint16 pid, sys_handler handler)
@@ -239,9 +239,7 @@ bool Sys_Unsubscribe_Handler(uint16 id, uint16 pid, sys_handler handler)
         return false;
     }
     event *e = event_find(id);
-    bool done = e != NULL && unsubscribe(e, pid, handler);
-    (void)os_leave(e != NULL ? SYS_OK : SYS_ERROR_EVENT);
-    return done;
+    return os_leave(e == NULL ? SYS_ERROR_EVENT : unsubscribe(e, pid, handler));
 }
 
 bool Sys_Unsubscribe_from_Event(uint16 id, uint16 pid)

@@ -64,6 +64,11 @@ sys_pcb *os_overflow(void)
     static const char text[] = "stack overflow: thread ";
     char number[DIGITS + 1];
     char *end = number + sizeof number;
+    if (os_cleanup_host != NULL) { /* a cleanup overflowed it; process_end_running() continues the teardown */
+        HAL_STORE(os_running, os_cleanup_host);
+        os_cleanup_host = NULL;
+        os_in_kernel = false;
+    }
     uint16 pid = os_running->pid;
     board_failsafe();
     os_count(&os_statistics.overflows);

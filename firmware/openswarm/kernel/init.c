@@ -19,4 +19,5 @@ void Sys_Start_Kernel(void)
 {
     board_start();
     hal_start();
+    section_start();
 }

@@ -108,7 +108,7 @@ static inline periodic *process_periodic(const sys_pcb *process) /* SYS_PERIODIC
 
 /* Bits of os_pending: why the next thread of the ring cannot run at once. The low byte, OS_WORK, is pending kernel work
  * and prevents idling; the high byte is set while a scheduler chooses. One word, so that a slice end tests it once. */
-enum { OS_MESSAGES = 0x01, OS_ALARM = 0x02, OS_WORK = 0xFF, OS_CHOICE = 0x100 };
+enum { OS_MESSAGES = 0x01, OS_ALARM = 0x02, OS_WATCH = 0x04, OS_WORK = 0xFF, OS_CHOICE = 0x100 };
 
 extern volatile uint16 os_pending;
 #define OS_HAS_WORK (*(const volatile uint8 *)&os_pending != 0) /* the low byte, which comes first */
@@ -141,13 +141,17 @@ void heap_update_peak(void);
 void stack_paint(void *begin, const void *end); /* whole words */
 bool kernel_stack_is_intact(void); /* its last byte was never written; for CPUs without a stack limit trap */
 
-/* Hooks of option/: set by the options an application uses, else NULL. A later hook calls the one installed before
- * it. */
-typedef bool (*os_thread_end_function)(sys_pcb *p);
-extern os_thread_end_function os_thread_end_hook; /* slice locked; p is on no list. True: the hook freed the block */
+/* Hooks of option/: each belongs to one option, which sets it at its first use; else NULL. Hooks of the teardown run
+ * in this order, slice locked, when p has left the ring or the blocked list. */
+typedef void (*os_teardown_function)(sys_pcb *p);
+extern os_teardown_function os_release_mutexes, os_release_joins, os_release_service;
+extern os_teardown_function os_run_cleanups; /* calls process_free(p) when the cleanups of p have run */
+extern bool (*os_free_joinable)(sys_pcb *p); /* true: freed what is to be freed, or kept a zombie */
+extern void (*os_watch)(void); /* kernel stack, slice level, after each tick; needs no heap */
 extern event *(*os_send_hook)(uint16 id, const void *data, uint16 size); /* a sender's event, instead of event_find() */
 
 /* event.c */
+enum { OS_DRIVERS = 0xFFFF }; /* owner of the drivers' subscriptions: the PID of no thread */
 void event_init(void);
 event **event_bucket(uint16 id);        /* first link of the bucket of id; slice locked */
 void event_insert(event *e, uint16 id); /* at the head of the bucket of id */
@@ -158,16 +162,22 @@ event *event_find(uint16 id);                /* any context */
 /* Link behind the last queued message; devices locked; set OS_MESSAGES after an insertion. A device may append a
  * block of its own with event NULL and its size: the kernel frees the block with the next messages. */
 extern message **queue_end;
-extern message *event_queue; /* messages outside the delivery batch */
+extern message *event_queue, *delivery_batch; /* messages sent since the current delivery round began; those before */
 
 /* process.c */
 void process_init(void);
+void section_start(void); /* after hal_start(): begins level thread, or postpones it to the end of main's open section */
 sys_pcb *process_find(uint16 pid);               /* any live thread; slice locked */
 sys_pcb *process_next(const sys_pcb *process);   /* iterates over live threads, from NULL to NULL; slice locked */
 void process_wake(sys_pcb *process, message *m); /* blocked list to the end of the ring; m: result of an event wait */
 void process_block(event *awaited, uint16 ms);   /* blocks the running thread; after os_enter_blocking() */
 sys_pcb *process_end_running(void);              /* kernel stack: ends the running thread, picks the next */
 HAL_NORETURN HAL_USED void os_thread_returned(void);
+void process_free(sys_pcb *p); /* last step of the teardown */
+/* Thread on whose stack cleanups of other threads run, with os_running set to the dying one; else NULL. If a cleanup
+ * kills it, it ends after them. */
+extern sys_pcb *os_cleanup_host;
+extern bool os_cleanup_host_ends;
 
 /* Cursor of the walk over the blocked list during which threads may be woken and killed; one walk at a time. */
 extern sys_pcb **process_scan;

@@ -14,7 +14,10 @@ sys_pcb *os_blocked;
 HAL_ZEROS sys_process_config os_plain;
 
 sys_pcb **process_scan;
-os_thread_end_function os_thread_end_hook;
+os_teardown_function os_release_mutexes, os_release_joins, os_release_service, os_run_cleanups;
+bool (*os_free_joinable)(sys_pcb *p);
+sys_pcb *os_cleanup_host;
+bool os_cleanup_host_ends;
 
 static uint16 newest_pid;
 volatile uint16 critical_depth;
@@ -140,7 +143,7 @@ static uint16 unused_pid(void)
     do {
         newest_pid++;
         LOOP_BOUND(n);
-    } while (process_find(newest_pid) != NULL); /* PID 0 is always in use */
+    } while (newest_pid == OS_DRIVERS || process_find(newest_pid) != NULL); /* PID 0 is always in use */
     return newest_pid;
 }
 
@@ -275,6 +278,14 @@ void Sys_End_CriticalSection(void)
     }
 }
 
+void section_start(void)
+{
+    critical_before = HAL_THREAD_LEVEL;
+    if (critical_depth == 0) {
+        hal_unlock(HAL_THREAD_LEVEL);
+    }
+}
+
 void os_call_in_section(void (*run)(void *), void *arg)
 {
     enum { NESTING_OFFSET = 0x4000 }; /* more sections than run can end */
@@ -308,7 +319,19 @@ bool os_leave(sys_error error)
 
 /* ---- End -------------------------------------------------------------------------------------------------------- */
 
-/* Ends thread p and frees its memory. Slice locked; no code runs on p's stack. */
+/* Teardown, last step: frees the memory of a thread that is on no list and has no cleanups. */
+void process_free(sys_pcb *p)
+{
+    uint16 pid = p->pid;
+    if (os_free_joinable == NULL || !os_free_joinable(p)) {
+        hal_stack_release(p);
+        heap_free(p->block, (uint16)((uint8 *)(p + 1) - p->block));
+    }
+    (void)Sys_Send_IntEvent(SYS_EVENT_TERMINATION, pid);
+}
+
+/* Ends thread p. Slice locked; no code runs on p's stack. The order is fixed, whichever option was used first: p leaves
+ * every list of the kernel, its cleanups run, its memory is freed. */
 static HAL_OUTLINE void end_thread(sys_pcb *p)
 {
     if (p->status & OS_OFF_RING) {
@@ -322,12 +345,20 @@ static HAL_OUTLINE void end_thread(sys_pcb *p)
     if (os_running == p) {
         HAL_STORE(os_running, &os_system);
     }
-    uint16 pid = p->pid;
-    if (os_thread_end_hook == NULL || !os_thread_end_hook(p)) {
-        hal_stack_release(p);
-        heap_free(p->block, (uint16)((uint8 *)(p + 1) - p->block));
+    if (os_release_mutexes != NULL) {
+        os_release_mutexes(p);
     }
-    (void)Sys_Send_IntEvent(SYS_EVENT_TERMINATION, pid);
+    if (os_release_joins != NULL) {
+        os_release_joins(p);
+    }
+    if (os_release_service != NULL) {
+        os_release_service(p);
+    }
+    if (os_run_cleanups != NULL) {
+        os_run_cleanups(p);
+    } else {
+        process_free(p);
+    }
 }
 
 sys_pcb *process_end_running(void)
@@ -355,7 +386,11 @@ bool Sys_Kill_Process(uint16 pid)
             if (p == os_running && !os_in_kernel) {
                 os_thread_returned();
             }
-            end_thread(p);
+            if (p == os_cleanup_host) {
+                os_cleanup_host_ends = true; /* a cleanup runs on its stack */
+            } else {
+                end_thread(p);
+            }
             error = SYS_OK;
         }
     }

@@ -9,6 +9,7 @@ bool os_eager;
 volatile bool os_in_kernel;
 PRIVATE_VALUE(os_in_kernel, 0);
 
+void (*os_watch)(void);
 static sys_pick pick_thread; /* NULL = round robin */
 
 /* ---- Dispatch: kernel stack, slice level ------------------------------------------------------------------------ */
@@ -21,6 +22,10 @@ static HAL_OUTLINE void work(void)
     if (os_pending & OS_ALARM) {
         HAL_CLEAR_BIT(os_pending, 1);
         clock_wake_due();
+    }
+    if (os_watch != NULL && (os_pending & OS_WATCH)) {
+        HAL_CLEAR_BIT(os_pending, 2);
+        os_watch();
     }
 #if !HAL_STACK_TRAPS
     if (!kernel_stack_is_intact()) {

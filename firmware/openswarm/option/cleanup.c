@@ -3,34 +3,73 @@
 #include "kernel.h"
 #include "openswarm_cleanup.h"
 
-static sys_cleanup *cleanups; /* of all threads, newest first; slice locked */
-static os_thread_end_function previous_hook;
-static bool hook_installed;
-static const sys_pcb *dying; /* the thread whose cleanups run */
+static sys_cleanup *cleanups;  /* of all threads, newest first; slice locked */
+static sys_pcb *dying;         /* threads on no other list whose cleanups are still to run, in order of their end */
+static sys_pcb *interrupted;   /* os_running of a handler in which cleanups run; NULL: they run elsewhere or do not run */
 
 /* Returns the link to the newest cleanup of a thread, or NULL if it has none. */
-static sys_cleanup **newest_of(uint16 pid)
+static sys_cleanup **newest_of(const sys_pcb *thread)
 {
     for (sys_cleanup **link = &cleanups; *link != NULL; link = &(*link)->next) {
-        if ((*link)->pid == pid) {
+        if ((*link)->thread == thread) {
             return link;
         }
     }
     return NULL;
 }
 
-static bool on_thread_end(sys_pcb *p)
+/* Runs the cleanups of all dying threads, also of those that a cleanup ends, and frees the threads. */
+static void run_all(void)
 {
-    sys_cleanup **link;
-    const sys_pcb *outer = dying; /* nested: a cleanup may end other threads */
-    dying = p;
-    while ((link = newest_of(p->pid)) != NULL) {
-        const sys_cleanup *c = *link;
-        *link = c->next;
-        os_call_in_section(c->run, c->arg);
+    bool in_kernel = os_in_kernel;
+    if (in_kernel) {
+        interrupted = os_running;
+    } else {
+        os_cleanup_host = os_running;
     }
-    dying = outer;
-    return previous_hook != NULL && previous_hook(p);
+    os_in_kernel = true;
+    while (dying != NULL) {
+        sys_pcb *p = dying;
+        sys_cleanup **link = newest_of(p);
+        if (link != NULL) {
+            const sys_cleanup *c = *link;
+            *link = c->next;
+            HAL_STORE(os_running, p);
+            os_call_in_section(c->run, c->arg);
+        } else {
+            dying = p->next;
+            HAL_STORE(os_running, in_kernel ? interrupted : os_cleanup_host);
+            process_free(p);
+        }
+    }
+    os_in_kernel = in_kernel;
+    os_cleanup_host = interrupted = NULL;
+    if (os_cleanup_host_ends) {
+        os_cleanup_host_ends = false;
+        os_thread_returned();
+    }
+    os_preempt(); /* a cleanup woke a thread or sent a message */
+}
+
+/* Teardown of a thread. One loop runs all cleanups, so that cleanups that end threads do not nest. */
+static void run_cleanups(sys_pcb *p)
+{
+    if (p == interrupted) {
+        interrupted = &os_system;
+    }
+    if (newest_of(p) == NULL) {
+        process_free(p);
+    } else {
+        sys_pcb **end = &dying;
+        while (*end != NULL) {
+            end = &(*end)->next;
+        }
+        p->next = NULL;
+        *end = p;
+    }
+    if (dying != NULL && os_cleanup_host == NULL && interrupted == NULL) {
+        run_all();
+    }
 }
 
 bool Sys_Push_Cleanup(sys_cleanup *c, void (*run)(void *), void *arg)
@@ -38,20 +77,19 @@ bool Sys_Push_Cleanup(sys_cleanup *c, void (*run)(void *), void *arg)
     if (os_enter() != SYS_OK) {
         return false;
     }
-    if (os_in_kernel || dying != NULL) {
+    if (os_in_kernel) {
         return os_leave(os_refuse());
+    }
+    if (c == NULL || run == NULL) {
+        return os_leave(SYS_ERROR_ARGUMENT);
     }
     for (const sys_cleanup *other = cleanups; other != NULL; other = other->next) {
         if (other == c) {
             return os_leave(SYS_ERROR_ARGUMENT);
         }
     }
-    if (!hook_installed) {
-        hook_installed = true;
-        previous_hook = os_thread_end_hook;
-        os_thread_end_hook = on_thread_end;
-    }
-    *c = (sys_cleanup){cleanups, run, arg, os_running->pid};
+    os_run_cleanups = run_cleanups;
+    *c = (sys_cleanup){cleanups, run, arg, os_running};
     cleanups = c;
     return os_leave(SYS_OK);
 }
@@ -64,7 +102,7 @@ bool Sys_Pop_Cleanup(bool run)
     if (os_in_kernel) {
         return os_leave(os_refuse());
     }
-    sys_cleanup **link = newest_of(os_running->pid);
+    sys_cleanup **link = newest_of(os_running);
     if (link == NULL) {
         return os_leave(SYS_ERROR_PROCESS);
     }

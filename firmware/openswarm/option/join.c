@@ -11,13 +11,10 @@ struct joiner { /* on the waiting thread's stack */
 };
 
 static joiner *joiners; /* slice locked */
-static os_thread_end_function previous_hook;
-static bool hook_installed;
 
-/* Wakes the threads that join an ended thread; returns whether there was one. Also drops the ended thread's own join. */
-static bool wake_joiners(const sys_pcb *gone)
+/* Teardown of a thread: wakes the threads that join it, which then do not need a zombie, and drops its own join. */
+static void release_joins(sys_pcb *gone)
 {
-    bool any = false;
     for (joiner **link = &joiners; *link != NULL;) {
         joiner *j = *link;
         if (j->thread != gone && j->pid != gone->pid) {
@@ -26,24 +23,21 @@ static bool wake_joiners(const sys_pcb *gone)
             *link = j->next;
             if (j->thread != gone) {
                 process_wake(j->thread, NULL);
-                any = true;
+                gone->status &= (uint8)~OS_JOINABLE;
             }
         }
     }
-    return any;
 }
 
 /* Keeps the control block of a joinable thread at the end of the blocked list. Killing the zombie frees the block. */
-static bool on_thread_end(sys_pcb *p)
+static bool free_joinable(sys_pcb *p)
 {
-    bool stays = previous_hook != NULL && previous_hook(p);
-    bool is_zombie = p->block == NULL;
-    if (is_zombie) {
+    if (p->block == NULL) {
         heap_free(p, sizeof *p);
         return true;
     }
-    if (wake_joiners(p) || !(p->status & OS_JOINABLE) || stays) {
-        return stays;
+    if (!(p->status & OS_JOINABLE)) {
+        return false;
     }
     hal_stack_release(p);
     heap_free(p->block, (uint16)((uint8 *)p - p->block));
@@ -59,24 +53,24 @@ static bool on_thread_end(sys_pcb *p)
     return true;
 }
 
-/* Installs the hook at the first use of joins. */
-static void install_hook(void)
-{
-    Sys_Start_CriticalSection();
-    if (!hook_installed) {
-        hook_installed = true;
-        previous_hook = os_thread_end_hook;
-        os_thread_end_hook = on_thread_end;
-    }
-    Sys_End_CriticalSection();
-}
-
 uint16 Sys_Start_Joinable(const sys_process_config *config)
 {
     sys_process_config joinable = *config;
-    install_hook();
+    os_free_joinable = free_joinable;
+    os_release_joins = release_joins;
     joinable.flags |= OS_JOINABLE;
     return Sys_Start_ProcessWith(&joinable);
+}
+
+/* Returns the thread that a thread joins, or NULL. */
+static const sys_pcb *joined_by(const sys_pcb *thread)
+{
+    for (const joiner *j = joiners; j != NULL; j = j->next) {
+        if (j->thread == thread) {
+            return process_find(j->pid);
+        }
+    }
+    return NULL;
 }
 
 bool Sys_Join(uint16 pid)
@@ -85,8 +79,13 @@ bool Sys_Join(uint16 pid)
         return false;
     }
     const sys_pcb *p = process_find(pid);
-    if (p == NULL || p == &os_system || p == os_running) {
+    if (p == NULL || p == &os_system) {
         return os_leave(SYS_ERROR_PROCESS);
+    }
+    for (const sys_pcb *next = p; next != NULL; next = joined_by(next)) {
+        if (next == os_running) {
+            return os_leave(SYS_ERROR_PROCESS); /* it would wait for itself */
+        }
     }
     if ((p->status & OS_STATE) == SYS_ZOMBIE) {
         sys_pcb **link = &os_blocked;
@@ -98,7 +97,7 @@ bool Sys_Join(uint16 pid)
         heap_free((void *)(uintptr_t)p, sizeof *p);
         return os_leave(SYS_OK);
     }
-    install_hook();
+    os_release_joins = release_joins;
     joiner waiting = {joiners, os_running, pid};
     joiners = &waiting;
     process_block(NULL, 0);

@@ -12,8 +12,6 @@ struct sys_mutex_waiter {
 };
 
 static sys_mutex *held; /* all mutexes with an owner; slice locked */
-static os_thread_end_function previous_hook;
-static bool hook_installed;
 
 static uint8 base_priority(const sys_pcb *thread)
 {
@@ -83,7 +81,8 @@ static void release(sys_mutex *m)
     hand_over(m);
 }
 
-static bool on_thread_end(sys_pcb *thread)
+/* Teardown of a thread: removes its waits and passes its mutexes on. */
+static void release_all(sys_pcb *thread)
 {
     sys_mutex *m;
     for (m = held; m != NULL; m = m->next) {
@@ -97,7 +96,6 @@ static bool on_thread_end(sys_pcb *thread)
             m = m->next;
         }
     }
-    return previous_hook != NULL && previous_hook(thread);
 }
 
 bool Sys_Lock_MutexTimeout(sys_mutex *m, uint16 ms)
@@ -113,11 +111,7 @@ bool Sys_Lock_MutexTimeout(sys_mutex *m, uint16 ms)
     if (base_priority(self) > m->ceiling) {
         return os_leave(SYS_ERROR_ARGUMENT);
     }
-    if (!hook_installed) {
-        hook_installed = true;
-        previous_hook = os_thread_end_hook;
-        os_thread_end_hook = on_thread_end;
-    }
+    os_release_mutexes = release_all;
     if (m->owner == NULL) {
         acquire(m, self);
         return os_leave(SYS_OK);

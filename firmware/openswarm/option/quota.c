@@ -3,7 +3,7 @@
  *
  * Senders find the newest event of a bucket without a call. A quota puts a gate in front of its event: an event whose
  * number does not belong to the bucket. Senders of that bucket then miss the fast path and call apply_quota(); all others
- * pay nothing. Queued messages are counted in the queue itself. */
+ * pay nothing. Waiting messages are counted in the queue and the delivery batch. */
 #include "kernel.h"
 #include "openswarm_quota.h"
 
@@ -12,17 +12,15 @@
 static sys_quota *quotas;
 static event null_event; /* has no subscribers: a message sent to it is not stored */
 
-/* Returns the newest queued message of e and adds their number to *count. ISRs may append messages meanwhile. */
-static message *newest_of(const event *e, uint16 *count)
+/* Counts the messages of e from m on and remembers the newest one. ISRs may append messages meanwhile. */
+static void count(message *m, const event *e, uint16 *waiting, message **newest)
 {
-    message *newest = NULL;
-    for (message *m = HAL_LOAD(event_queue); m != NULL; m = HAL_LOAD(m->queued.next)) {
+    for (; m != NULL; m = HAL_LOAD(m->queued.next)) {
         if (m->queued.event == e) {
-            newest = m;
-            ++*count;
+            *newest = m;
+            ++*waiting;
         }
     }
-    return newest;
 }
 
 static event *apply_quota(uint16 id, const void *data, uint16 size)
@@ -41,7 +39,9 @@ static event *apply_quota(uint16 id, const void *data, uint16 size)
         return e;
     }
     uint16 waiting = 0;
-    message *newest = newest_of(e, &waiting);
+    message *newest = NULL;
+    count(HAL_LOAD(delivery_batch), e, &waiting, &newest);
+    count(HAL_LOAD(event_queue), e, &waiting, &newest);
     if (waiting < (q->most != 0 ? q->most : 1u)) {
         return e;
     }

@@ -4,17 +4,15 @@
 #include "openswarm_service.h"
 
 static sys_service *services; /* slice locked */
-static os_thread_end_function previous_hook;
-static bool hook_installed;
 
-static bool on_thread_end(sys_pcb *p)
+/* Teardown of a thread: supervise() restarts its service. */
+static void release_service(sys_pcb *p)
 {
     for (sys_service *s = services; s != NULL; s = s->next) {
         if (s->pid == p->pid) {
             s->pid = 0;
         }
     }
-    return previous_hook != NULL && previous_hook(p);
 }
 
 static void start(sys_service *s)
@@ -23,11 +21,12 @@ static void start(sys_service *s)
     s->fed = clock_now();
 }
 
-static bool supervise(uint16 unused, uint16 event, sys_event_data *tick)
+/* Kills services whose watchdog has expired and restarts ended ones. No handler: a full heap loses its event. */
+static void supervise(void)
 {
-    (void)unused, (void)event;
+    uint16 now = clock_now();
     for (sys_service *s = services; s != NULL; s = s->next) {
-        if (s->pid != 0 && s->limit_ms != 0 && (sint16)(tick->value - s->fed - s->limit_ms) > 0) {
+        if (s->pid != 0 && s->limit_ms != 0 && (sint16)(now - s->fed - s->limit_ms) > 0) {
             (void)Sys_Kill_Process(s->pid);
             os_count(&s->bitten);
         }
@@ -38,7 +37,6 @@ static bool supervise(uint16 unused, uint16 event, sys_event_data *tick)
             }
         }
     }
-    return true;
 }
 
 bool Sys_Start_Service(sys_service *s)
@@ -54,17 +52,12 @@ bool Sys_Start_Service(sys_service *s)
     if (known != NULL && s->pid != 0) {
         return os_leave(SYS_ERROR_PROCESS);
     }
-    if (!hook_installed) {
-        hook_installed = true;
-        previous_hook = os_thread_end_hook;
-        os_thread_end_hook = on_thread_end;
-    }
+    os_release_service = release_service;
+    os_watch = supervise;
     s->pid = 0;
-    if (Sys_Subscribe_to_Event(SYS_1ms_TIMER, 0, supervise, NULL)) {
-        start(s);
-    }
+    start(s);
     if (s->pid == 0) {
-        error = SYS_ERROR_MEMORY;
+        error = (sys_error)Sys_Get_LastError();
     } else if (known == NULL) {
         s->next = services;
         services = s;
@@ -79,7 +72,7 @@ bool Sys_Feed_Watchdog(void)
         return false;
     }
     for (sys_service *s = services; s != NULL; s = s->next) {
-        if (s->pid == os_running->pid && !os_in_kernel) {
+        if (s->pid == os_running->pid && s->pid != 0 && !os_in_kernel) { /* 0: an ended service */
             s->fed = clock_now();
             error = SYS_OK;
         }

@@ -1,6 +1,8 @@
 /* Permitted contexts of each call, and the reported errors of refused calls (openswarm.h). */
 #include "test.h"
 
+#include "openswarm_io.h"
+
 static sys_event_data *refused_wait;
 static bool blocking_condition(sys_event_data *data)
 {
@@ -195,4 +197,41 @@ TEST(clearing_in_a_handler_leaves_the_data_to_the_kernel, "openswarm.h: Sys_Clea
     Sys_Yield();
     CHECK_EQ(deliveries, 2);
     CHECK_EQ(heap_now(), before);
+}
+
+static void note_thread(void)
+{
+    note('t');
+}
+
+TEST(a_section_may_span_the_start_of_the_kernel, "openswarm.h: Sys_Start_Kernel")
+{
+    host_use_virtual_time();
+    Sys_Init_Kernel();
+    Sys_Set_Scheduler(&sys_fixed_priority);
+    CHECK(Sys_Start_Process(note_thread) != 0);
+    Sys_Start_CriticalSection();
+    Sys_Start_CriticalSection();
+    Sys_Start_Kernel();
+    for (int i = 0; i < 30; i++) {
+        host_tick();
+    }
+    Sys_End_CriticalSection();
+    CHECK_EQ(strlen(trace), 0);
+    Sys_End_CriticalSection();
+    Sys_Sleep(2);
+    CHECK(strcmp(trace, "t") == 0);
+    CHECK_EQ(Sys_Get_Statistics()->refused, 0);
+}
+
+TEST(an_application_cannot_unsubscribe_the_drivers, "openswarm.h: Sys_Unsubscribe_from_Event")
+{
+    boot();
+    CHECK(Sys_Subscribe_to_Event(SYS_LEFTMOTOR_SPEED, 0, count_delivery, NULL));
+    CHECK(Sys_Unsubscribe_from_Event(SYS_LEFTMOTOR_SPEED, 0));
+    CHECK(!Sys_Unsubscribe_from_Event(SYS_LEFTMOTOR_SPEED, 0));
+    CHECK_EQ(Sys_Get_LastError(), SYS_ERROR_PROCESS);
+    CHECK(Sys_Send_IntEvent(SYS_LEFTMOTOR_SPEED, 50));
+    Sys_Yield();
+    CHECK_EQ(Sys_Get_MotorSpeed_Left(), 50);
 }

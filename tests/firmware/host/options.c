@@ -423,3 +423,90 @@ TEST(a_service_that_ends_is_restarted_up_to_its_limit, "openswarm_service.h: res
     CHECK(strcmp(trace, "ssss") == 0);
     CHECK_EQ(few.bitten, 0);
 }
+
+static void fills_the_heap_and_hangs(void *unused)
+{
+    (void)unused;
+    starts++;
+    for (uint16 id = 0x100; Sys_Register_Event(id); id++) {
+    }
+    for (;;) {
+        work(10);
+        host_slice();
+    }
+}
+
+TEST(the_watchdog_needs_no_heap, "openswarm_service.h: a service that takes all memory")
+{
+    static const sys_process_config config = {fills_the_heap_and_hangs, NULL, 0, 0, 0, 0, 0};
+    static sys_service service = {.config = &config, .limit_ms = 20, .restarts = 2};
+    boot();
+    CHECK(Sys_Start_Service(&service));
+    Sys_Sleep(500);
+    CHECK_EQ(service.bitten, 3);
+    CHECK_EQ(starts, 3);
+    CHECK_EQ(service.pid, 0);
+}
+
+TEST(a_service_reports_its_wrong_configuration, "openswarm_service.h: errors of Sys_Start_ProcessWith")
+{
+    static const sys_process_config config = {counts_and_ends, NULL, 10, 0, 0, 0, 0};
+    static sys_service service = {.config = &config, .restarts = 1};
+    boot();
+    CHECK(!Sys_Start_Service(&service));
+    CHECK_EQ(Sys_Get_LastError(), SYS_ERROR_ARGUMENT);
+}
+
+static uint16 ring[3];
+static void joins_the_next(void *next)
+{
+    Sys_Sleep(2);
+    bool joined = Sys_Join(*(const uint16 *)next);
+    note(joined ? 'j' : Sys_Get_LastError() == SYS_ERROR_PROCESS ? 'r' : '?');
+}
+
+TEST(threads_that_join_in_a_ring_are_refused, "openswarm_join.h: joins the caller, directly or through others")
+{
+    boot();
+    for (int i = 0; i < 3; i++) {
+        ring[i] = start(joins_the_next, &ring[(i + 1) % 3], 0);
+    }
+    Sys_Sleep(100);
+    CHECK(strcmp(trace, "rjj") == 0);
+}
+
+static sys_quota four;
+static uint16 most_waiting, taken;
+
+static void send_twenty(void)
+{
+    for (int i = 0; i < 20; i++) {
+        uint16 dropped = four.dropped;
+        CHECK(Sys_Send_IntEvent(E1, 1));
+        taken = (uint16)(taken + (four.dropped == dropped));
+    }
+    if (taken - deliveries > most_waiting) {
+        most_waiting = (uint16)(taken - deliveries);
+    }
+}
+
+static bool send_in_handler(uint16 pid, uint16 id, sys_event_data *data)
+{
+    (void)pid, (void)id, (void)data;
+    send_twenty();
+    return true;
+}
+
+TEST(a_quota_counts_the_messages_of_the_current_delivery, "openswarm_quota.h: Sys_Limit_Event")
+{
+    boot();
+    CHECK(Sys_Register_Event(E1) && Sys_Register_Event(E2) && Sys_Limit_Event(&four, E1, 4));
+    CHECK(Sys_Subscribe_to_Event(E2, 0, send_in_handler, NULL) && Sys_Subscribe_to_Event(E1, 0, count_delivery, NULL));
+    Sys_Start_CriticalSection();
+    CHECK(Sys_Send_IntEvent(E2, 0));
+    send_twenty();
+    Sys_End_CriticalSection();
+    Sys_Sleep(20);
+    CHECK_EQ(most_waiting, 4);
+    CHECK_EQ(deliveries, taken);
+}

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import itertools
+import json
 from pathlib import Path
 
 import pytest
 
 import emu
 from emu import Machine
+from emu.cli import main
 from tests.firmware.conftest import TARGET_APPS, Build
 
 FCY = 14_745_600
@@ -125,6 +127,7 @@ KINDS = ["push", "call chain", "large frame", "variadic call", "kernel call with
 def test_a_stack_overflow_ends_only_the_offender(image: Build, kind: int) -> None:
     """A stack overflow ends only the thread that causes it (kernel.md §4; bug 21 of openswarm-original.md §7)."""
     machine = load(image("overflow", TARGET_APPS))
+    machine.stop_on_fault = False
     run_to(machine, "begin")
     machine.poke("kind", kind)
     said = bytearray()
@@ -138,6 +141,34 @@ def test_a_stack_overflow_ends_only_the_offender(image: Build, kind: int) -> Non
     machine.run(cycles=FCY // 50)
     assert all(now > before for now, before in zip(words(machine, "rounds", 2), rounds, strict=True))
     assert machine.peek("LATD") & 0xFF == 0, "the motors stop"
+
+
+@pytest.mark.parametrize("kind", range(len(KINDS)), ids=KINDS)
+def test_the_emulator_reports_a_stack_overflow_as_a_fault(image: Build, kind: int) -> None:
+    """The report names thread and function; the system continues if the caller runs on."""
+    machine = load(image("overflow", TARGET_APPS))
+    run_to(machine, "begin")
+    machine.poke("kind", kind)
+    stop = machine.run(cycles=FCY // 20)
+    assert stop.reason == "fault", stop
+    assert stop.fault is not None
+    assert stop.fault.cause.startswith("stack overflow")
+    assert stop.fault.thread is not None
+    assert f"thread {machine.peek('culprit_pid')}" in stop.fault.thread
+    assert stop.fault.frames[0].function
+    assert machine.run(cycles=FCY // 20).reason == "limit"
+    assert machine.peek("ended") == machine.peek("culprit_pid")
+
+
+def test_a_run_ends_with_status_1_after_a_stack_overflow(image: Build, capsys: pytest.CaptureFixture[str]) -> None:
+    """`emu run`, also with --json: the first kind of overflow, a push."""
+    path = str(image("overflow", TARGET_APPS))
+    assert main(["run", path, "--seconds", "0.1"]) == 1
+    assert "stack overflow" in capsys.readouterr().err
+    assert main(["run", path, "--seconds", "0.1", "--json"]) == 1
+    facts = json.loads(capsys.readouterr().out)
+    assert facts["status"] == 1
+    assert facts["reason"] == "fault"
 
 
 def test_a_trap_stops_the_motors_and_reports(image: Build) -> None:

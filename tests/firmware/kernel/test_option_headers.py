@@ -99,7 +99,7 @@ def test_the_cycles_in_the_headers_are_the_measured_ones(cycles: dict[str, int])
     behind_two = cycles["Sys_Feed_Watchdog, two services are newer"] - feed
     assert contract("service", "Sys_Feed_Watchdog")[0] == [feed, behind_two // 2]
     looking = cycles["1 ms clock, idle, one service"] - cycles["1 ms clock, idle, for comparison"]
-    assert sentence("service", "which also costs its message:") == [looking]
+    assert sentence("service", "which takes") == [looking]
 
 
 def test_the_stack_in_the_headers_is_the_worst_case(

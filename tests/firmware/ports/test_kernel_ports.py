@@ -19,7 +19,7 @@ from tests.firmware.conftest import FIRMWARE, TARGET_APPS, Build, run_make
 from tests.firmware.kernel.test_kernel_on_target import run_to
 
 CONFORMS = re.compile(rb"conforms: (\d+) checks")
-CHECKS, CHECKS_OF_OPTIONS = 275, 376
+CHECKS, CHECKS_OF_OPTIONS = 282, 417
 """Number of checks of the conformance suite and of its options part.
 
 The numbers reveal checks that are not reached.

@@ -7,6 +7,7 @@ from collections.abc import Set as AbstractSet
 from emu.chips.chip import Chip
 from toolchain.bounds.annotations.reader import Annotation
 from toolchain.bounds.annotations.source_map import SourceMap
+from toolchain.elf.constants import STT_OBJECT
 from toolchain.elf.model import Bind, Executable, Symbol
 from toolchain.errors import ToolError
 
@@ -51,6 +52,8 @@ class NameResolver:
 
     def file(self, symbol: Symbol) -> str:
         """Return the file that defines a function or variable, "" if unknown."""
+        if symbol.type == STT_OBJECT:  # its address may be that of a function as well: data and code are two spaces
+            return self.sources.lines.files.get(symbol.value, "")
         known = self.sources.functions.get(symbol.value)
         if known is not None and symbol.value in self.entries:
             return known[0]

@@ -45,7 +45,7 @@ bool Sys_Start_Camera(void)
     processor = Sys_LineOfSight_Processor;
     (void)Sys_Register_Event(SYS_IO_1PXSENSOR);
     (void)Sys_Register_Event(SYS_IO_CAMERA);
-    (void)Sys_Subscribe_to_Event(SYS_IO_CAMERA, 0, on_frame, NULL);
+    (void)Sys_Subscribe_to_Event(SYS_IO_CAMERA, OS_DRIVERS, on_frame, NULL);
     type = hal_camera_init();
     if (type == CAMERA_NONE) {
         return false;

@@ -163,7 +163,7 @@ bool Sys_Share_Event(uint16 event, uint8 hops)
     for (shared_event *f = shared; s == NULL && f != shared + SYS_REMOTE_EVENTS; f++) {
         s = f->hops == 0 ? f : NULL;
     }
-    bool is_done = s != NULL ? Sys_Subscribe_to_Event(event, 0, on_event, NULL) : os_fail(SYS_ERROR_BUSY);
+    bool is_done = s != NULL ? Sys_Subscribe_to_Event(event, OS_DRIVERS, on_event, NULL) : os_fail(SYS_ERROR_BUSY);
     if (is_done) {
         s->event = event;
         hal_barrier();

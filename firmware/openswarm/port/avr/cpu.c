@@ -56,7 +56,6 @@ void hal_start(void)
     TIFR1 = 1 << OCF1B;
     TIMSK1 |= 1 << OCIE1B;
     sei();
-    cpu_open();
 }
 
 /* Frame of a yielded thread (switch.S) that returns into os_thread_start with r17:r16 = entry, r15:r14 = argument. */

@@ -54,8 +54,6 @@ void hal_start(void)
     SYST_RVR = F_CPU / 1000 - 1;
     SYST_CVR = 0;
     SYST_CSR = 7; /* on, interrupt, CPU clock */
-    hal_unlock(0);
-    __asm__ volatile("dsb\n\tisb" ::: "memory"); /* a slice end that was forced before is taken here */
 }
 
 static HAL_NORETURN void thread_main(void (*entry)(void *), void *arg)

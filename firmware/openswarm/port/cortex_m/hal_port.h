@@ -13,6 +13,7 @@
 #define HAL_WORD_IS_ONE_ACT 1
 
 typedef uint32_t hal_lock_state; /* BASEPRI */
+#define HAL_THREAD_LEVEL 0
 typedef uint32_t hal_limit;      /* MPU_RBAR of the guard: its address, CPU_GUARD_REGION */
 
 enum { CPU_PRIORITY_DEVICE = 0x50, CPU_PRIORITY_SLICE = 0xF0, CPU_SLICE_MS = 10, CPU_PENDSV = 14 };

@@ -54,7 +54,6 @@ void hal_start(void)
     IEC0bits.T1IE = 1;
     IEC0bits.T2IE = 1;
     IEC2bits.C2IE = 1;
-    CPU_SRL = 0; /* level thread; a slice end forced before is taken now, and another thread may run first */
 }
 
 /* Frame of a yielded thread (switch.S) that returns into os_thread_start with W8 = entry, W9 = argument. */

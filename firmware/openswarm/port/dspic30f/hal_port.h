@@ -19,6 +19,7 @@
 #define HAL_CLEAR_BIT(variable, bit) __asm__ volatile("bclr.b _" #variable ", #" #bit : : : "memory")
 
 typedef uint16_t hal_lock_state; /* SR */
+#define HAL_THREAD_LEVEL 0
 typedef uint16_t hal_limit;
 
 #define CPU_SRL (*(volatile uint8_t *)&SR)

@@ -189,7 +189,6 @@ void hal_start(void)
         sigaction(SIGALRM, &action, NULL);
         setitimer(ITIMER_REAL, &every_ms, NULL);
     }
-    hal_unlock(THREAD);
 }
 
 bool hal_stack_init(sys_pcb *process, uint8_t *stack, uint16_t bytes, void (*entry)(void *), void *arg)

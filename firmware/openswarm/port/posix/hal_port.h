@@ -4,6 +4,7 @@
 #define HAL_PORT_H
 
 typedef int hal_lock_state;
+#define HAL_THREAD_LEVEL 0
 typedef void *hal_limit;
 
 bool host_allocation_fails(void);

@@ -164,7 +164,6 @@ void hal_init(sys_pcb *process)
 void hal_start(void)
 {
     started = true; /* replace: start both timers, enable interrupts */
-    hal_unlock(THREAD);
 }
 
 bool hal_stack_init(sys_pcb *process, uint8_t *stack, uint16_t bytes, void (*entry)(void *), void *arg)

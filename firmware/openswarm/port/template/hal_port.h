@@ -7,6 +7,7 @@
 #define HAL_WORD_IS_ONE_ACT 0 /* correct for every CPU; 1 saves locks where loads and stores of words are atomic */
 
 typedef int hal_lock_state; /* replace: saved interrupt mask */
+#define HAL_THREAD_LEVEL 0  /* replace: the mask of level thread */
 typedef void *hal_limit;    /* replace: stack limit register, or any type if there is none */
 
 hal_lock_state hal_lock_slice(void);

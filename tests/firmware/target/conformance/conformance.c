@@ -127,7 +127,14 @@ int main(void)
     Sys_Run_SystemThread();
     CHECK(Sys_Wait_for_Event(SYS_1ms_TIMER) == NULL && !Sys_Wait_for_Period());
     CHECK(Sys_Get_Statistics()->refused == 5 && Sys_Get_LastError() == SYS_ERROR_CONTEXT);
+#ifdef SUITE_OF_OPTIONS
     Sys_Start_Kernel();
+#else
+    Sys_Start_CriticalSection();
+    Sys_Start_Kernel();
+    CHECK(noted("")); /* the section continues */
+    Sys_End_CriticalSection();
+#endif
     Sys_Sleep(2);
     CHECK(noted("e"));
     Sys_Set_Scheduler(&sys_round_robin);

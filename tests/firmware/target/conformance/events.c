@@ -292,8 +292,22 @@ static void exhaustion_is_told(void)
     CHECK(heap_now() == heap);
 }
 
+/* Main's subscriptions end, those of the drivers stay. */
+static void drivers_have_an_owner_of_their_own(void)
+{
+    CHECK(!Sys_Unsubscribe_from_Event(SYS_LEFTMOTOR_SPEED, 0) && Sys_Get_LastError() == SYS_ERROR_PROCESS);
+    CHECK(Sys_Subscribe_to_Event(SYS_LEFTMOTOR_SPEED, 0, count, NULL));
+    CHECK(Sys_Unsubscribe_from_Event(SYS_LEFTMOTOR_SPEED, 0));
+    CHECK(Sys_Send_IntEvent(SYS_LEFTMOTOR_SPEED, 20));
+    Sys_Yield();
+    CHECK(Sys_Get_MotorSpeed_Left() == 20 && Sys_Send_IntEvent(SYS_LEFTMOTOR_SPEED, 0));
+    Sys_Yield();
+    CHECK(Sys_Get_MotorSpeed_Left() == 0);
+}
+
 void check_events(void)
 {
+    drivers_have_an_owner_of_their_own();
     registration();
     handlers_run_between_threads();
     payloads_arrive_whole();

@@ -318,6 +318,104 @@ static void hostile_cleanups(void)
     }
 }
 
+/* ---- Teardown: leave every list, run the cleanups, free the memory ---------------------------------------------------- */
+
+static uint16 target_pid;
+static sys_cleanup hostile[2];
+
+static void kill_target(void *unused)
+{
+    (void)unused;
+    note(Sys_Get_ProcessID() == own_pid ? 'i' : '?');
+    note(Sys_Kill_Process(target_pid) ? 'k' : 'f');
+}
+
+static void kill_what_it_joins(void *unused)
+{
+    (void)unused;
+    own_pid = Sys_Get_ProcessID();
+    note(Sys_Push_Cleanup(&hostile[0], kill_target, NULL) ? '+' : '?');
+    (void)Sys_Join(target_pid);
+}
+
+static void kill_whom_it_awaits(void *unused)
+{
+    (void)unused;
+    own_pid = Sys_Get_ProcessID();
+    note(Sys_Push_Cleanup(&hostile[0], kill_target, NULL) ? '+' : '?');
+    (void)Sys_Lock_Mutex(&mutex);
+}
+
+static void cleanups_kill_what_their_thread_awaits(void)
+{
+    static void (*const targets[])(void *) = {spin, hold_for_ever};
+    static void (*const victims[])(void *) = {kill_what_it_joins, kill_whom_it_awaits};
+    uint16 heap = heap_now();
+    for (uint8 i = 0; i < 2; i++) {
+        target_pid = start(targets[i], NULL, 0);
+        Sys_Sleep(12);
+        forget();
+        uint16 victim = start(victims[i], NULL, 0);
+        Sys_Sleep(25);
+        CHECK(noted("+") && Sys_Kill_Process(victim) && noted("+ik"));
+        CHECK(Sys_Get_ProcessState(target_pid) == SYS_UNKNOWN && Sys_Get_ProcessState(victim) == SYS_UNKNOWN);
+        Sys_Sleep(12);
+        CHECK(heap_now() == heap && Sys_Lock_MutexTimeout(&mutex, 1) && Sys_Unlock_Mutex(&mutex));
+    }
+}
+
+static void use_what_is_the_killers(void *unused)
+{
+    (void)unused;
+    note(Sys_Unlock_Mutex(&mutex) ? '?' : 'u');
+    note(Sys_Pop_Cleanup(true) ? '?' : 'p');
+}
+
+static void push_that(void *unused)
+{
+    note(Sys_Push_Cleanup(&hostile[0], use_what_is_the_killers, NULL) ? '+' : '?');
+    spin(unused);
+}
+
+static void cleanups_own_nothing_of_the_killer(void)
+{
+    static const char letters[] = "x";
+    forget();
+    uint16 victim = start(push_that, NULL, 0);
+    CHECK(Sys_Lock_Mutex(&mutex) && Sys_Push_Cleanup(&hostile[1], tell, (void *)&letters[0]));
+    Sys_Sleep(12);
+    CHECK(Sys_Kill_Process(victim) && noted("+up"));
+    CHECK(Sys_Unlock_Mutex(&mutex) && Sys_Pop_Cleanup(true) && noted("+upx"));
+    CHECK(refused_as(Sys_Push_Cleanup(&hostile[0], NULL, NULL), SYS_ERROR_ARGUMENT));
+}
+
+static void push_kill(void *unused)
+{
+    own_pid = Sys_Get_ProcessID();
+    note(Sys_Push_Cleanup(&hostile[0], kill_target, NULL) ? '+' : '?');
+    spin(unused);
+}
+
+static void kill_and_be_killed(void *victim)
+{
+    static const char letters[] = "x";
+    target_pid = Sys_Get_ProcessID();
+    note(Sys_Push_Cleanup(&hostile[1], tell, (void *)&letters[0]) ? '+' : '?');
+    note(Sys_Kill_Process(*(const uint16 *)victim) ? '?' : '!'); /* it does not return */
+}
+
+static void a_cleanup_kills_the_killer(void)
+{
+    uint16 heap = heap_now();
+    forget();
+    uint16 victim = start(push_kill, NULL, 0);
+    Sys_Sleep(12);
+    uint16 killer = start(kill_and_be_killed, &victim, 0);
+    Sys_Sleep(25);
+    CHECK(noted("++ikx") && Sys_Get_ProcessState(killer) == SYS_UNKNOWN && Sys_Get_ProcessState(victim) == SYS_UNKNOWN);
+    CHECK(heap_now() == heap && Sys_Push_Cleanup(&hostile[0], kill_target, NULL) && Sys_Pop_Cleanup(false));
+}
+
 /* ---- Quota ------------------------------------------------------------------------------------------------------- */
 
 static sys_quota quota, quota_too;
@@ -383,6 +481,40 @@ static void a_handler_ends_its_limited_event(void)
     uint16 heap = heap_now();
     CHECK(Sys_Register_Event(E1) && Sys_Subscribe_to_Event(E1, 0, leave, NULL) && Sys_Keep_Latest(&quota, E1));
     CHECK(delivered(E1, 3) == 1 && !Sys_IsEventRegistered(E1) && heap_now() <= heap + 4 * sizeof(void *));
+}
+
+static uint16 taken, most_waiting;
+
+static void send_ten(void)
+{
+    for (uint8 i = 0; i < 10; i++) {
+        uint16 dropped = quota.dropped;
+        CHECK(Sys_Send_IntEvent(E1, i));
+        taken = (uint16)(taken + (quota.dropped == dropped));
+    }
+    if ((uint16)(taken - heard) > most_waiting) {
+        most_waiting = (uint16)(taken - heard);
+    }
+}
+
+static bool send_in_delivery(uint16 pid, uint16 event, sys_event_data *data)
+{
+    (void)pid, (void)event, (void)data;
+    send_ten();
+    return true;
+}
+
+static void a_quota_counts_the_current_delivery(void)
+{
+    heard = taken = most_waiting = 0;
+    CHECK(Sys_Register_Event(E1) && Sys_Register_Event(E2) && Sys_Limit_Event(&quota, E1, 4));
+    CHECK(Sys_Subscribe_to_Event(E2, 0, send_in_delivery, NULL) && Sys_Subscribe_to_Event(E1, 0, hear, NULL));
+    Sys_Start_CriticalSection();
+    CHECK(Sys_Send_IntEvent(E2, 0));
+    send_ten();
+    Sys_End_CriticalSection();
+    Sys_Sleep(20);
+    CHECK(most_waiting == 4 && heard == taken && Sys_Unregister_Event(E1) && Sys_Unregister_Event(E2));
 }
 
 /* ---- Services ---------------------------------------------------------------------------------------------------- */
@@ -453,6 +585,52 @@ static void services_are_restarted(void)
     CHECK(storm.pid == 0 && good.pid == 0 && heap_now() <= heap);
 }
 
+static uint16 partners[2];
+
+static void join_partner(void *pid)
+{
+    Sys_Sleep(2);
+    note(Sys_Join(*(const uint16 *)pid) ? 'j' : Sys_Get_LastError() == SYS_ERROR_PROCESS ? 'r' : '?');
+}
+
+static void threads_do_not_join_each_other(void)
+{
+    forget();
+    partners[0] = start(join_partner, &partners[1], 0);
+    partners[1] = start(join_partner, &partners[0], 0);
+    Sys_Sleep(50);
+    CHECK(noted("rj"));
+}
+
+static void a_service_reports_its_wrong_configuration(void)
+{
+    static const sys_process_config wrong = {end_at_once, NULL, 10, 0, 0, 0, 0};
+    static sys_service service = {.config = &wrong, .restarts = 1};
+    CHECK(refused_as(Sys_Start_Service(&service), SYS_ERROR_ARGUMENT));
+}
+
+static void take_all_memory(void *unused)
+{
+    begins++;
+    for (uint16 id = 0x100; Sys_Register_Event(id); id++) {
+    }
+    spin(unused);
+}
+
+static void a_service_that_takes_all_memory_is_restarted(void)
+{
+    static const sys_process_config greedy = {take_all_memory, NULL, 0, 0, 0, 0, 0};
+    static sys_service service = {.config = &greedy, .limit_ms = 20, .restarts = 2};
+    uint16 heap = heap_now();
+    begins = 0;
+    CHECK(Sys_Start_Service(&service));
+    Sys_Sleep(200);
+    CHECK(begins == 3 && service.bitten == 3 && service.pid == 0);
+    for (uint16 id = 0x100; Sys_Unregister_Event(id); id++) {
+    }
+    CHECK(heap_now() <= heap);
+}
+
 void check_options(void)
 {
     mutexes_refuse_what_they_cannot_do();
@@ -464,8 +642,15 @@ void check_options(void)
     joiners_die();
     cleanups_run_whatever_ends_the_thread();
     hostile_cleanups();
+    cleanups_kill_what_their_thread_awaits();
+    cleanups_own_nothing_of_the_killer();
+    a_cleanup_kills_the_killer();
     quotas_bound_what_waits();
     quotas_come_and_go();
     a_handler_ends_its_limited_event();
+    a_quota_counts_the_current_delivery();
+    threads_do_not_join_each_other();
+    a_service_reports_its_wrong_configuration();
+    a_service_that_takes_all_memory_is_restarted();
     services_are_restarted();
 }

@@ -1,0 +1,273 @@
+/* SPDX-License-Identifier: MIT */
+/* Teardown of a thread: leave every list, run the cleanups, free the memory (openswarm_cleanup.h). */
+#include "test.h"
+
+#include "openswarm_cleanup.h"
+#include "openswarm_join.h"
+#include "openswarm_mutex.h"
+
+static sys_mutex mutex = SYS_MUTEX(0);
+static sys_cleanup of_thread[4];
+static uint16 pids[4];
+static uint16 seen_pid;
+
+static uint16 start(void (*entry)(void *), const void *arg)
+{
+    sys_process_config config = {entry, (void *)arg, 0, 0, 0, 0, 0};
+    return Sys_Start_ProcessWith(&config);
+}
+
+static void sleep_for_ever(void *unused)
+{
+    (void)unused;
+    for (;;) {
+        Sys_Sleep(1000);
+    }
+}
+
+static void note_end(void *letter)
+{
+    note(*(const char *)letter);
+}
+
+static void kill(void *pid)
+{
+    note(Sys_Kill_Process(*(const uint16 *)pid) ? 'k' : 'f');
+}
+
+static void kill_then_join(void *unused)
+{
+    (void)unused;
+    CHECK(Sys_Push_Cleanup(&of_thread[0], kill, &pids[1]));
+    (void)Sys_Join(pids[1]);
+}
+
+TEST(a_cleanup_may_kill_the_thread_that_its_thread_joins, "openswarm_cleanup.h: the order of the teardown")
+{
+    boot();
+    uint16 empty = heap_now();
+    pids[1] = start(sleep_for_ever, NULL);
+    uint16 parent = start(kill_then_join, NULL);
+    Sys_Sleep(20);
+    CHECK(Sys_Kill_Process(parent));
+    CHECK(strcmp(trace, "k") == 0);
+    CHECK_EQ(Sys_Get_ProcessState(pids[1]), SYS_UNKNOWN);
+    CHECK_EQ(Sys_Get_ProcessState(parent), SYS_UNKNOWN);
+    CHECK(lists_are_well_formed());
+    Sys_Sleep(20);
+    CHECK_EQ(heap_now(), empty);
+}
+
+static void own_mutex(void *unused)
+{
+    CHECK(Sys_Lock_Mutex(&mutex));
+    sleep_for_ever(unused);
+}
+
+static void kill_then_lock(void *unused)
+{
+    (void)unused;
+    CHECK(Sys_Push_Cleanup(&of_thread[0], kill, &pids[1]));
+    (void)Sys_Lock_Mutex(&mutex);
+}
+
+TEST(a_cleanup_may_kill_the_owner_of_the_mutex_that_its_thread_awaits, "openswarm_cleanup.h: the order of the teardown")
+{
+    boot();
+    uint16 empty = heap_now();
+    pids[1] = start(own_mutex, NULL);
+    Sys_Sleep(5);
+    uint16 waiter = start(kill_then_lock, NULL);
+    Sys_Sleep(20);
+    CHECK(Sys_Kill_Process(waiter));
+    CHECK(mutex.owner == NULL && mutex.waiters == NULL);
+    CHECK(lists_are_well_formed());
+    Sys_Sleep(20);
+    CHECK_EQ(heap_now(), empty);
+}
+
+static void unlock_mutex(void *unused)
+{
+    (void)unused;
+    seen_pid = Sys_Get_ProcessID();
+    note(Sys_Unlock_Mutex(&mutex) ? 'u' : 'f');
+}
+
+static void lock_with_cleanup(void *unused)
+{
+    CHECK(Sys_Push_Cleanup(&of_thread[0], unlock_mutex, NULL));
+    CHECK(Sys_Lock_Mutex(&mutex));
+    sleep_for_ever(unused);
+}
+
+TEST(a_cleanup_acts_as_the_ending_thread, "openswarm_cleanup.h: Sys_Get_ProcessID")
+{
+    boot();
+    CHECK(Sys_Lock_Mutex(&mutex));
+    uint16 victim = start(lock_with_cleanup, NULL);
+    Sys_Sleep(20);
+    CHECK(Sys_Kill_Process(victim));
+    CHECK(strcmp(trace, "f") == 0);
+    CHECK_EQ(seen_pid, victim);
+    CHECK_EQ(Sys_Get_ProcessID(), 0);
+    CHECK(Sys_Unlock_Mutex(&mutex));
+}
+
+static void push_and_pop(void *unused)
+{
+    (void)unused;
+    note(Sys_Push_Cleanup(&of_thread[3], note_end, "i") ? '+' : 'f');
+    note(Sys_Pop_Cleanup(true) ? '-' : 'f');
+}
+
+static void push_hostile(void *unused)
+{
+    CHECK(Sys_Push_Cleanup(&of_thread[0], push_and_pop, NULL));
+    sleep_for_ever(unused);
+}
+
+static void push_then_kill(void *unused)
+{
+    CHECK(Sys_Push_Cleanup(&of_thread[1], note_end, "o"));
+    CHECK(Sys_Kill_Process(pids[0]));
+    note('|');
+    CHECK(Sys_Pop_Cleanup(true));
+    sleep_for_ever(unused);
+}
+
+TEST(a_cleanup_does_not_pop_the_killers, "openswarm_cleanup.h: allowed calls")
+{
+    boot();
+    pids[0] = start(push_hostile, NULL);
+    Sys_Sleep(5);
+    CHECK(start(push_then_kill, NULL) != 0);
+    Sys_Sleep(20);
+    CHECK(strcmp(trace, "ff|o") == 0);
+}
+
+static void look_at_mutex(void *unused)
+{
+    (void)unused;
+    note(mutex.owner == NULL ? 'n' : 'o');
+}
+
+static void mutex_first(void *unused)
+{
+    CHECK(Sys_Lock_Mutex(&mutex) && Sys_Push_Cleanup(&of_thread[0], look_at_mutex, NULL));
+    sleep_for_ever(unused);
+}
+
+static void cleanup_first(void *unused)
+{
+    CHECK(Sys_Push_Cleanup(&of_thread[0], look_at_mutex, NULL) && Sys_Lock_Mutex(&mutex));
+    sleep_for_ever(unused);
+}
+
+static void end_in_order(void (*entry)(void *))
+{
+    boot();
+    uint16 victim = start(entry, NULL);
+    Sys_Sleep(5);
+    CHECK(Sys_Kill_Process(victim));
+    CHECK(strcmp(trace, "n") == 0);
+}
+
+TEST(mutexes_are_released_before_cleanups_if_the_mutex_was_used_first, "openswarm_cleanup.h: a fixed order")
+{
+    end_in_order(mutex_first);
+}
+
+TEST(mutexes_are_released_before_cleanups_if_the_cleanup_was_used_first, "openswarm_cleanup.h: a fixed order")
+{
+    end_in_order(cleanup_first);
+}
+
+static void push_kill(void *other)
+{
+    uint16 number = (uint16)((const uint16 *)other - pids);
+    CHECK(Sys_Push_Cleanup(&of_thread[number], kill, other));
+    sleep_for_ever(NULL);
+}
+
+TEST(threads_whose_cleanups_kill_each_other_end_once, "openswarm_cleanup.h: ends other threads")
+{
+    boot();
+    uint16 empty = heap_now();
+    Sys_Subscribe_to_Event(SYS_EVENT_TERMINATION, 0, count_delivery, NULL);
+    uint16 one_more = heap_now();
+    pids[0] = start(push_kill, &pids[1]);
+    pids[1] = start(push_kill, &pids[2]);
+    pids[2] = start(push_kill, &pids[0]);
+    Sys_Sleep(40);
+    CHECK(Sys_Kill_Process(pids[1]));
+    CHECK(strcmp(trace, "kkf") == 0); /* the third finds the first gone */
+    Sys_Sleep(2);
+    CHECK_EQ(deliveries, 3);
+    CHECK(lists_are_well_formed());
+    CHECK_EQ(heap_now(), one_more);
+    Sys_Unsubscribe_from_Event(SYS_EVENT_TERMINATION, 0);
+    CHECK_EQ(heap_now(), empty);
+}
+
+static void kill_first(void *unused)
+{
+    CHECK(Sys_Push_Cleanup(&of_thread[3], note_end, "e"));
+    note(Sys_Kill_Process(pids[0]) ? '?' : '!'); /* does not return: the cleanup ends this thread */
+    sleep_for_ever(unused);
+}
+
+static void kill_killer(void *unused)
+{
+    CHECK(Sys_Push_Cleanup(&of_thread[0], note_end, "l") && Sys_Push_Cleanup(&of_thread[1], kill, &pids[3]));
+    sleep_for_ever(unused);
+}
+
+TEST(a_cleanup_may_kill_the_killer, "openswarm_cleanup.h: the thread on whose stack it runs")
+{
+    boot();
+    uint16 empty = heap_now();
+    pids[0] = start(kill_killer, NULL);
+    Sys_Sleep(5);
+    pids[3] = start(kill_first, NULL);
+    Sys_Sleep(20);
+    CHECK(strcmp(trace, "kle") == 0);
+    CHECK_EQ(Sys_Get_ProcessState(pids[0]), SYS_UNKNOWN);
+    CHECK_EQ(Sys_Get_ProcessState(pids[3]), SYS_UNKNOWN);
+    CHECK(lists_are_well_formed());
+    CHECK_EQ(heap_now(), empty);
+    sys_cleanup later;
+    CHECK(Sys_Push_Cleanup(&later, note_end, "p") && Sys_Pop_Cleanup(false));
+}
+
+static bool kill_in_handler(uint16 pid, uint16 id, sys_event_data *data)
+{
+    (void)pid, (void)id, (void)data;
+    CHECK(Sys_Kill_Process(pids[0]));
+    return true;
+}
+
+TEST(a_cleanup_in_a_handler_may_kill_the_interrupted_thread, "openswarm_cleanup.h: ends other threads")
+{
+    boot();
+    Sys_Register_Event(E1);
+    Sys_Subscribe_to_Event(E1, 0, kill_in_handler, NULL);
+    uint16 empty = heap_now();
+    pids[0] = start(kill_killer, NULL);
+    Sys_Sleep(5);
+    pids[3] = start(sleep_for_ever, NULL);
+    Sys_Send_IntEvent(E1, 0);
+    Sys_Sleep(20);
+    CHECK(strcmp(trace, "kl") == 0);
+    CHECK_EQ(Sys_Get_ProcessID(), 0);
+    CHECK(lists_are_well_formed());
+    CHECK_EQ(heap_now(), empty);
+}
+
+TEST(a_cleanup_without_a_function_is_refused, "openswarm_cleanup.h: ARGUMENT")
+{
+    boot();
+    CHECK(!Sys_Push_Cleanup(&of_thread[0], NULL, NULL));
+    CHECK_EQ(Sys_Get_LastError(), SYS_ERROR_ARGUMENT);
+    CHECK(!Sys_Push_Cleanup(NULL, note_end, NULL));
+    CHECK_EQ(Sys_Get_LastError(), SYS_ERROR_ARGUMENT);
+}
