@@ -50,8 +50,8 @@ IMAGES = {
     "points": (TARGET, 2.0, {"i": 0, "u": 100, "d": 24, "k": 192}),
     "crowded": (TARGET, 0.15, {"i": 0, "u": 60, "d": 2, "k": 400}),
 }
-"""Folder of each image, seconds of simulated time until it has made every call, and limits that cannot be measured
-(bounds --help)."""
+"""Folder of each image, simulated seconds until it has made every call, and values of annotation names that cannot be
+measured (`toolchain bounds --let`)."""
 ROUND, NEWEST, LAST = "numbers_are_round", "newest_pid", 0xFFFF
 """An image with the function `numbers_are_round` starts with the last PID already assigned, because starting that
 many threads would take too long."""

@@ -50,7 +50,7 @@ static f64 steady(unsigned lit, i64 line)
     return lit >> line & 1;
 }
 
-// Let receivers settle for `age` cycles with the lines `lit`.
+// Advance the receivers' levels by `age` cycles; `lit`: bit mask of the emitter lines that are on.
 static void settle(f64 *levels, unsigned lit, i64 age, f64 tau)
 {
     f64 left = exp((f64)-age / tau);

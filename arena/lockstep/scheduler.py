@@ -108,7 +108,7 @@ class LockStep:
         self._greenlets = [None] * len(self._greenlets)
 
     def _advance_within_room(self, ticks: int) -> None:
-        """As `advance`, for at most ROOM quanta."""
+        """Advance to `ticks`, at most ROOM quanta ahead."""
         self._hub = getcurrent()
         for number, robot in enumerate(self._robots):
             robot.native.state = IN_PYTHON

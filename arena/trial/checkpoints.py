@@ -22,7 +22,7 @@ CAN_FORK: Final = sys.platform == "linux"
 MAX_CHECKPOINTS: Final = 10
 """Greatest number of checkpoints."""
 EVERY_S: Final = 10.0
-"""Simulated seconds between two checkpoints, while they are new."""
+"""Simulated seconds between new checkpoints; `CheckpointPool.add` thins out older ones."""
 PATIENCE_S: Final = 5.0
 """Seconds to wait for a process to end."""
 _HEAD: Final = struct.Struct("<Q")

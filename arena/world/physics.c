@@ -30,8 +30,8 @@ struct chipmunk {
     struct vect (*total_impulse)(const void *arbiter);
 };
 
-// A disc that can be pushed. The two joints of an object are its friction on the floor. While everything about it is
-// zero, they change nothing, to the bit, until another body touches it: then they are not in the solver.
+// A pushable disc. Its two joints model friction on the floor. While its velocities and impulses are zero and no moving
+// body is near, the joints are removed from the solver: the result is bit-identical. A push adds them again.
 struct disc {
     void *body, *slide_joint, *spin_joint;
     f64 radius;

@@ -1,5 +1,7 @@
 """Measurement of the memory equation: RAM = A + B n + C m + D s + sum over pending messages of (E + d).
 
+A is the fixed part, B to D the bytes per thread, event and subscription, E the overhead of a pending message.
+
 The `footprint` application builds a load of n threads, m events, s subscriptions and messages of d bytes. The emulator
 reads the heap. Used memory is the capacity minus the reserve and the free blocks (kernel/memory.c). It must equal the
 count kept by the allocator.

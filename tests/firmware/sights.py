@@ -100,7 +100,7 @@ def sweep(machine: Machine, picture: np.ndarray, stride: int, phase: int = 0) ->
     end = place(machine, "round_end")
     cycle_number = tried = 0
     while machine.pc != end:
-        chosen = -(cycle_number - phase) % stride < 2 * LONGEST_STEP  # covers more offsets than any step has
+        chosen = -(cycle_number - phase) % stride < 2 * LONGEST_STEP  # only steps that may hold a tested cycle
         here, pc, before = machine.snapshot() if chosen else b"", machine.pc, machine.cycle
         machine.step()
         wanted = []

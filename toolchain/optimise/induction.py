@@ -60,7 +60,7 @@ def run(f: Function) -> None:
 
 
 def _loops(f: Function) -> list[tuple[CountedLoop, bool]]:
-    """Loops with one entry block, each with whether it is innermost."""
+    """Return the natural loops with one entering block, each with whether it is innermost."""
     blocks = {b.name: b for b in f.blocks}
     preds = predecessors(f)
     loops = natural_loops({b.name: b.succs for b in f.blocks}, f.blocks[0].name)

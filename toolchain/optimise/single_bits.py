@@ -203,7 +203,7 @@ def _truth(v: Value, mask: int, made: list[Instr]) -> Value:
 
 
 def _writes_single_bit(v: Value, p: Value) -> bool:
-    """Whether a store of the value to `p` changes one bit, or one of two bits."""
+    """Whether storing the value to `p` is a single-bit change or a select between two of them."""
     return _change(v, p) is not None or _choice(v, p) is not None
 
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* A 64-bit significand as an array of 16-bit digits, lowest first. */
+/* A 64-bit significand as an array of 16-bit digits, least significant first. */
 #ifndef F64_DIGITS_H
 #define F64_DIGITS_H
 

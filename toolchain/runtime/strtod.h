@@ -18,7 +18,7 @@
 #define MIDDLE_BIT_BIAS (2 - LOWEST_POWER) /* exponent of half of the last bit of a subnormal */
 
 typedef struct {
-    uint16_t *limbs; /* lowest first */
+    uint16_t *limbs; /* least significant first */
     int count;
 } integer_t;
 

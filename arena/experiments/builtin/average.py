@@ -30,7 +30,7 @@ MEASURES = [
 
 
 def all_curves(samples: TrialSamples) -> Mapping[str, Floats]:
-    """Return the errors of the robots that are switched on; nan until all of them have reported."""
+    """Return the greatest and the mean error over the powered-on robots; nan before all have reported."""
     means, values, living = last_values(samples, "mean")[0] / 100, last_values(samples, "value")[0], alive(samples)
     worst, typical = np.full((2, len(means)), np.nan)
     for sample, lives in enumerate(living):

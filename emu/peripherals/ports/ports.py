@@ -64,7 +64,7 @@ class Port(Peripheral):
         return False
 
     def reset(self, power_on: bool) -> None:
-        """Reset: all pins become inputs (TRIS = ones) and return to the port.
+        """Reset: all pins become inputs (TRIS = ones), and peripherals release them to the port.
 
         LAT does not change; its value is undefined.
         """

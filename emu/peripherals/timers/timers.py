@@ -51,7 +51,7 @@ class Timer(Counter):
         self.clear_due: Final = self.timestamp("clear_due", NEVER)
         """On a waveform clock: due cycle of the next match if TMR is cleared in clear_from <= cycle < clear_until."""
         self.closed: Final = self.timestamp("closed", NEVER)
-        """Cycle in which the flag rises for the gate's last falling edge."""
+        """Gated mode: cycle in which the interrupt flag rises after the gate's last falling edge."""
         self._match: Final = self.slot("match", self._fire)
         self._on_match: Final[list[Callable[[int], None]]] = []
         self._on_change: Final[list[Callable[[], None]]] = []

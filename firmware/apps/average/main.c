@@ -115,7 +115,7 @@ static void tell_others(uint8 *to, uint16 now)
     }
 }
 
-/* ISR: a message leaves. What it says has grown older while it waited. */
+/* ISR at the begin of a transmission: adds the queueing delay to the ages in it. */
 static void leaves(uint8 *payload, uint8 size)
 {
     uint8 waited = (uint8)((uint8)tick() - payload[QUEUED_AT]);

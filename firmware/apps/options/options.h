@@ -18,10 +18,10 @@ enum {
 
 extern volatile uint16 options_wanted;
 
-void options_begin(void); /* a stop: set options_wanted here */
-void options_ready(void); /* a stop: the scene's call comes next, and nothing interrupts it */
-void options_done(void);  /* a stop: the call has returned */
-void options_woken(void); /* a stop: so has that of a thread it waited for, or which waited */
-void options_spin(void);  /* another thread, without end */
+void options_begin(void); /* the measuring host stops here and sets options_wanted */
+void options_ready(void); /* the host stops here: the measured call is next, and no interrupt is due */
+void options_done(void);  /* the host stops here: the call has returned */
+void options_woken(void); /* the host stops here: the call of the waiting thread has returned, too */
+void options_spin(void);  /* entry of a thread that runs for ever */
 
 #endif

@@ -134,7 +134,7 @@ void *heap_alloc(uint16 size);            /* any context */
 void *heap_alloc_lasting(uint16 size);    /* small, long-lived blocks: at the lowest address; not in an ISR */
 void heap_free(void *block, uint16 size); /* with the size of the allocation; not in an ISR */
 void heap_free_deferred(void *block, uint16 size); /* fast for adjacent blocks; allocatable after heap_coalesce() */
-void heap_coalesce(void); /* joins the blocks freed last with their neighbours and refills the reserve of the ISRs */
+void heap_coalesce(void); /* merges the blocks of heap_free_deferred() and refills the reserve of the ISRs */
 void heap_update_peak(void);
 
 /* stack.c */
@@ -166,7 +166,7 @@ extern message *event_queue, *delivery_batch; /* messages sent since the current
 
 /* process.c */
 void process_init(void);
-void section_start(void); /* after hal_start(): begins level thread, or postpones it to the end of main's open section */
+void section_start(void); /* after hal_start(): enters thread level, or lets the end of main's section do so */
 sys_pcb *process_find(uint16 pid);               /* any live thread; slice locked */
 sys_pcb *process_next(const sys_pcb *process);   /* iterates over live threads, from NULL to NULL; slice locked */
 void process_wake(sys_pcb *process, message *m); /* blocked list to the end of the ring; m: result of an event wait */

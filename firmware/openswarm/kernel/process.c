@@ -142,7 +142,7 @@ static uint16 unused_pid(void)
 {
     do {
         newest_pid++;
-        LOOP_BOUND(n);
+        LOOP_BOUND(n + 1); ONE_LOOP(); /* n - 1 PIDs in use, OS_DRIVERS, and the result */
     } while (newest_pid == OS_DRIVERS || process_find(newest_pid) != NULL); /* PID 0 is always in use */
     return newest_pid;
 }

@@ -41,8 +41,10 @@ def test_agenda_steps_both_motors_at_the_library_s_rates(start):
 
 
 def test_remote_control_sampled_by_the_agenda_gives_the_keys_pressed(start):
-    """epuck.md §6: the agenda decodes pressed keys by sampling every 1.8 ms after the first edge, which INT0
-    detects."""
+    """epuck.md §6: the agenda, the periodic scheduler of the e-puck library, decodes pressed keys.
+
+    It samples every 1.8 ms after the first edge, which INT0 detects.
+    """
     machine = start("agenda.c")
     machine.run(cycles=FCY // 20)
     for number, key in enumerate((53, 12, 0, 63), start=1):

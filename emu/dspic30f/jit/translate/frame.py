@@ -76,7 +76,7 @@ class FunctionFrame:
         return self.e.let(f"icmp ult i64 {wide(begun + cost)}, %stop", bit=True)
 
     def advance(self, cycles: Number, mask: int) -> None:
-        """Let `cycles` pass. `mask` selects the W registers that the instruction writes on its destination side."""
+        """Advance the clock by `cycles`. `mask`: W registers written as destination, for RAW stalls of the next."""
         self.v.set("cycle", self.v.get("cycle") + cycles)
         self.v.set("stall", mask)
         self.counter.spend(self.at, cycles)

@@ -13,7 +13,7 @@ static uint8 target = NONE; /* store that is being filled */
 static uint8 running = NONE;
 static uint8 stored = NONE; /* store that Sys_Get_StoredUpdate found last */
 /* Since the last start: */
-static uint8 worn;                       /* bit n: store n did not hold a write and gets no more */
+static uint8 worn;                       /* bit n: a write to store n failed; no more writes */
 static uint8 refused;                    /* bit n: the program of store n could not be tried */
 static uint16 frozen[HAL_UPDATE_STORES]; /* flags that did not change when written, and are not written again */
 static sys_update coming;
