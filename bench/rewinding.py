@@ -71,7 +71,7 @@ def measure(minutes: float) -> dict[str, float]:
             copies = children(trial)
             after = f"after {minutes * part:g} min, MB"
             found[f"trial with {len(copies)} moments {after}"] = sum(memory_mb(one, "Pss:") for one in (trial, *copies))
-            found[f"what a moment shares with nobody {after}"] = sum(
+            found[f"private memory of a checkpoint {after}"] = sum(
                 memory_mb(one, "Private_") for one in copies
             ) / len(copies)
         fine = {"granularity": "instruction"}

@@ -144,7 +144,7 @@ class HostNeighbour:
             self.counts.resets += 1
             if self.counts.resets > MOST_RESETS:
                 raise RobotError(
-                    f"the robot has begun anew {self.counts.resets} times, at last from row {before.row}: it resets"
+                    f"the robot has restarted {self.counts.resets} times, at last from row {before.row}: it resets"
                     " meanwhile, or its flash does not hold"
                 )
             return True

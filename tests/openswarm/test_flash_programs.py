@@ -217,7 +217,7 @@ def test_who_falls_silent_is_told_where():
 
 
 @pytest.mark.parametrize("resets", [MOST_RESETS, MOST_RESETS + 1])
-def test_a_robot_that_begins_anew_is_followed_some_times(resets: int):
+def test_a_robot_that_restarts_is_followed_some_times(resets: int):
     robot, left = Robot(), [resets]
 
     def reset(row: int) -> None:
@@ -232,7 +232,7 @@ def test_a_robot_that_begins_anew_is_followed_some_times(resets: int):
     if resets <= MOST_RESETS:
         assert give_program(robot)[0].counts.resets == resets
     else:
-        with pytest.raises(RobotError, match=rf"begun anew {resets} times, at last from row 3: it resets meanwhile"):
+        with pytest.raises(RobotError, match=rf"restarted {resets} times, at last from row 3: it resets meanwhile"):
             give_program(robot)
 
 
