@@ -52,7 +52,7 @@ IMAGES = {
 }
 """Folder of each image, simulated seconds until it has made every call, and values of annotation names that cannot be
 measured (`toolchain bounds --let`)."""
-ROUND, NEWEST, LAST = "numbers_are_round", "newest_pid", 0xFFFF
+ROUND, NEWEST, LAST = "numbers_are_round", "newest_pid", 0xFFFE
 """An image with the function `numbers_are_round` starts with the last PID already assigned, because starting that
 many threads would take too long."""
 CALL_BYTES = 4

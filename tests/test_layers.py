@@ -11,7 +11,8 @@ from pathlib import Path
 
 import grimp
 import pytest
-from watchdog import HANG
+
+from tests.watchdog import HANG
 
 ROOT = Path(__file__).resolve().parents[1]
 LINTER = Path(sys.executable).with_name("lint-imports")

@@ -11,11 +11,11 @@ from threading import Thread
 
 import numpy as np
 import pytest
-from watchdog import HANG
 
 from arena.trial.record import RecordError, write_bytes
 from emu.boards.picture import write_picture
 from emu.host.files import atomic_file, atomic_text_file, is_opened, read_file
+from tests.watchdog import HANG
 from toolchain.errors import ToolError
 from toolchain.files import write_outputs
 

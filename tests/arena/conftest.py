@@ -9,10 +9,10 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from watchdog import HANG
 
 from tests.arena.images import BEGIN
 from tests.firmware.conftest import built_once
+from tests.watchdog import HANG
 
 ROOT = Path(__file__).resolve().parents[2]
 

@@ -12,7 +12,8 @@ from types import ModuleType
 
 import numpy as np
 import pytest
-from watchdog import HANG
+
+from tests.watchdog import HANG
 
 pytest.importorskip("pettingzoo", reason="PettingZoo is not installed (extra: learning)")
 

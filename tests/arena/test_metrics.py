@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from watchdog import HANG
 
 from arena.analysis.statistics import (
     _typical_interval,
@@ -31,6 +30,7 @@ from arena.metrics import (
     time_to,
 )
 from arena.scene.loader import load_scene
+from tests.watchdog import HANG
 
 R = 5.0
 

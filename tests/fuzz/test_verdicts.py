@@ -11,11 +11,11 @@ from functools import partial
 from pathlib import Path
 
 import pytest
-from watchdog import HANG
 
 from tests.fuzz import verdicts
 from tests.fuzz.seeds import ROOT, Campaign, parser
 from tests.fuzz.verdicts import Book, LogError, Verdict, run_all
+from tests.watchdog import HANG
 
 OTHER = """
 import sys, time

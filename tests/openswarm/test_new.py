@@ -11,9 +11,9 @@ import sys
 from pathlib import Path
 
 import pytest
-from watchdog import HANG
 
 from openswarm.cli import main
+from tests.watchdog import HANG
 
 ROOT = Path(__file__).resolve().parents[2]
 BIN = Path(sys.executable).parent

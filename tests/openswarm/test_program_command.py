@@ -15,10 +15,10 @@ from importlib.metadata import requires, version
 from pathlib import Path
 
 import pytest
-from watchdog import HANG
 
 from emu.host import exit_status, paths
 from openswarm.cli import COMMANDS, command, main
+from tests.watchdog import HANG
 
 ROOT = Path(__file__).resolve().parents[2]
 PROGRAMS = ("emu", "toolchain", "arena", "openswarm")

@@ -19,7 +19,7 @@ WANTED = ("mkdocs", "material", "mkdocstrings_handlers")
     reason="the site's generator is missing (extra: docs)",
 )
 def test_the_site_builds_without_a_warning(tmp_path):
-    words = [sys.executable, str(ROOT / "docs" / "site.py"), "--out", str(tmp_path / "site")]
+    words = [sys.executable, str(ROOT / "docs" / "tools" / "site.py"), "--out", str(tmp_path / "site")]
     done = subprocess.run(words, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stdout) == (0, ""), done.stderr
     pages = re.findall(r": ([\w/.-]+\.md)$", (ROOT / "docs" / "mkdocs.yml").read_text(encoding="utf-8"), re.MULTILINE)

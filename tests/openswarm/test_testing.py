@@ -124,7 +124,7 @@ def test_the_action_s_steps_as_they_are_from_the_wheel(tmp_path):
     A new project passes. With a mistake in its C source, the summary names thread and line, and there is a waveform.
     """
     action = yaml.safe_load((ROOT / "action.yml").read_text())
-    environment = first_steps.installed(first_steps.built_wheel(tmp_path), tmp_path / "venv")
+    environment = first_steps.install_wheel(first_steps.build_wheel(tmp_path), tmp_path / "venv")
     subprocess.run(["openswarm", "new", "robot"], cwd=tmp_path, env=environment, check=True, capture_output=True)
     source = tmp_path / "robot" / "src" / "main.c"
 

@@ -16,10 +16,10 @@ from xml.etree import ElementTree
 
 import jsonschema
 import pytest
-from watchdog import HANG
 
 from arena.commands import debug as arena_debug
 from openswarm.cli import main
+from tests.watchdog import HANG
 
 ROOT = Path(__file__).resolve().parents[2]
 FOLDER = ROOT / "editors" / "vscode"

@@ -29,7 +29,7 @@ def test_the_wheel_holds_everything_and_repeats(tmp_path):
     wheels = []
     for name in ("one", "another"):
         (tmp_path / name).mkdir()
-        wheels.append(first_steps.built_wheel(tmp_path / name))
+        wheels.append(first_steps.build_wheel(tmp_path / name))
     first, second = (hashlib.sha256(wheel.read_bytes()).hexdigest() for wheel in wheels)
     assert first == second
     with zipfile.ZipFile(wheels[0]) as wheel:

@@ -7,10 +7,10 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from watchdog import HANG
 
 from tests.fuzz.compiler.fuzz_compiler import SOURCES, examine
 from tests.fuzz.programs.c_shapes import Program
+from tests.watchdog import HANG
 
 
 @pytest.mark.parametrize("seed", range(1, 3))

@@ -11,13 +11,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from matplotlib.colors import to_rgb
-from watchdog import HANG
 
 from arena.analysis import plots
 from arena.analysis.report import BEGIN, END
 from arena.cli import main
 from arena.trial.record import RecordError, read_trial, trials_in, write_trial
 from arena.trial.trial import Rows
+from tests.watchdog import HANG
 
 SHORT = ["--brain", "scripted", "--minutes", "0.1", "--controller", "A"]
 

@@ -13,7 +13,6 @@ from pathlib import Path
 import pyarrow
 import pytest
 from pyarrow import parquet
-from watchdog import HANG
 
 from arena.campaign import campaign, cluster
 from arena.campaign.campaign import Plan
@@ -24,6 +23,7 @@ from arena.scene.loader import load_scene, scripted
 from arena.trial import versions
 from arena.trial.record import RecordError, read_trial
 from arena.trial.strict_json import mismatch
+from tests.watchdog import HANG
 
 ROOT = Path(__file__).resolve().parents[3]
 SHORT = ["run", "clustering", "--brain", "scripted", "--minutes", "0.05", "--trials", "1", "--jobs", "1"]

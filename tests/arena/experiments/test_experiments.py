@@ -10,7 +10,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from watchdog import HANG
 
 from arena.cli import main
 from arena.experiments import TrialSamples, experiment_of
@@ -21,6 +20,7 @@ from arena.scene.loader import Scene, SceneError, load_scene, scripted
 from arena.trial.record import read_trial
 from arena.trial.trial import run_trial
 from arena.world.physics import World
+from tests.watchdog import HANG
 
 ROOT = Path(__file__).resolve().parents[3]
 SCENE = """name = "mine"

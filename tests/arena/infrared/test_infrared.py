@@ -16,7 +16,6 @@ from functools import partial
 from pathlib import Path
 
 import pytest
-from watchdog import HANG
 
 from arena.cli import main
 from arena.infrared.channel import OpticalChannel, light_code
@@ -33,6 +32,7 @@ from emu.chips.dspic30f6014a import DSPIC30F6014A
 from emu.machine.machine import Machine
 from emu.system.record import Record
 from tests.arena import reference_light
+from tests.watchdog import HANG
 
 ROOT = Path(__file__).resolve().parents[3]
 UP = math.pi / 2

@@ -16,7 +16,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from watchdog import HANG
 
 from arena.campaign.campaign import Plan, run_one, trial_path
 from arena.cli import main
@@ -28,6 +27,7 @@ from arena.scene.loader import load_scene, scripted
 from arena.trial.record import RecordError, read_trial, write_trial
 from arena.trial.trial import Rows, run_trial
 from tests.arena.browser import BROWSER, needs_browser
+from tests.watchdog import HANG
 
 PROBE = """<pre id="result"></pre><script>
 const found = {before: d.t.length, title: document.title};

@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from watchdog import HANG
 
 from arena.cli import main
 from arena.replay.page import page
 from arena.trial.record import read_trial
 from tests.arena.browser import BROWSER, needs_browser
+from tests.watchdog import HANG
 
 SAMPLE = 7
 PROBE = """<pre id="result"></pre><script>

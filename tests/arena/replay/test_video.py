@@ -8,12 +8,12 @@ from pathlib import Path
 
 import pytest
 from PIL import Image
-from watchdog import HANG
 
 from arena.cli import main
 from arena.replay import video
 from arena.replay.video import SCALE, frames
 from arena.trial.record import read_trial
+from tests.watchdog import HANG
 
 
 @pytest.fixture(scope="module")

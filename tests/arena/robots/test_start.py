@@ -9,7 +9,6 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from watchdog import HANG
 
 from arena.cli import main
 from arena.robots.firmware_controller import FirmwareController
@@ -17,6 +16,7 @@ from arena.scene.loader import FCY, load_scene
 from arena.trial.record import Trial, read_trial
 from arena.world.physics import World
 from tests.arena.images import BEGIN, ECHO
+from tests.watchdog import HANG
 
 ROOT = Path(__file__).resolve().parents[3]
 Assembled = Callable[[str], Path]

@@ -19,7 +19,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from watchdog import HANG
 
 from arena.campaign.campaign import Plan, controllers_of
 from arena.commands import studio as command
@@ -32,6 +31,7 @@ from arena.trial import checkpoints
 from arena.trial.trial import run_trial
 from tests.arena.browser import BROWSER, needs_browser
 from tests.arena.images import ECHO
+from tests.watchdog import HANG
 
 ROOT = Path(__file__).resolve().parents[3]
 SECONDS = 6.0

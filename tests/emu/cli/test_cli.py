@@ -11,7 +11,8 @@ from pathlib import Path
 
 import pytest
 from programs import SPIN, executable
-from watchdog import HANG
+
+from tests.watchdog import HANG
 
 ROOT = Path(__file__).resolve().parents[3]
 EMU = [sys.executable, "-m", "emu"]

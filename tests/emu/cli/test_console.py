@@ -7,10 +7,10 @@ import socket
 import threading
 
 import pytest
-from watchdog import HANG
 
 from emu.run.input_log import HEADER, TimestampedInput, read_input_log
 from emu.run.uart_backends import open_port, wait_for_input
+from tests.watchdog import HANG
 
 
 def test_a_file_gets_every_byte_and_gives_none(tmp_path):

@@ -11,11 +11,11 @@ from collections import Counter
 from xml.etree import ElementTree
 
 import pytest
-from watchdog import HANG
 
 import emu
 from emu.cli import main
 from emu.instruments.coverage import Counts, count_executions
+from tests.watchdog import HANG
 from toolchain.driver import driver
 
 SOURCE = """\

@@ -8,12 +8,12 @@ import sys
 from pathlib import Path
 
 import pytest
-from watchdog import HANG
 
 from arena.trial.record import Columns, RecordError
 from emu.image.loader import load_image
 from emu.instruments.coverage import Counts
 from tests.fuzz.emulator.fuzz_inputs import call, campaign, converse
+from tests.watchdog import HANG
 
 HELLO = Path(__file__).with_name("hello.hex")
 

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 from programs import SETUP, executable
-from watchdog import HANG
 
 from emu.api import load
+from tests.watchdog import HANG
 
 LINE = "swarm\n"
 BIT_TCY = 16 * (7 + 1)

@@ -14,9 +14,9 @@ from pathlib import Path
 
 import pytest
 from programs import ECHO, HELLO, SPIN, executable
-from watchdog import HANG
 
 from emu.cli import main
+from tests.watchdog import HANG
 
 ROOT = Path(__file__).resolve().parents[3]
 

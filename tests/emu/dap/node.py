@@ -9,7 +9,8 @@ import sys
 from pathlib import Path
 
 import pytest
-from watchdog import HANG
+
+from tests.watchdog import HANG
 
 ROOT = Path(__file__).resolve().parents[3]
 PACKAGES = ("@vscode/debugadapter-testsupport@1.68", "mocha@11")

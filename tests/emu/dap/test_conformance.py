@@ -9,10 +9,10 @@ import sys
 from pathlib import Path
 
 import pytest
-from watchdog import HANG
 
 from tests.emu.dap.node import ROOT, mocha, node_modules
 from tests.emu.dap.test_dap import SOURCE, line_of
+from tests.watchdog import HANG
 from toolchain.driver import driver
 
 

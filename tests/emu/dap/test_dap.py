@@ -12,9 +12,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from watchdog import HANG
 
 from tests.emu.dap.client import ROOT, Client
+from tests.watchdog import HANG
 from toolchain.driver import driver
 
 SOURCE = Path(__file__).parent / "program.c"

@@ -9,9 +9,9 @@ import sys
 from pathlib import Path
 
 import pytest
-from watchdog import HANG
 
 from tests.emu.dap.test_dap import SOURCE, line_of
+from tests.watchdog import HANG
 from toolchain.driver import driver
 
 ROOT = Path(__file__).resolve().parents[3]

@@ -16,13 +16,13 @@ from engine_pair import load
 from random_firmware import difference
 from straight_body import Shape
 from straight_firmware import straight_firmware
-from watchdog import HANG
 
 from emu.dspic30f.jit import compiler as compiler_module
 from emu.dspic30f.jit.cache import SHELVES, ObjectCache
 from emu.dspic30f.jit.compiler import MAX_DEATHS, Compiler, LoadedCode
 from emu.dspic30f.jit.engine import JitEngine
 from emu.machine.machine import Machine
+from tests.watchdog import HANG
 
 IR = "define i64 @entry(ptr %rec, ptr %env) {{\n  ret i64 {}\n}}\n"
 

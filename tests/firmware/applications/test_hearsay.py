@@ -7,7 +7,8 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from watchdog import HANG
+
+from tests.watchdog import HANG
 
 HERE = Path(__file__).parent
 FIRMWARE = HERE.parents[2] / "firmware"

@@ -7,7 +7,8 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from watchdog import HANG
+
+from tests.watchdog import HANG
 
 HOST = Path(__file__).parents[1] / "host"
 TESTS = [name for file in sorted(HOST.glob("*.c")) for name in re.findall(r"^TEST\((\w+),", file.read_text(), re.M)]

@@ -9,9 +9,9 @@ import sys
 from pathlib import Path
 
 import pytest
-from watchdog import HANG
 
 from tests.firmware.conftest import FIRMWARE
+from tests.watchdog import HANG
 
 MAIN = """#include <openswarm.h>
 #ifndef BLINK

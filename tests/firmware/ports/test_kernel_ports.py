@@ -8,7 +8,6 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from watchdog import HANG
 
 import emu
 from firmware.tools.simulated import epuck2
@@ -17,6 +16,7 @@ from firmware.tools.simulated.machine import NotInstalled, Stopped, pointer, pok
 from firmware.tools.simulated.measure import sizes
 from tests.firmware.conftest import FIRMWARE, TARGET_APPS, Build, run_make
 from tests.firmware.kernel.test_kernel_on_target import run_to
+from tests.watchdog import HANG
 
 CONFORMS = re.compile(rb"conforms: (\d+) checks")
 CHECKS, CHECKS_OF_OPTIONS = 282, 417

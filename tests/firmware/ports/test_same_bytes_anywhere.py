@@ -13,9 +13,9 @@ import sys
 from pathlib import Path
 
 import pytest
-from watchdog import HANG
 
 from emu.cli import main
+from tests.watchdog import HANG
 from toolchain.driver import driver
 
 ROOT = Path(__file__).resolve().parents[3]

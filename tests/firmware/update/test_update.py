@@ -11,7 +11,6 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from watchdog import HANG
 
 import emu
 from emu.dspic30f.isa.text import parse
@@ -21,6 +20,7 @@ from openswarm.flashing.messages import MESSAGE, PARTS, Advertisement, Request, 
 from openswarm.flashing.messages import data as part_of
 from openswarm.flashing.program import ROWS as SLOT_ROWS
 from openswarm.flashing.program import Program
+from tests.watchdog import HANG
 
 HERE = Path(__file__).parent
 OPENSWARM = HERE.parents[2] / "firmware" / "openswarm"

@@ -5,9 +5,9 @@ import sys
 from pathlib import Path
 
 import pytest
-from watchdog import HANG
 
 from emu.api import load
+from tests.watchdog import HANG
 from toolchain.asm.assemble import assemble
 from toolchain.elf.write import executable_bytes
 from toolchain.link.hexfile import hex_text

@@ -11,7 +11,8 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from watchdog import HANG
+
+from tests.watchdog import HANG
 
 HERE = Path(__file__).parent
 RUNTIME = HERE.parents[2] / "toolchain" / "runtime"
