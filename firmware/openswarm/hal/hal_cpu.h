@@ -100,8 +100,9 @@ typedef sys_pcb *(*hal_pick)(void); /* kernel stack, slice level; returns the th
 /* Called before any other function. Until hal_start() interrupts stay disabled and the level is slice, so that blocking
  * calls are refused. Adopts the running context as that of process and sets its sp and limit. */
 void hal_init(sys_pcb *process);
-/* Starts the 1 ms clock (which calls os_clock_tick at level device) and the slice timer, and enables interrupts. The level
- * stays slice. The kernel then calls hal_unlock(HAL_THREAD_LEVEL), which takes a slice interrupt forced before. */
+/* Starts the 1 ms clock (which calls os_clock_tick at level device) and the slice timer, and enables interrupts. The
+ * level stays slice. The kernel then calls hal_unlock(HAL_THREAD_LEVEL), which takes a slice interrupt forced
+ * before. */
 void hal_start(void);
 
 /* Builds the first frame of a thread that calls entry(arg), then os_thread_returned(). The stack ends where process

@@ -83,8 +83,8 @@ enum {
 /* M | no | - | 60 | MEMORY.  Initialises kernel, board and devices; the caller becomes PID 0. Interrupts stay
  * disabled. */
 void Sys_Init_Kernel(void);
-/* M | no | - | 40 | none.  Enables clock, slices and devices. The caller continues as the system thread, in its critical
- * section if one is open. */
+/* M | no | - | 40 | none.  Enables clock, slices and devices. The caller continues as the system thread, in its
+ * critical section if one is open. */
 void Sys_Start_Kernel(void);
 /* T (PID 0 only) | never returns | - | 30 | CONTEXT.  Retires the system thread: from now on the kernel idles
  * whenever no thread is ready, and the stack of main is no longer used. */

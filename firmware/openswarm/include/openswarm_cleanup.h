@@ -23,8 +23,9 @@ typedef struct sys_cleanup {
 /* T | no | 94; 106 beside two of others | 28 | CONTEXT, ARGUMENT: NULL, or the object is pushed already.  Makes the
  * kernel call run(arg) when the calling thread ends, the newest cleanup first. SYS_EVENT_TERMINATION follows.
  *
- * Teardown has a fixed order. First the thread leaves every list of the kernel: it owns no subscription, message, mutex,
- * join or service, and no call finds its PID. Then its cleanups run. Its memory exists until the last one has returned.
+ * Teardown has a fixed order. First the thread leaves every list of the kernel: it owns no subscription, message,
+ * mutex, join or service, and no call finds its PID. Then its cleanups run. Its memory exists until the last one has
+ * returned.
  *
  * A cleanup may call what a handler may call (H). Sys_Get_ProcessID returns the PID of the ending thread. The cleanup
  * runs as in a critical section, on the stack of the context that ends the thread. If a cleanup ends other threads,

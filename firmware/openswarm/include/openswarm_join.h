@@ -11,8 +11,8 @@
 uint16 Sys_Start_Joinable(const sys_process_config *config);
 /* T | until the thread has ended | 803 for a zombie beside the events of the system; 242 to the next thread if it
  * blocks | 60 | CONTEXT, PROCESS: no such thread, or it is the system thread, the caller, or joins the caller,
- * directly or through others.  Waits for the end of any
- * thread, or removes a zombie. Several threads may join the same thread. */
+ * directly or through others.  Waits for the end of any thread, or removes a zombie. Several threads may join the
+ * same thread. */
 bool Sys_Join(uint16 pid);
 
 #endif

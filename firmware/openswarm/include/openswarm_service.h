@@ -26,9 +26,8 @@ typedef struct sys_service {
     uint16 bitten;                    /* kills by the watchdog; saturates */
 } sys_service;
 
-/* MTH | no | 108 more than Sys_Start_ProcessWith | 48 | those of
- * Sys_Start_ProcessWith, PROCESS: the service is running.  Starts the thread
- * and its supervision. A service without restarts left may be started again. */
+/* MTH | no | 108 more than Sys_Start_ProcessWith | 48 | those of Sys_Start_ProcessWith, PROCESS: the service is
+ * running.  Starts the thread and its supervision. A service without restarts left may be started again. */
 bool Sys_Start_Service(sys_service *service);
 /* T | no | 87, 10 more per service that began later | 22 | PROCESS: the caller is no service.  Resets the caller's
  * watchdog. */

@@ -3,9 +3,9 @@
 #include "kernel.h"
 #include "openswarm_cleanup.h"
 
-static sys_cleanup *cleanups;  /* of all threads, newest first; slice locked */
-static sys_pcb *dying;         /* threads on no other list whose cleanups are still to run, in order of their end */
-static sys_pcb *interrupted;   /* os_running of a handler in which cleanups run; NULL: they run elsewhere or do not run */
+static sys_cleanup *cleanups; /* of all threads, newest first; slice locked */
+static sys_pcb *dying;        /* threads on no other list whose cleanups are still to run, in order of their end */
+static sys_pcb *interrupted;  /* os_running of a handler in which cleanups run; NULL: they run elsewhere or not */
 
 /* Returns the link to the newest cleanup of a thread, or NULL if it has none. */
 static sys_cleanup **newest_of(const sys_pcb *thread)
