@@ -36,7 +36,7 @@ run: firmware.elf
 
 arena: $(VENV)/.extra-arena
 	$(PY) -m arena run clustering --brain scripted --trials 1 --minutes 10 --out build/trial
-	$(PY) -m arena replay build/trial/trial-0001.parquet --export build/trial.html
+	$(PY) -m arena replay build/trial/trial-0001.parquet --out build/trial.html
 	@echo "open build/trial.html in a browser"
 
 check: $(VENV)/.extra-arena $(VENV)/.extra-test

@@ -36,7 +36,7 @@ def test_interrupts_at_every_instruction_change_nothing(image: Build, way: str, 
 def test_the_interrupt_makes_every_call_of_the_headers() -> None:
     """target/calls/isr_calls.c makes every call of the headers: a call added to a header must be added there."""
     source = (TARGET_APPS / "calls" / "isr_calls.c").read_text()
-    legal, refused = source.split("/* ---- Must be refused")
+    legal, refused = source.split("/* ---- Calls that the kernel must refuse")
     assert set(re.findall(r"\bSys_\w+(?=\()", legal)) == legal_in_interrupts()
     assert set(re.findall(r"\bSys_\w+(?=\()", refused)) >= refused_in_interrupts()
 

@@ -290,7 +290,10 @@ def test_an_overflow_of_the_kernel_stack_stops_the_system(target: str, tmp_path:
 
 
 def test_the_smallest_program_of_the_kilobot(tmp_path: Path) -> None:
-    """Kernel, one thread and UART take 6 kB of flash and 500 bytes of RAM, including main's stack."""
+    """Kernel, one thread and UART take about 6 kB of flash and 500 bytes of RAM, including main's stack.
+
+    6,152 bytes are measured: 6,142 before a critical section could stay open across `Sys_Start_Kernel`.
+    """
     image = make("kilobot", "smallest", tmp_path)
     machine = kilobot(image)
     behind, last = machine.symbols["_end"] & 0xFFFF, 0x8FF
@@ -300,7 +303,7 @@ def test_the_smallest_program_of_the_kilobot(tmp_path: Path) -> None:
     assert machine.uart() == b"hello, swarm\r\n" * 3
     main_stack = len(machine.peek_bytes(behind + 1, last - behind).lstrip(paint))
     size = sizes(image)
-    assert size["flash"] <= 6144
+    assert size["flash"] <= 6152
     assert size["ram"] + main_stack <= 500
 
 
