@@ -15,7 +15,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 
-from emu.image.lines import Line, Lines  # noqa: E402
+from emu.image.lines import LineTable, SourceLine  # noqa: E402
 from emu.image.loader import load_image  # noqa: E402
 from toolchain.elf.read import read_executable  # noqa: E402
 from toolchain.errors import ToolError  # noqa: E402
@@ -49,7 +49,7 @@ def findings(image: Path) -> Iterator[str]:
         yield from intrusions(analysis, lines, vector, level, places[f"_sys_isr_{vector}"])
 
 
-def of_system(analysis: Analysis, lines: Lines, function: int) -> Line | None:
+def of_system(analysis: Analysis, lines: LineTable, function: int) -> SourceLine | None:
     """Return the first line of kernel or device code in a function, including inlined code."""
     end = min((entry for entry in analysis.entries if entry > function), default=function)
     for address in range(function, end, 2):
@@ -59,7 +59,7 @@ def of_system(analysis: Analysis, lines: Lines, function: int) -> Line | None:
     return None
 
 
-def intrusions(analysis: Analysis, lines: Lines, vector: str, level: int, entry: int) -> Iterator[str]:
+def intrusions(analysis: Analysis, lines: LineTable, vector: str, level: int, entry: int) -> Iterator[str]:
     """Yield all functions of the system reachable from `entry`, each with the shortest call path."""
     ways = {entry: [vector]}
     waiting = [entry]
