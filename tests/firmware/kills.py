@@ -92,8 +92,8 @@ class Stage:
         return block, pcb + PCB - block
 
     def is_reserve(self, block: int) -> bool:
-        """Whether interrupts may now allocate messages from this memory (`low` and `high` of kernel/memory.c)."""
-        return self.machine.peek("low") <= block < self.machine.peek("high")
+        """Whether interrupts may now allocate messages from this memory (`reserve_begin` and `reserve_end` of kernel/memory.c)."""
+        return self.machine.peek("reserve_begin") <= block < self.machine.peek("reserve_end")
 
     def kill(self, block: int, size: int, pause: int) -> None:
         """Inject the killing interrupt and the end of the slice at this boundary, then check all devices."""
