@@ -92,7 +92,7 @@ class Stage:
         return block, pcb + PCB - block
 
     def is_reserve(self, block: int) -> bool:
-        """Whether interrupts may now allocate messages from this memory (`reserve_begin` and `reserve_end` of kernel/memory.c)."""
+        """Whether interrupts may now allocate messages from this memory (the reserve of kernel/memory.c)."""
         return self.machine.peek("reserve_begin") <= block < self.machine.peek("reserve_end")
 
     def kill(self, block: int, size: int, pause: int) -> None:

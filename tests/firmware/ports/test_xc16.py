@@ -18,6 +18,7 @@ import pytest
 
 from emu.cli import main
 from tests.firmware.conftest import FIRMWARE, ROOT
+from toolchain.device_header import folder_of
 
 APPS = ["hello", "listing1", "processors", "footprint", "latency", "stress"]
 OPTIONS = (
@@ -138,6 +139,8 @@ def check_gnu99(source: Path, *folders: Path) -> None:
     includes = [f"-I{folder}" for folder in [*HEADERS, *shared, *folders]] + [
         "-isystem",
         str(ROOT / "toolchain" / "include"),
+        "-isystem",
+        str(folder_of("dsPIC30F6014A")),
     ]
     flags = [
         "-std=gnu99",
