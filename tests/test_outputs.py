@@ -116,6 +116,7 @@ def test_names_of_open_files_are_opened(tmp_path: Path) -> None:
 HEX = Path(__file__).resolve().parent / "emu" / "cli" / "hello.hex"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("line", "given", "start"),
     [

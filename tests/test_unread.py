@@ -21,6 +21,7 @@ WORDS = [
 ]  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("line", WORDS)
 def test_a_reader_that_has_gone_is_no_failure(line: str) -> None:
     """If standard output is a pipe whose reader has closed it, a command ends with status 0 and no message.

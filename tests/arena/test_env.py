@@ -148,6 +148,7 @@ def example() -> ModuleType:
     return module
 
 
+@pytest.mark.slow
 def test_a_controller_is_evolved_and_becomes_firmware(tmp_path: Path) -> None:
     """The evolved controller is at least as good as the first one, depends only on the seed, and its constants
     compile."""

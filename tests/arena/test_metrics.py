@@ -191,6 +191,7 @@ print((resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) // 1024)
 """
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="the peak of memory has other units, or none, elsewhere")
 def test_metrics_of_many_objects_need_little_memory() -> None:
     """Shares of 400 and of 100 objects over 15 minutes need less than 200 MB."""

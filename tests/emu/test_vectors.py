@@ -93,6 +93,7 @@ def test_the_recorded_set_is_complete() -> None:
     assert (len(rows), sum(row["assembles"] == "yes" for row in rows)) == (ENCODINGS, ASSEMBLED)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("part", range(PARTS))
 def test_every_semantic_vector_gives_its_recorded_state(
     engine: Engine, part: int, vectors: Path, request: pytest.FixtureRequest, capsys: pytest.CaptureFixture[str]

@@ -59,6 +59,7 @@ def test_a_failure_names_its_seed_and_how_to_see_it_again(
     assert "again: python tests/fuzz/fuzz_x.py --engine jit --seed 41 --tries 1" in said
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(campaigns()))
 def test_every_campaign_takes_a_seed_and_a_time(name: str) -> None:
     """Every campaign accepts --seed and --seconds, which `python -m tests.fuzz` passes."""

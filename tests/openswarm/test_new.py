@@ -44,6 +44,7 @@ def test_it_has_its_name_everywhere_and_no_hole(project):
     assert not [path for path in project.rglob("*") if path.is_file() and "@PROJECT@" in path.read_text()]
 
 
+@pytest.mark.slow
 def test_make_builds_and_its_test_tells_right_from_wrong(project):
     """The project's test passes, and a mistake in the C source is reported in the format of VS Code's problem
     matcher."""
@@ -77,6 +78,7 @@ def test_the_editor_finds_the_line_of_a_fault(project):
     assert [(one[2], one[3]) for one in found] == [("main.c", "8"), ("docs/examples/bad.c", "7")]
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(shutil.which("cmake") is None, reason="no CMake here (Debian package cmake)")
 def test_cmake_builds_it(project):
     """CMake identifies the compiler and builds a program with the same output as make's."""

@@ -30,6 +30,7 @@ def run_command(*words: str, **environment: str) -> subprocess.CompletedProcess[
                           cwd=ROOT, env=os.environ | environment)  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("program", PROGRAMS)
 def test_every_program_tells_its_version_and_helps_with_an_example(program):
     assert run_command(program, "--version").stdout == f"{program} {version('openswarm')}\n"
@@ -38,6 +39,7 @@ def test_every_program_tells_its_version_and_helps_with_an_example(program):
     assert run_command(program, "no-such-command").returncode == exit_status.BAD_INPUT
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("program", PROGRAMS)
 def test_every_program_completes_itself_in_bash(program, tmp_path):
     """The completion script of every program returns the commands to bash."""

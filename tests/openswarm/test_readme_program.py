@@ -14,6 +14,7 @@ from emu.cli import main
 ROOT = Path(__file__).resolve().parents[2]
 
 
+@pytest.mark.slow
 def test_the_program_blinks_and_drives(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """The README's thread toggles the body LED, and its handler drives after the selector is turned at 0.5 s."""
     (program,) = re.findall(r"```c\n(.*?)```", (ROOT / "README.md").read_text(encoding="utf-8"), re.DOTALL)

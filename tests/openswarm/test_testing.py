@@ -82,6 +82,7 @@ def run_pytest(folder: Path, *words: str) -> str:
     return done.stdout
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("how", [(), ("-n", "2", "--dist", "load")], ids=["one process", "xdist"])
 def test_a_failure_says_where_and_leaves_a_waveform(tests, how):
     said = run_pytest(tests, "--junitxml", "out.xml", "-o", "junit_family=xunit1", *how)
@@ -112,6 +113,7 @@ def test_without_firmware_it_says_what_to_write(tests):
     assert "no firmware: mark the test @pytest.mark.firmware(...) or set `firmware` in pytest.ini" in run_pytest(tests)
 
 
+@pytest.mark.slow
 def test_a_compiler_s_message_reaches_the_report(tests):
     (tests / "main.c").write_text("int main(void) { return nothing; }\n")
     assert re.search(r"main\.c:1:25: error: use of undeclared identifier", run_pytest(tests))

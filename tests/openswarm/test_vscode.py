@@ -185,6 +185,7 @@ def test_odd_values_of_a_configuration_are_refused_in_words() -> None:
     ]  # fmt: skip
 
 
+@pytest.mark.slow
 def test_it_is_packaged(tmp_path: Path) -> None:
     """VS Code's tool packages the extension, its licence and its README, and no other file."""
     npx = shutil.which("npx")

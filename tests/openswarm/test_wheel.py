@@ -56,6 +56,7 @@ def test_the_wheel_holds_everything_and_repeats(tmp_path):
     ]
 
 
+@pytest.mark.slow
 def test_the_first_steps_say_what_happens(tmp_path):
     """docs/first-steps.md works from the wheel in an empty folder with an empty HOME, and creates files only there."""
     script = ROOT / "docs" / "tools" / "first_steps.py"

@@ -201,6 +201,7 @@ class Bench:
         return "" if self.machine.w[15] == self.top - 4 else "callee: the stack is not balanced"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("level", ["-O0", "-Os"])
 @pytest.mark.parametrize("side", ["caller", "callee"])
 def test_every_vector_of_the_calling_convention(side: str, level: str, vectors: Path, tmp_path: Path) -> None:

@@ -33,6 +33,7 @@ int main(void) { return f(five, seven); }
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("letter", sorted(CLASSES))
 @pytest.mark.parametrize("level", ["-O0", "-Os"])
 def test_a_letter_is_a_register_of_its_class(letter: str, level: str, tmp_path: Path) -> None:

@@ -228,6 +228,7 @@ def abi_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return tmp_path_factory.mktemp("abi")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("level", LEVELS)
 @pytest.mark.parametrize("number", range(len(SIGNATURES)), ids=[s.rule for s in SIGNATURES])
 def test_c_puts_arguments_where_assembly_expects_them(number: int, level: str, abi_folder: Path) -> None:

@@ -13,6 +13,7 @@ from tests.fuzz.programs.c_shapes import Program
 from tests.watchdog import HANG
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(1, 3))
 def test_a_program_does_the_same_at_every_level_and_on_the_host(seed: int) -> None:
     """A program has one checksum and one sequence of register accesses at every level and on the host."""

@@ -10,6 +10,7 @@ SEEDS = [seed for seed in range(9000, 9014) if seed not in (9001, 9012)]
 """Seeds 9000-9013 without two whose programs run for more than 15,000,000 cycles at -O0."""
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not available(), reason="csmith is not installed (Debian package csmith)")
 @pytest.mark.parametrize("seed", SEEDS)
 def test_random_program_gives_one_checksum_at_every_level(seed: int) -> None:

@@ -17,6 +17,7 @@ def compiled(source: Path, folder: Path, *options: str) -> int:
     return cli.main(["c++", *options, str(source), "-o", str(folder / "a.elf")])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("level", "lto"), MODES)
 @pytest.mark.parametrize("program", sorted(path.name for path in PROGRAMS.glob("*.cpp")))
 def test_program(program: str, level: str, lto: str, tmp_path: Path) -> None:
@@ -25,6 +26,7 @@ def test_program(program: str, level: str, lto: str, tmp_path: Path) -> None:
     assert run(tmp_path / "a.elf").status == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "header",
     ["array", "algorithm", "atomic", "chrono", "functional", "limits", "memory", "numeric", "optional", "ratio",

@@ -117,6 +117,7 @@ REFUSED = [
 ]  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("options", OPTIONS, ids=" ".join)
 @pytest.mark.parametrize(("line", "said"), REFUSED, ids=[row[1] for row in REFUSED])
 def test_what_is_refused_of_a_function_names_its_line(

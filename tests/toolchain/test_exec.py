@@ -85,6 +85,7 @@ PARAMETERS = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("path", "level", "name"), PARAMETERS)
 def test_c_program_does_what_the_standard_says(path: Path, level: str, name: str, image_folder: Path) -> None:
     """Each case passes; its second argument cites the paragraph of C11 or of abi-elf.md."""

@@ -73,6 +73,7 @@ int main(void) {
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("alone", ALONE)
 @pytest.mark.parametrize("level", LEVELS)
 def test_loops_replaced_by_library_functions_link_and_work(level: str, alone: str, tmp_path: Path) -> None:

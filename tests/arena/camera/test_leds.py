@@ -117,6 +117,7 @@ def test_leds_are_visible_one_quantum_late() -> None:
     assert len(channel._leds[1]) <= 310
 
 
+@pytest.mark.slow
 def test_firmware_takes_a_robot_with_a_lit_red_led_for_an_object(
     clustering_image: Path, assembled: Callable[[str], Path], scene: Scene
 ) -> None:

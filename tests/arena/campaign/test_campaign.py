@@ -291,6 +291,7 @@ def test_a_disk_that_fills_up_during_a_run_ends_it_and_keeps_what_is_finished(
     assert len(contents(tmp_path)) == 3
 
 
+@pytest.mark.slow
 def test_an_interrupted_run_keeps_finished_trials_and_leaves_no_half_ones(tmp_path: Path) -> None:
     """After SIGINT the same command continues the run, and its files equal those of an uninterrupted run."""
     command = ["run", "clustering", "--brain", "scripted", "--trials", "8", "--minutes", "1"]

@@ -52,6 +52,7 @@ def test_firmware_travels_to_the_workers(
     assert capsys.readouterr().err.count("robot 0 stopped") == 2
 
 
+@pytest.mark.slow
 def test_a_scheduler_that_is_not_there_is_reported(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """A scheduler address that is invalid, or whose port has no listener, ends with exit status 2."""
     command = ["run", "clustering", "--brain", "scripted", "--minutes", "0.05", "--trials", "1", "--out", str(tmp_path)]

@@ -112,6 +112,7 @@ def test_a_sweep_cannot_choose_a_folder_by_its_values(tmp_path: Path) -> None:
     assert all(path.parent == tmp_path / "deep" / "deeper" for path in made)
 
 
+@pytest.mark.slow
 def test_two_runs_do_not_share_a_folder(tmp_path: Path) -> None:
     """The second run ends with status 3 and changes nothing; the first run is unaffected."""
     long = ["run", "clustering", "--brain", "scripted", "--minutes", "2", "--trials", "3", "--jobs", "1"]
@@ -250,6 +251,7 @@ def test_a_worker_of_another_version_is_refused() -> None:
         cluster.run_remote_trial(plan, cluster.InputFiles(None, None, []), 1, versions.versions() | {"pymunk": "0.1"})
 
 
+@pytest.mark.slow
 def test_a_scheduler_that_dies_is_one_line_and_what_is_finished_stays(tmp_path: Path) -> None:
     """A lost scheduler is status 3; the same command without the cluster continues."""
     pytest.importorskip("distributed", reason="Dask is not installed (extra: cluster)")

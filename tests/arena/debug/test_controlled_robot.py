@@ -36,6 +36,7 @@ def world(client: Client) -> str:
     return output
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("scene", "brain", "robot", "place"),
     [("clustering", "", 2, "react"), ("avoidance", "avoidance", 1, "steer")],
@@ -111,6 +112,7 @@ def test_a_change_in_the_past_becomes_the_present(clustering_image: Path) -> Non
     client.close()
 
 
+@pytest.mark.slow
 def test_a_client_that_disconnects_and_a_second_client(
     tmp_path: Path, clustering_image: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
@@ -198,6 +200,7 @@ def test_an_unknown_robot_is_refused(capsys: pytest.CaptureFixture[str]) -> None
     assert "no firmware" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_logged_inputs_reproduce_the_past_to_the_bit(tmp_path: Path, tmp_path_factory: pytest.TempPathFactory) -> None:
     """Logged inputs reproduce a robot's past to the bit: levels of the infrared sensors and the stored light."""
     image = built_once(tmp_path_factory, "avoidance")

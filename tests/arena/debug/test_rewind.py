@@ -76,6 +76,7 @@ def session_of(plan: Plan, folder: Path, **how: Any) -> Iterator[tuple[DebugSess
         session.close()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("swarm", SWARMS, ids=[one.scene for one in SWARMS])
 def test_random_walks_restore_equal_worlds(swarm: Swarm, image_of: Callable[[str], Path]) -> None:
     """Random forward and backward runs restore equal worlds, by hash, and leave the record unaffected.
@@ -98,6 +99,7 @@ def test_other_robots_are_restored_in_the_middle_of_a_quantum(image_of: Callable
     assert tally["met again"] > 20
 
 
+@pytest.mark.slow
 @needs_fork
 def test_an_editor_client_moves_the_whole_world(
     tmp_path: Path, tmp_path_factory: pytest.TempPathFactory, clustering_image: Path

@@ -81,6 +81,7 @@ def trial(tmp_path: Path, scene: str, seconds: float, *words: str) -> Trial:
     return read_trial(tmp_path / "out" / "trial-0001.parquet")
 
 
+@pytest.mark.slow
 def test_three_clocks_come_together(tmp_path: Path) -> None:
     """Three clocks that differ by 0.12 s approach each other although a third of all messages is lost."""
     made = trial(tmp_path, "clocks", 3.0, "--set", "start.spread_tcy=4423680")
@@ -104,6 +105,7 @@ def test_a_leader_is_one_who_lives() -> None:
     assert series.curves["leaders"].tolist() == [0, 1, 0, 1]
 
 
+@pytest.mark.slow
 def test_three_robots_elect_one(tmp_path: Path) -> None:
     """Three robots elect the robot whose selector makes it the leader."""
     made = trial(tmp_path, "leader", 2.0, "--set", "start.spread_tcy=1474560")
@@ -125,6 +127,7 @@ def test_who_has_stopped_says_so_and_stands() -> None:
     assert series.last("between") == pytest.approx(0.33)
 
 
+@pytest.mark.slow
 def test_three_robots_stop_together(tmp_path: Path) -> None:
     """One robot knows the stopping time; the two others stop at it because they receive its messages
     (docs/swarm.md)."""
@@ -143,6 +146,7 @@ def test_a_mean_is_that_of_those_who_live() -> None:
     assert series.curves["typical"][2:] == pytest.approx([0.1, 0.5 / 3])
 
 
+@pytest.mark.slow
 def test_robots_agree_on_a_mean(tmp_path: Path) -> None:
     """Robots with the values 15, 9 and 2 agree on their mean."""
     made = trial(tmp_path, "average", 1.5, "--set", "infrared.lost_share=0")
@@ -165,6 +169,7 @@ def test_who_knows_the_answer_knows_that_all_is_done() -> None:
     assert series.curves["right"] == pytest.approx([0, 0, 1 / 5, 1 / 3])
 
 
+@pytest.mark.slow
 def test_robots_share_a_search(tmp_path: Path) -> None:
     """A robot learns several parts of the search at once from its neighbours."""
     made = trial(tmp_path, "search", 1.5, "--set", "infrared.lost_share=0")

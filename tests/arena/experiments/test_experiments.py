@@ -108,6 +108,7 @@ int main(void)
 """
 
 
+@pytest.mark.slow
 def test_a_new_experiment_needs_a_scene_a_metric_and_some_c(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """A user-defined experiment in an empty folder can be run, printed, drawn and replayed."""
     app = tmp_path / "apps" / "mine"
@@ -194,6 +195,7 @@ def test_experiments_that_are_not_there(tmp_path: Path, capsys: pytest.CaptureFi
 # -- built-in experiments --------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["aggregation", "avoidance", "foraging"])
 def test_the_shipped_experiments_run_with_their_firmware(name: str, tmp_path: Path) -> None:
     """In three seconds of each built-in experiment no robot has a fault, robots move, metrics are finite, and curves

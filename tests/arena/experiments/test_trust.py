@@ -82,6 +82,7 @@ def with_metadata(record: Path, target: Path, **scene: object) -> Path:
     return target
 
 
+@pytest.mark.slow
 def test_reading_a_record_runs_no_code_and_shows_its_curves(study: Study, tmp_path: Path) -> None:
     """Page, figures, report and comparison use the recorded declaration and curves and run no code."""
     page = tmp_path / "page.html"
@@ -93,6 +94,7 @@ def test_reading_a_record_runs_no_code_and_shows_its_curves(study: Study, tmp_pa
     assert study.ran("compare", study.run, study.run, "--at", 1) == (False, "")
 
 
+@pytest.mark.slow
 def test_trust_runs_the_recorded_copy_or_a_named_file(study: Study, tmp_path: Path) -> None:
     """`--trust` and `--experiment` run the experiment's code; the page equals the one made without it."""
     pages = [tmp_path / f"{number}.html" for number in range(3)]
@@ -102,6 +104,7 @@ def test_trust_runs_the_recorded_copy_or_a_named_file(study: Study, tmp_path: Pa
     assert pages[0].read_text() == pages[1].read_text() == pages[2].read_text()
 
 
+@pytest.mark.slow
 def test_a_file_with_another_hash_is_not_run(study: Study, tmp_path: Path) -> None:
     """A changed copy beside the record and a named file with another hash are refused before they run."""
     other = tmp_path / "experiment.py"
@@ -115,6 +118,7 @@ def test_a_file_with_another_hash_is_not_run(study: Study, tmp_path: Path) -> No
         assert "is not the recorded experiment" in error
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", ["replay", "plot", "report", "compare"])
 def test_a_record_that_names_a_foreign_file_does_not_run_it(study: Study, tmp_path: Path, command: str) -> None:
     """The file that the record's scene names is not executed, with or without `--trust`."""
@@ -139,6 +143,7 @@ def test_a_record_that_names_a_foreign_file_does_not_run_it(study: Study, tmp_pa
     assert "not its hash" in error
 
 
+@pytest.mark.slow
 def test_measures_of_the_experiment_need_its_code(tmp_path: Path) -> None:
     """`compare` refuses measures of an untrusted experiment in one sentence, and computes them with `--trust`."""
     study = Study(tmp_path, MEASURES)
@@ -149,6 +154,7 @@ def test_measures_of_the_experiment_need_its_code(tmp_path: Path) -> None:
     assert study.ran("compare", study.run, study.run, "--at", 1, "--trust") == (True, "")
 
 
+@pytest.mark.slow
 def test_verify_runs_the_experiment_of_a_bundle_only_with_permission(study: Study, tmp_path: Path) -> None:
     """`verify` refuses a bundle with code in one sentence; with `--trust` or `--experiment` it verifies the bundle."""
     bundle = tmp_path / "study.zip"

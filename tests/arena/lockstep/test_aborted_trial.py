@@ -40,6 +40,7 @@ def interrupt(robot: FirmwareController) -> None:
     camera.sample(pixels)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("is_native", [True, False])
 def test_an_aborted_trial_is_freed(assembled: Callable[[str], Path], is_native: bool) -> None:
     """After an exception in one robot, the machines, the world and the threads are freed, although other robots wait

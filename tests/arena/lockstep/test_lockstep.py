@@ -58,6 +58,7 @@ def trial(scene: Scene, seed: int, image: Path, selector: int, seconds: float, a
     return result.rows.columns | {"faults": result.faults}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("image", "seed", "selector"), [
     ("clustering_image", 3, 0), ("clustering_image", 4, 1), ("talking_image", 5, 0),
 ])  # fmt: skip
@@ -137,6 +138,7 @@ def test_native_code_renders_and_probes_as_python_does(clustering_image: Path) -
     assert interpreted < 40
 
 
+@pytest.mark.slow
 def test_the_threads_that_run_robots_do_not_show(clustering_image: Path) -> None:
     """The number of threads, also if larger than the number of cores, does not affect the results."""
     alone, *_ = samples(clustering_image, True, 2.0, 12)

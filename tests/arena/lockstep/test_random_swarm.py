@@ -14,6 +14,7 @@ from tests.fuzz.swarm import fuzz_swarm
 from tests.fuzz.swarm.fuzz_swarm import EXPECTED, Trial, check
 
 
+@pytest.mark.slow
 def test_random_swarms_are_equal_in_all_modes(tmp_path: Path) -> None:
     """Single quanta, lock-step in Python and native lock-step give equal results. Three trials reach nearly all
     counters of the campaign."""

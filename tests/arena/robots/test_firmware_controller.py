@@ -184,6 +184,7 @@ def test_a_trial_continues_after_the_firmware_of_a_robot_trapped(
     assert "robot 1 stopped" in error
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("image", "seconds"), [("talking_image", 1.2), ("clustering_image", 3.0)])
 def test_emulated_trials_are_the_same_for_one_and_two_workers(
     image: str, seconds: float, tmp_path: Path, request: pytest.FixtureRequest

@@ -74,6 +74,7 @@ __MathError: bclr INTCON1, #4
     assert (status, trial.about["faults"]) == (0, [])
 
 
+@pytest.mark.slow
 def test_a_kernel_that_stopped_itself_is_reported(tmp_path: Path) -> None:
     """A kernel that ended in hal_stop() after a failed assertion is reported: it sleeps with all interrupts disabled,
     even if an event is pending."""

@@ -348,6 +348,7 @@ def test_bad_requests_are_reported_in_one_line(body: bytes, said: str) -> None:
         assert json.loads(asked(one, "/inspect?robot=1")[1]) == {"robot": 1, "script": True}
 
 
+@pytest.mark.slow
 def test_the_command_ends_with_ctrl_c() -> None:
     """`arena studio` prints its address and ends on Ctrl-C; a bad scene is one line and status 2."""
     words = [sys.executable, "-m", "arena", "studio", "clustering", "--brain", "scripted", "--port", "0"]

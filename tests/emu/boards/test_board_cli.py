@@ -50,6 +50,7 @@ def test_stimulus_file_reaches_the_program(program, tmp_path, capsys):
     assert "uart1 'hello'" in seen.err
 
 
+@pytest.mark.slow
 def test_screenshot_writes_what_the_driver_captured(program, scene, tmp_path, capsys):
     """`emu screenshot` writes the 20 x 20 pixels that the driver captured from the middle of the picture: left red,
     right green."""

@@ -42,6 +42,7 @@ def talk(machine: Machine, data: bytes, cycles: int = 300_000) -> bytes:
     return bytes(heard)
 
 
+@pytest.mark.slow
 def test_programmed_rows_replace_compiled_code(machine):
     """§16: erasing and programming stall the CPU for 2 ms each, and native code of the old row is discarded."""
     machine.run(cycles=2_500_000)
@@ -54,6 +55,7 @@ def test_programmed_rows_replace_compiled_code(machine):
         assert machine.peek("answer") == value
 
 
+@pytest.mark.slow
 def test_a_damaged_row_is_refused_and_nothing_is_erased(machine):
     assert talk(machine, packet(constant(1), damage=1)) == b"qKN"
     assert machine.program.word(ROW) == constant(7)[0]

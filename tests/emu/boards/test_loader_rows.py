@@ -86,6 +86,7 @@ class Host:
         return self.heard.decode()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("port", [1, 2])
 @pytest.mark.parametrize("engine", [name for name in NAMES if name != "auto"])
 def test_an_image_is_programmed_verified_and_started(engine: str, port: int, program) -> None:

@@ -75,6 +75,7 @@ def test_handler_reads_the_bus_16_to_18_tcy_behind_href_and_frames_come_every_16
     assert {later - earlier for earlier, later in pairwise(reads[:40])} == {8, 24}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("sources", "cycles"),
     [

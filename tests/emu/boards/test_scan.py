@@ -73,6 +73,7 @@ def test_closed_forms_equal_a_cycle_by_cycle_model(course, start):
             assert scan.nth_rise(mask, start - 1, number) == start + rise
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sensor", sorted(SENSORS))
 def test_no_register_value_breaks_the_sensor(sensor):
     """With any register values, edges still alternate and bytes are still sent."""

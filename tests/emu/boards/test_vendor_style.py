@@ -27,6 +27,7 @@ def start(request, program):
     return load
 
 
+@pytest.mark.slow
 def test_agenda_steps_both_motors_at_the_library_s_rates(start):
     """epuck.md §3: an agenda with a tick of 1,475 Tcy steps one motor every 20 and the other every 40 ticks: 500 and
     250 steps/s."""
@@ -40,6 +41,7 @@ def test_agenda_steps_both_motors_at_the_library_s_rates(start):
     assert (motors.left.lost, motors.left.illegal, motors.right.lost) == (0, 0, 0)
 
 
+@pytest.mark.slow
 def test_remote_control_sampled_by_the_agenda_gives_the_keys_pressed(start):
     """epuck.md §6: the agenda, the periodic scheduler of the e-puck library, decodes pressed keys.
 
@@ -69,6 +71,7 @@ def test_codec_gets_its_settings_and_the_samples(start):
     assert gaps == {2048}, "7,200 samples a second"
 
 
+@pytest.mark.slow
 def test_serial_protocol_by_interrupt_answers_text_and_binary(start):
     """epuck.md §6: the serial protocol answers text commands and several binary commands in a row, ended by 0; RCON
     shows the RESET."""
@@ -100,6 +103,7 @@ def test_serial_protocol_by_interrupt_answers_text_and_binary(start):
     assert ask(b"abcdefgh" * 2, wait=FCY // 10).count(b"z,") == 16
 
 
+@pytest.mark.slow
 def test_slow_camera_driver_captures_a_grey_picture(start):
     """epuck.md §7.3: the slow driver captures 40 x 40 of 320 x 320 grey pixels from a PO3030K with an interrupt every
     64 Tcy; the identity is 0x3030."""

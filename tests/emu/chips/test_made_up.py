@@ -111,6 +111,7 @@ def test_an_inconsistent_memory_map_is_refused() -> None:
         replace(DSPIC30F6014A, data=dict(DSPIC30F6014A.data) | {"yram": Region("yram", 0x1A00, 0x2800)})
 
 
+@pytest.mark.slow
 def test_a_sample_of_the_instruction_campaign() -> None:
     """A sample of tests/fuzz/emulator/fuzz_engines.py with the fictitious chip finds no difference."""
     assert check_pairs(7, len(ROWS), 2, "jit", MADE_UP)

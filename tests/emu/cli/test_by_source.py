@@ -155,6 +155,7 @@ def machine(build, request):
     return made
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("expression", "value"), GLOBALS)
 def test_expressions_of_c(machine, expression, value):
     assert machine.var(expression) == value
@@ -177,6 +178,7 @@ def test_an_assignment_changes_one_object_only(machine, expression, value):
         assert (machine.var("robot.place.flags"), machine.var("robot.place.x")) == (5, 7)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("expression", "words"),
     [("unknown", "nothing called 'unknown'"), ("robot.weight", "no member 'weight'"), ("robot +", "ends too early"),

@@ -79,6 +79,7 @@ def random_program(seed):
     return "volatile int total; " + "\n".join(functions) + f"\nint main(void) {{ {calls} return total & 0x7F; }}\n"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(10))
 @pytest.mark.parametrize("level", ["-O0", "-Os"])
 def test_what_is_counted_is_what_a_trace_shows(build, tmp_path, seed, level):

@@ -105,6 +105,7 @@ def test_endless_recursion_is_a_stack_overflow_in_the_recursive_function(build, 
     assert functions(found)[:5] == ["depth"] * 5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("level", ["-O0", "-Os"])
 @pytest.mark.parametrize("where", [0x9876, 0x17F00])
 def test_a_wild_jump_is_reported_with_its_origin(build, level, where):
@@ -146,6 +147,7 @@ def test_a_bad_store_is_reported_with_address_and_variables(build, level):
     assert known["value"] in ("1234",) if level == "-O0" else ("1234", "<optimised out>")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("source", "cause"), CHECKS.items())
 @pytest.mark.parametrize("level", ["-O0", "-Os"])
 def test_a_check_of_the_sanitizer_that_fails_is_a_fault(build, capfd, level, source, cause):

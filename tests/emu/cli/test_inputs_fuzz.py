@@ -18,6 +18,7 @@ from tests.watchdog import HANG
 HELLO = Path(__file__).with_name("hello.hex")
 
 
+@pytest.mark.slow
 def test_damaged_files_are_refused_or_read() -> None:
     outcomes = campaign(range(2026, 2146))
     assert sum(outcomes.values()) == 120
@@ -52,6 +53,7 @@ def test_a_message_nested_too_deeply_ends_the_session() -> None:
     assert converse(b'{"arguments": ' + b"[" * 100_000) == "answered"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("command", "key"), [("disassemble", "instructionCount"), ("readMemory", "count")]
 )  # fmt: skip

@@ -142,6 +142,7 @@ def counted(image, engine: str, until: int, timed: bool = False):
     return Profiler(machine, image, timed).run(until)
 
 
+@pytest.mark.slow
 def test_native_counts_equal_single_stepping(nested):
     """Functions, levels, sleep and calls of 200,000 cycles with two nested interrupts equal the counts of single
     steps. If both interrupts are entered at one boundary, single steps cannot separate their cycles, so the sum is

@@ -27,6 +27,7 @@ def machine_with(source, vectors=None, engine="plain"):
     return machine
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ["plain", "jit"])
 @pytest.mark.parametrize("length", [1, 7, 1280, 1_000_000])
 def test_slices_do_not_affect_the_run(monkeypatch, length, engine):

@@ -8,6 +8,7 @@ from engine_fuzz import check_pairs, check_programs
 from emu.dspic30f.isa.table import ROWS
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
 def test_every_row_gives_the_same_state_in_random_contexts(other: str, seed: int) -> None:
     """engines.md §4.2: every row gives the same registers, memory, SR, hidden state and cycle in random contexts,
@@ -15,6 +16,7 @@ def test_every_row_gives_the_same_state_in_random_contexts(other: str, seed: int
     assert check_pairs(seed, len(ROWS), 3, other) == 3 * len(ROWS)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
 def test_random_programs_give_the_same_state_at_random_cycles(other: str, seed: int) -> None:
     """engines.md §4.2: random programs with loops, calls, skips, REPEAT, DO, critical sections, timer interrupts and

@@ -21,6 +21,7 @@ def modules(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return node_modules(tmp_path_factory.mktemp("npm"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("transport", ["stdio", "tcp"])
 def test_the_server_passes_the_test_support_package(modules: Path, tmp_path: Path, transport: str) -> None:
     image = tmp_path / "program.elf"

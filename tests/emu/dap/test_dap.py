@@ -372,6 +372,7 @@ def framed(command: str, **arguments: Any) -> bytes:
     return b"Content-Length: %d\r\n\r\n%s" % (len(body), body)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("sent", "replies", "words"),
     [

@@ -129,6 +129,7 @@ class Anything(RowMachine):
         assert c in (0, 1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("row", ROWS, ids=lambda row: f"{row.id}-{row.mnemonic}")
 def test_a_row_stays_within_its_values_in_any_state(row: Row) -> None:
     """In any state of registers and modes, a row's addresses and pointers have 16 bits, accumulators 40, and flags

@@ -17,6 +17,7 @@ from straight_firmware import straight_firmware
 SHORT = Shape(instructions=250)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(4))
 def test_straight_programs_run_equally_in_blocks_and_in_exact_code(seed: int) -> None:
     """engines.md §4.3: straight programs give equal states in block code, in exact code and in the interpreter;
@@ -33,6 +34,7 @@ def test_wild_programs_run_equally(seed: int) -> None:
     assert check_wild(seed, stops=8).stops == 8
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [1])
 def test_long_runs_end_equally_and_with_equal_counts_of_instructions(seed: int) -> None:
     """Long runs of block code, exact code and the interpreter from one snapshot have equal final states and

@@ -170,6 +170,7 @@ def test_the_code_of_a_machine_goes_with_it(compiler: Compiler) -> None:
     assert not compiler._loaded
 
 
+@pytest.mark.slow
 def test_code_arrives_while_no_address_is_missed(compiler: Compiler) -> None:
     """Compiled code becomes available during a run that reaches no uncompiled address."""
     machine = Machine(engine="jit")

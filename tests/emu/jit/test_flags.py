@@ -62,6 +62,7 @@ def test_a_pair_is_a_flag_that_is_written_and_read_with_no_other_writer_between(
 STORING = [row for row in rows()[0] if row.syntax.endswith("{.B} f") and not row.syntax.startswith("CP")]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("row", STORING, ids=lambda row: row.mnemonic)
 def test_an_instruction_that_sets_flags_may_write_sr_or_a_byte_of_it(row: object) -> None:
     """isa.md §2.3: if an instruction's destination is SR or a byte of it, the flags outside of the written byte come

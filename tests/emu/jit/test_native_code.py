@@ -41,6 +41,7 @@ def pair(firmware: Firmware, ipl_slip: int = 0) -> Iterator[Machine]:
         yield machine
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(24))
 def test_random_firmware_gives_equal_records_at_random_stops(seed: int) -> None:
     """engines.md §4.3: the same seed gives the same bytes in the same cycle in both engines."""
@@ -157,6 +158,7 @@ def test_clearing_the_watchdog_blocking_and_table_writes_are_native(watchdog: bo
     assert (native.runner.counts.interpreted > 1_000) == watchdog
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(6))
 def test_hooks_are_called_at_each_arrival_and_the_code_around_them_is_native(seed: int) -> None:
     """Hooks in translated code are called in the same cycles as in the interpreter and leave the same records."""

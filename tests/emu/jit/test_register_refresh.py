@@ -74,6 +74,7 @@ LATCHES = """
 0x2D6."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("program", "inputs", "rendered"),
     [(WRITES, 0, False), (WRITES, 0xFF00, False), (READS, 0xFF00, True), (LATCHES, 0xFF00, True)],

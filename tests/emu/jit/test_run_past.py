@@ -27,6 +27,7 @@ def machine(engine: str, seed: int) -> Machine:
     return made
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ["plain", "jit"])
 @pytest.mark.parametrize("seed", range(3))
 def test_cuts_are_where_runs_would_have_ended(engine: str, seed: int) -> None:

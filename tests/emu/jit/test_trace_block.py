@@ -114,6 +114,7 @@ def test_a_block_ends_where_something_is_looked_at() -> None:
     assert arms(body, {skipped}) == arms(body, {behind}) == arms(body, last=skipped) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("body", BODIES.values(), ids=BODIES)
 def test_whole_records_are_equal_wherever_a_run_stops(body: list[int]) -> None:
     """Both engines have equal states at stops in every phase of the loop and of the interrupt."""
@@ -123,6 +124,7 @@ def test_whole_records_are_equal_wherever_a_run_stops(body: list[int]) -> None:
         assert not difference(plain, native)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("at", range(START, START + 2 * len(BODIES["one behind the other"]), 2))
 def test_hooks_are_met_as_often(at: int) -> None:
     """Hooks on a branch, on skipped instructions and after them are called as often, and in the same cycles, in both

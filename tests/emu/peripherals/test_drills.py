@@ -40,6 +40,7 @@ FLOORS = {"address": 0.37, "pointer": 0.90, "REPEAT": 0.52, "DO": 0.50, "handler
 writes."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("way", WAYS)
 @pytest.mark.parametrize("size", [1, 2])
 @pytest.mark.parametrize("write", [False, True])

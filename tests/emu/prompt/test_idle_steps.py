@@ -120,6 +120,7 @@ def test_a_step_of_the_past_continues_in_the_present(machine: emu.Machine) -> No
     assert (stop.reason, machine.cycle, history.is_past) == ("limit", 1_000 + SLEEP_CYCLES, False)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", ["step", "stepi", "next", "nexti"])
 def test_steps_of_the_prompt_end_with_a_sentence(
     machine: emu.Machine, command: str, capsys: pytest.CaptureFixture[str]

@@ -46,6 +46,7 @@ def uncobs(frame: bytes) -> bytes:
     return body[:-2]
 
 
+@pytest.mark.slow
 def test_processors_are_swapped_under_traffic_without_loss(image: Build) -> None:
     """Exchange three processors while traffic runs: no message may be lost.
 
@@ -80,6 +81,7 @@ def test_processors_are_swapped_under_traffic_without_loss(image: Build) -> None
 # ---- stress ---------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_stress_neither_leaks_nor_traps(image: Build) -> None:
     """`stress` runs without trap or leak: after every 200 actions it asserts that the heap is as before."""
     machine = load(image("stress"))
@@ -116,6 +118,7 @@ def test_no_application_drops_the_result_of_a_call_that_sets_it_up(app: str) -> 
 # ---- Faults ---------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_failed_assertion_is_a_firmware_fault(image: Build, tmp_path: Path, capfd) -> None:
     """A failed assertion is reported on UART1 with its source line, and `emu run` exits with status 1."""
     (tmp_path / "wrong").mkdir()
@@ -143,6 +146,7 @@ def host(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return tmp_path_factory.mktemp("host")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("app", ["listing1", "processors", "stress", "footprint", "latency", "hello"])
 def test_every_application_builds_for_a_host(host: Path, app: str) -> None:
     """Every application builds for Linux with the same kernel, without compiler warnings."""
@@ -200,6 +204,7 @@ def sines(*tones: tuple[int, int]) -> Callable[[int], float]:
     return lambda cycle: sum(a * math.sin(2 * math.pi * hz * cycle / FCY) for hz, a in tones)
 
 
+@pytest.mark.slow
 def test_tone_hears_what_its_filter_lets_through(image: Build) -> None:
     """`tone` measures 560 Hz nine times louder than 200 Hz, which its filter attenuates (cut-off 400 Hz).
 
@@ -219,6 +224,7 @@ def test_tone_hears_what_its_filter_lets_through(image: Build) -> None:
     assert lines[-4:] == ["200", "Hz"] * 2
 
 
+@pytest.mark.slow
 def test_commands_are_read_with_sscanf(image: Build) -> None:
     """`commands` parses its text commands with sscanf and answers each (firmware/apps/commands/README.md)."""
 
@@ -233,6 +239,7 @@ def test_commands_are_read_with_sscanf(image: Build) -> None:
     assert on_both_engines(image("commands"), ask).split() == ["ok", "50,-30", "24", "?", "?", "?"]
 
 
+@pytest.mark.slow
 def test_patrol_runs_its_behaviours_in_turn(image: Build) -> None:
     """`patrol`, a C++ application, runs its behaviours one after the other (firmware/apps/patrol/README.md)."""
 

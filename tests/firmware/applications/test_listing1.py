@@ -86,6 +86,7 @@ bool reactiveController(uint16 pid, uint16 eventID, sys_event_data *data)
 ALONE = load_scene("clustering").with_values(robots__count=1, robots__wheel_noise=0.0)
 
 
+@pytest.mark.slow
 def test_the_listing_with_two_corrections_compiles(image: Build, tmp_path: Path) -> None:
     """With two corrections the listing compiles, although with warnings; the headers declare every name it uses."""
     app = tmp_path / "printed"

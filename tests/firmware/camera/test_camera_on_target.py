@@ -19,6 +19,7 @@ def noise(seed: int = 1) -> np.ndarray:
     return np.random.default_rng(seed).integers(0, 256, (480, 640, 3), dtype=np.uint8)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("ipl_slip", "phase"), [(0, 0), (1, 60)])
 def test_lines_are_right_wherever_href_falls_in_a_kernel_call(image: Build, ipl_slip: int, phase: int) -> None:
     """A line is captured correctly at every phase of HREF against kernel calls (kernel.md §4).
@@ -29,6 +30,7 @@ def test_lines_are_right_wherever_href_falls_in_a_kernel_call(image: Build, ipl_
     assert sweep(machine, noise(), stride=199, phase=phase) > 130
 
 
+@pytest.mark.slow
 def test_a_capture_that_comes_late_spoils_the_line(image: Build) -> None:
     """A capture that starts late must spoil the line: proof that the sweep detects errors.
 
@@ -40,6 +42,7 @@ def test_a_capture_that_comes_late_spoils_the_line(image: Build) -> None:
     assert not np.array_equal(capture_at(machine, state, 0, masked=8), expected)
 
 
+@pytest.mark.slow
 def test_cpu_load_of_capture_and_classification_is_printed(image: Build, capsys, tmp_path) -> None:
     """Print the CPU load of capture and classification in percent, from exact cycle counts.
 
@@ -88,6 +91,7 @@ def scene_picture(colour: tuple[int, int, int], brightness: float, deviation: fl
     return np.clip(noisy, 0, 255).round().astype(np.uint8)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scene", SCENES)
 @pytest.mark.parametrize("program", PROGRAMS)
 def test_automatic_exposure_keeps_colours_apart_in_any_light(image: Build, program: str, scene: str) -> None:

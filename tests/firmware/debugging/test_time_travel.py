@@ -36,6 +36,7 @@ def record_run(
     return history, states, follows
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ["jit", "plain"])
 def test_every_state_is_restored_to_the_bit(image: Build, engine: str) -> None:
     """Reverse steps restore every bit across preemption, interrupts, camera frames (I2C, pixel port) and UART input."""
@@ -63,6 +64,7 @@ def test_every_state_is_restored_to_the_bit(image: Build, engine: str) -> None:
     assert history.size < 20 * len(history._states) * 1024 + (1 << 18)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [7, 10, 1006])
 def test_random_walks_back_restore_every_state(image: Build, seed: int) -> None:
     """Random walks of forward and reverse steps restore every state: three walks of the fuzz campaign.
@@ -76,6 +78,7 @@ def test_random_walks_back_restore_every_state(image: Build, seed: int) -> None:
     assert min(tally["steps"], tally["input"]) > 0
 
 
+@pytest.mark.slow
 def test_back_to_a_breakpoint_and_to_the_last_write(image: Build) -> None:
     machine = emu.load(image("culprit", TARGET_APPS))
     heard: list[int] = []

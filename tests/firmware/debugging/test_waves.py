@@ -85,6 +85,7 @@ def test_threads_priorities_and_variables_are_watched(image: Build, tmp_path: Pa
     assert all(time - picoseconds(tick) < picoseconds(60) for time, tick in zip(changed, latest, strict=True))
 
 
+@pytest.mark.slow
 def test_recording_changes_nothing_and_is_refused_in_words(
     image: Build, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -37,6 +37,7 @@ def talk(image: Build) -> tuple[Machine, Callable[..., list[str]]]:
     return machine, ask
 
 
+@pytest.mark.slow
 def test_commands_drive_the_robot_and_are_answered(talk) -> None:
     """The SerCom commands D E L B F C S move the robot and are answered (epuck.md §6).
 
@@ -65,6 +66,7 @@ def test_commands_drive_the_robot_and_are_answered(talk) -> None:
 WRONG = "D,1 D,1,2,3 D,1001,0 D,0,-1001 D,x,1 D,1, L,10,1 L,0,3 E,1 ! !65535,1 +300 + -64"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("line", WRONG.split())
 def test_commands_that_cannot_be_carried_out_are_answered_with_a_question_mark(talk, line: str) -> None:
     """A command with a wrong argument count, range or event is answered with a question mark and moves nothing.

@@ -63,6 +63,7 @@ def steps(machine: Machine) -> tuple[int, int]:
 # -- clustering --------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("table", TABLES)
 @pytest.mark.parametrize("program", PROGRAMS)
 def test_every_colour_gives_the_wheel_speeds_of_the_controller(image: Build, program: str, table: int) -> None:
@@ -126,6 +127,7 @@ def test_without_a_camera_nothing_hangs_and_the_robot_stands(image: Build, progr
 # -- camera ------------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sensor", ["PO6030K", "PO3030K", "PO8030D"])
 @pytest.mark.parametrize("program", PROGRAMS)
 def test_every_pixel_is_right(image: Build, program: str, sensor: str) -> None:
@@ -136,6 +138,7 @@ def test_every_pixel_is_right(image: Build, program: str, sensor: str) -> None:
     assert np.array_equal(captured(machine), window(noise()))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ["plain", "jit"])
 def test_reads_come_16_to_18_tcy_behind_href(image: Build, engine: str) -> None:
     """The driver reads each pixel byte 16 to 18 Tcy after HREF during kernel calls, motor steps and 1 ms events.
@@ -217,6 +220,7 @@ def test_a_slave_that_holds_sda_is_clocked_free(image: Build) -> None:
     assert np.array_equal(captured(machine), window(noise()))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("lines", [{"sda": True}, {"scl": True}])
 def test_a_line_that_stays_low_stops_the_camera_not_the_robot(image: Build, lines: dict[str, bool]) -> None:
     """If a bus line stays low, the kernel starts and reports which device failed."""
@@ -245,6 +249,7 @@ def after_camera_line(machine: Machine, act: Callable[[], None]) -> bytes:
     return bytes(heard)
 
 
+@pytest.mark.slow
 def test_faults_of_a_running_bus_are_survived(image: Build) -> None:
     """Bus faults during interrupt-driven transfers under the kernel are reported, and the report continues."""
 
@@ -342,6 +347,7 @@ def test_ambient_light_does_not_change_the_distance(image: Build) -> None:
 # -- interpreter and JIT --
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("program", PROGRAMS)
 def test_engines_agree_to_the_bit(image: Build, program: str) -> None:
     """Interpreter and JIT agree in registers, memory, devices and robot state.

@@ -35,6 +35,7 @@ def say(machine: Machine, text: str) -> None:
     machine.run(cycles=FCY // 20)
 
 
+@pytest.mark.slow
 def test_input_devices_pass_what_their_processor_makes_of_it(machine: Machine) -> None:
     """Input devices deliver the result of their processor: the default, a replacement, and the default again.
 

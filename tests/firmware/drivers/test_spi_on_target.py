@@ -48,6 +48,7 @@ def path(image: Build) -> Path:
     return image("spi")
 
 
+@pytest.mark.slow
 def test_bytes_go_both_ways_while_the_slave_is_selected(path: Path) -> None:
     turret = Turret(robot(path))
     assert turret.lines(FCY // 2) == [str(MEASUREMENT)] * 5
@@ -72,6 +73,7 @@ def test_the_processor_is_exchanged_while_the_program_runs(path: Path) -> None:
     assert turret.lines(FCY // 2)[1:] == [str(MEASUREMENT)] * 4
 
 
+@pytest.mark.slow
 def test_every_size_and_the_bounds(image: Build, tmp_path: Path) -> None:
     """Transfers of 1 to 1,024 bytes work in place, without output or without input; larger ones are refused."""
     app = tmp_path / "sizes"

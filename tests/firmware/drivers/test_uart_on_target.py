@@ -85,6 +85,7 @@ def started(path: Path) -> tuple[Machine, bytearray]:
     return machine, said
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("size", [1, 2, 32, 33, 34, 64, 65, 66, 67, 100, 500, 800])
 def test_a_message_of_any_size_goes_out_whole_and_takes_what_is_said(path: Path, size: int) -> None:
     """A message of 65 bytes is sent completely; a fixed buffer of 64 bytes would always refuse it."""

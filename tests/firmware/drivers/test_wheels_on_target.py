@@ -13,6 +13,7 @@ TICK_TCY = 1536
 SYS_ERROR_ARGUMENT = 5
 
 
+@pytest.mark.slow
 def test_every_speed_is_exact_over_a_whole_period(image: Build) -> None:
     """Every speed v makes exactly 5 v steps in 6,192 ticks of 1,536 Tcy (openswarm-original.md §5.2).
 

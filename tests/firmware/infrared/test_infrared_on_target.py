@@ -6,6 +6,7 @@ import math
 import struct
 
 import numpy as np
+import pytest
 
 from arena.infrared.channel import OpticalChannel
 from arena.robots.firmware_controller import FirmwareController
@@ -24,6 +25,7 @@ def statistics(machine: Machine) -> tuple[int, ...]:
     return struct.unpack("<7H", bytes(machine.record.bytes[at : at + 14]))
 
 
+@pytest.mark.slow
 def test_the_camera_loses_no_pixel_while_frames_are_sent(image: Build) -> None:
     """The camera captures every pixel while infra-red frames are sent.
 

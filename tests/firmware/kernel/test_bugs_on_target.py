@@ -19,6 +19,7 @@ TESTS = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", TESTS)
 def test_the_kernel_on_the_robot(image: Build, name: str) -> None:
     """Each test of host/original_bugs.c that can run on the chip passes on the emulated robot (openswarm-original.md
@@ -33,6 +34,7 @@ def test_the_kernel_on_the_robot(image: Build, name: str) -> None:
     assert stop.reason == "until", (stop, bytes(said))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("level", ["-O0", "-O1", "-O2"])
 def test_bug_22_the_kernel_works_at_every_optimisation_level(image: Build, level: str) -> None:
     """Bug 22, only -O0 worked: every kernel call works at each optimisation level (openswarm-original.md §7).

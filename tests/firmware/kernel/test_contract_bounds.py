@@ -61,6 +61,7 @@ def calls(image: Build) -> tuple[str, object]:
     return str(path), read_executable(path.read_bytes(), str(path))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("call", PROMISES)
 def test_a_call_takes_no_longer_than_its_contract(calls, call: str) -> None:
     """The contract of each call covers its bound, and is at most 1.6 times the bound."""
@@ -76,6 +77,7 @@ def test_a_call_takes_no_longer_than_its_contract(calls, call: str) -> None:
     assert cycles <= 1.6 * bound.cycles
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("call", LINK)
 def test_a_call_of_the_link_takes_no_longer_than_its_contract(image: Build, call: str) -> None:
     """A call of the infra-red link takes no longer than its contract.
@@ -101,6 +103,7 @@ def test_a_call_of_the_link_takes_no_longer_than_its_contract(image: Build, call
         assert bound.cycles <= cycles <= 1.6 * bound.cycles
 
 
+@pytest.mark.slow
 def test_everything_in_an_image_of_ours_is_bounded(image: Build, capsys: pytest.CaptureFixture[str]) -> None:
     """Every thread, context switch, interrupt, trap and stack of an image has a bound; the kernel stack stays below
     204 bytes."""
@@ -125,6 +128,7 @@ def crowded(image: Build) -> Path:
     return image("crowded", TARGET_APPS)
 
 
+@pytest.mark.slow
 def test_a_longer_memory_has_longer_paths(crowded: Path) -> None:
     """The bound of heap_free grows with the tree depth; without a given depth it assumes 11 nodes, enough for over 4
     kB."""
@@ -136,6 +140,7 @@ def test_a_longer_memory_has_longer_paths(crowded: Path) -> None:
     assert cycles[0] < cycles[1] == cycles[2]
 
 
+@pytest.mark.slow
 def test_bounds_are_close_where_structures_are_at_their_worst(crowded: Path) -> None:
     """No measured call exceeds its bound when the kernel's structures have their worst shapes.
 

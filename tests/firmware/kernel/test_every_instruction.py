@@ -15,6 +15,7 @@ from tests.fuzz.seeds import base_seed
 STRIDE = 211
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ipl_slip", [0, 1])
 @pytest.mark.parametrize("way", WAYS)
 def test_interrupts_at_every_instruction_change_nothing(image: Build, way: str, ipl_slip: int) -> None:

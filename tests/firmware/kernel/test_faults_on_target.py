@@ -43,6 +43,7 @@ def self_test_report(machine: Machine, heard: bytearray, seconds: float = 4.0) -
 # -- camera ------------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("microseconds", [10, 200, 700, 1500, 3000, 6000, 8000])
 def test_a_camera_pulled_out_while_it_is_programmed_costs_only_the_camera(image: Build, microseconds: int) -> None:
     """Unplugging the camera while it is programmed (no slave acknowledges) costs only the camera (epuck.md §7.1).
@@ -100,6 +101,7 @@ def test_a_camera_that_loses_contact_for_a_moment_spoils_one_frame(image: Build)
 # -- battery -----------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("volts", "word"), [(3.39, b"battery low"), (3.4, b"battery ok")])
 def test_a_low_battery_is_reported(image: Build, volts: float, word: bytes) -> None:
     """A battery below 3.4 V, which clears RF1, is reported (epuck.md §2)."""

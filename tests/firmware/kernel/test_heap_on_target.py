@@ -5,6 +5,8 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+import pytest
+
 import emu
 from emu import Machine
 from tests.firmware.conftest import FIRMWARE, TARGET_APPS, Build
@@ -75,6 +77,7 @@ class Histories:
         return f"{self.sends:,} sends, {self.starts:,} starts; Tcy at most: {worst}"
 
 
+@pytest.mark.slow
 def test_allocation_is_bounded_in_every_history(image: Build) -> None:
     """Sys_Send_Event and Sys_Start_Process stay within the headers' bounds in every history.
 

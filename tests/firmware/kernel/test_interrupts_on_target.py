@@ -39,6 +39,7 @@ def source(tmp_path: Path, text: str, enable: str = ENABLE, devices: str = "") -
     return tmp_path
 
 
+@pytest.mark.slow
 def test_functions_in_c_run_at_their_levels_on_the_kernel_stack(image: Build, tmp_path: Path) -> None:
     """Interrupt functions in C run at their levels on the kernel stack.
 
@@ -108,6 +109,7 @@ REFUSED = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rule", REFUSED)
 def test_a_broken_rule_breaks_the_build(image: Build, tmp_path: Path, rule: str) -> None:
     """Each violated rule of openswarm_interrupt.h fails the build in the compiler, the linker or interrupts.py."""

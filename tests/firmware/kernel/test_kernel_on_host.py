@@ -14,6 +14,7 @@ HOST = Path(__file__).parents[1] / "host"
 TESTS = [name for file in sorted(HOST.glob("*.c")) for name in re.findall(r"^TEST\((\w+),", file.read_text(), re.M)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", TESTS)
 def test_the_kernel_on_posix(host_program: Path, name: str) -> None:
     """Run one TEST of host/*.c in its own process. Its second argument names the requirement and its source."""

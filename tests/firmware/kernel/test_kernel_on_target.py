@@ -62,6 +62,7 @@ def listing1(image: Build) -> tuple[bytes, list[int], list[int]]:
     return bytes(said), wakes, starts
 
 
+@pytest.mark.slow
 def test_listing1_logs_every_250_ms(listing1: tuple[bytes, list[int], list[int]]) -> None:
     """The log lines have the format of the paper's Listing 1, time:(left,right)."""
     said, _, _ = listing1
@@ -76,6 +77,7 @@ def test_wake_ups_are_exactly_3686400_cycles_apart(listing1: tuple[bytes, list[i
     assert all(abs(b - a - 3_686_400) <= 1000 + bit for a, b in itertools.pairwise(starts))
 
 
+@pytest.mark.slow
 def test_the_clock_does_not_drift(image: Build) -> None:
     """The clock does not drift: five 1 ms events take exactly 73,728 Tcy, 3,600,000 take 53,084,160,000 (kernel.md
     §3)."""
@@ -93,6 +95,7 @@ def test_the_clock_does_not_drift(image: Build) -> None:
 # ---- Registers ----------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_registers_survive_preemption_under_a_storm(image: Build) -> None:
     """Registers survive preemption during an interrupt storm (kernel.md §4).
 
@@ -123,6 +126,7 @@ def test_registers_survive_preemption_under_a_storm(image: Build) -> None:
 KINDS = ["push", "call chain", "large frame", "variadic call", "kernel call without room", "interrupt frame"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", range(len(KINDS)), ids=KINDS)
 def test_a_stack_overflow_ends_only_the_offender(image: Build, kind: int) -> None:
     """A stack overflow ends only the thread that causes it (kernel.md §4; bug 21 of openswarm-original.md §7)."""
@@ -143,6 +147,7 @@ def test_a_stack_overflow_ends_only_the_offender(image: Build, kind: int) -> Non
     assert machine.peek("LATD") & 0xFF == 0, "the motors stop"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", range(len(KINDS)), ids=KINDS)
 def test_the_emulator_reports_a_stack_overflow_as_a_fault(image: Build, kind: int) -> None:
     """The report names thread and function; the system continues if the caller runs on."""
@@ -209,6 +214,7 @@ def thread_list(machine: Machine) -> list[int]:
     return seen
 
 
+@pytest.mark.slow
 def test_a_thread_keeps_64_of_its_128_bytes(image: Build) -> None:
     """Interrupts and kernel leave a thread 64 of 128 stack bytes, measured with a fill pattern and nested
     interrupts."""

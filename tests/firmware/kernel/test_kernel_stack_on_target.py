@@ -42,6 +42,7 @@ def culprit(machine: Machine, said: bytes) -> str:
     return inside[0].name.lstrip("_")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("ipl_slip", [0, 1])
 def test_an_overflow_of_the_kernel_stack_is_caught_at_the_culprit(image: Build, kind: str, ipl_slip: int) -> None:

@@ -11,6 +11,7 @@ from tests.firmware.kills import PAUSES, SCENES, Stage, run_to_begin, sweep
 STRIDE = 331
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ipl_slip", [0, 1])
 @pytest.mark.parametrize("scene", range(len(SCENES)), ids=SCENES)
 def test_a_thread_killed_inside_a_driver_call_leaves_the_device_to_others(
@@ -25,6 +26,7 @@ def test_a_thread_killed_inside_a_driver_call_leaves_the_device_to_others(
     assert seen.kills
 
 
+@pytest.mark.slow
 def test_a_write_into_a_dead_threads_memory_is_seen(image: Build) -> None:
     """The campaign detects a bus transfer that continues in the ended thread's block."""
 
@@ -44,6 +46,7 @@ def test_a_write_into_a_dead_threads_memory_is_seen(image: Build) -> None:
         stage.kill(*memory, 4)
 
 
+@pytest.mark.slow
 def test_the_bus_is_busy_while_its_thread_lives(image: Build) -> None:
     """A bus is freed by the end of its owner only: a time-out does not take it from a living thread."""
     stage = Stage(image("kills", TARGET_APPS))

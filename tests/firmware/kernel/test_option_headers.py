@@ -47,6 +47,7 @@ def sentence(option: str, begin: str) -> list[int]:
     return [int(number) for number in re.findall(r"\d+", re.sub(r"\([^)]*\)|\d+ (?:bytes|ms)", "", found[1]))]
 
 
+@pytest.mark.slow
 def test_the_cycles_in_the_headers_are_the_measured_ones(cycles: dict[str, int]) -> None:
     lock, unlock = cycles["Sys_Lock_Mutex"], cycles["Sys_Unlock_Mutex"]
     start = cycles["Sys_Start_ProcessWith, for comparison"]

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import random
 
+import pytest
+
 import emu
 from emu import Machine
 from tests.firmware.conftest import TARGET_APPS, Build
@@ -22,6 +24,7 @@ def scene(image: Build, number: int, seconds: float) -> Machine:
     return machine
 
 
+@pytest.mark.slow
 def test_a_ceiling_bounds_priority_inversion(image: Build) -> None:
     """With a mutex a high-priority thread waits at most for one 12 ms section of a low-priority thread.
 

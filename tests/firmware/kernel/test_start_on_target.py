@@ -14,6 +14,7 @@ SCHEDULERS = ["round robin", "fixed priority", "earliest deadline", "woken first
 MOMENTS = ["never", "before the threads", "before the start", "after the start"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("moment", range(len(MOMENTS)), ids=MOMENTS)
 @pytest.mark.parametrize("scheduler", range(len(SCHEDULERS)), ids=SCHEDULERS)
 @pytest.mark.parametrize("ipl_slip", [0, 1])
@@ -62,6 +63,7 @@ int main(void)
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("start", "again", "refused"),
     [("", "false", "4 calls"), ("", "true", "65,535 calls"), ("Sys_Start_Kernel();", "true", "")],

@@ -16,6 +16,7 @@ from tests.firmware.kernel.test_kernel_on_target import FCY, INT1IF, T2IF, T3IF,
 SLICE = 147_456
 
 
+@pytest.mark.slow
 def test_a_thread_gets_its_whole_slice_under_a_storm(image: Build) -> None:
     """A thread gets its whole slice of 147,456 Tcy during an event storm and full UART traffic (kernel.md §3).
 
@@ -76,6 +77,7 @@ def count_clock(path: Path, ticks: int) -> str:
     )
 
 
+@pytest.mark.slow
 def test_a_minute_of_clock_events_is_exact(image: Build) -> None:
     """60,000 clock events take exactly 884,736,000 Tcy (kernel.md §3). tests/fuzz/kernel/fuzz_clock.py counts an
     hour."""
@@ -114,6 +116,7 @@ def test_nothing_masks_the_stepper_for_long_or_the_camera_at_all(image: Build) -
     assert windows[6] == 0
 
 
+@pytest.mark.slow
 def test_an_interrupt_never_falls_between_the_test_and_the_sleep(image: Build) -> None:
     """A device interrupt at any instruction of the idle loop is handled at once, not 1 ms later (kernel.md §4)."""
     machine = load(image("latency"))

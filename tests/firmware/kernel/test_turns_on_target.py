@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pytest
+
 import emu
 from emu import Machine
 from tests.firmware.conftest import TARGET_APPS, Build
@@ -23,6 +25,7 @@ def scene(image: Build, number: int) -> Machine:
     return machine
 
 
+@pytest.mark.slow
 def test_a_preempted_thread_gets_the_rest_of_its_slice(image: Build) -> None:
     """A preempted thread gets the rest of its slice (hal_cpu.h, hal_slice_restart()).
 

@@ -21,6 +21,7 @@ def footprint(image, tmp_path_factory):
     return str(image("footprint")), out
 
 
+@pytest.mark.slow
 def test_the_memory_equation_fits_every_load_exactly(footprint, capsys):
     """The memory equation of kernel.md §5 equals the bytes that the emulator and the allocator count at every load.
 
@@ -37,6 +38,7 @@ def test_the_memory_equation_fits_every_load_exactly(footprint, capsys):
     assert equation["A"] == sum(equation["constant"].values())
 
 
+@pytest.mark.slow
 def test_footprint_and_cycles_have_not_grown(image, capsys):
     """Footprint and cycles equal the committed baselines.
 
@@ -51,6 +53,7 @@ def test_footprint_and_cycles_have_not_grown(image, capsys):
         assert status == 0, capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_the_one_number_that_grew_fails_the_check_and_names_the_lines(image, tmp_path, capsys):
     """One kernel cycle above the baseline fails the check, and the message names this number and its lines only."""
     table = json.loads((BASELINES / "cycles.json").read_text())
@@ -67,6 +70,7 @@ def test_the_one_number_that_grew_fails_the_check_and_names_the_lines(image, tmp
     assert f"+1 {place}" in out
 
 
+@pytest.mark.slow
 def test_an_update_holds_what_was_measured(image, tmp_path, capsys):
     path = tmp_path / "cycles.json"
     assert main(["cycles", str(image("options")), "--update", str(path), "--json"]) == 0
@@ -80,6 +84,7 @@ def test_another_application_is_refused(image, capsys, command):
     assert "is not the application `latency`" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("level", ["-O1", "-O2"])
 def test_what_cycles_are_counted_from_stands_at_higher_levels_too(image, level):
     """`emu cycles` finds Sys_Yield at every optimisation level: it is not inlined."""

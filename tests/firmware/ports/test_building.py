@@ -43,6 +43,7 @@ def make(tmp_path: Path):
     return build
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("words", [["DEFINES=-DBLINK=3"], ["OPTIMISE=-O2"], ["DEFINES=-DSYS_HEAP=2048 -DX='\"a  b\"'"]])
 def test_a_changed_option_builds_anew_and_so_does_the_way_back(make, words: list[str]) -> None:
     assert make()
@@ -55,6 +56,7 @@ def test_a_changed_option_builds_anew_and_so_does_the_way_back(make, words: list
     assert make.image.read_bytes() == plain
 
 
+@pytest.mark.slow
 def test_drivers_and_files_that_come_and_go_build_anew(make) -> None:
     """Removing a source file also causes a rebuild, although it leaves no newer file."""
     assert make()
@@ -86,6 +88,7 @@ def test_drivers_and_files_that_come_and_go_build_anew(make) -> None:
     assert make.image.read_bytes() == plain
 
 
+@pytest.mark.slow
 def test_another_toolchain_port_or_compiler_builds_anew(make, tmp_path: Path) -> None:
     """Images of different compilers, ports and toolchains have separate folders.
 
@@ -112,6 +115,7 @@ def test_another_toolchain_port_or_compiler_builds_anew(make, tmp_path: Path) ->
         assert make("TARGET=template")
 
 
+@pytest.mark.slow
 def test_a_failed_build_leaves_no_image_and_is_tried_again(make) -> None:
     assert make()
     plain = make.image.read_bytes()

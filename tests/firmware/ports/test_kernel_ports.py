@@ -68,6 +68,7 @@ def check_conforms(said: bytes, checks: int = CHECKS) -> None:
     assert int(found[1]) == checks
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("words", "checks"), [((), CHECKS), ((OPTIONS,), CHECKS_OF_OPTIONS)], ids=["kernel", "options"]
 )
@@ -93,6 +94,7 @@ def words_of(case: str) -> tuple[str, ...]:
     return ("DEFINES=-DFIRST_SCHEDULER=sys_earliest_deadline",) if "deadline" in case else ()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", ON_TARGETS)
 def test_the_dspic30f_conforms(image: Build, case: str) -> None:
     """The emulated e-puck passes the conformance suite."""
@@ -107,6 +109,7 @@ def test_the_dspic30f_conforms(image: Build, case: str) -> None:
     check_conforms(bytes(said))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", ON_TARGETS)
 def test_the_kilobot_conforms(case: str, tmp_path: Path) -> None:
     """The ATmega328P, on which storing a pointer takes two instructions, passes the conformance suite."""
@@ -119,6 +122,7 @@ def test_the_kilobot_conforms(case: str, tmp_path: Path) -> None:
     check_conforms(machine.uart())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", [case for case in ON_TARGETS if "wrap" not in case])
 def test_the_epuck2_conforms(case: str, tmp_path: Path) -> None:
     """The Cortex-M4 passes the conformance suite with FPU and MPU enabled."""
@@ -126,6 +130,7 @@ def test_the_epuck2_conforms(case: str, tmp_path: Path) -> None:
     check_conforms(said_by_epuck2(image, b" checks"))
 
 
+@pytest.mark.slow
 def test_the_options_of_the_dspic30f_conform(image: Build) -> None:
     """The dsPIC30F passes the options part: mutex, join, cleanup, quota, services and hostile programs."""
     machine = emu.load(image("conformance", TARGET_APPS, OPTIONS), engine="jit")
@@ -140,6 +145,7 @@ def test_the_options_of_the_kilobot_conform(tmp_path: Path) -> None:
     check_conforms(said_by_kilobot(image, 5), CHECKS_OF_OPTIONS)
 
 
+@pytest.mark.slow
 def test_the_options_of_the_epuck2_conform(tmp_path: Path) -> None:
     image = make("epuck2", "conformance", tmp_path, OPTIONS, apps=TARGET_APPS)
     check_conforms(said_by_epuck2(image, b" checks"), CHECKS_OF_OPTIONS)
@@ -176,6 +182,7 @@ def test_stress_on_the_kilobot(tmp_path: Path) -> None:
     check_stress(said_by_kilobot(make("kilobot", "stress", tmp_path), 20.2), 18)
 
 
+@pytest.mark.slow
 def test_stress_on_the_epuck2(tmp_path: Path) -> None:
     """The stress application runs 20 s of random actions on the e-puck2."""
     check_stress(said_by_epuck2(make("epuck2", "stress", tmp_path), rb"\n2\d{4} ms"), 17)

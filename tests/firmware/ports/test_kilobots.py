@@ -309,6 +309,7 @@ def test_in_pieces_as_in_one(image: Path, swarm: Open) -> None:
 # ---- Applications ---------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("distance", [36, 45, 48, 69])
 def test_neighbours_tell_what_they_hear(distance: int, tmp_path: Path, swarm: Open) -> None:
     """The unchanged e-puck application reports neighbours with numbers and distances.

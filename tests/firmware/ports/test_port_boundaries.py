@@ -78,6 +78,7 @@ def sweep(machine: Kilobot, way: str, stride: int) -> int:
     return rounds
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("way", WAYS)
 def test_the_kilobot_is_interrupted_everywhere(way: str, tmp_path: Path) -> None:
     """Interrupts at every 97th boundary lose nothing on the Kilobot.
@@ -133,6 +134,7 @@ def sweep_epuck2(image: Path, way: str, stride: int, phase: int, times: int) -> 
     return tried
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("way", WAYS)
 def test_the_epuck2_is_interrupted_everywhere(way: str, tmp_path: Path) -> None:
     """Interrupts at every 97th kernel instruction lose nothing on the e-puck2.

@@ -44,6 +44,7 @@ def built(root: Path, app: str, *words: str) -> Path:
     return out / "firmware.elf"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("app", ["clustering", "clustering-bare"])
 def test_two_checkouts_of_one_commit_build_the_same_bytes(checkouts: list[Path], app: str) -> None:
     """Two checkouts of one commit build identical bytes from C, assembly, inline functions and library, all with -g."""
@@ -54,6 +55,7 @@ def test_two_checkouts_of_one_commit_build_the_same_bytes(checkouts: list[Path],
         assert str(root).encode() not in plain
 
 
+@pytest.mark.slow
 def test_an_application_of_another_folder_does_not_bring_that_folder_along(checkouts: list[Path]) -> None:
     """Building an application by absolute path (`APPS=`) does not put that path into the image."""
     images = []

@@ -81,6 +81,7 @@ def make(stand_in: Path, app: str, out: Path) -> Path:
     return out / "firmware.elf"
 
 
+@pytest.mark.slow
 def test_it_builds_and_the_measuring_commands_find_their_symbols(stand_in: Path, tmp_path: Path, capsys) -> None:
     """`make -C firmware APP=... TOOLCHAIN=xc16` builds an image in which the measuring commands find their symbols.
 

@@ -65,6 +65,7 @@ def test_it_lies_where_the_host_knows_it(image):
     assert LOADER.start % ROW_UNITS == 0
 
 
+@pytest.mark.slow
 def test_damage_and_a_cut_in_the_middle_leave_a_robot_that_can_be_reached(robot, program):
     """A wrong checksum is refused before anything is erased; an interrupted transfer leaves the robot reachable.
 
@@ -103,6 +104,7 @@ def test_damage_and_a_cut_in_the_middle_leave_a_robot_that_can_be_reached(robot,
     assert b"it runs\nit runs\n" in line.heard  # after one second without a greeting from a host
 
 
+@pytest.mark.slow
 def test_the_command_flashes_a_robot_behind_a_pseudo_terminal(robot, program, capsys):
     """`openswarm flash` writes a program through a pseudo terminal, and the program prints on the same port."""
     master, slave = pty.openpty()

@@ -24,6 +24,7 @@ TRIES = 3
 LAMP = "#include <openswarm_io.h>\nint main(void) { return Sys_Set_LED(SYS_LED_BODY, true); }\n"
 
 
+@pytest.mark.slow
 def test_a_program_of_all_that_c_has_runs_in_the_slot(image):
     """A program in the slot uses constants, variables, the library, a handler and a thread through the kernel's call
     table."""
@@ -37,6 +38,7 @@ def test_a_program_of_all_that_c_has_runs_in_the_slot(image):
     assert said.decode().splitlines()[:6] == ["talks", *lines]
 
 
+@pytest.mark.slow
 def test_firmware_that_offers_fewer_calls_is_left_in_peace(image):
     """A program with unknown kernel calls resets the robot; after three starts the firmware runs without it."""
     machine = emu.load(image("programs", TARGET_APPS))

@@ -67,6 +67,7 @@ def slot(machine: Machine, rows: int) -> bytes:
     return b"".join(word.to_bytes(3, "little") for word in words)
 
 
+@pytest.mark.slow
 def test_a_robot_takes_checks_and_runs_what_the_host_has(robot, programs):
     """A robot receives, checks and runs the host's program although parts are damaged on the way.
 
@@ -102,6 +103,7 @@ def test_a_robot_takes_checks_and_runs_what_the_host_has(robot, programs):
         HostNeighbour(line, other, 20.0).give(lambda done, total: None)
 
 
+@pytest.mark.slow
 def test_a_robot_that_falls_silent_is_told(robot, programs):
     """The host reports a robot that does not answer, and one that receives nothing after it has requested rows.
 
@@ -131,6 +133,7 @@ def test_damaged_frames_are_none():
     assert unframed(b"runs 2\n") == unframed(b"") == b""
 
 
+@pytest.mark.slow
 def test_the_command_reaches_a_running_robot_behind_a_pseudo_terminal(robot, programs, capsys):
     master, slave = pty.openpty()
     tty.setraw(slave)

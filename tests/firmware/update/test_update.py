@@ -191,6 +191,7 @@ def test_no_image_reaches_into_the_slots(image, tmp_path):
     assert "at fixed addresses: .update_run 0xf800..0xffff, .update_stores 0x16800..0x17fff" in done.stderr
 
 
+@pytest.mark.slow
 def test_power_fails_at_every_write_of_a_robot(image):
     """Power failure at each flash or EEPROM operation of an update leaves a robot that runs a whole program.
 

@@ -109,6 +109,7 @@ def compare(seen: Watched, report: BoundsReport) -> None:
     assert seen.stack <= stack
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", PROGRAMS)
 def test_no_response_and_no_stack_is_above_its_bound(tmp_path: Path, name: str) -> None:
     """No response and no stack depth exceeds its bound; the higher interrupt comes close to its response bound.

@@ -143,6 +143,7 @@ def worst(image: Path, inputs: int) -> int:
     return longest
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", PROGRAMS)
 def test_assembly_stays_within_its_bound_or_is_refused_by_its_line(tmp_path: Path, name: str) -> None:
     """Unusual assembly stays within its bound or is refused with its line.

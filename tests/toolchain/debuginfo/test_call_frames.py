@@ -206,6 +206,7 @@ def compare_frames(image: Path) -> tuple[int, int]:
 LEVELS = ("-O0", "-O1", "-Os", "-O2 -fno-lto")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("level", LEVELS)
 def test_frames_of_a_program_with_nested_interrupts(tmp_path: Path, level: str) -> None:
     """A program with nested interrupts is unwound correctly at every instruction.
@@ -221,6 +222,7 @@ def test_frames_of_a_program_with_nested_interrupts(tmp_path: Path, level: str) 
     assert frames > 2 * instructions
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("level", LEVELS)
 @pytest.mark.parametrize("name", ["frames", "interrupts", "varargs", "structs"])
 def test_frames_of_the_execution_tests(tmp_path: Path, name: str, level: str) -> None:

@@ -224,6 +224,7 @@ def compare(seed: int, options: tuple[str, ...], folder: Path) -> tuple[int, int
     return evaluated, seen
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("options", [("-O0",), ("-O1",), ("-Os",), ("-O2",), ("-Os", "-fno-lto")], ids=" ".join)
 def test_locations_of_variables_are_correct(options: tuple[str, ...], tmp_path: Path) -> None:
     evaluated = seen = 0

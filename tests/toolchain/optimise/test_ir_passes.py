@@ -105,6 +105,7 @@ def outcomes(f: Function, seed: int) -> list[object]:
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("level", ["0", "s", "2"])
 @pytest.mark.parametrize("name", list(PASSES))
 def test_a_pass_preserves_behaviour(name: str, level: str) -> None:

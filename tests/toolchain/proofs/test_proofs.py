@@ -256,6 +256,7 @@ PROOFS = [(name, level) for name in CASES
 """(case, level) of each proof; branches are proved at one level, because one selection rule generates them at all."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "level"), PROOFS)
 def test_a_rule_holds_for_all_inputs(name: str, level: str, folder: Path) -> None:
     """The code computes the C expression for every input and preserves callee-saved registers."""

@@ -148,18 +148,21 @@ def verdict_on_fault(kind: str) -> Verdict:
     return verdict
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("level", ["-O1", "-Os", "-O2"])
 def test_right_code_is_proved(level: str) -> None:
     found = {v.function: v.kind for v in verdicts(compile_file([str(SAMPLE), level, "-w"]))}
     assert set(found.values()) == {"proved"}, found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", PLANTED)
 def test_a_planted_fault_is_refuted(kind: str) -> None:
     verdict = verdict_on_fault(kind)
     assert verdict.kind == "refuted", verdict
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", LATE)
 def test_a_fault_of_many_rounds_is_not_proved(kind: str) -> None:
     """A fault that needs many iterations is not proved; a failed induction does not refute it either."""
@@ -200,6 +203,7 @@ def test_memory_of_a_refutation_is_in_the_image(tmp_path: Path) -> None:
     assert machine.w[0] == ((second ^ 0x80) - 0x80) & 0xFFFF != ((first ^ 0x80) - 0x80) & 0xFFFF
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("file", ["clock.c", "error.c", "fault.c", "init.c"])
 def test_nothing_of_the_kernel_is_refuted(file: str) -> None:
     """No kernel function is refuted, and functions without loops are proved."""

@@ -262,6 +262,7 @@ def flat(data: Sequence[tuple[int, int]]) -> list[int]:
     return [part for value in data for part in value]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("log2n", [1, 2, 4, 7])
 def test_fft_is_exactly_its_model_and_nearly_the_sum(log2n: int, target: Target, rng: random.Random) -> None:
     n = 1 << log2n
@@ -327,6 +328,7 @@ WINDOWS = {
 }  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", WINDOWS)
 def test_windows_to_one_unit(name: str, target: Target) -> None:
     for n in (2, 5, 32):

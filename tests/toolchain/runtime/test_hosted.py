@@ -16,6 +16,7 @@ HERE = Path(__file__).parent
 PROGRAMS = ["hosted_text", "hosted_time"]
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(shutil.which("gcc") is None, reason="no host C compiler (Debian package gcc)")
 @pytest.mark.parametrize("level", ["-O0", "-Os"])
 @pytest.mark.parametrize("name", PROGRAMS)

@@ -7,6 +7,8 @@ import random
 import re
 from pathlib import Path
 
+import pytest
+
 import emu
 from tests.toolchain.c_programs import build, run
 
@@ -119,6 +121,7 @@ def _python_integer(form: str, value: int) -> str:
     return form % value
 
 
+@pytest.mark.slow
 def test_floating_point_digits_are_exact(tmp_path: Path) -> None:
     """%f %e %g print every digit as Python does, ties to even, for values whose integer and fraction fit in 64 bits."""
     rng = random.Random(1999)

@@ -98,6 +98,7 @@ def digits_program(folder: Path, printing: Path = RUNTIME / "format_double.c") -
     return program
 
 
+@pytest.mark.slow
 def test_doubles_are_printed_and_read_exactly(tmp_path: Path) -> None:
     """printf, strtod and strtof give every digit and every number as the host does (C11 7.21.6.1, 7.22.1.3)."""
     words = [digits_program(tmp_path), "100000", "7216"]

@@ -67,6 +67,7 @@ def integer_operation(name: str, bits: int, a: int, b: int) -> int:
     return exact[name]() & (1 << bits) - 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", ["si", "di"])
 @pytest.mark.parametrize("name", ["mul", "udiv", "umod", "div", "mod", "ashl", "lshr", "ashr"])
 def test_integer_helper(name: str, mode: str, tmp_path: Path) -> None:
@@ -168,6 +169,7 @@ int main(void)
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("double", [False, True], ids=["float", "double"])
 @pytest.mark.parametrize("name", ["add", "sub", "mul", "div"])
 def test_floating_helper(name: str, double: bool, tmp_path: Path) -> None:

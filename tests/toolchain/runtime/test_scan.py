@@ -180,6 +180,7 @@ def answers(cases: list[Case], functions: list[str], folder: Path, level: str) -
     return ran.uart.decode("latin-1").splitlines()
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(shutil.which("gcc") is None, reason="no host C compiler (Debian package gcc)")
 @pytest.mark.parametrize("level", ["-O0", "-Os"])
 def test_sscanf_stores_what_the_hosts_does(level: str, tmp_path: Path) -> None:
@@ -198,6 +199,7 @@ def test_sscanf_stores_what_the_hosts_does(level: str, tmp_path: Path) -> None:
     assert [(case, a, b) for case, a, b in zip(cases, expected, got, strict=True) if a != b] == []
 
 
+@pytest.mark.slow
 def test_scanf_reads_from_its_stream_what_sscanf_reads_from_a_text(tmp_path: Path) -> None:
     """scanf reads from a stream what sscanf reads from a string, incomplete numbers included."""
     rng = random.Random("stream")
