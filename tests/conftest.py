@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import os
+import shutil
 import signal
+import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -31,6 +33,10 @@ def pytest_configure(config: pytest.Config) -> None:
         signal.signal(signal.SIGINT, signal.default_int_handler)
     config.pluginmanager.register(WatchdogPlugin(), "watchdog")
     if not hasattr(config, "workerinput"):
+        # All child processes of a run share compiled modules, even where the environment turns them off.
+        os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+        compiled = os.environ["PYTHONPYCACHEPREFIX"] = tempfile.mkdtemp(prefix="pycache-")
+        config.add_cleanup(lambda: shutil.rmtree(compiled, ignore_errors=True))
         config.pluginmanager.register(Silence(config), "silence")
         config.pluginmanager.register(Skips(config.getoption("--allowed-skips")), "skips")
 
