@@ -77,6 +77,12 @@ class WaveformRecorder:
         for (variable, _), value in zip(self._watched, self._seen, strict=True):
             self._writer.change(variable, self._time(machine.cycle), value)
         pins.edges, pins.frames = self._edges, self._frames
+        self._logged = machine.cycle
+        """Cycle up to which the edges of waveforms are in the log."""
+        self._framed: Final = [0] * len(PORTS)
+        """Pins that were logged by their waveform, whose static level does not count while it is attached."""
+        self._waveform_pins = pins.waveform_pins.tolist()
+        self._removals.append(pins.on_waveform_change(self._log_waveforms, self._log_detached))
 
     def _time(self, cycle: int) -> int:
         return round(Fraction(cycle * PICOSECONDS) / self._hz)
@@ -161,10 +167,27 @@ class WaveformRecorder:
                 self._seen[index] = value
                 self._pending.append((now, variable, value))
 
+    def _log_waveforms(self, until: int) -> None:
+        """Log the edges of waveforms up to cycle `until`."""
+        self._machine.pins.log_waveforms(self._logged, until)
+        self._logged = max(self._logged, until)
+
+    def _log_detached(self) -> None:
+        """Log the levels of pins whose waveform was just detached."""
+        pins, before = self._machine.pins, self._waveform_pins
+        self._waveform_pins = pins.waveform_pins.tolist()
+        for port, (old, new) in enumerate(zip(before, self._waveform_pins, strict=True)):
+            if old & ~new:
+                pins.log_level(self._logged, port, old & ~new, pins.level[port])
+
     def _write(self, until: int) -> None:
         """Write all changes up to cycle `until`, sorted by cycle."""
+        self._log_waveforms(until)
+        for _, port, mask, *_ in self._frames:
+            self._framed[port] |= mask
         for cycle, port, levels in self._edges:
-            changed = (levels ^ self._levels[port]) & ~self._transmit[port]
+            waveforms = self._framed[port] & self._machine.pins.waveform_pins[port]
+            changed = (levels ^ self._levels[port]) & ~(self._transmit[port] | waveforms)
             self._levels[port] = levels
             for bit in range(16):
                 if changed >> bit & 1 and (port, bit) in self._pins:

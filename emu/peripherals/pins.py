@@ -17,7 +17,7 @@ calls the watchers. Call `flush` before reading a result that a lazy watcher com
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any, Final, Protocol
 
 from emu.system.events import Events
@@ -50,6 +50,13 @@ class Waveform(Protocol):
         """Return the first cycle after `cycle` at which `bits` may change, unless `Pins.invalidate` is called.
 
         Return `cycle` itself if the waveform gives no guarantee.
+        """
+
+    def changes(self, after: int, until: int) -> Iterable[tuple[int, int, int]]:
+        """Return (cycle, mask, levels) for cycle `after` + 1 and for each edge in after < cycle <= until.
+
+        Empty for a waveform that logs its edges when they occur. A recorder of all edges calls it before the waveform
+        changes and at the end of each stretch of the run.
         """
 
 
@@ -110,11 +117,14 @@ class Pins:
         """Ring of changes made by native code, each encoded as cycle << 24 | port << 16 | levels."""
         self._u64: Final = record.u64
         self._count: Final = record.reserve("pins.ring_count", "Q").index
+        self._logged: Final = record.reserve("pins.logged", "Q").index
+        """Whether edges are logged. Native code must then call Python for edges that no watcher needs."""
         self._edges: list[tuple[int, int, int]] | None = None
         self.frames: list[tuple[int, int, int, int, int, int]] | None = None
         """Log of UART frames if set to a list; frames are then not logged as edges.
 
-        An entry has: first cycle, port, pin mask, levels from bit 0 on, number of levels, cycles per level.
+        Single levels of waveform pins are frames of length 1. An entry has: first cycle, port, pin mask, levels from
+        bit 0 on, number of levels, cycles per level.
         """
         self._eager_before_log: list[int] = []
         self._watchers: Final[list[list[tuple[int, Watcher]]]] = [[] for _ in PORTS]
@@ -151,6 +161,7 @@ class Pins:
             for port, mask in enumerate(self._eager_before_log):
                 self.eager[port] = mask
         self._edges = log
+        self._u64[self._logged] = log is not None
 
     def watch(self, name: str, watcher: Watcher, *, lazy: bool = False) -> None:
         """Call `watcher` for every edge on one pin. With `lazy`, the call may happen later."""
@@ -242,9 +253,25 @@ class Pins:
         """Return the waveform attached to the pins in `mask`, None if there is none."""
         return next((wave for pins, wave in self._waveforms[port] if pins & mask), None)
 
-    def on_waveform_change(self, before: Callable[[int], None], after: Callable[[], None]) -> None:
-        """Call `before(cycle)` and `after()` around every `change_waveform`."""
-        self._on_waveform.append((before, after))
+    def on_waveform_change(self, before: Callable[[int], None], after: Callable[[], None]) -> Callable[[], None]:
+        """Call `before(cycle)` and `after()` around every `change_waveform`. Return a function that stops the calls."""
+        entry = (before, after)
+        self._on_waveform.append(entry)
+        return lambda: self._on_waveform.remove(entry)
+
+    def log_level(self, cycle: int, port: int, mask: int, levels: int) -> None:
+        """Append the levels of waveform pins from `cycle` on to the log of frames or of edges, if there is one."""
+        if self.frames is not None:
+            self.frames += [(cycle, port, 1 << bit, levels >> bit & 1, 1, 1) for bit in range(16) if mask >> bit & 1]
+        elif self._edges is not None:
+            self._edges.append((cycle, port, self.level[port] & ~mask | levels & mask))
+
+    def log_waveforms(self, after: int, until: int) -> None:
+        """Log the edges in after < cycle <= until of waveforms that do not log them when they occur."""
+        for port, waveforms in enumerate(self._waveforms):
+            for mask, waveform in waveforms:
+                for cycle, pins, levels in waveform.changes(after, until):
+                    self.log_level(cycle, port, pins & mask, levels)
 
     def change_waveform(self, cycle: int, change: Callable[[], None]) -> None:
         """Run `change`, which alters an attached waveform from `cycle` on. Timers clocked by it keep their counts."""

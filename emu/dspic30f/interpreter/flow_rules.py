@@ -130,13 +130,14 @@ def restore_repeat(m: StraightLineBuilder, p: FlowOperands, count: Number, left:
 def execute_do(m: StraightLineBuilder, p: FlowOperands, count: Number, start: int, end: int) -> None:
     """Execute DO for the loop from `start` to the instruction at `end`.
 
-    The registers of the outer loop are copied to the shadow registers (isa.md §7.6).
+    The registers of the outer loop are copied to the shadow registers, unless those already hold an outer loop's: at
+    deeper levels software saves the registers (isa.md §7.6).
     """
+    level = (m.get(p.corcon) & DL_MASK) >> DL_SHIFT
     for register, shadow in zip(p.loop, p.shadow, strict=True):
-        m.put(shadow, m.get(register))
+        m.put(shadow, m.select(level < SHADOWED, m.get(register), m.get(shadow)))
     for register, value in zip(p.loop, (count, start & 0xFFFF, start >> 16, end & 0xFFFF, end >> 16), strict=True):
         m.put(register, value)
-    level = (m.get(p.corcon) & DL_MASK) >> DL_SHIFT
     _nest(m, p, m.select(level < 7, level + 1, 7))
 
 

@@ -5,6 +5,7 @@ UNVERIFIED: the pin-filter delay of silicon (about 0.9 us per bit) is omitted, a
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Final
 
 from emu.chips.chip import I2cSite
@@ -108,6 +109,10 @@ class I2c(Peripheral):
     def constant_until(self, cycle: int) -> int:
         """Return NEVER between operations, when the lines are constant; during one, `cycle` (no guarantee)."""
         return NEVER if self._operation.value == _NONE or self._stalled.value else cycle
+
+    def changes(self, after: int, until: int) -> Iterable[tuple[int, int, int]]:
+        """Return no edges, because the operations log them."""
+        return ()
 
     def restored(self) -> None:
         """Attach the waveform to the pins if the module is on, otherwise detach it."""
@@ -315,14 +320,12 @@ class I2c(Peripheral):
 
     def _log_edges(self, first: int, end: int) -> None:
         """Write the operation's edges, from Tbrg `first` on, to the log of pin changes."""
-        log = self.context.pins.edges
-        if log is None:
+        pins, port, both = self.context.pins, self.wire.port, self.wire.sda | self.wire.scl
+        if pins.edges is None:
             return
-        port, both = self.wire.port, self.wire.sda | self.wire.scl
-        others = self.context.pins.level[port] & ~both
         for count in range(first, end):
             cycle = self._edge(count)
-            log.append((cycle, port, others | self.bits(cycle)))
+            pins.log_level(cycle, port, both, self.bits(cycle))
 
     # -- power and reset ---------------------------------------------------------------------------------------------
 

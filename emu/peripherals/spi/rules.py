@@ -35,6 +35,8 @@ class SpiOperands:
     level: Cell
     """Pin levels of the port that has SDI."""
     sdi: int
+    logged: Cell
+    """Whether edges of pins are logged."""
     step: EventSlot
     line: InterruptLine
 
@@ -109,5 +111,6 @@ def waits_to_begin(m: RuleBuilder, s: SpiOperands) -> Number:
 def fire(m: RuleBuilder, s: SpiOperands) -> None:
     """Handle the end of a word sent by a master, and start the next one."""
     m.require(((m.get(s.con) & s.bit["MSTEN"]) != 0) & (m.get(s.has_device) == 0))
+    m.require(m.get(s.logged) == 0)
     finish(m, s, open_end(m, s), m.get(s.busy) != 0)
     begin(m, s, m.now, bit_time(m, s), waits_to_begin(m, s))

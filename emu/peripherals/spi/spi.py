@@ -7,7 +7,7 @@ functions of the cycle. The module's logic is in `rules.py`.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Final
 
 from emu.chips.chip import SpiSite
@@ -78,6 +78,7 @@ class Spi(Peripheral):
             spre=fields["SPRE"][0],
             level=cell_of(self.record, "pins.level", port),
             sdi=pin,
+            logged=cell_of(self.record, "pins.logged"),
             step=event_slot(self.record, self._step),
             line=self._line.line,
             **{
@@ -123,6 +124,7 @@ class Spi(Peripheral):
             finish(rules, operands, word)
         if waits_to_begin(rules, operands):
             begin(rules, operands, due, self.bit_time)
+            self._log_word()
 
     def clock_word(self, word: int, bit_tcy: int = 16) -> bool:
         """Clock one word through this module as an external master, starting now. Return False if it cannot receive."""
@@ -132,6 +134,7 @@ class Spi(Peripheral):
             return False
         self._reply.value = word
         begin(self.bus.integers, self._operands, self.now + 1, bit_tcy)
+        self._log_word()
         return True
 
     # -- pins --------------------------------------------------------------------------------------------------------
@@ -150,6 +153,8 @@ class Spi(Peripheral):
                 else:
                     self._ports[port].own(pin, drive, self.con["CKP"] if role == "sck" else 0)
         self.restored()
+        port, following = self._pins["sck"][0], self.now + 1
+        self.context.pins.log_level(following, port, self._waveform_pins(), self.bits(following))
 
     def bits(self, cycle: int) -> int:
         """Return the levels of SCK and SDO (§12).
@@ -177,15 +182,36 @@ class Spi(Peripheral):
         """Return `cycle` (no guarantee), because idle levels depend on control bits that are plain storage."""
         return cycle
 
+    def changes(self, after: int, until: int) -> Iterable[tuple[int, int, int]]:
+        """Return no edges, because `_log_word` logs them."""
+        return ()
+
+    def _log_word(self) -> None:
+        """Append the edges of the word that begins to the log of pin changes, if there is one."""
+        pins, (port, clock) = self.context.pins, self._pins["sck"]
+        if pins.edges is None:
+            return
+        mask = self._waveform_pins()
+        start, bit = self._start.value, self._bit.value
+        for index in range(self.word_bits):
+            for cycle in (start + index * bit, start + index * bit + (bit + 1) // 2):
+                pins.log_level(cycle, port, mask, self.bits(cycle))
+        pins.log_level(start + self.word_bits * bit, port, mask & clock, clock if self.con["CKP"] else 0)
+
     def restored(self) -> None:
         """Attach the waveform to SDO and, as master, to SCK while the module is on."""
         self._has_device.value = self._exchange is not None
         port = self._pins["sck"][0]
         self.context.pins.detach(port, self)
+        mask = self._waveform_pins()
+        if mask:
+            self.context.pins.attach(port, mask, self)
+
+    def _waveform_pins(self) -> int:
+        """Return the mask of SDO and, as master, SCK while the module is on."""
         mask = self._pins["sck"][1] if self.con["MSTEN"] else 0
         mask |= 0 if self.con["DISSDO"] else self._pins["sdo"][1]
-        if self.stat["SPIEN"] and mask:
-            self.context.pins.attach(port, mask, self)
+        return mask if self.stat["SPIEN"] else 0
 
     # -- control -----------------------------------------------------------------------------------------------------
 

@@ -201,9 +201,9 @@ def fire_send(m: RuleBuilder, u: UartOperands) -> None:
     sent = m.get(u.shifting) != 0
     m.require((sent == 0) | ((m.get(u.end) <= m.now) & (m.get(u.at_once) == 0) & (stored < SENT)))
     m.require((((mode & u.bit["LPBACK"]) == 0) & ((m.get(u.watched) & u.tx_pin) == 0)) | (count == 0))
+    m.require((m.get(u.sta) & u.bit["UTXBRK"]) == 0)
     place = m.select(sent, stored, 0)
-    character = m.select((m.get(u.sta) & u.bit["UTXBRK"]) == 0, m.get(u.frame), 0)
-    m.put(u.sent, m.select(sent, m.get(u.start) << 16 | character, m.get(u.sent, place)), place)
+    m.put(u.sent, m.select(sent, m.get(u.start) << 16 | m.get(u.frame), m.get(u.sent, place)), place)
     m.put(u.sent_count, m.select(sent, stored + 1, stored))
     send_next(m, u, m.now)
 

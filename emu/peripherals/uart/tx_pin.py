@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Final
 
 from emu.peripherals.pins import Pins
@@ -33,6 +33,14 @@ class TxPin:
     def constant_until(self, cycle: int) -> int:
         """Return `cycle` (no guarantee), because firmware rarely reads its own TX pin."""
         return cycle
+
+    def changes(self, after: int, until: int) -> Iterable[tuple[int, int, int]]:
+        """Return no edges, because `log_frame` and `log_level` log them."""
+        return ()
+
+    def log_level(self, cycle: int, level: int) -> None:
+        """Append the pin's level from `cycle` on to the log of pin changes, if there is one."""
+        self._pins.log_level(cycle, self._port, self._mask, self._mask if level else 0)
 
     def log_frame(self, start: int, bits: int, length: int, bit: int) -> None:
         """Append a frame to the log of pin changes, if there is one:

@@ -94,6 +94,12 @@ class Uart(Peripheral):
         self._bit_began: Final = self.timestamp("bit_began", NEVER)
         """Start cycle of bit 0 in `wave`: the start bit, or the bit during which BRG was written."""
         self._tx_event: Final = self.slot("tx", self._tx_due)
+        self._break_event: Final = self.slot("break", self._break_due)
+        self._break_began: Final = self.timestamp("break_began", NEVER)
+        """First cycle in which UTXBRK holds TX low; NEVER without a break."""
+        self._break_start: Final = self.timestamp("break_start", NEVER)
+        self._break_ended: Final = self.timestamp("break_ended", NEVER)
+        """First and last cycle of TX low, of the break that `_break_due` will report."""
         self._pin: Final = TxPin(context.pins, tx_port, self._tx_pin, self._tx_level)
 
         self._rx: Final = self.array("rx", "H", FIFO + 1)
@@ -238,18 +244,54 @@ class Uart(Peripheral):
         if self._shifting.value:
             self._shifting.value = 0
             self.deliver_sent()  # loopback disconnects only the receive pin; the frame is sent on TX (§10)
-            self._listeners(0 if self.sta["UTXBRK"] else self._frame.value, self._start.value)
+            if self._break_began.value > self._start.value:  # during a break the line has no start bit
+                self._listeners(0 if self.sta["UTXBRK"] else self._frame.value, self._start.value)
         waits = self._tx_count.value > 0
         send_next(self.bus.integers, self._operands, due)
         if waits:
             start, mode = self._start.value, self.mode.value
+            if self._break_began.value <= start:
+                return
             self._pin.log_frame(start, self._wave.value, length(mode), self.bit_time)
             if self.mode["LPBACK"]:
-                self._receive_frame(start, self._frame.value | (BREAK if self.sta["UTXBRK"] else 0), 0)
+                self._receive_frame(start, self._frame.value, 0)
+
+    def _switch_break(self, on: bool) -> None:
+        """Begin or end a break: TX is low while UTXBRK is set and the transmitter is enabled (§10.1).
+
+        A receiver takes the falling edge for a start bit. After the time of a frame it has a zero byte without a stop
+        bit, if TX is still low; after a shorter break it has the bits that were high. A break that begins inside a
+        frame has no start bit of its own.
+        """
+        following = self.now + 1
+        if on == (self._break_began.value != NEVER):
+            return
+        self._pin.log_level(following, not on)
+        if not on:
+            self._break_ended.value = following
+            self._break_began.value = NEVER
+            return
+        self._break_began.value = following
+        if self._shifting.value and self._start.value < following:
+            return
+        self._break_ended.value = NEVER
+        self._break_start.value = following
+        self.events.set(self._break_event, following + length(self.mode.value) * self.bit_time)
+        if self.mode["LPBACK"] and self._receiving.value == QUIET:
+            self._receive_frame(following, BREAK, 0)
+
+    def _break_due(self, due: int) -> None:
+        """Report the byte that a receiver makes of a break, at the end of the frame that the break began."""
+        low = min(self._break_ended.value, due) - self._break_start.value
+        zeros = (2 * low + self.bit_time) // (2 * self.bit_time)  # number of bits whose middle is low
+        if zeros:  # a receiver rejects a start bit that is high in its middle
+            bits = first_stop(self.mode.value) - has_parity(self.mode.value) - 1
+            self.deliver_sent()
+            self._listeners((1 << bits) - 1 & ~((1 << zeros - 1) - 1), self._break_start.value)
 
     def _tx_level(self, cycle: int) -> int:
         """Return the level of TX at `cycle`; 1 is idle."""
-        if self.sta["UTXBRK"]:
+        if self._break_began.value <= cycle:
             return 0
         if not self._shifting.value or cycle < self._start.value:
             return 1
@@ -364,6 +406,7 @@ class Uart(Peripheral):
                 self._clock.value = self.now + 1
                 self._rx_port.own(self._rx_pin, drive=False, level=0)
                 self._transmitter_switched(self.is_sending_enabled)
+                self._switch_break(bool(self.sta["UTXBRK"]) and self.is_sending_enabled)
             else:
                 self._abort()
         if "ALTIO" in self.context.chip.sfrs[self.mode.name].fields and self.mode["ALTIO"]:
@@ -373,9 +416,10 @@ class Uart(Peripheral):
 
     def _sta_written(self, old: int, new: int, _lanes: int) -> None:
         fields = self.context.chip.sfrs[self.sta.name].fields
-        utxen, oerr = (1 << fields[name][0] for name in ("UTXEN", "OERR"))
+        utxen, utxbrk, oerr = (1 << fields[name][0] for name in ("UTXEN", "UTXBRK", "OERR"))
         if (old ^ new) & utxen and self.is_enabled:
             self._transmitter_switched(bool(new & utxen))
+        self._switch_break(bool(new & utxbrk) and self.is_sending_enabled)
         if old & oerr and not new & oerr:  # only a change from 1 to 0 flushes the FIFO (§10.2)
             self._rx_count.value = 0
             self._held.value = 0
@@ -391,6 +435,7 @@ class Uart(Peripheral):
                 self._clock.value = self.now + 1
                 self.events.set(self._tx_event, self.now + 1)
             return
+        self._switch_break(False)
         self._tx_port.disown(self._tx_pin)
         self._tx_count.value = 0
         self._shifting.value = 0
@@ -455,6 +500,7 @@ class Uart(Peripheral):
         self._tx_count.value = self._shifting.value = 0
         self._rx_count.value = self._held.value = self._receiving.value = 0
         self._start.value = self._end.value = NEVER
+        self._break_began.value = NEVER
         self._clock.value = 0
         self._plan_line()
 

@@ -8,7 +8,7 @@ ends. Generated code of the port reads the pixels from the record.
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import partial
 from typing import TYPE_CHECKING, Final
 
@@ -227,6 +227,10 @@ class Camera(BoardPart, I2cDevice):
     def nth_rise(self, mask: int, after: int, count: int) -> int:
         """Report no rising edges, because no device of the chip is clocked by the data lines."""
         return NEVER
+
+    def changes(self, after: int, until: int) -> Iterable[tuple[int, int, int]]:
+        """Return no edges: the log of pin changes has no pixel bytes, which depend on the scene at their time."""
+        return ()
 
     def _refresh(self, cycle: int) -> bool:
         """Render the line on the bus into the record, where native code reads its bytes.

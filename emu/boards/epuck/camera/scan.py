@@ -6,6 +6,7 @@ module in Tcy.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import astuple, dataclass, fields
 from typing import Final
 
@@ -145,6 +146,27 @@ class Scan:
         if 0 <= line < timing.lines and behind < timing.line_bytes * timing.byte_tcy:
             return cycle
         edges = (timing.vsync_rise, timing.vsync_fall, self._next_line(offset), timing.frame_tcy)
+        return cycle + min(edge for edge in edges if edge > offset) - offset
+
+    def changes(self, after: int, until: int) -> Iterator[tuple[int, int, int]]:
+        """Yield the levels of VSYNC and HREF in cycle `after` + 1 and at their edges in after < cycle <= until.
+
+        PCLK is omitted: it has millions of edges in a second.
+        """
+        cycle = after + 1
+        while cycle <= until:
+            yield cycle, VSYNC | HREF, self.bits(cycle)
+            cycle = self._next_edge(cycle) if self.running else until + 1
+
+    def _next_edge(self, cycle: int) -> int:
+        """Return the cycle of the next edge of VSYNC or HREF, or the end of the frame, after `cycle`."""
+        timing = self.timing
+        frame, offset = self.place(cycle)
+        if frame < 0:
+            return self.start
+        line = min(max((offset - timing.first_href) // timing.line_tcy, 0), timing.lines - 1)
+        line_end = timing.first_href + line * timing.line_tcy + timing.line_bytes * timing.byte_tcy
+        edges = (timing.vsync_rise, timing.vsync_fall, line_end, self._next_line(offset), timing.frame_tcy)
         return cycle + min(edge for edge in edges if edge > offset) - offset
 
     def _next_line(self, offset: int) -> int:
