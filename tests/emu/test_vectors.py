@@ -22,8 +22,8 @@ from engines import ENGINES, Engine
 from emu.dspic30f.isa import codec, text
 
 RAM_START = 0x0800
-NATIVE_STRIDE = 199
-PARTS = 4  # tests per engine, which pytest-xdist can run in parallel
+NATIVE_STRIDE = 499
+PARTS = 2  # tests per engine, which pytest-xdist can run in parallel
 STEP_LIMIT = 100_000  # number of instructions after which a program that has not reached its end fails
 CALL_WN_ROWS = {159: "goto", 161: "rcall"}  # known defect of the disassembler that wrote the vectors
 

@@ -1,4 +1,7 @@
-"""A boot loader over UART1: the firmware programs its own flash, on both engines (dspic30f6014a.md §10, §16)."""
+"""A boot loader over UART1: the firmware programs its own flash, whose code is native (dspic30f6014a.md §10, §16).
+
+test_loader_rows.py runs a boot loader on every engine.
+"""
 
 from __future__ import annotations
 
@@ -23,11 +26,11 @@ def packet(words: list[int], damage: int = 0) -> bytes:
     return b"\xc1" + data + bytes([sum(data) + damage & 0xFF])
 
 
-@pytest.fixture(params=["plain", "auto"])
-def machine(request, program) -> Machine:
+@pytest.fixture
+def machine(program) -> Machine:
     image = load_image(program("bootload.c"))
-    made = Machine(image.chip, engine=request.param, board=Epuck)
-    if request.param == "auto" and hasattr(made.runner, "wait"):
+    made = Machine(image.chip, board=Epuck)
+    if hasattr(made.runner, "wait"):
         made.runner.threshold, made.runner.wait = 1, True
     made.load(image)
     made.program.put_flash(ROW, constant(7))
@@ -42,7 +45,6 @@ def talk(machine: Machine, data: bytes, cycles: int = 300_000) -> bytes:
     return bytes(heard)
 
 
-@pytest.mark.slow
 def test_programmed_rows_replace_compiled_code(machine):
     """§16: erasing and programming stall the CPU for 2 ms each, and native code of the old row is discarded."""
     machine.run(cycles=2_500_000)
@@ -55,7 +57,6 @@ def test_programmed_rows_replace_compiled_code(machine):
         assert machine.peek("answer") == value
 
 
-@pytest.mark.slow
 def test_a_damaged_row_is_refused_and_nothing_is_erased(machine):
     assert talk(machine, packet(constant(1), damage=1)) == b"qKN"
     assert machine.program.word(ROW) == constant(7)[0]

@@ -1,4 +1,7 @@
-"""Programs in the style of the vendor's library, on the whole robot and on both engines (epuck.md §3, §6, §7)."""
+"""Programs in the style of the vendor's library, on the whole robot (epuck.md §3, §6, §7).
+
+Native code runs them; the last test compares its states with those of the interpreter.
+"""
 
 from __future__ import annotations
 
@@ -14,20 +17,19 @@ from emu.image.loader import load_image
 FCY = 14_745_600
 
 
-@pytest.fixture(params=["plain", "auto"])
-def start(request, program):
+@pytest.fixture
+def start(program):
     """Return a function that starts a program: start("agenda.c", camera="PO3030K") returns a machine with it."""
 
-    def load(source: str, **options) -> Machine:
+    def load(source: str, engine: str = "auto", **options) -> Machine:
         image = load_image(program(source))
-        machine = Machine(image.chip, engine=request.param, board=partial(Epuck, **options))
+        machine = Machine(image.chip, engine=engine, board=partial(Epuck, **options))
         machine.load(image)
         return machine
 
     return load
 
 
-@pytest.mark.slow
 def test_agenda_steps_both_motors_at_the_library_s_rates(start):
     """epuck.md §3: an agenda with a tick of 1,475 Tcy steps one motor every 20 and the other every 40 ticks: 500 and
     250 steps/s."""
@@ -41,7 +43,6 @@ def test_agenda_steps_both_motors_at_the_library_s_rates(start):
     assert (motors.left.lost, motors.left.illegal, motors.right.lost) == (0, 0, 0)
 
 
-@pytest.mark.slow
 def test_remote_control_sampled_by_the_agenda_gives_the_keys_pressed(start):
     """epuck.md §6: the agenda, the periodic scheduler of the e-puck library, decodes pressed keys.
 
@@ -71,7 +72,6 @@ def test_codec_gets_its_settings_and_the_samples(start):
     assert gaps == {2048}, "7,200 samples a second"
 
 
-@pytest.mark.slow
 def test_serial_protocol_by_interrupt_answers_text_and_binary(start):
     """epuck.md §6: the serial protocol answers text commands and several binary commands in a row, ended by 0; RCON
     shows the RESET."""
@@ -103,7 +103,6 @@ def test_serial_protocol_by_interrupt_answers_text_and_binary(start):
     assert ask(b"abcdefgh" * 2, wait=FCY // 10).count(b"z,") == 16
 
 
-@pytest.mark.slow
 def test_slow_camera_driver_captures_a_grey_picture(start):
     """epuck.md §7.3: the slow driver captures 40 x 40 of 320 x 320 grey pixels from a PO3030K with an interrupt every
     64 Tcy; the identity is 0x3030."""
@@ -120,17 +119,16 @@ def test_slow_camera_driver_captures_a_grey_picture(start):
     assert np.all(np.diff(frame.astype(np.int16), axis=0) % 256 == 5), "and 8 rows from the one above"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("source", ["agenda.c", "sound.c", "sercom.c", "slowcam.c"])
-def test_engines_agree_to_the_bit(program, source):
-    """engines.md §4.3: both engines reach the same state at the same cycle."""
+def test_engines_agree_to_the_bit(start, source):
+    """engines.md §4.3: both engines reach the same state at the same cycle, after a whole frame of the remote control."""
     states = []
     for engine in ("plain", "auto"):
-        image = load_image(program(source))
-        machine = Machine(image.chip, engine=engine, board=partial(Epuck, camera="PO3030K", seed=3))
-        machine.load(image)
+        machine = start(source, engine, camera="PO3030K", seed=3)
         machine.board.remote.press(7)
         machine.board.bluetooth.feed(b"C\rV\rxyz")
-        machine.run_until(2_222_222)
+        machine.run_until(444_444)
         states.append((machine.cycle, machine.record.field_at, machine.snapshot()))
     (cycle, name, one), (other_cycle, _, two) = states
     assert cycle == other_cycle

@@ -146,59 +146,74 @@ def build(tmp_path_factory):
     return make
 
 
-@pytest.fixture(params=["-O0", "-Os"])
-def machine(build, request):
-    """Return a machine paused in the deepest call of `inner`."""
+ASSIGNED = [
+    ("robot.speed[1]", -9), ("robot.place.mode", 30), ("robot.place.low", -8), ("small", 7), ("robot.gain", 1.25),
+    ("robot.big", 1 << 60), ("robot.u.parts[0]", 1), ("LATB", 0x1234),
+]  # fmt: skip
+INVALID = [
+    ("unknown", "nothing called 'unknown'"), ("robot.weight", "no member 'weight'"), ("robot +", "ends too early"),
+    ("robot * 2", "is no number"), ("hidden[3]", "elements 0 to 2"), ("1 / 0", "zero"), ("small small", "too much"),
+    ("", "empty"), ("a ` b", "not understood"), ("&5", "no address"),
+    ("&robot.place.mode", "no address"), ("09", "no number of C"), ("9" * 5000, "no number of C"),
+    ("'\\q'", "no char"),
+    ("1?" * 4000 + "1" + ":1" * 4000, "inside one another"), ("robot.speed + 1.5", "needs whole numbers"),
+    ("robot.speed[1e0]", "needs whole numbers"),
+    ("(struct unknown *)0x800", "nothing called 'struct unknown'"), ("(long char)1", "'long char' is no type"),
+    ("(int", "expected ')'"), ("(struct point)1", "no struct point"), ("(int)robot", "no int"),
+    ("*(void *)0x800", "has no value"), ("sizeof robot.place.mode", "bit field has no size"),
+    ("sizeof(void)", "size of void is not known"), ("(int)(1e308 * 10)", "inf is no whole"),
+    ("(int[0])1", "number of elements"), ("sizeof unknown", "nothing called 'unknown'"),
+    ("(int)" * 99 + "1", "inside"),
+    ("5", "names no object"),
+]  # fmt: skip
+
+
+@pytest.fixture(params=["-O0", "-Os"], scope="module")
+def paused(build, request):
+    """Return a machine paused in the deepest call of `inner`, and its snapshot."""
     made = emu.load(build(request.param))
     made.run(until="main")
     made.uart[1].expect("ready", within=20)
+    return made, made.snapshot()
+
+
+@pytest.fixture
+def machine(paused):
+    """Return the machine paused in the deepest call of `inner`, in the state of its snapshot."""
+    made, state = paused
+    made.restore(state)
     return made
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(("expression", "value"), GLOBALS)
-def test_expressions_of_c(machine, expression, value):
-    assert machine.var(expression) == value
+def test_expressions_of_c(machine):
+    got = [(expression, machine.var(expression), value) for expression, value in GLOBALS]
+    assert [one for one in got if one[1] != one[2]] == []
 
 
-@pytest.mark.parametrize(
-    ("expression", "value"), [("robot.speed[1]", -9), ("robot.place.mode", 30), ("robot.place.low", -8), ("small", 7),
-                              ("robot.gain", 1.25), ("robot.big", 1 << 60), ("robot.u.parts[0]", 1), ("LATB", 0x1234)],
-)  # fmt: skip
-def test_an_assignment_changes_one_object_only(machine, expression, value):
-    place = machine.value(expression)
-    around = machine.peek_bytes(place.address - 2, 20) if place.address >= 0x800 else None
-    machine.set_var(expression, value)
-    assert machine.var(expression) == value
-    if around is not None:
-        size = place.type.bytes
-        after = machine.peek_bytes(place.address - 2, 20)
-        assert (after[:2], after[2 + size :]) == (around[:2], around[2 + size :])
-    if "mode" in expression:
-        assert (machine.var("robot.place.flags"), machine.var("robot.place.x")) == (5, 7)
+def test_an_assignment_changes_one_object_only(machine, paused):
+    for expression, value in ASSIGNED:
+        machine.restore(paused[1])
+        place = machine.value(expression)
+        before = machine.peek_bytes(place.address - 2, 20) if place.address >= 0x800 else None
+        machine.set_var(expression, value)
+        assert machine.var(expression) == value, expression
+        if before is not None:
+            size = place.type.bytes
+            after = machine.peek_bytes(place.address - 2, 20)
+            assert (after[:2], after[2 + size :]) == (before[:2], before[2 + size :]), expression
+        if "mode" in expression:
+            assert (machine.var("robot.place.flags"), machine.var("robot.place.x")) == (5, 7)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("expression", "words"),
-    [("unknown", "nothing called 'unknown'"), ("robot.weight", "no member 'weight'"), ("robot +", "ends too early"),
-     ("robot * 2", "is no number"), ("hidden[3]", "elements 0 to 2"), ("1 / 0", "zero"), ("small small", "too much"),
-     ("", "empty"), ("a ` b", "not understood"), ("&5", "no address"),
-     ("&robot.place.mode", "no address"), ("09", "no number of C"), ("9" * 5000, "no number of C"),
-     ("'\\q'", "no char"),
-     ("1?" * 4000 + "1" + ":1" * 4000, "inside one another"), ("robot.speed + 1.5", "needs whole numbers"),
-     ("robot.speed[1e0]", "needs whole numbers"),
-     ("(struct unknown *)0x800", "nothing called 'struct unknown'"), ("(long char)1", "'long char' is no type"),
-     ("(int", "expected ')'"), ("(struct point)1", "no struct point"), ("(int)robot", "no int"),
-     ("*(void *)0x800", "has no value"), ("sizeof robot.place.mode", "bit field has no size"),
-     ("sizeof(void)", "size of void is not known"), ("(int)(1e308 * 10)", "inf is no whole"),
-     ("(int[0])1", "number of elements"), ("sizeof unknown", "nothing called 'unknown'"),
-     ("(int)" * 99 + "1", "inside"),
-     ("5", "names no object")],
-)  # fmt: skip
-def test_invalid_expressions_are_refused(machine, expression, words):
-    with pytest.raises(ValueError, match=re.escape(words)):
-        machine.value(expression)
+def test_invalid_expressions_are_refused(machine):
+    wrong = []
+    for expression, words in INVALID:
+        try:
+            wrong.append((expression[:80], machine.value(expression)))
+        except ValueError as error:
+            if words not in str(error):
+                wrong.append((expression[:80], str(error)))
+    assert wrong == []
 
 
 def test_a_variable_removed_by_the_linker_is_reported(build):

