@@ -1,8 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Elementary functions in double precision (C11 7.12.4-7.12.7). Polynomials are Chebyshev interpolants computed for
- * these intervals with 60 digits. Errors are below 4 units in the last place; in the trigonometric functions, whose
- * argument reduction uses 99 bits of pi/2, for |x| < 1e5. */
-#include "softfloat.h"
+ * these intervals with 60 digits. Errors are below 4 units in the last place for all arguments. */
+#include "math_reduce.h"
 
 #include <math.h>
 
@@ -15,11 +14,7 @@ static double polynomial(const double *c, int count, double z)
     return sum;
 }
 
-/* pi/2 and ln 2, each split into parts whose products with small integers are exact. */
-#define PIO2_1 1.5707963267341256
-#define PIO2_2 6.077100506303966e-11
-#define PIO2_3 2.0222662487959506e-21
-#define TWO_OVER_PI 0.63661977236758134308
+/* ln 2, split into parts whose products with small integers are exact. */
 #define LN2_1 0.6931471803691238
 #define LN2_2 1.9082149292705877e-10
 #define ONE_OVER_LN2 1.44269504088896340736
@@ -29,16 +24,37 @@ static const double sine[] = {-0.16666666666666666,    0.0083333333333309185,   
 static const double cosine[] = {0.041666666666666664,    -0.0013888888888887378, 2.4801587298736822e-05,
                                 -2.7557317256781059e-07, 2.087614315748681e-09,  -1.1382408611707654e-11};
 
-/* Split x = quadrant * pi/2 + *rest, |*rest| <= pi/4; return quadrant mod 4. */
+/* 2/pi in digits of 16 bits, as many as the largest exponent needs. */
+static const uint16_t two_over_pi[] = {
+    0xA2F9, 0x836E, 0x4E44, 0x1529, 0xFC27, 0x57D1, 0xF534, 0xDDC0, 0xDB62, 0x9599, 0x3C43, 0x9041,
+    0xFE51, 0x63AB, 0xDEBB, 0xC561, 0xB724, 0x6E3A, 0x424D, 0xD2E0, 0x0649, 0x2EEA, 0x09D1, 0x921C,
+    0xFE1D, 0xEB1C, 0xB129, 0xA73E, 0xE882, 0x35F5, 0x2EBB, 0x4484, 0xE99C, 0x7026, 0xB45F, 0x7E41,
+    0x3991, 0xD639, 0x8353, 0x39F4, 0x9C84, 0x5F8B, 0xBDF9, 0x283B, 0x1FF8, 0x97FF, 0xDE05, 0x980F,
+    0xEF2F, 0x118B, 0x5A0A, 0x6D1F, 0x6D36, 0x7ECF, 0x27CB, 0x09B7, 0x4F46, 0x3F66, 0x9E5F, 0xEA2D,
+    0x7527, 0xBAC7, 0xEBE5, 0xF17B, 0x3D07, 0x39F7, 0x8A52, 0x92EA, 0x6BFB, 0x5FB1, 0x1F8D, 0x5D08,
+};
+
+/* Split x = quadrant * pi/2 + *rest, |*rest| <= pi/4, for finite x; return quadrant mod 4. */
 static int reduce(double x, double *rest)
 {
-    if (fabs(x) <= M_PI_4) {
+    uint64_t bits = f64_bits(x), magnitude = bits & ~F64_SIGN;
+    if (magnitude <= f64_bits(M_PI_4)) {
         *rest = x; /* exact, and keeps the sign of zero */
         return 0;
     }
-    double turns = round(x * TWO_OVER_PI);
-    *rest = ((x - turns * PIO2_1) - turns * PIO2_2) - turns * PIO2_3;
-    return (int)fmod(turns, 4) & 3;
+    uint16_t digits[4];
+    int16_t exponent = (int16_t)((int16_t)(magnitude >> 52) - (F64_BIAS + 52));
+    int quadrant = __reduce_turns(two_over_pi, (magnitude & F64_MANTISSA) | (F64_MANTISSA + 1), &exponent, digits, 4);
+    uint64_t significand = 0, sign = bits & F64_SIGN;
+    for (int16_t i = 4; i--;)
+        significand = significand << 16 | digits[i];
+    int negative = quadrant & REDUCED_NEGATIVE;
+    if (significand & F64_SIGN) {
+        significand >>= 1;
+        exponent++;
+    }
+    *rest = f64_value(__f64_pack(negative ? sign ^ F64_SIGN : sign, (int16_t)(exponent + F64_BIAS - 2), significand));
+    return (sign ? -quadrant : quadrant) & 3;
 }
 
 /* Return sin(x + quadrant * pi/2) for |x| <= pi/4. */
@@ -203,7 +219,16 @@ static double upper(double x)
     return f64_value(f64_bits(x) & ~0x7FFFFFFULL);
 }
 
-/* Return log(x) as result + *tail for finite x > 0; with s = f / (2 + f), log(1 + f) = 2 atanh(s) = 2 s + s^3 (...). */
+/* 2/3 as the sum of a number with 26 bits and a correction. */
+#define TWO_THIRDS_1 0.6666666567325592
+#define TWO_THIRDS_2 9.934107462565104e-09
+
+/* Coefficients of s^5, s^7 ... in log(1 + f) - 2 s - 2/3 s^3. */
+static const double logarithm_rest[] = {0.4, 0.28571428571429364, 0.22222222221656232, 0.18181818335314404,
+                                        0.15384594970895457, 0.13334804238225345, 0.11706248540922386, 0.11723051028097753};
+
+/* Return log(x) for finite x > 0; with s = f / (2 + f), log(1 + f) = 2 atanh(s) = 2 s + s^3 (...). With `tail`, the result
+ * plus *tail has 64 correct bits, which pow needs: it multiplies the error by up to 745. */
 static double logarithm_of(double x, double *tail)
 {
     int twos;
@@ -217,22 +242,30 @@ static double logarithm_of(double x, double *tail)
     double sum_high = upper(sum), sum_low = m - (sum_high - 1);
     double s_low = ((f - s_high * sum_high) - s_high * sum_low) / sum;
     double z = s * s;
-    double small = 2 * s_low + s * z * polynomial(logarithm, 7, z) + twos * LN2_2;
     double large = twos * LN2_1, high = large + 2 * s_high;
-    double low = (large != 0 ? 2 * s_high - (high - large) : 0) + small;
-    double result = high + low;
-    *tail = low - (result - high);
+    double low = large != 0 ? 2 * s_high - (high - large) : 0, small = 2 * s_low + twos * LN2_2;
+    if (!tail)
+        return high + (low + (small + s * z * polynomial(logarithm, 7, z)));
+    /* 2/3 s^3 as the sum of `cubic` and `cubic_low`; products of two numbers with 26 bits are exact */
+    double square = s_high * s_high, square_high = upper(square);
+    double cube = square_high * s_high, cube_high = upper(cube);
+    double cube_low = (cube - cube_high) + ((square - square_high) * s_high + (square + (s_high + s) * s) * s_low);
+    double cubic = cube_high * TWO_THIRDS_1;
+    double cubic_low = cube_low * TWO_THIRDS_1 + (cube_high + cube_low) * TWO_THIRDS_2;
+    double total = high + cubic;
+    low += cubic - (total - high) + (small + (cubic_low + s * z * z * polynomial(logarithm_rest, 8, z)));
+    double result = total + low;
+    *tail = low - (result - total);
     return result;
 }
 
 double log(double x)
 {
-    double tail;
     if (isnan(x) || x < 0)
         return f64_value(F64_NAN);
     if (x == 0)
         return -HUGE_VAL;
-    return isinf(x) ? x : logarithm_of(x, &tail);
+    return isinf(x) ? x : logarithm_of(x, 0);
 }
 
 double log10(double x)
@@ -242,7 +275,6 @@ double log10(double x)
 
 double log2(double x)
 {
-    double tail;
     int twos;
     if (!(x > 0) || isinf(x))
         return log(x);
@@ -251,7 +283,7 @@ double log2(double x)
         m *= 2;
         twos--;
     }
-    return twos + logarithm_of(m, &tail) * ONE_OVER_LN2; /* the integer part is exact */
+    return twos + logarithm_of(m, 0) * ONE_OVER_LN2; /* the integer part is exact */
 }
 
 /* 1 + x loses low bits of x, so the result is scaled by x / (sum - 1). */
@@ -260,7 +292,7 @@ double log1p(double x)
     volatile double sum = 1 + x;
     if (sum == 1 || sum == HUGE_VAL) /* the result for -0 is -0 */
         return x;
-    return sum > 0 ? log(sum) * x / (sum - 1) : log(sum);
+    return sum > 0 ? log(sum) * (x / (sum - 1)) : log(sum);
 }
 
 /* Return 2 for even integers, 1 for odd integers, 0 for other numbers. */

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* math.h in single precision. Elementary functions have their own polynomials, so that programs that use only float link
  * no double arithmetic; powf, fmodf, exp2f, log2f, expm1f and log1pf use the double functions. Errors are below 4 units
- * in the last place; in the trigonometric functions for |x| < 5000. */
-#include "softfloat.h"
+ * in the last place for all arguments. */
+#include "math_reduce.h"
 
 #include <math.h>
 
@@ -14,12 +14,7 @@ static float polynomial(const float *c, int count, float z)
     return sum;
 }
 
-/* pi/2 and ln 2, each split into parts whose products with small integers are exact. */
-#define PIO2_1 1.5703125f
-#define PIO2_2 0.0004837512969970703f
-#define PIO2_3 7.549533620476723e-08f
-#define PIO2_4 2.563344151594519e-12f
-#define TWO_OVER_PI 0.63661977f
+/* ln 2, split into parts whose products with small integers are exact. */
 #define LN2_1 0.693115234375f
 #define LN2_2 3.1946184945309415e-05f
 #define PI 3.14159265f
@@ -154,15 +149,29 @@ float sqrtf(float x)
 static const float sine[] = {-0.166666646f, 0.00833274530f, -0.000195872493f};
 static const float cosine[] = {0.0416666646f, -0.00138883001f, 2.45472988e-05f};
 
+/* 2/pi in digits of 16 bits, as many as the largest exponent needs. */
+static const uint16_t two_over_pi[] = {0xA2F9, 0x836E, 0x4E44, 0x1529, 0xFC27, 0x57D1, 0xF534,
+                                       0xDDC0, 0xDB62, 0x9599, 0x3C43, 0x9041, 0xFE51};
+
+/* Split x = quadrant * pi/2 + *rest, |*rest| <= pi/4, for finite x; return quadrant mod 4. */
 static int reduce(float x, float *rest)
 {
-    if (fabsf(x) <= PI_4) {
+    uint32_t bits = f32_bits(x), magnitude = bits & ~F32_SIGN;
+    if (magnitude <= f32_bits(PI_4)) {
         *rest = x; /* exact, and keeps the sign of zero */
         return 0;
     }
-    float turns = roundf(x * TWO_OVER_PI);
-    *rest = (((x - turns * PIO2_1) - turns * PIO2_2) - turns * PIO2_3) - turns * PIO2_4;
-    return (int)(uint16_t)(int32_t)turns & 3;
+    uint16_t digits[2];
+    int16_t exponent = (int16_t)((int16_t)(magnitude >> 23) - (F32_BIAS + 23));
+    int quadrant = __reduce_turns(two_over_pi, (magnitude & F32_MANTISSA) | (F32_MANTISSA + 1), &exponent, digits, 2);
+    uint32_t significand = (uint32_t)digits[1] << 16 | digits[0], sign = bits & F32_SIGN;
+    int negative = quadrant & REDUCED_NEGATIVE;
+    if (significand & F32_SIGN) {
+        significand >>= 1;
+        exponent++;
+    }
+    *rest = f32_value(__f32_pack(negative ? sign ^ F32_SIGN : sign, (int16_t)(exponent + F32_BIAS - 2), significand));
+    return (sign ? -quadrant : quadrant) & 3;
 }
 
 static float sine_of(float x, int quadrant)
