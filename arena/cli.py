@@ -1,4 +1,4 @@
-"""Command line `python -m arena COMMAND`; each command is a module of `commands/`.
+"""Command line `python -m arena COMMAND`; each command is a module of `commands/`, which is imported when it runs.
 
 Exit statuses are those of `emu.host.exit_status`. Status 1 means that a robot had a fault: its firmware stopped, loops
 in a trap handler, or is silent. Finished trials are kept.
@@ -9,75 +9,82 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Callable, Sequence
+from importlib import import_module
 from importlib.metadata import version
+from typing import Any, Final
 
-import emu
-from arena.campaign.cluster import ClusterLostError
-from arena.commands import (
-    bundle,
-    channel,
-    compare,
-    debug,
-    experiment,
-    figures,
-    plot,
-    reaction,
-    replay,
-    report,
-    run,
-    sensitivity,
-    studio,
-    sweep,
-)
-from arena.scene.loader import SceneError, load_scene, scenes
-from arena.trial.record import FolderInUseError, RecordError
+from arena.commands import COMMANDS
 from emu.host.completion import SHELLS, script
 from emu.host.completion import description as completion_description
 from emu.host.exit_status import BAD_INPUT, CANNOT_CONTINUE, DONE, INTERRUPTED, ignore_unread_output
 
-COMMANDS: dict[str, tuple[Callable[[], argparse.ArgumentParser], Callable[[argparse.Namespace], int]]] = {
-    "run": (run.parser, run.run),
-    "debug": (debug.parser, debug.run),
-    "experiment": (experiment.parser, experiment.run),
-    "sweep": (sweep.parser, sweep.run),
-    "sensitivity": (sensitivity.parser, sensitivity.run),
-    "compare": (compare.parser, compare.run),
-    "plot": (plot.parser, plot.run),
-    "figures": (figures.parser, figures.run),
-    "report": (report.parser, report.run),
-    "bundle": (bundle.parser, bundle.run),
-    "verify": (bundle.verify_parser, bundle.verify),
-    "channel": (channel.parser, channel.run),
-    "reaction": (reaction.parser, reaction.run),
-    "replay": (replay.parser, replay.run),
-    "studio": (studio.parser, studio.run),
-}
+_USAGE: Final = """usage: arena COMMAND [options]
+
+Run experiments with robots that execute real firmware in a simulated arena.
+
+{commands}
+
+example: arena run clustering --brain scripted --trials 4 --minutes 10 --out results/scripted-A
+`arena COMMAND --help` explains a command; `arena --version` prints the version."""
+Command = tuple[argparse.ArgumentParser, Callable[[argparse.Namespace], Any]]
+"""Option parser of a command, and the function that runs it and returns the exit status."""
 
 
 @ignore_unread_output
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return the exit status of the process."""
-    parser, commands = _parser()
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    if not words or words[0] in ("-h", "--help"):
+        width = max(map(len, COMMANDS))
+        print(_USAGE.format(commands="\n".join(f"  {name:{width}}  {text}" for name, text in COMMANDS.items())))
+        return DONE if words else BAD_INPUT
+    if words == ["--version"]:
+        print(f"arena {version('openswarm')}")
+        return DONE
+    if words[0] not in COMMANDS:
+        print(f"arena: unknown command {words[0]!r}; known: {', '.join(COMMANDS)}", file=sys.stderr)
+        return BAD_INPUT
+    parser, run = command(words[0])
     try:
-        options = parser.parse_args(arguments)
+        options = parser.parse_args(words[1:])
     except SystemExit as ended:  # --help, or an error that argparse has printed
         return ended.code if isinstance(ended.code, int) else BAD_INPUT
+    return _call(run, options)
+
+
+def command(name: str) -> Command:
+    """Import a command and return its option parser and its function."""
+    run: Callable[[argparse.Namespace], Any]
+    if name == "scenes":
+        parser, run = argparse.ArgumentParser(description=COMMANDS[name], epilog="example: arena scenes"), _list_scenes
+    elif name == "completion":
+        parser = argparse.ArgumentParser(description=completion_description("arena"))
+        parser.epilog = "example: arena completion bash"
+        parser.add_argument("shell", choices=SHELLS)
+        run = _print_completion
+    else:
+        module = import_module(f"arena.commands.{'bundle' if name == 'verify' else name}")
+        parser = module.verify_parser() if name == "verify" else module.parser()
+        run = module.verify if name == "verify" else module.run
+    parser.prog, parser.formatter_class = f"arena {name}", argparse.RawDescriptionHelpFormatter
+    return parser, run
+
+
+def _call(run: Callable[[argparse.Namespace], Any], options: argparse.Namespace) -> int:
+    """Run a command and return its exit status; report errors as one line on standard error."""
+    from arena.campaign.cluster import ClusterLostError
+    from arena.scene.loader import SceneError
+    from arena.trial.record import FolderInUseError, RecordError
+    from emu.image.model import LoadError
+
     try:
-        if options.command == "scenes":
-            for name in scenes():
-                print(f"{name:20} {load_scene(name).description}")
-            return DONE
-        if options.command == "completion":
-            descriptions = {name: (one, one.description or "") for name, one in commands.items()}
-            print(script("arena", descriptions, options.shell))
-            return DONE
-        return COMMANDS[options.command][1](options)
+        return int(run(options))
     except BrokenPipeError:
         raise
     except (FolderInUseError, ClusterLostError) as error:
         print(f"arena: {error}; finished trials are kept; run the same command to continue", file=sys.stderr)
         return CANNOT_CONTINUE
-    except (SceneError, RecordError, emu.LoadError, ValueError, OSError) as error:
+    except (SceneError, RecordError, LoadError, ValueError, OSError) as error:
         print(f"arena: {error}", file=sys.stderr)
         return BAD_INPUT
     except MemoryError:
@@ -88,23 +95,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return INTERRUPTED
 
 
-def _parser() -> tuple[argparse.ArgumentParser, dict[str, argparse.ArgumentParser]]:
-    """Return the parser of the command line, and the parsers of its commands by name."""
-    parser = argparse.ArgumentParser(
-        prog="arena",
-        description="Run experiments with robots that execute real firmware in a simulated arena.",
-        epilog="example: arena run clustering --brain scripted --trials 4 --minutes 10 --out results/scripted-A",
-    )
-    parser.add_argument("--version", action="version", version=f"arena {version('openswarm')}")
-    commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
-    for name, (make, _) in COMMANDS.items():
-        one = make()
-        about = str(one.description).partition("\n")[0]
-        commands.add_parser(name, parents=[one], help=about, description=one.description, epilog=one.epilog,
-                            formatter_class=argparse.RawDescriptionHelpFormatter, add_help=False)  # fmt: skip
-    commands.add_parser("scenes", help="list the built-in scenes")
-    shells = commands.add_parser("completion", help="print a completion script for a shell",
-                                 description=completion_description("arena"), epilog="example: arena completion bash",
-                                 formatter_class=argparse.RawDescriptionHelpFormatter)  # fmt: skip
-    shells.add_argument("shell", choices=SHELLS)
-    return parser, commands.choices
+def _list_scenes(_options: argparse.Namespace) -> int:
+    from arena.scene.loader import load_scene, scenes
+
+    for name in scenes():
+        print(f"{name:20} {load_scene(name).description}")
+    return DONE
+
+
+def _print_completion(options: argparse.Namespace) -> int:
+    print(script("arena", {name: (command(name)[0], text) for name, text in COMMANDS.items()}, options.shell))
+    return DONE

@@ -16,6 +16,8 @@ from pathlib import Path
 
 import pytest
 
+import arena.cli
+from arena.commands import COMMANDS as ARENA
 from emu.host import exit_status, paths
 from openswarm.cli import COMMANDS, command, main
 from tests.watchdog import HANG
@@ -30,7 +32,6 @@ def run_command(*words: str, **environment: str) -> subprocess.CompletedProcess[
                           cwd=ROOT, env=os.environ | environment)  # fmt: skip
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("program", PROGRAMS)
 def test_every_program_tells_its_version_and_helps_with_an_example(program):
     assert run_command(program, "--version").stdout == f"{program} {version('openswarm')}\n"
@@ -116,6 +117,22 @@ def test_doctor_tries_compiler_and_emulator():
     done = run_command("openswarm", "doctor", "--try")
     assert done.returncode == 0, done.stdout
     assert re.search(r"ok +compile and run +works", done.stdout)
+
+
+@pytest.mark.slow
+def test_the_arena_imports_what_its_command_needs():
+    """`arena --version` imports no library of the extra, and `arena run --help` none of statistics or figures; the
+    list of commands has the first lines of their descriptions."""
+    code = "import sys, arena.cli; arena.cli.main([{}]); print(*(name for name in ({}) if name in sys.modules))"
+    for words, libraries in (
+        ("'--version'", "'numpy', 'scipy', 'pymunk', 'matplotlib'"),
+        ("'run', '--help'", "'scipy.stats', 'matplotlib', 'pyarrow'"),
+    ):
+        done = subprocess.run([sys.executable, "-c", code.format(words, libraries)], cwd=ROOT, text=True, check=True,
+                              capture_output=True)  # fmt: skip
+        assert done.stdout.endswith("\n\n"), done.stdout[-200:]
+    first_lines = {name: arena.cli.command(name)[0].description.partition("\n")[0].rstrip(".") for name in ARENA}
+    assert {name: line[0].lower() + line[1:] for name, line in first_lines.items()} == ARENA
 
 
 def test_the_arena_without_its_extra_names_it(tmp_path):
