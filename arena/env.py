@@ -5,7 +5,6 @@ World, sensors and supervisor are those of a trial. Equal seeds and actions give
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, ClassVar, Final
@@ -15,26 +14,21 @@ from gymnasium.spaces import Box
 from numpy.typing import ArrayLike, NDArray
 from pettingzoo import ParallelEnv
 
-from arena.camera.renderer import Renderer
 from arena.experiments import Experiment, TrialSamples, experiment_of
 from arena.experiments.supervisor import Supervisor, SupervisorHooks
 from arena.infrared.channel import OpticalChannel
-from arena.infrared.propagation import Optics
-from arena.infrared.ring import ambient
 from arena.robots.controller import Controller, ScriptedController
 from arena.robots.firmware_controller import FirmwareController
+from arena.robots.own_controller import Policy, load_controller
+from arena.robots.senses import SenseReader, Senses
 from arena.scene import dimensions
 from arena.scene.loader import FCY, Scene, load_scene, scripted
-from arena.world.physics import World, traits_of
-from emu.boards.epuck.analog import reflection_at
+from arena.world.physics import World
 
 SENSED: Final = 3
 """One-hot code of the line-of-sight sensor: nothing, object, robot."""
 SIZE: Final = SENSED + 8 + 8 + 2
 """Length of an observation: sensor, eight reflections (1: touches white), eight lights (1: dark), two wheel speeds."""
-FULL_REFLECTION: Final = 3788.0
-"""ADC counts of a white surface at zero distance (epuck.md §5)."""
-FULL_LIGHT: Final = 4095.0
 Reward = Callable[[Supervisor], float]
 Command = Callable[[float, float], bytes]
 """Translates wheel speeds in -1..1, left and right, into the bytes that a robot receives by Bluetooth."""
@@ -120,7 +114,6 @@ class ArenaEnv(ParallelEnv):  # type: ignore[misc]
         count = self.scene.robots.count
         self.agents = self.possible_agents[:]
         self._world = World(self.scene, chosen)
-        self._optics = Optics(self.scene)
         channel = OpticalChannel.of(self.scene)
         if self._image is None:
             self._controllers = [ScriptedController(self.scene, chosen, robot, "A") for robot in range(count)]
@@ -129,7 +122,7 @@ class ArenaEnv(ParallelEnv):  # type: ignore[misc]
                 FirmwareController(self.scene, chosen, robot, self._image, 0, channel) for robot in range(count)
             ]
         self._hooks = SupervisorHooks(self.experiment, Supervisor(self._world, self._controllers, chosen))
-        self._renderers = [Renderer(self.scene, robot, traits_of(self.scene, chosen, robot)) for robot in range(count)]
+        self._readers = [SenseReader(self.scene, chosen, robot) for robot in range(count)]
         self._speeds = [(0.0, 0.0)] * count
         self._value = self._metric()
         return self._observed(), {agent: {} for agent in self.agents}
@@ -177,6 +170,29 @@ class ArenaEnv(ParallelEnv):  # type: ignore[misc]
         """Controllers of the robots, in order."""
         return self._controllers
 
+    def senses(self, agent: str) -> Senses:
+        """Return what an agent senses now, as the controller of a trial gets it. Call `reset` first."""
+        robot = self.possible_agents.index(agent)
+        left, right = self._speeds[robot]
+        wheels = (left * dimensions.WHEEL_SPEED, right * dimensions.WHEEL_SPEED)
+        return self._readers[robot].read(self._world.poses, self._world.seconds, wheels)
+
+    def policy(self, path: Path) -> Callable[[], dict[str, Vector]]:
+        """Return a function that returns the actions of a controller in a Python file (robots/own_controller.py).
+
+        It holds one instance of the controller per agent, with the random generators of a trial with this seed; create
+        it after `reset`. Raises SceneError, also when the controller fails."""
+        loaded = load_controller(path.resolve())
+        seed = self._next_seed - 1
+        own = {agent: Policy(loaded, seed, robot) for robot, agent in enumerate(self.possible_agents)}
+
+        def actions() -> dict[str, Vector]:
+            speeds = {agent: own[agent].step(self.senses(agent)) for agent in self.agents}
+            return {agent: np.array(one, dtype=np.float32) / np.float32(dimensions.WHEEL_SPEED)
+                    for agent, one in speeds.items()}  # fmt: skip
+
+        return actions
+
     def close(self) -> None:
         """Close the controllers of the robots and their machines."""
         for controller in self._controllers:
@@ -194,15 +210,10 @@ class ArenaEnv(ParallelEnv):  # type: ignore[misc]
 
     def _observed(self) -> dict[str, Vector]:
         """Return the observation of each agent."""
-        poses = self._world.poses
         found = {}
         for robot, agent in enumerate(self.agents):
-            sensed = [0.0] * SENSED
-            self._renderers[robot].set_viewpoint(poses)
-            sensed[self._renderers[robot].line_of_sight()] = 1.0
-            near = [share * reflection_at(distance) / FULL_REFLECTION if math.isfinite(distance) else 0.0
-                    for distance, share in self._optics.surfaces(poses, robot)]  # fmt: skip
-            light = [counts / FULL_LIGHT for counts in ambient(self.scene, poses.robots[robot])]
-            values = (*sensed, *near, *light, *self._speeds[robot])
+            sensed, now = [0.0] * SENSED, self.senses(agent)
+            sensed[now.seen] = 1.0
+            values = (*sensed, *now.proximity, *now.light, *self._speeds[robot])
             found[agent] = np.clip(np.array(values, dtype=np.float32), -1, 1)
         return found

@@ -23,6 +23,7 @@ import numpy as np
 
 from arena.campaign.campaign import Plan, run_one, trial_path
 from arena.experiments import experiment_with_digest
+from arena.robots.own_controller import load_controller
 from arena.robots.reactive import SPEED_TABLES
 from arena.scene.loader import scene_of
 from arena.trial.manifest import MANIFEST, read_manifest
@@ -30,7 +31,7 @@ from arena.trial.record import EXPERIMENT, RecordError, read_trial, write_bytes
 
 INDEX: Final = "bundle.json"
 RECORD, DIGEST = "trial-*.parquet", "trial-*.json"
-PATTERNS: Final = (MANIFEST, EXPERIMENT, RECORD, DIGEST, "firmware*")
+PATTERNS: Final = (MANIFEST, EXPERIMENT, RECORD, DIGEST, "firmware*", "controller-*.py")
 LIMIT: Final = 1 << 32
 """Largest accepted size of an unpacked bundle, in bytes."""
 INDEX_LIMIT: Final = 1 << 24
@@ -189,8 +190,8 @@ def plan_of(folder: Path, own: Path | None = None, trust: bool = False) -> Plan:
         image = firmware["firmware"] if key["image_sha256"] else None
         _check_key(key)
         experiment = _trusted_experiment(folder, scene.experiment, key.get("experiment_sha256"), own, trust)
-        return Plan(scene, key["brain"], key["controller"], image, len(_trial_numbers(folder)),
-                    key["seconds"], key["seed"], experiment, images)  # fmt: skip
+        return Plan(scene, key["brain"], key["controller"], image, len(_trial_numbers(folder)), key["seconds"],
+                    key["seed"], experiment, images, _trusted_controllers(folder, key, trust))  # fmt: skip
     except READ_ERRORS as error:
         raise RecordError(f"{folder / MANIFEST}: {type(error).__name__}: {error}") from None
 
@@ -212,6 +213,21 @@ def _trusted_experiment(folder: Path, name: str, digest: str | None, own: Path |
     return path
 
 
+def _trusted_controllers(folder: Path, key: dict[str, Any], trust: bool) -> tuple[tuple[str, Path], ...]:
+    """Return the files of a run's own controllers.
+
+    Raises RecordError without permission to run their code, SceneError if the hash of a file is not the recorded one.
+    """
+    hashes: dict[str, str] = key.get("controllers_sha256") or {}
+    if hashes and not trust:
+        raise RecordError(f"{folder.name}: has controllers in Python, whose code is not run; accept the copies in the "
+                          "bundle with --trust")  # fmt: skip
+    files = tuple((name, folder / f"controller-{place}.py") for place, name in enumerate(hashes, start=1))
+    for name, path in files:
+        load_controller(path, hashes[name])
+    return files
+
+
 def _commit_of(folder: Path) -> str:
     """Return the commit that made a run, from its manifest; an empty text if it names none."""
     made_on = read_manifest(folder).get("made_on")
@@ -222,7 +238,7 @@ def _commit_of(folder: Path) -> str:
 def _check_key(key: dict[str, Any]) -> None:
     """Check the values of a manifest's key. Raises ValueError for values that no plan has."""
     for name, good in (
-        ("controller", key["controller"] in SPEED_TABLES),
+        ("controller", key["controller"] in {*SPEED_TABLES, *(key.get("controllers_sha256") or {})}),
         ("seconds", 0 < key["seconds"] < math.inf),
         ("seed", key["seed"] >= 0),
     ):

@@ -27,6 +27,7 @@ from arena.infrared.channel import OpticalChannel
 from arena.replay.live_feed import LiveFile, live_path
 from arena.robots.controller import Controller, ScriptedController
 from arena.scene.loader import Scene, SceneError
+from arena.scene.schema import RobotGroup
 from arena.trial.manifest import MANIFEST, read_manifest, write_manifest
 from arena.trial.record import FolderInUseError, RecordError, Trial, write_trial
 from arena.trial.trial import Rows, run_trial
@@ -57,6 +58,8 @@ class Plan:
     """File of a user's experiment; None for a built-in or installed one."""
     images: tuple[tuple[str, Path | None], ...] = ()
     """Firmware of the groups that name their own in the scene, by this name; None for a scripted group."""
+    controllers: tuple[tuple[str, Path], ...] = ()
+    """Python files of controllers, by the name that the scene or the run has for them."""
 
     @property
     def loaded_experiment(self) -> Experiment:
@@ -66,14 +69,23 @@ class Plan:
     @property
     def has_firmware(self) -> bool:
         """Whether any robot runs firmware. All robots of the trial then run in the shorter quantum."""
-        own = dict(self.images)
-        groups = self.scene.groups or (self.scene.group_of(0),)
-        return any((own[one.image] if one.image else self.image) is not None for one in groups)
+        return any(self.image_of(one) is not None for one in self.scene.groups or (RobotGroup(),))
+
+    def own_controller_of(self, group: RobotGroup) -> Path | None:
+        """Return the Python file that controls a group; None for firmware and for the tables A and B."""
+        return None if group.image else dict(self.controllers).get(group.controller or self.controller)
+
+    def image_of(self, group: RobotGroup) -> Path | None:
+        """Return the firmware of a group; None if it is scripted."""
+        if group.image:
+            return dict(self.images)[group.image]
+        return self.image if self.own_controller_of(group) is None else None
 
     def key(self) -> dict[str, Any]:
         """Return everything that a trial depends on except its seed; it is stored in every file."""
         scene = _plain(json.loads(json.dumps(asdict(self.scene))))
-        return {
+        own = {name: _digest(path) for name, path in self.controllers}
+        return ({"controllers_sha256": own} if own else {}) | {
             "scene": scene,
             "brain": self.brain,
             "controller": self.controller,
@@ -115,17 +127,17 @@ def trial_path(folder: Path, number: int) -> Path:
 
 def make_controllers(plan: Plan, seed: int, robots: Sequence[int], channel: OpticalChannel | None) -> list[Controller]:
     """Return the controllers of some robots. Raises emu.LoadError for an unusable image."""
-    own = dict(plan.images)
-    return [_controller(plan, own, seed, robot, channel) for robot in robots]
+    return [_controller(plan, seed, robot, channel) for robot in robots]
 
 
-def _controller(
-    plan: Plan, own: dict[str, Path | None], seed: int, robot: int, channel: OpticalChannel | None
-) -> Controller:
+def _controller(plan: Plan, seed: int, robot: int, channel: OpticalChannel | None) -> Controller:
     """Return the controller of one robot, by the firmware and controller of its group."""
     group = plan.scene.group_of(robot)
-    image = own[group.image] if group.image else plan.image
-    controller = group.controller or plan.controller
+    own, image, controller = plan.own_controller_of(group), plan.image_of(group), group.controller or plan.controller
+    if own is not None:
+        from arena.robots.own_controller import OwnController, load_controller
+
+        return OwnController(plan.scene, seed, robot, load_controller(own))
     if image is None:
         return ScriptedController(plan.scene, seed, robot, controller)
     from arena.robots.firmware_controller import FirmwareController  # scripted trials do not load the emulator

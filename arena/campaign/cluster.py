@@ -41,10 +41,11 @@ def run_on(
         from distributed.comm.core import CommClosedError
     except ImportError:
         raise ValueError("--scheduler needs Dask: pip install 'openswarm[arena,cluster]'") from None
-    sent = replace(plan, image=None, experiment=None, images=())
+    sent = replace(plan, image=None, experiment=None, images=(), controllers=())
     files = InputFiles(
-        _bytes(plan.image), _bytes(plan.experiment), [(name, _bytes(path)) for name, path in plan.images]
-    )
+        _bytes(plan.image), _bytes(plan.experiment), [(name, _bytes(path)) for name, path in plan.images],
+        [(name, path.read_bytes()) for name, path in plan.controllers],
+    )  # fmt: skip
     lost = (CancelledError, KilledWorker, CommClosedError)
     with _quiet(), Client(scheduler, timeout=10) as client:
         futures = [client.submit(run_remote_trial, sent, files, number, versions(), pure=False) for number in numbers]
@@ -76,11 +77,12 @@ def _quiet() -> Iterator[None]:
 
 
 class InputFiles(NamedTuple):
-    """Contents of the files that a plan refers to: firmware, experiment, and firmware of groups by name."""
+    """Contents of the files that a plan refers to: firmware, experiment, firmware and controllers of groups by name."""
 
     image: bytes | None
     experiment: bytes | None
     images: list[tuple[str, bytes | None]]
+    controllers: list[tuple[str, bytes]]
 
 
 def _bytes(path: Path | None) -> bytes | None:
@@ -106,7 +108,11 @@ def run_remote_trial(plan: Plan, files: InputFiles, number: int, wanted: dict[st
             return path
 
         images = [(group, stored(f"firmware-{place}", data)) for place, (group, data) in enumerate(files.images)]
+        controllers = []
+        for place, (controller, code) in enumerate(files.controllers, start=1):
+            controllers.append((controller, folder / f"controller-{place}.py"))
+            controllers[-1][1].write_bytes(code)
         plan = replace(plan, image=stored("firmware", files.image), experiment=stored(EXPERIMENT, files.experiment),
-                       images=tuple(images))  # fmt: skip
+                       images=tuple(images), controllers=tuple(controllers))  # fmt: skip
         one = run_one(plan, number, folder)
         return one, trial_path(folder, number).read_bytes()

@@ -21,6 +21,7 @@ COMMANDS: Final = {
     "replay": "write an HTML page or a video of a trial, or serve a page that follows a running trial",
     "studio": "run one trial in a browser page: pause, step, rewind, move robots and objects, inspect firmware",
     "scenes": "list the built-in scenes",
+    "keys": "list the keys of scene files with unit, range and default",
     "completion": "print a completion script for a shell",
 }
 """Name of every command and the first line of its description."""

@@ -23,7 +23,7 @@ from arena.trial.record import EXPERIMENT, Trial, trials_in, write_bytes
 from arena.trial.strict_json import json_text
 from emu.host.paths import use_cache
 
-DEFAULT_BRAIN, DEFAULT_CONTROLLER = "openswarm", "A"
+DEFAULT_BRAIN, SCRIPTED, DEFAULT_CONTROLLER = "openswarm", "scripted", "A"
 EXAMPLE = "example: arena run clustering --brain openswarm --controller A --trials 10 --jobs 2 --out results/os-A"
 
 
@@ -60,7 +60,11 @@ def add_plan(command: argparse.ArgumentParser) -> None:
         help="openswarm (default), bare, scripted, or an ELF or HEX file: controls the groups of robots without an "
         "`image` in the scene, or all robots if every group has one",
     )
-    command.add_argument("--controller", choices=sorted(SPEED_TABLES), help="table of speeds (default A)")
+    command.add_argument(
+        "--controller",
+        metavar="NAME",
+        help="table of speeds A (default) or B, or a Python file or entry point with a controller (docs/scenes.md)",
+    )
     command.add_argument(
         "--minutes", type=duration, default=15.0, metavar="M", help="simulated minutes per trial (default 15)"
     )
@@ -127,21 +131,44 @@ def plan_from(options: argparse.Namespace, trials: int) -> Plan:
     if scene.groups and all(group.image for group in scene.groups):
         brain, image = "+".join(dict.fromkeys(Path(one).stem for one in own_images)), None
     else:
-        name = options.brain or DEFAULT_BRAIN
+        is_python = all((one.controller or options.controller) not in (None, "", *SPEED_TABLES)
+                        for one in scene.groups or (RobotGroup(),))  # fmt: skip
+        name = options.brain or (SCRIPTED if is_python else DEFAULT_BRAIN)
         brain, image = Path(name).stem, image_for(name)
-    own, controller = experiment_file(scene.experiment, home), options.controller or DEFAULT_CONTROLLER
-    plan = Plan(scene, brain, controller, image, trials, 60 * options.minutes, options.seed, own, images)
+    own, (controller, controllers) = experiment_file(scene.experiment, home), _controllers(scene, options, home)
+    if controller not in SPEED_TABLES and image is not None:
+        raise ValueError(f"--controller {options.controller} runs in Python: use it without --brain {options.brain}")
+    plan = Plan(scene, brain, controller, image, trials, 60 * options.minutes, options.seed, own, images, controllers)
     if options.controller is not None and not has_choice_of_controller(plan):
         raise ValueError(f"--controller {options.controller} has no effect in scene {scene.name}: every robot has its "
                          "own; change `controller` or `selector` in [[robots]], or `selector` in [start]")  # fmt: skip
     return plan if plan.has_firmware else replace(plan, scene=scripted(scene))
 
 
+def _controllers(scene: Scene, options: argparse.Namespace, home: Path) -> tuple[str, tuple[tuple[str, Path], ...]]:
+    """Return the name of the run's controller, and the files of all controllers in Python by name.
+
+    Paths in the scene are relative to `home`, that of the option to the working directory. Records name the option's
+    file without its folder. Raises SceneError, ValueError."""
+    wanted = [(group.controller, group.controller, home) for group in scene.groups]
+    chosen = options.controller or DEFAULT_CONTROLLER
+    wanted.append((Path(chosen).name, chosen, Path()))
+    found: dict[str, Path] = {}
+    for name, file, folder in wanted:
+        if file in ("", *SPEED_TABLES):
+            continue
+        from arena.robots.own_controller import controller_file  # loads the infrared sensors
+
+        path = controller_file(file, folder)
+        if found.setdefault(name, path) != path:
+            raise ValueError(f"--controller {file}: the scene has another file of this name; rename one of them")
+    return Path(chosen).name, tuple(found.items())
+
+
 def has_choice_of_controller(plan: Plan) -> bool:
     """Whether the controller of the run determines the speeds or the selector of any robot."""
-    images = dict(plan.images)
     for group in plan.scene.groups or (RobotGroup(),):
-        image = images[group.image] if group.image else plan.image
+        image = plan.image_of(group)
         selector = plan.scene.start.selector if group.selector < 0 else group.selector
         if not group.controller and (image is None or selector < 0):
             return True
@@ -149,7 +176,7 @@ def has_choice_of_controller(plan: Plan) -> bool:
 
 
 def copy_inputs(plan: Plan, folder: Path) -> Plan:
-    """Copy firmware and experiment of a plan into the folder; return the plan of the copies.
+    """Copy firmware, experiment and controllers of a plan into the folder; return the plan of the copies.
 
     The originals may be rebuilt while the trials run."""
     if plan.experiment is not None:
@@ -161,7 +188,11 @@ def copy_inputs(plan: Plan, folder: Path) -> Plan:
         if copy is not None and path is not None:
             write_bytes(copy, path.read_bytes())
         images.append((group, copy))
-    return replace(plan, image=images[0][1], images=tuple(images[1:]))
+    controllers = []
+    for place, (name, path) in enumerate(plan.controllers, start=1):
+        controllers.append((name, folder / f"controller-{place}.py"))
+        write_bytes(controllers[-1][1], path.read_bytes())
+    return replace(plan, image=images[0][1], images=tuple(images[1:]), controllers=tuple(controllers))
 
 
 def run(options: argparse.Namespace) -> int:
@@ -194,7 +225,7 @@ def print_result(result: RunResult) -> None:
 def run_missing_trials(options: argparse.Namespace) -> RunResult:
     """Run the missing trials and return all. Raises as `run`."""
     plan = plan_from(options, options.trials)
-    folder = options.out or Path("results") / f"{plan.scene.name}-{plan.brain}-{plan.controller}"
+    folder = options.out or Path("results") / f"{plan.scene.name}-{plan.brain}-{plan.controller.removesuffix('.py')}"
     with locked_folder(folder):
         missing = open_folder(plan, folder, sys.argv[1:])
         plan = copy_inputs(plan, folder)

@@ -10,9 +10,8 @@ and `CURVES`. It may define `MEASURES`, `PUBLISHED`, `groups(scene, objects)`, a
 from __future__ import annotations
 
 import hashlib
-import importlib.util
+import importlib
 import re
-import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
@@ -26,6 +25,7 @@ from numpy.typing import NDArray
 
 from arena.metrics import MetricSeries
 from arena.scene.loader import Scene, SceneError
+from arena.scene.user_file import read_user_file, run_module
 
 FOLDER: Final = Path(__file__).parent / "builtin"
 PLAIN: Final = "plain"
@@ -167,10 +167,7 @@ def experiment_of(name: str, folder: Path = Path()) -> Experiment:
 
 def experiment_with_digest(path: Path, digest: str) -> Experiment:
     """Load the experiment of a file whose SHA-256 is `digest`. Another file is not run. Raises SceneError."""
-    source = _read(path)
-    if hashlib.sha256(source).hexdigest() != digest:
-        raise SceneError(f"{path}: is not the recorded experiment: its SHA-256 differs from {digest}")
-    return _load_source(path.resolve(), source)
+    return _load_source(path.resolve(), read_user_file(path, "experiment", digest))
 
 
 def loaded_experiment(digest: str) -> Experiment | None:
@@ -199,47 +196,18 @@ def _load_by_name(name: str) -> Experiment:
 
 def _load_file(path: Path) -> Experiment:
     """Load a user's experiment from its file."""
-    return _load_source(path, _read(path))
-
-
-def _read(path: Path) -> bytes:
-    if not path.is_file():
-        raise SceneError(f"{path}: no such experiment file")
-    return path.read_bytes()
+    return _load_source(path, read_user_file(path, "experiment"))
 
 
 @cache
 def _load_source(path: Path, source: bytes) -> Experiment:
-    """Load a user's experiment from the content of its file. Cached byte code is not used: no hash covers it."""
-    spec = importlib.util.spec_from_file_location(f"arena_experiment_{_module_name(path)}", path)
-    assert spec is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[module.__name__] = module  # dataclasses look up their module here
-    try:
-        exec(compile(source, str(path), "exec", dont_inherit=True), module.__dict__)
-    except (Exception, SystemExit) as error:
-        line = getattr(error, "lineno", None) or _line_in(path, error)
-        raise SceneError(f"{path}:{line or 1}: {type(error).__name__}: {error}") from None
+    """Load a user's experiment from the content of its file."""
     digest = hashlib.sha256(source).hexdigest()
-    return _loaded.setdefault(digest, _experiment_from(path.stem, module, digest))
-
-
-def _module_name(path: Path) -> str:
-    return re.sub(r"\W", "_", str(path))
+    return _loaded.setdefault(digest, _experiment_from(path.stem, run_module(path, source), digest))
 
 
 def _digest(path: Path) -> str:
     return hashlib.sha256(path.read_bytes()).hexdigest()
-
-
-def _line_in(path: Path, error: BaseException) -> int | None:
-    """Return the last line of the file in the traceback of an error; None if the file is not in it."""
-    line, trace = None, error.__traceback__
-    while trace is not None:
-        if trace.tb_frame.f_code.co_filename == str(path):
-            line = trace.tb_lineno
-        trace = trace.tb_next
-    return line
 
 
 def _experiment_from(name: str, module: ModuleType, digest: str) -> Experiment:

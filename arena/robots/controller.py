@@ -105,7 +105,29 @@ def remote_key_cycle(scene: Scene) -> int:
     return round(scene.start.remote_at_s * FCY)
 
 
-class ScriptedController:
+class ControllerWithoutUart:
+    """Base of controllers in Python, which have no UART and no LEDs."""
+
+    def take_lines(self) -> list[SerialLine]:
+        """Return no lines: this controller has no UART."""
+        return []
+
+    def take_led_changes(self) -> list[LedChange]:
+        """Return no changes: this controller has no LEDs."""
+        return []
+
+    def feed_uart(self, data: bytes) -> None:
+        """Ignore the bytes: this controller has no UART."""
+
+    def take_uart(self) -> bytes:
+        """Return no bytes: this controller has no UART."""
+        return b""
+
+    def close(self) -> None:
+        """Do nothing: there is nothing to release."""
+
+
+class ScriptedController(ControllerWithoutUart):
     """The clustering controller in Python, with the sensor geometry and the frame rate of the firmware's camera.
 
     It senses once per frame, at the pose extrapolated to that cycle. `LATENCY_TCY` later the wheels turn accordingly.
@@ -165,21 +187,3 @@ class ScriptedController:
     def reading(self) -> Reading:
         """As `Controller.reading`."""
         return self._reading
-
-    def take_lines(self) -> list[SerialLine]:
-        """Return no lines: a scripted controller has no UART."""
-        return []
-
-    def take_led_changes(self) -> list[LedChange]:
-        """Return no changes: a scripted controller has no LEDs."""
-        return []
-
-    def feed_uart(self, data: bytes) -> None:
-        """Ignore the bytes: a scripted controller has no UART."""
-
-    def take_uart(self) -> bytes:
-        """Return no bytes: a scripted controller has no UART."""
-        return b""
-
-    def close(self) -> None:
-        """Do nothing: there is nothing to release."""

@@ -47,6 +47,8 @@ __all__ = ["FCY", "BatterySetting", "CameraSetting", "Scene", "SceneError", "Sta
 FOLDER: Final = Path(__file__).parents[1] / "scenes"
 NAME: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9 ._-]{0,63}")
 COLOUR: Final = re.compile(r"#[0-9a-fA-F]{6}")
+CONTROLLER: Final = re.compile(r"|A|B|[a-z][a-z0-9_]*|[^\0]+\.py")
+"""Table A or B, entry point, or Python file of a controller."""
 
 
 class SceneError(ValueError):
@@ -425,8 +427,12 @@ def _check_group(errors: _Errors, table: str, one: RobotGroup, number: int) -> N
     if abs(one.heading_deg) > 1e6:
         words = f"{table}.heading_deg is {one.heading_deg}; expected -1e6 to 1e6, or nan for any"
         raise errors.at(table, "heading_deg", words, number)
-    if one.controller not in ("", "A", "B"):
-        raise errors.at(table, "controller", f"{table}.controller is {one.controller!r}; expected A or B", number)
+    if not CONTROLLER.fullmatch(one.controller):
+        words = f"{table}.controller is {one.controller!r}; expected A, B, the path of a .py file, or an entry point"
+        raise errors.at(table, "controller", words, number)
+    if one.image and one.controller not in ("", "A", "B"):
+        words = f"{table}.controller {one.controller!r} runs in Python; a group with an `image` runs firmware"
+        raise errors.at(table, "controller", words, number)
 
 
 def _check_kind(errors: _Errors, table: str, one: ObjectKind, number: int) -> None:

@@ -224,7 +224,8 @@ class RobotGroup(Placed):
 
     - `image`: their controller, as `--brain`; a path is relative to the scene file; empty: that of the run. `--brain`
       replaces the images of a scene in which every group has one.
-    - `controller`: A or B; empty: that of the run
+    - `controller`: table A or B, or a Python file or entry point (robots/own_controller.py); a path is relative to the
+      scene file; empty: that of the run
     - `id_first`: number of the first robot; the next ones count up. `{id}` in `stimulus` is replaced by it.
     - `heading_deg`: heading at the start; nan: random
     - `selector`, `remote`, `stimulus`: as in [start]

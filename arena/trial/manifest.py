@@ -12,7 +12,7 @@ from arena.trial.strict_json import mismatch
 MANIFEST: Final = "manifest.json"
 _SHAPE: Final = {
     "key": {"scene": dict, "brain": str, "controller": str, "seconds": float, "seed": int, "image_sha256?": str,
-            "images_sha256?": dict, "experiment_sha256?": str, "versions": dict},
+            "images_sha256?": dict, "experiment_sha256?": str, "controllers_sha256?": dict, "versions": dict},
     "host": [{"trial": int, "host_s": float, "faults": [FAULT]}],
 }  # fmt: skip
 

@@ -36,6 +36,7 @@ FREE_COLUMNS: Final = ("n_", CURVE_COLUMN)
 MAX_VALUE: Final = 1e7
 """Bound of all numbers of a record: positions in cm, times in s, speeds, shares. nan is not below it."""
 _HEAD: Final = {"scene": dict, "brain": str, "controller": str, "seed": int, "faults": [FAULT], "image_sha256?": str,
+                "controllers_sha256?": dict,
                 "images_sha256?": dict, "versions?": dict, "experiment_sha256?": str, "experiment?": SHAPE}  # fmt: skip
 """JSON shape of the metadata."""
 

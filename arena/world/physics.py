@@ -34,7 +34,8 @@ SHAPE_FRICTION: Final = math.sqrt(dimensions.CONTACT_FRICTION)
 """Friction of every shape: pymunk multiplies the values of two shapes in contact."""
 WALL_THICKNESS: Final = 20.0
 """Half thickness of the wall segments in cm: too thick for any body to tunnel through."""
-STREAM_WORLD, STREAM_WHEELS, STREAM_SENSORS, STREAM_START, STREAM_TRAITS, STREAM_EXPERIMENT, STREAM_INFRARED = range(7)
+(STREAM_WORLD, STREAM_WHEELS, STREAM_SENSORS, STREAM_START, STREAM_TRAITS, STREAM_EXPERIMENT, STREAM_INFRARED,
+ STREAM_CONTROLLERS) = range(8)  # fmt: skip
 """Streams of independent random numbers in a trial: `generator(seed, stream, robot)`."""
 
 

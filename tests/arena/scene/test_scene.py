@@ -237,7 +237,7 @@ def test_infrared_sensors_detect_obstacles_and_all_lamps(yard: Scene) -> None:
         (("[chassis]\n", "[chassis]\ncount = 3\n"), 8, "chassis.count: the groups determine the number of robots"),
         (("[[lamps]]", "[[lumps]]"), 70, "unexpected 'lumps'; expected name,"),
         (('controller = "B"', "controller = B"), 19, "Invalid value"),
-        (('controller = "B"', 'controller = "C"'), 19, "robots.controller is 'C'; expected A or B"),
+        (('controller = "B"', 'controller = "C"'), 19, "robots.controller is 'C'; expected A, B, the path"),
         (("radius_cm = 8", ""), 50, "obstacles: expected either a polygon or a radius_cm"),
         (("share = 0.2", "share = 2"), 56, "obstacles.share is 2.0; expected 0 to 1"),
         (("[300, 0]", "[-300, 0]"), 5, "arena.polygon"),
