@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import subprocess
+import runpy
 import sys
 
 import pytest
 
+from tests.cases import check_all
 from tests.fuzz.__main__ import campaigns
 from tests.fuzz.seeds import ROOT, Campaign, base_seed, parser
 
@@ -59,11 +60,17 @@ def test_a_failure_names_its_seed_and_how_to_see_it_again(
     assert "again: python tests/fuzz/fuzz_x.py --engine jit --seed 41 --tries 1" in said
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name", sorted(campaigns()))
-def test_every_campaign_takes_a_seed_and_a_time(name: str) -> None:
+def test_every_campaign_takes_a_seed_and_a_time(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Every campaign accepts --seed and --seconds, which `python -m tests.fuzz` passes."""
-    command = [sys.executable, str(campaigns()[name]), "--help"]
-    usage = subprocess.run(command, capture_output=True, text=True, check=True, cwd=ROOT).stdout
-    assert "--seed " in usage
-    assert "--seconds " in usage
+
+    def check(name: str) -> None:
+        monkeypatch.setattr(sys, "argv", [str(campaigns()[name]), "--help"])
+        with pytest.raises(SystemExit, match="0"):
+            runpy.run_path(str(campaigns()[name]), run_name="__main__")
+        usage = capsys.readouterr().out
+        assert "--seed " in usage
+        assert "--seconds " in usage
+
+    check_all(check, sorted(campaigns()))
