@@ -15,7 +15,7 @@ from emu.dspic30f.jit.cache import ObjectCache
 from emu.host.paths import runtime_libraries
 from emu.host.private_folder import danger
 from toolchain import device_header
-from toolchain.driver import runtime_archive
+from toolchain.driver import driver, runtime_archive
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="modes of POSIX")
 ARCHIVE = b"!<arch>\n" + bytes(100)
@@ -115,17 +115,23 @@ def test_a_damaged_runtime_library_counts_as_absent(cache: Path, damaged: tuple[
     assert runtime_archive._stored(archive) is None
 
 
-@pytest.mark.slow
-def test_a_program_links_although_the_cached_library_is_damaged(cache: Path, tmp_path: Path) -> None:
-    """If the cached library is damaged, the compiler builds and stores it again, and the program links."""
+def test_a_program_links_although_the_cached_library_is_damaged(
+    cache: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """If the cached library is damaged, the compiler builds and stores it again, and the program links.
+
+    The library has only the file that every program needs, because building all of it takes seconds.
+    """
+    small = tmp_path / "runtime"
+    small.mkdir()
+    (small / "crt0.s").write_bytes((runtime_archive.RUNTIME_DIR / "crt0.s").read_bytes())
+    monkeypatch.setattr(runtime_archive, "RUNTIME_DIR", small)
     archive = runtime_libraries() / f"libdspic-{runtime_archive.fingerprint()}.a"
     runtime_archive._store(archive, ARCHIVE)
     archive.write_bytes(archive.read_bytes()[:-1])
     source = tmp_path / "main.c"
-    source.write_text("volatile long a = 7, b = 3; int main(void) { return a / b; }\n")
-    done = subprocess.run([sys.executable, "-m", "toolchain", "cc", str(source), "-o", str(tmp_path / "main.elf")],
-                          capture_output=True, text=True, check=False)  # fmt: skip
-    assert done.returncode == 0, done.stderr
+    source.write_text("volatile int a = 7; int main(void) { return a; }\n")
+    assert driver.main([str(source), "-o", str(tmp_path / "main.elf")]) == 0
     stored = runtime_archive._stored(archive)
     assert stored is not None
-    assert len(stored) > 10_000
+    assert runtime_archive.defined_names(stored)

@@ -13,8 +13,8 @@ from emu.dspic30f.isa.text import parse
 from emu.machine.machine import Machine
 
 LOOP = 0x200
-CYCLES = 400_000
-"""Length of the run: a quarter of a frame of the PO6030K."""
+CYCLES = 160_000
+"""Length of the run: a tenth of a frame of the PO6030K."""
 
 
 class Number:
