@@ -143,10 +143,7 @@ def thread_overflow(machine: Machine, stop: Stop) -> Stop:
     """Return `stop` as the fault of an OpenSwarm thread that overflowed its stack in the last trap."""
     assert machine.checkpoints.trap is not None
     case = _case_of_trap(machine, machine.checkpoints.trap)
-    report = _diagnosed(machine, Inspector(machine), case)
-    if not report.cause.startswith("stack overflow"):  # an access above the limit; W15 is still below
-        report = replace(report, cause=f"stack overflow ({report.cause.rstrip(',')}),")
-    return replace(stop, reason="fault", fault=report)
+    return replace(stop, reason="fault", fault=_diagnosed(machine, Inspector(machine), case))
 
 
 def state_report(machine: Machine, cause: str) -> FaultReport:
@@ -337,6 +334,8 @@ def _detailed_cause(machine: Machine, case: _Case, trace: ExecutionTrace | None)
         why = "an odd address" if size == 2 and address & 1 else "where no memory is"
         verb = "writing" if is_write else "reading"
         return case.cause.replace("trap", f"trap: {verb} {size} byte{'s' * (size > 1)} at {address:#06x}, {why}", 1)
+    if case.vector.name == "StackError":  # an access above the limit; W15 is still below
+        return f"stack overflow ({case.cause.rstrip(',')}),"
     return case.cause
 
 

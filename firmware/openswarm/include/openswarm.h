@@ -61,7 +61,7 @@ typedef enum {
 
 /* Events registered by the system. Values 1-7 are the published ones; payloads in brackets. */
 enum {
-    SYS_EVENT_TERMINATION = 0x01,   /* [uint16 pid] a thread has ended: returned, killed or stopped by its stack limit */
+    SYS_EVENT_TERMINATION = 0x01,   /* [uint16 pid] a thread has ended: returned, killed, or dropped (SYS_ON_OVERFLOW) */
     SYS_LEFTMOTOR_SPEED = 0x02,     /* [sint16 mm/s] request to the motor driver, from any sender */
     SYS_RIGHTMOTOR_SPEED = 0x03,    /* [sint16 mm/s] */
     SYS_IO_1PXSENSOR = 0x04,        /* [sys_colour] from the camera */
@@ -202,7 +202,7 @@ typedef struct {
     uint16 events_lost; /* messages refused for lack of memory; saturates */
     uint16 refused;     /* calls from a context that does not permit them; saturates */
     uint16 deadlines_missed;
-    uint16 overflows;   /* threads stopped by their stack limit */
+    uint16 overflows;   /* threads dropped after a stack overflow (SYS_ON_OVERFLOW) */
 } sys_statistics;
 
 /* MTHI | no | ~20 | 8 | none. */

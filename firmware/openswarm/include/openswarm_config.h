@@ -26,6 +26,11 @@
 #ifndef SYS_REPORTS
 #define SYS_REPORTS 1 /* 0: no fault reports: a trap or a failed assertion only stops the system; saves flash */
 #endif
+#define SYS_STOP_SYSTEM 0
+#define SYS_DROP_THREAD 1
+#ifndef SYS_ON_OVERFLOW
+#define SYS_ON_OVERFLOW SYS_STOP_SYSTEM /* after a thread's stack overflow; SYS_DROP_THREAD: ends only that thread */
+#endif
 #ifndef SYS_UARTS
 #define SYS_UARTS 2 /* of the robot */
 #endif

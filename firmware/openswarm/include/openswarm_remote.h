@@ -27,13 +27,13 @@ enum {
 #define SYS_REMOTE_EVENTS 8 /* maximum number of events a robot shares */
 #endif
 #ifndef SYS_REMOTE_MEMORY
-#define SYS_REMOTE_MEMORY 12 /* arrivals of the last SYS_NEIGHBOUR_LIFETIME kept to detect duplicates; 1 to 255 */
+#define SYS_REMOTE_MEMORY 32 /* robots of origin heard within SYS_NEIGHBOUR_LIFETIME, at most; Kilobot: 16 */
 #endif
 
 /* MTH | no | as Sys_Subscribe_to_Event | 44 | EVENT, MEMORY, ARGUMENT, BUSY.  Shares an event over 1 to
- * SYS_REMOTE_HOPS hops; a second call changes the hops. BUSY: SYS_REMOTE_EVENTS are shared. Sharing is a
- * subscription of the system thread: Sys_Unsubscribe_from_Event(event, 0) ends it, with the event's other handlers
- * of that thread. */
+ * SYS_REMOTE_HOPS hops; a second call changes the hops. BUSY: SYS_REMOTE_EVENTS are shared. Sharing takes 6 bytes of
+ * the heap and ends when the event is unregistered. Neighbours get every event that is sent, also one that a quota
+ * drops or replaces on this robot. */
 bool Sys_Share_Event(uint16 event, uint8 hops);
 
 typedef struct {
@@ -41,6 +41,7 @@ typedef struct {
     uint16 arrived;    /* received for the first time */
     uint16 duplicates; /* received again, or this robot's own */
     uint16 passed_on;  /* forwarded for other robots */
+    uint16 refused;    /* not delivered: SYS_REMOTE_MEMORY other robots were heard lately */
     uint16 too_long;   /* not sent: payload above SYS_REMOTE_BYTES */
 } sys_remote_statistics; /* counters saturate */
 const sys_remote_statistics *Sys_Get_RemoteStatistics(void); /* MTHI */

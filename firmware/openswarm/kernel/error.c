@@ -4,7 +4,9 @@
 
 sys_statistics os_statistics;
 
-static volatile uint8 error_of_handlers, error_of_isrs;
+static struct {
+    volatile uint8 handlers, isrs;
+} errors_of;
 
 /* Lost messages of the first SYS_LOSS_COUNTERS events that lost one; entry 0 counts those of all other events. */
 typedef struct {
@@ -17,7 +19,7 @@ static loss losses[SYS_LOSS_COUNTERS + 1];
  * thread reads it. All handlers share one, because no handler interrupts another; all ISRs share one. */
 static HAL_OUTLINE volatile uint8 *last_error(void)
 {
-    return hal_in_isr() ? &error_of_isrs : os_in_kernel ? &error_of_handlers : &os_running->time_or_error.error;
+    return hal_in_isr() ? &errors_of.isrs : os_in_kernel ? &errors_of.handlers : &os_running->time_or_error.error;
 }
 
 bool os_fail(sys_error error)

@@ -17,6 +17,7 @@ message *event_queue;                        /* devices locked */
 message **queue_end;                         /* devices locked */
 message *delivery_batch;                     /* messages of the current delivery round not yet delivered */
 event *(*os_send_hook)(uint16 id, const void *data, uint16 size);
+void (*os_share_hook)(uint16 id, const void *data, uint16 size);
 static subscription *const no_subscription;  /* an empty list */
 static subscription *const *delivery_cursor; /* link to the next subscriber; adjusted when subscriptions change */
 
@@ -49,6 +50,9 @@ static HAL_INLINE event *find(uint16 id, const void *data, uint16 size)
     event *first = events[id % BUCKETS];
     if (first != NULL && first->id == id) {
         return first;
+    }
+    if (os_share_hook != NULL) {
+        os_share_hook(id, data, size);
     }
     return os_send_hook == NULL ? event_find(id) : os_send_hook(id, data, size);
 }
@@ -220,7 +224,7 @@ static sys_error unsubscribe(event *e, uint16 pid, sys_handler handler)
     subscription **link = &e->subscribers;
     LOOP_BOUND(s); LOOP_TOTAL(min(t, m * s)); LOOP_SHARE(Sys_Unsubscribe_Handler, s); ONE_LOOP();
     while (*link != NULL) {
-        if ((*link)->pid == pid && (handler == NULL || (*link)->handler == handler)) {
+        if ((*link)->pid == pid && ((*link)->handler == handler || (handler == NULL && pid != OS_DRIVERS))) {
             /* A thread has o subscriptions; each is removed once. */
             CALL_SHARE(unlink_subscription, Sys_Unsubscribe_Handler, min(s, o));
             CALL_SHARE(unlink_subscription, process.c / end_thread, min(t, m * s, o));

@@ -57,6 +57,7 @@ void Sys_Assertion_Failed(const char *file, uint16 line)
     stop();
 }
 
+#if SYS_ON_OVERFLOW == SYS_DROP_THREAD
 /* Ends the running thread. Subscribers of SYS_EVENT_TERMINATION get its PID, and UART1 sends a report once it is
  * free. */
 sys_pcb *os_overflow(void)
@@ -82,3 +83,4 @@ sys_pcb *os_overflow(void)
     (void)Sys_Send_Event(SYS_SEND_UART1, end, (uint16)(number + sizeof number - end));
     return process_end_running();
 }
+#endif

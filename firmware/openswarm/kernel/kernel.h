@@ -149,6 +149,7 @@ extern os_teardown_function os_run_cleanups; /* calls process_free(p) when the c
 extern bool (*os_free_joinable)(sys_pcb *p); /* true: freed what is to be freed, or kept a zombie */
 extern void (*os_watch)(void); /* kernel stack, slice level, after each tick; needs no heap */
 extern event *(*os_send_hook)(uint16 id, const void *data, uint16 size); /* a sender's event, instead of event_find() */
+extern void (*os_share_hook)(uint16 id, const void *data, uint16 size); /* any context: a sender's event behind a gate */
 
 /* event.c */
 enum { OS_DRIVERS = 0xFFFF }; /* owner of the drivers' subscriptions: the PID of no thread */
@@ -208,7 +209,8 @@ void os_count(uint16 *counter); /* saturating */
 void event_lost(uint16 id);
 
 /* fault.c */
-HAL_USED sys_pcb *os_overflow(void); /* kernel stack: ends the thread that hit its stack limit; picks the next */
+/* SYS_DROP_THREAD only. Kernel stack: ends the thread that hit its stack limit; picks the next. */
+HAL_USED sys_pcb *os_overflow(void);
 enum { OS_STACK = 4 };
 HAL_NORETURN HAL_USED void os_trap(uint16 cause, uint16 pc, uint16 pc_high);
 

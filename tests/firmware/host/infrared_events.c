@@ -100,7 +100,7 @@ TEST(robots_that_do_not_share_only_forward, "the number is known to those who sh
     CHECK_EQ(Sys_Get_RemoteStatistics()->passed_on, 1);
 }
 
-TEST(a_duplicate_is_forgotten_in_the_end, "a memory of fixed size: SYS_REMOTE_MEMORY arrivals")
+TEST(as_many_robots_are_told_apart_as_the_memory_holds, "each arrives at most once; one robot more is refused")
 {
     static recording all[SYS_REMOTE_MEMORY + 1];
     begin_sharing(1);
@@ -108,15 +108,27 @@ TEST(a_duplicate_is_forgotten_in_the_end, "a memory of fixed size: SYS_REMOTE_ME
         record_as((uint16)(100 + i), "m", &all[i]);
     }
     alarms = 0;
-    for (uint16 i = 0; i <= SYS_REMOTE_MEMORY; i++) {
+    for (uint16 i = 0; i < SYS_REMOTE_MEMORY; i++) {
         while (alarms != i + 1) { /* repeat: a robot that sends cannot receive */
             hear(&all[i]);
         }
-        hear(&all[i]);
     }
-    CHECK_EQ(alarms, SYS_REMOTE_MEMORY + 1);
-    hear(&all[0]);
-    CHECK_EQ(alarms, SYS_REMOTE_MEMORY + 2);
+    uint16 before = Sys_Get_RemoteStatistics()->duplicates;
+    for (uint16 i = 0; i < SYS_REMOTE_MEMORY; i++) {
+        while (Sys_Get_RemoteStatistics()->duplicates == before) {
+            hear(&all[i]);
+        }
+        before = Sys_Get_RemoteStatistics()->duplicates;
+    }
+    CHECK_EQ(alarms, SYS_REMOTE_MEMORY);
+    while (Sys_Get_RemoteStatistics()->refused == 0) {
+        hear(&all[SYS_REMOTE_MEMORY]);
+    }
+    CHECK_EQ(alarms, SYS_REMOTE_MEMORY);
+    scans_in_the_dark(4096 * 8); /* until the records have expired */
+    while (alarms == SYS_REMOTE_MEMORY) {
+        hear(&all[SYS_REMOTE_MEMORY]);
+    }
 }
 
 TEST(sharing_is_bounded, "openswarm_remote.h: ARGUMENT, EVENT, BUSY; long payloads stay here")

@@ -1,6 +1,7 @@
 /* Limits of openswarm_infrared.h and openswarm_remote.h: calls before the start, full queues, and after a reset. */
 #include "infrared_air.h"
 
+#include "openswarm_quota.h"
 #include "openswarm_remote.h"
 
 enum { ALARM = 0x140, OTHER = 9, ME = 5, BEHIND_A_FRAME = 10, PREAMBLE_SCANS = 18 };
@@ -94,30 +95,55 @@ TEST(a_robot_that_began_again_is_heard, "its sequence restarts as well: arrivals
     CHECK_EQ(alarms, 2);
 }
 
-TEST(arrivals_are_not_sent_back_however_long_they_wait, "their handlers held back: what is not remembered does not arrive")
+TEST(arrivals_are_not_sent_back_however_long_they_wait, "their handlers held back; sequences wrap meanwhile")
 {
     begin_early();
     scans_in_the_dark(2 * EARLY);
     Sys_Start_CriticalSection();
-    for (uint8 i = 0; i < 2 * SYS_REMOTE_MEMORY; i++) {
+    for (uint8 i = 0; i < 64; i++) {
         receive_alarm(i, i);
     }
     Sys_End_CriticalSection();
     Sys_Yield();
-    CHECK_EQ(alarms, SYS_REMOTE_MEMORY);
+    CHECK_EQ(alarms, 64);
     CHECK_EQ(Sys_Get_RemoteStatistics()->shared, 0);
 }
 
-TEST(an_arrival_without_handler_hides_no_event_for_long, "unsubscribed when it came: an own one of its contents goes out later")
+TEST(frames_overtake_each_other, "openswarm_remote.h: each event arrives at most once")
 {
+    static const uint8 order[] = {3, 1, 2, 5, 4, 3, 20, 5, 18, 18, 4, 30, 29};
     begin_early();
     scans_in_the_dark(2 * EARLY);
-    CHECK(Sys_Unsubscribe_from_Event(ALARM, 0) && Sys_Unsubscribe_from_Event(ALARM, OS_DRIVERS));
-    receive_alarm(1, 'x');
-    CHECK(Sys_Share_Event(ALARM, 1));
-    scans_in_the_dark(4096 * 8);
+    for (uint8 i = 0; i < sizeof order; i++) {
+        receive_alarm(order[i], order[i]);
+    }
+    Sys_Yield();
+    CHECK_EQ(alarms, 9); /* 3 1 2 5 4 20 18 30 29 */
+    CHECK_EQ(Sys_Get_RemoteStatistics()->duplicates, 4);
+}
+
+TEST(a_quota_does_not_hold_back_what_is_shared, "openswarm_remote.h, Sys_Share_Event")
+{
+    static sys_quota latest;
+    begin_early();
+    scans_in_the_dark(2 * EARLY);
+    CHECK(Sys_Keep_Latest(&latest, ALARM));
+    Sys_Start_CriticalSection();
+    for (uint8 i = 0; i < SYS_INFRARED_QUEUE / 2; i++) {
+        receive_alarm(i, 'x');                 /* replaces what waits */
+        CHECK(Sys_Send_Event(ALARM, "x", 1)); /* as this does, with equal contents */
+    }
+    Sys_End_CriticalSection();
+    Sys_Yield();
+    CHECK_EQ(alarms, 1);
+    CHECK_EQ(Sys_Get_RemoteStatistics()->arrived, SYS_INFRARED_QUEUE / 2);
+    CHECK_EQ(Sys_Get_RemoteStatistics()->shared, SYS_INFRARED_QUEUE / 2);
+    CHECK(Sys_Unregister_Event(ALARM) && Sys_Register_Event(ALARM));
     send_alarm('x');
-    CHECK_EQ(Sys_Get_RemoteStatistics()->shared, 1);
+    CHECK_EQ(Sys_Get_RemoteStatistics()->shared, SYS_INFRARED_QUEUE / 2); /* unregistering ended it */
+    CHECK(Sys_Share_Event(ALARM, 1));
+    send_alarm('x');
+    CHECK_EQ(Sys_Get_RemoteStatistics()->shared, SYS_INFRARED_QUEUE / 2 + 1);
 }
 
 TEST(an_event_that_finds_the_queue_full_is_not_shared, "openswarm_remote.h: sys_remote_statistics")

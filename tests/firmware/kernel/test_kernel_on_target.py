@@ -123,14 +123,21 @@ def test_registers_survive_preemption_under_a_storm(image: Build) -> None:
 
 # ---- Stack limits -------------------------------------------------------------------------------------------------
 
+DROPS = "DEFINES=-DSYS_ON_OVERFLOW=SYS_DROP_THREAD"
+"""Make variable by which a stack overflow ends only its thread."""
+LED_RING = 0xF6C0
+"""Bits of LATA that light the ring: the pattern of the safe state (board/epuck/pins.h)."""
 KINDS = ["push", "call chain", "large frame", "variadic call", "kernel call without room", "interrupt frame"]
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", range(len(KINDS)), ids=KINDS)
 def test_a_stack_overflow_ends_only_the_offender(image: Build, kind: int) -> None:
-    """A stack overflow ends only the thread that causes it (kernel.md §4; bug 21 of openswarm-original.md §7)."""
-    machine = load(image("overflow", TARGET_APPS))
+    """A stack overflow ends only the thread that causes it if the program chooses so (openswarm_config.h).
+
+    Source: kernel.md §4; bug 21 of openswarm-original.md §7.
+    """
+    machine = load(image("overflow", TARGET_APPS, DROPS))
     machine.stop_on_fault = False
     run_to(machine, "begin")
     machine.poke("kind", kind)
@@ -149,9 +156,10 @@ def test_a_stack_overflow_ends_only_the_offender(image: Build, kind: int) -> Non
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", range(len(KINDS)), ids=KINDS)
-def test_the_emulator_reports_a_stack_overflow_as_a_fault(image: Build, kind: int) -> None:
-    """The report names thread and function; the system continues if the caller runs on."""
-    machine = load(image("overflow", TARGET_APPS))
+@pytest.mark.parametrize("words", [(), (DROPS,)], ids=["stops", "drops"])
+def test_the_emulator_reports_a_stack_overflow_as_a_fault(image: Build, words: tuple[str, ...], kind: int) -> None:
+    """The report names thread and function, whether the system stops or ends only the thread and continues."""
+    machine = load(image("overflow", TARGET_APPS, *words))
     run_to(machine, "begin")
     machine.poke("kind", kind)
     stop = machine.run(cycles=FCY // 20)
@@ -161,8 +169,13 @@ def test_the_emulator_reports_a_stack_overflow_as_a_fault(image: Build, kind: in
     assert stop.fault.thread is not None
     assert f"thread {machine.peek('culprit_pid')}" in stop.fault.thread
     assert stop.fault.frames[0].function
-    assert machine.run(cycles=FCY // 20).reason == "limit"
-    assert machine.peek("ended") == machine.peek("culprit_pid")
+    if words:
+        assert machine.run(cycles=FCY // 20).reason == "limit"
+        assert machine.peek("ended") == machine.peek("culprit_pid")
+    else:
+        assert machine.peek("LATD") & 0xFF == 0, "the motors stop"
+        assert machine.peek("LATA") & LED_RING == LED_RING
+        assert machine.peek("ended") == 0
 
 
 def test_a_run_ends_with_status_1_after_a_stack_overflow(image: Build, capsys: pytest.CaptureFixture[str]) -> None:

@@ -58,6 +58,7 @@ void board_tick(void)
 void board_failsafe(void)
 {
     motors_stop();
+    LATA |= PIN_LED_RING_ALL;
 }
 
 void board_report(const char *text)

@@ -42,6 +42,7 @@ void board_tick(void)
 void board_failsafe(void)
 {
     motors_stop();
+    GPIO_BSRR(GPIO_D) = PIN_LED_RING_D << 16; /* low: on */
 }
 
 void board_report(const char *text)

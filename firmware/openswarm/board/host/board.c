@@ -39,6 +39,7 @@ void board_tick(void)
 void board_failsafe(void)
 {
     motors_stop();
+    leds = (1u << SYS_LED_RING) - 1u;
 }
 
 void board_report(const char *text)

@@ -29,6 +29,8 @@ void board_tick(void)
 void board_failsafe(void)
 {
     motors_stop();
+    DDRC &= (uint8)~(PIN_GREEN_C | PIN_BLUE_C);
+    DDRD |= PIN_RED_D;
 }
 
 void board_report(const char *text)

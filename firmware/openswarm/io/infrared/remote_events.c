@@ -1,12 +1,14 @@
 /* SPDX-License-Identifier: MIT */
 /* Events shared by neighbours (openswarm_remote.h).
  *
- * A frame contains the event, the hops left, the robot of origin and its sequence number; origin and sequence identify
- * duplicates. An arrival is sent on this robot like any event. It therefore also reaches the handler that sends local
- * events to neighbours, which recognises the arrival by its contents. Two arrivals with equal contents may be confused;
- * the difference has no effect.
+ * A frame contains the event, the hops left, the robot of origin and its sequence number. Per robot of origin the
+ * newest sequence and those shortly before it are recorded, which identifies duplicates at any rate.
  *
- * Arrivals expire: a robot that restarts counts its sequence from the beginning, and must be heard. */
+ * A sender's event is transmitted when it is sent, so that neither the queue of this robot nor a quota can confuse it
+ * with an arrival. As in option/quota.c, a gate in front of the event makes its senders miss the fast path; the kernel
+ * then calls transmit_own(). An arrival is sent on this robot like any event.
+ *
+ * Records expire: a robot that restarts counts its sequence from the beginning, and must be heard. */
 #include "infrared_parts.h"
 #include "kernel.h"
 #include "openswarm_remote.h"
@@ -18,7 +20,9 @@ enum {
     EVENT_BITS = 13,
     NUMBER_BITS = 11,
     SEQUENCES = 32,
-    TIME_SHIFT = 8 /* arrival times are in units of 256 ms: 16 bits are four hours */
+    WINDOW = 16,    /* sequences recorded behind the newest one */
+    GATE = 2,       /* number of the gate minus that of its event: no event of that number is in the bucket */
+    TIME_SHIFT = 8  /* times of records are in units of 256 ms: 16 bits are four hours */
 };
 
 typedef struct {
@@ -27,96 +31,119 @@ typedef struct {
 } shared_event;
 
 typedef struct {
-    uint16 origin;   /* number of the robot; its sequence in the upper bits */
-    uint16 contents; /* CRC of the contents */
+    uint16 newest; /* number of the robot; its newest sequence in the upper bits. 0: free */
+    uint16 older;  /* bit i: the sequence newest - 1 - i has arrived */
     uint16 when;
-    bool is_pending; /* sent on this robot, and not yet seen by on_event() */
-} arrival;
+} origin_record;
 
 static shared_event shared[SYS_REMOTE_EVENTS];
-static arrival arrivals[SYS_REMOTE_MEMORY]; /* written by the link's interrupt */
-static uint8 next_arrival, sequence;
+static origin_record origins[SYS_REMOTE_MEMORY]; /* written by the link's interrupt */
+static bool is_arriving; /* the interrupt sends an arrival on this robot; it ends before other code runs */
+static uint8 sequence; /* devices locked */
 static sys_remote_statistics statistics;
 
-static uint16 contents_of(uint16 event, const uint8 *data, uint16 size)
+/* Returns the link to the gate of an event, or NULL. A gate behind its event belongs to a former event of its number. */
+static event **gate_of(uint16 id, bool in_front_only)
 {
-    return (uint16)(coder_crc(data, (uint8)size) + event * 0x9E37u);
+    for (event **link = event_bucket(id); *link != NULL; link = &(*link)->next) {
+        if ((*link)->id == (uint16)(id + GATE)) {
+            return link;
+        }
+        if (in_front_only && (*link)->id == id) {
+            break;
+        }
+    }
+    return NULL;
 }
 
-static shared_event *find(uint16 event)
+static bool is_shared(const shared_event *s)
+{
+    return s->hops != 0 && event_find(s->event) != NULL && gate_of(s->event, true) != NULL;
+}
+
+static shared_event *find(uint16 id)
 {
     for (shared_event *s = shared; s != shared + SYS_REMOTE_EVENTS; s++) {
-        if (s->hops != 0 && s->event == event) {
+        if (s->event == id && is_shared(s)) {
             return s;
         }
     }
     return NULL;
 }
 
-static uint16 date(void)
-{
-    return (uint16)(Sys_Get_SystemTime() >> TIME_SHIFT);
-}
-
-static bool is_recent(const arrival *a)
-{
-    return a->origin != 0 && (uint16)(date() - a->when) <= SYS_NEIGHBOUR_LIFETIME >> TIME_SHIFT;
-}
-
-/* Whether an event with these contents is a pending arrival, which it then ends. */
-static bool has_arrived(uint16 contents)
-{
-    bool found = false;
-    for (arrival *a = arrivals; a != arrivals + SYS_REMOTE_MEMORY && !found; a++) {
-        hal_lock_state lock = hal_lock_devices();
-        if (a->is_pending && a->contents == contents) {
-            a->is_pending = false;
-            found = is_recent(a);
-        }
-        hal_unlock(lock);
-    }
-    return found;
-}
-
-static bool transmit(uint16 event, uint8 hops, uint16 origin, const void *data, uint8 size)
+static bool transmit(uint16 id, uint8 hops, uint16 origin, const void *data, uint8 size)
 {
     uint8 payload[HEADER + SYS_REMOTE_BYTES];
-    uint16 first = (uint16)(event | (uint16)hops << EVENT_BITS);
+    uint16 first = (uint16)(id | (uint16)hops << EVENT_BITS);
     payload[0] = (uint8)first;
     payload[1] = (uint8)(first >> 8);
     payload[2] = (uint8)origin;
     payload[3] = (uint8)(origin >> 8);
-    memcpy(payload + HEADER, data, size);
+    if (size != 0) {
+        memcpy(payload + HEADER, data, size);
+    }
     return queue_frame(FRAME_EVENT, payload, (uint8)(HEADER + size));
 }
 
-static bool on_event(uint16 pid, uint16 event, sys_event_data *data)
+/* Any context, before the event is sent on this robot. */
+static void transmit_own(uint16 id, const void *data, uint16 size)
 {
-    const shared_event *s = find(event);
-    (void)pid;
-    if (s == NULL || data->size > SYS_REMOTE_BYTES) {
-        os_count(&statistics.too_long);
-    } else if (!has_arrived(contents_of(event, data->payload, data->size))) {
-        sequence = (uint8)((sequence + 1u) % SEQUENCES);
-        uint16 origin = (uint16)(HAL_LOAD(infrared_number) | (uint16)sequence << NUMBER_BITS);
-        if (transmit(event, s->hops, origin, data->payload, (uint8)data->size)) {
-            os_count(&statistics.shared);
-        }
+    const shared_event *s = is_arriving ? NULL : find(id);
+    if (s == NULL) {
+        return;
     }
-    return true;
+    if (size > SYS_REMOTE_BYTES) {
+        os_count(&statistics.too_long);
+        return;
+    }
+    hal_lock_state lock = hal_lock_devices();
+    uint8 own = (uint8)((sequence + 1u) % SEQUENCES);
+    sequence = own;
+    hal_unlock(lock);
+    uint16 origin = (uint16)(HAL_LOAD(infrared_number) | (uint16)own << NUMBER_BITS);
+    if (transmit(id, s->hops, origin, data, (uint8)size)) {
+        os_count(&statistics.shared);
+    }
 }
 
-static bool is_known(uint16 origin)
+/* Returns the record of a robot, or a free one, or NULL: as many other robots were heard lately. */
+static origin_record *record_of(uint16 number, uint16 now)
 {
-    if ((origin & NUMBER_MASK) == infrared_number) {
-        return true;
-    }
-    for (const arrival *a = arrivals; a != arrivals + SYS_REMOTE_MEMORY; a++) {
-        if (a->origin == origin && is_recent(a)) {
-            return true;
+    origin_record *unused = NULL;
+    for (origin_record *r = origins; r != origins + SYS_REMOTE_MEMORY; r++) {
+        if ((uint16)(now - r->when) > SYS_NEIGHBOUR_LIFETIME >> TIME_SHIFT) {
+            r->newest = 0;
+        }
+        if (r->newest == 0) {
+            unused = r;
+        } else if ((r->newest & NUMBER_MASK) == number) {
+            return r;
         }
     }
-    return false;
+    return unused;
+}
+
+/* Records an arrival; false: it is a duplicate. */
+static bool record(origin_record *r, uint16 origin, uint16 now)
+{
+    uint16 ahead = ((origin >> NUMBER_BITS) - (r->newest >> NUMBER_BITS)) & (SEQUENCES - 1u);
+    if (r->newest == 0) {
+        r->newest = origin;
+        r->older = 0;
+    } else if (ahead == 0) {
+        return false;
+    } else if (ahead < WINDOW) {
+        r->older = (uint16)((r->older << 1 | 1u) << (ahead - 1u));
+        r->newest = origin;
+    } else {
+        uint16 bit = (uint16)(1u << (SEQUENCES - 1u - ahead));
+        if (r->older & bit) {
+            return false;
+        }
+        r->older |= bit;
+    }
+    r->when = now;
+    return true;
 }
 
 /* ISR. */
@@ -129,49 +156,86 @@ static void arrive(const frame *f)
     uint8 size = (uint8)(f->size - HEADER);
     uint16 first = (uint16)(f->payload[0] | (uint16)f->payload[1] << 8);
     uint16 origin = (uint16)(f->payload[2] | (uint16)f->payload[3] << 8);
-    uint16 event = first & SYS_REMOTE_LAST_EVENT;
+    uint16 id = first & SYS_REMOTE_LAST_EVENT;
     uint8 hops = (uint8)(first >> EVENT_BITS);
+    uint16 now = (uint16)(Sys_Get_SystemTime() >> TIME_SHIFT);
     if ((origin & NUMBER_MASK) == 0) { /* sent before the robot had drawn its number */
         origin |= f->number;
     }
-    if (is_known(origin)) {
+    if ((origin & NUMBER_MASK) == infrared_number) {
         os_count(&statistics.duplicates);
         return;
     }
-    arrival *a = arrivals + next_arrival;
-    if (a->is_pending && is_recent(a)) { /* handlers lag behind: once displaced, it would count as a local event */
+    origin_record *r = record_of(origin & NUMBER_MASK, now);
+    if (r == NULL) {
+        os_count(&statistics.refused);
         return;
     }
-    next_arrival = (uint8)((next_arrival + 1u) % SYS_REMOTE_MEMORY);
-    *a = (arrival){origin, contents_of(event, data, size), date(), false};
+    if (!record(r, origin, now)) {
+        os_count(&statistics.duplicates);
+        return;
+    }
     os_count(&statistics.arrived);
-    if (hops > 1 && transmit(event, (uint8)(hops - 1u), origin, data, size)) {
+    if (hops > 1 && transmit(id, (uint8)(hops - 1u), origin, data, size)) {
         os_count(&statistics.passed_on);
     }
-    if (find(event) != NULL) {
-        a->is_pending = Sys_Send_Event(event, data, size);
+    if (find(id) != NULL) {
+        is_arriving = true;
+        (void)Sys_Send_Event(id, data, size);
+        is_arriving = false;
     }
 }
 
-bool Sys_Share_Event(uint16 event, uint8 hops)
+static void remove_gate(uint16 id)
 {
-    if (event > SYS_REMOTE_LAST_EVENT || hops == 0 || hops > SYS_REMOTE_HOPS) {
-        return os_fail(SYS_ERROR_ARGUMENT);
+    event **link = gate_of(id, false);
+    if (link != NULL) {
+        event *gate = *link;
+        HAL_STORE(*link, gate->next);
+        heap_free(gate, sizeof *gate);
     }
-    Sys_Start_CriticalSection();
-    shared_event *s = find(event);
-    for (shared_event *f = shared; s == NULL && f != shared + SYS_REMOTE_EVENTS; f++) {
-        s = f->hops == 0 ? f : NULL;
+}
+
+static sys_error share(uint16 id, uint8 hops)
+{
+    shared_event *s = find(id);
+    if (event_find(id) == NULL) {
+        return SYS_ERROR_EVENT;
     }
-    bool is_done = s != NULL ? Sys_Subscribe_to_Event(event, OS_DRIVERS, on_event, NULL) : os_fail(SYS_ERROR_BUSY);
-    if (is_done) {
-        s->event = event;
+    if (s == NULL) {
+        s = shared;
+        while (is_shared(s)) {
+            if (++s == shared + SYS_REMOTE_EVENTS) {
+                return SYS_ERROR_BUSY;
+            }
+        }
+        event *gate = heap_alloc_lasting(sizeof *gate);
+        if (gate == NULL) {
+            return SYS_ERROR_MEMORY;
+        }
+        if (s->hops != 0) {
+            remove_gate(s->event); /* of an event that was unregistered */
+        }
+        s->hops = 0;
         hal_barrier();
-        s->hops = hops;
+        s->event = id;
+        remove_gate(id);
+        gate->id = (uint16)(id + GATE);
+        event_insert(gate, id);
+        HAL_STORE(os_share_hook, transmit_own);
         HAL_STORE(infrared_event_sink, arrive);
     }
-    Sys_End_CriticalSection();
-    return is_done;
+    hal_barrier();
+    s->hops = hops;
+    return SYS_OK;
+}
+
+bool Sys_Share_Event(uint16 id, uint8 hops)
+{
+    if (id > SYS_REMOTE_LAST_EVENT || hops == 0 || hops > SYS_REMOTE_HOPS) {
+        return os_fail(SYS_ERROR_ARGUMENT);
+    }
+    return os_enter() == SYS_OK && os_leave(share(id, hops));
 }
 
 const sys_remote_statistics *Sys_Get_RemoteStatistics(void)

@@ -59,7 +59,10 @@ static inline __attribute__((always_inline)) bool hal_in_isr(void)
 
 static inline __attribute__((always_inline)) bool hal_in_thread(void)
 {
-    return (GPIOR0 & CPU_OPEN) && !hal_in_isr();
+    if (!(GPIOR0 & CPU_OPEN)) {
+        return false;
+    }
+    return !hal_in_isr();
 }
 
 static inline __attribute__((always_inline)) void hal_slice_restart(uint16_t spent)

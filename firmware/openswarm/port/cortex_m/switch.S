@@ -4,7 +4,7 @@
 @ A thread that does not run has on its process stack, from the top: the hardware's frame (32 bytes, 104 if the thread has
 @ used the FPU), s16-s31 in that case (64), r4-r11 and EXC_RETURN (36); sp points below. The main stack is the kernel stack,
 @ the start of os_memory; it is empty whenever a thread runs.
-#include "hal_limits.h"
+#include "openswarm_config.h"
 #include "registers.h"
 
         .syntax unified
@@ -55,7 +55,15 @@ picked: movs    r0, #0
         blx     r1
         b       resume
 
-overflow:                               @ nothing of the thread is needed any more
+overflow:
+#if SYS_ON_OVERFLOW == SYS_STOP_SYSTEM
+        cpsid   i
+        movs    r0, #4                  @ OS_STACK
+        movs    r1, #0
+        movs    r2, #0
+        b       os_trap
+#else
+        @ nothing of the thread is needed any more
         ldr     r3, =cpu_pick
         movs    r0, #0
         str     r0, [r3]
@@ -65,6 +73,7 @@ overflow:                               @ nothing of the thread is needed any mo
         str     r0, [r3]
         bl      os_overflow
         b       resume
+#endif
 
 @ ---- Reset: main runs on the process stack, the hardware has set the main stack ------------------------------------
         .global Reset_Handler

@@ -7,7 +7,7 @@
 ; A SYS_DSP thread has accumulators, CORCON and its DO levels, under a tag of their own, on top of either.
 ; The kernel stack is the start of os_memory; it is empty whenever a thread runs. It lies below all thread stacks, so a
 ; thread's SPLIM, which stays set, never trips there.
-#include "hal_limits.h"
+#include "openswarm_config.h"
 
         .equ    PCB_LIMIT, 2            ; offsets in sys_pcb (0: sp) and bits of its status, checked by cpu.c
         .equ    PCB_STATUS, 8
@@ -202,10 +202,11 @@ os_isr_exit:
         retfie
 
 ; ---- Traps --------------------------------------------------------------------------------------------------------
-; Stack limit. A soft trap: the write has happened, within the thread's own block. The thread is given up, and with
-; it an ISR entry that had not yet left its stack; that interrupt's flag is still set. On the kernel stack it is the
-; end.
+; Stack limit. A soft trap: the write has happened, within the thread's own block. With SYS_DROP_THREAD the thread is
+; given up, and with it an ISR entry that had not yet left its stack; that interrupt's flag is still set. An overflow of
+; the kernel stack stops the system.
 __StackError:
+#if SYS_ON_OVERFLOW == SYS_DROP_THREAD
         mov     SPLIM, w0
         setm    SPLIM
         mov     #_os_memory+HAL_KERNEL_STACK_LIMIT, w1
@@ -218,6 +219,10 @@ __StackError:
         bclr    SR, #7
         rcall   _os_overflow
         bra     resume
+kernel_stack_error:
+#endif
+        mov     #4, w0
+        bra     fatal
 
         .macro  trap vector, number
         .global \vector
@@ -230,8 +235,6 @@ __StackError:
         trap    __AddressError, 1
         trap    __MathError, 2
         trap    __DefaultInterrupt, 3
-kernel_stack_error:
-        mov     #4, w0
 fatal:
         setm    SPLIM
         mov     [w15-4], w1             ; stacked PC
