@@ -186,7 +186,7 @@ def load(
     that takes the chip's peripherals, for example `functools.partial(emu.boards.epuck.board.Epuck, selector=3)`.
     `engine` is "auto", "jit" or "plain"; all give the same run. With `strict`, null pointers, uninitialised
     reads and stores into other threads' stacks are faults; this needs the plain engine.
-    `chip` is the device of a HEX file: "dsPIC30F6014A" or "dsPIC30F4013". An ELF file names its device itself.
+    `chip` is the device of a HEX file, one of `emu.chips.NAMES`. An ELF file names its device itself.
     Raises `emu.LoadError` if the file is no usable image, ValueError for an unknown engine, board or chip.
     """
     image = load_image(path, None if chip is None else chip_named(chip))

@@ -17,4 +17,4 @@ def device(name: str) -> Chip:
     try:
         return chip_named(name)
     except ValueError:
-        raise ToolError(f"device '{name}' is not supported (expected {' or '.join(DEVICES)})") from None
+        raise ToolError(f"device '{name}' is not supported (expected {', '.join(DEVICES)})") from None

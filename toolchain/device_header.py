@@ -127,7 +127,9 @@ def header(chip: Chip) -> str:
 
 @cache
 def folder_of(chip_name: str) -> Path:
-    """Return the folder that holds the header of a chip; the cache keeps one per version of the chips' tables.
+    """Return the folder with the header of a chip and Microchip's names for it.
+
+    The cache keeps one folder per version of the chips' tables.
 
     If the cache cannot be written or is not private, the folder is a temporary one. This process removes it at its end.
     """
@@ -139,13 +141,25 @@ def folder_of(chip_name: str) -> Path:
         try:
             if not safe:
                 raise PermissionError(folder)
-            _write(target, header(chip))
+            _write_all(target, chip)
         except OSError:
             temporary = tempfile.mkdtemp(prefix="dspic-headers-")
             atexit.register(shutil.rmtree, temporary, ignore_errors=True)
             folder = Path(temporary)
-            _write(folder / target.name, header(chip))
+            _write_all(folder / target.name, chip)
     return folder
+
+
+def _write_all(target: Path, chip: Chip) -> None:
+    """Write the headers that include a chip's header under Microchip's names, then that header.
+
+    XC16 finds its headers in any case: programs use `p30F4011.h`, `p30f4011.h` and `p30f6014A.h`.
+    """
+    device = chip.name.removeprefix("dsPIC")
+    for name in sorted({f"p{device}", f"p{device.lower()}", f"p{device.replace('F', 'f')}"}):
+        comments = "/* SPDX-License-Identifier: MIT */\n/* Microchip's name of the device header. */\n"
+        _write(target.with_name(f"{name}.h"), f'{comments}#include "{target.name}"\n')
+    _write(target, header(chip))
 
 
 def _version() -> str:

@@ -7,7 +7,7 @@ from typing import Final
 
 from emu.chips.chip import Chip
 
-NAMES: Final = ("dsPIC30F6014A", "dsPIC30F4013")
+NAMES: Final = ("dsPIC30F6014A", "dsPIC30F4013", "dsPIC30F3014", "dsPIC30F4011", "dsPIC30F6012A", "dsPIC30F6014")
 """Supported chips, the default first."""
 
 

@@ -102,6 +102,29 @@ class ConfigWord:
 
 
 @dataclass(frozen=True, slots=True)
+class ClockModes:
+    """How FOSC and OSCCON select the clock."""
+
+    pll: int
+    """Code of FOS, NOSC and COSC for the primary oscillator whose mode, with or without PLL, is in FPR."""
+    external: int
+    """Code of the primary oscillator without PLL. May equal `pll`."""
+    multipliers: Mapping[int, tuple[str, float]]
+    """PLL modes by FPR: source ("crystal" or "frc") and multiplier of its frequency."""
+    other: tuple[str, float]
+    """Source and multiplier for every other FPR. A multiplier of 1 means that no PLL runs."""
+    without_pll: frozenset[int]
+    """Codes of FPR for the primary oscillator without PLL."""
+
+    def is_valid(self, fos: int, fpr: int) -> bool:
+        """Whether FOS and FPR select a documented clock. The internal oscillators ignore FPR."""
+        modes = set(self.multipliers) if fos == self.pll else set()
+        if fos == self.external:
+            modes |= self.without_pll
+        return fpr in modes or fos < min(self.pll, self.external)
+
+
+@dataclass(frozen=True, slots=True)
 class InterruptSource:
     """Register bits of one interrupt: flag, enable and priority."""
 
@@ -173,6 +196,10 @@ class CompareSite:
 class AdcSite:
     pins: tuple[str, ...]
     irq: int
+    bits: int = 12
+    """Resolution, 12 or 10. The 10-bit converter has four sample-and-hold amplifiers."""
+    conversion: int = 14
+    """Duration of a conversion in TAD."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -189,6 +216,26 @@ class CanSite:
     number: int
     rx_pin: str
     tx_pin: str
+    irq: int
+
+
+@dataclass(frozen=True, slots=True)
+class PwmSite:
+    """Motor control PWM: (low, high) pins of each output pair, fault pin A."""
+
+    pairs: tuple[tuple[str, str], ...]
+    fault_pin: str
+    irq: int
+    fault_irq: int
+
+
+@dataclass(frozen=True, slots=True)
+class QeiSite:
+    """Quadrature encoder interface."""
+
+    a_pin: str
+    b_pin: str
+    index_pin: str
     irq: int
 
 
@@ -221,9 +268,12 @@ class Chip:
     adc: AdcSite
     dci: DciSite | None
     cans: tuple[CanSite, ...]
+    clock: ClockModes
     nvm_irq: int
     lvd_irq: int | None
     """Interrupt number of low-voltage detect; None if the chip lacks it."""
+    pwm: PwmSite | None = None
+    qei: QeiSite | None = None
 
     def __post_init__(self) -> None:
         sfr, ram, x, y = (self.data[name] for name in ("sfr", "ram", "xram", "yram"))

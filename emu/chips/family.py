@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Final
 
-from emu.chips.chip import ConfigWord, InterruptSource, Region, Sfr, Vector
+from emu.chips.chip import ClockModes, ConfigWord, InterruptSource, Region, Sfr, Vector
 
 IVT: Final = Region("ivt", 0x000004, 0x000080)
 AIVT: Final = Region("aivt", 0x000084, 0x000100)
@@ -106,6 +106,31 @@ def config_words(*words: ConfigWord) -> Mapping[str, ConfigWord]:
     """Return configuration words by name."""
     return MappingProxyType({word.name: word for word in words})
 
+
+_WITH_CRYSTAL: Final = {
+    0b0101: ("crystal", 4.0), 0b0110: ("crystal", 8.0), 0b0111: ("crystal", 16.0),
+    0b1101: ("crystal", 4.0), 0b1110: ("crystal", 8.0), 0b1111: ("crystal", 16.0),
+}  # fmt: skip
+"""PLL modes of a crystal (XT) and of an external clock (EC), by FPR."""
+_WITH_FRC: Final = {0b0001: ("frc", 4.0), 0b0011: ("frc", 16.0), 0b1010: ("frc", 8.0)}
+
+_WITHOUT_PLL: Final = frozenset((0b0000, 0b0010, 0b0100, 0b1000, 0b1001, 0b1011, 0b1100))
+"""FPR of XTL, HS, XT, ERCIO, ERC, EC and ECIO (dspic30f6014a.md §2)."""
+
+CLOCK_BY_FPR: Final = ClockModes(3, 3, MappingProxyType(_WITH_CRYSTAL | _WITH_FRC), ("crystal", 1.0), _WITHOUT_PLL)
+"""FOS in two bits, FPR in four: 30F4011 and 30F4012. The vendor's header p30f4011.h has the codes of the modes."""
+CLOCK_BY_FPR_WITHOUT_FRC_PLL: Final = ClockModes(3, 3, MappingProxyType(_WITH_CRYSTAL), ("crystal", 1.0), _WITHOUT_PLL)
+"""As `CLOCK_BY_FPR` without PLL modes of the FRC: 30F6010 to 30F6014. UNVERIFIED: DS70117 was not available."""
+CLOCK_BY_FOS: Final = ClockModes(7, 3, MappingProxyType(_WITH_CRYSTAL | _WITH_FRC | {
+    0b10001: ("crystal", 2.0), 0b10010: ("crystal", 4.0), 0b10011: ("crystal", 8.0),
+    0b10101: ("crystal", 4 / 3), 0b10110: ("crystal", 8 / 3), 0b10111: ("crystal", 16 / 3),
+}), ("crystal", 8.0), _WITHOUT_PLL)  # fmt: skip
+"""FOS in three bits, FPR in five: 30F3014, 30F4013 and the A parts (dspic30f6014a.md §2). Reserved FPR codes and images
+without configuration words have the setting of the e-puck's library."""
+FOSC_OF_FPR: Final = config_word("FOSC", 0xF80000, 0xC30F, FCKSM=(14, 2), FOS=(8, 2), FPR=(0, 4))
+FGS_WITHOUT_SEGMENTS: Final = config_word("FGS", 0xF8000A, 0x0003, GCP=(1, 1), GWRP=(0, 1))
+"""FGS of parts without CodeGuard."""
+FOSC_OF_FOS: Final = config_word("FOSC", 0xF80000, 0xC71F, FCKSM=(14, 2), FOS=(8, 3), FPR=(0, 5))
 
 SLOTS: Final = vectors_of({})
 """Names and addresses of all vectors, equal for every chip; which of them are implemented differs."""

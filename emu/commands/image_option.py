@@ -15,7 +15,7 @@ def add_chip_option(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--chip",
         metavar="NAME",
-        help=f"the chip: {' or '.join(NAMES)} (default: the one in an ELF file's flags, else {NAMES[0]})",
+        help=f"the chip: {', '.join(NAMES)} (default: the one in an ELF file's flags, else {NAMES[0]})",
     )
 
 

@@ -12,8 +12,9 @@ import sys
 from array import array
 from typing import Final, NamedTuple
 
-from emu.chips import chip_named, chip_of
+from emu.chips import NAMES, chip_named, chip_of
 from emu.chips.chip import Chip
+from emu.chips.members import MEMBERS, nearest
 from emu.image.elf_facts import EM_DSPIC30F, OCTETS_PER_UNIT, OCTETS_PER_WORD, PROCESSOR_MASK, SectionFlag
 from emu.image.model import Block, Image, LoadError, Section, check_blocks
 from emu.image.symbols import Symbol
@@ -95,11 +96,11 @@ def read_elf(data: bytes, path: str, chip: Chip | None) -> Image:
     reader = _Reader(data, path)
     (_, _, _, _, entry, phoff, shoff, e_flags, _, phentsize, phnum, shentsize, shnum, shstrndx) = _identify(reader)
     processor = e_flags & PROCESSOR_MASK
-    chip = chip or chip_of(processor) or chip_named()
+    chip = chip or _chip_of_file(reader, processor)
     if processor not in chip.processors:
-        reader.warnings.append(
-            f"built for processor id {processor:#x}, not {chip.processors[0]:#x} ({chip.name}); loaded as if it were"
-        )
+        named = MEMBERS.get(processor)
+        built = f"the {named}" if named else f"processor id {processor:#x}"
+        reader.warnings.append(f"built for {built}, not for the {chip.name} ({chip.processors[0]:#x}); loaded for that")
     headers = [_Header(*row) for row in reader.table(_SECTION, shoff, shnum, shentsize, "the section header table")]
     segments = [_Segment(*row) for row in reader.table(_SEGMENT, phoff, phnum, phentsize, "the program header table")]
     if not headers:
@@ -112,6 +113,21 @@ def read_elf(data: bytes, path: str, chip: Chip | None) -> Image:
         raise reader.fail("holds no program words: no section is marked as code, psv or EEPROM")
     symbols = _symbols(reader, headers, sections)
     return Image(path, "elf", chip, placed, tuple(sections), symbols, entry, tuple(reader.warnings))
+
+
+def _chip_of_file(reader: _Reader, processor: int) -> Chip:
+    """Return the chip for a processor id; the default chip for an id outside the family.
+
+    Raises LoadError for a member of the family without tables.
+    """
+    chip = chip_of(processor)
+    if chip is None and processor in MEMBERS:
+        member = MEMBERS[processor]
+        raise reader.fail(
+            f"is built for the {member}, which is not modelled (modelled: {', '.join(NAMES)}); `--chip"
+            f" {nearest(member).removeprefix('dsPIC')}` loads it for the nearest of them"
+        )
+    return chip or chip_named()
 
 
 def _identify(reader: _Reader) -> tuple[int, ...]:

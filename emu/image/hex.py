@@ -10,6 +10,7 @@ from array import array
 
 from emu.chips.chip import Chip
 from emu.image.elf_facts import OCTETS_PER_WORD, UNITS_PER_WORD
+from emu.image.fitness import misfits
 from emu.image.model import ERASED, LOADABLE, Block, Image, LoadError, check_blocks
 
 DATA, END, SEGMENT, START_SEGMENT, LINEAR, START_LINEAR = range(6)
@@ -25,7 +26,7 @@ def read_hex(data: bytes, path: str, chip: Chip) -> Image:
     blocks = check_blocks(path, chip, _blocks(words))
     if not blocks:
         raise LoadError(path, "holds no data records")
-    return Image(path, "hex", chip, blocks, warnings=warnings)
+    return Image(path, "hex", chip, blocks, warnings=(*warnings, *misfits(chip, words)))
 
 
 def _collect(data: bytes, path: str, chip: Chip) -> tuple[dict[int, int], tuple[str, ...]]:

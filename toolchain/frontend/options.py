@@ -19,7 +19,7 @@ from toolchain.errors import ToolError
 HELP = """\
 usage: python -m toolchain cc [options] files... [-o out.elf|out.hex|out.o]
 
-C compiler, assembler and linker for the dsPIC30F6014A and dsPIC30F4013 (-mcpu=), used like gcc.
+C compiler, assembler and linker for the dsPIC30F6014A and its relatives (-mcpu=), used like gcc.
   files                 .c  .cpp .cc (C++)  .s (assembly)  .S (preprocessed assembly)  .i  .ll/.bc (LLVM IR)  .o  .a
   -o FILE               output; .hex writes Intel HEX, anything else ELF (default a.elf)
   -c | -S | -E          stop after assembling | compiling | preprocessing

@@ -26,11 +26,15 @@
 /* On the line of a LOOP_BOUND, once for each function: in one call of `function`, this loop and all others with an equal
  * annotation have at most `rounds` iterations together.  If several such functions are active, the outermost counts. */
 #define LOOP_SHARE(function, rounds) _BOUNDS_NOTE("share", function rounds)
-/* Anywhere: the loops of this function, which may be assembly, have at most `rounds` iterations. */
+/* Anywhere: the loops of this function have at most `rounds` iterations.  A label of assembly at the head of a loop stands
+ * for that loop. */
 #define LOOPS_OF(function, rounds) _BOUNDS_NOTE("loops", function rounds)
 /* Before a call through a pointer: its targets are the listed functions; a listed type stands for all its functions whose
  * address is taken; a minus excludes a function. */
 #define CALL_TARGETS(...) _BOUNDS_NOTE("calls", __VA_ARGS__)
+/* Anywhere, for assembly: the same for the calls through pointers after the label or in the function `caller`.  Targets of
+ * several such annotations add up. */
+#define TARGETS_OF(caller, ...) _BOUNDS_NOTE("targets", caller __VA_ARGS__)
 /* Before a call of `callee` that is not inlined: one call of `function` makes it at most `times` times, counting all copies
  * of the call and all calls of `callee` in that line. */
 #define CALL_SHARE(callee, function, times) _BOUNDS_NOTE("often", callee function times)
@@ -57,6 +61,16 @@
 /* In a file: pointers that its code loads from memory point to RAM, so that dereferencing them costs no PSV cycles.
  * With a name, it applies to that file in the same folder, which may be assembly. */
 #define LINKS_IN_RAM(...) _BOUNDS_NOTE("ram", . __VA_ARGS__)
+
+/* Above a function, in the compiled file: annotations of the one line of the function that contains `text`, so that the
+ * function itself reads without them.  Each is one of
+ *     loop ROUNDS, total ROUNDS, share FUNCTION ROUNDS, one, same         as LOOP_BOUND, LOOP_TOTAL, LOOP_SHARE, ...
+ *     calls TARGET, calls (TARGET, ...), often CALLEE FUNCTION TIMES, if CALLEE EXPRESSION
+ *                                                                         as CALL_TARGETS, CALL_SHARE, CALL_IF
+ * Example: BOUNDS_AT("while (*link", loop s, share remove_all n * s);  */
+#define BOUNDS_AT(text, ...) _BOUNDS_AT(__COUNTER__, __LINE__, __VA_ARGS__)
+#define _BOUNDS_AT(number, line, ...) _BOUNDS_OTHER_LINE(number, line, __VA_ARGS__)
+#define _BOUNDS_OTHER_LINE(number, line, ...) _BOUNDS_LINE(number, _BOUNDS_AT_##line, "at", __VA_ARGS__)
 
 #define _BOUNDS_NOTE(kind, ...) _BOUNDS_LINE(__COUNTER__, __LINE__, kind, __VA_ARGS__)
 #define _BOUNDS_LINE(number, line, kind, ...) _BOUNDS_TEXT(number, line, kind, __VA_ARGS__)

@@ -1,7 +1,15 @@
 /* SPDX-License-Identifier: MIT */
 /* Microchip's name of the header that selects the device. */
-#ifdef __dsPIC30F4013__
+#if defined(__dsPIC30F4013__)
 #include "dspic30f4013.h"
+#elif defined(__dsPIC30F3014__)
+#include "dspic30f3014.h"
+#elif defined(__dsPIC30F4011__)
+#include "dspic30f4011.h"
+#elif defined(__dsPIC30F6012A__)
+#include "dspic30f6012a.h"
+#elif defined(__dsPIC30F6014__)
+#include "dspic30f6014.h"
 #else
 #include "dspic30f6014a.h"
 #endif

@@ -6,7 +6,8 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Final
 
-CHIP: Final = "dsPIC30F6014A"
+CHIPS: Final = ("dsPIC30F6014A", "dsPIC30F6014")
+"""Chip of the e-puck, and its predecessor with the same pins, for which some of its firmware was built."""
 
 CRYSTAL_HZ: Final = 7_372_800
 """Frequency in Hz of the crystal at OSC1 (dspic30f6014a.md §3)."""

@@ -6,7 +6,7 @@ from typing import Final
 
 from emu.boards.epuck.analog import Accelerometer, Infrared, Microphones
 from emu.boards.epuck.camera.camera import Camera
-from emu.boards.epuck.config import CHIP, CONFIG, CRYSTAL_HZ
+from emu.boards.epuck.config import CHIPS, CONFIG, CRYSTAL_HZ
 from emu.boards.epuck.motors import Motors
 from emu.boards.epuck.remote import Remote
 from emu.boards.epuck.simple import Battery, Bluetooth, Codec, Leds, Selector
@@ -23,8 +23,8 @@ class EpuckHardware:
     """
 
     def __init__(self, chip: Peripherals, *, camera: str | None = "PO6030K", selector: int = 0, seed: int = 0) -> None:
-        if chip.context.chip.name != CHIP:
-            raise ValueError(f"an e-puck has a {CHIP}, not a {chip.context.chip.name}")
+        if chip.context.chip.name not in CHIPS:
+            raise ValueError(f"an e-puck has a {CHIPS[0]}, not a {chip.context.chip.name}")
         chip.configure(crystal=CRYSTAL_HZ, config=CONFIG)
         self.chip: Final = chip
         self.noise: Final = Noise(chip.context.bus.record, seed)

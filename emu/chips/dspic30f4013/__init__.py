@@ -7,9 +7,11 @@ Sources:
   public programs for this part;
 - register addresses and bits: those of the family (registers.csv), for the devices that this part has.
 
+- processor id in ELF files: public XC16 files for this part and the vendor's list of parts (`members.py`).
+
 UNVERIFIED, without access to the data sheet (DS70138): the pins of CNx, the DCI's and OCFA's pins, the absence of T3CK
-to T5CK, the start of Y RAM, the fields of FOSC (those of the A parts) and FGS, the processor id in ELF files (position
-in the vendor's list of parts).
+to T5CK, the start of Y RAM (that of the 30F4011, which has as much RAM), the fields of FOSC (those of the A parts) and
+FGS.
 """
 
 from __future__ import annotations
@@ -30,7 +32,17 @@ from emu.chips.chip import (
     UartSite,
     load_sfrs,
 )
-from emu.chips.family import config_word, config_words, data_space, interrupts_of, program_space, vectors_of
+from emu.chips.family import (
+    CLOCK_BY_FOS,
+    FGS_WITHOUT_SEGMENTS,
+    FOSC_OF_FOS,
+    config_word,
+    config_words,
+    data_space,
+    interrupts_of,
+    program_space,
+    vectors_of,
+)
 
 _SFRS: Final = load_sfrs(Path(__file__).with_name("registers.csv"))
 _INTERRUPTS: Final = interrupts_of(_SFRS)
@@ -41,17 +53,17 @@ DSPIC30F4013: Final = Chip(
     vectors=vectors_of(_INTERRUPTS),
     interrupts=_INTERRUPTS,
     config=config_words(
-        config_word("FOSC", 0xF80000, 0xC71F, FCKSM=(14, 2), FOS=(8, 3), FPR=(0, 5)),
+        FOSC_OF_FOS,
         config_word("FWDT", 0xF80002, 0x803F, FWDTEN=(15, 1), FWPSA=(4, 2), FWPSB=(0, 4)),
         config_word("FBORPOR", 0xF80004, 0x80B3, MCLREN=(15, 1), BOREN=(7, 1), BORV=(4, 2), FPWRT=(0, 2)),
-        config_word("FGS", 0xF8000A, 0x0003, GCP=(1, 1), GWRP=(0, 1)),
+        FGS_WITHOUT_SEGMENTS,
         config_word("FICD", 0xF8000C, 0xC003, BKBUG=(15, 1), COE=(14, 1), ICS=(0, 2)),
     ),
     data=data_space(y_start=0x0C00, ram_end=0x1000),
     program=program_space(flash_end=0x8000, eeprom_bytes=0x400),
     device_id=0x0141,
     revision=0x1002,  # UNVERIFIED
-    processors=(0x0E, 0x0C),  # XC16 writes the first; version 0.2 of this toolchain wrote the second
+    processors=(0x0E,),
     ports=("A", "B", "C", "D", "F"),
     change_pins=("RC14", "RC13", *(f"RB{bit}" for bit in range(6)), *[""] * 9, "RF4", "RF5"),
     external_pins=(("RA11", 0), ("RD8", 16), ("RD9", 23)),
@@ -75,6 +87,7 @@ DSPIC30F4013: Final = Chip(
     adc=AdcSite(tuple(f"RB{channel}" for channel in range(13)), 11),
     dci=DciSite("RB10", "RB11", "RB9", "RB12", 41),
     cans=(CanSite(1, "RF0", "RF1", 27),),
+    clock=CLOCK_BY_FOS,
     nvm_irq=12,
     lvd_irq=42,
 )

@@ -24,7 +24,16 @@ from emu.chips.chip import (
     UartSite,
     load_sfrs,
 )
-from emu.chips.family import config_word, config_words, data_space, interrupts_of, program_space, vectors_of
+from emu.chips.family import (
+    CLOCK_BY_FOS,
+    FOSC_OF_FOS,
+    config_word,
+    config_words,
+    data_space,
+    interrupts_of,
+    program_space,
+    vectors_of,
+)
 
 SFRS: Final[Mapping[str, Sfr]] = load_sfrs(Path(__file__).with_name("registers.csv"))
 """Every register by its data-sheet name, in address order."""
@@ -35,7 +44,7 @@ INTERRUPTS: Final = interrupts_of(SFRS)
 VECTORS: Final = vectors_of(INTERRUPTS)
 
 CONFIG: Final[Mapping[str, ConfigWord]] = config_words(  # §2
-    config_word("FOSC", 0xF80000, 0xC71F, FCKSM=(14, 2), FOS=(8, 3), FPR=(0, 5)),
+    FOSC_OF_FOS,
     config_word("FWDT", 0xF80002, 0x803F, FWDTEN=(15, 1), FWPSA=(4, 2), FWPSB=(0, 4)),
     config_word("FBORPOR", 0xF80004, 0x87B3, MCLREN=(15, 1), BOREN=(7, 1), BORV=(4, 2), FPWRT=(0, 2)),
     config_word("FBS", 0xF80006, 0x310F, RBS=(12, 2), EBS=(8, 1), BSS=(1, 3), BWRP=(0, 1)),
@@ -58,7 +67,7 @@ DSPIC30F6014A: Final = Chip(
     program=program_space(flash_end=0x018000, eeprom_bytes=0x1000),  # §1.2
     device_id=0x02C3,
     revision=0x1002,  # UNVERIFIED: process and revision nibbles differ per silicon (§1.2)
-    processors=(0x1F, 0x18),  # the second is the 30F6014's (abi-elf.md §6.1)
+    processors=(0x1F,),  # abi-elf.md §6.1
     ports=("A", "B", "C", "D", "F", "G"),  # §6
     change_pins=tuple(_CHANGE_PINS.split()),
     external_pins=(("RF6", 0), ("RA12", 16), ("RA13", 23), ("RA14", 36), ("RA15", 37)),  # §5.5
@@ -86,6 +95,7 @@ DSPIC30F6014A: Final = Chip(
     adc=AdcSite(tuple(f"RB{channel}" for channel in range(16)), 11),  # §13
     dci=DciSite("RG12", "RG13", "RG14", "RG15", 41),  # §14
     cans=(CanSite(1, "RF0", "RF1", 27), CanSite(2, "RG0", "RG1", 38)),  # §15
+    clock=CLOCK_BY_FOS,  # §2
     nvm_irq=12,  # §16
     lvd_irq=42,  # §17
 )

@@ -19,34 +19,13 @@ LPRC_HZ: Final = 512_000
 LP_HZ: Final = 32_768
 """Frequency in Hz of the secondary oscillator on SOSCI/SOSCO (§2)."""
 
-_LP, _FRC, _LPRC, _EXTERNAL, _PLL = 0, 1, 2, 3, 7
-"""Source codes in FOS, NOSC and COSC (§2)."""
+_LP, _FRC, _LPRC = 0, 1, 2
+"""Source codes in FOS, NOSC and COSC (§2). Those of the primary oscillator are in `Chip.clock`."""
 _START_PERIODS: Final = 1024
 """Number of periods that the oscillator start-up timer counts (§3)."""
 _LOCK_SECONDS: Final = 20e-6  # UNVERIFIED: typical lock time, up to 50 us (§3)
 _TUNE: Final = 0.015  # UNVERIFIED: relative change of the FRC per OSCTUN step (§3)
 _POST: Final = (1, 4, 16, 64)
-
-_MULTIPLIERS: Final = {  # FPR with FOS = 7: (source, multiplier of its frequency), §2
-    0b00001: ("frc", 4.0),
-    0b00011: ("frc", 16.0),
-    0b01010: ("frc", 8.0),
-    0b00101: ("crystal", 4.0),
-    0b00110: ("crystal", 8.0),
-    0b00111: ("crystal", 16.0),
-    0b01101: ("crystal", 4.0),
-    0b01110: ("crystal", 8.0),
-    0b01111: ("crystal", 16.0),
-    0b10001: ("crystal", 2.0),
-    0b10010: ("crystal", 4.0),
-    0b10011: ("crystal", 8.0),
-    0b10101: ("crystal", 4 / 3),
-    0b10110: ("crystal", 8 / 3),
-    0b10111: ("crystal", 16 / 3),
-}
-
-_UNPROGRAMMED: Final = ("crystal", 8.0)
-"""Setting for reserved FPR codes and for images without configuration words: that of the e-puck's library (§2)."""
 
 _KEYS: Final = {0xFF00: (0x78, 0x9A), 0x00FF: (0x46, 0x57)}
 """Unlock bytes for OSCCONH and OSCCONL, by byte lane mask (§3)."""
@@ -60,7 +39,9 @@ class Oscillator(Peripheral):
     def __init__(self, context: ChipContext) -> None:
         super().__init__("osc", context)
         self.con: Final = self.register("OSCCON")
-        self.tun: Final = self.register("OSCTUN")
+        self._tun_in_con: Final = "OSCTUN" not in context.chip.sfrs
+        self.tun: Final = self.register("OSCCON" if self._tun_in_con else "OSCTUN")
+        self._modes: Final = context.chip.clock
         sfr = context.chip.sfrs["OSCCON"]
         self._free: Final = sfr.writable
         self._flags: Final = sfr.clear_only
@@ -68,7 +49,8 @@ class Oscillator(Peripheral):
         self.bus.writable[word] = 0xFFFF  # the hook needs the raw key bytes
         self.bus.clear_only[word] = 0
         self.con.written_by(self._con_written)
-        self.tun.written_by(lambda _old, _new, _lanes: self._rate_changed(self.now + 1))
+        if not self._tun_in_con:
+            self.tun.written_by(lambda _old, _new, _lanes: self._rate_changed(self.now + 1))
         self._key_lane: Final = self.cell("key_lane", "H")
         self._key_count: Final = self.cell("key_count", "B")
         self._key_cycle: Final = self.cell("key_cycle", "Q")
@@ -92,10 +74,18 @@ class Oscillator(Peripheral):
     def _config(self, name: str) -> int:
         return self.context.chip.config["FOSC"].field(self.context.program.setting("FOSC"), name)
 
+    def _primary(self) -> tuple[str, float]:
+        """Return source and multiplier of the primary oscillator, by FPR."""
+        return self._modes.multipliers.get(self._config("FPR"), self._modes.other)
+
+    def _has_pll(self, code: int) -> bool:
+        """Whether the PLL runs for a source code."""
+        return code == self._modes.pll and self._primary()[1] != 1
+
     def _source_hz(self, code: int, tune: int) -> float:
         frc = FRC_HZ * (1 + _TUNE * (tune - 16 if tune & 8 else tune))
-        if code == _PLL:
-            source, multiplier = _MULTIPLIERS.get(self._config("FPR"), _UNPROGRAMMED)
+        if code == self._modes.pll:
+            source, multiplier = self._primary()
             return (frc if source == "frc" else self.context.crystal) * multiplier
         return {_LP: LP_HZ, _FRC: frc, _LPRC: LPRC_HZ}.get(code, self.context.crystal)
 
@@ -108,13 +98,17 @@ class Oscillator(Peripheral):
         """Return the seconds from power-on to `cycle`, which must not precede the last clock change."""
         return self._elapsed.value / _PS + (cycle - self._since.value) / self.fcy()
 
+    def _tuning(self) -> int:
+        """Return the tuning of the FRC, which is in OSCTUN or, on parts without it, in OSCCON."""
+        return sum(self.tun[f"TUN{bit}"] << bit for bit in range(4))
+
     def _rate_changed(self, cycle: int) -> None:
         for callback in self.before_change:
             callback()
         self._elapsed.value = round(self.seconds(cycle) * _PS)
         self._since.value = cycle
         before = self.fcy()
-        self._current.value = (self.tun.value & 0xF) << 5 | self.con["COSC"] << 2 | self.con["POST"]
+        self._current.value = self._tuning() << 5 | self.con["COSC"] << 2 | self.con["POST"]
         self._tcy_fs.value = round(10**15 / self.fcy())
         self._reschedule(cycle, self.fcy() / before)
         for callback in self.on_change:
@@ -159,7 +153,7 @@ class Oscillator(Peripheral):
             self._request_switch()
         elif not self.con["OSWEN"]:
             self.events.cancel(self._switch)
-        if self.con["POST"] != self._current.value & 3:
+        if self.con["POST"] != self._current.value & 3 or self._tuning() != self._current.value >> 5:
             self._rate_changed(self.now + 1)
 
     def _request_switch(self) -> None:
@@ -175,9 +169,9 @@ class Oscillator(Peripheral):
     def _start_tcy(self, code: int) -> int:
         """Return the start-up time of a source in current Tcy: start-up timer for crystals, then PLL lock (§3)."""
         wait = 0.0
-        if code in (_LP, _EXTERNAL, _PLL):
+        if code in (_LP, self._modes.external, self._modes.pll):
             wait = _START_PERIODS / (LP_HZ if code == _LP else self.context.crystal)
-        if code == _PLL:
+        if self._has_pll(code):
             wait += _LOCK_SECONDS
         return round(wait * self.fcy())
 
@@ -191,7 +185,7 @@ class Oscillator(Peripheral):
 
     def _run_from(self, code: int, cycle: int) -> None:
         self.con["COSC"] = code
-        self.con["LOCK"] = code == _PLL
+        self.con["LOCK"] = self._has_pll(code)
         self._rate_changed(cycle)
 
     def abandon_switch(self) -> None:
@@ -234,7 +228,7 @@ class Oscillator(Peripheral):
         if power_on:
             self.con["NOSC"] = code
         self.con["COSC"] = code
-        self.con["LOCK"] = code == _PLL
+        self.con["LOCK"] = self._has_pll(code)
         self._key_count.value = 0
         if power_on:
             self._current.value = code << 2

@@ -93,7 +93,7 @@ def test_an_unusual_processor_id_is_a_warning():
     sample = xc16_like()
     sample.flags = 0x5A
     image = parsed(sample)
-    assert "processor id 0x5a" in image.warnings[0]
+    assert "processor id 0x5a, not for the dsPIC30F6014A" in image.warnings[0]
     assert not parsed(xc16_like()).warnings
 
 

@@ -61,8 +61,8 @@ def test_missing_bytes_and_words_read_erased():
 
 
 def test_a_fourth_byte_that_is_not_zero_is_a_warning():
-    image = parsed(record(0, b"\x00\x01\x04\xff") + END)
-    assert dict(image.words()) == {0: 0x040100}
+    image = parsed(record(0, b"\x00\x01\x02\xff") + END)
+    assert dict(image.words()) == {0: 0x020100}
     assert image.warnings == ("line 1: fourth byte of a program word is not 0 (ignored)",)
 
 
