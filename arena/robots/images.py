@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import subprocess
 import sys
@@ -36,9 +37,10 @@ def image_for(brain: str, home: Path = Path()) -> Path | None:
     if not is_own:
         raise ValueError(f"--brain {brain}: there is no firmware/apps/{application} beside this package")
     folder = paths.firmware()
-    # an installed package may not be writable: images then go into the user's cache
-    out = folder / "build" / application if paths.in_checkout() else paths.images() / application
-    if not paths.in_checkout():
+    # an installed package or a checkout may not be writable: images then go into the user's cache
+    is_own_folder = paths.in_checkout() and os.access(folder, os.W_OK)
+    out = folder / "build" / application if is_own_folder else paths.images() / application
+    if not is_own_folder:
         make_private(out)
         for one in (paths.cache(), paths.images(), out):
             if why := danger(one):

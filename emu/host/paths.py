@@ -5,7 +5,10 @@ The module imports nothing of the project. Its functions create no files or fold
 
 from __future__ import annotations
 
+import contextlib
 import os
+import tempfile
+from collections.abc import Callable
 from pathlib import Path
 from typing import Final
 
@@ -17,14 +20,14 @@ def cache() -> Path:
     """Return the cache folder: `$OPENSWARM_CACHE`, else `openswarm` in the user's cache folder.
 
     The user's cache folder is `$XDG_CACHE_HOME` or `~/.cache`; on macOS and Windows it is the platform's standard
-    folder.
+    folder. Users without a home folder, as in containers, have a folder below the one for temporary files.
     """
     own = os.environ.get("OPENSWARM_CACHE")
     if own:
         return Path(own)
     from platformdirs import user_cache_path
 
-    return user_cache_path("openswarm", appauthor=False)
+    return _or_temporary(user_cache_path)
 
 
 def use_cache(folder: str) -> Path:
@@ -57,7 +60,18 @@ def history() -> Path:
     """Return the history file of the debugger prompt, in the user's state folder (`$XDG_STATE_HOME`)."""
     from platformdirs import user_state_path
 
-    return user_state_path("openswarm", appauthor=False) / "debug-history"
+    return _or_temporary(user_state_path) / "debug-history"
+
+
+def _or_temporary(user_folder: Callable[..., Path]) -> Path:
+    """Return the project's folder in a folder of the user, or one for temporary files if the user has no home.
+
+    Without HOME and an entry in the user database, some versions of platformdirs do not expand `~`, others raise."""
+    with contextlib.suppress(RuntimeError):
+        folder = user_folder("openswarm", appauthor=False)
+        if folder.is_absolute():
+            return folder
+    return Path(tempfile.gettempdir()) / f"openswarm-{os.getuid()}"
 
 
 def in_checkout() -> bool:

@@ -21,7 +21,7 @@ pytestmark = pytest.mark.skipif(os.name != "posix", reason="modes of POSIX")
 ARCHIVE = b"!<arch>\n" + bytes(100)
 
 
-@pytest.fixture(params=[0o022, 0o002, 0o000])
+@pytest.fixture(params=[0o077, 0o022, 0o002, 0o000])
 def umask(request: pytest.FixtureRequest) -> Iterator[int]:
     """Set the umask of this process; 002 is common for users with a private group."""
     before = os.umask(request.param)
