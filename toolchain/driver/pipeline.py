@@ -136,6 +136,11 @@ def _single_bits(c: FunctionContext) -> None:
     single_bits.run(c.function, lambda name: sections.is_near(c.module, name))
 
 
+def _unoptimised_single_bits(c: FunctionContext) -> None:
+    single_bits.one_operation(c.function)
+    single_bits.branches_for_choices(c.function, lambda name: sections.is_near(c.module, name))
+
+
 FUNCTION_PASSES = [
     # LLVM IR -> legal IR
     Pass("unreachable", lambda c: cfg.remove_unreachable(c.function), ALL_LEVELS, ("ssa",), ("reachable",)),
@@ -151,7 +156,7 @@ FUNCTION_PASSES = [
     Pass("critical-edges", lambda c: cfg.split_critical_edges(c.function), ALL_LEVELS, ("no-switch",),
          ("no-critical-edges",)),
     Pass("single-bits", _single_bits, OPTIMISED, ("legal", "no-critical-edges")),
-    Pass("one-bit-operations", lambda c: single_bits.one_operation(c.function), UNOPTIMISED, ("legal",)),
+    Pass("single-bit-instructions", _unoptimised_single_bits, UNOPTIMISED, ("legal", "no-critical-edges")),
     # legal IR -> machine form over virtual registers
     Pass("select", _select, ALL_LEVELS, ("legal", "reachable", "no-switch", "no-critical-edges"), ("machine",)),
     Pass("local-cse", lambda c: local_cse.run(c.m), OPTIMISED, ("machine",)),

@@ -23,7 +23,7 @@ from emu.chips.chip import Chip
 from toolchain.abi.struct_alignment import LAYOUT_FLAGS
 from toolchain.device_header import folder_of
 from toolchain.errors import ToolError
-from toolchain.frontend import accumulators, asm_constraints, config_pragma, header_case
+from toolchain.frontend import accumulators, annotated_lines, asm_constraints, config_pragma, header_case
 from toolchain.frontend.asm_registers import REFUSED, respell
 from toolchain.frontend.options import CcOptions, Input
 
@@ -51,6 +51,8 @@ WARNINGS_OF_C = ["implicit-function-declaration", "implicit-int", "int-conversio
 # Library functions that clang may introduce, but that the run-time library does not contain.
 ABSENT_FUNCTIONS = ["stpcpy", "stpncpy", "bcmp", "exp10", "ldexp",
                     "ldexpf", "memccpy", "strndup", "cabs", "iprintf", "siprintf", "wcslen"]  # fmt: skip
+# Allocation functions, whose failure clang would assume away.
+ALLOCATION_FUNCTIONS = ["malloc", "calloc", "realloc", "aligned_alloc", "free"]
 # Predefined macros besides that of the chip (abi-elf.md §2.9). __XC16__ and __C30__ are undefined, because they select
 # Microchip's spellings of attributes.
 PREDEFINED = ["__dsPIC30F__", "__dsPIC30__", "__HAS_DSP__", "__HAS_EEDATA__", "__HAS_5VOLTS__"]
@@ -110,7 +112,7 @@ def front_end_flags(options: CcOptions, language: str = "c") -> list[str]:
     folders = [word for folder in own_folders for word in ("-isystem", str(folder))]
     guard = ["__HAS_CODEGUARD__"] if "FBS" in options.chip.config else []
     flags += [f"-D{name}=1" for name in (f"__{options.chip.name}__", *PREDEFINED, *guard)]
-    flags += [f"-fno-builtin-{name}" for name in ABSENT_FUNCTIONS]
+    flags += [f"-fno-builtin-{name}" for name in (*ABSENT_FUNCTIONS, *ALLOCATION_FUNCTIONS)]
     flags += ["-include", str(INCLUDE_DIR / "dspic_builtins.h")]
     if options.single_constants:
         flags += ["-Xclang", "-cl-single-precision-constant"]
@@ -157,6 +159,7 @@ def ir_job(options: CcOptions, item: Input, output: Path) -> Job:
     """Job that compiles one C file to unoptimised IR text with the attributes of the level."""
     arguments = [*front_end_flags(options, item.language), *_dependency_flags(options, item)]
     arguments += [*LAYOUT_FLAGS, "-Xclang", "-disable-llvm-passes", "-emit-llvm", "-S"]
+    arguments += annotated_lines.definitions(item.path)
     arguments += ["-x", item.language, str(item.path)]
     return Job([*arguments, "-o", str(output)], item.path, output.with_suffix(".layouts"), options.chip)
 

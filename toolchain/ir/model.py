@@ -27,7 +27,7 @@ class UnsupportedError(Exception):
 
 @dataclass(frozen=True, slots=True)
 class Type:
-    """One LLVM first-class type. kind: void int float ptr array struct func label meta vector opaque."""
+    """One LLVM first-class type. kind: void int wide float ptr array struct func label meta vector opaque."""
 
     kind: str
     bits: int = 0
@@ -38,7 +38,7 @@ class Type:
 
     def __str__(self) -> str:
         match self.kind:
-            case "int":
+            case "int" | "wide":
                 return f"i{self.bits}"
             case "float":
                 return {16: "half", 32: "float", 64: "double"}.get(self.bits, f"f{self.bits}")
@@ -62,17 +62,25 @@ VOID = Type("void")
 PTR = Type("ptr", 16)
 LABEL = Type("label")
 META = Type("meta")
-MAX_INT_BITS = 128  # greatest width in the input; products with overflow check have twice as many bits
+MAX_INT_BITS = 128  # greatest width of kind int in the input; products with overflow check have twice as many bits
+MAX_WIDE_BITS = 1 << 15  # greatest width of kind wide: integers that hold long runs of bit-fields
 _INTS = {n: Type("int", n) for n in range(1, 2 * MAX_INT_BITS + 17)}
 I1, I8, I16, I32, I64 = (_INTS[n] for n in (1, 8, 16, 32, 64))
 
 
 def int_type(bits: int) -> Type:
-    """The integer type of `bits` bits, 1..272; the parser accepts at most 128 (engines.md §5)."""
+    """The integer type of `bits` bits, 1..272; wider ones of the input are `wide_type` (engines.md §5)."""
     found = _INTS.get(bits)
     if found is None:
         raise UnsupportedError(f"integer type i{bits}: wider than {MAX_INT_BITS} bits")
     return found
+
+
+def wide_type(bits: int) -> Type:
+    """The type of integers of 129 bits and more, which are lists of words after legalisation."""
+    if bits > MAX_WIDE_BITS:
+        raise UnsupportedError(f"integer type i{bits}: wider than {MAX_WIDE_BITS} bits")
+    return Type("wide", bits)
 
 
 def align_of(t: Type) -> int:
@@ -90,13 +98,13 @@ def align_of(t: Type) -> int:
 
 def store_size(t: Type) -> int:
     """Number of bytes that a load or store of the type accesses."""
-    return (t.bits + 7) // 8 if t.kind in ("int", "float", "ptr") else size_of(t)
+    return (t.bits + 7) // 8 if t.kind in ("int", "wide", "float", "ptr") else size_of(t)
 
 
 def size_of(t: Type) -> int:
     """Size of the type in bytes, including padding at its end."""
     match t.kind:
-        case "int" | "float" | "ptr":
+        case "int" | "wide" | "float" | "ptr":
             n, a = (t.bits + 7) // 8, align_of(t)
             return (n + a - 1) // a * a
         case "array" | "vector":

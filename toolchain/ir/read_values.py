@@ -40,6 +40,7 @@ from .model import (
     int_type,
     size_of,
     struct_offsets,
+    wide_type,
 )
 
 
@@ -71,9 +72,8 @@ class ValueReader:
     def _type1(self, c: Cursor) -> Type:
         token = c.next()
         if token[0] == "i" and token[1:].isdigit():
-            if int(token[1:]) > MAX_INT_BITS:
-                raise c.error(f"integer type {token}: wider than {MAX_INT_BITS} bits")
-            return int_type(int(token[1:]))
+            bits = int(token[1:])
+            return int_type(bits) if bits <= MAX_INT_BITS else wide_type(bits)
         match token:
             case "ptr":
                 if c.accept("addrspace"):
@@ -199,7 +199,7 @@ class ValueReader:
             else:
                 bits64 = int.from_bytes(struct.pack("<d", float(token)), "little")
             return ConstInt(t, bits64 if t.bits == 64 else _narrow(bits64))
-        if t.kind not in ("int", "ptr"):
+        if t.kind not in ("int", "wide", "ptr"):
             raise c.error(f"number {token} of type {t}")
         return ConstInt(t, int(token, 0))
 

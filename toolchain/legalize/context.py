@@ -31,7 +31,7 @@ from toolchain.ir.model import (
 from toolchain.legalize import packing
 from toolchain.legalize.lanes import Lane
 
-AGGREGATES = ("struct", "array", "vector")
+AGGREGATES = ("struct", "array", "vector", "wide")
 LegalResult = Value | list[Value] | None
 """Legal form of one instruction: a value, the leaves of an aggregate, or None if it has no value."""
 
@@ -127,6 +127,8 @@ class LegalizationContext:
         leaves = leaves_of(v.type)
         if isinstance(v, Undef):
             return [Undef(legal_type(t)) for t, _ in leaves]
+        if isinstance(v, ConstInt):  # of a wide type
+            return [const(t, v.value >> 8 * at) for t, at in leaves]
         if isinstance(v, ConstZero):
             return [const(legal_type(t), 0) for t, _ in leaves]
         if isinstance(v, ConstAgg):
@@ -174,6 +176,8 @@ class LegalizationContext:
 
 def leaves_of(t: Type, at: int = 0) -> list[tuple[Type, int]]:
     """Scalar members of an aggregate that starts at offset `at`, with their byte offsets."""
+    if t.kind == "wide":
+        return [(I16, at + k) for k in range(0, (t.bits + 7) // 8, 2)]
     if t.kind in ("array", "vector"):
         step = size_of(t.elems[0])
         return [leaf for k in range(t.count) for leaf in leaves_of(t.elems[0], at + k * step)]

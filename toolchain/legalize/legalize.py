@@ -34,7 +34,7 @@ from toolchain.ir.model import (
     Value,
     int_type,
 )
-from toolchain.legalize import intrinsics, packing, softfloat, vectors
+from toolchain.legalize import intrinsics, packing, softfloat, vectors, wide_integers
 from toolchain.legalize.context import AGGREGATES, LegalResult, leaves_of
 from toolchain.legalize.memory import ATOMIC_CALLS, MemoryLegalizer
 
@@ -134,6 +134,8 @@ class Legalizer(MemoryLegalizer):
 
     def translate(self, i: Instr) -> LegalResult:
         """Translate one instruction without recording its value."""
+        if wide_integers.concerns(i):
+            return wide_integers.translate(self, i)
         handler = HANDLERS.get(i.op)
         if handler is None:
             raise UnsupportedError(f"instruction '{i.op}'")
@@ -304,6 +306,8 @@ class Legalizer(MemoryLegalizer):
     def call(self, i: Instr) -> LegalResult:
         callee = i.args[-1]
         if isinstance(callee, GlobalRef):
+            if callee.name.startswith(vectors.REDUCE):
+                return vectors.reduce(self, i, callee.name, self.translate)
             if callee.name.startswith("llvm.") and i.type.kind == "vector":
                 return vectors.intrinsic(self, i, self.call)
             if callee.name.startswith("llvm."):

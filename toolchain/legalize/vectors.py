@@ -10,6 +10,7 @@ from collections.abc import Callable
 from toolchain.abi.target import ARGUMENT_REGISTERS
 from toolchain.ir.build import const, legal_type
 from toolchain.ir.model import (
+    I1,
     VOID,
     ConstInt,
     Instr,
@@ -28,6 +29,10 @@ Translate = Callable[[Instr], LegalResult]
 OWN_HANDLER = frozenset(
     ("extractelement", "insertelement", "shufflevector", "bitcast", "load", "store", "freeze", "call", "ret")
 )
+
+REDUCE = "llvm.vector.reduce."
+REDUCING_OPERATIONS = frozenset(("add", "mul", "and", "or", "xor", "fadd", "fmul"))
+REDUCING_PREDICATES = {"smax": "sgt", "smin": "slt", "umax": "ugt", "umin": "ult"}
 
 
 def lane_count(i: Instr) -> int:
@@ -69,6 +74,31 @@ def intrinsic(lz: MemoryLegalizer, i: Instr, translate_call: Translate) -> list[
             raise UnsupportedError(f"vector operand of {i.args[-1]!r}")
         out.append(value)
     return out
+
+
+def reduce(lz: MemoryLegalizer, i: Instr, name: str, translate: Translate) -> Value:
+    """Translate a reduction: one scalar operation per further lane, from the first lane on."""
+    kind = name.removeprefix(REDUCE).split(".")[0]
+    vector = i.args[-2]  # fadd and fmul have a start value before it
+    values: list[Value] = [*i.args[:-2], *(Lane(vector, k) for k in range(vector.type.count))]
+    result = values[0]
+    for value in values[1:]:
+        steps: list[Instr]
+        if kind in REDUCING_OPERATIONS:
+            steps = [Instr(kind, i.type, [result, value])]
+        elif kind in REDUCING_PREDICATES:
+            larger = Instr("icmp", I1, [result, value])
+            larger.extra["pred"] = REDUCING_PREDICATES[kind]
+            steps = [larger, Instr("select", i.type, [larger, result, value])]
+        else:
+            raise UnsupportedError(f"vector reduction {kind}")
+        for step in steps:
+            made = translate(step)
+            assert isinstance(made, Value)
+            lz.values[id(step)] = made
+            lz.alive += [step, step.args]
+        result = steps[-1]
+    return lz.legal(result)
 
 
 def extractelement(lz: MemoryLegalizer, i: Instr) -> Value:

@@ -27,7 +27,7 @@ from toolchain.link.memory import HANDLE_LIMIT, ChipMemory
 from toolchain.link.options import LinkOptions
 from toolchain.link.place import Layout, Placer, even, is_const, largest_symbols, space_of
 from toolchain.link.relocate import Relocator
-from toolchain.link.resolve import Resolution, check, resolve
+from toolchain.link.resolve import Resolution, check, place_of, resolve
 
 LINKER_OBJECT = "<linker>"
 
@@ -75,7 +75,7 @@ def _link(objects: list[ObjectFile], archives: list[Archive], options: LinkOptio
     )
     entry = relocator.target(synthesize.wanted(options.entry)).address
     image = build_executable(inputs.resolution, outputs, relocator, entry, options.chip.processors[0])
-    messages = _foreign_processors(objects, options.chip)
+    messages = _foreign_processors(objects, options.chip) + _missing_heap(inputs)
     return Linked(image, inputs.resolution, placement.layout, outputs, placement.records, inputs.live, stack, messages)
 
 
@@ -323,6 +323,25 @@ def _foreign_processors(objects: list[ObjectFile], chip: Chip) -> list[str]:
         for obj in objects
         if obj.processor & PROCESSOR_MASK not in fitting
     ]
+
+
+def _missing_heap(inputs: _Inputs) -> list[str]:
+    """Return a warning if `malloc` of the run-time library is linked and there is no heap, so that it always fails."""
+    resolution = inputs.resolution
+    malloc = resolution.globals.get("_malloc")
+    if malloc is None or malloc.section not in inputs.live or "__eheap" in resolution.globals:
+        return []
+    if any(section.extended & ExtendedAttribute.HEAP for section in inputs.live):
+        return []
+    if not any(reloc.symbol.name == "__eheap" for reloc in malloc.section.relocs):
+        return []  # the program's own malloc
+    library = resolution.owner[malloc.section]
+    functions = {symbol.name for symbol in library.symbols if symbol.bind is not Bind.LOCAL}
+    callers = [place_of(resolution.owner[section], section, reloc.offset // 2) for section in resolution.owner
+               if section in inputs.live and section.is_code and resolution.owner[section] is not library
+               for reloc in section.relocs if reloc.symbol.name in functions]  # fmt: skip
+    called = f" (called at {', '.join(callers[:3])})" if callers else ""
+    return [f"warning: malloc always fails, because there is no heap{called}: link with -Wl,--heap=BYTES"]
 
 
 def memory_use(linked: Linked) -> dict[str, int]:

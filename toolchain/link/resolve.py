@@ -112,7 +112,7 @@ def resolve(
     return result
 
 
-def _place(obj: ObjectFile, section: Section, offset: int) -> str:
+def place_of(obj: ObjectFile, section: Section, offset: int) -> str:
     """Return object, section and enclosing symbol of a reference, for the message."""
     around = [s for s in obj.symbols if s.section is section and s.value <= offset and is_named(s)]
     name = max(around, key=lambda s: s.value).name if around else ""
@@ -135,7 +135,7 @@ def check(result: Resolution, provided: set[str], live: set[Section]) -> None:
                 if symbol.home is not Home.UNDEFINED or symbol.bind is Bind.WEAK or not symbol.name:
                     continue
                 if symbol.name not in result.globals and symbol.name not in provided:
-                    missing.setdefault(symbol.name, []).append(_place(obj, section, reloc.offset // 2))
+                    missing.setdefault(symbol.name, []).append(place_of(obj, section, reloc.offset // 2))
     for name, places in missing.items():
         shown = ", ".join(places[:MAX_REFERENCES])
         more = f" and {len(places) - MAX_REFERENCES} more" if len(places) > MAX_REFERENCES else ""

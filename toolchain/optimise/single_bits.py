@@ -1,8 +1,9 @@
 """Single-bit writes: one BSET, BCLR or BTG for every write of one bit of a volatile object in near memory.
 
 These instructions change one bit (isa.md §5.4), so a change that an interrupt makes to another bit is not lost.
-Programs rely on that for the flags of peripherals. The front end clears a bit-field before it sets it; `one_operation`
-merges the two. The middle end merges the writes of several branches; this pass separates them again. It recognises:
+Programs rely on that for the flags of peripherals. The front end clears a bit-field before it sets it, and reads it
+twice to toggle it; `one_operation` merges these. The middle end merges the writes of several
+branches; this pass separates them again. It recognises:
 
     shape                                                       result
     one store after the branches, of a phi                      a store in each branch
@@ -21,8 +22,11 @@ from dataclasses import dataclass
 from toolchain.abi.target import NEAR_END
 from toolchain.ir.cfg import dead_code, new_branch, predecessors
 from toolchain.ir.model import I1, VOID, Block, ConstInt, Function, GlobalRef, Instr, Value
+from toolchain.optimise import bit_patterns
 from toolchain.optimise.combine import users_of
 from toolchain.select.state import MEMORY_BARRIERS
+
+MAX_TREE = 24  # operations in the value of a store; the front end needs at most 12 for a bit-field of itself
 
 IsNear = Callable[[str], bool]
 """Function that returns whether the variable with a name is in near memory."""
@@ -49,24 +53,81 @@ def run(f: Function, is_near: IsNear) -> None:
     addresses = _single_bit_addresses(f, is_near)
     for b in f.blocks if addresses else ():
         _load_in_branches(f, b, is_near, addresses)
+    branches_for_choices(f, is_near)
+
+
+def branches_for_choices(f: Function, is_near: IsNear) -> None:
+    """Replace every store that chooses between two values of one bit by two branches with one instruction each."""
     for b in list(f.blocks):
         _branches_for_choice(f, b, is_near)
     dead_code(f)
 
 
 def one_operation(f: Function) -> None:
-    """Merge consecutive operations that together change one bit of a volatile object, in any memory."""
+    """Merge the operations that together change one bit of a volatile object, in any memory.
+
+    A bit-field that is written with a function of itself (`x.bit ^= 1`, `x.bit = !x.bit`) is read twice by the
+    front end; the instruction that changes the bit reads it once.
+    """
     users = users_of(f)
     for b in f.blocks:
         for store in [i for i in b.instrs if i.op == "store" and i.volatile]:
-            value, p = store.args
-            change = _change(value, p)
-            steps = _chain(value)[1]
-            if change is None or len(steps) < 2 or any(len(users[id(i)]) > 1 for i in (change[0], *steps)):
+            tree = _tree_of(b, store, users)
+            change = bit_patterns.single_change(store.args[0], tree.loads) if tree is not None else None
+            if tree is None or change is None:
                 continue
-            last, (old, op, k) = steps[-1], change
-            last.op, last.extra, last.args = op, {}, [old, ConstInt(old.type, k)]
+            op, k = change
+            value, old = tree.steps[-1], tree.loads[-1]
+            if len(tree.steps) == 1 and len(tree.loads) == 1:
+                continue
+            for load in tree.loads[:-1]:
+                b.instrs.remove(load)
+            b.instrs.remove(value)
+            value.op, value.extra, value.args = op, {}, [old, ConstInt(old.type, k)]
+            b.instrs.insert(b.instrs.index(store), value)
+            _forget(f, {id(i) for i in (*tree.loads[:-1], *tree.steps[:-1])})
     dead_code(f)
+
+
+@dataclass(frozen=True)
+class ValueTree:
+    """The loads of the stored object and the operations, in order, that compute only the value of a store."""
+
+    loads: list[Instr]
+    steps: list[Instr]
+
+
+def _tree_of(b: Block, store: Instr, users: dict[int, list[Instr]]) -> ValueTree | None:
+    """The tree of a store whose operands are constants and loads of the same object, without accesses in between."""
+    inside: dict[int, Instr] = {}
+    work = [store.args[0]]
+    while work:
+        v = work.pop()
+        if isinstance(v, Instr) and id(v) not in inside:
+            if len(inside) == MAX_TREE or not (v.op in bit_patterns.OPERATIONS or v.op == "load"):
+                return None
+            inside[id(v)] = v
+            work += v.args if v.op != "load" else []
+    found = [i for i in b.instrs if id(i) in inside]
+    loads = [i for i in found if i.op == "load"]
+    if not loads or len(found) != len(inside) or found[-1] is not store.args[0]:
+        return None
+    for load in loads:
+        if not load.volatile or load.type is not store.args[0].type or not _same(load.args[0], store.args[1]):
+            return None
+    if any(u is not store and id(u) not in inside for i in found for u in users.get(id(i), ())):
+        return None
+    between = b.instrs[b.instrs.index(loads[0]) : b.instrs.index(store)]
+    if any(_accesses(i) or i.op == "load" for i in between if i not in loads):
+        return None
+    return ValueTree(loads, [i for i in found if i.op != "load"])
+
+
+def _forget(f: Function, removed: set[int]) -> None:
+    """Remove the values of debug records that are computed no more."""
+    for record in f.dbg_records:
+        if id(record.value) in removed:
+            record.value = None
 
 
 def _single_bit_addresses(f: Function, is_near: IsNear) -> list[Value]:
@@ -366,7 +427,5 @@ def _split(f: Function, b: Block, store: Instr, choice: BitChoice, bodies: list[
                 phi.blocks = [end.name if name == b.name else name for name in phi.blocks]
     at = f.blocks.index(b) + 1
     f.blocks[at:at] = [*made, end]
-    for record in f.dbg_records:
-        if id(record.value) in choice.own:
-            record.value = None
+    _forget(f, set(choice.own))
     return end

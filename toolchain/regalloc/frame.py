@@ -10,6 +10,8 @@ Interrupt functions save all registers that they change, in the order of abi-elf
 
 from __future__ import annotations
 
+import re
+
 from toolchain.abi.target import CALLEE_SAVED, CALLER_SAVED, FP, LIT5_MAX, LIT10_MAX, LNK_MAX, SP, WORD_OFFSET
 from toolchain.ir.model import UnsupportedError
 from toolchain.mir.mir import MI, FrameSlot, Imm, Mem, MFunction, Operand
@@ -17,6 +19,7 @@ from toolchain.mir.mir import MI, FrameSlot, Imm, Mem, MFunction, Operand
 FRAME_POINTER_BYTES = 900  # maximum bytes of locals without LNK; the greatest literal of ADD #lit10 is 1023
 PROBE_REACH = 1022  # largest word offset of [Wn+lit] (isa.md §3)
 PROBE_BYTES = 8  # -fstack-check probes frames of more bytes (kernel.md §4)
+USES_STACK = re.compile(r"\b(?:push|pop|lnk|ulnk|w15|sp)\b", re.IGNORECASE)
 REPEATS = {"repmov", "repfill", "repclr", "div.s", "div.u", "div.sd", "div.ud"}
 
 
@@ -90,7 +93,7 @@ class FrameBuilder:
             out: list[MI] = []
             for mi in b.insts:
                 pushes = _pushes(mi)
-                out += mi.replacement(self._instruction(mi, pushed))
+                out += self._with_frame_pointer_kept(mi.replacement(self._instruction(mi, pushed)))
                 pushed += pushes
             b.insts = out
         self._prologue()
@@ -113,6 +116,17 @@ class FrameBuilder:
         else:
             m.locals_base = before or 2 * len(self.saved)
             m.frame_base = (SP, -(m.locals_base + self.locals))
+
+    def _with_frame_pointer_kept(self, new: list[MI]) -> list[MI]:
+        """The instructions, with W14 saved around inline assembly that clobbers it while it is the frame pointer."""
+        mi = new[0]
+        if mi.op != "asm" or not self.m.uses_fp or FP not in mi.also_defs:
+            return new
+        if USES_STACK.search(mi.text):
+            error = UnsupportedError("inline assembly clobbers the frame pointer W14 and uses the stack")
+            error.line = mi.line
+            raise error
+        return [MI("text", "push w14", line=mi.line), mi, MI("text", "pop w14", line=mi.line)]
 
     def _instruction(self, mi: MI, pushed: int) -> list[MI]:
         if mi.op == "lea":

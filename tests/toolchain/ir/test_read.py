@@ -126,7 +126,7 @@ def test_struct_layout_is_xc16s(type_text: str, size: int, offsets: list[int]) -
     [
         ("%x = add <vscale x 4 x i16> %a, %b", "cannot read"),
         ("%x = fadd half 0xH0000, 0xH0000", "floating-point type 'half'"),
-        ("%x = add i200 1, 2", "wider than 128 bits"),
+        ("%x = add i40000 1, 2", "wider than 32768 bits"),
         ("%x = landingpad { ptr, i32 } cleanup", "instruction 'landingpad'"),
     ],
 )

@@ -89,7 +89,7 @@ BITS = [
     ("of a byte by a bit of a word", "void f(int x){ if (x & 0x400) C |= 2; else C &= ~2; }",
      ["bclr.b _C,#1", "bset.b _C,#1"]),
     ("a bit that is copied", "void f(void){ F.a = F.b; }", ["bclr _F,#0", "bset _F,#0"]),
-    ("a bit that is turned", "void f(void){ F.a ^= 1; }", ["bclr _F,#0", "bset _F,#0"]),
+    ("a bit that is turned", "void f(void){ F.a ^= 1; }", ["btg _F,#0"]),
     ("the contrary of a bit", "void f(void){ F.b = !F.a; }", ["bclr _F,#1", "bset _F,#1"]),
     ("in a switch", """void f(int x){ switch (x) { case 0: A |= 1; break; case 1: A &= ~1; break;
      case 2: A |= 2; break; default: A &= ~2; } }""", ["bclr _A,#0", "bclr _A,#1", "bset _A,#0", "bset _A,#1"]),
