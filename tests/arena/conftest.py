@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 import tempfile
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 
 import pytest
 
 from tests.arena.images import BEGIN
 from tests.firmware.conftest import built_once
-from tests.watchdog import HANG
-
-ROOT = Path(__file__).resolve().parents[2]
+from toolchain.driver import driver
 
 
 @pytest.fixture(scope="session")
@@ -31,16 +28,14 @@ def talking_image(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="session")
 def assembled(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
-    """Return a function that assembles a source text to an image file."""
-    return lambda text: _assembled(tmp_path_factory.mktemp("assembled"), text)
+    """Return a function that assembles a source text to an image file, each text once."""
+    return cache(lambda text: _assembled(tmp_path_factory.mktemp("assembled"), text))
 
 
 def _assembled(folder: Path, text: str) -> Path:
     source, image = folder / "main.s", folder / "main.elf"
     source.write_text(text)
-    command = [sys.executable, "-m", "toolchain", "cc", str(source), "-o", str(image)]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=HANG, cwd=ROOT, check=False)
-    assert done.returncode == 0, done.stderr
+    assert driver.main([str(source), "-o", str(image)]) == 0
     return image
 
 

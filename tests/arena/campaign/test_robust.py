@@ -115,7 +115,7 @@ def test_a_sweep_cannot_choose_a_folder_by_its_values(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_two_runs_do_not_share_a_folder(tmp_path: Path) -> None:
     """The second run ends with status 3 and changes nothing; the first run is unaffected."""
-    long = ["run", "clustering", "--brain", "scripted", "--minutes", "2", "--trials", "3", "--jobs", "1"]
+    long = ["run", "clustering", "--brain", "scripted", "--minutes", "1", "--trials", "3", "--jobs", "1"]
     first = start_arena(*long, "--out", tmp_path)
     wait_for(tmp_path / "manifest.json")
     first.send_signal(signal.SIGSTOP)  # keeps it running when the second one starts
@@ -248,7 +248,7 @@ def test_a_worker_of_another_version_is_refused() -> None:
     """A worker of another version is refused, and the message names the versions."""
     plan = Plan(scripted(load_scene("clustering")), "scripted", "A", None, 1, 1.0, 1)
     with pytest.raises(ValueError, match=r"worker on .* has pymunk .* instead of 0\.1"):
-        cluster.run_remote_trial(plan, cluster.InputFiles(None, None, []), 1, versions.versions() | {"pymunk": "0.1"})
+        cluster.run_remote_trial(plan, cluster.InputFiles(None, None, [], []), 1, versions.versions() | {"pymunk": "0.1"})
 
 
 @pytest.mark.slow

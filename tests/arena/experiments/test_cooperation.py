@@ -70,7 +70,7 @@ def test_clocks_are_compared_with_the_arenas_time() -> None:
 
 
 def trial(tmp_path: Path, scene: str, seconds: float, *words: str) -> Trial:
-    """Run a short trial of few robots near each other; no robot is switched off."""
+    """Run a short trial of three robots near each other; no robot is switched off."""
     text = (Path(__file__).parents[3] / "arena" / "scenes" / f"{scene}.toml").read_text()
     lines = [line for line in text.splitlines() if not line.startswith("off =")]
     path = tmp_path / f"{scene}.toml"

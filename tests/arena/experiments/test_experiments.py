@@ -198,10 +198,10 @@ def test_experiments_that_are_not_there(tmp_path: Path, capsys: pytest.CaptureFi
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["aggregation", "avoidance", "foraging"])
 def test_the_shipped_experiments_run_with_their_firmware(name: str, tmp_path: Path) -> None:
-    """In three seconds of each built-in experiment no robot has a fault, robots move, metrics are finite, and curves
+    """In two seconds of each built-in experiment no robot has a fault, robots move, metrics are finite, and curves
     are drawn."""
     out = tmp_path / name
-    assert main(["run", name, "--trials", "1", "--minutes", "0.05", "--jobs", "2", "--out", str(out)]) == 0
+    assert main(["run", name, "--trials", "1", "--minutes", "0.035", "--jobs", "2", "--out", str(out)]) == 0
     trial = read_trial(out / "trial-0001.parquet")
     assert np.abs(trial.robots[-1] - trial.robots[0]).max() > 2
     for values in trial.series.curves.values():

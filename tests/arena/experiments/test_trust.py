@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
+from contextlib import redirect_stderr
+from io import StringIO
 from pathlib import Path
 
 import pyarrow.parquet as pq
 import pytest
 
-pytestmark = pytest.mark.slow  # every command is a separate process, which has loaded no experiment
-ROOT = Path(__file__).resolve().parents[3]
+from arena import experiments
+from arena.cli import main
+from arena.scene import user_file
+
 SCENE = """name = "mine"
 experiment = "mine.py"
 [arena]
@@ -37,10 +39,13 @@ def metrics(sample):
 MEASURES = 'MEASURES = [Measure("half", "half at {at:g} s", lambda series, at: series.at(at, "apart") / 2)]'
 
 
-def arena(*words: object) -> subprocess.CompletedProcess[str]:
-    """Run `arena` in a separate process, which has loaded no experiment."""
-    command = [sys.executable, "-m", "arena", *map(str, words)]
-    return subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+def arena(*words: object) -> tuple[int, str]:
+    """Run `arena` as in a new process, which has loaded no experiment; return exit status and standard error."""
+    experiments._loaded.clear()
+    experiments._load_source.cache_clear()
+    user_file.run_module.cache_clear()
+    with redirect_stderr(StringIO()) as said:
+        return main([*map(str, words)]), said.getvalue()
 
 
 class Study:
@@ -52,17 +57,17 @@ class Study:
         self.code.write_text(EXPERIMENT.format(mark=str(self.mark), measures=measures))
         (folder / "mine.toml").write_text(SCENE)
         self.run = folder / "out"
-        done = arena("run", folder / "mine.toml", "--brain", "scripted", "--trials", 2, "--minutes", 0.02,
-                     "--jobs", 1, "--out", self.run)  # fmt: skip
-        assert done.returncode == 0, done.stderr
+        status, error = arena("run", folder / "mine.toml", "--brain", "scripted", "--trials", 2, "--minutes", 0.02,
+                              "--jobs", 1, "--out", self.run)  # fmt: skip
+        assert status == 0, error
         self.record = self.run / "trial-0001.parquet"
 
     def ran(self, *words: object, status: int = 0) -> tuple[bool, str]:
         """Run a command. Return whether the experiment's code ran, and the standard error of the command."""
         self.mark.unlink(missing_ok=True)
-        done = arena(*words)
-        assert done.returncode == status, done.stderr
-        return self.mark.exists(), done.stderr
+        ended, error = arena(*words)
+        assert ended == status, error
+        return self.mark.exists(), error
 
 
 @pytest.fixture(scope="module")
@@ -82,7 +87,6 @@ def with_metadata(record: Path, target: Path, **scene: object) -> Path:
     return target
 
 
-@pytest.mark.slow
 def test_reading_a_record_runs_no_code_and_shows_its_curves(study: Study, tmp_path: Path) -> None:
     """Page, figures, report and comparison use the recorded declaration and curves and run no code."""
     page = tmp_path / "page.html"
@@ -94,7 +98,6 @@ def test_reading_a_record_runs_no_code_and_shows_its_curves(study: Study, tmp_pa
     assert study.ran("compare", study.run, study.run, "--at", 1) == (False, "")
 
 
-@pytest.mark.slow
 def test_trust_runs_the_recorded_copy_or_a_named_file(study: Study, tmp_path: Path) -> None:
     """`--trust` and `--experiment` run the experiment's code; the page equals the one made without it."""
     pages = [tmp_path / f"{number}.html" for number in range(3)]
@@ -104,7 +107,6 @@ def test_trust_runs_the_recorded_copy_or_a_named_file(study: Study, tmp_path: Pa
     assert pages[0].read_text() == pages[1].read_text() == pages[2].read_text()
 
 
-@pytest.mark.slow
 def test_a_file_with_another_hash_is_not_run(study: Study, tmp_path: Path) -> None:
     """A changed copy beside the record and a named file with another hash are refused before they run."""
     other = tmp_path / "experiment.py"
@@ -118,7 +120,6 @@ def test_a_file_with_another_hash_is_not_run(study: Study, tmp_path: Path) -> No
         assert "is not the recorded experiment" in error
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("command", ["replay", "plot", "report", "compare"])
 def test_a_record_that_names_a_foreign_file_does_not_run_it(study: Study, tmp_path: Path, command: str) -> None:
     """The file that the record's scene names is not executed, with or without `--trust`."""
@@ -143,7 +144,6 @@ def test_a_record_that_names_a_foreign_file_does_not_run_it(study: Study, tmp_pa
     assert "not its hash" in error
 
 
-@pytest.mark.slow
 def test_measures_of_the_experiment_need_its_code(tmp_path: Path) -> None:
     """`compare` refuses measures of an untrusted experiment in one sentence, and computes them with `--trust`."""
     study = Study(tmp_path, MEASURES)
@@ -154,7 +154,6 @@ def test_measures_of_the_experiment_need_its_code(tmp_path: Path) -> None:
     assert study.ran("compare", study.run, study.run, "--at", 1, "--trust") == (True, "")
 
 
-@pytest.mark.slow
 def test_verify_runs_the_experiment_of_a_bundle_only_with_permission(study: Study, tmp_path: Path) -> None:
     """`verify` refuses a bundle with code in one sentence; with `--trust` or `--experiment` it verifies the bundle."""
     bundle = tmp_path / "study.zip"

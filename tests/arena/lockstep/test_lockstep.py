@@ -141,9 +141,9 @@ def test_native_code_renders_and_probes_as_python_does(clustering_image: Path) -
 @pytest.mark.slow
 def test_the_threads_that_run_robots_do_not_show(clustering_image: Path) -> None:
     """The number of threads, also if larger than the number of cores, does not affect the results."""
-    alone, *_ = samples(clustering_image, True, 2.0, 12)
+    alone, *_ = samples(clustering_image, True, 2.0, 7)
     for threads in (2, 5):
-        found, painted, _ = samples(clustering_image, True, 2.0, 12, threads)
+        found, painted, _ = samples(clustering_image, True, 2.0, 7, threads)
         assert found == alone
         assert painted == 0
 
