@@ -13,7 +13,7 @@ from emu.chips.dspic30f6014a import DSPIC30F6014A
 from emu.machine.machine import Machine
 from emu.peripherals.i2c.slave import ExternalMaster
 from tests.emu.peripherals.conftest import Rig
-from tests.emu.peripherals.test_can import configure, load
+from tests.emu.peripherals.serial.test_can import configure, load
 
 TON = 0x8000
 SOURCES = {source.name: irq for irq, source in DSPIC30F6014A.interrupts.items()}

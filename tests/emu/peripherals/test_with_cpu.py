@@ -16,7 +16,7 @@ from cpu_rig import START, Rig
 
 from emu.chips.dspic30f6014a import SFRS, VECTORS
 
-from .device_programs import CHIPS, difference
+from .drills.device_programs import CHIPS, difference
 
 ENGINES = ("plain", "jit")
 A = {name: f"{sfr.address:#x}" for name, sfr in SFRS.items()}

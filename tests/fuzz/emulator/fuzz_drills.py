@@ -17,10 +17,10 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[3]
 sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "emu")]
 
-from peripherals.access_census import WAYS, modes_of  # noqa: E402
-from peripherals.device_drills import registers_of  # noqa: E402
-from peripherals.device_programs import CHIPS  # noqa: E402
-from peripherals.drill_runs import Tally, check  # noqa: E402
+from peripherals.drills.access_census import WAYS, modes_of  # noqa: E402
+from peripherals.drills.device_drills import registers_of  # noqa: E402
+from peripherals.drills.device_programs import CHIPS  # noqa: E402
+from peripherals.drills.drill_runs import Tally, check  # noqa: E402
 
 from tests.fuzz.seeds import Campaign, parser  # noqa: E402
 

@@ -13,7 +13,7 @@ from emu.boards.epuck.camera.scan import HREF, PCLK, VSYNC, per_frame
 from emu.boards.epuck.camera.sensors import SENSORS
 from emu.peripherals.timers.rules import write_ton
 
-from .conftest import Robot
+from ..conftest import Robot
 
 FCY = 14_745_600
 FIRST_READ = 17

@@ -17,7 +17,7 @@ from functools import cache, partial
 from pathlib import Path
 from typing import Final
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "jit"))
+sys.path.insert(0, str(Path(__file__).parents[2] / "jit"))
 
 from engine_pair import QuickCompiler
 from random_firmware import words_of

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from emu.peripherals.uart.rx_queue import BREAK
-from tests.emu.peripherals.test_uart import UTXBRK, UTXEN, collect, enable
+from tests.emu.peripherals.serial.test_uart import UTXBRK, UTXEN, collect, enable
 
 BIT = 128
 """Bit time in Tcy with BRG = 7, as `enable` sets it."""

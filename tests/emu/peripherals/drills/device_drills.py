@@ -15,7 +15,7 @@ from functools import cache, partial
 from pathlib import Path
 from typing import Any, Final
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "jit"))
+sys.path.insert(0, str(Path(__file__).parents[2] / "jit"))
 
 from random_firmware import words_of
 

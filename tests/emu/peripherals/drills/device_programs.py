@@ -18,9 +18,9 @@ from itertools import takewhile
 from pathlib import Path
 from typing import Any
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "cpu"))
-sys.path.insert(0, str(Path(__file__).parents[1] / "jit"))
-sys.path.insert(0, str(Path(__file__).parents[1] / "chips"))
+sys.path.insert(0, str(Path(__file__).parents[2] / "cpu"))
+sys.path.insert(0, str(Path(__file__).parents[2] / "jit"))
+sys.path.insert(0, str(Path(__file__).parents[2] / "chips"))
 
 import numpy as np
 from cpu_rig import START, assemble

@@ -12,7 +12,7 @@ from emu.boards.epuck.camera.scan import HREF, PCLK, VSYNC, FrameTiming, Scan
 from emu.boards.epuck.camera.sensors import SENSORS
 from emu.system.record import Record
 
-from .conftest import Robot
+from ..conftest import Robot
 
 
 @st.composite
