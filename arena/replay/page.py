@@ -1,12 +1,15 @@
 """Replay page: one HTML file that shows a trial from above, with LEDs, camera strips, curves, clusters and log.
 
-The data is a JSON block (`id="trial"`) with the values of the record; `page.html` draws it. The page of a running trial
-polls its server for new samples (`arena/replay/live_feed.py`, `arena/commands/studio.py`).
+The data is a JSON block (`id="trial"`) with the values of the record; the scripts of `page_files` draw it. A Content
+Security Policy permits only these scripts, by their hash. The page of a running trial polls its server for new samples
+(`arena/replay/live_feed.py`, `arena/commands/studio.py`).
 """
 
 from __future__ import annotations
 
 import base64
+import hashlib
+import math
 from pathlib import Path
 from typing import Any, Final
 
@@ -22,8 +25,9 @@ from arena.trial.record import Trial
 from arena.trial.strict_json import script_json
 from arena.world.physics import Poses, traits_of
 
-TEMPLATE: Final = Path(__file__).with_name("page.html")
-PLACE: Final = "/*TRIAL*/null"
+FILES: Final = Path(__file__).with_name("page_files")
+SCRIPTS: Final = ("view.js", "controls.js", "studio.js", "start.js")
+"""Parts of the page's script, in order."""
 _MIDDLE_ROW: Final = 240
 _STRIP: Final = np.arange(STRIP_PIXELS) * len(STRIP_COLUMNS) // STRIP_PIXELS + STRIP_COLUMNS.start
 
@@ -34,7 +38,25 @@ def page(trial: Trial, live: bool = False, studio: dict[str, Any] | None = None)
     With `live` the page polls its server for new samples. `studio` holds the data with which it sends commands
     (arena/commands/studio.py)."""
     data = trial_data(trial) | sample_data(trial) | {"live": live, "studio": studio}
-    return TEMPLATE.read_text(encoding="utf-8").replace(PLACE, script_json(data))
+    style, script = _text("style.css"), "".join(map(_text, SCRIPTS))
+    policy = (f"default-src 'none'; connect-src 'self'; style-src {_hash(style)}; script-src {_hash(script)}; "
+              "base-uri 'none'; form-action 'none'")  # fmt: skip
+    parts = {"/*STYLE*/\n": style, "/*SCRIPT*/\n": script, "/*POLICY*/": policy, "/*TRIAL*/null": script_json(data)}
+    whole = _text("page.html")
+    for place, content in parts.items():
+        whole = whole.replace(place, content)
+    return whole
+
+
+def _text(name: str) -> str:
+    """Return the content of a file of the page."""
+    return (FILES / name).read_text(encoding="utf-8")
+
+
+def _hash(content: str) -> str:
+    """Return the source expression of the Content Security Policy for an inline element, as page.html embeds it."""
+    digest = hashlib.sha256(f"\n{content}".encode()).digest()
+    return f"'sha256-{base64.b64encode(digest).decode()}'"
 
 
 def trial_data(trial: Trial) -> dict[str, Any]:
@@ -46,7 +68,7 @@ def trial_data(trial: Trial) -> dict[str, Any]:
         "height": trial.scene.arena.height_cm,
         "polygon": trial.scene.arena.polygon,
         "kinds": [
-            {"name": one.name, "radius": one.radius_cm, "colour": _css(one.colour) if trial.scene.kinds else "#ddd"}
+            {"name": one.name, "radius": one.radius_cm, "colour": _css(one.colour)}
             for one in map(trial.scene.kind_of, range(trial.scene.objects.count))
         ],
         "grouped": trial.experiment.has_groups,
@@ -59,6 +81,11 @@ def trial_data(trial: Trial) -> dict[str, Any]:
             for robot, one in enumerate(map(trial.scene.group_of, range(trial.scene.robots.count)))
         ],
         "robotRadius": dimensions.ROBOT_RADIUS,
+        "sight": min(trial.scene.camera.range_cm, 1000.0),
+        "infrared": {
+            "bearings": [math.radians(bearing) for bearing in dimensions.IR_BEARINGS_DEG],
+            "range": dimensions.IR_RANGE,
+        },
         "metrics": [
             {"name": one.name, "label": one.label, "unit": one.unit, "scale": one.scale, "best": one.best}
             for one in trial.experiment.curves

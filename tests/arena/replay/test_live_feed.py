@@ -26,7 +26,7 @@ from arena.robots.controller import ScriptedController
 from arena.scene.loader import load_scene, scripted
 from arena.trial.record import RecordError, read_trial, write_trial
 from arena.trial.trial import Rows, run_trial
-from tests.arena.browser import BROWSER, needs_browser
+from tests.arena.browser import BROWSER, needs_browser, probed
 from tests.watchdog import HANG
 
 PROBE = """<pre id="result"></pre><script>
@@ -193,7 +193,7 @@ def test_the_page_grows_in_a_browser(tmp_path: Path, recorded: tuple[dict[str, A
         asked = 0
 
         def page(self) -> str:
-            return super().page().replace("</html>", PROBE)
+            return probed(super().page(), PROBE)
 
         def more(self, first: int) -> dict[str, Any]:
             self.asked += 1

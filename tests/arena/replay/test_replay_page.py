@@ -12,7 +12,7 @@ import pytest
 from arena.cli import main
 from arena.replay.page import page
 from arena.trial.record import read_trial
-from tests.arena.browser import BROWSER, needs_browser
+from tests.arena.browser import BROWSER, needs_browser, probed
 from tests.watchdog import HANG
 
 SAMPLE = 7
@@ -80,7 +80,7 @@ def test_a_script_comment_from_a_robot_does_not_stop_the_page(trial: Path, tmp_p
     """`<!--<script>` in a robot's text opens a state of the HTML parser in which </script> does not end a script."""
     record = read_trial(trial)
     record.columns["log"][0] = [{"robot": 0, "cycle": 1, "text": HOSTILE}]
-    found = run_probe(page(record).replace("</html>", PROBE % SAMPLE), tmp_path)
+    found = run_probe(page(record), PROBE % SAMPLE, tmp_path)
     assert found["samples"] == len(record.times)
 
 
@@ -88,7 +88,7 @@ def test_a_script_comment_from_a_robot_does_not_stop_the_page(trial: Path, tmp_p
 def test_the_page_loads_scrubs_and_plays_in_a_browser(trial: Path, tmp_path: Path) -> None:
     """The page loads the trial, seeks to a time and plays in a browser."""
     main(["replay", str(trial)])
-    found = run_probe(trial.with_suffix(".html").read_text().replace("</html>", PROBE % SAMPLE), tmp_path)
+    found = run_probe(trial.with_suffix(".html").read_text(), PROBE % SAMPLE, tmp_path)
     record = read_trial(trial)
     assert (found["before"], found["samples"]) == (0, len(record.times))
     assert found["scrubbed"] == SAMPLE
@@ -97,9 +97,9 @@ def test_the_page_loads_scrubs_and_plays_in_a_browser(trial: Path, tmp_path: Pat
     assert found["robots"] == expected
     assert found["corner"] == [0, 0, 0, 0]
     assert all(pixel[3] == 255 for pixel in found["pixels"])  # the robots are drawn at their positions
-    assert found["playing"] == "Pause"
+    assert found["playing"] == "Pause record"
     assert found["after"] == len(record.times) - 1
-    assert found["end"] == "Play"
+    assert found["end"] == "Play record"
 
 
 SHOWN = """<pre id="result"></pre><script>
@@ -123,7 +123,7 @@ def test_the_page_shows_strips_leds_and_what_was_said(trial: Path, tmp_path: Pat
                                         {"robot": 0, "cycle": 49_153_000, "leds": 0}]  # fmt: skip
     record.columns["r0_strip"][SAMPLE] = bytes([90, 14, 14] * 10 + [10, 48, 14] * 5 + [112, 100, 100] * 5)
     record.columns["r0_seen"] = np.full(len(record.times), -1)
-    found = run_probe(page(record).replace("</html>", SHOWN % SAMPLE), tmp_path)
+    found = run_probe(page(record), SHOWN % SAMPLE, tmp_path)
     assert found["strip"] == [[90, 14, 14], [10, 48, 14], [112, 100, 100]]
     assert found["later"] == 256
     assert found["front"] == pytest.approx([255, 187, 0], abs=20)  # the edge of the disc is antialiased
@@ -157,6 +157,22 @@ const r0 = d.robots[0];
 const c = canvas.getBoundingClientRect();
 canvas.dispatchEvent(new MouseEvent("click", {clientX: c.left + X(r0.x[4]) + 2, clientY: c.top + Y(r0.y[4])}));
 found.clicked = chosen;
+const turn = {clientX: c.left + 50, clientY: c.top + 60, deltaY: -1, cancelable: true};
+canvas.dispatchEvent(new WheelEvent("wheel", turn));
+const under = [(50 - left) / scale, (low - 60) / scale]; found.zoom = zoom;
+canvas.dispatchEvent(new WheelEvent("wheel", turn));
+found.fixed = [(50 - left) / scale - under[0], (low - 60) / scale - under[1]];
+press("f"); const [x0, y0] = pose(0, share());
+found.tracked = [X(x0) - canvas.clientWidth / 2, Y(y0) - (canvas.clientHeight - 16) / 2];
+press("0"); found.whole = [zoom, panX, panY];
+press("s"); found.sensors = document.getElementById("sensors").checked;
+const focused = (id, key) => {           // whether the page leaves a key to the element that has the focus
+  const event = new KeyboardEvent("keydown", {key, bubbles: true, cancelable: true});
+  return document.getElementById(id).dispatchEvent(event) && !playing;
+};
+const keys = [["trails", " "], ["keys", " "], ["scrub", "PageDown"], ["scrub", "End"], ["speed", "t"]];
+found.native = keys.map(([id, key]) => focused(id, key));
+show(4); if (chosen < 0) press("n");
 const half = clock = (d.t[4] + d.t[5]) / 2;
 found.between = [share(), pose(0, share())[0], (r0.x[4] + r0.x[5]) / 2];
 press(" "); found.playing = playing; press(" ");
@@ -172,7 +188,7 @@ document.getElementById("result").textContent = JSON.stringify(found);
 @pytest.mark.parametrize("size", ["1280,720", "700,900"])
 def test_everything_can_be_reached_by_hand_and_key(trial: Path, tmp_path: Path, size: str) -> None:
     """All controls and views fit on the screen, keys and clicks work, and robots are interpolated between samples."""
-    found = run_probe(page(read_trial(trial)).replace("</html>", LAYOUT), tmp_path, size)
+    found = run_probe(page(read_trial(trial)), LAYOUT, tmp_path, size)
     width, height = found["inner"]
     for name, (left, top, right, bottom) in found["boxes"].items():
         assert (left >= 0, top >= 0, right <= width, bottom <= height) == (True,) * 4, (name, size, found["inner"])
@@ -186,15 +202,65 @@ def test_everything_can_be_reached_by_hand_and_key(trial: Path, tmp_path: Path, 
     assert found["second"][0] == 1
     assert found["second"][1].startswith("robot 1  at ")
     assert (found["none"], found["help"], found["clicked"], found["playing"]) == (-1, False, 0, True)
+    assert found["zoom"] == pytest.approx(1.2)
+    assert found["fixed"] == pytest.approx([0, 0], abs=1e-6)
+    assert found["tracked"] == pytest.approx([0, 0], abs=1e-6)
+    assert (found["whole"], found["sensors"]) == ([1, 0, 0], True)
+    assert found["native"] == [True] * 5
     share, x, middle = found["between"]
     assert (share, x) == pytest.approx((0.5, middle))
     assert found["sought"] == pytest.approx(0.5, abs=0.05)
 
 
-def run_probe(text: str, folder: Path, size: str = "1280,720") -> Any:
-    """Open a page that ends in a probe script, and return the result of the probe."""
+POLICY = """<pre id="result">{"own": "blocked"}</pre><script>
+document.getElementById("result").textContent = JSON.stringify({own: "ran"});
+</script></html>"""
+
+
+@needs_browser
+def test_the_policy_of_a_page_runs_its_own_script_only(trial: Path, tmp_path: Path) -> None:
+    """The page's script sets the title; a script that is not the page's does not run."""
+    path = tmp_path / "policy.html"
+    path.write_text(page(read_trial(trial)).replace("</html>", POLICY))
+    command = [str(BROWSER), "--headless", "--no-sandbox", "--disable-gpu", f"--user-data-dir={tmp_path / 'profile'}",
+               "--virtual-time-budget=4000", "--dump-dom", path.as_uri()]  # fmt: skip
+    shown = subprocess.run(command, capture_output=True, text=True, timeout=HANG, check=False).stdout
+    assert '{"own": "blocked"}' in shown
+    assert re.search("<title>[^<]*, seed 1</title>", shown)
+    assert "robot sees nothing" in shown
+
+
+RETRY = """<pre id="result"></pre><script>
+const status = document.getElementById("status"), found = {}, now = d.studio.now;
+setTimeout(() => {
+  found.lost = status.textContent;
+  window.fetch = async () => ({ok: true, json: async () => ({now: {...now, tick: 7}, from: d.t.length, faults: []})});
+}, 500);
+setTimeout(() => {
+  found.again = status.textContent; found.play = play.hidden;
+  document.getElementById("result").textContent = JSON.stringify(found);
+}, 3500);
+</script></html>"""
+
+
+@needs_browser
+def test_a_studio_page_tries_again_after_a_lost_connection(trial: Path, tmp_path: Path) -> None:
+    """A failed request shows when the next attempt follows; one successful answer continues the page."""
+    record = read_trial(trial)
+    robots = [[float(record.columns[f"r{i}_{key}"][0]) for key in ("x", "y", "heading")] for i in range(2)]
+    now = {"state": "paused", "tick": 3, "t": 0.0, "epoch": 0, "hit": "", "breakpoints": [], "debugger": None,
+           "robots": robots, "objects": record.objects[0].tolist()}  # fmt: skip
+    studio = {"header": "X-Token", "token": "t", "quantum": 0.01, "now": now}
+    found = run_probe(page(record, studio=studio), RETRY, tmp_path)
+    assert found["lost"] == "connection lost; next attempt in 1 s"
+    assert found["again"] == "paused, quantum 7"
+    assert found["play"] is True
+
+
+def run_probe(text: str, probe: str, folder: Path, size: str = "1280,720") -> Any:
+    """Open a page with a probe script, and return the result of the probe."""
     path = folder / "probed.html"
-    path.write_text(text)
+    path.write_text(probed(text, probe))
     command = [str(BROWSER), "--headless", "--no-sandbox", "--disable-gpu", f"--user-data-dir={folder / 'profile'}",
                "--virtual-time-budget=4000", f"--window-size={size}", "--dump-dom", path.as_uri()]  # fmt: skip
     done = subprocess.run(command, capture_output=True, text=True, timeout=HANG, check=False)

@@ -29,7 +29,7 @@ from arena.studio.process import Call, Studio
 from arena.studio.session import CommandRefusedError
 from arena.trial import checkpoints
 from arena.trial.trial import run_trial
-from tests.arena.browser import BROWSER, needs_browser
+from tests.arena.browser import BROWSER, needs_browser, probed
 from tests.arena.images import ECHO
 from tests.watchdog import HANG
 
@@ -414,7 +414,7 @@ def run_probe(one: StudioServer, probe: str, folder: Path, monkeypatch: pytest.M
 
     The browser's timers run in virtual time; requests do not."""
     plain = command.page
-    monkeypatch.setattr(command, "page", lambda *given, **more: plain(*given, **more).replace("</html>", probe))
+    monkeypatch.setattr(command, "page", lambda *given, **more: probed(plain(*given, **more), probe))
     words = [str(BROWSER), "--headless", "--no-sandbox", "--disable-gpu", "--disable-background-networking",
              f"--user-data-dir={folder}", "--virtual-time-budget=60000", "--dump-dom", one.address]  # fmt: skip
     done = subprocess.run(words, capture_output=True, text=True, timeout=HANG, check=False)
