@@ -16,7 +16,7 @@ typedef struct sys_pcb sys_pcb;
 typedef sys_pcb *(*sys_pick)(sys_pcb *first);
 
 struct sys_scheduler {
-    sys_pick pick; /* NULL = round robin */
+    sys_pick pick; /* NULL = round robin, which is never eager */
     bool eager; /* pick is also called within a slice when a thread wakes or a message arrives; first is then the
                  * running thread, which keeps the rest of its slice if it is not picked */
 };

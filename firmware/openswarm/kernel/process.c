@@ -364,6 +364,7 @@ static HAL_OUTLINE void end_thread(sys_pcb *p)
 sys_pcb *process_end_running(void)
 {
     critical_depth = 0;
+    os_in_kernel = true; /* a failure to report the end is no error of the system thread, which may be waiting */
     end_thread(os_running); /* perhaps already blocked: its stack may overflow while it blocks */
     return os_schedule();
 }

@@ -270,3 +270,26 @@ TEST(what_a_handler_sends_preempts_at_the_next_tick, "openswarm_scheduler.h: eag
     note('>');
     CHECK(strcmp(trace, "<H>") == 0);
 }
+
+static void note_t(void)
+{
+    note('T');
+}
+
+TEST(round_robin_withdraws_a_request_to_choose, "openswarm_scheduler.h: NULL; on posix, AVR and Cortex-M it once switched for ever")
+{
+    static const sys_scheduler eager_without_pick = {NULL, true};
+    boot();
+    Sys_Set_Scheduler(&sys_fixed_priority);
+    Sys_Start_CriticalSection();
+    Sys_Start_Process(note_t);
+    Sys_Set_Scheduler(&sys_round_robin);
+    Sys_End_CriticalSection();
+    note('<');
+    Sys_Set_Scheduler(&eager_without_pick);
+    Sys_Start_Process(note_t);
+    note('>');
+    Sys_Yield();
+    Sys_Yield();
+    CHECK(strcmp(trace, "<>TT") == 0);
+}

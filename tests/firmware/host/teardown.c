@@ -271,3 +271,23 @@ TEST(a_cleanup_without_a_function_is_refused, "openswarm_cleanup.h: ARGUMENT")
     CHECK(!Sys_Push_Cleanup(NULL, note_end, NULL));
     CHECK_EQ(Sys_Get_LastError(), SYS_ERROR_ARGUMENT);
 }
+
+static void return_at_once(void)
+{
+}
+
+static void sleep_5_ms(void)
+{
+    Sys_Sleep(5);
+}
+
+TEST(a_lost_report_of_an_end_leaves_the_waiting_main_alone, "openswarm.h: Sys_Sleep, Sys_Get_LastError; the error once replaced main's time-out")
+{
+    boot();
+    CHECK(Sys_Unregister_Event(SYS_EVENT_TERMINATION));
+    CHECK(Sys_Start_Process(return_at_once) != 0 && Sys_Start_Process(sleep_5_ms) != 0);
+    uint32 before = Sys_Get_SystemTime();
+    Sys_Sleep(9);
+    CHECK_EQ(Sys_Get_SystemTime() - before, 9);
+    CHECK_EQ(Sys_Get_LastError(), SYS_OK);
+}

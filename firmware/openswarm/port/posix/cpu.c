@@ -236,6 +236,7 @@ static void save_and(hal_pick pick)
 
 static void end_slice(void)
 {
+    slice_forced = 0;
     level = SLICE;
     save_and(preempted);
 }
