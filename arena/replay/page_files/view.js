@@ -11,7 +11,7 @@ const POLL_MS = 1000, FRAME_MS = 16, FCY = 14745600, TRAIL_S = 30, MARGIN = 14;
 const LEDS = ["led0", "led1", "led2", "led3", "led4", "led5", "led6", "led7", "front", "body"];
 const STRIP_HEIGHT = 14, STRIP_PIXEL = 8;
 const BEARING = Math.PI / 4;             // between two ring LEDs, clockwise from the front
-let PLOT_HEIGHT = 62, sample = 0, playing = false, clock = 0, last = 0, chosen = -1, scale = 1, left = 0, low = 0;
+let PLOT_HEIGHT = 62, plotWidth = 384, sample = 0, playing = false, clock = 0, last = 0, chosen = -1, scale = 1, left = 0, low = 0;
 let zoom = 1, panX = 0, panY = 0;        // of the view, relative to the whole arena in the middle
 const X = x => left + x * scale, Y = y => low - y * scale;
 
@@ -25,12 +25,11 @@ function layout() {
   const box = el("stage"), width = Math.max(box.clientWidth, 50), height = Math.max(box.clientHeight, 50);
   sized(canvas, width, height);
   PLOT_HEIGHT = innerHeight < 650 || innerWidth <= 820 ? 40 : 62;
-  const panel = plotWidth();
+  plotWidth = Math.max(Math.min(el("legend").clientWidth, 800), 200);
   sized(strips, 384, d.robots.length * STRIP_HEIGHT || 1);
-  sized(plot, panel, Math.max(d.metrics.length, 1) * PLOT_HEIGHT);
+  sized(plot, plotWidth, Math.max(d.metrics.length, 1) * PLOT_HEIGHT);
   draw();
 }
-function plotWidth() { return Math.max(Math.min(el("legend").clientWidth, 800), 200); }
 function colours() {                     // reads the colours of the light or dark style
   const style = getComputedStyle(document.documentElement);
   [INK, LINE, MARK] = ["--ink", "--line", "--mark"].map(name => style.getPropertyValue(name).trim());
@@ -177,7 +176,7 @@ function draw() {
 function label(m, value) { return `${Number((m.scale * value).toPrecision(3))}`; }
 function shown(m, s) { return d.curves[m.name][s] === null ? "-" : `${Number((m.scale * d.curves[m.name][s]).toPrecision(3))}${m.unit ? " " + m.unit : ""}`; }
 function drawPlot() {
-  const width = plotWidth(), end = d.t[d.t.length - 1] || 1;
+  const width = plotWidth, end = d.t[d.t.length - 1] || 1;
   q.clearRect(0, 0, width, plot.height);
   d.metrics.forEach((m, row) => {
     const values = d.curves[m.name], top = row * PLOT_HEIGHT + 13, high = PLOT_HEIGHT - 18;
