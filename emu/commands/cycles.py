@@ -1,73 +1,185 @@
-"""`emu cycles`: print the kernel operations' exact cycles, check them against a baseline, or update the baseline."""
+"""`emu cycles`: print the exact cycles of kernel and application operations, check or update a baseline of them."""
 
 from __future__ import annotations
 
 import argparse
-import json
+import sys
+from collections.abc import Mapping
+from fractions import Fraction
+from pathlib import Path
+from typing import Any, Final
 
-from emu.host.command import CommandError, Parser
-from emu.host.exit_status import DONE, FAULT
+from emu.commands.baseline_options import BaselineCommand, add_baseline_arguments, conditions_of
+from emu.commands.board_options import add_board_options, board_of, set_up
+from emu.commands.disasm import code_address
+from emu.debug.dwarf.units import debug_of
+from emu.debug.inlining import missing_function
+from emu.host.command import CommandError, Parser, seconds
+from emu.host.exit_status import FAULT
 from emu.image.loader import load_image
-from emu.kernel_metrics import baseline, latency
+from emu.image.model import Image
+from emu.kernel_metrics import latency
 from emu.kernel_metrics import options as kernel_options
+from emu.kernel_metrics.application_cycles import ApplicationCycles, measure
+from emu.kernel_metrics.baseline import Baseline, Number, Row
+from emu.kernel_metrics.blame import CodeListing, grown_lines
 from emu.kernel_metrics.target import MeasureError
 
-DESCRIPTION = """\
-Run the scenarios of the `latency` application and print the cycles of the kernel's operations, or those of the
-`options` application and print the cycles of the options' calls.
+DESCRIPTION: Final = """\
+Run a firmware image with the OpenSwarm kernel and print the cycles of its operations: preemptive and voluntary thread
+switches by pair of threads, sending to delivery and handlers by event, interrupts, masked interrupts, wake-ups.
 
-The numbers are exact and repeat exactly, so --check has no tolerance: it prints any increase over the baseline with
-the source lines that grew, and exits with status 1."""
+--function and --interval add own functions and intervals between two places (names, addresses, FILE:LINE). A function's
+cycles exclude interrupts, other threads and the scheduler. The kernel is found by its debug information; nothing is
+instrumented, and the numbers are exact.
+
+--check compares least, median and most cycles of the occurrences that no interrupt disturbed. A number that grew is
+attributed to source lines by aligning the old and the new instructions.
+
+--suite runs the scenarios of the applications `latency` or `options` instead, which measure the kernel itself.
+
+Exit status: 0 done, 1 a number is worse or the firmware has a fault, 2 bad input."""
+COLUMNS: Final = ("min", "median", "p99", "max", "count")
+GATED: Final = ("min", "median", "max")
 
 
 def parser() -> Parser:
-    made = Parser("cycles", DESCRIPTION, "emu cycles firmware/build/latency/firmware.elf --check firmware/cycles.json")
-    made.add_argument("image", metavar="IMAGE", help="ELF executable of the application `latency` or `options`")
-    made.add_argument("--engine", metavar="NAME", default="auto", help="auto, jit or plain (default auto)")
-    made.add_argument("--json", action="store_true", help="print one JSON object")
+    made = Parser(
+        "cycles", DESCRIPTION, "emu cycles firmware.elf --seconds 2 --function parse --interval main.c:30..main.c:40"
+    )
+    made.add_argument("image", metavar="IMAGE", help="ELF executable with debug information")
+    made.add_argument("--seconds", metavar="S", type=seconds, default=Fraction(1), help="simulated time (default 1)")
+    made.add_argument("--function", metavar="NAME", action="append", default=[], help="measure a function's calls")
+    made.add_argument(
+        "--interval",
+        metavar="A..B",
+        action="append",
+        default=[],
+        help="measure from place A to place B; may be repeated",
+    )
+    made.add_argument("--suite", action="store_true", help="run the scenarios of `latency` or `options`")
+    made.add_argument("--engine", metavar="NAME", default="auto", help="with --suite: auto, jit or plain")
     add_baseline_arguments(made)
+    add_board_options(made)
     return made
 
 
-def add_baseline_arguments(parser: Parser) -> None:
-    """Add --check FILE and --update FILE, for commands that print exact numbers."""
-    group = parser.add_mutually_exclusive_group()
-    group.add_argument("--check", metavar="FILE", help="compare with a baseline; status 1 if anything grew")
-    group.add_argument("--update", metavar="FILE", help="write the baseline")
-
-
 def run(options: argparse.Namespace) -> int:
-    """Run the command. Return 0 if printed or no number grew, 1 if a number grew, 2 for bad input."""
+    """Run the command. Return the exit status as listed in DESCRIPTION."""
     image = load_image(options.image)
+    return _suite(image, options) if options.suite else _application(image, options)
+
+
+def _application(image: Image, options: argparse.Namespace) -> int:
+    """Measure the operations of an application."""
+    from emu.api import Machine
+
+    if image.kind != "elf":
+        raise CommandError(f"{image.path}: a HEX file has no debug information; give the ELF file")
+    functions = [(name, _function(image, name)) for name in options.function]
+    intervals = [_interval(image, text) for text in options.interval]
+    command = BaselineCommand("cycles", options, conditions_of(options, parser()))
+    machine = Machine(image.chip, engine="plain", board=board_of(options))
+    machine.load(image)
+    set_up(machine, options)
+    try:
+        result = measure(machine, machine.cycles_in(options.seconds), functions, intervals)
+    except MeasureError as error:
+        raise CommandError(str(error)) from None
+    for kind, names in (("function", options.function), ("interval", options.interval)):
+        for name in names:
+            if f"{kind} {name}" not in result.operations:
+                raise CommandError(f"--{kind} {name}: did not occur in {float(options.seconds):g} s")
+    facts = {
+        "path": image.path, "seconds": result.seconds,
+        "operations": {name: one.statistics() for name, one in result.operations.items()},
+    }  # fmt: skip
+    status = _finish(command, image, _numbers(result, CodeListing(image)), facts, _text(result))
+    fault = result.stop.fault if result.stop is not None else None
+    if fault is not None:
+        print(f"emu cycles: {fault.report()}", file=sys.stderr)
+        return FAULT
+    return status
+
+
+def _function(image: Image, name: str) -> int:
+    if image.symbols.find(name) is None:
+        reason = missing_function(debug_of(image), name)
+        if reason:
+            raise CommandError(f"--function {name}: {reason}")
+    return code_address(image, name)
+
+
+def _interval(image: Image, text: str) -> tuple[str, int, int]:
+    begin, separator, end = text.partition("..")
+    if not begin or not separator or not end:
+        raise CommandError(f"--interval {text}: expected two places, A..B")
+    return text, _place(image, begin), _place(image, end)
+
+
+def _place(image: Image, text: str) -> int:
+    """Return the address of a name, an address or FILE:LINE. Raises CommandError."""
+    file, colon, line = text.rpartition(":")
+    if not colon or not line.isdecimal():
+        return code_address(image, text)
+    starts = [row.start for row in image.lines.rows if row.line == int(line) and Path(row.file).match(file)]
+    if not starts:
+        raise CommandError(f"--interval {text}: no code comes from line {line} of {file}")
+    return min(starts)
+
+
+def _numbers(result: ApplicationCycles, listing: CodeListing) -> dict[str, Number]:
+    """Return the numbers of a baseline: those of undisturbed occurrences, else the least of all."""
+    numbers = {}
+    for name, operation in result.operations.items():
+        statistics = operation.statistics()
+        if not operation.undisturbed:
+            numbers[f"{name}, min"] = Number(statistics["min"], "cycles", is_gated=False)
+            continue
+        places = {"min": operation.shortest, "median": operation.shortest, "max": operation.longest}
+        for key in GATED:
+            where = listing.where(places[key])
+            numbers[f"{name}, {key}"] = Number(statistics[f"undisturbed_{key}"], "cycles", where=where)
+    return numbers
+
+
+def _text(result: ApplicationCycles) -> str:
+    width = max((len(name) for name in result.operations), default=0)
+    lines = [f"{'cycles':{width}} {' '.join(f'{name:>9}' for name in COLUMNS)} {'undisturbed':>12}"]
+    for name, operation in result.operations.items():
+        statistics = operation.statistics()
+        cells = " ".join(f"{statistics[column]:9,}" for column in COLUMNS)
+        lines.append(f"{name:{width}} {cells} {statistics['undisturbed']:12,}")
+    return "\n".join(lines)
+
+
+def _suite(image: Image, options: argparse.Namespace) -> int:
+    """Run the scenarios of one of the kernel's measuring applications."""
     known = [each for each in (latency, kernel_options) if image.symbols.find(each.APPLICATION)]
     if not known:
         wanted = f"no symbol {latency.APPLICATION!r} or {kernel_options.APPLICATION!r}"
         raise CommandError(f"{image.path} is not the application `latency` or `options`: it has {wanted}")
+    command = BaselineCommand("cycles", options, {}, " --suite")
     try:
         windows = known[0].run_measures(image, options.engine)
     except (MeasureError, ValueError) as error:
         raise CommandError(str(error)) from None
-    sources = baseline.Sources(image.path)
-    numbers = {name: baseline.Number(w.cycles, sources.names(w.where)) for name, w in windows.items()}
-    if options.update:
-        baseline.save(options.update, numbers)
-    if options.json:
-        print(json.dumps({name: number.value for name, number in numbers.items()}, indent=2))
-    elif not options.check:
-        width = max(len(name) for name in numbers)
-        print("\n".join(f"{name:{width}} {number.value:8,} cycles" for name, number in numbers.items()))
-    return verdict(options, numbers, "cycles") if options.check else DONE
+    listing = CodeListing(image)
+    numbers = {name: Number(one.cycles, "cycles", where=listing.where(one.where)) for name, one in windows.items()}
+    width = max(len(name) for name in numbers)
+    text = "\n".join(f"{name:{width}} {number.value:8,} cycles" for name, number in numbers.items())
+    return _finish(command, image, numbers, {name: number.value for name, number in numbers.items()}, text)
 
 
-def verdict(options: argparse.Namespace, numbers: dict[str, baseline.Number], unit: str) -> int:
-    """Print the comparison for --check. Return exit status 1 if a number grew, otherwise 0."""
-    try:
-        rows = baseline.compare(baseline.load(options.check), numbers)
-    except ValueError as error:
-        raise CommandError(str(error)) from None
-    worse = any(row.is_worse for row in rows)
-    if not options.json:
-        print(baseline.table(rows, unit))
-        if not worse and any(row.old is None or row.new != row.old for row in rows):
-            print(f"nothing grew; keep the new numbers with --update {options.check}")
-    return FAULT if worse else DONE
+def _finish(
+    command: BaselineCommand, image: Image, numbers: Mapping[str, Number], facts: dict[str, Any], text: str
+) -> int:
+    listing = CodeListing(image)
+
+    def blame(row: Row, stored: Baseline) -> list[tuple[str, int]]:
+        if row.name not in stored.rows:
+            return []
+        return grown_lines(stored.rows[row.name].where, stored.code, numbers[row.name].where, listing)
+
+    code = listing.code({function for number in numbers.values() for function in number.where})
+    return command.finish(numbers, facts, lambda: text, blame, code)

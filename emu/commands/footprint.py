@@ -3,93 +3,182 @@
 from __future__ import annotations
 
 import argparse
-import json
 import os
+import sys
+from collections.abc import Mapping
 from dataclasses import asdict
+from fractions import Fraction
+from functools import partial
 from math import ceil
+from pathlib import Path
 from typing import Any
 
-from emu.commands.cycles import add_baseline_arguments, verdict
-from emu.host.command import CommandError, Parser, count
-from emu.host.exit_status import DONE
+from emu.commands.baseline_options import BaselineCommand, add_baseline_arguments, conditions_of
+from emu.commands.board_options import add_board_options, board_of, set_up
+from emu.debug.dwarf.units import debug_of
+from emu.host.command import CommandError, Parser, count, seconds
+from emu.host.exit_status import FAULT
+from emu.host.files import atomic_text_file
 from emu.image.footprint import UNKNOWN, Piece, pieces, totals
 from emu.image.loader import load_image
-from emu.image.model import Image
-from emu.kernel_metrics.baseline import Number, save, short
+from emu.image.model import BYTES_PER_WORD, Image
+from emu.kernel_metrics import memory
+from emu.kernel_metrics import options as kernel_options
+from emu.kernel_metrics.application_memory import ApplicationMemory, engine_for, measure
+from emu.kernel_metrics.baseline import Baseline, Number, Row
+from emu.kernel_metrics.blame import LINES_SHOWN, short
+from emu.kernel_metrics.footprint_rows import grown_pieces, line_of, run_numbers, static_numbers
+from emu.kernel_metrics.kernel_structures import KernelStructures
+from emu.kernel_metrics.memory_picture import html, ram_parts, rom_parts, svg
+from emu.kernel_metrics.memory_text import memory_text
+from emu.kernel_metrics.owners import sizes_by_owner
+from emu.kernel_metrics.target import MeasureError
 
 DESCRIPTION = """\
-Print ROM and RAM use of an image (bytes; 3 per program word), by part, source file and symbol.
+Print ROM and RAM use of an image (bytes; 3 per program word), by part, owner, source file and symbol.
 
-For the application `footprint`, also the memory of threads, events, subscriptions and messages: it is run with 60
-loads, the heap is read from the running image, and the memory equation RAM = A + B n + C m + D s + sum (E + d) is
-fitted. For the application `options`, the memory of each kernel option; --check then compares these numbers only."""
+An image with the OpenSwarm kernel is also run: threads with the high-water marks of their stacks, events with their
+subscriptions and queued messages, drivers, free memory, and the memory equation with the application's numbers. The
+kernel is found by its debug information; nothing is instrumented. --static omits the run.
+
+--check compares all numbers with a baseline; a row of the file may have a limit: "limit": "at least 20 %".
+
+For the application `footprint`, the memory equation is fitted to 60 loads. For the application `options`, --check
+compares the memory of each kernel option only.
+
+Exit status: 0 done, 1 a number is worse or the firmware has a fault, 2 bad input."""
 
 
 def parser() -> Parser:
-    made = Parser(
-        "footprint",
-        DESCRIPTION,
-        "emu footprint firmware.elf --symbols 20",
-    )
+    made = Parser("footprint", DESCRIPTION, "emu footprint firmware.elf --seconds 2 --picture memory.html")
     made.add_argument("image", metavar="IMAGE", help="ELF executable")
     made.add_argument("--symbols", metavar="N", type=count, default=15, help="how many symbols to list (default 15)")
-    made.add_argument("--json", action="store_true", help="print one JSON object with every symbol")
+    made.add_argument("--seconds", metavar="S", type=seconds, default=Fraction(1), help="simulated time (default 1)")
+    made.add_argument("--static", action="store_true", help="only the sizes of the image")
+    made.add_argument("--picture", metavar="FILE", help="draw the memory: .svg, or .html with the tables")
     add_baseline_arguments(made)
+    add_board_options(made)
     return made
 
 
 def run(options: argparse.Namespace) -> int:
-    """Run the command. Return 0 if printed or no number grew, 1 if a number grew, 2 for bad input."""
+    """Run the command. Return the exit status as listed in DESCRIPTION."""
     image = load_image(options.image)
     facts = static(image)
-    numbers = {name: Number(facts[key][size]) for name, key, size in _KEPT} | {
-        "ROM": Number(facts["rom"], _places(facts, "rom")),
-        "RAM": Number(facts["ram"], _places(facts, "ram")),
-    }
+    has_kernel = not options.static and _has_kernel(image)
+    flags = "" if has_kernel or _is_measuring(image) else " --static"
+    conditions = conditions_of(options, parser()) if has_kernel else {}
+    command = BaselineCommand("footprint", options, conditions, flags)
+    found = pieces(image)
+    numbers = static_numbers(image, found)
+    text = [partial(static_text, facts, options.symbols)]
     equation = _equation(image)
     if equation is not None:
         facts["equation"] = equation
+        text.append(partial(equation_text, equation))
         numbers |= {f"{name} of the memory equation": Number(ceil(equation[name])) for name in "ABCDE"}
         for owner, words in (("kernel", "of the kernel alone"), ("devices", "of kernel and devices")):
             numbers |= {f"{key} {words}": Number(equation["sizes"][owner][name]) for key, name in _SIZES}
     option_sizes = _options(image)
     if option_sizes is not None:
         facts["options"] = option_sizes
+        text.append(partial(_options_text, option_sizes))
         numbers = {name: Number(size) for name, size in option_sizes.items()}
-    if options.update:
-        save(options.update, numbers)
-    if options.json:
-        print(json.dumps(facts, indent=2))
-    elif not options.check:
-        print(static_text(facts, options.symbols))
-        if equation is not None:
-            print("\n" + equation_text(equation))
-        if option_sizes is not None:
-            print("\n" + "\n".join(f"{name:48} {size:7,}" for name, size in option_sizes.items()))
-    return verdict(options, numbers, "bytes") if options.check else DONE
+    use = _run(image, options) if has_kernel else None
+    if use is not None:
+        facts["run"] = use.facts()
+        text.append(partial(memory_text, use))
+        numbers |= run_numbers(use)
+    if options.picture:
+        _draw(options.picture, image, facts, use, "\n\n".join(part() for part in text))
+    status = command.finish(
+        numbers, facts, lambda: "\n\n".join(part() for part in text), partial(_blame, image, numbers, use), {}
+    )
+    fault = use.stop.fault if use is not None and use.stop is not None else None
+    if fault is not None:
+        print(f"emu footprint: {fault.report()}", file=sys.stderr)
+        return FAULT
+    return status
 
 
-def _places(facts: dict[str, Any], size: str) -> dict[str, int]:
-    """Return bytes by source file. The file names do not depend on the location of the checkout."""
-    return {short(name): sizes[size] for name, sizes in sorted(facts["modules"].items()) if sizes[size]}
+def _is_measuring(image: Image) -> bool:
+    """Whether the image is one of the kernel's measuring applications, which have their own scenarios."""
+    return any(image.symbols.find(name) is not None for name in (memory.APPLICATION, kernel_options.APPLICATION))
+
+
+def _has_kernel(image: Image) -> bool:
+    """Whether a run can attribute the image's allocations: it has the kernel and its debug information."""
+    try:
+        KernelStructures(image).code("os_thread_start")
+    except MeasureError:
+        return False
+    return not _is_measuring(image)
+
+
+def _run(image: Image, options: argparse.Namespace) -> ApplicationMemory:
+    """Run the image on the board of the options, and return its memory use. Raises CommandError."""
+    from emu.api import Machine
+
+    machine = Machine(image.chip, engine=engine_for(image), board=board_of(options))
+    machine.load(image)
+    set_up(machine, options)
+    try:
+        return measure(machine, machine.cycles_in(options.seconds))
+    except MeasureError as error:
+        raise CommandError(str(error)) from None
+
+
+def _blame(
+    image: Image, numbers: Mapping[str, Number], use: ApplicationMemory | None, row: Row, stored: Baseline
+) -> list[tuple[str, int]]:
+    """Return the symbols that grew with the lines that declare them, or the line that uses a thread or an event."""
+    old = {file: dict(parts) for file, parts in stored.rows[row.name].where.items()} if row.name in stored.rows else {}
+    new = {file: dict(parts) for file, parts in numbers[row.name].where.items()}
+    if not old:
+        line = line_of(row.name, use) if use is not None else ""
+        return [(line, row.difference or row.new or 0)] if line else []
+    return [(_declared(image, file, name), size) for file, name, size in grown_pieces(old, new)[:LINES_SHOWN]]
+
+
+def _declared(image: Image, file: str, name: str) -> str:
+    """Return where a symbol is declared: `src/main.c:12: table`."""
+    debug = debug_of(image)
+    plain = name.removeprefix("_")
+    lines = [one.line for one in debug.functions if one.name == plain and short(one.file) == file]
+    lines += [one.line for one in debug.globals.get(plain, []) if short(one.file) == file]
+    return f"{file}:{lines[0]}: {plain}" if lines and lines[0] else f"{file}: {plain}"
+
+
+def _draw(path: str, image: Image, facts: dict[str, Any], use: ApplicationMemory | None, text: str) -> None:
+    """Write the picture of --picture. Raises CommandError for another suffix or an image without kernel."""
+    if use is None:
+        raise CommandError("--picture needs an image with the OpenSwarm kernel, and no --static")
+    if not path.endswith((".svg", ".html")):
+        raise CommandError(f"--picture {path}: expected a name that ends in .svg or .html")
+    flash = BYTES_PER_WORD * image.chip.program["flash"].size // 2
+    owners = {owner: sizes.rom for owner, sizes in sizes_by_owner(image).items()}
+    ram = image.chip.data["ram"]
+    picture = svg([
+        (f"flash: {facts['rom']:,} of {flash:,} bytes", rom_parts(owners, facts["rom"], flash)),
+        (f"RAM: {ram.end - ram.start:,} bytes", ram_parts(use, ram.end - ram.start)),
+    ])  # fmt: skip
+    with atomic_text_file(path) as stream:
+        stream.write(picture if path.endswith(".svg") else html(Path(image.path).name, picture, text))
+
+
+def _options_text(sizes: dict[str, int]) -> str:
+    return "\n".join(f"{name:48} {size:7,}" for name, size in sizes.items())
 
 
 _SIZES = (("ROM", "rom"), ("A", "A"))
-_KEPT = (
-    ("ROM without vectors, start-up code and printf", "without_start_up_and_printf", "rom"),
-    ("RAM without start-up code and printf", "without_start_up_and_printf", "ram"),
-)
 
 
 def _equation(image: Image) -> dict[str, Any] | None:
     """Return the memory equation as plain data; None if the image is not the measuring application."""
-    from emu.kernel_metrics.memory import APPLICATION, measure
-    from emu.kernel_metrics.target import MeasureError
-
-    if image.symbols.find(APPLICATION) is None:
+    if image.symbols.find(memory.APPLICATION) is None:
         return None
     try:
-        equation = measure(image)
+        equation = memory.measure(image)
     except MeasureError as error:
         raise CommandError(str(error)) from None
     return {
@@ -104,21 +193,16 @@ def _equation(image: Image) -> dict[str, Any] | None:
 
 def _options(image: Image) -> dict[str, int] | None:
     """Return the bytes that each kernel option costs; None if the image is not the application `options`."""
-    from emu.kernel_metrics.options import APPLICATION, sizes
-    from emu.kernel_metrics.target import MeasureError
-
-    if image.symbols.find(APPLICATION) is None:
+    if image.symbols.find(kernel_options.APPLICATION) is None:
         return None
     try:
-        return sizes(image)
+        return kernel_options.sizes(image)
     except MeasureError as error:
         raise CommandError(str(error)) from None
 
 
 def equation_text(equation: dict[str, Any]) -> str:
     """Return the memory equation as text, beside the equations of the paper and of the original."""
-    from emu.kernel_metrics.memory import ORIGINAL, ORIGINAL_ROM, PAPER, PAPER_ROM
-
     alone, whole = equation["sizes"]["kernel"], equation["sizes"]["devices"]
     ours = {name: equation[name] for name in "ABCDE"}
     lines = [
@@ -133,9 +217,9 @@ def equation_text(equation: dict[str, Any]) -> str:
     for name, row, rom in (
         ("this kernel alone", ours | {"A": alone["A"]}, alone["rom"]),
         ("with motors, UARTs, LEDs, selector", ours, whole["rom"]),
-        ("paper, Eq. (1)", PAPER, PAPER_ROM),
-        ("original, as measured, alone", ORIGINAL, ORIGINAL_ROM["kernel"]),
-        ("with motors, UART, remote control", ORIGINAL, ORIGINAL_ROM["devices"]),
+        ("paper, Eq. (1)", memory.PAPER, memory.PAPER_ROM),
+        ("original, as measured, alone", memory.ORIGINAL, memory.ORIGINAL_ROM["kernel"]),
+        ("with motors, UART, remote control", memory.ORIGINAL, memory.ORIGINAL_ROM["devices"]),
     ):
         cells = " ".join(
             f"{row[key]:{7 if key == 'A' else 6}g}" if key in row else f"{'-':>{7 if key == 'A' else 6}}"
@@ -204,6 +288,11 @@ def _near(path: str) -> str:
     return path if near.startswith("..") or not path.startswith("/") else near
 
 
+def _fitted(name: str) -> str:
+    """Return a name that fits the column: a long one keeps its beginning and its end."""
+    return name if len(name) <= 48 else f"{name[:22]}...{name[-23:]}"
+
+
 def static_text(facts: dict[str, Any], symbols: int) -> str:
     """Return the sizes as text."""
     lines = [f"{facts['path']}: ROM {facts['rom']:,} bytes, RAM {facts['ram']:,} bytes"]
@@ -218,8 +307,9 @@ def static_text(facts: dict[str, Any], symbols: int) -> str:
         lines.append("(no debug information: build with -g for sizes by source file)")
     for title, key in tables:
         lines += ["", f"{title:48} {'ROM':>7} {'RAM':>7}"]
-        lines += [f"{_near(name)[-48:]:48} {size['rom']:7,} {size['ram']:7,}" for name, size in facts[key].items()]
+        lines += [f"{_fitted(_near(name)):48} {size['rom']:7,} {size['ram']:7,}" for name, size in facts[key].items()]
     if symbols > 0:
         lines += ["", f"{'symbol':48} {'ROM':>7} {'RAM':>7}"]
-        lines += [f"{item['name'][-48:]:48} {item['rom']:7,} {item['ram']:7,}" for item in facts["symbols"][:symbols]]
+        shown = facts["symbols"][:symbols]
+        lines += [f"{_fitted(item['name']):48} {item['rom']:7,} {item['ram']:7,}" for item in shown]
     return "\n".join(lines)

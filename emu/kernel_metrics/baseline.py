@@ -1,146 +1,195 @@
-"""Baselines: exact numbers kept in the repository. --update writes them, --check compares; any increase fails.
+"""Baselines: exact numbers kept in a repository. --update writes them, --check compares them.
 
-Input: numbers by name, each with its distribution over source lines. Outputs: `Row`s of a table, and a JSON file. The
-file identifies a source line by file and code text, so that moved lines and changed comments do not count as changes.
+A number that grew fails a check, and so does a row that is new or no longer measured. A row of the file may have a
+limit instead: `"limit": "at most 400"`, `"limit": "at least 20 %"`. `docs/baselines.md` describes the file.
 """
 
 from __future__ import annotations
 
 import json
 import re
-from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
+from fractions import Fraction
 from typing import Any, Final
 
 from emu.host.files import atomic_text_file, read_file
 
-GREW_SHOWN: Final = 4
-"""Maximum number of source lines shown for a number that grew."""
+SCHEMA: Final = "openswarm-baseline"
+VERSION: Final = 2
+"""Version of the file format. Files of version 1 had no schema."""
+_LIMIT: Final = re.compile(r"at (least|most) (\d{1,9}(?:\.\d{1,3})?)( ?%)?")
+_LIMIT_FORM: Final = '"at least 20 %" or "at most 400"'
+_KEYS: Final = frozenset(("schema", "version", "command", "conditions", "rows", "code"))
+_ROW_KEYS: Final = frozenset(("value", "unit", "of", "where", "limit", "gated"))
 
-C_COMMENT: Final = re.compile(r"/\*.*?(\*/|$)|//.*")
-ASSEMBLY_COMMENT: Final = re.compile(r"/\*.*?(\*/|$)|//.*|;.*")
+Where = Mapping[str, Mapping[str, int]]
+"""Distribution of a number: amounts by function (or source file) and by instruction index (or symbol)."""
 
 
 @dataclass(frozen=True, slots=True)
 class Number:
-    """A measured value and its distribution over source lines."""
+    """A measured value. `of` is the whole that a limit in percent refers to."""
 
     value: int
-    where: Mapping[str, int] = field(default_factory=dict)
+    unit: str = "bytes"
+    of: int | None = None
+    where: Where = field(default_factory=dict)
+    more_is_better: bool = False
+    is_gated: bool = True
+    """Whether growth fails a check. A number that is not gated is only compared with a limit of the baseline."""
+
+
+@dataclass(frozen=True, slots=True)
+class StoredRow:
+    """A row of a baseline file."""
+
+    value: int
+    where: Where = field(default_factory=dict)
+    limit: str = ""
+    is_gated: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class Baseline:
+    """Content of a baseline file: rows, the conditions of their measurement, and the code that was measured."""
+
+    command: str
+    conditions: Mapping[str, str]
+    rows: Mapping[str, StoredRow]
+    code: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    """Instructions by function, for the attribution of a difference to source lines."""
 
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """One row of a comparison. `old` is None for a new number, `new` for a number that is no longer measured."""
+    """Comparison of one number. `old` is None for a new number, `new` for a number that is no longer measured."""
 
     name: str
+    unit: str
     old: int | None
     new: int | None
-    grew: tuple[tuple[str, int], ...] = ()
+    verdict: str
+    """"same", "better", "worse", "over its limit", "missing in the baseline" or "no longer measured"."""
+    limit: str = ""
 
     @property
-    def is_worse(self) -> bool:
-        """Whether this row makes a check fail: the number grew, or is no longer measured."""
-        return self.new is None or (self.old is not None and self.new > self.old)
+    def fails(self) -> bool:
+        """Whether this row makes a check fail."""
+        return self.verdict not in ("same", "better")
+
+    @property
+    def difference(self) -> int | None:
+        """New value minus old value, None if one of them is missing."""
+        return None if self.old is None or self.new is None else self.new - self.old
 
 
-class Sources:
-    """Names of source lines in the baseline: file below `firmware/`, and the line's code if it can be read."""
-
-    def __init__(self, image_path: str) -> None:
-        self._roots: Final = [Path(), Path("firmware"), *Path(image_path).resolve().parents[:4]]
-        self._files: Final[dict[str, list[str]]] = {}
-
-    def name(self, place: str) -> str:
-        """Convert `/somewhere/firmware/openswarm/kernel/event.c:93` to `kernel/event.c: return m;`."""
-        file, _, line = place.rpartition(":")
-        if not file or not line.isdecimal():
-            return place
-        lines = self._lines(file)
-        number = int(line)
-        code = without_comments(lines[number - 1], file) if 0 < number <= len(lines) else ""
-        return f"{short(file)}: {code or f'line {number}'}"
-
-    def names(self, where: Mapping[str, int]) -> dict[str, int]:
-        """Return the counts with names instead of line numbers as keys."""
-        named: Counter[str] = Counter()
-        for place, count in where.items():
-            named[self.name(place)] += count
-        return dict(sorted(named.items()))
-
-    def _lines(self, file: str) -> list[str]:
-        if file not in self._files:
-            self._files[file] = []
-            for root in self._roots:
-                try:
-                    text = (root / file).read_text(encoding="utf-8", errors="replace")
-                except OSError:
-                    continue
-                self._files[file] = text.splitlines()
-                break
-        return self._files[file]
-
-
-def without_comments(line: str, file: str) -> str:
-    """Return the code of a source line without comments and with normalised white space."""
-    comment = ASSEMBLY_COMMENT if file.endswith((".s", ".S")) else C_COMMENT
-    return " ".join(comment.sub("", line).split())
-
-
-def short(file: str) -> str:
-    """Return a path without the folders that differ between checkouts."""
-    for folder in ("/openswarm/", "/apps/", "/runtime/"):
-        _, found, rest = f"/{file}".rpartition(folder)
-        if found:
-            return rest if folder == "/openswarm/" else folder[1:] + rest
-    return Path(file).name
-
-
-def save(path: str, numbers: Mapping[str, Number]) -> None:
-    """Write a baseline atomically."""
-    table = {name: {"value": number.value, "where": number.where} for name, number in numbers.items()}
+def save(path: str, baseline: Baseline, numbers: Mapping[str, Number]) -> None:
+    """Write a baseline atomically. `baseline.rows` holds the limits to keep, by row."""
+    rows = {}
+    for name, number in numbers.items():
+        row: dict[str, Any] = {"value": number.value, "unit": number.unit}
+        if number.of is not None:
+            row["of"] = number.of
+        if not number.is_gated:
+            row["gated"] = False
+        if number.where:
+            row["where"] = {place: dict(parts) for place, parts in number.where.items()}
+        stored = baseline.rows.get(name)
+        if stored is not None and stored.limit:
+            row["limit"] = stored.limit
+        rows[name] = row
+    head = {"schema": SCHEMA, "version": VERSION, "command": baseline.command, "conditions": dict(baseline.conditions)}
     with atomic_text_file(path) as stream:
-        json.dump(table, stream, indent=1)
-        stream.write("\n")
+        stream.write("{\n")
+        stream.writelines(f" {json.dumps(key)}: {json.dumps(value)},\n" for key, value in head.items())
+        stream.write(f' "rows": {_one_a_line(rows)},\n "code": {_one_a_line(baseline.code)}\n}}\n')
 
 
-def load(path: str) -> dict[str, Number]:
-    """Read a baseline. Raises ValueError if the file is not a baseline, OSError if it cannot be read."""
+def _one_a_line(table: Mapping[str, Any]) -> str:
+    """Return a JSON object with one key per line, so that a version control system shows changed rows."""
+    lines = [f"  {json.dumps(key)}: {json.dumps(value)}" for key, value in table.items()]
+    return "{\n" + ",\n".join(lines) + "\n }" if lines else "{}"
+
+
+def load(path: str) -> Baseline:
+    """Read a baseline. Raises ValueError that names the unreadable key, OSError if the file cannot be read."""
     try:
-        table: dict[str, Any] = json.loads(read_file(path))
-        return {
-            name: Number(int(row["value"]), {str(k): int(v) for k, v in row["where"].items()})
-            for name, row in table.items()
-        }
-    except (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError):
-        raise ValueError(f"{path}: is not a baseline written by --update") from None
+        table = json.loads(read_file(path))
+    except (ValueError, RecursionError):
+        raise ValueError(f"{path}: is not a baseline written by --update: it is no JSON") from None
+    if not isinstance(table, dict) or table.get("schema") != SCHEMA:
+        raise ValueError(f'{path}: schema: expected "{SCHEMA}"; write the file again with --update')
+    if table.get("version") != VERSION:
+        found = table.get("version")
+        raise ValueError(f"{path}: version: expected {VERSION}, not {found!r}; write the file again with --update")
+    for key in sorted(_KEYS ^ table.keys()):
+        raise ValueError(f"{path}: {key}: {'is missing' if key in _KEYS else 'is no key of a baseline'}")
+    for key, kind in (("command", str), ("conditions", dict), ("rows", dict), ("code", dict)):
+        if not isinstance(table[key], kind):
+            raise ValueError(f"{path}: {key}: expected {'text' if kind is str else 'an object'}")
+    conditions = {str(key): str(value) for key, value in table["conditions"].items()}
+    rows = {name: _row(f"{path}: rows.{name}", row) for name, row in table["rows"].items()}
+    return Baseline(table["command"], conditions, rows, _code(path, table["code"]))
 
 
-def compare(old: Mapping[str, Number], new: Mapping[str, Number]) -> list[Row]:
+def _row(place: str, row: Any) -> StoredRow:
+    if not isinstance(row, dict):
+        raise ValueError(f"{place}: expected an object")
+    for key in sorted(row.keys() - _ROW_KEYS):
+        raise ValueError(f"{place}.{key}: is no key of a row")
+    value = row.get("value")
+    if not isinstance(value, int) or isinstance(value, bool):
+        raise ValueError(f"{place}.value: expected a whole number, not {value!r}")
+    where = row.get("where", {})
+    is_where = isinstance(where, dict) and all(
+        isinstance(parts, dict) and all(isinstance(count, int) for count in parts.values()) for parts in where.values()
+    )
+    if not is_where:
+        raise ValueError(f"{place}.where: expected whole numbers by place and part")
+    limit = row.get("limit", "")
+    if not isinstance(limit, str) or (limit and _LIMIT.fullmatch(limit) is None):
+        raise ValueError(f"{place}.limit: expected {_LIMIT_FORM}, not {limit!r}")
+    if limit.endswith("%") and not isinstance(row.get("of"), int):
+        raise ValueError(f"{place}.limit: {limit!r} needs a row that is part of a whole; give a number instead")
+    return StoredRow(value, where, limit, row.get("gated", True) is not False)
+
+
+def _code(path: str, code: dict[str, Any]) -> dict[str, tuple[str, ...]]:
+    for name, lines in code.items():
+        if not isinstance(lines, list) or not all(isinstance(line, str) for line in lines):
+            raise ValueError(f"{path}: code.{name}: expected a list of instructions")
+    return {name: tuple(lines) for name, lines in code.items()}
+
+
+def compare(old: Mapping[str, StoredRow], new: Mapping[str, Number]) -> list[Row]:
     """Return one row per name: first in the order of `new`, then the names that are only in `old`."""
     rows = []
     for name, number in new.items():
-        before = old.get(name)
-        grew: tuple[tuple[str, int], ...] = ()
-        if before is not None and number.value > before.value:
-            more = {place: count - before.where.get(place, 0) for place, count in number.where.items()}
-            ranked = sorted(more.items(), key=lambda item: (-item[1], item[0]))
-            grew = tuple((place, count) for place, count in ranked[:GREW_SHOWN] if count > 0)
-        rows.append(Row(name, before.value if before else None, number.value, grew))
-    return rows + [Row(name, number.value, None) for name, number in old.items() if name not in new]
+        stored = old.get(name)
+        if stored is None:
+            verdict = "missing in the baseline" if number.is_gated else "same"
+            rows.append(Row(name, number.unit, None, number.value, verdict))
+        else:
+            rows.append(Row(name, number.unit, stored.value, number.value, _verdict(stored, number), stored.limit))
+    gone = [name for name, row in old.items() if name not in new and (row.is_gated or row.limit)]
+    return rows + [Row(name, "", old[name].value, None, "no longer measured", old[name].limit) for name in gone]
 
 
-def table(rows: list[Row], unit: str) -> str:
-    """Return the comparison as a text table."""
-    lines = [f"{'':58} {'baseline':>9} {'now':>9}"]
-    for row in rows:
-        old = "-" if row.old is None else f"{row.old:,}"
-        new = "gone" if row.new is None else f"{row.new:,}"
-        change = ""
-        if row.old is not None and row.new is not None and row.old != row.new:
-            change = f"  {row.new - row.old:+,} {unit}"
-        lines.append(f"{row.name:58} {old:>9} {new:>9}{change}{'  WORSE' if row.is_worse else ''}")
-        lines += [f"    {count:+6} {place}" for place, count in row.grew]
-    return "\n".join(lines)
+def _verdict(stored: StoredRow, number: Number) -> str:
+    gain = (number.value - stored.value) * (1 if number.more_is_better else -1)
+    if stored.limit:
+        return ("better" if gain > 0 else "same") if _within(stored.limit, number) else "over its limit"
+    if gain < 0:
+        return "worse" if number.is_gated else "same"
+    return "better" if gain > 0 else "same"
+
+
+def _within(limit: str, number: Number) -> bool:
+    """Whether a number keeps a limit of the form that `load` has checked."""
+    found = _LIMIT.fullmatch(limit)
+    assert found is not None
+    amount = Fraction(found[2])
+    if found[3]:
+        amount = amount * (number.of or 0) / 100
+    return number.value >= amount if found[1] == "least" else number.value <= amount

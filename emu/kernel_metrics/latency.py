@@ -14,6 +14,7 @@ from typing import Final
 
 from emu.image.model import Image
 from emu.kernel_metrics.meter import Meter, Window
+from emu.kernel_metrics.observation import DISI_LEVEL
 from emu.kernel_metrics.target import MeasureError, Target
 from emu.system.events import NEVER
 
@@ -33,8 +34,6 @@ JITTER_CYCLES: Final = 4_423_680
 """Tcy examined for the clock's jitter: 300 ms."""
 BYTE_CYCLES: Final = 1280
 """Tcy of a byte at 115,200 baud (epuck.md §2)."""
-DISI_LEVEL: Final = 6
-"""Highest priority that DISI masks (isa.md §12)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -262,7 +261,7 @@ def masked(meter: Meter) -> dict[str, Window]:
     """Measure the longest time for which interrupts of each priority 1..7 are masked, in the busiest scenario."""
     machine = meter.machine
     longest = {level: Window(0, False) for level in range(1, 8)}
-    since: dict[int, tuple[int, str]] = {}
+    since: dict[int, tuple[int, int]] = {}
     for _ in range(MASK_STEPS):
         cycle, pc = machine.cycle, machine.pc
         if machine.service_boundary(NEVER) is not None:
@@ -271,7 +270,7 @@ def masked(meter: Meter) -> dict[str, Window]:
         now = max(machine.state.ipl, DISI_LEVEL if machine.state.disi_end > machine.cycle else 0)
         for level in range(1, 8):
             if now >= level:
-                since.setdefault(level, (entered, meter.place(machine.pc)))
+                since.setdefault(level, (entered, machine.pc))
             elif level in since:
                 begin, place = since.pop(level)
                 if machine.cycle - begin > longest[level].cycles:

@@ -16,6 +16,7 @@ from typing import Final
 
 from emu.image.footprint import pieces
 from emu.image.model import Image
+from emu.kernel_metrics.heap import Heap
 from emu.kernel_metrics.owners import DEVICES, KERNEL, sizes_by_owner
 from emu.kernel_metrics.target import WORD, MeasureError, Target
 
@@ -40,12 +41,7 @@ KERNEL_EVENTS: Final = (0x01, 0x07)
 """Number of events that Sys_Init_Kernel registers for itself: termination and 1 ms (openswarm.h)."""
 EVENT: Final = 6
 """Size of a registered event in bytes (kernel.h)."""
-_PIECES: Final = (("reserve_begin", "reserve_end"), ("free_run", "free_run_end"))
-"""Variables that hold the ends of free ranges outside the free blocks: the reserve, and the block being freed."""
-_SIZE: Final = 4
-"""Offset of the size field in a free block (kernel/memory.c)."""
 _RESULT_WORDS: Final = 6
-_LONGEST_LIST: Final = 4096
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,62 +86,10 @@ class Equation:
     cases: list[Case]
 
 
-class Heap:
-    """The kernel's heap, read from the machine's memory."""
-
-    def __init__(self, target: Target) -> None:
-        self._target: Final = target
-        self.capacity: Final = self.free() + target.words("os_statistics", 1)[0]
-        """Size of the whole heap in bytes: free bytes plus those already allocated at the first read."""
-
-    def free(self) -> int:
-        """Return the bytes of the reserve and of all free blocks."""
-        target = self._target
-        free = sum(target.word(target.address(end)) - target.word(target.address(begin)) for begin, end in _PIECES)
-        return free + sum(target.word(hole + _SIZE) for hole in self._holes())
-
-    def _holes(self) -> Iterator[int]:
-        """Yield the addresses of the free blocks. Raises MeasureError if their tree is not a heap ordered by size."""
-        found = [self._target.word(self._target.address("holes"))]
-        no_hole = self._target.address("no_hole")
-        seen = 0
-        while found:
-            hole = found.pop()
-            if hole == no_hole:
-                continue
-            seen += 1
-            sides = [self._target.word(hole + WORD * side) for side in range(2)]
-            size = self._target.word(hole + _SIZE)
-            if seen > _LONGEST_LIST or any(self._target.word(side + _SIZE) > size for side in sides):
-                raise MeasureError("the tree of free blocks in the kernel's memory is not a heap by size")
-            found += sides
-            yield hole
-
-    def used(self) -> int:
-        """Return the allocated bytes."""
-        return self.capacity - self.free()
-
-    def events(self) -> Iterator[int]:
-        """Yield the identifiers of all registered events."""
-        target = self._target
-        for bucket in range(target.address("events"), target.address("events") + target.size("events"), WORD):
-            for event in self._list(target.word(bucket), WORD):
-                yield target.word(event)
-
-    def _list(self, block: int, link: int = 0) -> Iterator[int]:
-        """Yield the addresses of a linked list's elements; the link is at offset `link` of an element."""
-        for _ in range(_LONGEST_LIST):
-            if not block:
-                return
-            yield block
-            block = self._target.word(block + link)
-        raise MeasureError("a list of the kernel does not end")
-
-
 def measure(image: Image, engine: str = "auto") -> Equation:
     """Run all loads and fit the equation. Raises MeasureError if the application misbehaves or the counts differ."""
     target = Target(image, "footprint_begin", engine)
-    heap = Heap(target)
+    heap = Heap(target.machine)
     target.run_to("footprint_empty")
     empty = heap.used()
     cases = [_case(target, heap, load, empty) for load in loads()]

@@ -1,4 +1,4 @@
-"""Exact cycles between two points of a running kernel, with their distribution over source lines.
+"""Exact cycles between two points of a running kernel, with their distribution over instructions.
 
 Input: a `Target` stopped at the first point. Output: a `Window`. The machine single-steps only within a window.
 """
@@ -10,6 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Final
 
+from emu.kernel_metrics.observation import EXCEPTION_ENTRY
 from emu.kernel_metrics.target import MeasureError, Target
 from emu.system.device import flag_since
 from emu.system.events import NEVER
@@ -17,18 +18,20 @@ from emu.system.events import NEVER
 MAX_WINDOW_CYCLES: Final = 100_000
 """Tcy after which the end of a window counts as not reachable."""
 STACK_POINTER: Final = 15
+BEFORE_WINDOW: Final = -2
+"""Address under which the cycles before the first instruction of a window are counted."""
 CALL_BYTES: Final = 4
 """Number of bytes that a call pushes (isa.md §7.4)."""
 
 
 @dataclass(slots=True)
 class Window:
-    """Interval between two points. `where` distributes its `cycles` over source lines (or symbols)."""
+    """Interval between two points. `where` distributes its `cycles` over instruction addresses."""
 
     cycles: int
     interrupted: bool
     """Whether an exception was entered during the window."""
-    where: Counter[str] = field(default_factory=Counter)
+    where: Counter[int] = field(default_factory=Counter)
 
 
 class Meter:
@@ -44,7 +47,7 @@ class Meter:
         begin = machine.cycle if start is None else start
         window = Window(0, False)
         if machine.cycle > begin:
-            window.where["(before the first instruction)"] = machine.cycle - begin
+            window.where[BEFORE_WINDOW] = machine.cycle - begin
         while True:
             cycle, pc = machine.cycle, machine.pc
             if machine.service_boundary(NEVER) is not None or cycle - begin > MAX_WINDOW_CYCLES:
@@ -53,14 +56,14 @@ class Meter:
                 )
             if machine.pc != pc:
                 window.interrupted = True
-                window.where["(exception entry)"] += machine.cycle - cycle
+                window.where[EXCEPTION_ENTRY] += machine.cycle - cycle
             if end():
                 window.cycles = machine.cycle - begin
                 return window
-            cycle, place = machine.cycle, self.place(machine.pc)
+            cycle, address = machine.cycle, machine.pc
             if machine.step() is not None:
-                raise MeasureError(f"the machine stopped at {place}")
-            window.where[place] += machine.cycle - cycle
+                raise MeasureError(f"the machine stopped at {self.place(address)}")
+            window.where[address] += machine.cycle - cycle
 
     def place(self, pc: int) -> str:
         """Return the source line of an address, or its symbol if it has no line."""

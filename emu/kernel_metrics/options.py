@@ -33,18 +33,23 @@ SCENES: Final = (
     ),
     *("END_CLEANED", "LIMIT", "SEND", "SEND_LIMITED", "SEND_LIMITED_BEHIND_FOUR", "SEND_DROPPED"),
     *("SEND_REPLACED", "SEND_SECOND_QUOTA", "SEND_NEIGHBOUR", "SEND_ELSEWHERE", "START_SERVICE", "FEED"),
-    *("FEED_BEHIND_TWO", "TICK", "TICK_SERVICE"),
+    *("FEED_BEHIND_TWO", "TICK", "TICK_SERVICE", "TAKE", "TAKE_NONE", "SIGNAL", "SIGNAL_ONE_WAITS", "TAKE_BITS"),
+    *("TAKE_NO_BITS", "NOTIFY", "NOTIFY_ONE_WAITS", "START_TIMER", "START_TIMER_BESIDE_TWO", "STOP_TIMER"),
+    *("STOP_TIMER_BEHIND_TWO", "TICK_TIMER"),
 )
 """Scenes in the order of the enumeration in firmware/apps/options/options.h."""
-OPTIONS: Final = ("mutex", "join", "cleanup", "quota", "service", "woken_first")
+OPTIONS: Final = ("mutex", "join", "cleanup", "quota", "service", "semaphore", "notification", "timer", "woken_first")
 """Options by the names of their files in firmware/openswarm/option."""
-KERNEL_PARTS: Final = {"_os_call_in_section": "cleanup", "_event_bucket": "quota"}
-"""Kernel functions that are linked only for one option."""
-OBJECTS: Final = {"sys_mutex": "mutex", "sys_cleanup": "cleanup", "sys_quota": "quota", "sys_service": "service"}
+KERNEL_PARTS: Final = {
+    "_os_call_in_section": "cleanup", "_event_bucket": "quota", "_process_awaits": "semaphore"
+}  # fmt: skip
+"""Kernel functions that are linked only for options; `_process_awaits` is also that of notifications."""
+OBJECTS: Final = {"sys_mutex": "mutex", "sys_cleanup": "cleanup", "sys_quota": "quota", "sys_service": "service",
+                  "sys_semaphore": "semaphore", "sys_notification": "notification", "sys_timer": "timer"}  # fmt: skip
 """Object types by the suffix of the application's variable `options_NAME` of that type."""
 HEAP: Final = (("a quota", "LIMIT", "options_done"), ("a zombie", "JOIN_ZOMBIE", "options_done"))
 """(name, scene, stop): heap changes between the stop `options_ready` and another stop of a scene."""
-_ENDS_LATER: Final = ("END", "END_JOINED", "END_CLEANED", "TICK", "TICK_SERVICE")
+_ENDS_LATER: Final = ("END", "END_JOINED", "END_CLEANED", "TICK", "TICK_SERVICE", "TICK_TIMER")
 """Scenes in which the measured window begins after a delay."""
 
 MeasureFunction = Callable[[Meter], Window]
@@ -111,6 +116,20 @@ def measures() -> Iterator[tuple[str, str, MeasureFunction]]:
     yield "Sys_Feed_Watchdog, two services are newer", "FEED_BEHIND_TWO", until_return("Sys_Feed_Watchdog")
     yield "1 ms clock, idle, for comparison", "TICK", clock_until_idle
     yield "1 ms clock, idle, one service", "TICK_SERVICE", clock_until_idle
+    take, signal, bits = "Sys_Wait_for_Semaphore", "Sys_Signal_Semaphore", "Sys_Wait_for_Notification"
+    yield "Sys_Wait_for_Semaphore", "TAKE", until_return(take)
+    yield "Sys_Wait_for_Semaphore without unit, to the next thread", "TAKE_NONE", until_entry(take, "options_spin")
+    yield signal, "SIGNAL", until_return(signal)
+    yield f"{signal}, a better thread waits, to that", "SIGNAL_ONE_WAITS", until_entry(signal, "options_woken")
+    yield bits, "TAKE_BITS", until_return(bits)
+    yield f"{bits} without bit, to the next thread", "TAKE_NO_BITS", until_entry(bits, "options_spin")
+    yield "Sys_Notify", "NOTIFY", until_return("Sys_Notify")
+    yield "Sys_Notify, a better thread waits, to that", "NOTIFY_ONE_WAITS", until_entry("Sys_Notify", "options_woken")
+    yield "Sys_Start_Timer", "START_TIMER", until_return("Sys_Start_Timer")
+    yield "Sys_Start_Timer, two others run", "START_TIMER_BESIDE_TWO", until_return("Sys_Start_Timer")
+    yield "Sys_Stop_Timer", "STOP_TIMER", until_return("Sys_Stop_Timer")
+    yield "Sys_Stop_Timer, two others are newer", "STOP_TIMER_BEHIND_TWO", until_return("Sys_Stop_Timer")
+    yield "1 ms clock, idle, a timer sends without listeners", "TICK_TIMER", clock_until_idle
 
 
 def until_entry_on_kernel_stack(place: str) -> MeasureFunction:

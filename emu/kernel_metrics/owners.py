@@ -46,15 +46,16 @@ def sizes_by_owner(image: Image) -> dict[str, OwnerSize]:
     ram: Counter[str] = Counter()
     for piece in found:
         if piece.name != _HANDLES:
-            owner = _owner(piece.module) if not piece.module.endswith(".h") else homes.get(piece.name, KERNEL)
+            owner = owner_of_module(piece.module) if not piece.module.endswith(".h") else homes.get(piece.name, KERNEL)
             rom[owner] += piece.rom
             ram[owner] += piece.ram
     for file, size in handles(image):
-        rom[_owner(file)] += size
+        rom[owner_of_module(file)] += size
     return {owner: OwnerSize(rom[owner], ram[owner]) for owner in (KERNEL, DEVICES, APPLICATION)}
 
 
-def _owner(module: str) -> str:
+def owner_of_module(module: str) -> str:
+    """Return the owner of a source file; library code without a source file belongs to the kernel."""
     if module == UNKNOWN:
         return KERNEL
     return next((owner for folder, owner in _FOLDERS.items() if folder in f"/{module}"), APPLICATION)
@@ -65,7 +66,7 @@ def _homes(found: list[Piece]) -> dict[str, str]:
     sizes: dict[str, Counter[str]] = {}
     for piece in found:
         if piece.module != UNKNOWN and not piece.module.endswith(".h"):
-            sizes.setdefault(piece.name, Counter())[_owner(piece.module)] += piece.rom
+            sizes.setdefault(piece.name, Counter())[owner_of_module(piece.module)] += piece.rom
     return {name: count.most_common(1)[0][0] for name, count in sizes.items()}
 
 

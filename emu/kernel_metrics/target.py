@@ -21,6 +21,23 @@ class MeasureError(Exception):
     """The application did not behave as its README specifies."""
 
 
+def address_of(image: Image, name: str) -> int:
+    """Return the address of a symbol. Raises MeasureError if the image lacks it."""
+    symbol = image.symbols.find(name)
+    if symbol is None:
+        raise MeasureError(f"{image.path} has no symbol {name!r}")
+    return symbol.address
+
+
+def size_of(image: Image, name: str) -> int:
+    """Return the size of a symbol in its own units. If none is recorded, return the distance to the next symbol."""
+    symbol = image.symbols.find(name)
+    if symbol is None or symbol.size:
+        return symbol.size if symbol is not None else 0
+    behind = (s.address for s in image.symbols.all if s.space == symbol.space and s.address > symbol.address)
+    return min(behind, default=symbol.address) - symbol.address
+
+
 class Target:
     """A machine that runs a measuring application. `begin` is the symbol of the stop at which requests are written."""
 
@@ -37,18 +54,11 @@ class Target:
 
     def address(self, name: str) -> int:
         """Return the address of a symbol. Raises MeasureError if the image lacks it."""
-        symbol = self.image.symbols.find(name)
-        if symbol is None:
-            raise MeasureError(f"{self.image.path} has no symbol {name!r}")
-        return symbol.address
+        return address_of(self.image, name)
 
     def size(self, name: str) -> int:
         """Return the size of a symbol in its own units. If none is recorded, return the distance to the next symbol."""
-        symbol = self.image.symbols.find(name)
-        if symbol is None or symbol.size:
-            return symbol.size if symbol is not None else 0
-        behind = (s.address for s in self.image.symbols.all if s.space == symbol.space and s.address > symbol.address)
-        return min(behind, default=symbol.address) - symbol.address
+        return size_of(self.image, name)
 
     def word(self, address: int) -> int:
         """Return a word of RAM."""

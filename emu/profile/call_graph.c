@@ -3,7 +3,8 @@
 
    A return belongs to the call that stored its return address where the return reads it. If that address is on another
    stack, the return is a thread switch. The frames above it are dropped. Time in Sleep, in interrupts and in other
-   threads is attributed to no function. */
+   threads is attributed to no function. A caller of the idle function, which waits in a loop, is not charged for the
+   time from its first call of it to the end of its last one. */
 typedef unsigned char u8;
 typedef unsigned short u16;
 typedef unsigned int u32;
@@ -13,13 +14,13 @@ enum { STACKS = 128, DEPTH = 2048, EDGES = 1 << 16, TOP = 0xFFFFFFu };
 enum { CALLED = 1, RETURNED, ENTERED, SLEPT, RESET };
 enum { OPEN = 1, CLOSE, SWITCH, SLEEP };
 
-typedef struct { u64 start, stolen; u32 site, entry, place, level, edge; } Frame;
+typedef struct { u64 start, stolen, idle_from, idle_stolen; u32 site, entry, place, level, edge; } Frame;
 typedef struct { u64 left; u32 depth; Frame frame[DEPTH]; } Stack;
 typedef struct { u64 key, calls, cycles, most, least; } CallEdge;
 typedef struct { u64 cycle, since; u32 what, stack, level, entry, site, length; } CallEvent;
 typedef struct {
     u64 now;
-    u32 current, lost, edges, spare;
+    u32 current, lost, edges, idle;
     CallEvent *event;
     u64 events;
     CallEdge edge[EDGES];
@@ -61,8 +62,12 @@ static void push(CallGraph *t, u64 start, u32 site, u32 entry, u32 place, u32 le
         return;
     }
     Frame *f = &s->frame[s->depth++];
-    *f = (Frame){start, 0, site, entry, place, level, edge_of(t, level ? TOP : site, entry)};
+    *f = (Frame){start, 0, 0, 0, site, entry, place, level, edge_of(t, level ? TOP : site, entry)};
     t->edge[f->edge].calls++;
+    if (entry == t->idle && !level && s->depth > 1 && !f[-1].idle_from) {
+        f[-1].idle_from = start;
+        f[-1].idle_stolen = f[-1].stolen;
+    }
     u64 now = t->now;
     t->now = start;
     record_event(t, OPEN, f, since, 0);
@@ -87,7 +92,12 @@ static void pop(CallGraph *t) {
         if (own > e->most) e->most = own;
         if (!e->least || own < e->least) e->least = own;
     }
-    if (s->depth) s->frame[s->depth - 1].stolen += f->level ? all : f->stolen;
+    if (s->depth) {
+        Frame *caller = &s->frame[s->depth - 1];
+        caller->stolen += f->level ? all : f->stolen;
+        if (f->entry == t->idle && !f->level && caller->idle_from)
+            caller->stolen = caller->idle_stolen + (t->now - caller->idle_from);
+    }
     record_event(t, CLOSE, f, 0, 0);
 }
 
@@ -143,9 +153,10 @@ static void close_all(CallGraph *t) {
 
 u64 call_graph_size(void) { return sizeof(CallGraph); }
 
-/* Start the call graph: the program is at `entry` at cycle `now`. */
-void call_graph_begin(CallGraph *t, u64 now, u64 entry) {
+/* Start the call graph: the program is at `entry` at cycle `now`. `idle` is the idle function's entry, or 0xFFFFFF. */
+void call_graph_begin(CallGraph *t, u64 now, u64 entry, u64 idle) {
     t->now = now;
+    t->idle = (u32)idle;
     push(t, now, TOP, (u32)entry, ~0u, 0, 0);
 }
 
@@ -155,7 +166,7 @@ void call_graph_clear(CallGraph *t, u64 now) {
     for (u32 i = 0; i < STACKS; i++) {
         Stack *s = &t->stack[i];
         if (i != t->current) s->left = now;
-        for (u32 k = 0; k < s->depth; k++) s->frame[k].start = now, s->frame[k].stolen = 0;
+        for (u32 k = 0; k < s->depth; k++) s->frame[k].start = now, s->frame[k].stolen = s->frame[k].idle_from = 0;
     }
     t->now = now;
 }

@@ -32,7 +32,7 @@ _EVENT_TYPE: Final = np.dtype([
 def _code() -> dict[str, Callable[..., int]]:
     return functions(Path(__file__).with_name("call_graph.c"), {
         "call_graph_size": (INT, ()),
-        "call_graph_begin": (None, (ADDRESS, INT, INT)),
+        "call_graph_begin": (None, (ADDRESS, INT, INT, INT)),
         "call_graph_clear": (None, (ADDRESS, INT)),
         "call_graph_end": (None, (ADDRESS, INT)),
         "call_graph_open": (INT, (ADDRESS,)),
@@ -51,7 +51,7 @@ class CallEdge:
     entry: int
     calls: int
     cycles: int
-    """Inclusive Tcy from entry to return, without interrupts, sleep and other threads."""
+    """Inclusive Tcy from entry to return, without interrupts, sleep, other threads and the loop around `idle`."""
     most: int
     """Cycles of the longest call, without recursive calls."""
     least: int
@@ -77,9 +77,12 @@ class CallEvent(NamedTuple):
 
 
 class CallGraph:
-    """Builds the call graph from accounting records. The program is at `entry` at `cycle`. `timed` keeps the events."""
+    """Builds the call graph from accounting records. The program is at `entry` at `cycle`. `timed` keeps the events.
 
-    def __init__(self, cycle: int, entry: int, timed: bool = False) -> None:
+    `idle` is the entry of the function in which a scheduler waits; its caller is not charged for the waiting loop.
+    """
+
+    def __init__(self, cycle: int, entry: int, timed: bool = False, idle: int = NOWHERE) -> None:
         self._code: Final = _code()
         self._memory: Final[Any] = ctypes.create_string_buffer(self._code["call_graph_size"]())
         self._at: Final = ctypes.addressof(self._memory)
@@ -87,7 +90,7 @@ class CallGraph:
         self._room = np.empty(0, dtype=_EVENT_TYPE)
         """Reused buffer for events; allocating one for each call would take longer than filling it."""
         self._timed: Final = timed
-        self._code["call_graph_begin"](self._at, cycle, entry)
+        self._code["call_graph_begin"](self._at, cycle, entry, idle)
 
     def process(self, records: int, count: int) -> None:
         """Process `count` records at the host address `records`."""

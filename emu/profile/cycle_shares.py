@@ -19,12 +19,14 @@ import numpy as np
 from emu.debug.inspector import Inspector
 from emu.dspic30f.cycle_accounting import CycleAccounting
 from emu.image.model import Image
-from emu.profile.call_graph import CallEdge, CallEvent, CallGraph
+from emu.profile.call_graph import NOWHERE, CallEdge, CallEvent, CallGraph
 
 if TYPE_CHECKING:
     from emu.machine.machine import Machine
     from emu.machine.stops import Stop
 
+IDLE_FUNCTION: Final = "hal_idle"
+"""Function in which the scheduler of OpenSwarm waits (firmware/openswarm/port/dspic30f/switch.S)."""
 CodeLocation = tuple[str, str, int]
 """(function, source file, line) of code; "" and 0 for code without line information."""
 
@@ -106,7 +108,10 @@ class Profiler:
         self._runner: Final = machine.runner
         self._native: Final = self._runner if isinstance(self._runner, JitEngine) else None
         self._timed: Final = timed
-        self._call_graph: Final = CallGraph(machine.cycle, machine.pc, timed)
+        idle = image.symbols.find(IDLE_FUNCTION)
+        self._call_graph: Final = CallGraph(
+            machine.cycle, machine.pc, timed, idle.address if idle is not None else NOWHERE
+        )
         self._accounting: Final = CycleAccounting(machine.core, self._call_graph.process)
         self._rows: Final[dict[int, int]] = {}
         self._inside: Final[dict[int, frozenset[str]]] = {}

@@ -1,0 +1,37 @@
+"""Functions without code of their own: where the compiler inlined them.
+
+Input: debug information. Output: the functions that contain a copy, and a message that says what to do.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Final
+
+from emu.debug.dwarf.units import DebugInfo, Scope
+
+MOST_SHOWN: Final = 4
+"""Maximum number of functions that a message names."""
+REMEDY: Final = "add __attribute__((noinline)) or build with -fno-inline-functions"
+
+
+def inlined_into(debug: DebugInfo, name: str) -> list[str]:
+    """Return the names of the functions into which a function was inlined, in order of address."""
+    return list(dict.fromkeys(one.name for one in debug.functions if any(copy.name == name for copy in _copies(one))))
+
+
+def _copies(scope: Scope) -> Iterator[Scope]:
+    """Yield all inlined scopes inside a scope."""
+    for inner in scope.inner:
+        if inner.kind == "inlined":
+            yield inner
+        yield from _copies(inner)
+
+
+def missing_function(debug: DebugInfo, name: str) -> str:
+    """Return why a function has no code of its own: `inlined into main; add ...`; empty if it was not inlined."""
+    places = inlined_into(debug, name)
+    if not places:
+        return ""
+    more = f" and {len(places) - MOST_SHOWN} more" if len(places) > MOST_SHOWN else ""
+    return f"inlined into {', '.join(places[:MOST_SHOWN])}{more}; {REMEDY}"

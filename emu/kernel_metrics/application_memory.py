@@ -1,0 +1,374 @@
+"""Memory of an application of OpenSwarm: what its threads, events, messages and drivers allocate in a run.
+
+Input: a machine with an image that contains the kernel; nothing is instrumented. Output: `ApplicationMemory`. The
+kernel paints each stack, so the high-water mark is exact. Messages are counted when they are queued. The allocations
+are read whenever a thread enters the scheduler, where the kernel's lists are consistent.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import asdict, dataclass, field
+from typing import TYPE_CHECKING, Any, Final
+
+from emu.debug.inspector import Inspector
+from emu.image.footprint import pieces
+from emu.image.model import Image
+from emu.kernel_metrics.blame import short
+from emu.kernel_metrics.heap import Heap
+from emu.kernel_metrics.kernel_structures import STACK_FILL, KernelMemory, KernelStructures, ThreadMemory, event_name
+from emu.kernel_metrics.observation import HookObservation, Observation, stores_to
+from emu.kernel_metrics.owners import APPLICATION, owner_of_module
+
+if TYPE_CHECKING:
+    from emu.machine.machine import Machine
+    from emu.machine.stops import Stop
+
+RETURNED_BLOCK: Final = -1
+"""Event identifier of a queued block that a driver returns to the kernel."""
+ENTRY_REGISTER: Final = 8
+"""W8 holds the entry function at `os_thread_start` (firmware/openswarm/port/dspic30f/switch.S)."""
+SCHEDULER: Final = ("os_schedule", "os_yield", "os_slice_end")
+"""Functions in which the kernel, on its own stack, chooses the next thread (kernel/scheduler.c)."""
+
+
+@dataclass(slots=True)
+class ThreadUse:
+    """All threads of one entry function over the whole run; byte counts are the worst of them."""
+
+    name: str
+    """The entry function."""
+    pid: int
+    """PID of the first of these threads."""
+    stack: int
+    """Configured bytes."""
+    used: int
+    """High-water mark in bytes."""
+    free: int
+    """Bytes that were never written."""
+    guard: int
+    """Bytes between the stack limit and the control block."""
+    control_block: int
+    heap: int
+    """Bytes of the whole heap block: stack, control block and timing of a periodic thread."""
+    cleanups: int = 0
+    """Largest number of cleanup nodes."""
+    mutexes: int = 0
+    """Largest number of mutexes owned at once."""
+    started: int = 1
+    """Number of threads that were started with this entry function."""
+    line: str = ""
+    """Source line that started the thread."""
+
+
+@dataclass(slots=True)
+class EventUse:
+    """An event over the whole run."""
+
+    name: str
+    identifier: int
+    subscriptions: int
+    """Largest number of subscriptions, those of drivers included."""
+    by_drivers: int
+    peak_messages: int
+    peak_bytes: int
+    """Heap bytes of the messages that were queued at once, at most."""
+    sent: int
+    line: str = ""
+    """Source line that registered the event, or that subscribed to it last."""
+
+
+@dataclass(slots=True)
+class HeapUse:
+    """The heap in bytes."""
+
+    capacity: int
+    peak: int
+    """Largest use at any instruction."""
+    used: int
+    """Use at the end of the run."""
+    free: int
+    largest_free: int
+    """Largest free block at the end: a larger allocation fails."""
+    free_blocks: int
+    threads: int
+    events: int
+    subscriptions: int
+    gates: int
+    messages: int
+    """Queued messages at the end, and those that threads have not cleared."""
+    drivers: int
+    """All other allocations at the end: transmit queues of UARTs, blocks of bus transfers."""
+    drivers_peak: int
+    fullest: dict[str, int] = field(default_factory=dict)
+    """Use by kind at the fullest moment at which a thread ran."""
+
+    @property
+    def fragmentation(self) -> float:
+        """Share of the free bytes that is not in the largest free block, 0 to 1."""
+        return 1 - self.largest_free / self.free if self.free else 0.0
+
+
+@dataclass(slots=True)
+class ApplicationMemory:
+    """Memory of an application.
+
+    `most_threads` is the largest number of threads at once. `equation` holds the terms of the memory equation with the
+    application's numbers.
+    """
+
+    seconds: float
+    threads: list[ThreadUse]
+    most_threads: int
+    events: list[EventUse]
+    heap: HeapUse
+    kernel_stack: int
+    kernel_stack_used: int
+    equation: dict[str, Any]
+    stop: Stop | None = None
+
+    def facts(self) -> dict[str, Any]:
+        """Return everything as plain data."""
+        return {
+            "seconds": self.seconds,
+            "threads": [asdict(one) for one in self.threads],
+            "most_threads": self.most_threads,
+            "events": [asdict(one) for one in self.events],
+            "heap": asdict(self.heap) | {"fragmentation": self.heap.fragmentation},
+            "kernel_stack": {"size": self.kernel_stack, "used": self.kernel_stack_used},
+            "equation": self.equation,
+        }
+
+
+class _Run:
+    """Collects the memory use while the machine runs."""
+
+    def __init__(self, machine: Machine, kernel: KernelStructures) -> None:
+        self.machine: Final = machine
+        self.kernel: Final = kernel
+        self.threads: Final[dict[str, ThreadUse]] = {}
+        self.most_threads = 0
+        self.events: Final[dict[int, EventUse]] = {}
+        self.peak = 0
+        self.fullest = KernelMemory(0, [], {}, 0)
+        self.drivers_peak = 0
+        self._alive: Final[dict[int, tuple[int, str]]] = {}
+        """PID and entry function of the threads in memory, by control block."""
+        self._lines: Final[dict[int, str]] = {}
+        """Source line that started the thread, by control block."""
+        self._inspector: Final = Inspector(machine)
+        self._is_changed = False
+        observation = self.observation = Observation(machine) if machine.engine == "plain" else HookObservation(machine)
+        observation.at(kernel.code("os_thread_start"), self._thread_starts)
+        for name, callback in (
+            ("ring_append", self._enters_ring), ("Sys_Register_Event", self._names_event),
+            ("Sys_Subscribe_to_Event", self._names_event),
+        ):  # fmt: skip
+            if machine.image is not None and machine.image.symbols.find(name) is not None:
+                observation.at(kernel.code(name), callback)
+        observation.on_change(kernel.statistics, self._heap_changes)
+        observation.on_change(kernel.queue_end, self._queue_changes)
+        for name in SCHEDULER:  # the kernel's lists are consistent when a thread enters the scheduler
+            observation.at(kernel.code(name), self._enters_scheduler)
+
+    def _calling_line(self) -> str:
+        """Return the source line outside the kernel that has led to the present call."""
+        for frame in self._inspector.frames()[1:]:
+            if frame.line is not None and owner_of_module(frame.line.file) == APPLICATION:
+                return f"{short(frame.line.file)}:{frame.line.line}"
+        return ""
+
+    def _enters_ring(self) -> None:
+        pcb = self.machine.w[0]
+        if not self.kernel.is_woken(self.machine, pcb):
+            self._lines[pcb] = self._calling_line()
+
+    def _names_event(self) -> None:
+        line = self._calling_line()
+        if line:
+            self._event(self.machine.w[0]).line = line
+
+    def _thread_starts(self) -> None:
+        pcb = self.machine.peek(self.kernel.running)
+        self._thread(self.kernel.thread(self.machine, pcb), self.kernel.function_name(self.machine.w[ENTRY_REGISTER]))
+
+    def _thread(self, memory: ThreadMemory, entry: str) -> None:
+        """Add a thread, unless it is known."""
+        if self._alive.get(memory.pcb, (0, ""))[0] == memory.pid:
+            return
+        self._alive[memory.pcb] = memory.pid, entry
+        use = self.threads.get(entry)
+        if use is None:
+            line = self._lines.get(memory.pcb, "")
+            self.threads[entry] = ThreadUse(
+                entry, memory.pid, memory.stack, 0, memory.usable, memory.stack - memory.usable, self.kernel.pcb_bytes,
+                memory.size, line=line,
+            )  # fmt: skip
+        else:
+            use.started += 1
+            use.stack, use.heap = max(use.stack, memory.stack), max(use.heap, memory.size)
+
+    def _heap_changes(self, old: int, new: int) -> None:
+        self.peak = max(self.peak, new)
+        self._is_changed = True
+        if new >= old:
+            return
+        if old - new < self.kernel.pcb_bytes or not self._alive:
+            return
+        present = self.kernel.control_blocks(self.machine)
+        for pcb in [pcb for pcb in self._alive if pcb not in present]:
+            memory = self.kernel.thread(self.machine, pcb)
+            if memory.size == old - new:  # the block is freed now and still painted
+                self._measure(memory)
+                del self._alive[pcb]
+
+    def _measure(self, memory: ThreadMemory) -> None:
+        use = self.threads.get(self._alive.get(memory.pcb, (0, ""))[1])
+        if use is not None and memory.block:
+            use.used, use.free = max(use.used, memory.used), min(use.free, memory.unused)
+
+    def _queue_changes(self, _old: int, new: int) -> None:
+        if not self.kernel.memory <= new < self.kernel.memory_end:
+            return  # the queue is empty again
+        event, _size = self.kernel.message(self.machine, new)
+        if not event:
+            return
+        identifier = self.kernel.event_id(self.machine, event)
+        queued = self.kernel.queued(self.machine)
+        use = self._event(identifier)
+        use.sent += 1
+        messages, size = queued.get(identifier, (1, 0))
+        use.peak_messages, use.peak_bytes = max(use.peak_messages, messages), max(use.peak_bytes, size)
+
+    def _event(self, identifier: int) -> EventUse:
+        return self.events.setdefault(identifier, EventUse(event_name(identifier), identifier, 0, 0, 0, 0, 0))
+
+    def _enters_scheduler(self) -> None:
+        if self._is_changed:
+            self._is_changed = False
+            self.read()
+
+    def read(self) -> KernelMemory:
+        """Read all allocations. A thread must be running, or the CPU must be idle."""
+        found = self.kernel.read(self.machine)
+        for one in found.events.values():
+            use = self._event(one.identifier)
+            use.subscriptions, use.by_drivers = (
+                max(use.subscriptions, one.subscriptions),
+                max(use.by_drivers, one.by_drivers),
+            )
+        for kind, counts in zip(("cleanups", "mutexes"), self.kernel.nodes(self.machine), strict=True):
+            for owner, count in counts.items():
+                use_of = self.threads.get(self._alive.get(owner, (0, ""))[1])
+                if use_of is not None:
+                    setattr(use_of, kind, max(getattr(use_of, kind), count))
+        self.most_threads = max(self.most_threads, sum(bool(one.block) for one in found.threads))
+        self.drivers_peak = max(self.drivers_peak, self.by_kind(found)["drivers"])
+        if found.heap_used > self.fullest.heap_used:
+            self.fullest = found
+        return found
+
+    def finish(self) -> None:
+        """Read the stacks at the end of the run."""
+        for pcb in self.kernel.control_blocks(self.machine):
+            memory = self.kernel.thread(self.machine, pcb)
+            if memory.block:
+                self._thread(memory, self.kernel.function_name(self._entry(memory)))
+                self._measure(memory)
+
+    def _entry(self, memory: ThreadMemory) -> int:
+        """Return the entry function of a thread that has not run yet, from its initial frame (cpu.c)."""
+        return self.machine.peek(memory.pcb - memory.stack + 4)
+
+    def by_kind(self, memory: KernelMemory) -> dict[str, int]:
+        """Return the allocated bytes by kind. Their sum is the allocated memory."""
+        kernel = self.kernel
+        kinds = {
+            "threads": sum(one.size for one in memory.threads),
+            "events": kernel.event_bytes * len(memory.events),
+            "subscriptions": kernel.subscription_bytes * sum(one.subscriptions for one in memory.events.values()),
+            "gates": kernel.event_bytes * memory.gates,
+            "messages": sum(size for event, size in memory.queued_bytes.items() if event != RETURNED_BLOCK)
+            + memory.held_bytes,
+        }
+        return kinds | {"drivers": memory.heap_used - sum(kinds.values())}
+
+
+def engine_for(image: Image) -> str:
+    """Return the fastest engine that can observe an image: plain if the kernel's counters are stored through pointers.
+
+    Raises MeasureError if the image has no kernel with debug information.
+    """
+    kernel = KernelStructures(image)
+    known = all(stores_to(image, word) is not None for word in (kernel.statistics, kernel.queue_end))
+    return "auto" if known else "plain"
+
+
+def measure(machine: Machine, cycles: int) -> ApplicationMemory:
+    """Run a freshly loaded machine for `cycles` Tcy and return its memory use.
+
+    `engine_for` names an engine that can observe the image. Raises MeasureError if the image has no kernel with debug
+    information.
+    """
+    assert machine.image is not None
+    kernel = KernelStructures(machine.image)
+    run = _Run(machine, kernel)
+    run.observation.start()
+    try:
+        stop = machine.advance(machine.cycle + cycles)
+    finally:
+        run.observation.stop()
+    run.finish()
+    last = run.read()
+    kinds = run.by_kind(last)
+    heap = Heap(machine)
+    holes = heap.free_blocks()
+    free = sum(holes)
+    statistics = HeapUse(
+        heap.capacity, run.peak, last.heap_used, free, max(holes, default=0), len(holes), drivers_peak=run.drivers_peak,
+        fullest=run.by_kind(run.fullest), **kinds,
+    )  # fmt: skip
+    stack = kernel.memory_end - kernel.memory - statistics.capacity
+    painted = machine.peek_bytes(kernel.memory, stack)
+    used = len(painted.rstrip(bytes([STACK_FILL])))
+    return ApplicationMemory(
+        float(cycles / machine.hz), sorted(run.threads.values(), key=lambda one: one.pid), run.most_threads,
+        sorted(run.events.values(), key=lambda one: one.identifier), statistics, stack, used,
+        _equation(machine, kernel, run, statistics), stop,
+    )  # fmt: skip
+
+
+def _equation(machine: Machine, kernel: KernelStructures, run: _Run, heap: HeapUse) -> dict[str, Any]:
+    """Return the memory equation with the application's numbers at its fullest moment.
+
+    RAM = A + B n + C m + D s + sum over pending messages of (E + d). The stacks of an application differ, so B n is a
+    sum over its threads.
+    """
+    assert machine.image is not None
+    static: Counter[str] = Counter()
+    for piece in pieces(machine.image):
+        if piece.name != "_os_memory":
+            static[owner_of_module(piece.module)] += piece.ram
+    stack = kernel.memory_end - kernel.memory - heap.capacity
+    fullest = run.fullest
+    threads = [one for one in fullest.threads if one.block]
+    messages = fullest.held + sum(count for event, count in fullest.queued.items() if event != RETURNED_BLOCK)
+    constant = sum(static.values()) + stack
+    kinds = run.by_kind(fullest)
+    return {
+        "A": constant,
+        "A_parts": dict(sorted(static.items())) | {"kernel stack": stack},
+        "B": kernel.pcb_bytes,
+        "stacks": {str(one.pid): one.size - kernel.pcb_bytes for one in threads},
+        "C": kernel.event_bytes,
+        "D": kernel.subscription_bytes,
+        "E": kernel.message_bytes,
+        "n": len(threads),
+        "m": len(fullest.events),
+        "s": sum(one.subscriptions for one in fullest.events.values()),
+        "messages": messages,
+        "payload": kinds["messages"] - kernel.message_bytes * messages,
+        "gates": kinds["gates"],
+        "drivers": kinds["drivers"],
+        "ram": constant + fullest.heap_used,
+    }

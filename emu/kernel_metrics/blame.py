@@ -1,0 +1,159 @@
+"""Attribution of a cycle difference to source lines, by alignment of the old and the new instructions.
+
+Input: a number with its cycles by function and instruction, and the instructions of both images. Instructions are
+aligned by their text without registers and code addresses. An aligned instruction that takes as many cycles as before
+is not to blame, whatever line the compiler assigns to it now.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Iterable, Mapping
+from difflib import SequenceMatcher
+from functools import cached_property
+from pathlib import Path
+from typing import Final
+
+from emu.image.model import Image
+from emu.instruments.disassembly import items
+from emu.kernel_metrics.baseline import Where
+from emu.kernel_metrics.meter import BEFORE_WINDOW
+from emu.kernel_metrics.observation import EXCEPTION_ENTRY
+
+LINES_SHOWN: Final = 4
+"""Maximum number of source lines shown for a number that grew."""
+SPECIAL: Final = {BEFORE_WINDOW: "(before the first instruction)", EXCEPTION_ENTRY: "(exception entry)"}
+"""Parts of a window that belong to no instruction, by their pseudo-address."""
+_REGISTER: Final = re.compile(r"\b[wW]\d{1,2}\b")
+_CODE_OFFSET: Final = re.compile(r"(?<=[\w.])\+0x[0-9a-f]+")
+_C_COMMENT: Final = re.compile(r"/\*.*?(\*/|$)|//.*")
+_ASSEMBLY_COMMENT: Final = re.compile(r"/\*.*?(\*/|$)|//.*|;.*")
+
+
+class SourceLines:
+    """Text of the source lines of an image, if the files can be read."""
+
+    def __init__(self, image_path: str) -> None:
+        self._roots: Final = [Path(), Path("firmware"), *Path(image_path).resolve().parents[:4]]
+        self._files: Final[dict[str, list[str]]] = {}
+
+    def text(self, file: str, line: int) -> str:
+        """Return the code of a line without comments; empty if it cannot be read."""
+        lines = self._lines(file)
+        return without_comments(lines[line - 1], file) if 0 < line <= len(lines) else ""
+
+    def _lines(self, file: str) -> list[str]:
+        if file not in self._files:
+            self._files[file] = []
+            for root in self._roots:
+                try:
+                    text = (root / file).read_text(encoding="utf-8", errors="replace")
+                except OSError:
+                    continue
+                self._files[file] = text.splitlines()
+                break
+        return self._files[file]
+
+
+def without_comments(line: str, file: str) -> str:
+    """Return the code of a source line without comments and with normalised white space."""
+    comment = _ASSEMBLY_COMMENT if file.endswith((".s", ".S")) else _C_COMMENT
+    return " ".join(comment.sub("", line).split())
+
+
+def short(file: str) -> str:
+    """Return a path without the folders that differ between checkouts."""
+    for folder in ("/openswarm/", "/apps/", "/runtime/"):
+        _, found, rest = f"/{file}".rpartition(folder)
+        if found:
+            return rest if folder == "/openswarm/" else folder[1:] + rest
+    return file if not file.startswith("/") else Path(file).name
+
+
+class CodeListing:
+    """The instructions of an image by function, and their source lines."""
+
+    def __init__(self, image: Image) -> None:
+        self._image: Final = image
+        self._sources: Final = SourceLines(image.path)
+        self._functions: Final[dict[str, list[tuple[int, str]]]] = {}
+
+    @cached_property
+    def _starts(self) -> list[int]:
+        symbols = self._image.symbols
+        return sorted({s.address for s in symbols.all if s.space == "code" and s.names_content})
+
+    def where(self, addresses: Mapping[int, int]) -> dict[str, dict[str, int]]:
+        """Convert cycles by instruction address to cycles by function and instruction index."""
+        found: dict[str, dict[str, int]] = {}
+        for address, cycles in sorted(addresses.items()):
+            if address in SPECIAL:
+                found.setdefault(SPECIAL[address], {})["0"] = cycles
+                continue
+            name = self._name(address)
+            index = next((n for n, (at, _) in enumerate(self._listing(name)) if at == address), 0)
+            found.setdefault(name, {})[str(index)] = cycles
+        return found
+
+    def code(self, functions: Iterable[str]) -> dict[str, tuple[str, ...]]:
+        """Return the normalised instructions of functions, for a baseline."""
+        return {name: tuple(text for _, text in self._listing(name)) for name in sorted(functions) if name[0] != "("}
+
+    def place(self, function: str, index: int) -> str:
+        """Return the source line of an instruction as `src/main.c:12: code`, or the function's name."""
+        listing = self._listing(function) if function[0] != "(" else []
+        line = self._image.lines.find(listing[index][0]) if index < len(listing) else None
+        if line is None:
+            return function
+        text = self._sources.text(line.file, line.line)
+        return f"{short(line.file)}:{line.line}" + (f": {text}" if text else "")
+
+    def _name(self, address: int) -> str:
+        symbol = self._image.symbols.code(address)
+        return symbol[0].name if symbol is not None else f"{address:#08x}"
+
+    def _listing(self, name: str) -> list[tuple[int, str]]:
+        if name not in self._functions:
+            symbol = next((s for s in self._image.symbols.all if s.name == name and s.space == "code"), None)
+            found: list[tuple[int, str]] = []
+            if symbol is not None:
+                end = next((start for start in self._starts if start > symbol.address), symbol.address)
+                end = symbol.address + symbol.size if symbol.size else end
+                found = [(item.address, normalised(item.text)) for item in items(self._image, symbol.address, end)]
+            self._functions[name] = found
+        return self._functions[name]
+
+
+def normalised(text: str) -> str:
+    """Return the text of an instruction without register numbers and distances in code."""
+    return _CODE_OFFSET.sub("", _REGISTER.sub("w", text))
+
+
+def grown_lines(
+    old: Where, old_code: Mapping[str, tuple[str, ...]], new: Where, listing: CodeListing
+) -> list[tuple[str, int]]:
+    """Return the source lines to which the additional cycles belong, the largest share first."""
+    more: Counter[str] = Counter()
+    new_code = listing.code(new)
+    for function in sorted(new.keys() | old.keys()):
+        before, now = old.get(function, {}), new.get(function, {})
+        partner = aligned(old_code.get(function, ()), new_code.get(function, ()))
+        counted: set[str] = set()
+        for index, cycles in now.items():
+            mine = partner.get(int(index), int(index)) if function[0] != "(" else int(index)
+            known = before.get(str(mine), 0) if mine is not None else 0
+            counted.add(str(mine))
+            if cycles != known:
+                more[listing.place(function, int(index))] += cycles - known
+    ranked = sorted(more.items(), key=lambda item: (-item[1], item[0]))
+    return [(place, cycles) for place, cycles in ranked[:LINES_SHOWN] if cycles > 0]
+
+
+def aligned(old: tuple[str, ...], new: tuple[str, ...]) -> dict[int, int | None]:
+    """Return the index in `old` of each instruction of `new`, None for an inserted instruction."""
+    found: dict[int, int | None] = dict.fromkeys(range(len(new)))
+    for what, a, b, c, d in SequenceMatcher(None, old, new, autojunk=False).get_opcodes():
+        if what == "equal" or (what == "replace" and b - a == d - c):
+            found.update(zip(range(c, d), range(a, b), strict=True))
+    return found

@@ -1,0 +1,1 @@
+DEVICES := camera i2c
