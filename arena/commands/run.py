@@ -139,6 +139,9 @@ def plan_from(options: argparse.Namespace, trials: int) -> Plan:
     if controller not in SPEED_TABLES and image is not None:
         raise ValueError(f"--controller {options.controller} runs in Python: use it without --brain {options.brain}")
     plan = Plan(scene, brain, controller, image, trials, 60 * options.minutes, options.seed, own, images, controllers)
+    unused = "clock.scripted_quantum_ms" if plan.has_firmware else "clock.quantum_ms"
+    if any(setting.partition("=")[0].strip() == unused for setting in options.set):
+        raise ValueError(f"--set {unused} has no effect: {'some' if plan.has_firmware else 'no'} robot runs firmware")
     if options.controller is not None and not has_choice_of_controller(plan):
         raise ValueError(f"--controller {options.controller} has no effect in scene {scene.name}: every robot has its "
                          "own; change `controller` or `selector` in [[robots]], or `selector` in [start]")  # fmt: skip

@@ -64,6 +64,11 @@ def amplitude(distance_cm: float) -> float:
     return min(LAW_COUNTS * float(beyond**LAW_POWER), MAX_COUNTS) if beyond > 0 else MAX_COUNTS
 
 
+def is_in_reach(height_cm: float) -> bool:
+    """Whether a body blocks and reflects infrared light: light passes over bodies lower than the ring."""
+    return height_cm >= dimensions.IR_HEIGHT
+
+
 def distance_of(counts: float) -> float:
     """Return the distance in cm at which the amplitude is `counts`: the inverse of `amplitude`."""
     return LAW_FROM_CM + float((counts / LAW_COUNTS) ** (1 / LAW_POWER))
@@ -126,10 +131,13 @@ class Optics:
         code, setting = _code(), scene.infrared
         self._signal, self._surfaces = code["signal"], code["surfaces"]
         kinds = map(scene.kind_of, range(scene.objects.count))
-        self._objects = (_Disc * scene.objects.count)(*(_Disc(0, 0, kind.radius_cm, kind.share) for kind in kinds))
-        fixed = [_Disc(one.x_cm, one.y_cm, one.radius_cm, one.share) for one in scene.obstacles if one.radius_cm]
+        self._objects = (_Disc * scene.objects.count)(
+            *(_Disc(0, 0, kind.radius_cm if is_in_reach(kind.height_cm) else 0, kind.share) for kind in kinds)
+        )
+        obstacles = [one for one in scene.obstacles if is_in_reach(one.height_cm)]
+        fixed = [_Disc(one.x_cm, one.y_cm, one.radius_cm, one.share) for one in obstacles if one.radius_cm]
         self._fixed = (_Disc * len(fixed))(*fixed)
-        shapes = [(scene.arena.polygon, setting.wall_share), *((one.polygon, one.share) for one in scene.obstacles)]
+        shapes = [(scene.arena.polygon, setting.wall_share), *((one.polygon, one.share) for one in obstacles)]
         sides = [_Side(*side, share) for shape, share in shapes if shape for side in geometry.sides(shape)]
         self._sides = (_Side * len(sides))(*sides)
         self._optics = _Optics(

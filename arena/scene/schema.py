@@ -245,7 +245,7 @@ class ObjectKind(Placed):
     """Movable discs of one kind.
 
     `colour` is a name of `NAMED`, or red, green and blue as `#rrggbb`, as a camera shows them. `share` is their
-    infrared reflection as a share of white paper's.
+    infrared reflection as a share of white paper's; lower than 2.5 cm, a disc reflects and blocks no infrared light.
     """
 
     radius_cm: float = 5.0
@@ -258,7 +258,10 @@ class ObjectKind(Placed):
 
 @dataclass(frozen=True, slots=True)
 class Obstacle:
-    """Immovable obstacle: a polygon, or a disc of `radius_cm` at `x_cm`, `y_cm`."""
+    """Immovable obstacle: a polygon, or a disc of `radius_cm` at `x_cm`, `y_cm`.
+
+    Obstacles lower than 2.5 cm reflect and block no infrared light.
+    """
 
     name: str = ""
     polygon: Points = ()

@@ -24,6 +24,7 @@ from arena.infrared.ring import InfraredRing, ambient
 from arena.robots.firmware_controller import FirmwareController, volts_after
 from arena.scene import dimensions, geometry
 from arena.scene.loader import FCY, Scene, SceneError, load_scene
+from arena.scene.schema import ObjectKind, Obstacle
 from arena.world.physics import Poses, World
 from emu.boards.epuck.analog import Infrared, reflection_at
 from emu.boards.epuck.board import Epuck
@@ -215,6 +216,25 @@ def test_walls_objects_and_other_robots_block_the_light(scene: Scene) -> None:
     bent = scene.with_values(arena__polygon=((0, 0), (300, 0), (300, 300), (115, 140), (110, 300), (0, 300)))
     assert received(bent, here, there) == 0
     assert received(bent, here, (100.0, 120.0, UP)) > 0
+
+
+@pytest.mark.parametrize(("height_cm", "blocks"), [(0.2, False), (2.4, False), (2.5, True), (50.0, True)])
+def test_bodies_lower_than_the_ring_neither_block_nor_reflect(scene: Scene, height_cm: float, blocks: bool) -> None:
+    """Light passes over a sill or a disc lower than 2.5 cm, the height of the ring (epuck.md §9)."""
+    sill = Obstacle(polygon=((107.4, 95), (107.6, 95), (107.6, 105), (107.4, 105)), height_cm=height_cm)
+    disc = Obstacle(x_cm=107.5, y_cm=100, radius_cm=1, height_cm=height_cm)
+    kind = ObjectKind(radius_cm=1, height_cm=height_cm, place="poses", poses=((107.5, 100),))
+    poses = [(100.0, 100.0, 0.0), (115.0, 100.0, math.pi)]
+    empty = replace(scene, objects=replace(scene.objects, count=0))
+    for one, objects in (
+        (replace(empty, obstacles=(sill,)), []),
+        (replace(empty, obstacles=(disc,)), []),
+        (replace(scene, kinds=(kind,), objects=replace(scene.objects, count=1)), [(107.5, 100.0)]),
+    ):
+        optics = Optics(one)
+        assert bool(optics.signals(Poses(poses, objects), 0, [1])) is not blocks
+    optics = Optics(replace(empty, obstacles=(replace(sill, polygon=((103, 90), (104, 90), (104, 110), (103, 110))),)))
+    assert math.isfinite(optics.surfaces(Poses(poses[:1], []), 0)[0].millimetres) is blocks
 
 
 def meeting(x: float, y: float, east: float, north: float, side: geometry.Side) -> float:

@@ -500,6 +500,15 @@ def test_a_controller_without_effect_is_refused(tmp_path: Path) -> None:
         plan_of(tmp_path, text.replace("selector = 3", 'controller = "A"'), "--controller", "B")
 
 
+def test_a_quantum_that_no_robot_runs_in_is_refused(tmp_path: Path) -> None:
+    """`clock.quantum_ms` acts on trials with firmware, `clock.scripted_quantum_ms` on those without; the other one is
+    refused."""
+    text = GROUP.replace("aggregation", "scripted")
+    assert plan_of(tmp_path, text, "--set", "clock.scripted_quantum_ms=5").scene.clock.quantum_ms == 5
+    with pytest.raises(ValueError, match=r"clock\.quantum_ms has no effect: no robot runs firmware"):
+        plan_of(tmp_path, text, "--set", "clock.quantum_ms=5")
+
+
 def test_a_scripted_trial_runs_in_a_furnished_scene(tmp_path: Path) -> None:
     """A scripted trial in a furnished scene runs from `arena run` to page and figures; the record has the poses of
     all bodies."""
