@@ -1,11 +1,13 @@
-"""Fixture of the emulator's tests: the folder of recorded vectors."""
+"""Folders of shared helper modules, and a fixture of the emulator's tests: the folder of recorded vectors."""
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 
 import pytest
 
+sys.path[:0] = [str(Path(__file__).with_name(folder)) for folder in ("cpu", "jit", "chips", "loader", "cli")]
 VECTORS = Path(__file__).resolve().parents[1] / "vectors"
 
 

@@ -247,8 +247,9 @@ def test_the_hash_of_sources_sees_code_and_not_where_it_lies(tmp_path: Path, mon
 def test_a_worker_of_another_version_is_refused() -> None:
     """A worker of another version is refused, and the message names the versions."""
     plan = Plan(scripted(load_scene("clustering")), "scripted", "A", None, 1, 1.0, 1)
+    wanted = versions.versions() | {"pymunk": "0.1"}
     with pytest.raises(ValueError, match=r"worker on .* has pymunk .* instead of 0\.1"):
-        cluster.run_remote_trial(plan, cluster.InputFiles(None, None, [], []), 1, versions.versions() | {"pymunk": "0.1"})
+        cluster.run_remote_trial(plan, cluster.InputFiles(None, None, [], []), 1, wanted)
 
 
 @pytest.mark.slow

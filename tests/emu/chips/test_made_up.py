@@ -2,25 +2,20 @@
 
 from __future__ import annotations
 
-import sys
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
+from cpu_rig import assemble
+from engine_fuzz import check_pairs, check_programs
+from engine_pair import QuickCompiler, check_wild
+from made_up import FLASH_END, MADE_UP, RAM_END, SFR_END, Y_START
 
-sys.path[:0] = [str(Path(__file__).parents[1] / folder) for folder in ("chips", "cpu", "jit", "")]
-
-from cpu_rig import assemble  # noqa: E402
-from engine_fuzz import check_pairs, check_programs  # noqa: E402
-from engine_pair import QuickCompiler, check_wild  # noqa: E402
-from made_up import FLASH_END, MADE_UP, RAM_END, SFR_END, Y_START  # noqa: E402
-
-from emu.chips.chip import Region  # noqa: E402
-from emu.chips.dspic30f6014a import DSPIC30F6014A  # noqa: E402
-from emu.dspic30f.engines import NAMES  # noqa: E402
-from emu.dspic30f.isa.table import ROWS  # noqa: E402
-from emu.dspic30f.jit.engine import JitEngine  # noqa: E402
-from emu.machine.machine import Machine  # noqa: E402
+from emu.chips.chip import Region
+from emu.chips.dspic30f6014a import DSPIC30F6014A
+from emu.dspic30f.engines import NAMES
+from emu.dspic30f.isa.table import ROWS
+from emu.dspic30f.jit.engine import JitEngine
+from emu.machine.machine import Machine
 
 ENGINES = [name for name in NAMES if name != "auto"]
 NO_WATCHDOG = 0x7FFF

@@ -3,13 +3,8 @@
 from __future__ import annotations
 
 import json
-import sys
-from pathlib import Path
 
 import pytest
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "loader"))
-
 from dwarf_samples import debug_sections
 from elf_samples import xc16_like
 

@@ -6,6 +6,7 @@ Two machines with different engines run it in parallel; their whole records are 
 from __future__ import annotations
 
 import random
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
 from emu.chips.chip import Chip
@@ -235,6 +236,27 @@ def random_firmware(seed: int, chip: Chip = DSPIC30F6014A) -> Firmware:
     firmware.put(at, words_of("GOTO Expr", n=0x100))
     firmware.put(LEAF, words_of("RETURN"))
     return firmware
+
+
+T1_HANDLER = 0x1000
+
+
+def started(
+    registers: Mapping[int, int], sfrs: Iterable[tuple[str, int]] = (), handler: list[int] | None = None, seed: int = 0
+) -> tuple[Firmware, int]:
+    """Return firmware that sets W registers and device registers in order, and the address after these instructions.
+
+    `handler` is the code of T1's handler before RETFIE; without it the handler clears T1IF only."""
+    firmware = Firmware(seed)
+    firmware.put(0, words_of("GOTO Expr", n=0x100))
+    firmware.put(0x1A, [T1_HANDLER])
+    firmware.put(T1_HANDLER, (handler or []) + words_of("BCLR{.B} f, #bit4", f=0x84, b=3) + words_of("RETFIE"))
+    at = 0x100
+    for register, value in registers.items():
+        at = firmware.put(at, literal(value, register))
+    for sfr, value in sfrs:
+        at = firmware.put(at, to_sfr(sfr, value))
+    return firmware, at
 
 
 def load(machine: Machine, firmware: Firmware) -> None:

@@ -2,13 +2,7 @@
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
-
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parent))
-
 from engine_pair import Difference, InstructionObserver, Tally, advance, check_straight, check_wild, engine_pair
 from long_runs import check_long
 from straight_body import Shape

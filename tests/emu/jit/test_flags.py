@@ -3,13 +3,8 @@
 from __future__ import annotations
 
 import itertools
-import sys
-from pathlib import Path
 
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parent))
-
 from engine_pair import engine_pair
 from flag_drills import FLAGS, Tally, all_pairs, asked, check, kind, pairs_of, rows, written
 from random_firmware import BY_SYNTAX, Firmware, difference, words_of

@@ -3,15 +3,11 @@
 from __future__ import annotations
 
 import random
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parent))
-
-from random_firmware import Firmware, difference, literal, load, random_firmware, to_sfr, words_of
+from random_firmware import Firmware, difference, literal, load, random_firmware, started, to_sfr, words_of
 
 from emu.dspic30f.jit.cache import ObjectCache
 from emu.dspic30f.jit.engine import JitEngine
@@ -70,18 +66,10 @@ def test_a_snapshot_of_one_engine_goes_on_in_the_other() -> None:
 
 def counting_firmware() -> Firmware:
     """Return an endless loop that counts in W1, with a T1 interrupt every 100 Tcy that counts in W2."""
-    firmware = Firmware(0)
-    firmware.put(0, words_of("GOTO Expr", n=0x100))
-    firmware.put(0x1A, [0x1000])
-    at = 0x100
-    for register in range(16):
-        at = firmware.put(at, literal(0x900 if register == 15 else 0, register))
-    for sfr, value in (("PR1", 99), ("IEC0", 8), ("T1CON", 0x8000)):
-        at = firmware.put(at, to_sfr(sfr, value))
+    counting = words_of("INC{.B} Ws, Wd", B=0, s=2, p=0, d=2, q=0)
+    sfrs = (("PR1", 99), ("IEC0", 8), ("T1CON", 0x8000))
+    firmware, at = started(dict.fromkeys(range(15), 0) | {15: 0x900}, sfrs, counting)
     firmware.put(at, words_of("INC{.B} Ws, Wd", B=0, s=1, p=0, d=1, q=0) + words_of("BRA Expr", n=-2))
-    handler = words_of("INC{.B} Ws, Wd", B=0, s=2, p=0, d=2, q=0)
-    handler += words_of("BCLR{.B} f, #bit4", f=0x84, b=3) + words_of("RETFIE")
-    firmware.put(0x1000, handler)
     return firmware
 
 
@@ -247,11 +235,7 @@ def test_vectors_are_not_executed_as_instructions() -> None:
 def test_accumulators_are_one_thing_by_name_and_by_address() -> None:
     """isa.md §2.1: DSP instructions and data accesses to all six accumulator words, as words and bytes, agree in one
     block."""
-    firmware = Firmware(0)
-    firmware.put(0, words_of("GOTO Expr", n=0x100))
-    at = 0x100
-    for register in range(16):
-        at = firmware.put(at, literal(0x900 if register == 15 else 0x1234 * register & 0xFFFF, register))
+    firmware, at = started({n: 0x1234 * n & 0xFFFF for n in range(15)} | {15: 0x900})
     loop = [
         0xCA0001,  # LAC W1, A
         0xEE2022,  # NEG ACCAL
@@ -280,11 +264,7 @@ def test_accumulators_are_one_thing_by_name_and_by_address() -> None:
 def test_registers_of_a_module_that_goes_off_and_on_are_its_own_again() -> None:
     """dspic30f6014a.md §4: while T2MD is set, PR2 reads 0 and ignores writes; afterwards the same native instructions
     access it again."""
-    firmware = Firmware(0)
-    firmware.put(0, words_of("GOTO Expr", n=0x100))
-    at = 0x100
-    for register in range(16):
-        at = firmware.put(at, literal(0x900 if register == 15 else 3 * register, register))
+    firmware, at = started({n: 3 * n for n in range(15)} | {15: 0x900})
     sfrs = Machine(engine="plain").chip.sfrs
     bit = sfrs["PMD1"].fields["T2MD"][0]
     loop = words_of("BTG{.B} f, #bit4", f=sfrs["PMD1"].address + (bit >> 3), b=bit & 7)
@@ -317,3 +297,20 @@ def test_machines_with_one_program_share_what_was_translated() -> None:
     second.program.put_flash(0x1000, words_of("DEC{.B} Ws, Wd", B=0, s=2, p=0, d=2, q=0))
     second.run(100)
     assert {id(code) for code in second.runner.translated()} <= held[2]
+
+
+def test_a_timer_that_stops_in_idle_goes_on_behind_it() -> None:
+    """dspic30f6014a.md §4: TSIDL stops timer 2 only during Idle; it counts again when native code continues after the
+    wake-up."""
+    sfrs = (("PR1", 99), ("IPC0", 0x4444), ("IEC0", 8), ("PR2", 0xFFFF), ("T2CON", 0xA000), ("T1CON", 0x8000))
+    firmware, at = started({15: 0x900}, sfrs, seed=2)
+    idle = words_of("PWRSAV #lit1", k=1)
+    firmware.put(at, words_of("NOP") + idle + words_of("NOP") * 9 + words_of("BRA Expr", n=-12))
+    plain, native = pair(firmware)
+    counts = []
+    for machine in (plain, native):
+        machine.run(10_000)
+        counts.append(machine.read("TMR2"))
+    assert counts[0] == counts[1]
+    assert 500 < counts[0] < 8_000
+    assert not difference(plain, native)

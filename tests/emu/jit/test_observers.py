@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 import io
-import sys
-from collections.abc import Callable
+import random
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parent))
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "cli"))
-
-from engine_pair import QuickCompiler
-from hook_campaign import NEVER_REACHED, check_acting_hooks
+from engine_pair import Difference, QuickCompiler, engine_pair
 from programs import assembled, executable
+from random_firmware import BODY_WORDS, CODE, Firmware, difference, load, random_firmware, started, words_of
 
 import emu
 from emu.dap.breakpoints import Breakpoint
@@ -26,6 +22,15 @@ from emu.instruments.vcd import WaveformRecorder
 from emu.machine.machine import Machine
 from emu.machine.stops import Stop
 
+PEEKED = ("TMR1", "TMR2", "TMR3", "IFS0", "IFS1", "PORTD", "PORTF", "U1STA", "U1RXREG", "ADCON1", "INTTREG")
+"""Registers whose values depend on device time."""
+WRITTEN = (
+    "TMR1", "TMR2", "PR1", "PR2", "PR3", "T1CON", "T2CON", "LATD", "TRISD", "IFS0", "IEC0", "IPC0", "U1MODE", "U1STA",
+    "U1TXREG", "U1BRG", "OC1CON", "OC1R", "ADCON1",
+)  # fmt: skip
+HOOKED_ADDRESSES = 6
+NEVER_REACHED = 1 << 60
+"""Threshold of translation that no code reaches, so that all code is interpreted."""
 TIMER_LOOP = """
     mov #0xffff, w0
     mov w0, {PR1}
@@ -170,8 +175,93 @@ def test_a_trace_does_not_change_a_run_that_ends_asleep(
     assert results[0][1] == [0x41]
 
 
+class ActingHooks:
+    """Hooks of one machine that read and write its devices. Equal seeds and equal runs give equal actions."""
+
+    def __init__(self, machine: Machine, seed: int) -> None:
+        self.seen: list[tuple[int, int, tuple[int, ...]]] = []
+        """PC, cycle and values read, for each arrival."""
+        self._machine = machine
+        self._generator = random.Random(seed)
+        for address in self._generator.sample(range(CODE, CODE + 2 * BODY_WORDS, 2), HOOKED_ADDRESSES):
+            machine.hook_pc(address, self._act)
+
+    def _act(self) -> None:
+        machine, generator = self._machine, self._generator
+        values = [machine.peek(name) for name in PEEKED]
+        choice = generator.random()
+        if choice < 0.3:
+            values.append(machine.read(generator.choice(PEEKED)))
+        elif choice < 0.5:
+            machine.write(generator.choice(WRITTEN), generator.getrandbits(16))
+        elif choice < 0.6:
+            machine.write(generator.choice(("TMR1", "TMR2", "TMR3")), generator.randrange(400))
+        elif choice < 0.7:
+            machine.uart[1].feed(bytes([generator.randrange(256)]))
+        self.seen.append((machine.pc, machine.cycle, tuple(values)))
+
+
+def check_acting_hooks(seed: int, stops: int, cold: bool = False) -> int:
+    """Run one random program with acting hooks in both engines, and return the number of arrivals.
+
+    With `cold` the native engine has no code yet. Raises Difference if the hooks read different values or the
+    snapshots differ at a stop.
+    """
+    generator = random.Random(seed)
+    plain, native = engine_pair(random_firmware(seed), seed & 1, 0)
+    if cold:
+        assert isinstance(native.runner, JitEngine)
+        native.runner.threshold = NEVER_REACHED
+    hooks = [ActingHooks(machine, seed) for machine in (plain, native)]
+    for _ in range(stops):
+        cycles = generator.randrange(1, 600)
+        one, other = plain.run(cycles), native.run(cycles)
+        first, second = (acting.seen for acting in hooks)
+        if first != second:
+            pair = next((a, b) for a, b in zip([*first, None], [*second, None], strict=False) if a != b)
+            raise Difference(f"seed {seed}: hooks see {pair}")
+        found = difference(plain, native)
+        if one != other or found:
+            raise Difference(f"seed {seed}: {one} {other} {found}")
+    return len(hooks[0].seen)
+
+
 @pytest.mark.parametrize("cold", [False, True])
 @pytest.mark.parametrize("seed", [5, 9, 14, 21])
 def test_random_programs_with_acting_hooks_run_equally(seed: int, cold: bool) -> None:
     """Random programs with hooks that read and write device registers leave equal snapshots in both engines."""
     assert check_acting_hooks(seed, stops=8, cold=cold) > 0
+
+
+def arrivals(machines: Iterable[Machine], firmware: Firmware, address: int, cycles: int) -> list[list[int]]:
+    """Run firmware with a hook at `address` on each machine and return the cycles of its calls."""
+    seen: list[list[int]] = []
+    for machine in machines:
+        load(machine, firmware)
+        seen.append([])
+        machine.hook_pc(address, lambda m=machine, s=seen[-1]: s.append(m.cycle))  # type: ignore[misc]
+        machine.run(cycles)
+    return seen
+
+
+def test_a_hooked_repeat_that_never_fits_before_the_next_event_goes_on() -> None:
+    """engines.md §4.3: a hooked REPEAT that does not fit before the next event makes progress. The block checks the
+    whole loop after the hook; exact code then runs it."""
+    firmware, at = started({1: 200, 2: 0, 15: 0x900}, (("PR1", 99), ("IEC0", 8), ("T1CON", 0x8000)))
+    end = firmware.put(at, words_of("REPEAT Wn", s=1) + words_of("INC{.B} Ws, Wd", B=0, s=2, p=0, d=2, q=0))
+    firmware.put(end, words_of("BRA Expr", n=-3))
+    plain, native = engine_pair(firmware, 0, 2)
+    seen = arrivals((plain, native), firmware, at, 3_000)
+    assert seen[0] == seen[1]
+    assert len(seen[0]) > 10
+    assert not difference(plain, native)
+
+
+def test_each_iteration_of_a_hooked_target_is_an_arrival() -> None:
+    """A hook on a REPEAT target is called in every iteration, because each is a boundary (isa.md §7.5)."""
+    firmware, at = started({2: 0})
+    at = firmware.put(at, words_of("REPEAT #lit14", k=5))
+    firmware.put(at, words_of("INC{.B} Ws, Wd", B=0, s=2, p=0, d=2, q=0) + words_of("BRA Expr", n=-1))
+    seen = arrivals(engine_pair(firmware, 0, 2), firmware, at, 100)
+    assert seen == [seen[0]] * 2
+    assert len(seen[0]) == 6

@@ -2,14 +2,8 @@
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
-
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parent))
-
-from random_firmware import Firmware, difference, literal, load, to_sfr, words_of
+from random_firmware import Firmware, difference, load, started, words_of
 from test_native_code import own_cache, pair  # noqa: F401  (the fixture)
 
 from emu.chips.dspic30f6014a import DSPIC30F6014A
@@ -46,23 +40,15 @@ START = 0x200
 def polling_firmware(loop: list[int]) -> Firmware:
     """Return firmware with a polling loop. T1 matches every 97 Tcy; its handler toggles FLAG. W1 counts after the
     loop."""
-    firmware = Firmware(0)
-    firmware.put(0, words_of("GOTO Expr", n=0x100))
-    firmware.put(0x1A, [0x1000])
-    at = 0x100
-    for register in range(16):
-        at = firmware.put(at, literal(0xA00 if register == 15 else 7, register))
-    at = firmware.put(at, literal(0, 0) + words_of("MOV{.W} Wns, f", s=0, f=FLAG))
     enabled = 0 if loop == EMPTY["wait for an interrupt flag"] else 8
-    for sfr, value in (("PR1", 96), ("IEC0", enabled), ("T1CON", 0x8000)):
-        at = firmware.put(at, to_sfr(sfr, value))
-    firmware.put(at, words_of("GOTO Expr", n=START))
+    sfrs = (("PR1", 96), ("IEC0", enabled), ("T1CON", 0x8000))
+    toggle = words_of("BTG{.B} f, #bit4", f=FLAG, b=0)
+    firmware, at = started(dict.fromkeys(range(15), 7) | {15: 0xA00, 0: 0}, sfrs, toggle)
+    firmware.put(at, words_of("MOV{.W} Wns, f", s=0, f=FLAG) + words_of("GOTO Expr", n=START))
     at = firmware.put(START, loop)
     at = firmware.put(at, words_of("BCLR{.B} f, #bit4", f=IFS0, b=3))
     at = firmware.put(at, words_of("INC{.B} Ws, Wd", B=0, s=1, p=0, d=1, q=0))
     firmware.put(at, words_of("GOTO Expr", n=START))
-    handler = words_of("BCLR{.B} f, #bit4", f=IFS0, b=3) + words_of("BTG{.B} f, #bit4", f=FLAG, b=0)
-    firmware.put(0x1000, handler + words_of("RETFIE"))
     return firmware
 
 

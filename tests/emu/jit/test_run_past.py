@@ -2,14 +2,7 @@
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
-
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "cpu"))
-sys.path.insert(0, str(Path(__file__).parent))
-
 from cpu_rig import START, assemble
 from random_firmware import difference, load, random_firmware
 

@@ -2,15 +2,9 @@
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parent))
-
-from random_firmware import Firmware, difference, literal, to_sfr, words_of
+from random_firmware import Firmware, difference, started, words_of
 from test_native_code import own_cache, pair  # noqa: F401  (the fixture)
 
 from emu.chips.dspic30f6014a import DSPIC30F6014A
@@ -62,23 +56,15 @@ BODIES = {
 def firmware_of(body: list[int], corcon: int = 0) -> Firmware:
     """Return a program that repeats `body`. T1 matches every 97 Tcy, and its handler changes the operands of the
     body."""
-    firmware = Firmware(0)
-    firmware.put(0, words_of("GOTO Expr", n=0x100))
-    firmware.put(0x1A, [0x1000])
-    at = 0x100
-    for register in range(16):
-        at = firmware.put(at, literal({15: 0xA00, 4: 0x900, 2: 0xA001}.get(register, 0xB3 + register), register))
-    for sfr, value in (("PR1", 96), ("IEC0", 8), ("T1CON", 0x8000)):
-        at = firmware.put(at, to_sfr(sfr, value))
-    at = firmware.put(at, words_of("PUSH.S"))
-    firmware.put(at, words_of("GOTO Expr", n=START))
+    registers = {n: 0xB3 + n for n in range(15)} | {15: 0xA00, 4: 0x900, 2: 0xA001}
+    changing = words_of("ADD{.B} #lit10, Wn", B=0, k=0x101, d=1)
+    firmware, at = started(registers, (("PR1", 96), ("IEC0", 8), ("T1CON", 0x8000)), changing)
+    firmware.put(at, words_of("PUSH.S") + words_of("GOTO Expr", n=START))
     at = firmware.put(START, body)
     at = firmware.put(at, words_of("ADD{.B} #lit10, Wn", B=0, k=0x2F, d=1) + COUNT)
     firmware.put(at, words_of("GOTO Expr", n=START))
     call = START + 2 * (len(SHIFT + over(XOR)) + 1 + 0x100)
     firmware.put(call, COUNT + words_of("RETURN"))
-    handler = words_of("BCLR{.B} f, #bit4", f=IFS0, b=3) + words_of("ADD{.B} #lit10, Wn", B=0, k=0x101, d=1)
-    firmware.put(0x1000, handler + words_of("RETFIE"))
     return firmware
 
 

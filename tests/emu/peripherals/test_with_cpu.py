@@ -5,13 +5,7 @@ Sections without a file name are those of the chip reference.
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
-
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "cpu"))
-
 from cpu_rig import START, Rig
 
 from emu.chips.dspic30f6014a import SFRS, VECTORS

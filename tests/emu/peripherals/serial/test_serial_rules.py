@@ -3,14 +3,9 @@
 from __future__ import annotations
 
 import random
-import sys
 from itertools import pairwise
-from pathlib import Path
 
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parents[2] / "cpu"))
-
 from cpu_rig import Rig
 
 from emu.chips.dspic30f6014a import SFRS
