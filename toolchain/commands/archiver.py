@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import re
 from pathlib import Path
 
 from toolchain.commands.parser import parser
@@ -28,7 +29,10 @@ def options_of() -> argparse.ArgumentParser:
 
 def main(arguments: list[str]) -> int:
     """Run one operation (first letter of the key, as in GNU ar); return 0."""
-    options = options_of().parse_args(arguments)
+    words = [word for word in arguments if word != "-omf=elf" and not word.startswith("-mdfp=")]  # MPLAB X gives them
+    if words and re.fullmatch("-[rqdtxcsuvD]+", words[0]):
+        words[0] = words[0][1:]
+    options = options_of().parse_args(words)
     letters = options.operation.lstrip("-")
     action = [letter for letter in letters if letter in "rqdtx"] or (["s"] if "s" in letters else [])
     if len(action) != 1 or set(letters) - set("rqdtxcsuvD"):

@@ -32,6 +32,7 @@ def options_of() -> argparse.ArgumentParser:
                    help="paths that begin with OLD are recorded as NEW")  # fmt: skip
     p.add_argument("-p", dest="part", default=DEFAULT, help=f"processor: {' or '.join(DEVICES)} (default {DEFAULT})")
     p.add_argument("-omf", default="elf", choices=("elf",), help=argparse.SUPPRESS)
+    p.add_argument("-mdfp", default="", help=argparse.SUPPRESS)
     return p
 
 

@@ -45,6 +45,8 @@ def main(argv: list[str], cxx: bool = False, front: FrontEnd | None = None) -> i
             sys.stdout.write(HELP)
         elif options.action == "version":
             _print_version()
+        elif options.action == "print":
+            print(options.printed)
         else:
             with tempfile.TemporaryDirectory(prefix="dspic-cc-") as scratch:
                 try:
@@ -169,19 +171,29 @@ def _to_assembly(options: CcOptions, ir_text: str) -> str:
 
     check(ir_text, lambda ref: pipeline.position_in(ir_text, ref))
     try:
-        return pipeline.compile_module(ir_text, options)
+        return pipeline.compile_module(ir_text, options) + _formats(options)
     except UnsupportedError as error:
         raise ToolError(f"not supported: {error}") from error
 
 
+def _formats(options: CcOptions) -> str:
+    """Assembly of the formats of -msmart-io-format=, which the link stage reads like those of the program."""
+    if not options.io_formats:
+        return ""
+    strings = [",".join(map(str, text.encode() + b"\0")) for text in options.io_formats]
+    return "\t.section .smartio,psv,page\n" + "".join(f"\t.byte {text}\n" for text in strings)
+
+
 def assembler_options(options: CcOptions, compiled: bool) -> AssemblerOptions:
     """Options of the assembler. Only branches of compiled code are relaxed (shortened), as in XC16 (abi-elf.md §5)."""
+    from toolchain.arguments import definition
     from toolchain.asm.state import Options
 
     folders = [word[2:] for word in options.clang if word.startswith("-I") and len(word) > 2]
     folders += [b for a, b in zip(options.clang, options.clang[1:], strict=False) if a == "-I"]
-    return Options(include=folders, relax=compiled, compiled=compiled, debug=options.debug, chip=options.chip,
-                   prefix_map=options.prefix_map)  # fmt: skip
+    defined = dict(map(definition, options.asm_define))
+    return Options(include=folders + options.asm_include, define=defined, relax=compiled, compiled=compiled,
+                   debug=options.debug, chip=options.chip, prefix_map=options.prefix_map)  # fmt: skip
 
 
 def _assemble(options: CcOptions, text: str, name: str, compiled: bool) -> bytes:

@@ -42,8 +42,8 @@ TARGET_FLAGS = [
 # Unknown pragmas cause a warning, which also reveals `#pragma config`.
 # `space(ymemory), far` are two section names for clang, which uses the first. Notes about macro expansions are omitted.
 LANGUAGE_FLAGS = ["-nostdinc", "-fsigned-char", "-fshort-wchar", "-fno-ident", "-Wunknown-pragmas", "-Wno-section",
-                  "-Wno-atomic-alignment",
-                  "-fmacro-backtrace-limit=1"]  # fmt: skip
+                  "-Wno-atomic-alignment", "-Wno-unknown-warning-option",
+                  "-Wno-ignored-optimization-argument", "-fmacro-backtrace-limit=1"]  # fmt: skip
 # Errors of clang that are warnings in GCC 4 and XC16 in every dialect of C: calls of undeclared functions, `main()`,
 # incompatible pointers, a missing or superfluous value of `return`. With -Werror, GCC reports them as errors as well.
 WARNINGS_OF_C = ["implicit-function-declaration", "implicit-int", "int-conversion", "incompatible-pointer-types",
@@ -109,6 +109,7 @@ def front_end_flags(options: CcOptions, language: str = "c") -> list[str]:
     flags = [*TARGET_FLAGS, *LANGUAGE_FLAGS, CLANG_LEVEL[options.level]]
     flags += [f"-U{name}" for name in FOREIGN_MACROS]
     own_folders = (INCLUDE_DIR, folder_of(options.chip.name), builtin_include_dir())
+    own_folders = own_folders if options.own_headers else ()
     folders = [word for folder in own_folders for word in ("-isystem", str(folder))]
     guard = ["__HAS_CODEGUARD__"] if "FBS" in options.chip.config else []
     flags += [f"-D{name}=1" for name in (f"__{options.chip.name}__", *PREDEFINED, *guard)]

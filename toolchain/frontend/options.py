@@ -1,20 +1,23 @@
 """Command line of `python -m toolchain cc`: parses an argument list to CcOptions.
 
-Options are handled by the driver, passed to clang, or accepted without effect for compatibility with gcc and XC16. The
-parser reads no files except @response files.
+`option_table` says which options exist and what becomes of each. The parser reads no files except @response files.
 """
 
 from __future__ import annotations
 
 import os
+import re
 import shlex
+import sys
 from dataclasses import dataclass, field
+from importlib.metadata import version
 from pathlib import Path
 
 from emu.chips import chip_named
 from emu.chips.chip import Chip
 from toolchain.device import device
 from toolchain.errors import ToolError
+from toolchain.frontend.option_table import CLANG, IGNORED, REFUSED, OptionRow, row_of
 
 HELP = """\
 usage: python -m toolchain cc [options] files... [-o out.elf|out.hex|out.o]
@@ -44,62 +47,27 @@ C compiler, assembler and linker for the dsPIC30F6014A and its relatives (-mcpu=
   -nostdlib -nostartfiles -nodefaultlibs                        omit the run-time library, crt0
   -Map FILE             link map;  -Wl,OPTION and -Xlinker OPTION pass options to the linker
   -T FILE               accepted for the device's own linker script p30F6014A.gld, whose memory map is built in
-  -Wa,OPTION            accepted for compatibility, as are -msfr-warn= -merrata= -msmart-io= -omf=elf
+  -Wa,OPTION and -Xassembler OPTION pass options to the assembler
   -j N                  parallel front-end jobs (default: one per core)
   -save-temps           keep PROGRAM.ll and PROGRAM.s in the folder of the output
   -v  --version  --help
+
+The options of gcc and XC16 that are not listed here are in docs/xc16-options.md, with the reason if one has no effect.
 
 example: python -m toolchain cc -Os -g -Wall main.c switch.s -o firmware.elf
 exit status: 0 done, 1 errors in the C source, 2 other errors; after an error there is no output file
 """
 
-VALUE_FLAGS = {"-I", "-D", "-U", "-include", "-isystem", "-iquote", "-idirafter", "-imacros"}
 DEPENDENCY_VALUE_FLAGS = {"-MF", "-MT", "-MQ"}
-DEPENDENCY_FLAGS = {"-MD", "-MMD", "-MP"}
+DEPENDENCY_FLAGS = {"-MD", "-MMD", "-MP", "-MG"}
 PREPROCESS_ONLY_FLAGS = {"-M", "-MM"}
-CLANG_FLAGS = {
-    "-w", "-pedantic", "-pedantic-errors", "-ansi", "-P", "-C", "-CC", "-H", "-undef", "-trigraphs",
-    "-fwrapv", "-fno-wrapv", "-fno-strict-aliasing", "-fstrict-aliasing", "-fno-common", "-fcommon", "-fno-builtin",
-    "-fbuiltin", "-ffreestanding", "-fhosted", "-funsigned-char", "-fsigned-char", "-fshort-enums", "-fno-short-enums",
-    "-fno-inline", "-finline-functions", "-fno-inline-functions", "-fno-jump-tables", "-fjump-tables", "-ffast-math",
-    "-fno-fast-math", "-funroll-loops", "-fno-unroll-loops", "-fno-math-errno", "-fmath-errno", "-ftrapping-math",
-    "-fno-trapping-math", "-fms-extensions", "-fgnu89-inline", "-fno-gnu89-inline", "-fpack-struct",
-    "-fcolor-diagnostics", "-fno-color-diagnostics", "-fdiagnostics-color", "-fno-diagnostics-color",
-    "-fdiagnostics-color=always", "-fdiagnostics-color=never", "-fno-delete-null-pointer-checks",
-    "-fno-signed-zeros", "-ffinite-math-only", "-fstrict-flex-arrays", "-fdollars-in-identifiers",
-    "-ffinite-loops", "-fno-finite-loops", "-fno-caret-diagnostics", "-fno-optimize-sibling-calls",
-    "-fno-strict-overflow", "-fstrict-overflow", "-ffp-contract=off", "-ffp-contract=on", "-ffp-contract=fast",
-    "-dM", "-dD", "-dI", "-finstrument-functions",
-}  # fmt: skip
-CLANG_PREFIXES = (
-    "-std=", "-W", "-I", "-D", "-U", "-fno-builtin-", "-fmessage-length=", "-ferror-limit=", "-fmacro-prefix-map=",
-    "-ffile-prefix-map=", "-fdebug-prefix-map=", "-ftemplate-", "-fconstexpr-", "-fbracket-depth=", "-fpack-struct=",
-    "-fsanitize=", "-fno-sanitize=",
-)  # fmt: skip
-IGNORED_FLAGS = {
-    "-pipe", "-fno-short-double", "-ffunction-sections", "-fdata-sections", "-fno-function-sections",
-    "-fno-data-sections", "-fomit-frame-pointer", "-fno-omit-frame-pointer", "-fno-exceptions", "-fno-unwind-tables",
-    "-fno-asynchronous-unwind-tables", "-fno-stack-protector", "-mno-eds-warn", "-fno-ident", "-fno-pic", "-fno-pie",
-    "-mdfp", "-legacy-libc", "-no-legacy-libc", "-static", "-fuse-linker-plugin", "-fno-plt", "-mconst-in-code",
-    "-fxc16-attributes",
-}  # fmt: skip
-# Smart I/O is always active here (`link_stage.FORMAT_PARTS`). Errata options concern other chips. Warnings about SFR
-# accesses are unnecessary, because all registers are `volatile`.
-IGNORED_PREFIXES = ("-msmart-io=", "-msfr-warn=", "-merrata=", "-mreserve=")
 LARGE_DATA = {"-mlarge-data", "-mlarge-scalar", "-mlarge-aggregate"}
 SMALL_DATA = {"-msmall-data", "-msmall-scalar", "-msmall-aggregate"}
-REFUSED = {
-    "-fshort-double": "double is always 64-bit IEEE here; there is no 32-bit double",
-    "-mconst-in-data": "constants live in program memory and are read through the PSV window",
-    "-omf=coff": "there is no COFF output; Microchip's tools read our ELF (-omf=elf)",
-    "-mauxflash": "this device has no auxiliary flash",
-    "-mpa": "procedural abstraction is not done here; -Os is the smallest code",
-    "-shared": "there are no shared libraries on this device",
-    "-fpic": "position-independent code is not supported",
-    "-fPIC": "position-independent code is not supported",
-    "-pg": "use the emulator's profiler",
-}
-LEVELS = {"-O": "1", "-O0": "0", "-O1": "1", "-O2": "2", "-O3": "2", "-Os": "s", "-Oz": "s", "-Og": "1"}
+ASSEMBLER_IGNORED = re.compile(
+    r"-a[a-z]*(?:=.*)?|-g|-v|-W|-L|--(?:no-)?relax|--keep-locals|--(?:no-|fatal-)?warn(?:ings)?|-omf=elf|-p=.*|-mdfp=.*"
+)
+"""Options of -Wa that do not change the object: listings, messages, and the form of branches in the user's assembly."""
+LEVELS = {"-O": "1", "-O0": "0", "-O1": "1", "-O2": "2", "-O3": "2", "-Os": "s", "-Oz": "s", "-Og": "1", "-Ofast": "2"}
 LANGUAGES = {"none", "c", "cpp-output", "c++", "c++-cpp-output", "assembler", "assembler-with-cpp", "ir"}
 SUFFIX_LANGUAGE = {
     ".c": "c", ".i": "cpp-output", ".cpp": "c++", ".cc": "c++", ".cxx": "c++", ".C": "c++", ".ii": "c++-cpp-output",
@@ -136,6 +104,10 @@ class CcOptions:
     clang: list[str] = field(default_factory=list)
     dependency: list[str] = field(default_factory=list)
     linker: list[str] = field(default_factory=list)
+    asm_define: list[str] = field(default_factory=list)  # NAME=VALUE, from -Wa,--defsym
+    asm_include: list[str] = field(default_factory=list)
+    io_formats: list[str] = field(default_factory=list)  # formats of -msmart-io-format=
+    own_headers: bool = True
     map_file: Path | None = None
     library_dirs: list[Path] = field(default_factory=list)
     libraries: list[str] = field(default_factory=list)
@@ -145,6 +117,7 @@ class CcOptions:
     save_temps: bool = False
     verbose: bool = False
     action: str = "compile"
+    printed: str = ""  # text that the action "print" prints
 
     @property
     def prefix_map(self) -> list[tuple[str, str]]:
@@ -172,6 +145,10 @@ class _ArgumentCursor:
     def take(self) -> str:
         self.at += 1
         return self.words[self.at - 1]
+
+    def insert(self, words: list[str]) -> None:
+        """Let `words` be the next arguments."""
+        self.words[self.at : self.at] = words
 
     def value(self, option: str) -> str:
         if not self:
@@ -215,20 +192,31 @@ def parse(argv: list[str]) -> CcOptions:
     language = "none"
     while words:
         word = words.take()
-        if word == "-x":
-            language = words.value("-x")
+        if not word.startswith("-"):
+            options.inputs.append(_input(word, language))
+            continue
+        row = row_of(word)
+        if row is None:
+            raise ToolError(f"unknown option '{word}' (see --help)")
+        if row.effect == REFUSED:
+            raise ToolError(f"'{word}' is not supported: {row.note}")
+        if row.effect == IGNORED:
+            if row.takes_next_word or word == row.spelling.partition("[ ]<")[0] != row.spelling:
+                words.value(word)
+        elif (named := _joined(word, "-x", words)) is not None:
+            language = named
             if language not in LANGUAGES:
                 raise ToolError(f"unknown language '{language}' after -x (expected {', '.join(sorted(LANGUAGES))})")
-        elif not word.startswith("-"):
-            options.inputs.append(_input(word, language))
+        elif row.effect == CLANG:
+            _front_end(options, word, words, row)
         elif not (
             _stage(options, word)
             or _code_generation(options, word)
             or _linking(options, word, words)
-            or _front_end(options, word, words)
+            or _tools(options, word, words)
             or _session(options, word, words)
         ):
-            raise ToolError(f"unknown option '{word}' (see --help)")
+            raise AssertionError(f"the table accepts {word}, but no function handles it")
     if options.action == "compile":
         _check(options)
     return options
@@ -253,23 +241,22 @@ def _stage(options: CcOptions, word: str) -> bool:
     elif word == "-fsyntax-only":
         options.stage = "preprocess"
         options.clang.append(word)
-    elif word in PREPROCESS_ONLY_FLAGS:
-        options.stage = "preprocess"
-        options.dependency.append(word)
     else:
         return False
     return True
 
 
 def _code_generation(options: CcOptions, word: str) -> bool:
-    if word in REFUSED:
-        raise ToolError(f"'{word}' is not supported: {REFUSED[word]}")
-    if word in LEVELS:
+    if word.startswith("-O"):
+        if word not in LEVELS:
+            raise ToolError(f"unknown level '{word}' (expected {', '.join(LEVELS)})")
         options.level = LEVELS[word]
+        if word == "-Ofast":
+            options.clang.append("-ffast-math")
     elif word in ("-g0", "-g", "-g1", "-g2", "-g3", "-ggdb") or word.startswith("-gdwarf"):
         options.debug = word != "-g0"
-    elif word in ("-flto", "-fno-lto"):
-        options.lto = word == "-flto"
+    elif word.startswith(("-flto", "-fno-lto")):
+        options.lto = word.startswith("-flto")
     elif word in ("-fverify-machine", "-fno-verify-machine"):
         options.verify = word == "-fverify-machine"
     elif word in ("-fstack-check", "-fno-stack-check"):
@@ -278,16 +265,16 @@ def _code_generation(options: CcOptions, word: str) -> bool:
         options.large_code = word == "-mlarge-code"
     elif word in LARGE_DATA | SMALL_DATA:
         options.large_data = word in LARGE_DATA
-    elif word == "-omf=elf" or word.startswith(IGNORED_PREFIXES):
-        pass
-    elif word.startswith("-omf="):
-        raise ToolError(f"'{word}': the output format is ELF (-omf=elf)")
+    elif word.startswith("-msmart-io-format="):
+        options.io_formats.append(word.partition("=")[2].strip('"'))
+    elif word in ("-ext=cci", "-mcci"):
+        options.clang.append("-D__CCI__=1")
+    elif word == "-nostdinc":
+        options.own_headers = False
     elif word == "-fsingle-precision-constant":
         options.single_constants = True
-    elif word.startswith(("-mcpu=", "-p")) and word not in ("-pedantic", "-pedantic-errors", "-pipe"):
+    elif word.startswith("-mcpu=") or (word.startswith("-p") and not word.startswith("-print-")):
         options.chip = device(word.split("=", 1)[1] if "=" in word else word[2:])
-    elif word in IGNORED_FLAGS:
-        pass
     else:
         return False
     return True
@@ -302,8 +289,8 @@ def _linking(options: CcOptions, word: str, words: _ArgumentCursor) -> bool:
         _linker_words(options, [words.value(word)])
     elif (script := _joined(word, "-T", words)) is not None:
         _linker_words(options, [f"--script={script}"])
-    elif word.startswith("-Wa,"):
-        pass
+    elif word == "-u":
+        options.linker += [word, words.value(word)]
     elif (directory := _joined(word, "-L", words)) is not None:
         options.library_dirs.append(Path(directory))
     elif (name := _joined(word, "-l", words)) is not None:
@@ -323,26 +310,79 @@ def _linker_words(options: CcOptions, parts: list[str]) -> None:
     """Options of -Wl and -Xlinker; -Map is handled by the driver, which writes all outputs atomically."""
     rest = iter(parts)
     for part in rest:
+        if not part:  # MPLAB X writes -Wl,,,--defsym=...
+            continue
         if part.startswith(("-Map=", "--Map=")):
             options.map_file = Path(part.split("=", 1)[1])
         elif part in ("-Map", "--Map"):
             options.map_file = Path(next(rest, ""))
+        elif part.startswith("-L"):
+            options.library_dirs.append(Path(part[2:] or next(rest, "")))
+        elif part.startswith("-l"):
+            options.libraries.append(part[2:] or next(rest, ""))
         else:
             options.linker.append(part)
 
 
-def _front_end(options: CcOptions, word: str, words: _ArgumentCursor) -> bool:
-    if word in DEPENDENCY_VALUE_FLAGS:
-        options.dependency += [word, words.value(word)]
-    elif word in DEPENDENCY_FLAGS:
-        options.dependency.append(word)
-    elif word in VALUE_FLAGS:
-        options.clang += [word, words.value(word)]
-    elif word in CLANG_FLAGS or word.startswith(CLANG_PREFIXES):
-        options.clang.append(word)
+def _tools(options: CcOptions, word: str, words: _ArgumentCursor) -> bool:
+    """Options for the preprocessor and the assembler, and questions about the tools."""
+    if word.startswith("-Wp,"):
+        inside = word[4:].split(",")
+        words.insert([*inside[:1], "-MF", *inside[1:]] if inside[0] in ("-MD", "-MMD") and inside[1:] else inside)
+    elif word == "-Xpreprocessor":
+        words.insert([words.value(word)])
+    elif word.startswith("-Wa,"):
+        _assembler_words(options, word[4:].split(","))
+    elif word == "-Xassembler":
+        _assembler_words(options, [words.value(word)])
+    elif word.startswith(("-print-", "-dump")):
+        options.action, options.printed = "print", _answer(word)
     else:
         return False
     return True
+
+
+def _assembler_words(options: CcOptions, parts: list[str]) -> None:
+    """Options of -Wa. Raise ToolError for one that is unknown."""
+    rest = iter(parts)
+    for part in rest:
+        if part in ("--defsym", "-I", "-MD"):
+            value = next(rest, "")
+            part = f"{part}={value}" if part == "--defsym" else part + value
+        if part.startswith("--defsym="):
+            options.asm_define.append(part.partition("=")[2])
+        elif part.startswith("-I"):
+            options.asm_include.append(part[2:])
+        elif part and not part.startswith("-MD") and not ASSEMBLER_IGNORED.fullmatch(part):
+            raise ToolError(f"unknown option '{part}' of the assembler (-Wa): see `python -m toolchain as --help`")
+
+
+def _answer(word: str) -> str:
+    """The text that a question such as -print-prog-name=as prints, as gcc answers it."""
+    name, _, value = word.partition("=")
+    programs, package = Path(sys.executable).parent, Path(__file__).parents[1]
+    if name == "-print-prog-name":
+        program = programs / f"dspic-{'cc' if value in ('gcc', 'cc1', 'cc') else value}"
+        return str(program) if program.exists() else value
+    if name == "-print-file-name":
+        found = [path for folder in ("include", "runtime") if (path := package / folder / value).exists()]
+        return str(found[0]) if found else value
+    if name == "-print-search-dirs":
+        return f"install: {package}\nprograms: ={programs}\nlibraries: ={package / 'runtime'}"
+    answers = {"-print-libgcc-file-name": "libdspic.a", "-print-multi-lib": ".;", "-dumpmachine": "pic30-elf"}
+    return answers[name] if name in answers else version("openswarm")
+
+
+def _front_end(options: CcOptions, word: str, words: _ArgumentCursor, row: OptionRow) -> None:
+    """An option for clang, with its value if that is the next argument."""
+    values = row.takes_next_word or word == row.spelling.partition("[ ]<")[0] != row.spelling
+    parts = [word, words.value(word)] if values else [word]
+    if word in PREPROCESS_ONLY_FLAGS:
+        options.stage = "preprocess"
+    if word in DEPENDENCY_VALUE_FLAGS | DEPENDENCY_FLAGS | PREPROCESS_ONLY_FLAGS:
+        options.dependency += parts
+    else:
+        options.clang += parts
 
 
 def _session(options: CcOptions, word: str, words: _ArgumentCursor) -> bool:
@@ -352,7 +392,7 @@ def _session(options: CcOptions, word: str, words: _ArgumentCursor) -> bool:
         if not jobs.isdigit() or int(jobs) < 1:
             raise ToolError(f"-j needs a positive number, not '{jobs}'")
         options.jobs = int(jobs)
-    elif word in ("-save-temps", "--save-temps"):
+    elif word.startswith(("-save-temps", "--save-temps")):
         options.save_temps = True
     elif word in ("-v", "--verbose"):
         options.verbose = True

@@ -26,7 +26,9 @@ IGNORED_WORDS = (
     "--check-sections", "--no-check-sections",  # overlaps are always errors
     "--smart-io", "--no-smart-io",  # parts of printf are always linked by need of the format strings
     "--force-link", "--no-force-link", "--warn-common", "--cref", "--select-objects", "--no-select-objects",
-    "--warn-section-align", "--no-warn-section-align",
+    "--warn-section-align", "--no-warn-section-align", "--warn-once", "--no-undefined", "--relax", "--no-relax",
+    "--strip-all", "-s", "--strip-debug", "-S", "--discard-all", "-x", "--trace", "-t", "--no-keep-memory",
+    "--sort-common", "--ivt", "--verbose",
 )  # fmt: skip
 """Options of Microchip's linker that are accepted without effect."""
 DEVICE_SCRIPT = re.compile(r"p(30f\d{4}a?)\w*\.gld", re.IGNORECASE)
@@ -61,6 +63,8 @@ def add_options(p: argparse.ArgumentParser) -> None:
     p.add_argument("--memorysummary", metavar="FILE", help="write memory use as the XML that MPLAB X shows")
     p.add_argument("-T", "--script", action="append", default=[], metavar="FILE",
                    help="accepted for the device's own script, p30F6014A.gld: its memory map is built in")  # fmt: skip
+    p.add_argument("-D", dest="macros", action="append", default=[], help=argparse.SUPPRESS)  # of linker scripts
+    p.add_argument("-mdfp", action="append", default=[], help=argparse.SUPPRESS)
     for word in IGNORED_WORDS:
         p.add_argument(word, action="store_true", help=argparse.SUPPRESS)
     p.add_argument("-p", "--processor", default=DEFAULT, metavar="NAME",
