@@ -31,6 +31,14 @@ struct point *volatile somewhere = (struct point *)0x3001;
 static __attribute__((noinline)) void set(struct point *p, int value) { p->x = value; }
 int main(void) { set(somewhere, 1234); return room.x; }
 """
+PAST_THE_END = """
+        .global __reset
+        .text
+__reset: mov #0x800, w0
+        mov #0x1234, w1
+        mov w1, [w0]
+        nop
+"""
 DIVISION = """
 volatile int zero;
 int quotient(int n) { return n / zero; }
@@ -227,3 +235,16 @@ int main(void) { printf("?"); while (!U1STAbits.URXDA) { } return 1 / zero; }
     assert stop.fault is not None
     assert stop.fault.function == "main"
     assert stop.fault.branches == ()
+
+
+def test_no_jump_is_blamed_when_execution_runs_through_erased_flash(tmp_path):
+    """If execution runs through erased flash, the fault is the fetch beyond flash, and no jump is named as its cause,
+    because the last branch led into the program."""
+    source = tmp_path / "off.s"
+    source.write_text(PAST_THE_END)
+    image = emu.build(source, flags=("-nostdlib", "-nostartfiles"), output=tmp_path / "off.elf")
+    stop = emu.load(image, board=None).run(cycles=200_000)
+    assert stop.fault is not None
+    assert "jump to" not in stop.fault.cause
+    assert stop.fault.cause.startswith("address error trap")
+    assert stop.fault.pc >= 0x018000 - 2

@@ -1,4 +1,4 @@
-"""A sample of the fuzz campaign `tests/fuzz/emulator/fuzz_inputs.py`, and inputs that have made it fail."""
+"""Samples of the campaigns `fuzz_inputs.py`, `fuzz_run.py` and `fuzz_loader.py`, and inputs that have made one fail."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ import pytest
 from arena.trial.record import Columns, RecordError
 from emu.image.loader import load_image
 from emu.instruments.coverage import Counts
+from tests.fuzz.emulator import fuzz_loader, fuzz_run
 from tests.fuzz.emulator.fuzz_inputs import call, campaign, converse
 from tests.watchdog import HANG
 
@@ -24,6 +25,20 @@ def test_damaged_files_are_refused_or_read() -> None:
     assert sum(outcomes.values()) == 120
     assert sum(count for name, count in outcomes.items() if name.endswith("refused")) > 50
     assert sum(count for name, count in outcomes.items() if name.endswith("done")) > 10
+
+
+def test_damaged_firmware_ends_with_a_reason_and_nothing_else() -> None:
+    outcomes = fuzz_run.campaign(range(2016, 2076), ("plain", "jit"))
+    assert sum(outcomes.values()) == 60
+    assert outcomes["fault"] > 14
+    assert outcomes["limit"] > 7
+
+
+def test_mutated_files_are_loaded_or_refused_and_nothing_else_happens() -> None:
+    outcomes = fuzz_loader.campaign(range(20160, 21160))
+    assert sum(outcomes.values()) == 1000
+    assert outcomes["refused"] > 70
+    assert outcomes["loaded"] > 70
 
 
 def requests(*asked: tuple[str, object]) -> bytes:

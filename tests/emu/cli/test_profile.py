@@ -144,11 +144,11 @@ def counted(image, engine: str, until: int, timed: bool = False):
 
 @pytest.mark.slow
 def test_native_counts_equal_single_stepping(nested):
-    """Functions, levels, sleep and calls of 200,000 cycles with two nested interrupts equal the counts of single
+    """Functions, levels, sleep and calls of 100,000 cycles with two nested interrupts equal the counts of single
     steps. If both interrupts are entered at one boundary, single steps cannot separate their cycles, so the sum is
     compared."""
-    functions, levels, idle, calls = single_step_counts(nested, 200_000)
-    profile = counted(nested, "jit", 200_000)
+    functions, levels, idle, calls = single_step_counts(nested, 100_000)
+    profile = counted(nested, "jit", 100_000)
     assert profile.cycles == profile.end - profile.start
     assert idle > 1_000
     assert min(levels[level] for level in (0, 4, 5, 6)) > 1_000
@@ -168,7 +168,7 @@ def test_native_counts_equal_single_stepping(nested):
         place: n for place, n in calls.items() if place not in handlers
     }
     assert all(0 <= seen[name] - calls[name] <= 1 for name in handlers)  # one call may be in progress
-    assert profile == counted(nested, "plain", 200_000)
+    assert profile == counted(nested, "plain", 100_000)
 
 
 def test_inclusive_cycles_leave_out_interrupts_and_count_recursion_once(nested):
