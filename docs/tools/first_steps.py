@@ -53,7 +53,7 @@ def install_wheel(wheel: Path, folder: Path) -> dict[str, str]:
     # PYTHONPATH may contain this checkout.
     alone = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
     subprocess.run([sys.executable, "-m", "pip", "--python", python, "install", "--quiet", "--no-deps", "--no-index",
-                    "--no-compile", "--disable-pip-version-check", wheel], check=True, env=alone)  # fmt: skip
+                    "--disable-pip-version-check", wheel], check=True, env=alone)  # fmt: skip
     packages = next((folder / "lib").glob("python*")) / "site-packages"
     (packages / "dependencies.pth").write_text(sysconfig.get_path("purelib") + "\n")
     home = folder.parent / "home"
@@ -107,11 +107,12 @@ def main() -> int:
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     options.add_argument("--check", action="store_true")
     options.add_argument("--keep", type=Path, metavar="FOLDER")
+    options.add_argument("--wheel", type=Path, metavar="FILE", help="wheel to install (default: build it)")
     wanted = options.parse_args()
     with tempfile.TemporaryDirectory(prefix="newcomer-") as scratch:
         folder = (wanted.keep or Path(scratch)).resolve()
         folder.mkdir(parents=True, exist_ok=True)
-        environment = install_wheel(build_wheel(folder), folder / "venv")
+        environment = install_wheel(wanted.wheel or build_wheel(folder), folder / "venv")
         before = listing(folder / "venv")
         (folder / "work").mkdir()
         old = PAGE.read_text(encoding="utf-8")

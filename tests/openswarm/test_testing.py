@@ -120,13 +120,14 @@ def test_a_compiler_s_message_reaches_the_report(tests):
 
 
 @pytest.mark.skipif(shutil.which("git") is None or not (ROOT / ".git").exists(), reason="not a clone, or no git")
-def test_the_action_s_steps_as_they_are_from_the_wheel(tmp_path):
+@pytest.mark.slow
+def test_the_action_s_steps_as_they_are_from_the_wheel(wheel, tmp_path):
     """The steps of the CI action work in an environment that contains only the wheel.
 
     A new project passes. With a mistake in its C source, the summary names thread and line, and there is a waveform.
     """
     action = yaml.safe_load((ROOT / "action.yml").read_text())
-    environment = first_steps.install_wheel(first_steps.build_wheel(tmp_path), tmp_path / "venv")
+    environment = first_steps.install_wheel(wheel, tmp_path / "venv")
     subprocess.run(["openswarm", "new", "robot"], cwd=tmp_path, env=environment, check=True, capture_output=True)
     source = tmp_path / "robot" / "src" / "main.c"
 
