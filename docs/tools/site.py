@@ -1,8 +1,8 @@
 """Build the documentation site: `python docs/tools/site.py [--out build/site]`, with the extra `docs`.
 
 The site contains every Markdown file of the repository at its own path, so links work on GitHub and on the site.
-Generated pages are added: the output of `--help`, the Python interfaces from docstrings, the import graph and the
-kernel's headers. MkDocs builds in strict mode: a warning is a failure.
+Generated pages are added: the output of `--help`, the Python interfaces from docstrings, the import graph, the kernel's
+calls and a list of all pages. The pages can be opened from disk. MkDocs builds in strict mode: a warning is a failure.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ import tempfile
 from pathlib import Path
 
 import import_graph
+import kernel_reference
 
 ROOT = Path(__file__).resolve().parents[2]
 PROGRAMS = ("emu", "toolchain", "arena", "openswarm")
@@ -101,10 +102,21 @@ def reference(source: Path) -> None:
     python = "".join(f"## {name}\n\n::: {name}\n{options}\n" for name in MODULES)
     (folder / "python.md").write_text(f"# Python interfaces\n\n{python}", encoding="utf-8")
     (folder / "imports.md").write_text(import_graph.page(folder), encoding="utf-8")
-    headers = ["# Headers of the kernel\n\nEach function has its contract in the line above it.\n"]
-    for path in sorted((ROOT / "firmware/openswarm/include").glob("*.h")):
-        headers.append(f"## {path.name}\n\n```c\n{path.read_text(encoding='utf-8')}```\n")
-    (folder / "headers.md").write_text("\n".join(headers), encoding="utf-8")
+    (folder / "kernel-calls.md").write_text(kernel_reference.page(), encoding="utf-8")
+    (folder / "pages.md").write_text(all_pages(source), encoding="utf-8")
+
+
+def all_pages(source: Path) -> str:
+    """Return a page that links to every page, by folder: each page is then two clicks from Home."""
+    lines, folder = ["# All pages\n"], None
+    for page in sorted(source.rglob("*.md"), key=lambda one: (one.parent, one.name)):
+        place = page.relative_to(source)
+        if place.parent != folder:
+            folder = place.parent
+            lines.append(f"\n## {folder.as_posix() if folder.name else 'project'}\n")
+        heading = re.search("^# (.+)$", page.read_text(encoding="utf-8"), re.MULTILINE)
+        lines.append(f"- [{heading[1] if heading else place.name}](../{place.as_posix()})")
+    return "\n".join(lines) + "\n"
 
 
 def main() -> int:
@@ -115,6 +127,7 @@ def main() -> int:
         source = Path(scratch) / "pages"
         source.mkdir()
         copy_pages(source)
+        shutil.copy(ROOT / "docs" / "site.css", source / "docs")
         reference(source)
         settings = Path(scratch) / "mkdocs.yml"
         settings.write_text(f"INHERIT: {ROOT / 'docs' / 'mkdocs.yml'}\ndocs_dir: {source}\n", encoding="utf-8")

@@ -1,4 +1,4 @@
-"""The documentation site builds without a warning and contains every page of its table of contents."""
+"""The documentation site builds without a warning, links to every page, and has an anchor for every kernel call."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import re
 import subprocess
 import sys
 from pathlib import Path
+from urllib.parse import unquote
 
 import pytest
 
@@ -14,18 +15,61 @@ ROOT = Path(__file__).resolve().parents[2]
 WANTED = ("mkdocs", "material", "mkdocstrings_handlers")
 
 
-@pytest.mark.skipif(
-    any(importlib.util.find_spec(name) is None for name in WANTED),
-    reason="the site's generator is missing (extra: docs)",
-)
-def test_the_site_builds_without_a_warning(tmp_path):
-    words = [sys.executable, str(ROOT / "docs" / "tools" / "site.py"), "--out", str(tmp_path / "site")]
+@pytest.fixture(scope="module")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the folder of the site, which is built without a warning."""
+    if any(importlib.util.find_spec(name) is None for name in WANTED):
+        pytest.skip("the site's generator is missing (extra: docs)")
+    folder = tmp_path_factory.mktemp("site")
+    words = [sys.executable, str(ROOT / "docs" / "tools" / "site.py"), "--out", str(folder)]
     done = subprocess.run(words, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stdout) == (0, ""), done.stderr
+    return folder
+
+
+@pytest.mark.slow
+def test_the_site_has_every_page_of_its_contents(site: Path) -> None:
+    """Every page that mkdocs.yml lists exists; the Python reference names methods."""
     pages = re.findall(r": ([\w/.-]+\.md)$", (ROOT / "docs" / "mkdocs.yml").read_text(encoding="utf-8"), re.MULTILINE)
     assert len(pages) > 25
-    for page in pages:
-        place = re.sub(r"(README|index)$", "", page.removesuffix(".md")).rstrip("/")
-        assert (tmp_path / "site" / place / "index.html").is_file(), page
-    python = (tmp_path / "site" / "reference" / "python" / "index.html").read_text(encoding="utf-8")
-    assert "emu.machine.machine.Machine.run" in python
+    missing = [page for page in pages if not (site / _html(page)).is_file()]
+    assert missing == []
+    assert "emu.machine.machine.Machine.run" in (site / "reference/python.html").read_text(encoding="utf-8")
+
+
+@pytest.mark.slow
+def test_every_page_is_reached_from_home_in_three_clicks(site: Path) -> None:
+    """Following links from the front page leads to every page in at most three steps, and each link has a file."""
+    reached, edge = {site / "index.html"}, [site / "index.html"]
+    for _ in range(3):
+        found = {target for page in edge for target in _links(page)}
+        absent = sorted(str(one.relative_to(site)) for one in found if not one.is_file())
+        assert absent == []
+        edge = sorted(found - reached)
+        reached |= found
+    pages = {page for page in site.rglob("*.html") if page.name != "404.html"}
+    assert sorted(str(page.relative_to(site)) for page in pages - reached) == []
+
+
+@pytest.mark.slow
+def test_every_kernel_call_has_an_anchor(site: Path) -> None:
+    """Every function and macro `Sys_*` that a header declares has an anchor of its name on the page of the kernel."""
+    text = (site / "reference/kernel-calls.html").read_text(encoding="utf-8")
+    declared: set[str] = set()
+    for header in (ROOT / "firmware/openswarm/include").glob("*.h"):
+        code = re.sub(r"/\*.*?\*/", "", header.read_text(encoding="utf-8"), flags=re.DOTALL)
+        declared.update(re.findall(r"^(?:#define |[\w ]+[ *])(Sys_\w+)\(", code, re.MULTILINE))
+    assert len(declared) > 60
+    assert sorted(name for name in declared if f'id="{name}"' not in text) == []
+
+
+def _html(page: str) -> str:
+    """Return the path of a page in the site."""
+    folder, _, name = page.rpartition("/")
+    return f"{folder}/{'index' if name == 'README.md' else name.removesuffix('.md')}.html".lstrip("/")
+
+
+def _links(page: Path) -> set[Path]:
+    """Return the pages of the site that a page links to."""
+    targets = re.findall(r'href="?([^"#?> ]+\.html)', page.read_text(encoding="utf-8"))
+    return {(page.parent / unquote(one)).resolve() for one in targets if ":" not in one}
