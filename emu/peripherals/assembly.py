@@ -12,6 +12,8 @@ from emu.peripherals.base import IDLE, SLEEP, ChipContext, CpuSignals, Periphera
 from emu.peripherals.can.can import Can
 from emu.peripherals.i2c.i2c import I2c
 from emu.peripherals.interrupt_lines import Interrupts
+from emu.peripherals.motor.pwm import Pwm
+from emu.peripherals.motor.qei import Qei
 from emu.peripherals.pins import PORTS, Pins
 from emu.peripherals.ports.ports import ChangeNotice, ExternalInterrupts, Port
 from emu.peripherals.spi.dci import Dci
@@ -75,6 +77,10 @@ class Peripherals:
         }
         self.i2c: Final = I2c(chip.i2c, context, self.interrupts, self.ports) if chip.i2c is not None else None
         self.dci: Final = Dci(chip.dci, context, self.interrupts, self.ports) if chip.dci is not None else None
+        self.pwm: Final = Pwm(chip.pwm, context, self.interrupts, self.ports) if chip.pwm is not None else None
+        self.qei: Final = Qei(chip.qei, context, self.interrupts) if chip.qei is not None else None
+        if self.pwm is not None:
+            self.pwm.on_special = self.adc.special_event
         self.can: Final = {site.number: Can(site, context, self.interrupts, self.ports) for site in chip.cans}
         for uart in self.uart.values():
             if uart.site.autobaud_capture in self.capture:
@@ -98,6 +104,8 @@ class Peripherals:
             self.i2c,
             self.dci,
             *self.can.values(),
+            self.pwm,
+            self.qei,
             self.pmd,
         )
         self.all: Final[tuple[Peripheral, ...]] = tuple(part for part in parts if part is not None)
@@ -113,7 +121,8 @@ class Peripherals:
     def _modules(self) -> dict[str, Peripheral]:
         """Return the peripherals by the name of their PMD bit."""
         modules: dict[str, Peripheral] = {"ADC": self.adc}
-        modules |= {name: device for name, device in (("DCI", self.dci), ("I2C", self.i2c)) if device is not None}
+        optional = (("DCI", self.dci), ("I2C", self.i2c), ("PWM", self.pwm), ("QEI", self.qei))
+        modules |= {name: device for name, device in optional if device is not None}
         modules |= {f"T{number}": timer for number, timer in self.timer.items()}
         modules |= {f"SPI{number}": spi for number, spi in self.spi.items()}
         modules |= {f"C{number}": can for number, can in self.can.items()}

@@ -1,8 +1,12 @@
-"""12-bit ADC (§13): sampling, conversion in TAD, scan, alternating inputs, SMPI, buffer halves, triggers.
+"""ADC (§13): sampling, conversion in TAD, scan, alternating inputs, SMPI, buffer halves, triggers.
 
 Times are kept in half Tcy, because TAD is (ADCS + 1) half Tcy. Conversions between two interrupts post no events.
 They are computed when a register is read, before an input changes, or when the interrupt is due. Analog levels are
-ratiometric: 0..65535 of AVDD, so a level of `code << 4` converts to `code`.
+ratiometric: 0..65535 of AVDD, so the 12-bit converter converts a level of `code << 4` to `code`.
+
+The 10-bit converter (FRM DS70064E §17) has four sample-and-hold amplifiers. With SIMSAM they sample together, and a
+sequence converts CH0, CH1 and so on. UNVERIFIED: without SIMSAM, a sequence samples and converts one channel after the
+other, each with its own sampling time; SMPI counts sequences of all channels.
 """
 
 from __future__ import annotations
@@ -39,12 +43,12 @@ _SETTINGS_CACHE_SIZE: Final = 64
 """Maximum number of decoded register settings in the cache; firmware uses only a few."""
 _RC_TAD_SECONDS: Final = 1.5e-6  # UNVERIFIED: 1.2 to 1.5 us (§13)
 
-_MANUAL, _INT0, _TIMER3, _AUTO = 0, 1, 2, 7
+_MANUAL, _INT0, _TIMER3, _PWM, _AUTO = 0, 1, 2, 3, 7
 """Values of SSRC, which selects what ends sampling (§13)."""
 
 
 class Adc(Peripheral):
-    """The ADC: one sample-and-hold amplifier after two input multiplexers."""
+    """The ADC: one or four sample-and-hold amplifiers, each after two input multiplexers."""
 
     def __init__(self, site: AdcSite, context: ChipContext, interrupts: Interrupts, timers: dict[int, Timer]) -> None:
         super().__init__("adc", context)
@@ -56,6 +60,7 @@ class Adc(Peripheral):
         self.pcfg: Final = self.register("ADPCFG")
         self.cssl: Final = self.register("ADCSSL")
         self.idle_bit = (self.con1, "ADSIDL")
+        self._has_amplifiers: Final = "CHPS" in context.chip.sfrs["ADCON2"].fields
         self._buffers: Final = [self.register(f"ADCBUF{index:X}") for index in range(16)]
         for register in (*self._buffers, self.con1, self.con2):
             register.computed(partial(self._read, register))
@@ -83,6 +88,10 @@ class Adc(Peripheral):
         """Start of the current state, in cycles; `half` adds half a Tcy."""
         self._half: Final = self.cell("half", "B")
         self._held: Final = self.cell("held", "H")
+        self._held_too: Final = self.array("held_too", "H", 3)
+        """Samples of CH1 to CH3, which wait for their conversion."""
+        self._turn: Final = self.cell("turn", "B")
+        """Number of channels of the current sequence that have been converted."""
         self._scan: Final = self.cell("scan", "B")
         self._use_b: Final = self.cell("use_b", "B")
         self._next: Final = self.cell("next", "B")
@@ -125,6 +134,7 @@ class Adc(Peripheral):
             done=done,
             buffer=self._buffers[0].cell,
             level=cell_of(record, "adc.input"),
+            shift=16 - self.site.bits,
             step=event_slot(record, self._step),
             native_source=self.source.native_source,
             line=self._line.line,
@@ -175,7 +185,21 @@ class Adc(Peripheral):
             in_halves=bool(con2["BUFM"]),
             form=self.con1["FORM"],
             references=con2["VCFG"],
+            bits=self.site.bits,
+            conversion_tad=self.site.conversion,
+            amplifiers=(1, 2, 4, 4)[con2["CHPS"]] if self._has_amplifiers else 1,
+            simultaneous=self._has_amplifiers and bool(self.con1["SIMSAM"]),
+            others=self._other_inputs() if self._has_amplifiers else ((), ()),
         )
+
+    def _other_inputs(self) -> tuple[tuple[tuple[int, int], ...], tuple[tuple[int, int], ...]]:
+        """Return (positive, negative) inputs of CH1 to CH3 of multiplexers A and B; -1 is the low reference (§17.8)."""
+        chosen = ((self.chs[f"CH123S{mux}"], self.chs[f"CH123N{mux}"]) for mux in "AB")
+        first, second = (
+            tuple((3 * high + index, {2: 6, 3: 9}.get(low, -1 - index) + index) for index in range(3))
+            for high, low in chosen
+        )
+        return first, second
 
     def _references(self, vcfg: int) -> tuple[int, int]:
         """Return the low and high reference level.
@@ -187,10 +211,31 @@ class Adc(Peripheral):
         return self._vref_low.value if vcfg & 2 else 0, self._vref_high.value if vcfg & 1 else FULL_SCALE
 
     def _sample(self, settings: ConversionSettings, channel: int, negative: int, cycle: int) -> int:
-        """Return the conversion result, 0..4095, for an input sampled at `cycle`."""
+        """Return the conversion result for an input sampled at `cycle`. `negative` is CH0N: 1 selects AN1."""
+        return self._difference(settings, channel, 1 if negative else -1, cycle)
+
+    def _difference(self, settings: ConversionSettings, channel: int, negative: int, cycle: int) -> int:
+        """Return the conversion result of two inputs; a negative input of -1 is the low reference."""
         low, high = self._references(settings.references)
-        zero = self.source.at(1, cycle) if negative else low
-        return min(max((self.source.at(channel, cycle) - zero) * 4096 // max(high - low, 1), 0), 4095)
+        zero = self.source.at(negative, cycle) if negative >= 0 else low
+        codes = 1 << settings.bits
+        return min(max((self.source.at(channel, cycle) - zero) * codes // max(high - low, 1), 0), codes - 1)
+
+    def _sample_channel(self, settings: ConversionSettings, cycle: int) -> int:
+        """Return the sample whose conversion starts: of CH0, or of the sequence's next channel without SIMSAM.
+
+        With SIMSAM, all other channels are sampled with CH0.
+        """
+        turn, use_b = self._turn.value, self._use_b.value
+        if turn and not settings.simultaneous:
+            return self._difference(settings, *settings.others[use_b][turn - 1], cycle)
+        channel, negative, self._scan.value, following = settings.next_input(self._scan.value, use_b)
+        if settings.simultaneous:
+            for index, inputs in enumerate(settings.others[use_b][: settings.amplifiers - 1]):
+                self._held_too[index] = self._difference(settings, *inputs, cycle)
+        if settings.amplifiers == 1:
+            self._use_b.value = following
+        return self._sample(settings, channel, negative, cycle)
 
     # -- time --------------------------------------------------------------------------------------------------------
 
@@ -208,10 +253,7 @@ class Adc(Peripheral):
         if state == CONVERTING:
             self.con1["DONE"] = 0
             settings = self._current_settings()
-            channel, negative, self._scan.value, self._use_b.value = settings.next_input(
-                self._scan.value, self._use_b.value
-            )
-            self._held.value = self._sample(settings, channel, negative, halves + 1 >> 1)
+            self._held.value = self._sample_channel(settings, halves + 1 >> 1)
 
     def catch_up(self, cycle: int) -> None:
         """Complete every conversion that ends at or before `cycle`, except the one that requests the interrupt.
@@ -232,6 +274,8 @@ class Adc(Peripheral):
         if state <= WAITING:
             return False
         settings = self._current_settings()
+        if settings.amplifiers > 1:
+            return self._end_state(settings, cycle)
         begun = 2 * self._mark.value + self._half.value
         interrupted, moved = False, False
         held, done = self._held.value, 0
@@ -259,11 +303,49 @@ class Adc(Peripheral):
             self._stands.value = FOREVER if duration == NEVER else begun + duration + 1 >> 1
         return interrupted
 
-    def _store(self, settings: ConversionSettings, code: int) -> bool:
-        """Store a result and advance the buffer pointer. Return True after each SMPI + 1 results."""
-        value = code - 2048 if settings.form & 1 else code
+    def _end_state(self, settings: ConversionSettings, cycle: int) -> bool:
+        """End the current state of a sequence of several channels, if it ends at or before `cycle`.
+
+        Each state of such a sequence has its own event. Return whether the interrupt is requested.
+        """
+        state = self._state.value
+        duration = self._duration(settings, state)
+        end = 2 * self._mark.value + self._half.value + duration
+        if duration == NEVER or end + 1 >> 1 > cycle:
+            return False
+        if state == SAMPLING:
+            self._enter(CONVERTING, end)
+            return False
+        turn = self._turn.value + 1
+        if turn < settings.amplifiers:
+            self._store(settings, self._held.value, ends_sequence=False)
+            self._turn.value = turn
+            if settings.simultaneous:
+                self._held.value = self._held_too[turn - 1]
+                self._mark.value, self._half.value = end >> 1, end & 1
+            else:
+                self._enter(SAMPLING, end)
+            return False
+        self._turn.value = 0
+        self._use_b.value = int(settings.alternates and not self._use_b.value)
+        interrupted = self._store(settings, self._held.value)
+        if interrupted:
+            self._scan.value = 0
+        self._enter(SAMPLING if settings.auto_sample else WAITING, end)
+        self.con1["DONE"] = 1
+        return interrupted
+
+    def _store(self, settings: ConversionSettings, code: int, ends_sequence: bool = True) -> bool:
+        """Store a result and advance the buffer pointer. Return True after each SMPI + 1 sequences.
+
+        A sequence is one conversion, or one of each channel (CHPS).
+        """
+        value = code - (1 << settings.bits - 1) if settings.form & 1 else code
         place = self._next.value
-        self._buffers[place].value = value << 4 if settings.form & 2 else value
+        self._buffers[place].value = value << 16 - settings.bits if settings.form & 2 else value
+        if not ends_sequence:
+            self._next.value = (place + 1) % 16
+            return False
         count = self._count.value + 1
         if count < settings.results:
             self._count.value = count
@@ -291,6 +373,9 @@ class Adc(Peripheral):
             end = 2 * (self.now + 1)
             self._mark.value, self._half.value = end - duration >> 1, end - duration & 1
         self._stands.value = end + 1 >> 1
+        if settings.amplifiers > 1:
+            self.events.set(self._step, end + 1 >> 1)
+            return
         if state == SAMPLING:
             end += settings.conversion
         if settings.auto_sample and settings.sampling != NEVER:
@@ -323,7 +408,7 @@ class Adc(Peripheral):
         if not new & adon:
             self._switch_off()
         elif not old & adon:
-            self._scan.value = self._use_b.value = self._next.value = self._count.value = 0
+            self._scan.value = self._use_b.value = self._next.value = self._count.value = self._turn.value = 0
             self.con2["BUFS"] = 0
             self._enter(SAMPLING if new & samp or self.con1["ASAM"] else WAITING, start)
         elif self._state.value == WAITING and (new & samp or self.con1["ASAM"]):
@@ -382,8 +467,13 @@ class Adc(Peripheral):
         if self._timers[2].is_wide:
             self._timer_matched(due)
 
+    def special_event(self, due: int) -> None:
+        """Handle the special event of the motor control PWM in cycle `due`: a trigger if SSRC selects it (§17.12)."""
+        if self.con1["SSRC"] == _PWM:
+            self._start_conversion(due)
+
     def _start_conversion(self, cycle: int) -> None:
-        """Handle a trigger (SSRC = 1, 2): end sampling and start the conversion."""
+        """Handle a trigger (SSRC = 1, 2, 3): end sampling and start the conversion."""
         if self._state.value == SAMPLING and not self.is_frozen:
             self._enter(CONVERTING, 2 * cycle)
             self._plan()

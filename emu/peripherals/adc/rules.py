@@ -1,4 +1,4 @@
-"""Rules of the 12-bit ADC (§13): reads of stable registers, ADON, ADCSSL and complete conversion sequences."""
+"""Rules of the ADC (§13): reads of stable registers, ADON, ADCSSL and complete conversion sequences."""
 
 from __future__ import annotations
 
@@ -67,6 +67,8 @@ class AdcOperands:
     """Cell of the scan sequence's first element."""
     level: Cell
     """Cell of the level of channel 0; the other channels' cells follow."""
+    shift: int
+    """Number of low bits of a level that the result does not have: 16 minus the resolution."""
     level_from: Cell
     """Cell of the first cycle in which `level` of channel 0 is valid; the other channels' cells follow."""
     native_source: Cell
@@ -147,8 +149,8 @@ def fire_round(m: RuleBuilder, p: AdcOperands) -> None:
         code, data = m.get(p.native_source, channel << 1), m.get(p.native_source, (channel << 1) + 1)
         (level,) = m.lazy_select(m.get(p.level_from, channel) > sampled,
                             lambda: (m.call(code, data, channel, sampled),), m.get(p.level, channel))  # fmt: skip
-        m.put(p.buffer, level >> 4, (following + turn) & (BUFFERS - 1))
-        return next_place(place), cycle + step, level >> 4
+        m.put(p.buffer, level >> p.shift, (following + turn) & (BUFFERS - 1))
+        return next_place(place), cycle + step, level >> p.shift
 
     m.loop(missing, is_known, scan, begun)
     _place, _cycle, held = m.loop(missing, convert, scan, begun, 0)

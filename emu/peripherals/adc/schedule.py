@@ -14,7 +14,6 @@ from emu.peripherals.base import Peripheral
 from emu.system.events import NEVER
 from emu.system.rules import Cell
 
-CONVERSION_TAD: Final = 14
 SHORTEST_SAMPLING: Final = 2
 """Minimum sampling time for native code, in half Tcy. A shorter one could put two conversions into one cycle."""
 FOREVER: Final = 1 << 62
@@ -46,11 +45,21 @@ class ConversionSettings:
     form: int
     references: int
     """Value of VCFG, which selects the references."""
+    bits: int = 12
+    """Resolution of the converter."""
+    conversion_tad: int = 14
+    """Duration of one conversion in TAD."""
+    amplifiers: int = 1
+    """Number of channels in a sequence: CH0, CH1 and so on."""
+    simultaneous: bool = False
+    """SIMSAM: whether all channels are sampled together."""
+    others: tuple[tuple[tuple[int, int], ...], tuple[tuple[int, int], ...]] = ((), ())
+    """Inputs (positive, negative or -1) of CH1 to CH3, of multiplexers A and B."""
 
     @property
     def conversion(self) -> int:
         """Duration of a conversion, from the end of sampling to the result."""
-        return CONVERSION_TAD * self.tad
+        return self.conversion_tad * self.tad
 
     @property
     def channels(self) -> tuple[int, ...]:
@@ -68,7 +77,7 @@ class ConversionSettings:
     @property
     def is_plain(self) -> bool:
         """Whether native code can complete conversions with these settings."""
-        special = self.alternates or self.form or self.references or self.inputs[0][1]
+        special = self.alternates or self.form or self.references or self.inputs[0][1] or self.amplifiers > 1
         return self.auto_sample and SHORTEST_SAMPLING <= self.sampling < NEVER and not special
 
 

@@ -95,6 +95,13 @@ class Port(Peripheral):
         self._own_level.value = self._own_level.value & ~mask | (mask if level else 0)
         self._drive(self.now)
 
+    def drive_now(self, mask: int, owned: int, levels: int, cycle: int) -> None:
+        """From `cycle` on, drive the pins in `owned` with `levels`, and return the others in `mask`."""
+        self._owned.value = self._owned.value & ~mask | owned
+        self._own_drive.value = self._own_drive.value & ~mask | owned
+        self._own_level.value = self._own_level.value & ~mask | levels & owned
+        self._drive(cycle)
+
     def disown(self, mask: int) -> None:
         """Return pins to LAT and TRIS from the next cycle on."""
         self._owned.value &= ~mask

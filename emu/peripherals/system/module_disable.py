@@ -10,6 +10,8 @@ from emu.system.bus import RegisterWiring
 
 _PREFIXES: Final = {
     "ADC": ("ADCBUF", "ADCON", "ADCHS", "ADCSSL"),
+    "PWM": ("PT", "SEVTCMP", "PWMCON", "DTCON", "FLT", "OVDCON", "PDC"),
+    "QEI": ("QEICON", "DFLTCON", "POSCNT", "MAXCNT"),
     "DCI": ("DCI", "TSCON", "RSCON", "RXBUF", "TXBUF"),
 }
 """Name prefixes of registers that do not begin with their module's name."""

@@ -1,0 +1,1 @@
+"""Devices for motors: motor control PWM and quadrature encoder interface."""
