@@ -30,18 +30,23 @@ def run_make(folder: Path, *words: str) -> None:
     assert done.returncode == 0, done.stdout + done.stderr
 
 
-def built_once(factory: pytest.TempPathFactory, app: str, *words: str) -> Path:
-    """Build an application for the e-puck once for all worker processes of a test run."""
+def make_once(factory: pytest.TempPathFactory, name: str, product: str, folder: Path, *words: str) -> Path:
+    """Run `make` once for all worker processes of a test run, with `OUT` set, and return its product in that folder."""
     run = factory.getbasetemp()
     if "PYTEST_XDIST_WORKER" in os.environ:
         run = run.parent  # a worker's folder is inside the run's folder
-    out = run / f"{app}-{hashlib.sha256(repr(words).encode()).hexdigest()[:16]}"
-    image = out / "firmware.elf"
+    out = run / f"{name}-{hashlib.sha256(repr(words).encode()).hexdigest()[:16]}"
     with out.with_suffix(".lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
-        if not image.exists():
-            run_make(FIRMWARE, f"APP={app}", f"OUT={out}", f"PYTHON={sys.executable}", *words)
-    return image
+        if not (out / product).exists():
+            run_make(folder, f"OUT={out}", *words)
+    return out / product
+
+
+def built_once(factory: pytest.TempPathFactory, app: str, *words: str) -> Path:
+    """Build an application for the e-puck once for all worker processes of a test run."""
+    words = (f"APP={app}", f"PYTHON={sys.executable}", *words)
+    return make_once(factory, app, "firmware.elf", FIRMWARE, *words)
 
 
 @pytest.fixture(scope="session")
@@ -60,6 +65,4 @@ def host_program(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Build the kernel's host tests for the POSIX port with sanitizers."""
     if shutil.which("gcc") is None:
         pytest.skip("the host tests of the kernel are built with gcc, which is not installed (Debian package gcc)")
-    out = tmp_path_factory.mktemp("host")
-    run_make(Path(__file__).parent / "host", "-j2", f"OUT={out}")
-    return out / "kernel_tests"
+    return make_once(tmp_path_factory, "host", "kernel_tests", Path(__file__).parent / "host", "-j2")

@@ -149,23 +149,6 @@ TEST(mutexes_refuse_what_they_cannot_do, "openswarm_mutex.h: errors, ceilings of
     CHECK_EQ(Sys_Get_LastError(), SYS_ERROR_ARGUMENT);
 }
 
-TEST(the_mutex_of_a_killed_owner_passes_on_and_a_killed_waiter_is_removed, "openswarm_mutex.h: its owner ends")
-{
-    boot_below(&sys_fixed_priority);
-    uint16 empty = heap_now();
-    uint16 owner = start(take_turn, "a", 1);
-    Sys_Sleep(1);
-    uint16 waiter = start(take_turn, "b", 2);
-    start(take_turn, "c", 1);
-    Sys_Sleep(1);
-    CHECK(Sys_Kill_Process(waiter));
-    CHECK(Sys_Kill_Process(owner));
-    Sys_Sleep(10);
-    CHECK(strcmp(trace, "ac") == 0);
-    CHECK(mutex.owner == NULL && mutex.waiters == NULL);
-    CHECK_EQ(heap_now(), empty);
-}
-
 static void keep_result_and_lock(void *unused)
 {
     (void)unused;
@@ -254,28 +237,6 @@ TEST(the_newest_value_wins, "openswarm_quota.h: Sys_Keep_Latest")
     CHECK_EQ(Sys_Get_LastError(), SYS_ERROR_EVENT);
 }
 
-TEST(a_quota_bounds_what_waits, "openswarm_quota.h: Sys_Limit_Event")
-{
-    static sys_quota three;
-    boot();
-    Sys_Register_Event(E1);
-    CHECK(Sys_Limit_Event(&three, E1, 3));
-    CHECK(!Sys_Limit_Event(&three, E1, 0));
-    Sys_Subscribe_to_Event(E1, 0, count_delivery, NULL);
-    uint16 before = heap_now();
-    for (int i = 0; i < 10; i++) {
-        CHECK(Sys_Send_IntEvent(E1, 1));
-    }
-    CHECK_EQ(three.dropped, 7);
-    CHECK_EQ(heap_now() - before, 3 * (sizeof(message) + HEAP_STEP));
-    Sys_Yield();
-    CHECK_EQ(deliveries, 3);
-    CHECK_EQ(heap_now(), before);
-    CHECK(Sys_Send_IntEvent(E1, 1));
-    Sys_Yield();
-    CHECK_EQ(deliveries, 4);
-}
-
 /* ---- Join and zombies ------------------------------------------------------------------------------------ */
 
 static void ends_in_3_ms(void *unused)
@@ -332,44 +293,6 @@ TEST(join_waits_for_any_thread, "openswarm_join.h: Sys_Join")
     CHECK_EQ(heap_now(), empty);
 }
 
-/* ---- Cleanup --------------------------------------------------------------------------------------------- */
-
-static void say(void *c)
-{
-    note(*(const char *)c);
-}
-
-static void cleans_up(void *unused)
-{
-    (void)unused;
-    sys_cleanup first, second, third;
-    CHECK(!Sys_Pop_Cleanup(true));
-    CHECK(Sys_Push_Cleanup(&first, say, "1") && Sys_Push_Cleanup(&second, say, "2"));
-    CHECK(Sys_Push_Cleanup(&third, say, "3") && Sys_Pop_Cleanup(true));
-    Sys_Sleep(100);
-}
-
-static void leaves_it_to_the_end(void *unused)
-{
-    static sys_cleanup only; /* static: the stack of the thread no longer exists after it has ended */
-    (void)unused;
-    CHECK(Sys_Push_Cleanup(&only, say, "e"));
-}
-
-TEST(cleanups_run_whatever_ends_the_thread, "openswarm_cleanup.h: newest first, once")
-{
-    boot();
-    uint16 killed = start(cleans_up, NULL, 0);
-    Sys_Yield();
-    start(leaves_it_to_the_end, NULL, 0);
-    Sys_Yield();
-    CHECK(strcmp(trace, "3e") == 0);
-    CHECK(Sys_Kill_Process(killed));
-    CHECK(strcmp(trace, "3e21") == 0);
-    Sys_Sleep(150);
-    CHECK(strcmp(trace, "3e21") == 0);
-}
-
 /* ---- Services -------------------------------------------------------------------------------------------- */
 
 static uint16 starts, feedings;
@@ -385,12 +308,6 @@ static void hangs_after_three(void *unused)
     for (;;) {
         Sys_Sleep(1000);
     }
-}
-
-static void counts_and_ends(void *unused)
-{
-    (void)unused;
-    note('s');
 }
 
 TEST(a_service_that_hangs_is_restarted, "openswarm_service.h: limit_ms, restarts")
@@ -411,102 +328,4 @@ TEST(a_service_that_hangs_is_restarted, "openswarm_service.h: limit_ms, restarts
     CHECK_EQ(feedings, 9);
     CHECK_EQ(service.bitten, 3);
     CHECK_EQ(service.pid, 0);
-}
-
-TEST(a_service_that_ends_is_restarted_up_to_its_limit, "openswarm_service.h: restarts")
-{
-    static const sys_process_config config = {counts_and_ends, NULL, 0, 0, 0, 0, 0};
-    static sys_service few = {.config = &config, .restarts = 3};
-    boot();
-    CHECK(Sys_Start_Service(&few));
-    Sys_Sleep(50);
-    CHECK(strcmp(trace, "ssss") == 0);
-    CHECK_EQ(few.bitten, 0);
-}
-
-static void fills_the_heap_and_hangs(void *unused)
-{
-    (void)unused;
-    starts++;
-    for (uint16 id = 0x100; Sys_Register_Event(id); id++) {
-    }
-    for (;;) {
-        work(10);
-        host_slice();
-    }
-}
-
-TEST(the_watchdog_needs_no_heap, "openswarm_service.h: a service that takes all memory")
-{
-    static const sys_process_config config = {fills_the_heap_and_hangs, NULL, 0, 0, 0, 0, 0};
-    static sys_service service = {.config = &config, .limit_ms = 20, .restarts = 2};
-    boot();
-    CHECK(Sys_Start_Service(&service));
-    Sys_Sleep(500);
-    CHECK_EQ(service.bitten, 3);
-    CHECK_EQ(starts, 3);
-    CHECK_EQ(service.pid, 0);
-}
-
-TEST(a_service_reports_its_wrong_configuration, "openswarm_service.h: errors of Sys_Start_ProcessWith")
-{
-    static const sys_process_config config = {counts_and_ends, NULL, 10, 0, 0, 0, 0};
-    static sys_service service = {.config = &config, .restarts = 1};
-    boot();
-    CHECK(!Sys_Start_Service(&service));
-    CHECK_EQ(Sys_Get_LastError(), SYS_ERROR_ARGUMENT);
-}
-
-static uint16 ring[3];
-static void joins_the_next(void *next)
-{
-    Sys_Sleep(2);
-    bool joined = Sys_Join(*(const uint16 *)next);
-    note(joined ? 'j' : Sys_Get_LastError() == SYS_ERROR_PROCESS ? 'r' : '?');
-}
-
-TEST(threads_that_join_in_a_ring_are_refused, "openswarm_join.h: joins the caller, directly or through others")
-{
-    boot();
-    for (int i = 0; i < 3; i++) {
-        ring[i] = start(joins_the_next, &ring[(i + 1) % 3], 0);
-    }
-    Sys_Sleep(100);
-    CHECK(strcmp(trace, "rjj") == 0);
-}
-
-static sys_quota four;
-static uint16 most_waiting, taken;
-
-static void send_twenty(void)
-{
-    for (int i = 0; i < 20; i++) {
-        uint16 dropped = four.dropped;
-        CHECK(Sys_Send_IntEvent(E1, 1));
-        taken = (uint16)(taken + (four.dropped == dropped));
-    }
-    if (taken - deliveries > most_waiting) {
-        most_waiting = (uint16)(taken - deliveries);
-    }
-}
-
-static bool send_in_handler(uint16 pid, uint16 id, sys_event_data *data)
-{
-    (void)pid, (void)id, (void)data;
-    send_twenty();
-    return true;
-}
-
-TEST(a_quota_counts_the_messages_of_the_current_delivery, "openswarm_quota.h: Sys_Limit_Event")
-{
-    boot();
-    CHECK(Sys_Register_Event(E1) && Sys_Register_Event(E2) && Sys_Limit_Event(&four, E1, 4));
-    CHECK(Sys_Subscribe_to_Event(E2, 0, send_in_handler, NULL) && Sys_Subscribe_to_Event(E1, 0, count_delivery, NULL));
-    Sys_Start_CriticalSection();
-    CHECK(Sys_Send_IntEvent(E2, 0));
-    send_twenty();
-    Sys_End_CriticalSection();
-    Sys_Sleep(20);
-    CHECK_EQ(most_waiting, 4);
-    CHECK_EQ(deliveries, taken);
 }

@@ -3,13 +3,11 @@
 #include "test.h"
 
 #include "openswarm_cleanup.h"
-#include "openswarm_join.h"
 #include "openswarm_mutex.h"
 
 static sys_mutex mutex = SYS_MUTEX(0);
 static sys_cleanup of_thread[4];
 static uint16 pids[4];
-static uint16 seen_pid;
 
 static uint16 start(void (*entry)(void *), const void *arg)
 {
@@ -33,116 +31,6 @@ static void note_end(void *letter)
 static void kill(void *pid)
 {
     note(Sys_Kill_Process(*(const uint16 *)pid) ? 'k' : 'f');
-}
-
-static void kill_then_join(void *unused)
-{
-    (void)unused;
-    CHECK(Sys_Push_Cleanup(&of_thread[0], kill, &pids[1]));
-    (void)Sys_Join(pids[1]);
-}
-
-TEST(a_cleanup_may_kill_the_thread_that_its_thread_joins, "openswarm_cleanup.h: the order of the teardown")
-{
-    boot();
-    uint16 empty = heap_now();
-    pids[1] = start(sleep_for_ever, NULL);
-    uint16 parent = start(kill_then_join, NULL);
-    Sys_Sleep(20);
-    CHECK(Sys_Kill_Process(parent));
-    CHECK(strcmp(trace, "k") == 0);
-    CHECK_EQ(Sys_Get_ProcessState(pids[1]), SYS_UNKNOWN);
-    CHECK_EQ(Sys_Get_ProcessState(parent), SYS_UNKNOWN);
-    CHECK(lists_are_well_formed());
-    Sys_Sleep(20);
-    CHECK_EQ(heap_now(), empty);
-}
-
-static void own_mutex(void *unused)
-{
-    CHECK(Sys_Lock_Mutex(&mutex));
-    sleep_for_ever(unused);
-}
-
-static void kill_then_lock(void *unused)
-{
-    (void)unused;
-    CHECK(Sys_Push_Cleanup(&of_thread[0], kill, &pids[1]));
-    (void)Sys_Lock_Mutex(&mutex);
-}
-
-TEST(a_cleanup_may_kill_the_owner_of_the_mutex_that_its_thread_awaits, "openswarm_cleanup.h: the order of the teardown")
-{
-    boot();
-    uint16 empty = heap_now();
-    pids[1] = start(own_mutex, NULL);
-    Sys_Sleep(5);
-    uint16 waiter = start(kill_then_lock, NULL);
-    Sys_Sleep(20);
-    CHECK(Sys_Kill_Process(waiter));
-    CHECK(mutex.owner == NULL && mutex.waiters == NULL);
-    CHECK(lists_are_well_formed());
-    Sys_Sleep(20);
-    CHECK_EQ(heap_now(), empty);
-}
-
-static void unlock_mutex(void *unused)
-{
-    (void)unused;
-    seen_pid = Sys_Get_ProcessID();
-    note(Sys_Unlock_Mutex(&mutex) ? 'u' : 'f');
-}
-
-static void lock_with_cleanup(void *unused)
-{
-    CHECK(Sys_Push_Cleanup(&of_thread[0], unlock_mutex, NULL));
-    CHECK(Sys_Lock_Mutex(&mutex));
-    sleep_for_ever(unused);
-}
-
-TEST(a_cleanup_acts_as_the_ending_thread, "openswarm_cleanup.h: Sys_Get_ProcessID")
-{
-    boot();
-    CHECK(Sys_Lock_Mutex(&mutex));
-    uint16 victim = start(lock_with_cleanup, NULL);
-    Sys_Sleep(20);
-    CHECK(Sys_Kill_Process(victim));
-    CHECK(strcmp(trace, "f") == 0);
-    CHECK_EQ(seen_pid, victim);
-    CHECK_EQ(Sys_Get_ProcessID(), 0);
-    CHECK(Sys_Unlock_Mutex(&mutex));
-}
-
-static void push_and_pop(void *unused)
-{
-    (void)unused;
-    note(Sys_Push_Cleanup(&of_thread[3], note_end, "i") ? '+' : 'f');
-    note(Sys_Pop_Cleanup(true) ? '-' : 'f');
-}
-
-static void push_hostile(void *unused)
-{
-    CHECK(Sys_Push_Cleanup(&of_thread[0], push_and_pop, NULL));
-    sleep_for_ever(unused);
-}
-
-static void push_then_kill(void *unused)
-{
-    CHECK(Sys_Push_Cleanup(&of_thread[1], note_end, "o"));
-    CHECK(Sys_Kill_Process(pids[0]));
-    note('|');
-    CHECK(Sys_Pop_Cleanup(true));
-    sleep_for_ever(unused);
-}
-
-TEST(a_cleanup_does_not_pop_the_killers, "openswarm_cleanup.h: allowed calls")
-{
-    boot();
-    pids[0] = start(push_hostile, NULL);
-    Sys_Sleep(5);
-    CHECK(start(push_then_kill, NULL) != 0);
-    Sys_Sleep(20);
-    CHECK(strcmp(trace, "ff|o") == 0);
 }
 
 static void look_at_mutex(void *unused)
@@ -209,34 +97,10 @@ TEST(threads_whose_cleanups_kill_each_other_end_once, "openswarm_cleanup.h: ends
     CHECK_EQ(heap_now(), empty);
 }
 
-static void kill_first(void *unused)
-{
-    CHECK(Sys_Push_Cleanup(&of_thread[3], note_end, "e"));
-    note(Sys_Kill_Process(pids[0]) ? '?' : '!'); /* does not return: the cleanup ends this thread */
-    sleep_for_ever(unused);
-}
-
 static void kill_killer(void *unused)
 {
     CHECK(Sys_Push_Cleanup(&of_thread[0], note_end, "l") && Sys_Push_Cleanup(&of_thread[1], kill, &pids[3]));
     sleep_for_ever(unused);
-}
-
-TEST(a_cleanup_may_kill_the_killer, "openswarm_cleanup.h: the thread on whose stack it runs")
-{
-    boot();
-    uint16 empty = heap_now();
-    pids[0] = start(kill_killer, NULL);
-    Sys_Sleep(5);
-    pids[3] = start(kill_first, NULL);
-    Sys_Sleep(20);
-    CHECK(strcmp(trace, "kle") == 0);
-    CHECK_EQ(Sys_Get_ProcessState(pids[0]), SYS_UNKNOWN);
-    CHECK_EQ(Sys_Get_ProcessState(pids[3]), SYS_UNKNOWN);
-    CHECK(lists_are_well_formed());
-    CHECK_EQ(heap_now(), empty);
-    sys_cleanup later;
-    CHECK(Sys_Push_Cleanup(&later, note_end, "p") && Sys_Pop_Cleanup(false));
 }
 
 static bool kill_in_handler(uint16 pid, uint16 id, sys_event_data *data)

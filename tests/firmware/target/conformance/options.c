@@ -585,7 +585,7 @@ static void services_are_restarted(void)
     CHECK(storm.pid == 0 && good.pid == 0 && heap_now() <= heap);
 }
 
-static uint16 partners[2];
+static uint16 partners[3];
 
 static void join_partner(void *pid)
 {
@@ -593,13 +593,14 @@ static void join_partner(void *pid)
     note(Sys_Join(*(const uint16 *)pid) ? 'j' : Sys_Get_LastError() == SYS_ERROR_PROCESS ? 'r' : '?');
 }
 
-static void threads_do_not_join_each_other(void)
+static void threads_do_not_join_in_a_ring(void)
 {
     forget();
-    partners[0] = start(join_partner, &partners[1], 0);
-    partners[1] = start(join_partner, &partners[0], 0);
+    for (uint8 i = 0; i < 3; i++) {
+        partners[i] = start(join_partner, &partners[(i + 1) % 3], 0);
+    }
     Sys_Sleep(50);
-    CHECK(noted("rj"));
+    CHECK(noted("rjj"));
 }
 
 static void a_service_reports_its_wrong_configuration(void)
@@ -649,7 +650,7 @@ void check_options(void)
     quotas_come_and_go();
     a_handler_ends_its_limited_event();
     a_quota_counts_the_current_delivery();
-    threads_do_not_join_each_other();
+    threads_do_not_join_in_a_ring();
     a_service_reports_its_wrong_configuration();
     a_service_that_takes_all_memory_is_restarted();
     services_are_restarted();
