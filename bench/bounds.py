@@ -25,11 +25,9 @@ sys.path.insert(0, str(ROOT))
 
 import emu  # noqa: E402
 from bench.structures import Structures  # noqa: E402
-from toolchain.bounds.annotations.reader import read_annotation_section  # noqa: E402
 from toolchain.bounds.program import Program  # noqa: E402
 from toolchain.bounds.report import BoundAnalysis  # noqa: E402
 from toolchain.elf.read import read_executable  # noqa: E402
-from toolchain.stack.annotations import Annotations, add_symbols  # noqa: E402
 
 APART = ("refuse_message", "os_fail", "os_refuse")
 """Functions that are called only on paths excluded from the column "plain"."""
@@ -217,9 +215,7 @@ def _extent(program: Program, name: str) -> range:
 def rows_of(app: str, path: Path, values: dict[str, int], seconds: float) -> list[Row]:
     """Return the rows of all kernel calls in one image."""
     image = read_executable(path.read_bytes(), str(path))
-    annotations = Annotations()
-    add_symbols(annotations, image.symbols)
-    bare = Program(image, annotations, read_annotation_section(image, values))
+    bare = Program(image, values)
     names = [*bare.default_functions("_Sys_"), *(name for name in ALSO if bare.address(name) in bare.calls.entries)]
     meter = measure(path, bare, names, seconds)
     seen = meter.worst
@@ -227,7 +223,7 @@ def rows_of(app: str, path: Path, values: dict[str, int], seconds: float) -> lis
     itself = [name for name in there if name == ITSELF]
 
     def bound(name: str, limits: dict[str, int], left_out: list[str]) -> int | None:
-        program = Program(image, annotations, read_annotation_section(image, values | limits), left_out)
+        program = Program(image, values | limits, left_out)
         at = program.address(name)
         assert at is not None
         return BoundAnalysis(program).bound(name, at, "call").cycles

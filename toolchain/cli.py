@@ -26,7 +26,6 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "hex": ("toolchain.commands.hex", "convert an ELF executable to Intel HEX"),
     "bounds": ("toolchain.commands.bounds", "worst-case time, stack and interrupt response"),
     "prove": ("toolchain.commands.prove", "prove that machine code does what the IR says"),
-    "stack": ("toolchain.commands.stack", "worst-case stack use from the call graph"),
     "completion": ("toolchain.commands.completion", "print a completion script for the shell"),
 }
 

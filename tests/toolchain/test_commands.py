@@ -118,7 +118,7 @@ def test_libraries(files, capsys):
         (["objdump", "-d", "--start", "zz", "undefined.o"], "no symbol is called zz"),
         (["ar", "p", "x.a"], "expected one of"),
         (["ar", "t", "x.a"], "no such archive"),
-        (["stack", "undefined.o"], "not an executable"),
+        (["bounds", "undefined.o"], "not an executable"),
         (["frobnicate"], "unknown command 'frobnicate'"),
     ],
 )

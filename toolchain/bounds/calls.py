@@ -8,7 +8,14 @@ from typing import Final
 from emu.dspic30f.isa.flow import Branch, Skip
 from toolchain.bounds.abstract.state import INHERITED, NO_ADDRESS, AbstractState
 from toolchain.bounds.abstract.values import Value, extremes
-from toolchain.bounds.annotations.flow_facts import CALLS_TOO_DEEP, JUMP_PAST_TABLE, JUMP_WITHOUT_TABLE, UNKNOWN_RETURN
+from toolchain.bounds.annotations.flow_facts import (
+    CALLS_TOO_DEEP,
+    JUMP_PAST_TABLE,
+    JUMP_WITHOUT_TABLE,
+    NOT_ANALYSED,
+    UNBALANCED_RETURN,
+    UNKNOWN_RETURN,
+)
 from toolchain.bounds.graph import BasicBlock, Instruction
 from toolchain.bounds.result import FunctionResult
 from toolchain.bounds.steps import InstructionExecution
@@ -19,6 +26,8 @@ MAX_CALL_DEPTH: Final = 8 * MAX_RECURSION
 """Greatest depth of the abstract call stack."""
 RESULTS: Final = frozenset((0, 1))
 """Values of W0 (0 and 1) at a return for which separate return states are kept."""
+RETURN_TARGET: Final = "return target"
+"""Key of the popped return address in the registers of a return state."""
 MAX_TEST_BLOCK: Final = 6
 """Greatest number of instructions of a block that tests such a result after a call."""
 
@@ -89,8 +98,11 @@ class CallExecution(InstructionExecution):
                 state.w[15] = state.w[15] - 4 & 0xFFFF
                 self._arrive(last.after, state)
             return
+        if target in explorer.flow_facts.stack_depths:
+            self._pass_over(last, state, explorer.flow_facts.stack_depths[target], tail)
+            return
         depth = explorer.call_stack.count(target)
-        allowed = explorer.flow_facts.recursion_depth(target)
+        allowed = explorer.flow_facts.recursion_depths.get(target)
         if len(explorer.call_stack) > MAX_CALL_DEPTH:
             self.result.unbounded[last.pc] = CALLS_TOO_DEEP
             return
@@ -125,9 +137,15 @@ class CallExecution(InstructionExecution):
             self.result.exclude_iteration(*share, cycles)
             for end in ends:
                 end.shift(-cycles)
-        for end in ends:  # the callee preserves W8-W14 (abi-elf.md §2.1)
+        changed = explorer.preserved.changed_by(target)
+        for end in ends:
             if not tail and level is None:
-                end.w[8:15] = before.w[8:15]
+                target_of_return = end.regs.pop(RETURN_TARGET, None)
+                if end.w[15] != stack - 4 and not (is_constant(target_of_return) and target_of_return == last.after):
+                    self.result.unbounded[last.pc] = UNBALANCED_RETURN
+                for number in range(8, 15):
+                    if number not in changed:  # abi-elf.md §2.1
+                        end.w[number] = before.w[number]
             end.shift(start)
             end.waits |= waits
             end.masked_since = [since[k] if s == INHERITED else s for k, s in enumerate(end.masked_since)]
@@ -139,14 +157,37 @@ class CallExecution(InstructionExecution):
             else:
                 self._arrive(last.after, end)
 
+    def _pass_over(self, last: Instruction, state: AbstractState, depth: int, tail: bool) -> None:
+        """Continue after a call of a function that is not analysed and uses `depth` bytes of stack."""
+        self.result.unbounded[last.pc] = NOT_ANALYSED
+        top = state.w[15]
+        if not is_constant(top):
+            self._record_stack_switch(state)
+            return
+        state.w[15] = top + depth
+        self._record_stack_depth(state)
+        state.w[15] = top - 4 & 0xFFFF
+        self.result.unknown_store = True
+        if min(state.lowest_leak, *map(self._leak, state.w[:8])) < NO_ADDRESS:
+            state.mem = {}
+        self._forget_registers(state)
+        if tail:
+            self._record_return(state)
+        else:
+            self._arrive(last.after, state)
+
+    def _leak(self, value: Value) -> int:
+        """Return the lowest stack address that a value shows to a callee, NO_ADDRESS for none."""
+        return extremes(value)[0] if self.area.points_into(value) else NO_ADDRESS
+
     def _after_general_call(self, before: AbstractState, end: AbstractState, found: FunctionResult) -> AbstractState:
         """Return the caller's state after a call that was analysed in the general context."""
         private = self.explorer.model.tracked_words
         new = end.copy()
-        new.w = [*end.w[:15], before.w[15] - 4 & 0xFFFF]
+        new.w = [*end.w[:15], end.w[15] + before.w[15] - self.explorer.general_top(before.w[15]) & 0xFFFF]
         kept = {a: v for a, v in before.mem.items() if (a if a >= 0 else ~a) & ~1 not in private}
         handed = [*before.w[:8], *(before.mem.values() if found.reads_caller_stack else ())]
-        shown = min((extremes(value)[0] for value in handed if self.area.points_into(value)), default=NO_ADDRESS)
+        shown = min(map(self._leak, handed))
         if found.unknown_store and min(before.lowest_leak, shown) < NO_ADDRESS:
             kept = {}
         new.mem = kept | {a: v for a, v in end.mem.items() if (a if a >= 0 else ~a) & ~1 in private}
@@ -185,6 +226,7 @@ class CallExecution(InstructionExecution):
             state.ipl, state.disi_end = (0, 0), 0  # masking ends for this stack, independent of the new priority
             self._update_masking(state, self.code.entry)
             return
+        state.regs[RETURN_TARGET] = target
         self._record_return(state)
 
     def _record_return(self, state: AbstractState) -> None:

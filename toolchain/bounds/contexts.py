@@ -13,6 +13,7 @@ from toolchain.bounds.abstract.state import INHERITED, NO_ADDRESS, AbstractState
 from toolchain.bounds.abstract.values import RAM_POINTER, WORD, Value, extremes, interval, is_ram_address
 from toolchain.bounds.annotations.flow_facts import FlowFacts
 from toolchain.bounds.graph import FunctionGraph, GraphBuilder, Loop, merge_loops
+from toolchain.bounds.preserved import PreservedRegisters
 from toolchain.bounds.result import FunctionResult, Scope
 from toolchain.bounds.transfer import ImageModel, TransferFunctions, is_constant
 
@@ -26,15 +27,25 @@ FIRST_RAM_ADDRESS: Final = SFR_END
 """First RAM address; smaller values are taken as numbers."""
 
 
+class AnalysisCache:
+    """Results that all analysed entries of one image share."""
+
+    def __init__(self, graph: GraphBuilder) -> None:
+        self.graph: Final = graph
+        self.preserved: Final = PreservedRegisters(graph)
+        self.codes: Final[dict[int, FunctionGraph]] = {}
+        self.results: Final[dict[object, FunctionResult]] = {}
+        """By function, calling context and whether iterations are shared."""
+
+
 class CallContexts(ABC):
     """Results of the functions of one image by calling context; `execute` is the analysis of one function."""
 
-    def __init__(self, model: ImageModel, graph: GraphBuilder, flow_facts: FlowFacts, sharing: bool = False) -> None:
+    def __init__(self, model: ImageModel, cache: AnalysisCache, flow_facts: FlowFacts, sharing: bool = False) -> None:
         """Prepare the analysis; `sharing`: results list iterations that loops share in `shared_iterations`."""
-        self.model, self.graph, self.flow_facts, self.sharing = model, graph, flow_facts, sharing
+        self.model, self.graph, self.flow_facts, self.sharing = model, cache.graph, flow_facts, sharing
         self.transfer: Final = TransferFunctions(model)
-        self.codes: Final[dict[int, FunctionGraph]] = {}
-        self.results: Final[dict[object, FunctionResult]] = {}
+        self.preserved, self.codes, self.results = cache.preserved, cache.codes, cache.results
         self.nonterminating: Final[set[int]] = set()
         """Heads of loops that did not terminate in an earlier execution."""
         self.truncated: Final[set[int]] = set()
@@ -78,9 +89,13 @@ class CallContexts(ABC):
         return found
 
     def _key(self, entry: int, state: AbstractState) -> object:
-        """Return the memoisation key of a context; with shared iterations, it includes the enclosing scopes."""
+        """Return the memoisation key of a context.
+
+        With shared iterations it includes the enclosing scopes, with annotated recursions the active ones.
+        """
         around = [one for one in self.call_stack if one in self.flow_facts.sharing_scopes] if self.sharing else []
-        return entry, tuple(dict.fromkeys(around)), state.key()
+        active = [one for one in self.call_stack if one in self.flow_facts.recursion_depths]
+        return entry, self.sharing, tuple(dict.fromkeys(around)), tuple(active), state.key()
 
     def sharing_scope(self, code: FunctionGraph, loop: Loop, total: int | None) -> tuple[Scope, int] | None:
         """Return the scope (active call or whole analysis) in which a loop shares iterations, and their number."""
@@ -118,12 +133,12 @@ class CallContexts(ABC):
             or (not one_of_many and self.context_counts[entry] < (MAX_EXPOSED_CONTEXTS if exposed else MAX_CONTEXTS))
         ):
             return self.run(entry, state), False
-        stack = next((i for i, (lo, hi) in enumerate(self.model.stack_areas.ranges) if lo <= state.w[15] < hi), None)
+        stack = self.model.stack_areas.index(state.w[15])
         if stack is None:
             return self.run(entry, state), False
         general = AbstractState()
         general.w[:8] = map(generalised_argument, state.w[:8])
-        general.w[15] = self.model.stack_areas.ranges[stack][0] + CALLER_FRAME_BYTES
+        general.w[15] = self.general_top(state.w[15])
         general.ipl, general.stall = state.ipl, state.stall
         general.masked_since, general.do_loops = state.masked_since.copy(), state.do_loops
         general.disi_end, general.time = state.disi_end, state.time
@@ -131,7 +146,13 @@ class CallContexts(ABC):
         found = self.run(entry, general)
         if found.unbounded and self.bounded_counts[entry]:
             return self.run(entry, state), False
-        return found.relocated(stack, state.w[15] - self.model.stack_areas.ranges[stack][0] - CALLER_FRAME_BYTES), True
+        return found.relocated(stack, state.w[15] - self.general_top(state.w[15])), True
+
+    def general_top(self, top: int) -> int:
+        """Return W15 at the entry of the general context on the stack that contains `top`."""
+        stack = self.model.stack_areas.index(top)
+        assert stack is not None
+        return self.model.stack_areas.ranges[stack][0] + CALLER_FRAME_BYTES
 
 
 def generalised_argument(value: Value) -> Value:

@@ -11,14 +11,16 @@ from __future__ import annotations
 from typing import Final
 
 from emu.dspic30f.isa.flow import Branch, Call, Flow, Goto, Reset, Return, Skip
+from toolchain.abi.target import RETURN_ADDRESS_BYTES
 from toolchain.bounds.abstract.conditions import FlagResult, refine
 from toolchain.bounds.abstract.state import AbstractState, widen
-from toolchain.bounds.abstract.values import extremes, interval
+from toolchain.bounds.abstract.values import extremes, interval, key_of
 from toolchain.bounds.annotations.flow_facts import (
     DO_LOOP_ENDS_WITH_JUMP,
     IRREGULAR_DO_LOOP,
     LONG_LOOP,
     MERGED_LOOPS,
+    STACK_GROWS,
     UNBOUNDED_LOOP,
 )
 from toolchain.bounds.calls import CallExecution
@@ -26,11 +28,12 @@ from toolchain.bounds.contexts import CallContexts
 from toolchain.bounds.graph import BasicBlock, FunctionGraph, Instruction, Loop, OrderElement
 from toolchain.bounds.result import FunctionResult, Scope
 from toolchain.bounds.transfer import is_constant
-from toolchain.stack.effects import CALL_BYTES
 
 MAX_ITERATIONS: Final = 5_000
 NONTERMINATING_ITERATIONS: Final = 6
 """Maximum number of iterations executed of a loop that did not terminate in an earlier execution."""
+MAX_PUSHES: Final = 64
+"""Maximum number of iterations of a loop that changes W15."""
 MAX_STEPS: Final = 60_000
 MAX_RETURN_BLOCK: Final = 12
 """Greatest number of instructions of a returning block that is executed once per incoming path."""
@@ -58,7 +61,7 @@ class _FunctionExecution(CallExecution):
 
     def run(self, state: AbstractState) -> FunctionResult:
         self._record_stack_depth(state)
-        self.floor = max(0, state.w[15] - CALL_BYTES) if is_constant(state.w[15]) else 0
+        self.floor = max(0, state.w[15] - RETURN_ADDRESS_BYTES) if is_constant(state.w[15]) else 0
         for lost in self.code.missing_instructions:
             self.result.unbounded[lost] = "no instruction is here"
         if self.code.entry in self.code.blocks:
@@ -120,7 +123,10 @@ class _FunctionExecution(CallExecution):
             if now and before:
                 if bound is not None and iterations > bound:
                     break
-                if iterations > limit:
+                if iterations > min(limit, MAX_PUSHES) and self._stack_grows(loop, before, now):
+                    explorer.nonterminating.add(loop.head)
+                    self._widen(before, now)
+                elif iterations > limit:
                     if limit == MAX_ITERATIONS:
                         explorer.truncated.add(loop.head)
                     explorer.nonterminating.add(loop.head)
@@ -162,13 +168,18 @@ class _FunctionExecution(CallExecution):
             return None, None
         return min(bounds, default=None), shared
 
+    def _stack_grows(self, loop: Loop, before: dict[int, AbstractState], now: dict[int, AbstractState]) -> bool:
+        """Record whether the last iteration has changed W15."""
+        for head in before.keys() & now.keys():
+            if key_of(before[head].w[15]) != key_of(now[head].w[15]):
+                self.result.unbounded[loop.head] = STACK_GROWS
+                return True
+        return False
+
     def _widen(self, before: dict[int, AbstractState], now: dict[int, AbstractState]) -> None:
         """Widen the states at the loop heads against those of the previous iteration."""
         for head in before.keys() & now.keys():
-            was, state = before[head], now[head]
-            now[head] = self.pending[head] = widen(was, state)
-            if is_constant(was.w[15]) and not is_constant(state.w[15]):
-                self.result.unbounded[self.code.blocks[head].steps[-1].pc] = "the stack grows in this loop"
+            now[head] = self.pending[head] = widen(before[head], now[head])
 
     @staticmethod
     def _add_iterations(before: AbstractState, state: AbstractState, count: int) -> None:

@@ -10,11 +10,11 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import partial
 
+from toolchain.abi.target import RETURN_ADDRESS_BYTES
 from toolchain.bounds.annotations.flow_facts import CLOCK_STOPPED, WAITS_FOR_INTERRUPT
 from toolchain.bounds.program import Program
 from toolchain.bounds.report import Bound, BoundAnalysis
 from toolchain.errors import ToolError
-from toolchain.stack.effects import CALL_BYTES
 
 TRAP_LEVEL = 8
 LATENCY = 5
@@ -25,6 +25,8 @@ ENTRY = 2
 MOST_ORDERS = 12
 """Greatest number of interrupts whose nesting orders are enumerated; with more, all are assumed to nest."""
 START = "_main"
+SECOND_STACK = "kernel stack"
+"""Name of the second stack (STACK_AREA) in reports."""
 
 
 @dataclass(slots=True)
@@ -54,7 +56,7 @@ class BoundsReport:
     """Bound of main, which runs before threads or without them; computed for every report."""
     responses: list[Response] = field(default_factory=list)
     stacks: dict[str, int | None] = field(default_factory=dict)
-    """Bytes by stack: main and each thread under nested interrupts, and the second stack."""
+    """Bytes of each stack: main's and that of each thread, as in their rows, and the second stack."""
     contradictions: dict[str, str] = field(default_factory=dict)
     """Reasons why responses and stacks are unknown: source line -> contradiction to an annotated level."""
 
@@ -70,6 +72,12 @@ class BoundsReport:
         return stopped | {
             place: f"an endless loop in which levels up to {level} are held back" for place, level in highest.items()
         }
+
+    @property
+    def unbounded_stacks(self) -> dict[str, str]:
+        """Return the reasons why stacks have no bound: source line -> reason."""
+        rows = (*self.rows, *self.on_second_stack)
+        return self.contradictions | {place: why for row in rows for place, why in row.unbounded_stack.items()}
 
     @property
     def rows(self) -> list[Bound]:
@@ -147,20 +155,22 @@ def _response(report: BoundsReport, one: Bound) -> Response:
 
 
 def _stacks(report: BoundsReport, analysis: BoundAnalysis) -> None:
-    """Compute the depth of each stack under the deepest chain of nested interrupts."""
+    """Compute the bytes of each entry, and of the second stack, under the deepest chain of nested interrupts."""
 
     def known(*parts: Bound) -> bool:
         return not report.contradictions and all(part.stack_is_known for part in parts)
 
+    for row in (*report.rows, *report.on_second_stack):
+        row.stack_bytes = RETURN_ADDRESS_BYTES + row.bytes if row.stack_is_known else None
     on_thread = partial(_on_top, report.interrupts)
     on_second_stack = partial(_on_top, report.on_second_stack)
-    users = report.threads if report.main is None else [report.main, *report.threads]
-    for user in users:
+    for user in report.threads if report.main is None else [report.main, *report.threads]:
         total = max((depth + on_thread(level) for level, depth in user.stack.items()), default=0)
-        report.stacks[user.name] = CALL_BYTES + total if known(user, *report.interrupts) else None
+        user.stack_bytes = RETURN_ADDRESS_BYTES + total if known(user, *report.interrupts) else None
+        report.stacks[user.name] = user.stack_bytes
     if analysis.second_stack is not None:
         depths = [depth + on_second_stack(level) for row in report.rows for level, depth in row.second_stack.items()]
-        report.stacks["kernel stack"] = max(depths, default=0) if known(*report.rows, *report.on_second_stack) else None
+        report.stacks[SECOND_STACK] = max(depths, default=0) if known(*report.rows, *report.on_second_stack) else None
 
 
 def _on_top(interrupts: list[Bound], level: int) -> int:
@@ -170,7 +180,7 @@ def _on_top(interrupts: list[Bound], level: int) -> int:
     """
     able = [one for one in interrupts if one.level < TRAP_LEVEL and one.stack]
     if len(able) > MOST_ORDERS and any(at < one.level for one in able for at in one.stack):
-        return sum(CALL_BYTES + one.bytes for one in able)
+        return sum(RETURN_ADDRESS_BYTES + one.bytes for one in able)
     found: dict[tuple[int, frozenset[int]], int] = {}
 
     def deepest(level: int, used: frozenset[int]) -> int:
@@ -178,7 +188,7 @@ def _on_top(interrupts: list[Bound], level: int) -> int:
         if key not in found:
             found[key] = max(
                 (
-                    CALL_BYTES + depth + deepest(at, used | {number})
+                    RETURN_ADDRESS_BYTES + depth + deepest(at, used | {number})
                     for number, one in enumerate(able)
                     if number not in used and one.level > level
                     for at, depth in one.stack.items()

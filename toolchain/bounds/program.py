@@ -3,30 +3,29 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Final
 
-from emu.chips import chip_named, chip_of
-from emu.image.elf_facts import PROCESSOR_MASK
 from toolchain.bounds.abstract.state import AbstractState
 from toolchain.bounds.abstract.values import WINDOW
 from toolchain.bounds.annotations.bindings import AnnotationBindings
+from toolchain.bounds.annotations.file import FileAnnotations, add_symbols
 from toolchain.bounds.annotations.names import NameResolver
-from toolchain.bounds.annotations.reader import Annotation, AnnotationSet
-from toolchain.bounds.annotations.source_map import SourceMap
 from toolchain.bounds.graph import GraphBuilder
-from toolchain.bounds.signatures import Signatures
+from toolchain.elf.annotations import Annotation, read_annotation_section
+from toolchain.elf.code_map import CodeMap
 from toolchain.elf.disassemble import items
 from toolchain.elf.model import Executable
+from toolchain.elf.signatures import Signatures
+from toolchain.elf.source_map import SourceMap
 from toolchain.errors import ToolError
-from toolchain.stack.analyse import Analysis
-from toolchain.stack.annotations import Annotations
+from toolchain.link.levels import RESET_LEVEL, levels_of
 
 PAGE = 0x8000
 UNUSED = "__DefaultInterrupt"
 """Default handler of unused vectors; it does not return."""
-RESET_LEVEL = 4
-"""Priority of every interrupt after a reset (isa.md §2.1)."""
+ANY = "*"
+"""Target in an annotation file that stands for every function whose address is taken."""
 PYTHON_DEPTH = 20_000
 """Recursion limit of Python; the analysis recurses with the calls of the firmware."""
 
@@ -43,15 +42,29 @@ class Program:
     def __init__(
         self,
         image: Executable,
-        stack_annotations: Annotations,
-        annotations: AnnotationSet,
+        values: Mapping[str, int] | None = None,
         excluded_names: Iterable[str] = (),
+        file: FileAnnotations | None = None,
     ) -> None:
+        """Read the annotations of an image.
+
+        values          values of names in the annotations
+        excluded_names  functions whose callers' paths are ignored
+        file            annotations of the annotation file
+
+        Raises `ToolError` for an annotation that cannot be parsed or names an unknown function.
+        """
         sys.setrecursionlimit(max(sys.getrecursionlimit(), PYTHON_DEPTH))
-        self.image, self.annotations, self.excluded_names = image, annotations, excluded_names
-        self.chip: Final = chip_of(image.processor & PROCESSOR_MASK) or chip_named()
-        self.calls: Final = Analysis(image, stack_annotations)
-        self.graph: Final = GraphBuilder(self.calls.code, self.calls.entries)
+        self.image, self.excluded_names = image, excluded_names
+        self.annotations = read_annotation_section(image, values or {})
+        self.file: Final = file or FileAnnotations()
+        add_symbols(self.file, image.symbols)
+        self.calls: Final = CodeMap(image)
+        self.chip: Final = self.calls.chip
+        self.depths: Final = {self.calls.named(name): depth for name, depth in self.file.depth.items()}
+        self.recursions: Final = {self.calls.named(name): count for name, count in self.file.recursion.items()}
+        self._file_threads = {self.calls.named(name) for name in self.file.threads}
+        self.graph: Final = GraphBuilder(self.calls.code, self.calls.entries | self._file_threads)
         self.words: Final = {
             item.address + 2 * i: word
             for section in image.sections
@@ -64,10 +77,10 @@ class Program:
         self.sources: Final = SourceMap(debug)
         self.signatures: Final = Signatures(debug)
         self.names: Final = NameResolver(image, self.sources, self.chip, self.calls.entries)
-        self.bindings: Final = AnnotationBindings(annotations, self.sources, self.names, self.calls.code)
+        self.bindings: Final = AnnotationBindings(self.annotations, self.sources, self.names, self.calls.code)
         self._ram = {
             file
-            for annotation in annotations.of("ram")
+            for annotation in self.annotations.of("ram")
             for file in self.sources.matching_files(_neighbour_file(annotation))
         }
 
@@ -109,35 +122,50 @@ class Program:
     def call_targets(self, pc: int, state: AbstractState) -> list[int] | None:
         """Return the targets of a call through a pointer, by CALL_TARGETS or the annotation file; None if unknown."""
         found: set[int] = set()
-        for annotation in self.bindings.call_target_annotations(pc):
-            for name in (part.strip() for part in annotation.text.split(",")):
+        listed = [(annotation, annotation.text) for annotation in self.bindings.call_target_annotations(pc)]
+        symbol = self.calls.symbol(pc)
+        if not listed and symbol is not None:
+            listed = self._targets_of(symbol[0].value)
+        for annotation, text in listed:
+            for name in (part.strip() for part in text.split(",")):
                 if name.startswith("-"):
                     found.discard(self.address(name[1:].strip(), annotation) or 0)
                 elif name in self.signatures.types:
-                    wanted = self.signatures.types[name]
-                    found |= {a for a in self._address_taken() if self.signatures.functions.get(a) == wanted}
+                    found |= self._of_type(name)
                 else:
                     address = self.address(name, annotation)
                     if address is None:
                         raise ToolError(f"{annotation.place}: {name} is neither a function nor a function type")
                     found.add(address)
+        if listed:
             return sorted(found)
-        owner = self.calls.name(pc).partition("+")[0]
-        names = self.calls.annotations.calls
-        listed = names.get(owner) or names.get(owner.removeprefix("_"))
-        return [self.calls._named(name) for name in listed] if listed else None
+        owner = symbol[0].name if symbol is not None else ""
+        names = self.file.calls.get(owner) or self.file.calls.get(owner.removeprefix("_")) or []
+        if not names and self.file.any_handle:
+            names = [ANY]
+        taken = self.calls.handles
+        return sorted({a for name in names for a in (taken if name == ANY else [self.calls.named(name)])}) or None
+
+    def _targets_of(self, caller: int) -> list[tuple[Annotation, str]]:
+        """Return annotation and targets of each TARGETS_OF of a function or label."""
+        found = []
+        for annotation in self.annotations.of("targets"):
+            name, _, text = annotation.text.partition(" ")
+            if self.address(name, annotation) == caller:
+                found.append((annotation, text))
+        return found
+
+    def _of_type(self, name: str) -> set[int]:
+        """Return the functions of a function type whose address is taken, none for an unknown type."""
+        wanted = self.signatures.types.get(name)
+        return {a for a in self.calls.handles if wanted is not None and self.signatures.functions.get(a) == wanted}
 
     def threads(self) -> list[int]:
         """Return the entry functions of threads: those of a type that THREADS names, or of the annotation file."""
-        found = {self.calls._named(name) for name in self.calls.annotations.threads}
+        found = set(self._file_threads)
         for annotation in self.annotations.of("threads"):
             for name in annotation.text.split(","):
-                wanted = self.signatures.types.get(name.strip())
-                found |= {
-                    a
-                    for a in self._address_taken()
-                    if wanted is not None and self.signatures.functions.get(a) == wanted
-                }
+                found |= self._of_type(name.strip())
         return sorted(found)
 
     def interrupts(self) -> list[tuple[int, str, int]]:
@@ -147,26 +175,25 @@ class Program:
         traps have levels above 7.
         """
         traps = {vector.name: vector.level for vector in self.chip.vectors if vector.irq is None}
-        levels = self._annotated_levels()
+        levels = levels_of(self.image, self.annotations)
         found: dict[tuple[int, str], int] = {}
         for handler, vectors in self.calls.vectors.items():
             name = self.calls.name(handler)
             if name == UNUSED:
                 continue
-            plain = list(dict.fromkeys(vector.removeprefix("Alt") for vector in vectors.split()))
-            for vector in plain:
+            for vector in vectors:
                 level = traps.get(vector, levels.get(vector.removesuffix("Interrupt"), RESET_LEVEL))
-                found[handler, name if len(plain) == 1 else "__" + vector] = level
+                found[handler, name if len(vectors) == 1 else "__" + vector] = level
         return [(handler, name, level) for (handler, name), level in found.items()]
 
     def priorities(self) -> dict[int, list[tuple[int, str, int]]]:
         """Return, by priority register, shift, name and annotated level of each interrupt with a handler."""
-        levels = self._annotated_levels()
+        levels = levels_of(self.image, self.annotations)
         handled = {
-            vector.removeprefix("Alt")
+            vector
             for handler, names in self.calls.vectors.items()
             if self.calls.name(handler) != UNUSED
-            for vector in names.split()
+            for vector in names
         }
         found: dict[int, list[tuple[int, str, int]]] = {}
         for vector in self.chip.vectors:
@@ -181,19 +208,6 @@ class Program:
         """Return the addresses of interrupt enable registers."""
         return frozenset(self.chip.sfrs[source.enable[0]].address for source in self.chip.interrupts.values())
 
-    def _annotated_levels(self) -> dict[str, int]:
-        """Return the annotated levels by interrupt name."""
-        levels: dict[str, int] = {}
-        for annotation in self.annotations.of("level"):
-            name, _, text = annotation.text.partition(" ")
-            number = self.annotations.number(text, annotation)
-            if number is not None:
-                levels[name] = number
-        for symbol in self.image.symbols:
-            if symbol.name.startswith("os_level_of_"):
-                levels[symbol.name.removeprefix("os_level_of_")] = symbol.value
-        return levels
-
     def handlers_outside_sections(self) -> set[int]:
         """Return the handlers that OUTSIDE_ONLY names."""
         names = {
@@ -201,7 +215,7 @@ class Program:
             for annotation in self.annotations.of("outside")
             for name in annotation.text.split(",")
         }
-        return {handler for handler, found in self.calls.vectors.items() if names & set(found.split())}
+        return {handler for handler, found in self.calls.vectors.items() if names & set(found)}
 
     def excluded(self) -> frozenset[int]:
         """Return the entries of the excluded functions; raises `ToolError` for an unknown name."""
@@ -212,10 +226,6 @@ class Program:
                 raise ToolError(f"no function is called {name}")
             found.add(address)
         return frozenset(found)
-
-    def _address_taken(self) -> set[int]:
-        """Return the functions whose address is taken."""
-        return self.calls.handles
 
     def return_level(self, entry: int) -> int | None:
         """Return the CPU priority at which a stack-switching function returns, by COMES_BACK."""
@@ -238,7 +248,3 @@ class Program:
             for name in annotation.text.split(",")
         ]
         return [a for name, annotation in said if (a := self.address(name, annotation)) is not None]
-
-    def recursion_depth(self, entry: int) -> int | None:
-        """Return the greatest number of simultaneous activations of a function, by annotation."""
-        return self.calls.annotation(self.calls.annotations.recursion, entry)

@@ -4,20 +4,22 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from toolchain.abi.target import RETURN_ADDRESS_BYTES
 from toolchain.bounds.abstract.state import LEVELS, AbstractState, StackAreas
 from toolchain.bounds.abstract.values import Value, interval
 from toolchain.bounds.annotations.flow_facts import (
     BUDGET_EXCEEDED,
     CLOCK_STOPPED,
     STACK_STILL_BOUNDED,
+    UNBALANCED_RETURN,
     WAITS_FOR_INTERRUPT,
     FlowFacts,
 )
+from toolchain.bounds.contexts import AnalysisCache
 from toolchain.bounds.explorer import BudgetExceededError, Explorer
 from toolchain.bounds.program import Program
 from toolchain.bounds.result import FunctionResult
 from toolchain.bounds.transfer import ImageModel
-from toolchain.stack.effects import CALL_BYTES
 
 RAM = (0x0800, 0x2800)
 STACK_END = 0x8000
@@ -40,6 +42,9 @@ class Bound:
     level: int = 0
     cycles: int | None = None
     stack: dict[int, int] = field(default_factory=dict)
+    stack_bytes: int | None = None
+    """Bytes of stack, return address included, of main and threads with the deepest chain of interrupts; None if not
+    known.  Set by interference.py."""
     second_stack: dict[int, int] = field(default_factory=dict)
     path: list[str] = field(default_factory=list)
     masked: dict[int, tuple[int, str]] = field(default_factory=dict)
@@ -63,7 +68,12 @@ class Bound:
     @property
     def stack_is_known(self) -> bool:
         """Whether only loop bounds are missing, which leave the stack bounded."""
-        return all(why in STACK_STILL_BOUNDED for why in self.unbounded.values())
+        return not self.unbounded_stack
+
+    @property
+    def unbounded_stack(self) -> dict[str, str]:
+        """Code that leaves the stack without a bound: source line -> reason."""
+        return {place: why for place, why in self.unbounded.items() if why not in STACK_STILL_BOUNDED}
 
     @property
     def bytes(self) -> int:
@@ -76,6 +86,7 @@ class BoundAnalysis:
 
     def __init__(self, program: Program) -> None:
         self.program = program
+        self.cache = AnalysisCache(program.graph)
         self.second_stack = self._find_second_stack()
         self.base = self._base()
         areas = [(self.base, STACK_END)]
@@ -103,7 +114,8 @@ class BoundAnalysis:
             is_never_called=program.bindings.is_never_called,
             excluded=program.excluded(),
             call_targets=program.call_targets,
-            recursion_depth=program.recursion_depth,
+            recursion_depths=program.recursions,
+            stack_depths=program.depths,
             resume_points=program.resume_points,
             switches_stack=program.switches_stack,
             return_level=program.return_level,
@@ -142,9 +154,9 @@ class BoundAnalysis:
         state.masked_since = [0 if 0 < k <= level else None for k in range(LEVELS)]
         state.mem.update(self.known)
         state.w[15] = (
-            self.base + CALL_BYTES
+            self.base + RETURN_ADDRESS_BYTES
             if not on_second_stack or self.second_stack is None
-            else self.second_stack[0] + CALL_BYTES
+            else self.second_stack[0] + RETURN_ADDRESS_BYTES
         )
         if thread:
             state.mem.update(self.private)
@@ -153,7 +165,11 @@ class BoundAnalysis:
             most = self.program.annotations.number(text, annotation)
             if self.program.address(name, annotation) == entry and most is not None:
                 state.w[int(number)] = interval(0, most)
-        return Explorer(self.model, self.program.graph, self.flow_facts, sharing).run(entry, state)
+        start = state.w[15]
+        found = Explorer(self.model, self.cache, self.flow_facts, sharing).run(entry, state)
+        if any(end.w[15] != start - RETURN_ADDRESS_BYTES for end in found.return_states.values()):
+            found.unbounded[entry] = UNBALANCED_RETURN
+        return found
 
     def bound(self, name: str, entry: int, kind: str, level: int = 0, on_second_stack: bool = False) -> Bound:
         """Return the bound of one function."""
@@ -198,7 +214,9 @@ class BoundAnalysis:
         result.priority_changes = {place(pc): which for pc, which in found.priority_changes.items()}
         result.disi_after_return = max((end.disi_remaining for end in found.return_states.values()), default=0)
         result.is_endless = not found.return_states and found.switch_time is None and bool(found.endless_loops)
-        start = CALL_BYTES + (self.second_stack[0] if on_second_stack and self.second_stack is not None else self.base)
+        start = RETURN_ADDRESS_BYTES + (
+            self.second_stack[0] if on_second_stack and self.second_stack is not None else self.base
+        )
         deepest = -1
         for (stack, level), (top, chain) in found.peak.items():
             own = stack == (1 if on_second_stack else 0)

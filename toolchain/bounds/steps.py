@@ -150,7 +150,7 @@ class InstructionExecution:
                 key = number, state.ipl[0]
                 if lo <= top <= hi and top > self.result.peak.get(key, (-1,))[0]:
                     self.result.peak[key] = top, (self.code.entry,)
-        elif self.code.has_frame and self.area.points_into(top):
+        elif self.area.points_into(top):
             self.result.unbounded.setdefault(self.code.entry, VARIABLE_FRAME)
 
     def _update_masking(self, state: AbstractState, pc: int) -> None:

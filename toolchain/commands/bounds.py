@@ -6,15 +6,14 @@ import argparse
 import json
 from dataclasses import asdict
 
-from toolchain.bounds.annotations.reader import AnnotationSet, read_annotation_section
-from toolchain.bounds.interference import BoundsReport, report_of
+from toolchain.bounds.annotations.file import FileAnnotations, read_annotation_file
+from toolchain.bounds.interference import SECOND_STACK, BoundsReport, report_of
 from toolchain.bounds.program import Program
 from toolchain.bounds.report import Bound
 from toolchain.commands.parser import parser
 from toolchain.elf.read import read_executable
 from toolchain.errors import ToolError
 from toolchain.files import read_bytes, read_text
-from toolchain.stack.annotations import Annotations, add_symbols, read_annotations
 
 EXIT_OVER_LIMIT = 1
 _JSON_KEYS = {
@@ -33,23 +32,37 @@ _JSON_KEYS = {
 """Keys of --json that differ from the field names of `BoundsReport` and `Bound`; scripts depend on them."""
 KERNEL = "_Sys_"
 DESCRIPTION = """Bounds of a linked image: cycles, stack, longest masked time, and response of each interrupt.  Every
-function is executed on all its inputs at once.  Code without a bound is listed with the source line to annotate
-(bounds.h).  Cycles are those of the function's own code; interrupts have rows of their own.
+function is executed on all its inputs at once.  What has no bound is shown as ? and listed with its reason and the
+source line to annotate (bounds.h).  Cycles are those of the function's own code; interrupts have rows of their own.
+Bytes of stack include the return address; those of main and of threads include the deepest chain of interrupts, so
+they are what a thread needs (Sys_Start_ProcessWith).
 
 Names in annotations get their values by --let; for our kernel n threads, m events, b newer events in the same bucket,
 s subscriptions of one event, q queued messages, i times idle (above 0 what idles has no bound), u bytes of a stack
 never used, k bytes of the largest stack. Further names make bounds tighter: t subscriptions of all events
-together, o of one thread, h holes on a path of the heap's tree (10 at most, 11 in more than 4 kB)."""
+together, o of one thread, h holes on a path of the heap's tree (10 at most, 11 in more than 4 kB).
+
+An annotation file serves images without bounds.h, one statement per line, # starts a comment:
+
+    calls FUNCTION: TARGET, TARGET     what pointer calls inside FUNCTION reach, * = any with its address taken
+    depth FUNCTION BYTES               FUNCTION with all it calls uses at most BYTES, and is not analysed
+    recursion FUNCTION COUNT           at most COUNT activations at once
+    thread FUNCTION                    FUNCTION is the entry of a thread
+
+or absolute symbols __stack_depth_of_F, __stack_recursion_of_F, __stack_thread_F in the firmware."""
 
 
 def options_of() -> argparse.ArgumentParser:
     """Return the argument parser of the command."""
-    p = parser("bounds", DESCRIPTION, "python -m toolchain bounds firmware.elf --let n=4 --limit Sys_Yield=90")
+    p = parser("bounds", DESCRIPTION, "python -m toolchain bounds firmware.elf --let n=4 --stack-limit blinker=128")
     p.add_argument("image")
-    p.add_argument("-a", "--annotations", metavar="FILE", help="annotation file of `stack`")
+    p.add_argument("-a", "--annotations", metavar="FILE", help="annotation file")
     p.add_argument("--let", action="append", default=[], metavar="NAME=N", help="value of a name in annotations")
     p.add_argument("--function", action="append", default=[], metavar="NAME",
                    help="analyse this function (default: the kernel's calls, or main)")  # fmt: skip
+    p.add_argument("--thread", action="append", default=[], metavar="FUNCTION", help="as `thread` in the file")
+    p.add_argument("--any-handle", action="store_true",
+                   help="pointer calls without annotation reach any function whose address is taken")  # fmt: skip
     p.add_argument("--without", action="append", default=[], metavar="NAME",
                    help="ignore paths on which this function is called")  # fmt: skip
     p.add_argument("--limit", action="append", default=[], metavar="NAME=CYCLES", help="fail when NAME can take longer")
@@ -59,16 +72,16 @@ def options_of() -> argparse.ArgumentParser:
 
 
 def main(arguments: list[str]) -> int:
-    """Print the report; return 0, or 1 if a --limit is exceeded or there is no bound to compare."""
+    """Print the report; return 0, or 1 if a limit is exceeded or there is no bound to compare."""
     options = options_of().parse_args(arguments)
-    file = options.annotations
-    stack_annotations = read_annotations(read_text(file), file) if file else Annotations()
+    name = options.annotations
+    file = read_annotation_file(read_text(name), name) if name else FileAnnotations()
+    file.threads += options.thread
+    file.any_handle = options.any_handle
     image = read_executable(read_bytes(options.image), options.image)
-    add_symbols(stack_annotations, image.symbols)
-    annotations = read_annotation_section(image, dict(_pair("--let", text) for text in options.let))
-    program = Program(image, stack_annotations, annotations, options.without)
+    program = Program(image, dict(_pair("--let", text) for text in options.let), options.without, file)
     report = report_of(program, options.function or program.default_functions(KERNEL))
-    print(json.dumps(_as_data(report), indent=1) if options.json else as_text(report, annotations))
+    print(json.dumps(_as_data(report), indent=1) if options.json else as_text(report, program))
     limits = [(_pair("--limit", text), "cycles") for text in options.limit]
     limits += [(_pair("--stack-limit", text), "bytes of stack") for text in options.stack_limit]
     return max([_check(report, *limit, what) for limit, what in limits], default=0)
@@ -85,28 +98,27 @@ def _as_data(report: BoundsReport) -> dict[str, object]:
     return asdict(report, dict_factory=lambda fields: {_JSON_KEYS.get(name, name): value for name, value in fields})
 
 
-def as_text(report: BoundsReport, annotations: AnnotationSet) -> str:
+def as_text(report: BoundsReport, program: Program) -> str:
     """Return the report as tables."""
     rows = report.rows
     width = max((len(row.name) for row in rows), default=8)
     lines = [f"{'':9} {'':{width}}   cycles  stack  held back: level 1    4    5    6  deepest path"]
     lines += [_row(row, width) for row in rows]
+    if SECOND_STACK in report.stacks:
+        lines.append(f"{'stack':9} {SECOND_STACK:{width}} {'':8} {_number(report.stacks[SECOND_STACK]):>6}")
     if report.responses:
         lines += ["", f"{'interrupt':{width}}  level  held back  response  by"]
         lines += [
             f"{one.name:{width}}  {one.level:5}  {_number(one.masked):>9}  {_number(one.cycles):>8}  {one.where}"
             for one in report.responses
         ]
-    if report.stacks:
-        lines += ["", "stack under nested interrupts, by priority:"]
-        lines += [f"  {name:{width}} {_number(size):>6}" for name, size in report.stacks.items()]
-    unknown = report.contradictions | report.unbounded_responses
+    unknown = report.unbounded_responses | report.unbounded_stacks
     unknown |= {place: why for row in rows for place, why in row.unbounded.items()}
     if unknown:
         lines += ["", "not bounded; annotate (bounds.h):"]
         lines += [f"  {place}: {why}" for place, why in sorted(unknown.items())]
-    if annotations.missing:
-        lines += [f"names without a value (--let): {', '.join(sorted(annotations.missing))}"]
+    if program.annotations.missing:
+        lines += [f"names without a value (--let): {', '.join(sorted(program.annotations.missing))}"]
     return "\n".join(lines)
 
 
@@ -114,8 +126,7 @@ def _row(row: Bound, width: int) -> str:
     cycles = "for ever" if row.is_endless else _number(row.cycles)
     held = " ".join(f"{row.masked[k][0] if k in row.masked else '-':>4}" for k in (1, 4, 5, 6))
     path = " > ".join(row.path)
-    more = " " if row.stack_is_known else "+"
-    return f"{row.kind:9} {row.name:{width}} {cycles:>8} {row.bytes:6}{more}{'':16} {held}  {path}"
+    return f"{row.kind:9} {row.name:{width}} {cycles:>8} {_number(row.stack_bytes):>6}{'':17} {held}  {path}"
 
 
 def _number(value: int | None) -> str:
@@ -126,8 +137,11 @@ def _check(report: BoundsReport, name: str, limit: int, what: str) -> int:
     rows = [row for row in report.rows if row.name in (name, name.removeprefix("_"))]
     if not rows:
         raise ToolError(f"no analysed function is called {name}")
-    value = rows[0].cycles if what == "cycles" else rows[0].bytes if rows[0].stack_is_known else None
+    row = rows[0]
+    value, reasons = (row.cycles, row.unbounded) if what == "cycles" else (row.stack_bytes, report.unbounded_stacks)
     if value is not None and value <= limit:
         return 0
     print(f"{name}: {_number(value)} {what}, the limit is {limit}")
+    for place, why in sorted(reasons.items()) if value is None else ():
+        print(f"  {place}: {why}")
     return EXIT_OVER_LIMIT

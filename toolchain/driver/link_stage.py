@@ -15,6 +15,7 @@ from toolchain.files import read_bytes, write_outputs
 from toolchain.frontend.options import CcOptions
 from toolchain.link.command import link_options as link_settings
 from toolchain.link.command import output_files, parse_link_words
+from toolchain.link.levels import check_levels
 from toolchain.link.link import link
 from toolchain.link.mapfile import memory_report
 from toolchain.link.options import LinkOptions
@@ -72,6 +73,7 @@ def link_program(options: CcOptions, program: LinkInput) -> None:
     if program.runtime:
         archives.append(open_archive(program.runtime, RUNTIME_NAME))
     linked = link(objects, archives, link_options(options, objects))
+    check_levels(linked.image)
     for message in linked.messages:
         print(message, file=sys.stderr)
     words = parse_link_words(options.linker)

@@ -52,6 +52,11 @@
 #define THREADS(...) _BOUNDS_NOTE("threads", __VA_ARGS__)
 /* Anywhere: the priority of this interrupt, if it is not the reset value 4. */
 #define INTERRUPT_LEVEL(vector, level) _BOUNDS_NOTE("level", vector level)
+/* Anywhere: code of these files or folders runs at CPU priority `level` at most, copies inlined into other code included.
+ * The linker refuses an interrupt of a higher level from which it can be reached.  A handler's own file is exempt. */
+#define HIGHEST_LEVEL(level, ...) _BOUNDS_NOTE("highest", level __VA_ARGS__)
+/* Anywhere: only these interrupts have this level. */
+#define RESERVED_LEVEL(level, ...) _BOUNDS_NOTE("reserved", level __VA_ARGS__)
 /* In a file: only the analysed code changes this variable; threads start with this value. */
 #define PRIVATE_VALUE(variable, value) _BOUNDS_NOTE("private", variable value)
 /* Anywhere: these interrupts occur only while PRIVATE_VALUEs have their value. */

@@ -16,6 +16,9 @@
         .equ    BYTE, 7
         .equ    ROOM, 12                ; 32 bits in octal: 11 digits
 
+        .section .note.bounds,info      ; LOOPS_OF of bounds.h
+        .ascii  "loops format_digits 11@runtime/format.s:1\n"
+
         .section .text.___format,code
         .weak   ___format_wide
         .weak   ___format_double
@@ -33,7 +36,7 @@ next:   ze      [w9++],w1
         mov     #'%',w2
         cp      w1,w2
         bra     z,flags_first
-        rcall   put
+        rcall   format_put
         bra     next
 done:   mov     [w8+6],w0               ; sink->count
         mov     [--w15],w14
@@ -42,7 +45,8 @@ done:   mov     [w8+6],w0               ; sink->count
         mov.d   [--w15],w8
         return
 
-put:    mov     w8,w0                   ; sink->put(sink, W1), as a tail call
+format_put:
+        mov     w8,w0                   ; sink->put(sink, W1), as a tail call
         mov     [w8],w2
         goto    w2
 
@@ -185,7 +189,7 @@ conversion:
         mov     #'n',w2
         cp      w1,w2
         bra     z,count
-        rcall   put                     ; print any other character
+        rcall   format_put                     ; print any other character
         bra     next
 
 count:  dec2    w10,w10                 ; number of characters so far, in the size of the length modifier
@@ -273,13 +277,14 @@ integer:
         sl      w2,#8,w2
         ior     w13,w2,w13
         ior     w0,w1,w2
-        bra     nz,2f
+        bra     nz,format_digits
         cp0     w12
         bra     z,4f                    ; with precision 0, the value 0 has no digits
         mov     #'0',w1
         mov.b   w1,[w14++]
         bra     5f
-2:      mov     w0,w3                   ; divide: high word, then remainder and low word
+format_digits:
+        mov     w0,w3                   ; divide: high word, then remainder and low word
         repeat  #17
         div.uw  w1,w4
         mov     w0,w2
@@ -294,7 +299,7 @@ integer:
         mov.b   w1,[w14++]
         mov     w2,w1
         ior     w0,w1,w2
-        bra     nz,2b
+        bra     nz,format_digits
 4:      btss    w13,#ALTERNATE          ; # of octal: a leading 0
         bra     5f
         cp      w4,#8
@@ -331,19 +336,19 @@ integer:
         btss    w1,#6
         bra     8f
         mov     #'0',w1
-        rcall   put
+        rcall   format_put
         lsr     w13,#8,w1
-8:      rcall   put
+8:      rcall   format_put
 9:      dec     w12,w12
         bra     n,10f
         mov     #'0',w1
-        rcall   put
+        rcall   format_put
         bra     9b
 10:     sub     w15,#ROOM,w0
         cp      w14,w0
         bra     z,11f
         ze      [--w14],w1
-        rcall   put
+        rcall   format_put
         bra     10b
 11:     btsc    w13,#LEFT
         rcall   pad
@@ -353,7 +358,7 @@ integer:
 pad:    dec     w11,w11                 ; W11 spaces, none if negative
         bra     n,1f
         mov     #' ',w1
-        rcall   put
+        rcall   format_put
         bra     pad
 1:      return
 
@@ -378,7 +383,7 @@ text:   mov     w2,w12                  ; W12 characters from W14 in a field of 
 1:      dec     w12,w12
         bra     n,2f
         ze      [w14++],w1
-        rcall   put
+        rcall   format_put
         bra     1b
 2:      btsc    w13,#LEFT
         rcall   pad

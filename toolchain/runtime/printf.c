@@ -2,7 +2,13 @@
 /* printf, vprintf, puts, putchar; all output is written by __putchar (stdio.h). */
 #include "format.h"
 
+#include <bounds.h>
 #include <stdio.h>
+
+TARGETS_OF(format_put, send);
+TARGETS_OF(__format_pad, send);
+TARGETS_OF(__format_field, send);
+TARGETS_OF(__format_double, send);
 
 static void send(sink_t *sink, char character)
 {

@@ -26,10 +26,16 @@ _vsprintf:
         com     w0,w1
         bra     _vsnprintf
 
+        .section .note.bounds,info      ; TARGETS_OF of bounds.h
+        .ascii  "targets format_put vsnprintf_store@runtime/snprintf.s:1\n"
+        .ascii  "targets __format_pad vsnprintf_store@runtime/snprintf.s:1\n"
+        .ascii  "targets __format_field vsnprintf_store@runtime/snprintf.s:1\n"
+        .ascii  "targets __format_double vsnprintf_store@runtime/snprintf.s:1\n"
+
         .section .text._vsnprintf,code
         .global _vsnprintf
 _vsnprintf:
-        mov     #handle(store),w4
+        mov     #handle(vsnprintf_store),w4
         mov     w4,[w15++]              ; put
         sub     w15,#2,w5
         cp0     w1                      ; size 0: no character may be stored, so let `at` point to this sink
@@ -49,7 +55,8 @@ _vsnprintf:
         sub     w15,#8,w15
         return
 
-store:  add     w0,#6,w2                ; count every character, store those that fit
+vsnprintf_store:
+        add     w0,#6,w2                ; count every character, store those that fit
         inc     [w2],[w2]
         mov     [w0+2],w2
         mov     [w0+4],w3

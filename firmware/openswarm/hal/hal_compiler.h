@@ -41,6 +41,10 @@
 #define COMES_BACK(function, level) struct no_note
 #define RESUMED_BY(...) struct no_note
 #define LINKS_IN_RAM(...) struct no_note
+#define BOUNDS_AT(text, ...) struct no_note
+#define TARGETS_OF(caller, ...) struct no_note
+#define HIGHEST_LEVEL(level, ...) struct no_note
+#define RESERVED_LEVEL(level, ...) struct no_note
 #endif
 
 /* HAL_TEXT: value of a macro as text. HAL_ASSUME: a condition checked at compile time. */

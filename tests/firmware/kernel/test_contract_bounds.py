@@ -12,12 +12,10 @@ import emu
 from bench.bounds import IMAGES, rows_of
 from tests.firmware.conftest import TARGET_APPS, Build
 from tests.firmware.contracts import HEADERS
-from toolchain.bounds.annotations.reader import read_annotation_section
 from toolchain.bounds.program import Program
 from toolchain.bounds.report import BoundAnalysis
 from toolchain.cli import main
 from toolchain.elf.read import read_executable
-from toolchain.stack.annotations import Annotations
 
 LOAD = {"n": 4, "m": 4, "b": 1, "s": 1, "q": 1, "i": 0, "u": 100, "d": 2, "k": 224}
 SHORT = ("swap_reserve", "refuse_message", "first_waiter")
@@ -70,7 +68,7 @@ def test_a_call_takes_no_longer_than_its_contract(calls, call: str) -> None:
     lines = header[: re.search(rf"\b{call}\(", header).start()]
     assert f"| {text} |" in lines[lines.rindex("| no |") :] or f"| {text}." in lines[lines.rindex("| no |") :]
     _, executable = calls
-    program = Program(executable, Annotations(), read_annotation_section(executable, LOAD), left_out)
+    program = Program(executable, LOAD, left_out)
     bound = BoundAnalysis(program).bound(call, program.address(call), "call")
     assert not bound.unbounded
     assert bound.cycles <= slack * cycles
@@ -86,7 +84,7 @@ def test_a_call_of_the_link_takes_no_longer_than_its_contract(image: Build, call
     """
     path = image("infrared-calls", TARGET_APPS, "OPTIMISE=-Os -fno-lto")
     executable = read_executable(path.read_bytes(), str(path))
-    program = Program(executable, Annotations(), read_annotation_section(executable, LOAD))
+    program = Program(executable, LOAD)
     bound = BoundAnalysis(program).bound(call, program.address(call), "call")
     line = (HEADERS / "openswarm_infrared.h").read_text().partition(f" {call}(")[0].rpartition("| no | ")[2]
     cycles, stack = (int(word) for word in line.split(" | ")[:2])
@@ -135,7 +133,7 @@ def test_a_longer_memory_has_longer_paths(crowded: Path) -> None:
     executable = read_executable(crowded.read_bytes(), str(crowded))
     cycles = []
     for holes in ({"h": 10}, {"h": 11}, {}):
-        program = Program(executable, Annotations(), read_annotation_section(executable, LOAD | holes))
+        program = Program(executable, LOAD | holes)
         cycles.append(BoundAnalysis(program).bound("heap_free", program.address("heap_free"), "call").cycles)
     assert cycles[0] < cycles[1] == cycles[2]
 

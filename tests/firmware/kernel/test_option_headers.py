@@ -14,8 +14,18 @@ from toolchain.cli import main as toolchain
 
 INCLUDE = FIRMWARE / "openswarm" / "include"
 CONTRACT = re.compile(r"/\* [MTHI]+(?:, [\w ]+)? \| [^|]* \| (?P<cycles>[^|]*) \| (?P<stack>\d+)")
-CALL = 4
-"""Bytes of a return address: `toolchain stack` attributes them to the caller, contract lines to the called function."""
+
+CALLS = {
+    "mutex": ("Sys_Lock_Mutex", "Sys_Unlock_Mutex"),
+    "join": ("Sys_Start_Joinable", "Sys_Join"),
+    "cleanup": ("Sys_Push_Cleanup", "Sys_Pop_Cleanup"),
+    "quota": ("Sys_Limit_Event",),
+    "service": ("Sys_Start_Service", "Sys_Feed_Watchdog"),
+    "semaphore": ("Sys_Signal_Semaphore", "Sys_Wait_for_Semaphore"),
+    "notification": ("Sys_Notify", "Sys_Wait_for_Notification"),
+    "timer": ("Sys_Start_Timer", "Sys_Stop_Timer"),
+}
+"""Calls of each option."""
 
 
 @pytest.fixture(scope="module")
@@ -103,25 +113,36 @@ def test_the_cycles_in_the_headers_are_the_measured_ones(cycles: dict[str, int])
     assert sentence("service", "which takes") == [looking]
 
 
+@pytest.mark.slow
+def test_the_cycles_of_waits_and_timers_are_the_measured_ones(cycles: dict[str, int]) -> None:
+    for option, post, wait, nothing in (
+        ("semaphore", "Sys_Signal_Semaphore", "Sys_Wait_for_Semaphore", "unit"),
+        ("notification", "Sys_Notify", "Sys_Wait_for_Notification", "bit"),
+    ):
+        better = cycles[f"{post}, a better thread waits, to that"]
+        assert contract(option, post)[0] == [cycles[post], better]
+        assert contract(option, wait)[0] == [cycles[wait], cycles[f"{wait} without {nothing}, to the next thread"]]
+    stop = cycles["Sys_Stop_Timer"]
+    assert contract("timer", "Sys_Start_Timer")[0] == [
+        cycles["Sys_Start_Timer"],
+        cycles["Sys_Start_Timer, two others run"],
+    ]
+    behind_two = cycles["Sys_Stop_Timer, two others are newer"] - stop
+    assert contract("timer", "Sys_Stop_Timer")[0] == [stop, behind_two // 2]
+    due = cycles["1 ms clock, idle, a timer sends without listeners"] - cycles["1 ms clock, idle, for comparison"]
+    assert sentence("timer", "sending takes") == [due]
+
+
 def test_the_stack_in_the_headers_is_the_worst_case(
     path: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Stack bytes in the headers equal the worst case of `toolchain stack` without the frame of a switch
-    (openswarm.h)."""
-    annotations = tmp_path / "stack"
+    """Stack bytes in the headers equal the bounds without the frame of a switch (openswarm.h)."""
+    annotations = tmp_path / "annotations"
     annotations.write_text("depth _hal_block 0\n")
-    assert toolchain(["stack", str(path), "-a", str(annotations), "--functions", "--json"]) == 0
-    functions = json.loads(capsys.readouterr().out)["functions"]
-    depth = {function["name"]: function["total"] for function in functions}
-    for option, calls in {
-        "mutex": ("Sys_Lock_Mutex", "Sys_Unlock_Mutex"),
-        "join": ("Sys_Start_Joinable", "Sys_Join"),
-        "cleanup": ("Sys_Push_Cleanup", "Sys_Pop_Cleanup"),
-        "quota": ("Sys_Limit_Event",),
-        "service": ("Sys_Start_Service", "Sys_Feed_Watchdog"),
-    }.items():
-        for call in calls:
-            assert contract(option, call)[1] == depth[f"_{call}"] + CALL, call
+    names = [word for calls in CALLS.values() for call in calls for word in ("--function", call)]
+    assert toolchain(["bounds", str(path), "-a", str(annotations), *names, "--json"]) == 0
+    stack = {row["name"]: row["stack_bytes"] for row in json.loads(capsys.readouterr().out)["calls"]}
+    assert stack == {call: contract(option, call)[1] for option, calls in CALLS.items() for call in calls}
 
 
 def test_the_readme_has_the_measured_bytes(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -139,6 +160,9 @@ def test_the_readme_has_the_measured_bytes(path: Path, capsys: pytest.CaptureFix
         "join": [sizes["a zombie: heap"]],
         "cleanup": [sizes["sys_cleanup: RAM of one"]],
         "service": [sizes["sys_service: RAM of one"]],
+        "semaphore": [sizes["sys_semaphore: RAM of one"]],
+        "notification": [sizes["sys_notification: RAM of one"]],
+        "timer": [sizes["sys_timer: RAM of one"]],
         "woken_first": [],
     }
     for name, rom, ram, each in rows:

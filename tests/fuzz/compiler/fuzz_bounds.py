@@ -31,12 +31,10 @@ from tests.fuzz.programs import c_interrupts, c_notes, c_shapes  # noqa: E402
 from tests.fuzz.seeds import Campaign, parser  # noqa: E402
 from tests.toolchain.bounds.responses import Watched, watched  # noqa: E402
 from tests.toolchain.c_programs import build  # noqa: E402
-from toolchain.bounds.annotations.reader import read_annotation_section  # noqa: E402
 from toolchain.bounds.interference import report_of  # noqa: E402
 from toolchain.bounds.program import Program  # noqa: E402
 from toolchain.bounds.report import Bound, BoundAnalysis  # noqa: E402
 from toolchain.elf.read import read_executable  # noqa: E402
-from toolchain.stack.annotations import Annotations  # noqa: E402
 
 LEVELS = ("-Os", "-O0", "-O2", "-O1")
 CYCLES = 400_000
@@ -124,7 +122,7 @@ def examine(seed: int, folder: Path) -> tuple[str, dict[str, tuple[Seen, Bound]]
     if isinstance(seen, str):
         return seen, {}
     executable = read_executable(image.read_bytes(), str(image))
-    program = Program(executable, Annotations(), read_annotation_section(executable, {}))
+    program = Program(executable)
     analyst = BoundAnalysis(program)
     pairs = {}
     for name, what in seen.items():
@@ -160,7 +158,7 @@ class Held:
         names = [f"{timer}Interrupt" for timer in c_interrupts.TIMERS]
         seen = watched(image, names, program.phases(PHASES), WATCHED)
         executable = read_executable(image.read_bytes(), str(image))
-        report = report_of(Program(executable, Annotations(), read_annotation_section(executable, {})), ["main"])
+        report = report_of(Program(executable), ["main"])
         said = {one.name.removeprefix("_"): one.cycles for one in report.responses} | {"stack": report.stacks["main"]}
         for name, most in _worst(seen).items():
             limit = said[name]

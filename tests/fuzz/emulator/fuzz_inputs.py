@@ -229,7 +229,7 @@ class Bench:
                    ("emu", "footprint", str(self.image), "--check", "{}")),
             Format("counts", (folder / "counts.json").read_bytes(), "counts.json",
                    ("emu", "coverage", str(self.image), "--seconds", "0.0001", "--counts", "{}")),
-            Format("annotations", ANNOTATIONS, "stack.txt", ("toolchain", "stack", str(self.image), "-a", "{}")),
+            Format("annotations", ANNOTATIONS, "stack.txt", ("toolchain", "bounds", str(self.image), "-a", "{}")),
             Format("archive", (folder / "library.a").read_bytes(), "library.a", ("toolchain", "ar", "t", "{}"),
                    is_text=False),
             Format("options", b"-Os -g \"-DX=1\" '-DY' -Wall\n", "options",

@@ -10,12 +10,10 @@ import pytest
 from emu.image.loader import load_image
 from tests.fuzz.compiler.fuzz_bounds import examine, measure
 from tests.toolchain.c_programs import build
-from toolchain.bounds.annotations.reader import read_annotation_section
 from toolchain.bounds.program import Program
 from toolchain.bounds.report import BoundAnalysis
 from toolchain.cli import main
 from toolchain.elf.read import read_executable
-from toolchain.stack.annotations import Annotations
 
 COUNTDOWN_CONDITION = """
 int a[20];
@@ -335,7 +333,7 @@ def test_room_of_unknown_length_is_no_other_stack(level: str, called: str, tmp_p
     seen = measure(tmp_path / "a.elf")
     assert not isinstance(seen, str), seen
     executable = read_executable((tmp_path / "a.elf").read_bytes(), "a.elf")
-    program = Program(executable, Annotations(), read_annotation_section(executable, {}))
+    program = Program(executable)
     address = program.address("_main")
     assert address is not None
     bound = BoundAnalysis(program).bound("_main", address, "call", 0)

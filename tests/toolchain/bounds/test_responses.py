@@ -11,12 +11,10 @@ from tests.fuzz.compiler.fuzz_bounds import ENOUGH, INTERRUPTED, Held
 from tests.fuzz.programs import c_interrupts
 from tests.toolchain.bounds.responses import Watched, watched
 from tests.toolchain.c_programs import build
-from toolchain.bounds.annotations.reader import read_annotation_section
 from toolchain.bounds.interference import BoundsReport, report_of
 from toolchain.bounds.program import Program
 from toolchain.cli import main
 from toolchain.elf.read import read_executable
-from toolchain.stack.annotations import Annotations
 
 DEVICES = """
 #include <dspic30f6014a.h>
@@ -93,7 +91,7 @@ def images(folder: Path, text: str, annotated: tuple[int, int], actual: tuple[in
 def analyse(image: Path, function: str = "main") -> BoundsReport:
     """Return the report of `bounds` on an image."""
     executable = read_executable(image.read_bytes(), str(image))
-    return report_of(Program(executable, Annotations(), read_annotation_section(executable, {})), [function])
+    return report_of(Program(executable), [function])
 
 
 def compare(seen: Watched, report: BoundsReport) -> None:

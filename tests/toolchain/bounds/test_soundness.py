@@ -19,11 +19,9 @@ from toolchain.bounds.annotations.flow_facts import (
     STACK_POINTER_OVERWRITTEN,
     WAITS_FOR_INTERRUPT,
 )
-from toolchain.bounds.annotations.reader import read_annotation_section
 from toolchain.bounds.program import Program
 from toolchain.bounds.report import Bound, BoundAnalysis
 from toolchain.elf.read import read_executable
-from toolchain.stack.annotations import Annotations
 
 DATA = "volatile unsigned in, out; __attribute__((used)) unsigned get(void) { return in; }\n"
 HEAD = "    .text\n    .global _main\n_main:\n    mov _in,w0\n"
@@ -122,7 +120,7 @@ It has more contexts than the analysis separates.
 def bound_of(image: Path) -> Bound:
     """Return the bound of main."""
     executable = read_executable(image.read_bytes(), str(image))
-    program = Program(executable, Annotations(), read_annotation_section(executable, {}))
+    program = Program(executable)
     address = program.address("_main")
     assert address is not None
     return BoundAnalysis(program).bound("_main", address, "call")

@@ -106,6 +106,10 @@ class StackAreas:
         """Whether an address is in a stack."""
         return any(lo <= address < hi for lo, hi in self.ranges)
 
+    def index(self, address: int) -> int | None:
+        """Return the number of the stack that contains an address, None if none does."""
+        return next((number for number, (lo, hi) in enumerate(self.ranges) if lo <= address < hi), None)
+
     def points_into(self, value: Value) -> bool:
         """Whether every member points into one stack.
 

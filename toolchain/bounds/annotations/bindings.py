@@ -8,10 +8,10 @@ from typing import Final
 from emu.dspic30f.isa.facts import flow_of
 from emu.dspic30f.isa.flow import Call, Goto
 from toolchain.bounds.annotations.names import NameResolver
-from toolchain.bounds.annotations.reader import Annotation, AnnotationSet
-from toolchain.bounds.annotations.source_map import LineKey, SourceMap
 from toolchain.bounds.graph import FunctionGraph, Loop, all_loops
+from toolchain.elf.annotations import Annotation, AnnotationSet
 from toolchain.elf.disassemble import CodeItem
+from toolchain.elf.source_map import LineKey, SourceMap
 from toolchain.errors import ToolError
 
 LOOPS = ("loop", "total", "share", "same", "one")
@@ -45,11 +45,11 @@ class AnnotationBindings:
     # -- loops -------------------------------------------------------------------------------------------------------
 
     def loop_bound(self, code: FunctionGraph, loop: Loop) -> int | None:
-        """Return the iterations of a loop per entry, by its LOOP_BOUND or the function's LOOPS_OF."""
+        """Return the iterations of a loop per entry, by its LOOP_BOUND or a LOOPS_OF."""
         numbers = self._numbers(code, loop, "loop")
         numbers += [
             self.annotations.number(_words(annotation, 2)[1], annotation)
-            for annotation in self._function_annotations(code)
+            for annotation in self._machine_loop_annotations(code, loop)
         ]
         return None if None in numbers else max((n for n in numbers if n is not None), default=None)
 
@@ -72,7 +72,9 @@ class AnnotationBindings:
 
         Back edges in one source line are copies of its condition.  LOOPS_OF refers to loops of the machine code.
         """
-        if len(loop.heads) > 1 or self._annotations_at(code, "one", loop.head) or self._function_annotations(code):
+        if len(loop.heads) > 1 or self._annotations_at(code, "one", loop.head):
+            return True
+        if self._machine_loop_annotations(code, loop):
             return True
         back = [head for head in loop.members if loop.head in code.blocks[head].following]
         lines = {self.sources.line_of(code.blocks[head].steps[-1].pc) for head in back}
@@ -86,12 +88,12 @@ class AnnotationBindings:
             address for name, annotation in named if (address := self.names.find(name, annotation)) is not None
         )
 
-    def _function_annotations(self, code: FunctionGraph) -> list[Annotation]:
-        """Return the LOOPS_OF annotations of a function."""
+    def _machine_loop_annotations(self, code: FunctionGraph, loop: Loop) -> list[Annotation]:
+        """Return the LOOPS_OF annotations that name the function, or a label at the head of the loop."""
         return [
             annotation
             for annotation in self.annotations.of("loops")
-            if self.names.find(annotation.text.split()[0], annotation) == code.entry
+            if self.names.find(annotation.text.split()[0], annotation) in (code.entry, *loop.heads)
         ]
 
     def _numbers(self, code: FunctionGraph, loop: Loop, kind: str) -> list[int | None]:

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from typing import Final
 
 from toolchain.bounds.abstract.state import AbstractState
 from toolchain.bounds.graph import FunctionGraph, Loop
 
 VARIABLE_FRAME: Final = "allocates an unknown number of bytes on the stack (alloca, array of variable length)"
+STACK_GROWS: Final = "the stack grows in this loop"
 UNKNOWN_RETURN: Final = "returns to an unknown address (longjmp, stack switch)"
+UNBALANCED_RETURN: Final = "returns with another stack depth than at its entry"
 UNBOUNDED_LOOP: Final = "this loop has no known bound"
 LONG_LOOP: Final = "this loop has more than 5,000 iterations; annotate their number (LOOP_BOUND)"
 MERGED_LOOPS: Final = "this loop has several back edges: it may be two loops of the source (ONE_LOOP)"
@@ -26,8 +28,11 @@ DO_LOOPS_TOO_DEEP: Final = "a third nested DO loop: only two have registers (isa
 SPECIAL_ADDRESSING: Final = "enables modulo or bit-reversed addressing, which is not analysed"
 IRREGULAR_DO_LOOP: Final = "a DO loop is entered by a branch, or a DO loop within it is left by a branch"
 DO_LOOP_ENDS_WITH_JUMP: Final = "a DO loop ends with a branch, call or return"
+NOT_ANALYSED: Final = "the annotation file states only the stack depth of the called function"
 JUMP_WITHOUT_TABLE: Final = "no table of BRA or RETLW follows this jump"
-STACK_STILL_BOUNDED: Final = frozenset((UNBOUNDED_LOOP, LONG_LOOP, MERGED_LOOPS, WAITS_FOR_INTERRUPT, CLOCK_STOPPED))
+STACK_STILL_BOUNDED: Final = frozenset(
+    (UNBOUNDED_LOOP, LONG_LOOP, MERGED_LOOPS, WAITS_FOR_INTERRUPT, CLOCK_STOPPED, NOT_ANALYSED)
+)
 """Reasons that leave the stack bounded: the loop has been executed until its state reached a fixpoint."""
 
 
@@ -55,8 +60,10 @@ class FlowFacts:
     """Whether the call of a function at an address is excluded."""
     excluded: frozenset[int] = frozenset()
     """Functions that are assumed not to be called: paths into them are ignored."""
-    recursion_depth: Callable[[int], int | None] = lambda _entry: None
-    """Greatest number of simultaneous activations of a function."""
+    recursion_depths: Mapping[int, int] = field(default_factory=dict)
+    """By function: greatest number of simultaneous activations."""
+    stack_depths: Mapping[int, int] = field(default_factory=dict)
+    """By function that is not analysed: bytes of stack that it and its callees use."""
     resume_points: Callable[[], list[int]] = list
     """Functions in which execution continues after a switch to the stack of another thread."""
     switches_stack: Callable[[int], bool] = lambda _entry: False

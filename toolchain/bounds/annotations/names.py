@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Set as AbstractSet
 
 from emu.chips.chip import Chip
-from toolchain.bounds.annotations.reader import Annotation
-from toolchain.bounds.annotations.source_map import SourceMap
+from toolchain.elf.annotations import Annotation
 from toolchain.elf.constants import STT_OBJECT
 from toolchain.elf.model import Bind, Executable, Symbol
+from toolchain.elf.source_map import SourceMap
 from toolchain.errors import ToolError
 
 

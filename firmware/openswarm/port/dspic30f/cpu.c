@@ -23,6 +23,7 @@ INTERRUPT_LEVEL(T2, 1);
 INTERRUPT_LEVEL(C2, 1);
 LINKS_IN_RAM(switch.S);
 OUTSIDE_ONLY(T2, C2); /* the kernel runs at their level */
+HIGHEST_LEVEL(4, openswarm/kernel, openswarm/option, openswarm/io, openswarm/board);
 static volatile sint16 clock_phase; /* delay of the clock in fifths of a cycle */
 
 HAL_USED void cpu_clock_isr(void)

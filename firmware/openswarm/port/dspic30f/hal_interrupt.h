@@ -15,7 +15,7 @@
 #define HAL_INTERRUPT_DISABLE(vector) (_##vector##IE = 0, hal_barrier())
 #define HAL_INTERRUPT_ENABLE(vector, level) (_##vector##IP = (level), _##vector##IF = 0, _##vector##IE = 1)
 
-/* Defines a symbol from which firmware/tools/interrupts.py reads the level. */
+/* Defines a symbol from which the linker reads the level. */
 #define HAL_INTERRUPT_ENTRY(vector, level, function)                                                                  \
     __asm__(".equ HAL_KERNEL_STACK, " HAL_TEXT(HAL_KERNEL_STACK) "\n\t.equ HAL_KERNEL_STACK_LIMIT, "                    \
             HAL_TEXT(HAL_KERNEL_STACK_LIMIT) "\n\t.include \"isr.inc\"\n\t.text\n\tisr __" #vector "Interrupt, _" #function \

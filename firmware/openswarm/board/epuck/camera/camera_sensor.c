@@ -16,6 +16,7 @@ enum {
 };
 INTERRUPT_LEVEL(T4, 6);
 INTERRUPT_LEVEL(T5, 6);
+RESERVED_LEVEL(6, T4, T5);
 
 typedef struct {
     uint8_t number, value;

@@ -2,17 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from typing import Any
 
 from emu.image.lines import dwarf_of
-from toolchain.bounds.damage import refused_if_damaged
+from toolchain.errors import ToolError
 
 _STRIPPED = frozenset(("DW_TAG_typedef", "DW_TAG_const_type", "DW_TAG_volatile_type"))
 
 Signature = tuple[str, ...]
 LONGEST_CHAIN = 1000
 """Most typedefs and qualifiers of one type; damaged debug information may have a cycle of them."""
+
+
+@contextmanager
+def refused_if_damaged() -> Iterator[None]:
+    """Raise ToolError for an exception in the block, which reads debug information."""
+    try:
+        yield
+    except ToolError:
+        raise
+    except Exception as error:  # pyelftools checks little: damaged data raises exceptions of any kind
+        raise ToolError(f"the image's debug information is damaged: {type(error).__name__}: {error}") from None
 
 
 class Signatures:

@@ -8,8 +8,8 @@ from collections.abc import Iterable, Mapping
 from typing import Any, Final
 
 from emu.image.lines import LineTable, dwarf_of, file_names
-from toolchain.bounds.annotations.reader import Annotation
-from toolchain.bounds.damage import refused_if_damaged
+from toolchain.elf.annotations import Annotation
+from toolchain.elf.signatures import refused_if_damaged
 from toolchain.errors import ToolError
 
 LineKey = tuple[str, int]

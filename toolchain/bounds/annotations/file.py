@@ -1,10 +1,10 @@
-"""Annotations of the stack analysis: targets of pointer calls, recursion bounds, thread entries.
+"""Annotation file: targets of pointer calls, stack and recursion bounds, thread entries, for code without bounds.h.
 
 A text file, one statement per line, `#` starts a comment:
 
     calls FUNCTION: TARGET, TARGET ...   pointer calls inside FUNCTION reach one of these; * is every
                                          function whose address the program takes
-    depth FUNCTION BYTES                 FUNCTION and its callees use at most BYTES
+    depth FUNCTION BYTES                 FUNCTION and its callees use at most BYTES; they are not analysed
     recursion FUNCTION COUNT             at most COUNT activations of FUNCTION exist at once
     thread FUNCTION                      FUNCTION is the entry of a thread
 
@@ -27,19 +27,20 @@ _SYMBOL = re.compile(r"__stack_(depth_of|recursion_of|thread)_(.+)")
 
 
 @dataclass(slots=True)
-class Annotations:
+class FileAnnotations:
     """Annotations by function name as written."""
 
     calls: dict[str, list[str]] = field(default_factory=dict)
     depth: dict[str, int] = field(default_factory=dict)
     recursion: dict[str, int] = field(default_factory=dict)
     threads: list[str] = field(default_factory=list)
-    any_handle: bool = False  # pointer calls without annotated targets may reach all functions in `*`
+    any_handle: bool = False
+    """Whether pointer calls without known targets may reach every function whose address is taken."""
 
 
-def read_annotations(text: str, file: str) -> Annotations:
+def read_annotation_file(text: str, file: str) -> FileAnnotations:
     """Return the annotations in `text`; raise `ToolError` with file and line for a line that cannot be parsed."""
-    result = Annotations()
+    result = FileAnnotations()
     for number, raw in enumerate(text.splitlines(), 1):
         line = raw.partition("#")[0].strip()
         if not line:
@@ -63,7 +64,7 @@ def read_annotations(text: str, file: str) -> Annotations:
     return result
 
 
-def add_symbols(result: Annotations, symbols: Iterable[Symbol]) -> None:
+def add_symbols(result: FileAnnotations, symbols: Iterable[Symbol]) -> None:
     """Add the annotations in absolute symbols of the image; those of the file take precedence."""
     for symbol in symbols:
         match = _SYMBOL.fullmatch(symbol.name) if symbol.home is Home.ABSOLUTE else None

@@ -15,6 +15,8 @@ SECTION = ".note.bounds"
 _LINE = re.compile(r"(\w+) (.*)@(.+):(\d+)")
 _FUNCTION = re.compile(r"in (\w+)")
 """Pattern of the enclosing function, which the compiler writes after an annotation (toolchain/emit)."""
+AT = ("loop", "total", "share", "one", "same", "calls", "often", "if")
+"""Kinds of annotations within BOUNDS_AT."""
 _OF_A_FILE = re.compile(r"(\.\w+) ?/ ?(?=\w)")
 """Pattern of `file.c/name`, with the blanks that C formatters insert as in a division."""
 _OPERATORS: dict[type[ast.operator], Callable[[int, int], int]] = {
@@ -97,7 +99,24 @@ def read_annotation_section(image: Executable, values: Mapping[str, int]) -> Ann
                 match = _LINE.fullmatch(line)
                 if match is None:
                     raise ToolError(f"section {SECTION}: expected `kind text@file:line`, got {line!r}")
-                result.all.append(
-                    Annotation(match[1], _OF_A_FILE.sub(r"\1/", match[2].strip()), match[3], int(match[4]))
+                text = _OF_A_FILE.sub(r"\1/", match[2].strip())
+                parts = [part.partition(" ") for part in _parts(text)] if match[1] == "at" else [(match[1], "", text)]
+                result.all += [Annotation(kind, rest.strip(), match[3], int(match[4])) for kind, _, rest in parts]
+                wrong = next(
+                    (one for one in result.all[-len(parts) :] if match[1] == "at" and one.kind not in AT), None
                 )
+                if wrong is not None:
+                    raise ToolError(f"{wrong.place}: expected one of {', '.join(AT)}, got {wrong.kind!r}")
     return result
+
+
+def _parts(text: str) -> list[str]:
+    """Split the text of BOUNDS_AT at commas outside parentheses; remove the parentheses around a list of targets."""
+    parts, depth = [""], 0
+    for character in text:
+        depth += (character == "(") - (character == ")")
+        if character == "," and not depth:
+            parts.append("")
+        else:
+            parts[-1] += character
+    return [re.sub(r"^calls\s*\((.*)\)$", r"calls \1", part.strip()) for part in parts]

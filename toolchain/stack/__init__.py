@@ -1,1 +1,0 @@
-"""Worst-case stack use of a linked image, from its instructions."""
