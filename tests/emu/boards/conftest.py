@@ -54,6 +54,11 @@ class Robot:
     def write(self, name: str, value: int) -> None:
         self.machine.bus.write(self.machine.chip.sfrs[name].address, value)
 
+    def write_all(self, **values: int) -> None:
+        """Write registers in this order, all in the current cycle."""
+        for name, value in values.items():
+            self.write(name, value)
+
     def output(self, pin: str, level: int) -> None:
         """Drive a port pin as a program does."""
         letter, mask = pin[1], 1 << int(pin[2:])

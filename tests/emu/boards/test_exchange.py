@@ -58,11 +58,7 @@ def test_inputs_reach_the_pins_when_applied(robot):
 
 def test_samples_before_a_change_use_the_old_inputs(robot):
     """A conversion that sampled before `apply` has a result from the inputs before the change."""
-    robot.write("ADPCFG", 0)
-    robot.write("ADCHS", 13)
-    robot.write("ADCON3", 0x0102)
-    robot.write("ADCON2", 0x3C)
-    robot.write("ADCON1", 0x80E4)
+    robot.write_all(ADPCFG=0, ADCHS=13, ADCON3=0x0102, ADCON2=0x3C, ADCON1=0x80E4)
     robot.later(100)
     robot.board.outputs.update()
     robot.board.inputs.ambient[5] = 1000

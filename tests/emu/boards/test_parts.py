@@ -124,8 +124,7 @@ def test_jump_by_two_phases_loses_the_step(robot):
 
 def test_a_constant_pattern_that_is_not_a_phase_counts_as_illegal(robot):
     """§3: a constant pattern that is no phase counts as illegal, because each of the four phases drives two coils."""
-    robot.write("TRISD", 0xFF00)
-    robot.write("LATD", 0x0F)
+    robot.write_all(TRISD=0xFF00, LATD=0x0F)
     assert robot.at(15).board.motors.left.illegal == 0
     assert robot.at(16).board.motors.left.illegal == 1
 
@@ -159,10 +158,7 @@ def test_coil_time_is_counted_to_the_cycle(robot):
 
 def convert(robot, channel):
     """Make one polled conversion as the library does (chip reference §13)."""
-    robot.write("ADPCFG", 0)
-    robot.write("ADCON1", 0)
-    robot.write("ADCON3", 0x12)
-    robot.write("ADCHS", channel)
+    robot.write_all(ADPCFG=0, ADCON1=0, ADCON3=0x12, ADCHS=channel)
     robot.write("ADCON1", 0x8000)
     robot.write("ADCON1", 0x8002)
     robot.later(20)
@@ -275,12 +271,7 @@ def test_remote_raises_int0(robot):
 
 def test_codec_takes_words_only_out_of_reset(robot):
     """§6: the codec ignores words while AUDIO_ON (RF0) keeps it in reset."""
-    robot.write("DCICON2", 0x01EF)
-    robot.write("DCICON3", 3)
-    robot.write("TSCON", 1)
-    robot.write("RSCON", 1)
-    robot.write("TXBUF0", 0x1234)
-    robot.write("DCICON1", 0x8040)
+    robot.write_all(DCICON2=0x01EF, DCICON3=3, TSCON=1, RSCON=1, TXBUF0=0x1234, DCICON1=0x8040)
     robot.at(1000)
     assert robot.board.codec.words == 0
     robot.output("RF0", 1)
@@ -320,9 +311,7 @@ def test_noise_is_off_by_default_repeatable_and_scaled(robot):
 
 
 def send(robot, data):
-    robot.write("U1BRG", 7)
-    robot.write("U1MODE", 0x8000)
-    robot.write("U1STA", 0x400)
+    robot.write_all(U1BRG=7, U1MODE=0x8000, U1STA=0x400)
     for byte in data:
         robot.write("U1TXREG", byte)
         robot.later(1500)

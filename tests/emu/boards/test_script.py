@@ -29,8 +29,7 @@ SCRIPT = """
 
 def test_steps_happen_at_their_times(robot):
     """Stimulus steps execute at their times, given in seconds or cycles in any order."""
-    robot.write("U2BRG", 7)
-    robot.write("U2MODE", 0x8000)
+    robot.write_all(U2BRG=7, U2MODE=0x8000)
     robot.board.stimulus.play(parse(robot.board, SCRIPT))
     robot.at(round(0.001 * FCY) - 1)
     assert robot.board.selector.position == 0
@@ -105,9 +104,7 @@ def test_observer_reports_visible_outputs(robot):
     assert [line.split("  ")[-1] for line in lines] == ["leds led0", "leds led0 front", "leds front"]
     assert lines[0].split()[0] == "1.000000"
     lines.clear()
-    robot.write("U1BRG", 7)
-    robot.write("U1MODE", 0x8000)
-    robot.write("U1STA", 0x400)
+    robot.write_all(U1BRG=7, U1MODE=0x8000, U1STA=0x400)
     for byte in b"Hi\r\n":
         robot.write("U1TXREG", byte)
         robot.later(1500)

@@ -20,15 +20,17 @@ XT_PLL8 = 0xFFE6
 class Rig:
     """Devices on a bus, without a CPU. Only `at` advances time; all other methods act in the current cycle."""
 
-    def __init__(self, fosc: int = XT_PLL8, fwdt: int = 0x7FFF) -> None:
-        self.record = Record(DSPIC30F6014A.data["ram"].end)
+    chip = DSPIC30F6014A
+
+    def __init__(self, fosc: int = XT_PLL8, fwdt: int = 0x7FFF, *more: int) -> None:
+        self.record = Record(self.chip.data["ram"].end)
         self.events = Events(self.record)
-        self.bus = Bus(self.record, self.events, DSPIC30F6014A.data["sfr"].end)
-        self.program = ProgramMemory(self.record, DSPIC30F6014A)
-        self.program.config[0] = fosc
-        self.program.config[1] = fwdt
+        self.bus = Bus(self.record, self.events, self.chip.data["sfr"].end)
+        self.program = ProgramMemory(self.record, self.chip)
+        for index, word in enumerate((fosc, fwdt, *more)):
+            self.program.config[index] = word
         self.cpu_signals = CpuSignals()
-        self.dev: Peripherals = build(DSPIC30F6014A, self.bus, self.program, self.cpu_signals)
+        self.dev: Peripherals = build(self.chip, self.bus, self.program, self.cpu_signals)
         self.dev.reset("POR")
 
     def at(self, cycle: int) -> Rig:
@@ -40,7 +42,7 @@ class Rig:
         return self
 
     def address(self, name: str) -> int:
-        return DSPIC30F6014A.sfrs[name].address
+        return self.chip.sfrs[name].address
 
     def read(self, name: str) -> int:
         return self.bus.read(self.address(name))
@@ -51,14 +53,19 @@ class Rig:
     def write(self, name: str, value: int, lanes: int = 0xFFFF) -> None:
         self.bus.write(self.address(name), value, lanes)
 
+    def write_all(self, **values: int) -> None:
+        """Write registers in this order, all in the current cycle."""
+        for name, value in values.items():
+            self.write(name, value)
+
     def field(self, register: str, name: str) -> int:
-        lsb, width = DSPIC30F6014A.sfrs[register].fields[name]
+        lsb, width = self.chip.sfrs[register].fields[name]
         return self.peek(register) >> lsb & (1 << width) - 1
 
     def flag(self, source: str) -> int:
         """Return the interrupt flag with this name, for example "T1IF"."""
         return next(
-            self.field(word, source) for word in ("IFS0", "IFS1", "IFS2") if source in DSPIC30F6014A.sfrs[word].fields
+            self.field(word, source) for word in ("IFS0", "IFS1", "IFS2") if source in self.chip.sfrs[word].fields
         )
 
     def clear_flags(self) -> None:

@@ -21,9 +21,7 @@ def test_polled_conversion_of_the_library_takes_133_cycles(rig):
     """§13: a polled conversion with ADCS = 18 (TAD 9.5 Tcy) takes 14 TAD = 133 Tcy from the end of sampling; DONE and
     ADIF rise together."""
     code(rig, 9, 1234)
-    rig.write("ADCHS", 9)
-    rig.write("ADCON3", 18)
-    rig.write("ADCON1", ADON)
+    rig.write_all(ADCHS=9, ADCON3=18, ADCON1=ADON)
     rig.at(10).write("ADCON1", ADON | SAMP)
     rig.at(100).write("ADCON1", ADON)
     assert rig.at(101).read("ADCON1") == ADON
@@ -41,9 +39,7 @@ def test_scans_of_the_epuck_take_900_cycles(rig, adcs, channels):
     scanned = [number for number in range(16) if channels >> number & 1]
     for number in range(16):
         code(rig, number, 100 * number)
-    rig.write("ADCSSL", channels)
-    rig.write("ADCON2", 0x0400 | len(scanned) - 1 << 2)
-    rig.write("ADCON3", 0x0100 | adcs)
+    rig.write_all(ADCSSL=channels, ADCON2=0x0400 | len(scanned) - 1 << 2, ADCON3=0x0100 | adcs)
     rig.at(10).write("ADCON1", ADON | ASAM | AUTO)
     assert not rig.at(910).flag("ADIF")
     assert rig.at(911).flag("ADIF")
@@ -57,10 +53,7 @@ def test_buffer_fills_while_the_scan_runs(rig):
     """§13: each result is in its buffer at the end of its conversion, every 300 Tcy during the scan."""
     code(rig, 2, 22)
     code(rig, 3, 33)
-    rig.write("ADCSSL", 0x000C)
-    rig.write("ADCON2", 0x0404)
-    rig.write("ADCON3", 0x0127)
-    rig.write("ADCON1", ADON | ASAM | AUTO)
+    rig.write_all(ADCSSL=0x000C, ADCON2=0x0404, ADCON3=0x0127, ADCON1=ADON | ASAM | AUTO)
     assert rig.at(300).read("ADCBUF0") == 0
     assert rig.at(301).read("ADCBUF0") == 22
     assert rig.read("ADCBUF1") == 0
@@ -70,8 +63,7 @@ def test_buffer_fills_while_the_scan_runs(rig):
 def test_half_cycle_tad_adds_up_without_drift(rig):
     """§13: with ADCS = 0 and SAMC = 1 a conversion takes 7.5 Tcy, so every second one ends in the middle of a cycle,
     without drift."""
-    rig.write("ADCON3", 0x0100)
-    rig.write("ADCON1", ADON | ASAM | AUTO)
+    rig.write_all(ADCON3=0x0100, ADCON1=ADON | ASAM | AUTO)
     seen = []
     for cycle in range(1, 40):
         rig.at(cycle)
@@ -101,10 +93,7 @@ def test_alternating_inputs(rig):
     """§13: ALTS alternates between multiplexers A and B."""
     code(rig, 3, 3)
     code(rig, 12, 12)
-    rig.write("ADCHS", 0x0C03)
-    rig.write("ADCON2", 0x000D)
-    rig.write("ADCON3", 0x0101)
-    rig.write("ADCON1", ADON | ASAM | AUTO)
+    rig.write_all(ADCHS=0x0C03, ADCON2=0x000D, ADCON3=0x0101, ADCON1=ADON | ASAM | AUTO)
     rig.at(1 + 4 * 15)
     assert [rig.read(f"ADCBUF{n}") for n in range(4)] == [3, 12, 3, 12]
 
@@ -112,8 +101,7 @@ def test_alternating_inputs(rig):
 def test_buffer_halves_take_turns(rig):
     """§13: with BUFM, results alternate between buffers 0..7 and 8..F; BUFS reads which half is being filled."""
     rig.write("ADCON2", 0x0006)  # SMPI = 1
-    rig.write("ADCON3", 0x0101)
-    rig.write("ADCON1", ADON | ASAM | AUTO)
+    rig.write_all(ADCON3=0x0101, ADCON1=ADON | ASAM | AUTO)
     for index, level in enumerate((10, 20, 30, 40, 50)):
         code(rig, 0, level)
         rig.at(1 + 15 * (index + 1))
@@ -125,10 +113,7 @@ def test_buffer_halves_take_turns(rig):
 
 def test_timer_3_match_ends_sampling(rig):
     """§13: with SSRC = 010, the T3 flag in cycle 101 ends sampling; the conversion takes 7 (ADCS + 1) = 70 Tcy."""
-    rig.write("PR3", 99)
-    rig.write("ADCON3", 9)
-    rig.write("ADCON1", ADON | ASAM | TIMER3)
-    rig.write("T3CON", 0x8000)
+    rig.write_all(PR3=99, ADCON3=9, ADCON1=ADON | ASAM | TIMER3, T3CON=0x8000)
     assert rig.at(101).flag("T3IF")
     assert not rig.at(170).flag("ADIF")
     assert rig.at(171).flag("ADIF")
@@ -138,18 +123,13 @@ def test_timer_3_match_ends_sampling(rig):
 
 def test_timer_2_and_3_as_a_pair_trigger_too(rig):
     """§7, §13: a match of the 32-bit pair T2:T3 ends sampling."""
-    rig.write("PR2", 99)
-    rig.write("PR3", 0)
-    rig.write("ADCON3", 9)
-    rig.write("ADCON1", ADON | ASAM | TIMER3)
-    rig.write("T2CON", 0x8008)
+    rig.write_all(PR2=99, PR3=0, ADCON3=9, ADCON1=ADON | ASAM | TIMER3, T2CON=0x8008)
     assert rig.at(171).flag("ADIF")
 
 
 def test_int0_edge_ends_sampling(rig):
     """§13: with SSRC = 001, an INT0 edge in cycle 100 sets the flag in 101 and gives a result in 171."""
-    rig.write("ADCON3", 9)
-    rig.write("ADCON1", ADON | ASAM | INT0)
+    rig.write_all(ADCON3=9, ADCON1=ADON | ASAM | INT0)
     rig.at(100).dev.pins.set("RF6", 1)
     assert not rig.at(170).flag("ADIF")
     assert rig.at(171).flag("ADIF")
@@ -158,9 +138,7 @@ def test_int0_edge_ends_sampling(rig):
 def test_switching_off_aborts_and_restarts_the_pointers(rig):
     """§13: switching off aborts a conversion without a result and keeps ADCBUF; the next ADON starts with buffer 0."""
     code(rig, 0, 77)
-    rig.write("ADCON2", 2 << 2)
-    rig.write("ADCON3", 0x0101)
-    rig.write("ADCON1", ADON | ASAM | AUTO)
+    rig.write_all(ADCON2=2 << 2, ADCON3=0x0101, ADCON1=ADON | ASAM | AUTO)
     rig.at(20).write("ADCON1", ASAM | AUTO)
     assert rig.at(500).read("ADCBUF0") == 77
     assert rig.read("ADCBUF1") == 0
@@ -174,9 +152,7 @@ def test_negative_input_an1_is_subtracted(rig):
     """§13: with CH0NA the level of AN1 is subtracted; negative differences are clipped to 0."""
     code(rig, 5, 1000)
     code(rig, 1, 400)
-    rig.write("ADCHS", 0x15)
-    rig.write("ADCON3", 1)
-    rig.write("ADCON1", ADON | SAMP)
+    rig.write_all(ADCHS=0x15, ADCON3=1, ADCON1=ADON | SAMP)
     rig.write("ADCON1", ADON)
     assert rig.at(50).read("ADCBUF0") == 600
 
@@ -185,9 +161,7 @@ def test_external_references_scale_the_result(rig):
     """§13: with VCFG = 011 the result is floor(4096 (V - VREF-) / (VREF+ - VREF-))."""
     rig.dev.adc.set_references(0x4000, 0xC000)
     rig.dev.adc.set_input(0, 0x6000)
-    rig.write("ADCON2", 3 << 13)
-    rig.write("ADCON3", 1)
-    rig.write("ADCON1", ADON | SAMP)
+    rig.write_all(ADCON2=3 << 13, ADCON3=1, ADCON1=ADON | SAMP)
     rig.write("ADCON1", ADON)
     assert rig.at(50).read("ADCBUF0") == 1024
 
@@ -205,17 +179,14 @@ def test_source_is_evaluated_at_the_end_of_each_sampling(rig):
     = 1 and TAD 20."""
     seen = []
     rig.dev.adc.source[0] = lambda cycle: seen.append(cycle) or 0
-    rig.write("ADCON2", 4)
-    rig.write("ADCON3", 0x0127)
-    rig.write("ADCON1", ADON | ASAM | AUTO)
+    rig.write_all(ADCON2=4, ADCON3=0x0127, ADCON1=ADON | ASAM | AUTO)
     rig.at(602)
     assert seen == [21, 321]
 
 
 def test_idle_with_adsidl_waits(rig):
     """§17: with ADSIDL, the ADC stops during Idle and then continues."""
-    rig.write("ADCON3", 9)
-    rig.write("ADCON1", ADON | 0x2000 | SAMP)
+    rig.write_all(ADCON3=9, ADCON1=ADON | 0x2000 | SAMP)
     rig.at(10).write("ADCON1", ADON | 0x2000)
     rig.at(20).dev.sleep(1, 20)
     rig.at(1020).dev.wake(1020)
@@ -231,9 +202,8 @@ def test_reads_do_not_change_conversions(seed):
         draw, rig, seen = random.Random(seed), Rig(), []
         for channel in range(16):
             rig.dev.adc.source[channel] = lambda cycle, channel=channel: (cycle * 16 + channel * 997) & 0xFFFF
-        rig.write("ADCSSL", draw.randrange(1, 0x10000))
-        rig.write("ADCHS", draw.randrange(0x2000) & 0x1F1F)
-        rig.write("ADCON2", draw.randrange(5) << 2 | draw.choice((0, 0x400)) | draw.choice((0, 1)))
+        rig.write_all(ADCSSL=draw.randrange(1, 0x10000), ADCHS=draw.randrange(0x2000) & 0x1F1F)
+        rig.write_all(ADCON2=draw.randrange(5) << 2 | draw.choice((0, 0x400)) | draw.choice((0, 1)))
         rig.write("ADCON3", draw.randrange(32) << 8 | draw.randrange(12))
         changes = {draw.randrange(3000): draw.randrange(0x10000) for _ in range(6)}
         rig.write("ADCON1", ADON | ASAM | AUTO | draw.randrange(4) << 8)
@@ -258,10 +228,7 @@ def test_the_scan_starts_again_behind_every_interrupt(rig):
     three are converted."""
     for number in range(16):
         rig.dev.adc.set_input(number, 100 * number << 4)
-    rig.write("ADCSSL", 0x1F00)
-    rig.write("ADCON3", 0x0101)
-    rig.write("ADCON2", 0x0408)
-    rig.write("ADCON1", 0x80E4)
+    rig.write_all(ADCSSL=0x1F00, ADCON3=0x0101, ADCON2=0x0408, ADCON1=0x80E4)
     for _ in range(4):
         rig.first_cycle(lambda: rig.flag("ADIF"), rig.events.now, rig.events.now + 200)
         rig.clear_flags()
@@ -272,9 +239,7 @@ def test_the_scan_starts_again_behind_every_interrupt(rig):
 def test_levels_may_change_while_the_converter_is_stopped(rig, mode):
     """§17: in Idle with ADSIDL, or in Sleep, the ADC converts nothing, whatever the levels do; later results take 15
     TAD each."""
-    rig.write("ADCON2", 4)
-    rig.write("ADCON3", 0x0109)
-    rig.write("ADCON1", ADON | 0x2000 | ASAM | AUTO)
+    rig.write_all(ADCON2=4, ADCON3=0x0109, ADCON1=ADON | 0x2000 | ASAM | AUTO)
     rig.at(20).dev.sleep(mode, 20)
     assert rig.dev.adc.samples_from is None
     code(rig.at(500), 0, 77)
@@ -289,8 +254,7 @@ def test_levels_may_change_while_the_converter_is_stopped(rig, mode):
 def test_a_shorter_setting_ends_sampling_but_not_in_the_past(rig):
     """§13: if manual sampling has lasted 1000 Tcy when automatic mode is set, one conversion of 14 TAD starts at that
     time, none before."""
-    rig.write("ADCON3", 0x0109)
-    rig.write("ADCON1", ADON | ASAM)
+    rig.write_all(ADCON3=0x0109, ADCON1=ADON | ASAM)
     rig.at(1000).write("ADCON1", ADON | ASAM | SAMP | AUTO)
     code(rig, 0, 55)
     assert rig.at(1070).read("ADCON1") == ADON | ASAM | AUTO
@@ -306,9 +270,7 @@ def test_a_shorter_setting_ends_sampling_but_not_in_the_past(rig):
 def test_done_in_a_write_is_what_it_was_in_that_cycle(rig, looks, cycle, done, lanes):
     """§13: writing 1 to DONE, or a byte write above it, keeps the value of DONE in that cycle, whether it was read
     before or not. With SAMC = 1 and TAD 5 Tcy, the first result is there from cycle 76 to 81."""
-    rig.write("ADCON2", 15 << 2)
-    rig.write("ADCON3", 0x0109)
-    rig.write("ADCON1", ADON | ASAM | AUTO)
+    rig.write_all(ADCON2=15 << 2, ADCON3=0x0109, ADCON1=ADON | ASAM | AUTO)
     rig.at(cycle)
     if looks:
         rig.read("ADCON1")
@@ -321,8 +283,7 @@ def test_own_oscillator_at_slow_clocks(fosc, post):
     """§13: the ADRC oscillator's 1.5 us are less than half a Tcy at 230 kHz and below, where a TAD is half a Tcy. The
     clock changes in the middle of a conversion."""
     rig = Rig(fosc=fosc)
-    rig.write("ADCON3", 0x0180)
-    rig.write("ADCON1", ADON | ASAM | AUTO)
+    rig.write_all(ADCON3=0x0180, ADCON1=ADON | ASAM | AUTO)
     rig.at(100)
     for byte in (0x46, 0x57, post << 6):
         rig.write("OSCCON", byte, 0x00FF)

@@ -69,8 +69,7 @@ def test_the_pin_sends_in_loopback_too():
     """§10: in loopback the transmit pin still sends; only the receive pin is disconnected."""
     rig, sent = Rig(), []
     rig.dev.uart[1].on_byte = lambda byte, _start: sent.append(byte)
-    rig.write("U1MODE", 0x8040)
-    rig.write("U1STA", 0x0400)
+    rig.write_all(U1MODE=0x8040, U1STA=0x0400)
     rig.at(5).write("U1TXREG", 0x41)
     assert rig.at(1000).read("U1RXREG") == 0x41
     assert sent == [0x41]
@@ -79,8 +78,7 @@ def test_the_pin_sends_in_loopback_too():
 def test_a_break_is_heard_in_loopback():
     """§10: UTXBRK in loopback forces the line low, which is received as zeros with a framing error."""
     rig = Rig()
-    rig.write("U1MODE", 0x8040)
-    rig.write("U1STA", 0x0C00)
+    rig.write_all(U1MODE=0x8040, U1STA=0x0C00)
     rig.at(5).write("U1TXREG", 0x41)
     rig.at(1000)
     assert rig.field("U1STA", "FERR") == 1
@@ -92,9 +90,7 @@ def test_the_rate_changes_in_the_middle_of_a_character(before, after):
     """§10: writing BRG during a character restarts the baud counter: the current bit lasts one more bit time, then
     the others follow at the new rate."""
     rig = Rig()
-    rig.write("U1BRG", before)
-    rig.write("U1MODE", 0x8000)
-    rig.write("U1STA", 0x0400)
+    rig.write_all(U1BRG=before, U1MODE=0x8000, U1STA=0x0400)
     rig.at(5).write("U1TXREG", 0x35)
     old, new = 16 * (before + 1), 16 * (after + 1)
     start = rig.first_cycle(lambda: not rig.dev.pins.get("RF3"), 6, 300)
@@ -113,9 +109,7 @@ def test_nothing_is_lost_in_loopback_when_the_rate_rises_in_the_middle():
     """§10: if the rate rises during a character in loopback, no byte is lost, because the receiver samples the
     transmitter's own bits."""
     rig = Rig()
-    rig.write("U1BRG", 7)
-    rig.write("U1MODE", 0x8040)
-    rig.write("U1STA", 0x0400)
+    rig.write_all(U1BRG=7, U1MODE=0x8040, U1STA=0x0400)
     for byte in (0x11, 0x22, 0x33):
         rig.write("U1TXREG", byte)
     rig.at(400).write("U1BRG", 0)
@@ -144,8 +138,7 @@ def test_a_byte_that_is_cut_off_does_not_reach_the_slave(cut, heard, off):
     it."""
     rig, slave = Rig(), Notes()
     rig.dev.i2c.wire.attach(0x6E, slave)
-    rig.write("I2CBRG", 150)
-    rig.write("I2CCON", 0x9000)
+    rig.write_all(I2CBRG=150, I2CCON=0x9000)
     rig.at(5).write("I2CCON", 0x9001)
     rig.at(1000).write("I2CTRN", 0xDC)
     rig.at(3000).write("I2CTRN", 0x12)

@@ -114,15 +114,13 @@ def can_bus(number: int) -> Callable[[Rig], None]:
 
 def converter(rig: Rig) -> None:
     """Conversion of the ADC (§13)."""
-    rig.write("ADCON3", 0x0109)
-    rig.write("ADCON1", TON | 0x00E4)
+    rig.write_all(ADCON3=0x0109, ADCON1=TON | 0x00E4)
     rig.at(200)
 
 
 def memory(rig: Rig) -> None:
     """Erase of an EEPROM word (§16)."""
-    rig.write("NVMADRU", 0x7F)
-    rig.write("NVMADR", 0xF000)
+    rig.write_all(NVMADRU=0x7F, NVMADR=0xF000)
     rig.at(10).write("NVMKEY", 0x55)
     rig.at(11).write("NVMKEY", 0xAA)
     rig.at(12).write("NVMCON", 0xC044)
@@ -131,16 +129,14 @@ def memory(rig: Rig) -> None:
 
 def bus_master(rig: Rig) -> None:
     """Start condition of the I2C master (§11)."""
-    rig.write("I2CBRG", 10)
-    rig.write("I2CCON", 0x9000)
+    rig.write_all(I2CBRG=10, I2CCON=0x9000)
     rig.at(5).write("I2CCON", 0x9001)
     rig.at(40)
 
 
 def bus_slave(rig: Rig) -> None:
     """Address match of the I2C slave (§11)."""
-    rig.write("I2CADD", 0x42)
-    rig.write("I2CCON", 0x9000)
+    rig.write_all(I2CADD=0x42, I2CCON=0x9000)
     ExternalMaster(rig.dev.i2c.slave, rig.events).transfer([0x84])
     rig.at(5_000)
 
@@ -154,10 +150,7 @@ def change_notice(rig: Rig) -> None:
 
 def codec(rig: Rig) -> None:
     """Frames of the codec interface (§14)."""
-    rig.write("DCICON2", 0x00EF)
-    rig.write("DCICON3", 3)
-    rig.write("TSCON", 1)
-    rig.write("DCICON1", TON)
+    rig.write_all(DCICON2=0x00EF, DCICON3=3, TSCON=1, DCICON1=TON)
     rig.at(5_000)
 
 

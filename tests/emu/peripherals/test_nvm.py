@@ -90,8 +90,7 @@ def test_whole_eeprom_erase(rig):
     """§16: the whole EEPROM can be erased in one operation."""
     rig.program.put(0x7FF000, 1)
     rig.program.put(0x7FFFFE, 2)
-    rig.write("NVMADRU", 0x7F)
-    rig.write("NVMADR", 0xF000)
+    rig.write_all(NVMADRU=0x7F, NVMADR=0xF000)
     start(rig, 100, 0x4046)
     rig.at(100000)
     assert (rig.program.word(0x7FF000), rig.program.word(0x7FFFFE)) == (0xFFFF, 0xFFFF)

@@ -144,8 +144,7 @@ def test_uart_owns_its_pins_while_enabled(rig):
     rig.write("TRISF", 0)
     rig.at(5)
     assert rig.dev.pins.get("RF3") == 0
-    rig.write("U1MODE", 0x8000)
-    rig.write("U1STA", 0x400)
+    rig.write_all(U1MODE=0x8000, U1STA=0x400)
     assert rig.at(7).dev.pins.get("RF3") == 1
     rig.write("U1MODE", 0)
     assert rig.at(9).dev.pins.get("RF3") == 0

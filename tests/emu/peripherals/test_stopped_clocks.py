@@ -78,8 +78,7 @@ def test_pwm_stops_with_its_timer(start, tsidl):
 def test_a_capture_takes_the_count_of_a_stopped_timer():
     """§8: a capture stores the count at which TSIDL stopped timer 2."""
     rig = Rig()
-    rig.write("IC1CON", 0x83)
-    rig.write("T2CON", 0xA000)
+    rig.write_all(IC1CON=0x83, T2CON=0xA000)
     rig.at(20).dev.sleep(1, 20)
     count = rig.read("TMR2")
     rig.at(100).dev.pins.set("RD8", 1)
@@ -125,8 +124,7 @@ def test_a_closing_gate_interrupts_whatever_is_written_in_its_cycle(register, va
 def test_timer_three_is_on_its_own_when_its_partner_is_switched_off():
     """§7, §17: if timer 2 is disabled there is no 32-bit pair, and timer 3 follows T3CON."""
     rig = Rig()
-    rig.write("T3CON", 0x8000)
-    rig.write("T2CON", 0x8008)
+    rig.write_all(T3CON=0x8000, T2CON=0x8008)
     rig.at(20).write("PMD1", 1 << 12)
     first = rig.at(100).read("TMR3")
     assert rig.at(150).read("TMR3") == first + 50
@@ -271,8 +269,7 @@ def test_a_brown_out_takes_the_clock_of_the_configuration():
 def test_sleep_cuts_a_reception_off():
     """§10: Sleep stops the receiver's clock and so discards a character that is being received."""
     rig = Rig()
-    rig.write("U1BRG", 7)
-    rig.write("U1MODE", 0x8000)
+    rig.write_all(U1BRG=7, U1MODE=0x8000)
     rig.dev.uart[1].feed(b"A")
     nap(rig, 600, 10_000, 2)
     assert rig.field("U1STA", "RIDLE") == 1
@@ -287,8 +284,7 @@ def test_an_i2c_clock_released_while_the_module_is_stopped(freed):
     """§11: a transfer that waits for SCL while the module is stopped starts in the cycle after SCL is released and
     the module runs again, whichever is later."""
     rig = Rig()
-    rig.write("I2CBRG", 150)
-    rig.write("I2CCON", 0xB000)
+    rig.write_all(I2CBRG=150, I2CCON=0xB000)
     rig.at(5).write("I2CCON", 0xB001)
     rig.at(1000).write("I2CCON", 0xB002)
     rig.at(1001).dev.i2c.wire.hold(scl=True)
@@ -307,9 +303,7 @@ def test_a_master_does_not_resume_a_word_aborted_by_sleep():
     rig = Rig()
     sent = []
     rig.dev.spi[1].exchange = lambda word, _bits: sent.append(word) or 0
-    rig.write("SPI1CON", 0x20)
-    rig.write("SPI1STAT", 0x8000)
-    rig.write("SPI1BUF", 0x11)
+    rig.write_all(SPI1CON=0x20, SPI1STAT=0x8000, SPI1BUF=0x11)
     rig.at(5).write("SPI1BUF", 0x22)
     nap(rig, 600, 10_000, 2)
     rig.at(30_000)
@@ -348,8 +342,7 @@ def test_a_stopped_counter_misses_edges_of_a_waveform(start):
     """§7: edges between PWRSAV and the wake-up are not counted; the match is at the fourth counted edge."""
     rig = Rig()
     rig.dev.pins.attach(2, 8, Square())
-    rig.write("PR4", 4)
-    rig.write("T4CON", 0xA002)
+    rig.write_all(PR4=4, T4CON=0xA002)
     nap(rig, start, 1020)
     counted = (start - 1) // 100
     cycle = rig.first_cycle(lambda: rig.flag("T4IF"), 1020, 2000)

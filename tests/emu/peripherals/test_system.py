@@ -144,8 +144,7 @@ def test_power_on_sets_por_and_bor(rig):
 def test_other_resets_add_their_bit_and_keep_the_rest(rig, cause, bit):
     """§4: other resets set their bit in RCON and keep the rest; the demo firmware clears POR, executes RESET and must
     find POR = 0, SWR = 1."""
-    rig.write("RCON", 0x0500)
-    rig.write("PR1", 5)
+    rig.write_all(RCON=0x0500, PR1=5)
     rig.at(50).dev.reset(cause)
     assert rig.read("RCON") == 0x0500 | 1 << bit
     assert rig.read("PR1") == 0xFFFF
@@ -154,10 +153,7 @@ def test_other_resets_add_their_bit_and_keep_the_rest(rig, cause, bit):
 
 def test_reset_stops_every_device(rig):
     """§4: a reset stops every device; operations in progress have no effect afterwards."""
-    rig.write("PR1", 100)
-    rig.write("T1CON", 0x8000)
-    rig.write("U1MODE", 0x8000)
-    rig.write("U1STA", 0x400)
+    rig.write_all(PR1=100, T1CON=0x8000, U1MODE=0x8000, U1STA=0x400)
     rig.at(5).write("U1TXREG", 1)
     rig.at(20).dev.reset("SWR")
     rig.at(5000)
@@ -250,18 +246,15 @@ def test_low_voltage_interrupt_needs_a_stable_band_gap(rig):
 
 def test_disabled_module_reads_0_and_ignores_writes(rig):
     """§17: the registers of a module that PMD1 (T1MD) disables read 0 and ignore writes."""
-    rig.write("PR1", 7)
-    rig.write("PMD1", 1 << 11)
+    rig.write_all(PR1=7, PMD1=1 << 11)
     assert rig.read("PR1") == 0
-    rig.write("PR1", 9)
-    rig.write("PMD1", 0)
+    rig.write_all(PR1=9, PMD1=0)
     assert rig.read("PR1") == 0xFFFF
 
 
 def test_disabled_timer_stops_counting(rig):
     """§17: a disabled timer stops counting."""
-    rig.write("PR1", 100)
-    rig.write("T1CON", 0x8000)
+    rig.write_all(PR1=100, T1CON=0x8000)
     rig.at(50).write("PMD1", 1 << 11)
     rig.at(500).write("PMD1", 0)
     assert not rig.flag("T1IF")
@@ -296,8 +289,7 @@ def test_uart_with_usidl_waits_in_idle(rig):
     """§17: a UART with USIDL stops in Idle: a frame that would end in cycle 1409 ends 1000 cycles later."""
     sent = []
     rig.dev.uart[1].on_byte = lambda byte, start: sent.append(rig.events.now)
-    rig.write("U1BRG", 7)
-    rig.write("U1MODE", 0xA000)
+    rig.write_all(U1BRG=7, U1MODE=0xA000)
     rig.at(1).write("U1STA", 0x400)
     rig.at(10).write("U1TXREG", 1)
     rig.at(200).dev.sleep(1, 200)

@@ -40,8 +40,7 @@ def test_flag_of_an_unprescaled_timer_rises_when_the_count_reads_0_again(rig):
 def test_flag_of_a_prescaled_timer_comes_with_the_match_not_with_the_rollover(rig):
     """§7 rule 2: the flag of a prescaled timer rises after the match, not at the roll-over: with prescale 64, TMR
     becomes 3 in cycle 1 + 192; flag in 194, roll-over in 257."""
-    rig.write("PR2", 3)
-    rig.write("T2CON", TON | 2 << 4)
+    rig.write_all(PR2=3, T2CON=TON | 2 << 4)
     assert rig.at(192).read("TMR2") == 2
     assert rig.at(193).read("TMR2") == 3
     assert not rig.flag("T2IF")
@@ -53,8 +52,7 @@ def test_flag_of_a_prescaled_timer_comes_with_the_match_not_with_the_rollover(ri
 def test_cleared_flag_is_not_set_again_while_the_count_stays_at_the_period(rig):
     """§7 rule 3: a cleared flag is set again only at the next match, a whole period (4 x 64) later, although the
     count is still equal to PR."""
-    rig.write("PR2", 3)
-    rig.write("T2CON", TON | 2 << 4)
+    rig.write_all(PR2=3, T2CON=TON | 2 << 4)
     rig.at(195).write("IFS0", 0)
     assert not rig.at(449).flag("T2IF")
     assert rig.at(450).flag("T2IF")
@@ -74,17 +72,14 @@ def test_writing_the_period_value_into_the_count_does_not_raise_the_flag(rig):
 
 def test_period_0_holds_the_timer_at_0_without_interrupts(rig):
     """§7 rule 4: PR = 0 holds the timer at 0 without interrupts."""
-    rig.write("PR1", 0)
-    rig.write("T1CON", TON)
+    rig.write_all(PR1=0, T1CON=TON)
     assert rig.at(70000).read("TMR1") == 0
     assert not rig.flag("T1IF")
 
 
 def test_count_above_the_period_runs_to_the_top_and_wraps_silently(rig):
     """§7 rule 5: a count above PR runs to the top and wraps without a flag: 0xFFF0 in cycle 1, 0 in 17, 10 in 27."""
-    rig.write("TMR1", 0xFFF0)
-    rig.write("PR1", 10)
-    rig.write("T1CON", TON)
+    rig.write_all(TMR1=0xFFF0, PR1=10, T1CON=TON)
     assert rig.at(16).read("TMR1") == 0xFFFF
     assert rig.at(17).read("TMR1") == 0
     assert not rig.at(27).flag("T1IF")
@@ -119,8 +114,7 @@ def test_clearing_ton_freezes_the_count_and_empties_the_prescaler(rig):
 def test_rewriting_the_same_control_word_does_not_disturb_the_count(rig):
     """§7 rule 6 (choice): rewriting the same value to TxCON keeps count and prescaler; only a change of the clock
     source or prescale clears the prescaler."""
-    rig.write("PR1", 3)
-    rig.write("T1CON", TON | 1 << 4)
+    rig.write_all(PR1=3, T1CON=TON | 1 << 4)
     rig.at(5).write("T1CON", TON | 1 << 4)
     rig.at(24).write("T1CON", TON | 1 << 4)  # TMR becomes 3 in the next cycle
     assert rig.at(25).read("TMR1") == 3
@@ -130,8 +124,7 @@ def test_rewriting_the_same_control_word_does_not_disturb_the_count(rig):
 def test_match_of_the_cycle_in_which_the_timer_is_stopped_still_counts(rig):
     """§7 rule 10: a match in the cycle in which TON is cleared still sets the flag: TMR = PR and the write are in
     cycle 11, the flag rises in 12."""
-    rig.write("PR1", 10)
-    rig.write("T1CON", TON)
+    rig.write_all(PR1=10, T1CON=TON)
     rig.at(11).write("T1CON", 0)
     assert rig.at(12).flag("T1IF")
     assert not rig.at(12).field("T1CON", "TON")
@@ -140,8 +133,7 @@ def test_match_of_the_cycle_in_which_the_timer_is_stopped_still_counts(rig):
 def test_new_period_applies_from_the_next_cycle(rig):
     """§7: a new period is effective from the next cycle on: PR changes from 100 to 20 while the count is 10; 20 is
     reached in cycle 21, the flag rises in 22."""
-    rig.write("PR1", 100)
-    rig.write("T1CON", TON)
+    rig.write_all(PR1=100, T1CON=TON)
     rig.at(11).write("PR1", 20)
     assert not rig.at(21).flag("T1IF")
     assert rig.at(22).flag("T1IF")
@@ -168,8 +160,7 @@ def test_counter_with_period_1_interrupts_once_per_edge_only_if_the_handler_clea
         rig.at(cycle).dev.pins.set("RC4", 1)
         rig.at(cycle + 5).dev.pins.set("RC4", 0)
 
-    rig.write("PR5", 1)
-    rig.write("T5CON", TON | TCS)
+    rig.write_all(PR5=1, T5CON=TON | TCS)
     pulse(100)
     assert rig.at(105).flag("T5IF")
     rig.clear_flags()
@@ -186,8 +177,7 @@ def test_counter_with_period_1_interrupts_once_per_edge_only_if_the_handler_clea
 def test_counter_flag_rises_two_cycles_behind_the_edge(rig):
     """§7 rules 2 and 9: the flag of a counter rises two cycles after the edge: edge in 100, count in 101, flag in
     102."""
-    rig.write("PR5", 1)
-    rig.write("T5CON", TON | TCS)
+    rig.write_all(PR5=1, T5CON=TON | TCS)
     rig.at(100).dev.pins.set("RC4", 1)
     assert not rig.at(101).flag("T5IF")
     assert rig.at(102).flag("T5IF")
@@ -205,8 +195,7 @@ def test_counter_prescaler_counts_edges(rig):
 def test_gated_timer_counts_while_the_pin_is_high_and_flags_the_falling_edge(rig):
     """§7 gated mode: the timer counts while the pin is high, 80 counts from 100 to 180. The falling edge sets the
     flag, not the match with PR."""
-    rig.write("PR1", 40)
-    rig.write("T1CON", TON | TGATE)
+    rig.write_all(PR1=40, T1CON=TON | TGATE)
     assert rig.at(100).read("TMR1") == 0
     rig.dev.pins.set("RC14", 1)
     assert rig.at(150).read("TMR1") == 49 - 41
@@ -218,9 +207,7 @@ def test_gated_timer_counts_while_the_pin_is_high_and_flags_the_falling_edge(rig
 
 def test_wide_timer_counts_32_bits_and_interrupts_with_the_odd_timer(rig):
     """§7: a 32-bit timer counts in TMR3:TMR2 up to PR3:PR2 and sets T3IF, not T2IF."""
-    rig.write("PR2", 0x0005)
-    rig.write("PR3", 0x0001)
-    rig.write("T2CON", TON | T32)
+    rig.write_all(PR2=0x0005, PR3=0x0001, T2CON=TON | T32)
     assert rig.at(1 + 0x10005).read("TMR2") == 5
     assert rig.peek("TMR3") == 1
     assert not rig.flag("T3IF")
@@ -231,8 +218,7 @@ def test_wide_timer_counts_32_bits_and_interrupts_with_the_odd_timer(rig):
 
 def test_reading_the_low_word_of_a_wide_timer_latches_the_high_word(rig):
     """§7, §18: reading TMR2 of a 32-bit timer latches the upper half of the count in TMR3HLD."""
-    rig.write("PR2", 0xFFFF)
-    rig.write("T2CON", TON | T32)
+    rig.write_all(PR2=0xFFFF, T2CON=TON | T32)
     assert rig.at(0x10000).read("TMR2") == 0xFFFF
     assert rig.at(0x10001).peek("TMR3") == 1
     assert rig.read("TMR3HLD") == 0
@@ -242,8 +228,7 @@ def test_reading_the_low_word_of_a_wide_timer_latches_the_high_word(rig):
 
 def test_writing_the_low_word_of_a_wide_timer_takes_the_high_word_from_the_holding_register(rig):
     """§7: writing TMR2 of a 32-bit timer also writes TMR3HLD to the upper half of the count."""
-    rig.write("T2CON", TON | T32)
-    rig.write("TMR3HLD", 0x1234)
+    rig.write_all(T2CON=TON | T32, TMR3HLD=0x1234)
     rig.at(50).write("TMR2", 0x5678)
     assert rig.at(51).read("TMR2") == 0x5678
     assert rig.peek("TMR3") == 0x1234
@@ -251,17 +236,14 @@ def test_writing_the_low_word_of_a_wide_timer_takes_the_high_word_from_the_holdi
 
 def test_odd_control_register_is_ignored_in_wide_mode(rig):
     """§7: T3CON is ignored in 32-bit mode."""
-    rig.write("T3CON", TON)
-    rig.write("T2CON", TON | T32)
+    rig.write_all(T3CON=TON, T2CON=TON | T32)
     rig.at(10).write("T3CON", 0)
     assert rig.at(101).read("TMR2") == 100
 
 
 def test_timer_with_tsidl_stops_in_idle_and_the_others_do_not(rig):
     """§7: a timer with TSIDL stops in Idle, others do not: T1 does not count from cycle 100 to 600, T2 does."""
-    rig.write("PR1", 149)
-    rig.write("T1CON", TON | TSIDL)
-    rig.write("T2CON", TON)
+    rig.write_all(PR1=149, T1CON=TON | TSIDL, T2CON=TON)
     rig.at(100).dev.sleep(1, 100)
     rig.at(600).dev.wake(600)
     assert rig.read("TMR1") == 99
@@ -272,9 +254,7 @@ def test_timer_with_tsidl_stops_in_idle_and_the_others_do_not(rig):
 
 def test_only_timer_1_as_asynchronous_counter_runs_in_sleep(rig):
     """§7: in Sleep only timer 1 as asynchronous counter (TSYNC = 0) counts; T4 as counter does not."""
-    rig.write("PR1", 2)
-    rig.write("T1CON", TON | TCS)
-    rig.write("T4CON", TON | TCS)
+    rig.write_all(PR1=2, T1CON=TON | TCS, T4CON=TON | TCS)
     rig.at(100).dev.sleep(2, 100)
     for cycle in (200, 300):
         rig.at(cycle).dev.pins.set("RC14", 1)
@@ -289,8 +269,7 @@ def test_only_timer_1_as_asynchronous_counter_runs_in_sleep(rig):
 
 def test_native_description_reproduces_the_count(rig):
     """README: the record fields base, tick and period determine the count and the time of the match."""
-    rig.write("PR1", 999)
-    rig.write("T1CON", TON | 1 << 4)
+    rig.write_all(PR1=999, T1CON=TON | 1 << 4)
     rig.at(4321)
     fields = rig.record.fields
     base = rig.record.u64[fields["t1.base"].index]
@@ -380,8 +359,7 @@ def test_only_plain_16_bit_matches_are_offered_to_native_code(rig):
     assert offered() == 0
     rig.write("T2CON", TON | TGATE)
     assert offered() == 0
-    rig.write("T2CON", TON)
-    rig.write("PR2", 0)
+    rig.write_all(T2CON=TON, PR2=0)
     assert offered() == 0
 
 

@@ -64,16 +64,10 @@ def capture(robot, lines, bytes_per_line, skip_lines=0):
     """Capture a frame: T5 counts VSYNC, T4 counts HREF, and PORTD is read every 8 Tcy from 17 Tcy after the HREF
     edge."""
     camera = robot.board.camera
-    robot.write("TMR5", 0)
-    robot.write("PR5", 1)
-    robot.write("TMR4", skip_lines)
-    robot.write("PR4", skip_lines + 1)
-    robot.write("T5CON", 0x8002)
-    robot.write("IFS1", 0)
+    robot.write_all(TMR5=0, PR5=1, TMR4=skip_lines, PR4=skip_lines + 1, T5CON=0x8002, IFS1=0)
     while not robot.read("IFS1") & 1 << 6:
         robot.at(robot.machine.peripherals.context.bus.events.next_due())
-    robot.write("T5CON", 0)
-    robot.write("T4CON", 0x8002)
+    robot.write_all(T5CON=0, T4CON=0x8002)
     rows = []
     for _ in range(lines):
         robot.write("IFS1", 0)
@@ -269,8 +263,7 @@ def test_gain_and_exposure_registers_scale_the_picture():
 def test_identity_over_i2c(sensor, identity):
     """§7.1: the I2C module reads the identity from registers 0 and 1 at 0xDC/0xDD."""
     robot = Robot(camera=sensor)
-    robot.write("I2CBRG", 150)
-    robot.write("I2CCON", 0x9000)
+    robot.write_all(I2CBRG=150, I2CCON=0x9000)
 
     def operation(name, value):
         robot.write("IFS0", 0)
@@ -309,8 +302,7 @@ def test_reset_line_stops_the_sensor_and_clears_its_registers(robot):
 
 def test_unplugged_camera_gives_neither_answers_nor_edges(robot):
     """An unplugged camera does not answer at address 0x6E and has no VSYNC edges."""
-    robot.write("PR5", 1)
-    robot.write("T5CON", 0x8002)
+    robot.write_all(PR5=1, T5CON=0x8002)
     robot.board.camera.unplug()
     robot.at(20_000_000)
     assert not robot.read("IFS1") & 1 << 6

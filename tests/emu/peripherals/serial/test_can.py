@@ -101,10 +101,7 @@ def test_extended_identifier_survives_the_trip(rig):
 def test_masks_and_filters_choose_the_buffer(rig):
     """§15: filters 0-1 with mask 0 accept frames for RXB0, filters 2-5 with mask 1 for RXB1; FILHIT is the number of
     the filter."""
-    rig.write("C1RXM0SID", 0x7FF << 2)
-    rig.write("C1RXM1SID", 0x7FF << 2)
-    rig.write("C1RXF0SID", 0x100 << 2)
-    rig.write("C1RXF3SID", 0x200 << 2)
+    rig.write_all(C1RXM0SID=0x7FF << 2, C1RXM1SID=0x7FF << 2, C1RXF0SID=0x100 << 2, C1RXF3SID=0x200 << 2)
     configure(rig)
     load(rig, 0, 0x200, b"a")
     rig.at(3000)

@@ -9,11 +9,7 @@ DCIEN, DLOOP, UNFM = 0x8000, 0x800, 0x80
 
 def epuck(rig, con1=0x40, blen=3):
     """Set up the DCI as on the e-puck: 16 slots of 16 bits, 8 Tcy per bit, one slot used."""
-    rig.write("DCICON1", con1)
-    rig.write("DCICON2", blen << 10 | 0x01EF)
-    rig.write("DCICON3", 3)
-    rig.write("TSCON", 1)
-    rig.write("RSCON", 1)
+    rig.write_all(DCICON1=con1, DCICON2=blen << 10 | 0x01EF, DCICON3=3, TSCON=1, RSCON=1)
 
 
 def test_interrupt_of_the_epuck_comes_every_8192_cycles(rig):
@@ -81,11 +77,7 @@ def test_several_slots_and_short_words(rig):
     """§14: slots 0 and 2 of 3 carry left-aligned 8-bit words, here with Fcsck = Fcy / 4."""
     sent = []
     rig.dev.dci.on_word = lambda word, slot, cycle: sent.append((word, slot, cycle))
-    rig.write("DCICON2", 1 << 10 | 2 << 5 | 7)
-    rig.write("DCICON3", 1)
-    rig.write("TSCON", 5)
-    rig.write("TXBUF0", 0x12FF)
-    rig.write("TXBUF1", 0x34FF)
+    rig.write_all(DCICON2=1 << 10 | 2 << 5 | 7, DCICON3=1, TSCON=5, TXBUF0=0x12FF, TXBUF1=0x34FF)
     rig.at(10).write("DCICON1", DCIEN)
     rig.at(120)
     assert sent == [(0x1200, 0, 43), (0x3400, 2, 107)]
@@ -113,8 +105,7 @@ def test_switching_off_ends_with_the_frame(rig):
 def test_generator_stands_with_bcg_0(rig):
     """§14: with BCG = 0 the bit clock generator is stopped."""
     epuck(rig)
-    rig.write("DCICON3", 0)
-    rig.write("DCICON1", DCIEN)
+    rig.write_all(DCICON3=0, DCICON1=DCIEN)
     assert not rig.at(100000).flag("DCIIF")
 
 

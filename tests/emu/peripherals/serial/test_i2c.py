@@ -50,8 +50,7 @@ class Memory(I2cDevice):
 
 @pytest.fixture
 def bus(rig):
-    rig.write("I2CBRG", 150)
-    rig.write("I2CCON", BASE)
+    rig.write_all(I2CBRG=150, I2CCON=BASE)
     rig.at(9)
     return rig
 
@@ -262,8 +261,7 @@ def test_unread_byte_overflows(bus):
 def test_odd_brg_values_round_each_edge_down(rig):
     """§11: with an odd number of half Tcy, each edge is rounded down: BRG = 4 gives Tbrg = 2.5 Tcy, so 18 Tbrg are 45
     Tcy."""
-    rig.write("I2CBRG", 4)
-    rig.write("I2CCON", BASE)
+    rig.write_all(I2CBRG=4, I2CCON=BASE)
     rig.at(10).write("I2CTRN", 0)
     assert wait(rig) == 11 + 45
 
@@ -272,8 +270,7 @@ def test_odd_brg_values_round_each_edge_down(rig):
 def test_clock_pulses_last_exactly_brg_plus_one_tcy(rig, brg):
     """§11: on the SCL pin, the n-th of nine clock pulses falls n (BRG + 1) Tcy after the beginning. It rises half a
     bit earlier, rounded down, so the bus frequency is exact."""
-    rig.write("I2CBRG", brg)
-    rig.write("I2CCON", BASE)
+    rig.write_all(I2CBRG=brg, I2CCON=BASE)
     rig.at(5).write("I2CCON", BASE | SEN)
     wait(rig)
     start = rig.events.now + 1
@@ -290,8 +287,7 @@ def test_clock_pulses_last_exactly_brg_plus_one_tcy(rig, brg):
 def test_every_setting_sends_a_byte_in_nine_bits(rig):
     """§11: for all 512 values of BRG, a byte takes exactly nine bits."""
     for brg in range(512):
-        rig.write("I2CBRG", brg)
-        rig.write("I2CCON", BASE)
+        rig.write_all(I2CBRG=brg, I2CCON=BASE)
         rig.at(rig.events.now + 1).write("I2CTRN", 0)
         start = rig.events.now + 1
         assert not rig.at(start + 9 * (brg + 1) - 1).flag("MI2CIF"), brg
@@ -336,8 +332,7 @@ def run_slave(rig, service, cycles=60000, every=50):
 
 @pytest.fixture
 def slave(rig):
-    rig.write("I2CADD", 0x42)
-    rig.write("I2CCON", BASE)
+    rig.write_all(I2CADD=0x42, I2CCON=BASE)
     return rig
 
 

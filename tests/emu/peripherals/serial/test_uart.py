@@ -112,8 +112,7 @@ def test_transmit_interrupt_when_the_sender_is_first_enabled(rig):
 def test_data_loaded_before_utxen_starts_from_a_cleared_baud_clock(rig):
     """§10.1: data loaded before UTXEN start from a cleared baud clock: UTXEN is written in 1000, the clock runs from
     1001, and the start bit begins one bit later in 1129."""
-    rig.write("U1BRG", 7)
-    rig.write("U1MODE", UARTEN)
+    rig.write_all(U1BRG=7, U1MODE=UARTEN)
     rig.at(10).write("U1TXREG", 0x41)
     sent = collect(rig)
     rig.at(1000).write("U1STA", UTXEN)
@@ -344,8 +343,7 @@ def test_wake_raises_the_interrupt_at_the_start_edge_in_sleep(rig):
 def test_autobaud_lets_the_capture_module_time_the_senders_bits(rig, baud, bit):
     """§10: with ABAUD, IC1 captures every edge of 0x55 against timer 3, for any bit rate of the sender."""
     enable(rig, mode=ABAUD)
-    rig.write("T3CON", 0x8000)
-    rig.write("IC1CON", 1)
+    rig.write_all(T3CON=0x8000, IC1CON=1)
     rig.dev.uart[1].feed(b"\x55", cycle=1001, baud=baud)
     rig.at(1001 + round(3 * bit) + 2)
     times = [rig.read("IC1BUF") for _ in range(4)]

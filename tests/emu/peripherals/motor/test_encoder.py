@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from tests.emu.peripherals.motor_rig import MotorRig
+from tests.emu.peripherals.motor.motor_rig import MotorRig
 
 A, B, INDEX = "RB4", "RB5", "RB3"
 X2, X4, MATCH = 0x0400, 0x0600, 0x0100
@@ -73,10 +73,7 @@ def test_a_count_beyond_maxcnt_is_an_error_in_index_mode(rig: MotorRig) -> None:
     """§14.2.1: MAXCNT + 1 sets CNTERR and requests the interrupt, which CEID disables."""
     for ceid in (0, 0x100):
         rig.clear_flags()
-        rig.write("DFLTCON", ceid)
-        rig.write("MAXCNT", 2)
-        rig.write("POSCNT", 0)
-        rig.write("QEICON", X4)
+        rig.write_all(DFLTCON=ceid, MAXCNT=2, POSCNT=0, QEICON=X4)
         turn(rig, 1)
         assert rig.read("QEICON") >> 15 == 1
         assert rig.flag("QEI") == (ceid == 0)
@@ -84,8 +81,7 @@ def test_a_count_beyond_maxcnt_is_an_error_in_index_mode(rig: MotorRig) -> None:
 
 def test_the_filter_removes_pulses_of_less_than_three_clocks(rig: MotorRig) -> None:
     """§14.4: an input must be stable for three clocks of the filter, here of 4 Tcy."""
-    rig.write("MAXCNT", 0xFFFF)
-    rig.write("DFLTCON", 0x80 | 2 << 4)
+    rig.write_all(MAXCNT=0xFFFF, DFLTCON=0x80 | 2 << 4)
     rig.at(1).write("QEICON", X4 | MATCH)
     rig.at(20).dev.pins.set(A, 1)
     rig.at(28).dev.pins.set(A, 0)
@@ -167,8 +163,7 @@ def test_the_other_channels_have_a_second_set_of_inputs() -> None:
 def test_the_special_event_of_the_pwm_starts_a_conversion() -> None:
     """§17.12, §15.12: SSRC = 011 ends sampling when PTMR reaches SEVTCMP."""
     rig = converter(0x006C, 0x0200, chs=5)
-    rig.write("PTPER", 999)
-    rig.write("SEVTCMP", 500)
+    rig.write_all(PTPER=999, SEVTCMP=500)
     rig.at(20).write("PTCON", 0x8000)
     done = 21 + 500 + 4 * CONVERSION
     assert (rig.at(done - 1).flag("ADC"), rig.at(done).flag("ADC")) == (0, 1)

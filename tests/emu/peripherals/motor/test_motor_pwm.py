@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from tests.emu.peripherals.motor_rig import MotorRig
+from tests.emu.peripherals.motor.motor_rig import MotorRig
 
 PTEN, UP_DOWN, DOUBLE, SINGLE = 0x8000, 2, 3, 1
 
@@ -14,8 +14,7 @@ def start(rig: MotorRig, *, period: int = 99, duty: int = 60, con: int = 0, outp
     rig.write("PTPER", period)
     for pair in (1, 2, 3):
         rig.write(f"PDC{pair}", duty)
-    rig.write("DTCON1", dead)
-    rig.write("PWMCON1", outputs)
+    rig.write_all(DTCON1=dead, PWMCON1=outputs)
     rig.clear_flags()
     rig.write("PTCON", PTEN | con)
 
@@ -88,8 +87,7 @@ def test_duty_cycles_are_double_buffered() -> None:
     start(rig)
     rig.at(10).write("PDC1", 100)
     assert rig.edges("RE1", 10, 190) == [(31, "RE1", 0), (101, "RE1", 1), (151, "RE1", 0)]
-    rig.write("PWMCON2", 1)
-    rig.write("PDC1", 20)
+    rig.write_all(PWMCON2=1, PDC1=20)
     assert rig.edges("RE1", 190, 299) == [(201, "RE1", 1), (251, "RE1", 0)]
     rig.write("PWMCON2", 4)
     rig.at(302).write("PDC1", 20)
@@ -166,8 +164,7 @@ def test_the_configuration_word_selects_the_polarity(word: int, high: int, low: 
 def test_pins_that_the_module_does_not_own_belong_to_the_port() -> None:
     """§15.10: PENxy = 0 leaves a pin to LATE and TRISE."""
     rig = MotorRig()
-    rig.write("TRISE", 0)
-    rig.write("LATE", 0x20)
+    rig.write_all(TRISE=0, LATE=0x20)
     start(rig, outputs=0x01)
     assert rig.at(50).dev.pins.get("RE5") == 1
     assert rig.edges("RE1 RE3", 50, 300) == []
@@ -176,8 +173,7 @@ def test_pins_that_the_module_does_not_own_belong_to_the_port() -> None:
 def test_a_disabled_module_returns_its_pins() -> None:
     """PMD1.PWMMD resets the module: its registers read 0 and the port has the pins again."""
     rig = MotorRig()
-    rig.write("TRISE", 0)
-    rig.write("LATE", 0x02)
+    rig.write_all(TRISE=0, LATE=0x02)
     start(rig, duty=0)
     rig.at(50).write("PMD1", 0x0200)
     assert rig.at(52).read("PTPER") == 0
