@@ -57,6 +57,7 @@ class Stage:
 
     def __init__(self, path: Path, ipl_slip: int = 0) -> None:
         image = load_image(path)
+        self.ipl_slip = ipl_slip
         self.machine = Machine(image.chip, engine="auto", board=partial(Epuck), ipl_slip=ipl_slip)
         self.machine.load(image)
         self.machine.peripherals.spi[2].exchange = lambda word, _bits: word
@@ -69,6 +70,7 @@ class Stage:
         for _ in SCENES:
             self.run_to("checked")
         self.used = self.machine.peek("os_statistics")
+        self.begin = self.machine.snapshot()
         self.seen = Seen()
         self.after_kill: Callable[[Machine, int], None] | None = None
         """Callback after_kill(machine, address of the ended thread's memory), with which tests provoke a failure."""
@@ -135,18 +137,15 @@ class Stage:
 
 
 def sweep(
-    path: Path, ipl_slip: int, scene: int, stride: int = 1, phase: int = 0, pauses: tuple[int, ...] = PAUSES
+    stage: Stage, scene: int, stride: int = 1, phase: int = 0, pauses: tuple[int, ...] = PAUSES
 ) -> Iterator[Seen]:
     """Kill at every stride-th boundary of a scene from the phase-th on; yield the totals after each kill.
 
     A sleep is one boundary, as is each instruction of the interrupts that occur meanwhile.
     """
-    stage = Stage(path, ipl_slip)
     machine = stage.machine
-    while machine.peek("scene") != (scene - 1) % len(SCENES):
-        stage.run_to("checked")
-    run_to_begin(machine)
-    memory = stage.victim()
+    stage.seen = Seen()
+    memory = begin_scene(stage, scene)
     number = 0
     while machine.pc != stage.places["scene_end"]:
         if number % stride == phase % stride:
@@ -155,7 +154,7 @@ def sweep(
                 try:
                     stage.kill(*memory, pause)
                 except AssertionError as error:
-                    where = f"{SCENES[scene]}, boundary {number}, pause {pause} ms, slip {ipl_slip}"
+                    where = f"{SCENES[scene]}, boundary {number}, pause {pause} ms, slip {stage.ipl_slip}"
                     raise AssertionError(f"{where}: {error}") from error
                 machine.restore(here)
             yield stage.seen
@@ -163,7 +162,12 @@ def sweep(
         machine.step()
 
 
-def run_to_begin(machine: Machine) -> None:
-    """Run to the first instruction of the next scene."""
+def begin_scene(stage: Stage, scene: int) -> tuple[int, int]:
+    """Run from the first round's end to the first instruction of a scene; return the place of the victim's memory."""
+    machine = stage.machine
+    machine.restore(stage.begin)
+    while machine.peek("scene") != (scene - 1) % len(SCENES):
+        stage.run_to("checked")
     stop = machine.run(cycles=PATIENCE, until=place(machine, "scene_begin"))
     assert stop.reason == "until", stop
+    return stage.victim()

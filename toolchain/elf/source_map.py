@@ -33,6 +33,7 @@ class SourceMap:
             self._code.setdefault(file, []).append(number)
         self._all: Final = sorted({*self._code, *self._first_lines, *self.lines.files.values()})
         self._targets: Final[dict[Annotation, LineKey | None]] = {}
+        self._matching: Final[dict[str, list[str]]] = {}
 
     def _read(self, debug: Mapping[str, bytes]) -> None:
         if not debug.get(".debug_info"):
@@ -66,10 +67,12 @@ class SourceMap:
 
     def matching_files(self, name: str) -> list[str]:
         """Return the files that a path may denote: those with the most matching trailing folders."""
-        wanted = _components(name)
-        matches = {file: _common_suffix(wanted, _components(file)) for file in self._all}
-        most = max(matches.values(), default=0)
-        return [file for file, count in matches.items() if count == most] if most else []
+        if name not in self._matching:
+            wanted = _components(name)
+            matches = {file: _common_suffix(wanted, _components(file)) for file in self._all}
+            most = max(matches.values(), default=0)
+            self._matching[name] = [file for file, count in matches.items() if count == most] if most else []
+        return self._matching[name]
 
     def file_of(self, annotation: Annotation) -> str | None:
         """Return the file of an annotation, None if the image has no code of it; raise `ToolError` if ambiguous."""

@@ -18,11 +18,16 @@ from tests.firmware.conftest import FIRMWARE, Build, run_make
 from tests.firmware.kernel.test_kernel_on_target import FCY, load
 
 
+def heard(path: Path) -> tuple[emu.Machine, bytearray]:
+    """Return a robot with an image, and the text that it will have sent on UART1."""
+    machine, said = load(path), bytearray()
+    machine.uart[1].on_byte = lambda byte, _: said.append(byte)
+    return machine, said
+
+
 def test_hello_says_hello_every_second(image: Build) -> None:
     """`hello` prints its greeting once a second (firmware/apps/hello/README.md)."""
-    machine = load(image("hello"))
-    said = bytearray()
-    machine.uart[1].on_byte = lambda byte, _: said.append(byte)
+    machine, said = heard(image("hello"))
     machine.run(cycles=21 * FCY // 10)
     assert said.decode() == "hello, swarm\r\n" * 3
 
@@ -53,9 +58,7 @@ def test_processors_are_swapped_under_traffic_without_loss(image: Build) -> None
     The processors are the virtual actuator, the safety post-processor and the pair that adds and checks COBS frames
     with CRC-16, as in the paper.
     """
-    machine = load(image("processors"))
-    said = bytearray()
-    machine.uart[1].on_byte = lambda byte, _: said.append(byte)
+    machine, said = heard(image("processors"))
     machine.run(cycles=FCY // 4)
     assert said.decode().splitlines()[1:] == ["+085+115"] * 2  # v = 100 mm/s, omega = 0.6 rad/s, axle 53 mm
     machine.uart[1].feed(b"u")
@@ -84,9 +87,7 @@ def test_processors_are_swapped_under_traffic_without_loss(image: Build) -> None
 @pytest.mark.slow
 def test_stress_neither_leaks_nor_traps(image: Build) -> None:
     """`stress` runs without trap or leak: after every 200 actions it asserts that the heap is as before."""
-    machine = load(image("stress"))
-    said = bytearray()
-    machine.uart[1].on_byte = lambda byte, _: said.append(byte)
+    machine, said = heard(image("stress"))
     stop = machine.run(cycles=41 * FCY // 10)
     assert stop.reason == "limit"
     text = said.decode()
@@ -192,13 +193,6 @@ int main(void) {
 # ---- tone, commands, patrol -----------------------------------------------------------------------------------------
 
 
-def on_both_engines(folder: Path, ask: Callable[[emu.Machine], str]) -> str:
-    """Run a program in the interpreter and in the JIT; assert equal results of `ask` and return them."""
-    first, second = (ask(emu.load(folder, engine=engine)) for engine in ("plain", "jit"))
-    assert first == second
-    return first
-
-
 def sines(*tones: tuple[int, int]) -> Callable[[int], float]:
     """Return a sum of sine waves, each given as (frequency in Hz, amplitude in counts)."""
     return lambda cycle: sum(a * math.sin(2 * math.pi * hz * cycle / FCY) for hz, a in tones)
@@ -210,16 +204,11 @@ def test_tone_hears_what_its_filter_lets_through(image: Build) -> None:
 
     Source: firmware/apps/tone/README.md.
     """
-
-    def ask(machine: emu.Machine) -> str:
-        said = bytearray()
-        machine.uart[1].listen(lambda byte, _: said.append(byte))
-        machine.run(seconds=0.2)
-        machine.board.microphones.play(0, sines((200, 100), (560, 900)))
-        machine.run(seconds=0.42)
-        return said.decode()
-
-    lines = on_both_engines(image("tone"), ask).split()
+    machine, said = heard(image("tone"))
+    machine.run(seconds=0.2)
+    machine.board.microphones.play(0, sines((200, 100), (560, 900)))
+    machine.run(seconds=0.42)
+    lines = said.decode().split()
     assert lines[0] == "silence"
     assert lines[-4:] == ["200", "Hz"] * 2
 
@@ -227,27 +216,16 @@ def test_tone_hears_what_its_filter_lets_through(image: Build) -> None:
 @pytest.mark.slow
 def test_commands_are_read_with_sscanf(image: Build) -> None:
     """`commands` parses its text commands with sscanf and answers each (firmware/apps/commands/README.md)."""
-
-    def ask(machine: emu.Machine) -> str:
-        said = bytearray()
-        machine.uart[1].listen(lambda byte, _: said.append(byte))
-        for line in ("speed 50, -30", "get speed", "sum 0x10 010", "speed 1", "get lost", "speed 1,2 3"):
-            machine.uart[1].feed(line.encode() + b"\r\n")
-            machine.run(seconds=0.05)
-        return said.decode()
-
-    assert on_both_engines(image("commands"), ask).split() == ["ok", "50,-30", "24", "?", "?", "?"]
+    machine, said = heard(image("commands"))
+    for line in ("speed 50, -30", "get speed", "sum 0x10 010", "speed 1", "get lost", "speed 1,2 3"):
+        machine.uart[1].feed(line.encode() + b"\r\n")
+        machine.run(seconds=0.05)
+    assert said.decode().split() == ["ok", "50,-30", "24", "?", "?", "?"]
 
 
 @pytest.mark.slow
 def test_patrol_runs_its_behaviours_in_turn(image: Build) -> None:
     """`patrol`, a C++ application, runs its behaviours one after the other (firmware/apps/patrol/README.md)."""
-
-    def ask(machine: emu.Machine) -> str:
-        said = bytearray()
-        machine.uart[1].listen(lambda byte, _: said.append(byte))
-        machine.run(seconds=1.7)
-        return said.decode()
-
-    lines = on_both_engines(image("patrol"), ask).splitlines()
-    assert lines == ["1 straight 60 60", "2 spin 30 -30", "3 straight 60 60", "4 spin -30 30"]
+    machine, said = heard(image("patrol"))
+    machine.run(seconds=1.7)
+    assert said.decode().splitlines() == ["1 straight 60 60", "2 spin 30 -30", "3 straight 60 60", "4 spin -30 30"]

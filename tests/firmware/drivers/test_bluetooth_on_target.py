@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 
 import pytest
 
 from emu.machine.machine import Machine
 from emu.peripherals.uart.rx_queue import FRAMING_ERROR
+from tests.cases import check_all
 from tests.firmware.conftest import Build
 from tests.firmware.drivers.test_drivers_on_target import FCY, robot, steps
 
@@ -15,17 +17,31 @@ LINE_TIME = FCY // 20
 EVENTS = {"left": 2, "selector": 8, "proximity": 0x11, "motion": 0x12, "sound": 0x13, "led": 0x14}
 
 
-@pytest.fixture
-def talk(image: Build) -> tuple[Machine, Callable[..., list[str]]]:
-    """Return the self-test after its report, and a function that sends lines and returns the answers.
+SELECTOR = 6
 
-    The function collects answers until LINE_TIME after the last line.
-    """
-    machine = robot(image("selftest"), selector=6)
+
+@pytest.fixture(scope="module")
+def reported(image: Build) -> tuple[Path, bytes]:
+    """Return the image of the self-test and the robot's state after its report."""
+    machine = robot(image("selftest"), selector=SELECTOR)
     heard = bytearray()
     machine.uart[1].on_byte = lambda byte, _cycle: heard.append(byte)
     while b"end\r\n" not in heard:
         assert machine.run(cycles=FCY // 10).reason == "limit"
+    return image("selftest"), machine.snapshot()
+
+
+@pytest.fixture
+def talk(reported: tuple[Path, bytes]) -> tuple[Machine, Callable[..., list[str]]]:
+    """Return the self-test after its report, and a function that sends lines and returns the answers.
+
+    The function collects answers until LINE_TIME after the last line.
+    """
+    path, state = reported
+    machine = robot(path, selector=SELECTOR)
+    machine.restore(state)
+    heard = bytearray()
+    machine.uart[1].on_byte = lambda byte, _cycle: heard.append(byte)
 
     def ask(*lines: str, wait: int = LINE_TIME) -> list[str]:
         heard.clear()
@@ -66,18 +82,20 @@ def test_commands_drive_the_robot_and_are_answered(talk) -> None:
 WRONG = "D,1 D,1,2,3 D,1001,0 D,0,-1001 D,x,1 D,1, L,10,1 L,0,3 E,1 ! !65535,1 +300 + -64"
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("line", WRONG.split())
-def test_commands_that_cannot_be_carried_out_are_answered_with_a_question_mark(talk, line: str) -> None:
+def test_commands_that_cannot_be_carried_out_are_answered_with_a_question_mark(talk) -> None:
     """A command with a wrong argument count, range or event is answered with a question mark and moves nothing.
 
     Source: bluetooth.h.
     """
     machine, ask = talk
-    before = steps(machine)
-    assert ask(line) == ["?"]
-    assert ask("E") == ["e,0,0"]
-    assert steps(machine) == before
+
+    def check(line: str) -> None:
+        before = steps(machine)
+        assert ask(line) == ["?"]
+        assert ask("E") == ["e,0,0"]
+        assert steps(machine) == before
+
+    check_all(check, WRONG.split())
 
 
 def test_events_travel_both_ways(talk) -> None:

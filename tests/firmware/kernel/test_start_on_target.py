@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from itertools import product
 from pathlib import Path
 
 import pytest
 
+from emu import Machine
 from emu.cli import main
+from tests.cases import check_all
 from tests.firmware.conftest import TARGET_APPS, Build
 from tests.firmware.kernel.test_kernel_on_target import FCY, load, run_to, words
 
@@ -15,10 +18,8 @@ MOMENTS = ["never", "before the threads", "before the start", "after the start"]
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("moment", range(len(MOMENTS)), ids=MOMENTS)
-@pytest.mark.parametrize("scheduler", range(len(SCHEDULERS)), ids=SCHEDULERS)
 @pytest.mark.parametrize("ipl_slip", [0, 1])
-def test_the_start_completes_under_every_scheduler(image: Build, scheduler: int, moment: int, ipl_slip: int) -> None:
+def test_the_start_completes_under_every_scheduler(image: Build, ipl_slip: int) -> None:
     """Sys_Start_Kernel completes under every scheduler.
 
     A slice end that was forced before the start must not be served before both timers run: a thread that never
@@ -26,17 +27,28 @@ def test_the_start_completes_under_every_scheduler(image: Build, scheduler: int,
     """
     machine = load(image("starts", TARGET_APPS), ipl_slip)
     run_to(machine, "begin")
-    machine.poke("scheduler", scheduler)
-    machine.poke("moment", moment)
+    begin = machine.snapshot()
+
+    def check(scheduler: str, moment: str) -> None:
+        machine.restore(begin)
+        check_start(machine, scheduler, moment)
+
+    check_all(check, product(SCHEDULERS, MOMENTS))
+
+
+def check_start(machine: Machine, scheduler: str, moment: str) -> None:
+    """Run 100 ms from `begin` and check the threads' shares and the timers."""
+    machine.poke("scheduler", SCHEDULERS.index(scheduler))
+    machine.poke("moment", MOMENTS.index(moment))
     assert machine.run(cycles=FCY // 10).reason == "limit"
     rounds, periods = words(machine, "rounds", 2), machine.peek("periods")
     assert 98 <= machine.peek("now_ms") <= 100
     assert machine.peek("spins") > 0
-    if SCHEDULERS[scheduler] == "fixed priority" and moment != 0:
+    if scheduler == "fixed priority" and moment != "never":
         assert rounds[0] >= 45
         assert rounds[1] <= 1, "its priority is below the busy thread's"
         assert 18 <= periods <= 21, "every 5 ms in 100"
-    elif moment != 0 and SCHEDULERS[scheduler] == "earliest deadline":
+    elif scheduler == "earliest deadline" and moment != "never":
         assert 18 <= periods <= 21
         assert min(rounds) >= 4, "round robin beside it"
     else:
@@ -47,16 +59,21 @@ def test_the_start_completes_under_every_scheduler(image: Build, scheduler: int,
 
 NEVER_STARTED = """
 #include <openswarm.h>
+#include <openswarm_io.h>
+enum { ONCE, FOR_EVER, STARTED }; /* positions of the selector */
 int main(void)
 {
     Sys_Init_Kernel();
-    START
+    uint8 way = Sys_Get_Selector();
+    if (way == STARTED) {
+        Sys_Start_Kernel();
+    }
     do {
         Sys_Sleep(100);
         sys_event_data *data = Sys_Wait_for_Event(SYS_1ms_TIMER);
         Sys_Clear_EventData(&data);
         Sys_Yield();
-    } while (AGAIN);
+    } while (way != ONCE);
     Sys_Run_SystemThread();
     return 0;
 }
@@ -64,20 +81,17 @@ int main(void)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("start", "again", "refused"),
-    [("", "false", "4 calls"), ("", "true", "65,535 calls"), ("Sys_Start_Kernel();", "true", "")],
-    ids=["and main returns", "for ever", "but started"],
-)
 def test_calls_that_need_a_running_kernel_do_not_look_like_success(
-    image: Build, tmp_path: Path, capfd: pytest.CaptureFixture[str], start: str, again: str, refused: str
+    image: Build, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     """Blocking calls before Sys_Start_Kernel are refused; `emu run` reports the program and exits with status 1."""
     (tmp_path / "early").mkdir()
-    (tmp_path / "early" / "main.c").write_text(NEVER_STARTED.replace("START", start).replace("AGAIN", again))
-    path = image("early", tmp_path, f"DEFINES=-DCASE={len(start) + len(again)}")
-    assert main(["run", str(path), "--seconds", "0.5"]) == (1 if refused else 0)
-    said = capfd.readouterr().err
-    if refused:
-        assert f"firmware fault: the kernel was never started (Sys_Start_Kernel) and refused {refused}" in said
-    assert main(["run", str(path), "--seconds", "0.5", "--exit-code"]) == (125 if refused else 124)
+    (tmp_path / "early" / "main.c").write_text(NEVER_STARTED)
+    path = str(image("early", tmp_path))
+    for selector, refused in enumerate(("4 calls", "65,535 calls", "")):
+        command = ["run", path, "--seconds", "0.5", "--selector", str(selector)]
+        assert main(command) == (1 if refused else 0)
+        said = capfd.readouterr().err
+        if refused:
+            assert f"firmware fault: the kernel was never started (Sys_Start_Kernel) and refused {refused}" in said
+        assert main([*command, "--exit-code"]) == (125 if refused else 124)

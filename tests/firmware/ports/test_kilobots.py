@@ -14,6 +14,7 @@ import pytest
 from firmware.tools.simulated.kilobot import HZ, Kilobot
 from firmware.tools.simulated.kilobots import HIGH_GAIN_MM, REACH_MM, Kilobots, Robot, counts
 from firmware.tools.simulated.machine import NotInstalled, peek, peek_words
+from tests.cases import check_all
 from tests.firmware.conftest import FIRMWARE, TARGET_APPS
 from tests.firmware.ports.test_kernel_ports import make
 
@@ -232,24 +233,27 @@ def frame_begins(both: Kilobots, listener: Kilobot) -> None:
     pytest.fail("no frame begins")
 
 
-@pytest.mark.parametrize("after_us", [0, 300, 700, 1100, 2500, 5000])
-def test_a_foreign_pulse_damages_a_frame(image: Path, swarm: Open, after_us: float) -> None:
+def test_a_foreign_pulse_damages_a_frame(image: Path, swarm: Open) -> None:
     """A frame damaged by a foreign pulse is refused, and the next frame arrives."""
-    both = swarm(pair(image))
-    both.run(0.2)
-    left, right = both.robots
-    say(left, MESSAGE, bytes(8))  # zeros: any added light changes a bit
-    frame_begins(both, right)
-    if after_us:
-        both.run(after_us * 1e-6)
-    for _ in range(12):  # every 29 us, so that some pulses hit a byte
-        both.run(29e-6)
-        both.flash(1, 0)
-    both.run(0.1)
-    assert (peek(right, "messages"), statistics(right)["damaged"]) == (0, 1)
-    say(left, MESSAGE, b"again")
-    both.run(0.1)
-    assert message(right)[4] == b"again"
+
+    def check(after_us: float) -> None:
+        both = swarm(pair(image))
+        both.run(0.2)
+        left, right = both.robots
+        say(left, MESSAGE, bytes(8))  # zeros: any added light changes a bit
+        frame_begins(both, right)
+        if after_us:
+            both.run(after_us * 1e-6)
+        for _ in range(12):  # every 29 us, so that some pulses hit a byte
+            both.run(29e-6)
+            both.flash(1, 0)
+        both.run(0.1)
+        assert (peek(right, "messages"), statistics(right)["damaged"]) == (0, 1)
+        say(left, MESSAGE, b"again")
+        both.run(0.1)
+        assert message(right)[4] == b"again"
+
+    check_all(check, [0, 300, 700, 1100, 2500, 5000])
 
 
 def test_pulses_that_are_lost(image: Path, swarm: Open) -> None:
@@ -310,20 +314,22 @@ def test_in_pieces_as_in_one(image: Path, swarm: Open) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("distance", [36, 45, 48, 69])
-def test_neighbours_tell_what_they_hear(distance: int, tmp_path: Path, swarm: Open) -> None:
+def test_neighbours_tell_what_they_hear(tmp_path: Path, swarm: Open) -> None:
     """The unchanged e-puck application reports neighbours with numbers and distances.
 
     Distances come from the tables in the EEPROM; without tables they are 0.
     """
     app = make("kilobot", "neighbours", tmp_path)
-    robots = [Robot(app, 0, number=5), Robot(app, distance, number=6, calibrated=False, on_at=0.01)]
-    both = swarm(robots)
-    both.run(3.5)
-    lines = [line.split(b", sensor 0, ") for line in both.robots[0].uart().splitlines()]
-    assert [text for text, _ in lines] == [b"6 says 0", b"6 says 1", b"6 says 2"]
-    assert all(abs(int(told.removesuffix(b" mm")) - distance) <= 1 for _, told in lines)
-    assert both.robots[1].uart() == b"".join(b"5 says %d, sensor 0, 0 mm\n" % n for n in range(3))
+
+    def check(distance: int) -> None:
+        both = swarm([Robot(app, 0, number=5), Robot(app, distance, number=6, calibrated=False, on_at=0.01)])
+        both.run(3.5)
+        lines = [line.split(b", sensor 0, ") for line in both.robots[0].uart().splitlines()]
+        assert [text for text, _ in lines] == [b"6 says 0", b"6 says 1", b"6 says 2"]
+        assert all(abs(int(told.removesuffix(b" mm")) - distance) <= 1 for _, told in lines)
+        assert both.robots[1].uart() == b"".join(b"5 says %d, sensor 0, 0 mm\n" % n for n in range(3))
+
+    check_all(check, [36, 45, 48, 69])
 
 
 def test_an_alarm_lights_all(tmp_path: Path, image: Path, swarm: Open) -> None:

@@ -79,14 +79,14 @@ def sweep(machine: Kilobot, way: str, stride: int) -> int:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("way", WAYS)
-def test_the_kilobot_is_interrupted_everywhere(way: str, tmp_path: Path) -> None:
+def test_the_kilobot_is_interrupted_everywhere(tmp_path: Path) -> None:
     """Interrupts at every 97th boundary lose nothing on the Kilobot.
 
     Each mode starts at another offset, because rounds shift against the clock.
     """
-    machine = kilobot(make("kilobot", "boundaries", tmp_path, apps=TARGET_APPS))
-    assert sweep(machine, way, PRIME) > 50
+    image = make("kilobot", "boundaries", tmp_path, apps=TARGET_APPS)
+    for way in WAYS:
+        assert sweep(kilobot(image), way, PRIME) > 50
 
 
 def kernel_instructions(image: Path) -> list[int]:
@@ -135,15 +135,15 @@ def sweep_epuck2(image: Path, way: str, stride: int, phase: int, times: int) -> 
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("way", WAYS)
-def test_the_epuck2_is_interrupted_everywhere(way: str, tmp_path: Path) -> None:
+def test_the_epuck2_is_interrupted_everywhere(tmp_path: Path) -> None:
     """Interrupts at every 97th kernel instruction lose nothing on the e-puck2.
 
     They include instructions within IT blocks and under every mask.
     """
     image = make("epuck2", "boundaries", tmp_path, apps=TARGET_APPS)
     try:
-        assert sweep_epuck2(image, way, PRIME, 13 * WAYS.index(way), 1) > 10
+        for way in WAYS:
+            assert sweep_epuck2(image, way, PRIME, 13 * WAYS.index(way), 1) > 10
     except NotInstalled as missing:
         pytest.skip(str(missing))
 

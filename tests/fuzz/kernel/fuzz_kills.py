@@ -15,7 +15,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[3]
 sys.path.insert(0, str(ROOT))
 
-from tests.firmware.kills import SCENES, Seen, sweep  # noqa: E402
+from tests.firmware.kills import SCENES, Seen, Stage, sweep  # noqa: E402
 from tests.fuzz.kernel.fuzz_kernel import build  # noqa: E402
 from tests.fuzz.seeds import Campaign, parser  # noqa: E402
 
@@ -37,7 +37,7 @@ def main() -> int:
             seen = Seen()
             scene, slip = seed // 2 % len(SCENES), seed % 2
             try:
-                for last in sweep(path, slip, scene, stride, seed // (2 * len(SCENES)) % stride):
+                for last in sweep(Stage(path, slip), scene, stride, seed // (2 * len(SCENES)) % stride):
                     seen = last
                     if campaign.over and options.seconds is not None:
                         break
