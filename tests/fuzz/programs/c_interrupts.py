@@ -92,16 +92,8 @@ class Program:
     def _body(self, level: int, most: int, depth: int = 0, main: bool = False) -> str:
         """Return statements for code that runs at priority `level` and ends at the same priority."""
         pieces: list[Callable[[Program, int, int], str]] = [
-            _work,
-            _work,
-            _constant,
-            _divide,
-            _masked,
-            _put_back,
-            _disi,
-            _disi,
-            _counter,
-        ]
+            _work, _work, _constant, _divide, _masked, _put_back, _disi, _disi, _counter,
+        ]  # fmt: skip
         pieces += [_call, _if, _loop, _room] if depth < DEPTH else []
         pieces += [_idle] if main else []
         pieces += [_lowered, _tail] if level else []

@@ -83,12 +83,8 @@ def test_symbol_attributes(asm):
     f, g, u, h, buf = (out.symbols[n] for n in ("f", "g", "u", "h", "buf"))
     assert (f.bind, f.type, f.size) == (Bind.GLOBAL, c.STT_FUNC, 4)
     assert (g.bind, u.bind, u.home, h.bind, h.home) == (
-        Bind.WEAK,
-        Bind.WEAK,
-        Home.UNDEFINED,
-        Bind.GLOBAL,
-        Home.UNDEFINED,
-    )
+        Bind.WEAK, Bind.WEAK, Home.UNDEFINED, Bind.GLOBAL, Home.UNDEFINED,
+    )  # fmt: skip
     assert (buf.home, buf.size, buf.value) == (Home.COMMON, 10, 4)
     assert out.symbols["lbuf"].section.name == ".bss"
     assert ".Llocal" not in out.symbols

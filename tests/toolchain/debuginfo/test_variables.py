@@ -100,17 +100,19 @@ class LocationReader:
         self.info: DWARFInfo = dwarf_of(image)
         self.machine = machine
         entries = [die for unit in self.info.iter_CUs() for die in unit.iter_DIEs()]
+        self.rows = [
+            (one.address, two.address, one.line)
+            for unit in self.info.iter_CUs()
+            for one, two in pairwise(
+                e.state for e in self.info.line_program_for_CU(unit).get_entries() if e.state is not None
+            )
+            if not one.end_sequence
+        ]
         self.scopes = [die for die in entries if die.tag == "DW_TAG_subprogram"]
 
     def line(self, pc: int) -> int:
         """Return the source line of an address."""
-        best = (-1, 0)
-        for unit in self.info.iter_CUs():
-            states = [e.state for e in self.info.line_program_for_CU(unit).get_entries() if e.state is not None]
-            for one, two in pairwise(states):
-                if not one.end_sequence and one.address <= pc < two.address:
-                    best = max(best, (one.address, one.line))
-        return best[1]
+        return max(((start, line) for start, end, line in self.rows if start <= pc < end), default=(-1, 0))[1]
 
     def covers(self, die: DIE, pc: int) -> bool:
         values = {k: v.value for k, v in die.attributes.items()}

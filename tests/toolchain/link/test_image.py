@@ -236,29 +236,14 @@ def test_section_limits_resolve(image):
 def test_linker_and_device_symbols(image):
     """The linker defines its own symbols (abi-elf.md §3.3) and those of the device, SFRs in both spellings (§2.6)."""
     names = [
-        "__DATA_BASE",
-        "__DATA_LENGTH",
-        "__YDATA_BASE",
-        "__CODE_BASE",
-        "_PORTD",
-        "PORTD",
-        "_PORTDbits",
-        "__heap",
+        "__DATA_BASE", "__DATA_LENGTH", "__YDATA_BASE", "__CODE_BASE", "_PORTD", "PORTD", "_PORTDbits", "__heap",
         "__eheap",
-    ]
+    ]  # fmt: skip
     text = "u:" + "".join(f" mov #{n}, w0\n" for n in names)
     out = image(text, heap=100)
     assert [w >> 4 & 0xFFFF for w in out.words("u", len(names))] == [
-        0x800,
-        0x2000,
-        0x1800,
-        0x100,
-        0x2D4,
-        0x2D4,
-        0x2D4,
-        0x800,
-        0x864,
-    ]
+        0x800, 0x2000, 0x1800, 0x100, 0x2D4, 0x2D4, 0x2D4, 0x800, 0x864,
+    ]  # fmt: skip
 
 
 def test_an_object_may_define_a_device_symbol_itself(image):

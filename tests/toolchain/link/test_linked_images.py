@@ -98,13 +98,9 @@ def test_a_linked_program_starts_and_finds_everything(tmp_path, objects, form, p
     assert stop.reason == "halt", stop
     values = {name: machine.peek(at[name]) for name in ("sum", "seen", "from_psv", "from_ee", "ticks", "__exit_status")}
     assert values == {
-        "sum": 3,
-        "seen": 3,
-        "from_psv": int.from_bytes(b"ps", "little"),
-        "from_ee": 0xBEEF,
-        "ticks": 3,
+        "sum": 3, "seen": 3, "from_psv": int.from_bytes(b"ps", "little"), "from_ee": 0xBEEF, "ticks": 3,
         "__exit_status": 42,
-    }
+    }  # fmt: skip
     assert [machine.peek(at["zero"] + 2 * i) for i in range(4)] == [0] * 4
 
 

@@ -52,27 +52,17 @@ void words_too(int x) { unsigned p = port; port = x & 1 ? p | 6 : p & ~9u; if (x
 long signed_tens(long x) { return x / -10 + x % 10 * 5 - x / 4096 + x % 7; }
 """
 PASSES: dict[str, Callable[[Function], None]] = {
-    "dead code": cfg.dead_code,
-    "remainders": partial(combine.recover_remainders, for_size=False),
-    "remainders for size": partial(combine.recover_remainders, for_size=True),
-    "quotients": combine.reuse_quotients,
-    "conditional": combine.make_operations_conditional,
-    "selects": combine.group_selects,
-    "magic": partial(magic.run, for_size=False),
-    "magic for speed": partial(magic.run, for_size=False, for_speed=True),
-    "magic for size": partial(magic.run, for_size=True),
-    "paired divisions": combine.pair_divisions,
-    "induction": induction.run,
-    "increments": combine.sink_increments,
-    "blocks": combine.hoist_block_steps,
-    "countdowns": combine.move_countdowns,
-    "logical branches": cfg.split_logical_branches,
-    "sunk compares": cfg.sink_compares,
-    "switches for size": lambda f: switch.lower_switches(f, True),
-    "switches for speed": lambda f: switch.lower_switches(f, False),
-    "critical edges": cfg.split_critical_edges,
+    "dead code": cfg.dead_code, "remainders": partial(combine.recover_remainders, for_size=False),
+    "remainders for size": partial(combine.recover_remainders, for_size=True), "quotients": combine.reuse_quotients,
+    "conditional": combine.make_operations_conditional, "selects": combine.group_selects,
+    "magic": partial(magic.run, for_size=False), "magic for speed": partial(magic.run, for_size=False, for_speed=True),
+    "magic for size": partial(magic.run, for_size=True), "paired divisions": combine.pair_divisions,
+    "induction": induction.run, "increments": combine.sink_increments, "blocks": combine.hoist_block_steps,
+    "countdowns": combine.move_countdowns, "logical branches": cfg.split_logical_branches,
+    "sunk compares": cfg.sink_compares, "switches for size": lambda f: switch.lower_switches(f, True),
+    "switches for speed": lambda f: switch.lower_switches(f, False), "critical edges": cfg.split_critical_edges,
     "single bits": partial(single_bits.run, is_near=lambda name: True),
-}
+}  # fmt: skip
 TEXTS: dict[str, str] = {}
 
 

@@ -249,15 +249,9 @@ def generate(seed: int) -> MFunction:
 
 
 PASSES: dict[str, Callable[[MFunction], None]] = {
-    "peephole": peephole.run,
-    "schedule": schedule.run,
-    "tail-merging": tail_merging.run,
-    "layout": block_layout.run,
-    "jumps": branches.thread_jumps,
-    "reorder": branches.reorder,
-    "branches": branches.run,
-    "returns": returns.run,
-}
+    "peephole": peephole.run, "schedule": schedule.run, "tail-merging": tail_merging.run, "layout": block_layout.run,
+    "jumps": branches.thread_jumps, "reorder": branches.reorder, "branches": branches.run, "returns": returns.run,
+}  # fmt: skip
 
 
 def reachable(m: MFunction) -> MFunction:

@@ -19,6 +19,7 @@ from toolchain.legalize.magic import signed_factor, unsigned_factor
 
 z3 = pytest.importorskip("z3", reason="the solver is not installed (extra: test)")
 
+from tests.cases import check_all  # noqa: E402
 from tests.toolchain.proofs.symbolic import results, start, times, unknown_products  # noqa: E402
 
 Term = Any
@@ -251,28 +252,37 @@ def arguments(types: str) -> list[Term]:
     return out
 
 
-PROOFS = [(name, level) for name in CASES
-          for level in (("-Os",) if name in branches() else ("-O2",) if name in FAST else LEVELS)]  # fmt: skip
-"""(case, level) of each proof; branches are proved at one level, because one selection rule generates them at all."""
+def levels_of(name: str) -> tuple[str, ...]:
+    """Return the levels at which a case is proved: branches at one level, because one selection rule makes them all.
+
+    At -Os, DIV under REPEAT is not loop-free.
+    """
+    if name in branches():
+        return ("-Os",)
+    return ("-O2",) if name in FAST else tuple(level for level in LEVELS if level != "-Os" or name not in DIVIDES)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("name", "level"), PROOFS)
-def test_a_rule_holds_for_all_inputs(name: str, level: str, folder: Path) -> None:
+@pytest.mark.parametrize("level", LEVELS)
+def test_rules_hold_for_all_inputs(level: str, folder: Path) -> None:
     """The code computes the C expression for every input and preserves callee-saved registers."""
-    if level == "-Os" and name in DIVIDES:
-        pytest.skip("DIV under REPEAT, which is not loop-free")
+    code = compiled(level, folder)
+    check_all(lambda name: check_rule(name, code[name]), [name for name in CASES if level in levels_of(name)])
+
+
+def check_rule(name: str, code: list[int]) -> None:
+    """Assert that each path of the code gives the result of the case."""
     result, types, _, meaning = CASES[name]
     count = 0
     with unknown_products() if name in PRODUCTS else nullcontext({}) as products:
         wanted = meaning(*arguments(types))
-        for state in results(compiled(level, folder)[name]):
+        for state in results(code):
             count += 1
             got = state.w[0] if "long" not in result else z3.Concat(state.w[1], state.w[0])
             kept = z3.And(*(state.w[r] == z3.BitVec(f"w{r}", 16) for r in range(8, 15)))
             solver = z3.Solver()
             solver.add(*(known for _, known in products.values()), *state.path, z3.Or(got != wanted, z3.Not(kept)))
-            assert solver.check() == z3.unsat, f"{name} at {level} is wrong for {solver.model()}"
+            assert solver.check() == z3.unsat, f"wrong for {solver.model()}"
     assert count > 0
 
 
@@ -293,15 +303,16 @@ def test_upper_half() -> None:
     assert solver.check() == z3.unsat
 
 
-@pytest.mark.parametrize("bits", [16, 32])
-@pytest.mark.parametrize("d", [3, 5, 7, 10, 11, 60, 641, 1000, 32767, 65537, 1000000007])
-def test_products_divide(d: int, bits: int) -> None:
-    """Multiplication by the factor of `magic` gives the quotient for every dividend.
+DIVISORS = (3, 5, 7, 10, 11, 60, 641, 1000, 32767, 65537, 1000000007)
 
-    d is a constant, so that all terms are linear.
-    """
-    if d >> bits - 1:
-        return
+
+def test_products_divide() -> None:
+    """Multiplication by the factor of `magic` gives the quotient for every dividend."""
+    check_all(check_product, [(d, bits) for d in DIVISORS for bits in (16, 32) if d < 1 << bits - 1])
+
+
+def check_product(d: int, bits: int) -> None:
+    """d is a constant, so that all terms are linear."""
     x, half = z3.Int("x"), 1 << bits - 1
     (m, s), (n, t) = unsigned_factor(d, bits), signed_factor(d, bits)
     by_sum = floor_product(x, m - (1 << bits), bits)
@@ -336,14 +347,17 @@ WRONG: dict[str, tuple[str, Callable[..., Term]]] = {
 }
 
 
-@pytest.mark.parametrize("name", WRONG)
-def test_a_wrong_rule_is_refuted(name: str, folder: Path) -> None:
+def test_wrong_rules_are_refuted(folder: Path) -> None:
     """A wrong rule is refuted: z3 finds an input for which term and code differ."""
-    types, meaning = WRONG[name]
-    wrong = []
-    for state in results(compiled("-O2" if name in FAST else "-Os", folder)[name]):
-        got = z3.Concat(state.w[1], state.w[0]) if "long" in CASES[name][0] else state.w[0]
-        solver = z3.Solver()
-        solver.add(*state.path, got != meaning(*arguments(types)))
-        wrong.append(solver.check() == z3.sat)
-    assert any(wrong)
+
+    def check(name: str) -> None:
+        types, meaning = WRONG[name]
+        wrong = []
+        for state in results(compiled("-O2" if name in FAST else "-Os", folder)[name]):
+            got = z3.Concat(state.w[1], state.w[0]) if "long" in CASES[name][0] else state.w[0]
+            solver = z3.Solver()
+            solver.add(*state.path, got != meaning(*arguments(types)))
+            wrong.append(solver.check() == z3.sat)
+        assert any(wrong)
+
+    check_all(check, WRONG)

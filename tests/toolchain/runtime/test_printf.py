@@ -126,22 +126,8 @@ def test_floating_point_digits_are_exact(tmp_path: Path) -> None:
     """%f %e %g print every digit as Python does, ties to even, for values whose integer and fraction fit in 64 bits."""
     rng = random.Random(1999)
     values = [
-        0.0,
-        1.0,
-        -1.0,
-        0.5,
-        1.5,
-        2.5,
-        0.125,
-        9.995,
-        999999.5,
-        0.1,
-        123456789.125,
-        1e15,
-        4294967296.5,
-        -0.75,
-        100.0,
-    ]
+        0.0, 1.0, -1.0, 0.5, 1.5, 2.5, 0.125, 9.995, 999999.5, 0.1, 123456789.125, 1e15, 4294967296.5, -0.75, 100.0,
+    ]  # fmt: skip
     values += [rng.choice((-1, 1)) * rng.random() * 10.0 ** rng.randint(-30, 30) for _ in range(45)]
     calls, expected = [], []
     for value in values:

@@ -26,16 +26,8 @@ pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="no host C c
 def compile_host(output: Path, *words: object) -> None:
     """Compile with the host's gcc; on failure show its diagnostics."""
     command = [
-        "gcc",
-        "-std=gnu11",
-        "-O2",
-        "-fno-builtin",
-        "-ffp-contract=off",
-        *map(str, words),
-        "-o",
-        str(output),
-        "-lm",
-    ]
+        "gcc", "-std=gnu11", "-O2", "-fno-builtin", "-ffp-contract=off", *map(str, words), "-o", str(output), "-lm",
+    ]  # fmt: skip
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
 

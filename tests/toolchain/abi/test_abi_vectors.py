@@ -20,6 +20,7 @@ from pathlib import Path
 import pytest
 
 import emu
+from tests.fuzz.seeds import base_seed
 from tests.toolchain.c_programs import build
 
 BATCH = 64
@@ -203,28 +204,30 @@ class Bench:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("level", ["-O0", "-Os"])
-@pytest.mark.parametrize("side", ["caller", "callee"])
-def test_every_vector_of_the_calling_convention(side: str, level: str, vectors: Path, tmp_path: Path) -> None:
-    """Compiled callers and callees use the locations of every row of tests/vectors/abi.csv."""
+def test_every_vector_of_the_calling_convention(level: str, vectors: Path, tmp_path: Path) -> None:
+    """Compiled callers and callees use the locations of every row of tests/vectors/abi.csv.
+
+    Each row is tried as a caller at one level and as a callee at the other, which the commit determines.
+    """
     every = read(vectors / "abi.csv")
     types = SCALAR_DOUBLE.sub("float", (vectors / "abi.h").read_text())
     wrong: dict[int, str] = {}
     for first in range(0, len(every), BATCH):
         batch = every[first : first + BATCH]
-        make = caller_source if side == "caller" else callee_source
+        callers = {v.number for v in batch if (v.number + base_seed()) % 2 == (level == "-Os")}
         program = tmp_path / "vectors.c"
+        functions = [caller_source(v) if v.number in callers else callee_source(v) for v in batch]
         program.write_text("\n".join(
-            ["#include <stdarg.h>", types, *(make(v) for v in batch), "char spare[64];", "void arrived(void);",
+            ["#include <stdarg.h>", types, *functions, "char spare[64];", "void arrived(void);",
              "int main(void) { spare[0] = 1; arrived(); return 0; }"]))  # fmt: skip
         stub = tmp_path / "stub.s"
-        labels = "\n".join(f" .global _f{v.number}\n_f{v.number}:" for v in batch)
-        stub.write_text(STUB.format(labels=labels) + "\n")
+        stub.write_text(STUB.format(labels="\n".join(f" .global _f{n}\n_f{n}:" for n in sorted(callers))) + "\n")
         image = tmp_path / "vectors.elf"
         built = build([program, stub], image, level, "-fno-lto", "-std=gnu11", "-w", "-Wl,--no-gc-sections")
         assert built.status == 0, built.messages
         bench = Bench(image, first)
         for v in batch:
-            said = bench.call(v) if side == "caller" else bench.receive(v, bench.machine.address_of("_spare"))
+            said = bench.call(v) if v.number in callers else bench.receive(v, bench.machine.address_of("_spare"))
             if said:
                 wrong[v.number] = said
     assert wrong == {}

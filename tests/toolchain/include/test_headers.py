@@ -13,7 +13,7 @@ from tests.toolchain.c_programs import build, run
 from toolchain import device_header
 from toolchain.device_header import header
 
-INCLUDE = Path(__file__).resolve().parents[2] / "toolchain" / "include"
+INCLUDE = Path(__file__).resolve().parents[3] / "toolchain" / "include"
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -451,14 +451,8 @@ def test_linker_options_pass_through(capsys: pytest.CaptureFixture[str], tmp_pat
     source = write(tmp_path, "a.c", "#include <stdlib.h>\nint main(void) { char *p = malloc(100), *q = malloc(100); "
                    "free(p); return p && q && malloc(90) == p ? 0 : 1; }\n")  # fmt: skip
     words = [
-        "-Os",
-        "-fno-builtin",
-        source,
-        "-Wl,--heap=300",
-        f"-Wl,-Map={tmp_path / 'x.map'}",
-        "-o",
-        tmp_path / "x.elf",
-    ]
+        "-Os", "-fno-builtin", source, "-Wl,--heap=300", f"-Wl,-Map={tmp_path / 'x.map'}", "-o", tmp_path / "x.elf",
+    ]  # fmt: skip
     assert cc(capsys, *words) == (0, "")
     assert run(tmp_path / "x.elf", engine="auto").status == 0
     assert "heap.o" in (tmp_path / "x.map").read_text()

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from tests.toolchain.c_programs import run
+from tests.cases import check_all
+from tests.toolchain.c_programs import FrontEndOnce, build, run
 from toolchain import cli
 
-MODES = [(level, lto) for level in ("-O0", "-Os", "-O2") for lto in ("-flto", "-fno-lto")]
-PROGRAMS = Path(__file__).parent / "cxx"
+PROGRAMS = Path(__file__).parent
 
 
 def compiled(source: Path, folder: Path, *options: str) -> int:
@@ -18,26 +18,33 @@ def compiled(source: Path, folder: Path, *options: str) -> int:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("level", "lto"), MODES)
+@pytest.mark.parametrize("level", ["-O0", "-Os", "-O2"])
 @pytest.mark.parametrize("program", sorted(path.name for path in PROGRAMS.glob("*.cpp")))
-def test_program(program: str, level: str, lto: str, tmp_path: Path) -> None:
+def test_program(program: str, level: str, tmp_path: Path) -> None:
     """Each C++ program returns 0; otherwise the number of its first failing check."""
-    assert compiled(PROGRAMS / program, tmp_path, level, lto, "-Wall", "-Werror", "-Wl,--heap=256") == 0
-    assert run(tmp_path / "a.elf").status == 0
+    front = FrontEndOnce()
+    for lto in ("-flto", "-fno-lto"):
+        options = [level, lto, "-Wall", "-Werror", "-Wl,--heap=256"]
+        built = build([PROGRAMS / program], tmp_path / "a.elf", *options, front=front)
+        assert (built.status, built.messages) == (0, "")
+        assert run(tmp_path / "a.elf").status == 0, lto
+
+
+HEADERS = [
+    "array", "algorithm", "atomic", "chrono", "functional", "limits", "memory", "numeric", "optional", "ratio",
+    "string", "string_view", "tuple", "type_traits", "utility", "variant", "vector", "cassert", "cctype",
+    "cfloat", "cinttypes", "climits", "cmath", "csetjmp", "cstdarg", "cstddef", "cstdint", "cstdio", "cstdlib",
+    "cstring", "ctime", "new", "initializer_list", "iterator",
+]  # fmt: skip
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "header",
-    ["array", "algorithm", "atomic", "chrono", "functional", "limits", "memory", "numeric", "optional", "ratio",
-     "string", "string_view", "tuple", "type_traits", "utility", "variant", "vector", "cassert", "cctype",
-     "cfloat", "cinttypes",
-     "climits", "cmath", "csetjmp", "cstdarg", "cstddef", "cstdint", "cstdio", "cstdlib", "cstring", "ctime", "new",
-     "initializer_list", "iterator"],
-)  # fmt: skip
-def test_header_compiles(header: str, tmp_path: Path) -> None:
-    (tmp_path / "a.cpp").write_text(f"#include <{header}>\nint main() {{ return 0; }}\n")
-    assert cli.main(["c++", "-c", "-Wall", "-Werror", str(tmp_path / "a.cpp"), "-o", str(tmp_path / "a.o")]) == 0
+def test_headers_compile(tmp_path: Path) -> None:
+    def check(header: str) -> None:
+        (tmp_path / "a.cpp").write_text(f"#include <{header}>\nint main() {{ return 0; }}\n")
+        assert cli.main(["c++", "-c", "-Wall", "-Werror", str(tmp_path / "a.cpp"), "-o", str(tmp_path / "a.o")]) == 0
+
+    check_all(check, HEADERS)
 
 
 def test_c_and_cxx_in_one_program(tmp_path: Path) -> None:
