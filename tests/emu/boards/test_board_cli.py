@@ -50,13 +50,12 @@ def test_stimulus_file_reaches_the_program(program, tmp_path, capsys):
     assert "uart1 'hello'" in seen.err
 
 
-@pytest.mark.slow
 def test_screenshot_writes_what_the_driver_captured(program, scene, tmp_path, capsys):
     """`emu screenshot` writes the 20 x 20 pixels that the driver captured from the middle of the picture: left red,
     right green."""
     target = tmp_path / "frame.png"
     arguments = ["screenshot", str(program("camera.c", "lines.s")), "--camera", scene, "--seconds", "0.2", "-o"]
-    arguments += [str(target), "--buffer", "frame", "--size", "20x20", "--enlarge", "3", "--json", "--engine", "plain"]
+    arguments += [str(target), "--buffer", "frame", "--size", "20x20", "--enlarge", "3", "--json"]
     assert main(arguments) == 0
     facts = json.loads(capsys.readouterr().out)
     assert (facts["width"], facts["height"]) == (20, 20)
