@@ -94,6 +94,7 @@ def engine(request: pytest.FixtureRequest) -> Any:
     return ENGINES[request.param]()
 
 
+@pytest.mark.slow
 def test_pointers_move_by_the_size_of_the_access(engine: Any) -> None:
     """Pointers change by the size of the access, once, and three times under REPEAT."""
     (again,) = codec.encode(next(row for row in ROWS if row.syntax == "REPEAT #lit14"), {"k": STEPS - 1})

@@ -112,7 +112,6 @@ def test_a_sweep_cannot_choose_a_folder_by_its_values(tmp_path: Path) -> None:
     assert all(path.parent == tmp_path / "deep" / "deeper" for path in made)
 
 
-@pytest.mark.slow
 def test_two_runs_do_not_share_a_folder(tmp_path: Path) -> None:
     """The second run ends with status 3 and changes nothing; the first run is unaffected."""
     long = ["run", "clustering", "--brain", "scripted", "--minutes", "1", "--trials", "3", "--jobs", "1"]

@@ -45,6 +45,7 @@ def talk(machine: Machine, data: bytes, cycles: int = 300_000) -> bytes:
     return bytes(heard)
 
 
+@pytest.mark.slow
 def test_programmed_rows_replace_compiled_code(machine):
     """§16: erasing and programming stall the CPU for 2 ms each, and native code of the old row is discarded."""
     machine.run(cycles=2_500_000)
