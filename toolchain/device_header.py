@@ -98,6 +98,30 @@ def bit_macros(chip: Chip) -> Iterator[str]:
                 yield f"#define _{field} {sfr.name}bits.{field}"
 
 
+def field_header(chip: Chip) -> str:
+    """Text of the header with position, mask and length of every field, which Microchip's header names include."""
+    lines = [
+        "/* SPDX-License-Identifier: MIT */",
+        f"/* Fields of the registers of the {chip.name}: lowest bit, mask, number of bits; do not edit. */",
+        f"#ifndef {chip.name.upper()}_FIELDS_H",
+        f"#define {chip.name.upper()}_FIELDS_H",
+        "",
+    ]
+    for sfr in chip.sfrs.values():
+        fields = {**sfr.fields, **second_names(sfr)}
+        for name, (lsb, width) in list(fields.items()):
+            if width > 1:
+                fields |= {f"{name}{k}": (lsb + k, 1) for k in range(width) if f"{name}{k}" not in fields}
+        for name, (lsb, width) in fields.items():
+            prefix = f"#define _{sfr.name}_{name}_"
+            lines += [
+                f"{prefix}POSITION {lsb}",
+                f"{prefix}MASK 0x{((1 << width) - 1) << lsb:04X}",
+                f"{prefix}LENGTH {width}",
+            ]
+    return "\n".join([*lines, "", "#endif", ""])
+
+
 def header(chip: Chip) -> str:
     """Text of the header of a chip."""
     lines = [
@@ -156,9 +180,12 @@ def _write_all(target: Path, chip: Chip) -> None:
     XC16 finds its headers in any case: programs use `p30F4011.h`, `p30f4011.h` and `p30f6014A.h`.
     """
     device = chip.name.removeprefix("dsPIC")
+    fields = target.with_name(f"{target.stem}_fields.h")
+    _write(fields, field_header(chip))
     for name in sorted({f"p{device}", f"p{device.lower()}", f"p{device.replace('F', 'f')}"}):
         comments = "/* SPDX-License-Identifier: MIT */\n/* Microchip's name of the device header. */\n"
-        _write(target.with_name(f"{name}.h"), f'{comments}#include "{target.name}"\n')
+        names = f'#include "{target.name}"\n#include "{fields.name}"\n'
+        _write(target.with_name(f"{name}.h"), comments + names)
     _write(target, header(chip))
 
 

@@ -30,9 +30,10 @@ def irq_name(number: int) -> str:
 
 _DEFINITION = re.compile(r'^define [^@\n]*@("[^"]+"|[\w$.]+)\([^\n]*?(?: !dbg (!\d+))? \{$', re.MULTILINE)
 _ANNOTATIONS = re.compile(r"^@llvm\.global\.annotations = .*$", re.MULTILINE)
-_ANNOTATED = re.compile(r"\{ ptr @([\w$.]+), ptr (@[\w$.]+),")
+_ANNOTATED = re.compile(r"\{ ptr @([\w$.]+), ptr (@[\w$.]+), ptr @[\w$.]+, i32 \d+, ptr (@[\w$.]+|null) \}")
 _STRING = re.compile(r'^(@[\w$.]+) = [^\n]*c"interrupt\\00"', re.MULTILINE)
-_NUMBERED = re.compile(r'^(@[\w$.]+) = [^\n]*c"(irq|altirq):([^"]*)\\00"', re.MULTILINE)
+_NUMBERED = re.compile(r'^(@[\w$.]+) = [^\n]*c"(?:irq|altirq)\\00"', re.MULTILINE)
+_ARGUMENT = re.compile(r"^(@[\w$.]+) = [^\n]* constant \{ i32 \} (?:\{ i32 (-?\d+) \}|zeroinitializer)", re.MULTILINE)
 
 
 def check(ir_text: str, locate: Callable[[str], str]) -> None:
@@ -40,9 +41,9 @@ def check(ir_text: str, locate: Callable[[str], str]) -> None:
     marks = set(_STRING.findall(ir_text))
     annotations = _ANNOTATIONS.search(ir_text)
     pairs = _ANNOTATED.findall(annotations[0]) if annotations else []
-    handlers = {function for function, mark in pairs if mark in marks}
-    numbers = {mark: text for mark, _, text in _NUMBERED.findall(ir_text)}
-    numbered = {function: numbers[mark] for function, mark in pairs if mark in numbers}
+    handlers = {function for function, mark, _ in pairs if mark in marks}
+    numbers, arguments = set(_NUMBERED.findall(ir_text)), dict(_ARGUMENT.findall(ir_text))
+    numbered = {function: int(arguments.get(value) or 0) for function, mark, value in pairs if mark in numbers}
     defined_at = {name.strip('"'): ref for name, ref in _DEFINITION.findall(ir_text)}
     defined = set(defined_at)
 
@@ -69,10 +70,10 @@ def check(ir_text: str, locate: Callable[[str], str]) -> None:
         raise ToolError.of(findings)
 
 
-def _is_irq(text: str) -> bool:
+def _is_irq(number: int) -> bool:
     try:
-        return bool(irq_name(int(text, 0)))
-    except (ValueError, IndexError):
+        return bool(irq_name(number))
+    except IndexError:
         return False
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from toolchain.abi.target import NEAR_BYTES
 from toolchain.ir.model import Module, size_of
 
-# By section that a macro of dspic_attributes.h selects: its attributes. The initialiser adds bss or data.
+# By section that an attribute selects (frontend/attributes.py): its attributes. The initialiser adds bss or data.
 SECTION_ATTRIBUTES = {".near": ",near", ".far": "", ".xmemory": ",xmemory", ".ymemory": ",ymemory"}
 
 

@@ -279,7 +279,7 @@ class ModuleCompiler:
         self.serial = 0
         self.taken = address_taken_blocks(module)
         self.dwarf = DwarfWriter(module)
-        module.far = data.far_objects(self.notes, self.declared)
+        module.far = data.far_objects(self.notes)
         self.frame_offsets: dict[str, dict[str, int]] = {}  # `frame_offsets` of each function
 
     def run(self) -> str:
@@ -376,7 +376,7 @@ class ModuleCompiler:
         # sections `near` and `far` are ignored: -mlarge-code alone selects the form of calls
         own = "" if sections.attribute_section(f.section) else f.section
         section = own or (".isr.text." if interrupt else ".text.") + name
-        modifiers = isr.section_modifiers(f.name, self.notes.get(f.name, set()))
+        modifiers = isr.section_modifiers(self.notes.get(f.name, set()))
         keep = used.KEEP if f.name in self.used else ""
         self.lines.append(f"\t.section {section},code{modifiers}{keep}")
         self.lines.append("\t.align 2")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
 
 from toolchain.abi.names import block_label, symbol
 from toolchain.abi.sections import SECTION_ATTRIBUTES, attribute_section, is_near
@@ -41,12 +40,12 @@ SECTION_TYPES = {".const": "psv,page", ".nbss": "bss,near", ".ndata": "data,near
 CONFIG_SECTION = re.compile(r"__\w+\.sec")  # sections of configuration words, which are program words (abi-elf.md §6.6)
 
 
-def far_objects(notes: dict[str, set[str]], locate: Callable[[str], str]) -> frozenset[str]:
-    """Objects whose `address(N)` is beyond near memory; `locate` returns the position of an object for errors."""
+def far_objects(notes: dict[str, set[str]]) -> frozenset[str]:
+    """Objects whose `address(N)` is beyond near memory."""
     return frozenset(
         name
         for name, texts in notes.items()
-        if any(what == "address" and number >= NEAR_END for what, number in numbers(locate(name), texts))
+        if any(what == "address" and number >= NEAR_END for what, number in numbers(texts))
     )
 
 
@@ -76,7 +75,7 @@ class DataEmitter:
         """Append the lines of one definition."""
         name, size = symbol(self.module, var.name), size_of(var.type)
         zero = isinstance(var.init, ConstZero | Undef) or (isinstance(var.init, ConstInt) and var.init.value == 0)
-        modifiers = section_modifiers(var.name, self.notes.get(var.name, set()))
+        modifiers = section_modifiers(self.notes.get(var.name, set()))
         keep = KEEP if var.name in self.used else ""
         self.lines += self.info.marker(var.dbg)
         self.lines.append(f"\t.section {self._section(var, name, zero, modifiers)}{modifiers}{keep}")

@@ -8,6 +8,7 @@ from toolchain.abi.isr_names import IRQ_PREFIX, irq_name
 from toolchain.ir.model import (
     ConstAgg,
     ConstBytes,
+    ConstInt,
     ConstZero,
     Function,
     GlobalRef,
@@ -28,8 +29,18 @@ def annotations_of(module: Module) -> dict[str, set[str]]:
         return out
     for row in table.init.elems:
         if isinstance(row, ConstAgg) and isinstance(row.elems[0], GlobalRef):
-            out.setdefault(row.elems[0].name, set()).add(_text(module, row.elems[1]))
+            note = _text(module, row.elems[1]) + _argument(module, row.elems[4])
+            out.setdefault(row.elems[0].name, set()).add(note)
     return out
+
+
+def _argument(module: Module, v: Value) -> str:
+    """The argument of an annotation as "(number)", "" without one."""
+    if not isinstance(v, GlobalRef):
+        return ""
+    init = module.globals[v.name].init
+    first = init.elems[0] if isinstance(init, ConstAgg) else None
+    return f"({first.value if isinstance(first, ConstInt) else 0})"
 
 
 def _text(module: Module, v: Value) -> str:
@@ -83,8 +94,8 @@ def preprologue(notes: set[str]) -> tuple[str, ...]:
 
 def vector_symbols(notes: set[str]) -> tuple[str, ...]:
     """Assembler names under which the linker finds the handlers of `irq(N)` and `altirq(N)`."""
-    wanted = [(kind, int(number, 0)) for note in sorted(notes)
-              for kind, _, number in [note.partition(":")] if kind in IRQ_PREFIX]  # fmt: skip
+    wanted = [(kind, int(number[:-1])) for note in sorted(notes)
+              for kind, _, number in [note.partition("(")] if kind in IRQ_PREFIX]  # fmt: skip
     return tuple(f"__{IRQ_PREFIX[kind]}{irq_name(number)}" for kind, number in wanted)
 
 
@@ -95,23 +106,13 @@ def wants_probe(notes: set[str], default: bool) -> bool:
     return default or "os_probe" in notes
 
 
-def section_modifiers(name: str, notes: set[str]) -> str:
+def section_modifiers(notes: set[str]) -> str:
     """`,address(0x1000)`, `,noload`, `,reverse(64)` for a `.section` line (abi-elf.md §4.3)."""
     out = ",noload" if "noload" in notes else ""
-    return out + "".join(f",{what}(0x{number:X})" for what, number in numbers(name, notes))
+    return out + "".join(f",{what}(0x{number:X})" for what, number in numbers(notes))
 
 
-def numbers(position: str, notes: set[str]) -> list[tuple[str, int]]:
-    """("address" or "reverse", N) of the annotations of one object.
-
-    Raises UnsupportedError at `position` if N is not a number."""
-    out = []
-    for note in sorted(notes):
-        found = re.fullmatch(r"(address|reverse)\((.*)\)", note)
-        if found is None:
-            continue
-        try:
-            out.append((found[1], int(found[2].strip("() ").rstrip("uUlL"), 0)))
-        except ValueError:
-            raise UnsupportedError(f"attribute {note}: the argument must be a number", position) from None
-    return out
+def numbers(notes: set[str]) -> list[tuple[str, int]]:
+    """("address" or "reverse", N) of the annotations of one object."""
+    found = (re.fullmatch(r"(address|reverse)\((\d+)\)", note) for note in sorted(notes))
+    return [(match[1], int(match[2])) for match in found if match is not None]

@@ -14,7 +14,7 @@ import sys
 import tempfile
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import reduce
 from pathlib import Path
 
@@ -23,7 +23,7 @@ from emu.chips.chip import Chip
 from toolchain.abi.struct_alignment import LAYOUT_FLAGS
 from toolchain.device_header import folder_of
 from toolchain.errors import ToolError
-from toolchain.frontend import accumulators, annotated_lines, asm_constraints, config_pragma, header_case
+from toolchain.frontend import accumulators, annotated_lines, asm_constraints, attributes, config_pragma, header_case
 from toolchain.frontend.asm_registers import REFUSED, respell
 from toolchain.frontend.options import CcOptions, Input
 
@@ -69,6 +69,12 @@ CXX_FLAGS += [f"-D_LIBCPP_{name}={value}" for name, value in LIBCXX_SETTINGS.ite
 C_ONLY = {"-fgnu89-inline", "-fno-gnu89-inline"}
 FOREIGN_MACROS = ["MSP430", "__MSP430__"]
 CLANG_LEVEL = {"0": "-O0", "1": "-O1", "2": "-O2", "s": "-Oz"}
+
+
+SILENT = "-Wno-everything"  # instead of -w, which would hide the warning that reveals XC16's attributes
+MAX_FRONT_END_RUNS = 4  # each run changes the text for features that the previous run revealed
+Change = Callable[[str], str]
+"""Function that rewrites preprocessed text for clang."""
 
 
 class ClangError(Exception):
@@ -128,13 +134,20 @@ def front_end_flags(options: CcOptions, language: str = "c") -> list[str]:
     if is_cxx(language):
         flags += CXX_FLAGS if named else [*CXX_FLAGS, "-std=gnu++17"]
         flags += [word for word in options.clang if word not in C_ONLY]
-        return [*flags, "-isystem", str(library_include_dir()), *folders]
+        return [*_without_silence(flags), "-isystem", str(library_include_dir()), *folders]
     if not named:
         flags.append("-fgnu89-inline")  # XC16's default is gnu89, where plain `inline` defines the function
     if not {"-Werror", "-pedantic-errors"} & set(options.clang):
         flags += [f"-Wno-error={name}" for name in WARNINGS_OF_C]
     flags += options.clang
-    return [*flags, *folders]
+    return [*_without_silence(flags), *folders]
+
+
+def _without_silence(flags: list[str]) -> list[str]:
+    """The flags with SILENT instead of -w; `run_jobs` prints no message of a silent job without an error."""
+    if "-w" not in flags:
+        return flags
+    return [*(flag for flag in flags if flag != "-w"), SILENT, "-Wunknown-attributes"]
 
 
 def is_cxx(language: str) -> bool:
@@ -192,10 +205,8 @@ def optimise_job(options: CcOptions, module: Path, output: Path) -> Job:
     return Job([*arguments, "-S", "-emit-llvm", str(module), "-o", str(output)], module)
 
 
-def _run_changed(
-    program: list[str], arguments: list[str], change: Callable[[str], str]
-) -> subprocess.CompletedProcess[bytes]:
-    """Compile again with `change` applied to the preprocessed text."""
+def _run_changed(program: list[str], arguments: list[str], changes: list[Change]) -> subprocess.CompletedProcess[bytes]:
+    """Compile the preprocessed text with the changes applied."""
     *options, _, language, source, _, output = arguments  # ... -x LANGUAGE SOURCE -o OUTPUT
     text = Path(output).with_suffix(".changed.i")
     emit = {"-emit-llvm", "-S"}
@@ -205,32 +216,62 @@ def _run_changed(
     )
     if made.returncode:
         return made
-    text.write_text(change(text.read_text(errors="surrogateescape")), errors="surrogateescape")
+    changed = reduce(lambda given, change: change(given), changes, text.read_text(errors="surrogateescape"))
+    text.write_text(changed, errors="surrogateescape")
     second = [*without_preprocessing(options), "-Wno-unused-command-line-argument"]
     second += ["-x", "c++-cpp-output" if is_cxx(language) else "cpp-output", str(text), "-o", output]
     return subprocess.run([*program, *second], capture_output=True, check=False)
 
 
-def _run_job(program: list[str], arguments: list[str], chip: Chip) -> subprocess.CompletedProcess[bytes]:
-    """Run clang, and again with changed text if the source uses an XC16 feature that clang does not support."""
-    result = subprocess.run([*program, *arguments], capture_output=True, check=False)
-    if result.returncode and header_case.MISSING.search(result.stderr) and "-ivfsoverlay" not in arguments:
-        with tempfile.TemporaryDirectory(prefix="dspic-names-") as folder:
-            overlay = Path(folder) / "overlay.yaml"
-            overlay.write_text(header_case.overlay(arguments))
-            return _run_job(program, ["-ivfsoverlay", str(overlay), *arguments], chip)
-    changes: list[Callable[[str], str]] = []
-    if "-emit-llvm" in arguments and config_pragma.PRESENT in result.stderr:
-        changes.append(lambda text: config_pragma.rewrite(text, chip))
-    if result.returncode and REFUSED.search(result.stderr):
-        changes.append(respell)
-    if result.returncode and asm_constraints.REFUSED.search(result.stderr):
-        changes += [respell, asm_constraints.respell]
-    if result.returncode and accumulators.REFUSED.search(result.stderr):
-        changes += [respell, accumulators.rewrite]
-    if changes:
-        return _run_changed(program, arguments, lambda text: reduce(lambda t, change: change(t), changes, text))
+def _run_job(program: list[str], job: Job) -> subprocess.CompletedProcess[bytes]:
+    """Run clang, and again with changed text if the source uses XC16 features that clang does not support."""
+    arguments = job.arguments
+    compiles = job.printed is not None  # a job that compiles a source to IR
+    changes = _changes_of(job) if compiles else []
+    for _ in range(MAX_FRONT_END_RUNS):
+        if changes:
+            result = _run_changed(program, arguments, changes)
+        else:
+            result = subprocess.run([*program, *arguments], capture_output=True, check=False)
+        if result.returncode and header_case.MISSING.search(result.stderr) and "-ivfsoverlay" not in arguments:
+            with tempfile.TemporaryDirectory(prefix="dspic-names-") as folder:
+                overlay = Path(folder) / "overlay.yaml"
+                overlay.write_text(header_case.overlay(arguments))
+                return _run_job(program, replace(job, arguments=["-ivfsoverlay", str(overlay), *arguments]))
+        wanted = [change for change in _changes_for(result, job) if change not in changes] if compiles else []
+        if not wanted:
+            break
+        changes += wanted
     return result
+
+
+def _changes_of(job: Job) -> list[Change]:
+    """The changes that the text of the source file itself needs, whatever its headers contain."""
+    try:
+        source = job.source.read_bytes()
+    except OSError:
+        return []
+    changes: list[Change] = [attributes.rewrite] if attributes.suspected(source) else []
+    if config_pragma.IN_SOURCE.search(source):
+        changes.append(config_pragma.rewriter(job.chip.name))
+    return changes
+
+
+def _changes_for(result: subprocess.CompletedProcess[bytes], job: Job) -> list[Change]:
+    """The changes of the text that clang's messages ask for."""
+    said, failed = result.stderr, result.returncode != 0
+    changes: list[Change] = []
+    if attributes.IGNORED.search(said):
+        changes.append(attributes.rewrite)
+    if config_pragma.PRESENT in said:
+        changes.append(config_pragma.rewriter(job.chip.name))
+    if failed and (REFUSED.search(said) or asm_constraints.REFUSED.search(said) or accumulators.REFUSED.search(said)):
+        changes.append(respell)
+    if failed and asm_constraints.REFUSED.search(said):
+        changes.append(asm_constraints.respell)
+    if failed and accumulators.REFUSED.search(said):
+        changes.append(accumulators.rewrite)
+    return changes
 
 
 def without_preprocessing(options: list[str]) -> list[str]:
@@ -258,12 +299,13 @@ def run_jobs(jobs: list[Job], parallel: int, show: bool = False) -> None:
             print(shlex.join([*program, *job.arguments]), file=sys.stderr)
 
     def run(job: Job) -> subprocess.CompletedProcess[bytes]:
-        return _run_job([*program, *colour], job.arguments, job.chip)
+        return _run_job([*program, *colour], job)
 
     with ThreadPoolExecutor(max_workers=parallel or os.cpu_count() or 1) as pool:
         results = list(pool.map(run, jobs))
     for job, result in zip(jobs, results, strict=True):
-        sys.stderr.write(result.stderr.decode(errors="replace").replace("zig: ", "cc: "))
+        if result.returncode or SILENT not in job.arguments:
+            sys.stderr.write(result.stderr.decode(errors="replace").replace("zig: ", "cc: "))
         if job.printed is None:
             sys.stdout.write(result.stdout.decode(errors="replace"))
         else:

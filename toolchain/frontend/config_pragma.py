@@ -9,15 +9,18 @@ from __future__ import annotations
 
 import difflib
 import re
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from functools import cache, partial
 from pathlib import Path
 
+from emu.chips import chip_named
 from emu.chips.chip import Chip
 from toolchain.errors import ToolError
 
 PRESENT = b"#pragma config"
 """Part of clang's warning about unknown pragmas for a source that needs `rewrite`."""
 
+IN_SOURCE = re.compile(rb"^[ \t]*#[ \t]*pragma[ \t]+config\b", re.MULTILINE)
 _PRAGMA = re.compile(r"^[ \t]*#[ \t]*pragma[ \t]+config\b(.*)$", re.MULTILINE)
 _MARKER = re.compile(r'^# (\d+) "((?:[^"\\]|\\.)*)".*$', re.MULTILINE)
 _HEADER = Path(__file__).parents[1] / "include" / "dspic_compiler.h"
@@ -46,6 +49,12 @@ def settings(chip: Chip) -> dict[str, tuple[str, int]]:
 def values() -> dict[str, int]:
     """Mask of each named value of device header and XC16, with zeros for the bits that it clears."""
     return _PRAGMA_VALUES | {name: int(number, 16) for name, number in _MACRO.findall(_HEADER.read_text())}
+
+
+@cache
+def rewriter(chip_name: str) -> Callable[[str], str]:
+    """`rewrite` for a chip."""
+    return partial(rewrite, chip=chip_named(chip_name))
 
 
 def rewrite(text: str, chip: Chip) -> str:

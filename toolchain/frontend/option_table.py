@@ -73,7 +73,8 @@ SECTIONS: list[tuple[str, list[tuple[str, str, str]]]] = [
         ("-mafrlcsj", IGNORED, "MPLAB X's switch for comparing the optimisers of licences"),
         ("-mnofallback", IGNORED, "there is no licence"), ("--nofallback", IGNORED, "there is no licence"),
         ("-nofallback", IGNORED, "there is no licence"),
-        ("-omf=elf", IGNORED, "the only format"), ("-omf=<format>", REFUSED, "there is no COFF output; Microchip's tools read our ELF (-omf=elf)"),
+        ("-omf=elf", IGNORED, "the only format"), ("-omf=<format>", REFUSED,
+         "there is no COFF output; Microchip's tools read our ELF (-omf=elf)"),
         ("-p<device>", DRIVER, "as -mcpu="),
     ]),
     ("Language", [

@@ -4,7 +4,6 @@
 #define DSPIC_BUILTINS_H
 #ifndef __ASSEMBLER__
 #pragma GCC system_header
-#include "dspic_attributes.h"
 
 #ifdef __cplusplus
 extern "C" {

@@ -69,12 +69,12 @@
 /* All registers that a C function may change (abi-elf.md §2.1), for asm statements that call one. */
 #define OS_CALL_CLOBBERS OS_W0, OS_W1, OS_W2, OS_W3, OS_W4, OS_W5, OS_W6, OS_W7, "memory", "cc"
 
+/* Functions and placement of variables by the macros of Microchip's device headers; N: alignment in bytes. */
+#if defined(__XC16__) || defined(__C30__)
 #ifndef _ISR
 #define _ISR __attribute__((__interrupt__, __no_auto_psv__))
 #define _ISRFAST __attribute__((__interrupt__, __no_auto_psv__, __shadow__))
 #endif
-
-/* Placement of a variable, as in Microchip's device headers; N: alignment in bytes. */
 #ifndef _XBSS
 #define _PERSISTENT __attribute__((persistent))
 #define _NEAR __attribute__((near))
@@ -83,6 +83,25 @@
 #define _YBSS(N) __attribute__((space(ymemory), aligned(N)))
 #define _YDATA(N) __attribute__((space(ymemory), aligned(N)))
 #define _EEDATA(N) __attribute__((space(eedata), aligned(N)))
+#endif
+#else
+#ifndef _ISR
+#define _ISR __attribute__((__used__, __annotate__("interrupt"), __annotate__("no_auto_psv")))
+#define _ISRFAST \
+  __attribute__((__used__, __annotate__("interrupt"), __annotate__("no_auto_psv"), __annotate__("shadow")))
+#endif
+#ifndef _XBSS /* numbers make section names unique: constants and variables cannot share a section */
+#define __dspic_text(x) #x
+#define __dspic_number(x) __dspic_text(x)
+#define __dspic_space(name) __section__(name __dspic_number(__COUNTER__))
+#define _PERSISTENT __attribute__((__section__(".pbss")))
+#define _NEAR __attribute__((__dspic_space(".near.")))
+#define _XBSS(N) __attribute__((__dspic_space(".xmemory."), __aligned__(N)))
+#define _XDATA(N) __attribute__((__dspic_space(".xmemory."), __aligned__(N)))
+#define _YBSS(N) __attribute__((__dspic_space(".ymemory."), __aligned__(N)))
+#define _YDATA(N) __attribute__((__dspic_space(".ymemory."), __aligned__(N)))
+#define _EEDATA(N) __attribute__((__used__, __dspic_space(".eedata."), __aligned__(N)))
+#endif
 #endif
 
 /* Configuration words by name, as in Microchip's device headers: _FOSC(CSW_FSCM_OFF & XT_PLL8), semicolon optional;

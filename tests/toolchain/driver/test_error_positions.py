@@ -109,7 +109,6 @@ REFUSED = [
     (HANDLER.format("", "_T9Int", "void"), "interrupt function '_T9Int' does not have a vector's name"),
     (HANDLER.format("(irq(99))", "f", "void"), "interrupt function 'f': irq(99) is not an interrupt number"),
     ("void _T1Interrupt(void) {}", "function '_T1Interrupt' has the name of an interrupt vector"),
-    ("int x __attribute__((address(y), used));", "attribute address(y): the argument must be a number"),
     ("__attribute__((used)) int f(int n) { volatile char a[40000]; a[n] = 1; return a[3]; }", "(limit 16382)"),
     ("""volatile int v; __attribute__((used)) void f(void) { __asm__("" :: "r"(v), "r"(v), "r"(v), "r"(v), "r"(v),
      "r"(v) : "w0", "w1", "w2", "w3", "w4", "w5", "w6", "w7", "w8", "w9"); }""",

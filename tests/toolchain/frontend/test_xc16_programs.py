@@ -82,9 +82,9 @@ def test_accumulators_have_names_in_assembly(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("options", [("-ansi",), ("-std=c89",), ("-std=gnu89",), ("-std=c99",), ("-std=c11",), ()])
 def test_every_header_is_accepted_in_every_dialect(options: tuple[str, ...], tmp_path: Path) -> None:
-    folder = Path(driver.__file__).parent / "include"
+    folder = Path(driver.__file__).parents[1] / "include"
     others = tuple(part for other in CHIPS[1:] for part in (other.lower(), f"p{other[5:]}"))
-    names = sorted(h.name for h in folder.glob("*.h") if h.name != "dspic_attributes.h" and h.stem not in others)
+    names = sorted(h.name for h in folder.glob("*.h") if h.stem not in others)
     source = "".join(f"#include <{name}>\n" for name in names) + "int main(void) { return 3; }\n"
     assert status_of(tmp_path, source, "-Wall", "-Werror", *options) == 3
 
