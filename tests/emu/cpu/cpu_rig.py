@@ -1,7 +1,8 @@
 """A machine with a small assembly program in flash, and measurements of its cycles.
 
-Programs use the syntax of the instruction table: one statement per line, `label:` before it, `.word` for a raw program
-word. They start at START in cycle 0. The stack limit is not armed, and all W registers count as initialised.
+Programs use the syntax of the instruction table: statements on lines or separated by `|`, `label:` before one, `.word`
+for a raw program word. They start at START in cycle 0. The stack limit is not armed, and all W registers count as
+initialised.
 """
 
 from __future__ import annotations
@@ -35,7 +36,7 @@ def assemble(text: str, start: int = START) -> tuple[dict[int, int], dict[str, i
         except ValueError:
             return _Expression(labels.get(token, 0))
 
-    for line in text.splitlines():
+    for line in text.replace("|", "\n").splitlines():
         line = line.partition(";")[0].strip()
         while ":" in line:
             label, _, line = line.partition(":")

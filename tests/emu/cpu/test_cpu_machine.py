@@ -112,38 +112,13 @@ def test_programs_may_rewrite_themselves(engine: str) -> None:
     The row at 0x400 holds `inc w0, w0; return`; the program replaces it by `dec w0, w0; return`.
     """
     text = """
-        mov #0x000, w3
-        call 0x400
-        call 0x400
-        call 0x400
-        call 0x400
-        call 0x400
-        mov w0, 0x1000
-        mov #0x0, w1
-        mov w1, 0x32
-        mov #0x400, w2
-        tblwtl w2, [w2]
-        mov #0x4041, w4
-        rcall burn
-        tblwtl w6, [w2]
-        tblwth w7, [w2]
-        mov #0x402, w3
-        tblwtl w8, [w3]
-        tblwth w9, [w3]
-        mov #0x4001, w4
-        rcall burn
-        call 0x400
-        call 0x400
+        mov #0x000, w3 | call 0x400 | call 0x400 | call 0x400 | call 0x400 | call 0x400 | mov w0, 0x1000
+        mov #0x0, w1 | mov w1, 0x32 | mov #0x400, w2 | tblwtl w2, [w2] | mov #0x4041, w4 | rcall burn
+        tblwtl w6, [w2] | tblwth w7, [w2] | mov #0x402, w3 | tblwtl w8, [w3] | tblwth w9, [w3]
+        mov #0x4001, w4 | rcall burn | call 0x400 | call 0x400
         end: nop
-        burn: mov w4, 0x760
-        mov #0x55, w5
-        mov w5, 0x766
-        mov #0xAA, w5
-        mov w5, 0x766
-        bset 0x760, #15
-        nop
-        nop
-        return
+        burn: mov w4, 0x760 | mov #0x55, w5 | mov w5, 0x766 | mov #0xAA, w5 | mov w5, 0x766
+        bset 0x760, #15 | nop | nop | return
     """
     rig = Rig(text, engine, w0=0, w6=0x0000, w7=0xE9, w8=0x0000, w9=0x06)
     rig.machine.program.put_flash(0x400, [0xE80000, 0x060000])

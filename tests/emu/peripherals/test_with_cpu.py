@@ -36,13 +36,8 @@ def test_three_byte_moves_in_a_row_unlock_the_oscillator(engine):
     """§3: keys and data in consecutive MOV.B through a pointer unlock OSCCON."""
     rig = run(
         """
-        mov #{OSCCON}, w1
-        mov #0x46, w2
-        mov #0x57, w3
-        mov #0x40, w4
-        mov.b w2, [w1]
-        mov.b w3, [w1]
-        mov.b w4, [w1]
+        mov #{OSCCON}, w1 | mov #0x46, w2 | mov #0x57, w3 | mov #0x40, w4 | mov.b w2, [w1]
+        mov.b w3, [w1] | mov.b w4, [w1]
         end: bra end
         """,
         engine,
@@ -54,14 +49,8 @@ def test_an_instruction_between_the_keys_keeps_the_oscillator_locked(engine):
     """§3: an instruction between the keys keeps OSCCON locked."""
     rig = run(
         """
-        mov #{OSCCON}, w1
-        mov #0x46, w2
-        mov #0x57, w3
-        mov #0x40, w4
-        mov.b w2, [w1]
-        mov.b w3, [w1]
-        nop
-        mov.b w4, [w1]
+        mov #{OSCCON}, w1 | mov #0x46, w2 | mov #0x57, w3 | mov #0x40, w4 | mov.b w2, [w1]
+        mov.b w3, [w1] | nop | mov.b w4, [w1]
         end: bra end
         """,
         engine,
@@ -73,11 +62,7 @@ def test_reading_the_port_right_behind_the_latch_needs_a_nop(engine):
     """§6: MOV PORTD, w1 directly after MOV w0, LATD reads the old pins; after a NOP it reads the new ones."""
     rig = run(
         """
-        clr {TRISD}
-        mov #0x1234, w0
-        mov w0, {LATD}
-        mov {PORTD}, w1
-        mov {PORTD}, w2
+        clr {TRISD} | mov #0x1234, w0 | mov w0, {LATD} | mov {PORTD}, w1 | mov {PORTD}, w2
         end: bra end
         """,
         engine,
@@ -90,16 +75,8 @@ def test_bset_on_the_port_copies_pins_and_on_the_latch_does_not(engine):
     not."""
     rig = run(
         """
-        mov #0x00FF, w0
-        mov w0, {TRISD}
-        mov #0x0001, w0
-        mov w0, {LATD}
-        nop
-        bset {LATD}, #8
-        nop
-        mov {LATD}, w1
-        bset {PORTD}, #1
-        mov {LATD}, w2
+        mov #0x00FF, w0 | mov w0, {TRISD} | mov #0x0001, w0 | mov w0, {LATD} | nop | bset {LATD}, #8
+        nop | mov {LATD}, w1 | bset {PORTD}, #1 | mov {LATD}, w2
         end: bra end
         """,
         engine,
@@ -111,13 +88,7 @@ def test_a_timer_read_by_the_program_counts_every_cycle(engine):
     """§7: a timer counts every cycle: after BSET T1CON in cycle 0, TMR1 read 1, 2 and 6 cycles later is 0, 1 and 5."""
     rig = run(
         """
-        bset {T1CON}, #15
-        mov {TMR1}, w1
-        mov {TMR1}, w2
-        nop
-        nop
-        nop
-        mov {TMR1}, w3
+        bset {T1CON}, #15 | mov {TMR1}, w1 | mov {TMR1}, w2 | nop | nop | nop | mov {TMR1}, w3
         end: bra end
         """,
         engine,
@@ -130,23 +101,9 @@ def test_a_wide_timer_is_read_consistently_through_its_holding_register(engine):
     both reads."""
     rig = run(
         """
-        mov #0xFFFF, w0
-        mov w0, {PR2}
-        mov w0, {PR3}
-        mov #8, w0
-        mov w0, {T2CON}
-        mov #7, w0
-        mov w0, {TMR3HLD}
-        mov #0xFFFC, w0
-        mov w0, {TMR2}
-        mov #0x8008, w0
-        mov w0, {T2CON}
-        nop
-        nop
-        mov {TMR2}, w1
-        mov {TMR3HLD}, w2
-        mov {TMR2}, w3
-        mov {TMR3HLD}, w4
+        mov #0xFFFF, w0 | mov w0, {PR2} | mov w0, {PR3} | mov #8, w0 | mov w0, {T2CON} | mov #7, w0
+        mov w0, {TMR3HLD} | mov #0xFFFC, w0 | mov w0, {TMR2} | mov #0x8008, w0 | mov w0, {T2CON} | nop
+        nop | mov {TMR2}, w1 | mov {TMR3HLD}, w2 | mov {TMR2}, w3 | mov {TMR3HLD}, w4
         end: bra end
         """,
         engine,
@@ -158,17 +115,10 @@ def test_polling_the_converter_takes_the_time_of_the_conversion(engine):
     """§13: after BCLR of SAMP, the first poll after 133 Tcy reads DONE; the loop of BTSS and BRA takes 3 Tcy."""
     rig = Rig(
         """
-        mov #18, w0
-        mov w0, {ADCON3}
-        mov #9, w0
-        mov w0, {ADCHS}
-        bset {ADCON1}, #15
-        bset {ADCON1}, #1
-        repeat #50
-        nop
+        mov #18, w0 | mov w0, {ADCON3} | mov #9, w0 | mov w0, {ADCHS} | bset {ADCON1}, #15
+        bset {ADCON1}, #1 | repeat #50 | nop
         convert: bclr {ADCON1}, #1
-        wait: btss {ADCON1}, #0
-        bra wait
+        wait: btss {ADCON1}, #0 | bra wait
         done: mov {ADCBUF0}, w1
         end: bra end
         """.format(**A),
@@ -188,21 +138,10 @@ def test_an_input_that_changes_in_the_cycle_of_its_interrupt_does_not_take_it(en
     """§13, §17: an input level that is set between two runs of a CPU in Idle, at any cycle, does not delay an
     interrupt."""
     program = """
-        mov #0x001C, w0
-        mov w0, {ADCSSL}
-        mov #0x0408, w0
-        mov w0, {ADCON2}
-        mov #0x0113, w0
-        mov w0, {ADCON3}
-        mov #0x80E4, w0
-        mov w0, {ADCON1}
-        bset {IEC0}, #11
-        mov #0x00E0, w0
+        mov #0x001C, w0 | mov w0, {ADCSSL} | mov #0x0408, w0 | mov w0, {ADCON2} | mov #0x0113, w0
+        mov w0, {ADCON3} | mov #0x80E4, w0 | mov w0, {ADCON1} | bset {IEC0}, #11 | mov #0x00E0, w0
         mov w0, {SR}
-        wait: pwrsav #1
-        bclr {IFS0}, #11
-        inc w5, w5
-        bra wait
+        wait: pwrsav #1 | bclr {IFS0}, #11 | inc w5, w5 | bra wait
         """.format(**A)
     left, changed = Rig(program, engine), Rig(program, engine)
     w5 = left.machine.w[5]
@@ -220,20 +159,10 @@ def test_uart_bytes_written_by_polling_follow_without_gaps(engine):
     UARTEN started."""
     rig = Rig(
         """
-        mov #7, w0
-        mov w0, {U1BRG}
-        enable: bset {U1MODE}, #15
-        bset {U1STA}, #10
-        mov #0x41, w1
-        mov #8, w2
-        next: btsc {U1STA}, #9
-        bra next
-        mov w1, {U1TXREG}
-        inc w1, w1
-        dec w2, w2
-        bra nz, next
-        wait: btss {U1STA}, #8
-        bra wait
+        mov #7, w0 | mov w0, {U1BRG}
+        enable: bset {U1MODE}, #15 | bset {U1STA}, #10 | mov #0x41, w1 | mov #8, w2
+        next: btsc {U1STA}, #9 | bra next | mov w1, {U1TXREG} | inc w1, w1 | dec w2, w2 | bra nz, next
+        wait: btss {U1STA}, #8 | bra wait
         end: bra end
         """.format(**A),
         engine,
@@ -252,10 +181,7 @@ def test_change_notice_wakes_from_sleep_once_the_oscillator_runs(engine):
     1,024 periods of 7.3728 MHz and locks in 20 us: 2,048 + 295 Tcy."""
     rig = Rig(
         """
-        bset {CNEN1}, #13
-        bset {IEC0}, #15
-        pwrsav #0
-        mov #1, w1
+        bset {CNEN1}, #13 | bset {IEC0}, #15 | pwrsav #0 | mov #1, w1
         end: bra end
         """.format(**A),
         engine,
@@ -311,26 +237,12 @@ def test_eeprom_write_goes_on_while_the_program_counts_and_interrupts_at_its_end
     """§16: during an EEPROM write the program runs on; after 2 ms NVMIF interrupts, and TBLRDL reads the word back."""
     rig = Rig(
         """
-        mov #0x7F, w0
-        mov w0, {TBLPAG}
-        mov #0xF010, w1
-        mov #0xBEEF, w2
-        tblwtl w2, [w1]
-        mov #0x4004, w0
-        mov w0, {NVMCON}
-        mov #0x55, w0
+        mov #0x7F, w0 | mov w0, {TBLPAG} | mov #0xF010, w1 | mov #0xBEEF, w2 | tblwtl w2, [w1]
+        mov #0x4004, w0 | mov w0, {NVMCON} | mov #0x55, w0 | mov w0, {NVMKEY} | mov #0xAA, w0
         mov w0, {NVMKEY}
-        mov #0xAA, w0
-        mov w0, {NVMKEY}
-        start: bset {NVMCON}, #15
-        nop
-        nop
-        clr w3
-        wait: inc w3, w3
-        btsc {NVMCON}, #15
-        bra wait
-        end: tblrdl [w1], w4
-        bra end
+        start: bset {NVMCON}, #15 | nop | nop | clr w3
+        wait: inc w3, w3 | btsc {NVMCON}, #15 | bra wait
+        end: tblrdl [w1], w4 | bra end
         """.format(**A),
         engine,
     )
@@ -350,17 +262,10 @@ def test_an_interrupt_between_the_keys_breaks_the_sequence(engine):
     """§16: if the handler of T1 runs between the keys 0x55 and 0xAA, no write starts."""
     rig = Rig(
         """
-        mov #0x4044, w0
-        mov w0, {NVMCON}
-        mov #0xAA, w1
-        mov #0x55, w0
-        first: mov w0, {NVMKEY}
-        mov w1, {NVMKEY}
-        bset {NVMCON}, #15
-        nop
+        mov #0x4044, w0 | mov w0, {NVMCON} | mov #0xAA, w1 | mov #0x55, w0
+        first: mov w0, {NVMKEY} | mov w1, {NVMKEY} | bset {NVMCON}, #15 | nop
         end: bra end
-        handler: bclr {IFS0}, #3
-        retfie
+        handler: bclr {IFS0}, #3 | retfie
         """.format(**A),
         engine,
     )
@@ -375,14 +280,8 @@ def test_reset_instruction_keeps_rcon_and_brings_the_devices_down(engine):
     """epuck.md §2: RESET keeps POR, which software has cleared, sets SWR, and resets the devices."""
     rig = Rig(
         """
-        btss {RCON}, #0
-        bra second
-        bclr {RCON}, #0
-        mov #0x8000, w0
-        mov w0, {T1CON}
-        reset
-        second: mov {RCON}, w1
-        mov {T1CON}, w2
+        btss {RCON}, #0 | bra second | bclr {RCON}, #0 | mov #0x8000, w0 | mov w0, {T1CON} | reset
+        second: mov {RCON}, w1 | mov {T1CON}, w2
         end: bra end
         """.format(**A),
         engine,
@@ -398,26 +297,14 @@ def test_i2c_polled_write_takes_the_bus_time(engine):
     """§11: a polled write takes 59 Tbrg of 75.5 Tcy, plus the polls: start 2 Tbrg, three bytes of 18, stop 3."""
     rig = Rig(
         """
-        mov #150, w0
-        mov w0, {I2CBRG}
-        bset {I2CCON}, #15
+        mov #150, w0 | mov w0, {I2CBRG} | bset {I2CCON}, #15
         begin: bset {I2CCON}, #0
-        start: btsc {I2CCON}, #0
-        bra start
-        mov #0xDC, w0
-        rcall send
-        mov #0x1D, w0
-        rcall send
-        mov #0x70, w0
-        rcall send
-        bset {I2CCON}, #2
-        stop: btsc {I2CCON}, #2
-        bra stop
+        start: btsc {I2CCON}, #0 | bra start | mov #0xDC, w0 | rcall send | mov #0x1D, w0 | rcall send
+        mov #0x70, w0 | rcall send | bset {I2CCON}, #2
+        stop: btsc {I2CCON}, #2 | bra stop
         end: bra end
         send: mov w0, {I2CTRN}
-        busy: btsc {I2CSTAT}, #14
-        bra busy
-        return
+        busy: btsc {I2CSTAT}, #14 | bra busy | return
         """.format(**A),
         engine,
     )

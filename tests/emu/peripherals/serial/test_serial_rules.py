@@ -12,56 +12,21 @@ from emu.chips.dspic30f6014a import SFRS
 
 A = {name: f"{sfr.address:#x}" for name, sfr in SFRS.items()}
 UART = """
-    mov #{brg}, w0
-    mov w0, {U1BRG}
-    mov #{mode}, w0
-    mov w0, {U1MODE}
-    mov #{status}, w0
-    mov w0, {U1STA}
-    mov #{RX}, w8
-    mov #3, w3
-    loop: btss {U1STA}, #0
-    bra silent
-    mov {U1RXREG}, w1
-    add w1, w2, w2
-    btsc w1, #0
-    mov.b [w8], w4
-    add w4, w2, w2
-    btsc {U1STA}, #1
-    bclr {U1STA}, #1
-    silent: dec w3, w3
-    bra nz, loop
-    mov #{pause}, w3
-    mov w2, {U1TXREG}
-    inc w2, w2
-    bra loop
+    mov #{brg}, w0 | mov w0, {U1BRG} | mov #{mode}, w0 | mov w0, {U1MODE} | mov #{status}, w0
+    mov w0, {U1STA} | mov #{RX}, w8 | mov #3, w3
+    loop: btss {U1STA}, #0 | bra silent | mov {U1RXREG}, w1 | add w1, w2, w2 | btsc w1, #0
+    mov.b [w8], w4 | add w4, w2, w2 | btsc {U1STA}, #1 | bclr {U1STA}, #1
+    silent: dec w3, w3 | bra nz, loop | mov #{pause}, w3 | mov w2, {U1TXREG} | inc w2, w2 | bra loop
 """
 """Program that adds up received characters and sends the sum, whether the FIFO has room or not. It reads some
 characters by pointer."""
 
 SPI = """
-    mov #{con}, w0
-    mov w0, {SPI1CON}
-    bset {SPI1STAT}, #15
-    mov #{BUF}, w8
-    mov #3, w3
-    loop: mov w2, {SPI1BUF}
-    inc w2, w2
-    wait: btsc w2, #0
-    bra read
-    btss {SPI1STAT}, #0
-    bra wait
-    read: mov {SPI1BUF}, w1
-    xor w1, w2, w2
-    dec w3, w3
-    bra nz, loop
-    mov #{pause}, w3
-    inc {SPI1BUF}
-    mov [w8], w4
-    mov.b w4, [w8]
-    btsc {SPI1STAT}, #6
-    bclr {SPI1STAT}, #6
-    bra loop
+    mov #{con}, w0 | mov w0, {SPI1CON} | bset {SPI1STAT}, #15 | mov #{BUF}, w8 | mov #3, w3
+    loop: mov w2, {SPI1BUF} | inc w2, w2
+    wait: btsc w2, #0 | bra read | btss {SPI1STAT}, #0 | bra wait
+    read: mov {SPI1BUF}, w1 | xor w1, w2, w2 | dec w3, w3 | bra nz, loop | mov #{pause}, w3
+    inc {SPI1BUF} | mov [w8], w4 | mov.b w4, [w8] | btsc {SPI1STAT}, #6 | bclr {SPI1STAT}, #6 | bra loop
 """
 """Program that sends words, every second one without waiting for the previous one. One instruction reads and writes
 the buffer."""
@@ -150,15 +115,9 @@ def test_lazy_listeners_receive_the_same_bytes_as_eager_ones() -> None:
 
 
 POLL = """
-    mov #0x53E, w0
-    mov w0, {SPI1CON}
-    bset {SPI1STAT}, #15
+    mov #0x53E, w0 | mov w0, {SPI1CON} | bset {SPI1STAT}, #15
     loop: mov w2, {SPI1BUF}
-    wait: btss {SPI1STAT}, #0
-    bra wait
-    mov {SPI1BUF}, w1
-    inc w2, w2
-    bra loop
+    wait: btss {SPI1STAT}, #0 | bra wait | mov {SPI1BUF}, w1 | inc w2, w2 | bra loop
 """
 
 
