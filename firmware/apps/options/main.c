@@ -32,13 +32,12 @@ sys_mutex options_mutex __attribute__((used)) = SYS_MUTEX(3);
 sys_cleanup options_cleanup __attribute__((used));
 sys_quota options_quota __attribute__((used));
 
-static const sys_process_config spinner; /* set below */
-sys_service options_service __attribute__((used)) = {.config = &spinner, .limit_ms = 30000, .restarts = SYS_ALWAYS};
+sys_service options_service __attribute__((used)) = {.config = &options_spinner, .limit_ms = 30000, .restarts = SYS_ALWAYS};
 
 static sys_mutex other_mutex = SYS_MUTEX(3);
 static sys_cleanup other_cleanups[2];
 static sys_quota other_quota;
-static sys_service other_services[2] = {{.config = &spinner, .restarts = SYS_ALWAYS}, {.config = &spinner, .restarts = SYS_ALWAYS}};
+static sys_service other_services[2] = {{.config = &options_spinner, .restarts = SYS_ALWAYS}, {.config = &options_spinner, .restarts = SYS_ALWAYS}};
 
 /* Called through these, so that the compiler writes each function whole, as for a program that calls it often. */
 static bool (*volatile lock)(sys_mutex *) = Sys_Lock_Mutex;
@@ -56,14 +55,14 @@ static bool (*volatile feed)(void) = Sys_Feed_Watchdog;
 
 static const uint16 value = 7;
 
-static void settle(void) /* the next tick and the end of the slice are far */
+void options_settle(void)
 {
     Sys_Sleep(2);
 }
 
-static void settle_under_round_robin(void) /* and no call asks for another choice of thread */
+void options_settle_under_round_robin(void)
 {
-    settle();
+    options_settle();
     Sys_Set_Scheduler(&sys_round_robin);
 }
 
@@ -118,7 +117,7 @@ static void push_and_rest(void *cleanup)
 }
 
 static const uint16 soon = 1, later = 5;
-static const sys_process_config spinner = {spin, NULL, 0, 0, 0, 0, 0};
+const sys_process_config options_spinner = {spin, NULL, 0, 0, 0, 0, 0};
 static const sys_process_config owner = {own, &options_mutex, 0, 3, 0, 0, 0};
 static const sys_process_config other_owner = {own, &other_mutex, 0, 3, 0, 0, 0};
 static const sys_process_config waiter = {wait_for_mutex, NULL, 0, 3, 0, 0, 0};
@@ -141,7 +140,7 @@ static void wait_for_end(const sys_process_config *config, bool joined)
         (void)join(pid);
         options_woken();
     } else {
-        settle();
+        options_settle();
         options_spin();
     }
 }
@@ -150,8 +149,8 @@ static void with_mutex(uint16 scene)
 {
     if (scene == LOCK_TAKEN) {
         (void)start(&owner);
-        (void)start(&spinner);
-        settle();
+        (void)start(&options_spinner);
+        options_settle();
     } else if (scene != LOCK && scene != LOCK_SECOND) {
         (void)lock(&options_mutex);
     }
@@ -163,7 +162,7 @@ static void with_mutex(uint16 scene)
     while (waiters-- != 0) {
         (void)start(&waiter);
     }
-    settle();
+    options_settle();
     if (scene != UNLOCK_PRIORITIES && scene != UNLOCK_TO_BETTER) {
         Sys_Set_Scheduler(&sys_round_robin);
     }
@@ -173,15 +172,15 @@ static void with_mutex(uint16 scene)
 
 static void with_end(uint16 scene)
 {
-    uint16 pid = scene == JOIN_ZOMBIE ? start_joinable(&brief) : scene == JOIN_LIVING ? start(&spinner) : 0;
+    uint16 pid = scene == JOIN_ZOMBIE ? start_joinable(&brief) : scene == JOIN_LIVING ? start(&options_spinner) : 0;
     if (scene < END) {
-        settle_under_round_robin();
+        options_settle_under_round_robin();
     }
     options_ready();
     if (scene == START) {
-        (void)start(&spinner);
+        (void)start(&options_spinner);
     } else if (scene == START_JOINABLE) {
-        (void)start_joinable(&spinner);
+        (void)start_joinable(&options_spinner);
     } else if (scene == END || scene == END_JOINED) {
         wait_for_end(&lasting, scene == END_JOINED);
     } else {
@@ -199,7 +198,7 @@ static void with_cleanup(uint16 scene)
         others.arg = &other_cleanups[i];
         (void)start(&others);
     }
-    settle_under_round_robin();
+    options_settle_under_round_robin();
     options_ready();
     if (scene <= PUSH_BEHIND_TWO) {
         (void)push(&options_cleanup, clean, NULL);
@@ -224,7 +223,7 @@ static void with_quota(uint16 scene)
     if (scene == SEND_SECOND_QUOTA) {
         (void)limit(&other_quota, OPTIONS_ELSEWHERE, 8);
     }
-    settle_under_round_robin();
+    options_settle_under_round_robin();
     Sys_Start_CriticalSection(); /* nothing is delivered */
     while (waiting-- != 0) {
         (void)send(event, &value, sizeof value);
@@ -242,7 +241,7 @@ static void served(void *behind)
     for (uint16 i = 0; i < 2 && behind != NULL; i++) {
         (void)start_service(&other_services[i]);
     }
-    settle_under_round_robin();
+    options_settle_under_round_robin();
     options_ready();
     (void)feed();
     options_done();
@@ -260,11 +259,11 @@ static void with_service(uint16 scene)
         if (scene == TICK_SERVICE) {
             (void)start_service(&options_service);
         }
-        settle();
+        options_settle();
         options_ready();
         Sys_Sleep(60000);
     } else if (scene == START_SERVICE) {
-        settle_under_round_robin();
+        options_settle_under_round_robin();
         options_ready();
         (void)start_service(&options_service);
     } else {
@@ -290,8 +289,10 @@ static void measured(void *unused)
         with_cleanup(scene);
     } else if (scene < START_SERVICE) {
         with_quota(scene);
-    } else {
+    } else if (scene < TAKE) {
         with_service(scene);
+    } else {
+        options_waits(scene);
     }
     options_done();
     Sys_Set_Scheduler(&sys_woken_first); /* linked, so that its bytes are counted */

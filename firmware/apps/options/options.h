@@ -13,10 +13,17 @@ enum {
     PUSH, PUSH_BEHIND_TWO, POP, POP_AND_RUN, POP_BEHIND_TWO, END_CLEANED,
     LIMIT, SEND, SEND_LIMITED, SEND_LIMITED_BEHIND_FOUR, SEND_DROPPED, SEND_REPLACED, SEND_SECOND_QUOTA, SEND_NEIGHBOUR,
     SEND_ELSEWHERE,
-    START_SERVICE, FEED, FEED_BEHIND_TWO, TICK, TICK_SERVICE
+    START_SERVICE, FEED, FEED_BEHIND_TWO, TICK, TICK_SERVICE,
+    TAKE, TAKE_NONE, SIGNAL, SIGNAL_ONE_WAITS, TAKE_BITS, TAKE_NO_BITS, NOTIFY, NOTIFY_ONE_WAITS,
+    START_TIMER, START_TIMER_BESIDE_TWO, STOP_TIMER, STOP_TIMER_BEHIND_TWO, TICK_TIMER
 };
 
 extern volatile uint16 options_wanted;
+
+void options_settle(void);                   /* the next tick and the end of the slice are far */
+void options_settle_under_round_robin(void); /* and no call asks for another choice of thread */
+void options_waits(uint16 scene);            /* waits.c: the scenes from TAKE on */
+extern const sys_process_config options_spinner;
 
 void options_begin(void); /* the measuring host stops here and sets options_wanted */
 void options_ready(void); /* the host stops here: the measured call is next, and no interrupt is due */

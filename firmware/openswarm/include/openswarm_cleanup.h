@@ -20,7 +20,7 @@ typedef struct sys_cleanup {
     struct sys_pcb *thread;
 } sys_cleanup;
 
-/* T | no | 94; 106 beside two of others | 28 | CONTEXT, ARGUMENT: NULL, or the object is pushed already.  Makes the
+/* MT | no | 94; 106 beside two of others | 28 | CONTEXT, ARGUMENT: NULL, or the object is pushed already.  Makes the
  * kernel call run(arg) when the calling thread ends, the newest cleanup first. SYS_EVENT_TERMINATION follows.
  *
  * Teardown has a fixed order. First the thread leaves every list of the kernel: it owns no subscription, message,
@@ -31,7 +31,7 @@ typedef struct sys_cleanup {
  * runs as in a critical section, on the stack of the context that ends the thread. If a cleanup ends other threads,
  * their cleanups follow those of this thread. If it ends the thread on whose stack it runs, that thread ends last. */
 bool Sys_Push_Cleanup(sys_cleanup *cleanup, void (*run)(void *arg), void *arg);
-/* T | no | 99, 9 more per newer one of others, 54 and those of run if it is called | 24 and run's | CONTEXT,
+/* MT | no | 99, 9 more per newer one of others, 54 and those of run if it is called | 24 and run's | CONTEXT,
  * PROCESS: the caller has none.  Removes the caller's newest cleanup; run: also calls it. */
 bool Sys_Pop_Cleanup(bool run);
 

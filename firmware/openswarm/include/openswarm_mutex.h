@@ -25,15 +25,15 @@ typedef struct sys_mutex {
 
 #define SYS_MUTEX(highest_priority) {NULL, NULL, NULL, (highest_priority), 0}
 
-/* T | while another thread owns it | 149, 14 more per mutex that others own; 240 to the next thread if it blocks | 50
+/* T | while another thread owns it | 149, 14 more per mutex that others own; 243 to the next thread if it blocks | 50
  * | CONTEXT, PROCESS: the caller owns it already, ARGUMENT: the caller's priority is above the ceiling.  Needs no
  * heap. An uncleared wait result stays. */
 bool Sys_Lock_Mutex(sys_mutex *mutex);
 /* The same; false with SYS_OK also after ms milliseconds. ms 0 = no time-out. */
 bool Sys_Lock_MutexTimeout(sys_mutex *mutex, uint16 ms);
-/* T, also in a critical section | no | 133, 13 more per mutex that others own; 257 if the scheduler chooses again
+/* MT | no | 133, 13 more per mutex that others own; 257 if the scheduler chooses again
  * because the caller's priority falls; 268 if a thread waits, 13 more per further one and 27 per mutex that others
- * own; 425 until a waiter of higher priority continues, 852 until the caller does if that thread unlocks and sleeps
+ * own; 425 until a waiter of higher priority continues, 856 until the caller does if that thread unlocks and sleeps
  * | 34 | CONTEXT, PROCESS: the caller does not own it. */
 bool Sys_Unlock_Mutex(sys_mutex *mutex);
 

@@ -7,7 +7,7 @@
  *
  * A service that ends, for whatever reason, is restarted within a slice, up to `restarts` times. A service that does
  * not call Sys_Feed_Watchdog for more than limit_ms is killed first. The kernel supervises the services between two
- * threads, which takes 127 cycles a ms and no heap. A restart needs the memory of the thread that ended; it is
+ * threads, which takes 135 cycles a ms and no heap. A restart needs the memory of the thread that ended; it is
  * repeated every ms until that is free. An endless critical section or handler also stops this supervision. */
 #ifndef OPENSWARM_SERVICE_H
 #define OPENSWARM_SERVICE_H
@@ -29,7 +29,7 @@ typedef struct sys_service {
 /* MTH | no | 108 more than Sys_Start_ProcessWith | 48 | those of Sys_Start_ProcessWith, PROCESS: the service is
  * running.  Starts the thread and its supervision. A service without restarts left may be started again. */
 bool Sys_Start_Service(sys_service *service);
-/* T | no | 87, 10 more per service that began later | 22 | PROCESS: the caller is no service.  Resets the caller's
+/* MTH | no | 87, 10 more per service that began later | 22 | PROCESS: the caller is no service.  Resets the caller's
  * watchdog. */
 bool Sys_Feed_Watchdog(void);
 

@@ -45,8 +45,7 @@ void os_clock_tick(void)
     board_tick();
 }
 
-/* Moves the alarm to `moment` if that is earlier than the alarm in force. */
-static HAL_OUTLINE void set_alarm(uint16 moment)
+HAL_OUTLINE void clock_set_alarm(uint16 moment)
 {
     uint16 distance = (uint16)(moment - base); /* at least 1 */
     hal_lock_state lock = hal_lock_devices();
@@ -75,7 +74,7 @@ void clock_wake_due(void)
         if ((uint16)(p->time_or_error.wake - now + elapsed) <= elapsed) {
             process_wake(p, NULL);
         } else {
-            set_alarm(p->time_or_error.wake);
+            clock_set_alarm(p->time_or_error.wake);
         }
     }
 }
@@ -85,5 +84,13 @@ void clock_set_wake(sys_pcb *process, uint16 ms)
     clock_wake_due(); /* sets base to the present time, so that a time-out may be 65,535 ms long */
     process->time_or_error.wake = (uint16)(base + ms);
     process->status |= OS_TIMED;
-    set_alarm(process->time_or_error.wake);
+    clock_set_alarm(process->time_or_error.wake);
+}
+
+uint16 clock_set_alarm_in(uint16 ms) /* not a part of clock_set_wake(), which needs the stack */
+{
+    clock_wake_due();
+    uint16 moment = (uint16)(base + ms);
+    clock_set_alarm(moment);
+    return moment;
 }

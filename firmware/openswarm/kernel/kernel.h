@@ -53,7 +53,7 @@ union message {
 
 /* Cause of a wait, or progress within the slice. */
 typedef union {
-    event *awaited; /* blocked: NULL if the thread waits for time only */
+    event *awaited; /* blocked: NULL if the thread waits for time only; an option's object, which is no event */
     uint16 spent;   /* ready: part of the slice used before the thread was preempted, in the port's units */
 } event_or_slice;
 
@@ -108,7 +108,7 @@ static inline periodic *process_periodic(const sys_pcb *process) /* SYS_PERIODIC
 
 /* Bits of os_pending: why the next thread of the ring cannot run at once. The low byte, OS_WORK, is pending kernel work
  * and prevents idling; the high byte is set while a scheduler chooses. One word, so that a slice end tests it once. */
-enum { OS_MESSAGES = 0x01, OS_ALARM = 0x02, OS_WATCH = 0x04, OS_WORK = 0xFF, OS_CHOICE = 0x100 };
+enum { OS_MESSAGES = 0x01, OS_ALARM = 0x02, OS_WATCH = 0x04, OS_POSTED = 0x08, OS_WORK = 0xFF, OS_CHOICE = 0x100 };
 
 extern volatile uint16 os_pending;
 #define OS_HAS_WORK (*(const volatile uint8 *)&os_pending != 0) /* the low byte, which comes first */
@@ -148,6 +148,9 @@ extern os_teardown_function os_release_mutexes, os_release_joins, os_release_ser
 extern os_teardown_function os_run_cleanups; /* calls process_free(p) when the cleanups of p have run */
 extern bool (*os_free_joinable)(sys_pcb *p); /* true: freed what is to be freed, or kept a zombie */
 extern void (*os_watch)(void); /* kernel stack, slice level, after each tick; needs no heap */
+/* Kernel stack, slice level, after OS_POSTED was set: wake threads of the blocked list. */
+extern void (*os_grant_semaphores)(void), (*os_wake_notified)(void);
+extern void (*os_expire_timers)(void); /* kernel stack, slice level, after an alarm; sets the next one */
 extern event *(*os_send_hook)(uint16 id, const void *data, uint16 size); /* a sender's event, instead of event_find() */
 extern void (*os_share_hook)(uint16 id, const void *data, uint16 size); /* any context: a sender's event behind a gate */
 
@@ -171,6 +174,7 @@ void section_start(void); /* after hal_start(): enters thread level, or lets the
 sys_pcb *process_find(uint16 pid);               /* any live thread; slice locked */
 sys_pcb *process_next(const sys_pcb *process);   /* iterates over live threads, from NULL to NULL; slice locked */
 void process_wake(sys_pcb *process, message *m); /* blocked list to the end of the ring; m: result of an event wait */
+bool process_awaits(const event *object);        /* whether a blocked thread waits for it; slice locked */
 void process_block(event *awaited, uint16 ms);   /* blocks the running thread; after os_enter_blocking() */
 sys_pcb *process_end_running(void);              /* kernel stack: ends the running thread, picks the next */
 HAL_NORETURN HAL_USED void os_thread_returned(void);
@@ -197,6 +201,8 @@ HAL_USED sys_pcb *os_schedule(void);              /* the running thread is no lo
 void os_preempt(void); /* requests a decision of an eager scheduler as soon as the level allows; any context */
 
 /* clock.c */
+uint16 clock_set_alarm_in(uint16 ms); /* returns the low word of that moment; slice locked */
+void clock_set_alarm(uint16 moment);  /* if it is earlier than the alarm in force */
 void clock_set_wake(sys_pcb *process, uint16 ms); /* starts the time-out of a blocked process; slice locked */
 void clock_wake_due(void);
 uint16 clock_now(void);  /* low word; any context */

@@ -128,6 +128,16 @@ sys_pcb *process_find(uint16 pid)
     return p;
 }
 
+bool process_awaits(const event *object)
+{
+    const sys_pcb *p = os_blocked;
+    LOOP_BOUND(n);
+    while (p != NULL && p->event_or_slice.awaited != object) {
+        p = p->next;
+    }
+    return p != NULL;
+}
+
 /* ---- Beginning -------------------------------------------------------------------------------------------------- */
 
 void process_init(void)

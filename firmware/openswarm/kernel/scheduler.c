@@ -10,6 +10,9 @@ volatile bool os_in_kernel;
 PRIVATE_VALUE(os_in_kernel, 0);
 
 void (*os_watch)(void);
+void (*os_grant_semaphores)(void);
+void (*os_wake_notified)(void);
+void (*os_expire_timers)(void);
 static sys_pick pick_thread; /* NULL = round robin */
 
 /* ---- Dispatch: kernel stack, slice level ------------------------------------------------------------------------ */
@@ -18,14 +21,27 @@ static sys_pick pick_thread; /* NULL = round robin */
 static HAL_OUTLINE void work(void)
 {
     event_deliver_queued();
-    HAL_STORE(critical_depth, 0); /* ends a section that a handler left open */
     if (os_pending & OS_ALARM) {
         HAL_CLEAR_BIT(os_pending, 1);
         clock_wake_due();
+        if (os_expire_timers != NULL) {
+            os_expire_timers();
+            event_deliver_queued(); /* the events of timers do not wait for the next switch */
+        }
     }
+    HAL_STORE(critical_depth, 0); /* ends a section that a handler left open */
     if (os_watch != NULL && (os_pending & OS_WATCH)) {
         HAL_CLEAR_BIT(os_pending, 2);
         os_watch();
+    }
+    if ((os_grant_semaphores != NULL || os_wake_notified != NULL) && (os_pending & OS_POSTED)) {
+        HAL_CLEAR_BIT(os_pending, 3);
+        if (os_grant_semaphores != NULL) {
+            os_grant_semaphores();
+        }
+        if (os_wake_notified != NULL) {
+            os_wake_notified();
+        }
     }
 #if !HAL_STACK_TRAPS
     if (!kernel_stack_is_intact()) {

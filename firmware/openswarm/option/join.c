@@ -22,7 +22,9 @@ static void release_joins(sys_pcb *gone)
         } else {
             *link = j->next;
             if (j->thread != gone) {
-                process_wake(j->thread, NULL);
+                if (j->thread->status & OS_OFF_RING) { /* else its time-out expired and it has not run since */
+                    process_wake(j->thread, NULL);
+                }
                 gone->status &= (uint8)~OS_JOINABLE;
             }
         }
@@ -73,7 +75,7 @@ static const sys_pcb *joined_by(const sys_pcb *thread)
     return NULL;
 }
 
-bool Sys_Join(uint16 pid)
+bool Sys_JoinTimeout(uint16 pid, uint16 ms)
 {
     if (os_enter_blocking() != SYS_OK) {
         return false;
@@ -100,6 +102,21 @@ bool Sys_Join(uint16 pid)
     os_release_joins = release_joins;
     joiner waiting = {joiners, os_running, pid};
     joiners = &waiting;
-    process_block(NULL, 0);
-    return true;
+    process_block(NULL, ms);
+    bool ended = true;
+    Sys_Start_CriticalSection();
+    for (joiner **link = &joiners; *link != NULL; link = &(*link)->next) {
+        if (*link == &waiting) { /* release_joins() would have removed it */
+            *link = waiting.next;
+            ended = false;
+            break;
+        }
+    }
+    Sys_End_CriticalSection();
+    return ended;
+}
+
+bool Sys_Join(uint16 pid)
+{
+    return Sys_JoinTimeout(pid, 0);
 }

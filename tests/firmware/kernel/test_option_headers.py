@@ -35,7 +35,7 @@ def path(image: Build) -> Path:
 
 @pytest.fixture
 def cycles(path: Path, capsys: pytest.CaptureFixture[str]) -> dict[str, int]:
-    assert emu(["cycles", str(path), "--json"]) == 0
+    assert emu(["cycles", "--suite", str(path), "--json"]) == 0
     return dict(json.loads(capsys.readouterr().out))
 
 

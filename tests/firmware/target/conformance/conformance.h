@@ -25,6 +25,7 @@ void check_threads(void);   /* threads.c: switching, sleeping, killing, critical
 void check_events(void);    /* events.c: registration to delivery, waits, memory */
 void check_attacks(void);   /* attacks.c: floods, deaths, unbalanced calls, numbers that wrap */
 void check_options(void);   /* options.c: mutex, join, cleanup, quota, service; only with -DSUITE_OF_OPTIONS */
+void check_waits(void);     /* waits.c: semaphore, notification, timer; in the same image */
 void check_registers(void); /* registers.c: registers of a thread survive preemption */
 
 #endif
