@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from importlib.metadata import requires
 
 from emu.host.exit_status import BAD_INPUT
+from emu.host.installation import install_command
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -20,7 +21,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         extra = extra_with(error.name or "")
         if extra is None:
             raise
-        print(f"arena: {error.name} is not installed: pip install 'openswarm[{extra}]'", file=sys.stderr)
+        print(f"arena: {error.name} is not installed: {install_command(extra)}", file=sys.stderr)
         return BAD_INPUT
 
 

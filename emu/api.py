@@ -119,6 +119,26 @@ class Machine(BareMachine):
             self._inspector = Inspector(self)
         return self._inspector
 
+    def program_address(self, place: str | int) -> int:
+        """Return the program address of a function or label by name. An address is checked and returned.
+
+        Raises KeyError for an unknown name, and for a function that was inlined everywhere: the text says where.
+        Raises ValueError for an address at which no instruction can start.
+        """
+        try:
+            return super().program_address(place)
+        except KeyError as error:
+            from emu.debug.inlining import address_of, missing_function
+
+            if self.image is None or not isinstance(place, str):
+                raise
+            debug = self.inspector.debug
+            address = address_of(debug, place)
+            if address is not None:
+                return address
+            reason = missing_function(debug, place)
+            raise KeyError(f"{error.args[0]}: {reason}" if reason else error.args[0]) from None
+
     def value(self, expression: str) -> Value:
         """Return the typed object that a C expression denotes: `machine.value("robot.speed[1]").set(3)`.
 

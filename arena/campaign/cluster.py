@@ -18,6 +18,7 @@ from typing import NamedTuple
 from arena.campaign.campaign import FinishedTrial, Plan, Report, run_one, trial_path
 from arena.trial.record import EXPERIMENT, write_bytes
 from arena.trial.versions import versions
+from emu.host.installation import install_command
 
 
 class ClusterLostError(Exception):
@@ -40,7 +41,7 @@ def run_on(
         from distributed import CancelledError, Client, KilledWorker, as_completed
         from distributed.comm.core import CommClosedError
     except ImportError:
-        raise ValueError("--scheduler needs Dask: pip install 'openswarm[arena,cluster]'") from None
+        raise ValueError(f"--scheduler needs Dask: {install_command('arena,cluster')}") from None
     sent = replace(plan, image=None, experiment=None, images=(), controllers=())
     files = InputFiles(
         _bytes(plan.image), _bytes(plan.experiment), [(name, _bytes(path)) for name, path in plan.images],

@@ -5,39 +5,55 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+from collections.abc import Iterable
+from fnmatch import fnmatch
 from fractions import Fraction
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from emu.commands.board_options import add_board_options, board_of, set_up
 from emu.commands.image_option import add_chip_option, image_of
 from emu.host.command import CommandError, Parser, seconds
 from emu.host.exit_status import DONE, FAULT
 from emu.host.files import atomic_text_file
+from emu.host.sources import SourceFinder
 from emu.image.model import Image
 from emu.instruments.coverage import Counts, CoverageReport, count_executions
+from emu.instruments.coverage_pages import lines_run, outcomes_seen, percent, write_pages
+from emu.instruments.disassembly import items
+from emu.kernel_metrics.owners import APPLICATION, owner_of_module
 
+KEYS: Final = ("lines", "branch outcomes")
 DESCRIPTION: Final = """\
 Run a firmware image and report the executed code, from exact counts in the unmodified image.
 
-Reports: lcov (genhtml --branch-coverage converts it to HTML) and Cobertura. Branches are those of the object code: both
-outcomes of every conditional branch and skip. Comments LCOV_EXCL_LINE, _START and _STOP exclude lines. --counts adds
-the counts of earlier runs of the same image, and stores the sum. UART1 goes to standard output. Functions that the
-linker removed are not in the report.
+Reports: a table of the source files, HTML pages, lcov and Cobertura. The kernel and its drivers are in them only with
+--kernel; --only selects files. Branches are those of the object code: both outcomes of every conditional branch and
+skip. Comments LCOV_EXCL_LINE, _START and _STOP exclude lines. --counts adds the counts of earlier runs of the same
+image, and stores the sum. UART1 goes to standard output. Functions that the linker removed are not in the report.
 
 Exit status: 0 done, 1 firmware fault (the reports are written), 2 bad input."""
 
 
 def parser() -> Parser:
-    example = "emu coverage firmware.elf --seconds 1 --lcov out.info && genhtml --branch-coverage -o html out.info"
+    example = "emu coverage firmware.elf --seconds 1 --only src/ --html coverage"
     made = Parser("coverage", DESCRIPTION, example)
     made.add_argument("image", metavar="IMAGE", help="ELF executable with debug information")
     add_chip_option(made)
     made.add_argument("--seconds", metavar="S", type=seconds, default=Fraction(1), help="simulated time (default 1)")
+    made.add_argument("--html", metavar="DIR", help="write HTML pages into a folder")
     made.add_argument("--lcov", metavar="FILE", help="write an lcov tracefile")
     made.add_argument("--cobertura", metavar="FILE", help="write Cobertura XML")
     made.add_argument("--counts", metavar="FILE", help="add the counts of this file, if it exists, and write the sum")
-    made.add_argument("--root", metavar="DIR", default=".", help="base folder of relative file names (default .)")
+    made.add_argument("--root", metavar="DIR", default=".", help="first folder to search for sources (default .)")
+    made.add_argument(
+        "--only",
+        metavar="PATTERN",
+        action="append",
+        default=[],
+        help="only files such as src/ or '*/parser.c'",
+    )
+    made.add_argument("--kernel", action="store_true", help="also the OpenSwarm kernel and its drivers")
     made.add_argument("--json", action="store_true", help="print the totals as one JSON object")
     add_board_options(made)
     return made
@@ -50,7 +66,7 @@ def run(options: argparse.Namespace) -> int:
     image = image_of(options)
     if not len(image.lines):
         raise CommandError(f"{image.path} has no line table; build it with -g")
-    machine = Machine(image.chip, engine="plain", board=board_of(options))
+    machine = Machine(image.chip, board=board_of(options))
     machine.load(image)
     set_up(machine, options)
     counts = _earlier(options, image)
@@ -59,18 +75,21 @@ def run(options: argparse.Namespace) -> int:
     stop_counting = count_executions(machine, counts)
     stop = machine.run(seconds=options.seconds)
     stop_counting()
-    root = Path(options.root).resolve()
-    report = CoverageReport(machine.inspector, counts, root.joinpath)
+    sources = SourceFinder(image.path, options.root)
+    report = CoverageReport(machine.inspector, counts, sources.path)
+    instructions = _select(report, image, counts, options)
+    if options.html:
+        write_pages(Path(options.html), report.files, sources.path)
     if options.lcov:
         with atomic_text_file(options.lcov) as stream:
-            stream.writelines(f"{line}\n" for line in report.lcov(root.joinpath))
+            stream.writelines(f"{line}\n" for line in report.lcov(sources.path))
     if options.cobertura:
         with atomic_text_file(options.cobertura) as stream:
-            stream.write(report.cobertura(root.joinpath))
+            stream.write(report.cobertura(sources.path))
     if options.counts:
         with atomic_text_file(options.counts) as stream:
             json.dump(counts.facts(image), stream)
-    _print(report, options.json)
+    _print(report, instructions, options.json)
     if stop.fault is not None:
         print(f"emu coverage: {stop.fault.report()}", file=sys.stderr)
     return FAULT if stop.fault is not None else DONE
@@ -85,15 +104,57 @@ def _earlier(options: argparse.Namespace, image: Image) -> Counts:
         raise CommandError(f"{options.counts}: {error}") from None
 
 
-def _print(report: CoverageReport, as_json: bool) -> None:
-    lines = [count for one in report.files.values() for count in one.lines.values()]
+def _select(report: CoverageReport, image: Image, counts: Counts, options: argparse.Namespace) -> tuple[int, int]:
+    """Remove the files that the options exclude. Return the executed and all instructions of the other files.
+
+    Raises CommandError if no file matches --only.
+    """
+    has_kernel = any(owner_of_module(name) != APPLICATION for name in report.files)
+    has_own = any(owner_of_module(name) == APPLICATION for name in report.files)
+    for name in list(report.files):
+        is_foreign = has_kernel and has_own and not options.kernel and owner_of_module(name) != APPLICATION
+        if (is_foreign and not options.only) or (options.only and not _matches(name, options.only)):
+            del report.files[name]
+    if options.only and not report.files:
+        raise CommandError(f"--only {options.only[0]}: no source file of {image.path} matches")
+    if not options.only and (options.kernel or not (has_kernel and has_own)):
+        return report.instructions_run, report.instructions
+    addresses = set()
+    for row in image.lines.rows:
+        if row.file in report.files:
+            addresses.update(item.address for item in items(image, row.start, row.end))
+    return sum(counts.executed[address] > 0 for address in addresses), len(addresses)
+
+
+def _matches(name: str, patterns: list[str]) -> bool:
+    return any(fnmatch(name, pattern) or fnmatch(name, f"{pattern.rstrip('/')}/*") for pattern in patterns)
+
+
+def _print(report: CoverageReport, instructions: tuple[int, int], as_json: bool) -> None:
+    """Print one row per file and the totals."""
+    by_file = {name: (lines_run(one), outcomes_seen(one)) for name, one in sorted(report.files.items())}
     totals = {
-        "lines": (sum(count > 0 for count in lines), len(lines)),
-        "branch outcomes": (report.outcomes_seen, report.outcomes),
-        "instructions": (report.instructions_run, report.instructions),
+        "lines": _summed(lines for lines, _ in by_file.values()),
+        "branch outcomes": _summed(outcomes for _, outcomes in by_file.values()),
+        "instructions": instructions,
     }
     if as_json:
-        print(json.dumps({name: {"run": part, "all": whole} for name, (part, whole) in totals.items()}))
+        facts: dict[str, Any] = {name: {"run": part, "all": whole} for name, (part, whole) in totals.items()}
+        facts["files"] = {
+            name: {key: {"run": part, "all": whole} for key, (part, whole) in zip(KEYS, both, strict=True)}
+            for name, both in by_file.items()
+        }
+        print(json.dumps(facts))
         return
+    width = max(map(len, (*by_file, "branch outcomes")))
+    print(f"{'file':{width}} {'lines':>16} {'':>8} {'branch outcomes':>16}")
+    for name, ((run, lines), (seen, outcomes)) in by_file.items():
+        cells = f"{f'{run:,} of {lines:,}':>16} {percent(run, lines):>8} {f'{seen:,} of {outcomes:,}':>16}"
+        print(f"{name:{width}} {cells} {percent(seen, outcomes):>8}")
     for name, (part, whole) in totals.items():
         print(f"{name:16} {part:7,} of {whole:7,}  {100 * part / whole if whole else 100:6.2f} %")
+
+
+def _summed(pairs: Iterable[tuple[int, int]]) -> tuple[int, int]:
+    found = list(pairs)
+    return sum(part for part, _ in found), sum(whole for _, whole in found)

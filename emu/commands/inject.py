@@ -18,6 +18,7 @@ from emu.commands.image_option import add_chip_option, image_of
 from emu.host.command import CommandError, Parser, count
 from emu.host.exit_status import DONE
 from emu.host.files import atomic_text_file
+from emu.host.installation import install_command
 from emu.host.paths import use_cache
 from emu.image.model import Image
 from emu.inject.campaign import Campaign, CampaignError, read
@@ -84,7 +85,7 @@ def run(options: argparse.Namespace) -> int:
     try:
         import scipy.stats  # noqa: F401
     except ImportError:
-        raise CommandError("intervals need scipy: pip install 'openswarm[arena]'") from None
+        raise CommandError(f"intervals need scipy: {install_command('arena')}") from None
     if options.only is not None:
         if not 0 <= options.only < campaign.trials:
             raise CommandError(f"--only: the campaign has trials 0 to {campaign.trials - 1}")

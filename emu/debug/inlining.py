@@ -15,6 +15,11 @@ MOST_SHOWN: Final = 4
 REMEDY: Final = "add __attribute__((noinline)) or build with -fno-inline-functions"
 
 
+def address_of(debug: DebugInfo, name: str) -> int | None:
+    """Return the address of a function's copy that has code of its own, by its C name; None if there is none."""
+    return next((one.ranges[0][0] for one in debug.functions if one.name == name), None)
+
+
 def inlined_into(debug: DebugInfo, name: str) -> list[str]:
     """Return the names of the functions into which a function was inlined, in order of address."""
     return list(dict.fromkeys(one.name for one in debug.functions if any(copy.name == name for copy in _copies(one))))

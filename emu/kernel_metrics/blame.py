@@ -1,8 +1,8 @@
 """Attribution of a cycle difference to source lines, by alignment of the old and the new instructions.
 
 Input: a number with its cycles by function and instruction, and the instructions of both images. Instructions are
-aligned by their text without registers and code addresses. An aligned instruction that takes as many cycles as before
-is not to blame, whatever line the compiler assigns to it now.
+aligned by their text without registers and addresses. An aligned instruction that takes as many cycles as before is not
+to blame, whatever line the compiler assigns to it now.
 """
 
 from __future__ import annotations
@@ -15,11 +15,14 @@ from functools import cached_property
 from pathlib import Path
 from typing import Final
 
+from emu.debug.dwarf.units import debug_of
+from emu.host.sources import SourceFinder
 from emu.image.model import Image
 from emu.instruments.disassembly import items
 from emu.kernel_metrics.baseline import Where
 from emu.kernel_metrics.meter import BEFORE_WINDOW
 from emu.kernel_metrics.observation import EXCEPTION_ENTRY
+from emu.kernel_metrics.owners import owner_of_module
 
 LINES_SHOWN: Final = 4
 """Maximum number of source lines shown for a number that grew."""
@@ -27,6 +30,7 @@ SPECIAL: Final = {BEFORE_WINDOW: "(before the first instruction)", EXCEPTION_ENT
 """Parts of a window that belong to no instruction, by their pseudo-address."""
 _REGISTER: Final = re.compile(r"\b[wW]\d{1,2}\b")
 _CODE_OFFSET: Final = re.compile(r"(?<=[\w.])\+0x[0-9a-f]+")
+_LITERAL: Final = re.compile(r"#(0x[0-9a-f]+)")
 _C_COMMENT: Final = re.compile(r"/\*.*?(\*/|$)|//.*")
 _ASSEMBLY_COMMENT: Final = re.compile(r"/\*.*?(\*/|$)|//.*|;.*")
 
@@ -35,7 +39,7 @@ class SourceLines:
     """Text of the source lines of an image, if the files can be read."""
 
     def __init__(self, image_path: str) -> None:
-        self._roots: Final = [Path(), Path("firmware"), *Path(image_path).resolve().parents[:4]]
+        self._finder: Final = SourceFinder(image_path)
         self._files: Final[dict[str, list[str]]] = {}
 
     def text(self, file: str, line: int) -> str:
@@ -45,14 +49,9 @@ class SourceLines:
 
     def _lines(self, file: str) -> list[str]:
         if file not in self._files:
-            self._files[file] = []
-            for root in self._roots:
-                try:
-                    text = (root / file).read_text(encoding="utf-8", errors="replace")
-                except OSError:
-                    continue
-                self._files[file] = text.splitlines()
-                break
+            path = self._finder.find(file)
+            text = path.read_text(encoding="utf-8", errors="replace") if path is not None else ""
+            self._files[file] = text.splitlines()
         return self._files[file]
 
 
@@ -101,13 +100,40 @@ class CodeListing:
         return {name: tuple(text for _, text in self._listing(name)) for name in sorted(functions) if name[0] != "("}
 
     def place(self, function: str, index: int) -> str:
-        """Return the source line of an instruction as `src/main.c:12: code`, or the function's name."""
+        """Return the source line of an instruction as `src/main.c:12: code`, or the function's name.
+
+        Code that was inlined from another owner's file belongs to the line that calls it.
+        """
         listing = self._listing(function) if function[0] != "(" else []
         line = self._image.lines.find(listing[index][0]) if index < len(listing) else None
         if line is None:
             return function
-        text = self._sources.text(line.file, line.line)
-        return f"{short(line.file)}:{line.line}" + (f": {text}" if text else "")
+        file, number = self._calling_line(listing[index][0], line.file, line.line)
+        text = self._sources.text(file, number)
+        return f"{short(file)}:{number}" + (f": {text}" if text else "")
+
+    def _calling_line(self, pc: int, file: str, line: int) -> tuple[str, int]:
+        scope = debug_of(self._image).function(pc)
+        if scope is None:
+            return file, line
+        owner = owner_of_module(scope.file)
+        for inner in reversed(scope.chain(pc)):
+            if owner_of_module(file) == owner:
+                break
+            if inner.kind == "inlined" and inner.call_line:
+                file, line = inner.call_file, inner.call_line
+        return file, line
+
+    def _text(self, text: str) -> str:
+        """Return a normalised instruction; a literal that is an address of the image has no value."""
+        literal = _LITERAL.search(text)
+        if literal is not None and self._is_address(int(literal[1], 16)):
+            text = text.replace(literal[0], "#address")
+        return normalised(text)
+
+    def _is_address(self, value: int) -> bool:
+        symbols = self._image.symbols
+        return bool(symbols.labels(value)) or symbols.data(value) is not None
 
     def _name(self, address: int) -> str:
         symbol = self._image.symbols.code(address)
@@ -120,7 +146,7 @@ class CodeListing:
             if symbol is not None:
                 end = next((start for start in self._starts if start > symbol.address), symbol.address)
                 end = symbol.address + symbol.size if symbol.size else end
-                found = [(item.address, normalised(item.text)) for item in items(self._image, symbol.address, end)]
+                found = [(item.address, self._text(item.text)) for item in items(self._image, symbol.address, end)]
             self._functions[name] = found
         return self._functions[name]
 
@@ -133,27 +159,33 @@ def normalised(text: str) -> str:
 def grown_lines(
     old: Where, old_code: Mapping[str, tuple[str, ...]], new: Where, listing: CodeListing
 ) -> list[tuple[str, int]]:
-    """Return the source lines to which the additional cycles belong, the largest share first."""
+    """Return the source lines to which the additional cycles belong.
+
+    Lines with new or changed instructions come first: an unchanged line that takes longer does so because of them.
+    """
     more: Counter[str] = Counter()
+    is_changed: Counter[str] = Counter()
     new_code = listing.code(new)
-    for function in sorted(new.keys() | old.keys()):
-        before, now = old.get(function, {}), new.get(function, {})
-        partner = aligned(old_code.get(function, ()), new_code.get(function, ()))
-        counted: set[str] = set()
+    for function, now in new.items():
+        before = old.get(function, {})
+        is_code = function[0] != "("
+        partner, changed = aligned(old_code.get(function, ()), new_code[function]) if is_code else ({}, set())
         for index, cycles in now.items():
-            mine = partner.get(int(index), int(index)) if function[0] != "(" else int(index)
-            known = before.get(str(mine), 0) if mine is not None else 0
-            counted.add(str(mine))
-            if cycles != known:
-                more[listing.place(function, int(index))] += cycles - known
-    ranked = sorted(more.items(), key=lambda item: (-item[1], item[0]))
-    return [(place, cycles) for place, cycles in ranked[:LINES_SHOWN] if cycles > 0]
+            place = listing.place(function, int(index))
+            mine = partner.get(int(index)) if is_code else int(index)
+            more[place] += cycles - (before.get(str(mine), 0) if mine is not None else 0)
+            is_changed[place] += int(index) in changed
+    grown = {place: cycles for place, cycles in more.items() if cycles > 0 or is_changed[place]}
+    ranked = sorted(grown.items(), key=lambda item: (not is_changed[item[0]], -item[1], item[0]))
+    return ranked[:LINES_SHOWN]
 
 
-def aligned(old: tuple[str, ...], new: tuple[str, ...]) -> dict[int, int | None]:
-    """Return the index in `old` of each instruction of `new`, None for an inserted instruction."""
-    found: dict[int, int | None] = dict.fromkeys(range(len(new)))
+def aligned(old: tuple[str, ...], new: tuple[str, ...]) -> tuple[dict[int, int | None], set[int]]:
+    """Return the partner in `old` of each instruction of `new`, None for an inserted one; and the changed ones."""
+    partner: dict[int, int | None] = dict.fromkeys(range(len(new)))
+    changed: set[int] = set()
     for what, a, b, c, d in SequenceMatcher(None, old, new, autojunk=False).get_opcodes():
-        if what == "equal" or (what == "replace" and b - a == d - c):
-            found.update(zip(range(c, d), range(a, b), strict=True))
-    return found
+        if what != "equal":
+            changed.update(range(c, d))
+        partner.update(zip(range(c, d), range(a, b), strict=False))
+    return partner, changed

@@ -1,10 +1,6 @@
 # SPDX-License-Identifier: MIT
 # CMake's toolchain file for the dsPIC30F6014A:  cmake --toolchain "$(openswarm path cmake)/openswarm.cmake" ...
-#
-# openswarm_application(NAME SOURCES FILE... [DEVICES NAME...] [DEFINES NAME=VALUE...])
-#   builds NAME.elf and NAME.hex from the files, the kernel and its devices; DEVICES are the drivers beside the standard
-#   ones, folders of openswarm/io and openswarm/board/epuck of the kernel. Objects hold LLVM IR (-flto), so that the whole
-#   program is optimised when it is linked, as the kernel's Makefile does.
+# and openswarm_application(), which needs no toolchain file.
 set(CMAKE_SYSTEM_NAME Generic)
 set(CMAKE_SYSTEM_PROCESSOR dspic30f6014a)
 
@@ -36,42 +32,4 @@ endif()
 set(CMAKE_FIND_ROOT_PATH_MODE_PROGRAM NEVER)
 set(CMAKE_FIND_ROOT_PATH_MODE_LIBRARY ONLY)
 set(CMAKE_FIND_ROOT_PATH_MODE_INCLUDE ONLY)
-
-function(openswarm_application name)
-  cmake_parse_arguments(PARSE_ARGV 1 APP "" "" "SOURCES;DEVICES;DEFINES")
-  if(NOT APP_SOURCES OR APP_UNPARSED_ARGUMENTS)
-    message(FATAL_ERROR "openswarm_application(NAME SOURCES FILE... [DEVICES NAME...] [DEFINES NAME=VALUE...])")
-  endif()
-  execute_process(COMMAND ${OPENSWARM_COMMAND} path firmware OUTPUT_VARIABLE firmware OUTPUT_STRIP_TRAILING_WHITESPACE
-                  COMMAND_ERROR_IS_FATAL ANY)
-  set(os ${firmware}/openswarm)
-  set(folders ${os}/kernel ${os}/io ${os}/board/epuck ${os}/port/dspic30f)
-  set(devices)
-  foreach(device IN LISTS APP_DEVICES)
-    set(found)
-    foreach(place io board/epuck)
-      if(IS_DIRECTORY ${os}/${place}/${device})
-        list(APPEND found ${os}/${place}/${device})
-      endif()
-    endforeach()
-    if(NOT found)
-      message(FATAL_ERROR "DEVICES ${device}: neither in ${os}/io nor in ${os}/board/epuck")
-    endif()
-    list(APPEND devices ${found})
-  endforeach()
-  set(system)
-  foreach(folder IN LISTS folders devices)
-    file(GLOB files CONFIGURE_DEPENDS ${folder}/*.c ${folder}/*.S)
-    list(APPEND system ${files})
-  endforeach()
-  add_executable(${name} ${APP_SOURCES} ${system})
-  target_include_directories(${name} PRIVATE ${os}/include ${os}/hal ${os}/kernel ${os}/io ${os}/port/dspic30f
-                             ${os}/board/epuck ${devices})
-  target_compile_definitions(${name} PRIVATE ${APP_DEFINES})
-  get_filename_component(beside ${firmware} DIRECTORY)
-  target_compile_options(${name} PRIVATE -Wall -Wextra -ffile-prefix-map=${PROJECT_SOURCE_DIR}/=
-                         -ffile-prefix-map=${beside}/= $<$<COMPILE_LANGUAGE:C>:-flto>)
-  target_link_options(${name} PRIVATE -Os -fstack-check)
-  add_custom_command(TARGET ${name} POST_BUILD COMMAND ${OPENSWARM_HEX} $<TARGET_FILE:${name}> -o ${name}.hex
-                     BYPRODUCTS ${name}.hex VERBATIM)
-endfunction()
+include(${CMAKE_CURRENT_LIST_DIR}/openswarm_application.cmake)

@@ -19,6 +19,7 @@ from typing import Final
 
 from emu.host import paths
 from emu.host.exit_status import DONE, FAULT
+from emu.host.installation import install_command
 from openswarm.commands import made_parser
 
 DESCRIPTION: Final = """\
@@ -128,7 +129,7 @@ def packages() -> Iterator[Finding]:
     for group, names in wanted.items():
         lacking = [one for one in names if not _version(one)]
         found = "" if lacking else ", ".join(f"{one} {_version(one)}" for one in names)
-        remedy = f"lacks {', '.join(lacking)}: pip install 'openswarm[{group}]'"
+        remedy = f"lacks {', '.join(lacking)}: {install_command(group)}"
         yield Finding("extra", f"[{group}]", found, EXTRAS.get(group, group), remedy, False)
 
 

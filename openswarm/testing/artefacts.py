@@ -1,6 +1,6 @@
 """Artefacts of a failed test: a folder with the state of the firmware and its recent history.
 
-report.txt     the fault, or the state of the robot: thread, call stack with source lines, last branches
+report.txt     the assertion; the fault, or the state of the robot: thread, call stack with source lines, last branches
 waves.vcd      pins and UART bytes of the last STRETCH_MS, or since the last input, for GTKWave
 uart1.txt      all output, one file for each UART with output
 state.bin      the whole state, for `Machine.restore`
@@ -20,12 +20,14 @@ STRETCH_MS: Final = 50
 """Maximum length of the waveform in milliseconds."""
 
 
-def write(robot: Robot, folder: Path) -> str:
-    """Write the artefacts of `robot` into `folder`; return the text of the report."""
+def write(robot: Robot, folder: Path, failure: str) -> str:
+    """Write the artefacts of `robot` into `folder`; return the text of the report, which begins with `failure`."""
     folder.mkdir(parents=True, exist_ok=True)
     report = str(robot.fault) if robot.fault is not None else state_report(robot.machine, "the test failed;").report()
-    (folder / "report.txt").write_text(report.replace("firmware fault: the test", "the test") + "\n", encoding="utf-8")
-    for number, line in robot.uarts.items():
+    report = report.replace("firmware fault: the test", "the test")
+    text = failure if report in failure else f"{failure}\n\n{report}"
+    (folder / "report.txt").write_text(text + "\n", encoding="utf-8")
+    for number, line in robot.uart.items():
         if line.said:
             (folder / f"uart{number}.txt").write_bytes(bytes(line.said))
     (folder / "state.bin").write_bytes(robot.machine.snapshot())

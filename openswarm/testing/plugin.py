@@ -112,6 +112,16 @@ def robot(request: pytest.FixtureRequest, firmware: Path) -> Robot:
     return made
 
 
+def failure_of(call: pytest.CallInfo[None]) -> str:
+    """Return what failed in a test: `assert 0 == 3 (test_robot.py:12)`, or the exception."""
+    info = call.excinfo
+    if info is None:
+        return ""
+    place = info.getrepr(style="short").reprcrash
+    text = info.exconly(tryshort=True).removeprefix("AssertionError: ")
+    return f"{text}\n  at {Path(place.path).name}:{place.lineno}" if place is not None else text
+
+
 def _artefacts(item: pytest.Item) -> Path:
     """Return the folder for the artefacts of a test."""
     root: Path = item.config.rootpath / item.config.getoption("--robot-artefacts")
@@ -134,7 +144,7 @@ def pytest_runtest_makereport(
 
         for number, one in enumerate(robots):
             folder = _artefacts(item) / str(number) if number else _artefacts(item)
-            text = artefacts.write(one, folder)
+            text = artefacts.write(one, folder, failure_of(call))
             report.sections.append(("robot", f"{text}\n\nwaveform: {folder / 'waves.vcd'}\nall of it: {folder}"))
             item.user_properties.append((f"robot{number or ''}_artefacts", str(folder)))
     report.user_properties = list(item.user_properties)

@@ -6,7 +6,7 @@ fault fails the call in which it occurs, with the complete fault report.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import emu
+from emu.debug.inlining import missing_function
 
 if TYPE_CHECKING:
     from re import Match
@@ -24,14 +25,19 @@ if TYPE_CHECKING:
     from emu.profile.cycle_shares import Profile, Profiler
 
 MILLISECONDS: Final = 1000
+OWN: Final = frozenset(("image", "machine", "board", "uart", "fault"))
+"""Attributes that belong to a robot; all others are those of its machine."""
 
 
 class FirmwareFault(AssertionError):
     """A firmware fault; the text is the report of `emu run`."""
 
 
-class Line:
-    """A UART of the robot. `expect` also matches earlier output that no previous expectation has matched."""
+class UartLine:
+    """A UART of the robot, with all attributes of the emulator's `Uart`.
+
+    `expect` also matches earlier output that no previous expectation has matched. A firmware fault fails it.
+    """
 
     def __init__(self, robot: Robot, uart: Uart) -> None:
         self._robot: Final = robot
@@ -41,17 +47,45 @@ class Line:
         uart.listen(lambda byte, _cycle: self.said.append(byte & 0xFF), lazy=True)
         uart.expect(b"", within=0)  # starts the capture of output
 
-    def expect(self, pattern: Pattern, *, within_ms: float) -> Match[bytes]:
+    def expect(self, pattern: Pattern, *, within: float | None = None, within_ms: float | None = None) -> Match[bytes]:
         """Run until the output matches `pattern`: text or bytes literally, or a compiled regular expression.
 
-        Raises ExpectError after `within_ms` of simulated time, and FirmwareFault.
+        `within` is in ms of simulated time; `within_ms` is an older name for it. Raises ExpectError when the time has
+        passed, FirmwareFault, and TypeError without a time.
         """
-        found: Match[bytes] = self._robot.watched(partial(self._uart.expect, pattern, within=within_ms))
+        limit = within if within is not None else within_ms
+        if limit is None:
+            raise TypeError("expect() needs within=MILLISECONDS")
+        found: Match[bytes] = self._robot.watched(partial(self._uart.expect, pattern, within=limit))
         return found
 
-    def feed(self, data: bytes) -> None:
-        """Send bytes to the robot, at the baud rate of its receiver."""
-        self._uart.feed(data)
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._uart, name)
+
+    def __repr__(self) -> str:
+        return f"<UART of a robot: {len(self.said)} bytes sent, the last {bytes(self.said[-40:])!r}>"
+
+
+class UartLines(Mapping[int, UartLine]):
+    """The UARTs by number. `expect`, `feed` and `said` without a number are those of UART1."""
+
+    def __init__(self, lines: dict[int, UartLine]) -> None:
+        self._lines: Final = lines
+        self.expect: Final = lines[1].expect
+        self.feed: Final = lines[1].feed
+        self.said: Final = lines[1].said
+
+    def __getitem__(self, number: int) -> UartLine:
+        return self._lines[number]
+
+    def __iter__(self) -> Iterator[int]:
+        return iter(self._lines)
+
+    def __len__(self) -> int:
+        return len(self._lines)
+
+    def __repr__(self) -> str:
+        return f"<UARTs {', '.join(map(str, self._lines))} of a robot>"
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,7 +114,8 @@ class Measured:
         entry = self._robot.machine.program_address(function)
         edges = [edge for edge in self.profile.edges if edge.entry == entry and edge.most]
         if not edges:
-            raise ValueError(f"{function} was not called, or is inlined")
+            reason = missing_function(self._robot.machine.inspector.debug, function)
+            raise ValueError(f"{function} was not called" + (f"; it is also {reason}" if reason else ""))
         return Cycles(
             sum(edge.calls for edge in edges), sum(edge.cycles for edge in edges),
             max(edge.most for edge in edges), min(edge.least for edge in edges),
@@ -103,7 +138,11 @@ class Measured:
 
 
 class Robot:
-    """A robot after power-on. `machine` gives access to its whole state (`help(emu.Machine)`)."""
+    """A robot after power-on: an `emu.Machine` whose runs fail the test if the firmware has a fault.
+
+    It has every attribute of `emu.Machine` by the same name, with the same units: `call`, `hook_pc`, `set_var`,
+    `snapshot`, `restore`, `threads`, ... `run`, `step` and `uart[n].expect` raise FirmwareFault.
+    """
 
     def __init__(self, image: Path, **around: Any) -> None:
         """Load an image.
@@ -128,8 +167,7 @@ class Robot:
             self.board.camera.show(read_picture(str(picture)))
         if stimulus is not None:
             self.board.stimulus.load(Path(stimulus))
-        self.uarts: Final = {number: Line(self, uart) for number, uart in self.machine.uart.items()}
-        self.uart: Final = self.uarts[1]
+        self.uart: Final = UartLines({number: UartLine(self, uart) for number, uart in self.machine.uart.items()})
         self.fault: FirmwareFault | None = None
 
     @property
@@ -137,14 +175,25 @@ class Robot:
         """The camera, or None; `show(picture)` takes a picture of shape (480, 640, 3)."""
         return self.board.camera
 
-    @property
-    def cycle(self) -> int:
-        """Tcy since power-on."""
-        return self.machine.cycle
+    def run(
+        self,
+        cycles: int | None = None,
+        until: Callable[[], bool] | str | int | None = None,
+        *,
+        seconds: float | None = None,
+        ms: float | None = None,
+    ) -> emu.Stop:
+        """Run as `emu.Machine.run`; `ms` is another unit for `seconds`. Raises FirmwareFault, and its ValueErrors."""
+        if ms is not None:
+            if seconds is not None:
+                raise ValueError("give seconds or ms, not both")
+            seconds = ms / MILLISECONDS
+        stop: emu.Stop = self.watched(lambda: self.machine.run(cycles, until, seconds=seconds))
+        return stop
 
-    def run(self, *, ms: float) -> emu.Stop:
-        """Run for `ms` of simulated time. Raises FirmwareFault."""
-        stop: emu.Stop = self.watched(lambda: self.machine.run(seconds=ms / MILLISECONDS))
+    def step(self, limit: int | None = None) -> emu.Stop | None:
+        """Run one instruction as `emu.Machine.step`. Raises FirmwareFault."""
+        stop: emu.Stop | None = self.watched(lambda: self.machine.step(limit))
         return stop
 
     def run_to(self, place: str, *, within_ms: float) -> None:
@@ -174,19 +223,16 @@ class Robot:
         self.fault = FirmwareFault(report)
         return self.fault
 
-    def var(self, expression: str) -> Any:
-        """Return the value of a C expression in the firmware."""
-        return self.machine.var(expression)
-
     def stack(self, thread: str) -> Thread:
         """Return an OpenSwarm thread by the name of its function; `.free` is its number of never written stack bytes.
 
         Raises KeyError for an unknown name.
         """
-        for one in self.machine.threads():
+        threads = self.machine.threads()
+        for one in threads:
             if one.name == thread:
                 return one
-        raise KeyError(f"no thread runs {thread}, only {', '.join(one.name for one in self.machine.threads())}")
+        raise KeyError(f"no thread runs {thread}, only {', '.join(one.name for one in threads)}")
 
     @contextmanager
     def measured(self) -> Iterator[Measured]:
@@ -197,3 +243,22 @@ class Robot:
         profiler = Profiler(self.machine, self.machine.image)
         with profiler.counting() as profile:
             yield Measured(self, profiler, profile)
+
+    def __getattr__(self, name: str) -> Any:
+        if name == "machine":  # not set yet
+            raise AttributeError(name)
+        return getattr(self.machine, name)
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        machine = self.__dict__.get("machine")
+        if machine is not None and name not in OWN and hasattr(machine, name):
+            setattr(machine, name, value)
+        else:
+            object.__setattr__(self, name, value)
+
+    def __dir__(self) -> list[str]:
+        return sorted({*object.__dir__(self), *dir(self.machine)})
+
+    def __repr__(self) -> str:
+        state = "after a fault" if self.fault is not None else f"at cycle {self.machine.cycle:,}"
+        return f"<robot with {self.image.name[:80]}, {state}>"

@@ -29,6 +29,8 @@ def table(root: ElementTree.Element) -> list[str]:
             report = Path(properties.get("robot_artefacts", "")) / "report.txt"
             text = report.read_text(encoding="utf-8").rstrip() if report.is_file() else failure.get("message", "")
             told += ["", f"**{name}**", "", "```", text, "```"]
+            folder = properties.get("robot_artefacts")
+            told += [f"Reports and waveform: `{folder}`"] if folder else []
     return lines + told
 
 

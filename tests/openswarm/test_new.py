@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 import re
-import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -22,7 +21,7 @@ BIN = Path(sys.executable).parent
 @pytest.fixture(scope="module")
 def project(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("new") / "my-robot"
-    assert main(["new", str(folder)]) == 0
+    assert main(["new", str(folder), "--no-baselines"]) == 0
     return folder
 
 
@@ -50,10 +49,10 @@ def test_make_builds_and_its_test_finds_what_is_wrong(project):
     Code's problem matcher. The first steps (test_wheel.py) run the test of the right firmware."""
     source = project / "src" / "main.c"
     right = source.read_text()
-    source.write_text(right.replace("Sys_Sleep(1000)", "Sys_Sleep(900)"))
+    source.write_text(right.replace("Sys_Sleep(1000)", "Sys_Sleep(900)", 1))
     done = run_command(project, "make", "test")
     assert (done.returncode, "1 failed" in done.stdout or "2 failed" in done.stdout) == (2, True), done.stdout
-    source.write_text(right.replace("Sys_Sleep(1000)", "Sys_Slep(1000)"))
+    source.write_text(right.replace("Sys_Sleep(1000)", "Sys_Slep(1000)", 1))
     done = run_command(project, "make")
     assert done.returncode == 2
     task = json.loads((project / ".vscode" / "tasks.json").read_text())["tasks"][0]
@@ -61,7 +60,7 @@ def test_make_builds_and_its_test_finds_what_is_wrong(project):
     errors = [found for line in done.stderr.splitlines() if (found := pattern.match(line)) and found[4] == "error"]
     assert errors
     assert (project / errors[0][1]).samefile(source)
-    assert errors[0][2] == "11"
+    assert errors[0][2] == str(right.splitlines().index("        Sys_Sleep(1000);") + 1)
     source.write_text(right)
 
 
@@ -74,23 +73,6 @@ def test_the_editor_finds_the_line_of_a_fault(project):
     lines = [line for page in pages for line in page.splitlines() if line.startswith("emu run: firmware fault")]
     found = [pattern.match(line) for line in lines]
     assert [(one[2], one[3]) for one in found] == [("main.c", "8"), ("docs/examples/bad.c", "7")]
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(shutil.which("cmake") is None, reason="no CMake here (Debian package cmake)")
-def test_cmake_builds_it(project):
-    """CMake identifies the compiler and builds a program with the same output as make's."""
-    done = run_command(project, "cmake", "-B", "build/cmake")
-    assert done.returncode == 0, done.stderr
-    assert (project / "build/cmake/compile_commands.json").exists()
-    done = run_command(project, "cmake", "--build", "build/cmake", "-j2")
-    assert done.returncode == 0, done.stdout + done.stderr
-    done = run_command(project, str(BIN / "emu"), "run", "build/cmake/firmware.hex", "--seconds", "1.5")
-    assert done.stdout.splitlines() == ["hello from my-robot"] * 2
-    wrong = project / "CMakeLists.txt"
-    wrong.write_text(wrong.read_text().replace("SOURCES ${sources}", "SOURCES ${sources} DEVICES warp-drive"))
-    done = run_command(project, "cmake", "-B", "build/cmake")
-    assert "DEVICES warp-drive: neither in" in " ".join(done.stderr.split())
 
 
 @pytest.mark.parametrize(

@@ -19,6 +19,7 @@ import pytest
 import arena.cli
 from arena.commands import COMMANDS as ARENA
 from emu.host import exit_status, paths
+from emu.host.installation import install_command
 from openswarm.cli import COMMANDS, command, main
 from tests.watchdog import HANG
 
@@ -143,7 +144,7 @@ def test_the_arena_without_its_extra_names_it(tmp_path):
         (tmp_path / package / f"{package}.py").write_text(f"raise ModuleNotFoundError(name={package!r})\n")
         done = run_command("arena", "compare", "x", "y", PYTHONPATH=str(tmp_path / package))
         assert done.returncode == exit_status.BAD_INPUT
-        assert done.stderr == f"arena: {package} is not installed: pip install 'openswarm[arena]'\n"
+        assert done.stderr == f"arena: {package} is not installed: {install_command('arena')}\n"
 
 
 def test_the_archiver_does_what_cmake_asks(tmp_path):

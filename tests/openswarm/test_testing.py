@@ -13,6 +13,7 @@ from xml.etree import ElementTree
 import pytest
 import yaml
 
+from emu.host import paths
 from tests.vcd_reader import VCDVCD
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -127,7 +128,7 @@ def test_the_action_s_steps_as_they_are_from_the_wheel(wheel, tmp_path):
     A new project passes. With a mistake in its C source, the summary names thread and line, and there is a waveform.
     """
     action = yaml.safe_load((ROOT / "action.yml").read_text())
-    environment = first_steps.install_wheel(wheel, tmp_path / "venv")
+    environment = first_steps.install_wheel(wheel, tmp_path / "venv") | {"OPENSWARM_CACHE": str(paths.cache())}
     subprocess.run(["openswarm", "new", "robot"], cwd=tmp_path, env=environment, check=True, capture_output=True)
     source = tmp_path / "robot" / "src" / "main.c"
 
@@ -153,13 +154,16 @@ def test_the_action_s_steps_as_they_are_from_the_wheel(wheel, tmp_path):
         return statuses, summary.read_text()
 
     statuses, summary = play()
-    assert statuses == [0, 0, 0]
+    assert statuses == [0, 0, 0, 0]
+    assert summary.count("PASS: none of") == 2
     assert summary.count("| passed |") == 4
-    source.write_text(source.read_text().replace("Sys_Sleep(1000);", "Sys_Sleep(1000); *(volatile int *)0x3001 = 1;"))
+    right = source.read_text()
+    source.write_text(right.replace("Sys_Sleep(1000);", "Sys_Sleep(1000); *(volatile int *)0x3001 = 1;", 1))
     statuses, summary = play()
-    assert statuses == [0, 1, 0]
+    assert statuses == [0, 1, 2, 0]
     assert "| failed |" in summary
-    assert re.search(r"\(greet\+0x\w+, src/main\.c:11\) in thread 1 \(greet\)", summary)
+    line = right.splitlines().index("        Sys_Sleep(1000);") + 1
+    assert re.search(rf"\(greet\+0x\w+, src/main\.c:{line}\) in thread 1 \(greet\)", summary)
     left = tmp_path / "robot" / "robot-artefacts"
     assert os.listdir(left)
     assert VCDVCD(str(next(left.glob("*/waves.vcd"))), only_sigs=True).signals

@@ -10,6 +10,8 @@ from pathlib import Path
 
 import pytest
 
+from emu.host import paths
+
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "docs" / "tools"))
 import first_steps  # noqa: E402
@@ -53,8 +55,12 @@ def test_the_wheel_holds_everything_and_repeats(wheel, tmp_path):
 
 @pytest.mark.slow
 def test_the_first_steps_say_what_happens(wheel, tmp_path):
-    """docs/first-steps.md works from the wheel in an empty folder with an empty HOME, and creates files only there."""
+    """docs/first-steps.md works from the wheel in an empty folder with an empty HOME, and creates files only there.
+
+    The cache is that of all tests, which has the run-time library.
+    """
     script = ROOT / "docs" / "tools" / "first_steps.py"
-    words = [sys.executable, str(script), "--check", "--wheel", str(wheel), "--keep", str(tmp_path / "first-steps")]
+    words = [sys.executable, str(script), "--check", "--wheel", str(wheel), "--cache", str(paths.cache()),
+             "--keep", str(tmp_path / "first-steps")]  # fmt: skip
     done = subprocess.run(words, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stdout) == (0, ""), done.stderr

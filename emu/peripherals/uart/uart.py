@@ -306,13 +306,17 @@ class Uart(Peripheral):
 
     # -- receive -----------------------------------------------------------------------------------------------------
 
-    def feed(self, data: bytes | Iterable[int], cycle: int | None = None, *, errors: int = 0, baud: float = 0) -> None:
+    def feed(
+        self, data: str | bytes | Iterable[int], cycle: int | None = None, *, errors: int = 0, baud: float = 0
+    ) -> None:
         """Queue frames that arrive back to back on RX, at this UART's own bit time or at `baud` bits per second.
 
         If `cycle` is given, the first start bit is not before that cycle, and a disabled receiver loses the frames.
         Otherwise the sender waits until the receiver is enabled. `errors` may combine FRAMING_ERROR, PARITY_ERROR and
-        BREAK.
+        BREAK. Text is sent as Latin-1. Raises UnicodeEncodeError (a ValueError) for other characters.
         """
+        if isinstance(data, str):
+            data = data.encode("latin-1")
         bit = round(self.context.fcy() * 256 / baud) if baud else 0
         marks = errors | (WAIT_FOR_RECEIVER if cycle is None else 0)
         self.line.put(QueuedFrame(cycle or 0, byte & 0x1FF | marks, bit) for byte in data)

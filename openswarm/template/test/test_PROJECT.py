@@ -14,25 +14,26 @@ pytestmark = pytest.mark.firmware("..")  # the folder that contains the Makefile
 def test_it_greets_every_second(robot):
     ends = []
     for _ in range(3):
-        robot.uart.expect("hello from @PROJECT@\r\n", within_ms=1100)
+        robot.uart[1].expect("hello from @PROJECT@\r\n", within=1100)  # simulated ms
         ends.append(robot.cycle)
     assert ends[2] - ends[1] == pytest.approx(emu.FCY_HZ, rel=1e-3)  # cycles per second
 
 
-def test_the_body_led_follows(robot):
-    robot.run(ms=500)
+def test_the_handler_sets_the_body_led(robot):
+    robot.run(seconds=0.5)
     assert robot.board.leds["body"]
-    robot.run(ms=1000)
+    robot.run(seconds=1)
     assert not robot.board.leds["body"]
 
 
 def test_threads_leave_room_on_their_stacks(robot):
-    robot.run(ms=2000)
+    robot.run(seconds=2)
     assert robot.stack("greet").free >= 8
+    assert robot.stack("beat").free >= 8
 
 
-def test_greeting_is_quick(robot):
+def test_sending_is_quick(robot):
     with robot.measured() as measured:
-        robot.run(ms=2500)
-    assert measured.cycles("Sys_Send_Event").most < 1000
+        robot.run(seconds=2.5)
+    assert measured.cycles("on_beat").most < 100
     assert measured.coverage("main.c") >= 0.8  # main never returns

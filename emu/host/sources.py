@@ -1,0 +1,37 @@
+"""Source files by their names in an image's debug information, in checkouts, projects and installed packages.
+
+Images name their sources relative to a folder, so that their bytes do not depend on the place of a checkout:
+`src/main.c` to that of the project, `firmware/openswarm/kernel/event.c` to that of the kernel.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Final
+
+from emu.host import paths
+
+LEVELS: Final = 5
+"""Number of folders above an image in which its project is searched (build/cmake/firmware.make/firmware.elf)."""
+
+
+class SourceFinder:
+    """Finds the source files of the image at `image_path`. `root` is searched before all other folders."""
+
+    def __init__(self, image_path: str, root: str | Path = ".") -> None:
+        firmware = paths.firmware()
+        self.root: Final = Path(root).resolve()
+        above = Path(image_path).resolve().parents[:LEVELS]
+        self._folders: Final = (self.root, *above, firmware.parent, firmware)
+        self._known: Final[dict[str, Path | None]] = {}
+
+    def find(self, name: str) -> Path | None:
+        """Return the path of a source file; None if it does not exist."""
+        if name not in self._known:
+            places = (folder / name for folder in self._folders)
+            self._known[name] = next((place.resolve() for place in places if place.is_file()), None)
+        return self._known[name]
+
+    def path(self, name: str) -> Path:
+        """Return the path of a source file; below the root if it does not exist."""
+        return self.find(name) or self.root / name
