@@ -108,11 +108,14 @@ def main() -> int:
     options.add_argument("--check", action="store_true")
     options.add_argument("--keep", type=Path, metavar="FOLDER")
     options.add_argument("--wheel", type=Path, metavar="FILE", help="wheel to install (default: build it)")
+    options.add_argument("--cache", type=Path, metavar="FOLDER", help="cache (default: a new one in HOME)")
     wanted = options.parse_args()
     with tempfile.TemporaryDirectory(prefix="newcomer-") as scratch:
         folder = (wanted.keep or Path(scratch)).resolve()
         folder.mkdir(parents=True, exist_ok=True)
         environment = install_wheel(wanted.wheel or build_wheel(folder), folder / "venv")
+        if wanted.cache is not None:
+            environment["OPENSWARM_CACHE"] = str(wanted.cache)
         before = listing(folder / "venv")
         (folder / "work").mkdir()
         old = PAGE.read_text(encoding="utf-8")
