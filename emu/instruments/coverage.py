@@ -1,6 +1,6 @@
 """Coverage from exact counts of executed instructions and taken branches.
 
-Input: a machine with the plain engine. Outputs: `Counts`, and lcov and Cobertura reports made from them. Coverage
+Input: a machine. Outputs: `Counts`, and lcov and Cobertura reports made from them. Coverage
 refers
 to the code in the image, optimised or not. Functions that the linker removed are not in the reports.
 """
@@ -73,10 +73,33 @@ def fingerprint(image: Image) -> str:
 def count_executions(machine: Machine, counts: Counts) -> Callable[[], None]:
     """Start to count the instructions that `machine` executes. Return a function that stops counting.
 
-    Raises ValueError for an engine other than plain.
+    `counts` is complete once that function has been called. Native code has its own counters; it is translated again.
     """
-    if machine.engine != "plain":
-        raise ValueError(f"counting needs the plain engine, not {machine.engine!r}")
+    stop_interpreted = _count_interpreted(machine, counts)
+    if machine.engine == "plain":
+        return stop_interpreted
+    from emu.dspic30f.jit.counting import ExecutionCounting
+    from emu.dspic30f.jit.engine import JitEngine
+
+    engine, counting = machine.runner, ExecutionCounting(machine.core)
+    assert isinstance(engine, JitEngine)
+    stop_native = engine.start_counting(counting)
+
+    def stop() -> None:
+        stop_native()
+        stop_interpreted()
+        program = machine.program
+        for numbers, counter in ((counting.executed, counts.executed), (counting.taken, counts.taken)):
+            for word in numbers.nonzero()[0].tolist():
+                pc = 2 * word
+                if counter is counts.executed or is_conditional(program.word(pc), program.word(pc + 2), pc):
+                    counter[pc] += int(numbers[word])
+
+    return stop
+
+
+def _count_interpreted(machine: Machine, counts: Counts) -> Callable[[], None]:
+    """Start to count the instructions that the sequencer executes. Return a function that stops counting."""
     sequencer, state = machine.core.sequencer, machine.state
     execute, executed, taken = sequencer.execute, counts.executed, counts.taken
     conditional: dict[int, int] = {}

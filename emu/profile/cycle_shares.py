@@ -153,7 +153,9 @@ class Profiler:
 
     def _open(self) -> Callable[[], None]:
         if self._native is not None:
-            return self._native.start_accounting(self._accounting, self.row_of)
+            from emu.dspic30f.jit.counting import CycleCounting
+
+            return self._native.start_counting(CycleCounting(self._accounting, self.row_of))
         self._accounting.start()
         return self._accounting.stop
 

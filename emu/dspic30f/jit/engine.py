@@ -16,13 +16,13 @@ from typing import Any, Final
 from weakref import WeakValueDictionary
 
 from emu.dspic30f.core import Core
-from emu.dspic30f.cycle_accounting import LONGEST_RUN, CycleAccounting
 from emu.dspic30f.isa.builder import Context
 from emu.dspic30f.isa.codec import decode_for_execution
 from emu.dspic30f.isa.facts import facts_of
 from emu.dspic30f.isa.row import Insn
 from emu.dspic30f.jit.cold_runner import ColdRunner
 from emu.dspic30f.jit.compiler import LoadedCode, shared_compiler
+from emu.dspic30f.jit.counting import Counting
 from emu.dspic30f.jit.environment import (
     ACCOUNTING,
     AT_BOUNDARY,
@@ -50,7 +50,6 @@ from emu.dspic30f.jit.machine_layout import (
     wiring_hash,
 )
 from emu.dspic30f.jit.runtime import dispatch_text
-from emu.dspic30f.jit.translate.cycle_counters import AccountingBoundaryCounter, AccountingCounter, RowOf
 from emu.dspic30f.jit.translate.function import Translator
 from emu.dspic30f.jit.translate.indirect_sfr import indirect_sfr_text
 from emu.dspic30f.jit.translate.region import Region, discover
@@ -130,8 +129,7 @@ class JitEngine:
         self.share_group: object = None
         """Machines with equal values share translations. Tests that change translations set a unique object."""
         self._longest = NATIVE_CYCLES
-        self._accounting: CycleAccounting | None = None
-        self._row_of: RowOf = lambda pc: pc
+        self._counting: Counting | None = None
         self._state: Final = core.state
         self._u16: Final = core.record.u16
         self._words: Final = core.chip.program["flash"].end // 2
@@ -340,8 +338,8 @@ class JitEngine:
         words = [address >> 1 for address in facts_of(insn).reads]
         return words[0] if words and 2 * words[0] in self._code.layout.rules else 0
 
-    def start_accounting(self, accounting: CycleAccounting, row_of: RowOf) -> Callable[[], None]:
-        """Account for all cycles in `accounting`, per source line by `row_of`. Return the function that ends it.
+    def start_counting(self, counting: Counting) -> Callable[[], None]:
+        """Count what all code does. Return the function that ends it.
 
         Until then, all code is compiled before it runs, and the sequencer runs code that is not compiled."""
         saved = self._interpret, self._run_cold, self.wait, self._native
@@ -349,20 +347,20 @@ class JitEngine:
         def run(record: int, env: int) -> Any:
             reason = self._dispatch(record, env)
             if reason != RETFIE:  # after a RETFIE, the cycle of the last log entry may still change
-                accounting.flush_log()
+                counting.after_run()
             return reason
 
-        accounting.start()
+        counting.start()
         execute = self._core.sequencer.execute
         self._interpret, self._run_cold, self.wait, self._native = execute, lambda _limit: execute(), True, run
-        self._accounting, self._row_of, self._longest, self._dispatch = accounting, row_of, LONGEST_RUN, None
-        self._env[ACCOUNTING] = accounting.address
+        self._counting, self._longest, self._dispatch = counting, counting.longest or NATIVE_CYCLES, None
+        self._env[ACCOUNTING] = counting.address
         self.forget()
 
         def stop() -> None:
-            accounting.stop()
+            counting.stop()
             self._interpret, self._run_cold, self.wait, self._native = saved
-            self._accounting, self._longest, self._dispatch = None, NATIVE_CYCLES, None
+            self._counting, self._longest, self._dispatch = None, NATIVE_CYCLES, None
             self.forget()
 
         return stop
@@ -440,7 +438,7 @@ class JitEngine:
             self._wiring = core.bus.rules[:], wiring_hash(layout)
         identity = translation_hash(key.context, layout, self._wiring[1])
         program = hashlib.sha256(core.program.flash).digest()
-        counted = 0 if self._accounting is None else self._env_address  # accounting code depends on the cells
+        counted = 0 if self._counting is None else self._env_address  # counting code depends on the cells
         switches = core.bus.off, frozenset(core.bus.watched), self.wait, counted, self.share_group
         shared = identity, program, layout.hooks, *switches
         code = _shared.get(shared)
@@ -461,13 +459,12 @@ class JitEngine:
 
     # -- translation ------------------------------------------------------------------------------------------------
     def _prepare(self) -> None:
-        accounting = self._accounting
-        counter = None if accounting is None else AccountingBoundaryCounter(accounting.words, accounting.tail)
+        counter = None if self._counting is None else self._counting.boundary_counter()
         text = dispatch_text(self._core, 2 * self._words, counter)
         self._dispatcher = self._at_once(text, BLOCK_LEVEL)
         self._dispatch = Call(self._dispatcher.address)
         self._publish_native_handle()
-        if self.seconds is None and accounting is None:
+        if self.seconds is None and self._counting is None:
             self._native = self._dispatch
 
     def _at_once(self, text: str, level: int) -> LoadedCode:
@@ -492,16 +489,16 @@ class JitEngine:
         code.entries |= region.leaders
         self.counts.regions += 1
         hooked = sorted(code.layout.hooks & region.steps.keys())
-        accounting = self._accounting
-        rows = [self._row_of(at) for at in sorted(region.steps)] if accounting is not None else None
-        identity = repr((region.words(), sorted(region.leaders), pc, hooked, rows)).encode()
+        counting = self._counting
+        counted = counting.identity(region) if counting is not None else None
+        identity = repr((region.words(), sorted(region.leaders), pc, hooked, counted)).encode()
         for exact, level in ((True, STEP_LEVEL), (False, BLOCK_LEVEL)):
             key = self.compiler.key(level, b"exact" if exact else b"block", code.identity, identity)
             known = self.compiler.lookup(key)
             if known is not None:
                 self._install((code, exact), known)
                 continue
-            counter = None if accounting is None else AccountingCounter(accounting.words, accounting.tail, self._row_of)
+            counter = counting.counter() if counting is not None else None
             translator = Translator(region, code.layout, code.context, exact, counter)
             text, entries = translator.text(), translator.entries
             if self.wait:

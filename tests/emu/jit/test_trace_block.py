@@ -10,6 +10,7 @@ from test_native_code import own_cache, pair  # noqa: F401  (the fixture)
 from emu.chips.dspic30f6014a import DSPIC30F6014A
 from emu.dspic30f.cycle_accounting import CycleAccounting
 from emu.dspic30f.isa.codec import decode_for_execution
+from emu.dspic30f.jit.counting import CycleCounting
 from emu.dspic30f.jit.engine import JitEngine
 from emu.dspic30f.jit.translate.region import Region, discover
 from emu.dspic30f.jit.translate.trace_block import MAX_BRANCHES, MAX_SKIPPED, trace_block
@@ -134,7 +135,7 @@ def test_cycles_are_counted_on_both_ways(name: str) -> None:
     for machine in pair(firmware_of(BODIES[name])):
         accounting = CycleAccounting(machine.core, lambda _at, _count: None)
         if isinstance(machine.runner, JitEngine):
-            machine.runner.start_accounting(accounting, lambda pc: pc)
+            machine.runner.start_counting(CycleCounting(accounting, lambda pc: pc))
         else:
             accounting.start()
         machine.run(20_000)

@@ -43,6 +43,12 @@ class CycleCounter:
     def spend(self, pc: int, cycles: Number) -> None:
         """Account for `cycles` of the instruction at `pc`."""
 
+    def execute(self, pc: int, times: Number = 1) -> None:
+        """Count executions of the instruction at `pc`."""
+
+    def take(self, pc: int, times: Number = 1) -> None:
+        """Count that the conditional branch or skip at `pc` is taken."""
+
     def settle(self) -> None:
         """Emit the additions at the end of a block."""
 

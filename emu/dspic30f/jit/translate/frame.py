@@ -75,8 +75,12 @@ class FunctionFrame:
         begun = self.v.get("cycle") if start is None else start
         return self.e.let(f"icmp ult i64 {wide(begun + cost)}, %stop", bit=True)
 
-    def advance(self, cycles: Number, mask: int) -> None:
-        """Advance the clock by `cycles`. `mask`: W registers written as destination, for RAW stalls of the next."""
+    def advance(self, cycles: Number, mask: int, times: int = 1) -> None:
+        """Advance the clock by the `cycles` of the current instruction, executed `times` times.
+
+        `mask`: W registers written as destination, for RAW stalls of the next instruction.
+        """
         self.v.set("cycle", self.v.get("cycle") + cycles)
         self.v.set("stall", mask)
         self.counter.spend(self.at, cycles)
+        self.counter.execute(self.at, times)

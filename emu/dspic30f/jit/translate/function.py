@@ -141,6 +141,8 @@ class Translator(FunctionFrame):
             self.v.set("cycle", cycle + skipped * loop.cycles)
             for address, cycles in loop.costs:
                 self.counter.spend(address, skipped * cycles)
+                self.counter.execute(address, skipped)
+            self.counter.take(back, skipped)
         self.jump(pc)
 
     # -- blocks -----------------------------------------------------------------------------------------------------
@@ -396,6 +398,8 @@ class Translator(FunctionFrame):
         self.v.new_block()
         self.v.set("cycle", self.v.get("cycle") + taken_cost(step))
         self.counter.spend(step.pc, taken_cost(step))
+        if step.target != step.next_pc:  # a branch to the next instruction cannot be seen to be taken
+            self.counter.take(step.pc)
 
     def _flow(self, step: Step, flow: Flow, cycles: Number, mask: int) -> None:
         """Translate a flow that ends the block."""

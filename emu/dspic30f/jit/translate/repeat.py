@@ -107,7 +107,7 @@ class RepeatTranslator:
         target.insn.row.does(b, target.insn.x)  # type: ignore[arg-type]
         b.commit()
         b.repeating = b.left_count = None
-        f.advance(DIVIDE_COUNT + 1, target.facts.writes)
+        f.advance(DIVIDE_COUNT + 1, target.facts.writes, times=DIVIDE_COUNT + 1)
 
     def _counted_loop(self, target: Step, count: Number, cycles: int, again: int) -> None:
         """Emit a counted loop.

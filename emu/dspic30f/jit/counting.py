@@ -1,0 +1,121 @@
+"""What native code counts while it runs: cycles (`CycleCounting`) or executions (`ExecutionCounting`).
+
+`JitEngine.start_counting` translates all code again with the counter of one of them.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Final, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from emu.dspic30f.core import Core
+from emu.dspic30f.cycle_accounting import LONGEST_RUN, CycleAccounting
+from emu.dspic30f.jit.translate.cycle_counters import (
+    AccountingBoundaryCounter,
+    AccountingCounter,
+    BoundaryCounter,
+    CycleCounter,
+    RowOf,
+)
+from emu.dspic30f.jit.translate.execution_counter import ExecutionCounter
+from emu.dspic30f.jit.translate.region import Region
+
+
+class Counting(Protocol):
+    """A kind of counting, for `JitEngine.start_counting`."""
+
+    address: int
+    """Host address of the cells, which native code finds in the environment word ACCOUNTING."""
+    longest: int | None
+    """Maximum length in Tcy of a native run; None for the engine's own."""
+
+    def start(self) -> None:
+        """Start to count what the sequencer runs."""
+
+    def stop(self) -> None:
+        """Stop counting."""
+
+    def after_run(self) -> None:
+        """Process what native code has logged, after each of its runs."""
+
+    def counter(self) -> CycleCounter:
+        """Return a counter for one translated function."""
+
+    def boundary_counter(self) -> BoundaryCounter:
+        """Return the counter of native boundaries."""
+
+    def identity(self, region: Region) -> Any:
+        """Return what distinguishes the code of a region from that without counting."""
+
+
+class CycleCounting:
+    """Counts cycles by source line and CPU priority in `accounting`."""
+
+    longest: int | None = LONGEST_RUN
+
+    def __init__(self, accounting: CycleAccounting, row_of: RowOf) -> None:
+        self._accounting: Final = accounting
+        self._row_of: Final = row_of
+        self.address = accounting.address
+        self.start = accounting.start
+        self.stop = accounting.stop
+        self.after_run = accounting.flush_log
+
+    def counter(self) -> CycleCounter:
+        """Return a counter for one translated function."""
+        return AccountingCounter(self._accounting.words, self._accounting.tail, self._row_of)
+
+    def boundary_counter(self) -> BoundaryCounter:
+        """Return the counter of native boundaries."""
+        return AccountingBoundaryCounter(self._accounting.words, self._accounting.tail)
+
+    def identity(self, region: Region) -> Any:
+        """Return the source lines of the region's instructions."""
+        return [self._row_of(at) for at in sorted(region.steps)]
+
+
+class ExecutionCounting:
+    """Counts executions and taken branches by program address, as `emu.instruments.coverage` does for the sequencer.
+
+    Cells of executions hold differences: the count of an address is the sum of all cells up to its own.
+    """
+
+    longest: int | None = None
+
+    def __init__(self, core: Core) -> None:
+        self._words: Final = core.chip.program["flash"].end // 2
+        self._memory: Final = np.zeros(2 * (self._words + 1), dtype=np.int64)
+        self.address = int(self._memory.ctypes.data)
+
+    @property
+    def executed(self) -> npt.NDArray[np.int64]:
+        """Return the executions by program word."""
+        return np.cumsum(self._memory[: self._words])
+
+    @property
+    def taken(self) -> npt.NDArray[np.int64]:
+        """Return how often each branch or skip was taken, by program word."""
+        return self._memory[self._words + 1 : 2 * self._words + 1]
+
+    def start(self) -> None:
+        """Do nothing: the caller counts what the sequencer runs."""
+
+    def stop(self) -> None:
+        """Do nothing."""
+
+    def after_run(self) -> None:
+        """Do nothing: native code writes no log."""
+
+    def counter(self) -> CycleCounter:
+        """Return a counter for one translated function."""
+        return ExecutionCounter(self._words + 1)
+
+    def boundary_counter(self) -> BoundaryCounter:
+        """Return the counter of native boundaries, which counts nothing."""
+        return BoundaryCounter()
+
+    def identity(self, region: Region) -> Any:
+        """Return a mark; the counter depends on nothing else."""
+        return f"executions {self._words}"

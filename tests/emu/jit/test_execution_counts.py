@@ -1,0 +1,83 @@
+"""Coverage by native counters equals that of the plain engine, which counts every instruction by itself."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+import emu
+from emu.dspic30f.jit.engine import JitEngine
+from emu.instruments.coverage import Counts, count_executions
+from emu.machine.machine import Machine
+from tests.emu.jit.random_firmware import load, random_firmware
+from toolchain.driver import driver
+
+SOURCE = """
+#include <p30F6014A.h>
+volatile int ticks; volatile long total; char text[40];
+void __attribute__((interrupt, no_auto_psv)) _T1Interrupt(void) { IFS0bits.T1IF = 0; ticks++; }
+static int mix(int n) { return n % 7 == 3 ? n * 5 : n / 3; }
+int main(void) {
+    PR1 = 700; IEC0bits.T1IE = 1; T1CON = 0x8000; U1MODE = 0x8000; U1STA = 0x400;
+    for (int i = 0; ; i++) {
+        for (int k = 0; k < 40; k++) { text[k] = (char)mix(i + k); total += text[k]; }
+        while (!U1STAbits.TRMT) {}
+        U1TXREG = (char)i;
+        if (i % 4 == 0) __asm__ volatile("pwrsav #1");
+    }
+}
+"""
+
+
+def counted(machine: Machine, cycles: int) -> tuple[Counts, bytes]:
+    """Run with counters and return the counts and the final state."""
+    counts = Counts()
+    if isinstance(machine.runner, JitEngine):
+        machine.runner.threshold = 1
+    stop = count_executions(machine, counts)
+    machine.run(cycles=cycles)
+    stop()
+    return counts, machine.snapshot()
+
+
+@pytest.fixture(scope="module")
+def image(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("counts")
+    (folder / "p.c").write_text(SOURCE)
+    assert driver.main(["-Os", "-g", str(folder / "p.c"), "-o", str(folder / "p.elf")]) == 0
+    return folder / "p.elf"
+
+
+def test_a_program_with_interrupts_loops_and_polls(image: Path) -> None:
+    """Counts of executions and of taken branches are equal, and counting changes no state."""
+    plain, state = counted(emu.load(image, engine="plain", board=None), 120_000)
+    native, other = counted(emu.load(image, engine="jit", board=None), 120_000)
+    assert native.executed == plain.executed
+    assert native.taken == plain.taken
+    assert state == other
+    assert sum(plain.executed.values()) > 60_000
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(4))
+def test_random_firmware(seed: int) -> None:
+    """The same holds for random instructions of every row with traps, REPEAT, DO and interrupts."""
+    found = []
+    for engine in ("plain", "jit"):
+        machine = Machine(engine=engine)
+        load(machine, random_firmware(seed))
+        found.append(counted(machine, 6_000))
+    (plain, state), (native, other) = found
+    assert state == other
+    assert native.executed == plain.executed
+    assert native.taken == plain.taken
+
+
+def test_counting_ends(image: Path) -> None:
+    """After the end of counting, the engine runs its usual code and counts nothing."""
+    machine = emu.load(image, engine="jit", board=None)
+    counts, _ = counted(machine, 20_000)
+    before = counts.executed.copy()
+    machine.run(cycles=20_000)
+    assert counts.executed == before
