@@ -220,7 +220,7 @@ class CallExecution(InstructionExecution):
 
     def _return(self, target: Value, state: AbstractState) -> None:
         if not is_constant(state.w[15]):
-            if not self.explorer.flow_facts.switches_stack(self.code.entry):
+            if not self.explorer.flow_facts.switches_stack(self.code.entry) or self.area.points_into(state.w[15]):
                 self.result.unbounded[self.code.entry] = UNKNOWN_RETURN
             self._record_stack_switch(state)
             state.ipl, state.disi_end = (0, 0), 0  # masking ends for this stack, independent of the new priority

@@ -115,7 +115,8 @@ class _FunctionExecution(CallExecution):
         if loop.members.isdisjoint(pending):
             return
         bound, shared = self._annotated_bound(loop)
-        limit = NONTERMINATING_ITERATIONS if loop.head in explorer.nonterminating else MAX_ITERATIONS
+        hopeless = loop.head in explorer.nonterminating or (bound or 0) > MAX_ITERATIONS
+        limit = NONTERMINATING_ITERATIONS if hopeless else MAX_ITERATIONS
         before: dict[int, AbstractState] = {}
         iterations = 0
         while not loop.members.isdisjoint(pending):

@@ -223,7 +223,7 @@ class BoundAnalysis:
             base = start if own else self.second_stack[0] if self.second_stack is not None else 0
             table = result.stack if own else result.second_stack
             table[level] = max(table.get(level, 0), top - base)
-            if top - base > deepest:
+            if top - base > deepest and (own or result.kind == "interrupt"):
                 deepest, result.path = top - base, [self.program.calls.name(e).removeprefix("_") for e in chain]
         for table_ in (found.masked, found.masked_prefix):
             for level, (cycles, where) in table_.items():

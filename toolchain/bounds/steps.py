@@ -145,13 +145,16 @@ class InstructionExecution:
 
     def _record_stack_depth(self, state: AbstractState) -> None:
         top = state.w[15]
-        if is_constant(top):
-            for number, (lo, hi) in enumerate(self.area.ranges):
-                key = number, state.ipl[0]
-                if lo <= top <= hi and top > self.result.peak.get(key, (-1,))[0]:
-                    self.result.peak[key] = top, (self.code.entry,)
-        elif self.area.points_into(top):
-            self.result.unbounded.setdefault(self.code.entry, VARIABLE_FRAME)
+        if not is_constant(top):
+            if not self.area.points_into(top):
+                return
+            if self.code.has_frame:
+                self.result.unbounded.setdefault(self.code.entry, VARIABLE_FRAME)
+            top = extremes(top)[1]
+        for number, (lo, hi) in enumerate(self.area.ranges):
+            key = number, state.ipl[0]
+            if lo <= top <= hi and top > self.result.peak.get(key, (-1,))[0]:
+                self.result.peak[key] = top, (self.code.entry,)
 
     def _update_masking(self, state: AbstractState, pc: int) -> None:
         """Begin or end masked times of levels."""

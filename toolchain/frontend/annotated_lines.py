@@ -13,7 +13,7 @@ _ESCAPED = re.compile(r"\\(.)")
 
 
 def definitions(source: Path) -> list[str]:
-    """Return options that define `_BOUNDS_AT_N`, for an annotation in line N, as the line of its statement.
+    """Return options that define `_BOUNDS_AT_N`, for an annotation that ends in line N, as the line of its statement.
 
     The statement is in the next function; no other line of it contains the text. Raises `ToolError` otherwise.
     """
@@ -38,4 +38,5 @@ def _targets(lines: list[str], source: Path) -> Iterator[tuple[int, int]]:
         if len(found) != 1:
             count = "no line" if not found else f"{len(found)} lines"
             raise ToolError(f"{count} of the next function contain {wanted!r}", SourceLocation(str(source), number))
-        yield number, found[0]
+        last = next((k for k in range(number, end) if ");" in lines[k - 1]), number)
+        yield last, found[0]  # __LINE__ in a macro call is that of its end

@@ -15,6 +15,7 @@
  *   b  newer events in the same bucket      s  subscriptions of one event
  *   q  queued messages                      i  times idle
  *   u  bytes of a stack never used          k  bytes of the largest stack
+ *   w  bytes of a polled I2C transfer
  * Optional, for closer bounds:
  *   t  subscriptions of all events          o  subscriptions of one thread
  *   h  holes on a path of the heap's tree   j  free runs pending at a call (0 outside handlers)

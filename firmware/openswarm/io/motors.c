@@ -27,11 +27,11 @@ static sint16 clamp(sint16 mm_s)
 }
 
 /* Messages are applied in the order they were sent, so the newest one wins. */
+BOUNDS_AT("processor(event", calls sys_motor_processor);
 static bool on_speed(uint16 pid, uint16 event, sys_event_data *data)
 {
     sys_wheel_speeds wanted = speeds;
     (void)pid;
-    CALL_TARGETS(sys_motor_processor);
     if (processor(event, data, &wanted)) {
         HAL_STORE(speeds.left, clamp(wanted.left)); /* read by ISRs */
         HAL_STORE(speeds.right, clamp(wanted.right));

@@ -23,6 +23,7 @@ void selector_init(void)
     (void)Sys_Register_Event(SYS_IO_SELECTOR);
 }
 
+BOUNDS_AT("processor(&position)", calls sys_selector_processor);
 void selector_tick(void)
 {
     uint8 position = hal_selector_read();
@@ -34,7 +35,6 @@ void selector_tick(void)
         equal_ms++;
     } else if (position != accepted) {
         accepted = position;
-        CALL_TARGETS(sys_selector_processor);
         if (processor(&position)) {
             (void)Sys_Send_Event(SYS_IO_SELECTOR, &position, sizeof position);
         }

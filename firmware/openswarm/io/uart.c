@@ -58,9 +58,9 @@ static struct {
     sys_error error; /* why the message cannot be sent */
 } building;
 
+BOUNDS_AT("while (", loop d);
 static void discard(void)
 {
-    LOOP_BOUND(d);
     while (building.first != NULL) {
         message *block = building.first;
         building.first = block->queued.next;
@@ -99,6 +99,7 @@ static bool put(uint8 byte)
     return true;
 }
 
+BOUNDS_AT("c->encode(", calls sys_tx_processor);
 static HAL_OUTLINE bool write_message(uint8 uart, const void *message, uint16 size)
 {
     channel *c = &channels[uart];
@@ -111,7 +112,6 @@ static HAL_OUTLINE bool write_message(uint8 uart, const void *message, uint16 si
     building.taken = 0;
     building.error = SYS_ERROR_ARGUMENT;
     building.limit = (uint16)(SYS_UART_TX - HAL_LOAD(c->taken));
-    CALL_TARGETS(sys_tx_processor);
     bool sound = c->encode(message, size, put) && building.to == c; /* false if the processor wrote to a UART */
     building.to = NULL;
     hal_lock_state lock = hal_lock_devices();
@@ -161,9 +161,9 @@ sint16 uart_next_byte(uint8 uart)
 }
 
 /* ISR. If there is no memory for the event, the next tick tries again. */
+BOUNDS_AT("for (", loop SYS_UARTS);
 static HAL_OUTLINE void tell_ready(void)
 {
-    LOOP_BOUND(SYS_UARTS);
     for (uint8 uart = 0; uart < SYS_UARTS; uart++) {
         if ((refused & 1u << uart) && channels[uart].first == NULL &&
             Sys_Send_IntEvent(event_of(uart, SYS_UART1_READY), SYS_UART_TX)) {
@@ -189,11 +189,11 @@ bool Sys_Write_UART2(const void *message, uint16 size)
     return SYS_UARTS > SYS_UART2 ? write_message(SYS_UART2, message, size) : os_fail(SYS_ERROR_ARGUMENT);
 }
 
+BOUNDS_AT("for (", loop d);
+BOUNDS_AT("!put_byte(", calls sys_put);
 bool Sys_Raw_Tx(const uint8 *message, uint16 size, sys_put put_byte)
 {
-    LOOP_BOUND(d);
     for (uint16 i = 0; i < size; i++) {
-        CALL_TARGETS(sys_put);
         if (!put_byte(message[i])) {
             return false;
         }
@@ -210,12 +210,12 @@ static void pass_on(uint8 uart, const uint8 *bytes, uint16 size)
     }
 }
 
+BOUNDS_AT("c->decode(", calls sys_rx_processor);
 void uart_received(uint8 uart, uint8 byte)
 {
     channel *c = &channels[uart];
     uint16 used = c->used;
     c->quiet = false;
-    CALL_TARGETS(sys_rx_processor);
     uint16 size = c->decode(byte, c->received, &c->used);
     if (size != 0) {
         c->used = 0;
@@ -238,9 +238,9 @@ uint16 Sys_Chunk_Rx(uint8 byte, uint8 *buffer, uint16 *used)
 }
 
 /* Ends a chunk if no byte arrived from one tick to the next. */
+BOUNDS_AT("for (", loop SYS_UARTS);
 void uart_tick(void)
 {
-    LOOP_BOUND(SYS_UARTS);
     for (uint8 uart = 0; uart < SYS_UARTS; uart++) {
         channel *c = &channels[uart];
         if (c->quiet && c->used != 0 && c->decode == Sys_Chunk_Rx) {

@@ -135,9 +135,9 @@ static HAL_OUTLINE bool wake_waiters(const event *e, message *m)
 }
 
 /* Clears the event of every message of e from m on, so that delivery drops the message. */
+BOUNDS_AT("for (; m != NULL", loop q, total q);
 static HAL_OUTLINE void detach_messages(message *m, const event *e)
 {
-    LOOP_BOUND(q); LOOP_TOTAL(q);
     for (; m != NULL; m = HAL_LOAD(m->queued.next)) {
         if (m->queued.event == e) {
             m->queued.event = NULL;
@@ -145,6 +145,7 @@ static HAL_OUTLINE void detach_messages(message *m, const event *e)
     }
 }
 
+BOUNDS_AT("while (e->subscribers", loop s);
 bool Sys_Unregister_Event(uint16 id)
 {
     if (os_enter() != SYS_OK) {
@@ -156,7 +157,6 @@ bool Sys_Unregister_Event(uint16 id)
         return os_leave(SYS_ERROR_EVENT);
     }
     HAL_STORE(*link, e->next); /* from here on ISRs queue no message for it */
-    LOOP_BOUND(s);
     while (e->subscribers != NULL) {
         unlink_subscription(&e->subscribers);
     }
@@ -173,10 +173,11 @@ bool Sys_Unregister_Event(uint16 id)
 /* ---- Subscription ------------------------------------------------------------------------------------------- */
 
 /* Updates the subscription or adds it. Slice locked. */
+BOUNDS_AT("while (s != NULL", loop s);
+BOUNDS_AT("while (*link != NULL", loop s);
 static sys_error subscribe(event *e, uint16 pid, sys_handler handler, sys_condition condition)
 {
     subscription *s = e->subscribers, **link = &e->subscribers;
-    LOOP_BOUND(s);
     while (s != NULL && (s->pid != pid || s->handler != handler)) {
         s = s->next;
     }
@@ -185,7 +186,6 @@ static sys_error subscribe(event *e, uint16 pid, sys_handler handler, sys_condit
         if (s == NULL) {
             return SYS_ERROR_MEMORY;
         }
-        LOOP_BOUND(s);
         while (*link != NULL && link != delivery_cursor) { /* behind the cursor it would get the current message too */
             link = &(*link)->next;
         }
@@ -218,16 +218,16 @@ bool Sys_Subscribe_to_Event(uint16 id, uint16 pid, sys_handler handler, sys_cond
 }
 
 /* Removes subscriptions of a thread; handler NULL = all of them. Slice locked. */
+BOUNDS_AT("while (*link", loop s, total min(t, m * s), share Sys_Unsubscribe_Handler s, one);
+/* A thread has o subscriptions; each is removed once. */
+BOUNDS_AT("unlink_subscription(link)", often unlink_subscription Sys_Unsubscribe_Handler min(s, o),
+          often unlink_subscription process.c / end_thread min(t, m * s, o));
 static sys_error unsubscribe(event *e, uint16 pid, sys_handler handler)
 {
     sys_error error = SYS_ERROR_PROCESS;
     subscription **link = &e->subscribers;
-    LOOP_BOUND(s); LOOP_TOTAL(min(t, m * s)); LOOP_SHARE(Sys_Unsubscribe_Handler, s); ONE_LOOP();
     while (*link != NULL) {
         if ((*link)->pid == pid && ((*link)->handler == handler || (handler == NULL && pid != OS_DRIVERS))) {
-            /* A thread has o subscriptions; each is removed once. */
-            CALL_SHARE(unlink_subscription, Sys_Unsubscribe_Handler, min(s, o));
-            CALL_SHARE(unlink_subscription, process.c / end_thread, min(t, m * s, o));
             unlink_subscription(link);
             error = SYS_OK;
         } else {
@@ -251,10 +251,10 @@ bool Sys_Unsubscribe_from_Event(uint16 id, uint16 pid)
     return Sys_Unsubscribe_Handler(id, pid, NULL);
 }
 
+BOUNDS_AT("for (event *e", loop m, total m);
 void event_drop_subscriptions(uint16 pid)
 {
     for (event **bucket = events; bucket != events + BUCKETS; bucket++) {
-        LOOP_BOUND(m); LOOP_TOTAL(m);
         for (event *e = *bucket; e != NULL; e = e->next) {
             (void)unsubscribe(e, pid, NULL);
         }
@@ -339,23 +339,23 @@ static uint16 value_of(const message *m, uint16 size)
 }
 
 /* Calls the handlers of e. A handler or condition may end any subscription and any thread, including its own. */
+BOUNDS_AT("while (", loop s);
+BOUNDS_AT("s->condition(data)", calls sys_condition);
+BOUNDS_AT("!handler(", calls sys_handler);
+BOUNDS_AT("if (*delivery_cursor == s)", same);
 static void run_handlers(const event *e, sys_event_data *data)
 {
     uint16 id = e->id;
     const subscription *s;
     delivery_cursor = &e->subscribers;
-    LOOP_BOUND(s);
     while ((s = *delivery_cursor) != NULL) {
-        CALL_TARGETS(sys_condition);
         if ((s->condition == NULL || s->condition(data)) && *delivery_cursor == s) {
             sys_handler handler = s->handler;
             uint16 pid = s->pid;
-            CALL_TARGETS(sys_handler);
             if (!handler(pid, id, data)) {
                 (void)Sys_Unsubscribe_Handler(id, pid, handler);
             }
         }
-        SAME_LOOP();
         if (*delivery_cursor == s) {
             delivery_cursor = &s->next;
         }
@@ -364,15 +364,15 @@ static void run_handlers(const event *e, sys_event_data *data)
 
 /* Clears the condition of every waiter whose condition holds for the data. wake_waiters() wakes them afterwards: a
  * condition may kill a thread, which would free the message that the thread had just received. */
+BOUNDS_AT("while (", loop n);
+BOUNDS_AT("condition(data)", calls sys_condition);
+BOUNDS_AT("if (*process_scan == p)", same);
 static void evaluate_conditions(const event *e, sys_event_data *data)
 {
     sys_pcb *p;
     process_scan = &os_blocked;
-    LOOP_BOUND(n);
     while ((p = *process_scan) != NULL) {
-        CALL_TARGETS(sys_condition);
         bool holds = p->event_or_slice.awaited == e && p->wait.condition != NULL && p->wait.condition(data);
-        SAME_LOOP();
         if (*process_scan == p) { /* else the condition ended the wait of its own thread */
             if (holds) {
                 p->wait.condition = NULL;
@@ -400,6 +400,7 @@ static void deliver(message *m)
     }
 }
 
+BOUNDS_AT("while (", loop q, one);
 void event_deliver_queued(void)
 {
     hal_lock_state lock = hal_lock_devices();
@@ -408,7 +409,6 @@ void event_deliver_queued(void)
     queue_end = &event_queue;
     os_pending &= (uint16)~OS_MESSAGES;
     hal_unlock(lock);
-    LOOP_BOUND(q); ONE_LOOP();
     while (delivery_batch != NULL) {
         message *m = delivery_batch;
         delivery_batch = m->queued.next;
@@ -425,6 +425,7 @@ static bool holds_result(const sys_pcb *p, const message *m)
     return p->wait.result == m && (!(p->status & OS_OFF_RING) || p->event_or_slice.awaited == NULL);
 }
 
+BOUNDS_AT("while (", loop n, one);
 void event_release_result(sys_pcb *process)
 {
     message *m = process->wait.result;
@@ -433,7 +434,6 @@ void event_release_result(sys_pcb *process)
     if (m == NULL) {
         return;
     }
-    LOOP_BOUND(n); ONE_LOOP();
     while ((p = process_next(p)) != NULL) {
         if (holds_result(p, m)) {
             return;

@@ -87,11 +87,11 @@ static HAL_INLINE uint16 *trailing_size(uint8 *end)
 }
 
 /* Returns the link to the hole that begins at an address, or a link to no_hole. */
+BOUNDS_AT("for (uint16 bit", loop PATH, share coalesce_free_run 2 * PATH, share heap_free PATHS);
 static HAL_OUTLINE hole **find_hole(uintptr_t at)
 {
     hole **link = &holes;
     uint16 offset = (uint16)(at - (uintptr_t)os_memory.bytes);
-    LOOP_BOUND(PATH); LOOP_SHARE(coalesce_free_run, 2 * PATH); LOOP_SHARE(heap_free, PATHS);
     for (uint16 bit = TOP_BIT; *link != &no_hole && (uintptr_t)*link != at; bit >>= 1) {
         link = offset & bit ? &(*link)->side[1] : &(*link)->side[0];
     }
@@ -122,12 +122,12 @@ static HAL_OUTLINE void insert_hole(void *at, uint16 size)
 }
 
 /* Removes a hole from the tree: the larger of its two children moves up, and so on downwards. */
+/* The nodes searched and the nodes moved lie on one path. */
+BOUNDS_AT("while (left != right)", loop PATH - 1, share heap_alloc_lasting PATH,
+          share coalesce_free_run 2 * PATH, share heap_free PATHS);
 static HAL_OUTLINE hole *remove_hole(hole **link)
 {
     hole *removed = *link, *left = removed->side[0], *right = removed->side[1];
-    /* The nodes searched and the nodes moved lie on one path. */
-    LOOP_BOUND(PATH - 1); LOOP_SHARE(heap_alloc_lasting, PATH); LOOP_SHARE(coalesce_free_run, 2 * PATH);
-    LOOP_SHARE(heap_free, PATHS);
     while (left != right) { /* until both are no_hole */
         hole *next;
         if (left->size >= right->size) {
@@ -158,6 +158,12 @@ static HAL_INLINE uint16 reserve_size(void)
 }
 
 /* Merges the free run with the holes on both sides or with the reserve. Slice locked. */
+/* Starting a thread frees no block (unless hal_stack_init() may fail): it merges only a run that is already pending. */
+BOUNDS_AT("find_hole((uintptr_t)begin", often find_hole heap_free RUNS, often find_hole process.c / start min(1, j));
+BOUNDS_AT("remove_hole(link)", often remove_hole heap_free RUNS, often remove_hole process.c / start min(1, j));
+BOUNDS_AT("find_hole((uintptr_t)end)", often find_hole heap_free RUNS, often remove_hole heap_free RUNS,
+          often find_hole process.c / start min(1, j), often remove_hole process.c / start min(1, j));
+BOUNDS_AT("insert_hole(begin", often insert_hole heap_free RUNS, often insert_hole process.c / start min(1, j));
 static HAL_OUTLINE void coalesce_free_run(void)
 {
     uint8 *begin = free_run, *end = free_run_end;
@@ -166,16 +172,11 @@ static HAL_OUTLINE void coalesce_free_run(void)
         return;
     }
     free_run = free_run_end;
-    /* The word in front of the run is the size of a hole only if the tree has a hole of that size there. Starting a
-     * thread frees no block (unless hal_stack_init() may fail): it merges only a run that is already pending. */
-    CALL_SHARE(find_hole, heap_free, RUNS); CALL_SHARE(find_hole, process.c / start, min(1, j));
+    /* The word in front of the run is the size of a hole only if the tree has a hole of that size there. */
     hole **link = find_hole((uintptr_t)begin - *trailing_size(begin));
     if ((uint8 *)*link + (*link)->size == begin) {
-        CALL_SHARE(remove_hole, heap_free, RUNS); CALL_SHARE(remove_hole, process.c / start, min(1, j));
         begin = (uint8 *)remove_hole(link);
     }
-    CALL_SHARE(find_hole, heap_free, RUNS); CALL_SHARE(remove_hole, heap_free, RUNS);
-    CALL_SHARE(find_hole, process.c / start, min(1, j)); CALL_SHARE(remove_hole, process.c / start, min(1, j));
     end += remove_hole(find_hole((uintptr_t)end))->size; /* no_hole: 0 */
     hal_lock_state lock = hal_lock_devices();
     if (end == reserve_begin) {
@@ -187,18 +188,17 @@ static HAL_OUTLINE void coalesce_free_run(void)
     }
     hal_unlock(lock);
     if (is_hole) {
-        CALL_SHARE(insert_hole, heap_free, RUNS); CALL_SHARE(insert_hole, process.c / start, min(1, j));
         insert_hole(begin, (uint16)(end - begin));
     }
 }
 
 /* Swaps the reserve with the largest hole if the hole is larger; returns whether it did. Slice locked. */
+BOUNDS_AT("remove_hole(&holes)", if remove_hole min(1, x));
 static HAL_OUTLINE uint16 swap_reserve(void)
 {
     if (holes->size <= reserve_size()) {
         return 0;
     }
-    CALL_IF(remove_hole, min(1, x));
     hole *h = remove_hole(&holes);
     hal_lock_state lock = hal_lock_devices();
     uint8 *from = reserve_begin, *to = reserve_end;
@@ -220,6 +220,7 @@ void heap_coalesce(void)
 /* ---- Allocation ------------------------------------------------------------------------------------------------- */
 
 /* Allocates from the reserve. The rest of the reserve stays empty or large enough for a hole. */
+BOUNDS_AT("swap_reserve()", loop 1); /* after one swap the reserve is the largest free block */
 void *heap_alloc(uint16 size)
 {
     if (HAL_ALLOCATION_FAILS()) {
@@ -236,16 +237,15 @@ void *heap_alloc(uint16 size)
             return block;
         }
         hal_unlock(lock);
-        LOOP_BOUND(1); /* after one swap the reserve is the largest free block */
     } while (!hal_in_isr() && swap_reserve());
     return NULL;
 }
 
 /* Allocates from the lowest sufficient hole on the leftmost path of the tree, else from the reserve. */
+BOUNDS_AT("while (", loop PATH, share heap_alloc_lasting PATH);
 void *heap_alloc_lasting(uint16 size)
 {
     hole **link = NULL, **next = &holes;
-    LOOP_BOUND(PATH); LOOP_SHARE(heap_alloc_lasting, PATH);
     while ((*next)->size >= size + sizeof(hole)) {
         link = next;
         next = &(*link)->side[0];

@@ -16,6 +16,7 @@ HAL_OUTLINE void stack_paint(void *begin, const void *end)
 }
 
 /* Returns the painted bytes at the far end of a stack. */
+BOUNDS_AT("p[-1] == PAINT", loop u);
 static uint16 unused(const uint8 *stack, uint16 bytes)
 {
 #ifdef HAL_STACK_GROWS_DOWN
@@ -26,7 +27,6 @@ static uint16 unused(const uint8 *stack, uint16 bytes)
     return (uint16)(p - stack);
 #else
     const uint8 *p = stack + bytes;
-    LOOP_BOUND(u);
     while (p != stack && p[-1] == PAINT) {
         p--;
     }

@@ -74,8 +74,8 @@ PROGRAMS = {
         "1: bset 0x42,#7\n repeat #50\n nop\n pwrsav #1\n repeat #60\n nop\n bclr 0x42,#7\n bra 1b\n" + T1 + T2, 4, 2),
 }  # fmt: skip
 """Test programs by name: code of main after `begin`, handlers, and interrupt levels of T1 and T2."""
-PHASES = [{"first": 160 + k, "second": 60_000 if k % 2 else 150 + k * 11 % 600} for k in range(0, 420, 3)]
-PHASES += [{"first": 425 + k, "second": 400 + k} for k in range(0, 60, 2)]
+PHASES = [{"first": 160 + k, "second": 60_000 if k % 2 else 150 + k * 11 % 600} for k in range(0, 420, 6)]
+PHASES += [{"first": 425 + k, "second": 400 + k} for k in range(0, 60, 4)]
 CYCLES = 1_200
 
 

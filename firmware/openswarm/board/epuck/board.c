@@ -11,7 +11,7 @@
 
 /* 7.3728 MHz crystal, PLL x8: 14.7456 MHz instruction clock (epuck.md §2, openswarm-original.md §10). */
 _FOSC(CSW_FSCM_OFF & XT_PLL8);
-_FWDT(WDT_OFF);
+_FWDT(WDT_OFF & WDTPSA_8 & WDTPSB_8); /* 128 ms once software starts it (hal_reset.h) */
 _FBORPOR(PBOR_OFF & MCLR_EN);
 _FGS(CODE_PROT_OFF);
 
@@ -61,16 +61,16 @@ void board_failsafe(void)
     LATA |= PIN_LED_RING_ALL;
 }
 
+BOUNDS_AT("while (*text", loop 40);
+BOUNDS_AT("while (U1STAbits.UTXBF", loop 320); /* 1,280 Tcy are a byte */
+BOUNDS_AT("while (!U1STAbits.TRMT", loop 1600); /* five bytes */
 void board_report(const char *text)
 {
-    LOOP_BOUND(40);
     while (*text != '\0') {
-        LOOP_BOUND(320); /* 1,280 Tcy are a byte */
         while (U1STAbits.UTXBF) {
         }
         U1TXREG = (uint8)*text++;
     }
-    LOOP_BOUND(1600); /* five bytes */
     while (!U1STAbits.TRMT) {
     }
 }

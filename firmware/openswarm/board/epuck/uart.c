@@ -56,10 +56,10 @@ void hal_uart_transmit(uint8_t uart)
 }
 
 /* Fills the FIFO; 1: nothing was left to send. */
+BOUNDS_AT("while (", loop 5); /* four places, and the byte that leaves meanwhile */
 static HAL_OUTLINE uint16 fill(uint8 uart)
 {
     volatile registers *r = registers_of(uart);
-    LOOP_BOUND(5); /* four places, and the byte that leaves meanwhile */
     while (!(r->status & FIFO_FULL)) {
         sint16 byte = uart_next_byte(uart);
         if (byte < 0) {
@@ -70,11 +70,11 @@ static HAL_OUTLINE uint16 fill(uint8 uart)
     return 0;
 }
 
+BOUNDS_AT("while (", loop 6, one); /* four places, the shift register, and a byte that comes meanwhile */
 static HAL_OUTLINE void empty(uint8 uart)
 {
     volatile registers *r = registers_of(uart);
     uint16 status;
-    LOOP_BOUND(6); ONE_LOOP(); /* four places, the shift register, and a byte that comes meanwhile */
     while ((status = r->status) & HAS_BYTE) {
         uint8 byte = (uint8)r->receive;
         if (status & FRAMING_ERROR) {

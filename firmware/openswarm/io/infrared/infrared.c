@@ -81,6 +81,7 @@ void infrared_housekeeping(void)
     keep_alive();
 }
 
+BOUNDS_AT("!processor(", calls sys_sending_processor);
 bool Sys_Send_Neighbours(const void *payload, uint16 size)
 {
     uint8 changed[SYS_MESSAGE_BYTES];
@@ -90,7 +91,6 @@ bool Sys_Send_Neighbours(const void *payload, uint16 size)
     }
     memcpy(changed, payload, size);
     sys_sending_processor processor = HAL_LOAD(sending_processor);
-    CALL_TARGETS(sys_sending_processor);
     if (processor != NULL && (!processor(changed, &bytes) || bytes == 0 || bytes > SYS_MESSAGE_BYTES)) {
         return os_fail(SYS_ERROR_ARGUMENT);
     }

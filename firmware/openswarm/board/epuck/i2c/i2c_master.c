@@ -2,6 +2,7 @@
 /* I2C master (dspic30f6014a.md §11): one step per MI2CIF. */
 #include "i2c_master.h"
 
+#include "hal_compiler.h"
 #include "pins.h"
 
 enum {
@@ -161,6 +162,9 @@ i2c_result i2c_advance(void)
     }
 }
 
+/* Steps: start, two addresses, restart, stop, and two for each byte. */
+BOUNDS_AT("while (result == I2C_BUSY)", loop 5 + 2 * w);
+BOUNDS_AT("while (!IFS0bits.MI2CIF)", loop 20000);
 static i2c_result poll(const i2c_transfer *wanted)
 {
     i2c_result result = I2C_BUSY;
