@@ -55,16 +55,6 @@ TEST(blocking_calls_are_refused_before_the_start, "openswarm.h: what may block i
     CHECK_EQ(Sys_Get_Statistics()->refused, 8);
 }
 
-TEST(no_scheduler_is_refused, "openswarm.h: Sys_Set_Scheduler")
-{
-    boot();
-    CHECK(Sys_Set_Scheduler(&sys_fixed_priority));
-    CHECK(!Sys_Set_Scheduler(NULL));
-    CHECK_EQ(Sys_Get_LastError(), SYS_ERROR_ARGUMENT);
-    Sys_Start_Process(yield_for_ever);
-    Sys_Yield();
-}
-
 static uint16 state_seen_by_isr;
 static void ask_for_state(void)
 {
@@ -222,16 +212,4 @@ TEST(a_section_may_span_the_start_of_the_kernel, "openswarm.h: Sys_Start_Kernel"
     Sys_Sleep(2);
     CHECK(strcmp(trace, "t") == 0);
     CHECK_EQ(Sys_Get_Statistics()->refused, 0);
-}
-
-TEST(an_application_cannot_unsubscribe_the_drivers, "openswarm.h: Sys_Unsubscribe_from_Event")
-{
-    boot();
-    CHECK(Sys_Subscribe_to_Event(SYS_LEFTMOTOR_SPEED, 0, count_delivery, NULL));
-    CHECK(Sys_Unsubscribe_from_Event(SYS_LEFTMOTOR_SPEED, 0));
-    CHECK(!Sys_Unsubscribe_from_Event(SYS_LEFTMOTOR_SPEED, 0));
-    CHECK_EQ(Sys_Get_LastError(), SYS_ERROR_PROCESS);
-    CHECK(Sys_Send_IntEvent(SYS_LEFTMOTOR_SPEED, 50));
-    Sys_Yield();
-    CHECK_EQ(Sys_Get_MotorSpeed_Left(), 50);
 }

@@ -9,38 +9,6 @@ static bool once(uint16 pid, uint16 id, sys_event_data *data)
     return false;
 }
 
-static bool unregister_in_handler(uint16 pid, uint16 id, sys_event_data *data)
-{
-    (void)pid, (void)data;
-    deliveries++;
-    CHECK(Sys_Unregister_Event(id));
-    return true;
-}
-static void wait_for_gone(void)
-{
-    CHECK(Sys_Wait_for_Event(E1) == NULL);
-    CHECK_EQ(Sys_Get_LastError(), SYS_ERROR_EVENT);
-    note('g');
-}
-
-TEST(an_event_may_be_unregistered_by_its_own_handler, "openswarm.h: messages are dropped, waiters wake with NULL")
-{
-    boot();
-    Sys_Register_Event(E1);
-    Sys_Start_Process(wait_for_gone);
-    Sys_Yield();
-    Sys_Subscribe_to_Event(E1, 0, unregister_in_handler, NULL);
-    Sys_Subscribe_to_Event(E1, 0, count_delivery, NULL);
-    Sys_Send_IntEvent(E1, 1);
-    Sys_Send_IntEvent(E1, 2);
-    Sys_Yield();
-    Sys_Yield();
-    CHECK_EQ(deliveries, 1);
-    CHECK_EQ(trace[0], 'g');
-    CHECK(!Sys_Send_IntEvent(E1, 3));
-    CHECK_EQ(Sys_Get_LastError(), SYS_ERROR_EVENT);
-}
-
 TEST(a_handler_that_returns_false_is_unsubscribed, "kernel.md §1: false unsubscribes the handler")
 {
     boot();
@@ -211,4 +179,40 @@ TEST(an_event_is_handled_at_once_when_only_idle_is_ready, "kernel.md §2: not at
     host_at_idle(send_in_idle);
     Sys_Sleep(20);
     CHECK_EQ(handled_at, 3);
+}
+
+static uint16 victim;
+static bool kill_victim_when_asked(sys_event_data *data)
+{
+    (void)data;
+    (void)Sys_Kill_Process(victim);
+    return true;
+}
+
+static void keep_result(void)
+{
+    (void)Sys_Wait_for_Event(E1);
+    note('k');
+    yield_for_ever();
+}
+static void wait_and_kill(void)
+{
+    sys_event_data *data = Sys_Wait_for_Condition(E1, kill_victim_when_asked);
+    note(data != NULL && data->size == 5 && memcmp(data->payload, "event", 5) == 0 ? 'w' : '?');
+    Sys_Clear_EventData(&data);
+}
+
+TEST(a_condition_may_kill_a_thread_that_the_same_message_woke, "openswarm.h: Sys_Wait_for_Condition")
+{
+    boot();
+    Sys_Register_Event(E1);
+    uint16 empty = heap_now();
+    victim = Sys_Start_Process(keep_result);
+    Sys_Start_Process(wait_and_kill);
+    Sys_Yield();
+    Sys_Send_Event(E1, "event", 5);
+    Sys_Yield();
+    Sys_Yield();
+    CHECK(strcmp(trace, "w") == 0);
+    CHECK_EQ(heap_now(), empty);
 }
