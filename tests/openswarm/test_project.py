@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from emu.host import installation
+from emu.host import installation, paths
 from openswarm.cli import main
 from tests.watchdog import HANG
 
@@ -94,7 +94,8 @@ def test_make_and_cmake_build_the_same_bytes(tmp_path):
 @pytest.mark.skipif(shutil.which("git") is None or not (ROOT / ".git").exists(), reason="not a clone, or no git")
 @pytest.mark.slow
 def test_the_workflow_s_steps_work_offline_as_they_are_written(wheel, tmp_path):
-    """Every `run` step of the workflow runs in an empty folder with an empty HOME, without a package index."""
+    """Every `run` step of the workflow runs in an empty folder with an empty HOME, without a package index; the cache is
+    that of all tests, which has the run-time library."""
     python = tmp_path / "venv" / "bin" / "python"
     subprocess.run([sys.executable, "-m", "venv", python.parents[1]], check=True)
     dependencies = tmp_path / "dependencies"
@@ -113,7 +114,7 @@ def test_the_workflow_s_steps_work_offline_as_they_are_written(wheel, tmp_path):
     package = job["env"]["OPENSWARM_PACKAGE"].split("'")[1]
     environment = {
         "PATH": f"{python.parent}{os.pathsep}/usr/bin{os.pathsep}/bin", "HOME": str(home), "PIP_NO_INDEX": "1",
-        "OPENSWARM_PACKAGE": package, "GITHUB_STEP_SUMMARY": str(summary), "OPENSWARM_CACHE": str(tmp_path / "cache"),
+        "OPENSWARM_PACKAGE": package, "GITHUB_STEP_SUMMARY": str(summary), "OPENSWARM_CACHE": str(paths.cache()),
         "GITHUB_BASE_REF": "main",
     }  # fmt: skip
     git = ("git", "-c", "user.name=x", "-c", "user.email=x@example.org")

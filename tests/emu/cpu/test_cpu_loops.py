@@ -6,7 +6,6 @@ import pytest
 from cpu_rig import Rig
 
 ISR = "isr: inc 0x1100\nbclr 0x84, #3\nretfie"
-ISR_CYCLES = 1 + 1 + 3
 DA, RA = 0x0200, 0x0010
 
 
