@@ -94,8 +94,10 @@ def test_make_and_cmake_build_the_same_bytes(tmp_path):
 @pytest.mark.skipif(shutil.which("git") is None or not (ROOT / ".git").exists(), reason="not a clone, or no git")
 @pytest.mark.slow
 def test_the_workflow_s_steps_work_offline_as_they_are_written(wheel, tmp_path):
-    """Every `run` step of the workflow runs in an empty folder with an empty HOME, without a package index; the cache is
-    that of all tests, which has the run-time library."""
+    """Every `run` step of the workflow runs in an empty folder with an empty HOME, without a package index.
+
+    The cache is that of all tests, which has the run-time library.
+    """
     python = tmp_path / "venv" / "bin" / "python"
     subprocess.run([sys.executable, "-m", "venv", python.parents[1]], check=True)
     dependencies = tmp_path / "dependencies"
