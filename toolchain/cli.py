@@ -38,6 +38,10 @@ example: python -m toolchain cc -Os main.c -o firmware.elf
 are also installed as programs: dspic-cc, dspic-as, dspic-ld, dspic-ar ..."""
 
 
+XC16_PROGRAMS = {"gcc": "cc", "cc": "cc", "bin2hex": "hex", "g++": "c++"}
+"""Commands by the names of XC16's programs without `xc16-`; the others have the same names."""
+
+
 def _usage() -> str:
     return USAGE.format(commands="\n".join(f"  {name:10} {text}" for name, (_, text) in COMMANDS.items()))
 
@@ -75,6 +79,9 @@ def by_name() -> int:
     """
     name = Path(sys.argv[0]).stem.removeprefix("dspic-")
     words = sys.argv[1:]
+    if name.startswith(("xc16-", "pic30-")):
+        name = XC16_PROGRAMS.get(name.partition("-")[2], name.partition("-")[2])
+        words = ["--xc16-defaults", *words] if name == "cc" and "--version" not in words else words
     if name != "cc" and words == ["--version"]:
         print(f"dspic-{name} (openswarm) {version('openswarm')}")
         return DONE

@@ -117,6 +117,7 @@ def front_end(options: CcOptions, scratch: Path) -> dict[Input, bytes]:
     """Unoptimised IR of every input except assembly and objects. All C files are compiled before an error is raised."""
     from toolchain.abi.struct_alignment import mark
     from toolchain.driver.whole_program import is_bitcode
+    from toolchain.frontend import short_double
     from toolchain.frontend.clang import ir_job, run_jobs, with_i32_levels
     from toolchain.frontend.externally_initialised import mark_externally_initialised
 
@@ -128,7 +129,9 @@ def front_end(options: CcOptions, scratch: Path) -> dict[Input, bytes]:
     for item in options.inputs:
         if item in targets:
             layouts = targets[item].with_suffix(".layouts").read_text(errors="replace")
-            modules[item] = mark(mark_externally_initialised(with_i32_levels(targets[item].read_bytes())), layouts)
+            text = with_i32_levels(targets[item].read_bytes())
+            text = short_double.rename(text) if options.short_double else text
+            modules[item] = mark(mark_externally_initialised(text), layouts)
         elif item.language in ("ir", "object"):
             content = read_bytes(item.path)
             if item.language == "ir" or is_bitcode(content):
@@ -171,9 +174,16 @@ def _to_assembly(options: CcOptions, ir_text: str) -> str:
 
     check(ir_text, lambda ref: pipeline.position_in(ir_text, ref))
     try:
-        return pipeline.compile_module(ir_text, options) + _formats(options)
+        return pipeline.compile_module(ir_text, options) + _formats(options) + _double_mark(options)
     except UnsupportedError as error:
         raise ToolError(f"not supported: {error}") from error
+
+
+def _double_mark(options: CcOptions) -> str:
+    """Assembly of the symbol that marks objects whose double has 32 bits."""
+    from toolchain.frontend.short_double import MARK
+
+    return f"\t.weak {MARK}\n\t.set {MARK},1\n" if options.short_double else ""
 
 
 def _formats(options: CcOptions) -> str:
@@ -258,8 +268,9 @@ def _output(options: CcOptions, item: Input, suffix: str) -> Path:
 def _compile_program(options: CcOptions, scratch: Path, front: FrontEnd) -> LinkInput:
     """Input of the linker: objects in command line order, the object of the merged C files last, and archives."""
     from toolchain.driver.link_stage import LinkInput, find_library, output_path
-    from toolchain.driver.runtime_archive import library
+    from toolchain.driver.runtime_archive import library, short_double_library
     from toolchain.frontend import polled_flags
+    from toolchain.frontend.short_double import MARK
 
     modules = front(options, scratch)
     program = LinkInput(runtime=library(object_of, options.jobs) if options.runtime or options.startup else b"")
@@ -281,6 +292,8 @@ def _compile_program(options: CcOptions, scratch: Path, front: FrontEnd) -> Link
             write_outputs([(base.with_suffix(".ll"), ir_text.encode()), (base.with_suffix(".s"), assembly.encode())])
         name = next(iter(modules)).path.name if len(modules) == 1 else "program.c"
         program.objects.append((name, _assemble(options, assembly, name, compiled=True)))
+    if program.runtime and any(MARK.encode() in content for _, content in program.objects):
+        program.runtime = short_double_library(program.runtime, object_of)
     return program
 
 

@@ -13,6 +13,7 @@ from toolchain.elf.read import read_object
 from toolchain.errors import ToolError
 from toolchain.files import read_bytes, write_outputs
 from toolchain.frontend.options import CcOptions
+from toolchain.frontend.short_double import MARK
 from toolchain.link.command import link_options as link_settings
 from toolchain.link.command import output_files, parse_link_words
 from toolchain.link.levels import check_levels
@@ -22,6 +23,10 @@ from toolchain.link.options import LinkOptions
 from toolchain.link.smartio import plain_name
 
 RUNTIME_NAME = "run-time library"
+DOUBLE_HELPER = re.compile(
+    r"___(?:(?:add|sub|mul|div)df3|(?:eq|ne|lt|le|gt|ge|unord)df2|extendsfdf2|truncdfsf2|\w*df[sd]i|float\w*df)"
+)
+"""Names of the functions that code with 64-bit double calls."""
 BUILT_IN_LIBRARIES = {"c", "m", "gcc", "pic30", "dsp"}
 """Names of libraries whose content is part of the run-time library; -l has no effect for them."""
 
@@ -74,12 +79,24 @@ def link_program(options: CcOptions, program: LinkInput) -> None:
         archives.append(open_archive(program.runtime, RUNTIME_NAME))
     linked = link(objects, archives, link_options(options, objects))
     check_levels(linked.image)
-    for message in linked.messages:
+    for message in [*linked.messages, *_mixed_doubles(objects)]:
         print(message, file=sys.stderr)
     words = parse_link_words(options.linker)
     if words.report_mem:
         print(memory_report(linked))
     write_outputs(output_files(linked, output_path(options), options.map_file, None, words.memorysummary))
+
+
+def _mixed_doubles(objects: list[ObjectFile]) -> list[str]:
+    """Return a warning if objects with 32-bit and with 64-bit double are linked together."""
+    marked = [obj for obj in objects if any(symbol.name == MARK for symbol in obj.symbols)]
+    wide = [obj for obj in objects if obj not in marked and any(DOUBLE_HELPER.fullmatch(s.name) for s in obj.symbols)]
+    if not marked or not wide:
+        return []
+    return [
+        f"{wide[0].name}: warning: its double has 64 bits, that of {marked[0].name} 32 bits: compile all files with or "
+        "without -fshort-double"
+    ]
 
 
 def link_options(options: CcOptions, objects: list[ObjectFile]) -> LinkOptions:

@@ -52,6 +52,7 @@ class CompileOptions(Protocol):
     stack_check: bool
     large_code: bool
     large_data: bool
+    frame_pointer: bool  # LNK and ULNK in every function, as XC16 does without optimisation
     verify: bool  # verify the machine form after every pass
 
 
@@ -64,6 +65,7 @@ class BackendOptions:
     stack_check: bool = False
     large_code: bool = False
     large_data: bool = False
+    frame_pointer: bool = False
     verify: bool = True
 
 
@@ -125,7 +127,7 @@ def _select(c: FunctionContext) -> None:
     c.machine.preserved, c.machine.preprologue = isr.preserved(c.notes), isr.preprologue(c.notes)
     if c.interrupt:
         c.machine.preserved += isr.accumulators(c.function)
-    c.machine.uses_fp = frame.wants_frame_pointer(c.machine)
+    c.machine.uses_fp = frame.wants_frame_pointer(c.machine, c.options.frame_pointer)
 
 
 def _allocate(c: FunctionContext) -> None:

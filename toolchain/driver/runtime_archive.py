@@ -23,10 +23,15 @@ from toolchain.frontend.options import CcOptions, Input
 RUNTIME_DIR = Path(__file__).parents[1] / "runtime"
 PACKAGE_DIRS = ("toolchain", "emu/dspic30f/isa", "emu/chips")
 """Dependencies of the compiled library, relative to the parent folder of `toolchain`."""
-UNRELATED = ("toolchain/link", "toolchain/cli.py", "toolchain/README.md")
+UNRELATED = (
+    "toolchain/link", "toolchain/bounds", "toolchain/proof", "toolchain/commands", "toolchain/cli.py",
+    "toolchain/README.md",
+)  # fmt: skip
 SUFFIXES = (".py", ".c", ".cpp", ".h", ".s", ".inc", ".csv")
 LEVEL = "s"
 CHECKSUM_BYTES = 32
+SHORT_DOUBLE_VARIANTS = ("format.s", "scan.c", "scan_stream.c")
+"""Sources with a variant for programs whose double has 32 bits."""
 LANGUAGES = {".c": "c", ".cpp": "c++", ".s": "assembler"}
 
 
@@ -88,15 +93,38 @@ def build(compile_one: Compile, jobs: int = 0) -> bytes:
     return archive_bytes(members)
 
 
-def _member(compile_one: Compile, source: Path) -> bytes:
+def short_double_library(archive: bytes, compile_one: Compile) -> bytes:
+    """The library for programs whose double has 32 bits: its printf and scanf take and store such doubles."""
+    from toolchain.elf.archive import ArchiveMember, archive_bytes, read_members
+
+    key = hashlib.sha256(archive).hexdigest()[:20]
+    cached = runtime_libraries() / f"libdspic-short-{key}.a"
+    stored = _stored(cached)
+    if stored is not None:
+        return stored
+    sources = {Path(name).stem + ".o": RUNTIME_DIR / name for name in SHORT_DOUBLE_VARIANTS}
+    members = [ArchiveMember(m.name, _member(compile_one, sources[m.name], True)) if m.name in sources else m
+               for m in read_members(archive, "run-time library")]  # fmt: skip
+    content = archive_bytes(members)
+    _store(cached, content)
+    return content
+
+
+def _member(compile_one: Compile, source: Path, short_double: bool = False) -> bytes:
     item = Input(source, LANGUAGES[source.suffix])
     options = CcOptions(
+        asm_define=["SHORT_DOUBLE=1"] if short_double else [],
         inputs=[item],
         stage="assemble",
         level=LEVEL,
         stack_check=True,  # with -fstack-check, the library functions that a program calls must check, too
         runtime=False,
-        clang=["-std=c11" if item.language == "c" else "-std=c++17", "-ffreestanding", "-Wall"],
+        clang=[
+            "-std=c11" if item.language == "c" else "-std=c++17",
+            "-ffreestanding",
+            "-Wall",
+            *(["-DSHORT_DOUBLE=1"] if short_double else []),
+        ],
     )
     with tempfile.TemporaryDirectory(prefix="dspic-rt-") as scratch:
         return _weakened(compile_one(options, item, Path(scratch)), source.name)

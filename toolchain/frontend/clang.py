@@ -26,6 +26,7 @@ from toolchain.errors import ToolError
 from toolchain.frontend import accumulators, annotated_lines, asm_constraints, attributes, config_pragma, header_case
 from toolchain.frontend.asm_registers import REFUSED, respell
 from toolchain.frontend.options import CcOptions, Input
+from toolchain.frontend.short_double import FLAGS as SHORT_DOUBLE_FLAGS
 
 INCLUDE_DIR = Path(__file__).parents[1] / "include"
 
@@ -121,6 +122,8 @@ def front_end_flags(options: CcOptions, language: str = "c") -> list[str]:
     flags += [f"-D{name}=1" for name in (f"__{options.chip.name}__", *PREDEFINED, *guard)]
     flags += [f"-fno-builtin-{name}" for name in (*ABSENT_FUNCTIONS, *ALLOCATION_FUNCTIONS)]
     flags += ["-include", str(INCLUDE_DIR / "dspic_builtins.h")]
+    if options.short_double:
+        flags += SHORT_DOUBLE_FLAGS
     if options.single_constants:
         flags += ["-Xclang", "-cl-single-precision-constant"]
     if options.debug:

@@ -31,11 +31,14 @@ C compiler, assembler and linker for the dsPIC30F6014A and its relatives (-mcpu=
   -g                    debug information
   -flto / -fno-lto      optimise the whole program when linking C files (default on; with -c: off)
   -ffreestanding        no assumptions about library functions; main need not return int
+  -fshort-double        double has 32 bits, as by default with XC16 (here: 64); long double, too
+  --xc16-defaults       XC16's defaults: -fshort-double; also for the program under the name xc16-gcc
   -fsingle-precision-constant   unsuffixed floating constants are float
   -mlarge-code          two-word calls, which reach all of the flash (default -msmall-code: RCALL, +-32 K words)
   -ffile-prefix-map=OLD=NEW   paths that begin with OLD are recorded as NEW (debug information and __FILE__)
   -mlarge-data          only variables with attribute near are near (default -msmall-data: objects up to 64 bytes are
                         near); -mlarge-scalar and -mlarge-aggregate have the same effect
+  -fno-omit-frame-pointer   LNK, ULNK and W14 in every function (default at -O0; -fomit-frame-pointer: where needed)
   -fstack-check         functions with a frame above 8 bytes probe SPLIM on entry
   -fverify-machine      check the code after every pass of the back end (also DSPIC_VERIFY_MACHINE=1)
   -fsanitize=undefined  undefined behaviour stops at a breakpoint (word DA4000) in the code that causes it
@@ -99,6 +102,8 @@ class CcOptions:
     stack_check: bool = False
     verify: bool = field(default_factory=lambda: os.environ.get("DSPIC_VERIFY_MACHINE") == "1")
     single_constants: bool = False
+    keep_frame_pointer: bool | None = None  # -fno-omit-frame-pointer, -fomit-frame-pointer
+    short_double: bool = False
     large_code: bool = False
     large_data: bool = False
     clang: list[str] = field(default_factory=list)
@@ -125,6 +130,11 @@ class CcOptions:
         maps = ("-ffile-prefix-map=", "-fdebug-prefix-map=")
         pairs = [word.partition("=")[2].partition("=") for word in self.clang if word.startswith(maps)]
         return [(old, new) for old, _, new in pairs]
+
+    @property
+    def frame_pointer(self) -> bool:
+        """Whether every function has a frame with LNK and ULNK: at -O0 by default, as with XC16."""
+        return self.level == "0" if self.keep_frame_pointer is None else self.keep_frame_pointer
 
     @property
     def whole_program(self) -> bool:
@@ -259,6 +269,12 @@ def _code_generation(options: CcOptions, word: str) -> bool:
         options.lto = word.startswith("-flto")
     elif word in ("-fverify-machine", "-fno-verify-machine"):
         options.verify = word == "-fverify-machine"
+    elif word in ("-fshort-double", "-fno-short-double"):
+        options.short_double = word == "-fshort-double"
+    elif word == "--xc16-defaults":
+        options.short_double = True
+    elif word in ("-fomit-frame-pointer", "-fno-omit-frame-pointer"):
+        options.keep_frame_pointer = word == "-fno-omit-frame-pointer"
     elif word in ("-fstack-check", "-fno-stack-check"):
         options.stack_check = word == "-fstack-check"
     elif word in ("-mlarge-code", "-msmall-code"):

@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: MIT */
-/* C11 5.2.4.2.2: IEC 60559 single, double; long double is double. */
+/* C11 5.2.4.2.2: IEC 60559 single, double; long double is double (32 bits with -fshort-double). */
 #ifndef FLOAT_H
 #define FLOAT_H
 
 #define FLT_EVAL_METHOD 0
 #define FLT_RADIX 2
 #define FLT_ROUNDS 1
-#define DECIMAL_DIG 17
+#define DECIMAL_DIG DBL_DECIMAL_DIG
 
 #define FLT_MANT_DIG 24
 #define FLT_DIG 6
@@ -21,13 +21,13 @@
 #define FLT_TRUE_MIN __FLT_DENORM_MIN__
 #define FLT_HAS_SUBNORM 1
 
-#define DBL_MANT_DIG 53
-#define DBL_DIG 15
-#define DBL_DECIMAL_DIG 17
-#define DBL_MIN_EXP (-1021)
-#define DBL_MIN_10_EXP (-307)
-#define DBL_MAX_EXP 1024
-#define DBL_MAX_10_EXP 308
+#define DBL_MANT_DIG __DBL_MANT_DIG__
+#define DBL_DIG __DBL_DIG__
+#define DBL_DECIMAL_DIG __DBL_DECIMAL_DIG__
+#define DBL_MIN_EXP __DBL_MIN_EXP__
+#define DBL_MIN_10_EXP __DBL_MIN_10_EXP__
+#define DBL_MAX_EXP __DBL_MAX_EXP__
+#define DBL_MAX_10_EXP __DBL_MAX_10_EXP__
 #define DBL_MAX __DBL_MAX__
 #define DBL_EPSILON __DBL_EPSILON__
 #define DBL_MIN __DBL_MIN__

@@ -23,8 +23,13 @@ USES_STACK = re.compile(r"\b(?:push|pop|lnk|ulnk|w15|sp)\b", re.IGNORECASE)
 REPEATS = {"repmov", "repfill", "repclr", "div.s", "div.u", "div.sd", "div.ud"}
 
 
-def wants_frame_pointer(m: MFunction) -> bool:
-    """Whether the function needs a frame pointer; register allocation must not use W14 then."""
+def wants_frame_pointer(m: MFunction, preferred: bool) -> bool:
+    """Whether the function has a frame pointer; register allocation must not use W14 then.
+
+    `preferred`: also where none is needed, except in functions whose inline assembly changes W14.
+    """
+    if preferred and not any(mi.op == "asm" and FP in mi.also_defs for b in m.blocks for mi in b.insts):
+        return True
     return m.dynamic_stack or sum(o.size for o in m.frame if o.fixed is None) > FRAME_POINTER_BYTES
 
 

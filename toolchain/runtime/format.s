@@ -406,7 +406,15 @@ wide_signed:
 3:      mov     #handle(___format_wide),w3
         bra     large
 floating:
+        .ifdef SHORT_DOUBLE             ; -fshort-double: the argument has 32 bits
+        sub     w10,#4,w10
+        mov.d   [w10],w0
+        call    ___extendsfdf2
+        mov.d   w0,w4
+        mov.d   w2,w6
+        .else
         rcall   argument64
+        .endif
         mov     #handle(___format_double),w3
 large:  cp0     w3                      ; null if not linked: the format was built at run time
         bra     z,next

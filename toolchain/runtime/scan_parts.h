@@ -76,6 +76,11 @@ static int in_set(const char *set, char character, const char **end)
     return character && found != inverted;
 }
 
+/* Whether the program's double has 32 bits (-fshort-double); the library's has 64. */
+#ifndef SHORT_DOUBLE
+#define SHORT_DOUBLE 0
+#endif
+
 static const char *number_field(const char *at, unsigned width, char conversion, int length, void *to)
 {
     const char *stop = at + strnlen(at, width), *after;
@@ -83,7 +88,7 @@ static const char *number_field(const char *at, unsigned width, char conversion,
     if (strchr("aefgAEFG", conversion)) {
         double value;
         after = __scan_double ? __scan_double(at, stop, &value) : NULL;
-        if (after && to && length == LONG)
+        if (after && to && length == LONG && !SHORT_DOUBLE)
             *(double *)to = value;
         else if (after && to)
             *(float *)to = (float)value;

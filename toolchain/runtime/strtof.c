@@ -15,5 +15,12 @@
 #define SMALLEST_POWER (-46)
 #define HUGE_NUMBER HUGE_VALF
 #define SCALE ldexpf
+float __short_atof(const char *text);
 #define STRING_TO_NUMBER strtof
 #include "strtod.h"
+
+/* atof of programs whose double has 32 bits. */
+float __short_atof(const char *text)
+{
+    return strtof(text, NULL);
+}

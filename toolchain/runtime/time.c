@@ -27,6 +27,13 @@ double difftime(time_t end, time_t start)
     return (double)end - (double)start;
 }
 
+/* difftime of programs whose double has 32 bits. */
+float __short_difftime(time_t end, time_t start);
+float __short_difftime(time_t end, time_t start)
+{
+    return (float)end - (float)start;
+}
+
 /* Return the days from 1970-01-01 to a date; month 0-11, day 1-31. */
 static long days_of(long year, int month, long day)
 {
