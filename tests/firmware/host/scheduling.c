@@ -1,6 +1,8 @@
 /* Schedulers other than round robin, and preemption in real time (openswarm.h, openswarm_scheduler.h). */
 #include "test.h"
 
+#include "openswarm_semaphore.h"
+
 /* ---- Earliest deadline first ---------------------------------------------------------------------------------- */
 
 static int met[3], missed[3];
@@ -292,4 +294,23 @@ TEST(round_robin_withdraws_a_request_to_choose, "openswarm_scheduler.h: NULL; on
     Sys_Yield();
     Sys_Yield();
     CHECK(strcmp(trace, "<>TT") == 0);
+}
+
+static sys_semaphore unit = SYS_SEMAPHORE(0);
+
+static void note_unit(void)
+{
+    CHECK(Sys_Wait_for_Semaphore(&unit));
+    note('U');
+}
+
+TEST(a_signal_outside_a_section_preempts_at_once, "openswarm_semaphore.h; on posix it once waited for the next call")
+{
+    boot();
+    Sys_Set_Scheduler(&sys_woken_first);
+    Sys_Start_Process(note_unit);
+    Sys_Yield();
+    CHECK(Sys_Signal_Semaphore(&unit));
+    note('>');
+    CHECK(strcmp(trace, "U>") == 0);
 }

@@ -130,6 +130,7 @@ bool hal_slice_is_over(void)
 void hal_slice_force(void)
 {
     slice_forced = 1;
+    take_interrupts(); /* at thread level, as an interrupt controller does */
 }
 
 void hal_slice_unforce(void)
