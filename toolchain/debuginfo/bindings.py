@@ -27,8 +27,9 @@ def bind(f: Function, info: DebugMetadata) -> None:
     for k, home in in_memory(f, info).items():
         f.dbg_records[k].kind, f.dbg_records[k].value = "memory", home
     for record in f.dbg_records:
-        if record.kind == "dbg_declare" and isinstance(record.value, Arg):  # a struct parameter, possibly in registers
-            record.kind = "parameter"
+        if record.kind == "dbg_declare" and isinstance(record.value, Arg):
+            # a struct parameter, possibly in registers, or a local that the function returns: it is the caller's object
+            record.kind = "returned" if "sret" in record.value.attrs else "parameter"
         if record.kind == "dbg_assign":
             record.kind = "dbg_value"
             if isinstance(record.address, Instr):  # the value is in memory, which other code may change

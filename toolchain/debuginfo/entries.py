@@ -24,8 +24,10 @@ COMPOSITES = {"DW_TAG_structure_type": "structure_type", "DW_TAG_union_type": "u
               "DW_TAG_enumeration_type": "enumeration_type", "DW_TAG_array_type": "array_type"}  # fmt: skip
 
 
-def _expression(f: FunctionInfo, where: tuple[int, ...]) -> list[str]:
-    """DWARF expression of a `mir.VariableLocation`: in the frame, in registers, or an implicit value."""
+def _expression(f: FunctionInfo, name: str, where: tuple[int, ...]) -> list[str]:
+    """DWARF expression of a `mir.VariableLocation`: in the frame, in registers, at an address, or an implicit value."""
+    if name in f.returned:
+        return [str(OP_BREG0 + where[0]), "0"]
     if where[0] < 0:
         return [str(OP_FBREG), *sleb(f.objects[-1 - where[0]])]
     if all(w >= CONSTANT_WORD for w in where):
@@ -176,7 +178,7 @@ class CompileUnit:
             attributes.append(_constant(f.constants[name]))
         elif ranges:
             attributes.append(("location", "data4", f".Ldbg_loc{self.number}_{len(self.lists)}"))
-            self.lists.append([(start, end, _expression(f, where)) for start, end, where in ranges])
+            self.lists.append([(start, end, _expression(f, name, where)) for start, end, where in ranges])
         return DebugEntry("formal_parameter" if self.info.number(ref, "arg") else "variable", attributes)
 
     # -- types --------------------------------------------------------------------------------------------------------

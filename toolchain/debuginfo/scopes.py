@@ -28,6 +28,7 @@ class FunctionInfo:
     known: list[str] = field(default_factory=list)  # all variables, including those of inlined functions
     constants: dict[str, bytes] = field(default_factory=dict)  # variables with the same constant value everywhere
     objects: dict[int, int] = field(default_factory=dict)  # offset of each frame object from W15 at entry
+    returned: frozenset[str] = frozenset()  # variables whose words are the address of the object that is returned
 
 
 @dataclass

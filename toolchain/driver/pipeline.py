@@ -368,7 +368,7 @@ class ModuleCompiler:
             objects = {k: offset_of(c.m, k) for k in range(len(c.m.frame))}
             info = FunctionInfo(
                 name, f.dbg, end, c.m.frame_base, rows.rows, frame_vars, ranges.found, known, bindings.constants(f),
-                objects,
+                objects, frozenset(record.variable for record in f.dbg_records if record.kind == "returned"),
             )  # fmt: skip
             self.dwarf.add_function(info)
 

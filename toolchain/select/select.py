@@ -88,6 +88,8 @@ class FunctionSelector(SelectionContext):
         """Words of a variable (`mir.VariableLocation`); empty if its location is unknown."""
         if record.kind == "parameter":
             return tuple(self.registers.get(id(word), (OPTIMISED_OUT,))[0] for word in record.words)
+        if record.kind == "returned":
+            return tuple(self.registers.get(id(record.value), ()))
         if record.kind != "dbg_value" or record.expression:
             return ()
         if isinstance(record.value, ConstInt):

@@ -11,7 +11,9 @@ from dataclasses import dataclass, field
 from typing import Any, Final
 
 MAX_SHOWN_ELEMENTS: Final = 16
-"""Maximum number of array elements shown."""
+"""Maximum number of elements shown of each array."""
+MAX_SHOWN_NUMBERS: Final = 64
+"""Maximum number of numbers shown of an object, over all its members and elements."""
 FLOATS: Final = {4: "<f", 8: "<d"}
 QUALIFIERS: Final = ("typedef", "const", "volatile")
 TAGGED: Final = ("struct", "union", "enum")
@@ -150,7 +152,12 @@ def encode(kind: Type, value: Any) -> bytes:
 
 
 def text_of(kind: Type, value: Any) -> str:
-    """Return a value as one line of text."""
+    """Return a value as one line of text. Of a large object it shows the first MAX_SHOWN_NUMBERS numbers."""
+    return _text_of(kind, value, [MAX_SHOWN_NUMBERS])
+
+
+def _text_of(kind: Type, value: Any, left: list[int]) -> str:
+    """Return the text of a value; `left` has the number of numbers that may still be shown."""
     bare = kind.bare
     match bare.kind:
         case "pointer":
@@ -165,19 +172,29 @@ def text_of(kind: Type, value: Any) -> str:
         case "float":
             return f"{value:.9g}" if bare.size == 4 else repr(value)
         case "array" if bare.target is not None:
-            return _array(bare.target, value)
+            return _array(bare.target, value, left)
         case "struct" | "union":
-            parts = (f"{one.name} = {text_of(one.type, value[one.name])}" for one in bare.members if one.name)
-            return "{" + ", ".join(parts) + "}"
+            named = [(f"{one.name} = ", one.type, value[one.name]) for one in bare.members if one.name]
+            return _list(named, len(named), left)
     return str(value)
 
 
-def _array(target: Type, values: list[Any]) -> str:
+def _array(target: Type, values: list[Any], left: list[int]) -> str:
     if target.bare.kind == "char":
         octets = bytes(value & 0xFF for value in values)
         return repr(octets.rstrip(b"\0").decode("latin-1"))
-    shown = ", ".join(text_of(target, value) for value in values[:MAX_SHOWN_ELEMENTS])
-    return "{" + shown + (", ..." if len(values) > MAX_SHOWN_ELEMENTS else "") + "}"
+    return _list([("", target, value) for value in values[:MAX_SHOWN_ELEMENTS]], len(values), left)
+
+
+def _list(parts: list[tuple[str, Type, Any]], count: int, left: list[int]) -> str:
+    """Return the parts in braces, as far as `left` permits; `count` is the number of all parts."""
+    shown = []
+    for name, kind, value in parts:
+        if left[0] <= 0:
+            break
+        shown.append(name + _text_of(kind, value, left))
+        left[0] -= kind.bare.kind not in ("array", "struct", "union")
+    return "{" + ", ".join(shown + ["..."] * (len(shown) < count)) + "}"
 
 
 def parts_of(kind: Type) -> Iterator[Member]:
