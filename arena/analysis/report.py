@@ -1,4 +1,4 @@
-"""Report of several runs in Markdown: the tables of docs/experiment.md §4."""
+"""Report of several runs in Markdown: the tables of docs/experiment-appendix.md §4."""
 
 from __future__ import annotations
 

@@ -15,7 +15,7 @@ from arena.commands.arguments import count, count_or_none, duration
 from arena.commands.run import DEFAULT_CONTROLLER
 from arena.robots.reactive import SPEED_TABLES
 
-EXAMPLE = "example: arena experiment clustering --document docs/experiment.md --figures docs/figures"
+EXAMPLE = "example: arena experiment clustering --document docs/experiment-appendix.md --figures docs/figures"
 
 
 def parser() -> argparse.ArgumentParser:

@@ -1,4 +1,4 @@
-"""`arena figures RESULTS`: draw every figure of docs/experiment.md from the runs in one folder."""
+"""`arena figures RESULTS`: draw every figure of docs/experiment-appendix.md from the runs in one folder."""
 
 from __future__ import annotations
 

@@ -21,7 +21,7 @@ def parser() -> argparse.ArgumentParser:
     command = argparse.ArgumentParser(
         description="write tables and figures of runs as Markdown, grouped by controller",
         epilog="example: arena report results/openswarm-A results/bare-A results/openswarm-B results/bare-B "
-        "--document docs/experiment.md --figures docs/figures",
+        "--document docs/experiment-appendix.md --figures docs/figures",
     )
     command.add_argument("runs", nargs="+", type=Path, metavar="FOLDER", help="folder of a run")
     command.add_argument(

@@ -41,8 +41,8 @@ VARIANTS: Final = {
     "misses 10 % of frames": ["camera.false_negative=0.1"],
     "invents objects in 10 %": ["camera.false_positive=0.1"],
 }
-"""Variants within the ranges of docs/experiment.md §2. A pitch of -0.38 degrees shifts the picture by four rows; the
-second row of the window then shows robots up to 135 cm away."""
+"""Variants within the ranges of docs/experiment-appendix.md §2. A pitch of -0.38 degrees shifts the picture by four
+rows; the second row of the window then shows robots up to 135 cm away."""
 
 
 def parser() -> argparse.ArgumentParser:

@@ -62,7 +62,7 @@ class Columns(dict[str, Any]):
 
 @dataclass(frozen=True)
 class Trial:
-    """One recorded trial. docs/experiment.md explains `columns`; `about` is the metadata."""
+    """One recorded trial. docs/experiment-appendix.md explains `columns`; `about` is the metadata."""
 
     path: Path
     columns: dict[str, Any]

@@ -59,7 +59,7 @@ def test_all_alone_is_one_of_n_and_nothing_is_nothing() -> None:
 
 
 def test_time_to_a_share_is_the_first_sample_that_has_it() -> None:
-    """The time to a share is that of the first sample with it (docs/experiment.md §1)."""
+    """The time to a share is that of the first sample with it (docs/experiment-appendix.md §1)."""
     times, shares = np.array([0.0, 1.0, 2.0, 3.0]), np.array([0.1, 0.5, 0.4, 0.8])
     assert time_to(times, shares, 0.5) == 1.0
     assert time_to(times, shares, 0.8) == 3.0
@@ -204,7 +204,7 @@ def test_metrics_of_many_objects_need_little_memory() -> None:
 # -- statistics added to the registered ones ------------------------------------------------------------------------
 
 TWO_SETS = [(-0.40, 0.05), (-0.30, -0.25, 0.05, 0.05, 0.05, 0.05)]
-"""Two sets of ten differences whose printed values equal those of controller B in docs/experiment.md."""
+"""Two sets of ten differences whose printed values equal those of controller B in docs/experiment-appendix.md."""
 
 
 def padded(differences: tuple[float, ...]) -> np.ndarray:

@@ -130,14 +130,14 @@ def test_objects_are_detected_to_150_cm(scene: Scene) -> None:
 
 
 def test_the_range_ends_detection(scene: Scene) -> None:
-    """docs/experiment.md §2: bodies beyond the range look like the wall."""
+    """docs/experiment-appendix.md §2: bodies beyond the range look like the wall."""
     near, far = (ReferenceCamera(scene.with_values(camera__range_cm=150.0), one_object(cm), 0) for cm in (149.0, 151.0))
     assert (sensor_of(near), sensor_of(far)) == (OBJECT, NOTHING)
 
 
 def test_robots_are_detected_nearer_than_objects(scene: Scene) -> None:
-    """docs/experiment.md §3: all robots at 1 m are detected, but less than half at 1.4 m, where a robot of 55 mm
-    fills one row."""
+    """docs/experiment-appendix.md §3: all robots at 1 m are detected, but less than half at 1.4 m, where a robot of
+    55 mm fills one row."""
     rng = np.random.default_rng(1)
     shares = []
     for distance in (60.0, 100.0, 140.0, 200.0):
@@ -159,8 +159,8 @@ def test_robots_are_detected_nearer_than_objects(scene: Scene) -> None:
 def test_pitch_determines_the_detection_range_of_robots(
     scene: Scene, pitch_deg: float, distance: float, low: float, high: float
 ) -> None:
-    """docs/experiment.md §3: robots are detected to 105 cm with two rows of the window, to 135 cm with the window
-    four rows lower, and to 150 cm with one degree of pitch."""
+    """docs/experiment-appendix.md §3: robots are detected to 105 cm with two rows of the window, to 135 cm with the
+    window four rows lower, and to 150 cm with one degree of pitch."""
     rng = np.random.default_rng(1)
     pitched = scene.with_values(camera__pitch_deg=pitch_deg)
     centre = distance + dimensions.ROBOT_RADIUS

@@ -20,22 +20,10 @@ def study(tmp_path_factory: pytest.TempPathFactory, talking_image: Path) -> Path
     """Create a run with two scripted trials and a run with one firmware trial."""
     folder = tmp_path_factory.mktemp("study")
     short = ["--minutes", "0.02", "--jobs", "1", "--robots", "2", "--objects", "3"]
-    assert (
-        main(["run", "clustering", "--brain", "scripted", *short, "--trials", "2", "--out", str(folder / "script")])
-        == 0
-    )
-    command = [
-        "run",
-        "clustering",
-        "--brain",
-        str(talking_image),
-        *short,
-        "--trials",
-        "1",
-        "--out",
-        str(folder / "talk"),
-    ]
-    assert main(command) in (0, 1)
+    words = ["run", "clustering", *short]
+    assert main([*words, "--brain", "scripted", "--trials", "2", "--out", str(folder / "script")]) == 0
+    words += ["--brain", str(talking_image), "--trials", "1", "--out", str(folder / "talk")]
+    assert main(words) in (0, 1)
     return folder
 
 

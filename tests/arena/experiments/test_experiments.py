@@ -270,16 +270,12 @@ polygon = [[5, 30], [15, 30], [15, 40], [5, 40]]
 @pytest.mark.parametrize(
     ("place", "why"),
     [
-        ((90, 90), "is outside the walls"),
-        ((-1, 5), "is outside the walls"),
-        ((50, 48), "touches a wall or an obstacle"),
-        ((2, 50), "is in a wall"),
-        ((20, 60), "touches obstacle pillar"),
-        ((10, 35), "is inside obstacle box"),
-        ((40, 22), "touches what is at (40, 20) cm"),
-        ((math.nan, 20), "is outside the walls"),
+        ((90, 90), "is outside the walls"), ((-1, 5), "is outside the walls"),
+        ((50, 48), "touches a wall or an obstacle"), ((2, 50), "is in a wall"),
+        ((20, 60), "touches obstacle pillar"), ((10, 35), "is inside obstacle box"),
+        ((40, 22), "touches what is at (40, 20) cm"), ((math.nan, 20), "is outside the walls"),
     ],
-)
+)  # fmt: skip
 def test_a_supervisor_cannot_move_a_body_into_another_one(place: tuple[float, float], why: str, tmp_path: Path) -> None:
     """Walls of any shape, obstacles, robots and objects obstruct a move by the supervisor; the body then stays where
     it is."""

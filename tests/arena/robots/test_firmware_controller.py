@@ -57,8 +57,8 @@ def test_wheel_speeds_are_those_of_the_table_for_what_the_camera_shows(
 def test_pixels_are_the_colours_of_their_classes_with_noise(
     clustering_image: Path, alone: Scene, vignetting: float
 ) -> None:
-    """docs/experiment.md §2: pixels are the colours of their classes plus normal noise of sd 3 in each channel, in
-    rows of one class and of several."""
+    """docs/experiment-appendix.md §2: pixels are the colours of their classes plus normal noise of sd 3 in each
+    channel, in rows of one class and of several."""
     scene = alone.with_values(objects__count=1, camera__vignetting=vignetting)
     firmware = FirmwareController(scene, 1, 0, clustering_image)
     poses = World.of(scene, 1, [(200, 150, 0.0)], [(240.0, 150.0)]).poses
@@ -74,8 +74,8 @@ def test_pixels_are_the_colours_of_their_classes_with_noise(
 
 
 def test_the_scripted_sensor_has_first_frame_and_latency_of_the_firmware(clustering_image: Path, alone: Scene) -> None:
-    """docs/experiment.md §2: the scripted sensor has the times measured on the firmware: the first frame within 0.2
-    ms, the latency, which depends on the kernel, within 0.25 ms."""
+    """docs/experiment-appendix.md §2: the scripted sensor has the times measured on the firmware: the first frame
+    within 0.2 ms, the latency, which depends on the kernel, within 0.25 ms."""
     firmware = FirmwareController(alone, 1, 0, clustering_image, SELECTOR["A"] | AT_ONCE)
     world = World(alone, 1)
     rows: dict[int, int] = {}

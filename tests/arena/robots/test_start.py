@@ -193,22 +193,7 @@ def test_invalid_start_values_are_refused(
     setting: str, message: str, talking_image: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Invalid values of `[start]` end with exit status 2 before a trial starts."""
-    assert (
-        main(
-            [
-                "run",
-                "clustering",
-                "--brain",
-                str(talking_image),
-                "--trials",
-                "1",
-                "--set",
-                setting,
-                "--out",
-                str(tmp_path),
-            ]
-        )
-        == 2
-    )
+    words = ["run", "clustering", "--brain", str(talking_image), "--trials", "1", "--set", setting]
+    assert main([*words, "--out", str(tmp_path)]) == 2
     assert message in capsys.readouterr().err
     assert not list(tmp_path.glob("trial-*"))

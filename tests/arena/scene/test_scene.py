@@ -281,20 +281,8 @@ def test_five_hundred_mutated_scenes_are_read_or_refused_in_one_line(tmp_path: P
     that names the file."""
     path = tmp_path / "my.toml"
     pieces = [
-        "-1",
-        "1e999",
-        "nan",
-        "[[]]",
-        "{}",
-        '"x"',
-        "[[robots]]",
-        "=",
-        "\x00",
-        "é",
-        "true",
-        "[0, 0]",
-        "99999999999",
-    ]
+        "-1", "1e999", "nan", "[[]]", "{}", '"x"', "[[robots]]", "=", "\x00", "é", "true", "[0, 0]", "99999999999",
+    ]  # fmt: skip
     refused = 0
     for seed in range(500):
         rng = random.Random(seed)

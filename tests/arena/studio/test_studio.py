@@ -318,17 +318,11 @@ def test_unauthorised_requests_are_refused() -> None:
 @pytest.mark.parametrize(
     ("body", "said"),
     [
-        (b"{", "not valid JSON"),
-        (b"[" * 5000, "not valid JSON"),
-        (b"[]", "expected an object"),
-        (b'{"do": "__init__"}', "expected an object"),
-        (b'{"do": "run"}', "run: expected pace"),
-        (b'{"do": "run", "pace": 0}', "expected a positive number"),
-        (b'{"do": "run", "pace": NaN}', "pace is nan"),
-        (b'{"do": "step", "quanta": true}', "quanta is True"),
-        (b'{"do": "step", "quanta": 1.5}', "quanta is 1.5"),
-        (b'{"do": "rewind", "tick": -1}', "quantum -1"),
-        (b'{"do": "rewind", "tick": 1e400}', "tick is inf"),
+        (b"{", "not valid JSON"), (b"[" * 5000, "not valid JSON"), (b"[]", "expected an object"),
+        (b'{"do": "__init__"}', "expected an object"), (b'{"do": "run"}', "run: expected pace"),
+        (b'{"do": "run", "pace": 0}', "expected a positive number"), (b'{"do": "run", "pace": NaN}', "pace is nan"),
+        (b'{"do": "step", "quanta": true}', "quanta is True"), (b'{"do": "step", "quanta": 1.5}', "quanta is 1.5"),
+        (b'{"do": "rewind", "tick": -1}', "quantum -1"), (b'{"do": "rewind", "tick": 1e400}', "tick is inf"),
         (b'{"do": "move", "kind": "wall", "number": 0, "x": 1, "y": 1}', "cannot be moved"),
         (b'{"do": "move", "kind": "robot", "number": 9, "x": 1, "y": 1}', "there is no robot 9"),
         (b'{"do": "move", "kind": "robot", "number": 0, "x": 1e9, "y": 1}', "outside the walls"),
@@ -336,7 +330,7 @@ def test_unauthorised_requests_are_refused() -> None:
         (b'{"do": "toggle_breakpoint", "robot": 0, "place": "main"}', "robot 0 is scripted"),
         (b'{"do": "pause", "more": 1}', "expected no parameters"),
     ],
-)
+)  # fmt: skip
 def test_bad_requests_are_reported_in_one_line(body: bytes, said: str) -> None:
     """A bad request gets status 409 and one line, and the studio continues."""
     with serving() as one:

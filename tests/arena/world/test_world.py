@@ -1,4 +1,4 @@
-"""The world: units, calibrations of components, repeatability (docs/experiment.md §3)."""
+"""The world: units, calibrations of components, repeatability (docs/experiment-appendix.md §3)."""
 
 import copy
 import math
