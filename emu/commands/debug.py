@@ -5,22 +5,27 @@ from __future__ import annotations
 import argparse
 import socket
 import sys
+from fractions import Fraction
 from functools import partial
 from typing import TYPE_CHECKING, Any, Final
 
 from emu.boards import BOARDS
 from emu.commands.board_options import add_board_options, board_of, set_up
-from emu.host.command import CommandError, Parser, port
+from emu.host.command import CommandError, Parser, port, seconds
 from emu.host.exit_status import BAD_INPUT, DONE
 
 if TYPE_CHECKING:
     from emu.dap.wire import Wire
     from emu.machine.machine import Machine
+    from emu.machine.stops import Stop
 
+SCRIPT_SECONDS: Final = Fraction(60)
+"""Simulated time after which a script ends."""
 DESCRIPTION: Final = """\
 Debug firmware from an editor: a server of the Debug Adapter Protocol on standard input and output, or on a TCP port
 of this machine. With --tui, debug it in the terminal: a prompt with completion and history; its command `help` lists
-all commands. Without a terminal, standard input is a script with one command per line; the first error ends it:
+all commands. Without a terminal, standard input is a script with one command per line; the first error ends it. So
+does the time limit of 60 simulated seconds, or of --seconds:
 
     printf 'break add if a == 3\\nrun\\nbacktrace\\n' | emu debug --tui firmware.elf
 
@@ -35,11 +40,18 @@ Exit status: 0 the client, the user or the script has ended the session; 1 the s
 input."""
 
 
+class TimeLimitReached(BaseException):
+    """The time limit of the session. It is no Exception, because the server answers those as failed requests."""
+
+
 def parser() -> Parser:
     made = Parser("debug", DESCRIPTION, "emu debug --port 4711    or    emu debug --tui firmware.elf --selector 3")
     made.add_argument("--port", metavar="N", type=port, help="serve clients one by one on 127.0.0.1:N (0: a free one)")
     made.add_argument("--once", action="store_true", help="with --port: end after the first client")
     made.add_argument("--tui", metavar="IMAGE", help="debug this ELF file in the terminal, with the options below")
+    made.add_argument(
+        "--seconds", metavar="S", type=seconds, help="with --tui: limit of the simulated time (for a script 60)"
+    )
     made.add_argument("--engine", default="auto", help="auto, jit or plain (default auto)")
     made.add_argument(
         "--strict",
@@ -83,13 +95,43 @@ def _prompted(options: argparse.Namespace) -> int:
         raise CommandError("--port and --once cannot be used with --tui")
     machine = emu.load(options.tui, board=board_of(options), engine=options.engine, strict=options.strict)
     set_up(machine, options)
-    return Prompt("emu debug", lambda client: Server(client, lambda _launch: machine)).serve({}, sys.stdin)
+    limit = options.seconds or (None if sys.stdin.isatty() else SCRIPT_SECONDS)
+    if limit is not None:
+        _limit_time(machine, limit)
+    try:
+        return Prompt("emu debug", lambda client: Server(client, lambda _launch: machine)).serve({}, sys.stdin)
+    except TimeLimitReached as error:
+        sys.stdout.flush()
+        raise CommandError(str(error)) from None
+
+
+def _limit_time(machine: Machine, limit: Fraction) -> None:
+    """Make every run and step that reaches a simulated time raise TimeLimitReached."""
+    last = machine.cycles_in(limit)
+    advance, step = machine.advance, machine.step
+
+    def check() -> None:
+        if machine.cycle >= last:
+            raise TimeLimitReached(f"the limit of {float(limit):g} simulated seconds is reached (--seconds)")
+
+    def limited_advance(cycle: int) -> Stop | None:
+        check()
+        stop = advance(min(cycle, last))
+        if stop is None:
+            check()
+        return stop
+
+    def limited_step(cycle: int | None = None) -> Stop | None:
+        check()
+        return step(cycle)
+
+    vars(machine).update(advance=limited_advance, step=limited_step)
 
 
 def _refuse_options_of_the_prompt(options: argparse.Namespace) -> None:
     """Raise CommandError for a command-line option that an editor sets in its launch configuration."""
     made = parser()
-    for name in ("engine", "strict", "board", "crystal", "selector", "camera", "sensor", "stimulus"):
+    for name in ("engine", "strict", "seconds", "board", "crystal", "selector", "camera", "sensor", "stimulus"):
         if getattr(options, name) != made.get_default(name):
             raise CommandError(f"--{name} needs --tui; for an editor, set `{name}` in the launch configuration")
 

@@ -8,6 +8,7 @@ Input: a specification from the command line (`-`, FILE, `pty`, `tcp:PORT`, `non
 from __future__ import annotations
 
 import contextlib
+import errno
 import os
 import select
 import socket
@@ -17,6 +18,8 @@ from typing import Final
 
 READ_SIZE: Final = 4096
 
+NO_ROOM: Final = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT)
+"""Errors of a full disk or of a limit of its user."""
 SPECIFICATIONS: Final = "-, FILE, pty, tcp:PORT or none"
 
 
@@ -37,7 +40,10 @@ class ConsolePort:
         self._close: Final = close
 
     def write(self, data: bytes) -> None:
-        """Write the firmware's output. Raises BrokenPipeError if the reader of standard output has closed it."""
+        """Write the firmware's output.
+
+        Raises BrokenPipeError if the reader of standard output has closed it, OSError if there is no room for it.
+        """
         if self.capture is not None:
             self.capture += data
             return
@@ -52,7 +58,9 @@ class ConsolePort:
                 if self._close is None:
                     raise
                 self.out_fd = None
-            except OSError:
+            except OSError as error:
+                if error.errno in NO_ROOM:
+                    raise
                 self.out_fd = None
         if not self._discards:
             self.lost += len(data)
