@@ -33,13 +33,8 @@ def run_command(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
 def test_it_has_its_name_everywhere_and_no_hole(project):
     names = {path.relative_to(project).as_posix() for path in project.rglob("*") if path.is_file()}
     assert {
-        "Makefile",
-        "CMakeLists.txt",
-        "src/main.c",
-        "test/test_my-robot.py",
-        ".vscode/tasks.json",
-        ".gitignore",
-    } <= names
+        "Makefile", "CMakeLists.txt", "src/main.c", "test/test_my-robot.py", ".vscode/tasks.json", ".gitignore",
+    } <= names  # fmt: skip
     assert not [path for path in project.rglob("*") if path.is_file() and "@PROJECT@" in path.read_text()]
 
 

@@ -79,16 +79,11 @@ def test_handler_reads_the_bus_16_to_18_tcy_behind_href_and_frames_come_every_16
 @pytest.mark.parametrize(
     ("sources", "cycles", "noise"),
     [
-        (("camera.c", "lines.s"), 900_000, 1.0),
-        (("steps.c",), 1_500_000, 1.0),
-        (("proximity.c",), 400_000, 0.0),
-        (("proximity.c",), 200_000, 1.0),
-        (("adscan.c",), 400_000, 0.0),
-        (("adscan.c",), 200_000, 1.0),
-        (("startup.c",), 150_000, 0.0),
-        (("serial.c",), 200_000, 1.0),
+        (("camera.c", "lines.s"), 900_000, 1.0), (("steps.c",), 1_500_000, 1.0), (("proximity.c",), 400_000, 0.0),
+        (("proximity.c",), 200_000, 1.0), (("adscan.c",), 400_000, 0.0), (("adscan.c",), 200_000, 1.0),
+        (("startup.c",), 150_000, 0.0), (("serial.c",), 200_000, 1.0),
     ],
-)
+)  # fmt: skip
 def test_engines_agree_to_the_bit_on_a_busy_robot(program, sources, cycles, noise):
     """engines.md §4.3: the same inputs give the same record in the same cycle in every engine, including noise,
     remote control and radio.

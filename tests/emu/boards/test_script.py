@@ -51,30 +51,19 @@ def test_steps_happen_at_their_times(robot):
 @pytest.mark.parametrize(
     ("line", "message"),
     [
-        ("1s", "expected one of selector"),
-        ("1s dance", "expected one of selector"),
-        ("soon selector 1", "begins with its time"),
-        ("-1s selector 1", "begins with its time"),
-        ("1.5 selector 1", "begins with its time"),
-        ("1s selector 16", "positions 0 to 15"),
-        ("1s selector", "expected 1 arguments"),
-        ("1s ir 8 20", "sensors are 0 to 7"),
-        ("1s remote 64", "commands 0 to 63"),
-        ("1s remote louder", "invalid literal"),
-        ("1s pin RH1 0", "not a pin name"),
-        ("1s pin RA6 2", "a level is 0 or 1"),
-        ("1s uart1 hello", "malformed|expected|invalid"),
-        ("1s battery 9", "0 to 5 V"),
-        ("1s camera off", "expected `plug`"),
-        ("1s picture", "expected 1 arguments"),
-        ("1s lamp -1", "brightness is"),
-        ("1s bluetooth off", "`up` or `down`"),
-        ("1s i2c sda", "expected `sda CLOCKS`"),
-        ("1s noise -1", "strength of noise"),
-        ('1s uart1 "x" wrong', "expected one of framing"),
-        ('1s uart1 "open', "No closing quotation"),
+        ("1s", "expected one of selector"), ("1s dance", "expected one of selector"),
+        ("soon selector 1", "begins with its time"), ("-1s selector 1", "begins with its time"),
+        ("1.5 selector 1", "begins with its time"), ("1s selector 16", "positions 0 to 15"),
+        ("1s selector", "expected 1 arguments"), ("1s ir 8 20", "sensors are 0 to 7"),
+        ("1s remote 64", "commands 0 to 63"), ("1s remote louder", "invalid literal"),
+        ("1s pin RH1 0", "not a pin name"), ("1s pin RA6 2", "a level is 0 or 1"),
+        ("1s uart1 hello", "malformed|expected|invalid"), ("1s battery 9", "0 to 5 V"),
+        ("1s camera off", "expected `plug`"), ("1s picture", "expected 1 arguments"),
+        ("1s lamp -1", "brightness is"), ("1s bluetooth off", "`up` or `down`"),
+        ("1s i2c sda", "expected `sda CLOCKS`"), ("1s noise -1", "strength of noise"),
+        ('1s uart1 "x" wrong', "expected one of framing"), ('1s uart1 "open', "No closing quotation"),
     ],
-)
+)  # fmt: skip
 def test_mistakes_are_reported_with_file_and_line(robot, line, message):
     """An error in a stimulus file is reported with file, line and expected input."""
     with pytest.raises(StimulusError, match=rf"^file:2: .*({message})"):

@@ -34,15 +34,11 @@ def test_reset_values_have_no_unimplemented_bits():
 @pytest.mark.parametrize(
     ("slot", "name", "ivt", "aivt"),
     [
-        (1, "OscillatorFail", 0x06, 0x86),
-        (4, "MathError", 0x0C, 0x8C),
-        (8, "INT0Interrupt", 0x14, 0x94),
-        (19, "ADCInterrupt", 0x2A, 0xAA),
-        (29, "T4Interrupt", 0x3E, 0xBE),
-        (49, "DCIInterrupt", 0x66, 0xE6),
+        (1, "OscillatorFail", 0x06, 0x86), (4, "MathError", 0x0C, 0x8C), (8, "INT0Interrupt", 0x14, 0x94),
+        (19, "ADCInterrupt", 0x2A, 0xAA), (29, "T4Interrupt", 0x3E, 0xBE), (49, "DCIInterrupt", 0x66, 0xE6),
         (61, "Interrupt53", 0x7E, 0xFE),
     ],
-)
+)  # fmt: skip
 def test_vectors_sit_where_the_table_says(slot, name, ivt, aivt):
     """dspic30f6014a.md §5.1, §5.2; abi-elf.md §2.7: vectors are at the addresses of the reference."""
     vector = VECTORS[slot]

@@ -200,19 +200,11 @@ class Program:
         while len(self.words) < length:
             rng.choices(
                 (
-                    self._straight,
-                    self._branch,
-                    self._skip,
-                    self._repeat,
-                    self._do,
-                    self._call,
-                    self._disi,
-                    self._status,
-                    self._core,
-                    self._idle,
+                    self._straight, self._branch, self._skip, self._repeat, self._do, self._call, self._disi,
+                    self._status, self._core, self._idle,
                 ),
                 (60, 8, 8, 8, 4, 4, 2, 2, 2, 1),
-            )[0]()
+            )[0]()  # fmt: skip
         self._add("BRA Expr", n=-len(self.words) - 1)
 
     def _add(self, syntax: str, **fields: int) -> None:

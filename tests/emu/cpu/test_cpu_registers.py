@@ -78,14 +78,10 @@ def test_the_program_counter_can_be_read(engine: str) -> None:
 @pytest.mark.parametrize(
     ("place", "written", "read"),
     [
-        (0x20, 0xFFFF, 0xFFFE),
-        (0x36, 0xFFFF, 0x3FFF),
-        (0x46, 0xFFFF, 0xCFFF),
-        (0x48, 0xFFFF, 0xFFFE),
-        (0x4A, 0x0000, 0x0001),
-        (0x32, 0xFFFF, 0x00FF),
+        (0x20, 0xFFFF, 0xFFFE), (0x36, 0xFFFF, 0x3FFF), (0x46, 0xFFFF, 0xCFFF), (0x48, 0xFFFF, 0xFFFE),
+        (0x4A, 0x0000, 0x0001), (0x32, 0xFFFF, 0x00FF),
     ],
-)
+)  # fmt: skip
 def test_unimplemented_bits(engine: str, place: int, written: int, read: int) -> None:
     """isa.md §2.1: unimplemented bits of SPLIM, RCOUNT, MODCON, XMODSRT, XMODEND and TBLPAG are not stored."""
     rig = Rig(f"mov w0, {place}\nend: nop", engine, w0=written)

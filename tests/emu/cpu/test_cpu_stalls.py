@@ -17,18 +17,13 @@ def pair(engine: str, first: str, second: str, **w: int) -> int:
 @pytest.mark.parametrize(
     ("first", "second", "cycles"),
     [
-        ("add w0, w1, w2", "mov w2, w3", FREE),
-        ("add w0, w1, w2", "mov [w2], w3", STALLED),
-        ("add w0, w1, w2", "mov [w2++], w3", STALLED),
-        ("add w0, w1, [w2]", "mov w2, w3", FREE),
-        ("add w0, w1, [w2]", "mov [w2], w3", FREE),
-        ("add w0, w1, [w2]", "mov [w2++], w3", FREE),
-        ("add w0, w1, [w2++]", "mov w2, w3", FREE),
-        ("add w0, w1, [w2++]", "mov [w2], w3", STALLED),
-        ("add w0, w1, [w2++]", "mov [w2++], w3", STALLED),
-        ("add w0, w1, [--w2]", "mov [w2], w3", STALLED),
+        ("add w0, w1, w2", "mov w2, w3", FREE), ("add w0, w1, w2", "mov [w2], w3", STALLED),
+        ("add w0, w1, w2", "mov [w2++], w3", STALLED), ("add w0, w1, [w2]", "mov w2, w3", FREE),
+        ("add w0, w1, [w2]", "mov [w2], w3", FREE), ("add w0, w1, [w2]", "mov [w2++], w3", FREE),
+        ("add w0, w1, [w2++]", "mov w2, w3", FREE), ("add w0, w1, [w2++]", "mov [w2], w3", STALLED),
+        ("add w0, w1, [w2++]", "mov [w2++], w3", STALLED), ("add w0, w1, [--w2]", "mov [w2], w3", STALLED),
     ],
-)
+)  # fmt: skip
 def test_the_table_of_register_dependencies(engine: str, first: str, second: str, cycles: int) -> None:
     """isa.md §13.2: each row of the table of register dependencies has its stall, in the table's order (both operands
     of the sum are even addresses)."""

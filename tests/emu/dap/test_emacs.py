@@ -37,13 +37,8 @@ def test_a_session_in_emacs(tmp_path: Path) -> None:
     )  # fmt: skip
     assert done.returncode == 0, done.stdout + done.stderr
     assert done.stdout.splitlines()[-9:] == [
-        "add at program.c:13: total = sum;",
-        "Locals: a=0 b=0 sum=0",
-        "add at program.c:14: return sum;",
-        "add at program.c:13: total = sum;",
-        "add at program.c:13: total = sum;",
-        "Locals: a=0 b=0 sum=0",
-        "twice at program.c:20: return add(once, n);",
-        "add at program.c:13: total = sum;",
+        "add at program.c:13: total = sum;", "Locals: a=0 b=0 sum=0", "add at program.c:14: return sum;",
+        "add at program.c:13: total = sum;", "add at program.c:13: total = sum;", "Locals: a=0 b=0 sum=0",
+        "twice at program.c:20: return add(once, n);", "add at program.c:13: total = sum;",
         "the adapter has ended: 0",
-    ]
+    ]  # fmt: skip

@@ -38,20 +38,9 @@ MODE_CORCON = 0x10F7
 """CORCON bits that programs change: all but IPL3, the DO level and EDT (isa.md §2.4)."""
 
 SEPARATE = (
-    "RETFIE",
-    "RETURN",
-    "RETLW",
-    "RESET",
-    "ULNK",
-    "DIV.S",
-    "DIV.SD",
-    "DIV.U",
-    "DIV.UD",
-    "DIVF",
-    "LNK",
-    "PWRSAV",
+    "RETFIE", "RETURN", "RETLW", "RESET", "ULNK", "DIV.S", "DIV.SD", "DIV.U", "DIV.UD", "DIVF", "LNK", "PWRSAV",
     "DISI",
-)
+)  # fmt: skip
 """Mnemonics that need surrounding code; rows with control flow also need it."""
 ORDINARY = [row for row in table.ROWS if row.mnemonic not in FLOWS + SEPARATE]
 PLAIN = [row for row in ORDINARY if not row.mnemonic.startswith(("CPS", "BTSS", "BTSC"))]

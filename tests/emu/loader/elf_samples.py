@@ -120,13 +120,9 @@ def xc16_like() -> ElfSample:
             SampleSection("__FOSC.sec", 0xF80000, words(0x00C706)),
         ],
         names=[
-            Name("__reset", 0x100, 2),
-            Name("_main", 0x104, 2, size=6, kind=2),
-            Name(".L3", 0x106, 2, binding=0),
-            Name("_helper", 0x200, 3, size=4, kind=2),
-            Name("_table", 0x8180, 4, size=4, kind=1),
-            Name("_counter", 0x0800, 5, size=2, kind=1),
-            Name("_buffer", 0x0802, 6, size=4, kind=1),
+            Name("__reset", 0x100, 2), Name("_main", 0x104, 2, size=6, kind=2), Name(".L3", 0x106, 2, binding=0),
+            Name("_helper", 0x200, 3, size=4, kind=2), Name("_table", 0x8180, 4, size=4, kind=1),
+            Name("_counter", 0x0800, 5, size=2, kind=1), Name("_buffer", 0x0802, 6, size=4, kind=1),
             Name("_PORTA", 0x02C2, None),
         ],
-    )
+    )  # fmt: skip

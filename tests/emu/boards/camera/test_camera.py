@@ -26,19 +26,11 @@ def po6030(x=240, y=160, scale=4, form="rgb565"):
     start = (x + 16 - scale) // scale - 1
     row = y + 8 - scale
     return [
-        (1, 0x51, start & 0xFF),
-        (1, 0x50, start >> 8),
-        (1, 0x60, row >> 8),
-        (1, 0x61, row & 0xFF),
-        (1, 0x62, 488 >> 8),
-        (1, 0x63, 488 & 0xFF),
-        (0, 0x91, speed[("grey", scale) if form == "grey" else scale]),
-        (1, 0x38, {"rgb565": 0x08, "grey": 0x0D, "yuv": 0x02}[form]),
-        (1, 0x80, 0x20 * scale),
-        (1, 0x81, 0x20 * scale),
-        (1, 0x82, 1),
-        (0, 0x90, 0xC0),
-    ]
+        (1, 0x51, start & 0xFF), (1, 0x50, start >> 8), (1, 0x60, row >> 8), (1, 0x61, row & 0xFF),
+        (1, 0x62, 488 >> 8), (1, 0x63, 488 & 0xFF), (0, 0x91, speed[("grey", scale) if form == "grey" else scale]),
+        (1, 0x38, {"rgb565": 0x08, "grey": 0x0D, "yuv": 0x02}[form]), (1, 0x80, 0x20 * scale),
+        (1, 0x81, 0x20 * scale), (1, 0x82, 1), (0, 0x90, 0xC0),
+    ]  # fmt: skip
 
 
 def po3030(x=240, y=160, scale=4, form="rgb565"):

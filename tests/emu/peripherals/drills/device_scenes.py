@@ -185,21 +185,7 @@ def _supply(draw: random.Random) -> Scene:
 
 
 SCENES = {
-    "timer": _timer,
-    "pair": _pair,
-    "scan": _scan,
-    "converter": _converter,
-    "compare": _compare,
-    "capture": _capture,
-    "uart": _uart,
-    "spi": _spi,
-    "bus": _bus,
-    "codec": _codec,
-    "can": _can,
-    "ports": _ports,
-    "edges": _edges,
-    "camera": _camera,
-    "programming": _programming,
-    "supply": _supply,
-    "off and on": _off_and_on,
-}
+    "timer": _timer, "pair": _pair, "scan": _scan, "converter": _converter, "compare": _compare,
+    "capture": _capture, "uart": _uart, "spi": _spi, "bus": _bus, "codec": _codec, "can": _can, "ports": _ports,
+    "edges": _edges, "camera": _camera, "programming": _programming, "supply": _supply, "off and on": _off_and_on,
+}  # fmt: skip

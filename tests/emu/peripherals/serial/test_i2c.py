@@ -441,14 +441,9 @@ def test_a_logic_analyser_decodes_the_transaction_from_the_pins(bus):
     memory.delay = 700
     bus.dev.i2c.wire.attach(0x6E, memory)
     bus.pending = [
-        ("I2CTRN", 0xDC),
-        ("I2CTRN", 0x5A),
-        ("I2CCON", BASE | RSEN),
-        ("I2CTRN", 0xDD),
-        ("I2CCON", BASE | RCEN),
-        ("I2CCON", BASE | ACKEN | ACKDT),
-        ("I2CCON", BASE | PEN),
-    ]
+        ("I2CTRN", 0xDC), ("I2CTRN", 0x5A), ("I2CCON", BASE | RSEN), ("I2CTRN", 0xDD), ("I2CCON", BASE | RCEN),
+        ("I2CCON", BASE | ACKEN | ACKDT), ("I2CCON", BASE | PEN),
+    ]  # fmt: skip
     bus.write("I2CCON", BASE | SEN)
     assert sniff(bus, 15_000) == ["S", (0xDC, True), (0x5A, True), "S", (0xDD, True), (0x5A, False), "P"]
 
