@@ -269,7 +269,6 @@ def _compile_program(options: CcOptions, scratch: Path, front: FrontEnd) -> Link
     """Input of the linker: objects in command line order, the object of the merged C files last, and archives."""
     from toolchain.driver.link_stage import LinkInput, find_library, output_path
     from toolchain.driver.runtime_archive import library, short_double_library
-    from toolchain.frontend import polled_flags
     from toolchain.frontend.short_double import MARK
 
     modules = front(options, scratch)
@@ -282,8 +281,8 @@ def _compile_program(options: CcOptions, scratch: Path, front: FrontEnd) -> Link
     program.archives += [archive for name in options.libraries if (archive := find_library(options, name))]
     if modules and options.whole_program:
         merged = _merge(modules, program)
-        if "-w" not in options.clang:
-            for finding in polled_flags.findings(merged.decode()):
+        if "-w" not in options.clang and options.level != "0":  # without optimisation, every access reads memory
+            for finding in _polled_flags(options, merged, program, scratch):
                 print(finding, file=sys.stderr)
         ir_text = optimise(options, merged, scratch)
         assembly = _to_assembly(options, ir_text)
@@ -295,6 +294,20 @@ def _compile_program(options: CcOptions, scratch: Path, front: FrontEnd) -> Link
     if program.runtime and any(MARK.encode() in content for _, content in program.objects):
         program.runtime = short_double_library(program.runtime, object_of)
     return program
+
+
+def _polled_flags(options: CcOptions, merged: bytes, program: LinkInput, scratch: Path) -> list[str]:
+    """Warnings about polled flags with their positions; the sources are compiled again if they have no positions."""
+    from toolchain.driver.pipeline import position_in
+    from toolchain.frontend import polled_flags
+
+    text = merged.decode()
+    found = polled_flags.findings(text, lambda reference: position_in(text, reference))
+    if not found or options.debug:
+        return found
+    again = replace(options, debug=True, clang=[*options.clang, "-w"], dependency=[], verbose=False)
+    located = _merge(front_end(again, scratch), program).decode()
+    return polled_flags.findings(located, lambda reference: position_in(located, reference))
 
 
 def _merge(modules: dict[Input, bytes], program: LinkInput) -> bytes:

@@ -52,8 +52,11 @@ class CompileOptions(Protocol):
     stack_check: bool
     large_code: bool
     large_data: bool
-    frame_pointer: bool  # LNK and ULNK in every function, as XC16 does without optimisation
     verify: bool  # verify the machine form after every pass
+
+    @property
+    def frame_pointer(self) -> bool:
+        """Whether every function has LNK and ULNK, as XC16's do without optimisation."""
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,8 @@ from collections.abc import Callable, Iterable
 
 from toolchain.errors import ToolError
 
+_DUPLICATE = re.compile(r"error: duplicate symbol '?_?([\w$]+)'?[:,] defined in")
+_IN_SECTION = re.compile(r"(?:error: )?[^:\s]+:\(\.[\w.$]*?\._(\w+)(?:\+0x[0-9a-f]+)?\)")
 _UNDEFINED = re.compile(r"error: undefined symbol (\S+), referenced at ")
 _REFUSED = re.compile(r"not supported: (?:LLVM IR line|in function|in variable|function) ")
 _HANDLER = re.compile(r"error: (interrupt )?function '")
@@ -23,31 +25,62 @@ MAX_POSITIONS = 3  # maximum number of positions shown per symbol
 def concerns_generated_code(error: ToolError) -> bool:
     """Whether debug information adds positions to an error, one of assembler, back end, linker or handler names."""
     return any(
-        re.match(r"[^:\n]+: error: ", line) or _UNDEFINED.search(line) or _REFUSED.search(line) or _HANDLER.match(line)
+        re.match(r"[^:\n]+: error: ", line)
+        or _DUPLICATE.search(line)
+        or _IN_SECTION.match(line)
+        or _UNDEFINED.search(line)
+        or _REFUSED.search(line)
+        or _HANDLER.match(line)
         for line in error.findings
     )
 
 
 def with_positions(error: ToolError, modules: Callable[[], Iterable[str]]) -> ToolError:
-    """`error` with the source lines that use undefined symbols; `modules` returns IR text with debug information."""
-    if not any(_UNDEFINED.search(line) for line in error.findings):
+    """`error` with source lines: of uses of undefined symbols, of duplicate definitions, of objects in sections.
+
+    `modules` returns IR text with debug information.
+    """
+    patterns = (_UNDEFINED, _DUPLICATE, _IN_SECTION)
+    if not any(pattern.search(line) for line in error.findings for pattern in patterns):
         return error
     uses: dict[str, list[str]] = {}
+    definitions: dict[str, list[str]] = {}
     for text in modules():
         for symbol, position in _uses(text):
             positions = uses.setdefault(symbol, [])
             if position not in positions:
                 positions.append(position)
-    findings: list[str] = []
-    for line in error.findings:
-        found = _UNDEFINED.search(line)
-        positions = uses.get(found[1], []) if found else []
-        if found is None or not positions:
-            findings.append(line)
-            continue
-        findings += [f"{position.split(' ')[0]}: error: undefined symbol {found[1]}, {position.split(' ', 1)[1]}"
-                     for position in positions[:MAX_POSITIONS]]  # fmt: skip
-    return ToolError.of(findings)
+        for name, position in _definitions(text):
+            definitions.setdefault(name, []).append(position)
+    return ToolError.of([line for finding in error.findings for line in _located(finding, uses, definitions)])
+
+
+def _located(finding: str, uses: dict[str, list[str]], definitions: dict[str, list[str]]) -> list[str]:
+    """The lines of one finding with the positions that are known."""
+    if undefined := _UNDEFINED.search(finding):
+        return [f"{position.split(' ')[0]}: error: undefined symbol {undefined[1]}, {position.split(' ', 1)[1]}"
+                for position in uses.get(undefined[1], [])[:MAX_POSITIONS]] or [finding]  # fmt: skip
+    if duplicate := _DUPLICATE.search(finding):
+        first, *others = definitions.get(duplicate[1], [""])
+        return [f"{other}: error: duplicate symbol '{duplicate[1]}': first defined at {first}; "
+                "make one of them static, or remove it" for other in others] or [finding]  # fmt: skip
+    if (place := _IN_SECTION.match(finding)) and definitions.get(place[1]):
+        return [f"{definitions[place[1]][0]}: error: {finding.removeprefix('error: ').replace(': error: ', ': ', 1)}"]
+    return [finding]
+
+
+def _definitions(text: str) -> Iterable[tuple[str, str]]:
+    """(C name, "file:line") of every function and variable that a module defines."""
+    from toolchain.debuginfo.metadata import DebugMetadata
+    from toolchain.ir.read import read_module
+
+    module = read_module(text)
+    info = DebugMetadata(module)
+    defined = [(f.name, f.dbg) for f in module.functions.values() if f.blocks]
+    defined += [(v.name, v.dbg) for v in module.globals.values() if v.init is not None]
+    for name, reference in defined:
+        if position := info.declared(reference):
+            yield name, f"{position[0]}:{position[1]}"
 
 
 def _uses(text: str) -> Iterable[tuple[str, str]]:

@@ -116,8 +116,7 @@ def front_end_flags(options: CcOptions, language: str = "c") -> list[str]:
     flags = [*TARGET_FLAGS, *LANGUAGE_FLAGS, CLANG_LEVEL[options.level]]
     flags += [f"-U{name}" for name in FOREIGN_MACROS]
     own_folders = (INCLUDE_DIR, folder_of(options.chip.name), builtin_include_dir())
-    own_folders = own_folders if options.own_headers else ()
-    folders = [word for folder in own_folders for word in ("-isystem", str(folder))]
+    folders = [word for folder in (own_folders if options.own_headers else ()) for word in ("-isystem", str(folder))]
     guard = ["__HAS_CODEGUARD__"] if "FBS" in options.chip.config else []
     flags += [f"-D{name}=1" for name in (f"__{options.chip.name}__", *PREDEFINED, *guard)]
     flags += [f"-fno-builtin-{name}" for name in (*ABSENT_FUNCTIONS, *ALLOCATION_FUNCTIONS)]

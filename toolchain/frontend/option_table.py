@@ -68,7 +68,7 @@ SECTIONS: list[tuple[str, list[tuple[str, str, str]]]] = [
         ("-mno-file", IGNORED, "no file is needed"),
         ("-moptimize-page-setting", IGNORED, "this family has no DSRPAG register"),
         ("-mcodecov[=<word>]", REFUSED, "there is no coverage instrumentation: use `emu run --coverage`"),
-        ("-mchp-stack-usage", IGNORED, "use `python -m toolchain stack`"),
+        ("-mchp-stack-usage", IGNORED, "use `python -m toolchain bounds`"),
         ("-mdebugger", IGNORED, "no debug executive is linked"),
         ("-mafrlcsj", IGNORED, "MPLAB X's switch for comparing the optimisers of licences"),
         ("-mnofallback", IGNORED, "there is no licence"), ("--nofallback", IGNORED, "there is no licence"),

@@ -8,6 +8,7 @@ pointers.
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from toolchain.abi.isr_names import VECTOR_FUNCTIONS
@@ -36,8 +37,8 @@ class _FunctionText:
     made: dict[str, str] = field(default_factory=dict)
 
 
-def findings(text: str) -> list[str]:
-    """Warnings to print, in the order of the source."""
+def findings(text: str, locate: Callable[[str], str]) -> list[str]:
+    """Warnings to print, in the order of the source; `locate` returns "file:line" of a !dbg reference."""
     bodies = {name.strip('"'): body for name, body in FUNCTION.findall(text)}
     interrupts = _closure({name for name in bodies if name in VECTOR_FUNCTIONS}, bodies)
     written = {place for name in interrupts for place in STORE.findall(bodies[name]) if place.startswith("@")}
@@ -48,9 +49,9 @@ def findings(text: str) -> list[str]:
         if name in interrupts or not any(place in body for place in written):
             continue
         out += [
-            f"warning: {where}'{flag[1:]}' is written by an interrupt function and waited for in a loop of '{name}', "
+            f"{where}warning: '{flag[1:]}' is written by an interrupt function and waited for in a loop of '{name}', "
             "which may read it only once: declare it volatile"
-            for flag, where in _polled(_parse(body), written, text)
+            for flag, where in _polled(_parse(body), written, locate)
         ]
     return out
 
@@ -85,8 +86,8 @@ def _parse(body: str) -> _FunctionText:
     return code
 
 
-def _polled(code: _FunctionText, written: set[str], text: str) -> list[tuple[str, str]]:
-    """(variable, source line or "") of every loop that polls a variable."""
+def _polled(code: _FunctionText, written: set[str], locate: Callable[[str], str]) -> list[tuple[str, str]]:
+    """(variable, "file:line: " or "") of every loop that polls a variable."""
     out = []
     for body in natural_loops(code.succs, next(iter(code.blocks))).values():
         lines = [line for name in body for line in code.blocks[name]]
@@ -102,14 +103,9 @@ def _polled(code: _FunctionText, written: set[str], text: str) -> list[tuple[str
             if not leaves & written or leaves & set(stored):
                 continue
             reference = LINE_REFERENCE.search(end)
-            where = f"line {_line_number(reference[1], text)}: " if reference is not None else ""
+            where = f"{locate('!' + reference[1])}: " if reference is not None else ""
             out += [(place, where) for place in sorted(leaves & written)]
     return list(dict.fromkeys(out))
-
-
-def _line_number(reference: str, text: str) -> str:
-    found = re.search(rf"^!{reference} = !DILocation\(line: (\d+)", text, re.MULTILINE)
-    return found[1] if found is not None else "?"
 
 
 def _read_by(line: str, code: _FunctionText) -> set[str]:

@@ -112,9 +112,20 @@ class Placer:
 
     def _fix(self, section: Section, pool: Pool, load: int, address: int, what: str) -> None:
         if load % 2 or not pool.reserve(load, even(section.units)):
-            end = load + even(section.units)
-            raise ToolError(f"{self._name(section)} at {load:#x}..{end:#x} overlaps another section or leaves {what}")
+            raise self._conflict(section, load, what)
         self._record(section, address, load)
+
+    def _conflict(self, section: Section, load: int, what: str) -> ToolError:
+        """The error for a section that cannot have the address that `address(N)` gives it."""
+        end = load + even(section.units)
+        here = f"{self._name(section)} at {load:#x}..{end - 1:#x}"
+        if load % 2:
+            return ToolError(f"{here}: the address is odd")
+        for other, at in self.layout.placed.items():
+            if space_of(other) == space_of(section) and at.load < end and load < at.load + at.size:
+                there = f"{self._name(other)} at {at.load:#x}..{at.load + at.size - 1:#x}"
+                return ToolError(f"{here} overlaps {there}: give one of them another address")
+        return ToolError(f"{here} leaves {what}")
 
     # -- program -------------------------------------------------------------------------------------------------
 

@@ -108,6 +108,11 @@ class Relocator:
                 raise FieldError(f"target {target.address + _signed(field, 16):#x} is odd")
             if formula is Formula.DO_END and distance >> 1 in (-2, -1, 0):
                 raise FieldError("DO loop shorter than two instructions")
+            if formula is Formula.BRANCH and not kind.low <= distance >> 1 <= kind.high:
+                raise FieldError(
+                    f"the target is {abs(distance) // 2} words away, a branch or RCALL reaches {kind.high}: "
+                    "compile with -mlarge-code, or use CALL and GOTO"
+                )
             return fields.checked(kind, distance >> 1)
         if formula is Formula.HALF:
             if target.address & 1:

@@ -149,6 +149,9 @@ def parse(statement: str, expr: Expr = Number.read) -> Parsed:
                 return _parsed(form, site, parts, expr, statement)
             except OperandError as error:
                 raise StatementError(f"{statement}: {error}") from None
+    absent = next((n for n in re.findall(r"\b[wW](\d+)\b", " ".join(tokens)) if int(n) > 15), None)
+    if absent is not None:
+        raise StatementError(f"{statement}: there is no register W{absent}, only W0 to W15")
     accepted = " | ".join(form.syntax for form, _ in choices)
     raise StatementError(f"{statement}: operands fit none of {accepted}")
 

@@ -114,8 +114,9 @@ def test_polled_flags_that_are_not_volatile_cause_a_warning(level: str, tmp_path
     built = build([source], tmp_path / "polls.elf", level, "-g")
     assert built.status == 0
     named = [line.split("'")[1::2] for line in built.messages.splitlines() if "waited for" in line]
-    assert named == [["flag", "wait"], ["flag", "waiting"], ["other", "wide"], ["flag", "bounded"]]
-    assert "line 4: 'flag'" in built.messages
+    expected = [["flag", "wait"], ["flag", "waiting"], ["other", "wide"], ["flag", "bounded"]]
+    assert named == ([] if level == "-O0" else expected)
+    assert level == "-O0" or f"{source}:4: warning: 'flag'" in built.messages
     assert build([source], tmp_path / "quiet.elf", level, "-w").messages == ""
 
 

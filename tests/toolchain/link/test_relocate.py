@@ -118,7 +118,7 @@ def test_undefined_weak_symbols_are_zero():
         ("FILE_REG_BYTE", 0, 0x2000, "near addressing: the address must be below 0x2000"),
         ("FILE_REG", 0, 0x801, "must be even"),
         ("FILE_REG_WORD", 0, 0x801, "must be even"), ("FILE_REG_WORD_WITH_DST", 0, 0x801, "odd address"),
-        ("WORD", 0, 0x10000, "outside"), ("8", 0, 256, "outside -128..255"), ("PCREL_BRANCH", 0, 0x17000, "outside"),
+        ("WORD", 0, 0x10000, "outside"), ("8", 0, 256, "outside -128..255"), ("PCREL_BRANCH", 0, 0x17000, "away"),
         ("PCREL_BRANCH", 0, 0x105, "odd"), ("PCREL_DO", 0, 0x102, "shorter than two"),
         ("UNSIGNED_5", 0, 32, "outside 0..31"),
         ("FRAME_SIZE", 0, 3, "even"), ("DSP_6", 0, 17, "outside -16..16"), ("UNSIGNED_10", 0, 1024, "outside"),
