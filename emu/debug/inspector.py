@@ -50,6 +50,9 @@ class Frame:
         where = f" ({self.line})" if self.line is not None else ""
         return f"{self.function}{where} at {self.pc:#08x}" + (f" [{self.kind}]" if self.kind != "call" else "")
 
+    def __repr__(self) -> str:
+        return f"<Frame {str(self)[:180]}>"
+
 
 class Inspector:
     """Inspector of `machine` that uses its image's debug information. Raises ValueError if no image is loaded."""

@@ -55,6 +55,9 @@ class Thread:
     def __str__(self) -> str:
         return f"thread {self.pid} ({self.name})"
 
+    def __repr__(self) -> str:
+        return f"<thread {self.pid} ({self.name[:80]}): {self.state}, {self.used} bytes of stack used>"
+
     @property
     def used(self) -> int | None:
         """High-water mark of the stack in bytes."""

@@ -50,6 +50,9 @@ class Block:
     False for constants and tables. HEX files do not distinguish, so always True there.
     """
 
+    def __repr__(self) -> str:
+        return f"<Block {self.origin[:80]}: {len(self.words)} words at {self.base:#08x}>"
+
     @property
     def end(self) -> int:
         """First address after the block."""
@@ -71,6 +74,9 @@ class Section:
     octets: bytes
     """Raw file content (empty for bss)."""
 
+    def __repr__(self) -> str:
+        return f"<Section {self.name[:80]}: {self.kind}, {self.size} units at {self.address:#x}>"
+
     @property
     def program_words(self) -> int:
         """Number of program words that the section occupies, 0 if it is not loaded."""
@@ -91,6 +97,9 @@ class Image:
     entry: int | None = None
     """e_entry of an ELF file (PC units). The chip itself always starts at 0."""
     warnings: tuple[str, ...] = field(default=())
+
+    def __repr__(self) -> str:
+        return f"<Image {self.path[-80:]}: {self.kind}, {self.chip.name}, {len(self.blocks)} blocks>"
 
     def words(self, region: Region | None = None) -> Iterator[tuple[int, int]]:
         """Yield (address, word) of every defined program word, in address order, in one region or in all."""

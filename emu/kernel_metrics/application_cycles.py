@@ -23,9 +23,10 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import partial
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from emu.dspic30f.exceptions.interrupts import Accepted
+from emu.host.tables import data_frame, html_table
 from emu.kernel_metrics.application_memory import SCHEDULER
 from emu.kernel_metrics.heap import Heap
 from emu.kernel_metrics.kernel_structures import KernelStructures, event_name
@@ -53,7 +54,7 @@ MOST_MASKABLE: Final = 7
 P99: Final = 99
 
 
-@dataclass(slots=True)
+@dataclass(slots=True, repr=False)
 class Operation:
     """All occurrences of one operation in Tcy."""
 
@@ -81,6 +82,9 @@ class Operation:
         if value > most:
             self.longest = log.cycles(begin, end)
         self.extremes = min(least, value), max(most, value)
+
+    def __repr__(self) -> str:
+        return f"<{self.name[:120]}: {len(self.all)} times>"
 
     def statistics(self) -> dict[str, int]:
         """Return count, min, median, p99 and max in Tcy (nearest rank), and the same of undisturbed occurrences."""
@@ -147,6 +151,20 @@ class ApplicationCycles:
     seconds: float
     operations: dict[str, Operation]
     stop: Stop | None = None
+
+    def __repr__(self) -> str:
+        return f"<cycles of {len(self.operations)} operations in {self.seconds:g} s>"
+
+    def rows(self) -> list[dict[str, object]]:
+        """Return one row per operation: name, count, min, median, p99 and max in Tcy."""
+        return [{"operation": name, **one.statistics()} for name, one in self.operations.items()]
+
+    def frame(self) -> Any:
+        """Return `rows` as a pandas DataFrame. Raises ModuleNotFoundError without pandas."""
+        return data_frame(self.rows())
+
+    def _repr_html_(self) -> str:
+        return html_table(self.rows(), repr(self)[1:-1])
 
 
 class _Run:

@@ -12,6 +12,7 @@ from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any, Final
 
 from emu.debug.inspector import Inspector
+from emu.host.tables import data_frame, html_table
 from emu.image.footprint import pieces
 from emu.image.model import Image
 from emu.kernel_metrics.blame import short
@@ -126,6 +127,18 @@ class ApplicationMemory:
     kernel_stack_used: int
     equation: dict[str, Any]
     stop: Stop | None = None
+
+    def __repr__(self) -> str:
+        threads, heap = len(self.threads), self.heap
+        return f"<memory in {self.seconds:g} s: {threads} threads, heap {heap.used:,} of {heap.capacity:,} bytes used>"
+
+    def frame(self) -> Any:
+        """Return one row per thread as a pandas DataFrame. Raises ModuleNotFoundError without pandas."""
+        return data_frame([asdict(one) for one in self.threads])
+
+    def _repr_html_(self) -> str:
+        threads = html_table([asdict(one) for one in self.threads], repr(self)[1:-1])
+        return threads + html_table([asdict(one) for one in self.events], "events")
 
     def facts(self) -> dict[str, Any]:
         """Return everything as plain data."""

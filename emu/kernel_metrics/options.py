@@ -35,10 +35,22 @@ SCENES: Final = (
     *("SEND_REPLACED", "SEND_SECOND_QUOTA", "SEND_NEIGHBOUR", "SEND_ELSEWHERE", "START_SERVICE", "FEED"),
     *("FEED_BEHIND_TWO", "TICK", "TICK_SERVICE", "TAKE", "TAKE_NONE", "SIGNAL", "SIGNAL_ONE_WAITS", "TAKE_BITS"),
     *("TAKE_NO_BITS", "NOTIFY", "NOTIFY_ONE_WAITS", "START_TIMER", "START_TIMER_BESIDE_TWO", "STOP_TIMER"),
-    *("STOP_TIMER_BEHIND_TWO", "TICK_TIMER"),
+    *("STOP_TIMER_BEHIND_TWO", "TICK_TIMER", "RESET_CAUSE", "START_WATCHDOG"),
 )
 """Scenes in the order of the enumeration in firmware/apps/options/options.h."""
-OPTIONS: Final = ("mutex", "join", "cleanup", "quota", "service", "semaphore", "notification", "timer", "woken_first")
+OPTIONS: Final = (
+    "mutex",
+    "join",
+    "cleanup",
+    "quota",
+    "service",
+    "semaphore",
+    "notification",
+    "timer",
+    "reset",
+    "watchdog",
+    "woken_first",
+)
 """Options by the names of their files in firmware/openswarm/option."""
 KERNEL_PARTS: Final = {
     "_os_call_in_section": "cleanup", "_event_bucket": "quota", "_process_awaits": "semaphore"
@@ -130,6 +142,8 @@ def measures() -> Iterator[tuple[str, str, MeasureFunction]]:
     yield "Sys_Stop_Timer", "STOP_TIMER", until_return("Sys_Stop_Timer")
     yield "Sys_Stop_Timer, two others are newer", "STOP_TIMER_BEHIND_TWO", until_return("Sys_Stop_Timer")
     yield "1 ms clock, idle, a timer sends without listeners", "TICK_TIMER", clock_until_idle
+    yield "Sys_Get_ResetCause", "RESET_CAUSE", until_return("Sys_Get_ResetCause")
+    yield "Sys_Start_HardwareWatchdog", "START_WATCHDOG", until_return("Sys_Start_HardwareWatchdog")
 
 
 def until_entry_on_kernel_stack(place: str) -> MeasureFunction:

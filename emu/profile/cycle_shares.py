@@ -12,12 +12,13 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from fnmatch import fnmatch
 from functools import cached_property
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from emu.debug.inspector import Inspector
 from emu.dspic30f.cycle_accounting import CycleAccounting
+from emu.host.tables import data_frame, html_table
 from emu.image.model import Image
 from emu.profile.call_graph import NOWHERE, CallEdge, CallEvent, CallGraph
 
@@ -54,6 +55,24 @@ class Profile:
     """Call events in order, if `timed`. The iterable can be consumed only once."""
     stop: Stop | None = None
     """Stop that ended the run early; None if there was none."""
+
+    def __repr__(self) -> str:
+        return f"<Profile: {self.cycles:,} cycles, {self.idle:,} idle, {len(self.functions)} functions>"
+
+    def rows(self) -> list[dict[str, object]]:
+        """Return one row per function: name, exclusive cycles and share in percent, the largest first."""
+        whole = max(self.cycles, 1)
+        return [
+            {"function": name, "cycles": cycles, "percent": 100 * cycles / whole}
+            for name, cycles in self.functions.most_common()
+        ]
+
+    def frame(self) -> Any:
+        """Return `rows` as a pandas DataFrame. Raises ModuleNotFoundError without pandas."""
+        return data_frame(self.rows())
+
+    def _repr_html_(self) -> str:
+        return html_table(self.rows(), repr(self)[1:-1])
 
     @property
     def functions(self) -> Counter[str]:

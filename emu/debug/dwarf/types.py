@@ -50,6 +50,9 @@ class Type:
     """Names of enumerators by value."""
     is_signed: bool = False
 
+    def __repr__(self) -> str:
+        return f"<Type {str(self)[:160]}: {self.bytes} bytes>"
+
     @property
     def bare(self) -> Type:
         """The type without typedefs and qualifiers."""

@@ -63,6 +63,9 @@ class Variable:
     file: str = ""
     line: int = 0
 
+    def __repr__(self) -> str:
+        return f"<Variable {self.name[:80]}: {str(self.type)[:80]}>"
+
 
 @dataclass(eq=False, slots=True)
 class Scope:
@@ -83,6 +86,9 @@ class Scope:
     unit: int = 0
     returns: Type | None = None
     """Type of a function's result; None for void."""
+
+    def __repr__(self) -> str:
+        return f"<Scope {self.kind} {self.name[:80]}: {len(self.variables)} variables>"
 
     def contains(self, pc: int) -> bool:
         """Whether the scope contains the instruction at `pc`."""
