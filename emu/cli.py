@@ -10,7 +10,6 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 from importlib import import_module
-from importlib.metadata import version
 from typing import Final
 
 from emu.commands import COMMANDS
@@ -37,6 +36,8 @@ def _answer(words: list[str]) -> int:
         print(_USAGE.format(commands="\n".join(f"  {name:{width}}  {text}" for name, text in COMMANDS.items())))
         return DONE if words else BAD_INPUT
     if words == ["--version"]:
+        from importlib.metadata import version  # imported only here: it takes as long as a short run
+
         print(f"emu {version('openswarm')}")
         return DONE
     name, rest = words[0], words[1:]

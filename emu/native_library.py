@@ -13,7 +13,6 @@ import os
 import subprocess
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Final
 
@@ -39,7 +38,7 @@ def functions(source: Path, signatures: Signatures) -> dict[str, Callable[..., A
 
     compiler = shared_compiler()
     text = source.read_bytes()
-    key = compiler.key(2, version("ziglang").encode(), repr(FLAGS).encode(), text)
+    key = compiler.key(2, _compiler_identity(), repr(FLAGS).encode(), text)
     code = compiler.cache.get(key)
     if code is None:
         code = _compiled(source)
@@ -53,6 +52,18 @@ def functions(source: Path, signatures: Signatures) -> dict[str, Callable[..., A
     _libraries.append(library)
     return {name: ctypes.PYFUNCTYPE(result, *arguments)(int(library[name]))
             for name, (result, arguments) in signatures.items()}  # fmt: skip
+
+
+def _compiler_identity() -> bytes:
+    """Return what distinguishes the installed compiler: its package's file with time and size.
+
+    The package's version would need importlib.metadata, whose import takes as long as a short run.
+    """
+    found = importlib.util.find_spec("ziglang")
+    if found is None or found.origin is None:
+        return b""
+    status = os.stat(found.origin)
+    return f"{found.origin} {status.st_mtime_ns} {status.st_size}".encode()
 
 
 def address_of(function: Callable[..., Any]) -> int:

@@ -16,6 +16,19 @@ import numpy as np
 import numpy.typing as npt
 
 from emu.dspic30f.core import Core
+from emu.dspic30f.cycle_log import (
+    CALLED,
+    ENTERED,
+    ENTRY_WORDS,
+    IDLE,
+    LOG,
+    LOG_COUNT,
+    LONGEST_RUN,
+    RESET,
+    RETFIE_CELL,
+    RETURNED,
+    SLEPT,
+)
 from emu.dspic30f.exceptions.faults import DeviceReset
 from emu.dspic30f.exceptions.interrupts import Accepted
 from emu.dspic30f.exceptions.power import Sleeping
@@ -24,21 +37,6 @@ from emu.dspic30f.state.state import STACK_POINTER
 
 LEVELS: Final = 16
 """Number of CPU priorities, including those of traps (isa.md §14.1)."""
-IDLE, LOG_COUNT, RETFIE_CELL, LOG = range(4)
-"""Indices of the words after the cells: cycles in Idle and Sleep; number of log entries; address of the cell of the
-RETFIE that native code ran last; first log entry."""
-ENTRY_WORDS: Final = 4
-"""Words of a log entry:
-
-0. cycle
-1. kind | level << 8 | W15 << 16 | instruction address << 32, where W15 points to the return address
-2. target address | cycles of an interrupt's entry or of a sleep << 32
-3. cycle of the interrupt request
-"""
-CALLED, RETURNED, ENTERED, SLEPT, RESET = range(1, 6)
-"""Kinds of log entries."""
-LONGEST_RUN: Final = 1 << 20
-"""Maximum length in Tcy of a native run between two flushes of the log; each cycle adds at most one entry."""
 LOG_ROOM: Final = 1024
 """Number of entries from the sequencer after which the log is flushed."""
 

@@ -11,7 +11,8 @@ import numpy as np
 import numpy.typing as npt
 
 from emu.dspic30f.core import Core
-from emu.dspic30f.cycle_accounting import LONGEST_RUN, CycleAccounting
+from emu.dspic30f.cycle_accounting import CycleAccounting
+from emu.dspic30f.cycle_log import LONGEST_RUN
 from emu.dspic30f.jit.translate.cycle_counters import (
     AccountingBoundaryCounter,
     AccountingCounter,

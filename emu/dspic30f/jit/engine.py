@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
 from time import perf_counter
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 from weakref import WeakValueDictionary
 
 from emu.dspic30f.core import Core
@@ -22,7 +22,6 @@ from emu.dspic30f.isa.facts import facts_of
 from emu.dspic30f.isa.row import Insn
 from emu.dspic30f.jit.cold_runner import ColdRunner
 from emu.dspic30f.jit.compiler import LoadedCode, shared_compiler
-from emu.dspic30f.jit.counting import Counting
 from emu.dspic30f.jit.environment import (
     ACCOUNTING,
     AT_BOUNDARY,
@@ -57,6 +56,9 @@ from emu.dspic30f.state.modes import Key, Modes
 from emu.dspic30f.state.state import IPL3, NOT_REPEATING, RUN
 from emu.system.native_handle import FRESH_ROOM, Native, Run
 from emu.system.rules import Rule
+
+if TYPE_CHECKING:
+    from emu.dspic30f.jit.counting import Counting
 
 BLOCK_LEVEL, STEP_LEVEL = 2, 0
 """LLVM optimisation levels for block code and for exact code."""

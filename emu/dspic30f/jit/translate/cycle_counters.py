@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Final
 
-from emu.dspic30f.cycle_accounting import (
+from emu.dspic30f.cycle_log import (
     CALLED,
     ENTERED,
     ENTRY_WORDS,
