@@ -7,8 +7,10 @@ from __future__ import annotations
 
 from typing import Final
 
+from emu.peripherals.base import StateCell
 from emu.peripherals.pins import Pins, parse_pin
 from emu.system.events import Events
+from emu.system.record import Record
 
 
 class I2cDevice:
@@ -40,7 +42,7 @@ class I2cDevice:
 class I2cBus:
     """Slaves on the bus, and lines that the environment holds low. Both lines have pull-ups."""
 
-    def __init__(self, pins: Pins, events: Events, sda_pin: str, scl_pin: str) -> None:
+    def __init__(self, pins: Pins, events: Events, record: Record, sda_pin: str, scl_pin: str) -> None:
         self._pins: Final = pins
         self._events: Final = events
         self.port, self.sda = parse_pin(sda_pin)
@@ -49,7 +51,8 @@ class I2cBus:
             raise ValueError("SDA and SCL are expected on one port")
         self.devices: Final[dict[int, I2cDevice]] = {}
         """Slaves by 7-bit address."""
-        self._stuck_clocks = 0
+        self._stuck_clocks: Final = StateCell(record, "i2c.stuck_clocks", "I")
+        """Number of SCL pulses after which a held SDA is released; 0 if it is not held that way."""
         pins.input[self.port] |= self.sda | self.scl
         pins.watch(scl_pin, self._clocked)
 
@@ -71,7 +74,7 @@ class I2cBus:
 
     def hold(self, *, sda: bool = False, scl: bool = False, clocks: int = 0) -> None:
         """Hold lines low from outside. If `clocks` is not 0, release SDA after that many SCL pulses."""
-        self._stuck_clocks = clocks if sda else 0
+        self._stuck_clocks.value = clocks if sda else 0
         mask = self.sda | self.scl
         free = (0 if sda else self.sda) | (0 if scl else self.scl)
         self._pins.set_port(self.port, mask, free)
@@ -82,9 +85,9 @@ class I2cBus:
 
     def pulses(self, count: int) -> None:
         """Count `count` clock pulses made by the chip's master towards the release of a held SDA."""
-        if self._stuck_clocks:
-            self._stuck_clocks = max(self._stuck_clocks - count, 0)
-            if not self._stuck_clocks:
+        if self._stuck_clocks.value:
+            self._stuck_clocks.value = max(self._stuck_clocks.value - count, 0)
+            if not self._stuck_clocks.value:
                 self.release()
 
     def _clocked(self, _cycle: int, _changed: int, levels: int) -> None:

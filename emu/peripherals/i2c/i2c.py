@@ -39,7 +39,7 @@ class I2c(Peripheral):
         self.con.written_by(self._con_written)
         self.trn.written_by(self._trn_written)
         self.rcv.read_by(self._rcv_read)
-        self.wire: Final = I2cBus(context.pins, self.events, site.sda_pin, site.scl_pin)
+        self.wire: Final = I2cBus(context.pins, self.events, self.record, site.sda_pin, site.scl_pin)
         self._port: Final = ports[self.wire.port]
         self._operation: Final = self.cell("operation", "B")
         self._begun: Final = self.timestamp("begun", NEVER)
