@@ -15,7 +15,8 @@ MARK = "__short_double"
 _WITH_F = (
     "fabs floor ceil trunc round fmod modf frexp ldexp ilogb copysign fmin fmax sqrt sin cos tan asin acos atan atan2 "
     "exp log log10 pow hypot sinh cosh tanh asinh acosh atanh exp2 expm1 log2 log1p cbrt rint nearbyint lrint llrint "
-    "lround llround logb scalbn scalbln nextafter remainder remquo fdim fma nan"
+    "cacos casin catan ccos csin ctan cacosh casinh catanh ccosh csinh ctanh cexp clog csqrt conj cproj cabs carg "
+    "creal cimag cpow lround llround logb scalbn scalbln nextafter remainder remquo fdim fma nan"
 )
 NAMES = {name: f"{name}f" for name in _WITH_F.split()} | {
     "nexttoward": "nextafterf", "nexttowardf": "nextafterf", "strtod": "strtof", "strtold": "strtof",
