@@ -110,6 +110,7 @@ def test_drivers_and_files_that_come_and_go_build_anew(make: Maker) -> None:
     assert make.image.read_bytes() == plain
 
 
+@pytest.mark.slow
 def test_another_toolchain_port_or_compiler_builds_anew(make: Maker, writer: Path) -> None:
     """Images of different compilers, ports and toolchains differ, and each is rebuilt only if it has changed."""
     microchip = ["TOOLCHAIN=xc16", f"XC16={writer}", "XC16_BIN2HEX=true"]
