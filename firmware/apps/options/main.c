@@ -1,4 +1,5 @@
 /* One call of an option in each scene, measured from outside between symbols. README.md. */
+#include "hal_compiler.h"
 #include "options.h"
 
 #include <openswarm_cleanup.h>
@@ -96,6 +97,7 @@ static void end_soon(void *ms)
     Sys_Sleep(*(const uint16 *)ms);
 }
 
+TARGETS_OF(process.c / os_call_in_section, clean);
 static void clean(void *unused)
 {
     (void)unused;

@@ -1,7 +1,8 @@
-/* Scenes of the options that wait without losing a wake-up, and of timers. README.md. */
+/* Scenes of the options that wait without losing a wake-up, of timers, and of reset causes. README.md. */
 #include "options.h"
 
 #include <openswarm_notification.h>
+#include <openswarm_reset.h>
 #include <openswarm_semaphore.h>
 #include <openswarm_timer.h>
 
@@ -18,6 +19,9 @@ static void (*volatile notify_value)(sys_notification *, uint16, uint16) = Sys_N
 static uint16 (*volatile take_bits)(sys_notification *, uint16, uint16) = Sys_Wait_for_Notification;
 static bool (*volatile start_timer)(sys_timer *, uint16, uint16, uint16, uint16) = Sys_Start_Timer;
 static bool (*volatile stop_timer)(sys_timer *) = Sys_Stop_Timer;
+
+static const sys_reset_cause *(*volatile reset_cause)(void) = Sys_Get_ResetCause;
+static bool (*volatile start_watchdog)(void) = Sys_Start_HardwareWatchdog;
 
 static void wait_for_post(void *bits)
 {
@@ -92,7 +96,11 @@ static void with_timer(uint16 scene)
 
 void options_waits(uint16 scene)
 {
-    if (scene < START_TIMER) {
+    if (scene >= RESET_CAUSE) {
+        options_settle_under_round_robin();
+        options_ready();
+        (void)(scene == RESET_CAUSE ? reset_cause() != NULL : start_watchdog());
+    } else if (scene < START_TIMER) {
         with_post(scene);
     } else {
         with_timer(scene);

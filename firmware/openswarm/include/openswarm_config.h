@@ -24,7 +24,7 @@
 #define SYS_LOSS_COUNTERS 4 /* events with their own loss counter; losses of further events are summed under id 0 */
 #endif
 #ifndef SYS_REPORTS
-#define SYS_REPORTS 1 /* 0: no fault reports: a trap or a failed assertion only stops the system; saves flash */
+#define SYS_REPORTS 1 /* 0: faults are neither reported nor kept (openswarm_reset.h): they only stop the system; saves flash */
 #endif
 #define SYS_STOP_SYSTEM 0
 #define SYS_DROP_THREAD 1

@@ -20,7 +20,7 @@ typedef struct sys_notification {
     uint16 awaited;        /* private to the kernel */
 } sys_notification;
 
-/* MTHI | no | 16; 369 until a better thread that waits runs | 4 | none.  Sets bits. The next thread switch wakes the thread that waits for one of them; under an
+/* MTHI | no | 16; 372 until a better thread that waits runs | 4 | none.  Sets bits. The next thread switch wakes the thread that waits for one of them; under an
  * eager scheduler that switch follows at once. */
 void Sys_Notify(sys_notification *notification, uint16 bits);
 /* The same; first replaces the value. */

@@ -7,7 +7,7 @@
  *
  * A service that ends, for whatever reason, is restarted within a slice, up to `restarts` times. A service that does
  * not call Sys_Feed_Watchdog for more than limit_ms is killed first. The kernel supervises the services between two
- * threads, which takes 135 cycles a ms and no heap. A restart needs the memory of the thread that ended; it is
+ * threads, which takes 142 cycles a ms and no heap. A restart needs the memory of the thread that ended; it is
  * repeated every ms until that is free. An endless critical section or handler also stops this supervision. */
 #ifndef OPENSWARM_SERVICE_H
 #define OPENSWARM_SERVICE_H

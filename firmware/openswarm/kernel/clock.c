@@ -35,7 +35,7 @@ void os_clock_tick(void)
     if (now == alarm) {
         os_pending |= OS_ALARM;
     }
-    if (os_watch != NULL) {
+    if (os_watch != NULL || os_feed != NULL) {
         os_pending |= OS_WATCH;
     }
     if (OS_HAS_WORK) {

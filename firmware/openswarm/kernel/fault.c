@@ -2,6 +2,8 @@
 /* Fault reports: stack overflow, traps and failed assertions. The motors stop before anything is reported. */
 #include "kernel.h"
 
+void (*os_record_fault)(uint16 fault, uint16 place, uint16 page);
+
 enum { DIGITS = 6 }; /* buffer size: digits of a 16-bit number and the terminating NUL */
 
 /* Writes the digits of a number in front of end; returns the first one. */
@@ -41,17 +43,25 @@ void os_trap(uint16 cause, uint16 pc, uint16 pc_high)
     static const char names[] = "oscillator\0address\0math\0interrupt\0stack";
     static const uint8 at[] = {0, 11, 19, 24, 34};
     board_failsafe();
+    if (SYS_REPORTS && os_record_fault != NULL) {
+        os_record_fault((uint16)(cause + 1u), pc, pc_high);
+    }
     board_report(names + at[cause]);
     report_number(" trap at 0x", pc_high, 16);
     report_number(":", pc, 16);
     stop();
 }
 
+enum { FAULT_ASSERTION = 6 }; /* causes of os_trap() are SYS_FAULT_OSCILLATOR to SYS_FAULT_STACK less 1 */
+
 /* Reports "file.c:123 in thread 1" and stops. */
 void Sys_Assertion_Failed(const char *file, uint16 line)
 {
     (void)hal_lock_devices();
     board_failsafe();
+    if (SYS_REPORTS && os_record_fault != NULL) {
+        os_record_fault(FAULT_ASSERTION, line, 0);
+    }
     board_report(file);
     report_number(":", line, 10);
     stop();

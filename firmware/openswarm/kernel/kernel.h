@@ -151,6 +151,8 @@ extern void (*os_watch)(void); /* kernel stack, slice level, after each tick; ne
 /* Kernel stack, slice level, after OS_POSTED was set: wake threads of the blocked list. */
 extern void (*os_grant_semaphores)(void), (*os_wake_notified)(void);
 extern void (*os_expire_timers)(void); /* kernel stack, slice level, after an alarm; sets the next one */
+extern void (*os_feed)(void); /* kernel stack, slice level, after each tick */
+extern void (*os_record_fault)(uint16 fault, uint16 place, uint16 page); /* a fatal fault; everything is masked */
 extern event *(*os_send_hook)(uint16 id, const void *data, uint16 size); /* a sender's event, instead of event_find() */
 extern void (*os_share_hook)(uint16 id, const void *data, uint16 size); /* any context: a sender's event behind a gate */
 

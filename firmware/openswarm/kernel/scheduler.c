@@ -10,6 +10,7 @@ volatile bool os_in_kernel;
 PRIVATE_VALUE(os_in_kernel, 0);
 
 void (*os_watch)(void);
+void (*os_feed)(void);
 void (*os_grant_semaphores)(void);
 void (*os_wake_notified)(void);
 void (*os_expire_timers)(void);
@@ -30,9 +31,14 @@ static HAL_OUTLINE void work(void)
         }
     }
     HAL_STORE(critical_depth, 0); /* ends a section that a handler left open */
-    if (os_watch != NULL && (os_pending & OS_WATCH)) {
+    if ((os_watch != NULL || os_feed != NULL) && (os_pending & OS_WATCH)) {
         HAL_CLEAR_BIT(os_pending, 2);
-        os_watch();
+        if (os_watch != NULL) {
+            os_watch();
+        }
+        if (os_feed != NULL) {
+            os_feed();
+        }
     }
     if ((os_grant_semaphores != NULL || os_wake_notified != NULL) && (os_pending & OS_POSTED)) {
         HAL_CLEAR_BIT(os_pending, 3);

@@ -75,6 +75,7 @@ bool hal_stack_init(sys_pcb *process, uint8_t *stack, uint16_t bytes, void (*ent
 
 HAL_OUTLINE void hal_stop(void)
 {
+    RCONbits.SWDTEN = 0;
     IEC0 = IEC1 = IEC2 = INTCON1 = 0; /* no interrupt wakes the CPU again: the robot stops, an emulated run ends */
     for (;;) {
         __asm__ volatile("pwrsav #1");
