@@ -1,4 +1,4 @@
-# The C library's snprintf needs about 110 bytes of the logging thread's stack, the interrupts another 62. Microchip's
+# The C library's sprintf needs about 110 bytes of the logging thread's stack, the interrupts another 62. Microchip's
 # library has not been measured; avr-libc's takes about 120, newlib-nano's about 400.
 STACK_ON_epuck := $(if $(filter xc16,$(TOOLCHAIN)),640,256)
 STACK_ON_kilobot := 208
