@@ -34,7 +34,7 @@ NONTERMINATING_ITERATIONS: Final = 6
 """Maximum number of iterations executed of a loop that did not terminate in an earlier execution."""
 MAX_PUSHES: Final = 64
 """Maximum number of iterations of a loop that changes W15."""
-MAX_STEPS: Final = 60_000
+MAX_STEPS: Final = 500_000
 MAX_RETURN_BLOCK: Final = 12
 """Greatest number of instructions of a returning block that is executed once per incoming path."""
 

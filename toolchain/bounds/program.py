@@ -77,12 +77,23 @@ class Program:
         self.sources: Final = SourceMap(debug)
         self.signatures: Final = Signatures(debug)
         self.names: Final = NameResolver(image, self.sources, self.chip, self.calls.entries)
+        self.recursions.update(self._recursion_bounds())
         self.bindings: Final = AnnotationBindings(self.annotations, self.sources, self.names, self.calls.code)
         self._ram = {
             file
             for annotation in self.annotations.of("ram")
             for file in self.sources.matching_files(_neighbour_file(annotation))
         }
+
+    def _recursion_bounds(self) -> dict[int, int]:
+        """Return the activations of functions, by RECURSION_BOUND; functions that are not linked have none."""
+        found = {}
+        for annotation in self.annotations.of("recursion"):
+            name, _, text = annotation.text.partition(" ")
+            address, count = self.address(name, annotation), self.annotations.number(text, annotation)
+            if address is not None and count is not None:
+                found[address] = count
+        return found
 
     def _window(self) -> dict[int, int] | None:
         """Return the bytes of the PSV window; None without PSV sections, empty if they are on several pages."""

@@ -42,6 +42,8 @@
 #define CALL_IF(callee, expression) _BOUNDS_NOTE("if", callee expression)
 /* Anywhere: if the function is analysed as an entry, register Wn is at most `most`. */
 #define ARGUMENT_BOUND(function, n, most) _BOUNDS_NOTE("argument", function n most)
+/* Anywhere: at most `count` activations of the function exist at once. */
+#define RECURSION_BOUND(function, count) _BOUNDS_NOTE("recursion", function count)
 /* Anywhere: the function switches to another stack, and returns to its caller at this CPU priority. */
 #define COMES_BACK(function, level) _BOUNDS_NOTE("back", function level)
 /* Anywhere: functions in which execution continues after a switch to the stack of another thread, each at most once. */

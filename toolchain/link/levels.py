@@ -206,7 +206,7 @@ class _Check:
         names |= {name.removeprefix("_") for name in names}
         for annotation in self.annotations.of("targets"):
             caller, _, text = annotation.text.partition(" ")
-            texts += [text] if caller in names else []
+            texts += [text] if caller.rpartition("/")[2] in names else []
         words = [word.strip() for text in texts for word in text.split(",")]
         return [target for word in words for target in self._named(word)] if words else None
 

@@ -16,6 +16,10 @@
  *   q  queued messages                      i  times idle
  *   u  bytes of a stack never used          k  bytes of the largest stack
  *   w  bytes of a polled I2C transfer
+ * Of options:
+ *   l  locked mutexes                       c  cleanup functions pushed
+ *   y  quotas                               v  services
+ *   r  running timers
  * Optional, for closer bounds:
  *   t  subscriptions of all events          o  subscriptions of one thread
  *   h  holes on a path of the heap's tree   j  free runs pending at a call (0 outside handlers)
@@ -43,6 +47,7 @@
 #define RESUMED_BY(...) struct no_note
 #define LINKS_IN_RAM(...) struct no_note
 #define BOUNDS_AT(text, ...) struct no_note
+#define RECURSION_BOUND(function, count) struct no_note
 #define TARGETS_OF(caller, ...) struct no_note
 #define HIGHEST_LEVEL(level, ...) struct no_note
 #define RESERVED_LEVEL(level, ...) struct no_note

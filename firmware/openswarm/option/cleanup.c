@@ -8,6 +8,7 @@ static sys_pcb *dying;        /* threads on no other list whose cleanups are sti
 static sys_pcb *interrupted;  /* os_running of a handler in which cleanups run; NULL: they run elsewhere or not */
 
 /* Returns the link to the newest cleanup of a thread, or NULL if it has none. */
+BOUNDS_AT("for (", loop c);
 static sys_cleanup **newest_of(const sys_pcb *thread)
 {
     for (sys_cleanup **link = &cleanups; *link != NULL; link = &(*link)->next) {
@@ -19,6 +20,9 @@ static sys_cleanup **newest_of(const sys_pcb *thread)
 }
 
 /* Runs the cleanups of all dying threads, also of those that a cleanup ends, and frees the threads. */
+BOUNDS_AT("while (dying", loop c + n, one);
+/* A cleanup that ends the thread in which it runs leads here once more. */
+RECURSION_BOUND(run_cleanups, 2);
 static void run_all(void)
 {
     bool in_kernel = os_in_kernel;
@@ -52,6 +56,7 @@ static void run_all(void)
 }
 
 /* Teardown of a thread. One loop runs all cleanups, so that cleanups that end threads do not nest. */
+BOUNDS_AT("while (*end", loop n);
 static void run_cleanups(sys_pcb *p)
 {
     if (p == interrupted) {
@@ -72,6 +77,7 @@ static void run_cleanups(sys_pcb *p)
     }
 }
 
+BOUNDS_AT("for (", loop c);
 bool Sys_Push_Cleanup(sys_cleanup *c, void (*run)(void *), void *arg)
 {
     if (os_enter() != SYS_OK) {

@@ -13,6 +13,7 @@ struct joiner { /* on the waiting thread's stack */
 static joiner *joiners; /* slice locked */
 
 /* Teardown of a thread: wakes the threads that join it, which then do not need a zombie, and drops its own join. */
+BOUNDS_AT("for (", loop n, one);
 static void release_joins(sys_pcb *gone)
 {
     for (joiner **link = &joiners; *link != NULL;) {
@@ -32,6 +33,7 @@ static void release_joins(sys_pcb *gone)
 }
 
 /* Keeps the control block of a joinable thread at the end of the blocked list. Killing the zombie frees the block. */
+BOUNDS_AT("while (*end", loop n);
 static bool free_joinable(sys_pcb *p)
 {
     if (p->block == NULL) {
@@ -65,6 +67,7 @@ uint16 Sys_Start_Joinable(const sys_process_config *config)
 }
 
 /* Returns the thread that a thread joins, or NULL. */
+BOUNDS_AT("for (", loop n);
 static const sys_pcb *joined_by(const sys_pcb *thread)
 {
     for (const joiner *j = joiners; j != NULL; j = j->next) {
@@ -75,6 +78,9 @@ static const sys_pcb *joined_by(const sys_pcb *thread)
     return NULL;
 }
 
+BOUNDS_AT("for (const sys_pcb *next", loop n);
+BOUNDS_AT("while (*link != p)", loop n);
+BOUNDS_AT("for (joiner **link", loop n);
 bool Sys_JoinTimeout(uint16 pid, uint16 ms)
 {
     if (os_enter_blocking() != SYS_OK) {

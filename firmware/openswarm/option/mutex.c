@@ -13,6 +13,7 @@ struct sys_mutex_waiter {
 
 static sys_mutex *held; /* all mutexes with an owner; slice locked */
 
+BOUNDS_AT("for (", loop l);
 static uint8 base_priority(const sys_pcb *thread)
 {
     for (const sys_mutex *m = held; m != NULL; m = m->next) {
@@ -34,6 +35,7 @@ static void acquire(sys_mutex *m, sys_pcb *thread)
     }
 }
 
+BOUNDS_AT("for (", loop n);
 static void remove_waiter(sys_mutex *m, const sys_pcb *thread)
 {
     for (waiter **link = &m->waiters; *link != NULL; link = &(*link)->next) {
@@ -46,6 +48,7 @@ static void remove_waiter(sys_mutex *m, const sys_pcb *thread)
 
 /* Passes a free mutex to the waiter of the highest priority, the first of equals. A waiter whose time-out expired but
  * which has not run since is no longer blocked. */
+BOUNDS_AT("for (", loop n);
 static void hand_over(sys_mutex *m)
 {
     sys_pcb *best = NULL;
@@ -63,6 +66,8 @@ static void hand_over(sys_mutex *m)
     }
 }
 
+BOUNDS_AT("while (", loop l);
+BOUNDS_AT("for (", loop l);
 static void release(sys_mutex *m)
 {
     sys_pcb *thread = m->owner;
@@ -82,6 +87,8 @@ static void release(sys_mutex *m)
 }
 
 /* Teardown of a thread: removes its waits and passes its mutexes on. */
+BOUNDS_AT("m = m->next) {", loop l);
+BOUNDS_AT("m != NULL;) {", loop l * l, one);
 static void release_all(sys_pcb *thread)
 {
     sys_mutex *m;
@@ -98,6 +105,7 @@ static void release_all(sys_pcb *thread)
     }
 }
 
+BOUNDS_AT("while (*end", loop n);
 bool Sys_Lock_MutexTimeout(sys_mutex *m, uint16 ms)
 {
     sys_pcb *self = os_running;

@@ -13,6 +13,7 @@ static bool notification_wait(sys_event_data *unused)
 }
 
 /* Kernel stack. */
+BOUNDS_AT("for (", loop n, one);
 static void wake_notified(void)
 {
     sys_pcb *next;

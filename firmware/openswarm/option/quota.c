@@ -13,6 +13,7 @@ static sys_quota *quotas;
 static event null_event; /* has no subscribers: a message sent to it is not stored */
 
 /* Counts the messages of e from m on and remembers the newest one. ISRs may append messages meanwhile. */
+BOUNDS_AT("for (", loop q);
 static void count(message *m, const event *e, uint16 *waiting, message **newest)
 {
     for (; m != NULL; m = HAL_LOAD(m->queued.next)) {
@@ -23,6 +24,9 @@ static void count(message *m, const event *e, uint16 *waiting, message **newest)
     }
 }
 
+BOUNDS_AT("while (e != NULL", loop m + y);
+BOUNDS_AT("while (q != NULL", loop y);
+TARGETS_OF(event.c / Sys_Send_Event, apply_quota);
 static event *apply_quota(uint16 id, const void *data, uint16 size)
 {
     event *e = *event_bucket(id);
@@ -56,6 +60,8 @@ static event *apply_quota(uint16 id, const void *data, uint16 size)
 }
 
 /* Removes a quota, and the quota and gate of an event: an event has at most one of each. Slice locked. */
+BOUNDS_AT("for (sys_quota", loop y, one);
+BOUNDS_AT("for (event", loop m + y);
 static void remove_quota(const sys_quota *again, uint16 id)
 {
     for (sys_quota **link = &quotas; *link != NULL;) {

@@ -28,6 +28,7 @@ static bool takes_unit(sys_semaphore *s)
 }
 
 /* Kernel stack: passes units to threads in order of waiting. */
+BOUNDS_AT("for (", loop n, one);
 static void grant(void)
 {
     sys_pcb *next;

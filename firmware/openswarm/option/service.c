@@ -6,6 +6,7 @@
 static sys_service *services; /* slice locked */
 
 /* Teardown of a thread: supervise() restarts its service. */
+BOUNDS_AT("for (", loop v, one);
 static void release_service(sys_pcb *p)
 {
     for (sys_service *s = services; s != NULL; s = s->next) {
@@ -22,6 +23,7 @@ static void start(sys_service *s)
 }
 
 /* Kills services whose watchdog has expired and restarts ended ones. No handler: a full heap loses its event. */
+BOUNDS_AT("for (", loop v, one);
 static void supervise(void)
 {
     uint16 now = clock_now();
@@ -39,6 +41,7 @@ static void supervise(void)
     }
 }
 
+BOUNDS_AT("while (known", loop v);
 bool Sys_Start_Service(sys_service *s)
 {
     sys_error error = SYS_OK;
@@ -65,6 +68,7 @@ bool Sys_Start_Service(sys_service *s)
     return os_leave(error);
 }
 
+BOUNDS_AT("for (", loop v, one);
 bool Sys_Feed_Watchdog(void)
 {
     sys_error error = SYS_ERROR_PROCESS;

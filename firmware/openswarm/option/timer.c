@@ -8,6 +8,7 @@ enum { LONGEST = 32767 }; /* ms: a timer is due if the time passed it by no more
 static sys_timer *timers; /* running ones; slice locked */
 
 /* Takes a timer off the list; false: it does not run. Slice locked. */
+BOUNDS_AT("for (", loop r);
 static bool stop(const sys_timer *t)
 {
     for (sys_timer **link = &timers; *link != NULL; link = &(*link)->next) {
@@ -20,6 +21,7 @@ static bool stop(const sys_timer *t)
 }
 
 /* Kernel stack: sends the events of the timers that are due. */
+BOUNDS_AT("for (", loop r, one);
 static void expire(void)
 {
     uint16 now = clock_now();

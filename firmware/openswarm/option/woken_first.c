@@ -4,6 +4,7 @@
 #include "kernel.h"
 
 /* Returns the first thread of the ring that was woken and has not run since, else the first thread. */
+BOUNDS_AT("while (p != first)", loop n);
 static sys_pcb *first_woken(sys_pcb *first)
 {
     sys_pcb *p = first;

@@ -86,6 +86,7 @@ static bool transmit(uint16 id, uint8 hops, uint16 origin, const void *data, uin
 }
 
 /* Any context, before the event is sent on this robot. */
+TARGETS_OF(event.c / Sys_Send_Event, transmit_own);
 static void transmit_own(uint16 id, const void *data, uint16 size)
 {
     const shared_event *s = is_arriving ? NULL : find(id);
