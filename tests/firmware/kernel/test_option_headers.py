@@ -10,6 +10,7 @@ import pytest
 
 from emu.cli import main as emu
 from tests.firmware.conftest import FIRMWARE, Build
+from tests.firmware.contracts import CALL, callers
 from toolchain.cli import main as toolchain
 
 INCLUDE = FIRMWARE / "openswarm" / "include"
@@ -27,6 +28,45 @@ CALLS = {
     "reset": ("Sys_Get_ResetCause", "Sys_Start_HardwareWatchdog"),
 }
 """Calls of each option."""
+
+VARIANTS = {
+    "Sys_Lock_MutexTimeout": "Sys_Lock_Mutex",
+    "Sys_JoinTimeout": "Sys_Join",
+    "Sys_Wait_for_SemaphoreTimeout": "Sys_Wait_for_Semaphore",
+    "Sys_Notify_Value": "Sys_Notify",
+    "Sys_Keep_Latest": "Sys_Limit_Event",
+}
+"""Calls of options with the call that they are "the same" as, whose row is theirs too."""
+OTHERS = {"compat", "config", "infrared", "interrupt", "io", "remote", "scheduler"}
+"""Headers beside openswarm.h that belong to no option of the kernel."""
+
+
+def declared(header: str) -> set[str]:
+    """Return the names of the calls that a public header declares."""
+    return set(CALL.findall((INCLUDE / header).read_text()))
+
+
+def test_every_call_of_the_kernel_is_in_the_footprint() -> None:
+    """The application `footprint` names every call of openswarm.h, and each has a contract line."""
+    text = (FIRMWARE / "apps" / "footprint" / "main.c").read_text()
+    calls = declared("openswarm.h")
+    assert {call for call in calls if not re.search(rf"\b{call}\(", text)} == set()
+    assert calls - set(callers("openswarm.h")) == {"Sys_Assertion_Failed"}
+
+
+def test_every_call_of_an_option_has_a_row() -> None:
+    """Each call of an option's header has a contract line, a cycle row and a size row of its file."""
+    options = {file.stem.partition("_")[2] for file in INCLUDE.glob("openswarm_*.h")} - OTHERS
+    assert options == set(CALLS)
+    cycles, sizes = (
+        json.loads((FIRMWARE / "baseline" / f"options-{kind}.json").read_text()) for kind in ("cycles", "footprint")
+    )
+    rows = {re.split(r"[ ,]", row)[0] for row in cycles["rows"]}
+    for option in options:
+        calls = declared(f"openswarm_{option}.h")
+        assert calls == set(callers(f"openswarm_{option}.h")), option
+        assert {VARIANTS.get(call, call) for call in calls} <= rows, option
+        assert f"{option}: ROM" in sizes["rows"]
 
 
 @pytest.fixture(scope="module")
