@@ -1,0 +1,153 @@
+"""The kernel against its model (tests/firmware/model): random programs, calls of the headers, planted faults."""
+
+from __future__ import annotations
+
+import shutil
+from functools import partial
+from pathlib import Path
+from random import Random
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from tests.cases import check_all
+from tests.firmware.conftest import TARGET_APPS, Build
+from tests.firmware.contracts import CALL, HEADERS, callers
+from tests.firmware.model import kernel as _kernel  # noqa: F401  (its import declares every call)
+from tests.firmware.model.calls import CALLS
+from tests.firmware.model.compare import Kernels, build, random_programs
+from tests.firmware.model.faults import FAULTS, FOUND_BY, plant
+from tests.firmware.model.generator import MOST_CALLS, Generator
+from tests.firmware.model.on_target import DEFINES, Robot, small_programs
+from tests.firmware.model.program import Program
+from tests.fuzz.seeds import base_seed
+
+PROGRAMS = 600
+MODELLED = (
+    "",
+    "_cleanup",
+    "_join",
+    "_mutex",
+    "_notification",
+    "_quota",
+    "_remote",
+    "_scheduler",
+    "_semaphore",
+    "_service",
+    "_timer",
+)
+"""Headers whose calls the model knows: openswarm.h and its options."""
+NOT_MODELLED = {
+    "_compat": "other spellings",
+    "_config": "no calls",
+    "_infrared": "devices: tests/firmware/infrared",
+    "_interrupt": "macros of a port: tests/firmware/kernel/test_interrupts_on_target.py",
+    "_io": "devices: tests/firmware/drivers",
+    "_reset": "ends the run",
+}
+"""The other headers, and why the model does not know their calls."""
+OUTSIDE = {
+    "Sys_Init_Kernel": "its effect is the model's initial state",
+    "Sys_Assertion_Failed": "ends the system",
+    "Sys_Next_Ready": "for schedulers, which the interpreter has two of",
+    "Sys_Pid_Of": "for schedulers",
+    "Sys_Priority_Of": "for schedulers",
+}
+"""Calls of MODELLED headers that no program makes, and why."""
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Build the interpreter for the POSIX port and return its folder."""
+    if shutil.which("gcc") is None:
+        pytest.skip("the interpreter of kernel programs is built with gcc, which is not installed (Debian package gcc)")
+    folder = tmp_path_factory.mktemp("model") / "built"
+    build(folder)
+    build(folder / "remote", "REMOTE=1")
+    return folder
+
+
+def differences(kernels: Kernels, programs: list[Program]) -> list[str]:
+    pairs = zip(programs, kernels.check(programs), strict=True)
+    return [f"{program}\n{difference}" for program, difference in pairs if difference]
+
+
+def test_every_header_is_modelled_or_listed() -> None:
+    names = {path.stem.removeprefix("openswarm") for path in HEADERS.glob("openswarm*.h")}
+    assert names <= {*MODELLED, *NOT_MODELLED}
+
+
+@pytest.mark.parametrize("header", MODELLED)
+def test_the_model_knows_every_call_of_a_header(header: str) -> None:
+    """The model knows each call, with the contexts that its contract line permits."""
+    name = f"openswarm{header}.h"
+    declared = set(CALL.findall((HEADERS / name).read_text()))
+    permitted = callers(name)
+    assert declared - CALLS.keys() - OUTSIDE.keys() == set()
+    assert {call: CALLS[call] for call in permitted if call in CALLS} == {
+        call: letters for call, letters in permitted.items() if call in CALLS
+    }
+    without = {call for call in declared & CALLS.keys() if call not in permitted}
+    assert not without, f"no contract line: {sorted(without)}"
+
+
+def test_a_program_survives_its_text() -> None:
+    for program in random_programs(base_seed(), 20):
+        assert Program.parse(str(program)) == program
+        assert len(program) <= MOST_CALLS + 10
+
+
+@pytest.mark.slow
+def test_random_programs_agree(built: Path) -> None:
+    """Programs that the commit determines return, call and leave the same on the kernel and on the model."""
+    assert not differences(Kernels(built / "interpreter"), random_programs(base_seed(), PROGRAMS))
+    shared = random_programs(base_seed(), PROGRAMS // 6, remote=True)
+    assert not differences(Kernels(built / "remote" / "interpreter"), shared)
+
+
+@pytest.mark.slow
+def test_drawn_programs_agree(built: Path) -> None:
+    """As above, with programs that hypothesis draws and shrinks."""
+    kernels = Kernels(built / "interpreter")
+
+    @settings(max_examples=60, deadline=None, suppress_health_check=list(HealthCheck))
+    @given(st.randoms(use_true_random=False))
+    def agree(random: Random) -> None:
+        assert not differences(kernels, [Generator(random).program()])
+
+    agree()
+
+
+@pytest.mark.slow
+def test_planted_faults_are_found(built: Path, tmp_path: Path) -> None:
+    """The program that found a fault in the campaign differs while the fault is planted, and only then.
+
+    Every fourth fault is planted; the commit determines which.
+    """
+    assert FOUND_BY.keys() == {fault.name for fault in FAULTS}
+    programs = {name: Program.parse(text) for name, text in FOUND_BY.items()}
+    for remote, interpreter in ((False, built / "interpreter"), (True, built / "remote" / "interpreter")):
+        names = [fault.name for fault in FAULTS if fault.remote == remote]
+        assert not differences(Kernels(interpreter), [programs[name] for name in names])
+
+    def check(number: int) -> None:
+        fault = FAULTS[number]
+        folder = tmp_path / str(number)
+        assert differences(Kernels(plant(fault, built, folder)), [programs[fault.name]]), fault.name
+        shutil.rmtree(folder)
+
+    check_all(check, range(base_seed() % 4, len(FAULTS), 4))
+
+
+def check_on_robot(robot: Robot, program: Program) -> None:
+    difference = robot.difference(program)
+    assert difference is None, f"{program}\n{difference}"
+
+
+@pytest.mark.slow
+def test_programs_agree_on_the_robot(image: Build) -> None:
+    """Programs that the commit determines agree with the model on the emulated dsPIC30F, too."""
+    robot = Robot(image("model", TARGET_APPS, f"DEFINES={DEFINES}"))
+    check_all(partial(check_on_robot, robot), small_programs(base_seed(), 30))
+    assert robot.compared > 15

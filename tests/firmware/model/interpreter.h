@@ -1,0 +1,39 @@
+/* Interpreter of random programs of kernel calls (README.md): portable part and machine. */
+#ifndef INTERPRETER_H
+#define INTERPRETER_H
+
+#include "operations.h"
+
+#include "openswarm.h"
+
+enum {
+    MOST_RECORDS = 300, /* a run ends then, */
+    MOST_IDLES = 50,    /* or when the kernel has idled so often */
+    MOST_STARTS = 40,   /* later starts of threads are skipped */
+    MOST_PIDS = 256,
+    SIZES = 15
+};
+
+extern const uint16 interpreter_sizes[SIZES]; /* Sizes of state.py */
+
+/* What the program observed: one record per call, and one per entry of a script. */
+typedef struct {
+    uint8 script, kind; /* of the running script */
+    uint8 index, code;  /* of the operation; ENTRY, 0xFE at the end of a script */
+    uint16 pid, result, error, heap, time, extra;
+} record;
+
+void interpreter_load(const uint8 *program); /* encoded as program.py describes */
+void interpreter_main(void);                 /* never returns */
+void interpreter_final_state(void);          /* records the state of the kernel; any context */
+
+/* The machine that runs the interpreter. */
+void machine_record(const record *r); /* may end the run */
+void machine_start(void);                /* Sys_Start_Kernel */
+void machine_tick(void);
+void machine_slice(void);
+void machine_interrupt(void (*isr)(void));
+void machine_interrupt_at_unlock(uint8 n, void (*isr)(void));
+void machine_fail(uint8 skip, uint8 count);
+
+#endif
