@@ -77,6 +77,8 @@ class EventUse:
     sent: int
     line: str = ""
     """Source line that registered the event, or that subscribed to it last."""
+    sender: str = ""
+    """Source line that queued the message at the peak."""
 
 
 @dataclass(slots=True)
@@ -251,6 +253,8 @@ class _Run:
         use = self._event(identifier)
         use.sent += 1
         messages, size = queued.get(identifier, (1, 0))
+        if messages > use.peak_messages or size > use.peak_bytes:
+            use.sender = self._calling_line() or use.sender
         use.peak_messages, use.peak_bytes = max(use.peak_messages, messages), max(use.peak_bytes, size)
 
     def _event(self, identifier: int) -> EventUse:

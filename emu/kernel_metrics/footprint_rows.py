@@ -79,7 +79,10 @@ def line_of(row: str, memory: ApplicationMemory) -> str:
     for thread in memory.threads:
         if row.startswith(f"thread {thread.name}: "):
             return thread.line
-    return next((event.line for event in memory.events if row.startswith(f"{event.name}: ")), "")
+    for event in memory.events:
+        if row.startswith(f"{event.name}: "):
+            return event.sender if "queued" in row else event.line
+    return ""
 
 
 def grown_pieces(old: dict[str, dict[str, int]], new: dict[str, dict[str, int]]) -> list[tuple[str, str, int]]:

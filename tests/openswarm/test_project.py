@@ -69,7 +69,7 @@ def test_make_and_cmake_build_the_same_bytes(tmp_path):
     drivers.mkdir(parents=True)
     (drivers / "near.c").write_text('#include "near.h"\n#include <analog.h>\nint near(void) { return LIMIT; }\n')
     (drivers / "near.h").write_text("int near(void);\n")
-    (project / "src" / "app.mk").write_text("DEVICES := analog\nDEFINES += -DLIMIT=45\n")
+    (project / "src" / "app.mk").write_text("DEVICES := analog\noverride DEFINES += -DLIMIT=45\n")
     text = '#include "drivers/near/near.h"\n#include <analog.h>\n' + source.read_text()
     calls = "    Sys_Start_Analog();\n    Sys_Set_LED(near(), true);\n"
     source.write_text(text.replace("    Sys_Start_Kernel();", f"{calls}    Sys_Start_Kernel();"))
