@@ -7,6 +7,8 @@ from emu.machine.machine import Machine
 
 SLICE = 4_000
 """Tcy between two polls of the line."""
+LONGEST = 8 * SLICE
+"""Tcy between two polls of a line that has been silent for some time."""
 
 
 class Line:
@@ -28,6 +30,8 @@ class Line:
 
     def read(self, seconds: float) -> bytes:
         limit = self.machine.cycle + round(seconds * emu.FCY_HZ) + 1
+        cycles = SLICE
         while not self.heard and self.machine.cycle < limit:
-            self.machine.run(cycles=min(SLICE, limit - self.machine.cycle))
+            self.machine.run(cycles=min(cycles, limit - self.machine.cycle))
+            cycles = min(2 * cycles, LONGEST)
         return bytes([self.heard.pop(0)]) if self.heard else b""

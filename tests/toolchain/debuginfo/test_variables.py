@@ -15,6 +15,7 @@ from elftools.dwarf.die import DIE
 from elftools.dwarf.dwarfinfo import DWARFInfo
 
 import emu
+from tests.fuzz.seeds import base_seed
 from tests.toolchain.c_programs import build
 from tests.toolchain.debuginfo.dwarf_reader import dwarf_of
 
@@ -229,8 +230,9 @@ def compare(seed: int, options: tuple[str, ...], folder: Path) -> tuple[int, int
 @pytest.mark.slow
 @pytest.mark.parametrize("options", [("-O0",), ("-O1",), ("-Os",), ("-O2",), ("-Os", "-fno-lto")], ids=" ".join)
 def test_locations_of_variables_are_correct(options: tuple[str, ...], tmp_path: Path) -> None:
+    """Locations give the values of all variables, in two of four programs, which the commit determines."""
     evaluated = seen = 0
-    for seed in range(4):
+    for seed in range(base_seed() % 2, 4, 2):
         one, all_ = compare(seed, options, tmp_path)
         evaluated, seen = evaluated + one, seen + all_
     assert seen > 50
