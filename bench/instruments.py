@@ -22,6 +22,7 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
 import emu  # noqa: E402
+from emu.debug.expressions.filters import filter_of  # noqa: E402
 from emu.dspic30f.jit.engine import JitEngine  # noqa: E402
 from emu.instruments.coverage import Counts, count_executions  # noqa: E402
 from emu.instruments.trace import Tracer  # noqa: E402
@@ -52,6 +53,15 @@ def hook(machine: emu.Machine, cycles: int) -> None:
     remove()
 
 
+def conditional(machine: emu.Machine, cycles: int) -> None:
+    asked: Callable[[], bool] = lambda: machine.peek("rounds") == 1  # noqa: E731
+    remove = machine.hook_pc(
+        "mark", asked, filter_of(machine.inspector, "rounds == 1", machine.program_address("mark"))
+    )
+    machine.run(cycles=cycles)
+    remove()
+
+
 def until(machine: emu.Machine, cycles: int) -> None:
     machine.run(cycles=cycles, until=lambda: False)
 
@@ -67,7 +77,8 @@ def trace(machine: emu.Machine, cycles: int) -> None:
 
 
 RUNS: dict[str, tuple[Run, float]] = {
-    "none": (plain, 1), "hook every 500 Tcy": (hook, 1), "until= a condition": (until, SHORT),
+    "none": (plain, 1), "hook every 500 Tcy": (hook, 1), "conditional breakpoint": (conditional, 1),
+    "until= a condition": (until, SHORT),
     "watch": (watch, SHORT), "trace": (trace, SHORT),
 }  # fmt: skip
 

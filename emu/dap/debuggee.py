@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 from emu.dap.breakpoints import Breakpoint
+from emu.debug.expressions.filters import filter_of
 from emu.debug.history import History
 from emu.debug.inspector import Frame, Inspector
 from emu.debug.threads import Thread, Threads
@@ -20,6 +21,7 @@ from emu.dspic30f.isa.facts import facts_of
 from emu.dspic30f.isa.flow import Call
 from emu.image.lines import SourceLine
 from emu.machine.stops import SLEEP_CYCLES, STILL_ASLEEP
+from emu.system.filters import Filter
 
 if TYPE_CHECKING:
     from emu.machine.machine import Machine
@@ -94,7 +96,19 @@ class Debuggee:
         addresses = self._breakpoint_addresses()
         if self._run_target is not None:
             addresses |= set(self._run_target[0])
-        self._hooks = [self.machine.hook_pc(place, self._is_breakpoint_hit) for place in sorted(addresses)]
+        self._hooks = [
+            self.machine.hook_pc(place, self._is_breakpoint_hit, filter_)
+            for place in sorted(addresses)
+            for filter_ in self._filters_at(place)
+        ]
+
+    def _filters_at(self, place: int) -> list[Filter | None]:
+        """Return the filter of the breakpoints at an address; None if every arrival matters or there are several."""
+        conditions = [one.condition for one in self.all() if one.kind != "data" and place in one.addresses]
+        is_target = self._run_target is not None and place in self._run_target[0]
+        if is_target or len(conditions) != 1 or not conditions[0]:
+            return [None]
+        return [filter_of(self.inspector, conditions[0], place)]
 
     def _is_breakpoint_hit(self) -> bool:
         """Mark the breakpoints at the current PC that are hit. Return whether the run stops here."""

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 from typing import Any, Final, Protocol
 
 from emu.dspic30f.core import Core
+from emu.system.filters import Filter
 from emu.system.native_handle import Native, Run
 
 NAMES: Final = ("auto", "jit", "plain")
@@ -80,12 +82,20 @@ class PlainEngine:
         """Return None, because this engine has no native code."""
 
 
-def make_engine(name: str, core: Core, pc_hooks: Mapping[int, Any]) -> Engine:
-    """Return the engine called `name`. Raises ValueError for a name that is not one of NAMES."""
+def make_engine(
+    name: str,
+    core: Core,
+    pc_hooks: Mapping[int, Any],
+    pc_filters: Mapping[int, Sequence[Filter | None]] = MappingProxyType({}),
+) -> Engine:
+    """Return the engine called `name`. Raises ValueError for a name that is not one of NAMES.
+
+    `pc_filters` has the filter of each hook of an address. Native code may pass the address if none of them holds.
+    """
     if name not in NAMES:
         raise ValueError(f"there is no engine {name!r}; expected one of {', '.join(NAMES)}")
     if name == "plain":
         return PlainEngine(core)
     from emu.dspic30f.jit.engine import JitEngine  # imported here: the translator is slow to load
 
-    return JitEngine(core, pc_hooks)
+    return JitEngine(core, pc_hooks, pc_filters)

@@ -35,6 +35,7 @@ from emu.machine.stops import (
 from emu.peripherals import CpuSignals, Peripherals, build
 from emu.system.bus import Bus
 from emu.system.events import NEVER, Events
+from emu.system.filters import Filter
 from emu.system.native_handle import Native, Run
 from emu.system.program import ProgramMemory
 from emu.system.record import Record
@@ -88,6 +89,8 @@ class Machine(StateAccess):
         self.resets: Final[list[tuple[int, str]]] = []
         """(cycle, cause) of the last resets."""
         self._pc_hooks: Final[dict[int, list[PcHook]]] = {}
+        self._pc_filters: Final[dict[int, list[Filter | None]]] = {}
+        """Filters of the hooks of each address, in any order."""
         self._last_hook_stop: tuple[int, int] | None = None
         """PC and cycle at which a hook ended the last run."""
         self._last_reset = LastReset()
@@ -110,7 +113,7 @@ class Machine(StateAccess):
         )
         """Hot state of `run_until`: the 64-bit view of the record, and the indices of cycle, deadline and mode."""
         self.memory_observer = observer(self) if observer is not None else None
-        self.runner = make_engine(engine, self.core, self._pc_hooks)
+        self.runner = make_engine(engine, self.core, self._pc_hooks, self._pc_filters)
         self.reset("POR")
 
     @property
@@ -567,14 +570,15 @@ class Machine(StateAccess):
 
     # Hooks
 
-    def hook_pc(self, place: NameOrAddress, hook: PcHook) -> Callable[[], None]:
+    def hook_pc(self, place: NameOrAddress, hook: PcHook, when: Filter | None = None) -> Callable[[], None]:
         """Call `hook` before the instruction at `place`: a function, a label or a program address.
 
-        A true result stops the run. Returns a function that removes the hook. Raises KeyError for an unknown name,
-        ValueError for an odd address.
+        A true result stops the run. With `when`, the hook need not be called where a comparison does not hold. Returns
+        a function that removes the hook. Raises KeyError for an unknown name, ValueError for an odd address.
         """
         address = self.program_address(place)
         self._pc_hooks.setdefault(address, []).append(hook)
+        self._pc_filters.setdefault(address, []).append(when)
         self.runner.forget()
         removed = False
 
@@ -584,8 +588,9 @@ class Machine(StateAccess):
                 return
             removed = True
             self._pc_hooks[address].remove(hook)
+            self._pc_filters[address].remove(when)
             if not self._pc_hooks[address]:
-                del self._pc_hooks[address]
+                del self._pc_hooks[address], self._pc_filters[address]
             self.runner.forget()
 
         return remove

@@ -8,10 +8,11 @@ from __future__ import annotations
 
 import ctypes
 import hashlib
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from time import perf_counter
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final
 from weakref import WeakValueDictionary
 
@@ -54,6 +55,7 @@ from emu.dspic30f.jit.translate.indirect_sfr import indirect_sfr_text
 from emu.dspic30f.jit.translate.region import Region, discover
 from emu.dspic30f.state.modes import Key, Modes
 from emu.dspic30f.state.state import IPL3, NOT_REPEATING, RUN
+from emu.system.filters import Filter
 from emu.system.native_handle import FRESH_ROOM, Native, Run
 from emu.system.rules import Rule
 
@@ -121,9 +123,15 @@ class JitEngine:
 
     name = "jit"
 
-    def __init__(self, core: Core, pc_hooks: Mapping[int, Any]) -> None:
+    def __init__(
+        self,
+        core: Core,
+        pc_hooks: Mapping[int, Any],
+        pc_filters: Mapping[int, Sequence[Filter | None]] = MappingProxyType({}),
+    ) -> None:
         self._core: Final = core
         self._hooks: Final = pc_hooks
+        self._pc_filters: Final = pc_filters
         self.threshold = 4
         """How often an address without code must be reached before it is translated."""
         self.wait = False
@@ -435,20 +443,25 @@ class JitEngine:
 
     def _new_code(self, key: Key) -> CodeTable:
         core = self._core
-        layout = machine_layout(core, key, frozenset(self._hooks), self._offset)
+        layout = machine_layout(core, key, frozenset(self._hooks), self._offset, self._filters())
         if self._wiring[0] != core.bus.rules:
             self._wiring = core.bus.rules[:], wiring_hash(layout)
         identity = translation_hash(key.context, layout, self._wiring[1])
         program = hashlib.sha256(core.program.flash).digest()
         counted = 0 if self._counting is None else self._env_address  # counting code depends on the cells
         switches = core.bus.off, frozenset(core.bus.watched), self.wait, counted, self.share_group
-        shared = identity, program, layout.hooks, *switches
+        shared = identity, program, layout.hooks, frozenset(layout.filters.items()), *switches
         code = _shared.get(shared)
         if code is None:
             table = ctypes.c_uint64 * self._words
             helper = self._indirect_sfr_code(layout)
             code = _shared[shared] = CodeTable(key.context, layout, identity, helper, table(), table())
         return code
+
+    def _filters(self) -> dict[int, tuple[Filter, ...]]:
+        """Return the filters of the addresses at which every hook has one."""
+        known = {pc: tuple(one for one in filters if one is not None) for pc, filters in self._pc_filters.items()}
+        return {pc: some for pc, some in known.items() if some and len(some) == len(self._pc_filters[pc])}
 
     def _indirect_sfr_code(self, layout: MachineLayout) -> LoadedCode:
         """Return the helper for indirect SFR access."""
@@ -490,7 +503,8 @@ class JitEngine:
             return
         code.entries |= region.leaders
         self.counts.regions += 1
-        hooked = sorted(code.layout.hooks & region.steps.keys())
+        filters = code.layout.filters
+        hooked = [(pc, filters[pc]) if pc in filters else pc for pc in sorted(code.layout.hooks & region.steps.keys())]
         counting = self._counting
         counted = counting.identity(region) if counting is not None else None
         identity = repr((region.words(), sorted(region.leaders), pc, hooked, counted)).encode()

@@ -12,6 +12,7 @@ from emu.dspic30f.interpreter import flow_rules
 from emu.dspic30f.isa.builder import Context
 from emu.dspic30f.state.data_space import W_END
 from emu.dspic30f.state.modes import REGISTERS, Key
+from emu.system.filters import Filter
 from emu.system.rules import Rule
 
 SfrAccess = Literal["plain", "slow", "irq", "flags", "sr"]
@@ -71,6 +72,8 @@ class MachineLayout:
     """Rules of device registers, by even data address."""
     hooks: frozenset[int] = frozenset()
     """Hooked program addresses, before which native code returns to Python."""
+    filters: Mapping[int, tuple[Filter, ...]] = field(default_factory=dict)
+    """Filters of hooked addresses: native code passes the address if none of them holds."""
     do_start: int = -1
     """Address of the active DO loop's first instruction; -1 if no loop is active."""
     do_end: int = -1
@@ -95,9 +98,9 @@ def wiring_hash(layout: MachineLayout) -> bytes:
 def translation_hash(context: Context, layout: MachineLayout, wiring: bytes) -> bytes:
     """Return the hash of processor modes and layout. `wiring` is the layout's `wiring_hash`.
 
-    Hooks are excluded, because a region's key contains the hooks inside the region.
+    Hooks and filters are excluded, because a region's key contains those inside the region.
     """
-    facts = vars(layout) | {"hooks": None, "offset": None, "rules": wiring}
+    facts = vars(layout) | {"hooks": None, "filters": None, "offset": None, "rules": wiring}
     parts = [sorted(part.items()) if isinstance(part, Mapping) else part for part in facts.values()]
     return hashlib.sha256(repr((context, parts)).encode()).digest()
 
@@ -111,7 +114,13 @@ def record_offsets(core: Core) -> dict[str, int]:
     return offset
 
 
-def machine_layout(core: Core, key: Key, hooks: frozenset[int], offset: Mapping[str, int]) -> MachineLayout:
+def machine_layout(
+    core: Core,
+    key: Key,
+    hooks: frozenset[int],
+    offset: Mapping[str, int],
+    filters: Mapping[int, tuple[Filter, ...]] | None = None,
+) -> MachineLayout:
     """Return the facts that translations in the modes `key` may rely on."""
     chip, bus, signals = core.chip, core.bus, core.sequencer.power.signals
     words = {chip.sfrs[s.flag[0]].address: chip.sfrs[s.enable[0]].address for s in chip.interrupts.values()}
@@ -135,6 +144,7 @@ def machine_layout(core: Core, key: Key, hooks: frozenset[int], offset: Mapping[
         flow=flow_rules.operands_of(core.state),
         rules={2 * word: rule for word, rule in enumerate(bus.rules) if rule is not None},
         hooks=hooks,
+        filters=filters or {},
         do_start=start,
         do_end=end,
     )

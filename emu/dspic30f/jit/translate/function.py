@@ -28,6 +28,7 @@ from emu.dspic30f.jit.exit_reasons import (
 from emu.dspic30f.jit.machine_layout import MachineLayout
 from emu.dspic30f.jit.translate.builder import NeedsInterpreter
 from emu.dspic30f.jit.translate.cycle_counters import CycleCounter
+from emu.dspic30f.jit.translate.filters import some_filter_holds
 from emu.dspic30f.jit.translate.frame import FunctionFrame
 from emu.dspic30f.jit.translate.indirect_sfr import interrupt_requested
 from emu.dspic30f.jit.translate.polling import empty_loops
@@ -227,14 +228,21 @@ class Translator(FunctionFrame):
         e.start(ready)
 
     def _stop_for_hook(self, pc: int) -> None:
-        """Leave native code before the hooked address `pc`, unless Python has just called its hook."""
-        e = self.e
+        """Leave native code before the hooked address `pc`, unless its hook was just called or none filter holds."""
+        e, filters = self.e, self.layout.filters.get(pc)
+        if filters is not None:
+            calls, passes = e.fresh("calls"), e.fresh("passes")
+            e.end(f"br i1 {truth(some_filter_holds(e, filters))}, label %{calls}, label %{passes}")
+            e.start(calls)
         word, seen = e.name(), e.fresh("seen")
         e.line(f"{word} = getelementptr i64, ptr %env, i64 {RESUME}")
         hooked = e.load(word, 64)
         e.end(f"br i1 {truth(hooked == pc)}, label %{seen}, label %{self.exit(pc, HOOK)}")
         e.start(seen)
         e.line(f"store i64 {NOWHERE}, ptr {word}, align 1")
+        if filters is not None:
+            e.end(f"br label %{passes}")
+            e.start(passes)
 
     # -- instructions -----------------------------------------------------------------------------------------------
     def _instruction(self, step: Step, written: Number) -> tuple[bool, Number]:
