@@ -1,4 +1,4 @@
-"""Write compile_commands.json for editors: python tools/compile_commands.py FILE -m toolchain cc OPTION... SOURCE...
+"""Write compile_commands.json for editors: python tools/compile_commands.py -m toolchain cc OPTION... SOURCE... -o FILE
 
 The arguments are those of the compiler command that the Makefile has run in the current folder. It compiles all sources
 at once; the file has one command for each, with the flags by which the toolchain runs clang.
@@ -32,4 +32,5 @@ def commands(arguments: list[str], folder: Path) -> list[dict[str, object]]:
 
 
 if __name__ == "__main__":
-    Path(sys.argv[1]).write_text(json.dumps(commands(sys.argv[2:], Path.cwd()), indent=1) + "\n", encoding="utf-8")
+    text = json.dumps(commands(sys.argv[1:-2], Path.cwd()), indent=1)
+    Path(sys.argv[-1]).write_text(text + "\n", encoding="utf-8")
