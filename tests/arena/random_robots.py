@@ -146,14 +146,11 @@ def _sets_camera(chance: Chance, _n: int) -> str:
     return _written(
         *chance.choice(
             (
-                (0x1D, chance.randrange(4)),
-                (0x04, 8),
-                (0x08, chance.randrange(3)),
-                (0x0E, chance.randrange(2)),
+                (0x1D, chance.randrange(4)), (0x04, 8), (0x08, chance.randrange(3)), (0x0E, chance.randrange(2)),
                 (chance.randrange(256), chance.randrange(256)),
             )
         )
-    )
+    )  # fmt: skip
 
 
 def _written(register: int, value: int) -> str:

@@ -15,17 +15,9 @@ from emu.dspic30f.isa.flow import Branch, Call, Do, Goto, Repeat, Return, Skip
 
 SR, CORCON = 0x42, 0x44
 REGISTERS = {
-    "SR": SR,
-    "CORCON": CORCON,
-    "TBLPAG": 0x32,
-    "RCOUNT": 0x36,
-    "MODCON": 0x46,
-    "XMODSRT": 0x48,
-    "XMODEND": 0x4A,
-    "YMODSRT": 0x4C,
-    "YMODEND": 0x4E,
-    "XBREV": 0x50,
-}
+    "SR": SR, "CORCON": CORCON, "TBLPAG": 0x32, "RCOUNT": 0x36, "MODCON": 0x46, "XMODSRT": 0x48, "XMODEND": 0x4A,
+    "YMODSRT": 0x4C, "YMODEND": 0x4E, "XBREV": 0x50,
+}  # fmt: skip
 FLAGS = {"C": 0, "Z": 1, "OV": 2, "N": 3, "DC": 8, "SB": 12, "SA": 13, "OB": 14, "OA": 15}
 READ_ONLY_SR = 0x0210  # DA, RA
 Y_RAM = range(0x1800, 0x2800)

@@ -72,14 +72,11 @@ def test_without_links_there_is_no_column_of_messages(assembled: Callable[[str],
 @pytest.mark.parametrize(
     ("links", "words"),
     [
-        ([[0, 0]], "two different robots of 0 to 4"),
-        ([[0, 5]], "two different robots of 0 to 4"),
-        ([[0, 0.5]], "two different robots of 0 to 4"),
-        ([[0, 1, 2]], "two different robots of 0 to 4"),
-        ([[0, 1], [1, 0]], "is listed twice"),
-        ([0, 1], "expected a list of points"),
+        ([[0, 0]], "two different robots of 0 to 4"), ([[0, 5]], "two different robots of 0 to 4"),
+        ([[0, 0.5]], "two different robots of 0 to 4"), ([[0, 1, 2]], "two different robots of 0 to 4"),
+        ([[0, 1], [1, 0]], "is listed twice"), ([0, 1], "expected a list of points"),
     ],
-)
+)  # fmt: skip
 def test_invalid_links_are_refused(links: list[object], words: str) -> None:
     """Invalid links are refused with a message that names the valid robot numbers."""
     with pytest.raises(SceneError, match=words):

@@ -103,14 +103,11 @@ def test_stamps_come_back_as_they_were_written(tmp_path):
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
-        ("1 1\n", "line 1: expected `CYCLE UART HEX`"),
-        ("\n1 1 4\n", "line 2: expected `CYCLE UART HEX`"),
-        ("x 1 41\n", "line 1: expected"),
-        ("1 3 41\n", "line 1: there is no UART3"),
-        ("5 1 41\n4 1 41\n", "line 2: cycle 4 is lower"),
-        ("-5 1 41\n", "line 1: cycle -5 is lower"),
+        ("1 1\n", "line 1: expected `CYCLE UART HEX`"), ("\n1 1 4\n", "line 2: expected `CYCLE UART HEX`"),
+        ("x 1 41\n", "line 1: expected"), ("1 3 41\n", "line 1: there is no UART3"),
+        ("5 1 41\n4 1 41\n", "line 2: cycle 4 is lower"), ("-5 1 41\n", "line 1: cycle -5 is lower"),
     ],
-)
+)  # fmt: skip
 def test_a_damaged_record_is_refused_with_its_line(tmp_path, text, expected):
     path = tmp_path / "stamps"
     path.write_text(text)

@@ -43,14 +43,11 @@ class OnNumbers:
 
 
 RULES = {
-    "repeat": (flow_rules.execute_repeat, ("count",)),
-    "repeated": (flow_rules.end_iteration, ("counting",)),
+    "repeat": (flow_rules.execute_repeat, ("count",)), "repeated": (flow_rules.end_iteration, ("counting",)),
     "repeating": (flow_rules.restore_repeat, ("count", "left")),
-    "do": (flow_rules.execute_do, ("count", "start", "end")),
-    "loop_again": (flow_rules.end_loop_iteration, ()),
-    "resume": (flow_rules.execute_retfie, ("srl", "ipl3")),
-    "disi": (flow_rules.execute_disi, ("count", "after")),
-}
+    "do": (flow_rules.execute_do, ("count", "start", "end")), "loop_again": (flow_rules.end_loop_iteration, ()),
+    "resume": (flow_rules.execute_retfie, ("srl", "ipl3")), "disi": (flow_rules.execute_disi, ("count", "after")),
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("name", RULES)

@@ -77,14 +77,9 @@ class Tally:
         """Return the counts by name."""
         names = ("programs", "instructions", "entries", "places", "rows", "native_rows")
         return {name: dict(getattr(self, name)) for name in names} | {
-            "executed": self.executed(),
-            "stops": self.stops,
-            "exchanges": self.exchanges,
-            "hooks": self.hooks,
-            "pairs": len(self.seen),
-            "native_pairs": len(self.native),
-            "exact_pairs": len(self.both),
-        }
+            "executed": self.executed(), "stops": self.stops, "exchanges": self.exchanges, "hooks": self.hooks,
+            "pairs": len(self.seen), "native_pairs": len(self.native), "exact_pairs": len(self.both),
+        }  # fmt: skip
 
     def add(self, other: Tally) -> None:
         """Add the counts of another tally."""

@@ -131,12 +131,9 @@ def mode_words(generator: random.Random, chip: Chip = DSPIC30F6014A) -> list[int
     """Return a write to a mode register, or to the state of a DO loop."""
     name = generator.choice(("CORCON", "MODCON", "XBREV", "DOENDL", "DOSTARTL", "DCOUNT", "PSVPAG", "SPLIM"))
     values = {
-        "DOENDL": CODE + generator.randrange(0, 2 * BODY_WORDS, 2),
-        "DOSTARTL": CODE,
-        "DCOUNT": 2,
-        "SPLIM": chip.data["ram"].end - 0x200,
-        "CORCON": generator.getrandbits(16) & 0x10F7,
-    }
+        "DOENDL": CODE + generator.randrange(0, 2 * BODY_WORDS, 2), "DOSTARTL": CODE, "DCOUNT": 2,
+        "SPLIM": chip.data["ram"].end - 0x200, "CORCON": generator.getrandbits(16) & 0x10F7,
+    }  # fmt: skip
     value = values.get(name, generator.getrandbits(16))
     return literal(value, 7) + words_of("MOV{.W} Wns, f", s=7, f=chip.sfrs[name].address)
 

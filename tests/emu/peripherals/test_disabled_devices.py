@@ -11,13 +11,10 @@ from emu.peripherals.i2c.slave import ExternalMaster
 from .conftest import Rig
 
 OWNERS = {
-    "OC1": ({"OC1CON": 2}, "PMD2", 0, "D"),
-    "U1": ({"U1MODE": 0x8000, "U1STA": 0x0400}, "PMD1", 5, "F"),
-    "I2C": ({"I2CCON": 0x9000}, "PMD1", 7, "G"),
-    "SPI1": ({"SPI1CON": 0x20, "SPI1STAT": 0x8000}, "PMD1", 3, "F"),
-    "DCI": ({"DCICON1": 0x8000}, "PMD1", 8, "G"),
-    "C1": ({"C1CTRL": 0x0200}, "PMD1", 1, "F"),
-}
+    "OC1": ({"OC1CON": 2}, "PMD2", 0, "D"), "U1": ({"U1MODE": 0x8000, "U1STA": 0x0400}, "PMD1", 5, "F"),
+    "I2C": ({"I2CCON": 0x9000}, "PMD1", 7, "G"), "SPI1": ({"SPI1CON": 0x20, "SPI1STAT": 0x8000}, "PMD1", 3, "F"),
+    "DCI": ({"DCICON1": 0x8000}, "PMD1", 8, "G"), "C1": ({"C1CTRL": 0x0200}, "PMD1", 1, "F"),
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("module", OWNERS)

@@ -165,21 +165,12 @@ def supply(rig: Rig) -> None:
 EXTERNAL = {"INT0": "RF6", "INT1": "RA12", "INT2": "RA13", "INT3": "RA14", "INT4": "RA15"}
 CAUSES: dict[str, Callable[[Rig], None]] = {
     **{name: external(int(name[-1]), pin) for name, pin in EXTERNAL.items()},
-    **{f"IC{n}": capture(n) for n in range(1, 9)},
-    **{f"OC{n}": compare(n) for n in range(1, 9)},
-    **{f"T{n}": timer(n) for n in range(1, 6)},
-    **{f"U{n}RX": received(n) for n in (1, 2)},
-    **{f"U{n}TX": sent(n) for n in (1, 2)},
-    **{f"SPI{n}": serial_port(n) for n in (1, 2)},
-    **{f"C{n}": can_bus(n) for n in (1, 2)},
-    "ADC": converter,
-    "NVM": memory,
-    "MI2C": bus_master,
-    "SI2C": bus_slave,
-    "CN": change_notice,
-    "DCI": codec,
-    "LVD": supply,
-}
+    **{f"IC{n}": capture(n) for n in range(1, 9)}, **{f"OC{n}": compare(n) for n in range(1, 9)},
+    **{f"T{n}": timer(n) for n in range(1, 6)}, **{f"U{n}RX": received(n) for n in (1, 2)},
+    **{f"U{n}TX": sent(n) for n in (1, 2)}, **{f"SPI{n}": serial_port(n) for n in (1, 2)},
+    **{f"C{n}": can_bus(n) for n in (1, 2)}, "ADC": converter, "NVM": memory, "MI2C": bus_master, "SI2C": bus_slave,
+    "CN": change_notice, "DCI": codec, "LVD": supply,
+}  # fmt: skip
 
 
 def flags(rig: Rig) -> set[str]:

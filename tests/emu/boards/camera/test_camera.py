@@ -124,15 +124,12 @@ def test_po3030k_grey_window(scale, shift):
 @pytest.mark.parametrize(
     ("sensor", "writes", "frame", "fps"),
     [
-        ("PO6030K", po6030(), 1_600_000, 9.216),
-        ("PO6030K", po6030(form="grey"), 800_000, 18.432),
-        ("PO6030K", po6030(scale=1), 6_400_000, 2.304),
-        ("PO3030K", po3030(), 3_408_000, 4.33),
-        ("PO3030K", po3030(form="grey"), 1_704_000, 8.65),
-        ("PO3030K", po3030(scale=2), 6_816_000, 2.16),
+        ("PO6030K", po6030(), 1_600_000, 9.216), ("PO6030K", po6030(form="grey"), 800_000, 18.432),
+        ("PO6030K", po6030(scale=1), 6_400_000, 2.304), ("PO3030K", po3030(), 3_408_000, 4.33),
+        ("PO3030K", po3030(form="grey"), 1_704_000, 8.65), ("PO3030K", po3030(scale=2), 6_816_000, 2.16),
         ("PO3030K", po3030(scale=1), 13_632_000, 1.08),
     ],
-)
+)  # fmt: skip
 def test_frame_rates(sensor, writes, frame, fps):
     """§7.4, §7.1: a frame lasts 800 x 500 or 852 x 1000 columns of N Tcy."""
     robot = Robot(camera=sensor)

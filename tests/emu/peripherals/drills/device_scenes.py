@@ -101,13 +101,10 @@ def _codec(draw: random.Random) -> Scene:
     """Return the settings of the codec interface in random order, because any of them may be the last that the port
     waits for."""
     settings = [
-        ("DCICON3", draw.randrange(16)),
-        ("TSCON", draw.randrange(0x10000)),
-        ("RSCON", draw.randrange(0x10000)),
-        ("DCICON2", draw.randrange(0x1000)),
-        ("DCICON1", 0x8000 | draw.choice((0, 0x800, draw.randrange(0x800)))),
+        ("DCICON3", draw.randrange(16)), ("TSCON", draw.randrange(0x10000)), ("RSCON", draw.randrange(0x10000)),
+        ("DCICON2", draw.randrange(0x1000)), ("DCICON1", 0x8000 | draw.choice((0, 0x800, draw.randrange(0x800)))),
         ("TXBUF0", draw.randrange(0x10000)),
-    ]
+    ]  # fmt: skip
     if draw.random() < 0.5:
         draw.shuffle(settings)
     return settings
@@ -116,28 +113,20 @@ def _codec(draw: random.Random) -> Scene:
 def _can(draw: random.Random) -> Scene:
     n = draw.choice((1, 2))
     return [
-        (f"C{n}CFG1", draw.randrange(8)),
-        (f"C{n}CFG2", draw.randrange(0x800)),
-        (f"C{n}INTE", 0xFF),
-        (f"C{n}RXM0SID", 0),
-        (f"C{n}RX0CON", 0),
-        (f"C{n}CTRL", draw.choice((0x0200, 0x0000, 0x0400, 0x0700))),
-        (f"C{n}TX0SID", draw.randrange(0x10000)),
-        (f"C{n}TX0DLC", draw.randrange(0x80)),
+        (f"C{n}CFG1", draw.randrange(8)), (f"C{n}CFG2", draw.randrange(0x800)), (f"C{n}INTE", 0xFF),
+        (f"C{n}RXM0SID", 0), (f"C{n}RX0CON", 0), (f"C{n}CTRL", draw.choice((0x0200, 0x0000, 0x0400, 0x0700))),
+        (f"C{n}TX0SID", draw.randrange(0x10000)), (f"C{n}TX0DLC", draw.randrange(0x80)),
         (f"C{n}TX0CON", 0x08 | draw.randrange(4)),
-    ]
+    ]  # fmt: skip
 
 
 def _ports(draw: random.Random) -> Scene:
     letter = draw.choice("ABCDFG")
     return [
-        (f"TRIS{letter}", draw.choice((0, 0xFF00, draw.randrange(0x10000)))),
-        ("CNEN1", draw.randrange(0x10000)),
-        ("CNPU1", draw.randrange(0x10000)),
-        ("CNEN2", draw.randrange(0x100)),
-        ("CNPU2", draw.randrange(0x100)),
+        (f"TRIS{letter}", draw.choice((0, 0xFF00, draw.randrange(0x10000)))), ("CNEN1", draw.randrange(0x10000)),
+        ("CNPU1", draw.randrange(0x10000)), ("CNEN2", draw.randrange(0x100)), ("CNPU2", draw.randrange(0x100)),
         (f"LAT{letter}", draw.randrange(0x10000)),
-    ]
+    ]  # fmt: skip
 
 
 def _edges(draw: random.Random) -> Scene:
@@ -146,16 +135,10 @@ def _edges(draw: random.Random) -> Scene:
 
 def _camera(draw: random.Random) -> Scene:
     return [
-        ("TRISC", 0xFFFF & ~draw.choice((0, 0x2000))),
-        ("LATC", 0x2000),
-        ("TRISD", draw.choice((0xFF00, 0xFFFF, 0))),
-        ("PR4", draw.choice((1, 3))),
-        ("T4CON", 0x8002),
-        ("PR5", 1),
-        ("T5CON", 0x8002),
-        ("PR1", 9),
-        ("T1CON", draw.choice((0x8002, 0))),
-    ]
+        ("TRISC", 0xFFFF & ~draw.choice((0, 0x2000))), ("LATC", 0x2000),
+        ("TRISD", draw.choice((0xFF00, 0xFFFF, 0))), ("PR4", draw.choice((1, 3))), ("T4CON", 0x8002), ("PR5", 1),
+        ("T5CON", 0x8002), ("PR1", 9), ("T1CON", draw.choice((0x8002, 0))),
+    ]  # fmt: skip
 
 
 def _programming(draw: random.Random) -> Scene:
