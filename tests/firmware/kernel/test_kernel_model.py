@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 from functools import partial
 from pathlib import Path
@@ -151,3 +152,9 @@ def test_programs_agree_on_the_robot(image: Build) -> None:
     robot = Robot(image("model", TARGET_APPS, f"DEFINES={DEFINES}"))
     check_all(partial(check_on_robot, robot), small_programs(base_seed(), 30))
     assert robot.compared > 15
+
+
+def test_the_readme_states_every_planted_fault() -> None:
+    """The table in model/README.md has a number of programs for each."""
+    text = (Path(__file__).parents[1] / "model" / "README.md").read_text()
+    assert {name for name, _ in re.findall(r"\| ([^|]+) \| ([\d,]+) (?=\|)", text)} == FOUND_BY.keys()

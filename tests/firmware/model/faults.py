@@ -107,7 +107,7 @@ FAULTS = (
     _one("a timer drifts", TIMER, "(uint16)(t->due + t->period);\n", "(uint16)(clock_now() + t->period);\n"),
     _one("a service restarts for ever", SERVICE, "                s->restarts--;\n", "                ;\n"),
 )  # fmt: skip
-"""Those up to "an end overwrites main's time-out" were real faults of this kernel."""
+"""Those up to "an end overwrites main's time-out" stem from the kernel's history."""
 
 
 def _found_by() -> dict[str, str]:

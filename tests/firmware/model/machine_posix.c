@@ -44,6 +44,7 @@ bool __wrap_host_allocation_fails(void)
 static void end_run(void)
 {
     is_final = true;
+    host_at_unlock(0, NULL);
     interpreter_final_state();
     _exit(EXIT_SUCCESS);
 }
