@@ -85,7 +85,8 @@ def _interrupt(arguments: list[str], number: int) -> list[str]:
 REWRITES: dict[str, Rewrite] = {
     "interrupt": _interrupt,
     **{name: _annotation(name) for name in ("auto_psv", "no_auto_psv", "shadow", "noload")},
-    **{name: _valued(name) for name in ("address", "reverse")},
+    "address": lambda arguments, number: ["__used__", *_valued("address")(arguments, number)],
+    "reverse": _valued("reverse"),
     "near": _section(".near"), "far": _section(".far"),
     "persistent": lambda _arguments, _number: ['__section__(".pbss")'],
     "keep": lambda _arguments, _number: ["__used__", "__retain__"],

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -159,12 +160,13 @@ def test_xc16_attributes(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> 
     """Each Microchip attribute, in its spelling, selects its section (abi-elf.md §1.4, §2.5)."""
     source = write(tmp_path, "a.c", XC16_ATTRIBUTES)
     assert cc(capsys, "-Os", "-Wall", "-S", source, "-o", tmp_path / "a.s") == (0, "")
-    said = (tmp_path / "a.s").read_text()
+    said = re.sub(r"(\.eedata|\.prog)\.\d+,", r"\1.N,", (tmp_path / "a.s").read_text())
+    assert said.count(".section .eedata.N,") == 2
     for line in (
-        ".eedata.0,eedata,keep", ".eedata.1,eedata,keep", ".xmemory._x_line,bss,xmemory",
+        ".eedata.N,eedata,keep", ".xmemory._x_line,bss,xmemory",
         ".ymemory._y_line,bss,ymemory",
         ".pbss,persist", ".near._close,bss,near", ".far._distant,bss", ".nbss._untouched,bss,near,noload",
-        ".nbss._fft,bss,near,reverse(0x40)", ".bss._fixed,bss,address(0x1000),keep", ".prog.7,code",
+        ".nbss._fft,bss,near,reverse(0x40)", ".bss._fixed,bss,address(0x1000),keep", ".prog.N,code",
         ".text._moved,code,address(0x8000),keep",
     ):  # fmt: skip
         assert f"\t.section {line}\n" in said, line
@@ -176,8 +178,6 @@ def test_xc16_attributes(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> 
 
 
 @pytest.mark.parametrize(("line", "attribute"), [
-    ("volatile int n __attribute__((sfr(0x2D2)));", "sfr"),
-    ("extern volatile int n __attribute__((__sfr__));", "sfr"),
     ("void __attribute__((boot)) n(void) {}", "boot"),
     ("void __attribute__((noinline, secure(1))) n(void) {}", "secure"),
     ("int n __attribute__((space(dma)));", "space(dma)"),
@@ -307,7 +307,7 @@ BAD_COMMAND_LINES = [
     (["-Os"], "no input files"),
     (["nowhere.c"], "nowhere.c: no such file"),
     (["--frobnicate", "a.c"], "unknown option '--frobnicate'"),
-    (["-fshort-double", "a.c"], "double is always 64-bit"),
+    (["-mlarge-arrays", "a.c"], "an object has at most 32 Kbytes"),
     (["-mcpu=33FJ128", "a.c"], "device '33FJ128' is not supported"),
     (["a.c", "-o"], "option '-o' needs a value"),
     (["a.c", "-o", "a.c"], "would overwrite an input"),
