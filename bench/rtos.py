@@ -42,13 +42,22 @@ STACK_BYTES = 256
 """Stack size of a task in main.c."""
 SETTLING = 8
 """Number of measurement windows that are skipped at the start."""
+FRAMES_SEEN = 24
+"""Switches of each kind examined in bench/c/frames: every thread is among them."""
+RETURN_ADDRESS = 4
+"""Bytes that a call or an interrupt pushes (isa.md §7.4)."""
+PCB_STATUS, SYS_DSP = 8, 0x10
+"""Place and bit of the DSP flag in a control block (port/dspic30f/cpu.c)."""
 
 ROWS = (
     ("flash of the kernel, all calls linked", "flash"),
     ("flash: kernel, one thread, one UART", "smallest flash"),
     ("RAM of the kernel, its stack included", "A"),
     ("RAM a thread costs beside its stack", "pcb"),
-    ("frame of a preempted thread on its stack", "frame"),
+    ("frame of a yielded thread on its stack", "yielded"),
+    ("the same, DSP state kept", "yielded, DSP"),
+    ("frame of a preempted thread on its stack", "preempted"),
+    ("the same, DSP state kept", "preempted, DSP"),
     ("RAM of an event, a subscription, a message", "objects"),
     ("switch at the end of a slice", "switch"),
     ("switch by a yield", "yield"),
@@ -72,6 +81,9 @@ more cycles each way.
 NOTES = """
 - dsPIC30F6014A: the same emulator and the same compiler at -Os for both kernels. ATmega328P: simavr, with the 4 cycles
   of interrupt response added that it omits. Cortex-M4: QEMU's netduinoplus2.
+- Frames: read from the stacks of threads at the switch, with what the call or the interrupt pushes. OpenSwarm keeps DSP
+  state (accumulators, CORCON, DO loops: none open here) for threads that ask for it, FreeRTOS for all. Not measured on
+  the other CPUs: their sources have 37 bytes preempted and 22 yielded (`port/avr`), 68 for both (`port/cortex_m`).
 - Switch at the end of a slice: from the timer's request (Cortex-M4: from PendSV's first instruction) to the first
   instruction of the next thread. OpenSwarm has a slice of 10 ms and a separate clock interrupt; FreeRTOS's tick of 1 ms
   counts time and switches.
@@ -106,8 +118,9 @@ def run(*words: str | Path) -> None:
 def on_dspic(folder: Path) -> dict[str, Any]:
     """Return the cells of the dsPIC30F, measured as by `emu cycles` and `emu footprint`."""
     images = {}
-    for app in ("latency", "footprint", "smallest"):
-        run("make", "-s", "-C", "firmware", f"APP={app}", f"OUT={folder / app}", f"PYTHON={sys.executable}")
+    for app in ("latency", "footprint", "smallest", "frames"):
+        apps = ["APPS=../bench/c"] if app == "frames" else []
+        run("make", "-s", "-C", "firmware", f"APP={app}", f"OUT={folder / app}", f"PYTHON={sys.executable}", *apps)
         images[app] = load_image(str(folder / app / "firmware.elf"))
     cycles = {name: window.cycles for name, window in run_measures(images["latency"]).items()}
     equation = memory_equation(images["footprint"])
@@ -117,7 +130,7 @@ def on_dspic(folder: Path) -> dict[str, Any]:
         "smallest flash": sum(piece.rom for piece in pieces(images["smallest"])),
         "A": alone["A"],
         "pcb": round(equation["B"]) - 128,
-        "frame": 42,
+        **frames(images["frames"]),
         "objects": [round(equation[name]) for name in "CDE"],
         "switch": cycles["preemptive switch, 2 ready threads"],
         "yield": cycles["Sys_Yield to a yielded thread"],
@@ -127,7 +140,21 @@ def on_dspic(folder: Path) -> dict[str, Any]:
     }
 
 
-def on_port(robot: str, frame: int) -> dict[str, Any]:
+def frames(image: Image) -> dict[str, int]:
+    """Return the bytes of saved frames, read from the stacks of the threads of bench/c/frames."""
+    target = Target(image, "main", "auto")
+    machine, found = target.machine, {}
+    for kind, entry, saved in (("preempted", "_T2Interrupt", "os_slice_end"), ("yielded", "hal_yield", "os_yield")):
+        for _ in range(FRAMES_SEEN):
+            target.run_to(entry)
+            before, thread = machine.w[15] - RETURN_ADDRESS, target.words("os_running", 1)[0]
+            keeps_dsp = target.word(thread + PCB_STATUS) & SYS_DSP
+            target.run_to(saved)
+            found[f"{kind}, DSP" if keeps_dsp else kind] = target.word(thread) - before
+    return found
+
+
+def on_port(robot: str) -> dict[str, Any]:
     """Return the cells of a simulated robot. Raises NotInstalled."""
     found = measure(robot)
     cycles, equation, sizes = found["cycles"], found["equation"], found["sizes"]
@@ -136,7 +163,7 @@ def on_port(robot: str, frame: int) -> dict[str, Any]:
         "smallest flash": sizes["smallest"]["flash"],
         "A": found["kernel_ram"],
         "pcb": equation["B"] - found["stack"],
-        "frame": frame,
+        **dict.fromkeys(("yielded", "yielded, DSP", "preempted", "preempted, DSP")),
         "objects": [equation[name] for name in "CDE"],
         "switch": cycles["preemptive switch, 2 ready threads"] + found["response"],
         "yield": cycles["Sys_Yield to a yielded thread"],
@@ -204,6 +231,15 @@ def on_freertos(checkout: Path, folder: Path) -> dict[str, Any]:
         call = 2  # cycles of CALL (isa.md §13.1)
         return meter.measure_until(lambda: inside() and running() != before, meter.machine.cycle - call).cycles
 
+    def frame(entry: str) -> Callable[[Meter], int]:
+        def take(meter: Meter) -> int:
+            target.run_to(entry)
+            before, thread = meter.machine.w[15] - RETURN_ADDRESS, running()
+            target.run_to("vTaskSwitchContext")
+            return target.word(thread) - before
+
+        return take
+
     def sending(meter: Meter) -> int:
         target.run_to("rtos_send")
         return meter.measure_until(meter.inside("rtos_received")).cycles
@@ -215,7 +251,10 @@ def on_freertos(checkout: Path, folder: Path) -> dict[str, Any]:
         "smallest flash": None,
         "A": sum(ram for _, ram in kernel) - heap.size,
         "pcb": free[1] - free[2] - STACK_BYTES,
-        "frame": 2 * (4 + 16 + 11 + 3),
+        "yielded": None,
+        "yielded, DSP": settle(YIELD, frame("vPortYield")),
+        "preempted": None,
+        "preempted, DSP": settle(TICK, frame("_T1Interrupt")),
         "objects": None,
         "switch": switch,
         "yield": yielded,
@@ -238,9 +277,9 @@ def collect(checkout: Path | None) -> dict[str, Any]:
     with tempfile.TemporaryDirectory(prefix="openswarm-rtos-") as name:
         folder = Path(name)
         cells["dsPIC30F"] = on_dspic(folder)
-        for column, robot, frame in (("ATmega328P", "kilobot", 37), ("Cortex-M4", "epuck2", 68)):
+        for column, robot in (("ATmega328P", "kilobot"), ("Cortex-M4", "epuck2")):
             try:
-                cells[column] = on_port(robot, frame)
+                cells[column] = on_port(robot)
             except NotInstalled as missing:
                 print(f"rtos: {column} as measured before: {missing}", file=sys.stderr)
                 kept.append(column)
