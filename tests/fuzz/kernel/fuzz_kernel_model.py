@@ -21,8 +21,9 @@ from tests.firmware.model.faults import find_all  # noqa: E402
 from tests.fuzz.seeds import SKIPPED, Campaign, parser  # noqa: E402
 
 PROGRAMS = 500
-SHARING = 6
-"""Every sixth batch has programs that share events with other robots."""
+KINDS = 6
+"""Of six batches in a row, one shares events with other robots, and one runs under sanitizers."""
+SANITIZE = "-fsanitize=address,undefined -fno-sanitize-recover=undefined"
 MOST = 40_000
 """Programs after which a planted fault counts as not found."""
 
@@ -44,10 +45,11 @@ def main() -> int:
                 missed += program is None
                 print(f"{fault.name}: {f'{tried:,} programs' if tried else 'not found'}", flush=True)
             return campaign.failed(f"{missed} faults not found") if missed else campaign.ended("every fault found")
-        without, linked = Kernels(built / "interpreter"), Kernels(built / "remote" / "interpreter")
+        plain, sharing = Kernels(built / "interpreter"), Kernels(built / "remote" / "interpreter")
+        sanitized = Kernels(build(built / "sanitized", f"SANITIZE={SANITIZE}"))
         for seed in campaign:
-            remote = seed % SHARING == 0
-            kernels = linked if remote else without
+            remote = seed % KINDS == 0
+            kernels = sharing if remote else sanitized if seed % KINDS == 1 else plain
             programs = random_programs(seed, PROGRAMS, remote)
             for program, difference in zip(programs, kernels.check(programs), strict=True):
                 if difference is not None:
