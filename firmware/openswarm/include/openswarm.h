@@ -10,7 +10,7 @@
  * threads, m events, b newer events in the same bucket (identifier modulo 8), s subscriptions of one event, d
  * payload bytes; g cycles free a block of memory: 60-150, at most 1,200 in a fragmented heap. Cycles were measured
  * on firmware/apps and tests/firmware/target; those with a ~ are counted by hand. Stack is that of `python -m
- * toolchain stack` with the return address; a switch adds its frame (port/dspic30f/README.md). Calls that may block
+ * toolchain bounds` with the return address; a switch adds its frame (port/dspic30f/README.md). Calls that may block
  * or yield are refused before Sys_Start_Kernel. A call from a context that is not listed is refused: it returns
  * failure, sets SYS_ERROR_CONTEXT and increments sys_statistics.refused.
  */
