@@ -119,7 +119,7 @@ def _select(report: CoverageReport, image: Image, counts: Counts, options: argpa
         raise CommandError(f"--only {options.only[0]}: no source file of {image.path} matches")
     if not options.only and (options.kernel or not (has_kernel and has_own)):
         return report.instructions_run, report.instructions
-    addresses = set()
+    addresses: set[int] = set()
     for row in image.lines.rows:
         if row.file in report.files:
             addresses.update(item.address for item in items(image, row.start, row.end))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from html import escape
+from importlib import import_module
 from typing import Any
 
 MOST_SHOWN = 200
@@ -28,7 +29,7 @@ def _cell(value: Any) -> str:
 def data_frame(rows: Sequence[Mapping[str, Any]]) -> Any:
     """Return the rows as a pandas DataFrame. Raises ModuleNotFoundError that names pandas if it is not installed."""
     try:
-        import pandas
+        pandas = import_module("pandas")
     except ModuleNotFoundError:
         raise ModuleNotFoundError("frame() needs pandas: pip install pandas", name="pandas") from None
     return pandas.DataFrame(list(rows))
