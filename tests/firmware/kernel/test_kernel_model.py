@@ -45,7 +45,7 @@ NOT_MODELLED = {
     "_infrared": "devices: tests/firmware/infrared",
     "_interrupt": "macros of a port: tests/firmware/kernel/test_interrupts_on_target.py",
     "_io": "devices: tests/firmware/drivers",
-    "_reset": "ends the run",
+    "_reset": "outlives the run of a program",
 }
 """The other headers, and why the model does not know their calls."""
 OUTSIDE = {
@@ -150,8 +150,8 @@ def check_on_robot(robot: Robot, program: Program) -> None:
 def test_programs_agree_on_the_robot(image: Build) -> None:
     """Programs that the commit determines agree with the model on the emulated dsPIC30F, too."""
     robot = Robot(image("model", TARGET_APPS, f"DEFINES={DEFINES}"))
-    check_all(partial(check_on_robot, robot), small_programs(base_seed(), 30))
-    assert robot.compared > 15
+    check_all(partial(check_on_robot, robot), small_programs(base_seed(), 15))
+    assert robot.compared > 7
 
 
 def test_the_readme_states_every_planted_fault() -> None:
