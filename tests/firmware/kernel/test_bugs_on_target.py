@@ -7,10 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from tests.cases import check_all
 from tests.firmware.conftest import TARGET_APPS, Build
 from tests.firmware.drivers.test_drivers_on_target import START, robot
-from tests.firmware.kernel.test_kernel_on_target import FCY, load, place, run_to
+from tests.firmware.kernel.test_kernel_on_target import FCY, check_each_from, load, place, run_to
 
 HOST = Path(__file__).parents[1] / "host"
 # These need the host's unlock hook or UART sink; test_every_instruction.py and the processor tests cover them.
@@ -28,17 +27,14 @@ def test_the_kernel_on_the_robot(image: Build) -> None:
     machine = load(image("bugs", TARGET_APPS, defines))
     said = bytearray()
     machine.uart[1].on_byte = lambda byte, _: said.append(byte)
-    run_to(machine, "begin")
-    begin = machine.snapshot()
 
     def check(name: str) -> None:
-        machine.restore(begin)
         said.clear()
         machine.poke("chosen", TESTS.index(name))
         stop = machine.run(cycles=4 * FCY, until=place(machine, "passed"))
         assert stop.reason == "until", (stop, bytes(said))
 
-    check_all(check, TESTS)
+    check_each_from(machine, "begin", check, TESTS)
 
 
 @pytest.mark.slow

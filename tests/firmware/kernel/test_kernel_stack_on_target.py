@@ -8,21 +8,17 @@ import pytest
 
 from emu.machine.machine import Machine
 from tests.firmware.conftest import TARGET_APPS, Build
-from tests.firmware.kernel.test_kernel_on_target import FCY, load, place, run_to
+from tests.firmware.kernel.test_kernel_on_target import FCY, check_each_from, load, place, run_to
 
 KERNEL_STACK = 224
 """Size of the kernel stack in bytes (port/dspic30f/hal_limits.h); the heap follows it."""
 FIRST = 0x41
 """Value of the firmware's `kind` that selects the first of KINDS (target/handlers)."""
 KINDS = {
-    "formats": ("snprintf", "vsnprintf", "format", "formats"),
-    "recursion": ("chain",),
-    "large frame": ("large_frame",),
-    "kernel call without room": ("Sys_Send_IntEvent", "Sys_Send_Event"),
-    "condition": ("chain",),
-    "interrupt": ("chain",),
-    "scheduler": ("chain",),
-}
+    "formats": ("snprintf", "vsnprintf", "format", "formats"), "recursion": ("chain",), "large frame": ("large_frame",),
+    "kernel call without room": ("Sys_Send_IntEvent", "Sys_Send_Event"), "condition": ("chain",),
+    "interrupt": ("chain",), "scheduler": ("chain",),
+}  # fmt: skip
 """Overflow cases with the functions that may be running at the trap; the first case allows any library function."""
 
 
@@ -43,28 +39,32 @@ def culprit(machine: Machine, said: bytes) -> str:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("ipl_slip", [0, 1])
-def test_an_overflow_of_the_kernel_stack_is_caught_at_the_culprit(image: Build, kind: str, ipl_slip: int) -> None:
+def test_an_overflow_of_the_kernel_stack_is_caught_at_the_culprit(image: Build, ipl_slip: int) -> None:
     """An overflow of the kernel stack, here by snprintf("%f") in a handler, is reported in the function that causes
     it."""
     machine = load(image("handlers", TARGET_APPS), ipl_slip)
-    run_to(machine, "begin")
-    machine.poke("kind", FIRST + list(KINDS).index(kind))
     said = bytearray()
     machine.uart[1].on_byte = lambda byte, _: said.append(byte)
     before: list[list[int]] = []
+    harmed: list[bool] = []
     for name in ("snprintf", "deep_handler", "deep_condition", "deep_isr", "deep_pick"):
         machine.hook_pc(place(machine, name), lambda: before.append(heap(machine)) is not None)
-    harmed: list[bool] = []
     machine.hook_pc(place(machine, "_StackError"), lambda: harmed.append(heap(machine) != before[-1]) is not None)
-    stop = machine.run(cycles=FCY // 4, until=place(machine, "hal_stop"))
-    assert stop.reason == "until", stop
-    assert harmed == [False]
-    assert machine.peek("LATD") & 0xFF == 0, "the motors stop"
-    name = culprit(machine, bytes(said))
-    library = kind == "formats" and name not in ("chain", "fill", "large_frame")
-    assert name in KINDS[kind] or library, name
+
+    def check(kind: str) -> None:
+        for seen in (said, before, harmed):
+            seen.clear()
+        machine.poke("kind", FIRST + list(KINDS).index(kind))
+        stop = machine.run(cycles=FCY // 4, until=place(machine, "hal_stop"))
+        assert stop.reason == "until", stop
+        assert harmed == [False]
+        assert machine.peek("LATD") & 0xFF == 0, "the motors stop"
+        name = culprit(machine, bytes(said))
+        library = kind == "formats" and name not in ("chain", "fill", "large_frame")
+        assert name in KINDS[kind] or library, name
+
+    check_each_from(machine, "begin", check, KINDS)
 
 
 def test_half_a_kernel_stack_is_free_beside_an_ordinary_handler(image: Build) -> None:

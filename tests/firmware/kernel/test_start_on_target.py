@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from itertools import product
 from pathlib import Path
 
@@ -9,9 +10,8 @@ import pytest
 
 from emu import Machine
 from emu.cli import main
-from tests.cases import check_all
 from tests.firmware.conftest import TARGET_APPS, Build
-from tests.firmware.kernel.test_kernel_on_target import FCY, load, run_to, words
+from tests.firmware.kernel.test_kernel_on_target import FCY, check_each_from, load, words
 
 SCHEDULERS = ["round robin", "fixed priority", "earliest deadline", "woken first"]
 MOMENTS = ["never", "before the threads", "before the start", "after the start"]
@@ -26,14 +26,7 @@ def test_the_start_completes_under_every_scheduler(image: Build, ipl_slip: int) 
     yields would prevent their start.
     """
     machine = load(image("starts", TARGET_APPS), ipl_slip)
-    run_to(machine, "begin")
-    begin = machine.snapshot()
-
-    def check(scheduler: str, moment: str) -> None:
-        machine.restore(begin)
-        check_start(machine, scheduler, moment)
-
-    check_all(check, product(SCHEDULERS, MOMENTS))
+    check_each_from(machine, "begin", partial(check_start, machine), product(SCHEDULERS, MOMENTS))
 
 
 def check_start(machine: Machine, scheduler: str, moment: str) -> None:

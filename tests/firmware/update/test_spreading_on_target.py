@@ -146,7 +146,7 @@ def test_the_command_reaches_a_running_robot_behind_a_pseudo_terminal(robot, pro
     master, slave = pty.openpty()
     tty.setraw(slave)
     robot.board.bluetooth.on_byte = lambda byte, _cycle: os.write(master, bytes([byte]))
-    words = ["flash", str(programs[4]), "--port", os.ttyname(slave), "--wait", "100", "--json"]
+    words = ["flash", str(programs[4]), "--port", os.ttyname(slave), "--wait", "600", "--json"]
     status: list[int] = []
     host = threading.Thread(target=lambda: status.append(main(words)))
     host.start()
