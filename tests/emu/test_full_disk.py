@@ -25,7 +25,8 @@ def image(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def limit_files() -> None:
-    """Limit the size of files, which has the effect of a disk that becomes full."""
+    """Limit the size of files, which has the effect of a disk that becomes full. With -B Python writes no truncated
+    byte code, which later processes would read."""
     resource.setrlimit(resource.RLIMIT_FSIZE, (LARGEST_FILE, LARGEST_FILE))
 
 
@@ -39,7 +40,7 @@ def test_a_full_disk_under_a_waveform_is_one_line(option: str, target: str, imag
     elif not Path(target).exists():
         pytest.skip("only Linux has /dev/full")
     words = ["run", str(image), "--cycles", "60000", "--engine", "plain", option, target]
-    done = subprocess.run([sys.executable, "-m", "emu", *words], capture_output=True, text=True, check=False,
+    done = subprocess.run([sys.executable, "-B", "-m", "emu", *words], capture_output=True, text=True, check=False,
                           cwd=Path(__file__).parents[2], preexec_fn=limit_files)  # fmt: skip
     assert done.returncode == 2, done.stderr
     assert done.stderr.count("\n") == 1
