@@ -15,6 +15,7 @@ import pytest
 
 from emu.cli import main
 from emu.kernel_metrics.kernel_structures import SYSTEM_EVENTS
+from openswarm.testing.robot import Robot
 
 HERE = Path(__file__).parent
 FIRMWARE = HERE.parents[2] / "firmware"
@@ -158,3 +159,14 @@ def test_switches_take_the_cycles_that_the_kernels_suite_measures(courier, suite
     assert found["handler on_parcel"] == found["function on_parcel"]
     assert found["handler on_parcel"]["min"] == 1 + 1 + 3  # MOV, ADD, RETLW (isa.md §13.1)
     assert found["interrupt T1: request to entry"]["min"] == 4  # isa.md §14.2
+
+
+def test_the_scheduler_is_not_charged_for_the_idle_loop(image):
+    """A call of os_schedule that waits in hal_idle counts only its work before the first and after the last wait."""
+    robot = Robot(image("hello"))
+    robot.run(ms=5)
+    with robot.measured() as measured:
+        robot.run(ms=1100)
+    waiting = measured.cycles("hal_idle")
+    assert waiting.calls > 100
+    assert measured.cycles("os_schedule").total < waiting.total
