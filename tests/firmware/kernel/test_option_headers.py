@@ -83,7 +83,7 @@ def cycles(path: Path, capsys: pytest.CaptureFixture[str]) -> dict[str, int]:
 def contract(option: str, call: str) -> tuple[list[int], int]:
     """Return the numbers of the cycles field and the stack bytes of a contract line."""
     text = (INCLUDE / f"openswarm_{option}.h").read_text()
-    declared = re.search(rf"^[\w *]*\b{call}\(", text, re.M)
+    declared = re.search(rf"^\w[\w *]*\b{call}\(", text, re.M)
     assert declared, f"{call} is not declared"
     found = CONTRACT.match(text, text.rindex("/* ", 0, declared.start()))
     assert found, f"{call} has no contract line"
