@@ -59,13 +59,13 @@ HAL_OUTLINE void clock_set_alarm(uint16 moment)
 }
 
 /* Wakes the threads whose time-out has expired and sets the alarm to the next one. Slice locked. */
+BOUNDS_AT("for (", loop n);
 void clock_wake_due(void)
 {
     uint16 now = clock_now();
     uint16 elapsed = (uint16)(now - base);
     sys_pcb *next;
     base = now;
-    LOOP_BOUND(n);
     for (sys_pcb *p = os_blocked; p != NULL; p = next) {
         next = p->next;
         if (!(p->status & OS_TIMED)) {

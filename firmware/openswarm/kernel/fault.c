@@ -7,13 +7,13 @@ void (*os_record_fault)(uint16 fault, uint16 place, uint16 page);
 enum { DIGITS = 6 }; /* buffer size: digits of a 16-bit number and the terminating NUL */
 
 /* Writes the digits of a number in front of end; returns the first one. */
+LOOPS_OF(put_number, 4);
 static HAL_OUTLINE char *put_number(char *end, uint16 number, uint16 radix)
 {
     do {
         uint16 digit = number % radix;
         number /= radix;
         *--end = (char)(digit < 10 ? '0' + digit : 'a' - 10 + digit);
-        LOOP_BOUND(4);
     } while (number != 0);
     return end;
 }

@@ -54,10 +54,11 @@ static HAL_OUTLINE void ring_remove(const sys_pcb *p)
 }
 
 /* Returns the link of the blocked list that points to p. */
+/* Per woken thread, n * n / 4: those that stay in front of it. */
+BOUNDS_AT("while (*link != p)", loop n, share event.c / wake_waiters n * n / 4);
 static HAL_OUTLINE sys_pcb **link_to(const sys_pcb *p)
 {
     sys_pcb **link = &os_blocked;
-    LOOP_BOUND(n); LOOP_SHARE(event.c / wake_waiters, n * n / 4); /* per woken thread: those that stay in front of it */
     while (*link != p) {
         link = &(*link)->next;
     }
@@ -118,20 +119,21 @@ sys_pcb *process_next(const sys_pcb *p)
     return os_blocked;
 }
 
+/* Each PID in use is found at another position. */
+BOUNDS_AT("} while (", loop n, share start n * (n + 1) / 2);
 sys_pcb *process_find(uint16 pid)
 {
     sys_pcb *p = NULL;
     do {
         p = process_next(p);
-        LOOP_BOUND(n); LOOP_SHARE(start, n * (n + 1) / 2); /* each PID in use is found at another position */
     } while (p != NULL && p->pid != pid);
     return p;
 }
 
+BOUNDS_AT("while (", loop n);
 bool process_awaits(const event *object)
 {
     const sys_pcb *p = os_blocked;
-    LOOP_BOUND(n);
     while (p != NULL && p->event_or_slice.awaited != object) {
         p = p->next;
     }
@@ -148,11 +150,11 @@ void process_init(void)
     ring_append(&os_system);
 }
 
+BOUNDS_AT("} while (", loop n + 1, one); /* n - 1 PIDs in use, OS_DRIVERS, and the result */
 static uint16 unused_pid(void)
 {
     do {
         newest_pid++;
-        LOOP_BOUND(n + 1); ONE_LOOP(); /* n - 1 PIDs in use, OS_DRIVERS, and the result */
     } while (newest_pid == OS_DRIVERS || process_find(newest_pid) != NULL); /* PID 0 is always in use */
     return newest_pid;
 }

@@ -63,6 +63,9 @@ static HAL_INLINE sys_pcb *dispatch(sys_pcb *next, uint16 spent)
     return next;
 }
 
+BOUNDS_AT("if (os_ring != NULL)", loop i); /* i times idle; 0: a thread is ready */
+BOUNDS_AT("pick(os_ring->next)", calls (sys_pick, -os_slice_end, -os_yield));
+BOUNDS_AT("while (os_ring->next != next)", loop n);
 sys_pcb *os_schedule(void)
 {
     hal_guard_kernel_stack();
@@ -72,7 +75,6 @@ sys_pcb *os_schedule(void)
         if (OS_HAS_WORK) {
             work();
         }
-        LOOP_BOUND(i); /* i times idle; 0: a thread is ready */
         if (os_ring != NULL) {
             break;
         }
@@ -81,9 +83,7 @@ sys_pcb *os_schedule(void)
     }
     sys_pick pick = HAL_LOAD(pick_thread);
     if (pick != NULL) {
-        CALL_TARGETS(sys_pick, -os_slice_end, -os_yield);
         const sys_pcb *next = pick(os_ring->next);
-        LOOP_BOUND(n);
         while (os_ring->next != next) {
             os_ring = os_ring->next;
         }
@@ -170,10 +170,10 @@ uint8 Sys_Priority_Of(const sys_pcb *process)
     return process->priority;
 }
 
+BOUNDS_AT("for (", loop n);
 static sys_pcb *highest_priority(sys_pcb *first)
 {
     sys_pcb *best = first;
-    LOOP_BOUND(n);
     for (sys_pcb *p = first->next; p != first; p = p->next) {
         if (p->priority > best->priority) {
             best = p;
@@ -191,6 +191,7 @@ static void report_miss(sys_pcb *p)
 
 /* Picks the job on time with the earliest deadline. If there is none, late jobs and threads without a period share the
  * CPU by round robin, so that a late job cannot starve them. */
+BOUNDS_AT("} while (p != first)", loop n);
 static sys_pcb *earliest_deadline(sys_pcb *first)
 {
     uint16 now = clock_now();
@@ -208,7 +209,6 @@ static sys_pcb *earliest_deadline(sys_pcb *first)
             }
         }
         p = p->next;
-        LOOP_BOUND(n);
     } while (p != first);
     return best;
 }

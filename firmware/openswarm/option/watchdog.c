@@ -6,6 +6,7 @@
 #include "openswarm_reset.h"
 
 #ifdef HAL_WATCHDOG_MS
+TARGETS_OF(scheduler.c / work, feed);
 static void feed(void)
 {
     hal_watchdog_clear();
