@@ -18,7 +18,8 @@ from toolchain.driver import driver
 SOURCE = """
 volatile unsigned count; volatile int level; volatile char letter = -3; volatile long wide;
 volatile unsigned long mask = 0xF0000000; int local_too;
-void __attribute__((noinline)) mark(int local_too) { count++; level = 50 - (int)count + local_too; wide -= 70000; mask |= 16; }
+void __attribute__((noinline)) mark(int local_too)
+{ count++; level = 50 - (int)count + local_too; wide -= 70000; mask |= 16; }
 int main(void) { for (;;) { mark(0); letter++; } }
 """
 CONDITIONS = ("count == 40", "count", "!level", "level < -20", "level >= 45 && count != 2", "3 < count", "letter == -1",

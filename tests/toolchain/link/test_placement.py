@@ -54,7 +54,7 @@ def test_fixed_aligned_and_reversed_sections(image):
     assert out.symbols["ali_"] % 64 == 0
     assert (out.symbols["rev_"] + 40) % 64 == 0
     for bad in ("bss,address(0x700)", "bss,address(0x27FF)", "code,address(0x18000)", "code,address(0x80)"):
-        with pytest.raises(ToolError, match="leaves|odd"):
+        with pytest.raises(ToolError, match=r"leaves|odd"):
             image(PLACE.format("bad", bad, 4))
     with pytest.raises(ToolError, match="overlaps"):
         image(PLACE.format("one", "code,address(0x400)", 8) + PLACE.format("two", "code,address(0x406)", 8))
