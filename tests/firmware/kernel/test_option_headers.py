@@ -176,10 +176,13 @@ def test_the_cycles_of_waits_and_timers_are_the_measured_ones(cycles: dict[str, 
         assert contract("reset", call)[0] == [cycles[call]]
 
 
+@pytest.mark.slow
 def test_the_stack_in_the_headers_is_the_worst_case(
     path: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Stack bytes in the headers equal the bounds without the frame of a switch (openswarm.h)."""
+    """Stack bytes in the headers equal the bounds without the frame of a switch (openswarm.h).
+
+    `Sys_Pop_Cleanup` also runs a function of the application; its bound here is that with this application's."""
     annotations = tmp_path / "annotations"
     annotations.write_text("depth _hal_block 0\n")
     names = [word for calls in CALLS.values() for call in calls for word in ("--function", call)]
@@ -187,7 +190,8 @@ def test_the_stack_in_the_headers_is_the_worst_case(
     stack = {row["name"]: row["stack_bytes"] for row in json.loads(capsys.readouterr().out)["calls"]}
     stated = {call: contract(option, call)[1] for option, calls in CALLS.items() for call in calls}
     runs = stack.pop("Sys_Pop_Cleanup"), stated.pop("Sys_Pop_Cleanup")
-    assert runs[0] is None, "it runs a function of the application, which has no bound here"
+    assert runs[0] is not None
+    assert runs[0] >= runs[1]
     assert stack == stated
 
 
