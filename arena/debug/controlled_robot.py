@@ -175,7 +175,7 @@ class ControlledRobot:
     # Called in the trial's greenlets
 
     def finish(self) -> bool:
-        """Let the debugger inspect the robot after the end of the trial; return whether it ever had the robot.
+        """Let the debugger inspect the robot after the end of the trial; return whether it ever controlled it.
 
         Raises ReplayRequired if the debugger goes back to an earlier cycle."""
         self._is_over = True

@@ -50,7 +50,7 @@ class DebugSession:
         self.has_fault = False
         """Whether a robot had a fault."""
         self.had_robot = False
-        """Whether the debugger ever had its robot."""
+        """Whether the debugger ever controlled its robot."""
         try:
             while not self.is_over and self.receive() != ("ready",):
                 pass

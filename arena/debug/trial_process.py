@@ -11,7 +11,9 @@ the debug protocol pass unchanged.
 | `rewind` cycle, count | the trial must go back; the reply `(True,)` announces that a checkpoint will continue |
 | `leaves` state, messages | state and unread messages for this checkpoint; the process ends |
 | `left`, `alive` | the client has disconnected; the trial continues without it |
-| `recorded` trial, `over` fault, had robot, `failed` error | end of the trial |
+| `recorded` trial | end of the trial and of its record |
+| `over` fault, controlled | end of the process: the two results of `_run` |
+| `failed` error | end of the process: the exception that ended the trial |
 
 A checkpoint blocks until it receives `("fork",)`, which asks for a fork of itself, or `("resume", state, count)`.
 """
@@ -109,7 +111,7 @@ class CheckpointedRobot(ControlledRobot):
         return self.is_recorded and not server.terminate_debuggee
 
     def _launch(self, arguments: dict[str, Any]) -> Machine:
-        """Return the machine of the robot as response to `launch`. Raises ValueError for an argument of `emu debug`."""
+        """Return the robot's machine as response to `launch`. Raises ValueError for an argument of a single robot."""
         for name in SINGLE_ROBOT_ARGUMENTS:
             if name in arguments:
                 raise ValueError(f"`{name}` is for a robot alone; in a swarm the scene says it: --set KEY=VALUE")
@@ -204,7 +206,7 @@ def serve(end: socket.socket, plan: Plan, robot: int, folder: Path, is_recorded:
 def _run(controlled: CheckpointedRobot, plan: Plan, folder: Path) -> tuple[bool, bool]:
     """Run the trial until it is over and the debugger has detached.
 
-    Return whether a robot had a fault, and whether the debugger ever had its robot."""
+    Return whether a robot had a fault, and whether the debugger ever controlled its robot."""
 
     def progress(_trial: int, _seconds: float) -> None:
         if controlled.is_detached:

@@ -166,7 +166,7 @@ def experiment_of(name: str, folder: Path = Path()) -> Experiment:
 
 
 def experiment_with_digest(path: Path, digest: str) -> Experiment:
-    """Load the experiment of a file whose SHA-256 is `digest`. Another file is not run. Raises SceneError."""
+    """Load the experiment of a file. Raises SceneError; a file whose SHA-256 is not `digest` is not executed."""
     return _load_source(path.resolve(), read_user_file(path, "experiment", digest))
 
 

@@ -136,7 +136,7 @@ class OpticalChannel:
 
     @classmethod
     def of(cls, scene: Scene) -> OpticalChannel:
-        """Return the channel of a trial in a scene."""
+        """Return the channel of a new trial of a scene."""
         return cls(scene.robots.count, scene.clock.quantum_tcy, tau=scene.infrared.tau_us * 1e-6 * FCY)
 
     @property

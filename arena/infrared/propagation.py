@@ -30,7 +30,8 @@ PUBLISHED: Final = (
 """libIrcom's table: distance of the centres in cm, and counts between dark and lit (swarmcom.md §3.1). That distances
 are between centres is UNVERIFIED: it is inferred from the first entry, robots that touch."""
 LAW_COUNTS, LAW_FROM_CM, LAW_POWER = 10_269.0, 6.0, -2.354
-"""A(d) = 10269 (d - 6)^-2.354, fitted to that table, error 6.3 % (swarmcom.md §3.1). UNVERIFIED beyond 22 cm."""
+"""Counts A at d cm, fitted to that table: A(d) = 10269 (d - 6)^-2.354, error 6.3 % (swarmcom.md §3.1). UNVERIFIED
+beyond 22 cm."""
 MAX_COUNTS: Final = 3500.0
 """Greatest effect of one robot: the table saturates there (swarmcom.md §3.1)."""
 MIN_COUNTS: Final = 0.1

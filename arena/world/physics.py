@@ -27,7 +27,7 @@ from emu.native_library import ADDRESS, INT, address_of, functions
 ITERATIONS: Final = 20
 """Iterations of the constraint solver (epuck.md §4)."""
 ROWS: Final = 256
-"""Poses in one sheet of memory."""
+"""Rows of the pose buffer (`sheet`): each row holds the poses at the end of one quantum."""
 COLLISION_SLOP: Final = 0.01
 """Overlap in cm that the solver leaves between bodies in contact."""
 SHAPE_FRICTION: Final = math.sqrt(dimensions.CONTACT_FRICTION)
@@ -120,8 +120,9 @@ class PoseBlock(NamedTuple):
     last: int
     """Ticks at the end of the first and the last quantum."""
     sheet: NDArray[np.float64]
+    """Pose buffer that contains the block."""
     row: int
-    """Row of the sheet with the poses of the first quantum."""
+    """Row of the pose buffer with the poses of the first quantum."""
     address: int
     """Address of that row."""
 
@@ -172,7 +173,7 @@ class NativeWorld(Structure):
         *((name, c_void_p) for name in ("quanta", "world", "wheels")), ("width", c_int64),
         ("ticks", c_int64),  # finished quanta
         ("limit", c_int64),  # tick up to which native code can run
-        *((name, c_void_p) for name in ("row", "now", "before")),  # poses: room for the next, current, one quantum ago
+        *((name, c_void_p) for name in ("row", "now", "before")),  # addresses: free row, current, previous poses
     ]  # fmt: skip
 
 
@@ -353,9 +354,9 @@ class World:
         self.poses = self._read()
 
     def run_quanta(self, speeds: int, room: int, count: int) -> list[PoseBlock]:
-        """Run `count` quanta with the wheel speeds that `Wheels` keeps; return the blocks of poses at their ends.
+        """Run `count` quanta with the wheel speeds stored by `Wheels`; return the blocks of poses at their ends.
 
-        `speeds` is the address of a table with the address of each robot's speeds, `room` quanta of them.
+        `speeds` is the address of an array with one pointer per robot, to a ring buffer with speeds of `room` quanta.
         """
         made = []
         while count:
@@ -373,9 +374,10 @@ class World:
         return made
 
     def prepare_native(self, now: Poses, before: Poses, is_enabled: bool = True) -> None:
-        """Let native code run quanta by `native` until noise is due or the sheet is full; none if not `is_enabled`.
+        """Fill `self.native` with the number of quanta that native code may run, and with addresses of poses.
 
-        `now` are the current poses, `before` those one quantum earlier.
+        Native code may run until new wheel noise must be drawn or the pose buffer is full, and no quantum unless
+        `is_enabled`. `now` are the current poses, `before` those one quantum earlier.
         """
         native, row = self.native, self._free_row()
         noisy = self.ticks % self._noise_ticks
@@ -385,7 +387,7 @@ class World:
         native.row, native.now, native.before = self._sheet_at + row * self._row_bytes, now.address, before.address
 
     def collect_native(self) -> list[PoseBlock]:
-        """Take over the quanta that native code has run since `prepare_native`; return their poses."""
+        """Account for the quanta that native code has run since `prepare_native`; return their poses."""
         ticks, count = self.native.ticks, self.native.ticks - self.ticks
         if not count:
             return []

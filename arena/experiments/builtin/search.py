@@ -1,4 +1,4 @@
-"""Shared search: parts that robots know to be done (`done N`), and share with the right answer (`best N`)."""
+"""Shared search of a number range: parts known to be searched (`done N`), robots with the right answer (`best N`)."""
 
 from __future__ import annotations
 
