@@ -45,9 +45,7 @@ class Block:
     origin: str
     """Section or line that the words come from, for messages."""
     is_code: bool = True
-    """Whether the words are code;
-
-    False for constants and tables. HEX files do not distinguish, so always True there.
+    """Whether the words are code and not constants or tables. Always True for HEX files, which do not distinguish them.
     """
 
     def __repr__(self) -> str:

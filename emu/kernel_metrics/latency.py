@@ -25,7 +25,7 @@ DEVICE_LEVEL: Final = 4
 ATTEMPTS: Final = 50
 """Maximum number of windows examined to find one without another interrupt."""
 SETTLING: Final = 5
-"""Number of windows skipped, until every thread has yielded once."""
+"""Number of thread switches that are skipped before the measured one, so that every thread has yielded once."""
 CALL_CYCLES: Final = 2
 """Cycles of CALL and RCALL (isa.md §13.1)."""
 MASK_STEPS: Final = 150_000

@@ -29,7 +29,7 @@ IPL_SHIFT: Final = 5
 EXCEPTION_ENTRY: Final = -1
 """Address under which the cycles of an exception entry are logged."""
 LOGGED: Final = 1 << 20
-"""Number of instructions whose addresses are kept at least."""
+"""Minimum number of instructions that the log keeps."""
 
 EntryObserver = Callable[[Accepted, int, int], None]
 """observer(exception, cycle before, interrupted address)"""
@@ -63,7 +63,7 @@ class ExecutionLog:
 
 
 class Observation:
-    """Observes `machine` between `start` and `stop`. Raises ValueError for an engine other than plain."""
+    """Callbacks on events of `machine` between `start` and `stop`. Raises ValueError for an engine other than plain."""
 
     def __init__(self, machine: Machine, *, logged: bool = False) -> None:
         if machine.engine != "plain":

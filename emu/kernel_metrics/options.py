@@ -51,24 +51,25 @@ OPTIONS: Final = (
     "watchdog",
     "woken_first",
 )
-"""Options by the names of their files in firmware/openswarm/option."""
+"""Options: the names of their files in firmware/openswarm/option, without `.c`."""
 KERNEL_PARTS: Final = {
     "_os_call_in_section": "cleanup", "_event_bucket": "quota", "_process_awaits": "semaphore"
 }  # fmt: skip
-"""Kernel functions that are linked only for options; `_process_awaits` is also that of notifications."""
+"""Option of each kernel function that is linked only for an option. `_process_awaits` is counted for semaphores,
+although notifications need it, too."""
 OBJECTS: Final = {"sys_mutex": "mutex", "sys_cleanup": "cleanup", "sys_quota": "quota", "sys_service": "service",
                   "sys_semaphore": "semaphore", "sys_notification": "notification", "sys_timer": "timer"}  # fmt: skip
-"""Object types by the suffix of the application's variable `options_NAME` of that type."""
+"""By object type: NAME of the application's variable `options_NAME` of that type."""
 HEAP: Final = (("a quota", "LIMIT", "options_done"), ("a zombie", "JOIN_ZOMBIE", "options_done"))
-"""(name, scene, stop): heap changes between the stop `options_ready` and another stop of a scene."""
+"""(name, scene, symbol): each row is the change of heap use while the scene runs from `options_ready` to the symbol."""
 _ENDS_LATER: Final = ("END", "END_JOINED", "END_CLEANED", "TICK", "TICK_SERVICE", "TICK_TIMER")
-"""Scenes in which the measured window begins after a delay."""
+"""Scenes in which the measured window begins after a delay. In all others the millisecond count must not change."""
 
 MeasureFunction = Callable[[Meter], Window]
 
 
 def until_return(call: str) -> MeasureFunction:
-    """Measure from the first instruction of a function to the instruction after its call."""
+    """Measure from the first instruction of function `call` to the instruction to which it returns."""
 
     def take(meter: Meter) -> Window:
         meter.target.run_to(call)
@@ -78,7 +79,10 @@ def until_return(call: str) -> MeasureFunction:
 
 
 def until_entry(call: str, place: str) -> MeasureFunction:
-    """Measure from the first instruction of a call to a function's entry, or to the resumption of a thread in it."""
+    """Measure from the entry of function `call` until the CPU runs in function `place` at priority 0.
+
+    It enters `place` there, or resumes a thread that was preempted in it.
+    """
 
     def take(meter: Meter) -> Window:
         meter.target.run_to(call)

@@ -14,7 +14,7 @@ CHECKPOINT_CYCLES: Final = 1 << 23
 SLEEP_CYCLES: Final = 1 << 24
 """Maximum length of a sleep within one step that has no limit, in Tcy (1.1 s of an e-puck)."""
 STILL_ASLEEP: Final = "the CPU still sleeps: no enabled interrupt has woken it"
-"""Detail of a stop: a step whose limit comes before an interrupt."""
+"""Detail of the stop of a step in Idle or Sleep mode that reached its limit before an interrupt."""
 RESETS_KEPT: Final = 16
 """Capacity of `Machine.resets`."""
 RESET_LOOP: Final = 8

@@ -264,7 +264,7 @@ class JitEngine:
             self._core.events.fire_until(cycle if self._u16[self._mode] != RUN else cycle - 1)
             return not self._core.sequencer.power.signals.interrupted()
         if reason == INTERPRET and self._refresh(self._u32[self._pc], cycle):
-            self._env[AT_BOUNDARY] = 0  # the boundary of this instruction is done
+            self._env[AT_BOUNDARY] = 0  # the instruction boundary has been processed
             return True
         return False
 

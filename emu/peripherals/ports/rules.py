@@ -46,7 +46,10 @@ class PortOperands:
 
 
 def read_port(m: RuleBuilder, p: PortOperands) -> Number:
-    """Return the pin levels; outputs appear one cycle late. Waveforms must be constant or a byte stream."""
+    """Return the pin levels, on which outputs appear one cycle late.
+
+    The rule requires that each waveform on the port is constant or the byte stream.
+    """
     levels = m.select(m.now <= m.get(p.changed), m.get(p.before), m.get(p.level))
     waveform_pins = m.get(p.waveform_pins)
     is_constant = m.below(m.now, m.get(p.constant_until)) | (waveform_pins == 0)

@@ -54,7 +54,7 @@ class RuleEmitter:
 
 
 class AccessContext(Protocol):
-    """The part of a builder that rules of accesses use."""
+    """The part of an instruction's builder that `AccessEmitter` uses."""
 
     @property
     def e(self) -> Emitter: ...
@@ -74,7 +74,10 @@ class AccessContext(Protocol):
 
 
 class AccessEmitter(RuleEmitter):
-    """Emitter for the rule of one access of the instruction being translated. The instruction commits its stores."""
+    """Emitter for rules of a translated instruction: its register accesses, and its effects on devices.
+
+    All stores are deferred to the end of the instruction.
+    """
 
     def __init__(self, b: AccessContext) -> None:
         super().__init__(b.e)
@@ -86,7 +89,7 @@ class AccessEmitter(RuleEmitter):
         return self._b.sr_word() if cell == self._b.layout.flow.sr else super().get(cell, index)
 
     def put(self, cell: Cell, value: Number, index: Number = 0) -> None:
-        """Defer a store until the instruction is committed."""
+        """Defer a store to the end of the translated instruction."""
         if cell == self._b.layout.flow.sr:
             self._b.deferred.sr = value, 0xFFFF
             return
@@ -105,7 +108,7 @@ class AccessEmitter(RuleEmitter):
         return found
 
     def post(self, slot: EventSlot, due: Number) -> None:
-        """Defer the posting of an event. The deadline may move nearer, so native code leaves after the instruction."""
+        """Defer the posting of an event. Native code returns after the instruction: the deadline may become earlier."""
         deadline = self.get(slot.deadline)
         self.put(slot.due, due)
         self.put(slot.deadline, self.least(deadline, due))
