@@ -199,7 +199,7 @@ class _Check:
         return found
 
     def _targets(self, pc: int, entry: int) -> list[int] | None:
-        """Return the targets of a pointer call by the annotations of its line or function; None if unknown."""
+        """Return the targets of an indirect call from the annotations of its line or function; None if unknown."""
         line = self.sources.line_of(pc)
         texts = [note.text for note in self.annotations.of("calls") if self.sources.target_line(note) == line]
         names = {self.map.name(pc).partition("+")[0], self.map.name(entry)}

@@ -101,7 +101,7 @@ def _logical(op: str, a: Bit, b: Bit) -> Bit:
 
 
 def _sum(a: list[Bit], b: list[Bit]) -> list[Bit]:
-    """Bits of a sum or difference up to the first carry or borrow that may occur: the lowest bit is that of XOR."""
+    """Bits of a sum or difference: the lowest one is that of XOR, the others are unknown because of carry or borrow."""
     low = _logical("xor", a[0], b[0])
     return [low] + [None] * (len(a) - 1)
 

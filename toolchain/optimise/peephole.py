@@ -185,7 +185,7 @@ STEPS = {"inc": 1, "inc2": 2, "dec": -1, "dec2": -2}
 
 
 def auto_increment(b: MBlock) -> bool:
-    """Merge an access through [Wn] with the step of Wn by the access size: to [Wn++] or [Wn--], [++Wn] or [--Wn]."""
+    """Merge accesses through [Wn] with increments of Wn by the access size: to [Wn++], [Wn--], [++Wn] or [--Wn]."""
     changed = False
     k = 0
     while k < len(b.insts):
@@ -202,7 +202,7 @@ def auto_increment(b: MBlock) -> bool:
 
 
 def _step_amount(mi: MI) -> int | None:
-    """Signed step of an instruction that increments or decrements a register; None for any other."""
+    """Signed amount by which an instruction increments a register; None for any other instruction."""
     if mi.pred or mi.byte:
         return None
     if mi.op in STEPS and isinstance(mi.args[0], int) and mi.args[0] == mi.args[1]:
@@ -219,7 +219,7 @@ def flags_unused(b: MBlock, at: int) -> bool:
 
 
 def _fold_after(b: MBlock, at: int, r: int, amount: int) -> bool:
-    """Merge the step of r at index `at` with the last access through [r] before it; return whether it succeeded."""
+    """Try to merge the increment of r at index `at` with the last access through [r] before it; return success."""
     for k in range(at - 1, -1, -1):
         mi = b.insts[k]
         if r in mi.uses() or r in mi.defs():
@@ -230,7 +230,7 @@ def _fold_after(b: MBlock, at: int, r: int, amount: int) -> bool:
 
 
 def _fold_before(b: MBlock, at: int, r: int, amount: int) -> bool:
-    """Merge the step of r at index `at` with the first access through [r] after it; return whether it succeeded."""
+    """Try to merge the increment of r at index `at` with the first access through [r] after it; return success."""
     for k in range(at + 1, len(b.insts)):
         mi = b.insts[k]
         if r in mi.uses() or r in mi.defs():

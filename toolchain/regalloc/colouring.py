@@ -293,10 +293,13 @@ class Colouring:
 
 
 def allocate(m: MFunction, for_size: bool, verify: bool = False) -> MFunction:
-    """Replace virtual registers by W0-W14 and return the function. Ensures: pairs are even-aligned, no pair moves.
+    """Replace virtual registers by W0-W14 and return the function.
+
+    In the result, every pair is an even register and the next one, and pair moves are expanded to word moves.
 
     Coalescing with argument and result registers usually helps, but may leave too few registers for other values. Small
-    functions are therefore allocated with, without, and with thorough coalescing; the cheapest result is returned.
+    functions are therefore allocated three times, with it, without it, and with it and `thorough` (see `coalesce`).
+    The cheapest result is returned. If the first one has no moves and no saved registers, the others are omitted.
     """
     remove_dead(m)
     size = sum(len(b.insts) for b in m.blocks)
@@ -346,7 +349,7 @@ def _no_room(m: MFunction, registers: set[int]) -> UnsupportedError:
 
 
 def _crowded(m: MFunction) -> bool:
-    """Whether the result contains moves or callee-saved registers, which another trial may avoid."""
+    """Whether an allocation contains copies or writes callee-saved registers, which another trial may avoid."""
     return any(mi.is_copy() or any(r in CALLEE_SAVED for r in mi.defs()) for b in m.blocks for mi in b.insts)
 
 
