@@ -27,7 +27,7 @@ LATEST_PAYLOAD = 16
 
 
 class Options(Events):
-    """Everything that is linked only where it is used."""
+    """Model of all options of the kernel, which are linked only into images that use them."""
 
     def __init__(self, sizes: Sizes, code: Code) -> None:
         super().__init__(sizes, code)
@@ -39,12 +39,12 @@ class Options(Events):
         """Threads whose cleanups are to run, in order of their end."""
         self.cleaning = False
         self.host: Thread | None = None
-        """Thread in whose call cleanups of other threads run."""
+        """Thread whose call runs the cleanups of other threads; None at other times."""
         self.host_ends = False
         self.interrupted: Thread | None = None
-        """The running thread, while a handler's call runs cleanups."""
+        """Thread that was running when cleanups began to run in kernel context; None at other times."""
         self.gates: set[int] = set()
-        """Events that had a quota: each keeps an event's memory for its next one."""
+        """Numbers of events that have or had a quota. The kernel keeps one gate for each, of the size of an event."""
         self.services: list[Service] = []
         """Supervised services, the last started first."""
 
@@ -157,7 +157,7 @@ class Options(Events):
         return False
 
     def leave_joins(self, thread: Thread) -> None:
-        """Drop the thread's own join and wake the threads that join it; it then needs no zombie."""
+        """Remove the thread's own join and wake the threads that join it; it then does not become a zombie."""
         for waiting, pid in list(self.joins):
             if waiting is thread:
                 self.joins.remove((waiting, pid))
@@ -204,7 +204,7 @@ class Options(Events):
     def run_cleanups(self, thread: Thread) -> None:
         """Run the cleanups of a thread that has left all lists, the newest first, and free it.
 
-        One loop runs all: the cleanups of a thread that a cleanup ends follow those of this one.
+        If a cleanup ends another thread, the same loop runs the cleanups of that thread after those of this one.
         """
         if thread is self.interrupted:
             self.interrupted = self.system
@@ -273,7 +273,7 @@ class Options(Events):
         return True
 
     def apply_quota(self, event: Event, payload: bytes) -> bool:
-        """Whether the quota of an event has dropped a message or replaced the waiting one."""
+        """Apply an event's quota to a message. Return whether it drops the message or replaces the newest one."""
         quota = event.quota
         if quota is None:
             return False

@@ -8,7 +8,7 @@ from tests.firmware.model.state import Code, Error, Notification, Semaphore, Siz
 from tests.firmware.model.threads import Step
 
 LONGEST = 0x7FFF
-"""ms of a timer."""
+"""Maximum delay and period of a timer, in ms."""
 
 
 class Waits(Options):
@@ -65,7 +65,7 @@ class Waits(Options):
 
     @call("Sys_Wait_for_Notification", "T", 0, blocks=True)
     def wait_for_notification(self, notification: Notification, bits: int, ms: int) -> Step:
-        """Take those of the bits that are set; wait until one is."""
+        """Take all set bits among `bits`; if none is set, wait until one is."""
         if not bits or self.is_awaited(notification):
             self.fail(Error.BUSY if bits else Error.ARGUMENT)
             return 0
@@ -101,7 +101,7 @@ class Waits(Options):
         return self.take_unit(semaphore, ms)
 
     def take_unit(self, semaphore: Semaphore, ms: int) -> Step:
-        """Take a unit, or wait for one behind the threads that wait already."""
+        """Take a unit. If there is none or a thread already waits, wait after the threads that wait."""
         if semaphore.count and not self.is_awaited(semaphore):
             semaphore.count -= 1
             return True

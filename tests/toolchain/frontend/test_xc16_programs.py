@@ -179,7 +179,7 @@ def test_a_setting_made_twice_is_refused_unless_it_is_the_same(
 
 
 def test_every_value_macro_of_the_header_changes_one_word() -> None:
-    """Each value macro of the header changes one setting of one word: its mask has zeros only there."""
+    """Each value macro of the header changes one setting of one word: only bits of that setting are 0 in it."""
     masks = [mask for _, mask in config_pragma.settings(chip_named()).values()]
     for name, value in config_pragma.values().items():
         assert any((value | mask) & 0xFFFF == 0xFFFF for mask in [*masks, 0xC71F, 0x803F]), name

@@ -98,8 +98,8 @@ def _bus(draw: random.Random) -> Scene:
 
 
 def _codec(draw: random.Random) -> Scene:
-    """Return the settings of the codec interface in random order, because any of them may be the last that the port
-    waits for."""
+    """Return the settings of the codec interface, in random order in half of the scenes, so that the port starts after
+    different writes."""
     settings = [
         ("DCICON3", draw.randrange(16)), ("TSCON", draw.randrange(0x10000)), ("RSCON", draw.randrange(0x10000)),
         ("DCICON2", draw.randrange(0x1000)), ("DCICON1", 0x8000 | draw.choice((0, 0x800, draw.randrange(0x800)))),
