@@ -27,7 +27,7 @@ def _parse_whole(text: str, least: int) -> int:
 
 
 def duration(text: str) -> float:
-    """Parse a time in s or min, or a factor: a positive number of at most 1e7."""
+    """Parse a positive number of at most 1e7: a time in s or min, or a factor."""
     try:
         value = float(text)
     except ValueError:

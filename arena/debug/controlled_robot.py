@@ -39,7 +39,7 @@ class ReplayRequired(Exception):
 
 
 class RobotHistory(History):
-    """History of a robot: its past runs in the machine alone, its present together with the world."""
+    """History of a robot of a trial: the machine alone replays the past; the present runs together with the world."""
 
     def __init__(self, controlled: ControlledRobot, machine: Machine) -> None:
         super().__init__(machine)
@@ -65,7 +65,7 @@ class RobotHistory(History):
         return stop
 
     def _step_present(self, limit: int) -> Stop | None:
-        """Step once in the present; a sleeping CPU sleeps on over the ends of quanta, at most to cycle `limit`."""
+        """Step once in the present. A sleep may continue over the ends of quanta, at most to cycle `limit`."""
         machine, stepped, last = self.machine, False, limit
         before = position(machine)
 

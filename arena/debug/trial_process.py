@@ -123,7 +123,7 @@ class CheckpointedRobot(ControlledRobot):
         return CAN_FORK
 
     def offer_checkpoint(self, near: int | None = None) -> None:
-        """As `Environment.offer_checkpoint`. After the end of the trial the last checkpoint is near enough."""
+        """As `Environment.offer_checkpoint`. After the end of the trial, none is forked."""
         cycle, last = self.machine.cycle, self._checkpoint_cycle
         is_due = last is None or cycle - last >= self._interval
         if near is not None and last is not None and not is_due:

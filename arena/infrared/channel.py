@@ -24,7 +24,7 @@ No frame of the firmware's link is dark for so long: no word begins with more th
 and 21 bits last 15.4 ms (firmware/openswarm/io/infrared).
 """
 _ROOM: Final = 256
-"""Changes that are kept at first."""
+"""Initial capacity of a history, in changes."""
 _OVERRUN: Final = 64
 """Tcy by which a robot can pass the end of a quantum, which ends with a whole instruction."""
 
@@ -141,7 +141,7 @@ class OpticalChannel:
 
     @property
     def delay(self) -> int:
-        """Tcy by which light arrives late."""
+        """Delay in Tcy with which a robot receives light."""
         return self.quantum + _OVERRUN
 
     def switch(self, robot: int, cycle: int, line: int, lit: bool) -> None:
