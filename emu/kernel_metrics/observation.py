@@ -32,7 +32,7 @@ LOGGED: Final = 1 << 20
 """Minimum number of instructions that the log keeps."""
 
 EntryObserver = Callable[[Accepted, int, int], None]
-"""observer(exception, cycle before, interrupted address)"""
+"""observer(exception, cycle before its entry, address of the interrupted instruction)"""
 
 
 class ExecutionLog:
@@ -182,8 +182,8 @@ class Observation:
 class HookObservation:
     """The callbacks at addresses and at changed words of `Observation`, for every engine and at full speed.
 
-    A changed word is found by hooks behind the instructions that store to it. Raises ValueError for a word that the
-    image also stores to through a pointer (`stores_to`).
+    Hooks after the instructions that store to a word detect its changes. Raises ValueError for a word that the image
+    may also store to through a pointer (`stores_to`).
     """
 
     def __init__(self, machine: Machine) -> None:
@@ -229,9 +229,9 @@ def _call(callback: Callable[[], None]) -> None:
 
 
 def stores_to(image: Image, address: int) -> list[int] | None:
-    """Return the addresses behind all instructions that name a word of RAM as their destination.
+    """Return the addresses that follow all instructions that name a word of RAM as their destination.
 
-    None if the image takes the word's address, so that it may also be stored to through a pointer.
+    Return None if the image takes the word's address, so that it may also be stored to through a pointer.
     """
     found = image.symbols.data(address)
     if found is None:

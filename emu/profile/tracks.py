@@ -17,7 +17,7 @@ THREAD_START: Final = "_os_thread_start"
 MAIN: Final = (0, 0)
 """Track of the first stack."""
 Track = tuple[int, int]
-"""(stack, number of earlier threads on it); for a handler (-1, CPU priority)."""
+"""A thread: (number of its stack, number of earlier threads on it). An interrupt handler: (-1, CPU priority)."""
 
 
 class TrackEvent(NamedTuple):

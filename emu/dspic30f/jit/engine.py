@@ -237,7 +237,7 @@ class JitEngine:
         return cycle >= limit or (reason != BOUNDARY_WORK and cycle != start)
 
     def _run_native(self, start: int, limit: int) -> tuple[int, int, int]:
-        """Run native code from the boundary at cycle `start`, as long as Python can continue it without an instruction.
+        """Run native code from the boundary at cycle `start`, as long as Python need not interpret an instruction.
 
         Return the last exit reason, its cycle, and the limit, which native code may have passed.
         """
@@ -327,7 +327,7 @@ class JitEngine:
         return True
 
     def _remember_refresh(self, instruction: int) -> None:
-        """Record an instruction that waits for a device, so that the program around native code can update it."""
+        """Record an instruction whose register a device must update, for the host program that calls native code."""
         fresh = self._env[REFRESHED : REFRESHED + FRESH_ROOM]
         free = fresh.index(0)
         if instruction not in fresh and free < FRESH_ROOM - 1:
