@@ -185,7 +185,7 @@ class _Check:
                 case Return() | Reset():
                     continue
             work.append(after)
-            if isinstance(flow, Goto):  # a jump into the table of BRA and RETLW behind it
+            if isinstance(flow, Goto):  # a computed jump into the table of BRA and RETLW after it
                 work += self._table(after)
         return _Function(sorted(seen), sorted(callees), sorted(pointers))
 
