@@ -250,8 +250,10 @@ def meeting(x: float, y: float, east: float, north: float, side: geometry.Side) 
 
 
 def plain_signals(scene: Scene, poses: Poses, robot: int) -> list[tuple[int, float, list[float]]]:
-    """Return the light signals at a robot by a reference calculation: sending robot, counts on a sensor that faces
-    it, and share of each sensor."""
+    """Return the light signals at a robot by a reference calculation.
+
+    A signal is (sending robot, counts on a sensor that faces it, share of each sensor).
+    """
     x, y, heading = poses.robots[robot]
     discs = [(*place[:2], dimensions.ROBOT_RADIUS) for place in poses.robots]
     discs += [(*place, scene.kind_of(number).radius_cm) for number, place in enumerate(poses.objects)]

@@ -39,7 +39,7 @@ class Difference(Exception):
 
 
 def random_insn(rng: random.Random, row: Row, ram: int = DSPIC30F6014A.data["ram"].start) -> Insn:
-    """Return a legal instruction of a row; addresses of file operands are mostly above `ram`."""
+    """Return a random legal instruction of a row of the instruction table. Most file operands are at `ram` or above."""
     while True:
         fields = {}
         for letter, field in row.fields.items():

@@ -15,7 +15,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "emu" / "isa"))
 
 
 def main() -> int:
-    from sleigh import disagreement  # in the folder of the test that checks a sample
+    from sleigh import disagreement  # tests/emu/isa/sleigh.py
 
     classes: Counter[str] = Counter()
     example: dict[str, int] = {}

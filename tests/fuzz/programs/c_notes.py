@@ -130,7 +130,7 @@ void @part@(void)
 
 
 def rare(p: Program, part: str, times: int) -> None:
-    """CALL_SHARE and CALL_IF among other calls of the same function."""
+    """CALL_SHARE and CALL_IF apply to one call; another call of the same function has no annotation."""
     rounds = p.rng.randrange(1, 12)
     wanted = [p.rng.random() < 0.3 for _ in range(rounds)]
     p.add("unsigned char wanted_@part@[@rounds@];", part=part, rounds=rounds)
