@@ -33,7 +33,7 @@ from emu.boards.epuck.board import Epuck  # noqa: E402
 from emu.dspic30f.jit.engine import JitEngine  # noqa: E402
 from emu.profile.cycle_shares import Profiler  # noqa: E402
 
-MIPS = 14_745_600  # engines.md §4.2
+MIPS = 14_745_600  # instruction cycles per second of an e-puck (engines.md §4.2)
 
 
 SOURCES = {
