@@ -45,7 +45,9 @@ class Key(NamedTuple):
 
 def parser() -> argparse.ArgumentParser:
     """Return the parser of the command's options."""
-    command = argparse.ArgumentParser(description="list the keys of scene files", epilog="example: arena keys camera")
+    command = argparse.ArgumentParser(
+        description="list the keys of scene files with unit, range and default", epilog="example: arena keys camera"
+    )
     command.add_argument("table", nargs="?", help="list only this table, for example robots")
     command.add_argument("--json", action="store_true", help="print the keys as JSON")
     command.add_argument("--markdown", action="store_true", help="print the keys as a page of the documentation")

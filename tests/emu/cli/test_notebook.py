@@ -66,5 +66,5 @@ def test_a_frame_needs_pandas(monkeypatch):
     with pytest.raises(ModuleNotFoundError, match="frame\\(\\) needs pandas"):
         data_frame(rows)
     monkeypatch.undo()
-    pandas = pytest.importorskip("pandas")
+    pandas = pytest.importorskip("pandas", reason="pandas is not installed (extra: test)")
     assert data_frame(rows).equals(pandas.DataFrame(rows))
