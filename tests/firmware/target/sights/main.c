@@ -124,7 +124,7 @@ static void devices(void)
     i2c_transfer transfer = {0x6E, sizeof type_register, sizeof type, &type_register, &type};
     Sys_Send_IntEvent(SYS_LEFTMOTOR_SPEED, 129);
     Sys_Send_IntEvent(SYS_RIGHTMOTOR_SPEED, (uint16)-128);
-    expect(Sys_Connect_Motors(SYS_IO_SELECTOR) && Sys_Unsubscribe_from_Event(SYS_IO_SELECTOR, 0xFFFF));
+    expect(Sys_Connect_Motors(SYS_IO_SELECTOR) && !Sys_Unsubscribe_from_Event(SYS_IO_SELECTOR, 0xFFFF));
     (void)Sys_Set_MotorProcessor(NULL);
     Sys_Write_UART1("sight", 5);
     Sys_Write_UART2("sight", 5);
