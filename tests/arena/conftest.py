@@ -64,7 +64,7 @@ def full_disk() -> Path:
     """Return a file whose writes fail with ENOSPC. Only Linux has such a file without a mount, which needs root."""
     device = Path("/dev/full")
     if not device.exists():
-        pytest.skip("only Linux has /dev/full")
+        pytest.skip("only Linux has /dev/full, a device that is always full")
     return device
 
 

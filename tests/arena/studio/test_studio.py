@@ -146,7 +146,7 @@ def test_commands_during_a_rewind_discard_later_actions() -> None:
         assert studio.ask("digest") == last, "later actions are discarded"
 
 
-@pytest.mark.skipif(not checkpoints.CAN_FORK, reason="checkpoints exist on Linux only")
+@pytest.mark.skipif(not checkpoints.CAN_FORK, reason="checkpoints are forked processes, which only Linux makes safely")
 def test_a_checkpoint_restores_the_state_to_the_byte(clustering_image: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """After a checkpoint is restored, the trial continues as in the first pass, with an object moved after each
     checkpoint.

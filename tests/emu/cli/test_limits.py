@@ -28,7 +28,7 @@ def endless(tmp_path_factory):
     return folder / "main.elf"
 
 
-@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full on this system")
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="only Linux has /dev/full, a device that is always full")
 @pytest.mark.parametrize("words", [(), ("--uart1", "/dev/full")])
 def test_output_without_room_is_an_error(words):
     with open("/dev/full", "w") as full:

@@ -92,7 +92,7 @@ def test_a_fault_is_reported_and_kept_over_a_reset(image: Build, kind: int, faul
     assert machine.peek(cause + 4) != 0, "the place"
     machine.reset("EXTR")
     run_to(machine, "begin")
-    assert machine.peek(cause) == RESET_PIN, "a fault is told once"
+    assert machine.peek(cause) == RESET_PIN, "a fault is reported once"
 
 
 @pytest.mark.parametrize("kind", [3, 4], ids=["section", "handler"])

@@ -140,6 +140,7 @@ int main(void)
     Sys_Set_Scheduler(&sys_round_robin);
 #ifdef SUITE_OF_OPTIONS
     check_options();
+    check_limits();
     check_waits();
 #else
     check_threads();

@@ -21,10 +21,20 @@ bool noted(const char *text);
 
 uint16 start(void (*entry)(void *), void *arg, uint8 priority); /* returns the PID, or 0 on failure */
 
+/* Whether a call failed with this error. */
+static inline bool refused_as(bool done, sys_error error)
+{
+    return !done && Sys_Get_LastError() == error;
+}
+
+void spin_for_ever(void *unused); /* options.c: a thread that never waits; counts in rounds_spun */
+extern volatile uint16 rounds_spun;
+
 void check_threads(void);   /* threads.c: switching, sleeping, killing, critical sections, schedulers */
 void check_events(void);    /* events.c: registration to delivery, waits, memory */
 void check_attacks(void);   /* attacks.c: floods, deaths, unbalanced calls, numbers that wrap */
-void check_options(void);   /* options.c: mutex, join, cleanup, quota, service; only with -DSUITE_OF_OPTIONS */
+void check_options(void);   /* options.c: mutex, join, cleanup; only with -DSUITE_OF_OPTIONS */
+void check_limits(void);    /* limits.c: quota, service; in the same image */
 void check_waits(void);     /* waits.c: semaphore, notification, timer; in the same image */
 void check_registers(void); /* registers.c: registers of a thread survive preemption */
 

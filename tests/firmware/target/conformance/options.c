@@ -1,27 +1,25 @@
-/* The options mutex, join, cleanup, quota and service, also used by hostile programs. They have their own image, built
+/* The options mutex, join and cleanup, also used by hostile programs. They have their own image, built
  * with -DSUITE_OF_OPTIONS, because a small robot cannot hold them together with the kernel's checks. */
 #include "conformance.h"
 
 #include <openswarm_cleanup.h>
 #include <openswarm_join.h>
 #include <openswarm_mutex.h>
-#include <openswarm_quota.h>
-#include <openswarm_service.h>
 
 #define FILE_LETTER 'o'
 
 static sys_mutex mutex = SYS_MUTEX(3), second = SYS_MUTEX(5);
-static volatile uint16 spins;
+volatile uint16 rounds_spun;
 static volatile bool held;
 static volatile uint8 others;
 static uint16 own_pid;
 
-static void spin(void *unused)
+void spin_for_ever(void *unused)
 {
     (void)unused;
     for (;;) {
         (void)Sys_Get_SystemTime(); /* on some hosts time advances in calls only */
-        spins++;
+        rounds_spun++;
     }
 }
 
@@ -36,11 +34,6 @@ static bool listen(uint16 pid, uint16 event, sys_event_data *data)
 {
     (void)pid, (void)event, (void)data;
     return true;
-}
-
-static bool refused_as(bool done, sys_error error)
-{
-    return !done && Sys_Get_LastError() == error;
 }
 
 /* ---- Mutex ------------------------------------------------------------------------------------------------------- */
@@ -237,7 +230,7 @@ static void joiners_die(void)
 {
     uint16 heap = heap_now();
     forget();
-    own_pid = start(spin, NULL, 0);
+    own_pid = start(spin_for_ever, NULL, 0);
     uint16 a = start(join_it, &own_pid, 0), b = start(join_it, &own_pid, 0);
     CHECK(own_pid != 0 && a != 0 && b != 0);
     Sys_Sleep(30);
@@ -303,16 +296,16 @@ static void hostile_cleanups(void)
     for (uint8 i = 0; i < 2; i++) {
         forget();
         uint16 pid = start(push_again, (void *)(i == 0 ? &soon : &never), 0);
-        uint16 other = start(spin, NULL, 0);
+        uint16 other = start(spin_for_ever, NULL, 0);
         Sys_Sleep(12);
-        spins = 0;
+        rounds_spun = 0;
         Sys_Start_CriticalSection();
         CHECK(i == 0 || Sys_Kill_Process(pid));
         spend(12);
-        CHECK(spins == 0); /* the critical section still exists */
+        CHECK(rounds_spun == 0); /* the critical section still exists */
         Sys_End_CriticalSection();
         Sys_Sleep(12);
-        CHECK(noted("+rrr") && spins != 0 && Sys_Kill_Process(other));
+        CHECK(noted("+rrr") && rounds_spun != 0 && Sys_Kill_Process(other));
         Sys_Yield();
         CHECK(heap_now() == heap);
     }
@@ -348,7 +341,7 @@ static void kill_whom_it_awaits(void *unused)
 
 static void cleanups_kill_what_their_thread_awaits(void)
 {
-    static void (*const targets[])(void *) = {spin, hold_for_ever};
+    static void (*const targets[])(void *) = {spin_for_ever, hold_for_ever};
     static void (*const victims[])(void *) = {kill_what_it_joins, kill_whom_it_awaits};
     uint16 heap = heap_now();
     for (uint8 i = 0; i < 2; i++) {
@@ -374,7 +367,7 @@ static void use_what_is_the_killers(void *unused)
 static void push_that(void *unused)
 {
     note(Sys_Push_Cleanup(&hostile[0], use_what_is_the_killers, NULL) ? '+' : '?');
-    spin(unused);
+    spin_for_ever(unused);
 }
 
 static void cleanups_own_nothing_of_the_killer(void)
@@ -393,7 +386,7 @@ static void push_kill(void *unused)
 {
     own_pid = Sys_Get_ProcessID();
     note(Sys_Push_Cleanup(&hostile[0], kill_target, NULL) ? '+' : '?');
-    spin(unused);
+    spin_for_ever(unused);
 }
 
 static void kill_and_be_killed(void *victim)
@@ -416,175 +409,6 @@ static void a_cleanup_kills_the_killer(void)
     CHECK(heap_now() == heap && Sys_Push_Cleanup(&hostile[0], kill_target, NULL) && Sys_Pop_Cleanup(false));
 }
 
-/* ---- Quota ------------------------------------------------------------------------------------------------------- */
-
-static sys_quota quota, quota_too;
-static uint16 heard, last;
-
-static bool hear(uint16 pid, uint16 event, sys_event_data *data)
-{
-    (void)pid, (void)event;
-    heard++;
-    last = data->value;
-    return true;
-}
-
-static uint16 delivered(uint16 event, uint16 messages)
-{
-    heard = 0;
-    Sys_Start_CriticalSection();
-    for (uint16 i = 1; i <= messages; i++) {
-        CHECK(Sys_Send_IntEvent(event, i));
-    }
-    Sys_End_CriticalSection();
-    Sys_Yield();
-    return heard;
-}
-
-static void quotas_bound_what_waits(void)
-{
-    CHECK(refused_as(Sys_Limit_Event(&quota, E1, 2), SYS_ERROR_EVENT));
-    CHECK(Sys_Register_Event(E1) && Sys_Subscribe_to_Event(E1, 0, hear, NULL));
-    CHECK(refused_as(Sys_Limit_Event(&quota, E1, 0), SYS_ERROR_ARGUMENT) && delivered(E1, 5) == 5);
-    CHECK(Sys_Limit_Event(&quota, E1, 2) && delivered(E1, 5) == 2 && last == 2 && quota.dropped == 3);
-    CHECK(Sys_Keep_Latest(&quota_too, E1) && delivered(E1, 5) == 1 && last == 5 && quota_too.dropped == 0);
-    Sys_Start_CriticalSection();
-    CHECK(Sys_Send_IntEvent(E1, 7) && Sys_Send_Event(E1, "text", 4)); /* another payload size: dropped */
-    Sys_End_CriticalSection();
-    Sys_Yield();
-    CHECK(last == 7 && quota_too.dropped == 1 && Sys_Unregister_Event(E1));
-}
-
-/* Sets a quota twice; its event is unregistered and registered again between two others of the same bucket. */
-static void quotas_come_and_go(void)
-{
-    uint16 heap = heap_now();
-    for (uint8 i = 0; i < 20; i++) {
-        CHECK(Sys_Register_Event(E1) && Sys_Subscribe_to_Event(E1, 0, hear, NULL));
-        CHECK(Sys_Limit_Event(&quota, E1, 1) && Sys_Limit_Event(&quota, E1, 2) && delivered(E1, 4) == 2);
-        CHECK(Sys_Unregister_Event(E1) && Sys_Register_Event(E1) && Sys_Register_Event(E1 + 8));
-        CHECK(Sys_Subscribe_to_Event(E1, 0, hear, NULL) && delivered(E1, 4) == 4); /* the quota ended with its event */
-        CHECK(Sys_Unregister_Event(E1) && Sys_Unregister_Event(E1 + 8));
-    }
-    CHECK(heap_now() <= heap + 4 * sizeof(void *)); /* memory that the event's next quota will use */
-}
-
-static bool leave(uint16 pid, uint16 event, sys_event_data *data)
-{
-    heard++;
-    CHECK(Sys_Send_IntEvent(event, data->value) && Sys_Send_IntEvent(event, data->value));
-    return Sys_Unsubscribe_Handler(event, pid, leave) && Sys_Unregister_Event(event);
-}
-
-static void a_handler_ends_its_limited_event(void)
-{
-    uint16 heap = heap_now();
-    CHECK(Sys_Register_Event(E1) && Sys_Subscribe_to_Event(E1, 0, leave, NULL) && Sys_Keep_Latest(&quota, E1));
-    CHECK(delivered(E1, 3) == 1 && !Sys_IsEventRegistered(E1) && heap_now() <= heap + 4 * sizeof(void *));
-}
-
-static uint16 taken, most_waiting;
-
-static void send_ten(void)
-{
-    for (uint8 i = 0; i < 10; i++) {
-        uint16 dropped = quota.dropped;
-        CHECK(Sys_Send_IntEvent(E1, i));
-        taken = (uint16)(taken + (quota.dropped == dropped));
-    }
-    if ((uint16)(taken - heard) > most_waiting) {
-        most_waiting = (uint16)(taken - heard);
-    }
-}
-
-static bool send_in_delivery(uint16 pid, uint16 event, sys_event_data *data)
-{
-    (void)pid, (void)event, (void)data;
-    send_ten();
-    return true;
-}
-
-static void a_quota_counts_the_current_delivery(void)
-{
-    heard = taken = most_waiting = 0;
-    CHECK(Sys_Register_Event(E1) && Sys_Register_Event(E2) && Sys_Limit_Event(&quota, E1, 4));
-    CHECK(Sys_Subscribe_to_Event(E2, 0, send_in_delivery, NULL) && Sys_Subscribe_to_Event(E1, 0, hear, NULL));
-    Sys_Start_CriticalSection();
-    CHECK(Sys_Send_IntEvent(E2, 0));
-    send_ten();
-    Sys_End_CriticalSection();
-    Sys_Sleep(20);
-    CHECK(most_waiting == 4 && heard == taken && Sys_Unregister_Event(E1) && Sys_Unregister_Event(E2));
-}
-
-/* ---- Services ---------------------------------------------------------------------------------------------------- */
-
-static volatile uint16 begins;
-static void end_at_once(void *unused)
-{
-    (void)unused;
-    begins++;
-}
-
-static void never_yield(void *unused)
-{
-    begins++;
-    CHECK(Sys_Feed_Watchdog());
-    spin(unused);
-}
-
-static void live_well(void *unused)
-{
-    (void)unused;
-    begins++;
-    for (;;) {
-        Sys_Sleep(4);
-        (void)Sys_Feed_Watchdog();
-    }
-}
-
-static void services_are_restarted(void)
-{
-    static const sys_process_config brief_one = {end_at_once, NULL, 0, 0, 0, 0, 0};
-    static const sys_process_config busy_one = {never_yield, NULL, 0, 0, 0, 0, 0};
-    static const sys_process_config good_one = {live_well, NULL, 0, 0, 0, 0, 0};
-    static sys_service few = {.config = &brief_one, .restarts = 3}, busy = {.config = &busy_one, .limit_ms = 20, .restarts = 2};
-    static sys_service good = {.config = &good_one, .limit_ms = 20, .restarts = SYS_ALWAYS};
-    static sys_service storm = {.config = &brief_one, .restarts = SYS_ALWAYS};
-    CHECK(refused_as(Sys_Feed_Watchdog(), SYS_ERROR_PROCESS));
-    begins = 0;
-    CHECK(Sys_Start_Service(&few));
-    Sys_Sleep(100);
-    CHECK(begins == 4 && few.pid == 0);
-    begins = 0;
-    CHECK(Sys_Start_Service(&busy) && refused_as(Sys_Start_Service(&busy), SYS_ERROR_PROCESS));
-    Sys_Sleep(200);
-    CHECK(begins == 3 && busy.bitten == 3 && busy.pid == 0);
-    begins = 0;
-    few.restarts = 1;
-    CHECK(Sys_Start_Service(&few)); /* restart after its end */
-    Sys_Sleep(60);
-    CHECK(begins == 2);
-    begins = 0;
-    CHECK(Sys_Start_Service(&good));
-    Sys_Sleep(100);
-    CHECK(begins == 1 && good.bitten == 0 && Sys_Kill_Process(good.pid));
-    Sys_Sleep(20);
-    CHECK(begins == 2 && good.bitten == 0);
-    begins = 0;
-    CHECK(Sys_Start_Service(&storm));
-    uint16 heap = heap_now();
-    Sys_Sleep(200); /* the service ends and restarts repeatedly; others run */
-    uint16 pid = start(spin, NULL, 0);
-    spins = 0;
-    Sys_Sleep(50);
-    CHECK(begins > 5 && spins != 0 && Sys_Kill_Process(pid));
-    storm.restarts = good.restarts = 0;
-    CHECK(Sys_Kill_Process(good.pid));
-    Sys_Sleep(30);
-    CHECK(storm.pid == 0 && good.pid == 0 && heap_now() <= heap);
-}
-
 static uint16 partners[3];
 
 static void join_partner(void *pid)
@@ -603,35 +427,6 @@ static void threads_do_not_join_in_a_ring(void)
     CHECK(noted("rjj"));
 }
 
-static void a_service_reports_its_wrong_configuration(void)
-{
-    static const sys_process_config wrong = {end_at_once, NULL, 10, 0, 0, 0, 0};
-    static sys_service service = {.config = &wrong, .restarts = 1};
-    CHECK(refused_as(Sys_Start_Service(&service), SYS_ERROR_ARGUMENT));
-}
-
-static void take_all_memory(void *unused)
-{
-    begins++;
-    for (uint16 id = 0x100; Sys_Register_Event(id); id++) {
-    }
-    spin(unused);
-}
-
-static void a_service_that_takes_all_memory_is_restarted(void)
-{
-    static const sys_process_config greedy = {take_all_memory, NULL, 0, 0, 0, 0, 0};
-    static sys_service service = {.config = &greedy, .limit_ms = 20, .restarts = 2};
-    uint16 heap = heap_now();
-    begins = 0;
-    CHECK(Sys_Start_Service(&service));
-    Sys_Sleep(200);
-    CHECK(begins == 3 && service.bitten == 3 && service.pid == 0);
-    for (uint16 id = 0x100; Sys_Unregister_Event(id); id++) {
-    }
-    CHECK(heap_now() <= heap);
-}
-
 void check_options(void)
 {
     mutexes_refuse_what_they_cannot_do();
@@ -646,12 +441,5 @@ void check_options(void)
     cleanups_kill_what_their_thread_awaits();
     cleanups_own_nothing_of_the_killer();
     a_cleanup_kills_the_killer();
-    quotas_bound_what_waits();
-    quotas_come_and_go();
-    a_handler_ends_its_limited_event();
-    a_quota_counts_the_current_delivery();
     threads_do_not_join_in_a_ring();
-    a_service_reports_its_wrong_configuration();
-    a_service_that_takes_all_memory_is_restarted();
-    services_are_restarted();
 }

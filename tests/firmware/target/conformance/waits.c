@@ -15,11 +15,6 @@ static sys_semaphore units = SYS_SEMAPHORE(0);
 static sys_notification notice;
 static const char letters[] = "ab";
 
-static bool refused_as(bool done, sys_error error)
-{
-    return !done && Sys_Get_LastError() == error;
-}
-
 static void wait_until_noted(const char *text)
 {
     for (uint16 i = 0; i < PATIENCE && !noted(text); i++) {
