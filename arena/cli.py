@@ -10,13 +10,13 @@ import argparse
 import sys
 from collections.abc import Callable, Sequence
 from importlib import import_module
-from importlib.metadata import version
 from typing import Any, Final
 
 from arena.commands import COMMANDS
 from emu.host.completion import SHELLS, script
 from emu.host.completion import description as completion_description
 from emu.host.exit_status import BAD_INPUT, CANNOT_CONTINUE, DONE, INTERRUPTED, ignore_unread_output
+from emu.host.front import answer, listing
 
 _USAGE: Final = """usage: arena COMMAND [options]
 
@@ -34,16 +34,9 @@ Command = tuple[argparse.ArgumentParser, Callable[[argparse.Namespace], Any]]
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return the exit status of the process."""
     words = list(sys.argv[1:] if arguments is None else arguments)
-    if not words or words[0] in ("-h", "--help"):
-        width = max(map(len, COMMANDS))
-        print(_USAGE.format(commands="\n".join(f"  {name:{width}}  {text}" for name, text in COMMANDS.items())))
-        return DONE if words else BAD_INPUT
-    if words == ["--version"]:
-        print(f"arena {version('openswarm')}")
-        return DONE
-    if words[0] not in COMMANDS:
-        print(f"arena: unknown command {words[0]!r}; known: {', '.join(COMMANDS)}", file=sys.stderr)
-        return BAD_INPUT
+    status = answer("arena", words, COMMANDS, lambda: _USAGE.format(commands=listing(COMMANDS)))
+    if status is not None:
+        return status
     parser, run = command(words[0])
     try:
         options = parser.parse_args(words[1:])

@@ -15,6 +15,7 @@ from typing import Final
 from emu.commands import COMMANDS
 from emu.host.command import CommandError, Parser
 from emu.host.exit_status import BAD_INPUT, BAD_INPUT_AS_STATUS, DONE, ignore_unread_output
+from emu.host.front import answer, listing
 
 _USAGE: Final = """usage: emu COMMAND [options]
 
@@ -31,20 +32,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _answer(words: list[str]) -> int:
-    if not words or words[0] in ("-h", "--help"):
-        width = max(map(len, COMMANDS))
-        print(_USAGE.format(commands="\n".join(f"  {name:{width}}  {text}" for name, text in COMMANDS.items())))
-        return DONE if words else BAD_INPUT
-    if words == ["--version"]:
-        from importlib.metadata import version  # imported only here: it takes as long as a short run
-
-        print(f"emu {version('openswarm')}")
-        return DONE
-    name, rest = words[0], words[1:]
-    if name not in COMMANDS:
-        print(f"emu: unknown command {name!r}; expected one of {', '.join(COMMANDS)}", file=sys.stderr)
-        return BAD_INPUT
-    return _call(name, rest)
+    status = answer("emu", words, COMMANDS, lambda: _USAGE.format(commands=listing(COMMANDS)))
+    return _call(words[0], words[1:]) if status is None else status
 
 
 def _call(name: str, rest: list[str]) -> int:

@@ -10,10 +10,10 @@ import sys
 from argparse import ArgumentParser, Namespace
 from collections.abc import Sequence
 from importlib import import_module
-from importlib.metadata import version
 from typing import Final, Protocol, cast
 
-from emu.host.exit_status import BAD_INPUT, DONE, INTERRUPTED, ignore_unread_output
+from emu.host.exit_status import BAD_INPUT, INTERRUPTED, ignore_unread_output
+from emu.host.front import answer, listing
 
 COMMANDS: Final = {
     "new": "set up a project: Makefile, CMake, main.c, a test, settings for VS Code",
@@ -67,15 +67,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _answer(words: list[str]) -> int:
-    if not words or words[0] in ("-h", "--help"):
-        width = max(map(len, COMMANDS))
-        print(_USAGE.format(commands="\n".join(f"  {name:{width}}  {text}" for name, text in COMMANDS.items())))
-        return DONE if words else BAD_INPUT
-    if words == ["--version"]:
-        print(f"openswarm {version('openswarm')}")
-        return DONE
-    if words[0] not in COMMANDS:
-        print(f"openswarm: unknown command {words[0]!r}; known are {', '.join(COMMANDS)}", file=sys.stderr)
-        return BAD_INPUT
+    status = answer("openswarm", words, COMMANDS, lambda: _USAGE.format(commands=listing(COMMANDS)))
+    if status is not None:
+        return status
     module = command(words[0])
     return module.run(module.parser().parse_args(words[1:]))

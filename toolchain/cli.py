@@ -12,6 +12,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 from emu.host.exit_status import BAD_INPUT, DONE, INTERRUPTED, ignore_unread_output
+from emu.host.front import answer
 from toolchain.errors import ToolError
 
 COMMANDS: dict[str, tuple[str, str]] = {
@@ -50,15 +51,9 @@ def _usage() -> str:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return its exit status: 0 success, 1 errors in C sources, 2 bad input or usage."""
     words = list(sys.argv[1:] if arguments is None else arguments)
-    if not words or words[0] in ("-h", "--help"):
-        print(_usage())
-        return DONE if words else BAD_INPUT
-    if words == ["--version"]:
-        print(f"toolchain {version('openswarm')}")
-        return DONE
-    if words[0] not in COMMANDS:
-        print(f"toolchain: unknown command {words[0]!r}; known: {', '.join(COMMANDS)}", file=sys.stderr)
-        return BAD_INPUT
+    status = answer("toolchain", words, COMMANDS, _usage)
+    if status is not None:
+        return status
     try:
         return int(import_module(COMMANDS[words[0]][0]).main(words[1:]) or DONE)
     except ToolError as error:

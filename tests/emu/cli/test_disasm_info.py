@@ -108,7 +108,7 @@ def test_usage_mistakes_are_one_line_and_status_2(capsys):
         main(["info"])
     assert caught.value.code == 2
     assert capsys.readouterr().err.count("\n") == 1
-    assert output(capsys, "no-such", status=2).err.startswith("emu: unknown command 'no-such'; expected one of run")
+    assert output(capsys, "no-such", status=2).err.startswith("emu: unknown command 'no-such'; known: run")
 
 
 @pytest.mark.parametrize("command", ["info", "disasm"])

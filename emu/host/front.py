@@ -1,0 +1,32 @@
+"""What every command line answers before it runs a command: help, version, unknown commands."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Collection, Sequence
+
+from emu.host.exit_status import BAD_INPUT, DONE
+
+
+def answer(program: str, words: Sequence[str], commands: Collection[str], usage: Callable[[], str]) -> int | None:
+    """Print usage, version or an error if `words` name no command; return the exit status.
+
+    Returns None if the first word is one of `commands`."""
+    if not words or words[0] in ("-h", "--help"):
+        print(usage())
+        return DONE if words else BAD_INPUT
+    if list(words) == ["--version"]:
+        from importlib.metadata import version  # imported only here: it takes as long as a short run
+
+        print(f"{program} {version('openswarm')}")
+        return DONE
+    if words[0] not in commands:
+        print(f"{program}: unknown command {words[0]!r}; known: {', '.join(commands)}", file=sys.stderr)
+        return BAD_INPUT
+    return None
+
+
+def listing(commands: dict[str, str]) -> str:
+    """Return one line per command: its name and the first line of its description."""
+    width = max(map(len, commands))
+    return "\n".join(f"  {name:{width}}  {text}" for name, text in commands.items())
