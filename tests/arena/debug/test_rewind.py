@@ -30,7 +30,9 @@ from tests.firmware.conftest import built_once
 from tests.fuzz.swarm.fuzz_rewind import SWARMS, Swarm, plan_of, walk
 
 FEW = Swarm("clustering", 1.0, (), (), {"robots__count": 2, "objects__count": 2, "start__selector": 8})
-needs_fork = pytest.mark.skipif(not checkpoints.CAN_FORK, reason="checkpoints are forked processes, which only Linux makes safely")
+needs_fork = pytest.mark.skipif(
+    not checkpoints.CAN_FORK, reason="checkpoints are forked processes, which only Linux makes safely"
+)
 
 
 @pytest.fixture
