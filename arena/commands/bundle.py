@@ -8,7 +8,7 @@ from pathlib import Path
 
 from arena.campaign import bundle
 from arena.commands.arguments import count, removed_processes
-from arena.commands.trust import add_trust_options
+from arena.commands.trust_options import add_trust_options
 from arena.trial.strict_json import json_text
 
 DIFFERENT = 1

@@ -14,7 +14,7 @@ from arena.commands.run import with_overrides
 from arena.infrared.propagation import PUBLISHED, Optics, amplitude, distance_of
 from arena.scene.loader import Scene, load_scene
 from arena.trial.strict_json import json_text
-from arena.world.physics import Poses
+from arena.world.poses import Poses
 
 THRESHOLDS: Final = (10.0, 2.0)
 """Amplitudes in ADC counts whose range is drawn.

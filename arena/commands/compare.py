@@ -7,7 +7,7 @@ from pathlib import Path
 
 from arena.analysis.comparison import compare_runs
 from arena.commands.arguments import duration
-from arena.commands.trust import add_trust_options, load_trusted
+from arena.commands.trust_options import add_trust_options, load_trusted
 from arena.trial.record import trials_in
 from arena.trial.strict_json import json_text
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from arena.analysis import plots
 from arena.commands.arguments import count_or_none
-from arena.commands.trust import add_trust_options, load_trusted
+from arena.commands.trust_options import add_trust_options, load_trusted
 from arena.replay import filmstrip
 from arena.trial.record import Trial, trials_in
 

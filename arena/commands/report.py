@@ -11,7 +11,7 @@ import numpy as np
 from arena.analysis import plots
 from arena.analysis.report import by_controller, report, with_results
 from arena.commands.arguments import duration
-from arena.commands.trust import add_trust_options, load_trusted
+from arena.commands.trust_options import add_trust_options, load_trusted
 from arena.trial.manifest import read_manifest
 from arena.trial.record import trials_in, write_text
 

@@ -63,7 +63,7 @@ struct robot {
     i64 noise_shift; // a random 32-bit number, shifted by this, is the index of a line's first noise value
     const void *pair;
     void *drive, *generator;
-    i64 *steps;    // room for the motor steps of all noted quanta
+    i64 *steps;    // [most quanta of one run][2]: motor steps of the left and the right wheel in each quantum
     i64 row, href; // of the picture and of the camera line that is to be rendered
 };
 

@@ -26,7 +26,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, Final
 
 from emu.dspic30f.exceptions.interrupts import Accepted
-from emu.host.tables import data_frame, html_table
+from emu.host.result_tables import data_frame, html_table
 from emu.kernel_metrics.application_memory import SCHEDULER
 from emu.kernel_metrics.heap import Heap
 from emu.kernel_metrics.kernel_structures import KernelStructures, event_name

@@ -12,7 +12,7 @@ from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any, Final
 
 from emu.debug.inspector import Inspector
-from emu.host.tables import data_frame, html_table
+from emu.host.result_tables import data_frame, html_table
 from emu.image.footprint import pieces
 from emu.image.model import Image
 from emu.kernel_metrics.blame import short

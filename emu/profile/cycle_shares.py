@@ -18,7 +18,7 @@ import numpy as np
 
 from emu.debug.inspector import Inspector
 from emu.dspic30f.cycle_accounting import CycleAccounting
-from emu.host.tables import data_frame, html_table
+from emu.host.result_tables import data_frame, html_table
 from emu.image.model import Image
 from emu.profile.call_graph import NOWHERE, CallEdge, CallEvent, CallGraph
 

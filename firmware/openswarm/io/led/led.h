@@ -21,7 +21,7 @@ typedef struct {
 typedef bool (*sys_led_processor)(sys_led_order *order);
 sys_led_processor Sys_Set_LEDProcessor(sys_led_processor processor); /* MTH; NULL: orders unchanged */
 
-/* M | no | - | 40 | MEMORY.  Between Sys_Init_Kernel and Sys_Start_Kernel. */
+/* M | no | - | 40 | MEMORY.  Between Sys_Init_Kernel and Sys_Start_Kernel. Columns: openswarm.h, top. */
 bool Sys_Start_LEDs(void);
 
 #endif

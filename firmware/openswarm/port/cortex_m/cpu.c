@@ -16,7 +16,7 @@ typedef struct { /* registers restored by PendSV, then those restored by the har
 
 volatile uint8 cpu_slice_ms = CPU_SLICE_MS;
 volatile bool cpu_forced;
-hal_pick cpu_pick; /* PendSV's next task; NULL = end of slice */
+hal_pick cpu_pick; /* called by PendSV, returns the next thread; NULL: a slice has ended */
 
 extern uint32_t main_stack_bottom[];
 

@@ -128,7 +128,7 @@ static void take(uint16 size, bool is_hole)
 {
     uint16 *at = heap_alloc(size);
     expect(at != NULL);
-    at[size / 2 - 1] = NEAR; /* as size of a preceding hole it points to a lower address */
+    at[size / 2 - 1] = NEAR; /* as if a hole ended here: heap_free must search for it in vain */
     taken[pieces].at = at;
     taken[pieces].size = size;
     taken[pieces++].is_hole = is_hole;
