@@ -1,7 +1,7 @@
 """Device headers such as `dspic30f6014a.h`, generated from the register tables of `emu.chips`.
 
-The compiler generates the header of its chip on first use and keeps it in the user's cache. This compiler and XC16
-accept the headers. `python -m toolchain.device_header CHIP` prints one.
+The compiler generates the headers of its chip on first use and keeps them in the user's cache. This compiler and XC16
+accept them. `python -m toolchain.device_header CHIP [NAME]` prints one, such as `timer.h` of the peripheral library.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from emu.chips import NAMES, chip_named
 from emu.chips.chip import Chip, Sfr
 from emu.host.paths import headers
 from emu.host.private_folder import is_usable, make_private
+from toolchain import peripheral_library
 
 CHIPS = Path(emu.chips.__path__[0])
 ALTERNATIVES: dict[str, dict[str, str]] = {
@@ -174,12 +175,20 @@ def folder_of(chip_name: str) -> Path:
     return folder
 
 
+def include_folders(chip_name: str) -> tuple[Path, Path]:
+    """Return the folder of the device headers and the folder of the chip's peripheral library."""
+    folder = folder_of(chip_name)
+    return folder, folder / chip_named(chip_name).name.lower()
+
+
 def _write_all(target: Path, chip: Chip) -> None:
-    """Write the headers that include a chip's header under Microchip's names, then that header.
+    """Write the peripheral library, the headers with Microchip's names of a chip's header, and last that header.
 
     XC16 finds its headers in any case: programs use `p30F4011.h`, `p30f4011.h` and `p30f6014A.h`.
     """
     device = chip.name.removeprefix("dsPIC")
+    for name, text in peripheral_library.headers(chip).items():
+        _write(target.with_suffix("") / name, text)
     fields = target.with_name(f"{target.stem}_fields.h")
     _write(fields, field_header(chip))
     for name in sorted({f"p{device}", f"p{device.lower()}", f"p{device.replace('F', 'f')}"}):
@@ -190,9 +199,9 @@ def _write_all(target: Path, chip: Chip) -> None:
 
 
 def _version() -> str:
-    """Hash of all inputs of a header: this module and the tables of the chips."""
+    """Hash of all inputs of a header: this module, the peripheral library and the tables of the chips."""
     digest = hashlib.sha256(Path(__file__).read_bytes())
-    for path in sorted(CHIPS.rglob("*")):
+    for path in sorted([*CHIPS.rglob("*"), *Path(peripheral_library.__path__[0]).iterdir()]):
         if path.suffix in (".py", ".csv"):
             digest.update(path.name.encode() + b"\0" + path.read_bytes())
     return digest.hexdigest()[:16]
@@ -208,15 +217,26 @@ def _write(target: Path, text: str) -> None:
 
 
 def main() -> int:
-    """Print the header of the chip on the command line, by default the first one, and return the exit status."""
-    if len(sys.argv) > 2 or sys.argv[1:2] == ["--help"]:
-        print(f"usage: python -m toolchain.device_header [CHIP]; CHIP is one of {', '.join(NAMES)}", file=sys.stderr)
+    """Print the header that the command line names, by default that of the first chip, and return the exit status."""
+    words = sys.argv[1:]
+    if len(words) > 2 or words[:1] == ["--help"]:
+        print(
+            f"usage: python -m toolchain.device_header [CHIP [NAME]]; CHIP is one of {', '.join(NAMES)}; "
+            f"NAME is one of {', '.join(peripheral_library.BODIES)}",
+            file=sys.stderr,
+        )
         return 2
     try:
-        print(header(chip_named(*sys.argv[1:])), end="")
+        chip = chip_named(*words[:1])
     except ValueError as error:
         print(f"toolchain.device_header: {error}", file=sys.stderr)
         return 2
+    known = {"": header(chip), **peripheral_library.headers(chip)}
+    name = words[1] if len(words) > 1 else ""
+    if name not in known:
+        print(f"toolchain.device_header: no header {name}: use one of {', '.join(list(known)[1:])}", file=sys.stderr)
+        return 2
+    print(known[name], end="")
     return 0
 
 

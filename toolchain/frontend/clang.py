@@ -21,7 +21,7 @@ from pathlib import Path
 from emu.chips import chip_named
 from emu.chips.chip import Chip
 from toolchain.abi.struct_alignment import LAYOUT_FLAGS
-from toolchain.device_header import folder_of
+from toolchain.device_header import include_folders
 from toolchain.errors import ToolError
 from toolchain.frontend import accumulators, annotated_lines, asm_constraints, attributes, config_pragma, header_case
 from toolchain.frontend.asm_registers import REFUSED, respell
@@ -115,7 +115,7 @@ def front_end_flags(options: CcOptions, language: str = "c") -> list[str]:
     """Flags of the target and language, followed by the user's flags."""
     flags = [*TARGET_FLAGS, *LANGUAGE_FLAGS, CLANG_LEVEL[options.level]]
     flags += [f"-U{name}" for name in FOREIGN_MACROS]
-    own_folders = (INCLUDE_DIR, folder_of(options.chip.name), builtin_include_dir())
+    own_folders = (INCLUDE_DIR, *include_folders(options.chip.name), builtin_include_dir())
     folders = [word for folder in (own_folders if options.own_headers else ()) for word in ("-isystem", str(folder))]
     guard = ["__HAS_CODEGUARD__"] if "FBS" in options.chip.config else []
     flags += [f"-D{name}=1" for name in (f"__{options.chip.name}__", *PREDEFINED, *guard)]
@@ -127,7 +127,7 @@ def front_end_flags(options: CcOptions, language: str = "c") -> list[str]:
         flags += ["-Xclang", "-cl-single-precision-constant"]
     if options.debug:
         # Images must not depend on the folders in which this package and clang are installed.
-        own = ((INCLUDE_DIR, "toolchain/include"), (folder_of(options.chip.name), "toolchain/include"),
+        own = ((INCLUDE_DIR, "toolchain/include"), (include_folders(options.chip.name)[0], "toolchain/include"),
                (builtin_include_dir(), "clang/include"))  # fmt: skip
         flags += ["-g", "-gdwarf-2", *(f"-fdebug-prefix-map={path}={name}" for path, name in own)]
     if any(word.startswith("-fsanitize=") for word in options.clang):
