@@ -13,13 +13,14 @@ import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.patches import Circle, Rectangle
+from matplotlib.patches import Circle, Polygon, Rectangle
 
 from arena.analysis.comparison import series_by_seed
 from arena.analysis.statistics import bootstrap_band
 from arena.experiments import Curve
 from arena.experiments.declaration import code_needed
-from arena.scene import dimensions
+from arena.scene import dimensions, geometry
+from arena.scene.schema import ObjectKind
 from arena.trial.record import Trial
 
 Runs = Mapping[str, list[Trial]]
@@ -65,18 +66,25 @@ def snapshots(runs: Runs) -> Figure:
 
 
 def _arena(axis: Axes, trial: Trial, sample: int) -> None:
-    radius = trial.scene.objects.radius_cm
     places = trial.objects[sample]
     labels = trial.experiment.groups(trial.scene, places)
     largest = max(set(labels), key=labels.count) if labels else -1
-    for (x, y), label in zip(places, labels, strict=True):
+    for number, (place, label) in enumerate(zip(trial.object_poses[sample], labels, strict=True)):
         is_filled = label == largest and labels.count(label) > 1
-        axis.add_patch(Circle((x, y), radius, facecolor="tab:red" if is_filled else "mistyrose", edgecolor="k"))
+        axis.add_patch(object_patch(trial.scene.kind_of(number), place, "tab:red" if is_filled else "mistyrose"))
     for index, (x, y) in enumerate(trial.robots[sample]):
         heading = float(trial.columns[f"r{index}_heading"][sample])
         axis.add_patch(Circle((x, y), dimensions.ROBOT_RADIUS, facecolor="tab:green", edgecolor="k"))
         axis.plot([x, x + 6 * np.cos(heading)], [y, y + 6 * np.sin(heading)], "k", linewidth=1)
     frame(axis, trial)
+
+
+def object_patch(kind: ObjectKind, place: tuple[float, ...], colour: str) -> Circle | Polygon:
+    """Return the outline of an object at x, y in cm and, for a polygon, heading in rad."""
+    if kind.polygon:
+        corners = geometry.turned(geometry.centred(kind.polygon), *place)
+        return Polygon(corners, facecolor=colour, edgecolor="k")
+    return Circle((place[0], place[1]), kind.radius_cm, facecolor=colour, edgecolor="k")
 
 
 def frame(axis: Axes, trial: Trial) -> None:

@@ -43,7 +43,8 @@ class Appearance(NamedTuple):
     """Visible bodies of a furnished scene.
 
     - `colours`: by class
-    - `objects`: radius, height, class
+    - `objects`: radius (0: a polygon), height, class
+    - `polygons`: of each movable polygon, in order: number of the object, corners around its centre, height, class
     - `sides`: ends, height, class of walls and polygonal obstacles
     - `discs`: x, y, radius, height, class of round obstacles
     - `patches`: patches of the floor with their classes
@@ -52,6 +53,7 @@ class Appearance(NamedTuple):
 
     colours: NDArray[np.uint8]
     objects: list[tuple[float, float, int]]
+    polygons: list[tuple[int, geometry.Corners, float, int]]
     sides: list[tuple[geometry.Side, float, int]]
     discs: list[tuple[float, float, float, float, int]]
     patches: list[tuple[Patch, int]]
@@ -92,9 +94,10 @@ def _appearance(scene: Scene) -> Appearance:
             colours.append(colour)
         return colours.index(colour)
 
-    objects = [
-        (one.radius_cm, one.height_cm, class_of(one.colour)) for one in map(scene.kind_of, range(scene.objects.count))
-    ]
+    kinds = list(map(scene.kind_of, range(scene.objects.count)))
+    objects = [(0.0 if one.polygon else one.radius_cm, one.height_cm, class_of(one.colour)) for one in kinds]
+    polygons = [(number, geometry.centred(one.polygon), one.height_cm, class_of(one.colour))
+                for number, one in enumerate(kinds) if one.polygon]  # fmt: skip
     room = geometry.sides(scene.arena.polygon) if scene.arena.polygon else []
     sides = [(side, dimensions.WALL_HEIGHT, WALL) for side in room]
     sides += [(side, one.height_cm, class_of(one.colour)) for one in scene.obstacles if one.polygon
@@ -103,7 +106,7 @@ def _appearance(scene: Scene) -> Appearance:
              for one in scene.obstacles if one.radius_cm]  # fmt: skip
     patches = [(patch, class_of(patch.colour)) for patch in scene.patches]
     sensor_classes = list(range(len(COLOURS))) + [_nearest_reference(colour) for colour in colours[len(COLOURS) :]]
-    return Appearance(np.array(colours, dtype=np.uint8), objects, sides, discs, patches, sensor_classes)
+    return Appearance(np.array(colours, dtype=np.uint8), objects, polygons, sides, discs, patches, sensor_classes)
 
 
 def _nearest_reference(colour: tuple[int, ...]) -> int:

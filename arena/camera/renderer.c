@@ -31,6 +31,15 @@ struct led {
 struct side {
     f64 ax, ay, bx, by, height;
     i64 class;
+    f64 range; // greatest distance at which it is visible
+};
+
+// A movable polygon: object number `object`, with corners (x, y) around its centre.
+struct polygon {
+    const f64 *corners;
+    i64 count, object;
+    f64 height;
+    i64 class;
 };
 
 struct patch {
@@ -60,6 +69,8 @@ struct view {
     i64 disc_count;
     struct side *sides;
     i64 side_count;
+    const struct polygon *polygons;
+    i64 polygon_count;
     f64 x, y, cos, sin;
 };
 
@@ -113,8 +124,30 @@ static void add_disc(struct view *v, f64 x, f64 y, const struct disc *like)
             (struct disc){ahead, left, radius, like->height, like->class, like->leds, like->cos, like->sin};
 }
 
+// Add a side that may be in view, with its ends in the camera frame.
+static void add_side(struct view *v, const struct side *one)
+{
+    f64 x1 = one->ax - v->x, y1 = one->ay - v->y, x2 = one->bx - v->x, y2 = one->by - v->y;
+    struct side turned = {x1 * v->cos + y1 * v->sin, y1 * v->cos - x1 * v->sin, x2 * v->cos + y2 * v->sin,
+                          y2 * v->cos - x2 * v->sin, one->height,               one->class, one->range};
+    if (turned.ax > 0 || turned.bx > 0)
+        v->sides[v->side_count++] = turned;
+}
+
+static void add_polygon(struct view *v, const struct polygon *one, const f64 *at, f64 heading)
+{
+    f64 c = cos(heading), s = sin(heading);
+    const f64 *from = one->corners + 2 * (one->count - 1);
+    for (const f64 *to = one->corners; to < one->corners + 2 * one->count; from = to, to += 2) {
+        struct side side = {at[0] + c * from[0] - s * from[1], at[1] + s * from[0] + c * from[1],
+                            at[0] + c * to[0] - s * to[1],     at[1] + s * to[0] + c * to[1],
+                            one->height, one->class, v->range};
+        add_side(v, &side);
+    }
+}
+
 // Set the viewpoint to the own pose in `poses`, extrapolated by `quanta` of the motion since `before`, and collect what
-// is in view. Both tables hold x, y, heading of the robots, then x, y of the objects.
+// is in view. Both tables hold x, y, heading of the robots, then x, y of the objects, then headings of the polygons.
 void set_viewpoint(struct view *v, const f64 *poses, const f64 *before, f64 quanta)
 {
     const f64 *now = poses + 3 * v->own, *then = before + 3 * v->own;
@@ -127,7 +160,8 @@ void set_viewpoint(struct view *v, const f64 *poses, const f64 *before, f64 quan
     v->disc_count = v->side_count = 0;
     const f64 *objects = poses + 3 * v->robots;
     for (i64 i = 0; i < v->objects; i++)
-        add_disc(v, objects[2 * i], objects[2 * i + 1], &v->object_discs[i]);
+        if (v->object_discs[i].radius > 0)
+            add_disc(v, objects[2 * i], objects[2 * i + 1], &v->object_discs[i]);
     for (i64 i = 0; i < v->robots; i++) {
         if (i == v->own)
             continue;
@@ -139,14 +173,10 @@ void set_viewpoint(struct view *v, const f64 *poses, const f64 *before, f64 quan
         add_disc(v, poses[3 * i], poses[3 * i + 1], &v->robot);
     }
     sort(v->discs, v->disc_count);
-    for (i64 i = 0; i < v->outline_count; i++) {
-        const struct side *one = &v->outlines[i];
-        f64 x1 = one->ax - v->x, y1 = one->ay - v->y, x2 = one->bx - v->x, y2 = one->by - v->y;
-        struct side turned = {x1 * v->cos + y1 * v->sin, y1 * v->cos - x1 * v->sin, x2 * v->cos + y2 * v->sin,
-                              y2 * v->cos - x2 * v->sin, one->height,               one->class};
-        if (turned.ax > 0 || turned.bx > 0)
-            v->sides[v->side_count++] = turned;
-    }
+    for (i64 i = 0; i < v->outline_count; i++)
+        add_side(v, &v->outlines[i]);
+    for (i64 i = 0; i < v->polygon_count; i++)
+        add_polygon(v, &v->polygons[i], objects + 2 * v->polygons[i].object, objects[2 * v->objects + i]);
 }
 
 static int contains(const struct patch *patch, f64 x, f64 y)
@@ -288,7 +318,7 @@ void classify_rays(const struct view *v, const struct rays *rays)
         }
         for (i64 s = 0; s < v->side_count; s++) {
             f64 depth = side_depth(v, &v->sides[s], slope);
-            if (depth > 0)
+            if (depth > 0 && depth * length <= v->sides[s].range)
                 occlude(v, &p, depth, v->sides[s].height, v->sides[s].class);
         }
         rays->seen[i] = (uint8_t)(p.seen == FLOOR ? floor_class(v, slope, p.rise) : p.seen);
@@ -333,7 +363,7 @@ static i64 ray_class(const struct view *v, const struct rays *rays, f64 slope, f
     }
     for (i64 s = 0; s < v->side_count; s++) {
         f64 depth = side_depth(v, &v->sides[s], slope);
-        if (depth > 0)
+        if (depth > 0 && depth <= v->sides[s].range / sqrt(a))
             offer_hit(v, &best, rise, depth, v->sides[s].height, v->sides[s].class);
     }
     for (i64 d = 0; d < v->fixed_count; d++) {

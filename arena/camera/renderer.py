@@ -6,6 +6,7 @@ tests/arena/reference_camera.py is the specification; the tests compare both.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from ctypes import POINTER, Structure, addressof, c_double, c_int64, c_void_p
 from functools import cache
@@ -19,7 +20,8 @@ from arena.camera.appearance import COLOURS, LED_POSITIONS, NOTHING, OBJECT, ROB
 from arena.camera.lens import Floats, lens_of
 from arena.scene import dimensions
 from arena.scene.loader import Scene
-from arena.world.physics import Poses, Traits
+from arena.world.physics import Traits
+from arena.world.poses import Poses
 from emu.native_library import ADDRESS, DOUBLE, INT, address_of, functions
 
 NEAREST: Final = 0.05
@@ -50,7 +52,15 @@ class _Led(Structure):
 class _Side(Structure):
     """`struct side` of renderer.c."""
 
-    _fields_ = [(name, c_double) for name in ("ax", "ay", "bx", "by", "height")] + [("class", c_int64)]
+    _fields_ = [*((name, c_double) for name in ("ax", "ay", "bx", "by", "height")), ("class", c_int64),
+                ("range", c_double)]  # fmt: skip
+
+
+class _Polygon(Structure):
+    """`struct polygon` of renderer.c."""
+
+    _fields_ = [("corners", c_void_p), ("count", c_int64), ("object", c_int64), ("height", c_double),
+                ("class", c_int64)]  # fmt: skip
 
 
 class _Patch(Structure):
@@ -73,6 +83,7 @@ class _View(Structure):
         ("fixed", POINTER(_Disc)), ("fixed_count", c_int64), ("outlines", POINTER(_Side)), ("outline_count", c_int64),
         ("patches", POINTER(_Patch)), ("patch_count", c_int64),
         ("discs", POINTER(_Disc)), ("disc_count", c_int64), ("sides", POINTER(_Side)), ("side_count", c_int64),
+        ("polygons", POINTER(_Polygon)), ("polygon_count", c_int64),
         ("x", c_double), ("y", c_double), ("cos", c_double), ("sin", c_double),
     ]  # fmt: skip
 
@@ -109,7 +120,15 @@ class _SceneBodies:
             (appearance.discs, appearance.sides, appearance.patches) if appearance is not None else ([], [], [])
         )
         self.fixed: Final = (_Disc * len(fixed))(*(_Disc(*one) for one in fixed))
-        self.outlines: Final = (_Side * len(sides))(*(_Side(*ends, height, kind) for ends, height, kind in sides))
+        self.outlines: Final = (_Side * len(sides))(
+            *(_Side(*ends, height, kind, math.inf) for ends, height, kind in sides)
+        )
+        polygons = appearance.polygons if appearance is not None else []
+        self.polygon_corners: Final = [np.array(corners, dtype=np.float64) for _, corners, _, _ in polygons]
+        self.polygons: Final = (_Polygon * len(polygons))(*(
+            _Polygon(corners.ctypes.data, len(corners), number, height, kind)
+            for (number, _, height, kind), corners in zip(polygons, self.polygon_corners, strict=True)
+        ))  # fmt: skip
         self.corners: Final = [np.array(patch.polygon or [], dtype=np.float64).reshape(-1, 2) for patch, _ in patches]
         self.patches: Final = (_Patch * len(patches))(*(
             _Patch(patch.x_cm, patch.y_cm, patch.radius_cm, corners.ctypes.data, len(corners), kind)
@@ -166,7 +185,7 @@ class Renderer:
         self.leds: Final = np.zeros(scene.robots.count, dtype=np.int64)
         """Lit LEDs of each robot, bit n: ring LED n, 8 front, 9 body; used in scenes with `camera.sees_leds`."""
         self._discs: Final = (_Disc * (len(bodies.objects) + scene.robots.count))()
-        self._sides: Final = (_Side * len(bodies.outlines))()
+        self._sides: Final = (_Side * (len(bodies.outlines) + sum(map(len, bodies.polygon_corners))))()
         self._view: Final = _View(
             dimensions.CAMERA_AHEAD, dimensions.CAMERA_HEIGHT, dimensions.WALL_HEIGHT, NEAREST,
             scene.arena.width_cm, scene.arena.height_cm, scene.camera.range_cm, self.lens.widest, traits.yaw,
@@ -176,9 +195,10 @@ class Renderer:
             _Disc(0.0, 0.0, dimensions.ROBOT_RADIUS, dimensions.ROBOT_HEIGHT, ROBOT), bodies.objects,
             bodies.fixed, len(bodies.fixed), bodies.outlines, len(bodies.outlines),
             bodies.patches, len(bodies.patches), self._discs, 0, self._sides, 0,
+            bodies.polygons, len(bodies.polygons),
         )  # fmt: skip
         self._address: Final = addressof(self._view)
-        self._counts = scene.robots.count, len(bodies.objects)
+        self._counts = scene.robots.count, len(bodies.objects), len(bodies.polygons)
         self._sensor_classes: Final = bodies.sensor_classes.ctypes.data
         self._rows: Final[dict[tuple[float, int], RowRays]] = {}
         self._vignetting: Final = scene.camera.vignetting
@@ -193,11 +213,13 @@ class Renderer:
 
     def _adapt(self, poses: Poses) -> None:
         """Accept poses of fewer robots or objects than the scene has, as in tests and replays."""
-        robots, objects = poses.counts
+        robots, objects, polygons = poses.counts
         if objects > len(self._bodies.objects) or robots > len(self.leds):
             raise ValueError(f"{robots} robots and {objects} objects are more than the scene has")
+        if polygons != sum(one.object < objects for one in self._bodies.polygons):
+            raise ValueError(f"{polygons} polygons are not those of the scene's first {objects} objects")
         self._counts = poses.counts
-        self._view.robots, self._view.objects = poses.counts
+        self._view.robots, self._view.objects, self._view.polygon_count = poses.counts
 
     def classify_row(self, v: int, columns: NDArray[np.intp]) -> NDArray[np.uint8]:
         """Return the pixel classes of one row in some columns, valid until the next call for that row."""

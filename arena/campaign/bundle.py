@@ -78,26 +78,35 @@ def pack(folders: list[Path], target: Path, light: bool = False) -> str:
     return hashlib.sha256(whole).hexdigest()
 
 
+BEGINNING_S: Final = 60.0
+"""Simulated seconds that `verify --beginning` runs."""
+
+
 @dataclass(frozen=True)
 class Digest:
-    """Digest of a record: SHA-256 of the file and of each column, and the versions that it names."""
+    """Digest of a record: SHA-256 of the file, of each column, and of all columns up to `BEGINNING_S`; its versions."""
 
     sha256: str
     columns: dict[str, str]
     versions: dict[str, str]
+    beginning: str = ""
 
 
 def digest_of(record: Path) -> Digest:
     """Return the digest of the file of a trial. Raises RecordError."""
     trial = read_trial(record)
     columns = {name: hashlib.sha256(_plain(values)).hexdigest() for name, values in trial.columns.items()}
-    return Digest(hashlib.sha256(record.read_bytes()).hexdigest(), columns, trial.about.get("versions") or {})
+    whole, start = hashlib.sha256(record.read_bytes()).hexdigest(), hashlib.sha256()
+    samples = int(np.searchsorted(trial.times, BEGINNING_S + 1e-3))
+    for name, values in sorted(trial.columns.items()):
+        start.update(f"{name} ".encode() + _plain(values[:samples]))
+    return Digest(whole, columns, trial.about.get("versions") or {}, start.hexdigest())
 
 
 def _plain(values: Any) -> bytes:
     """Return the values of a column as bytes that are equal for equal values."""
     if isinstance(values, np.ndarray):
-        return f"{values.dtype.str} ".encode() + bytes(values.data)
+        return f"{values.dtype.str} ".encode() + values.tobytes()
     return json.dumps(values, default=bytes.hex).encode()
 
 
@@ -109,7 +118,7 @@ def _expected_digest(folder: Path, number: int) -> Digest:
     path = record.with_suffix(".json")
     try:
         found = json.loads(path.read_text())
-        return Digest(found["sha256"], dict(found["columns"]), dict(found["versions"]))
+        return Digest(found["sha256"], dict(found["columns"]), dict(found["versions"]), str(found.get("beginning", "")))
     except READ_ERRORS as error:
         raise RecordError(f"{path}: not the digest of a trial: {type(error).__name__}: {error}") from None
 
@@ -247,14 +256,16 @@ def _check_key(key: dict[str, Any]) -> None:
 
 
 def verify(bundle: Path, chosen: Callable[[list[int]], list[int]], own: Path | None = None,
-           trust: bool = False) -> Iterator[Check]:  # fmt: skip
+           trust: bool = False, beginning: bool = False) -> Iterator[Check]:  # fmt: skip
     """Run trials of each run again and yield the results; `chosen` selects from the numbers of a run.
 
-    `own` and `trust` permit to run the code of a run's own experiment, as in `plan_of`.
-    Raises RecordError, SceneError, emu.LoadError."""
+    With `beginning` only the first `BEGINNING_S` seconds are run and compared. `own` and `trust` permit to run the code
+    of a run's own experiment, as in `plan_of`. Raises RecordError, SceneError, emu.LoadError."""
     with tempfile.TemporaryDirectory(prefix="arena-") as name:
         for folder in unpack(bundle, Path(name)):
             plan = plan_of(folder, own, trust)
+            if beginning:
+                plan = replace(plan, seconds=min(plan.seconds, BEGINNING_S))
             again = folder / "again"
             again.mkdir()
             numbers = _trial_numbers(folder)
@@ -263,17 +274,22 @@ def verify(bundle: Path, chosen: Callable[[list[int]], list[int]], own: Path | N
             for number in chosen(numbers):
                 run_one(plan, number, again)
                 expected, actual = _expected_digest(folder, number), digest_of(trial_path(again, number))
-                yield replace(_compare(folder.name, number, expected, actual), commit=_commit_of(folder))
+                if beginning and not expected.beginning:
+                    raise RecordError(f"{bundle}: has no hashes of the first {BEGINNING_S:g} s; pack it again")
+                yield replace(_compare(folder.name, number, expected, actual, beginning), commit=_commit_of(folder))
 
 
-def _compare(run: str, number: int, expected: Digest, actual: Digest) -> Check:
-    """Compare the digests of a recorded and a repeated trial."""
+def _compare(run: str, number: int, expected: Digest, actual: Digest, beginning: bool) -> Check:
+    """Compare the digests of a recorded and a repeated trial, with `beginning` those of the first seconds only."""
     if expected.sha256 == actual.sha256:
         return Check(run, number, True, (), ())
     now, then = actual.versions, expected.versions
     changed = tuple(
         f"{name} {then.get(name, '?')} then, {now[name]} now" for name in now if then.get(name) != now[name]
     )
+    if beginning:
+        is_equal = expected.beginning == actual.beginning
+        return Check(run, number, is_equal, () if is_equal else (f"the first {BEGINNING_S:g} s",), changed)
     names = sorted({*expected.columns, *actual.columns})
     differs = tuple(name for name in names if expected.columns.get(name) != actual.columns.get(name))
     return Check(run, number, not differs and bool(changed), differs, changed)

@@ -39,8 +39,8 @@ Report = Callable[[int, float], None]
 _queue: Any = None
 
 SELECTOR = {"A": 0, "B": 1}
-"""Position of the robots' rotary switch for each controller. In firmware/apps/clustering bit 0 selects controller B,
-and bit 3 starts the robot without the remote control."""
+"""Position of the robots' rotary switch for each controller that firmware has. In firmware/apps/clustering bit 0
+selects controller B, and bit 3 starts the robot without the remote control."""
 
 
 @dataclass(frozen=True)
@@ -143,7 +143,8 @@ def _controller(plan: Plan, seed: int, robot: int, channel: OpticalChannel | Non
     from arena.robots.firmware_controller import FirmwareController  # scripted trials do not load the emulator
 
     chosen = plan.scene.start_of(robot).selector
-    return FirmwareController(plan.scene, seed, robot, image, SELECTOR[controller] if chosen < 0 else chosen, channel)
+    selector = SELECTOR.get(controller, 0) if chosen < 0 else chosen
+    return FirmwareController(plan.scene, seed, robot, image, selector, channel)
 
 
 @contextmanager

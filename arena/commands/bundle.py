@@ -51,6 +51,11 @@ def verify_parser() -> argparse.ArgumentParser:
     command.add_argument(
         "--number", type=count, action="append", metavar="N", help="run trial N of each run again; repeatable"
     )
+    command.add_argument(
+        "--beginning",
+        action="store_true",
+        help=f"run and compare only the first {bundle.BEGINNING_S:g} simulated seconds",
+    )
     add_trust_options(command)
     command.add_argument("--strict", action="store_true", help="require equal bytes, and so equal versions")
     command.add_argument("--processes", type=removed_processes, help=argparse.SUPPRESS)
@@ -67,12 +72,12 @@ def verify(options: argparse.Namespace) -> int:
         return [one for one in numbers if one in options.number] if options.number else numbers[: options.trials]
 
     status, checks = 0, []
-    for one in bundle.verify(options.bundle, chosen, options.experiment, options.trust):
+    for one in bundle.verify(options.bundle, chosen, options.experiment, options.trust, options.beginning):
         good = one.equal and not (options.strict and one.versions)
         status = status if good else DIFFERENT
         checks.append(asdict(one))
         if not options.json:
-            print(_result_line(one))
+            print(_result_line(one, options.beginning))
     if not checks:
         numbers = " or ".join(map(str, options.number))
         raise ValueError(f"{options.bundle}: verified nothing: no run has a trial {numbers}; choose another --number")
@@ -87,8 +92,8 @@ def verify(options: argparse.Namespace) -> int:
     return status
 
 
-def _result_line(one: bundle.Check) -> str:
-    place = f"{one.run}, trial {one.number}"
+def _result_line(one: bundle.Check, beginning: bool) -> str:
+    place = f"{one.run}, trial {one.number}" + (f", first {bundle.BEGINNING_S:g} s" if beginning else "")
     if one.equal and not one.versions:
         return f"{place}: equal to the byte"
     other = f" ({'; '.join(one.versions)})" if one.versions else ""

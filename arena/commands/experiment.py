@@ -8,12 +8,11 @@ from pathlib import Path
 
 from arena.analysis.comparison import NEAR_S
 from arena.analysis.report import with_results
-from arena.campaign.campaign import check_folder
+from arena.campaign.campaign import SELECTOR, check_folder
 from arena.commands import report
 from arena.commands import run as single
 from arena.commands.arguments import count, count_or_none, duration
 from arena.commands.run import DEFAULT_CONTROLLER
-from arena.robots.reactive import SPEED_TABLES
 
 EXAMPLE = "example: arena experiment clustering --document docs/experiment-appendix.md --figures docs/figures"
 
@@ -65,8 +64,8 @@ def run(options: argparse.Namespace) -> int:
     """Run all arms and the report; return the highest exit status. Raises as `run` and `report`.
 
     All arguments are checked before the first trial."""
-    if not options.controllers or set(options.controllers) - set(SPEED_TABLES):
-        raise ValueError(f"--controllers {options.controllers}: expected some of {''.join(SPEED_TABLES)}")
+    if not options.controllers or set(options.controllers) - set(SELECTOR):
+        raise ValueError(f"--controllers {options.controllers}: expected some of {''.join(SELECTOR)}")
     if options.trials < 2:
         raise ValueError("--trials must be 2 or more for a comparison")
     arms = _arms(options)

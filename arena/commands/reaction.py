@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 import emu
 from arena.camera.appearance import COLOURS, NOTHING, OBJECT, ROBOT
+from arena.campaign.campaign import SELECTOR
 from arena.commands.arguments import count, count_or_none
 from arena.robots.images import image_for
-from arena.robots.reactive import SPEED_TABLES
 from arena.scene.loader import FCY
 from arena.trial.strict_json import json_text
 from emu.boards.epuck.board import Epuck
@@ -45,7 +45,7 @@ def parser() -> argparse.ArgumentParser:
         "--brain", action="append", help="openswarm, bare, or an ELF file; repeatable (default: openswarm and bare)"
     )
     command.add_argument("--word", metavar="SYMBOL", help="word that holds the left wheel's speed, for other firmware")
-    command.add_argument("--controller", default="A", choices=sorted(SPEED_TABLES), help="table of speeds (default A)")
+    command.add_argument("--controller", default="A", choices=sorted(SELECTOR), help="table of speeds (default A)")
     command.add_argument("--frames", type=count, default=300, metavar="N", help="frames to measure (default 300)")
     command.add_argument("--seed", type=count_or_none, default=1, help="seed of the pictures (default 1)")
     command.add_argument("--json", action="store_true", help="print JSON")

@@ -6,11 +6,13 @@ import argparse
 import os
 import re
 import sys
+import tomllib
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from arena.campaign.campaign import FinishedTrial, Plan, locked_folder, open_folder, run_all
+from arena.campaign.campaign import SELECTOR, FinishedTrial, Plan, locked_folder, open_folder, run_all
 from arena.commands.arguments import count, count_or_none, duration, removed_processes
 from arena.commands.progress import ProgressDisplay
 from arena.experiments import experiment_file
@@ -63,7 +65,8 @@ def add_plan(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--controller",
         metavar="NAME",
-        help="table of speeds A (default) or B, or a Python file or entry point with a controller (docs/scenes.md)",
+        help="table of speeds A (default), B or aggregate (scripted only), or a Python file or entry point with a "
+        "controller (docs/scenes.md)",
     )
     command.add_argument(
         "--minutes", type=duration, default=15.0, metavar="M", help="simulated minutes per trial (default 15)"
@@ -103,10 +106,13 @@ def with_overrides(scene: Scene, settings: list[str], robots: int | None = None,
     return scene.with_values(**values)
 
 
-def parse_value(text: str) -> bool | int | float | str:
-    """Parse `text` as a truth value or number; return other text, and `inf`, unchanged."""
+def parse_value(text: str) -> bool | int | float | str | list[Any]:
+    """Parse `text` as a truth value, a number or a list as in a scene; return other text, and `inf`, unchanged."""
     if text in ("true", "false"):
         return text == "true"
+    if text.startswith("["):
+        with suppress(tomllib.TOMLDecodeError):
+            return list(tomllib.loads(f"value = {text}")["value"])
     for kind in (int, float):
         try:
             return kind(text) if text != "inf" else text
@@ -131,12 +137,12 @@ def plan_from(options: argparse.Namespace, trials: int) -> Plan:
     if scene.groups and all(group.image for group in scene.groups):
         brain, image = "+".join(dict.fromkeys(Path(one).stem for one in own_images)), None
     else:
-        is_python = all((one.controller or options.controller) not in (None, "", *SPEED_TABLES)
+        is_python = all((one.controller or options.controller) not in (None, "", *SELECTOR)
                         for one in scene.groups or (RobotGroup(),))  # fmt: skip
         name = options.brain or (SCRIPTED if is_python else DEFAULT_BRAIN)
         brain, image = Path(name).stem, image_for(name)
     own, (controller, controllers) = experiment_file(scene.experiment, home), _controllers(scene, options, home)
-    if controller not in SPEED_TABLES and image is not None:
+    if controller not in SELECTOR and image is not None:
         raise ValueError(f"--controller {options.controller} runs in Python: use it without --brain {options.brain}")
     plan = Plan(scene, brain, controller, image, trials, 60 * options.minutes, options.seed, own, images, controllers)
     unused = "clock.scripted_quantum_ms" if plan.has_firmware else "clock.quantum_ms"
@@ -144,7 +150,8 @@ def plan_from(options: argparse.Namespace, trials: int) -> Plan:
         raise ValueError(f"--set {unused} has no effect: {'some' if plan.has_firmware else 'no'} robot runs firmware")
     if options.controller is not None and not has_choice_of_controller(plan):
         raise ValueError(f"--controller {options.controller} has no effect in scene {scene.name}: every robot has its "
-                         "own; change `controller` or `selector` in [[robots]], or `selector` in [start]")  # fmt: skip
+                         "own; change `controller` or `selector` in [[robots]], or `selector` in [start]"
+                         + ("" if controller in SELECTOR else "; or add --brain scripted"))  # fmt: skip
     return plan if plan.has_firmware else replace(plan, scene=scripted(scene))
 
 
@@ -173,7 +180,7 @@ def has_choice_of_controller(plan: Plan) -> bool:
     for group in plan.scene.groups or (RobotGroup(),):
         image = plan.image_of(group)
         selector = plan.scene.start.selector if group.selector < 0 else group.selector
-        if not group.controller and (image is None or selector < 0):
+        if not group.controller and (image is None or (selector < 0 and plan.controller in SELECTOR)):
             return True
     return False
 

@@ -12,11 +12,10 @@ from typing import Any, Final
 import numpy as np
 
 from arena.analysis.comparison import series_by_seed
-from arena.campaign.campaign import Plan, locked_folder, open_folder
+from arena.campaign.campaign import SELECTOR, Plan, locked_folder, open_folder
 from arena.commands.arguments import count, count_or_none, duration
 from arena.commands.run import folder_name, run_with_progress, with_overrides
 from arena.experiments import experiment_file, experiment_of
-from arena.robots.reactive import SPEED_TABLES
 from arena.scene.loader import load_scene, scripted
 from arena.trial.record import EXPERIMENT, trials_in, write_bytes, write_text
 from arena.trial.strict_json import json_text
@@ -74,8 +73,8 @@ def parser() -> argparse.ArgumentParser:
 
 def run(options: argparse.Namespace) -> int:
     """Run all variants and print the table. Raises SceneError, RecordError, ValueError."""
-    if not options.controllers or set(options.controllers) - set(SPEED_TABLES):
-        raise ValueError(f"--controllers {options.controllers}: expected some of {''.join(SPEED_TABLES)}")
+    if not options.controllers or set(options.controllers) - set(SELECTOR):
+        raise ValueError(f"--controllers {options.controllers}: expected some of {''.join(SELECTOR)}")
     wanted = [name for name in VARIANTS if not options.only or any(text in name for text in options.only)]
     if not wanted:
         raise ValueError(f"--only {options.only}: no such variant; known: {'; '.join(VARIANTS)}")

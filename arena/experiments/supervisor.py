@@ -75,22 +75,21 @@ class Supervisor:
             raise SceneError(f"note {name!r}: init must note every name first")
         self.noted[name] = float(value)
 
-    def move_object(self, number: int, x_cm: float, y_cm: float) -> None:
-        """Place an object at rest at a position.
+    def move_object(self, number: int, x_cm: float, y_cm: float, heading: float | None = None) -> None:
+        """Place an object at rest at a position, a polygon with `heading` in rad if given.
 
         Raises SceneError if it is outside the room, in an obstacle or in another body; IndexError for a wrong number.
         """
         number = range(len(self._world.objects))[number]
         self._check_free(len(self._world.robots) + number, f"object {number}", x_cm, y_cm)
-        self._world.move(self._world.objects[number], x_cm, y_cm)
+        self._world.move(self._world.objects[number], x_cm, y_cm, _checked(f"object {number}", heading))
 
     def move_robot(self, number: int, x_cm: float, y_cm: float, heading: float | None = None) -> None:
         """Place a robot at a position, with `heading` in rad if given. Raises as `move_object`."""
         number = range(len(self._world.robots))[number]
-        if heading is not None and not math.isfinite(heading):
-            raise SceneError(f"robot {number}: heading {heading} rad: expected a finite number")
+        turned = _checked(f"robot {number}", heading)
         self._check_free(number, f"robot {number}", x_cm, y_cm)
-        self._world.move(self._world.robots[number], x_cm, y_cm, heading)
+        self._world.move(self._world.robots[number], x_cm, y_cm, turned)
 
     def tell(self, robot: int, text: str) -> None:
         """Send text to a robot by Bluetooth. A scripted robot ignores it."""
@@ -105,6 +104,13 @@ class Supervisor:
         why = obstruction(self.scene, outlines_of(self.scene), discs, x, y, radius)
         if why:
             raise SceneError(f"{name} at ({x:g}, {y:g}) cm {why}; choose a free place")
+
+
+def _checked(name: str, heading: float | None) -> float | None:
+    """Return a heading in rad. Raises SceneError for a number that is not finite."""
+    if heading is not None and not math.isfinite(heading):
+        raise SceneError(f"{name}: heading {heading} rad: expected a finite number")
+    return heading
 
 
 class SupervisorHooks:

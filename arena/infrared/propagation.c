@@ -24,6 +24,13 @@ struct side {
     f64 ax, ay, bx, by, share;
 };
 
+// A movable polygon: object number `object`, with corners (x, y) around its centre.
+struct polygon {
+    const f64 *corners;
+    i64 count, object;
+    f64 share;
+};
+
 struct optics {
     f64 law_counts, law_from, law_power, max_counts, min_counts; // as in propagation.py
     f64 gain, per_emitter, emitter_power, receiver_power;
@@ -35,9 +42,11 @@ struct optics {
     i64 fixed_count;
     const struct side *sides;
     i64 side_count;
+    const struct polygon *polygons; // in the order of their headings in the poses; out of reach: no corners
+    i64 polygon_count;
 };
 
-// Poses of all bodies: x, y, heading of the robots, then x, y of the objects.
+// Poses of all bodies: x, y, heading of the robots, then x, y of the objects, then headings of the polygons.
 struct poses {
     const f64 *values;
     i64 robots, objects;
@@ -71,6 +80,41 @@ static f64 hit_distance(const struct side *s, f64 x, f64 y, f64 east, f64 north)
     return along > 0 && 0 <= part && part <= 1 ? along : -1;
 }
 
+// A ray, and the nearest side that it hits: distance along it, and reflection.
+struct ray {
+    f64 x, y, east, north, distance, share;
+};
+
+static void offer_side(struct ray *ray, const struct side *one)
+{
+    f64 along = hit_distance(one, ray->x, ray->y, ray->east, ray->north);
+    if (along < 0 || along >= ray->distance)
+        return;
+    f64 dx = one->bx - one->ax, dy = one->by - one->ay;
+    ray->distance = along;
+    ray->share = one->share * fabs((ray->east * dy - ray->north * dx) / sqrt(dx * dx + dy * dy));
+}
+
+// Offer all sides of walls, polygonal obstacles and movable polygons to a ray.
+static void offer_sides(const struct optics *o, const struct poses *p, struct ray *ray)
+{
+    for (i64 i = 0; i < o->side_count; i++)
+        offer_side(ray, &o->sides[i]);
+    const f64 *objects = p->values + 3 * p->robots, *headings = objects + 2 * p->objects;
+    for (i64 i = 0; i < o->polygon_count; i++) {
+        const struct polygon *one = &o->polygons[i];
+        if (one->object >= p->objects || !one->count)
+            continue;
+        const f64 *at = objects + 2 * one->object, *from = one->corners + 2 * (one->count - 1);
+        f64 c = cos(headings[i]), s = sin(headings[i]);
+        for (const f64 *to = one->corners; to < one->corners + 2 * one->count; from = to, to += 2) {
+            struct side side = {at[0] + c * from[0] - s * from[1], at[1] + s * from[0] + c * from[1],
+                                at[0] + c * to[0] - s * to[1], at[1] + s * to[0] + c * to[1], one->share};
+            offer_side(ray, &side);
+        }
+    }
+}
+
 // Whether a body or wall is between two robots.
 static int is_occluded(const struct optics *o, const struct poses *p, i64 own, i64 other)
 {
@@ -85,12 +129,9 @@ static int is_occluded(const struct optics *o, const struct poses *p, i64 own, i
         if (0 < along && along < 1 && aside_x * aside_x + aside_y * aside_y < one.radius * one.radius)
             return 1;
     }
-    for (i64 i = 0; i < o->side_count; i++) {
-        f64 along = hit_distance(&o->sides[i], here[0], here[1], dx, dy);
-        if (along >= 0 && along < 1)
-            return 1;
-    }
-    return 0;
+    struct ray ray = {here[0], here[1], dx, dy, 1, 0};
+    offer_sides(o, p, &ray);
+    return ray.distance < 1;
 }
 
 static f64 beam(f64 angle, f64 power)
@@ -132,16 +173,10 @@ static void surface(const struct optics *o, const struct poses *p, i64 own, i64 
     const f64 *here = p->values + 3 * own;
     f64 x = here[0], y = here[1], angle = here[2] - o->bearings[sensor], east = cos(angle), north = sin(angle);
     f64 to_x = wall_distance(x, east, o->width), to_y = wall_distance(y, north, o->height);
-    f64 distance = to_x < to_y ? to_x : to_y, share = o->wall_share * fabs(to_x < to_y ? east : north);
-    for (i64 i = 0; i < o->side_count; i++) {
-        const struct side *one = &o->sides[i];
-        f64 along = hit_distance(one, x, y, east, north);
-        if (along < 0 || along >= distance)
-            continue;
-        f64 dx = one->bx - one->ax, dy = one->by - one->ay;
-        distance = along;
-        share = one->share * fabs((east * dy - north * dx) / sqrt(dx * dx + dy * dy));
-    }
+    struct ray ray = {x, y, east, north, to_x < to_y ? to_x : to_y, 0};
+    ray.share = o->wall_share * fabs(to_x < to_y ? east : north);
+    offer_sides(o, p, &ray);
+    f64 distance = ray.distance, share = ray.share;
     for (i64 i = 0; i < p->robots + p->objects + o->fixed_count; i++) {
         if (i == own)
             continue;

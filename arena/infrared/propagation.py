@@ -15,9 +15,11 @@ from functools import cache
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
+import numpy as np
+
 from arena.scene import dimensions, geometry
 from arena.scene.loader import Scene
-from arena.world.physics import Poses
+from arena.world.poses import Poses
 from emu.boards.epuck.analog import PULSE_PINS, SENSORS
 from emu.native_library import ADDRESS, INT, functions
 
@@ -98,6 +100,12 @@ class _Side(Structure):
     _fields_ = [(name, c_double) for name in ("ax", "ay", "bx", "by", "share")]
 
 
+class _Polygon(Structure):
+    """`struct polygon` of propagation.c."""
+
+    _fields_ = [("corners", c_void_p), ("count", c_int64), ("object", c_int64), ("share", c_double)]
+
+
 class _Optics(Structure):
     """`struct optics` of propagation.c."""
 
@@ -107,6 +115,7 @@ class _Optics(Structure):
                                         "wall_share", "range")),
         ("bearings", c_double * SENSORS), ("robot", _Disc), ("objects", POINTER(_Disc)),
         ("fixed", POINTER(_Disc)), ("fixed_count", c_int64), ("sides", POINTER(_Side)), ("side_count", c_int64),
+        ("polygons", POINTER(_Polygon)), ("polygon_count", c_int64),
     ]  # fmt: skip
 
 
@@ -131,10 +140,18 @@ class Optics:
     def __init__(self, scene: Scene) -> None:
         code, setting = _code(), scene.infrared
         self._signal, self._surfaces = code["signal"], code["surfaces"]
-        kinds = map(scene.kind_of, range(scene.objects.count))
-        self._objects = (_Disc * scene.objects.count)(
-            *(_Disc(0, 0, kind.radius_cm if is_in_reach(kind.height_cm) else 0, kind.share) for kind in kinds)
-        )
+        kinds = list(map(scene.kind_of, range(scene.objects.count)))
+        self._objects = (_Disc * scene.objects.count)(*(
+            _Disc(0, 0, kind.radius_cm if is_in_reach(kind.height_cm) and not kind.polygon else 0, kind.share)
+            for kind in kinds
+        ))  # fmt: skip
+        shaped = [(number, kind) for number, kind in enumerate(kinds) if kind.polygon]
+        self._corners = [np.array(geometry.centred(kind.polygon) if is_in_reach(kind.height_cm) else (), dtype=float)
+                         for _, kind in shaped]  # fmt: skip
+        self._polygons = (_Polygon * len(shaped))(*(
+            _Polygon(corners.ctypes.data, len(corners), number, kind.share)
+            for (number, kind), corners in zip(shaped, self._corners, strict=True)
+        ))  # fmt: skip
         obstacles = [one for one in scene.obstacles if is_in_reach(one.height_cm)]
         fixed = [_Disc(one.x_cm, one.y_cm, one.radius_cm, one.share) for one in obstacles if one.radius_cm]
         self._fixed = (_Disc * len(fixed))(*fixed)
@@ -146,7 +163,7 @@ class Optics:
             setting.signal_gain, 1 / brightest(setting.emitter_power), setting.emitter_power, setting.receiver_power,
             scene.arena.width_cm, scene.arena.height_cm, setting.wall_share, dimensions.IR_RANGE,
             (c_double * SENSORS)(*_BEARINGS), _Disc(0, 0, dimensions.ROBOT_RADIUS, setting.robot_share), self._objects,
-            self._fixed, len(fixed), self._sides, len(sides),
+            self._fixed, len(fixed), self._sides, len(sides), self._polygons, len(shaped),
         )  # fmt: skip
         self._at = addressof(self._optics)
         self._poses = _Poses()
@@ -155,10 +172,12 @@ class Optics:
         self._found_at = addressof(self._found)
 
     def _set_poses(self, poses: Poses) -> None:
-        """Pass the poses to native code. Raises ValueError if they have more objects than the scene."""
-        robots, objects = poses.counts
+        """Pass the poses to native code. Raises ValueError if their objects are not the first ones of the scene."""
+        robots, objects, polygons = poses.counts
         if objects > len(self._objects):
             raise ValueError(f"{objects} objects are more than the scene has")
+        if polygons != sum(one.object < objects for one in self._polygons):
+            raise ValueError(f"{polygons} polygons are not those of the scene's first {objects} objects")
         self._poses.values, self._poses.robots, self._poses.objects = poses.address, robots, objects
 
     def signals(self, poses: Poses, robot: int, others: Iterable[int]) -> list[Signal]:

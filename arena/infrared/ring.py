@@ -16,7 +16,8 @@ from arena.infrared.channel import OpticalChannel, Receivers, light_code
 from arena.infrared.propagation import Optics
 from arena.scene import dimensions
 from arena.scene.loader import FCY, Scene
-from arena.world.physics import STREAM_INFRARED, Poses, generator
+from arena.world.physics import STREAM_INFRARED, generator
+from arena.world.poses import Poses
 from emu.boards.epuck.analog import PULSE_PINS, SENSORS, reflection_at
 from emu.boards.epuck.board import Epuck
 from emu.native_library import address_of

@@ -18,7 +18,8 @@ from greenlet import getcurrent, greenlet
 from arena.infrared.channel import OpticalChannel
 from arena.lockstep.threads import NEEDS_WORLD, REACHED, NativeScheduler
 from arena.robots.native_robot import AWAITS_POSES, IN_PYTHON, RUNNABLE, NativeRobot
-from arena.world.physics import PoseBlock, Poses, World
+from arena.world.physics import World
+from arena.world.poses import PoseBlock, Poses
 from arena.world.wheels import ROOM, Wheels
 
 _RUN: Final = -1

@@ -7,14 +7,14 @@ from typing import Any, Final
 
 import numpy as np
 from matplotlib.figure import Figure
-from matplotlib.patches import Circle
+from matplotlib.patches import Circle, Polygon
 from numpy.typing import NDArray
 
 from arena.camera.appearance import COLOURS, NAMES, OBJECT, ROBOT, WALL
 from arena.camera.renderer import WINDOW_COLUMNS
 from arena.replay.page import sample_data
 from arena.robots.controller import STRIP_COLUMNS, STRIP_PIXELS
-from arena.scene import dimensions
+from arena.scene import dimensions, geometry
 from arena.trial.record import Trial
 
 PICTURES: Final = 6
@@ -100,9 +100,12 @@ def _from_above(axis: Any, trial: Trial, data: dict[str, Any], robot: int, sampl
     heading = data["robots"][robot]["heading"][sample]
     path = trial.robots[: sample + 1, robot]
     axis.plot(path[:, 0], path[:, 1], color="0.6", linewidth=0.8)
-    for thing, (ox, oy) in enumerate(trial.objects[sample]):
-        radius = trial.scene.kind_of(thing).radius_cm
-        axis.add_patch(Circle((ox, oy), radius, facecolor=_FACES[OBJECT], edgecolor="k"))
+    for thing, place in enumerate(trial.object_poses[sample]):
+        kind = trial.scene.kind_of(thing)
+        outline = (Polygon(geometry.turned(geometry.centred(kind.polygon), *place)) if kind.polygon else
+                   Circle((place[0], place[1]), kind.radius_cm))  # fmt: skip
+        outline.set(facecolor=_FACES[OBJECT], edgecolor="k")
+        axis.add_patch(outline)
     for rx, ry in trial.robots[sample]:
         axis.add_patch(Circle((rx, ry), dimensions.ROBOT_RADIUS, facecolor=_FACES[ROBOT], edgecolor="k"))
     axis.plot([x, x + 150 * np.cos(heading)], [y, y + 150 * np.sin(heading)], "k:", linewidth=0.8)

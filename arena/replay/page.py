@@ -18,12 +18,13 @@ import numpy as np
 from arena.camera.appearance import colours_of
 from arena.camera.renderer import Renderer
 from arena.robots.controller import STRIP_COLUMNS, STRIP_PIXELS
-from arena.scene import dimensions
+from arena.scene import dimensions, geometry
 from arena.scene.loader import Scene
 from arena.scene.schema import NAMED, Obstacle, Patch
 from arena.trial.record import Trial
 from arena.trial.strict_json import script_json
-from arena.world.physics import Poses, traits_of
+from arena.world.physics import traits_of
+from arena.world.poses import Poses
 
 FILES: Final = Path(__file__).with_name("page_files")
 SCRIPTS: Final = ("view.js", "controls.js", "studio.js", "start.js")
@@ -68,7 +69,8 @@ def trial_data(trial: Trial) -> dict[str, Any]:
         "height": trial.scene.arena.height_cm,
         "polygon": trial.scene.arena.polygon,
         "kinds": [
-            {"name": one.name, "radius": one.radius_cm, "colour": _css(one.colour)}
+            {"name": one.name, "radius": one.radius_cm, "colour": _css(one.colour),
+             "polygon": geometry.centred(one.polygon) if one.polygon else ()}
             for one in map(trial.scene.kind_of, range(trial.scene.objects.count))
         ],
         "grouped": trial.experiment.has_groups,
@@ -123,7 +125,7 @@ def sample_data(trial: Trial) -> dict[str, Any]:
     return {
         "t": trial.times.tolist(),
         "robots": robots,
-        "objects": objects.tolist(),
+        "objects": trial.object_poses,
         "clusters": [trial.experiment.groups(trial.scene, places) for places in objects],
         "curves": {name: values.tolist() for name, values in series.curves.items()},
         "log": columns["log"],
@@ -144,7 +146,7 @@ def _camera_views(trial: Trial) -> list[tuple[list[int], list[bytes]]]:
     count = scene.robots.count
     views: list[tuple[list[int], list[bytes]]] = []
     headings = [trial.columns[f"r{robot}_heading"] for robot in range(count)]
-    robots, objects = trial.robots.tolist(), trial.objects.tolist()
+    robots, objects = trial.robots.tolist(), trial.object_poses
     for robot in range(count):
         seen, strips = list(map(int, trial.columns[f"r{robot}_seen"])), list(trial.columns[f"r{robot}_strip"])
         is_script = not any(strips)

@@ -17,7 +17,7 @@ from PIL import Image, ImageDraw
 from arena.camera.appearance import COLOURS
 from arena.replay.page import sample_data
 from arena.robots.controller import STRIP_PIXELS
-from arena.scene import dimensions
+from arena.scene import dimensions, geometry
 from arena.scene.loader import Scene
 from arena.trial.record import RecordError, Trial, reason_of
 from emu.host.files import atomic_file
@@ -86,9 +86,13 @@ def _frame(scene: Scene, data: dict[str, Any], sample: int, caption: str) -> Ima
         draw.ellipse((left - r, low - r, left + r, low + r), fill=fill, outline=_INK)
 
     labels = data["clusters"][sample]
-    for thing, ((x, y), label) in enumerate(zip(data["objects"][sample], labels, strict=True)):
-        disc(x, y, scene.kind_of(thing).radius_cm,
-             _CLUSTERS[label % len(_CLUSTERS)] if labels.count(label) > 1 else _PALE)  # fmt: skip
+    for thing, (place, label) in enumerate(zip(data["objects"][sample], labels, strict=True)):
+        kind, fill = scene.kind_of(thing), _CLUSTERS[label % len(_CLUSTERS)] if labels.count(label) > 1 else _PALE
+        if kind.polygon:
+            corners = geometry.turned(geometry.centred(kind.polygon), *place)
+            draw.polygon([(x * SCALE, height - y * SCALE) for x, y in corners], fill=fill, outline=_INK)
+        else:
+            disc(place[0], place[1], kind.radius_cm, fill)
     for number, robot in enumerate(data["robots"]):
         x, y, heading = robot["x"][sample], robot["y"][sample], robot["heading"][sample]
         disc(x, y, dimensions.ROBOT_RADIUS, _SEEN[robot["seen"][sample]])

@@ -13,7 +13,8 @@ from arena.camera.renderer import Renderer
 from arena.robots.reactive import steps_per_second
 from arena.scene import dimensions
 from arena.scene.loader import FCY, Scene
-from arena.world.physics import STREAM_SENSORS, STREAM_START, Poses, generator, traits_of
+from arena.world.physics import STREAM_SENSORS, STREAM_START, generator, traits_of
+from arena.world.poses import Poses
 
 LATENCY_TCY: Final = 258_484
 """Time from the middle of the sensor window's rows to the new wheel speed, 17.5 ms.

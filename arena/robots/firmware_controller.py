@@ -34,7 +34,8 @@ from arena.robots.controller import (
 from arena.robots.native_robot import NativeRobot
 from arena.robots.robot_control import RobotControl
 from arena.scene.loader import FCY, BatterySetting, Scene
-from arena.world.physics import STREAM_SENSORS, Poses, generator, traits_of
+from arena.world.physics import STREAM_SENSORS, generator, traits_of
+from arena.world.poses import Poses
 from arena.world.wheels import Wheels
 from emu.boards.epuck.board import Epuck
 from emu.boards.epuck.camera.scan import LINE_PIXELS

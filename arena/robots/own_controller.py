@@ -22,7 +22,8 @@ from arena.robots.senses import SenseReader, Senses
 from arena.scene import dimensions
 from arena.scene.loader import FCY, Scene, SceneError
 from arena.scene.user_file import line_of, read_user_file, run_module
-from arena.world.physics import STREAM_CONTROLLERS, Poses, generator
+from arena.world.physics import STREAM_CONTROLLERS, generator
+from arena.world.poses import Poses
 
 DEFAULT_PERIOD_S: Final = 0.1
 FASTEST_PERIOD_S, SLOWEST_PERIOD_S = 0.001, 60.0

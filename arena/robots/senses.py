@@ -10,7 +10,8 @@ from arena.camera.renderer import Renderer
 from arena.infrared.propagation import Optics
 from arena.infrared.ring import ambient
 from arena.scene.loader import Scene
-from arena.world.physics import Poses, traits_of
+from arena.world.physics import traits_of
+from arena.world.poses import Poses
 from emu.boards.epuck.analog import reflection_at
 
 FULL_REFLECTION: Final = 3788.0

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from functools import cache
 from itertools import combinations
 
 Point = Sequence[float]
+Corners = tuple[tuple[float, float], ...]
 Side = tuple[float, float, float, float]
 """x and y of both ends."""
 
@@ -30,6 +33,45 @@ def is_simple(points: Sequence[Point]) -> bool:
         if other - one not in (1, count - 1) and _cross(outline[one], outline[other]):
             return False
     return True
+
+
+def is_convex(points: Sequence[Point]) -> bool:
+    """Whether a simple polygon turns to one side only at its corners."""
+    turns = [_turn(*one, *other[2:]) for one, other in zip(sides(points), sides([*points[1:], points[0]]), strict=True)]
+    return all(turn >= 0 for turn in turns) or all(turn <= 0 for turn in turns)
+
+
+@cache
+def centred(points: tuple[tuple[float, ...], ...]) -> Corners:
+    """Return the corners of a polygon relative to its centroid, counter-clockwise."""
+    if area(points) < 0:
+        points = points[::-1]
+    whole, x, y = 6 * area(points), 0.0, 0.0
+    for x1, y1, x2, y2 in sides(points):
+        cross = x1 * y2 - x2 * y1
+        x, y = x + (x1 + x2) * cross / whole, y + (y1 + y2) * cross / whole
+    return tuple((one[0] - x, one[1] - y) for one in points)
+
+
+def turned(points: Corners, x: float, y: float, heading: float) -> list[tuple[float, float]]:
+    """Return corners turned by `heading` rad about the origin, and then moved by (x, y)."""
+    cos, sin = math.cos(heading), math.sin(heading)
+    return [(x + cos * u - sin * v, y + sin * u + cos * v) for u, v in points]
+
+
+def mean_distance(points: Corners) -> float:
+    """Return the mean distance of the points of a convex polygon from the origin, which is inside; cm.
+
+    The polygon is divided into triangles with a corner at the origin. With `h` as the distance of a side from the
+    origin, the integral of the distance over its triangle is that of h^3 / (3 cos^3) over the angle."""
+    total = 0.0
+    for x1, y1, x2, y2 in sides(points):
+        length = math.hypot(x2 - x1, y2 - y1)
+        height = (x1 * y2 - x2 * y1) / length
+        for x, y, sign in ((x1, y1, -1), (x2, y2, 1)):
+            slope = ((x2 - x1) * x + (y2 - y1) * y) / length / height
+            total += sign * height**3 / 6 * (slope * math.sqrt(1 + slope * slope) + math.asinh(slope))
+    return total / area(points)
 
 
 def _turn(ax: float, ay: float, bx: float, by: float, cx: float, cy: float) -> float:

@@ -174,6 +174,8 @@ def _with_list_value(scene: Scene, section: str, key: str, value: Any) -> Scene:
     if len(tables) > 1:
         raise SceneError(f"{scene.name}: {section}.{key} cannot be set for {len(tables)} [[{section}]] tables at once; "
                          f"write `{key}` into the [[{section}]] tables of the scene file")  # fmt: skip
+    if key == "radius_cm" and tables[0].polygon:
+        raise SceneError(f"{scene.name}: objects.radius_cm has no effect in this scene; change `polygon`")
     if key == "count" and tables[0].place == "poses":
         raise SceneError(f"{scene.name}: {section}.count is the number of listed poses; write all `poses` "
                          f'into [[{section}]] of the scene file, or another `place` than "poses"')  # fmt: skip
@@ -296,10 +298,18 @@ def _scene(errors: _Errors, data: dict[str, Any]) -> Scene:
         raise errors.at("", "name", "a scene needs a name")
     if values.get("groups") and "objects" not in values and "kinds" not in values:
         values["objects"] = Objects(count=0)  # a scene with groups of robots has only the objects it lists
-    return _counted(Scene(**values))
+    scene = _counted(Scene(**values))
+    for number, (given, one) in enumerate(zip(data.get("kinds") or data.get("objects", ()), scene.kinds, strict=False)):
+        if one.polygon and given.get("radius_cm", one.radius_cm) != one.radius_cm:
+            words = "objects.radius_cm has no effect beside `polygon`; remove it"
+            raise errors.at("objects", "radius_cm", words, number)
+    return scene
 
 
 def _numbered(one: K) -> K:
+    """Return a table with its count of listed poses, and with the radius of its polygon's circumscribed circle."""
+    if isinstance(one, ObjectKind) and len(one.polygon) >= 3 and geometry.area(one.polygon):
+        one = replace(one, radius_cm=max(math.hypot(x, y) for x, y in geometry.centred(one.polygon)))
     return replace(one, count=len(one.poses)) if one.place == "poses" else one
 
 
@@ -438,8 +448,12 @@ def _check_group(errors: _Errors, table: str, one: RobotGroup, number: int) -> N
 def _check_kind(errors: _Errors, table: str, one: ObjectKind, number: int) -> None:
     _check_placed(errors, table, one, number)
     _check_colour(errors, table, one, number)
-    if any(len(pose) != 2 for pose in one.poses):
-        raise errors.at(table, "poses", f"{table}.poses: objects are discs: [x, y]", number)
+    if not one.polygon and any(len(pose) != 2 for pose in one.poses):
+        raise errors.at(table, "poses", f"{table}.poses: an object without a polygon is a disc: [x, y]", number)
+    if one.polygon:
+        _check_polygon(errors, table, one.polygon, number)
+        if not geometry.is_convex(one.polygon):
+            raise errors.at(table, "polygon", f"{table}.polygon: a movable polygon must be convex", number)
 
 
 def _check_colour(errors: _Errors, table: str, one: Any, number: int) -> None:

@@ -11,9 +11,10 @@ import numpy as np
 
 from arena.scene import dimensions, geometry
 from arena.scene.loader import Scene, SceneError
-from arena.scene.schema import Placed, RobotGroup
+from arena.scene.schema import ObjectKind, Placed, RobotGroup
 
-Place = tuple[float, float]
+Place = tuple[float, ...]
+"""Position x, y in cm; of a movable polygon also its heading in rad."""
 TRIES: Final = 2000
 """Random positions to try before the scene counts as full."""
 
@@ -65,7 +66,8 @@ def obstruction(
 ) -> str:  # fmt: skip
     """Return what obstructs a disc at a position, or an empty text.
 
-    `outlines` are those of the scene; `taken` are other discs: x, y, radius."""
+    `outlines` are those of the scene; `taken` are other discs: x, y, radius. A movable polygon counts as its
+    circumscribed circle."""
     arena = scene.arena
     if not (0 < x < arena.width_cm and 0 < y < arena.height_cm):
         return "is outside the walls"
@@ -110,11 +112,18 @@ class _Placer:
             found[number] = [self._place_one(*wanted[number], index) for index in range(wanted[number][0].count)]
         robots: list[tuple[float, float, float]] = []
         for number, group in enumerate(groups):
+            robots += [(place[0], place[1], self._heading(group, place)) for place in found[number]]
+        objects: list[Place] = []
+        for number, kind in enumerate(kinds, start=len(groups)):
             for place in found[number]:
-                heading = place[2] if len(place) == 3 else group.heading_deg
-                drawn = float(self._rng.uniform(-math.pi, math.pi))
-                robots.append((place[0], place[1], drawn if math.isnan(heading) else math.radians(heading)))
-        return robots, [(x, y) for number in range(len(groups), len(wanted)) for x, y in found[number]]
+                objects.append((place[0], place[1], *((self._heading(kind, place),) if kind.polygon else ())))
+        return robots, objects
+
+    def _heading(self, one: RobotGroup | ObjectKind, place: Place) -> float:
+        """Return the heading of a body in rad: as listed, that of its table, or random."""
+        degrees = place[2] if len(place) == 3 else one.heading_deg
+        drawn = float(self._rng.uniform(-math.pi, math.pi))
+        return drawn if math.isnan(degrees) else math.radians(degrees)
 
     def _place_one(self, one: Placed, what: str, radius: float, index: int) -> tuple[float, ...]:
         """Return the pose of body `index` of a group and mark it as taken. Raises SceneError without room."""

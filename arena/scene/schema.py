@@ -53,7 +53,7 @@ class Robots:
 
 @dataclass(frozen=True, slots=True)
 class Objects:
-    """Movable objects: discs seen from above."""
+    """Movable discs of one kind on marks; [[objects]] tables describe other objects."""
 
     count: int = 20
     radius_cm: float = 5.0
@@ -201,7 +201,7 @@ class Placed:
     - `uniform`: in a rectangle `width_cm` x `depth_cm` around the centre; 0: the whole arena
     - `normal`: normally distributed around the centre, standard deviation `sd_cm`
     - `circle`: at equal distances on a circle of radius `circle_cm` around the centre
-    - `poses`: the list `poses` of x, y, and for robots the heading in degrees
+    - `poses`: the list `poses` of x, y, and for robots and polygons optionally the heading in degrees
 
     The centre is (`x_cm`, `y_cm`), by default that of the arena.
     """
@@ -224,8 +224,8 @@ class RobotGroup(Placed):
 
     - `image`: their controller, as `--brain`; a path is relative to the scene file; empty: that of the run. `--brain`
       replaces the images of a scene in which every group has one.
-    - `controller`: table A or B, or a Python file or entry point (robots/own_controller.py); a path is relative to the
-      scene file; empty: that of the run
+    - `controller`: table A, B or aggregate, or a Python file or entry point (robots/own_controller.py); a path is
+      relative to the scene file; empty: that of the run
     - `id_first`: number of the first robot; the next ones count up. `{id}` in `stimulus` is replaced by it.
     - `heading_deg`: heading at the start; nan: random
     - `selector`, `remote`, `stimulus`: as in [start]
@@ -242,13 +242,20 @@ class RobotGroup(Placed):
 
 @dataclass(frozen=True, slots=True)
 class ObjectKind(Placed):
-    """Movable discs of one kind.
+    """Movable objects of one kind: discs, or convex polygons.
 
-    `colour` is a name of `NAMED`, or red, green and blue as `#rrggbb`, as a camera shows them. `share` is their
-    infrared reflection as a share of white paper's; lower than 2.5 cm, a disc reflects and blocks no infrared light.
+    - `polygon`: corners in cm; the position of such an object is the centroid. Its `radius_cm` is that of the
+      circumscribed circle, within which no other body is placed at the start.
+    - `heading_deg`: rotation of a polygon at the start; nan: random
+    - `floor_friction`: coefficient for an even pressure on the floor
+    - `colour`: a name of `NAMED`, or red, green and blue as `#rrggbb`, as a camera shows them
+    - `share`: infrared reflection as a share of white paper's; an object lower than 2.5 cm reflects and blocks no
+      infrared light
     """
 
     radius_cm: float = 5.0
+    polygon: Points = ()
+    heading_deg: float = math.nan
     height_cm: float = 10.0
     mass_kg: float = 0.035
     floor_friction: float = 0.58

@@ -222,7 +222,7 @@ class TrialSession:
         world, attached = self._running.world, self._attached
         return {
             "tick": world.ticks, "t": world.seconds, "epoch": self.epoch, "quanta": self._running.quanta,
-            "robots": world.poses.robots, "objects": world.poses.objects, "hit": self._hit,
+            "robots": world.poses.robots, "objects": world.object_poses(), "hit": self._hit,
             "breakpoints": [f"{robot} {place}" for robot, place in self._breakpoints],
             "debugger": {"robot": attached.robot, "port": attached.port, "is_connected": attached.is_connected}
                         if attached else None,

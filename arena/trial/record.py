@@ -78,6 +78,16 @@ class Trial:
         """Positions of the objects: samples x objects x 2, cm."""
         return self._places("o", self.scene.objects.count)
 
+    @cached_property
+    def object_poses(self) -> list[list[tuple[float, ...]]]:
+        """Poses of the objects by sample: x and y in cm, and of a polygon the heading in rad."""
+        found = self.objects.tolist()
+        for number in range(self.scene.objects.count):
+            if self.scene.kind_of(number).polygon:
+                for sample, heading in enumerate(self.columns[f"o{number}_heading"]):
+                    found[sample][number].append(float(heading))
+        return [[tuple(place) for place in sample] for sample in found]
+
     @property
     def robots(self) -> NDArray[np.float64]:
         """Positions of the robots: samples x robots x 2, cm."""

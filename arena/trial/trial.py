@@ -20,6 +20,8 @@ from arena.robots.controller import Controller
 from arena.scene.loader import Scene
 from arena.world.physics import World
 
+_OBJECT: Final = ("x", "y", "heading")
+"""Columns of an object; the last one for polygons."""
 STOPPED: Final = (0.0, 0.0)
 """Wheel speeds of a robot at rest."""
 
@@ -184,8 +186,8 @@ class _Recorder:
         """Add one row. Values are rounded to 1e-4 cm and rad, which halves the file and is far below any effect."""
         world = self._world
         row: dict[str, Any] = {"t": round(world.seconds, 6)}
-        for index, (x, y) in enumerate(world.poses.objects):
-            row[f"o{index}_x"], row[f"o{index}_y"] = round(x, 4), round(y, 4)
+        for index, place in enumerate(world.object_poses()):
+            row |= {f"o{index}_{name}": round(value, 4) for name, value in zip(_OBJECT, place, strict=False)}
         log, lights = [], []
         for index, controller in enumerate(self._controllers):
             row |= self._robot_columns(index, controller, world.poses.robots[index], wheels[index])

@@ -30,7 +30,7 @@ struct chipmunk {
     struct vect (*total_impulse)(const void *arbiter);
 };
 
-// A pushable disc. Its two joints model friction on the floor. While its velocities and impulses are zero and no moving
+// A pushable body. Its two joints model friction on the floor. While its velocities and impulses are zero and no moving
 // body is near, the joints are removed from the solver: the result is bit-identical. A push adds them again.
 struct disc {
     void *body, *slide_joint, *spin_joint;
@@ -51,8 +51,10 @@ struct world {
     f64 dt, axle, thrust, thrust_torque, brake, brake_torque;
     i64 robot_count, object_count;
     struct robot *robots;
-    struct disc *discs; // the robots', then the objects
+    struct disc *discs; // the robots', then the objects; of a polygon the circumscribed circle
     i64 steps;
+    void **polygons; // bodies of the objects that are polygons
+    i64 polygon_count;
 };
 
 // Bodies so near (edge to edge) can touch before the next check. A check is due when a body has come WAY, a third of
@@ -62,7 +64,7 @@ static const f64 NEAR = 3, WAY = 1;
 // Steps between two searches for objects that can rest.
 enum { REST_PERIOD = 64 };
 
-// Write the pose of every body: x, y, heading of the robots, then x, y of the objects.
+// Write the pose of every body: x, y, heading of the robots, then x, y of the objects, then the headings of the polygons.
 void read_poses(const struct world *w, f64 *out)
 {
     for (i64 i = 0; i < w->robot_count; i++) {
@@ -73,6 +75,8 @@ void read_poses(const struct world *w, f64 *out)
         struct vect at = w->c.position(w->discs[w->robot_count + i].body);
         *out++ = at.x, *out++ = at.y;
     }
+    for (i64 i = 0; i < w->polygon_count; i++)
+        *out++ = w->c.angle(w->polygons[i]);
 }
 
 // Limit the joints of a robot to the force of its turning wheels or of its brakes.

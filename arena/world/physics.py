@@ -1,4 +1,4 @@
-"""The world in two dimensions: walls, discs with floor friction, e-pucks with force-limited wheels (epuck.md §4).
+"""The world in two dimensions: walls, objects with floor friction, e-pucks with force-limited wheels (epuck.md §4).
 
 Lengths cm, masses kg, time s. One `step` is one quantum, always of the same length. Only the wheel speeds act on the
 bodies between two steps. The same calls give the same numbers, to the bit.
@@ -20,8 +20,9 @@ from pymunk._chipmunk_cffi import ffi, lib
 
 from arena.scene import dimensions, geometry
 from arena.scene.loader import Scene
-from arena.scene.placement import place_all
+from arena.scene.placement import Place, place_all
 from arena.scene.schema import ObjectKind
+from arena.world.poses import PoseBlock, Poses
 from emu.native_library import ADDRESS, INT, address_of, functions
 
 ITERATIONS: Final = 20
@@ -64,69 +65,6 @@ def traits_of(scene: Scene, seed: int, robot: int) -> Traits:
     return Traits(math.radians(spread.camera_yaw_sd_deg * yaw), spread.camera_pitch_sd_deg * pitch, bias)
 
 
-class Poses:
-    """Immutable poses of all bodies. Robots: x, y, heading; objects: x, y. cm and rad."""
-
-    __slots__ = ("_objects", "_robots", "address", "counts", "values")
-
-    def __init__(self, robots: Sequence[tuple[float, float, float]], objects: Sequence[tuple[float, float]]) -> None:
-        numbers = [value for place in (*robots, *objects) for value in place]
-        values = np.array(numbers, dtype=np.float64)
-        self._begin(values, len(robots), values.ctypes.data)
-
-    def _begin(self, values: NDArray[np.float64], robots: int, address: int) -> None:
-        """Set the values; poses as lists are created on demand."""
-        self.values = values
-        """The numbers of the robots, then those of the objects."""
-        self.counts = robots, (len(values) - 3 * robots) // 2
-        self.address = address
-        """Address of the values in the host's memory."""
-        self._robots: list[tuple[float, float, float]] | None = None
-        self._objects: list[tuple[float, float]] | None = None
-
-    @classmethod
-    def of(cls, values: NDArray[np.float64], robots: int, address: int | None = None) -> Poses:
-        """Return poses of `robots` robots over `values`, without a copy. A known `address` of `values` saves time."""
-        poses = cls.__new__(cls)
-        poses._begin(values, robots, values.ctypes.data if address is None else address)
-        return poses
-
-    def __reduce__(self) -> tuple[Callable[..., Poses], tuple[NDArray[np.float64], int]]:
-        """Copy and pickle by value: the address is valid in one process only."""
-        return Poses.of, (self.values, self.counts[0])
-
-    @property
-    def robots(self) -> list[tuple[float, float, float]]:
-        """Poses of the robots: x, y, heading."""
-        if self._robots is None:
-            count = 3 * self.counts[0]
-            numbers = self.values[:count].tolist()
-            self._robots = list(zip(numbers[::3], numbers[1::3], numbers[2::3], strict=True))
-        return self._robots
-
-    @property
-    def objects(self) -> list[tuple[float, float]]:
-        """Positions of the objects: x, y."""
-        if self._objects is None:
-            numbers = self.values[3 * self.counts[0] :].tolist()
-            self._objects = list(zip(numbers[::2], numbers[1::2], strict=True))
-        return self._objects
-
-
-class PoseBlock(NamedTuple):
-    """Consecutive quanta whose poses are contiguous in memory."""
-
-    first: int
-    last: int
-    """Ticks at the end of the first and the last quantum."""
-    sheet: NDArray[np.float64]
-    """Pose buffer that contains the block."""
-    row: int
-    """Row of the pose buffer with the poses of the first quantum."""
-    address: int
-    """Address of that row."""
-
-
 class _Chipmunk(Structure):
     """`struct chipmunk` of physics.c: functions of the physics library, by their names there."""
 
@@ -163,6 +101,7 @@ class _World(Structure):
         *((name, c_double) for name in ("dt", "axle", "thrust", "thrust_torque", "brake", "brake_torque")),
         ("robot_count", c_int64), ("object_count", c_int64),
         ("robots", POINTER(_Robot)), ("discs", POINTER(_Disc)), ("steps", c_int64),
+        ("polygons", POINTER(c_void_p)), ("polygon_count", c_int64),
     ]  # fmt: skip
 
 
@@ -204,7 +143,7 @@ class World:
         scene: Scene,
         seed: int,
         robots: Sequence[tuple[float, float, float]],
-        objects: Sequence[tuple[float, float]],
+        objects: Sequence[Place],
     ) -> World:
         """Return a world with the bodies at given poses (cm, rad), for calibrations and tests."""
         world = cls.__new__(cls)
@@ -216,7 +155,7 @@ class World:
         scene: Scene,
         seed: int,
         robots: Sequence[tuple[float, float, float]],
-        objects: Sequence[tuple[float, float]],
+        objects: Sequence[Place],
     ) -> None:
         self.scene = scene
         self.dt = scene.clock.quantum_tcy / 14_745_600
@@ -231,7 +170,9 @@ class World:
         self._joints: list[tuple[pymunk.PivotJoint, pymunk.GearJoint] | None] = []
         drives = [self._add_drive(body) for body in self.robots]
         self._floor: list[tuple[pymunk.PivotJoint, pymunk.GearJoint]] = []
-        self.objects = [self._add_object(scene.kind_of(number), x, y) for number, (x, y) in enumerate(objects)]
+        kinds = list(map(scene.kind_of, range(len(objects))))
+        self.objects = [self._add_object(kind, *place) for kind, place in zip(kinds, objects, strict=True)]
+        self._polygons = [body for kind, body in zip(kinds, self.objects, strict=True) if kind.polygon]
         self._wheel_rng = [generator(seed, STREAM_WHEELS, robot) for robot in range(len(robots))]
         self._noise_ticks = max(round(scene.robots.noise_period_s / self.dt), 1)
         self._fill_structs(seed, drives)
@@ -258,14 +199,16 @@ class World:
             addresses = (_address(joint._constraint) for joint in joints)
             discs.append(_Disc(_address(body._body), *addresses, self.scene.kind_of(number).radius_cm))
         self._discs = (_Disc * len(discs))(*discs)
+        polygons = (c_void_p * len(self._polygons))(*(_address(body._body) for body in self._polygons))
         self._world = _World(
             _Chipmunk(*(_address(ffi.addressof(lib, name)) for name in _Chipmunk.NAMES)), _address(self.space._space),
-            self.dt, setting.axle_cm, *forces, len(self._robots), len(self.objects), self._robots, self._discs,
+            self.dt, setting.axle_cm, *forces, len(self._robots), len(self.objects), self._robots, self._discs, 0,
+            polygons, len(polygons),
         )  # fmt: skip
         self._at = addressof(self._world)
         self._wheels = np.zeros((len(self.robots), 2))
         self._wheels_at = self._wheels.ctypes.data
-        self._width = 3 * len(self.robots) + 2 * len(self.objects)
+        self._width = 3 * len(self.robots) + 2 * len(self.objects) + len(self._polygons)
         self._sheet, self._sheet_at, self._row = np.empty((0, self._width)), 0, 0
         self._row_bytes = self._sheet.itemsize * self._width
         self.native = NativeWorld(address_of(self._run_quanta), self._at, self._wheels_at, self._width)
@@ -294,18 +237,19 @@ class World:
             shape.friction = SHAPE_FRICTION
             self.space.add(shape)
 
-    def _disc(self, mass: float, radius: float, x: float, y: float) -> pymunk.Body:
-        """Add a disc that can be pushed."""
-        body = pymunk.Body(mass, dimensions.disc_moment(mass, radius))
+    def _body(self, mass: float, radius: float, x: float, y: float, corners: geometry.Corners = ()) -> pymunk.Body:
+        """Add a disc or, with `corners`, a polygon that can be pushed."""
+        moment = pymunk.moment_for_poly(mass, corners) if corners else dimensions.disc_moment(mass, radius)
+        body = pymunk.Body(mass, moment)
         body.position = x, y
-        shape = pymunk.Circle(body, radius)
+        shape = pymunk.Poly(body, corners) if corners else pymunk.Circle(body, radius)
         shape.friction = SHAPE_FRICTION
         self.space.add(body, shape)
         return body
 
     def _add_robot(self, x: float, y: float, heading: float) -> pymunk.Body:
         """Add the body of a robot."""
-        body = self._disc(dimensions.ROBOT_MASS, dimensions.ROBOT_RADIUS, x, y)
+        body = self._body(dimensions.ROBOT_MASS, dimensions.ROBOT_RADIUS, x, y)
         body.angle = heading
         return body
 
@@ -329,14 +273,17 @@ class World:
         """Return the greatest force and torque with which the wheels pull or hold a robot."""
         return dimensions.newton(force_n), dimensions.newton(force_n) * self.scene.robots.axle_cm / 2
 
-    def _add_object(self, setting: ObjectKind, x: float, y: float) -> pymunk.Body:
+    def _add_object(self, setting: ObjectKind, x: float, y: float, heading: float = 0.0) -> pymunk.Body:
         """Add an object. Its floor friction is two joints of limited force that hold it at rest."""
-        body = self._disc(setting.mass_kg, setting.radius_cm, x, y)
+        corners = geometry.centred(setting.polygon) if setting.polygon else ()
+        body = self._body(setting.mass_kg, setting.radius_cm, x, y, corners)
+        body.angle = heading
         slide = pymunk.PivotJoint(self.space.static_body, body, (0, 0), (0, 0))
         spin = pymunk.GearJoint(self.space.static_body, body, 0.0, 1.0)
         mu = setting.floor_friction
         slide.max_force = dimensions.floor_force(setting.mass_kg, mu)
-        spin.max_force = dimensions.floor_torque(setting.mass_kg, setting.radius_cm, mu)
+        spin.max_force = (slide.max_force * geometry.mean_distance(corners) if corners else
+                          dimensions.floor_torque(setting.mass_kg, setting.radius_cm, mu))  # fmt: skip
         for joint in (slide, spin):
             joint.max_bias = 0.0
             self.space.add(joint)
@@ -400,7 +347,8 @@ class World:
     def poses_in(self, block: PoseBlock, tick: int) -> Poses:
         """Return the poses after `tick` quanta, which must be in the block."""
         row = tick - block.first
-        return Poses.of(block.sheet[block.row + row], len(self.robots), block.address + row * self._row_bytes)
+        at = block.address + row * self._row_bytes
+        return Poses.of(block.sheet[block.row + row], len(self.robots), len(self._polygons), at)
 
     def _free_row(self) -> int:
         """Return a free row for poses. Rows are never written twice, because `Poses` are immutable."""
@@ -431,7 +379,7 @@ class World:
         self._row += 1
         at = self._sheet_at + row * self._row_bytes
         self._read_poses(self._at, at)
-        return Poses.of(self._sheet[row], len(self.robots), at)
+        return Poses.of(self._sheet[row], len(self.robots), len(self._polygons), at)
 
     @property
     def seconds(self) -> float:
@@ -441,6 +389,12 @@ class World:
     def seconds_at(self, tick: int) -> float:
         """Return the time at the start of quantum `tick`."""
         return tick * self.scene.clock.quantum_tcy / 14_745_600
+
+    def object_poses(self) -> list[Place]:
+        """Return x and y of each object in cm, and of a polygon its heading in rad."""
+        headings = iter(self.poses.headings)
+        return [(*place, next(headings)) if self.scene.kind_of(number).polygon else place
+                for number, place in enumerate(self.poses.objects)]  # fmt: skip
 
     def object_places(self) -> NDArray[np.float64]:
         """Return the centres of the objects, n x 2, cm."""

@@ -22,7 +22,7 @@ from arena.infrared.propagation import amplitude
 from arena.robots.firmware_controller import FirmwareController
 from arena.robots.images import image_for
 from arena.scene.loader import FCY, load_scene
-from arena.world.physics import Poses
+from arena.world.poses import Poses
 from emu.machine.machine import Machine
 
 DISTANCES = (12.0, 18.0, 22.0, 25.0, 26.5, 28.0, 30.0, 32.0, 35.0)

@@ -21,7 +21,7 @@ from arena.infrared.propagation import Optics
 from arena.robots.firmware_controller import FirmwareController
 from arena.robots.images import image_for
 from arena.scene.loader import FCY, load_scene
-from arena.world.physics import Poses
+from arena.world.poses import Poses
 from emu.machine.machine import Machine
 
 SWARMS = (2, 10, 30)

@@ -25,12 +25,17 @@ from arena.camera.appearance import (
 )
 from arena.camera.lens import lens_of
 from arena.camera.renderer import NEAREST, VOTES, WINDOW_COLUMNS, WINDOW_ROWS
-from arena.scene import dimensions
+from arena.scene import dimensions, geometry
 from arena.scene.loader import Scene
-from arena.world.physics import Poses, Traits
+from arena.world.physics import Traits
+from arena.world.poses import Poses
 
 Disc = tuple[float, float, float, float, int]
 """Disc in the camera frame: centre ahead and left of the camera, radius, height, class."""
+
+
+Side = tuple[float, float, float, float, float, int, float]
+"""Side in the camera frame: ahead and left of both ends, height, class, greatest distance at which it is visible."""
 
 
 class ReferenceCamera:
@@ -64,8 +69,9 @@ class ReferenceCamera:
             self._collect(poses.objects, scene.objects.radius_cm, dimensions.OBJECT_HEIGHT, OBJECT)
         else:
             for place, (radius, height, kind) in zip(poses.objects, appearance.objects, strict=True):
-                self._collect([place], radius, height, kind)
-        self._sides = self._visible_sides(appearance) if appearance is not None else []
+                if radius:
+                    self._collect([place], radius, height, kind)
+        self._sides = self._visible_sides(appearance, poses) if appearance is not None else []
         others = [(one[0], one[1]) for index, one in enumerate(poses.robots) if index != own]
         self._collect(others, dimensions.ROBOT_RADIUS, dimensions.ROBOT_HEIGHT, ROBOT)
         self.discs.sort()
@@ -94,14 +100,18 @@ class ReferenceCamera:
                 if abs(left) - 1.2 * radius < widest * (ahead + radius):  # 1.2: slope of the ray to the rim
                     self.discs.append((ahead, left, radius, height, kind))
 
-    def _visible_sides(self, appearance: Appearance) -> list[tuple[float, float, float, float, float, int]]:
-        """Return the sides of walls and obstacles in the camera frame: ahead and left of both ends, height, class."""
+    def _visible_sides(self, appearance: Appearance, poses: Poses) -> list[Side]:
+        """Return the sides of walls, obstacles and movable polygons in the camera frame."""
         cos, sin, found = self._cos, self._sin, []
-        for (x1, y1, x2, y2), height, kind in appearance.sides:
+        sides = [(*one, math.inf) for one in appearance.sides]
+        for (number, corners, height, kind), heading in zip(appearance.polygons, poses.headings, strict=True):
+            outline = geometry.sides(geometry.turned(corners, *poses.objects[number], heading))
+            sides += [(side, height, kind, self._range) for side in outline]
+        for (x1, y1, x2, y2), height, kind, reach in sides:
             x1, y1, x2, y2 = x1 - self._x, y1 - self._y, x2 - self._x, y2 - self._y
             ends = x1 * cos + y1 * sin, y1 * cos - x1 * sin, x2 * cos + y2 * sin, y2 * cos - x2 * sin
             if ends[0] > 0 or ends[2] > 0:
-                found.append((*ends, height, kind))
+                found.append((*ends, height, kind, reach))
         return found
 
     def hits(self, slope: float, discs: list[Disc] | None = None) -> list[tuple[float, float, int]]:
@@ -119,11 +129,11 @@ class ReferenceCamera:
             depth = max((b - math.sqrt(root)) / a, NEAREST)
             if depth <= reach:
                 found.append((depth, height, kind))
-        for ax, ay, bx, by, height, kind in self._sides:
+        for ax, ay, bx, by, height, kind, farthest in self._sides:
             across = (by - ay) - slope * (bx - ax)
             if across:
                 depth, part = (ax * (by - ay) - ay * (bx - ax)) / across, (ax * slope - ay) / across
-                if depth > 0 and 0 <= part <= 1:
+                if depth > 0 and 0 <= part <= 1 and depth <= farthest / math.sqrt(a):
                     found.append((max(depth, NEAREST), height, kind))
         if self._appearance is not None:
             found += self._fixed_hits(slope)

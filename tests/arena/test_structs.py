@@ -28,13 +28,13 @@ TWINS: dict[Path, dict[str, type[Structure]]] = {
                            "native_world": physics.NativeWorld, "worker": threads._Worker,
                            "scheduler": threads._Scheduler},
     ARENA / "camera/renderer.c": {"disc": renderer._Disc, "led": renderer._Led, "side": renderer._Side,
-                        "patch": renderer._Patch,
+                        "polygon": renderer._Polygon, "patch": renderer._Patch,
                         "view": renderer._View, "rays": renderer._Rays},
     ARENA / "world/wheels.c": {"drive": wheels._Drive},
     ARENA / "world/physics.c": {"chipmunk": physics._Chipmunk, "disc": physics._Disc, "robot": physics._Robot,
                         "world": physics._World},
     ARENA / "infrared/propagation.c": {"disc": propagation._Disc, "side": propagation._Side,
-                         "optics": propagation._Optics,
+                         "polygon": propagation._Polygon, "optics": propagation._Optics,
                          "poses": propagation._Poses},
     ARENA / "infrared/light.c": {"history": channel._History, "receivers": channel.Receivers, "source": ring._Source,
                         "source_list": ring._SourceList, "light": ring._Light},
@@ -81,7 +81,7 @@ def test_a_struct_has_the_offsets_and_the_size_of_its_twin(source: Path, tmp_pat
 def test_every_shared_struct_is_compared() -> None:
     """Every struct that Python and C share is in TWINS; a new one needs an entry unless only C uses it."""
     own = {("renderer.c", "pixel"), ("renderer.c", "hit"), ("physics.c", "vect"),
-           ("line.c", "scan"), ("motors.c", "state")}  # fmt: skip
+           ("propagation.c", "ray"), ("line.c", "scan"), ("motors.c", "state")}  # fmt: skip
     found = {(path.name, name) for folder in (ARENA, BOARD) for path in folder.rglob("*.c")
              for name in re.findall(r"^struct (\w+) \{$", path.read_text(), re.M)}  # fmt: skip
     assert found - own == {(path.name, name) for path, twins in TWINS.items() for name in twins}

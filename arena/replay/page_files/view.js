@@ -140,13 +140,14 @@ function draw() {
   if (el("trails").checked) drawTrails();
   const sizes = {};
   for (const c of d.clusters[sample]) sizes[c] = (sizes[c] || 0) + 1;
-  d.objects[sample].forEach(([x, y], i) => {
+  d.objects[sample].forEach(([x, y, a], i) => {
     const c = d.clusters[sample][i], kind = d.kinds[i];
-    if (isNow()) [x, y] = d.studio.now.objects[i];
-    else if (part) { const next = d.objects[sample + 1][i]; x += part * (next[0] - x); y += part * (next[1] - y); }
+    if (isNow()) [x, y, a] = d.studio.now.objects[i];
+    else if (part) { const next = d.objects[sample + 1][i]; x += part * (next[0] - x); y += part * (next[1] - y); a += part * (next[2] - a); }
     const grouped = sizes[c] > 1;
     if (grouped) { g.lineWidth = 3; g.strokeStyle = GROUPS[c % GROUPS.length]; }
-    disc(x, y, kind.radius, kind.colour);
+    if (kind.polygon.length) { shape({polygon: kind.polygon.map(([u, v]) => [x + u * Math.cos(a) - v * Math.sin(a), y + u * Math.sin(a) + v * Math.cos(a)])}, kind.colour); g.stroke(); }
+    else disc(x, y, kind.radius, kind.colour);
     g.lineWidth = 1; g.strokeStyle = INK;
   });
   drawLinks(part);

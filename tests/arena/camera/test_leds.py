@@ -18,7 +18,7 @@ from arena.robots.firmware_controller import FirmwareController
 from arena.scene import dimensions
 from arena.scene.loader import Scene, load_scene
 from arena.trial.record import read_trial
-from arena.world.physics import Poses
+from arena.world.poses import Poses
 from tests.arena.reference_camera import ReferenceCamera
 from tests.arena.robots.test_firmware_controller import AT_ONCE
 

@@ -11,7 +11,8 @@ from arena.camera.lens import Lens
 from arena.camera.renderer import Renderer
 from arena.scene import dimensions
 from arena.scene.loader import Scene, load_scene
-from arena.world.physics import Poses, World
+from arena.world.physics import World
+from arena.world.poses import Poses
 from tests.arena.reference_camera import ReferenceCamera, sensor_of
 
 ROBOT_AT = (20.0, 150.0, 0.0)

@@ -137,6 +137,25 @@ def test_a_light_bundle_says_as_much(
     assert "not the digest of a trial" in capsys.readouterr().err
 
 
+def test_the_beginning_of_a_trial_is_verified_by_its_own_hash(
+    study: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """`verify --beginning` runs only the first seconds, with and without firmware, and finds other values in them."""
+    monkeypatch.setattr(bundle, "BEGINNING_S", 0.6)
+    light, changed = tmp_path / "light.zip", tmp_path / "changed.zip"
+    bundle.pack([study / "script", study / "talk"], light, light=True)
+    assert main(["verify", str(light), "--beginning"]) == 0
+    output = capsys.readouterr().out
+    assert "script, trial 1, first 0.6 s: all values equal" in output or "first 0.6 s: equal" in output
+    with zipfile.ZipFile(light) as archive:
+        digest = json.loads(archive.read("talk/trial-0001.json"))
+    for beginning, status, words in (("0" * 64, 1, "talk, trial 1, first 0.6 s: different in the first 0.6 s"),
+                                     ("", 2, "has no hashes of the first 0.6 s; pack it again")):  # fmt: skip
+        other = {"talk/trial-0001.json": json.dumps(digest | {"beginning": beginning}).encode()}
+        assert main(["verify", str(rewritten(light, changed, listed(light, other))), "--beginning"]) == status
+        assert words in "".join(capsys.readouterr())
+
+
 def test_a_record_that_is_not_what_the_plan_gives_is_found(
     study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -19,7 +19,7 @@ from arena.infrared.propagation import Optics, amplitude, brightest
 from arena.infrared.ring import InfraredRing, ambient
 from arena.robots.firmware_controller import FirmwareController, volts_after
 from arena.scene.loader import FCY, Scene, SceneError, load_scene
-from arena.world.physics import Poses
+from arena.world.poses import Poses
 from emu.boards.epuck.analog import Infrared, reflection_at
 from emu.boards.epuck.board import Epuck
 from emu.boards.noise import Noise

@@ -14,7 +14,8 @@ from arena.infrared.propagation import PUBLISHED, Optics, amplitude, beam, brigh
 from arena.scene import dimensions, geometry
 from arena.scene.loader import Scene, load_scene
 from arena.scene.schema import ObjectKind, Obstacle
-from arena.world.physics import Poses, World
+from arena.world.physics import World
+from arena.world.poses import Poses
 
 UP = math.pi / 2
 

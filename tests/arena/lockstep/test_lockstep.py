@@ -19,7 +19,8 @@ from arena.robots.controller import Controller, LedChange, Reading, SerialLine
 from arena.robots.firmware_controller import FirmwareController
 from arena.scene.loader import Scene, load_scene
 from arena.trial.trial import run_trial
-from arena.world.physics import Poses, World
+from arena.world.physics import World
+from arena.world.poses import Poses
 from emu.boards.epuck.camera.scan import LINE_PIXELS
 from emu.dspic30f.jit.engine import JitEngine
 from tests.arena.images import BEGIN

@@ -24,7 +24,8 @@ from arena.scene import dimensions, geometry
 from arena.scene.loader import FCY, Scene, SceneError, load_scene, scene_of
 from arena.scene.schema import NAMED
 from arena.trial.record import read_trial
-from arena.world.physics import Poses, World, traits_of
+from arena.world.physics import World, traits_of
+from arena.world.poses import Poses
 from tests.arena.images import BEGIN, REPEATING
 from tests.arena.reference_camera import ReferenceCamera, sensor_of
 

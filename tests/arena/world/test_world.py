@@ -21,7 +21,8 @@ from arena.scene import dimensions
 from arena.scene.loader import Scene, SceneError, load_scene
 from arena.scene.schema import Arena, Obstacle
 from arena.trial.trial import run_trial
-from arena.world.physics import Poses, World
+from arena.world.physics import World
+from arena.world.poses import Poses
 from arena.world.wheels import ROOM, Wheels
 
 
@@ -309,5 +310,5 @@ def test_quanta_in_a_row_equal_single_quanta() -> None:
                 poses = rows.poses_in(block, tick)
                 assert poses.values.tolist() == one.poses.values.tolist()
                 assert poses.address == poses.values.ctypes.data
-    assert (rows.ticks, rows.poses.counts) == (900, (2, 5))
+    assert (rows.ticks, rows.poses.counts) == (900, (2, 5, 0))
     assert rows.poses.robots != World(scene, 3).poses.robots
