@@ -102,9 +102,14 @@ def _mixed_doubles(objects: list[ObjectFile]) -> list[str]:
 def link_options(options: CcOptions, objects: list[ObjectFile]) -> LinkOptions:
     """Linker settings from the words of -Wl and -Xlinker; unused sections are removed by default."""
     result = link_settings(parse_link_words(["--gc-sections", *options.linker]))
-    result.undefined += format_parts(objects)
+    result.undefined += [*format_parts(objects), *uart_choice(objects)]
     result.chip = options.chip
     return result
+
+
+def uart_choice(objects: list[ObjectFile]) -> list[str]:
+    """Symbol of the library's standard streams with a choice of the UART, for a program that names __C30_UART."""
+    return ["___stdio_uart"] if any(s.name == "___C30_UART" for obj in objects for s in obj.symbols) else []
 
 
 def format_parts(objects: list[ObjectFile]) -> list[str]:

@@ -127,6 +127,7 @@ def _legalize(c: FunctionContext) -> None:
 def _select(c: FunctionContext) -> None:
     c.machine = select.FunctionSelector(c.module, c.function, c.for_size, c.taken).run()
     c.machine.interrupt = c.interrupt
+    c.machine.naked = "naked" in c.function.attrs or isr.NAKED in c.notes
     c.machine.preserved, c.machine.preprologue = isr.preserved(c.notes), isr.preprologue(c.notes)
     if c.interrupt:
         c.machine.preserved += isr.accumulators(c.function)

@@ -18,6 +18,8 @@ from toolchain.ir.model import (
 )
 
 PREFIX = "os_isr:"
+NAKED = "naked"
+"""Annotation of a naked function with C statements, which clang's attribute does not allow."""
 WORDS = {"interrupt", "auto_psv", "no_auto_psv", "shadow"}
 
 

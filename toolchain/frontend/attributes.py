@@ -98,6 +98,10 @@ REWRITES: dict[str, Rewrite] = {
     "externally_visible": lambda _arguments, _number: ["__used__"],
     **{name: _refusal(name) for name in ("boot", "secure", "eds", "fillupper")},
 }  # fmt: skip
+NAKED: dict[str, Rewrite] = {"naked": lambda _arguments, _number: ['__annotate__("naked")', "__noinline__", "__used__"]}
+"""The attribute of functions without prologue and epilogue, for sources whose naked functions contain C statements."""
+NAKED_WITH_STATEMENTS = re.compile(rb"non-ASM statement in naked function|parameter references not allowed in naked")
+"""Pattern of clang's messages about such a source."""
 NAMES = "|".join(REWRITES)
 USED = re.compile(rf"\b(?:__)?(?:{NAMES})(?:__)?\b".encode())
 """Pattern of the names of XC16's attributes in a source."""
@@ -114,6 +118,16 @@ def suspected(source: bytes) -> bool:
 
 def rewrite(text: str) -> str:
     """Replace XC16's attributes in preprocessed C. The lines keep their numbers."""
+    return _replace(text, REWRITES)
+
+
+def rewrite_naked(text: str) -> str:
+    """Replace the attribute `naked` in preprocessed C. The lines keep their numbers."""
+    return _replace(text, NAKED)
+
+
+def _replace(text: str, rules: dict[str, Rewrite]) -> str:
+    """Replace the attributes for which there is a rule."""
     out: list[str] = []
     at = number = 0
     registers: list[str] = []
@@ -130,7 +144,7 @@ def rewrite(text: str) -> str:
             name, arguments = _parts(attribute)
             if name == "sfr" and arguments:
                 registers += _register(text, token.start(), end, arguments[0])
-            rule = REWRITES.get(name)
+            rule = rules.get(name)
             replaced += [attribute] if rule is None else rule(arguments, number)
         close = text.index(")", text.index(")", end) + 1) + 1
         lines = sum(not line.startswith("#") for line in text[token.start() : close].split("\n")[1:])

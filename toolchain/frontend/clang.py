@@ -265,6 +265,8 @@ def _changes_for(result: subprocess.CompletedProcess[bytes], job: Job) -> list[C
     changes: list[Change] = []
     if attributes.IGNORED.search(said):
         changes.append(attributes.rewrite)
+    if failed and attributes.NAKED_WITH_STATEMENTS.search(said):
+        changes.append(attributes.rewrite_naked)
     if config_pragma.PRESENT in said:
         changes.append(config_pragma.rewriter(job.chip.name))
     if failed and (REFUSED.search(said) or asm_constraints.REFUSED.search(said) or accumulators.REFUSED.search(said)):

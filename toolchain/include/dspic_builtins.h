@@ -76,6 +76,8 @@ __attribute__((__noreturn__)) void __dspic_longjmp(unsigned int *environment, in
   }))
 #define __builtin_tblpage(object) __dspic_address("tblpage", object)
 #define __builtin_tbloffset(object) __dspic_address("tbloffset", object)
+#define __builtin_tbladdress(object) \
+  ((unsigned long)__builtin_tblpage(object) << 16 | __builtin_tbloffset(object))
 #define __builtin_psvpage(object) __dspic_address("psvpage", object)
 #define __builtin_psvoffset(object) __dspic_address("psvoffset", object)
 

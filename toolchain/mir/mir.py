@@ -503,6 +503,7 @@ class MFunction:
     pair_hints: dict[int, int] = field(default_factory=dict)  # preferred high word register of each low word register
     dynamic_stack: bool = False  # W15 changes by amounts that are known only at run time
     uses_fp: bool = False  # W14 is the frame pointer
+    naked: bool = False  # without prologue and epilogue
     interrupt: str = ""  # "", "no_auto_psv", "auto_psv"; "shadow" may be appended after a comma
     preserved: tuple[str, ...] = ()  # variables that an interrupt function saves in addition to registers
     preprologue: tuple[str, ...] = ()  # lines of assembly before the prologue

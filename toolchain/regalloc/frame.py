@@ -28,6 +28,8 @@ def wants_frame_pointer(m: MFunction, preferred: bool) -> bool:
 
     `preferred`: also where none is needed, except in functions whose inline assembly changes W14.
     """
+    if m.naked:
+        return False
     if preferred and not any(mi.op == "asm" and FP in mi.also_defs for b in m.blocks for mi in b.insts):
         return True
     return m.dynamic_stack or sum(o.size for o in m.frame if o.fixed is None) > FRAME_POINTER_BYTES
@@ -48,7 +50,8 @@ class FrameBuilder:
         written: set[int] = set()
         for b in self.m.blocks:
             for mi in b.insts:
-                written.update(mi.defs())
+                if not (self.m.naked and mi.op == "asm"):
+                    written.update(mi.defs())
         if not self.m.interrupt:
             keep = [r for r in CALLEE_SAVED if r in written and not (r == FP and self.m.uses_fp)]
             return keep
@@ -66,6 +69,10 @@ class FrameBuilder:
         for _, o in free:
             o.offset = at
             at += (o.size + 1) // 2 * 2
+        if self.m.naked and (at or self.saved or self.m.dynamic_stack):
+            raise UnsupportedError(
+                f"a stack frame in the naked function {self.m.name}: move its C statements to another function"
+            )
         if at > LNK_MAX:
             raise UnsupportedError(f"frame of {at} bytes (limit {LNK_MAX})")
         return at

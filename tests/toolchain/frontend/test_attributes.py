@@ -45,12 +45,48 @@ int main(void){
   if ((unsigned)&a != 0x1010 || (unsigned)&b != 0x1000 || (unsigned)&c != 0x1040 || (unsigned)&d != 0x1020) return 1;
   if ((unsigned)&z != 0x1900 || (unsigned)&y < 0x1800 || (unsigned)&z2 != 0x1902 || (unsigned)&z3 != 0x1600) return 2;
   if (__builtin_tblpage(area) != 1 || __builtin_tbloffset(area) != 0x5000) return 3;
+  if (__builtin_tbladdress(area) != 0x15000) return 3;
   MYREG = 0x55; if (LATD != 0x55) return 4;
   if (sizeof s != 3 || d != 5) return 5;
   if (m != 2 || p != 4 || l != 2) return 6;
   if ((unsigned)nearbuf >= 0x2000) return 7;
   return 0; }
 """
+
+
+NAKED = """
+#include <xc.h>
+int x, y;
+void __attribute__((naked)) only_assembly(void) { asm("mov #3,w0"); asm("mov w0,_x"); asm("return"); }
+void __attribute((__naked__, unused)) with_statements(void) { asm("mov #4,w0"); y = x + 4; LATB |= 5; asm("return"); }
+int main(void)
+{
+    unsigned top = WREG15;
+    only_assembly();
+    with_statements();
+    return x == 3 && y == 7 && (LATB & 5) == 5 && WREG15 == top ? 0 : 1;
+}
+"""
+
+
+@pytest.mark.parametrize("level", ["-O0", "-Os"])
+def test_naked_functions_have_no_frame(level: str, tmp_path: Path) -> None:
+    """A naked function, with or without C statements, returns by its own `return`: nothing is on the stack."""
+    (tmp_path / "a.c").write_text(NAKED)
+    built = build([tmp_path / "a.c"], tmp_path / "a.elf", level, "-Wall", "-fstack-check")
+    assert (built.status, built.messages) == (0, "")
+    assert run(tmp_path / "a.elf").status == 0
+
+
+def test_naked_function_that_needs_a_frame_is_an_error(tmp_path: Path) -> None:
+    """C statements of a naked function that need the stack are refused with function and cure."""
+    (tmp_path / "a.c").write_text(
+        'void g(int *);\nvoid __attribute__((naked)) f(void) { int a; g(&a); asm("return"); }\n'
+    )
+    built = build([tmp_path / "a.c"], tmp_path / "a.o", "-c")
+    assert built.status == 2
+    assert "a stack frame in the naked function f" in built.first_error
+    assert "a.c:2" in built.first_error
 
 
 @pytest.mark.parametrize("level", ["-O0", "-Os"])

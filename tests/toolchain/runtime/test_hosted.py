@@ -139,3 +139,39 @@ def test_standard_input_is_the_first_uart(tmp_path: Path) -> None:
         machine.uart[1].feed([byte])
     stop = machine.run(cycles=200_000)
     assert (stop.reason, machine.w[0]) == ("halt", 0)
+
+
+@pytest.mark.parametrize(
+    ("declaration", "statement"),
+    [
+        ("#include <libpic30.h>", "__C30_UART = 2;"),
+        ("int __C30_UART = 2;", ""),
+        ("extern int __C30_UART;", "__C30_UART = 2;"),
+    ],
+)
+def test_standard_streams_use_the_selected_uart(declaration: str, statement: str, tmp_path: Path) -> None:
+    """With __C30_UART = 2, printf and getchar use UART2; with 1, its default, UART1."""
+    (tmp_path / "a.c").write_text(
+        f"""#include <stdio.h>
+{declaration}
+int main(void)
+{{
+    {statement}
+    printf("%d", 42);
+    int character = getchar();
+    __C30_UART = 1;
+    putchar('x');
+    return character;
+}}
+"""
+    )
+    built = build([tmp_path / "a.c"], tmp_path / "a.elf", "-Os", "-Wall")
+    assert (built.status, built.messages) == (0, "")
+    machine = emu.load(tmp_path / "a.elf", board=None)
+    said: dict[int, bytearray] = {1: bytearray(), 2: bytearray()}
+    for number, text in said.items():
+        machine.uart[number].on_byte = lambda byte, cycle, text=text: text.append(byte)
+    machine.run(cycles=20_000)
+    machine.uart[2].feed(b"!")
+    assert machine.run(cycles=20_000).reason == "halt"
+    assert (machine.w[0], said[1], said[2]) == (ord("!"), b"x", b"42")
