@@ -32,6 +32,8 @@ from toolchain.bounds.transfer import is_constant
 MAX_ITERATIONS: Final = 5_000
 NONTERMINATING_ITERATIONS: Final = 6
 """Maximum number of iterations executed of a loop that did not terminate in an earlier execution."""
+TEST_ITERATION: Final = 32
+"""Iteration before which a loop without annotation is tested for a count that its values decide."""
 MAX_PUSHES: Final = 64
 """Maximum number of iterations of a loop that changes W15."""
 MAX_STEPS: Final = 500_000
@@ -58,6 +60,10 @@ class _FunctionExecution(CallExecution):
         self.pending: dict[int, AbstractState] = {}
         self.merged: Final[set[int]] = set()
         """Heads of loops whose annotations do not apply (MERGED_LOOPS)."""
+        self.source = code.entry
+        """Address of the last instruction of the block that is executed."""
+        self.edges: set[tuple[int, int]] = set()
+        """Edges of the control-flow graph, as pairs of `source` and target, that the present loop iteration took."""
 
     def run(self, state: AbstractState) -> FunctionResult:
         self._record_stack_depth(state)
@@ -92,6 +98,7 @@ class _FunctionExecution(CallExecution):
                     self._block(self.code.blocks[part], state)
 
     def _arrive(self, target: int, state: AbstractState) -> None:
+        self.edges.add((self.source, target))
         block = self.code.blocks[target]
         if block.steps[-1].flow is Return and len(block.steps) <= MAX_RETURN_BLOCK and target not in self.code.heads:
             self._block(block, state)  # states are not joined, so that return states stay separate by result
@@ -119,6 +126,7 @@ class _FunctionExecution(CallExecution):
         limit = NONTERMINATING_ITERATIONS if hopeless else MAX_ITERATIONS
         before: dict[int, AbstractState] = {}
         iterations = 0
+        edges: set[tuple[int, int]] = set()
         while not loop.members.isdisjoint(pending):
             now = {head: pending[head] for head in loop.heads if head in pending}
             if now and before:
@@ -130,6 +138,9 @@ class _FunctionExecution(CallExecution):
                 elif iterations > limit:
                     if limit == MAX_ITERATIONS:
                         explorer.truncated.add(loop.head)
+                    explorer.nonterminating.add(loop.head)
+                    self._widen(before, now)
+                elif iterations == TEST_ITERATION and bound is None and self._count_is_open(loop, before, now, edges):
                     explorer.nonterminating.add(loop.head)
                     self._widen(before, now)
                 if shared is not None:
@@ -145,12 +156,49 @@ class _FunctionExecution(CallExecution):
                         self._add_iterations(before[loop.head], now[loop.head], bound - iterations)
                         iterations = bound
             before = {head: state.copy() for head, state in now.items()}
-            if loop.head in now:
-                self._block(self.code.blocks[loop.head], pending.pop(loop.head))
-            self._visit(loop.body)
+            edges = self._iterate(loop)
             iterations += 1
         for head in loop.heads:
             pending.pop(head, None)
+
+    def _iterate(self, loop: Loop) -> set[tuple[int, int]]:
+        """Execute one iteration of a loop from the pending states; return the edges that it took."""
+        outer, self.edges = self.edges, set()
+        if loop.head in self.pending:
+            self._block(self.code.blocks[loop.head], self.pending.pop(loop.head))
+        self._visit(loop.body)
+        taken, self.edges = self.edges, outer | self.edges
+        return taken
+
+    def _count_is_open(
+        self,
+        loop: Loop,
+        before: dict[int, AbstractState],
+        now: dict[int, AbstractState],
+        edges: set[tuple[int, int]],
+    ) -> bool:
+        """Whether no value that changes from iteration to iteration decides a branch of a loop.
+
+        before, now  states at the head before and after the last iteration, which took `edges`
+
+        If iterations from a state in which these values are unknown lead to the same state by the same edges, the
+        values decide none of the branches, and executing more iterations would not find the loop's end.
+        """
+        if len(loop.heads) > 1 or loop.head not in before or loop.head not in now:
+            return False
+        trial = _FunctionExecution(self.explorer, self.code)
+        trial.floor = self.floor
+        state, after = before[loop.head], now[loop.head]
+        for _ in range(NONTERMINATING_ITERATIONS):
+            state = widen(state, after)
+            trial.pending = {loop.head: state.copy()}
+            taken = trial._iterate(loop)
+            if loop.head not in trial.pending or taken != edges:
+                return False
+            after = trial.pending[loop.head]
+            if after.key() == state.key():
+                return True
+        return False
 
     def _annotated_bound(self, loop: Loop) -> tuple[int | None, tuple[Scope, int] | None]:
         """Return the annotated bound of a loop, and the scope in which it shares iterations.
@@ -215,7 +263,8 @@ class _FunctionExecution(CallExecution):
 
     def _block(self, block: BasicBlock, state: AbstractState) -> None:
         """Execute a block and pass the resulting states to its successors."""
-        explorer = self.explorer
+        explorer, outer = self.explorer, self.source
+        self.source = block.steps[-1].pc
         explorer.steps += len(block.steps)
         if explorer.steps > MAX_STEPS:
             raise BudgetExceededError
@@ -238,8 +287,9 @@ class _FunctionExecution(CallExecution):
                 self.result.unbounded[last.pc] = IRREGULAR_DO_LOOP
         if state.do_loops and last.pc == state.do_loops[-1][1] and not isinstance(flow, Branch | Goto | Return):
             self._loop_end(state, last)
-            return
-        self._follow(block, flow, state, None if rewritten else (result,))
+        else:
+            self._follow(block, flow, state, None if rewritten else (result,))
+        self.source = outer
 
     def _loop_end(self, state: AbstractState, last: Instruction) -> None:
         """Continue after the last instruction of a DO loop: repeat or leave it (isa.md §7.6)."""

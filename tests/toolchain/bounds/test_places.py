@@ -190,6 +190,21 @@ def test_the_annotation_of_an_unrolled_loop_does_not_apply_to_the_enclosing_loop
     assert "this loop has no known bound" in row["open"].values()
 
 
+COUNTED_LIST = """
+struct node { struct node *next; } *volatile head; volatile unsigned result;
+int main(void) { unsigned n = 0; for (struct node *p = head; p && %s; p = p->next) n++; result = n; return 0; }
+"""
+
+
+def test_a_counter_that_decides_no_branch_does_not_prolong_the_analysis(tmp_path: Path, capsys) -> None:
+    """A loop that only data end has no known bound although a counter changes; a counter that ends it bounds it."""
+    row = report(capsys, built(tmp_path, COUNTED_LIST % "1", "-Os"))
+    assert list(row["open"].values()) == ["this loop has no known bound"]
+    row = report(capsys, built(tmp_path, COUNTED_LIST % "n != 1000", "-Os"))
+    assert not row["open"]
+    assert row["cycles"] > 4000
+
+
 def test_a_loop_with_too_many_iterations_is_reported(tmp_path: Path, capsys) -> None:
     """A loop whose iteration count exceeds the limit of the analysis is reported."""
     text = "volatile unsigned n; int main(void) { for (unsigned i = 0; i < 6000; i++) n = i; return 0; }"

@@ -186,6 +186,9 @@ def widen(before: AbstractState, after: AbstractState) -> AbstractState:
     new.mem = {k: v for k, v in after.mem.items() if k in before.mem and key_of(before.mem[k]) == key_of(v)}
     new.regs = {k: v for k, v in after.regs.items() if k in before.regs and key_of(before.regs[k]) == key_of(v)}
     new.flags = {k: v if key_of(before.flags[k]) == key_of(v) else BIT for k, v in after.flags.items()}
+    new.lowest_leak = min(before.lowest_leak, after.lowest_leak)
+    new.stall, new.waits = before.stall | after.stall, before.waits | after.waits
+    new.ipl = min(before.ipl[0], after.ipl[0]), max(before.ipl[1], after.ipl[1])
     return new
 
 
