@@ -34,24 +34,29 @@ class HostCodeError(RuntimeError):
 
 def functions(source: Path, signatures: Signatures) -> dict[str, Callable[..., Any]]:
     """Return the functions of a C file. They hold the GIL, so each call must be short. Raises HostCodeError."""
+    return functions_of(source.read_text("utf-8"), source.stem, signatures)
+
+
+def functions_of(source: str, name: str, signatures: Signatures) -> dict[str, Callable[..., Any]]:
+    """Return the functions of a C text, for code that is generated. `name` appears in messages. As `functions`."""
     import llvmlite.binding as llvm
 
     compiler = shared_compiler()
-    text = source.read_bytes()
+    text = source.encode()
     key = compiler.key(2, _compiler_identity(), repr(FLAGS).encode(), text)
     code = compiler.cache.get(key)
     if code is None:
-        code = _compiled(source)
+        code = _compiled(text, name)
         compiler.cache.put(key, code)
     llvm.initialize_native_target()
     llvm.initialize_native_asmprinter()
     builder = llvm.JITLibraryBuilder().add_object_img(code).add_current_process()
-    for name in signatures:
-        builder.export_symbol(name)
-    library = builder.link(llvm.create_lljit_compiler(use_jit_link=True), source.stem)
+    for function in signatures:
+        builder.export_symbol(function)
+    library = builder.link(llvm.create_lljit_compiler(use_jit_link=True), name)
     _libraries.append(library)
-    return {name: ctypes.PYFUNCTYPE(result, *arguments)(int(library[name]))
-            for name, (result, arguments) in signatures.items()}  # fmt: skip
+    return {function: ctypes.PYFUNCTYPE(result, *arguments)(int(library[function]))
+            for function, (result, arguments) in signatures.items()}  # fmt: skip
 
 
 def _compiler_identity() -> bytes:
@@ -71,16 +76,18 @@ def address_of(function: Callable[..., Any]) -> int:
     return ctypes.cast(function, ctypes.c_void_p).value or 0  # type: ignore[arg-type]
 
 
-def _compiled(source: Path) -> bytes:
-    """Compile a C file and return the object file."""
+def _compiled(text: bytes, name: str) -> bytes:
+    """Compile a C text and return the object file."""
     spec = importlib.util.find_spec("ziglang")
     if spec is None or spec.origin is None:
         raise HostCodeError("the C compiler is missing: install the Python package 'ziglang' (pip install ziglang)")
     clang = Path(spec.origin).parent / ("zig.exe" if os.name == "nt" else "zig")
     with tempfile.TemporaryDirectory() as folder:
         made = Path(folder) / "made.o"
+        source = Path(folder) / f"{name}.c"
+        source.write_bytes(text)
         command = [str(clang), "clang", *FLAGS, "-c", str(source), "-o", str(made)]
         done = subprocess.run(command, capture_output=True, text=True, check=False)
         if done.returncode:
-            raise HostCodeError(f"{source}: {done.stderr.strip()}")
+            raise HostCodeError(f"{name}.c: {done.stderr.strip()}")
         return made.read_bytes()

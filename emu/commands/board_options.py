@@ -27,12 +27,12 @@ MOST_HZ: Final = 40_000_000
 """Frequency in Hz of the family's fastest external clock (dspic30f6014a.md §3)."""
 
 
-def add_board_options(parser: argparse.ArgumentParser) -> None:
+def add_board_options(parser: argparse.ArgumentParser, boards: tuple[str, ...] = BOARDS) -> None:
     """Add --cache, --board, --crystal, --selector, --camera, --sensor and --stimulus."""
     parser.add_argument("--cache", type=use_cache, metavar="DIR", help="keep native code in DIR instead of the cache")
     board = parser.add_argument_group("robot")
     board.add_argument(
-        "--board", choices=BOARDS, default=BOARDS[0], help="board around the chip (default epuck; none: bare pins)"
+        "--board", choices=boards, default=BOARDS[0], help="board around the chip (default epuck; none: bare pins)"
     )
     board.add_argument("--crystal", metavar="HZ", type=_crystal, help="crystal of bare pins (default 7372800)")
     board.add_argument("--selector", metavar="N", type=_selector, default=0, help="position of the selector, 0 to 15")

@@ -42,7 +42,7 @@ def _collect(data: bytes, path: str, chip: Chip) -> tuple[dict[int, int], tuple[
             continue
         if ended:
             raise LoadError(path, f"line {number}: text after the end-of-file record")
-        kind, address, payload = _record(text, f"line {number}", path)
+        kind, address, payload = parse_record(text, f"line {number}", path)
         if kind == END:
             ended = True
         elif kind == LINEAR:
@@ -75,7 +75,7 @@ def _check_place(first: int, length: int, chip: Chip, where: str, path: str) -> 
             )
 
 
-def _record(text: bytes, where: str, path: str) -> tuple[int, int, bytes]:
+def parse_record(text: bytes, where: str, path: str) -> tuple[int, int, bytes]:
     """Parse and check one line. Return record type, 16-bit address and payload."""
     if not text.startswith(b":"):
         raise LoadError(path, f"{where}: a record starts with ':', found {text[:1]!r}")

@@ -5,7 +5,7 @@
  * before: so a pulse is never late, and every run is the same. Light takes DELAY from pin to comparator; it also keeps
  * a pulse in the future of a receiver that is an instruction ahead.
  *
- * simavr knows no conversion that the comparator starts; it is started here. It reads a channel's voltage when the
+ * simavr knows no conversion that the comparator or a capture starts; it is started here. It reads a channel's voltage when the
  * program reads the result, so a voltage stays until the next pulse. */
 #include "simavr.h"
 
@@ -30,6 +30,7 @@ enum {
     ADCSRB = 0x7B,
     TRIGGERS = 7,
     BY_COMPARATOR = 1,
+    BY_CAPTURE = 7, /* the comparator drives the capture unit */
     SLEEP = 0x9588 /* the instruction */
 };
 
@@ -144,7 +145,8 @@ static void comparator_changed(struct avr_irq_t *irq, uint32_t value, void *para
     place *p = parameter;
     avr_t *avr = p->machine->avr;
     (void)irq;
-    if (value != 0 && (avr->data[ADCSRB] & TRIGGERS) == BY_COMPARATOR) {
+    uint8_t trigger = avr->data[ADCSRB] & TRIGGERS;
+    if (value != 0 && (trigger == BY_COMPARATOR || trigger == BY_CAPTURE)) {
         avr_raise_irq(avr_io_getirq(avr, AVR_IOCTL_ADC_GETIRQ, ADC_IRQ_IN_TRIGGER), 1);
     }
 }

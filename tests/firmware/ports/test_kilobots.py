@@ -16,6 +16,7 @@ from firmware.tools.simulated.kilobots import HIGH_GAIN_MM, REACH_MM, Kilobots, 
 from firmware.tools.simulated.machine import NotInstalled, peek, peek_words
 from tests.cases import check_all
 from tests.firmware.conftest import FIRMWARE, TARGET_APPS
+from tests.firmware.ports.emulated_kilobots import EmulatedKilobots
 from tests.firmware.ports.test_kernel_ports import make
 
 MESSAGE, EVENT = 1, 2
@@ -26,7 +27,8 @@ STRENGTH_OF_LOW_GAIN = 1024
 DDRC, DDRD, ACSR = 0x27, 0x2A, 0x50
 ACD = 1 << 7
 
-Open = Callable[..., Kilobots]
+SIMULATORS: dict[str, Callable[..., Any]] = {"simavr": Kilobots, "emulator": EmulatedKilobots}
+Open = Callable[..., Any]
 
 
 @pytest.fixture(scope="module")
@@ -34,14 +36,17 @@ def image(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return make("kilobot", "pulses", tmp_path_factory.mktemp("pulses"), apps=TARGET_APPS)
 
 
-@pytest.fixture
-def swarm() -> Iterator[Open]:
-    """Return a function that creates a swarm for one test; skip the test if a Debian package is missing."""
-    opened: list[Kilobots] = []
+@pytest.fixture(params=SIMULATORS)
+def swarm(request: pytest.FixtureRequest) -> Iterator[Open]:
+    """Return a function that creates a swarm for one test, in simavr and in the project's emulator.
 
-    def open_one(robots: Sequence[Robot], **settings: Any) -> Kilobots:
+    A missing Debian package skips the test.
+    """
+    opened: list[Any] = []
+
+    def open_one(robots: Sequence[Robot], **settings: Any) -> Any:
         try:
-            opened.append(Kilobots(robots, **settings))
+            opened.append(SIMULATORS[request.param](robots, **settings))
         except NotInstalled as missing:
             pytest.skip(str(missing))
         return opened[-1]

@@ -50,7 +50,7 @@ void pulses_prepare(uint16 first_alarm)
         noise = (uint16)((noise << 1 | noise >> 15) ^ convert(CHANNEL_BATTERY));
     }
     pulses_gain(true);
-    ADCSRB = 1 << ADTS0; /* the comparator starts conversions */
+    ADCSRB = 1 << ADTS2 | 1 << ADTS1 | 1 << ADTS0; /* a capture starts a conversion; its handler clears the flag */
     ADCSRA = 1 << ADEN | 1 << ADATE | CLOCK_OF_ADC;
     OCR1A = first_alarm; /* T1 is 0 until the kernel starts it */
     TIMSK1 |= 1 << OCIE1A;

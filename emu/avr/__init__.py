@@ -1,0 +1,1 @@
+"""Cycle-exact emulator of the ATmega328P: instruction table, core and devices in C, firmware images, machine."""

@@ -1,0 +1,79 @@
+// One ATmega328P: register addresses, bits, and helpers that all parts use. Python declares `struct avr` (state.py).
+//
+// Source: ATmega328P data sheet (docs/reference/avr.md names its sections). A write in cycle t acts from cycle t + 1.
+
+enum { PC_MASK = FLASH_BYTES / 2 - 1, IO_START = 0x20, RAMEND = DATA_BYTES - 1 };
+#define NEVER (~(u64)0)
+
+enum {
+    PINB = 0x23, DDRB, PORTB, PINC, DDRC, PORTC, PIND, DDRD, PORTD,
+    TIFR0 = 0x35, TIFR1, TIFR2, PCIFR = 0x3B, EIFR, EIMSK, GPIOR0, EECR, EEDR, EEARL, EEARH, GTCCR,
+    TCCR0A, TCCR0B, TCNT0, OCR0A, OCR0B, GPIOR1 = 0x4A, GPIOR2, SPCR, SPSR, SPDR, ACSR = 0x50,
+    SMCR = 0x53, MCUSR, MCUCR, SPMCSR = 0x57, SPL = 0x5D, SPH, SREG_AT,
+    WDTCSR = 0x60, CLKPR, PRR = 0x64, OSCCAL = 0x66, PCICR = 0x68, EICRA, PCMSK0 = 0x6B, PCMSK1, PCMSK2,
+    TIMSK0, TIMSK1, TIMSK2, ADCL = 0x78, ADCH, ADCSRA, ADCSRB, ADMUX, DIDR0 = 0x7E, DIDR1,
+    TCCR1A, TCCR1B, TCCR1C, TCNT1L = 0x84, TCNT1H, ICR1L, ICR1H, OCR1AL, OCR1AH, OCR1BL, OCR1BH,
+    TCCR2A = 0xB0, TCCR2B, TCNT2, OCR2A, OCR2B, ASSR = 0xB6, TWBR = 0xB8, TWAMR = 0xBD,
+    UCSR0A = 0xC0, UCSR0B, UCSR0C, UBRR0L = 0xC4, UBRR0H, UDR0
+};
+
+// Vectors by number; vector n is at word 2 n.
+enum {
+    V_RESET, V_INT0, V_INT1, V_PCINT0, V_PCINT1, V_PCINT2, V_WDT, V_T2_COMPA, V_T2_COMPB, V_T2_OVF, V_T1_CAPT,
+    V_T1_COMPA, V_T1_COMPB, V_T1_OVF, V_T0_COMPA, V_T0_COMPB, V_T0_OVF, V_SPI, V_UART_RX, V_UART_UDRE, V_UART_TX,
+    V_ADC, V_EE_READY, V_COMPARATOR, V_TWI, V_SPM_READY, VECTORS
+};
+
+enum { FLAG_C = 1, FLAG_Z = 2, FLAG_N = 4, FLAG_V = 8, FLAG_S = 16, FLAG_H = 32, FLAG_T = 64, FLAG_I = 128 };
+
+enum { // kinds of fault (machine.py)
+    FAULT_NONE, FAULT_ILLEGAL, FAULT_LOAD, FAULT_STORE, FAULT_STACK, FAULT_END, FAULT_FLASH
+};
+
+// Kinds of input. Values: port << 16 | driven << 8 | level; a byte; microvolts of channel INPUT_ANALOG + n.
+enum { INPUT_PIN, INPUT_UART, INPUT_ANALOG };
+
+enum { CH_TEMPERATURE = 8, CH_AIN0, CH_AIN1 }; // of analog_uv
+enum { BANDGAP_UV = 1100000 };
+
+static int bit_of(const struct avr *m, u32 address, u32 bit)
+{
+    return m->data[address] >> bit & 1;
+}
+
+static void set_bit(struct avr *m, u32 address, u32 bit, u32 on)
+{
+    m->data[address] = (u8)((m->data[address] & ~(1u << bit)) | on << bit);
+}
+
+static u32 word_at(const struct avr *m, u32 address)
+{
+    return m->data[address] | (u32)m->data[address + 1] << 8;
+}
+
+static void log_change(struct avr *m, u32 address, u32 value, u64 at)
+{
+    if (m->log_count == LOG_ROOM)
+        return;
+    m->log_cycle[m->log_count] = at;
+    m->log_register[m->log_count] = (u8)address;
+    m->log_value[m->log_count] = (u8)value;
+    if (++m->log_count >= LOG_ROOM / 2)
+        m->deadline = 0; // the caller empties the log
+}
+
+// An event moves the deadline only forward; `reschedule` recomputes it.
+static void schedule(struct avr *m, u32 event, u64 at)
+{
+    m->due[event] = at;
+    if (at < m->next_due)
+        m->next_due = at;
+}
+
+static u32 random_bits(struct avr *m)
+{
+    m->random ^= m->random << 13;
+    m->random ^= m->random >> 17;
+    m->random ^= m->random << 5;
+    return m->random;
+}

@@ -1,0 +1,218 @@
+"""One ATmega328P with an image: run, read and write its memories, give inputs, take outputs, snapshot and restore.
+
+    machine = Atmega328p(load_avr_image("firmware.elf"))
+    machine.run_until(8_000_000)        # one second at 8 MHz
+    machine.peek("counter", 2)
+
+The same image, inputs and seed give the same run, cycle by cycle.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Final
+
+from emu.avr.core.state import EEPROM_BYTES, FLASH_BYTES, LOG_ROOM, PROGRAM_ENTRIES, Avr, Decoded
+from emu.avr.image import AvrImage
+from emu.avr.native import native
+
+HZ: Final = 8_000_000
+"""Clock frequency in Hz of the internal oscillator."""
+RAMEND: Final = 0x8FF
+HALT: Final = 2
+"""Result RUN_HALT of avr_run (core/interpreter.c)."""
+INPUT_PIN, INPUT_UART, INPUT_ANALOG = 0, 1, 2
+"""Kinds of input (core/avr.h). An analog input has the kind INPUT_ANALOG + channel."""
+CHANNEL_TEMPERATURE, CHANNEL_AIN0, CHANNEL_AIN1 = 8, 9, 10
+ERASED_BOOT_WORD: Final = 0x3800
+"""Word address of the 4 KB boot section (fuses BOOTSZ = 00)."""
+SPL, SREG, UDR0 = 0x5D, 0x5F, 0xC6
+_CHUNK: Final = 4_000_000
+"""Cycles per native call. A call holds the interpreter lock."""
+_FAULTS: Final = {
+    1: "illegal instruction {address:#06x}",
+    2: "load from {address:#06x}, behind the end of RAM at 0x8ff",
+    3: "store to {address:#06x}, behind the end of RAM at 0x8ff",
+    4: "stack pointer {address:#06x} is outside RAM (0x100 to 0x8ff)",
+    5: "execution ran past the end of flash",
+    6: "read of flash at {address:#06x}, behind its end at 0x7fff",
+}
+"""Text of each kind of fault (core/avr.h)."""
+
+
+class Program:
+    """Decoded flash. Machines with equal flash may share one."""
+
+    def __init__(self) -> None:
+        self.code: Final = (Decoded * PROGRAM_ENTRIES)()
+        self.address: Final = ctypes.addressof(self.code)
+
+
+@dataclass(frozen=True, slots=True)
+class AvrFault:
+    """A fault of the firmware: what happened, and the byte address of the instruction."""
+
+    message: str
+    pc: int
+    cycle: int
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """A watched register got another value at `cycle`. A byte that the UART has sent is a change of UDR0."""
+
+    cycle: int
+    register: int
+    value: int
+
+
+class Atmega328p:
+    """A microcontroller at its reset vector. `program`: decoded image to share, of a machine with the same image.
+
+    `seed` selects the noise of analog inputs, any integer.
+    """
+
+    def __init__(self, image: AvrImage, *, seed: int = 1, program: Program | None = None) -> None:
+        self.image: Final = image
+        self.state: Final = Avr()
+        self._address: Final = ctypes.addressof(self.state)
+        self._native: Final = native()
+        self._run: Final = self._native["avr_run"]
+        ctypes.memmove(self.state.flash, image.flash, FLASH_BYTES)
+        ctypes.memset(self.state.eeprom, 0xFF, EEPROM_BYTES)
+        for address, octet in image.eeprom.items():
+            self.state.eeprom[address] = octet
+        self.state.boot_start = ERASED_BOOT_WORD
+        self.state.avcc_uv = self.state.aref_uv = 3_300_000
+        self.state.random = (seed * 2_654_435_761 & 0xFFFF_FFFF) or 1
+        self.changes: Final[list[Change]] = []
+        """Outputs since the caller cleared the list."""
+        self._native["avr_power_on"](self._address)
+        self.program = program or self._decoded()
+
+    def _decoded(self) -> Program:
+        program = Program()
+        self._native["avr_decode"](self._address, program.address, 0, FLASH_BYTES // 2 - 1)
+        return program
+
+    def run_until(self, cycle: int) -> str:
+        """Run up to a cycle. Return "limit", "fault", or "halt" if nothing can wake the CPU before that.
+
+        The last instruction may end a few cycles later.
+        """
+        while True:
+            goal = min(cycle, self.state.cycle + _CHUNK)
+            result = self._run(self._address, self.program.address, goal)
+            if self.attend() is not None:
+                return "fault"
+            if result == HALT:
+                return "halt"
+            if self.state.cycle >= cycle:
+                return "limit"
+
+    def attend(self) -> AvrFault | None:
+        """Take the outputs of native code into `changes`, decode changed flash, and return the fault, if any."""
+        if self.state.log_count:
+            self._take_log()
+        if self.state.program_changed:
+            self.state.program_changed = 0
+            self.program = self._decoded()
+        return self.fault
+
+    def step(self) -> str:
+        """Execute one instruction or enter an interrupt. Return as `run_until`."""
+        return self.run_until(self.state.cycle + 1)
+
+    def _take_log(self) -> None:
+        state = self.state
+        count = min(state.log_count, LOG_ROOM)
+        self.changes.extend(map(Change, state.log_cycle[:count], state.log_register[:count], state.log_value[:count]))
+        state.log_count = 0
+
+    @property
+    def cycle(self) -> int:
+        """Return the CPU cycles since power-on."""
+        return self.state.cycle
+
+    @property
+    def pc(self) -> int:
+        """Return the byte address of the next instruction."""
+        return 2 * self.state.pc
+
+    @property
+    def sp(self) -> int:
+        """Return the stack pointer, which points to the next free byte."""
+        return self.state.data[SPL] | self.state.data[SPL + 1] << 8
+
+    @property
+    def fault(self) -> AvrFault | None:
+        """Return the fault that stopped the machine."""
+        state = self.state
+        if not state.fault:
+            return None
+        text = _FAULTS[state.fault].format(address=state.fault_address)
+        return AvrFault(text, 2 * state.fault_pc, state.cycle)
+
+    def watch(self, registers: Iterable[int]) -> None:
+        """Report changes of I/O registers (data addresses) in `changes`."""
+        for register in registers:
+            self.state.watched[register] = 1
+
+    def _resolved(self, place: str | int) -> int:
+        if isinstance(place, int):
+            return place
+        symbol = self.image.symbols.find(place)
+        if symbol is None or symbol.space != "data":
+            raise KeyError(f"the image has no variable {place!r}")
+        return symbol.address
+
+    def peek(self, place: str | int, size: int = 1) -> int:
+        """Return a little-endian number of data memory, by address or variable. Raises KeyError."""
+        return int.from_bytes(self.peek_bytes(place, size), "little")
+
+    def peek_bytes(self, place: str | int, count: int) -> bytes:
+        """Return bytes of data memory as they are stored, without the effects of a read. Raises KeyError."""
+        address = self._resolved(place)
+        return bytes(self.state.data[address : address + count])
+
+    def poke_bytes(self, place: str | int, octets: bytes) -> None:
+        """Write bytes of data memory, without the effects of a write. Raises KeyError."""
+        address = self._resolved(place)
+        self.state.data[address : address + len(octets)] = list(octets)
+
+    def write_eeprom(self, address: int, octets: bytes) -> None:
+        """Write bytes of the EEPROM. Raises ValueError if they are not within its 1,024 bytes."""
+        if not 0 <= address <= EEPROM_BYTES - len(octets):
+            raise ValueError(f"{len(octets)} bytes at {address:#x} are not in the EEPROM")
+        self.state.eeprom[address : address + len(octets)] = list(octets)
+
+    def _input(self, cycle: int, kind: int, value: int) -> None:
+        if self._native["avr_input"](self._address, cycle, kind, value):
+            raise ValueError("too many inputs wait for their cycle")
+
+    def set_pins(self, cycle: int, port: int, driven: int, levels: int) -> None:
+        """Drive pins of port 0 (B), 1 (C) or 2 (D) from a cycle on; bits of `driven` that are 0 float."""
+        self._input(cycle, INPUT_PIN, port << 16 | driven << 8 | levels)
+
+    def set_analog(self, cycle: int, channel: int, microvolts: int) -> None:
+        """Set the voltage of ADC channel 0 to 7, the temperature sensor (8), AIN0 (9) or AIN1 (10) from a cycle on."""
+        self._input(cycle, INPUT_ANALOG + channel, microvolts)
+
+    def receive(self, cycle: int, octet: int) -> None:
+        """Let the UART receive a byte whose frame ends at a cycle."""
+        self._input(cycle, INPUT_UART, octet)
+
+    def snapshot(self) -> bytes:
+        """Return the whole state."""
+        return bytes(self.state)
+
+    def restore(self, snapshot: bytes) -> None:
+        """Return to the state of a snapshot of this machine. Raises ValueError for other bytes."""
+        if len(snapshot) != ctypes.sizeof(Avr):
+            raise ValueError("these bytes are no snapshot of an ATmega328P")
+        flash = bytes(self.state.flash)
+        ctypes.memmove(self._address, snapshot, len(snapshot))
+        if bytes(self.state.flash) != flash:
+            self.program = self._decoded()

@@ -1,0 +1,192 @@
+// Infrared light between Kilobots: edges of emitters reach the receivers' comparators and converters.
+//
+// Time is counted in ticks of 1/8 MHz since the start of the swarm; each robot has its own clock rate. Light reaches other
+// robots `delay` ticks after the emitter's pin, the robot itself (its echo) ECHO ticks after it. A robot runs only as
+// far as no other robot can have sent light before, so light is never late and a run does not depend on how it is cut.
+
+typedef i64 (*run_function)(struct avr *m, const struct insn *code, u64 until);
+typedef i64 (*input_function)(struct avr *m, u64 at, i64 kind, i64 value);
+
+// MARGIN: an instruction may end so many ticks behind the goal of its robot; light up to there is known.
+enum { EDGES = 256, ECHO = 9, MARGIN = 8 };
+enum { INPUT_ANALOG = 2, CH_HIGH_GAIN = 0, CH_LOW_GAIN = 1, CH_AIN0 = 9 };
+enum { RUN_LIMIT, RUN_FAULT, RUN_HALT, RUN_LOG, RUN_PROGRAM, RUN_LIGHT }; // results of avr_run
+enum { LIT_UV = 1000000, DARK_UV = 0 };
+
+struct edge {
+    u64 at; // ticks
+    u32 high_uv, low_uv;
+    i32 change; // +1: light goes on, -1: off
+};
+
+struct link { // what a receiver gets of a sender
+    u32 high_uv, low_uv;
+    u32 loss;   // of 65,536 pulses
+    u32 hidden; // the pulse that is on the way is lost
+};
+
+struct robot {
+    struct avr *avr;
+    const struct insn *code;
+    u64 on_at; // tick of power-on
+    u64 rate;  // cycles per 2^32 ticks
+    u64 period; // ticks per 2^32 cycles, rounded down
+    u32 lights, edge_count;
+    u64 reached; // tick up to which the robot has run
+    u64 pulses;  // light pulses it has sent
+    struct edge edges[EDGES];
+};
+
+struct air {
+    i64 count;
+    struct robot *robots;
+    struct link *links; // [sender][receiver]
+    run_function run;
+    input_function input;
+    u64 delay, random;
+    u64 lost_edges; // edges for which a receiver had no room
+};
+
+static u32 draw(struct air *a)
+{
+    a->random ^= a->random << 13;
+    a->random ^= a->random >> 7;
+    a->random ^= a->random << 17;
+    return (u32)(a->random >> 32);
+}
+
+// The robot's cycle at a tick, and the first tick at or after a cycle.
+static u64 cycle_at(const struct robot *r, u64 tick)
+{
+    return tick <= r->on_at ? 0 : (u64)((unsigned __int128)(tick - r->on_at) * r->rate >> 32);
+}
+
+static u64 tick_of(const struct robot *r, u64 cycle)
+{
+    u64 tick = r->on_at + (u64)((unsigned __int128)cycle * r->period >> 32);
+    while (cycle_at(r, tick) < cycle)
+        tick++;
+    return tick;
+}
+
+static void add_edge(struct air *a, struct robot *r, struct edge edge)
+{
+    if (r->edge_count == EDGES) {
+        a->lost_edges++;
+        return;
+    }
+    u32 place = r->edge_count++;
+    while (place && r->edges[place - 1].at > edge.at) {
+        r->edges[place] = r->edges[place - 1];
+        place--;
+    }
+    r->edges[place] = edge;
+}
+
+// Give the edges up to tick `until` to the robot's inputs. The comparator sees light or darkness; strength stays.
+static void deliver(struct air *a, struct robot *r, u64 until)
+{
+    u32 done = 0;
+    for (; done < r->edge_count && r->edges[done].at <= until; done++) {
+        const struct edge *e = r->edges + done;
+        u64 cycle = cycle_at(r, e->at);
+        u32 before = r->lights;
+        if (e->change > 0) {
+            r->lights++;
+            a->input(r->avr, cycle, INPUT_ANALOG + CH_HIGH_GAIN, e->high_uv);
+            a->input(r->avr, cycle, INPUT_ANALOG + CH_LOW_GAIN, e->low_uv);
+        } else if (r->lights)
+            r->lights--;
+        if (!before != !r->lights)
+            a->input(r->avr, cycle, INPUT_ANALOG + CH_AIN0, r->lights ? LIT_UV : DARK_UV);
+    }
+    for (u32 n = done; n < r->edge_count; n++)
+        r->edges[n - done] = r->edges[n];
+    r->edge_count -= done;
+}
+
+// A robot's emitter went on or off.
+static void emit(struct air *a, i64 sender)
+{
+    struct robot *s = a->robots + sender;
+    u64 at = tick_of(s, s->avr->light_cycle);
+    i32 change = s->avr->lit ? 1 : -1;
+    s->pulses += change > 0;
+    for (i64 n = 0; n < a->count; n++) {
+        struct link *l = a->links + sender * a->count + n;
+        if (!l->high_uv && !l->low_uv)
+            continue;
+        if (change > 0)
+            l->hidden = l->loss && (draw(a) & 0xFFFF) < l->loss;
+        if (!l->hidden)
+            add_edge(a, a->robots + n, (struct edge){at + (n == sender ? ECHO : a->delay), l->high_uv, l->low_uv, change});
+    }
+    s->avr->light_changed = 0;
+}
+
+// Light at one robot that no robot has sent: from tick `at` for `ticks`.
+void air_flash(struct air *a, i64 receiver, i64 at, i64 ticks, i64 high_uv, i64 low_uv)
+{
+    add_edge(a, a->robots + receiver, (struct edge){(u64)at, (u32)high_uv, (u32)low_uv, 1});
+    add_edge(a, a->robots + receiver, (struct edge){(u64)(at + ticks), (u32)high_uv, (u32)low_uv, -1});
+}
+
+// When the robot can send light at the earliest: a sleeping one at its next event.
+static u64 acts_at(const struct robot *r)
+{
+    const struct avr *m = r->avr;
+    if (!m->resting && !m->halted)
+        return r->reached;
+    u64 wakes = m->next_due == ~0ULL ? m->next_due : tick_of(r, m->next_due);
+    u64 light = r->edge_count ? r->edges[0].at : ~0ULL;
+    u64 first = wakes < light ? wakes : light;
+    return first > r->reached ? first : r->reached;
+}
+
+// Run one robot to tick `goal`. Return 0, or 1 if Python must handle its state (fault, log, new program).
+static int run_robot(struct air *a, i64 index, u64 goal)
+{
+    struct robot *r = a->robots + index;
+    while (r->reached < goal) {
+        deliver(a, r, r->reached + MARGIN);
+        u64 piece = r->edge_count && r->edges[0].at - MARGIN < goal ? r->edges[0].at - MARGIN : goal;
+        u64 cycle = cycle_at(r, piece);
+        i64 result = a->run(r->avr, r->code, cycle);
+        if (result == RUN_HALT) // only light can wake it
+            r->avr->cycle = cycle > r->avr->cycle ? cycle : r->avr->cycle;
+        u64 reached = tick_of(r, r->avr->cycle);
+        if (result == RUN_LIGHT)
+            emit(a, index);
+        else if (result != RUN_LIMIT && result != RUN_HALT) {
+            r->reached = reached;
+            return 1;
+        } else if (reached < piece)
+            reached = piece; // between two cycles
+        r->reached = reached;
+    }
+    return 0;
+}
+
+// Run all robots to tick `until`. Return -1, or the index of a robot that Python must handle.
+i64 air_run(struct air *a, i64 until)
+{
+    for (;;) {
+        u64 first = ~0ULL, second = ~0ULL;
+        i64 next = -1;
+        for (i64 n = 0; n < a->count; n++) {
+            u64 at = acts_at(a->robots + n);
+            if (a->robots[n].reached < (u64)until && (next < 0 || at < first)) {
+                second = first < second ? first : second;
+                first = at, next = n;
+            } else if (at < second)
+                second = at;
+        }
+        if (next < 0)
+            return -1;
+        u64 goal = second > ~0ULL - a->delay ? (u64)until : second + a->delay - MARGIN;
+        if (goal > (u64)until)
+            goal = (u64)until;
+        if (run_robot(a, next, goal))
+            return next;
+    }
+}

@@ -1,0 +1,130 @@
+"""Report of a Kilobot: what its LED, motors, UART and infrared emitter do, from changes of registers.
+
+Input: `Change`s of one robot. Output: `Report`s in order of time. Pins: kilobot.md §1.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from typing import Any, Final
+
+from emu.avr.machine import HZ, UDR0, Change
+from emu.boards.kilobot.messages import PulseDecoder
+
+DDRB, PORTB, DDRC, PORTC, DDRD, PORTD = 0x24, 0x25, 0x27, 0x28, 0x2A, 0x2B
+MCUSR, TCCR2A, TCCR2B, OCR2A, OCR2B = 0x54, 0xB0, 0xB1, 0xB3, 0xB4
+WATCHED: Final = (DDRB, PORTB, DDRC, PORTC, DDRD, PORTD, TCCR2A, TCCR2B, OCR2A, OCR2B, UDR0, MCUSR)
+LED_PINS: Final = (((DDRD, PORTD, 5), (DDRD, PORTD, 4)), ((DDRC, PORTC, 3), (DDRC, PORTC, 2)),
+                   ((DDRC, PORTC, 5), (DDRC, PORTC, 4)))  # fmt: skip
+"""Pins of red, green and blue; the first counts 1, the second 2. A pin lights if it is a low output."""
+EMITTERS: Final = 0xC7
+SETTLED: Final = HZ // 1000
+"""Cycles for which LED and motors must keep a state to be reported: 1 ms. Registers change one after the other."""
+
+
+@dataclass(frozen=True, slots=True)
+class Report:
+    """One report: `kind` is led, motors, uart, message or reset; `content` its fields."""
+
+    cycle: int
+    kind: str
+    content: dict[str, Any]
+
+    @property
+    def seconds(self) -> float:
+        """Return the time of the report in seconds of the robot's clock."""
+        return self.cycle / HZ
+
+    def __str__(self) -> str:
+        fields = " ".join(f"{name}={value}" for name, value in self.content.items())
+        return f"{self.seconds:.6f} {self.kind} {fields}".rstrip()
+
+
+def led_of(registers: dict[int, int]) -> tuple[int, int, int]:
+    """Return red, green and blue, 0 to 3 each, of the registers' values."""
+
+    def level(pins: Iterable[tuple[int, int, int]]) -> int:
+        return sum(
+            weight
+            for weight, (direction, port, bit) in enumerate(pins, 1)
+            if registers.get(direction, 0) >> bit & 1 and not registers.get(port, 0) >> bit & 1
+        )
+
+    red, green, blue = (level(pins) for pins in LED_PINS)
+    return red, green, blue
+
+
+def motors_of(registers: dict[int, int]) -> tuple[int, int]:
+    """Return the duties of the left and the right motor, 0 to 255, of the registers' values."""
+    if not registers.get(TCCR2B, 0) & 7:
+        return 0, 0
+    control = registers.get(TCCR2A, 0)
+    left = registers.get(OCR2A, 0) if control & 0x80 and registers.get(DDRB, 0) & 8 else 0
+    right = registers.get(OCR2B, 0) if control & 0x20 and registers.get(DDRD, 0) & 8 else 0
+    return left, right
+
+
+class KilobotObserver:
+    """Observer of one robot. Give it all changes of the registers in WATCHED, in order."""
+
+    def __init__(self) -> None:
+        self._registers: dict[int, int] = {}
+        self._reported: dict[str, tuple[int, ...]] = {"led": (0, 0, 0), "motors": (0, 0)}
+        self._waiting: dict[str, tuple[int, tuple[int, ...]]] = {}
+        self._decoder = PulseDecoder()
+        self._text = bytearray()
+        self._text_at = 0
+
+    def take(self, changes: Iterable[Change]) -> Iterator[Report]:
+        """Yield the reports of changes."""
+        for change in changes:
+            yield from self.settle(change.cycle)
+            yield from self._one(change)
+
+    def settle(self, cycle: int) -> Iterator[Report]:
+        """Yield the states of LED and motors that have lasted long enough at a cycle."""
+        due = sorted((since, kind) for kind, (since, _) in self._waiting.items() if cycle - since >= SETTLED)
+        for since, kind in due:
+            yield from self._settled(since, kind)
+
+    def end(self) -> Iterator[Report]:
+        """Yield what is still held back at the end of a run: the last states, and an unfinished line of the UART."""
+        for since, kind in sorted((since, kind) for kind, (since, _) in self._waiting.items()):
+            yield from self._settled(since, kind)
+        if self._text:
+            yield Report(self._text_at, "uart", {"text": self._text.decode("latin-1")})
+
+    def _settled(self, since: int, kind: str) -> Iterator[Report]:
+        state = self._waiting.pop(kind)[1]
+        if state == self._reported[kind]:
+            return
+        self._reported[kind] = state
+        names = ("red", "green", "blue") if kind == "led" else ("left", "right")
+        yield Report(since, kind, dict(zip(names, state, strict=True)))
+
+    def _one(self, change: Change) -> Iterator[Report]:
+        if change.register == UDR0:
+            if not self._text:
+                self._text_at = change.cycle
+            self._text.append(change.value)
+            if change.value == 10:
+                yield Report(self._text_at, "uart", {"text": self._text.decode("latin-1")})
+                self._text.clear()
+            return
+        if change.register == MCUSR:
+            self._registers.clear()
+            yield Report(change.cycle, "reset", {"cause": "watchdog"})
+        was_lit = self._is_lit()
+        self._registers[change.register] = change.value
+        if self._is_lit() and not was_lit:
+            message = self._decoder.pulse(change.cycle)
+            if message is not None:
+                yield Report(change.cycle, "message", {"type": message.type, "data": message.data.hex(),
+                                                       "crc": "right" if message.is_whole else "wrong"})  # fmt: skip
+        for kind, state in (("led", led_of(self._registers)), ("motors", motors_of(self._registers))):
+            if self._waiting.get(kind, (0, self._reported[kind]))[1] != state:
+                self._waiting[kind] = (change.cycle, state)
+
+    def _is_lit(self) -> bool:
+        return bool(self._registers.get(DDRB, 0) & self._registers.get(PORTB, 0) & EMITTERS)

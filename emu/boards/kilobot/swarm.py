@@ -1,0 +1,240 @@
+"""Kilobots in lock step that receive each other's infrared light, pulse by pulse (air.c).
+
+    with KilobotSwarm([KilobotSetup(image, number=1), KilobotSetup(image, x=50, number=2)]) as swarm:
+        swarm.run(2.0)
+        swarm.robots[0].peek("counter")
+
+The same robots, seed and calls give the same run, however it is cut into calls. Facts: kilobot.md §1, §2.
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+from collections.abc import Callable, Sequence
+from ctypes import Structure, addressof, c_int32, c_int64, c_uint32, c_uint64, c_void_p
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any, Final
+
+from emu.avr.core.state import declaration
+from emu.avr.image import AvrImage
+from emu.avr.machine import HZ, Atmega328p, Program
+from emu.avr.native import TYPES, native
+from emu.native_library import ADDRESS, INT, address_of, functions_of
+
+REACH_MM: Final = 70.0
+"""Default range in mm between the centres of two robots. Sellers state 7 cm, real data 14 cm (kilobot.md §1)."""
+FULL_SCALE: Final = 1023
+HIGH_GAIN_MM, LOW_GAIN_MM = 40.0, 20.0
+"""Distances in mm at which the gains saturate; beyond, counts fall with the square. UNVERIFIED, docs/accuracy.md."""
+CALIBRATED_MM: Final = tuple(range(33, 99, 5))
+"""Distances in mm of the strength tables in the EEPROM (kilobot.md §1)."""
+NUMBER_AT, LOW_GAIN_AT, HIGH_GAIN_AT = 0xB0, 0x20, 0x50
+"""EEPROM addresses of the calibration (kilobot.md §1): UID (low byte first), counts (high byte first)."""
+DUTIES: Final = {0x05: 70, 0x09: 70, 0x0C: 65, 0x14: 65}
+"""Calibrated duties of 255 by EEPROM address: turn left, turn right, straight left, straight right (kilobot.md §1)."""
+AREF_UV: Final = 3_000_000
+THRESHOLD_UV: Final = 500_000
+BATTERY_UV, BATTERY_NOISE_UV = 2_000_000, 31_000
+"""Voltage of ADC6 at half of a battery of 4 V, and its noise, from which kilolib draws random bits. UNVERIFIED."""
+EMITTERS: Final = 0xC7
+"""Pins of port B that may be emitters (kilobot.md §1)."""
+PULSE_TICKS: Final = 9
+EDGES: Final = 256
+"""Room for edges of light that are on their way to a robot (air.c)."""
+ADC6, ADC7, AIN1 = 6, 7, 10
+LOSS_ONE: Final = 1 << 16
+ONE_RATE: Final = 1 << 32
+
+
+class KilobotFaultError(Exception):
+    """A robot's firmware faulted. `robot` is its index."""
+
+    def __init__(self, robot: int, message: str) -> None:
+        super().__init__(f"robot {robot}: {message}")
+        self.robot = robot
+
+
+class _Edge(Structure):
+    """`struct edge` of air.c."""
+
+    _fields_ = [("at", c_uint64), ("high_uv", c_uint32), ("low_uv", c_uint32), ("change", c_int32)]
+
+
+class _Link(Structure):
+    """`struct link` of air.c."""
+
+    _fields_ = [(name, c_uint32) for name in ("high_uv", "low_uv", "loss", "hidden")]
+    high_uv: int
+    low_uv: int
+    loss: int
+
+
+class _Robot(Structure):
+    """`struct robot` of air.c."""
+
+    _fields_ = [("avr", c_void_p), ("code", c_void_p),
+                *((name, c_uint64) for name in ("on_at", "rate", "period")),
+                ("lights", c_uint32), ("edge_count", c_uint32), ("reached", c_uint64), ("pulses", c_uint64),
+                ("edges", _Edge * EDGES)]  # fmt: skip
+    code: int
+    reached: int
+    pulses: int
+
+
+class _Air(Structure):
+    """`struct air` of air.c."""
+
+    _fields_ = [("count", c_int64), *((name, c_void_p) for name in ("robots", "links", "run", "input")),
+                ("delay", c_uint64), ("random", c_uint64), ("lost_edges", c_uint64)]  # fmt: skip
+    lost_edges: int
+
+
+def counts(gain_mm: float, distance_mm: float) -> int:
+    """Return the converter's counts for a pulse of a neighbour at a distance in mm."""
+    return FULL_SCALE if distance_mm <= gain_mm else round(FULL_SCALE * (gain_mm / distance_mm) ** 2)
+
+
+def microvolts(count: int) -> int:
+    """Return an input voltage that the converter reads as `count`, 0 to 1023."""
+    return (count * AREF_UV + 1023) // 1024 + (1 if count else 0)
+
+
+@dataclass(frozen=True)
+class KilobotSetup:
+    """One robot at power-on."""
+
+    image: AvrImage
+    x: float = 0.0
+    """Position of its centre in mm."""
+    y: float = 0.0
+    number: int | None = None
+    """Its UID; None: an erased EEPROM."""
+    on_at: float = 0.0
+    """Time of power-on in seconds."""
+    calibrated: bool = True
+    """Whether its EEPROM has motor duties and the tables of strength by distance."""
+    clock: float = 1.0
+    """Frequency of its oscillator by the nominal 8 MHz."""
+
+
+class KilobotSwarm:
+    """Kilobots at power-on. `loss`: part of the pulses, 0 to 1, that a receiver misses. `delay`: ticks of 1/8 MHz after
+    which light reaches other robots, 16 or more. Raises ValueError.
+    """  # fmt: skip
+
+    def __init__(self, robots: Sequence[KilobotSetup], *, seed: int = 1, loss: float = 0.0, delay: int = 32,
+                 reach: float = REACH_MM) -> None:  # fmt: skip
+        if not 0 <= loss < 1:
+            raise ValueError(f"a loss of {loss} is not within 0 and 1")
+        if delay < 2 * PULSE_TICKS:
+            raise ValueError(f"a delay of {delay} ticks is less than {2 * PULSE_TICKS}")
+        self._loss, self._reach = int(loss * LOSS_ONE), reach
+        self.places = [(robot.x, robot.y) for robot in robots]
+        self.now = 0
+        """Ticks of 1/8 MHz since the start."""
+        self._functions = _code()
+        programs: dict[bytes, Program] = {}
+        self.robots: list[Atmega328p] = []
+        for index, robot in enumerate(robots):
+            machine = Atmega328p(robot.image, seed=seed * 1_000_003 + index, program=programs.get(robot.image.flash))
+            programs.setdefault(robot.image.flash, machine.program)
+            set_up(machine, robot.number, calibrated=robot.calibrated)
+            self.robots.append(machine)
+        count = len(robots)
+        self._robots = (_Robot * count)(*(
+            _Robot(addressof(machine.state), machine.program.address, int(robot.on_at * HZ),
+                   int(robot.clock * ONE_RATE), int(ONE_RATE / robot.clock), reached=int(robot.on_at * HZ))
+            for machine, robot in zip(self.robots, robots, strict=True)))  # fmt: skip
+        self._links = (_Link * (count * count))()
+        self._air = _Air(count, addressof(self._robots), addressof(self._links), address_of(native()["avr_run"]),
+                         address_of(native()["avr_input"]), delay, seed * 2_654_435_761 % (1 << 63) | 1)  # fmt: skip
+        for index in range(count):
+            self._look_at(index)
+
+    def _look_at(self, moved: int) -> None:
+        """Set the links between one robot and all others, both ways."""
+        count = len(self.robots)
+        for other in range(count):
+            distance = math.dist(self.places[moved], self.places[other])
+            for sender, receiver in ((moved, other), (other, moved)):
+                link = self._links[sender * count + receiver]
+                link.loss = self._loss
+                link.high_uv = microvolts(counts(HIGH_GAIN_MM, distance)) if distance <= self._reach else 0
+                link.low_uv = microvolts(counts(LOW_GAIN_MM, distance)) if distance <= self._reach else 0
+
+    def move(self, robot: int, x: float, y: float) -> None:
+        """Move a robot to a position in mm, at once."""
+        self.places[robot] = (x, y)
+        self._look_at(robot)
+
+    def flash(self, robot: int, after_us: float, distance: float = 0.0) -> None:
+        """Let one robot receive a light pulse of 9 ticks in some us, as strong as of a robot at a distance in mm."""
+        self.light(robot, self.now + int(after_us * HZ / 1e6), distance)
+
+    def light(self, robot: int, tick: int, distance: float = 0.0) -> None:
+        """Let one robot receive a light pulse at a tick of the future, as `flash`. At most 100 may wait."""
+        strengths = [microvolts(counts(gain, distance)) for gain in (HIGH_GAIN_MM, LOW_GAIN_MM)]
+        self._functions["air_flash"](addressof(self._air), robot, tick, PULSE_TICKS, *strengths)
+
+    def pulses_sent(self, robot: int) -> int:
+        """Return the light pulses that a robot has sent since power-on."""
+        return self._robots[robot].pulses
+
+    def run(self, seconds: float) -> None:
+        """Run all robots for a time. Raises KilobotFaultError."""
+        self.run_until(self.now + int(seconds * HZ))
+
+    def run_until(self, tick: int) -> None:
+        """Run all robots to a tick of 1/8 MHz. Raises KilobotFaultError."""
+        self.now = tick
+        while True:
+            index = self._functions["air_run"](addressof(self._air), tick)
+            if index < 0:
+                break
+            machine = self.robots[index]
+            fault = machine.attend()
+            self._robots[index].code = machine.program.address
+            if fault is not None:
+                place = machine.image.place(fault.pc)
+                raise KilobotFaultError(index, f"{fault.message} at {place}, cycle {fault.cycle}")
+        for machine in self.robots:
+            machine.attend()
+
+    def close(self) -> None:
+        """End the swarm. It holds memory only."""
+
+    def __enter__(self) -> KilobotSwarm:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self.close()
+
+
+def set_up(machine: Atmega328p, number: int | None, *, calibrated: bool = True) -> None:
+    """Connect the parts of a Kilobot to a machine that was not started yet, and write its EEPROM."""
+    if number is not None:
+        machine.write_eeprom(NUMBER_AT, struct.pack("<H", number))
+    if calibrated:
+        for address, duty in DUTIES.items():
+            machine.write_eeprom(address, bytes([duty]))
+        for address, gain in ((LOW_GAIN_AT, LOW_GAIN_MM), (HIGH_GAIN_AT, HIGH_GAIN_MM)):
+            table = [counts(gain, distance) for distance in CALIBRATED_MM]
+            machine.write_eeprom(address, struct.pack(f">{len(table)}H", *table))
+    state = machine.state
+    state.emitters = EMITTERS
+    state.aref_uv = AREF_UV
+    state.noise_uv[ADC6] = BATTERY_NOISE_UV
+    machine.set_analog(0, AIN1, THRESHOLD_UV)
+    machine.set_analog(0, ADC6, BATTERY_UV)
+    machine.set_pins(0, 2, 1, 1)  # PD0 high: not charging
+
+
+@cache
+def _code() -> dict[str, Callable[..., Any]]:
+    """Return the functions of air.c."""
+    text = "\n".join([TYPES, declaration(), '#line 1 "emu/boards/kilobot/air.c"',
+                      Path(__file__).with_name("air.c").read_text("utf-8")])  # fmt: skip
+    return functions_of(text, "air", {"air_run": (INT, (ADDRESS, INT)), "air_flash": (None, (ADDRESS, *[INT] * 5))})

@@ -1,0 +1,116 @@
+"""Run of one Kilobot for `emu run --board kilobot`: image, overhead controller, reports, and the end of the run."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import Any, Final
+
+from emu.avr.image import AvrImage, load_avr_image
+from emu.avr.machine import HZ, AvrFault
+from emu.boards.kilobot.messages import OHC_GAP, TYPES, Message, frame, pulses_of
+from emu.boards.kilobot.observer import WATCHED, KilobotObserver, Report
+from emu.boards.kilobot.swarm import KilobotFaultError, KilobotSetup, KilobotSwarm
+
+FIRST_COMMAND: Final = HZ // 5
+"""Tick of the overhead controller's first message."""
+COMMAND_TICKS: Final = HZ // 2
+"""Ticks for which it repeats the message. IDLE looks at the robot's state every 201 ms (kilobot.md §2)."""
+CHUNK: Final = HZ // 10
+"""Ticks after which outputs are reported."""
+
+
+@dataclass
+class KilobotRun:
+    """Result of a run. `reason`: limit, halt, fault or interrupted. Addresses are byte addresses of flash."""
+
+    image: AvrImage
+    reason: str
+    pc: int
+    cycles: int
+    host_seconds: float
+    fault: AvrFault | None = None
+    notes: list[str] = field(default_factory=list)
+    reports: list[Report] = field(default_factory=list)
+
+    @property
+    def seconds(self) -> float:
+        """Return the simulated time in seconds."""
+        return self.cycles / HZ
+
+    def facts(self) -> dict[str, Any]:
+        """Return the result as data."""
+        symbols = self.image.symbols
+        line = self.image.lines.find(self.pc)
+        facts: dict[str, Any] = {
+            "reason": self.reason, "pc": self.pc, "symbol": symbols.text(self.pc) if symbols.code(self.pc) else None,
+            "line": str(line) if line else None, "cycles": self.cycles, "seconds": self.seconds,
+            "host_seconds": self.host_seconds,
+            "speed": self.seconds / self.host_seconds if self.host_seconds else None, "engine": "avr",
+        }  # fmt: skip
+        if self.fault is not None:
+            facts["fault"] = {"message": self.fault.message, "pc": self.fault.pc, "cycle": self.fault.cycle}
+        kinds: dict[str, list[dict[str, Any]]] = {"led": [], "motors": [], "message": [], "uart": [], "reset": []}
+        for report in self.reports:
+            kinds[report.kind].append({"seconds": report.seconds, **report.content})
+        return facts | kinds
+
+
+def run_kilobot(
+    path: str, *, seconds: float | None, cycles: int | None, command: str, uid: int, show: bool
+) -> KilobotRun:
+    """Run an image on one Kilobot until it halts, faults or reaches a limit; Ctrl-C ends it, too.
+
+    `seconds`, `cycles`: limit of simulated time, None: none. `command`: what the overhead controller sends, "none" or a
+    key of TYPES. `uid`: 0 to 65535. `show`: print reports as they come. Raises LoadError.
+    """
+    limit = cycles if seconds is None else max(1, int(seconds * HZ))
+    image = load_avr_image(path)
+    swarm = KilobotSwarm([KilobotSetup(image, number=uid)])
+    machine, observer = swarm.robots[0], KilobotObserver()
+    machine.watch(WATCHED)
+    run = KilobotRun(image, "limit", 0, 0, 0.0)
+    start = time.perf_counter()
+    next_command = FIRST_COMMAND if command != "none" else None
+    try:
+        while limit is None or swarm.now < limit:
+            ends = [end for end in (swarm.now + CHUNK, limit, next_command) if end is not None]
+            swarm.run_until(min(ends))
+            _report(run, observer.take(machine.changes), show)
+            machine.changes.clear()
+            _report(run, observer.settle(machine.cycle), show)
+            if swarm.now == next_command:
+                next_command = _send(swarm, command)
+            if machine.state.halted and next_command is None:
+                run.reason = "halt"
+                break
+    except KilobotFaultError:
+        run.reason, run.fault = "fault", machine.fault
+        _report(run, observer.take(machine.changes), show)
+    except KeyboardInterrupt:
+        run.reason = "interrupted"
+    _report(run, observer.end(), show)
+    if machine.state.unmodelled:
+        run.notes.append(f"register {machine.state.unmodelled:#04x} has no model; it behaves as plain memory")
+    run.host_seconds = time.perf_counter() - start
+    run.pc = machine.pc if run.fault is None else run.fault.pc
+    run.cycles = machine.state.halted_at if run.reason == "halt" else machine.cycle
+    return run
+
+
+def _send(swarm: KilobotSwarm, command: str) -> int | None:
+    """Send one message of the overhead controller now. Return the tick of the next one, None after the last."""
+    pulses = list(pulses_of(frame(Message(bytes(9), TYPES[command])), swarm.now + 1))
+    for tick in pulses:
+        swarm.light(0, tick)
+    after = pulses[-1] + OHC_GAP
+    return after if after < FIRST_COMMAND + COMMAND_TICKS else None
+
+
+def _report(run: KilobotRun, reports: Iterable[Report], show: bool) -> None:
+    """Add reports to the result and print them if wanted."""
+    for report in reports:
+        run.reports.append(report)
+        if show:
+            print(report, flush=True)

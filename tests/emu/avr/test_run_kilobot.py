@@ -1,0 +1,124 @@
+"""`emu run --board kilobot`: reports, JSON, faults with function and line, refusals."""
+
+from __future__ import annotations
+
+import json
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+
+from emu.boards.kilobot.messages import Message, PulseDecoder, crc16, frame, pulses_of
+from emu.boards.kilobot.observer import led_of
+from emu.cli import main
+from tests.emu.avr.conftest import Build
+
+BLINK = """
+#include <util/delay.h>
+int main(void) {
+    DDRD |= 1 << 5 | 1 << 4; _delay_ms(10);
+    DDRD &= ~(1 << 4); DDRC |= 1 << 3; _delay_ms(10);
+    TCCR2A = 0xA1; TCCR2B = 2; DDRB |= 8; DDRD |= 8; OCR2A = 70; OCR2B = 65; _delay_ms(10);
+    UBRR0 = 25; UCSR0A = 2; UCSR0B = 8;
+    for (const char *at = "hello\\n"; *at; at++) { while (!(UCSR0A & 0x20)) ; UDR0 = *at; }
+    while (!(UCSR0A & 0x40)) ;
+    cli(); sleep_mode(); for (;;) ;
+}
+"""
+FAULT = """
+static void __attribute__((noinline)) spoil(volatile uint8_t *at)
+{
+    *at = 1;
+}
+int main(void) { spoil((volatile uint8_t *)0x900); for (;;) ; }
+"""
+
+
+def test_reports(build: Build, capsys: pytest.CaptureFixture[str]) -> None:
+    """LED, motors and UART are reported with their times; the run ends where the program sleeps forever."""
+    image = build(BLINK)
+    assert main(["run", image.path, "--board", "kilobot", "--ohc", "none"]) == 0
+    told = capsys.readouterr()
+    lines = [line.split(" ", 1) for line in told.out.splitlines()]
+    assert [text for _, text in lines] == [
+        "led red=3 green=0 blue=0",
+        "led red=1 green=1 blue=0",
+        "motors left=70 right=65",
+        "uart text=hello",
+    ]
+    times = [float(at) for at, _ in lines]
+    assert times == sorted(times)
+    assert 0.0199 < times[2] < 0.0202
+    assert told.err.startswith("halt at 0x")
+    assert "(main+" in told.err
+
+
+def test_json(build: Build, capsys: pytest.CaptureFixture[str]) -> None:
+    """--json gives the same as data, with the limit's reason and status."""
+    image = build(BLINK)
+    assert main(["run", image.path, "--board", "kilobot", "--json", "--cycles", "100000", "--exit-code"]) == 124
+    told = json.loads(capsys.readouterr().out)
+    assert (told["reason"], told["status"], told["engine"]) == ("limit", 124, "avr")
+    assert [led["red"] for led in told["led"]] == [3, 1]
+    assert told["cycles"] >= 100_000
+    assert told["motors"] == []
+
+
+def test_a_fault_names_function_and_line(build: Build, capsys: pytest.CaptureFixture[str]) -> None:
+    """A store behind RAM ends the run with status 1 and the place of the instruction."""
+    image = build(FAULT)
+    assert main(["run", image.path, "--board", "kilobot"]) == 1
+    told = capsys.readouterr().err
+    assert "fault: store to 0x0900, behind the end of RAM at 0x8ff" in told
+    line = (Path(image.path).with_name("program.c")).read_text().splitlines().index("    *at = 1;") + 1
+    assert "(spoil" in told
+    assert f"program.c:{line})" in told
+
+
+def test_refusals(build: Build, capsys: pytest.CaptureFixture[str]) -> None:
+    """Options of the e-puck, options of the Kilobot without it, and other files are refused in one line."""
+    image = build(BLINK)
+    for words, text in (
+        ([image.path, "--board", "kilobot", "--selector", "3"], "--selector does not apply to --board kilobot"),
+        ([image.path, "--ohc", "run"], "--ohc needs --board kilobot"),
+        ([__file__, "--board", "kilobot"], "is neither ELF nor Intel HEX"),
+    ):
+        assert main(["run", *words]) == 2
+        assert text in capsys.readouterr().err
+
+
+# ---- Messages --------------------------------------------------------------------------------------------------------
+
+
+def test_frames_have_the_published_times() -> None:
+    """13 bytes of 10 bits take 34,968 ticks; zeros need 38 pulses or a few more for the CRC (kilobot.md §2)."""
+    pulses = list(pulses_of(frame(Message(bytes(9), 0))))
+    assert pulses[:3] == [0, 2_420, 2_706]
+    assert pulses[-1] - pulses[2] == 12 * 2_430 + 11 * 282
+    assert 13 * 2 <= len(pulses) <= 13 * 2 + 16
+
+
+def test_messages_are_decoded() -> None:
+    """A decoder reads the pulses of a frame, each off by up to 100 ticks; a missing one gives a wrong CRC."""
+    message = Message(bytes([0, 255, 0x55, 0xAA, 1, 128, 7, 8, 9]), 0x88)
+    pulses = list(pulses_of(frame(message), 1_000))
+    for shift in (0, 100, -100):
+        decoder = PulseDecoder()
+        found = [decoder.pulse(at + (shift if n % 3 else 0)) for n, at in enumerate(pulses)]
+        assert [one for one in found if one] == [message]
+    decoder = PulseDecoder()
+    bits = [n for n, (a, b) in enumerate(pairwise(pulses)) if b - a == 270][1]
+    found = [decoder.pulse(at) for n, at in enumerate(pulses) if n != bits]
+    assert [one.is_whole for one in found if one] == [False]
+
+
+def test_crc() -> None:
+    """The CRC is CRC-16/MCRF4XX, whose check value is 0x6F91."""
+    assert crc16(b"123456789") == 0x6F91
+
+
+def test_led() -> None:
+    """A pin lights if it is an output that is low: the direction register decides the colour (kilobot.md §1)."""
+    assert led_of({0x2A: 0x30}) == (3, 0, 0)
+    assert led_of({0x27: 0x3C}) == (0, 3, 3)
+    assert led_of({0x27: 0x28, 0x28: 0x20}) == (0, 1, 0)
