@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from functools import partial
 
 from toolchain.abi.target import RETURN_ADDRESS_BYTES
-from toolchain.bounds.annotations.flow_facts import CLOCK_STOPPED, WAITS_FOR_INTERRUPT
+from toolchain.bounds.annotations.flow_facts import CLOCK_STOPPED
 from toolchain.bounds.program import Program
 from toolchain.bounds.report import Bound, BoundAnalysis
 from toolchain.errors import ToolError
@@ -140,7 +140,8 @@ def _response(report: BoundsReport, one: Bound) -> Response:
             known &= other.cycles is not None
             more += (other.cycles or 0) + other.disi_after_return + latency
             continue
-        cycles, place = other.masked.get(level, (0, ""))
+        masked, place = other.masked.get(level, (0, ""))
+        cycles = masked or 0
         if unnested and other.kind == "interrupt":
             known &= other.cycles is not None
             cycles, place = max(cycles, other.cycles or 0), place or other.nesting_disabled_at
@@ -148,9 +149,7 @@ def _response(report: BoundsReport, one: Bound) -> Response:
             more += cycles
         elif cycles > longest:
             longest, where = cycles, f"{place} in {other.name}"
-        known &= level not in other.masked_for_ever and all(
-            why == WAITS_FOR_INTERRUPT for why in other.unbounded.values()
-        )
+        known &= level not in other.masked_for_ever and other.only_waits_are_unbounded
     return Response(one.name, level, longest if known else None, where, longest + more + latency if known else None)
 
 

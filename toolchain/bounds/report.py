@@ -34,7 +34,7 @@ class Bound:
             None without a bound
     stack   greatest depth above the return address in bytes, by CPU priority at that depth
     second_stack  the same on the second stack (STACK_AREA), from its start
-    masked  by level, the longest time for which interrupts of that level are masked
+    masked  by level, the longest time for which interrupts of that level are masked, and where; None if not known
     """
 
     name: str
@@ -47,7 +47,7 @@ class Bound:
     known.  Set by interference.py."""
     second_stack: dict[int, int] = field(default_factory=dict)
     path: list[str] = field(default_factory=list)
-    masked: dict[int, tuple[int, str]] = field(default_factory=dict)
+    masked: dict[int, tuple[int | None, str]] = field(default_factory=dict)
     unbounded: dict[str, str] = field(default_factory=dict)
     """Code without a bound: source line -> reason."""
     is_endless: bool = False
@@ -69,6 +69,11 @@ class Bound:
     def stack_is_known(self) -> bool:
         """Whether only loop bounds are missing, which leave the stack bounded."""
         return not self.unbounded_stack
+
+    @property
+    def only_waits_are_unbounded(self) -> bool:
+        """Whether all code has a bound except waits for interrupts, which mask none."""
+        return all(why == WAITS_FOR_INTERRUPT for why in self.unbounded.values())
 
     @property
     def unbounded_stack(self) -> dict[str, str]:
@@ -201,6 +206,8 @@ class BoundAnalysis:
                 result.unbounded.setdefault(
                     place(pc), CLOCK_STOPPED if pc in found.clock_stops else WAITS_FOR_INTERRUPT
                 )
+        if not result.only_waits_are_unbounded:
+            result.masked = {level: (None, where) for level, (_, where) in result.masked.items()}
         sums = [max(times) for group in (contexts, shared) if (times := _times(group))]
         if sums and not result.unbounded:
             result.cycles = min(sums)
@@ -225,18 +232,20 @@ class BoundAnalysis:
             table[level] = max(table.get(level, 0), top - base)
             if top - base > deepest and (own or result.kind == "interrupt"):
                 deepest, result.path = top - base, [self.program.calls.name(e).removeprefix("_") for e in chain]
+        masked: dict[int, tuple[int, str]] = {}
         for table_ in (found.masked, found.masked_prefix):
             for level, (cycles, where) in table_.items():
-                if cycles > result.masked.get(level, (-1, ""))[0]:
-                    result.masked[level] = cycles, place(where)
+                if cycles > masked.get(level, (-1, ""))[0]:
+                    masked[level] = cycles, place(where)
         for end in found.return_states.values():
             for level in range(1, LEVELS):
                 since = end.masked_since[level]
                 if since is not None:
                     blocked = end.disi_remaining if level < LEVELS - 1 else 0
                     cycles = end.time + blocked - max(since, 0)
-                    if cycles > result.masked.get(level, (-1, ""))[0]:
-                        result.masked[level] = cycles, "its end"
+                    if cycles > masked.get(level, (-1, ""))[0]:
+                        masked[level] = cycles, "its end"
+        result.masked.update(masked)
 
 
 def _times(contexts: list[FunctionResult]) -> list[int]:

@@ -124,9 +124,16 @@ def as_text(report: BoundsReport, program: Program) -> str:
 
 def _row(row: Bound, width: int) -> str:
     cycles = "for ever" if row.is_endless else _number(row.cycles)
-    held = " ".join(f"{row.masked[k][0] if k in row.masked else '-':>4}" for k in (1, 4, 5, 6))
+    held = " ".join(f"{_held(row, level):>4}" for level in (1, 4, 5, 6))
     path = " > ".join(row.path)
     return f"{row.kind:9} {row.name:{width}} {cycles:>8} {_number(row.stack_bytes):>6}{'':17} {held}  {path}"
+
+
+def _held(row: Bound, level: int) -> str:
+    if level not in row.masked:
+        return "-"
+    cycles, _ = row.masked[level]
+    return "?" if cycles is None else str(cycles)
 
 
 def _number(value: int | None) -> str:

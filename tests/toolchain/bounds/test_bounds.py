@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -265,6 +266,14 @@ def test_the_longest_masked_time_is_reported(tmp_path, capsys) -> None:
     assert 31 < cycles <= 40
     assert "program.c:3" in place
     assert "6" not in row["masked"]
+
+
+def test_the_masked_time_is_unknown_if_a_loop_has_no_bound(tmp_path, capsys) -> None:
+    """No number is shown for a level that a loop without a bound may mask for longer."""
+    image = built(tmp_path, MASKS.replace('__asm__ volatile("repeat', 'while (PORTD) {} __asm__ volatile("repeat'))
+    assert report(capsys, image)["masked"]["5"][0] is None
+    main(["bounds", str(image)])
+    assert re.search(r"^call +main .*  \?    -  main$", capsys.readouterr().out, re.M)
 
 
 def test_a_limit_that_can_be_exceeded_fails(tmp_path, capsys) -> None:
