@@ -2,9 +2,9 @@
 
     python bench/instruments.py [--seconds S] [--repeat N] [--json]
 
-Instruments: coverage, a hook and a conditional breakpoint that are reached every 500 Tcy, `until=` with a condition,
-`emu.watch`, and a trace. The program computes in a loop of about 500 Tcy (bench/c/compute.c has longer ones). The
-figure is the minimum host CPU time of N runs; the kinds alternate. Slow instruments run a shorter time.
+The program computes in a loop of about 500 Tcy. A hook and conditions are reached once per round, `rounds` changes once
+per round, `rare` every 256 rounds. The figure is the minimum host CPU time of N runs; the kinds alternate. Instruments
+that call Python often or write much text run a shorter time.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from __future__ import annotations
 import argparse
 import io
 import json
+import os
 import sys
 import tempfile
 import time
@@ -22,65 +23,115 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
 import emu  # noqa: E402
-from emu.debug.expressions.filters import filter_of  # noqa: E402
+from emu.dap.breakpoints import Breakpoint  # noqa: E402
+from emu.dap.debuggee import Debuggee  # noqa: E402
+from emu.debug.history import History  # noqa: E402
+from emu.dspic30f.cycle_accounting import CycleAccounting  # noqa: E402
+from emu.dspic30f.jit.counting import CycleCounting  # noqa: E402
 from emu.dspic30f.jit.engine import JitEngine  # noqa: E402
 from emu.instruments.coverage import Counts, count_executions  # noqa: E402
 from emu.instruments.trace import Tracer  # noqa: E402
+from emu.instruments.vcd import WaveformRecorder  # noqa: E402
 
 SOURCE = """
-volatile unsigned rounds; volatile long total; static int table[16];
-void __attribute__((noinline)) mark(void) { rounds++; }
+#define TIMER_CONTROL (*(volatile unsigned *)0x0104)
+volatile unsigned rounds, rare; volatile long total; static int table[16];
+void __attribute__((noinline)) mark(void) { if ((++rounds & 255) == 0) rare++; }
+void __attribute__((noinline)) inner(int i) { table[i & 15] += i; total += table[i & 7] ^ i; }
 int main(void) {
+    TIMER_CONTROL = 0x8000;
     for (;;) {
         mark();
-        for (int i = 0; i < 30; i++) { table[i & 15] += i; total += table[i & 7] ^ i; }
+        for (int i = 0; i < 18; i++) inner(i);
     }
 }
 """
-SHORT = 0.01
-"""Share of the simulated time for instruments that run in single steps."""
 
-Run = Callable[[emu.Machine, int], None]
+Run = Callable[[emu.Machine, int], object]
 
 
-def plain(machine: emu.Machine, cycles: int) -> None:
-    machine.run(cycles=cycles)
+def hook(place: str) -> Run:
+    """Return a run with a hook in Python that does nothing."""
+
+    def run(machine: emu.Machine, cycles: int) -> None:
+        remove = machine.hook_pc(place, lambda: None)
+        machine.run(cycles=cycles)
+        remove()
+
+    return run
 
 
-def hook(machine: emu.Machine, cycles: int) -> None:
-    remove = machine.hook_pc("mark", lambda: None)
-    machine.run(cycles=cycles)
-    remove()
+def breakpoint_if(condition: str) -> Run:
+    """Return a run with a conditional breakpoint of the debugger, whose condition never holds."""
+
+    def run(machine: emu.Machine, cycles: int) -> None:
+        target = Debuggee(machine, lambda: False, lambda _text: None, History(machine))
+        address = machine.program_address("mark")
+        target.set_breakpoints("here", [Breakpoint(1, "function", (address,), condition=condition)])
+        target.goto(machine.cycle + cycles)
+        target.release()
+
+    return run
 
 
-def conditional(machine: emu.Machine, cycles: int) -> None:
-    asked: Callable[[], bool] = lambda: machine.peek("rounds") == 1  # noqa: E731
-    remove = machine.hook_pc(
-        "mark", asked, filter_of(machine.inspector, "rounds == 1", machine.program_address("mark"))
-    )
-    machine.run(cycles=cycles)
-    remove()
+def watch(place: str) -> Run:
+    """Return a run with `emu.watch`, which pauses at every change."""
+    return lambda machine, cycles: sum(1 for _ in emu.watch(machine, machine.value(place).address or 0, cycles=cycles))
 
 
-def until(machine: emu.Machine, cycles: int) -> None:
-    machine.run(cycles=cycles, until=lambda: False)
+def waveform(*names: str) -> Run:
+    """Return a run with a waveform of the named values."""
 
+    def run(machine: emu.Machine, cycles: int) -> None:
+        recorder = WaveformRecorder(machine, io.StringIO(), names)
+        recorder.advance(machine.cycle + cycles)
+        recorder.close()
 
-def watch(machine: emu.Machine, cycles: int) -> None:
-    for _ in emu.watch(machine, "rounds", cycles=cycles):
-        pass
+    return run
 
 
 def trace(machine: emu.Machine, cycles: int) -> None:
+    """Run with an instruction trace."""
     assert machine.image is not None
-    Tracer(machine, machine.image, io.StringIO()).advance(machine.cycle + cycles)
+    with open(os.devnull, "w", encoding="utf-8") as stream:
+        tracer = Tracer(machine, machine.image, stream)
+        tracer.advance(machine.cycle + cycles)
+        tracer.close()
+
+
+def coverage(machine: emu.Machine, cycles: int) -> None:
+    """Run with execution counts."""
+    stop = count_executions(machine, Counts())
+    machine.run(cycles=cycles)
+    stop()
+
+
+def profile(machine: emu.Machine, cycles: int) -> None:
+    """Run with cycle accounting by instruction, without a call graph."""
+    assert isinstance(machine.runner, JitEngine)
+    stop = machine.runner.start_counting(CycleCounting(CycleAccounting(machine.core), lambda pc: pc))
+    machine.run(cycles=cycles)
+    stop()
 
 
 RUNS: dict[str, tuple[Run, float]] = {
-    "none": (plain, 1), "hook every 500 Tcy": (hook, 1), "conditional breakpoint": (conditional, 1),
-    "until= a condition": (until, SHORT),
-    "watch": (watch, SHORT), "trace": (trace, SHORT),
-}  # fmt: skip
+    "none": (lambda machine, cycles: machine.run(cycles=cycles), 1),
+    "profile": (profile, 1),
+    "coverage": (coverage, 1),
+    "hook in Python, every 500 Tcy": (hook("mark"), 0.05),
+    "hook in Python, inner loop": (hook("inner"), 0.01),
+    "break if, global": (breakpoint_if("rounds == 1"), 1),
+    "break if, SFR and register": (breakpoint_if("TMR1 > 5 && W15 > 0x8000"), 1),
+    "until at a place": (lambda machine, cycles: machine.run(cycles=cycles, until="mark", when="rare == 65535"), 1),
+    "until a condition": (lambda machine, cycles: machine.run(cycles=cycles, until="rare > 60000"), 1),
+    "until a function": (lambda machine, cycles: machine.run(cycles=cycles, until=lambda: False), 0.001),
+    "watch, changes every 128,000 Tcy": (watch("rare"), 1),
+    "watch, changes every 500 Tcy": (watch("rounds"), 0.01),
+    "vcd, changes every 128,000 Tcy": (waveform("rare", "ipl"), 1),
+    "vcd, changes every 500 Tcy": (waveform("rounds"), 0.05),
+    "trace": (trace, 0.02),
+}
+"""Runs by the name of the instrument, each with its share of the simulated time."""
 
 
 def machine_of(image: Path) -> emu.Machine:
@@ -102,14 +153,6 @@ def measure(image: Path, seconds: float, repeat: int) -> dict[str, float]:
             begun = time.process_time()
             run(machine, cycles)
             best[name] = max(best.get(name, 0), cycles / float(machine.hz) / (time.process_time() - begun))
-        machine, counts = machine_of(image), Counts()
-        stop = count_executions(machine, counts)
-        cycles = int(machine.hz * seconds)
-        machine.run(cycles=cycles // 100)
-        begun = time.process_time()
-        machine.run(cycles=cycles)
-        best["coverage"] = max(best.get("coverage", 0), seconds / (time.process_time() - begun))
-        stop()
     return best
 
 
@@ -129,7 +172,7 @@ def main() -> None:
         print(json.dumps({"real time": found, "share": shares}))
         return
     for name, speed in found.items():
-        print(f"{name:22} {speed:9.2f} x real time  {shares[name]:8.4f}")
+        print(f"{name:34} {speed:9.3f} x real time  {shares[name]:8.4f}")
 
 
 if __name__ == "__main__":

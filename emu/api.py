@@ -25,10 +25,12 @@ True
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -38,13 +40,15 @@ from emu.chips.chip import Chip, Vector
 from emu.chips.dspic30f6014a import DSPIC30F6014A
 from emu.image.loader import load_image
 from emu.machine.machine import Machine as BareMachine
-from emu.machine.state_access import MemoryObserver
+from emu.machine.state_access import MemoryObserver, NameOrAddress
 from emu.machine.stops import Stop
 from emu.peripherals import Peripherals
+from emu.system.events import NEVER
 
 if TYPE_CHECKING:
     from emu.debug.inspector import Frame, Inspector, Value
     from emu.debug.threads import Thread
+    from emu.dspic30f.change_log import Change as LoggedChange
 
 
 class Machine(BareMachine):
@@ -100,6 +104,37 @@ class Machine(BareMachine):
         from emu.debug.fault_report import thread_overflow
 
         return thread_overflow(self, stop)
+
+    def run(
+        self,
+        cycles: int | None = None,
+        until: Callable[[], bool] | NameOrAddress | None = None,
+        *,
+        seconds: float | Fraction | None = None,
+        when: str | None = None,
+    ) -> Stop:
+        """Run as in the base class. Conditions in C run natively: `run(until="mark", when="count > 40")`.
+
+        With `when`, the run ends at the place `until` only while the condition holds. Without a place, `until` may be
+        a condition itself, `run(until="count > 40")`: the run ends after the first instruction after which it holds.
+        Comparisons of variables with numbers, joined by `&&`, cost little. Every other condition is slow, as is one
+        about registers without a place. Raises ValueError also for an invalid condition, or one without a place.
+        """
+        if when is None and not (isinstance(until, str) and self._is_condition(until)):
+            return super().run(cycles, until, seconds=seconds)
+        from emu.instruments.conditions import run_to_place, run_until
+
+        limit = self._limit_of(cycles, seconds)
+        if when is None:
+            return run_until(self, self.inspector, str(until), limit)
+        if until is None or callable(until):
+            raise ValueError("`when` needs a place: until=NAME or until=ADDRESS")
+        return run_to_place(self, self.inspector, self.program_address(until), when, limit)
+
+    def _is_condition(self, text: str) -> bool:
+        """Whether `text` is no name: a C expression of several parts, and no symbol of the image."""
+        known = self.image is not None and self.image.symbols.find(text) is not None
+        return not known and re.fullmatch(r"[\w.$@]*", text) is None
 
     def _on_trap(self, vector: Vector) -> None:
         super()._on_trap(vector)
@@ -248,27 +283,46 @@ class Change:
 def watch(machine: BareMachine, place: str | int, *, size: int = 2, cycles: int | None = None) -> Iterator[Change]:
     """Run `machine` and yield every change of a variable, register or data address (`size` 1 or 2 bytes).
 
-    The value is compared after every instruction, so the machine runs only as fast as in single steps. The iterator
-    ends
-    with the run, after at most `cycles` Tcy. Raises KeyError for an unknown name.
+    The machine is paused at each change that the iterator yields. Native code observes RAM; for a register, the machine
+    makes single steps. The iterator ends with the run, after at most `cycles` Tcy. Raises KeyError for an unknown name.
     """
+    from emu.dspic30f.change_log import WatchedNumber
+    from emu.instruments.changes import is_in_ram, log_changes
+
     address = machine.address_of(place)
-    value = machine.peek(address, size)
     changes: list[Change] = []
+    value, is_running = machine.peek(address, size), False
+
+    def add(cycle: int, pc: int, now: int) -> None:
+        nonlocal value
+        changes.append(Change(cycle, pc, value, now))
+        value = now
 
     def changed() -> bool:
-        nonlocal value
         now = machine.peek(address, size)
         if now != value:
-            changes.append(Change(machine.cycle, machine.pc, value, now))
-            value = now
+            add(machine.cycle, machine.pc, now)
         return bool(changes)
 
-    end = None if cycles is None else machine.cycle + cycles
-    while True:
-        left = None if end is None else max(end - machine.cycle, 0)  # the last instruction may end after the limit
-        stop: Stop = machine.run(cycles=left, until=changed)
-        yield from changes
-        if stop.reason != "until":
-            return
-        changes.clear()
+    def log(found: list[LoggedChange]) -> None:
+        for one in found:
+            add(one.cycle, one.pc, one.value)
+        if is_running:
+            machine.interrupt()
+
+    end = NEVER if cycles is None else machine.cycle + cycles
+    is_logged = is_in_ram(machine, address, size)
+    end_log = log_changes(machine, [WatchedNumber(address, size)], log, ()) if is_logged else None
+    try:
+        while machine.cycle < end:
+            is_running = True
+            stop = machine.advance(end) if is_logged else machine.step_until(changed, end)
+            is_running = False
+            is_changed = bool(changes)
+            yield from changes
+            changes.clear()
+            if not is_changed or (stop is not None and stop.reason not in ("until", "interrupted")):
+                return
+    finally:
+        if end_log is not None:
+            end_log()

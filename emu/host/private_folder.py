@@ -5,7 +5,6 @@ The module imports nothing of the project.
 
 from __future__ import annotations
 
-import multiprocessing
 import os
 import stat
 import sys
@@ -45,7 +44,9 @@ def is_usable(*folders: Path) -> bool:
 
 @cache
 def _is_usable(folder: Path, why: str) -> bool:
-    if why and multiprocessing.parent_process() is None:  # the parent of a worker has reported it
+    workers = sys.modules.get("multiprocessing.process")  # imported here, it would delay the start of every command
+    is_worker = workers is not None and workers.parent_process() is not None
+    if why and not is_worker:  # the parent of a worker has reported it
         print(f"openswarm: the cache {folder} is not used, because {why}; delete it, or set OPENSWARM_CACHE to a "
               "folder of your own with mode 0700", file=sys.stderr, flush=True)  # fmt: skip
     return not why

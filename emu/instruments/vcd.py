@@ -1,8 +1,9 @@
 """Waveforms of a run as a VCD file, for GTKWave and similar viewers, written by pyvcd.
 
 Input: a machine, a stream, names to watch. Output: changes of pins and bytes of UARTs. If watched, also the CPU's
-priority, sleep, the running OpenSwarm thread and variables. Watching makes the machine single-step; pins and bytes do
-not. Each time is computed from the cycle and the initial clock, rounded to 1 ps, so rounding errors do not accumulate.
+priority, sleep, the running OpenSwarm thread and variables. Native code logs them, but for a watched register the
+machine makes single steps. Each time is computed from the cycle and the initial clock, rounded to 1 ps, so rounding
+errors do not accumulate.
 """
 
 from __future__ import annotations
@@ -15,6 +16,8 @@ from typing import TYPE_CHECKING, Any, Final, TextIO
 from emu.debug import symbolic
 from emu.debug.inspector import Inspector
 from emu.debug.threads import RUNNING
+from emu.dspic30f.change_log import Change, Watched, WatchedNumber
+from emu.instruments.changes import is_in_ram, log_changes
 from emu.peripherals.pins import PORTS, parse_pin
 
 if TYPE_CHECKING:
@@ -31,8 +34,8 @@ CPU: Final = ("ipl", "asleep", "thread")
 class WaveformRecorder:
     """Records `machine` while `advance` runs it. `watch` lists names of CPU, or expressions that denote a variable.
 
-    With `again` it also records replayed cycles, for which other listeners are not called. Raises ValueError for a
-    name that cannot be watched.
+    With `again` it also records the pins and bytes of replayed cycles, for which other listeners are not called.
+    Raises ValueError for a name that cannot be watched, or if another instrument runs.
     """
 
     def __init__(
@@ -72,10 +75,16 @@ class WaveformRecorder:
             count = self._writer.register_var(scope, "tx_count", "integer", size=32, init=0)
             self._bytes[number] = [data, count, 0]
             self._removals.append(uart.listen(partial(self._sent, number), part=again))
-        self._watched: Final = [self._watch(name) for name in watch]
-        self._seen: Final = [get() for _, get in self._watched]
-        for (variable, _), value in zip(self._watched, self._seen, strict=True):
+        found = [self._watch(name) for name in watch]
+        self._seen: Final = [get() for _, get, _ in found]
+        for (variable, _, _), value in zip(found, self._seen, strict=True):
             self._writer.change(variable, self._time(machine.cycle), value)
+        self._variables: Final = [variable for variable, _, _ in found]
+        logged = [one for _, _, one in found if one is not None]
+        self._sampled: Final = [] if len(logged) == len(found) else [get for _, get, _ in found]
+        """Functions that read the watched values after each step, if native code cannot log them all."""
+        if logged and not self._sampled:
+            self._removals.append(log_changes(machine, logged, self._changed))
         pins.edges, pins.frames = self._edges, self._frames
         self._logged = machine.cycle
         """Cycle up to which the edges of waveforms are in the log."""
@@ -100,24 +109,29 @@ class WaveformRecorder:
                     found[port, bit] = self._writer.register_var("pins", full, "wire", size=1, init=level)
         return found
 
-    def _watch(self, name: str) -> tuple[Any, Callable[[], Any]]:
-        """Return the VCD variable for a watched name, and a function that reads its value."""
+    def _watch(self, name: str) -> tuple[Any, Callable[[], Any], Watched | None]:
+        """Return the VCD variable for a watched name, a function that reads its value, and its entry in a log.
+
+        The entry is None for a value that is not in RAM.
+        """
         machine, state = self._machine, self._machine.state
         if name == "ipl":
-            return self._writer.register_var("cpu", name, "reg", size=4, init=0), lambda: state.ipl
+            return self._writer.register_var("cpu", name, "reg", size=4, init=0), lambda: state.ipl, "ipl"
         if name == "asleep":
-            return self._writer.register_var("cpu", name, "wire", size=1, init=0), lambda: int(machine.is_asleep)
+            variable = self._writer.register_var("cpu", name, "wire", size=1, init=0)
+            return variable, lambda: int(machine.is_asleep), "asleep"
         if name == "thread":
-            return self._writer.register_var("cpu", name, "integer", size=16, init=0), self._thread()
+            return (self._writer.register_var("cpu", name, "integer", size=16, init=0), *self._thread())
         value = symbolic.variable(Inspector(machine), name)
         address, size = value.address, value.type.bytes
         if address is None or not value.type.is_number or value.bits is not None:
             raise ValueError(f"{name!r} is not a variable in memory with a numeric type")
         variable = self._writer.register_var("variables", name.replace(" ", ""), "reg", size=8 * size, init=0)
-        return variable, lambda: machine.peek(address, size)
+        logged = WatchedNumber(address, size) if is_in_ram(machine, address, size) else None
+        return variable, lambda: machine.peek(address, size), logged
 
-    def _thread(self) -> Callable[[], int]:
-        """Return a function that reads the PID of the running thread."""
+    def _thread(self) -> tuple[Callable[[], int], WatchedNumber]:
+        """Return a function that reads the PID of the running thread, and the PID's entry in a log."""
         inspector = Inspector(self._machine)
         running = inspector.variable(RUNNING)
         pcb = running.type.target if running is not None else None
@@ -130,7 +144,11 @@ class WaveformRecorder:
             block = self._machine.peek(place)
             return self._machine.peek(block + pid.offset) if block else 0
 
-        return number
+        return number, WatchedNumber(place, 2, pid.offset)
+
+    def _changed(self, changes: list[Change]) -> None:
+        """Collect logged changes."""
+        self._pending += [(one.cycle, self._variables[one.number], one.value) for one in changes]
 
     def _sent(self, number: int, byte: int, _start: int) -> None:
         data, count, sent = self._bytes[number]
@@ -144,8 +162,8 @@ class WaveformRecorder:
         """Run as `Machine.advance` does, and write the changes."""
         machine, stop = self._machine, None
         while stop is None and machine.cycle < cycle:
-            stop = self._step(cycle) if self._watched else self._advance(min(cycle, machine.cycle + FLUSH_CYCLES))
-            if not self._watched or len(self._edges) + len(self._pending) > 1000 or machine.cycle >= cycle or stop:
+            stop = self._step(cycle) if self._sampled else self._advance(min(cycle, machine.cycle + FLUSH_CYCLES))
+            if not self._sampled or len(self._edges) + len(self._pending) > 1000 or machine.cycle >= cycle or stop:
                 machine.pins.flush()
                 self._write(machine.cycle)
         return stop
@@ -161,11 +179,11 @@ class WaveformRecorder:
 
     def _sample(self) -> None:
         now = self._machine.cycle
-        for index, (variable, get) in enumerate(self._watched):
+        for index, get in enumerate(self._sampled):
             value = get()
             if value != self._seen[index]:
                 self._seen[index] = value
-                self._pending.append((now, variable, value))
+                self._pending.append((now, self._variables[index], value))
 
     def _log_waveforms(self, until: int) -> None:
         """Log the edges of waveforms up to cycle `until`."""
@@ -214,12 +232,12 @@ class WaveformRecorder:
     def close(self) -> None:
         """Write the remaining changes and close the file. After a failed write, only stop recording. Raises OSError."""
         machine = self._machine
+        for remove in self._removals:
+            remove()
         if not self._has_failed:
             machine.pins.flush()
             self._write(machine.cycle)
         machine.pins.edges = machine.pins.frames = None
-        for remove in self._removals:
-            remove()
         if not self._has_failed:
             self._writer.close(self._time(machine.cycle))
 

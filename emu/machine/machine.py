@@ -277,20 +277,28 @@ class Machine(StateAccess):
         """Run until a stop, for at most `cycles` Tcy or `seconds` of simulated time.
 
         `until` names a function or label, or is a program address: the run ends with reason "until" when the PC next
-        reaches it. It may also be a condition, which is tested after every instruction and therefore slow. Raises
+        reaches it. It may also be a function, which is called after every instruction and therefore slow. Raises
         KeyError for an unknown name, ValueError if both limits are given or a limit is negative or no number.
         """
+        limit = self._limit_of(cycles, seconds)
+        if until is None:
+            return self.advance(limit) or self.stopped("limit")
+        if callable(until):
+            return self.step_until(until, limit)
+        return self.run_to(self.program_address(until), limit)
+
+    def _limit_of(self, cycles: int | None, seconds: float | Fraction | None) -> int:
+        """Return the cycle at which a run ends. Raises as `run`."""
         if seconds is not None:
             if cycles is not None:
                 raise ValueError("give cycles or seconds, not both")
             cycles = self.cycles_in(seconds) if seconds != 0 else 0
         if cycles is not None and not (isinstance(cycles, Real) and 0 <= cycles < math.inf and cycles == int(cycles)):
             raise ValueError(f"cycles = {cycles!r}: expected a whole number of 0 or more")
-        limit = NEVER if cycles is None else self.cycle + int(cycles)
-        if until is None:
-            return self.advance(limit) or self.stopped("limit")
-        if not callable(until):
-            return self._run_to(self.program_address(until), limit)
+        return NEVER if cycles is None else self.cycle + int(cycles)
+
+    def step_until(self, condition: Callable[[], bool], limit: int) -> Stop:
+        """Run to the first instruction after which `condition` holds, at most to cycle `limit`."""
         checkpoint = 0
         while self.cycle < limit:
             if self.cycle >= checkpoint:
@@ -299,7 +307,7 @@ class Machine(StateAccess):
             stop = self.step(limit)
             if stop is not None and stop.reason != "limit":
                 return stop
-            if until():
+            if condition():
                 return self.stopped("until")
         return self.stopped("limit")
 
@@ -312,10 +320,15 @@ class Machine(StateAccess):
             if stop is not None or self.cycle >= cycle:
                 return stop
 
-    def _run_to(self, address: int, limit: int) -> Stop:
-        """Run until the PC next reaches `address`, at most to cycle `limit`."""
+    def run_to(
+        self, address: int, limit: int, condition: Callable[[], bool] = lambda: True, when: Filter | None = None
+    ) -> Stop:
+        """Run until the PC next reaches `address` while `condition` holds, at most to cycle `limit`.
+
+        `when` is a filter of the condition.
+        """
         start = self.cycle
-        remove = self.hook_pc(address, lambda: self.cycle > start)
+        remove = self.hook_pc(address, lambda: self.cycle > start and condition(), when)
         try:
             stop = self.advance(limit)
         finally:

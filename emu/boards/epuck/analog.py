@@ -98,8 +98,6 @@ class Infrared(BoardPart):
         decayed = _DECAYED * self._tau_seconds * _FASTEST_HZ
         self._ring: Final = _Ring(*places, decayed, NOISE_COUNTS, NOISE_SHARE)
         self._ring_at: Final = addressof(self._ring)
-        self._level_of, self._settled = _code()["level"], _code()["settled"]
-        self._native_source: Final = address_of(self._level_of)
         self._update_tau()
         chip.oscillator.on_change.append(self._update_tau)
         self._sources: Final = [partial(self._level, sensor) for sensor in range(SENSORS)]
@@ -109,7 +107,6 @@ class Infrared(BoardPart):
         for line, pin in enumerate(PULSE_PINS):
             self.pins.watch(pin, partial(self._switched, line))
             self._predict(line)
-        self.set_native_ready(True)
         noise.on_change.append(self._predict_all)
 
     @property
@@ -143,7 +140,7 @@ class Infrared(BoardPart):
             return
         self._is_ready = is_ready
         for sensor, source in enumerate(self._sources):
-            code = self._native_source if is_ready else 0
+            code = address_of(_code()["level"]) if is_ready else 0
             self.chip.adc.source.set_native(_FIRST_CHANNEL + sensor, source, code, self._ring_at)
 
     def start_segment(self, cycle: int) -> None:
@@ -187,7 +184,7 @@ class Infrared(BoardPart):
 
     def _switched(self, line: int, cycle: int, changed: int, levels: int) -> None:
         self.chip.adc.catch_up(self.now)
-        share = self._settled(self.record.address, self._ring_at, line, cycle)
+        share = _code()["settled"](self.record.address, self._ring_at, line, cycle)
         self._from[line] = round(share * 0xFFFF)
         self._since[line] = cycle
         self._lit[line] = bool(levels & changed)
@@ -209,7 +206,9 @@ class Infrared(BoardPart):
     def _level(self, sensor: int, cycle: int) -> int:
         if self._prepare is not None:
             self._prepare(cycle)
-        return self._level_of(self.record.address, self._ring_at, _FIRST_CHANNEL + sensor, cycle)
+        elif not self._is_ready:  # the first conversion: a run without any starts faster
+            self.set_native_ready(True)
+        return _code()["level"](self.record.address, self._ring_at, _FIRST_CHANNEL + sensor, cycle)
 
 
 class Accelerometer(BoardPart):

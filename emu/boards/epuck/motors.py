@@ -46,6 +46,7 @@ class _Pair(Structure):
 
 @cache
 def _code() -> dict[str, Callable[..., int]]:
+    """Return the functions of motors.c, loaded at the first coil pattern: a run without motors starts faster."""
     return functions(Path(__file__).with_name("motors.c"), {
         "settle_by": (None, (ADDRESS, INT)),
         "change": (None, (ADDRESS, INT, INT)),
@@ -69,9 +70,6 @@ class Stepper(BoardPart):
         self._state[_INDEX] = _NOWHERE
         self._state[_SETTLED] = 1
         self._on_step: Callable[[int, int], None] | None = None
-        code = _code()
-        self._settle_by, self._change = code["settle_by"], code["change"]
-        self._decode = code["decode"]
         self._motor: Final = _Motor(self.record.address + field.offset, shift, forward)
         self._history: _History | None = None
         self.address: Final = addressof(self._motor)
@@ -140,29 +138,29 @@ class Stepper(BoardPart):
         """Return the steps settled by cycle `now`. The recorded pin changes must already be processed."""
         state = self._state
         if not state[_SETTLED]:
-            self._run_and_notify(self._settle_by, now)
+            self._run_and_notify("settle_by", now)
         return state[_STEPS]
 
     def _changed(self, cycle: int, _changed: int, levels: int) -> None:
         """Handle a new coil pattern, which ends the previous one."""
-        self._run_and_notify(self._change, cycle, levels)
+        self._run_and_notify("change", cycle, levels)
 
     @property
     def has_listener(self) -> bool:
         """Whether a listener is called for each step."""
         return self._on_step is not None
 
-    def _run_and_notify(self, work: Callable[..., int], *arguments: int) -> None:
-        """Call a decoder function, then call the listener if the function has counted a step."""
+    def _run_and_notify(self, function: str, *arguments: int) -> None:
+        """Call a function of the decoder, then call the listener if the function has counted a step."""
         state = self._state
         before, since = state[_STEPS], state[_SINCE]
-        work(self.address, *arguments)
+        _code()[function](self.address, *arguments)
         if state[_STEPS] != before and self._on_step is not None and not self.events.quiet:
             self._on_step(since, state[_STEPS] - before)
 
     def _read(self, changes: int, count: int) -> None:
         """Decode the ring of pin changes, which is only used while no step listener exists."""
-        self._decode(self.address, changes, count, PORT)
+        _code()["decode"](self.address, changes, count, PORT)
 
 
 class Motors:
@@ -171,7 +169,6 @@ class Motors:
     def __init__(self, chip: Peripherals) -> None:
         self.left: Final = Stepper("motor.left", chip, 0, -1)
         self.right: Final = Stepper("motor.right", chip, 4, 1)
-        self._both_by: Final = _code()["steps_of_both"]
         self._pins: Final = chip.pins
         self._pair: Final = _Pair(self.left.address, self.right.address, PORT, *chip.pins.ring_addresses, 0)
         self._pair_address: Final = addressof(self._pair)
@@ -197,7 +194,7 @@ class Motors:
     @property
     def code(self) -> int:
         """Host address of the function `steps_of_both` of motors.c."""
-        return address_of(self._both_by)
+        return address_of(_code()["steps_of_both"])
 
     def native_pair(self) -> int:
         """Return the host address of `struct pair` for native code; 0 while a step listener exists.
@@ -219,7 +216,8 @@ class Motors:
         at, steps = array("q", cycles), array("q", bytes(16 * count))
         self._pair.watched = pins.watched_ports(2)
         arguments = self._pair_address, left.events.now, at.buffer_info()[0], count, steps.buffer_info()[0]
-        if not self._both_by(*arguments):
+        steps_of_both = _code()["steps_of_both"]
+        if not steps_of_both(*arguments):
             pins.flush()
-            self._both_by(*arguments)
+            steps_of_both(*arguments)
         return steps

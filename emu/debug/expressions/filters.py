@@ -1,92 +1,142 @@
 """Filters of conditional breakpoints: conditions that native code can evaluate (emu/system/filters.py).
 
-Only a conjunction of comparisons of global variables with constants becomes a filter; every other condition is
-evaluated by `expression.evaluate` at each arrival. A filter that holds is followed by that evaluation, too.
+A conjunction of comparisons of numbers with constants becomes a filter. A number is a variable, a member, an element at
+a constant index, a W register, an SFR or a field of one. Every other condition is evaluated by `expression.evaluate` at
+each arrival. A filter that holds is followed by that evaluation, too.
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Final
 
 from emu.debug.dwarf.location import Unavailable
-from emu.debug.dwarf.units import Scope, Variable
-from emu.debug.expressions.expression import ExpressionError, tokens
-from emu.debug.inspector import Inspector
+from emu.debug.expressions.expression import ExpressionError, evaluate, tokens
+from emu.debug.inspector import Frame, Inspector, Value
+from emu.debug.unwind import REGISTERS
 from emu.system.filters import OPERATORS, Comparison, Filter
 
 _MIRRORED: Final = {"<": ">", "<=": ">=", ">": "<", ">=": "<="}
 _INT_BITS: Final = 16
+_W_END: Final = 2 * REGISTERS
+"""First data address after the memory-mapped W registers (isa.md §1.2)."""
+_PROBES: Final = tuple(tuple(0x2000 + 0x100 * n + step * (n + 1) for n in range(REGISTERS)) for step in (0, 2))
+"""Two sets of register values. An address that moves by 2 (n + 1) between them is a constant distance from Wn."""
 Token = tuple[str, str]
 
 
-def filter_of(inspector: Inspector, condition: str, address: int) -> Filter | None:
-    """Return the filter of a breakpoint's condition at a program address, None if it has none."""
+def filter_of(inspector: Inspector, condition: str, address: int | None = None) -> Filter | None:
+    """Return the filter of a condition at a program address, None if it has none.
+
+    Without an address, the condition may name only what every place of the program knows.
+    """
     try:
         found = tokens(condition)
-    except ExpressionError:
+        parts: list[list[Token]] = [[]]
+        for token in found:
+            if token == ("sign", "&&"):
+                parts.append([])
+            else:
+                parts[-1].append(token)
+        comparisons = [_comparison(inspector, part, address) for part in parts]
+    except (ExpressionError, Unavailable, IndexError):
         return None
-    parts: list[list[Token]] = [[]]
-    for token in found:
-        if token == ("sign", "&&"):
-            parts.append([])
-        else:
-            parts[-1].append(token)
-    comparisons = [_comparison(inspector, part, address) for part in parts]
     known = tuple(one for one in comparisons if one is not None)
     return known if len(known) == len(parts) else None
 
 
-def _comparison(inspector: Inspector, part: list[Token], address: int) -> Comparison | None:
+def _comparison(inspector: Inspector, part: list[Token], address: int | None) -> Comparison | None:
     """Return one comparison, None if it is of another form."""
-    texts = [text for _, text in part]
-    match [kind for kind, _ in part]:
-        case ["name"]:
-            return _made(inspector, texts[0], "!=", "0", address)
-        case ["sign", "name"] if texts[0] == "!":
-            return _made(inspector, texts[1], "==", "0", address)
-        case ["name", "sign", "number"]:
-            return _made(inspector, texts[0], texts[1], texts[2], address)
-        case ["name", "sign", "sign", "number"] if texts[2] == "-":
-            return _made(inspector, texts[0], texts[1], "-" + texts[3], address)
-        case ["number", "sign", "name"]:
-            return _made(inspector, texts[2], _MIRRORED.get(texts[1], texts[1]), texts[0], address)
+    if part[0] == ("sign", "!"):
+        return _made(inspector, part[1:], "==", "0", address)
+    places = [number for number, (kind, text) in enumerate(part) if kind == "sign" and text in OPERATORS]
+    if not places:
+        return _made(inspector, part, "!=", "0", address)
+    operator, left, right = part[places[0]][1], part[: places[0]], part[places[0] + 1 :]
+    if left[0][0] == "number":
+        left, right, operator = right, left, _MIRRORED.get(operator, operator)
+    match right:
+        case [("number", literal)]:
+            return _made(inspector, left, operator, literal, address)
+        case [("sign", "-"), ("number", literal)]:
+            return _made(inspector, left, operator, "-" + literal, address)
     return None
 
 
-def _made(inspector: Inspector, name: str, operator: str, literal: str, address: int) -> Comparison | None:
-    """Return the comparison of a variable with a literal, if C compares the two as mathematics does."""
-    variable = _global(inspector, name, address)
-    if operator not in OPERATORS or variable is None:
-        return None
-    try:
-        place = inspector.value(variable).address
-    except Unavailable:
-        return None
-    bare, size = variable.type.bare, variable.type.bytes
-    is_signed = bare.kind == "signed" or (bare.kind == "char" and bare.is_signed)
-    ram = inspector.machine.chip.data["ram"]
-    if place is None or bare.kind not in ("signed", "unsigned", "char", "bool") or size not in (1, 2, 4):
+def _made(
+    inspector: Inspector, operand: list[Token], operator: str, literal: str, address: int | None
+) -> Comparison | None:
+    """Return the comparison of an operand with a literal, if C compares the two as mathematics does."""
+    place = _place(inspector, operand, address)
+    if place is None:
         return None
     try:
         number = int(literal.rstrip("lL"), 0)
     except ValueError:  # a suffix `u`, or an octal number
         return None
-    bits = max(8 * size, _INT_BITS)
-    low, high = (-(1 << bits - 1), (1 << bits - 1) - 1) if is_signed else (0, (1 << bits) - 1)
-    if not low <= number <= high or place not in ram or place + size > ram.end:
+    bits = max(8 * place.size, _INT_BITS)
+    low, high = (-(1 << bits - 1), (1 << bits - 1) - 1) if place.is_signed else (0, (1 << bits) - 1)
+    return replace(place, operator=operator, number=number) if low <= number <= high else None
+
+
+def _place(inspector: Inspector, operand: list[Token], address: int | None) -> Comparison | None:
+    """Return an unfinished comparison that describes where an operand is; None if that depends on memory."""
+    if address is None:
+        found = _object(inspector, operand, None)
+        return None if found is None else _described(inspector, found, None)
+    one, other = (_object(inspector, operand, frame) for frame in _frames(inspector, address))
+    if one is None or other is None:
         return None
-    return Comparison(place, size, is_signed, operator, number)
+    if one.address == other.address or one.address is None or other.address is None:
+        return _described(inspector, one, None)
+    base, rest = divmod(other.address - one.address, 2)
+    return None if rest or not 0 < base <= REGISTERS else _described(inspector, one, base - 1)
 
 
-def _global(inspector: Inspector, name: str, address: int) -> Variable | None:
-    """Return the variable outside functions that `name` denotes at a program address, None if a local may hide it."""
-    function = inspector.debug.function(address)
-    if function is None or _declares(function, name):
+def _frames(inspector: Inspector, address: int) -> tuple[Frame | None, Frame | None]:
+    """Return the innermost frame at a program address for each of the two sets of register values."""
+    one, other = (next(iter(inspector.frames(address, values)), None) for values in _PROBES)
+    return one, other
+
+
+def _object(inspector: Inspector, operand: list[Token], frame: Frame | None) -> Value | None:
+    """Return the object that `name`, `name.member` or `name[number]` denotes in a frame, in any depth."""
+    end = 1
+    while end <= len(operand):
+        text = "".join(text for _, text in operand[:end])
+        found = evaluate(inspector, text, frame) if operand[0][0] == "name" else None
+        if not isinstance(found, Value):
+            return None
+        match operand[end : end + 3]:
+            case []:
+                return found
+            case [("sign", "."), ("name", _), *_]:
+                end += 2
+            case [("sign", "["), ("number", _), ("sign", "]")] if found.type.bare.kind == "array":
+                end += 3
+            case _:
+                return None
+    return None
+
+
+def _described(inspector: Inspector, found: Value, base: int | None) -> Comparison | None:
+    """Return the unfinished comparison of a number, None if native code cannot read it.
+
+    With `base`, its address lies at a constant distance from the value of that W register.
+    """
+    bare, size = found.type.bare, found.type.bytes
+    if bare.kind not in ("signed", "unsigned", "char", "bool") or size not in (1, 2, 4) or len(found.pieces) != 1:
         return None
-    mine = inspector.debug.statics.get(function.unit, {}).get(name)
-    same_name = inspector.debug.globals.get(name, [])
-    return mine or (same_name[0] if same_name else None)
-
-
-def _declares(scope: Scope, name: str) -> bool:
-    return any(one.name == name for one in scope.variables) or any(_declares(inner, name) for inner in scope.inner)
+    is_signed = bare.kind == "signed" or (bare.kind == "char" and bare.is_signed)
+    piece, chip = found.pieces[0], inspector.machine.chip
+    if piece.kind == "register" and base is None and piece.at + (size > 2) < REGISTERS:
+        return Comparison(2 * piece.at + piece.skip, size, is_signed, "==", 0, field=found.bits)
+    if piece.kind != "memory":
+        return None
+    if base is not None:
+        return Comparison(piece.at - _PROBES[0][base], size, is_signed, "==", 0, base, found.bits)
+    ram, place = chip.data["ram"], piece.at
+    in_ram = place in ram and place + size <= ram.end
+    if not in_ram and not (_W_END <= place < ram.start and place + size <= (place & ~1) + 2):
+        return None
+    return Comparison(place, size, is_signed, "==", 0, None, found.bits)

@@ -1,4 +1,4 @@
-"""What native code counts while it runs: cycles (`CycleCounting`) or executions (`ExecutionCounting`).
+"""What native code counts or logs while it runs: cycles, executions, changes of numbers, or every instruction.
 
 `JitEngine.start_counting` translates all code again with the counter of one of them.
 """
@@ -10,9 +10,12 @@ from typing import Any, Final, Protocol
 import numpy as np
 import numpy.typing as npt
 
+from emu.dspic30f.change_log import ChangeLog
 from emu.dspic30f.core import Core
 from emu.dspic30f.cycle_accounting import CycleAccounting
 from emu.dspic30f.cycle_log import LONGEST_RUN
+from emu.dspic30f.instruction_log import RUN_CYCLES, InstructionLog
+from emu.dspic30f.jit.translate.change_counter import ChangeBoundaryCounter, ChangeCounter
 from emu.dspic30f.jit.translate.cycle_counters import (
     AccountingBoundaryCounter,
     AccountingCounter,
@@ -21,6 +24,7 @@ from emu.dspic30f.jit.translate.cycle_counters import (
     RowOf,
 )
 from emu.dspic30f.jit.translate.execution_counter import ExecutionCounter
+from emu.dspic30f.jit.translate.instruction_counter import InstructionBoundaryCounter, InstructionCounter
 from emu.dspic30f.jit.translate.region import Region
 
 
@@ -31,12 +35,17 @@ class Counting(Protocol):
     """Host address of the cells, which native code finds in the environment word ACCOUNTING."""
     longest: int | None
     """Maximum length in Tcy of a native run; None for the engine's own."""
+    is_exact: bool
+    """Whether only exact code is used, which can log every instruction."""
 
     def start(self) -> None:
         """Start to count what the sequencer runs."""
 
     def stop(self) -> None:
         """Stop counting."""
+
+    def before_run(self) -> None:
+        """Prepare for a run of native code."""
 
     def after_run(self) -> None:
         """Process what native code has logged, after each of its runs."""
@@ -55,6 +64,7 @@ class CycleCounting:
     """Counts cycles by source line and CPU priority in `accounting`."""
 
     longest: int | None = LONGEST_RUN
+    is_exact = False
 
     def __init__(self, accounting: CycleAccounting, row_of: RowOf) -> None:
         self._accounting: Final = accounting
@@ -63,6 +73,9 @@ class CycleCounting:
         self.start = accounting.start
         self.stop = accounting.stop
         self.after_run = accounting.flush_log
+
+    def before_run(self) -> None:
+        """Do nothing: the accounting has no state to prepare."""
 
     def counter(self) -> CycleCounter:
         """Return a counter for one translated function."""
@@ -84,6 +97,7 @@ class ExecutionCounting:
     """
 
     longest: int | None = None
+    is_exact = False
 
     def __init__(self, core: Core) -> None:
         self._words: Final = core.chip.program["flash"].end // 2
@@ -106,6 +120,9 @@ class ExecutionCounting:
     def stop(self) -> None:
         """Do nothing."""
 
+    def before_run(self) -> None:
+        """Do nothing."""
+
     def after_run(self) -> None:
         """Do nothing: native code writes no log."""
 
@@ -120,3 +137,57 @@ class ExecutionCounting:
     def identity(self, region: Region) -> Any:
         """Return a mark; the counter depends on nothing else."""
         return f"executions {self._words}"
+
+
+class ChangeCounting:
+    """Logs changes of watched numbers."""
+
+    longest: int | None = None
+    is_exact = False
+
+    def __init__(self, core: Core, log: ChangeLog) -> None:
+        self._log: Final = log
+        self._ram: Final = core.chip.data["ram"].start, core.chip.data["ram"].end
+        self.address = log.address
+        self.start = log.start
+        self.stop = log.stop
+        self.before_run = log.before_run
+        self.after_run = log.after_run
+
+    def counter(self) -> CycleCounter:
+        """Return a counter for one translated function."""
+        return ChangeCounter(self._log, self._ram)
+
+    def boundary_counter(self) -> BoundaryCounter:
+        """Return the counter of native boundaries."""
+        return ChangeBoundaryCounter()
+
+    def identity(self, region: Region) -> Any:
+        """Return what is watched."""
+        return "changes", self._log.watched, self._log.leaves
+
+
+class InstructionLogging:
+    """Logs every instruction. Boundaries are left to the sequencer, which logs them."""
+
+    longest: int | None = RUN_CYCLES
+    is_exact = True
+
+    def __init__(self, log: InstructionLog) -> None:
+        self.address = log.address
+        self.start = log.start
+        self.stop = log.stop
+        self.before_run = log.before_run
+        self.after_run = log.after_run
+
+    def counter(self) -> CycleCounter:
+        """Return a counter for one translated function."""
+        return InstructionCounter()
+
+    def boundary_counter(self) -> BoundaryCounter:
+        """Return the counter of native boundaries, of which there are none."""
+        return InstructionBoundaryCounter()
+
+    def identity(self, region: Region) -> Any:
+        """Return a mark; the counter depends on nothing else."""
+        return "instructions"

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import ctypes
 import hashlib
+import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
@@ -16,6 +17,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final
 from weakref import WeakValueDictionary
 
+from emu.dspic30f.change_log import ONE_INSTRUMENT
 from emu.dspic30f.core import Core
 from emu.dspic30f.isa.builder import Context
 from emu.dspic30f.isa.codec import decode_for_execution
@@ -49,9 +51,6 @@ from emu.dspic30f.jit.machine_layout import (
     translation_hash,
     wiring_hash,
 )
-from emu.dspic30f.jit.runtime import dispatch_text
-from emu.dspic30f.jit.translate.function import Translator
-from emu.dspic30f.jit.translate.indirect_sfr import indirect_sfr_text
 from emu.dspic30f.jit.translate.region import Region, discover
 from emu.dspic30f.state.modes import Key, Modes
 from emu.dspic30f.state.state import IPL3, NOT_REPEATING, RUN
@@ -65,11 +64,20 @@ if TYPE_CHECKING:
 BLOCK_LEVEL, STEP_LEVEL = 2, 0
 """LLVM optimisation levels for block code and for exact code."""
 
+WARM_UP: Final = 4000
+"""Cycles after power-on that the first machine of a process interprets, in Tcy.
+
+To import the translator takes longer.
+"""
+
 COLD_CYCLES: Final = 1000
 """Maximum length of an interpreted run in Tcy before native code is looked up again."""
 
 NATIVE_CYCLES: Final = 30_000_000
 """Maximum length of a native run in Tcy before Python handles signals."""
+
+TRANSLATOR: Final = "emu.dspic30f.jit.translate.function"
+"""Module that is imported at the first translation."""
 
 NATIVE_FIELDS: Final = {"cycle": "cpu.cycle", "now": "events.now", "deadline": "events.deadline", "pc": "cpu.pc",
                         "mode": "cpu.mode"}  # fmt: skip
@@ -139,6 +147,7 @@ class JitEngine:
         self.share_group: object = None
         """Machines with equal values share translations. Tests that change translations set a unique object."""
         self._longest = NATIVE_CYCLES
+        self._warm_at = 0 if TRANSLATOR in sys.modules else WARM_UP
         self._counting: Counting | None = None
         self._state: Final = core.state
         self._u16: Final = core.record.u16
@@ -180,6 +189,9 @@ class JitEngine:
         if state.edt or self._core.events.deadline < state.cycle:  # a hook called `kick` after the boundary
             self._core.sequencer.execute()
             return
+        if state.cycle < self._warm_at and not self.wait:
+            self._run_cold(min(limit, self._warm_at))
+            return
         if self.compiler.busy:
             self._collect()
         self._select()
@@ -219,6 +231,8 @@ class JitEngine:
         """Implement `Engine.natively`. Calls are often short, so this function reads the record directly."""
         start = self._u64[self._now]
         if self._dispatch is None or not start or self._u16[self._edt]:  # a native boundary needs a preceding cycle
+            return False
+        if self._counting is not None and self._counting.is_exact:
             return False
         if self.compiler.busy:
             self._collect()
@@ -351,10 +365,15 @@ class JitEngine:
     def start_counting(self, counting: Counting) -> Callable[[], None]:
         """Count what all code does. Return the function that ends it.
 
-        Until then, all code is compiled before it runs, and the sequencer runs code that is not compiled."""
+        Until then, all code is compiled before it runs, and the sequencer runs code that is not compiled. Raises
+        ValueError if the engine already counts.
+        """
+        if self._counting is not None:
+            raise ValueError(ONE_INSTRUMENT)
         saved = self._interpret, self._run_cold, self.wait, self._native
 
         def run(record: int, env: int) -> Any:
+            counting.before_run()
             reason = self._dispatch(record, env)
             if reason != RETFIE:  # after a RETFIE, the cycle of the last log entry may still change
                 counting.after_run()
@@ -468,12 +487,16 @@ class JitEngine:
         bus = self._core.bus
         key = bus.off, frozenset(bus.watched), layout.limit_armed
         if key not in self._indirect_sfr:
+            from emu.dspic30f.jit.translate.indirect_sfr import indirect_sfr_text
+
             text = indirect_sfr_text(self._core, layout)
             self._indirect_sfr[key] = self._at_once(text, STEP_LEVEL)
         return self._indirect_sfr[key]
 
     # -- translation ------------------------------------------------------------------------------------------------
     def _prepare(self) -> None:
+        from emu.dspic30f.jit.runtime import dispatch_text  # imported here, as the translator: slow to import
+
         counter = None if self._counting is None else self._counting.boundary_counter()
         text = dispatch_text(self._core, 2 * self._words, counter)
         self._dispatcher = self._at_once(text, BLOCK_LEVEL)
@@ -497,6 +520,8 @@ class JitEngine:
 
     def _request(self, code: CodeTable, pc: int) -> None:
         """Install the region at `pc` from memory or disk, otherwise request it from the compile process."""
+        from emu.dspic30f.jit.translate.function import Translator
+
         region = discover(pc, self._fetch, code.entries, self._hooks)
         code.regions[pc] = region
         if not region.steps:
@@ -509,6 +534,8 @@ class JitEngine:
         counted = counting.identity(region) if counting is not None else None
         identity = repr((region.words(), sorted(region.leaders), pc, hooked, counted)).encode()
         for exact, level in ((True, STEP_LEVEL), (False, BLOCK_LEVEL)):
+            if counting is not None and counting.is_exact and not exact:
+                continue
             key = self.compiler.key(level, b"exact" if exact else b"block", code.identity, identity)
             known = self.compiler.lookup(key)
             if known is not None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-NEXT, INTERPRET, DEADLINE, BOUNDARY_WORK, MISS, RETFIE, HOOK, MODES, ARRIVE, UNFINISHED = range(10)
+NEXT, INTERPRET, DEADLINE, BOUNDARY_WORK, MISS, RETFIE, HOOK, MODES, ARRIVE, UNFINISHED, CHANGED = range(11)
 """Reasons:
 
 - NEXT: continue at PC.
@@ -15,4 +15,5 @@ NEXT, INTERPRET, DEADLINE, BOUNDARY_WORK, MISS, RETFIE, HOOK, MODES, ARRIVE, UNF
 - MODES: the processor modes have changed; PC belongs to another table of code.
 - ARRIVE: events are due before the access of the instruction at PC.
 - UNFINISHED: the boundary before PC has begun and must be finished regardless of the limit.
+- CHANGED: the consumer of the change log must be called before the instruction at PC.
 """

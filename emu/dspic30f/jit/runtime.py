@@ -29,7 +29,7 @@ from emu.dspic30f.jit.exit_reasons import (
 from emu.dspic30f.jit.exit_reasons import (
     UNFINISHED as UNFINISHED_EXIT,
 )
-from emu.dspic30f.jit.translate.boundary import DONE, UNFINISHED, boundary_text
+from emu.dspic30f.jit.translate.boundary import DONE, PYTHON, UNFINISHED, boundary_text
 from emu.dspic30f.jit.translate.cycle_counters import BoundaryCounter
 from emu.system.events import NEVER
 
@@ -106,6 +106,8 @@ arrived:
   store i64 %cycle6, ptr %arrived_place
   br label %again
 returned:
+  br i1 {returns}, label %unsure, label %resumed
+resumed:
   %limit3 = load i64, ptr %env
   %entered3 = getelementptr i64, ptr %env, i64 {entered}
   %count3 = load i64, ptr %entered3
@@ -178,13 +180,26 @@ miss:
 """
 
 
+NO_BOUNDARY: Final = f"""declare i64 @llvm.umin.i64(i64, i64)
+define internal i64 @boundary(ptr %rec, i64 %limit, ptr %entered) {{
+  ret i64 {PYTHON}
+}}
+define internal i64 @fire(ptr %rec, i64 %last) {{
+  ret i64 0
+}}
+"""
+"""IR of boundaries that native code leaves to Python."""
+
+
 def dispatch_text(core: Core, flash_end: int, counter: BoundaryCounter | None = None) -> str:
     """Return the IR of the dispatch loop and its boundaries. `flash_end` is the end of flash in PC units."""
     counter = counter if counter is not None else BoundaryCounter()
     offset = {name: core.record.fields[f"cpu.{name}"].offset for name in ("pc", "repeat", "cycle")}
-    return boundary_text(core, counter) + DISPATCH.format(
+    boundary = boundary_text(core, counter) if counter.is_native else NO_BOUNDARY
+    return boundary + DISPATCH.format(
         **offset,
         third=counter.third_cycle(),
+        returns=str(counter.returns_after_retfie).lower(),
         flash_end=flash_end,
         blocks=BLOCKS,
         steps=STEPS,

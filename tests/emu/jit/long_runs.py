@@ -16,9 +16,9 @@ from random_firmware import difference, load
 from straight_body import Shape
 from straight_firmware import straight_firmware
 
-from emu.dspic30f.jit import engine as jit_engine
 from emu.dspic30f.jit.engine import JitEngine
 from emu.dspic30f.jit.environment import ENV_WORDS
+from emu.dspic30f.jit.translate import function
 from emu.dspic30f.jit.translate.function import Translator
 from emu.dspic30f.jit.translate.values import Number
 from emu.machine.machine import Machine
@@ -74,11 +74,11 @@ class CountedExact:
         request = runner._request
 
         def requested(code: Any, pc: int) -> None:
-            jit_engine.Translator = CountingTranslator  # type: ignore[misc]
+            function.Translator = CountingTranslator  # type: ignore[misc]
             try:
                 request(code, pc)
             finally:
-                jit_engine.Translator = Translator  # type: ignore[misc]
+                function.Translator = Translator  # type: ignore[misc]
             ctypes.memset(ctypes.addressof(code.blocks), 0, ctypes.sizeof(code.blocks))
 
         runner._request = requested  # type: ignore[method-assign]

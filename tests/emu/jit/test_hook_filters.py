@@ -16,14 +16,33 @@ from emu.dspic30f.jit.engine import JitEngine
 from toolchain.driver import driver
 
 SOURCE = """
+#include <p30F6014A.h>
 volatile unsigned count; volatile int level; volatile char letter = -3; volatile long wide;
 volatile unsigned long mask = 0xF0000000; int local_too;
+volatile struct { char low; signed int high : 5; unsigned rest : 11; } packed;
+volatile int table[4]; volatile int *pointer = table;
 void __attribute__((noinline)) mark(int local_too)
-{ count++; level = 50 - (int)count + local_too; wide -= 70000; mask |= 16; }
-int main(void) { for (;;) { mark(0); letter++; } }
+{ count++; level = 50 - (int)count; wide -= 70000 + local_too; mask |= 16;
+  packed.high = (int)count; packed.rest = count; table[2]++; }
+void __attribute__((noinline, optimize("O0"))) deep(int argument)
+{ volatile int kept = argument + 1; volatile long far = kept - 70000L;
+  __asm__ volatile("work: nop"); kept = (int)far; }
+int main(void)
+{
+    PR1 = 333; T1CON = 0x8000; U1MODE = 0x8000; U1STA = 0x400;
+    for (;;) { mark((int)count & 3); deep((int)count & 7); letter++; if (U1STAbits.TRMT) U1TXREG = 'a'; }
+}
 """
-CONDITIONS = ("count == 40", "count", "!level", "level < -20", "level >= 45 && count != 2", "3 < count", "letter == -1",
-              "wide < -900000", "mask == 0xF0000010 && count > 30")  # fmt: skip
+GLOBALS = ("count == 40", "count", "!level", "level < -20", "level >= 45 && count != 2", "3 < count", "letter == -1",
+           "wide < -900000", "mask == 0xF0000010 && count > 30", "table[2] == 9", "packed.high == -3",
+           "packed.rest > 20")  # fmt: skip
+AT_MARK = ("W0 == 2", "W15 > 0x800", "W4", "TMR1 < 40", "TMR1 > 300", "U1STA.TRMT", "!U1STAbits.TRMT && TMR1 > 100",
+           "T1CONbits.TON == 1", "SR.Z", "local_too == 3")  # fmt: skip
+AT_WORK = ("kept == 3", "far < -69996", "kept == 8 && count > 9", "table[2] > 3")
+CONDITIONS = [
+    *(("mark", one) for one in (*GLOBALS, *AT_MARK)),
+    *(("work", one) for one in AT_WORK),
+]
 
 
 @pytest.fixture(scope="module")
@@ -41,45 +60,46 @@ def machine_of(image: Path, engine: str) -> emu.Machine:
     return machine
 
 
-def stops(machine: emu.Machine, condition: str) -> tuple[list[int], int]:
-    """Return the cycles of the first stops at `mark` with a condition, and how often Python was called."""
-    address, calls, found = machine.program_address("mark"), 0, []
+def stops(machine: emu.Machine, condition: str, place: str = "mark") -> tuple[list[int], int]:
+    """Return the cycles of the first stops at `place` with a condition, and how often Python was called."""
+    address, calls, found = machine.program_address(place), 0, []
 
     def hook() -> bool:
         nonlocal calls
         calls += 1
-        return bool(number_of(evaluate(machine.inspector, condition)))
+        return bool(number_of(evaluate(machine.inspector, condition, machine.backtrace()[0])))
 
     filter_ = filter_of(machine.inspector, condition, address)
     assert filter_ is not None
     machine.hook_pc(address, hook, filter_)
     for _ in range(5):
-        if machine.run(cycles=2_000).reason == "breakpoint":
+        if machine.run(cycles=4_000).reason == "breakpoint":
             found.append(machine.cycle)
     return found, calls
 
 
-@pytest.mark.parametrize("condition", CONDITIONS)
-def test_the_stops_are_those_of_the_plain_engine(image: Path, condition: str) -> None:
-    expected, arrivals = stops(machine_of(image, "plain"), condition)
+@pytest.mark.parametrize(("place", "condition"), CONDITIONS)
+def test_the_stops_are_those_of_the_plain_engine(image: Path, place: str, condition: str) -> None:
+    expected, arrivals = stops(machine_of(image, "plain"), condition, place)
     assert expected
-    native, calls = stops(machine_of(image, "jit"), condition)
+    native, calls = stops(machine_of(image, "jit"), condition, place)
     assert native == expected
     assert calls <= arrivals
 
 
 def test_native_code_does_not_call_a_hook_whose_filter_is_false(image: Path) -> None:
-    _, calls = stops(machine_of(image, "jit"), "count == 40")
-    _, arrivals = stops(machine_of(image, "plain"), "count == 40")
-    assert calls < arrivals / 4
+    for place, condition in (("mark", "count == 40"), ("mark", "TMR1 > 330"), ("work", "kept == 8")):
+        _, calls = stops(machine_of(image, "jit"), condition, place)
+        _, arrivals = stops(machine_of(image, "plain"), condition, place)
+        assert calls < arrivals / 2
 
 
 @pytest.mark.parametrize(
     "condition",
-    ["local_too == 1", "count + 1 == 2", "level == 0xFFFF", "count == -1", "count == 3u", "TMR1 > 5", "nothing"],
+    ["count + 1 == 2", "level == 0xFFFF", "count == -1", "count == 3u", "nothing", "pointer[1] == 2", "*pointer", "&&"],
 )
 def test_other_conditions_have_no_filter(image: Path, condition: str) -> None:
-    """Locals, arithmetic, comparisons that C converts to unsigned, registers and unknown names are left to Python."""
+    """Arithmetic, comparisons that C converts to unsigned, targets of pointers and unknown names are left to Python."""
     machine = machine_of(image, "jit")
     assert filter_of(machine.inspector, condition, machine.program_address("mark")) is None
 

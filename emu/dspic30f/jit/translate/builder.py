@@ -351,6 +351,7 @@ class LlvmBuilder:
             self._store_static(ea, v, size)
             return
         in_ram, target = self._in_ram(ea, size, ptr), ea
+        self.deferred.ram_stores.append((ea, size))
         if self.reach is not None and ptr != STACK_POINTER and not self.several_stores:
             self.deferred.indirect_store = IndirectStore(ea, v, size, in_ram)
             return
@@ -385,6 +386,7 @@ class LlvmBuilder:
         if address < W_END:
             self._store_w(address >> 1, ea & 1, v, size)
         elif address >= self.layout.ram[0]:
+            self.deferred.ram_stores.append((ea, size))
             self.deferred.stores.append(lambda: self.e.store(pointer(self.e, ea), v, 8 * size))
         else:
             lanes = 0xFFFF if size == 2 else (0xFF00 if ea & 1 else 0x00FF)

@@ -21,6 +21,7 @@ from emu.dspic30f.cycle_log import (
     SLEPT,
 )
 from emu.dspic30f.jit.environment import ACCOUNTING, INTERRUPTS
+from emu.dspic30f.jit.translate.deferred import DeferredEffects
 from emu.dspic30f.jit.translate.values import Emitter, Number, Value, wide
 from emu.dspic30f.state.state import IPL3, IPL_MASK
 
@@ -33,6 +34,10 @@ class CycleCounter:
 
     unsettled: tuple[object, ...] = ()
     """Cycles that an exit would have to add. Exits that add different cycles need different blocks."""
+    splits_repeats = False
+    """Whether block code leaves a REPEAT with stores to exact code, which ends every iteration by itself."""
+    looks_asleep = False
+    """Whether `look` is needed after the start of Idle."""
 
     def begin(self, emitter: Emitter, offset: Mapping[str, int]) -> None:
         """Prepare for the function that `emitter` writes."""
@@ -66,6 +71,21 @@ class CycleCounter:
 
     def take_back_cycle(self, pc: int) -> None:
         """Subtract the third cycle of the RETFIE at `pc`, because an exception may replace it."""
+
+    def begin_instruction(self, pc: int) -> None:
+        """Log, in exact code, that the instruction at `pc` starts."""
+
+    def looks_after(self, effects: DeferredEffects) -> Number:
+        """Return whether `look` is needed after an instruction with these effects."""
+        return 0
+
+    def look(self, site: int, cycle: Number, next_pc: Number) -> str:
+        """Emit a look at the state after the instruction at `site`. Return whether native code must then return."""
+        return "false"
+
+    def definitions(self) -> str:
+        """Return the IR of the functions that the counter calls."""
+        return ""
 
 
 class AccountingCounter(CycleCounter):
@@ -172,6 +192,11 @@ class AccountingCounter(CycleCounter):
 
 class BoundaryCounter:
     """Null counter of native boundaries: emits nothing. `AccountingBoundaryCounter` has the same interface."""
+
+    is_native = True
+    """Whether native code handles boundaries; otherwise it returns to Python for each of them."""
+    returns_after_retfie = False
+    """Whether native code returns after every RETFIE."""
 
     def idle(self, prefix: str, until: str) -> str:
         """Return IR that accounts for the cycles from %cycle to `until` as Idle. `prefix` makes its names unique."""

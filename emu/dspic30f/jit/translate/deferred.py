@@ -28,6 +28,8 @@ class DeferredEffects:
     acc: dict[int, Number] = field(default_factory=dict)
     registers: dict[str, Number] = field(default_factory=dict)
     stores: list[Callable[[], None]] = field(default_factory=list)
+    ram_stores: list[tuple[Number, int]] = field(default_factory=list)
+    """Address and size in bytes of each store that may hit RAM."""
     initialises: int = 0
     psv_reads: list[Value] = field(default_factory=list)
     """For each load, a truth value: whether it read the PSV window."""

@@ -5,13 +5,13 @@ from __future__ import annotations
 from typing import Final
 
 from emu.dspic30f.isa.builder import Context
-from emu.dspic30f.jit.exit_reasons import NEXT
+from emu.dspic30f.jit.exit_reasons import CHANGED, NEXT
 from emu.dspic30f.jit.machine_layout import MachineLayout
 from emu.dspic30f.jit.translate.builder import LlvmBuilder
 from emu.dspic30f.jit.translate.cycle_counters import CycleCounter
 from emu.dspic30f.jit.translate.region import Region
-from emu.dspic30f.jit.translate.values import Emitter, Number, Value, wide
-from emu.dspic30f.jit.translate.variables import MemoryVariables, Variables
+from emu.dspic30f.jit.translate.values import Emitter, Number, Value, truth, wide
+from emu.dspic30f.jit.translate.variables import MemoryVariables, Variables, pointer
 
 
 class FunctionFrame:
@@ -74,6 +74,25 @@ class FunctionFrame:
         """Return whether `cost` cycles from cycle `start` (default: now) end before the deadline."""
         begun = self.v.get("cycle") if start is None else start
         return self.e.let(f"icmp ult i64 {wide(begun + cost)}, %stop", bit=True)
+
+    def look(self, site: int, next_pc: Number, condition: Number) -> None:
+        """Where `condition` holds, let the counter look at the state after the instruction at `site`.
+
+        It may make native code return before the instruction at `next_pc`.
+        """
+        if isinstance(condition, int) and not condition:
+            return
+        e, cycle = self.e, self.v.get("cycle")
+        look, leave, on = (e.fresh(name) for name in ("look", "leave", "on"))
+        e.end(f"br i1 {truth(condition)}, label %{look}, label %{on}")
+        e.start(look)
+        leaves = self.counter.look(site, cycle, next_pc)
+        e.end(f"br i1 {leaves}, label %{leave}, label %{on}")
+        e.start(leave)
+        if self.b.deferred.check_interrupts:
+            e.store(pointer(e, self.layout.offset["events.deadline"]), 0, 64)
+        self.v.leave(next_pc, CHANGED)
+        e.start(on)
 
     def advance(self, cycles: Number, mask: int, times: int = 1) -> None:
         """Advance the clock by the `cycles` of the current instruction, executed `times` times.

@@ -88,7 +88,7 @@ class Translator(FunctionFrame):
         reason = str(MISS) if self.exact else tail.let("load i64, ptr %x.reason").text
         tail.end(f"ret i64 {reason}")
         body = "\n".join(part.text() for part in (head, self.e, tail))
-        return PROLOGUE + body + EPILOGUE
+        return self.counter.definitions() + PROLOGUE + body + EPILOGUE
 
     def _entry_block(self) -> Emitter:
         """Return the first block, which loads the variables and dispatches on PC. It is generated last."""
@@ -175,6 +175,8 @@ class Translator(FunctionFrame):
         e.start(go)
         if start in self.layout.hooks:
             self._stop_for_hook(start)
+        if self.exact:
+            self.counter.begin_instruction(start)
         if start in self._heads:
             e.line(f"store i1 true, ptr %passed.{start:x}")
         written: Number = v.get("stall")
@@ -232,7 +234,7 @@ class Translator(FunctionFrame):
         e, filters = self.e, self.layout.filters.get(pc)
         if filters is not None:
             calls, passes = e.fresh("calls"), e.fresh("passes")
-            e.end(f"br i1 {truth(some_filter_holds(e, filters))}, label %{calls}, label %{passes}")
+            e.end(f"br i1 {truth(some_filter_holds(self, filters, calls))}, label %{calls}, label %{passes}")
             e.start(calls)
         word, seen = e.name(), e.fresh("seen")
         e.line(f"{word} = getelementptr i64, ptr %env, i64 {RESUME}")
@@ -322,7 +324,9 @@ class Translator(FunctionFrame):
             self.counter.level_changed()
         if step.pc == self.layout.do_end:
             self._end_of_loop(step)
-        elif deferred.deadline_moved or deferred.check_interrupts:
+            return True
+        self.look(step.pc, step.next_pc, self.counter.looks_after(deferred))
+        if deferred.deadline_moved or deferred.check_interrupts:
             self._continue_after_effects(step.next_pc)
         else:
             self._leave_after_sfr_write(step.next_pc)
@@ -353,10 +357,11 @@ class Translator(FunctionFrame):
 
         The sequencer handles EDT. At the end of the loop, native code leaves the function.
         """
-        flow = self.layout.flow
+        flow, looks = self.layout.flow, self.counter.looks_after(self.b.deferred)
         self.counter.settle()
 
         def end(again: bool) -> None:
+            self.look(step.pc, self.layout.do_start if again else step.next_pc, looks)
             if again:
                 self._continue_after_effects(self.layout.do_start)
                 return
@@ -429,6 +434,7 @@ class Translator(FunctionFrame):
                 self._go_to(step, target)
             case Call(target):
                 self.counter.called(step.pc, target, self.v.get("W15") - 4, self.v.get("cycle"))
+                self.look(step.pc, target & PC_MASK, self.counter.looks_after(self.b.deferred))
                 self._go_to(step, target)
             case Return():
                 self._return(step, flow)
@@ -490,6 +496,7 @@ class Translator(FunctionFrame):
         e.store(pointer(e, offset["cpu.mode"]), IDLE, 16)
         e.store(pointer(e, offset["cpu.slept"]), self.v.get("cycle") - 1, 64)
         e.store(pointer(e, offset["events.deadline"]), 0, 64)
+        self.look(self.at, next_pc, int(self.counter.looks_asleep))
         e.end(f"br label %{self.exit(next_pc, BOUNDARY_WORK)}")
 
     # -- interrupts -------------------------------------------------------------------------------------------------

@@ -80,6 +80,9 @@ class RepeatTranslator:
     def _whole_loop(self, step: Step, target: Step, count: Number, stall: Number) -> None:
         """Emit code that runs all iterations at once if they end before the deadline."""
         f, e = self._f, self._f.e
+        if f.counter.splits_repeats and target.facts.stores:
+            e.end(f"br label %{f.exit(step.pc, DEADLINE)}")
+            return
         again = int(flow_rules.stall(target.facts.writes, target.facts.source_pointers))
         cycles = target.insn.row.cycles
         total = stall + 1 + cycles * (count + 1) + again * count
@@ -164,6 +167,7 @@ class RepeatTranslator:
         go = e.fresh("go")
         e.end(f"br i1 {early.text}, label %{go}, label %{f.exit(target.pc, BOUNDARY_WORK)}")
         e.start(go)
+        f.counter.begin_instruction(target.pc)
         f.at = target.pc
         stall = flow_rules.stall(f.v.get("stall"), target.facts.source_pointers)
         paths = LlvmRulePaths(e, on_path=f.v.new_block)
@@ -174,9 +178,10 @@ class RepeatTranslator:
         b.repeating = None
         f.advance(target.insn.row.cycles + stall, target.facts.writes | b.deferred.mapped_w)
         f.counter.settle()
-        counting = paths.get(flow.sr) & RA
+        counting, looks = paths.get(flow.sr) & RA, f.counter.looks_after(b.deferred)
 
         def end(again: bool) -> None:
+            f.look(target.pc, target.pc if again else target.next_pc, looks)
             if again:
                 e.end(f"br label %{label}")
             else:

@@ -1,0 +1,186 @@
+"""Log of changes of watched numbers: cycle, place in the program, number and new value of each change.
+
+Input: a connected core and what to watch. Output: entries for a consumer, in order. A change is seen after the
+instruction or at the boundary that makes it. For code that the sequencer runs, this module wraps the sequencer. Native
+code appends to the same memory (jit/translate/change_counter.py). Replayed cycles and diagnosis are not logged.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, Final, Literal, NamedTuple
+
+from emu.dspic30f.core import Core
+from emu.dspic30f.state.state import RUN
+from emu.system.filters import Filter
+
+COUNT, SEEN = 0, 1
+"""Words of the log: number of entries; the last seen values, one word for each watched number. Entries follow."""
+ENTRY_WORDS: Final = 4
+"""Words of an entry: cycle; program address after the change and, in the upper half, of its instruction; index of the
+watched number; value."""
+ROOM: Final = 1024
+"""Number of entries after which native code returns, so that the consumer is called."""
+ONE_INSTRUMENT: Final = "one instrument at a time: a profile, coverage, watched numbers or a trace"
+BOUNDARY: Final = 0xFFFFFF
+"""Address of the instruction for a change that a boundary makes, for example by the entry of an interrupt."""
+
+
+@dataclass(frozen=True, slots=True)
+class WatchedNumber:
+    """An unsigned number in RAM: `size` bytes (1, 2, 4 or 8) at `address`.
+
+    With `offset`, the number lies `offset` bytes after the place to which the pointer at `address` points. It is 0 for
+    a null pointer, and outside RAM.
+    """
+
+    address: int
+    size: int
+    offset: int | None = None
+
+
+Watched = WatchedNumber | Literal["ipl", "asleep"]
+"""A number in RAM, the CPU's priority, or 1 while the CPU sleeps."""
+
+
+class Change(NamedTuple):
+    """A logged change. `pc` is the next instruction, `site` the one that made the change, or BOUNDARY."""
+
+    cycle: int
+    """Cycle in which the next instruction starts, in Tcy."""
+    pc: int
+    site: int
+    number: int
+    """Index of the watched number."""
+    value: int
+
+
+class ChangeLog:
+    """Logs the changes of `watched` between `start` and `stop` to `consumer`, which receives lists of changes.
+
+    `leaves` says when native code returns so that the consumer sees a change at once: None means only for a full log,
+    () at each change, a filter at changes after which it holds. Its comparisons may name fixed RAM addresses only.
+    """
+
+    def __init__(
+        self,
+        core: Core,
+        watched: Sequence[Watched],
+        consumer: Callable[[list[Change]], object],
+        leaves: Filter | None = None,
+    ) -> None:
+        self._core: Final = core
+        self.watched: Final = tuple(watched)
+        self.leaves: Final = leaves
+        self._consumer: Final = consumer
+        self.first: Final = SEEN + len(self.watched)
+        """Word of the first entry."""
+        self._words: Final = (ctypes.c_uint64 * (self.first + ENTRY_WORDS * (ROOM + 2 * len(self.watched))))()
+        self.address: Final = ctypes.addressof(self._words)
+        """Host address of the log."""
+        self._getters: Final = [_getter(core, one) for one in self.watched]
+        self._undo: Final[list[Callable[[], None]]] = []
+        self._is_stale = True
+        """Whether unlogged cycles have passed since the values were seen."""
+
+    def start(self) -> None:
+        """Start to log what the sequencer does."""
+        sequencer = self._core.sequencer
+        if "execute" in vars(sequencer):
+            raise ValueError(ONE_INSTRUMENT)
+        self.before_run()
+        for name, wrapper in (
+            ("execute", self._after_instruction), ("boundary", self._after_boundary),
+            ("after_retfie", self._after_instruction),
+        ):  # fmt: skip
+            vars(sequencer)[name] = wrapper(getattr(sequencer, name))
+            self._undo.append(partial(delattr, sequencer, name))
+
+    def stop(self) -> None:
+        """Restore the sequencer and deliver the remaining changes."""
+        while self._undo:
+            self._undo.pop()()
+        self.after_run()
+
+    def before_run(self) -> None:
+        """Prepare for a run of native code: forget what happened in cycles that are not logged."""
+        if self._core.events.quiet:
+            self._is_stale = True
+        elif self._is_stale:
+            self._is_stale = False
+            for index, get in enumerate(self._getters):
+                self._words[SEEN + index] = get()
+
+    def after_run(self) -> None:
+        """Pass the entries to the consumer and empty the log."""
+        count = self._words[COUNT]
+        if not count:
+            return
+        self._words[COUNT] = 0
+        if self._is_stale:
+            return
+        end = self.first + ENTRY_WORDS * count
+        rows = zip(*(self._words[self.first + word : end : ENTRY_WORDS] for word in range(ENTRY_WORDS)), strict=True)
+        self._consumer([Change(cycle, where & 0xFFFFFFFF, where >> 32, index, value)
+                        for cycle, where, index, value in rows])  # fmt: skip
+
+    def _after_instruction(self, execute: Callable[[], None]) -> Callable[[], None]:
+        state = self._core.state
+
+        def watched() -> None:
+            site = state.pc
+            self.before_run()
+            try:
+                execute()
+            finally:
+                self._look(site)
+
+        return watched
+
+    def _after_boundary(self, boundary: Callable[[int], bool]) -> Callable[[int], bool]:
+        def watched(limit: int) -> bool:
+            self.before_run()
+            try:
+                return boundary(limit)
+            finally:
+                self._look(BOUNDARY)
+
+        return watched
+
+    def _look(self, site: int) -> None:
+        """Log the numbers that have changed, and deliver them."""
+        if self._is_stale:
+            return
+        words, state = self._words, self._core.state
+        for index, get in enumerate(self._getters):
+            value = get()
+            if value != words[SEEN + index]:
+                words[SEEN + index] = value
+                entry = self.first + ENTRY_WORDS * words[COUNT]
+                words[entry : entry + ENTRY_WORDS] = [state.cycle, site << 32 | state.pc, index, value]
+                words[COUNT] += 1
+        if words[COUNT]:
+            self.after_run()
+
+
+def _getter(core: Core, one: Watched) -> Callable[[], Any]:
+    """Return the function that reads a watched number."""
+    state, record, ram = core.state, core.record, core.chip.data["ram"]
+    if one == "ipl":
+        return lambda: state.ipl
+    if one == "asleep":
+        return lambda: int(state.mode != RUN)
+    data, address, size, offset = record.bytes, one.address, one.size, one.offset
+    if offset is None:
+        return lambda: int.from_bytes(data[address : address + size], "little")
+
+    def pointed() -> int:
+        block = record.u16[address >> 1]
+        place = block + offset & 0xFFFF
+        inside = block and ram.start <= place <= ram.end - size
+        return int.from_bytes(data[place : place + size], "little") if inside else 0
+
+    return pointed
