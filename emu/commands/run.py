@@ -27,6 +27,7 @@ from emu.run.uart_backends import SPECIFICATIONS, ConsolePort, open_port
 if TYPE_CHECKING:
     from emu.api import Machine
     from emu.dspic30f.isa.row import Insn
+    from emu.instruments.trace import Tracer
     from emu.instruments.vcd import WaveformRecorder
     from emu.machine.stops import Stop
 
@@ -69,7 +70,7 @@ def parser() -> Parser:
     made.add_argument(
         "--trace",
         metavar="FILE",
-        help="write cycle, PC, disassembly and changed registers (slow; -: stdout, UART1 is silent then)",
+        help="write cycle, PC, disassembly and changed registers (-: stdout, UART1 is silent then)",
     )
     made.add_argument("--vcd", metavar="FILE", help="write pins and UART bytes as a waveform (GTKWave)")
     made.add_argument(
@@ -77,7 +78,7 @@ def parser() -> Parser:
         metavar="LIST",
         type=lambda text: [name.strip() for name in text.split(",") if name.strip()],
         default=[],
-        help="add ipl, asleep, thread and variables to the waveform (slow)",
+        help="add ipl, asleep, thread and variables to the waveform; a register is slow",
     )
     made.add_argument("--json", action="store_true", help="print one JSON object instead of text; UARTs go into it")
     made.add_argument("--exit-code", action="store_true", help="use the firmware's status as the exit status")
@@ -205,9 +206,11 @@ def _run_session(
 
 def _instruments(options: argparse.Namespace, machine: Machine, image: Image, stack: ExitStack) -> Any:
     """Open trace and waveform files in `stack`. Return the function that runs the machine; None without instruments."""
-    advance = None
+    advance: Any = None
     if options.trace:
-        advance = _tracer(machine, image, stack.enter_context(atomic_text_file(options.trace)))
+        tracer = _tracer(machine, image, stack.enter_context(atomic_text_file(options.trace)))
+        stack.callback(tracer.close)
+        advance = tracer.advance
     if options.vcd:
         waveforms = _waveforms(options, machine, stack.enter_context(atomic_text_file(options.vcd)), advance)
         stack.callback(waveforms.close)
@@ -375,17 +378,20 @@ def _limit(options: argparse.Namespace, machine: Machine) -> int:
     return FOREVER
 
 
-def _tracer(machine: Machine, image: Image, stream: TextIO) -> Any:
+def _tracer(machine: Machine, image: Image, stream: TextIO) -> Tracer:
     from emu.instruments.trace import Tracer
 
-    return Tracer(machine, image, stream).advance
+    try:
+        return Tracer(machine, image, stream)
+    except ValueError as error:
+        raise CommandError(str(error)) from None
 
 
 def _waveforms(options: argparse.Namespace, machine: Machine, stream: TextIO, advance: Any) -> WaveformRecorder:
     from emu.instruments.vcd import WaveformRecorder
 
     if advance is not None and options.vcd_watch:
-        raise CommandError("--vcd-watch and --trace both step the machine; give one")
+        raise CommandError("--vcd-watch and --trace: give one of them")
     try:
         return WaveformRecorder(machine, stream, options.vcd_watch, advance)
     except ValueError as error:
