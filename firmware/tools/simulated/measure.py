@@ -1,6 +1,6 @@
-"""Measure the kernel on Kilobot and e-puck2: cycles or instructions of operations, bytes of objects.
+"""Measure the kernel on Kilobot, e-puck2 and QEMU's RISC-V: cycles or instructions of operations, bytes of objects.
 
-    python -m firmware.tools.simulated.measure kilobot|epuck2 [--json]
+    python -m firmware.tools.simulated.measure kilobot|epuck2|qemu_virt [--json]
 
 Runs the applications `latency` and `footprint` as they are: scenarios and loads are written into the image from
 outside, and counted between symbols.
@@ -17,14 +17,16 @@ import sys
 import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
 from elftools.elf.elffile import ELFFile
 
-from firmware.tools.simulated.epuck2 import Epuck2
 from firmware.tools.simulated.kilobot import Kilobot
 from firmware.tools.simulated.machine import Machine, NotInstalled, Stopped, Symbols, peek_words, pointer, poke_words
+from firmware.tools.simulated.qemu import EPUCK2, QEMU_VIRT, Qemu
 
 FIRMWARE = Path(__file__).resolve().parents[2]
 FIELDS = ("threads", "yielders", "subscribers", "waiters", "events", "payload", "sender")
@@ -73,7 +75,10 @@ def limit(robot: Robot, name: str) -> int:
 ROBOTS = {
     "kilobot": Robot("kilobot", "avr", "cycles", Kilobot, lambda _: 14 * 4, b"\0\0", 3, 4, "-DSYS_HEAP=1000"),
     "epuck2": Robot(
-        "epuck2", "cortex_m", "instructions", Epuck2, lambda symbols: symbols["PendSV_Handler"], b"\0\xbf", 2, 0
+        "epuck2", "cortex_m", "instructions", partial(Qemu, EPUCK2), itemgetter("PendSV_Handler"), b"\0\xbf", 2, 0
+    ),
+    "qemu_virt": Robot(
+        "qemu_virt", "riscv", "instructions", partial(Qemu, QEMU_VIRT), itemgetter("slice_interrupt"), b"\1\0", 2, 0
     ),
 }
 

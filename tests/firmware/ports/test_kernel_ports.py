@@ -1,4 +1,4 @@
-"""The kernel on an ATmega328P in simavr and on a Cortex-M4 in QEMU; the conformance suite on every target."""
+"""The kernel on an ATmega328P in simavr, a Cortex-M4 and a RISC-V in QEMU; the conformance suite on every target."""
 
 from __future__ import annotations
 
@@ -11,55 +11,24 @@ from pathlib import Path
 import pytest
 
 import emu
-from firmware.tools.simulated import epuck2
-from firmware.tools.simulated.kilobot import HZ, Kilobot
-from firmware.tools.simulated.machine import NotInstalled, Stopped, pointer, poke_words
+from firmware.tools.simulated.kilobot import HZ
+from firmware.tools.simulated.machine import pointer, poke_words
 from firmware.tools.simulated.measure import sizes
 from tests.cases import check_all
 from tests.firmware.conftest import FIRMWARE, TARGET_APPS, Build, run_make
 from tests.firmware.kernel.test_kernel_on_target import run_to
+from tests.firmware.ports.targets import BOARDS, kilobot, make, said_by_kilobot, said_in_qemu
 from tests.fuzz.seeds import base_seed
 from tests.watchdog import HANG
 
 CONFORMS = re.compile(rb"conforms: (\d+) checks")
-CHECKS, CHECKS_OF_OPTIONS = 283, 543
+CHECKS, CHECKS_OF_OPTIONS = 283, 545
 """Number of checks of the conformance suite and of its options part.
 
 The numbers reveal checks that are not reached.
 """
 OPTIONS = "DEFINES=-DSUITE_OF_OPTIONS"
 """Make variable that builds the second image, the options part of the suite."""
-
-
-def make(target: str, app: str, out: Path, *words: str, apps: Path | None = None) -> Path:
-    """Build an image for another robot; skip the test if a Debian package is missing."""
-    folder = [f"APPS={os.path.relpath(apps, FIRMWARE)}"] if apps else []
-    command = ["make", "-s", "-C", str(FIRMWARE), f"TARGET={target}", f"APP={app}", f"OUT={out}", *folder, *words]
-    done = subprocess.run(command, capture_output=True, text=True, check=False, env={**os.environ, "MAKEFLAGS": ""})
-    if "is not installed" in done.stderr:
-        pytest.skip(done.stderr.strip())
-    assert done.returncode == 0, done.stdout + done.stderr
-    return out / "firmware.elf"
-
-
-def kilobot(image: Path) -> Kilobot:
-    try:
-        return Kilobot(image)
-    except NotInstalled as missing:
-        pytest.skip(str(missing))
-
-
-def said_by_kilobot(image: Path, seconds: float) -> bytes:
-    machine = kilobot(image)
-    machine.run(int(seconds * HZ))
-    return machine.uart()
-
-
-def said_by_epuck2(image: Path, text: bytes) -> bytes:
-    try:
-        return epuck2.run_until(image, text)
-    except NotInstalled as missing:
-        pytest.skip(str(missing))
 
 
 # ---- Conformance suite ----------------------------------------------------------------------------------------------
@@ -90,7 +59,7 @@ def test_a_host_conforms(target: str, words: tuple[str, ...], checks: int, tmp_p
 NEARLY_ROUND = (("now_ms", 0xFE00), ("newest_pid", 0xFF00))
 """Kernel variables with values that wrap after half a second and after 256 threads."""
 WRAPS, DEADLINES = "clock and PIDs wrap", "earliest deadline first"
-ROBOTS = ("epuck", "kilobot", "epuck2")
+ROBOTS = ("epuck", "kilobot", *BOARDS)
 
 
 def conditions(robot: str, *more: str) -> list[str]:
@@ -148,14 +117,15 @@ def test_the_kilobot_conforms(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_the_epuck2_conforms(tmp_path: Path) -> None:
-    """The Cortex-M4 passes the conformance suite with FPU and MPU enabled."""
+@pytest.mark.parametrize("target", BOARDS)
+def test_a_cpu_in_qemu_conforms(target: str, tmp_path: Path) -> None:
+    """The Cortex-M4, with FPU and MPU enabled, and the RISC-V pass the conformance suite."""
 
     def check(condition: str) -> None:
-        image = make("epuck2", "conformance", tmp_path, *words_of(condition), apps=TARGET_APPS)
-        check_conforms(said_by_epuck2(image, b" checks"))
+        image = make(target, "conformance", tmp_path, *words_of(condition), apps=TARGET_APPS)
+        check_conforms(said_in_qemu(target, image, b" checks"))
 
-    check_all(check, conditions("epuck2"))
+    check_all(check, conditions(target))
 
 
 @pytest.mark.slow
@@ -170,9 +140,10 @@ def test_the_options_of_the_kilobot_conform(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_the_options_of_the_epuck2_conform(tmp_path: Path) -> None:
-    image = make("epuck2", "conformance", tmp_path, OPTIONS, apps=TARGET_APPS)
-    check_conforms(said_by_epuck2(image, b" checks"), CHECKS_OF_OPTIONS)
+@pytest.mark.parametrize("target", BOARDS)
+def test_the_options_of_a_cpu_in_qemu_conform(target: str, tmp_path: Path) -> None:
+    image = make(target, "conformance", tmp_path, OPTIONS, apps=TARGET_APPS)
+    check_conforms(said_in_qemu(target, image, b" checks"), CHECKS_OF_OPTIONS)
 
 
 # ---- Listing 1 and stress -------------------------------------------------------------------------------------------
@@ -185,9 +156,10 @@ def test_listing_1_logs_on_the_kilobot(tmp_path: Path) -> None:
     assert said_by_kilobot(make("kilobot", "listing1", tmp_path), 2.0) == LINES
 
 
-def test_listing_1_logs_on_the_epuck2(tmp_path: Path) -> None:
-    image = make("epuck2", "listing1", tmp_path)
-    assert said_by_epuck2(image, rb"1750:\(0,0\)\r\n").startswith(LINES)
+@pytest.mark.parametrize("target", BOARDS)
+def test_listing_1_logs_in_qemu(target: str, tmp_path: Path) -> None:
+    image = make(target, "listing1", tmp_path)
+    assert said_in_qemu(target, image, rb"1750:\(0,0\)\r\n").startswith(LINES)
 
 
 def check_stress(said: bytes, reports: int) -> None:
@@ -207,124 +179,10 @@ def test_stress_on_the_kilobot(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_stress_on_the_epuck2(tmp_path: Path) -> None:
-    """The stress application runs 20 s of random actions on the e-puck2."""
-    check_stress(said_by_epuck2(make("epuck2", "stress", tmp_path), rb"\n2\d{4} ms"), 17)
-
-
-# ---- Stack limits ---------------------------------------------------------------------------------------------------
-
-OVERFLOW = r"""
-#include <openswarm.h>
-#include <openswarm_io.h>
-static volatile uint16 depth;
-static uint16 recurse(uint16 n)
-{
-    volatile uint8 room[16];
-    room[0] = (uint8)n;
-    if (n == SYS_DEFAULT_STACK / 16) {
-        Sys_Sleep(5);
-        return depth;
-    }
-    return (uint16)(recurse((uint16)(n + 1u)) + room[0] + depth);
-}
-static void greedy(void) { Sys_Sleep(20); depth = recurse(0); }
-static void modest(void) { for (;;) { Sys_Sleep(100); Sys_Write_UART1("on\n", 3); } }
-int main(void)
-{
-    Sys_Init_Kernel();
-    Sys_Start_Process(modest);
-    Sys_Start_Process(greedy);
-    Sys_Start_Kernel();
-    Sys_Run_SystemThread();
-    return 0;
-}
-"""
-
-
-@pytest.fixture
-def overflowing(tmp_path: Path) -> Path:
-    """Return a folder of applications, one of which has a second thread that overflows its stack."""
-    (tmp_path / "overflowing").mkdir()
-    (tmp_path / "overflowing" / "main.c").write_text(OVERFLOW)
-    return tmp_path
-
-
-DROPS = "DEFINES=-DSYS_ON_OVERFLOW=SYS_DROP_THREAD"
-"""Make variable by which a stack overflow ends only its thread."""
-
-
-@pytest.mark.parametrize(
-    ("words", "reported"), [((), b"stack trap at 0x0:0 in thread 2"), ((DROPS,), b"overflow: thread 2")]
-)
-def test_the_epuck2_stops_at_a_stack_overflow_or_drops_the_thread(
-    overflowing: Path, words: tuple[str, ...], reported: bytes
-) -> None:
-    """The MPU of the e-puck2 stops a thread that overflows: the end of the system, or of the thread.
-
-    Source: port/cortex_m/README.md.
-    """
-    image = make("epuck2", "overflowing", overflowing / "out", *words, apps=overflowing)
-    said = said_by_epuck2(image, rb"(on\n){3}" if words else rb"thread 2\r\n")
-    assert reported + b"\r\n" in said
-    assert words or b"on\n" not in said
-
-
-def test_the_kilobot_stops_when_a_stack_has_overflown(overflowing: Path) -> None:
-    """On the Kilobot the next switch detects a stack overflow and stops the system (port/avr/README.md).
-
-    Nothing stops the thread itself. Here unused memory lies below the stack; another thread there would have been
-    damaged.
-    """
-    machine = kilobot(make("kilobot", "overflowing", overflowing / "out", apps=overflowing))
-    with pytest.raises(Stopped):
-        machine.run(HZ)
-    assert machine.uart().startswith(b"stack trap at 0x0:0 in thread 2")
-
-
-IN_A_HANDLER = r"""
-#include <openswarm.h>
-static volatile uint8 sum;
-static bool handler(uint16 pid, uint16 event, sys_event_data *data)
-{
-    volatile uint8 room[BYTES];
-    (void)pid, (void)event;
-    for (uint16 i = BYTES; data->value == 25 && i-- != 0;) {
-        room[i] = (uint8)i;
-        sum += room[i];
-    }
-    return true;
-}
-int main(void)
-{
-    Sys_Init_Kernel();
-    Sys_Subscribe_to_Event(SYS_1ms_TIMER, 0, handler, NULL);
-    Sys_Start_Kernel();
-    Sys_Run_SystemThread();
-    return 0;
-}
-"""
-
-
-@pytest.mark.parametrize("target", ["kilobot", "epuck2"])
-def test_an_overflow_of_the_kernel_stack_stops_the_system(target: str, tmp_path: Path) -> None:
-    """An overflow of the kernel stack stops the system: by the MPU at once, on the AVR after the handlers.
-
-    The AVR detects it by the fill pattern in the last byte of the stack, which requires that the kernel's variables
-    below survive. The handler therefore leaves the last bytes of the stack to the tick that interrupts it
-    (port/avr/README.md).
-    """
-    (tmp_path / "handler").mkdir()
-    (tmp_path / "handler" / "main.c").write_text(IN_A_HANDLER)
-    bytes_of = {"kilobot": "(SYS_KERNEL_STACK-28)", "epuck2": "SYS_KERNEL_STACK"}
-    image = make(target, "handler", tmp_path / "out", f"DEFINES=-DBYTES='{bytes_of[target]}'", apps=tmp_path)
-    if target == "epuck2":
-        assert said_by_epuck2(image, rb" in thread \d+\r\n").startswith(b"stack trap at 0x")
-    else:
-        machine = kilobot(image)
-        with pytest.raises(Stopped):
-            machine.run(HZ)
-        assert machine.uart().startswith(b"stack trap at 0x0:0 in thread ")
+@pytest.mark.parametrize("target", BOARDS)
+def test_stress_in_qemu(target: str, tmp_path: Path) -> None:
+    """The stress application runs 20 s of random actions on the Cortex-M4 and the RISC-V."""
+    check_stress(said_in_qemu(target, make(target, "stress", tmp_path), rb"\n2\d{4} ms"), 17)
 
 
 # ---- Size ---------------------------------------------------------------------------------------------------------
@@ -362,7 +220,12 @@ def test_seven_threads_of_128_bytes_run_on_the_kilobot(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("port", "packages"), [("avr", "gcc-avr avr-libc"), ("cortex_m", "gcc-arm-none-eabi libnewlib-arm-none-eabi")]
+    ("port", "packages"),
+    [
+        ("avr", "gcc-avr avr-libc"),
+        ("cortex_m", "gcc-arm-none-eabi libnewlib-arm-none-eabi"),
+        ("riscv", "gcc-riscv64-unknown-elf picolibc-riscv64-unknown-elf"),
+    ],
 )
 def test_a_missing_compiler_is_named_with_its_packages(port: str, packages: str, tmp_path: Path) -> None:
     """A missing compiler ends the build with exit status 2 and one line that names its packages."""

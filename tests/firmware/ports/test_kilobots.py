@@ -17,7 +17,7 @@ from firmware.tools.simulated.machine import NotInstalled, peek, peek_words
 from tests.cases import check_all
 from tests.firmware.conftest import FIRMWARE, TARGET_APPS
 from tests.firmware.ports.emulated_kilobots import EmulatedKilobots
-from tests.firmware.ports.test_kernel_ports import make
+from tests.firmware.ports.targets import make
 
 MESSAGE, EVENT = 1, 2
 """Values of the firmware variable `wanted` (target/pulses): send a message, send an event."""

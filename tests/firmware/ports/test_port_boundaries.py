@@ -1,11 +1,11 @@
-"""Interrupts at every instruction of every kernel call on the AVR and Cortex-M ports: target/boundaries.
+"""Interrupts at every instruction of every kernel call on AVR, Cortex-M and RISC-V: target/boundaries.
 
 The test runs a sample. `python -m tests.firmware.ports.test_port_boundaries` visits all boundaries of the Kilobot, or
 with --robot epuck2 those of the e-puck2.
 
 In simavr a boundary is an instruction of the round, at which the harness sets the interrupt flag. In QEMU a boundary
-is the n-th execution of an instruction address. The CPU stops there at a breakpoint and executes one store to the
-NVIC or the SCB while interrupts are masked and the clock is stopped.
+is the n-th execution of an instruction address. The CPU stops there at a breakpoint and executes one store to a
+device while interrupts are masked and the clock is stopped.
 """
 
 from __future__ import annotations
@@ -16,20 +16,39 @@ import subprocess
 import sys
 import tempfile
 from contextlib import closing
+from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 
-from firmware.tools.simulated.epuck2 import Epuck2
 from firmware.tools.simulated.kilobot import Kilobot
-from firmware.tools.simulated.machine import Machine, NotInstalled, Stopped, peek
+from firmware.tools.simulated.machine import Machine, Stopped, peek
 from tests.firmware.conftest import TARGET_APPS
-from tests.firmware.ports.test_kernel_ports import kilobot, make
+from tests.firmware.ports.targets import in_qemu, kilobot, make
 
-EXTI0, PENDSV = (0xE000E200, 1 << 6), (0xE000ED04, 1 << 28)
-"""(address, value) of the stores that request the interrupts: NVIC_ISPR0 and SCB_ICSR.
+Store = tuple[int, int]
+"""Address and value."""
 
-Source: ARMv7-M architecture reference manual, B3.
+
+@dataclass(frozen=True)
+class Injection:
+    """How a CPU in QEMU is interrupted."""
+
+    binutils: str
+    """Prefix of the programs that read its images."""
+    device: Store
+    """Requests the device interrupt of target/boundaries."""
+    slice: Store
+    """Requests the end of the slice."""
+
+
+INJECTIONS = {
+    "epuck2": Injection("arm-none-eabi-", (0xE000E200, 1 << 6), (0xE000ED04, 1 << 28)),
+    "qemu_virt": Injection("riscv64-unknown-elf-", (0x00101008, 0), (0x02000000, 1)),
+}
+"""Cortex-M: NVIC_ISPR0 and SCB_ICSR. RISC-V: the alarm of QEMU's goldfish_rtc, and msip.
+
+Source: ARMv7-M architecture reference manual, B3; QEMU 7.2, hw/rtc/goldfish_rtc.c, hw/intc/riscv_aclint.c.
 """
 KERNEL_CODE = re.compile(r"/openswarm/(kernel|option|port)/")
 INT0, SLICE = 1, 14
@@ -89,24 +108,28 @@ def test_the_kilobot_is_interrupted_everywhere(tmp_path: Path) -> None:
         assert sweep(kilobot(image), way, PRIME) > 50
 
 
-def kernel_instructions(image: Path) -> list[int]:
+def kernel_instructions(target: str, image: Path) -> list[int]:
     """Return the addresses of all instructions of kernel, options and port."""
-    symbols = subprocess.run(["arm-none-eabi-nm", "-l", "-S", image], capture_output=True, text=True, check=True).stdout
-    rows = (line.split() for line in symbols.splitlines() if KERNEL_CODE.search(line))
+
+    def output(program: str, *words: str) -> str:
+        command = [INJECTIONS[target].binutils + program, *words, image]
+        return subprocess.run(command, capture_output=True, text=True, check=True).stdout
+
+    rows = (line.split() for line in output("nm", "-l", "-S").splitlines() if KERNEL_CODE.search(line))
     spans = [(int(row[0], 16), int(row[1], 16)) for row in rows if len(row) == 5 and row[2] in "tT"]
-    code = subprocess.run(["arm-none-eabi-objdump", "-d", image], capture_output=True, text=True, check=True).stdout
-    places = (int(match[1], 16) for match in re.finditer(r"^ *([0-9a-f]+):\t(?!.*\t\.(?:word|short|byte))", code, re.M))
+    code = re.finditer(r"^ *([0-9a-f]+):\t(?!.*\t\.(?:word|short|byte))", output("objdump", "-d"), re.M)
+    places = (int(match[1], 16) for match in code)
     return sorted(at for at in places if any(start <= at < start + size for start, size in spans))
 
 
-def sweep_epuck2(image: Path, way: str, stride: int, phase: int, times: int) -> int:
+def sweep_in_qemu(target: str, image: Path, way: str, stride: int, phase: int, times: int) -> int:
     """Inject one interrupt per round at the times-th execution of every stride-th kernel instruction.
 
     Return the number of injected interrupts; an instruction that executes less often gets none.
     """
-    places = kernel_instructions(image)[phase::stride]
+    places = kernel_instructions(target, image)[phase::stride]
     tried = 0
-    with closing(Epuck2(image)) as machine:
+    with closing(in_qemu(target, image)) as machine:
         end, idle = machine.symbols["round_end"], machine.symbols.span("hal_idle")
         for number, place in enumerate(places):
             machine.run_to("round_begin")
@@ -117,12 +140,12 @@ def sweep_epuck2(image: Path, way: str, stride: int, phase: int, times: int) -> 
                 continue
             before = peek(machine, "interrupts")
             if way != "device":
-                machine.store(*PENDSV)
+                machine.store(*INJECTIONS[target].slice)
             for _ in range(number * 7 % 45 if way == "nested" else 0):
                 if machine.pc not in idle:  # WFI would not end while the clock is stopped
                     machine.step()
             if way != "slice":
-                machine.store(*EXTI0)
+                machine.store(*INJECTIONS[target].device)
             where = f"{way}, {place:#x} the {times}. time"
             try:
                 machine.run_to("round_begin")
@@ -135,25 +158,23 @@ def sweep_epuck2(image: Path, way: str, stride: int, phase: int, times: int) -> 
 
 
 @pytest.mark.slow
-def test_the_epuck2_is_interrupted_everywhere(tmp_path: Path) -> None:
-    """Interrupts at every 97th kernel instruction lose nothing on the e-puck2.
+@pytest.mark.parametrize("target", INJECTIONS)
+def test_a_cpu_in_qemu_is_interrupted_everywhere(target: str, tmp_path: Path) -> None:
+    """Interrupts at every 97th kernel instruction lose nothing on the e-puck2 and on QEMU's RISC-V.
 
     They include instructions within IT blocks and under every mask.
     """
-    image = make("epuck2", "boundaries", tmp_path, apps=TARGET_APPS)
-    try:
-        for way in WAYS:
-            assert sweep_epuck2(image, way, PRIME, 13 * WAYS.index(way), 1) > 10
-    except NotInstalled as missing:
-        pytest.skip(str(missing))
+    image = make(target, "boundaries", tmp_path, apps=TARGET_APPS)
+    for way in WAYS:
+        assert sweep_in_qemu(target, image, way, PRIME, 13 * WAYS.index(way), 1) > 10
 
 
 def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m tests.firmware.ports.test_port_boundaries", description=__doc__)
-    parser.add_argument("--robot", choices=("kilobot", "epuck2"), default="kilobot")
+    parser.add_argument("--robot", choices=("kilobot", *INJECTIONS), default="kilobot")
     parser.add_argument("--stride", type=int, default=1, help="boundaries from one to the next (default 1: all)")
-    parser.add_argument("--phase", type=int, default=0, help="of the e-puck2: the first of them (default 0)")
-    parser.add_argument("--times", type=int, default=1, help="of the e-puck2: which time an instruction is come to")
+    parser.add_argument("--phase", type=int, default=0, help="in QEMU: the first of them (default 0)")
+    parser.add_argument("--times", type=int, default=1, help="in QEMU: which time an instruction is come to")
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         try:
@@ -165,7 +186,7 @@ def main() -> int:
             if options.robot == "kilobot":
                 tried = sweep(Kilobot(image), way, options.stride)
             else:
-                tried = sweep_epuck2(image, way, options.stride, options.phase, options.times)
+                tried = sweep_in_qemu(options.robot, image, way, options.stride, options.phase, options.times)
             print(f"{way}: {tried:,} boundaries, nothing lost", flush=True)
     return 0
 

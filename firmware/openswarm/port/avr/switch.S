@@ -15,6 +15,7 @@
 #define DUE 1
 #define KERNEL 2
 #define OVER 3
+#define FORCED 4
 #define PCB_STATUS 8                    /* offsets in sys_pcb (0: sp, 2: limit) and bits, checked by cpu.c */
 #define STATUS_READY 1
 #define PAINT 0xA5
@@ -88,6 +89,7 @@ cpu_open:
 ; The library's own prologue and epilogue of functions (-mcall-prologues) push and pop r2-r17, r28 and r29: Z = where the first
 ; continues with Y = SP, r30 = bytes that the second frees above Y.
 leave_thread:
+        cbi     GPIOR0, FORCED          ; the request is served: else a superfluous one would come again for ever
         movw    r22, r30
         ldi     r26, 0
         ldi     r27, 0

@@ -37,6 +37,8 @@ PendSV_Handler:
         ldr     r3, =cpu_pick
         ldr     r1, [r3]
         cbnz    r1, picked
+        ldr     r3, =cpu_forced         @ the request is served: else a superfluous one would come again for ever
+        strb    r1, [r3]
         mov     r0, r2
         bl      os_slice_end
 resume: ldr     r1, [r0, #PCB_LIMIT]

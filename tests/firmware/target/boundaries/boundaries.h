@@ -4,7 +4,7 @@
 
 #include <openswarm.h>
 
-/* Per CPU (avr/, cortex_m/): the device interrupt that the harness requests calls boundaries_isr(). */
+/* Per CPU (avr/, cortex_m/, riscv/): the device interrupt that the harness requests calls boundaries_isr(). */
 void inject_init(void);
 void boundaries_isr(void);
 

@@ -6,7 +6,7 @@
 enum { EXTI0 = 6, VECTORS = 16 + 82, DEVICE = 0x50 };
 #define SCB_VTOR REGISTER(0xE000ED08)
 
-/* The harness executes only the first instruction (firmware/tools/simulated/epuck2.py). */
+/* The harness executes only the first instruction (firmware/tools/simulated/qemu.py). */
 __attribute__((naked, noinline)) static void inject_store(volatile uint32_t *address, uint32_t value)
 {
     (void)address, (void)value;

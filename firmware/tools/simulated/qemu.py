@@ -1,9 +1,9 @@
-"""An e-puck2's Cortex-M4 in QEMU, driven through the gdb stub; `now` counts instructions that were stepped.
+"""An e-puck2's Cortex-M4 or a RISC-V in QEMU, driven through the gdb stub; `now` counts instructions that were stepped.
 
-The machine is netduinoplus2 (STM32F405), the nearest that Debian's QEMU has: the same core and UART. Its clock is fixed
-by `-icount shift=2`: an instruction takes 4 ns, and the same run comes out the same. A run for its text has
-`sleep=off`, so that sleeping takes no time of the host; under the gdb stub that would let the clock run on while the
-CPU is looked at.
+The e-puck2's machine is netduinoplus2 (STM32F405), the nearest that Debian's QEMU has: the same core and UART. The
+clock is fixed by `-icount`: an instruction takes a constant time, and the same run comes out the same. A run for its
+text has `sleep=off`, so that sleeping takes no time of the host; under the gdb stub that would let the clock run on
+while the CPU is looked at.
 """
 
 from __future__ import annotations
@@ -16,33 +16,68 @@ import socket
 import subprocess
 import tempfile
 import time
+from dataclasses import dataclass
 from pathlib import Path
 
 from firmware.tools.simulated.machine import NotInstalled, Stopped, Symbols
 
-QEMU = "qemu-system-arm"
 PATIENCE = 60.0
 """Host time limit of one run in seconds."""
-_PC, _LR, _XPSR = 15, 14, 25
-_IT_STATE = 0x0600FC00
 
 
-def command(image: Path, serial: str, sleep: str = "off") -> list[str]:
-    """Return QEMU's command line; `serial` receives the e-puck2's UART. Raises NotInstalled."""
-    if shutil.which(QEMU) is None:
-        raise NotInstalled(f"{QEMU} is not installed; Debian package: qemu-system-arm")
-    machine = [QEMU, "-M", "netduinoplus2", "-kernel", str(image), "-display", "none", "-monitor", "none"]
-    lines = ["-serial", "null", "-serial", "null", "-serial", serial]  # the third is USART3
-    return [*machine, *lines, "-icount", f"shift=2,sleep={sleep}"]
+@dataclass(frozen=True)
+class Board:
+    """A machine of QEMU; registers by their numbers in gdb's protocol."""
+
+    program: str
+    package: str
+    """Debian package of the program."""
+    machine: tuple[str, ...]
+    """Arguments that choose the machine and leave UART1 as the next serial line."""
+    shift: int
+    """An instruction takes 2 ** shift ns."""
+    pc: int
+    link: int
+    """Return address of a function."""
+    argument: int
+    """First argument of a function; the second is the next register."""
+    status: int | None = None
+    """Register that holds the state of a conditional block, which `store` must leave."""
+    conditional: int = 0
+    """Bits of that state."""
+
+    def command(self, image: Path, serial: str, sleep: str = "off") -> list[str]:
+        """Return QEMU's command line; `serial` receives UART1. Raises NotInstalled."""
+        if shutil.which(self.program) is None:
+            raise NotInstalled(f"{self.program} is not installed; Debian package: {self.package}")
+        quiet = ["-display", "none", "-monitor", "none"]
+        clock = ["-icount", f"shift={self.shift},sleep={sleep}"]
+        return [self.program, *self.machine, "-kernel", str(image), *quiet, "-serial", serial, *clock]
 
 
-def run_until(image: Path, text: bytes, seconds: float = 5 * PATIENCE) -> bytes:
-    """Return the UART's output up to a match of the regular expression `text`.
+EPUCK2 = Board(
+    "qemu-system-arm",
+    "qemu-system-arm",
+    ("-M", "netduinoplus2", "-serial", "null", "-serial", "null"),  # the third is USART3
+    shift=2,
+    pc=15,
+    link=14,
+    argument=0,
+    status=25,
+    conditional=0x0600FC00,
+)
+QEMU_VIRT = Board(
+    "qemu-system-riscv32", "qemu-system-misc", ("-M", "virt", "-bios", "none"), shift=5, pc=32, link=1, argument=10
+)
+
+
+def run_until(board: Board, image: Path, text: bytes, seconds: float = 5 * PATIENCE) -> bytes:
+    """Return UART1's output up to a match of the regular expression `text`.
 
     Raises Stopped with what came instead, NotInstalled.
     """
     process = subprocess.Popen(
-        command(image, "stdio"), stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
+        board.command(image, "stdio"), stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
     )
     assert process.stdout is not None
     os.set_blocking(process.stdout.fileno(), False)
@@ -50,8 +85,9 @@ def run_until(image: Path, text: bytes, seconds: float = 5 * PATIENCE) -> bytes:
     end = time.monotonic() + seconds
     try:
         while not re.search(text, heard):
+            ended = time.monotonic() > end or process.poll() is not None  # before the last bytes are read
             heard += process.stdout.read() or b""
-            if time.monotonic() > end or process.poll() is not None:
+            if ended and not re.search(text, heard):
                 raise Stopped(f"no {text!r} after {heard!r}")
             time.sleep(0.01)
     finally:
@@ -61,12 +97,24 @@ def run_until(image: Path, text: bytes, seconds: float = 5 * PATIENCE) -> bytes:
     return heard
 
 
-class Epuck2:
+def run(board: Board, image: Path, seconds: float = PATIENCE) -> tuple[int, bytes]:
+    """Return QEMU's exit status and UART1's output, of a program that ends QEMU. Raises Stopped, NotInstalled."""
+    try:
+        done = subprocess.run(
+            board.command(image, "stdio"), stdin=subprocess.DEVNULL, capture_output=True, timeout=seconds, check=False
+        )
+    except subprocess.TimeoutExpired as expired:
+        raise Stopped(f"QEMU still runs after {seconds:g} s and {expired.stdout!r}") from None
+    return done.returncode, done.stdout
+
+
+class Qemu:
     """A CPU at its reset vector. Raises NotInstalled."""
 
     pointer = 4
 
-    def __init__(self, image: Path) -> None:
+    def __init__(self, board: Board, image: Path) -> None:
+        self.board = board
         self.symbols = Symbols(image)
         self.now = 0
         self._folder = Path(tempfile.mkdtemp(prefix="openswarm-qemu-"))
@@ -74,7 +122,7 @@ class Epuck2:
         self._uart = self._folder / "uart"
         listening = ["-chardev", f"socket,path={address},server=on,wait=off,id=gdb", "-gdb", "chardev:gdb", "-S"]
         self._process = subprocess.Popen(
-            [*command(image, f"file:{self._uart}", "on"), *listening],
+            [*board.command(image, f"file:{self._uart}", "on"), *listening],
             stdin=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
         )
@@ -126,7 +174,7 @@ class Epuck2:
 
     @property
     def pc(self) -> int:
-        return self._register(_PC)
+        return self._register(self.board.pc)
 
     def step(self) -> None:
         if not self._ask("s").startswith("T05"):
@@ -134,13 +182,17 @@ class Epuck2:
         self.now += 1
 
     def store(self, address: int, value: int) -> None:
-        """Write by a store of the CPU, because the stub cannot write to the registers of NVIC and SCB.
+        """Write by a store of the CPU, because the stub cannot write to the registers of devices.
 
-        The firmware has `inject_store`, whose first instruction stores r1 at r0. It alone is executed, no interrupt
-        is taken and no time passes; then the CPU is at its previous address, also inside an IT block."""
-        before = {number: self._ask(f"p{number:x}") for number in (0, 1, _PC, _XPSR)}
-        flags = int.from_bytes(bytes.fromhex(before[_XPSR]), "little") & ~_IT_STATE
-        wanted = {0: address, 1: value, _PC: self.symbols["inject_store"], _XPSR: flags}
+        The firmware has `inject_store`, whose first instruction stores its second argument at the first. It alone is
+        executed, no interrupt is taken and no time passes; then the CPU is at its previous address, also inside an IT
+        block."""
+        board = self.board
+        wanted = {board.argument: address, board.argument + 1: value, board.pc: self.symbols["inject_store"]}
+        status = [board.status] * (board.status is not None)
+        before = {number: self._ask(f"p{number:x}") for number in (*wanted, *status)}
+        for number in status:
+            wanted[number] = int.from_bytes(bytes.fromhex(before[number]), "little") & ~board.conditional
         for number, content in wanted.items():
             self._set(number, content.to_bytes(4, "little").hex())
         self._ask("Qqemu.sstep=7")
@@ -172,7 +224,7 @@ class Epuck2:
             raise Stopped(f"QEMU does not write to {address:#x}")
 
     def return_address(self) -> int:
-        return self._register(_LR) & ~1
+        return self._register(self.board.link) & ~self.symbols.thumb
 
     def uart(self) -> bytes:
         """Return all output of the UART so far."""
