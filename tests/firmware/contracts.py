@@ -33,6 +33,16 @@ def callers(header: str) -> dict[str, str]:
     return found
 
 
+def numbers(header: str) -> dict[str, tuple[str, int]]:
+    """Return the cycles field and the stack bytes of the contract line of each function of a header that has both."""
+    found = {}
+    for comment, declarations in re.findall(r"/\*(.*?)\*/((?:(?!/\*|\n\n).)*)", (HEADERS / header).read_text(), re.S):
+        fields = [field.strip() for field in re.sub(r"\s+\*?\s*", " ", comment).split("|")]
+        if len(fields) > 4 and fields[3].isdecimal():
+            found |= dict.fromkeys(CALL.findall(declarations), (fields[2], int(fields[3])))
+    return found
+
+
 def legal_in_interrupts() -> set[str]:
     """Return the names of kernel and device calls that an interrupt may make."""
     both = callers("openswarm.h") | callers("openswarm_io.h")

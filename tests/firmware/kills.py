@@ -1,10 +1,11 @@
-"""Kill campaign: threads are killed within driver calls, at every instruction boundary, on the emulated robot.
+"""Kill campaign: threads are killed within calls of drivers and options, at every instruction boundary, on the emulated
+robot.
 
-Input is the firmware target/kills, whose victim thread runs scenes of driver calls. A deviation raises AssertionError
+Input is the firmware target/kills, whose victim thread runs scenes of such calls. A deviation raises AssertionError
 with scene, boundary and pause, which reproduce it.
 
-After the kill no interrupt may write into the victim's memory. Then the keeper thread uses every bus and line, and
-the heap must be as before. tests/firmware/kernel/test_kills_on_target.py runs a sample,
+After the kill no interrupt may write into the victim's memory. Then the keeper thread uses every bus, line and option,
+and the heap must be as before. tests/firmware/kernel/test_kills_on_target.py runs a sample,
 tests/fuzz/kernel/fuzz_kills.py all.
 """
 
@@ -24,7 +25,8 @@ from tests.firmware.kernel.test_kernel_on_target import place, thread_list
 INT1IF, T2IF = 1 << 0, 1 << 6
 PATIENCE = 3_000_000
 """Maximum cycles until the keeper has checked all devices: transfers time out after 25 ms."""
-SCENES = ("I2C read", "I2C without slave", "SPI", "UART", "UART in frames", "motors, LEDs", "setters and getters")
+SCENES = ("I2C read", "I2C without slave", "SPI", "UART", "UART in frames", "motors, LEDs", "setters and getters",
+          "mutex, cleanups, join")  # fmt: skip
 PAUSES = (0, 4)
 """Milliseconds between the kill and the keeper's calls: none, or enough for an abandoned transfer to end."""
 PCB = 18

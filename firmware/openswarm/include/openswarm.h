@@ -86,7 +86,7 @@ void Sys_Init_Kernel(void);
 /* M | no | - | 40 | none.  Enables clock, slices and devices. The caller continues as the system thread, in its
  * critical section if one is open. */
 void Sys_Start_Kernel(void);
-/* T (PID 0 only) | never returns | - | 30 | CONTEXT.  Retires the system thread: from now on the kernel idles
+/* T (PID 0 only) | never returns | - | 12 | CONTEXT.  Retires the system thread: from now on the kernel idles
  * whenever no thread is ready, and the stack of main is no longer used. */
 void Sys_Run_SystemThread(void);
 
@@ -110,21 +110,22 @@ typedef struct {
 } sys_process_config;
 
 /* MTH | no | 520 + 20 n, of which 2 per byte paint the stack; at most 900 more while memory is short, and
- * 800 in a handler | 28 | MEMORY.  PID, or 0 = failed (PID 0 is the system thread). */
+ * 800 in a handler | 34 | MEMORY.  PID, or 0 = failed (PID 0 is the system thread). */
 uint16 Sys_Start_Process(sys_function f);
-/* MTH | no | as above | 28 | MEMORY, ARGUMENT.  The same with a configuration. */
+/* MTH | no | as above | 34 | MEMORY, ARGUMENT.  The same with a configuration. */
 uint16 Sys_Start_ProcessWith(const sys_process_config *config);
-/* MTH | own PID: never returns | ~450 + 25 m + g per subscription of its own | 42 | PROCESS.  Ends a thread with its
+/* MTH | own PID: never returns | ~450 + 25 m + g per subscription of its own | 54 | PROCESS.  Ends a thread with its
  * subscriptions, its wait and its uncleared wait result. */
 bool Sys_Kill_Process(uint16 pid);
-/* T | no | 54 to a yielded thread, 66 to a preempted one | 20 | CONTEXT.  Ends the caller's slice. */
+/* T | no | 54 to a yielded thread, 66 to a preempted one | 4 | CONTEXT.  Ends the caller's slice. */
 void Sys_Yield(void);
-/* T | yes, ms rounded up to the next 1 ms tick | ~200 + 20 n | 42 | CONTEXT.  0 ms = Sys_Yield. */
+/* T | yes, ms rounded up to the next 1 ms tick | ~200 + 20 n | 36 | CONTEXT.  0 ms = Sys_Yield. */
 void Sys_Sleep(uint16 ms);
-/* T with SYS_PERIODIC | until its next release | ~240 + 20 n | 46 | CONTEXT, PROCESS.  True: the deadline was met. */
+/* T with SYS_PERIODIC | until its next release | ~240 + 20 n | 60 | CONTEXT, PROCESS.  True: the deadline was met. */
 bool Sys_Wait_for_Period(void);
-/* MTHI | no | 16 | 4 | none.  Nests. Until the matching End, no thread switch occurs and no handler runs; a slice end
- * inside is taken there. Interrupts stay enabled. An open section ends with its thread, or with the handlers. */
+/* MTHI | no | 20 | 4 | none.  Nests. Until the matching End, no thread switch occurs and no handler runs; a slice end
+ * inside is taken there. Interrupts stay enabled. An open section ends with its thread, or with the handlers. In an ISR
+ * neither call has an effect. */
 void Sys_Start_CriticalSection(void);
 void Sys_End_CriticalSection(void);
 /* MTHI | no | 6 | 4 | none.  The running thread. In a handler that is the interrupted thread: use the pid argument. */
@@ -152,46 +153,46 @@ uint16 Sys_Get_UnusedKernelStack(void);
  * the remaining time with threads without a period. */
 typedef struct sys_scheduler sys_scheduler;
 extern const sys_scheduler sys_round_robin, sys_woken_first, sys_fixed_priority, sys_earliest_deadline;
-/* MTHI | no | 24, refused 35 | 4 | ARGUMENT.  Sets the scheduler from the next thread switch on. NULL is refused. */
+/* MTHI | no | 28, refused 35 | 16 | ARGUMENT.  Sets the scheduler from the next thread switch on. NULL is refused. */
 bool Sys_Set_Scheduler(const sys_scheduler *scheduler);
 
 /* ---- Events ------------------------------------------------------------------------------------------------- */
 
-/* MTH | no | 146 + 9 b; at most 600 more while memory is short | 30 | MEMORY.  True also if already registered. */
+/* MTH | no | 146 + 9 b; at most 600 more while memory is short | 28 | MEMORY.  True also if already registered. */
 bool Sys_Register_Event(uint16 event);
-/* MTH | no | ~230 + 9 b + (15 + g) s + 20 n + g | 26 | EVENT.  Ends the event's subscriptions, drops its queued
+/* MTH | no | ~230 + 9 b + (15 + g) s + 20 n + g | 40 | EVENT.  Ends the event's subscriptions, drops its queued
  * messages and wakes its waiters with NULL. */
 bool Sys_Unregister_Event(uint16 event);
-/* MTHI | no | ~70 + 9 b | 12 | none. */
+/* MTHI | no | ~40 + 9 b | 14 | none. */
 bool Sys_IsEventRegistered(uint16 event);
-/* MTH | no | ~140 + 9 b + 11 s + 18 n | 34 | EVENT, PROCESS, MEMORY, ARGUMENT.  Once per (event, pid, handler):
- * subscribing again replaces the condition. condition NULL = always. Handlers run in order of subscription. A
- * handler subscribed during a delivery gets the next message first, before the handlers that the current one has not
- * reached. */
+/* MTH | no | ~140 + 9 b + 11 s + 18 n; at most 650 more while memory is short | 46 | EVENT, PROCESS, MEMORY, ARGUMENT.
+ * Once per (event, pid, handler): subscribing again replaces the condition. condition NULL = always. Handlers run in
+ * order of subscription. A handler subscribed during a delivery gets the next message first, before the handlers that
+ * the current one has not reached. */
 bool Sys_Subscribe_to_Event(uint16 event, uint16 pid, sys_handler handler, sys_condition condition);
-/* MTH | no | ~120 + 9 b + (15 + g) s | 34 | EVENT, PROCESS: it had none.  Unsubscribes all handlers of a thread. PID 0
+/* MTH | no | ~120 + 9 b + (15 + g) s | 48 | EVENT, PROCESS: it had none.  Unsubscribes all handlers of a thread. PID 0
  * is the system thread only: the drivers' handlers belong to no thread. */
 bool Sys_Unsubscribe_from_Event(uint16 event, uint16 pid);
-/* MTH | no | ~120 + 9 b + (15 + g) s | 34 | EVENT, PROCESS: it was not subscribed.  Unsubscribes one handler. */
+/* MTH | no | ~120 + 9 b + (15 + g) s | 44 | EVENT, PROCESS: it was not subscribed.  Unsubscribes one handler. */
 bool Sys_Unsubscribe_Handler(uint16 event, uint16 pid, sys_handler handler);
 /* MTHI | no | 95, or 124 + 10 b; 17 + d/2 more unless d = 2; 8 per waiting thread if there is no handler; 70 without
- * listeners; at most 460 more while memory is short | 32 | EVENT, MEMORY, ARGUMENT.  Copies the payload into a
+ * listeners; at most 460 more while memory is short | 30 | EVENT, MEMORY, ARGUMENT.  Copies the payload into a
  * queued message. True also without listeners; then nothing is stored. False: nothing was queued. Payloads above
  * SYS_SMALL_PAYLOAD: not from an ISR. ISRs share the free block that was the largest when memory was last freed or a
  * thread started. */
 bool Sys_Send_Event(uint16 event, const void *data, uint16 size);
-/* MTHI | no | 104, or 133 + 10 b | 38 | EVENT, MEMORY.  As above. */
+/* MTHI | no | 104, or 133 + 10 b | 36 | EVENT, MEMORY.  As above. */
 bool Sys_Send_IntEvent(uint16 event, uint16 value);
-/* T | yes | ~250 + 9 b + 30 n | 46 | CONTEXT, EVENT.  NULL: refused, or the event was unregistered. A thread owns one
+/* T | yes | ~250 + 9 b + 30 n | 42 | CONTEXT, EVENT.  NULL: refused, or the event was unregistered. A thread owns one
  * wait result at a time: its next wait, except sleep, frees the previous one. */
 sys_event_data *Sys_Wait_for_Event(uint16 event);
 sys_event_data *Sys_Wait_for_Condition(uint16 event, sys_condition condition);
-/* As above; NULL with SYS_OK also after ms milliseconds. ms 0 = no time-out. */
+/* T | yes | as above | 48 | CONTEXT, EVENT.  NULL with SYS_OK also after ms milliseconds. ms 0 = no time-out. */
 sys_event_data *Sys_Wait_for_ConditionTimeout(uint16 event, sys_condition condition, uint16 ms);
-/* T | no | ~70 + 25 n + g | 30 | none.  Frees a wait result and sets *data = NULL. NULL-safe; in a handler or an ISR
+/* T | no | ~70 + 25 n + g | 36 | none.  Frees a wait result and sets *data = NULL. NULL-safe; in a handler or an ISR
  * it only sets NULL. */
 void Sys_Clear_EventData(sys_event_data **data);
-/* MTHI | no | ~50 | 8 | none.  Messages of this event lost for lack of memory since the start; saturates at 65535. */
+/* MTHI | no | ~50 | 4 | none.  Messages of this event lost for lack of memory since the start; saturates at 65535. */
 uint16 Sys_Get_LostEvents(uint16 event);
 
 /* ---- Information -------------------------------------------------------------------------------------------- */
@@ -207,10 +208,11 @@ typedef struct {
 
 /* MTHI | no | ~20 | 8 | none. */
 const sys_statistics *Sys_Get_Statistics(void);
-/* MTHI | no | 12 | 8 | none.  Milliseconds since Sys_Start_Kernel, without drift; wraps after 49.7 days. */
+/* MTHI | no | 12 | 4 | none.  Milliseconds since Sys_Start_Kernel, without drift; wraps after 49.7 days. */
 uint32 Sys_Get_SystemTime(void);
 /* MTHI | no | 18 | 8 | none.  The caller's sys_error: each thread has one; all handlers and conditions share one;
- * all ISRs share one. It stays until the next failing call. In a thread, blocking may set it to SYS_OK. */
+ * all ISRs share one. It stays until the next failing call; sends and restarts of the kernel itself do not change it.
+ * In a thread, blocking may set it to SYS_OK. */
 uint16 Sys_Get_LastError(void);
 /* MTHI | no | 6 | 4 | none.  The current speed, mm/s, after the post-processor. */
 sint16 Sys_Get_MotorSpeed_Left(void);

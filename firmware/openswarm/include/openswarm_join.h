@@ -9,7 +9,7 @@
  * state SYS_ZOMBIE, with its PID and 18 bytes of the heap, until Sys_Join returns for it; if a thread already joins
  * it, it disappears at once. Sys_Kill_Process also removes a zombie, and sends its SYS_EVENT_TERMINATION again. */
 uint16 Sys_Start_Joinable(const sys_process_config *config);
-/* T | until the thread has ended | 803 for a zombie beside the events of the system; 245 to the next thread if it
+/* T | until the thread has ended | 796 for a zombie beside the events of the system; 245 to the next thread if it
  * blocks | 60 | CONTEXT, PROCESS: no such thread, or it is the system thread, the caller, or joins the caller,
  * directly or through others.  Waits for the end of any thread, or removes a zombie. Several threads may join the
  * same thread. */

@@ -26,8 +26,8 @@ typedef struct sys_mutex {
 #define SYS_MUTEX(highest_priority) {NULL, NULL, NULL, (highest_priority), 0}
 
 /* T | while another thread owns it | 149, 14 more per mutex that others own; 243 to the next thread if it blocks | 34,
- * with a time-out 50 | CONTEXT, PROCESS: the caller owns it already, ARGUMENT: the caller's priority is above the ceiling.  Needs no
- * heap. An uncleared wait result stays. */
+ * with a time-out 50 | CONTEXT, PROCESS: the caller owns it already, ARGUMENT: the caller's priority is above the
+ * ceiling.  Needs no heap. An uncleared wait result stays. */
 bool Sys_Lock_Mutex(sys_mutex *mutex);
 /* The same; false with SYS_OK also after ms milliseconds. ms 0 = no time-out. */
 bool Sys_Lock_MutexTimeout(sys_mutex *mutex, uint16 ms);

@@ -40,10 +40,10 @@ void *bus_take(bus *wanted, uint16 size, void (*silence)(void))
 
 void bus_give(bus *used, void (*silence)(void))
 {
-    Sys_Start_CriticalSection();
+    section_open();
     silence();
     heap_free(used->block, used->size);
     used->block = NULL;
     os_running->status &= (uint8)~OS_USES_BUS;
-    Sys_End_CriticalSection();
+    section_close();
 }

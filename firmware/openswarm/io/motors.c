@@ -42,15 +42,17 @@ static bool on_speed(uint16 pid, uint16 event, sys_event_data *data)
 
 bool Sys_Connect_Motors(uint16 event)
 {
-    return Sys_Subscribe_to_Event(event, OS_DRIVERS, on_speed, NULL);
+    return event_connect(event, on_speed);
 }
 
 sys_motor_processor Sys_Set_MotorProcessor(sys_motor_processor wanted)
 {
-    Sys_Start_CriticalSection();
+    if (os_enter() != SYS_OK) {
+        return NULL;
+    }
     sys_motor_processor before = processor;
     processor = wanted != NULL ? wanted : Sys_Default_MotorProcessor;
-    Sys_End_CriticalSection();
+    section_close();
     return before;
 }
 

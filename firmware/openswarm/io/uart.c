@@ -259,10 +259,12 @@ void uart_tick(void)
 
 sys_tx_processor Sys_Set_TxProcessor(uint8 uart, sys_tx_processor wanted)
 {
-    Sys_Start_CriticalSection();
+    if (os_enter() != SYS_OK) {
+        return NULL;
+    }
     sys_tx_processor before = channels[uart].encode;
     channels[uart].encode = wanted != NULL ? wanted : Sys_Raw_Tx;
-    Sys_End_CriticalSection();
+    section_close();
     return before;
 }
 
@@ -300,7 +302,7 @@ void uart_init(uint8 uart)
     (void)Sys_Register_Event(send);
     (void)Sys_Register_Event(event_of(uart, SYS_UART1_RECEIVED));
     (void)Sys_Register_Event(event_of(uart, SYS_UART1_READY));
-    (void)Sys_Subscribe_to_Event(send, OS_DRIVERS, on_send, NULL);
+    (void)event_connect(send, on_send);
 }
 
 void uart_start(uint8 uart)

@@ -41,7 +41,9 @@ void os_clock_tick(void)
     if (OS_HAS_WORK) {
         os_preempt();
     }
+    uint8 error = os_errors.isrs;
     (void)Sys_Send_IntEvent(SYS_1ms_TIMER, now);
+    os_errors.isrs = error; /* a failure is no error of the application's ISRs */
     board_tick();
 }
 

@@ -4,9 +4,7 @@
 
 sys_statistics os_statistics;
 
-static struct {
-    volatile uint8 handlers, isrs;
-} errors_of;
+struct os_errors os_errors;
 
 /* Lost messages of the first SYS_LOSS_COUNTERS events that lost one; entry 0 counts those of all other events. */
 typedef struct {
@@ -19,13 +17,21 @@ static loss losses[SYS_LOSS_COUNTERS + 1];
  * thread reads it. All handlers share one, because no handler interrupts another; all ISRs share one. */
 static HAL_OUTLINE volatile uint8 *last_error(void)
 {
-    return hal_in_isr() ? &errors_of.isrs : os_in_kernel ? &errors_of.handlers : &os_running->time_or_error.error;
+    return hal_in_isr() ? &os_errors.isrs : os_in_kernel ? &os_errors.handlers : &os_running->time_or_error.error;
 }
 
 bool os_fail(sys_error error)
 {
     *last_error() = (uint8)error;
     return false;
+}
+
+void event_announce(uint16 id, uint16 value)
+{
+    volatile uint8 *error = last_error();
+    uint8 before = *error;
+    (void)Sys_Send_IntEvent(id, value);
+    *error = before;
 }
 
 void os_count(uint16 *counter)

@@ -69,9 +69,9 @@ static HAL_OUTLINE const sys_pcb *first_waiter(const event *e)
 
 bool Sys_IsEventRegistered(uint16 id)
 {
-    Sys_Start_CriticalSection();
+    hal_lock_state lock = hal_lock_slice();
     bool found = event_find(id) != NULL;
-    Sys_End_CriticalSection();
+    hal_unlock(lock);
     return found;
 }
 
@@ -175,8 +175,12 @@ bool Sys_Unregister_Event(uint16 id)
 /* Updates the subscription or adds it. Slice locked. */
 BOUNDS_AT("while (s != NULL", loop s);
 BOUNDS_AT("while (*link != NULL", loop s);
-static sys_error subscribe(event *e, uint16 pid, sys_handler handler, sys_condition condition)
+static sys_error subscribe(uint16 id, uint16 pid, sys_handler handler, sys_condition condition)
 {
+    event *e = event_find(id);
+    if (e == NULL) {
+        return SYS_ERROR_EVENT;
+    }
     subscription *s = e->subscribers, **link = &e->subscribers;
     while (s != NULL && (s->pid != pid || s->handler != handler)) {
         s = s->next;
@@ -204,17 +208,17 @@ static sys_error subscribe(event *e, uint16 pid, sys_handler handler, sys_condit
 
 bool Sys_Subscribe_to_Event(uint16 id, uint16 pid, sys_handler handler, sys_condition condition)
 {
-    sys_error error = SYS_ERROR_ARGUMENT;
     if (os_enter() != SYS_OK) {
         return false;
     }
-    if (handler != NULL) {
-        event *e = event_find(id);
-        error = e == NULL                                        ? SYS_ERROR_EVENT
-                : pid != OS_DRIVERS && process_find(pid) == NULL ? SYS_ERROR_PROCESS
-                                                                 : subscribe(e, pid, handler, condition);
-    }
-    return os_leave(error);
+    return os_leave(handler == NULL             ? SYS_ERROR_ARGUMENT
+                    : process_find(pid) == NULL ? SYS_ERROR_PROCESS
+                                                : subscribe(id, pid, handler, condition));
+}
+
+bool event_connect(uint16 id, sys_handler handler)
+{
+    return os_enter() == SYS_OK && os_leave(subscribe(id, OS_DRIVERS, handler, NULL));
 }
 
 /* Removes subscriptions of a thread; handler NULL = all of them. Slice locked. */
@@ -353,7 +357,10 @@ static void run_handlers(const event *e, sys_event_data *data)
             sys_handler handler = s->handler;
             uint16 pid = s->pid;
             if (!handler(pid, id, data)) {
-                (void)Sys_Unsubscribe_Handler(id, pid, handler);
+                event *still = event_find(id); /* NULL: the handler unregistered it */
+                if (still != NULL) {
+                    (void)unsubscribe(still, pid, handler);
+                }
             }
         }
         if (*delivery_cursor == s) {
@@ -478,7 +485,7 @@ void Sys_Clear_EventData(sys_event_data **data)
         if ((message *)*data == os_running->wait.result && !os_in_kernel) {
             event_release_result(os_running);
         }
-        Sys_End_CriticalSection();
+        section_close();
     }
     *data = NULL;
 }

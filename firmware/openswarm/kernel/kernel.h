@@ -116,7 +116,8 @@ extern sys_pcb *os_running;   /* &os_system while idle */
 extern sys_pcb os_system;     /* system thread, PID 0 */
 extern sys_pcb *os_ring;      /* ring member before the running one (or before the next, if it blocked); NULL = empty */
 extern sys_pcb *os_blocked;   /* blocked threads in order of blocking */
-extern volatile uint16 critical_depth; /* nesting in the running thread; while os_in_kernel, in the running handler */
+/* Nesting in the running thread; while os_in_kernel, in the running handler. No ISR reads or changes it. */
+extern volatile uint16 critical_depth;
 extern bool os_eager;         /* a wake-up or message preempts the running thread */
 extern volatile bool os_in_kernel; /* a handler, condition, wake-up or scheduler runs on the kernel stack */
 extern sys_statistics os_statistics;
@@ -165,6 +166,10 @@ void event_deliver_queued(void);        /* kernel stack: all messages queued bef
 void event_drop_subscriptions(uint16 pid);
 void event_release_result(sys_pcb *process); /* releases the wait result; the last holder frees the message */
 event *event_find(uint16 id);                /* any context */
+bool event_connect(uint16 id, sys_handler handler); /* subscribes a handler of a driver, which belongs to no thread */
+/* Sends an event of the kernel's own; not in an ISR. A failure is counted as a lost event, but is no error of the
+ * caller. */
+void event_announce(uint16 id, uint16 value);
 /* Link behind the last queued message; devices locked; set OS_MESSAGES after an insertion. A device may append a
  * block of its own with event NULL and its size: the kernel frees the block with the next messages. */
 extern message **queue_end;
@@ -172,6 +177,9 @@ extern message *event_queue, *delivery_batch; /* messages sent since the current
 
 /* process.c */
 void process_init(void);
+/* A critical section; not in an ISR. */
+HAL_OUTLINE void section_open(void);
+HAL_OUTLINE void section_close(void);
 void section_start(void); /* after hal_start(): enters thread level, or lets the end of main's section do so */
 sys_pcb *process_find(uint16 pid);               /* any live thread; slice locked */
 sys_pcb *process_next(const sys_pcb *process);   /* iterates over live threads, from NULL to NULL; slice locked */
@@ -211,6 +219,9 @@ uint16 clock_now(void);  /* low word; any context */
 HAL_USED void os_clock_tick(void); /* ISR, every 1 ms */
 
 /* error.c */
+extern struct os_errors {
+    volatile uint8 handlers, isrs; /* last error of all handlers, and of all ISRs */
+} os_errors;
 HAL_OUTLINE bool os_fail(sys_error error); /* sets the caller's last error and returns false */
 sys_error os_refuse(void);     /* sets, counts and returns SYS_ERROR_CONTEXT */
 void os_count(uint16 *counter); /* saturating */

@@ -268,25 +268,40 @@ void Sys_Run_SystemThread(void)
 
 /* ---- Critical sections ------------------------------------------------------------------------------------------ */
 
-void Sys_Start_CriticalSection(void)
+HAL_OUTLINE void section_open(void)
 {
     hal_lock_state before = hal_lock_slice();
     uint16 depth = critical_depth;
-    HAL_STORE(critical_depth, (uint16)(depth + 1u)); /* an ISR in between restores the depth before it returns */
+    critical_depth = (uint16)(depth + 1u);
     if (depth == 0) {
         critical_before = before;
     }
 }
 
-void Sys_End_CriticalSection(void)
+HAL_OUTLINE void section_close(void)
 {
-    hal_lock_state before = critical_before; /* read first: at depth 0 an ISR's section stores its own */
+    hal_lock_state before = critical_before;
     uint16 depth = critical_depth;
     if (depth != 0) {
-        HAL_STORE(critical_depth, (uint16)(depth - 1u));
+        critical_depth = (uint16)(depth - 1u);
         if (depth == 1) {
             hal_unlock(before);
         }
+    }
+}
+
+/* In an ISR neither has an effect: it would change the nesting of the interrupted thread or handler. */
+void Sys_Start_CriticalSection(void)
+{
+    if (!hal_in_isr()) {
+        section_open();
+    }
+}
+
+void Sys_End_CriticalSection(void)
+{
+    if (!hal_in_isr()) {
+        section_close();
     }
 }
 
@@ -301,12 +316,12 @@ void section_start(void)
 void os_call_in_section(void (*run)(void *), void *arg)
 {
     enum { NESTING_OFFSET = 0x4000 }; /* more sections than run can end */
-    Sys_Start_CriticalSection();
+    section_open();
     uint16 depth = critical_depth;
-    HAL_STORE(critical_depth, (uint16)(depth + NESTING_OFFSET));
+    critical_depth = (uint16)(depth + NESTING_OFFSET);
     run(arg);
-    HAL_STORE(critical_depth, depth);
-    Sys_End_CriticalSection();
+    critical_depth = depth;
+    section_close();
 }
 
 sys_error os_enter(void)
@@ -314,7 +329,7 @@ sys_error os_enter(void)
     if (hal_in_isr()) {
         return os_refuse();
     }
-    Sys_Start_CriticalSection();
+    section_open();
     return SYS_OK;
 }
 
@@ -325,7 +340,7 @@ sys_error os_enter_blocking(void)
 
 bool os_leave(sys_error error)
 {
-    Sys_End_CriticalSection();
+    section_close();
     return error == SYS_OK || os_fail(error);
 }
 
@@ -339,7 +354,7 @@ void process_free(sys_pcb *p)
         hal_stack_release(p);
         heap_free(p->block, (uint16)((uint8 *)(p + 1) - p->block));
     }
-    (void)Sys_Send_IntEvent(SYS_EVENT_TERMINATION, pid);
+    event_announce(SYS_EVENT_TERMINATION, pid);
 }
 
 /* Ends thread p. Slice locked; no code runs on p's stack. The order is fixed, whichever option was used first: p leaves
@@ -376,14 +391,13 @@ static HAL_OUTLINE void end_thread(sys_pcb *p)
 sys_pcb *process_end_running(void)
 {
     critical_depth = 0;
-    os_in_kernel = true; /* a failure to report the end is no error of the system thread, which may be waiting */
     end_thread(os_running); /* perhaps already blocked: its stack may overflow while it blocks */
     return os_schedule();
 }
 
 void os_thread_returned(void)
 {
-    Sys_Start_CriticalSection();
+    section_open();
     hal_abandon(process_end_running);
 }
 
@@ -427,6 +441,6 @@ sys_state Sys_Get_ProcessState(uint16 pid)
     if (p != NULL) {
         state = (p == os_running && !os_in_kernel) ? SYS_RUNNING : (sys_state)(p->status & OS_STATE);
     }
-    Sys_End_CriticalSection();
+    section_close();
     return state;
 }

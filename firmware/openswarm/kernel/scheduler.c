@@ -30,7 +30,7 @@ static HAL_OUTLINE void work(void)
             event_deliver_queued(); /* the events of timers do not wait for the next switch */
         }
     }
-    HAL_STORE(critical_depth, 0); /* ends a section that a handler left open */
+    critical_depth = 0; /* ends a section that a handler left open */
     if ((os_watch != NULL || os_feed != NULL) && (os_pending & OS_WATCH)) {
         HAL_CLEAR_BIT(os_pending, 2);
         if (os_watch != NULL) {
@@ -186,7 +186,7 @@ static void report_miss(sys_pcb *p)
 {
     p->status |= OS_MISSED;
     os_count(&os_statistics.deadlines_missed);
-    (void)Sys_Send_IntEvent(SYS_DEADLINE_MISSED, p->pid);
+    event_announce(SYS_DEADLINE_MISSED, p->pid);
 }
 
 /* Picks the job on time with the earliest deadline. If there is none, late jobs and threads without a period share the

@@ -51,7 +51,7 @@ uint16 Sys_Get_UnusedStack(uint16 pid)
         bytes = unused(stack, (uint16)((const uint8 *)p - stack - HAL_STACK_GUARD));
 #endif
     }
-    Sys_End_CriticalSection();
+    section_close();
     return bytes;
 }
 

@@ -110,7 +110,7 @@ bool Sys_JoinTimeout(uint16 pid, uint16 ms)
     joiners = &waiting;
     process_block(NULL, ms);
     bool ended = true;
-    Sys_Start_CriticalSection();
+    section_open();
     for (joiner **link = &joiners; *link != NULL; link = &(*link)->next) {
         if (*link == &waiting) { /* release_joins() would have removed it */
             *link = waiting.next;
@@ -118,7 +118,7 @@ bool Sys_JoinTimeout(uint16 pid, uint16 ms)
             break;
         }
     }
-    Sys_End_CriticalSection();
+    section_close();
     return ended;
 }
 

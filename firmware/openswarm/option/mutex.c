@@ -130,12 +130,12 @@ bool Sys_Lock_MutexTimeout(sys_mutex *m, uint16 ms)
     }
     *end = &own_node;
     process_block(NULL, ms);
-    Sys_Start_CriticalSection();
+    section_open();
     bool mine = m->owner == self; /* the previous owner handed it over */
     if (!mine) {
         remove_waiter(m, self);
     }
-    Sys_End_CriticalSection();
+    section_close();
     return mine;
 }
 

@@ -81,35 +81,32 @@ static void remove_quota(const sys_quota *again, uint16 id)
     }
 }
 
-static bool add(sys_quota *q, uint16 id, uint16 most)
+/* Slice locked. most 0: the newest payload replaces the waiting one. */
+static sys_error add(sys_quota *q, uint16 id, uint16 most)
 {
-    sys_error error = SYS_ERROR_EVENT;
-    if (os_enter() != SYS_OK) {
-        return false;
+    if (event_find(id) == NULL) {
+        return SYS_ERROR_EVENT;
     }
-    if (event_find(id) != NULL) {
-        remove_quota(q, id);
-        event *gate = heap_alloc_lasting(sizeof *gate);
-        error = SYS_ERROR_MEMORY;
-        if (gate != NULL) {
-            error = SYS_OK;
-            *q = (sys_quota){quotas, id, most, 0};
-            hal_barrier();
-            HAL_STORE(quotas, q);
-            HAL_STORE(os_send_hook, apply_quota);
-            gate->id = (uint16)(id + 1u);
-            event_insert(gate, id);
-        }
+    remove_quota(q, id);
+    event *gate = heap_alloc_lasting(sizeof *gate);
+    if (gate == NULL) {
+        return SYS_ERROR_MEMORY;
     }
-    return os_leave(error);
+    *q = (sys_quota){quotas, id, most, 0};
+    hal_barrier();
+    HAL_STORE(quotas, q);
+    HAL_STORE(os_send_hook, apply_quota);
+    gate->id = (uint16)(id + 1u);
+    event_insert(gate, id);
+    return SYS_OK;
 }
 
 bool Sys_Limit_Event(sys_quota *q, uint16 event, uint16 most)
 {
-    return most != 0 ? add(q, event, most) : os_fail(SYS_ERROR_ARGUMENT);
+    return os_enter() == SYS_OK && os_leave(most != 0 ? add(q, event, most) : SYS_ERROR_ARGUMENT);
 }
 
 bool Sys_Keep_Latest(sys_quota *q, uint16 event)
 {
-    return add(q, event, 0);
+    return os_enter() == SYS_OK && os_leave(add(q, event, 0));
 }

@@ -52,10 +52,13 @@ bool Sys_Signal_Semaphore(sys_semaphore *s)
         os_pending |= OS_POSTED;
     }
     hal_unlock(lock);
+    if (units == 0) {
+        return os_fail(SYS_ERROR_BUSY);
+    }
     if (os_eager) {
         os_preempt();
     }
-    return units != 0 || os_fail(SYS_ERROR_BUSY);
+    return true;
 }
 
 bool Sys_Wait_for_SemaphoreTimeout(sys_semaphore *s, uint16 ms)

@@ -33,7 +33,9 @@ static void supervise(void)
             os_count(&s->bitten);
         }
         if (s->pid == 0 && s->restarts != 0) {
+            sys_error error = (sys_error)Sys_Get_LastError();
             start(s);
+            (void)os_fail(error); /* a restart that fails is no error of a handler */
             if (s->pid != 0 && s->restarts != SYS_ALWAYS) {
                 s->restarts--;
             }

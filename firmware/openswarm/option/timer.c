@@ -29,7 +29,7 @@ static void expire(void)
         sys_timer *t = *link;
         uint16 late = (uint16)(now - t->due);
         if (late <= LONGEST) {
-            (void)Sys_Send_IntEvent(t->event, t->value);
+            event_announce(t->event, t->value);
             if (t->period == 0) {
                 *link = t->next;
                 continue;
@@ -46,11 +46,11 @@ static void expire(void)
 
 bool Sys_Start_Timer(sys_timer *t, uint16 event, uint16 value, uint16 first_ms, uint16 period_ms)
 {
-    if (first_ms == 0 || first_ms > LONGEST || period_ms > LONGEST) {
-        return os_fail(SYS_ERROR_ARGUMENT);
-    }
     if (os_enter() != SYS_OK) {
         return false;
+    }
+    if (first_ms == 0 || first_ms > LONGEST || period_ms > LONGEST) {
+        return os_leave(SYS_ERROR_ARGUMENT);
     }
     (void)stop(t);
     os_expire_timers = expire;

@@ -2,6 +2,9 @@
 #include "test.h"
 
 #include "openswarm_io.h"
+#include "openswarm_quota.h"
+#include "openswarm_semaphore.h"
+#include "openswarm_timer.h"
 
 static sys_event_data *refused_wait;
 static bool blocking_condition(sys_event_data *data)
@@ -212,4 +215,121 @@ TEST(a_section_may_span_the_start_of_the_kernel, "openswarm.h: Sys_Start_Kernel"
     Sys_Sleep(2);
     CHECK(strcmp(trace, "t") == 0);
     CHECK_EQ(Sys_Get_Statistics()->refused, 0);
+}
+
+/* ---- Calls of interrupts ---------------------------------------------------------------------------------------- */
+
+static void isr_with_bad_arguments(void)
+{
+    static sys_quota quota;
+    static sys_timer timer;
+    CHECK(!Sys_Limit_Event(&quota, E1, 0) && !Sys_Start_Timer(&timer, E1, 0, 0, 0));
+    CHECK(!Sys_Subscribe_to_Event(E1, 0, NULL, NULL));
+    CHECK(Sys_Set_TxProcessor(SYS_UART1, NULL) == NULL && Sys_Set_MotorProcessor(NULL) == NULL);
+    CHECK_EQ(Sys_Get_LastError(), SYS_ERROR_CONTEXT);
+}
+
+TEST(an_isr_is_refused_before_its_arguments_are_examined, "openswarm.h: a call from a context that is not listed")
+{
+    boot();
+    host_device(isr_with_bad_arguments);
+    CHECK_EQ(Sys_Get_Statistics()->refused, 5);
+}
+
+static void isr_ends_sections(void)
+{
+    Sys_End_CriticalSection();
+    Sys_End_CriticalSection();
+}
+static void isr_starts_a_section(void)
+{
+    Sys_Start_CriticalSection();
+}
+
+TEST(sections_of_an_isr_change_no_nesting, "openswarm.h: Sys_Start_CriticalSection")
+{
+    boot();
+    CHECK(Sys_Start_Process(note_thread) != 0);
+    Sys_Start_CriticalSection();
+    host_device(isr_ends_sections);
+    Sys_Yield();
+    CHECK_EQ(Sys_Get_Statistics()->refused, 1);
+    CHECK_EQ(strlen(trace), 0);
+    Sys_End_CriticalSection();
+    host_device(isr_starts_a_section);
+    Sys_Yield();
+    CHECK(strcmp(trace, "t") == 0);
+    CHECK_EQ(Sys_Get_Statistics()->refused, 1);
+}
+
+/* ---- Errors and decisions of the kernel itself ------------------------------------------------------------------ */
+
+static uint16 isr_error;
+static void isr_sets_no_scheduler(void)
+{
+    CHECK(!Sys_Set_Scheduler(NULL));
+}
+static void isr_reads_its_error(void)
+{
+    isr_error = Sys_Get_LastError();
+}
+
+TEST(sends_of_the_kernel_change_no_last_error, "openswarm.h: Sys_Get_LastError")
+{
+    boot();
+    CHECK(Sys_Unregister_Event(SYS_EVENT_TERMINATION) && Sys_Unregister_Event(SYS_1ms_TIMER));
+    uint16 pid = Sys_Start_Process(note_thread);
+    CHECK(!Sys_Subscribe_to_Event(E1, 0, NULL, NULL));
+    CHECK(Sys_Kill_Process(pid));
+    CHECK_EQ(Sys_Get_LastError(), SYS_ERROR_ARGUMENT);
+    host_device(isr_sets_no_scheduler);
+    host_tick();
+    host_device(isr_reads_its_error);
+    CHECK_EQ(isr_error, SYS_ERROR_ARGUMENT);
+}
+
+static uint16 handler_error;
+static bool reads_its_error(uint16 pid, uint16 id, sys_event_data *data)
+{
+    (void)pid, (void)id, (void)data;
+    handler_error = Sys_Get_LastError();
+    return true;
+}
+static bool kills_its_thread(uint16 pid, uint16 id, sys_event_data *data)
+{
+    (void)id, (void)data;
+    CHECK(Sys_Kill_Process(pid));
+    return false;
+}
+
+TEST(a_timer_without_event_and_an_ended_handler_are_no_errors, "openswarm.h: Sys_Get_LastError")
+{
+    static sys_timer timer;
+    boot();
+    uint16 pid = Sys_Start_Process(note_thread);
+    CHECK(Sys_Register_Event(E1) && Sys_Subscribe_to_Event(E1, pid, kills_its_thread, NULL));
+    CHECK(Sys_Subscribe_to_Event(E1, 0, reads_its_error, NULL) && Sys_Start_Timer(&timer, E_NEVER, 0, 1, 0));
+    Sys_Sleep(2);
+    CHECK(Sys_Send_IntEvent(E1, 0));
+    Sys_Yield();
+    CHECK_EQ(handler_error, SYS_OK);
+}
+
+static uint16 decisions;
+static sys_pcb *first_ready(sys_pcb *first)
+{
+    decisions++;
+    return first;
+}
+
+TEST(a_signal_that_is_refused_asks_no_scheduler, "openswarm_semaphore.h: Sys_Signal_Semaphore")
+{
+    static const sys_scheduler eager = {first_ready, true};
+    static sys_semaphore full = SYS_SEMAPHORE(65535);
+    boot();
+    CHECK(Sys_Set_Scheduler(&eager));
+    decisions = 0;
+    CHECK(!Sys_Signal_Semaphore(&full));
+    CHECK_EQ(decisions, 0);
+    CHECK_EQ(Sys_Get_LastError(), SYS_ERROR_BUSY);
 }

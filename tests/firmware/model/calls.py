@@ -102,8 +102,8 @@ class Calls:
 
     @call("Sys_Start_CriticalSection", "MTHI")
     def start_section(self) -> None:
-        self.depth += 1
+        self.depth += not self.in_isr  # an interrupt changes no nesting
 
     @call("Sys_End_CriticalSection", "MTHI")
     def end_section(self) -> None:
-        self.depth = max(self.depth - 1, 0)
+        self.depth = max(self.depth - (not self.in_isr), 0)

@@ -64,10 +64,10 @@ class Events(Threads):
     def subscribe(self, number: int, pid: int, handler: Handler | None, condition: Condition | None) -> bool:
         if handler is None:
             return self.fail(Error.ARGUMENT)
-        if number not in self.events:
-            return self.fail(Error.EVENT)
         if self.find(pid) is None:
             return self.fail(Error.PROCESS)
+        if number not in self.events:
+            return self.fail(Error.EVENT)
         return self.leave(self.add_subscription(self.events[number], pid, handler, condition))
 
     def add_subscription(
@@ -137,17 +137,24 @@ class Events(Threads):
 
     def send(self, number: int, payload: bytes) -> bool:
         """Queue a message, unless there is no listener, or a quota drops it or replaces the waiting one."""
+        return self.leave(self.queue_message(number, payload))
+
+    def announce(self, number: int, value: int) -> None:
+        """Send an event of the kernel's own: a failure is no error of the caller."""
+        self.queue_message(number, (value & 0xFFFF).to_bytes(2, "little"))
+
+    def queue_message(self, number: int, payload: bytes) -> Error:
         event = self.events.get(number)
         if event is None:
-            return self.fail(Error.EVENT)
+            return Error.EVENT
         if self.apply_quota(event, payload) or not self.has_listener(event):
-            return True
+            return Error.OK
         if not self.allocate(self.sizes.message + len(payload)):
             self.lose(number)
-            return self.fail(Error.MEMORY)
+            return Error.MEMORY
         self.queue.append(Message(event, payload))
         self.preempt()
-        return True
+        return Error.OK
 
     def has_listener(self, event: Event) -> bool:
         return bool(event.subscriptions) or any(thread.awaited is event for thread in self.blocked)
@@ -202,7 +209,9 @@ class Events(Threads):
             if (one.condition is None or one.condition(message)) and self.is_next(event, one):
                 pid = one.pid if one.pid is not None else 0xFFFF
                 if not one.handler(pid, event.number, message):
-                    self.remove_handlers(event.number, one.pid, one.handler)
+                    still = self.events.get(event.number)
+                    if still is not None:
+                        self.remove_subscriptions(still, one.pid, one.handler)
             if self.is_next(event, one):
                 self.cursor += 1
         self.delivering = None

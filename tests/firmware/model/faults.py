@@ -61,7 +61,10 @@ FAULTS = (
         "    uint16 now = clock_now();\n    if (HAL_ALLOCATION_FAILS()) {\n        return;\n    }\n",
     ),
     _one("a quota counts one of two queues", QUOTA, "    count(HAL_LOAD(delivery_batch), e, &waiting, &newest);\n", ""),
-    _one("a wrong configuration counts as memory", SERVICE, "(sys_error)Sys_Get_LastError()", "SYS_ERROR_MEMORY"),
+    _one(
+        "a wrong configuration counts as memory", SERVICE, "        error = (sys_error)Sys_Get_LastError();\n",
+        "        error = SYS_ERROR_MEMORY;\n",
+    ),
     _one("a NULL cleanup is accepted", CLEANUP, "c == NULL || run == NULL", "c == NULL"),
     _one("threads join each other", JOIN, "if (next == os_running) {", "if (next == os_running && next == p) {"),
     Fault(
@@ -76,7 +79,20 @@ FAULTS = (
         "a notification before the wait is lost", NOTIFICATION, "    n->bits |= bits;\n",
         "    n->bits |= bits & n->awaited;\n",
     ),
-    _one("an end overwrites main's time-out", PROCESS, "    os_in_kernel = true; /* a failure", "    /* a failure"),
+    _one("an end overwrites main's time-out", PROCESS, "    event_announce(SYS", "    (void)Sys_Send_IntEvent(SYS"),
+    _one(
+        "an application subscribes as the drivers", EVENT, ": process_find(pid) == NULL ?",
+        ": pid != OS_DRIVERS && process_find(pid) == NULL ?",
+    ),
+    _one("a failing send of a timer is an error", TIMER, "event_announce(t->", "(void)Sys_Send_IntEvent(t->"),
+    _one(
+        "an ISR ends a section", PROCESS,
+        "    if (!hal_in_isr()) {\n        section_close", "    {\n        section_close",
+    ),
+    _one(
+        "an ISR gets the wrong error", QUOTA, "return os_enter() == SYS_OK && os_leave(most != 0",
+        "return most == 0 ? os_fail(SYS_ERROR_ARGUMENT) : os_enter() == SYS_OK && os_leave(most != 0",
+    ),
     _one("a woken thread runs next", PROCESS, "    os_ring = p;\n    os_preempt();", "    os_preempt();"),
     _one(
         "the last waiter is woken first", PROCESS, "    self->next = NULL;\n    sys_pcb **end = link_to(NULL);",
@@ -107,7 +123,7 @@ FAULTS = (
     _one("a timer drifts", TIMER, "(uint16)(t->due + t->period);\n", "(uint16)(clock_now() + t->period);\n"),
     _one("a service restarts for ever", SERVICE, "                s->restarts--;\n", "                ;\n"),
 )  # fmt: skip
-"""Those up to "an end overwrites main's time-out" stem from the kernel's history."""
+"""Those up to "an ISR gets the wrong error" stem from the kernel's history."""
 
 
 def _found_by() -> dict[str, str]:

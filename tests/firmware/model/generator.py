@@ -41,7 +41,8 @@ REMOTE = (Code.SHARE, Code.SHARE, Code.ARRIVE, Code.ARRIVE, Code.ARRIVE, Code.AR
 """Calls of programs that share events, for an interpreter with the infra-red link."""
 IN_ISR = (Code.SEND_INT, Code.SEND_INT, Code.SEND_INT, Code.SEND, Code.NOTIFY, Code.SIGNAL,
           Code.IS_REGISTERED, Code.SET_SCHEDULER, Code.LOST, Code.KILL, Code.SUBSCRIBE, Code.PROCESS_STATE,
-          Code.UNLOCK, Code.PUSH, Code.SLEEP)  # fmt: skip
+          Code.UNLOCK, Code.PUSH, Code.SLEEP, Code.LIMIT, Code.START_TIMER, Code.START_SECTION,
+          Code.END_SECTION, Code.END_SECTION)  # fmt: skip
 PREFERRED = {Kind.CLEANUP: (Code.KILL, Code.KILL, Code.UNLOCK, Code.PUSH, Code.POP, Code.START_PROCESS),
              Kind.HANDLER: (Code.SEND_INT, Code.SEND_INT, Code.KILL, Code.READ, Code.UNREGISTER),
              Kind.CONDITION: (Code.KILL, Code.UNSUBSCRIBE_HANDLER, Code.SUBSCRIBE)}  # fmt: skip
@@ -157,11 +158,12 @@ class Generator:
             return r.randint(0, 7), 0, 0
         if name == "SUBSCRIBE":
             handler = r.choice((0, 0, 1, 1, 2, 3, 4)) if r.random() < 0.2 else r.randint(0, 3)
-            return self.event(), r.choice((4, 4, 5, self.process())), handler + 8 * r.choice((0, 0, 0, 1, 2, 3))
+            owner = r.choice((4, 4, 5, self.process(), r.choice((4, 6))))
+            return self.event(), owner, handler + 8 * r.choice((0, 0, 0, 1, 2, 3))
         if name == "UNSUBSCRIBE":
-            return self.event(), r.choice((4, self.process())), 0
+            return self.event(), r.choice((4, 4, 6, *[self.process()] * 3)), 0
         if name == "UNSUBSCRIBE_HANDLER":
-            return self.event(), r.choice((4, self.process())), r.randint(0, 3)
+            return self.event(), r.choice((4, 4, 6, *[self.process()] * 3)), r.randint(0, 3)
         if name == "SEND":
             return self.event(), r.randint(0, 9), r.randint(0, 3)
         if name in ("SEND_INT", "WAIT_CONDITION"):

@@ -58,7 +58,7 @@ class Kernel(Remote):
             self.blocked.append(thread)
         else:
             self.free(period + thread.stack + self.sizes.thread)
-        self.send(TERMINATION, thread.pid.to_bytes(2, "little"))
+        self.announce(TERMINATION, thread.pid)
 
     # ---- Motors ----------------------------------------------------------------------------------------------------
 

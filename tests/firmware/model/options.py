@@ -322,7 +322,9 @@ class Options(Events):
                 self.kill(service.pid)
                 service.bitten = min(service.bitten + 1, SATURATED)
             if not service.pid and service.restarts:
+                before = self.last_error()
                 self.begin_service(service)
+                self.fail(before)  # a restart that fails is no error of a handler
                 if service.pid and service.restarts != ALWAYS:
                     service.restarts -= 1
 

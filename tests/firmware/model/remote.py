@@ -88,14 +88,14 @@ class Remote(Waits):
         self.frames += self.frames < QUEUE + 1
         return self.frames <= QUEUE
 
-    def send(self, number: int, payload: bytes) -> bool:
+    def queue_message(self, number: int, payload: bytes) -> Error:
         """Transmit a shared event that this robot sends, then queue it here."""
         if not self.arriving and self.slot_of(number) is not None:
             if len(payload) > MOST_BYTES:
                 self.count("too_long")
             elif self.transmit():
                 self.count("shared")
-        return super().send(number, payload)
+        return super().queue_message(number, payload)
 
     def arrive(self, number: int, hops: int, robot: int, sequence: int, payload: bytes) -> None:
         """Interrupt: a frame with an event of another robot has arrived, from it or from a robot in between."""

@@ -301,10 +301,10 @@ class Threads(Calls):
         assert thread.period is not None
         thread.period.missed = True
         self.deadlines_missed = min(self.deadlines_missed + 1, SATURATED)
-        self.send(DEADLINE_MISSED, thread.pid.to_bytes(2, "little"))
+        self.announce(DEADLINE_MISSED, thread.pid)
 
-    def send(self, number: int, payload: bytes) -> bool:
-        """Send an event (events.py)."""
+    def announce(self, number: int, value: int) -> None:
+        """Send an event of the kernel's own (events.py)."""
         raise NotImplementedError
 
     # ---- Time ------------------------------------------------------------------------------------------------------
@@ -318,7 +318,7 @@ class Threads(Calls):
         self.supervision_due |= self.supervises
         if self.has_work:
             self.preempt()
-        self.send(CLOCK, (self.now & 0xFFFF).to_bytes(2, "little"))
+        self.announce(CLOCK, self.now)
         self.in_isr = before
 
     def set_alarm(self, moment: int) -> None:

@@ -86,7 +86,6 @@ class Waits(Options):
     @call("Sys_Signal_Semaphore", "MTHI")
     def signal(self, semaphore: Semaphore) -> bool:
         if semaphore.count == 0xFFFF:
-            self.preempt()
             return self.fail(Error.BUSY)
         semaphore.count += 1
         self.post()
@@ -141,7 +140,7 @@ class Waits(Options):
             return
         for timer in list(self.timers):
             if timer.due <= self.now:
-                self.send(timer.event, timer.value.to_bytes(2, "little"))
+                self.announce(timer.event, timer.value)
                 if not timer.period:
                     self.timers.remove(timer)
                     continue

@@ -93,7 +93,7 @@ static bool on_reported(uint16 pid, uint16 event, sys_event_data *data)
 static bool report(sint32 event, bool wanted)
 {
     uint16 number = (uint16)event;
-    return wanted ? Sys_Subscribe_to_Event(number, OS_DRIVERS, on_reported, NULL)
+    return wanted ? event_connect(number, on_reported)
                   : Sys_Unsubscribe_Handler(number, OS_DRIVERS, on_reported);
 }
 
@@ -198,5 +198,5 @@ bool Sys_Start_Bluetooth(void)
     (void)Sys_Set_RxProcessor(SYS_UART1, Sys_Line_Rx);
     (void)Sys_Set_TxProcessor(SYS_UART1, Sys_Line_Tx);
     return Sys_Register_Event(SYS_BLUETOOTH_RECEIVED) &&
-           Sys_Subscribe_to_Event(SYS_UART1_RECEIVED, OS_DRIVERS, on_line, NULL);
+           event_connect(SYS_UART1_RECEIVED, on_line);
 }

@@ -45,7 +45,7 @@ bool Sys_Start_Camera(void)
     processor = Sys_LineOfSight_Processor;
     (void)Sys_Register_Event(SYS_IO_1PXSENSOR);
     (void)Sys_Register_Event(SYS_IO_CAMERA);
-    (void)Sys_Subscribe_to_Event(SYS_IO_CAMERA, OS_DRIVERS, on_frame, NULL);
+    (void)event_connect(SYS_IO_CAMERA, on_frame);
     type = hal_camera_init();
     if (type == CAMERA_NONE) {
         return false;
@@ -56,10 +56,12 @@ bool Sys_Start_Camera(void)
 
 sys_camera_processor Sys_Set_CameraProcessor(sys_camera_processor wanted)
 {
-    Sys_Start_CriticalSection();
+    if (os_enter() != SYS_OK) {
+        return NULL;
+    }
     sys_camera_processor before = processor;
     processor = wanted != NULL ? wanted : Sys_LineOfSight_Processor;
-    Sys_End_CriticalSection();
+    section_close();
     return before;
 }
 

@@ -161,5 +161,5 @@ bool Sys_Start_Infrared(void)
     hal_infrared_start();
     return is_ready && Sys_Register_Event(SYS_NEIGHBOUR_MESSAGE) && Sys_Register_Event(SYS_NEIGHBOUR_SEEN) &&
            Sys_Register_Event(SYS_NEIGHBOUR_LOST) && Sys_Register_Event(SYS_SEND_NEIGHBOURS) &&
-           Sys_Subscribe_to_Event(SYS_SEND_NEIGHBOURS, OS_DRIVERS, on_request, NULL);
+           event_connect(SYS_SEND_NEIGHBOURS, on_request);
 }

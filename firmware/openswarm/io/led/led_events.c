@@ -51,5 +51,5 @@ sys_led_processor Sys_Set_LEDProcessor(sys_led_processor wanted)
 bool Sys_Start_LEDs(void)
 {
     processor = NULL;
-    return Sys_Register_Event(SYS_IO_LED) && Sys_Subscribe_to_Event(SYS_IO_LED, OS_DRIVERS, on_order, NULL);
+    return Sys_Register_Event(SYS_IO_LED) && event_connect(SYS_IO_LED, on_order);
 }

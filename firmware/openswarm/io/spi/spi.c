@@ -79,10 +79,12 @@ bool Sys_SPI_Transfer(const uint8 *out, uint8 *in, uint16 size)
 
 sys_spi_processor Sys_Set_SPIProcessor(sys_spi_processor wanted)
 {
-    Sys_Start_CriticalSection();
+    if (os_enter() != SYS_OK) {
+        return NULL;
+    }
     sys_spi_processor before = processor;
     processor = wanted;
-    Sys_End_CriticalSection();
+    section_close();
     return before;
 }
 

@@ -72,7 +72,7 @@ static void options_are_refused(void)
     MUST(!Sys_Lock_Mutex(&mutex) && !Sys_Unlock_Mutex(&mutex));
     MUST(Sys_Start_Joinable(&config) == 0 && !Sys_Join(driver_pid));
     MUST(!Sys_Push_Cleanup(&cleanup, NULL, NULL) && !Sys_Pop_Cleanup(true));
-    MUST(!Sys_Limit_Event(&no_quota, HEARD, 1) && !Sys_Keep_Latest(&no_quota, HEARD));
+    MUST(!Sys_Limit_Event(&no_quota, HEARD, 0) && !Sys_Keep_Latest(&no_quota, HEARD));
     MUST(!Sys_Start_Service(&service) && !Sys_Feed_Watchdog());
     MUST(refused > UINT16_MAX - 10 || Sys_Get_Statistics()->refused - refused == 10);
 }
@@ -90,10 +90,9 @@ __attribute__((used)) void boundaries_isr(void)
     MUST(!Sys_Send_IntEvent(NEVER, 1));
     (void)Sys_Send_IntEvent(SHARED, 1); /* the event may be registered at this moment */
     (void)Sys_Send_IntEvent(WAITED, 2); /* a value that the waiter's condition rejects */
+    Sys_End_CriticalSection(); /* of no effect here, as is the next one */
     Sys_Start_CriticalSection();
     Sys_Start_CriticalSection();
-    Sys_End_CriticalSection();
-    Sys_End_CriticalSection();
     (void)Sys_Get_ProcessID();
     MUST(Sys_Get_ProcessState(NEVER) == SYS_UNKNOWN);
     (void)Sys_Get_ProcessState(driver_pid);

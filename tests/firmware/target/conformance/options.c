@@ -382,6 +382,31 @@ static void cleanups_own_nothing_of_the_killer(void)
     CHECK(refused_as(Sys_Push_Cleanup(&hostile[0], NULL, NULL), SYS_ERROR_ARGUMENT));
 }
 
+static void look_at_mutex(void *unused)
+{
+    (void)unused;
+    note(mutex.owner == NULL ? 'n' : 'o');
+}
+
+static void own_and_look(void *mutex_first)
+{
+    bool locked = mutex_first != NULL && Sys_Lock_Mutex(&mutex);
+    note(Sys_Push_Cleanup(&hostile[0], look_at_mutex, NULL) ? '+' : '?');
+    note(locked || Sys_Lock_Mutex(&mutex) ? 'm' : '?');
+    spin_for_ever(NULL);
+}
+
+static void a_mutex_is_released_before_cleanups_run(void)
+{
+    static uint8 any;
+    for (uint8 i = 0; i < 2; i++) {
+        forget();
+        uint16 pid = start(own_and_look, i == 0 ? NULL : &any, 0);
+        Sys_Sleep(12);
+        CHECK(noted("+m") && Sys_Kill_Process(pid) && noted("+mn"));
+    }
+}
+
 static void push_kill(void *unused)
 {
     own_pid = Sys_Get_ProcessID();
@@ -440,6 +465,7 @@ void check_options(void)
     hostile_cleanups();
     cleanups_kill_what_their_thread_awaits();
     cleanups_own_nothing_of_the_killer();
+    a_mutex_is_released_before_cleanups_run();
     a_cleanup_kills_the_killer();
     threads_do_not_join_in_a_ring();
 }

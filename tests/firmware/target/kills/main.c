@@ -1,5 +1,5 @@
-/* Scenes of driver calls, within which INT1 kills the victim thread at any instruction (tests/firmware/kills.py). The
- * keeper thread then uses every device itself and restores the memory. */
+/* Scenes of calls of drivers and options, within which INT1 kills the victim thread at any instruction
+ * (tests/firmware/kills.py). The keeper thread then uses every device and option itself and restores the memory. */
 #include <analog.h>
 #include <battery.h>
 #include <bluetooth.h>
@@ -7,8 +7,11 @@
 #include <i2c.h>
 #include <led.h>
 #include <openswarm.h>
+#include <openswarm_cleanup.h>
 #include <openswarm_interrupt.h>
 #include <openswarm_io.h>
+#include <openswarm_join.h>
+#include <openswarm_mutex.h>
 #include <remote.h>
 #include <spi.h>
 
@@ -116,7 +119,26 @@ static void look_round(void)
     (void)Sys_Get_UARTStatistics(SYS_UART2);
 }
 
-static void (*const scenes[])(void) = {read_bus, ask_nobody, exchange_words, say_much, say_in_frames, move_and_light, look_round};
+static sys_mutex mutex = SYS_MUTEX(0);
+static sys_cleanup cleanups[2];
+static uint16 partner_pid;
+static volatile uint16 cleaned[2], rounds; /* runs of each cleanup; times that the rival owned the mutex */
+
+static void clean(void *runs)
+{
+    expect(++*(volatile uint16 *)runs == 1 && mutex.owner == NULL); /* the rival sleeps while the victim ends */
+}
+
+static void own_and_join(void)
+{
+    cleaned[0] = cleaned[1] = 0;
+    expect(Sys_Push_Cleanup(&cleanups[0], clean, (void *)&cleaned[0]) && Sys_Lock_Mutex(&mutex));
+    expect(Sys_Push_Cleanup(&cleanups[1], clean, (void *)&cleaned[1]) && !Sys_JoinTimeout(partner_pid, 2));
+    expect(Sys_Pop_Cleanup(false) && Sys_Unlock_Mutex(&mutex) && Sys_Pop_Cleanup(true));
+}
+
+static void (*const scenes[])(void) = {read_bus,      ask_nobody,     exchange_words, say_much,
+                                       say_in_frames, move_and_light, look_round,     own_and_join};
 enum { SCENES = sizeof scenes / sizeof *scenes };
 
 static void victim(void *unused)
@@ -146,6 +168,35 @@ static bool on_kill(uint16 pid, uint16 event, sys_event_data *data)
     return true;
 }
 
+static void rival(void *unused)
+{
+    (void)unused;
+    for (;;) {
+        expect(Sys_Lock_Mutex(&mutex) && Sys_Unlock_Mutex(&mutex));
+        rounds++;
+        Sys_Sleep(3);
+    }
+}
+
+static void partner(void *unused)
+{
+    (void)unused;
+    for (;;) {
+        Sys_Sleep(60000);
+    }
+}
+
+static void check_options(void)
+{
+    uint16 before = rounds;
+    expect(Sys_Lock_MutexTimeout(&mutex, 1) && Sys_Unlock_Mutex(&mutex));
+    for (uint8 i = 0; i < 2; i++) { /* none is pushed still */
+        expect(Sys_Push_Cleanup(&cleanups[i], clean, NULL) && Sys_Pop_Cleanup(false));
+    }
+    Sys_Sleep(SETTLE_MS);
+    expect(rounds != before);
+}
+
 static void check_devices(void)
 {
     uint8 in[5] = {0};
@@ -162,11 +213,13 @@ static void check_devices(void)
     for (uint8 led = 0; led < SYS_LEDS; led++) {
         (void)Sys_Set_LED(led, false);
     }
+    check_options();
 }
 
 int main(void)
 {
     static const sys_process_config config = {victim, NULL, VICTIM_STACK, 0, 0, 0, 0};
+    static const sys_process_config others[] = {{rival, NULL, 0, 0, 0, 0, 0}, {partner, NULL, 0, 0, 0, 0, 0}};
     Sys_Init_Kernel();
     Sys_Register_Event(DONE);
     Sys_Register_Event(KILL);
@@ -178,6 +231,9 @@ int main(void)
     Sys_Start_Remote();
     Sys_Start_LEDs();
     Sys_Enable_Interrupt(INT1);
+    expect(Sys_Start_ProcessWith(&others[0]) != 0);
+    partner_pid = Sys_Start_ProcessWith(&others[1]);
+    expect(partner_pid != 0);
     Sys_Start_Kernel();
     for (;;) {
         Sys_Sleep(SETTLE_MS); /* until written data is sent */
