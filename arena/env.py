@@ -6,6 +6,7 @@ World, sensors and supervisor are those of a trial. Equal seeds and actions give
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, ClassVar, Final
 
@@ -17,6 +18,7 @@ from pettingzoo import ParallelEnv
 from arena.experiments import Experiment, TrialSamples, experiment_of
 from arena.experiments.supervisor import Supervisor, SupervisorHooks
 from arena.infrared.channel import OpticalChannel
+from arena.replay.video import arena_picture
 from arena.robots.controller import Controller, ScriptedController
 from arena.robots.firmware_controller import FirmwareController
 from arena.robots.own_controller import Policy, load_controller
@@ -58,13 +60,16 @@ class ArenaEnv(ParallelEnv):  # type: ignore[misc]
     An action holds for `decision_s` seconds: speeds of the left and right wheel, in -1..1 of 12.8 cm/s. The reward is
     equal for all robots: the increase of the experiment's first metric, or `reward(stage)`. With `image` the robots run
     firmware, and `command` translates each action into a Bluetooth message. An episode is truncated after `seconds`
-    simulated seconds and terminated by the experiment's `done`.
+    simulated seconds and terminated by the experiment's `done`. With `render_mode="rgb_array"`, `render` returns a
+    picture of the arena from above.
+
+    A pickled or copied environment repeats its episode from the seed and the actions, which gives the same numbers;
+    changes by `stage` are not repeated.
 
     Raises SceneError, emu.LoadError, ValueError.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {"name": "arena_v0", "render_modes": []}
-    render_mode = None
+    metadata: ClassVar[dict[str, Any]] = {"name": "arena_v0", "render_modes": ["rgb_array"]}
 
     def __init__(
         self,
@@ -75,11 +80,18 @@ class ArenaEnv(ParallelEnv):  # type: ignore[misc]
         reward: Reward | None = None,
         image: Path | None = None,
         command: Command = serial_command,
+        render_mode: str | None = None,
     ) -> None:
+        if render_mode not in (None, *self.metadata["render_modes"]):
+            raise ValueError(f"render_mode = {render_mode!r}: expected None or 'rgb_array'")
+        self.render_mode = render_mode
+        self._settings: Final = {"seconds": seconds, "decision_s": decision_s, "reward": reward, "image": image,
+                                 "command": command, "render_mode": render_mode}  # fmt: skip
         found = load_scene(scene) if isinstance(scene, str) else scene
-        home = Path(scene).parent if isinstance(scene, str) else Path()
+        if isinstance(scene, str) and found.experiment.endswith(".py"):
+            found = replace(found, experiment=str((Path(scene).parent / found.experiment).resolve()))
         self.scene: Final = found if image is not None else scripted(found)
-        self.experiment: Final[Experiment] = experiment_of(self.scene.experiment, home)
+        self.experiment: Final[Experiment] = experiment_of(self.scene.experiment)
         self._ticks: Final = round(decision_s * FCY / self.scene.clock.quantum_tcy)
         if self._ticks < 1 or not seconds > 0:
             raise ValueError(
@@ -92,6 +104,9 @@ class ArenaEnv(ParallelEnv):  # type: ignore[misc]
         self.possible_agents = [f"robot_{robot}" for robot in range(self.scene.robots.count)]
         self.agents: list[str] = []
         self._next_seed = 0
+        self._taken: list[dict[str, Vector]] = []
+        """Actions of the episode so far."""
+        self._has_begun = False
         self._controllers: list[Controller] = []
         self._action: Final = Box(-1.0, 1.0, (2,), np.float32)
         self._observation: Final = Box(-1.0, 1.0, (SIZE,), np.float32)
@@ -125,6 +140,7 @@ class ArenaEnv(ParallelEnv):  # type: ignore[misc]
         self._readers = [SenseReader(self.scene, chosen, robot) for robot in range(count)]
         self._speeds = [(0.0, 0.0)] * count
         self._value = self._metric()
+        self._taken, self._has_begun = [], True
         return self._observed(), {agent: {} for agent in self.agents}
 
     def step(
@@ -135,6 +151,7 @@ class ArenaEnv(ParallelEnv):  # type: ignore[misc]
         A robot without an action stops. Return observations, rewards, terminations, truncations and infos. Raises
         ValueError, and changes nothing, if an action is not two finite numbers."""
         self._speeds = [_speeds(agent, actions.get(agent, (0.0, 0.0))) for agent in self.agents]
+        self._taken.append({agent: np.array(one, dtype=float) for agent, one in actions.items()})
         wheels = [(left * dimensions.WHEEL_SPEED, right * dimensions.WHEEL_SPEED) for left, right in self._speeds]
         if self._image is not None:
             for controller, speeds in zip(self._controllers, self._speeds, strict=True):
@@ -159,6 +176,31 @@ class ArenaEnv(ParallelEnv):  # type: ignore[misc]
             dict.fromkeys(agents, late and not over),
             {agent: {"metric": self._value} for agent in agents},
         )
+
+    @property
+    def state_space(self) -> Box:
+        """Space of `state`."""
+        scene, kinds = self.scene, map(self.scene.kind_of, range(self.scene.objects.count))
+        size = 3 * scene.robots.count + 2 * scene.objects.count + sum(bool(kind.polygon) for kind in kinds)
+        return Box(-np.inf, np.inf, (size,), np.float64)
+
+    def state(self) -> NDArray[np.float64]:
+        """Return the poses of all bodies: x and y in cm and heading in rad of each robot, then x and y of each object,
+        then the headings of the objects that are polygons. Call `reset` first."""
+        return self._world.poses.values.copy()
+
+    def render(self) -> NDArray[np.uint8]:
+        """Return a picture of the arena from above, height x width x 3. Raises ValueError without a `render_mode`."""
+        if self.render_mode is None:
+            raise ValueError('render: create the environment with render_mode="rgb_array"')
+        seen = [self.senses(agent).seen for agent in self.possible_agents]
+        labels = self.experiment.groups(self.scene, self._hooks.supervisor.objects)
+        picture = arena_picture(self.scene, self._world.poses.robots, seen, self._world.object_poses(), labels)
+        return np.array(picture)
+
+    def __reduce__(self) -> tuple[Callable[..., ArenaEnv], tuple[Any, ...]]:
+        """Pickle and copy as the inputs from which the episode can be repeated."""
+        return _repeated, (self.scene, self._settings, self._next_seed, self._has_begun, self._taken)
 
     @property
     def stage(self) -> Supervisor:
@@ -217,3 +259,15 @@ class ArenaEnv(ParallelEnv):  # type: ignore[misc]
             values = (*sensed, *now.proximity, *now.light, *self._speeds[robot])
             found[agent] = np.clip(np.array(values, dtype=np.float32), -1, 1)
         return found
+
+
+def _repeated(scene: Scene, settings: dict[str, Any], next_seed: int, has_begun: bool,
+              actions: list[dict[str, Vector]]) -> ArenaEnv:  # fmt: skip
+    """Return an environment whose episode has had these actions."""
+    env = ArenaEnv(scene, **settings)
+    env._next_seed = next_seed
+    if has_begun:
+        env.reset(seed=next_seed - 1)
+        for one in actions:
+            env.step(one)
+    return env

@@ -11,6 +11,7 @@ from typing import Any, Final
 
 import matplotlib
 import numpy as np
+from cycler import cycler
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Polygon, Rectangle
@@ -19,7 +20,7 @@ from arena.analysis.comparison import series_by_seed
 from arena.analysis.statistics import bootstrap_band
 from arena.experiments import Curve
 from arena.experiments.declaration import code_needed
-from arena.scene import dimensions, geometry
+from arena.scene import dimensions, geometry, palette
 from arena.scene.schema import ObjectKind
 from arena.trial.record import Trial
 
@@ -43,7 +44,8 @@ def draw_all(runs: Runs, folder: Path, form: str, prefix: str = "", names: Seque
     }
     paths = []
     for name in names:
-        figure = figures[name](runs)
+        with matplotlib.rc_context({"axes.prop_cycle": cycler(color=palette.LINES)}):
+            figure = figures[name](runs)
         if figure is None:
             continue
         path = folder / f"{prefix}{name}.{form}"
@@ -70,11 +72,11 @@ def _arena(axis: Axes, trial: Trial, sample: int) -> None:
     labels = trial.experiment.groups(trial.scene, places)
     largest = max(set(labels), key=labels.count) if labels else -1
     for number, (place, label) in enumerate(zip(trial.object_poses[sample], labels, strict=True)):
-        is_filled = label == largest and labels.count(label) > 1
-        axis.add_patch(object_patch(trial.scene.kind_of(number), place, "tab:red" if is_filled else "mistyrose"))
+        fill = palette.OBJECT if label == largest and labels.count(label) > 1 else palette.PALE_OBJECT
+        axis.add_patch(object_patch(trial.scene.kind_of(number), place, fill))
     for index, (x, y) in enumerate(trial.robots[sample]):
         heading = float(trial.columns[f"r{index}_heading"][sample])
-        axis.add_patch(Circle((x, y), dimensions.ROBOT_RADIUS, facecolor="tab:green", edgecolor="k"))
+        axis.add_patch(Circle((x, y), dimensions.ROBOT_RADIUS, facecolor=palette.ROBOT, edgecolor="k"))
         axis.plot([x, x + 6 * np.cos(heading)], [y, y + 6 * np.sin(heading)], "k", linewidth=1)
     frame(axis, trial)
 

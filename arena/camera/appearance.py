@@ -43,6 +43,7 @@ class Appearance(NamedTuple):
     """Visible bodies of a furnished scene.
 
     - `colours`: by class
+    - `robot`: class of the robots
     - `objects`: radius (0: a polygon), height, class
     - `polygons`: of each movable polygon, in order: number of the object, corners around its centre, height, class
     - `sides`: ends, height, class of walls and polygonal obstacles
@@ -52,6 +53,7 @@ class Appearance(NamedTuple):
     """
 
     colours: NDArray[np.uint8]
+    robot: int
     objects: list[tuple[float, float, int]]
     polygons: list[tuple[int, geometry.Corners, float, int]]
     sides: list[tuple[geometry.Side, float, int]]
@@ -105,8 +107,9 @@ def _appearance(scene: Scene) -> Appearance:
     discs = [(one.x_cm, one.y_cm, one.radius_cm, one.height_cm, class_of(one.colour))
              for one in scene.obstacles if one.radius_cm]  # fmt: skip
     patches = [(patch, class_of(patch.colour)) for patch in scene.patches]
+    robot, painted = class_of(scene.robots.colour), np.array(colours, dtype=np.uint8)
     sensor_classes = list(range(len(COLOURS))) + [_nearest_reference(colour) for colour in colours[len(COLOURS) :]]
-    return Appearance(np.array(colours, dtype=np.uint8), objects, polygons, sides, discs, patches, sensor_classes)
+    return Appearance(painted, robot, objects, polygons, sides, discs, patches, sensor_classes)
 
 
 def _nearest_reference(colour: tuple[int, ...]) -> int:

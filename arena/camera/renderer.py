@@ -136,6 +136,7 @@ class _SceneBodies:
         ))  # fmt: skip
         sensor_classes = appearance.sensor_classes if appearance is not None else range(len(COLOURS))
         self.sensor_classes: Final = np.array(sensor_classes, dtype=np.uint8)
+        self.robot: Final = appearance.robot if appearance is not None else ROBOT
         self.led_positions: Final = (_Led * len(LED_POSITIONS))(*(_Led(*one) for one in LED_POSITIONS))
         self.led_classes: Final = led_classes(scene)
 
@@ -192,7 +193,7 @@ class Renderer:
             own, scene.robots.count, len(bodies.objects), scene.is_furnished,
             self.leds.ctypes.data if scene.camera.sees_leds else None, bodies.led_positions,
             len(bodies.led_positions), *bodies.led_classes, dimensions.LED_COS,
-            _Disc(0.0, 0.0, dimensions.ROBOT_RADIUS, dimensions.ROBOT_HEIGHT, ROBOT), bodies.objects,
+            _Disc(0.0, 0.0, dimensions.ROBOT_RADIUS, dimensions.ROBOT_HEIGHT, bodies.robot), bodies.objects,
             bodies.fixed, len(bodies.fixed), bodies.outlines, len(bodies.outlines),
             bodies.patches, len(bodies.patches), self._discs, 0, self._sides, 0,
             bodies.polygons, len(bodies.polygons),

@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 from arena.commands.run import with_overrides
 from arena.infrared.propagation import PUBLISHED, Optics, amplitude, distance_of
 from arena.scene.loader import Scene, load_scene
+from arena.scene.palette import LINES
 from arena.trial.strict_json import json_text
 from arena.world.poses import Poses
 
@@ -61,6 +62,8 @@ def draw(optics: Optics) -> Figure:
     """Draw the amplitude by distance, and the range by direction."""
     figure = Figure(figsize=(10, 4.4), layout="constrained")
     left, right = figure.add_subplot(1, 2, 1), figure.add_subplot(1, 2, 2, projection="polar")
+    for axes in (left, right):
+        axes.set_prop_cycle(color=LINES)
     distances = np.arange(7.4, 60, 0.1)
     left.semilogy(*zip(*PUBLISHED, strict=True), "o", color="k", markersize=4, label="published (libIrcom)")
     for name, sender, receiver in (("brightest direction", BEST_DEG, 90.0), ("front to front", 0.0, 0.0),

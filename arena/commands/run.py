@@ -60,7 +60,7 @@ def add_plan(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--brain",
         help="openswarm (default), bare, scripted, or an ELF or HEX file: controls the groups of robots without an "
-        "`image` in the scene, or all robots if every group has one",
+        "`image` or a controller in Python in the scene, or all robots if every group has one",
     )
     command.add_argument(
         "--controller",
@@ -132,6 +132,8 @@ def plan_from(options: argparse.Namespace, trials: int) -> Plan:
     home = Path(options.scene).parent
     if options.brain is not None and all(group.image for group in scene.groups):
         scene = replace(scene, groups=tuple(replace(group, image="") for group in scene.groups))
+    if options.brain not in (None, SCRIPTED) and all(group.controller not in ("", *SELECTOR) for group in scene.groups):
+        scene = replace(scene, groups=tuple(replace(group, controller="") for group in scene.groups))
     own_images = list(dict.fromkeys(group.image for group in scene.groups if group.image))
     images = tuple((one, image_for(one, home)) for one in own_images)
     if scene.groups and all(group.image for group in scene.groups):

@@ -14,7 +14,7 @@ from arena.camera.appearance import COLOURS, NAMES, OBJECT, ROBOT, WALL
 from arena.camera.renderer import WINDOW_COLUMNS
 from arena.replay.page import sample_data
 from arena.robots.controller import STRIP_COLUMNS, STRIP_PIXELS
-from arena.scene import dimensions, geometry
+from arena.scene import dimensions, geometry, palette
 from arena.trial.record import Trial
 
 PICTURES: Final = 6
@@ -25,7 +25,6 @@ CHANGE_CM_S: Final = 2.0
 """Least difference of wheel speeds, in cm/s, that counts as a new command.
 
 One step more or less in the 10 ms in which steps are counted is 1.28 cm/s."""
-_FACES: Final = {OBJECT: "tab:red", ROBOT: "tab:green"}
 
 
 def command_changes(trial: Trial, robot: int) -> list[int]:
@@ -104,9 +103,9 @@ def _from_above(axis: Any, trial: Trial, data: dict[str, Any], robot: int, sampl
         kind = trial.scene.kind_of(thing)
         outline = (Polygon(geometry.turned(geometry.centred(kind.polygon), *place)) if kind.polygon else
                    Circle((place[0], place[1]), kind.radius_cm))  # fmt: skip
-        outline.set(facecolor=_FACES[OBJECT], edgecolor="k")
+        outline.set(facecolor=palette.OBJECT, edgecolor="k")
         axis.add_patch(outline)
     for rx, ry in trial.robots[sample]:
-        axis.add_patch(Circle((rx, ry), dimensions.ROBOT_RADIUS, facecolor=_FACES[ROBOT], edgecolor="k"))
+        axis.add_patch(Circle((rx, ry), dimensions.ROBOT_RADIUS, facecolor=palette.ROBOT, edgecolor="k"))
     axis.plot([x, x + 150 * np.cos(heading)], [y, y + 150 * np.sin(heading)], "k:", linewidth=0.8)
     axis.set(xlim=(x - VIEW_CM, x + VIEW_CM), ylim=(y - VIEW_CM, y + VIEW_CM), aspect="equal")

@@ -18,7 +18,7 @@ import numpy as np
 from arena.camera.appearance import colours_of
 from arena.camera.renderer import Renderer
 from arena.robots.controller import STRIP_COLUMNS, STRIP_PIXELS
-from arena.scene import dimensions, geometry
+from arena.scene import dimensions, geometry, palette
 from arena.scene.loader import Scene
 from arena.scene.schema import NAMED, Obstacle, Patch
 from arena.trial.record import Trial
@@ -83,6 +83,7 @@ def trial_data(trial: Trial) -> dict[str, Any]:
             for robot, one in enumerate(map(trial.scene.group_of, range(trial.scene.robots.count)))
         ],
         "robotRadius": dimensions.ROBOT_RADIUS,
+        "palette": {"seen": palette.SEEN, "groups": palette.GROUPS},
         "sight": min(trial.scene.camera.range_cm, 1000.0),
         "infrared": {
             "bearings": [math.radians(bearing) for bearing in dimensions.IR_BEARINGS_DEG],

@@ -7,7 +7,7 @@ import importlib
 import math
 import shutil
 import subprocess
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, Final
@@ -17,7 +17,7 @@ from PIL import Image, ImageDraw
 from arena.camera.appearance import COLOURS
 from arena.replay.page import sample_data
 from arena.robots.controller import STRIP_PIXELS
-from arena.scene import dimensions, geometry
+from arena.scene import dimensions, geometry, palette
 from arena.scene.loader import Scene
 from arena.trial.record import RecordError, Trial, reason_of
 from emu.host.files import atomic_file
@@ -30,9 +30,9 @@ LIMIT: Final = 20_000
 """Most frames of a video; more frames are probably a mistake in --speed."""
 _LINE: Final = 14
 _PIXEL: Final = 6
-_INK, _PAPER, _PALE = (34, 34, 34), (255, 255, 255), (221, 221, 221)
-_SEEN: Final = ((187, 187, 187), (204, 0, 0), (0, 136, 0))
-_CLUSTERS: Final = ((230, 140, 60), (110, 170, 230), (190, 130, 220), (240, 210, 80), (120, 200, 150), (230, 130, 160))
+_INK, _PAPER, _PALE = palette.rgb(palette.INK), palette.rgb(palette.PAPER), (221, 221, 221)
+_SEEN: Final = tuple(map(palette.rgb, palette.SEEN))
+_CLUSTERS: Final = tuple(map(palette.rgb, palette.GROUPS))
 
 
 def write_video(trial: Trial, path: Path, speed: float, seconds: float | None = None) -> None:
@@ -72,12 +72,16 @@ def frames(trial: Trial, times: list[float]) -> Iterator[Image.Image]:
         yield _frame(trial.scene, data, sample, caption)
 
 
-def _frame(scene: Scene, data: dict[str, Any], sample: int, caption: str) -> Image.Image:
-    """Draw one frame: the arena from above, `caption`, and the camera strips."""
+def arena_picture(
+    scene: Scene, robots: Sequence[tuple[float, float, float]], seen: Sequence[int],
+    objects: Sequence[tuple[float, ...]], labels: Sequence[int],
+) -> Image.Image:  # fmt: skip
+    """Draw the arena from above, `SCALE` pixels per cm.
+
+    `robots` are poses in cm and rad, `seen` the answers of their sensors, `objects` x and y and of a polygon the
+    heading, `labels` the group of each object."""
     width, height = round(scene.arena.width_cm * SCALE), round(scene.arena.height_cm * SCALE)
-    rows = len(data["robots"])
-    total = height + _LINE * (rows + 1) + 4
-    image = Image.new("RGB", (width + width % 2, total + total % 2), _PAPER)
+    image = Image.new("RGB", (width, height), _PAPER)
     draw = ImageDraw.Draw(image)
     draw.rectangle((0, 0, width - 1, height - 1), outline=_INK)
 
@@ -85,20 +89,36 @@ def _frame(scene: Scene, data: dict[str, Any], sample: int, caption: str) -> Ima
         left, low, r = x * SCALE, height - y * SCALE, radius * SCALE
         draw.ellipse((left - r, low - r, left + r, low + r), fill=fill, outline=_INK)
 
-    labels = data["clusters"][sample]
-    for thing, (place, label) in enumerate(zip(data["objects"][sample], labels, strict=True)):
+    for one in scene.obstacles:
+        if one.polygon:
+            draw.polygon([(x * SCALE, height - y * SCALE) for x, y in one.polygon], outline=_INK)
+        else:
+            disc(one.x_cm, one.y_cm, one.radius_cm, _PAPER)
+    for thing, (place, label) in enumerate(zip(objects, labels, strict=True)):
         kind, fill = scene.kind_of(thing), _CLUSTERS[label % len(_CLUSTERS)] if labels.count(label) > 1 else _PALE
         if kind.polygon:
             corners = geometry.turned(geometry.centred(kind.polygon), *place)
             draw.polygon([(x * SCALE, height - y * SCALE) for x, y in corners], fill=fill, outline=_INK)
         else:
             disc(place[0], place[1], kind.radius_cm, fill)
-    for number, robot in enumerate(data["robots"]):
-        x, y, heading = robot["x"][sample], robot["y"][sample], robot["heading"][sample]
-        disc(x, y, dimensions.ROBOT_RADIUS, _SEEN[robot["seen"][sample]])
+    for number, ((x, y, heading), answer) in enumerate(zip(robots, seen, strict=True)):
+        disc(x, y, dimensions.ROBOT_RADIUS, _SEEN[answer])
         tip = (x + 9 * math.cos(heading)) * SCALE, height - (y + 9 * math.sin(heading)) * SCALE
         draw.line((x * SCALE, height - y * SCALE, *tip), fill=_INK, width=2)
         draw.text((x * SCALE + 8, height - y * SCALE - 14), str(number), fill=_INK)
+    return image
+
+
+def _frame(scene: Scene, data: dict[str, Any], sample: int, caption: str) -> Image.Image:
+    """Draw one frame: the arena from above, `caption`, and the camera strips."""
+    robots = [(one["x"][sample], one["y"][sample], one["heading"][sample]) for one in data["robots"]]
+    seen = [one["seen"][sample] for one in data["robots"]]
+    picture = arena_picture(scene, robots, seen, data["objects"][sample], data["clusters"][sample])
+    (width, height), rows = picture.size, len(robots)
+    total = height + _LINE * (rows + 1) + 4
+    image = Image.new("RGB", (width + width % 2, total + total % 2), _PAPER)
+    image.paste(picture)
+    draw = ImageDraw.Draw(image)
     draw.text((4, height + 2), f"{data['t'][sample]:6.1f} s   {caption}", fill=_INK)
     for number in range(rows):
         _strip(draw, number, data["robots"][number], sample, height + _LINE * (number + 1) + 2)
@@ -117,8 +137,8 @@ def _strip(draw: ImageDraw.ImageDraw, number: int, robot: dict[str, Any], sample
     draw.text((30 + STRIP_PIXELS * _PIXEL, y), " ".join(lit), fill=_INK)
 
 
-def _palette() -> list[tuple[int, int, int]]:
-    """Return the palette of all frames: drawn colours, colours of the camera, and ramps for noise and smooth edges."""
+def _gif_colours() -> list[tuple[int, int, int]]:
+    """Return the colours of a GIF: drawn colours, colours of the camera, and ramps for noise and smooth edges."""
     drawn = [_INK, _PAPER, _PALE, *_SEEN, *_CLUSTERS, *(tuple(map(int, colour)) for colour in COLOURS)]
     ramps = [(grey, grey, grey) for grey in range(0, 256, 8)]
     ramps += [(level, level // 6, level // 6) for level in range(8, 256, 8)]
@@ -128,9 +148,9 @@ def _palette() -> list[tuple[int, int, int]]:
 
 def _gif(pictures: Iterator[Image.Image], part: Path) -> None:
     """Write the frames as a GIF."""
-    palette = Image.new("P", (1, 1))
-    palette.putpalette([value for colour in _palette() for value in colour])
-    coloured = (picture.quantize(palette=palette, dither=Image.Dither.NONE) for picture in pictures)
+    table = Image.new("P", (1, 1))
+    table.putpalette([value for colour in _gif_colours() for value in colour])
+    coloured = (picture.quantize(palette=table, dither=Image.Dither.NONE) for picture in pictures)
     first = next(coloured)
     first.save(part, "GIF", save_all=True, append_images=coloured, duration=round(1000 / FRAMES_PER_S), loop=0)
 

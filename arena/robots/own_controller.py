@@ -25,6 +25,7 @@ from arena.scene.user_file import line_of, read_user_file, run_module
 from arena.world.physics import STREAM_CONTROLLERS, generator
 from arena.world.poses import Poses
 
+BUILTIN: Final = Path(__file__).with_name("builtin")
 DEFAULT_PERIOD_S: Final = 0.1
 FASTEST_PERIOD_S, SLOWEST_PERIOD_S = 0.001, 60.0
 
@@ -32,16 +33,20 @@ FASTEST_PERIOD_S, SLOWEST_PERIOD_S = 0.001, 60.0
 def controller_file(name: str, folder: Path = Path()) -> Path:
     """Return the file of a user's controller, which is run once to check it.
 
-    `name` is the path of a Python file relative to `folder`, or an entry point. Raises SceneError for other names."""
+    `name` is the path of a Python file relative to `folder`, a module of `builtin`, or an entry point. Raises
+    SceneError for other names."""
     if name.endswith(".py"):
         path = (folder / name).resolve()
         load_controller(path)
         return path
+    if name.isidentifier() and (BUILTIN / f"{name}.py").is_file():
+        return BUILTIN / f"{name}.py"
     for point in entry_points(group="openswarm.controllers"):
         if point.name == name:
             module: ModuleType = point.load()
             return Path(str(module.__file__)).resolve()
-    raise SceneError(f"unknown controller {name!r}; expected {', '.join(sorted(SPEED_TABLES))}, the path of a .py "
+    known = ", ".join((*sorted(SPEED_TABLES), *sorted(path.stem for path in BUILTIN.glob("[a-z]*.py"))))
+    raise SceneError(f"unknown controller {name!r}; expected {known}, the path of a .py "
                      "file, or an entry point of openswarm.controllers")  # fmt: skip
 
 

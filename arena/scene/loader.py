@@ -84,8 +84,9 @@ class Scene:
 
     @property
     def is_furnished(self) -> bool:
-        """Whether the scene has more than four walls and objects of one kind."""
-        return bool(self.kinds or self.obstacles or self.patches or self.arena.polygon)
+        """Whether the scene has more than four walls, green robots and objects of one kind."""
+        is_painted = self.robots.colour != Robots().colour
+        return bool(is_painted or self.kinds or self.obstacles or self.patches or self.arena.polygon)
 
     def group_of(self, robot: int) -> RobotGroup:
         """Return the group of a robot."""
@@ -377,6 +378,7 @@ def _checked(scene: Scene, errors: _Errors) -> Scene:
     if not 0 <= scene.robots.count <= 1000 or not 0 <= scene.objects.count <= 10_000:
         words = f"{scene.robots.count} robots and {scene.objects.count} objects; expected at most 1000 and 10000"
         raise errors.at("robots", "count", words)
+    _check_colour(errors, "robots", scene.robots, None)
     _check_links(errors, scene)
     _check_off(errors, scene)
     if scene.arena.polygon:
@@ -456,7 +458,7 @@ def _check_kind(errors: _Errors, table: str, one: ObjectKind, number: int) -> No
             raise errors.at(table, "polygon", f"{table}.polygon: a movable polygon must be convex", number)
 
 
-def _check_colour(errors: _Errors, table: str, one: Any, number: int) -> None:
+def _check_colour(errors: _Errors, table: str, one: Any, number: int | None) -> None:
     if one.colour not in NAMED and not COLOUR.fullmatch(one.colour):
         words = f"{table}.colour is {one.colour!r}; expected {', '.join(NAMED)} or #rrggbb"
         raise errors.at(table, "colour", words, number)

@@ -37,7 +37,7 @@ class Robots:
 
     `wheel_noise` is a share of the speed, drawn every `noise_period_s`. The `_sd` values are standard deviations of
     normal distributions, drawn once per robot and trial: yaw (to the left) and pitch (upwards) of the camera, and the
-    share by which each wheel is faster.
+    share by which each wheel is faster. `colour` is that of the skirt, as a camera shows it.
     """
 
     count: int = 5
@@ -49,6 +49,7 @@ class Robots:
     camera_yaw_sd_deg: float = 0.0
     camera_pitch_sd_deg: float = 0.0
     wheel_bias_sd: float = 0.0
+    colour: str = "green"
 
 
 @dataclass(frozen=True, slots=True)
@@ -224,8 +225,8 @@ class RobotGroup(Placed):
 
     - `image`: their controller, as `--brain`; a path is relative to the scene file; empty: that of the run. `--brain`
       replaces the images of a scene in which every group has one.
-    - `controller`: table A, B or aggregate, or a Python file or entry point (robots/own_controller.py); a path is
-      relative to the scene file; empty: that of the run
+    - `controller`: table A, B or aggregate, the controller transport, or a Python file or entry point
+      (robots/own_controller.py); a path is relative to the scene file; empty: that of the run
     - `id_first`: number of the first robot; the next ones count up. `{id}` in `stimulus` is replaced by it.
     - `heading_deg`: heading at the start; nan: random
     - `selector`, `remote`, `stimulus`: as in [start]

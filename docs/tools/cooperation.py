@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from arena.experiments import experiment_of
+from arena.scene import palette
 from arena.trial.record import Trial, trials_in
 
 SETTLED = {"average": "agreed", "clocks": "agreed", "halt": "together", "leader": "elected", "search": "found"}
@@ -54,10 +55,10 @@ def draw(path: Path, name: str, trials: list[Trial]) -> None:
         known = ~np.isnan(values).all(axis=0)
         for low, high in ((5, 95), (25, 75)):
             bounds = np.nanpercentile(values[:, known], [low, high], axis=0)
-            axis.fill_between(times[known], *bounds, color="tab:blue", alpha=0.2, linewidth=0)
-        axis.plot(times[known], np.nanmedian(values[:, known], axis=0), color="tab:blue")
+            axis.fill_between(times[known], *bounds, color=palette.BLUE, alpha=0.2, linewidth=0)
+        axis.plot(times[known], np.nanmedian(values[:, known], axis=0), color=palette.BLUE)
         for _, second in trials[0].scene.start.off:
-            axis.axvline(second, color="tab:red", linestyle=":", linewidth=1)
+            axis.axvline(second, color=palette.VERMILION, linestyle=":", linewidth=1)
         axis.set(xlabel="s", xlim=(0, times[-1]))
         axis.set_ylabel(textwrap.fill(f"{curve.label}, {curve.unit}".rstrip(", "), 45), fontsize=8)
         if curve.name in LOG:

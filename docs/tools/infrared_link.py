@@ -16,9 +16,10 @@ import struct
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 from arena.infrared.channel import OpticalChannel
-from arena.infrared.propagation import amplitude
+from arena.infrared.propagation import amplitude, brightest
 from arena.robots.firmware_controller import FirmwareController
 from arena.robots.images import image_for
 from arena.scene.loader import FCY, load_scene
@@ -41,6 +42,10 @@ BEACONS = 1
 """Number of frames without a message that each robot sends before its first message."""
 DAMAGED = 2
 """Index of the damaged frames in sys_infrared_statistics."""
+PHASES = 200
+"""Phases between the scans of two robots over which `expected` averages."""
+SCAN_US = 1e6 / 4096
+"""Time between two scans (docs/design/infrared.md)."""
 WARM_S = 0.5
 """Seconds before the robots send their first message."""
 
@@ -120,13 +125,44 @@ def facing(distance: float, turned: float = 0.0) -> Poses:
     return Poses([(150.0, 150.0, math.pi / 2), (150.0 + distance, 150.0, math.pi / 2 + math.radians(turned))], [])
 
 
-def expected(distance: float, noise: float) -> tuple[float, float]:
-    """Return the expected bit error rate and the expected share of intact frames. A bit is decided by three scans,
-    weighted 1-2-1, against half the amplitude."""
-    deviation = noise * math.sqrt(6) / 4
-    wrong = math.erfc(amplitude(distance) / (2 * deviation) / math.sqrt(2)) / 2
-    word = (1 - wrong) ** CODE + CODE * wrong * (1 - wrong) ** (CODE - 1)
-    return wrong, word**WORDS
+class Expected(NamedTuple):
+    """Expected errors of a receiver whose preamble is found.
+
+    `repaired` is the number of repaired bits per bit of intact frames, `low` and `high` those of the phases at 10 and
+    90 %, `intact` the share of intact frames, `ideal` the bit error rate without transitions of light."""
+
+    repaired: float
+    low: float
+    high: float
+    intact: float
+    ideal: float
+
+
+def expected(distance: float, noise: float) -> Expected:
+    """Return the expected errors between robots that face each other with one emitter and one sensor.
+
+    A bit is decided by three scans, weighted 1-2-1, against half the amplitude of one emitter. After a transition,
+    which half of the bits have, the receiver is still settling in the first scan. How much depends on the phase between
+    the scans of both robots, which is random and lasts for the frame."""
+    scene = load_scene("clustering").infrared
+    counts, deviation = amplitude(distance) / brightest(scene.emitter_power), noise * math.sqrt(6) / 4
+    ideal = _tail(counts / 2 / deviation)
+    rates, shares = [], []
+    for phase in range(PHASES):
+        unsettled = math.exp(-(phase + 0.5) / PHASES * SCAN_US / scene.tau_us)
+        wrong = (ideal + _tail((counts / 2 - counts / 4 * unsettled) / deviation)) / 2
+        single = CODE * wrong * (1 - wrong) ** (CODE - 1)
+        word = (1 - wrong) ** CODE + single
+        rates.append(single / word / CODE)
+        shares.append(word**WORDS)
+    repaired = sum(rate * share for rate, share in zip(rates, shares, strict=True)) / sum(shares)
+    ordered = sorted(rates)
+    return Expected(repaired, ordered[PHASES // 10], ordered[-1 - PHASES // 10], sum(shares) / PHASES, ideal)
+
+
+def _tail(deviations: float) -> float:
+    """Return the probability that a normal variable is more than this many standard deviations above its mean."""
+    return math.erfc(deviations / math.sqrt(2)) / 2
 
 
 def keep(path: Path, jobs: list[Job], found: list[Found]) -> None:
@@ -155,11 +191,13 @@ def main() -> None:
             found = list(pool.map(measure, jobs))
     else:
         found = [measure(job) for job in jobs]
-    print("senders   cm  deg   sent arrived damaged  share  repaired/bit  expected: bits  frames")
+    print("senders   cm  deg   sent arrived damaged  share  repaired/bit  expected: bits  10 to 90 % of phases  frames")
     for job, one in zip(jobs, found, strict=True):
-        wrong, frames = expected(job.distance, chosen.noise)
+        model = expected(job.distance, chosen.noise)
         seen = f"{one.sent:6} {one.arrived:7} {one.damaged:7} {one.share:6.2f} {one.bit_errors:13.1e}"
-        print(f"{job.senders:7} {job.distance:4g} {job.turned:4g} {seen} {wrong:15.1e} {frames:7.2f}")
+        spread = f"{model.low:.1e} to {model.high:.1e}"
+        print(f"{job.senders:7} {job.distance:4g} {job.turned:4g} {seen} {model.repaired:15.1e} {spread:>24} "
+              f"{model.intact:7.2f}")  # fmt: skip
     if chosen.data is not None:
         keep(chosen.data, jobs, found)
 

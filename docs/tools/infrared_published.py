@@ -16,6 +16,9 @@ from pathlib import Path
 from typing import Any
 
 from infrared_link import CODE, WORDS, Found, Job, expected
+from scipy.stats import beta
+
+from arena.scene import palette
 
 HERE = Path(__file__).parents[1]
 MESSAGE_BITS = 64
@@ -25,7 +28,7 @@ RANGE_SHARE = 0.5
 """Share of the frames of a single sender that still arrive at our range."""
 GAPS_DEG = (116, 180, 244)
 """Bearings of the gaps between a robot's sensors, in degrees clockwise (swarmcom.md 4); UNVERIFIED by measurement."""
-OURS, THEIRS, OTHERS = "tab:blue", "tab:red", "tab:green"
+OURS, THEIRS, OTHERS = palette.BLUE, palette.VERMILION, palette.GREEN
 UNSURE = (0, (4, 2))
 
 
@@ -70,14 +73,26 @@ def our_range(runs: list[tuple[Job, Found]]) -> float:
     return near + (far - near) * (here.share - RANGE_SHARE) / (here.share - there.share)
 
 
+def interval(found: int, of: int) -> tuple[float, float]:
+    """Return the exact 95 % interval of a share (Clopper and Pearson), for independent bits."""
+    return float(beta.ppf(0.025, found, of - found + 1)), float(beta.ppf(0.975, found + 1, of - found))
+
+
 def draw_errors(axes: Any, runs: list[tuple[Job, Found]], reach: float, factor: float) -> None:
     alone = [(cm, one) for cm, _, one in by_distance(runs, 1) if one.arrived]
     noise = runs[0][0].noise
     seen = [(cm, one.bit_errors) for cm, one in alone if one.repaired]
     unseen = [(cm, SCARCE / (one.arrived * WORDS * CODE)) for cm, one in alone if not one.repaired]
-    fine = [12 + step / 10 for step in range(581)]
-    axes.semilogy(fine, [expected(one, noise)[0] for one in fine], "k:", lw=1, label="expected of three scans")
-    axes.semilogy(*zip(*seen, strict=True), "s-", color=OURS, label="ours, in frames that arrived")
+    fine = [18 + step / 5 for step in range(81)]
+    model = [expected(one, noise) for one in fine]
+    axes.fill_between(fine, [one.low for one in model], [one.high for one in model], color="k", alpha=0.15, lw=0,
+                      label="expected, 10 to 90 % of phases")  # fmt: skip
+    axes.semilogy(fine, [one.repaired for one in model], "k:", lw=1, label="expected in frames that arrived")
+    bounds = [interval(one.repaired, one.arrived * WORDS * CODE) for _, one in alone if one.repaired]
+    reach_of_bars = [[rate - low for (_, rate), (low, _) in zip(seen, bounds, strict=True)],
+                     [high - rate for (_, rate), (_, high) in zip(seen, bounds, strict=True)]]  # fmt: skip
+    axes.errorbar(*zip(*seen, strict=True), yerr=reach_of_bars, fmt="s-", capsize=2, color=OURS,
+                  label="ours, in frames that arrived, 95 %")  # fmt: skip
     axes.semilogy(*zip(*unseen, strict=True), "v", color=OURS, mfc="none", label="ours: none seen, less than this")
     axes.axvline(reach, color=OTHERS, ls=UNSURE, lw=1.2, label="libIrcom: nominal range")
     axes.axvline(reach * factor, color=THEIRS, ls=UNSURE, lw=1.2, label="SwarmCom: up to 3 times that")

@@ -73,7 +73,8 @@ class ReferenceCamera:
                     self._collect([place], radius, height, kind)
         self._sides = self._visible_sides(appearance, poses) if appearance is not None else []
         others = [(one[0], one[1]) for index, one in enumerate(poses.robots) if index != own]
-        self._collect(others, dimensions.ROBOT_RADIUS, dimensions.ROBOT_HEIGHT, ROBOT)
+        self._robot = appearance.robot if appearance is not None else ROBOT
+        self._collect(others, dimensions.ROBOT_RADIUS, dimensions.ROBOT_HEIGHT, self._robot)
         self.discs.sort()
         self._lit = [
             (*self._in_camera_frame(x, y), turned - heading - traits.yaw, lit)
@@ -191,7 +192,8 @@ class ReferenceCamera:
                     seen.append(self._floor(ray, rise))
                     break
                 if z <= height:
-                    seen.append(self._robot_class(depth, slope * depth, z) if kind == ROBOT and self._lit else kind)
+                    is_robot = kind == self._robot and bool(self._lit)
+                    seen.append(self._robot_class(depth, slope * depth, z) if is_robot else kind)
                     break
             else:
                 if wall < 0:
@@ -212,8 +214,8 @@ class ReferenceCamera:
                 near = forward * to_front + aside * to_left >= dimensions.ROBOT_RADIUS * dimensions.LED_COS
                 if lit >> led & 1 and near and low <= z <= high:
                     return self._led_class
-            return self._body_class if lit >> len(LED_POSITIONS) & 1 else ROBOT
-        return ROBOT
+            return self._body_class if lit >> len(LED_POSITIONS) & 1 else self._robot
+        return self._robot
 
     def within(self, right: float, left: float) -> list[Disc]:
         """Return the discs that rays with slopes `right` to `left` can hit, and possibly some others."""

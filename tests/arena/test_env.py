@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import math
+import pickle
 import subprocess
 import sys
 from collections.abc import Callable
@@ -51,6 +52,56 @@ def test_the_same_seed_and_actions_give_the_same_numbers() -> None:
     assert all((one == two).all() for one, two in zip(first, again, strict=True))
     assert not all((one == two).all() for one, two in zip(first, other, strict=True))
     assert all((one == two).all() for one, two in zip(other, series(6), strict=True))
+
+
+def test_a_pickled_environment_continues_as_the_original() -> None:
+    """A copy in the middle of an episode has the state of the original, and both continue with the same numbers."""
+    env = ArenaEnv("chen2015", seconds=2.0, render_mode="rgb_array")
+    env.reset(seed=4)
+    actions = {agent: np.array([1.0, 0.5], np.float32) for agent in env.agents}
+    for _ in range(3):
+        env.step(actions)
+    copied = pickle.loads(pickle.dumps(env))
+    assert (copied.state() == env.state()).all()
+    assert env.state().shape == env.state_space.shape == (3 * 20 + 2 + 1,)
+    for one, two in zip(env.step(actions), copied.step(actions), strict=True):
+        np.testing.assert_equal(one, two)
+    assert (copied.reset()[0]["robot_0"] == env.reset()[0]["robot_0"]).all()
+    picture = env.render()
+    assert (picture.shape, picture.dtype) == ((360, 640, 3), np.uint8)
+    assert len(np.unique(picture.reshape(-1, 3), axis=0)) > 3
+
+
+def test_the_render_mode_is_checked() -> None:
+    """Only pictures as arrays exist; `render` without a mode is refused."""
+    with pytest.raises(ValueError, match="render_mode = 'human': expected None or 'rgb_array'"):
+        ArenaEnv("aggregation", render_mode="human")
+    with pytest.raises(ValueError, match='create the environment with render_mode="rgb_array"'):
+        ArenaEnv("aggregation").render()
+
+
+def test_a_vector_environment_is_several_worlds_that_restart() -> None:
+    """Rows are the robots of all worlds; each equals the single environment of its seed, also after the restart."""
+    from arena.vector_env import ArenaVectorEnv
+
+    vector = ArenaVectorEnv(2, scene="aggregation", seconds=0.3)
+    observed, _ = vector.reset(seed=5)
+    assert observed.shape == vector.observation_space.shape == (16, SIZE)
+    single, actions = ArenaEnv("aggregation", seconds=0.3), np.tile(np.array([0.5, 1.0], np.float32), (16, 1))
+    for step in range(5):
+        expected = []
+        for seed in (5, 6):
+            seen, _ = single.reset(seed=seed + 2 * (step >= 3))
+            for _ in range(step - 3 * (step >= 3)):
+                seen, *_ = single.step(dict(zip(single.agents, actions, strict=False)))
+            expected += list(seen.values())
+        assert (observed == np.array(expected)).all(), step
+        observed, rewards, over, late, infos = vector.step(actions)
+        assert (rewards.shape, over.any(), late.all()) == ((16,), False, step == 2)
+        assert ("final_obs" in infos) == (step == 2)
+    vector.close()
+    with pytest.raises(ValueError, match="0 worlds: expected at least one"):
+        ArenaVectorEnv(0, scene="aggregation")
 
 
 def test_robots_sense_what_stands_before_them_and_move_as_told() -> None:

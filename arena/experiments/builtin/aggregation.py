@@ -11,7 +11,8 @@ from arena.metrics import compactnesses, largest_shares
 from arena.scene import dimensions
 
 CURVES = [
-    Curve("cluster", "robots in the largest group", "%", 100, 1.0),
+    Curve("cluster", "robots in the largest group", "%", 100, 1.0,
+          (0.986, "98.6 % of 40 e-pucks, 30 trials (Gauci et al. 2014)")),
     Curve("dispersion", "dispersion of the robots, sum of squared distances to their centre / 4 r²"),
 ]
 REACH_CM = 4 * dimensions.ROBOT_RADIUS

@@ -5,8 +5,7 @@ let INK = "#222", LINE = "#bbb", MARK = "#cce5f5";  // colours of style.css, whi
 const canvas = el("view"), g = canvas.getContext("2d"), scrub = el("scrub"), play = el("play");
 const strips = el("strips"), h = strips.getContext("2d"), plot = el("plot"), q = plot.getContext("2d");
 const SEEN = ["nothing", "object", "robot"];
-const SEEN_COLOUR = ["#bbbbbb", "#d55e00", "#009e73"];                 // this and below: palette of Okabe and Ito, whose
-const GROUPS = ["#e69f00", "#56b4e9", "#f0e442", "#0072b2", "#cc79a7", "#d55e00", "#009e73"];  // colours are distinct for colour-blind readers too
+const SEEN_COLOUR = d.palette.seen, GROUPS = d.palette.groups;
 const POLL_MS = 1000, FRAME_MS = 16, FCY = 14745600, TRAIL_S = 30, MARGIN = 14;
 const LEDS = ["led0", "led1", "led2", "led3", "led4", "led5", "led6", "led7", "front", "body"];
 const STRIP_HEIGHT = 14, STRIP_PIXEL = 8;

@@ -103,8 +103,20 @@ def test_firmware_and_a_controller_in_python_exclude_each_other(
     assert run("--controller", EXAMPLE, "--brain", "openswarm", "--out", tmp_path / "out") == 2
     assert "runs in Python: use it without --brain openswarm" in capsys.readouterr().err
     assert run("--controller", "C", "--out", tmp_path / "out") == 2
-    assert "unknown controller 'C'; expected A, B, the path of a .py file" in capsys.readouterr().err
+    words = "unknown controller 'C'; expected A, B, aggregate, transport, the path of a .py file"
+    assert words in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
+
+
+def test_firmware_replaces_the_controllers_in_python_of_a_scene(tmp_path: Path, talking_image: Path) -> None:
+    """`--brain FILE` runs the firmware in a scene whose groups all name a controller in Python; `--brain scripted` runs
+    that controller."""
+    for brain, is_firmware in ((str(talking_image), True), ("scripted", False)):
+        out = tmp_path / Path(brain).stem
+        main(["run", "chen2015", "--brain", brain, *RUN[:3], "0.01", *RUN[4:], "--robots", "2", "--out", str(out)])
+        trial = read_trial(out / "trial-0001.parquet")
+        assert bool(trial.about["image_sha256"]) == is_firmware == (not trial.is_scripted)
+        assert bool(trial.about.get("controllers_sha256")) == (not is_firmware)
 
 
 def test_the_same_file_controls_agents_of_the_learning_environment() -> None:
