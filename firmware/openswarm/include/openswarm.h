@@ -7,9 +7,9 @@
  * Each function below carries one contract line:
  *     callers | blocks? | worst-case Tcy on the dsPIC30F | stack bytes | error codes (Sys_Get_LastError)
  * Callers: M = main before Sys_Start_Kernel, T = thread, H = event handler or condition, I = ISR of priority 4. n
- * threads, m events, b newer events in the same bucket (identifier modulo 8), s subscriptions of one event, d
- * payload bytes; g cycles free a block of memory: 60-150, at most 1,200 in a fragmented heap. Cycles were measured
- * on firmware/apps and tests/firmware/target; those with a ~ are counted by hand. Stack is that of `python -m
+ * threads, m events, b newer events in the same bucket (identifier modulo 8), s subscriptions of one event, q queued
+ * messages, d payload bytes; g cycles free a block of memory: 60-150, at most 1,200 in a fragmented heap. Cycles were
+ * measured on firmware/apps and tests/firmware/target; those with a ~ are counted by hand. Stack is that of `python -m
  * toolchain bounds` with the return address; a switch adds its frame (port/dspic30f/README.md). Calls that may block
  * or yield are refused before Sys_Start_Kernel. A call from a context that is not listed is refused: it returns
  * failure, sets SYS_ERROR_CONTEXT and increments sys_statistics.refused.
@@ -160,7 +160,7 @@ bool Sys_Set_Scheduler(const sys_scheduler *scheduler);
 
 /* MTH | no | 146 + 9 b; at most 600 more while memory is short | 28 | MEMORY.  True also if already registered. */
 bool Sys_Register_Event(uint16 event);
-/* MTH | no | ~230 + 9 b + (15 + g) s + 20 n + g | 40 | EVENT.  Ends the event's subscriptions, drops its queued
+/* MTH | no | ~230 + 9 b + (15 + g) s + 20 n + 10 q + g | 40 | EVENT.  Ends the event's subscriptions, drops its queued
  * messages and wakes its waiters with NULL. */
 bool Sys_Unregister_Event(uint16 event);
 /* MTHI | no | ~40 + 9 b | 14 | none. */
