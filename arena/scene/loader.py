@@ -8,19 +8,28 @@ from __future__ import annotations
 import math
 import re
 import tomllib
-from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any, Final, TypeVar
 
 from arena.scene import geometry
+from arena.scene.checks import (
+    CHECKS,
+    SceneError,
+    TableErrors,
+    check_colour,
+    check_key,
+    check_limits,
+    check_links,
+    check_off,
+    check_polygon,
+    check_shape,
+    wrong_points,
+)
 from arena.scene.schema import (
     FCY,
     INHERIT,
-    LIMITS,
     LISTS,
-    NAMED,
-    PLACES,
     TABLES,
     Arena,
     BatterySetting,
@@ -39,20 +48,12 @@ from arena.scene.schema import (
     Robots,
     Start,
 )
-from emu.boards.epuck.remote import KEYS
 from emu.host.files import is_standard, read_file
 
 __all__ = ["FCY", "BatterySetting", "CameraSetting", "Scene", "SceneError", "Start", "load_scene", "scene_of", "scenes",
            "scripted"]  # fmt: skip
 FOLDER: Final = Path(__file__).parents[1] / "scenes"
 NAME: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9 ._-]{0,63}")
-COLOUR: Final = re.compile(r"#[0-9a-fA-F]{6}")
-CONTROLLER: Final = re.compile(r"|A|B|[a-z][a-z0-9_]*|[^\0]+\.py")
-"""Table A or B, entry point, or Python file of a controller."""
-
-
-class SceneError(ValueError):
-    """A scene cannot be read or built; the message names the file, the key, and the line if there is one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,9 +143,9 @@ class Scene:
             if section not in TABLES or key not in {one.name for one in fields(TABLES[section])}:
                 raise SceneError(f"there is no scene value {section}.{key}")
             _check_has_effect(scene, section, key)
-            table = _table(_Errors(self.name), section, TABLES[section], {key: value}, getattr(scene, section))
+            table = _table(TableErrors(self.name), section, TABLES[section], {key: value}, getattr(scene, section))
             scene = replace(scene, **{section: table})
-        return _checked(scene, _Errors(self.name))
+        return _checked(scene, TableErrors(self.name))
 
 
 _LIST_OF: Final = {"robots": "groups", "objects": "kinds"}
@@ -170,7 +171,7 @@ def _is_key_of_list(scene: Scene, section: str, key: str) -> bool:
 
 def _with_list_value(scene: Scene, section: str, key: str, value: Any) -> Scene:
     """Return the scene with a value of its only [[robots]] or [[objects]] table replaced. Raises SceneError."""
-    name, errors = _LIST_OF[section], _Errors(scene.name)
+    name, errors = _LIST_OF[section], TableErrors(scene.name)
     tables = getattr(scene, name)
     if len(tables) > 1:
         raise SceneError(f"{scene.name}: {section}.{key} cannot be set for {len(tables)} [[{section}]] tables at once; "
@@ -232,49 +233,17 @@ def load_scene(name: str) -> Scene:
         raise SceneError(f"{path}:{at}: {error}") from None
     except (OSError, RecursionError, ValueError) as error:
         raise SceneError(f"{path}: {error}") from None
-    errors = _Errors(str(path), text)
+    errors = TableErrors(str(path), text)
     return _checked(_scene(errors, data), errors)
 
 
 def scene_of(values: dict[str, Any]) -> Scene:
     """Return the scene of a record from its metadata. Raises SceneError if this version cannot build it."""
-    errors = _Errors("the record")
+    errors = TableErrors("the record")
     return _checked(_scene(errors, values), errors)
 
 
-class _Errors:
-    """Creates errors with the line in the file. The TOML parser reports no lines, so it searches table and key."""
-
-    def __init__(self, path: str, text: str = "") -> None:
-        self._path = path
-        self._lines = text.splitlines()
-
-    def at(self, table: str, key: str, words: str, number: int | None = None) -> SceneError:
-        """Return an error about a key of the `number`th table of a name, or (empty key) about the table itself."""
-        line = self._find(table, key, number) if self._lines else None
-        return SceneError(f"{self._path}{f':{line}' if line else ''}: {words}")
-
-    def _find(self, table: str, key: str, number: int | None) -> int | None:
-        here, seen, start = "", -1, None
-        for place, line in enumerate(self._lines, start=1):
-            head = re.match(r"\s*\[\[?\s*([A-Za-z0-9_.\"'-]+)\s*\]?\]", line)
-            if head:
-                here = head[1].strip("\"'")
-                if here == table:
-                    seen += 1
-                    if start is None or seen == number:
-                        start = place
-            elif not key and here:
-                continue
-            elif here == table and (number is None or seen == number):
-                if re.match(rf"\s*[\"']?{re.escape(key)}[\"']?\s*[=.]", line):
-                    return place
-            elif not here and table and re.match(rf"\s*[\"']?{re.escape(table)}[\"']?\s*[=.]", line):
-                start = place
-        return start
-
-
-def _scene(errors: _Errors, data: dict[str, Any]) -> Scene:
+def _scene(errors: TableErrors, data: dict[str, Any]) -> Scene:
     values: dict[str, Any] = {}
     for key, value in data.items():
         is_list = isinstance(value, list) and all(isinstance(one, dict) for one in value)
@@ -328,7 +297,9 @@ def _counted(scene: Scene) -> Scene:
     return scene
 
 
-def _table(errors: _Errors, name: str, kind: type[T], values: dict[str, Any], base: T, number: int | None = None) -> T:
+def _table(
+    errors: TableErrors, name: str, kind: type[T], values: dict[str, Any], base: T, number: int | None = None
+) -> T:
     known = {one.name: type(getattr(base, one.name)) for one in fields(kind)}  # type: ignore[arg-type]
     taken: dict[str, Any] = {}
     for key, value in values.items():
@@ -342,7 +313,7 @@ def _table(errors: _Errors, name: str, kind: type[T], values: dict[str, Any], ba
         if want is float and type(value) is int:
             value = float(value)
         if want is tuple:
-            wrong = _wrong_points(value)
+            wrong = wrong_points(value)
             if wrong:
                 raise errors.at(name, key, f"{name}.{key}: {wrong}", number)
             value = tuple(tuple(map(float, one)) for one in value)
@@ -352,135 +323,27 @@ def _table(errors: _Errors, name: str, kind: type[T], values: dict[str, Any], ba
     return replace(base, **taken)  # type: ignore[type-var]
 
 
-def _wrong_points(value: Any) -> str:
-    """Return what is wrong with a list of points, or an empty text."""
-    if not isinstance(value, (list, tuple)) or not all(isinstance(one, (list, tuple)) for one in value):
-        return "expected a list of points, [[x, y], ...]"
-    for one in value:
-        if len(one) not in (2, 3) or not all(type(number) in (int, float) and abs(number) < 1e6 for number in one):
-            return f"{list(one)}: expected a point [x, y] in cm or a pose [x, y, degrees]"
-    return ""
-
-
-def _checked(scene: Scene, errors: _Errors) -> Scene:
+def _checked(scene: Scene, errors: TableErrors) -> Scene:
     """Validate all values of a scene. Raises SceneError."""
     if not NAME.fullmatch(scene.name):
         raise errors.at("", "name", f"name is {scene.name!r}; expected up to 64 letters, digits, blanks and -_., "
                         "a letter or digit first: results go into a folder of this name")  # fmt: skip
-    _check_key(errors, "start", scene.start.remote)
+    check_key(errors, "start", scene.start.remote)
     for name in LISTS:
         table = {"groups": "robots", "kinds": "objects"}.get(name, name)
         for number, one in enumerate(getattr(scene, name)):
-            _check_limits(errors, table, one, number)
-            _CHECKS.get(name, _check_shape)(errors, table, one, number)
+            check_limits(errors, table, one, number)
+            CHECKS.get(name, check_shape)(errors, table, one, number)
     for name in TABLES:
-        _check_limits(errors, name, getattr(scene, name))
+        check_limits(errors, name, getattr(scene, name))
     if not 0 <= scene.robots.count <= 1000 or not 0 <= scene.objects.count <= 10_000:
         words = f"{scene.robots.count} robots and {scene.objects.count} objects; expected at most 1000 and 10000"
         raise errors.at("robots", "count", words)
-    _check_colour(errors, "robots", scene.robots, None)
-    _check_links(errors, scene)
-    _check_off(errors, scene)
+    check_colour(errors, "robots", scene.robots, None)
+    check_links(errors, scene.bluetooth.links, scene.robots.count)
+    check_off(errors, scene.start.off, scene.robots.count)
     if scene.arena.polygon:
-        _check_polygon(errors, "arena", scene.arena.polygon, None)
+        check_polygon(errors, "arena", scene.arena.polygon, None)
         if min(value for point in scene.arena.polygon for value in point) < 0:
             raise errors.at("arena", "polygon", "arena.polygon: corners are 0 or more cm from the lower left")
     return scene
-
-
-def _check_links(errors: _Errors, scene: Scene) -> None:
-    taken: set[frozenset[float]] = set()
-    for link in scene.bluetooth.links:
-        ends = frozenset(link)
-        words = ""
-        if len(link) != 2 or len(ends) != 2 or not all(end in range(scene.robots.count) for end in ends):
-            words = f"expected two different robots of 0 to {scene.robots.count - 1}"
-        elif ends in taken:
-            words = "is listed twice"
-        if words:
-            raise errors.at("bluetooth", "links", f"bluetooth.links: {[f'{end:g}' for end in link]}: {words}")
-        taken.add(ends)
-
-
-def _check_off(errors: _Errors, scene: Scene) -> None:
-    taken: set[float] = set()
-    for one in scene.start.off:
-        if len(one) != 2 or one[0] not in range(scene.robots.count) or one[1] < 0 or one[0] in taken:
-            words = f"expected a robot of 0 to {scene.robots.count - 1}, once, and a second of the trial"
-            raise errors.at("start", "off", f"start.off: {[f'{value:g}' for value in one]}: {words}")
-        taken.add(one[0])
-
-
-def _check_limits(errors: _Errors, name: str, table: Any, number: int | None = None) -> None:
-    for key, (low, high) in LIMITS[type(table)].items():
-        value = getattr(table, key)
-        if not low <= value <= high:
-            raise errors.at(name, key, f"{name}.{key} is {value}; expected {low} to {high}", number)
-
-
-def _check_key(errors: _Errors, table: str, key: str, number: int | None = None) -> None:
-    if key not in ("", INHERIT, *KEYS, *map(str, range(64))):
-        words = f"{table}.remote is {key!r}; expected {', '.join(KEYS)}, 0 to 63, or empty"
-        raise errors.at(table, "remote", words, number)
-
-
-def _check_placed(errors: _Errors, table: str, one: Any, number: int) -> None:
-    if one.place not in PLACES:
-        words = f"{table}.place is {one.place!r}; expected {', '.join(PLACES)}"
-        raise errors.at(table, "place", words, number)
-    if (one.place == "poses") != bool(one.poses):
-        words = f'{table}.poses goes with place = "poses", and only with it'
-        raise errors.at(table, "poses" if one.poses else "place", words, number)
-
-
-def _check_group(errors: _Errors, table: str, one: RobotGroup, number: int) -> None:
-    _check_placed(errors, table, one, number)
-    _check_key(errors, table, one.remote, number)
-    if abs(one.heading_deg) > 1e6:
-        words = f"{table}.heading_deg is {one.heading_deg}; expected -1e6 to 1e6, or nan for any"
-        raise errors.at(table, "heading_deg", words, number)
-    if not CONTROLLER.fullmatch(one.controller):
-        words = f"{table}.controller is {one.controller!r}; expected A, B, the path of a .py file, or an entry point"
-        raise errors.at(table, "controller", words, number)
-    if one.image and one.controller not in ("", "A", "B"):
-        words = f"{table}.controller {one.controller!r} runs in Python; a group with an `image` runs firmware"
-        raise errors.at(table, "controller", words, number)
-
-
-def _check_kind(errors: _Errors, table: str, one: ObjectKind, number: int) -> None:
-    _check_placed(errors, table, one, number)
-    _check_colour(errors, table, one, number)
-    if not one.polygon and any(len(pose) != 2 for pose in one.poses):
-        raise errors.at(table, "poses", f"{table}.poses: an object without a polygon is a disc: [x, y]", number)
-    if one.polygon:
-        _check_polygon(errors, table, one.polygon, number)
-        if not geometry.is_convex(one.polygon):
-            raise errors.at(table, "polygon", f"{table}.polygon: a movable polygon must be convex", number)
-
-
-def _check_colour(errors: _Errors, table: str, one: Any, number: int | None) -> None:
-    if one.colour not in NAMED and not COLOUR.fullmatch(one.colour):
-        words = f"{table}.colour is {one.colour!r}; expected {', '.join(NAMED)} or #rrggbb"
-        raise errors.at(table, "colour", words, number)
-
-
-def _check_shape(errors: _Errors, table: str, one: Any, number: int) -> None:
-    _check_colour(errors, table, one, number)
-    if bool(one.polygon) == bool(one.radius_cm):
-        raise errors.at(table, "polygon", f"{table}: expected either a polygon or a radius_cm", number)
-    if one.polygon:
-        _check_polygon(errors, table, one.polygon, number)
-
-
-def _check_polygon(errors: _Errors, table: str, points: tuple[tuple[float, ...], ...], number: int | None) -> None:
-    if len(points) < 3 or any(len(point) != 2 for point in points):
-        raise errors.at(table, "polygon", f"{table}.polygon: expected three or more corners [x, y]", number)
-    if not geometry.is_simple(points):
-        raise errors.at(table, "polygon", f"{table}.polygon: its sides cross, or it has no area", number)
-
-
-_CHECKS: Final[Mapping[str, Callable[[_Errors, str, Any, int], None]]] = {
-    "groups": _check_group,
-    "kinds": _check_kind,
-    "lamps": lambda _errors, _table, _one, _number: None,
-}

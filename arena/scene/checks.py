@@ -1,0 +1,169 @@
+"""Checks of the tables of a scene, and errors that name file, line and key."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping
+from typing import Any, Final
+
+from arena.scene import geometry
+from arena.scene.schema import INHERIT, LIMITS, NAMED, PLACES, ObjectKind, Points, RobotGroup
+from emu.boards.epuck.remote import KEYS
+
+COLOUR: Final = re.compile(r"#[0-9a-fA-F]{6}")
+CONTROLLER: Final = re.compile(r"|A|B|[a-z][a-z0-9_]*|[^\0]+\.py")
+"""Table A or B, entry point, or Python file of a controller."""
+
+
+class SceneError(ValueError):
+    """A scene cannot be read or built; the message names the file, the key, and the line if there is one."""
+
+
+class TableErrors:
+    """Creates errors with the line in the file. The TOML parser reports no lines, so it searches table and key."""
+
+    def __init__(self, path: str, text: str = "") -> None:
+        self._path = path
+        self._lines = text.splitlines()
+
+    def at(self, table: str, key: str, words: str, number: int | None = None) -> SceneError:
+        """Return an error about a key of the `number`th table of a name, or (empty key) about the table itself."""
+        line = self._find(table, key, number) if self._lines else None
+        return SceneError(f"{self._path}{f':{line}' if line else ''}: {words}")
+
+    def _find(self, table: str, key: str, number: int | None) -> int | None:
+        here, seen, start = "", -1, None
+        for place, line in enumerate(self._lines, start=1):
+            head = re.match(r"\s*\[\[?\s*([A-Za-z0-9_.\"'-]+)\s*\]?\]", line)
+            if head:
+                here = head[1].strip("\"'")
+                if here == table:
+                    seen += 1
+                    if start is None or seen == number:
+                        start = place
+            elif not key and here:
+                continue
+            elif here == table and (number is None or seen == number):
+                if re.match(rf"\s*[\"']?{re.escape(key)}[\"']?\s*[=.]", line):
+                    return place
+            elif not here and table and re.match(rf"\s*[\"']?{re.escape(table)}[\"']?\s*[=.]", line):
+                start = place
+        return start
+
+
+def wrong_points(value: Any) -> str:
+    """Return what is wrong with a list of points, or an empty text."""
+    if not isinstance(value, (list, tuple)) or not all(isinstance(one, (list, tuple)) for one in value):
+        return "expected a list of points, [[x, y], ...]"
+    for one in value:
+        if len(one) not in (2, 3) or not all(type(number) in (int, float) and abs(number) < 1e6 for number in one):
+            return f"{list(one)}: expected a point [x, y] in cm or a pose [x, y, degrees]"
+    return ""
+
+
+def check_links(errors: TableErrors, links: Points, robots: int) -> None:
+    """Check the Bluetooth links between `robots` robots."""
+    taken: set[frozenset[float]] = set()
+    for link in links:
+        ends = frozenset(link)
+        words = ""
+        if len(link) != 2 or len(ends) != 2 or not all(end in range(robots) for end in ends):
+            words = f"expected two different robots of 0 to {robots - 1}"
+        elif ends in taken:
+            words = "is listed twice"
+        if words:
+            raise errors.at("bluetooth", "links", f"bluetooth.links: {[f'{end:g}' for end in link]}: {words}")
+        taken.add(ends)
+
+
+def check_off(errors: TableErrors, off: Points, robots: int) -> None:
+    """Check the robots that are switched off, of `robots` robots."""
+    taken: set[float] = set()
+    for one in off:
+        if len(one) != 2 or one[0] not in range(robots) or one[1] < 0 or one[0] in taken:
+            words = f"expected a robot of 0 to {robots - 1}, once, and a second of the trial"
+            raise errors.at("start", "off", f"start.off: {[f'{value:g}' for value in one]}: {words}")
+        taken.add(one[0])
+
+
+def check_limits(errors: TableErrors, name: str, table: Any, number: int | None = None) -> None:
+    """Check the numbers of a table against `schema.LIMITS`. Raises SceneError."""
+    for key, (low, high) in LIMITS[type(table)].items():
+        value = getattr(table, key)
+        if not low <= value <= high:
+            raise errors.at(name, key, f"{name}.{key} is {value}; expected {low} to {high}", number)
+
+
+def check_key(errors: TableErrors, table: str, key: str, number: int | None = None) -> None:
+    """Check the key of the remote control. Raises SceneError."""
+    if key not in ("", INHERIT, *KEYS, *map(str, range(64))):
+        words = f"{table}.remote is {key!r}; expected {', '.join(KEYS)}, 0 to 63, or empty"
+        raise errors.at(table, "remote", words, number)
+
+
+def check_placed(errors: TableErrors, table: str, one: Any, number: int) -> None:
+    """Check the placement of a table. Raises SceneError."""
+    if one.place not in PLACES:
+        words = f"{table}.place is {one.place!r}; expected {', '.join(PLACES)}"
+        raise errors.at(table, "place", words, number)
+    if (one.place == "poses") != bool(one.poses):
+        words = f'{table}.poses goes with place = "poses", and only with it'
+        raise errors.at(table, "poses" if one.poses else "place", words, number)
+
+
+def check_group(errors: TableErrors, table: str, one: RobotGroup, number: int) -> None:
+    """Check a table [[robots]]. Raises SceneError."""
+    check_placed(errors, table, one, number)
+    check_key(errors, table, one.remote, number)
+    if abs(one.heading_deg) > 1e6:
+        words = f"{table}.heading_deg is {one.heading_deg}; expected -1e6 to 1e6, or nan for any"
+        raise errors.at(table, "heading_deg", words, number)
+    if not CONTROLLER.fullmatch(one.controller):
+        words = f"{table}.controller is {one.controller!r}; expected A, B, the path of a .py file, or an entry point"
+        raise errors.at(table, "controller", words, number)
+    if one.image and one.controller not in ("", "A", "B"):
+        words = f"{table}.controller {one.controller!r} runs in Python; a group with an `image` runs firmware"
+        raise errors.at(table, "controller", words, number)
+
+
+def check_kind(errors: TableErrors, table: str, one: ObjectKind, number: int) -> None:
+    """Check a table [[objects]]. Raises SceneError."""
+    check_placed(errors, table, one, number)
+    check_colour(errors, table, one, number)
+    if not one.polygon and any(len(pose) != 2 for pose in one.poses):
+        raise errors.at(table, "poses", f"{table}.poses: an object without a polygon is a disc: [x, y]", number)
+    if one.polygon:
+        check_polygon(errors, table, one.polygon, number)
+        if not geometry.is_convex(one.polygon):
+            raise errors.at(table, "polygon", f"{table}.polygon: a movable polygon must be convex", number)
+
+
+def check_colour(errors: TableErrors, table: str, one: Any, number: int | None) -> None:
+    """Check the colour of a table. Raises SceneError."""
+    if one.colour not in NAMED and not COLOUR.fullmatch(one.colour):
+        words = f"{table}.colour is {one.colour!r}; expected {', '.join(NAMED)} or #rrggbb"
+        raise errors.at(table, "colour", words, number)
+
+
+def check_shape(errors: TableErrors, table: str, one: Any, number: int) -> None:
+    """Check an obstacle or a patch: a polygon or a disc. Raises SceneError."""
+    check_colour(errors, table, one, number)
+    if bool(one.polygon) == bool(one.radius_cm):
+        raise errors.at(table, "polygon", f"{table}: expected either a polygon or a radius_cm", number)
+    if one.polygon:
+        check_polygon(errors, table, one.polygon, number)
+
+
+def check_polygon(errors: TableErrors, table: str, points: tuple[tuple[float, ...], ...], number: int | None) -> None:
+    """Check the corners of a polygon. Raises SceneError."""
+    if len(points) < 3 or any(len(point) != 2 for point in points):
+        raise errors.at(table, "polygon", f"{table}.polygon: expected three or more corners [x, y]", number)
+    if not geometry.is_simple(points):
+        raise errors.at(table, "polygon", f"{table}.polygon: its sides cross, or it has no area", number)
+
+
+CHECKS: Final[Mapping[str, Callable[[TableErrors, str, Any, int], None]]] = {
+    "groups": check_group,
+    "kinds": check_kind,
+    "lamps": lambda _errors, _table, _one, _number: None,
+}
