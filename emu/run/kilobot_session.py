@@ -9,8 +9,9 @@ from typing import Any, Final
 
 from emu.avr.image import AvrImage, load_avr_image
 from emu.avr.machine import HZ, AvrFault
-from emu.boards.kilobot.messages import OHC_GAP, TYPES, Message, frame, pulses_of
+from emu.boards.kilobot.messages import DATA_SIZE, TYPES, Message, frame
 from emu.boards.kilobot.observer import WATCHED, KilobotObserver, Report
+from emu.boards.kilobot.overhead import send_frame
 from emu.boards.kilobot.swarm import KilobotFaultError, KilobotSetup, KilobotSwarm
 
 FIRST_COMMAND: Final = HZ // 5
@@ -101,10 +102,7 @@ def run_kilobot(
 
 def _send(swarm: KilobotSwarm, command: str) -> int | None:
     """Send one message of the overhead controller now. Return the tick of the next one, None after the last."""
-    pulses = list(pulses_of(frame(Message(bytes(9), TYPES[command])), swarm.now + 1))
-    for tick in pulses:
-        swarm.light(0, tick)
-    after = pulses[-1] + OHC_GAP
+    after = send_frame(swarm, frame(Message(bytes(DATA_SIZE), TYPES[command])))
     return after if after < FIRST_COMMAND + COMMAND_TICKS else None
 
 

@@ -87,6 +87,7 @@ static void enter_interrupt(struct avr *m, u32 pending)
     set_pair(m->data + SPL, sp - 2);
     m->data[SREG_AT] &= (u8)~FLAG_I;
     m->pc = (u16)(2 * vector + (m->data[MCUCR] & 2 ? m->boot_start : 0));
+    m->tracing = 0, m->round = 0;
     m->cycle += INTERRUPT_CYCLES;
     acknowledge(m, vector);
 }
@@ -143,6 +144,12 @@ static int boundary(struct avr *m)
             continue;
         }
         m->deadline = m->next_due < m->until ? m->next_due : m->until;
+        if (m->round && !m->shadow) {
+            u64 passed = (m->deadline - m->cycle) / m->round * m->round;
+            m->cycle += passed, m->skipped += passed;
+            if (m->cycle >= m->until)
+                continue;
+        }
         if (m->shadow && m->cycle + 1 < m->deadline)
             m->deadline = m->cycle + 1;
         m->shadow = 0;
@@ -393,38 +400,184 @@ static void loop_on_itself(struct avr *m)
     }
 }
 
+// A loop that only counts registers down: SBIW, DEC or SUBI with SBCI, and BRNE back to it.
+struct countdown {
+    u64 cycles; // of a round
+    u32 bytes;  // of the counter
+    u32 is_word; // counted by SBIW
+    u8 registers[4];
+};
+
+static struct countdown countdown_of(const struct insn *code, const struct insn *branch)
+{
+    const struct insn *first = code + branch->k;
+    struct countdown c = {0, 0, 0, {0}};
+    if (first->op == OP_DEC)
+        c = (struct countdown){3, 1, 0, {first->d}};
+    else if (first->op == OP_SBIW)
+        c = (struct countdown){4, 2, 1, {first->d, (u8)(first->d + 1)}};
+    else
+        for (const struct insn *i = first; i < branch; i++)
+            c.registers[c.bytes++] = i->d, c.cycles = c.bytes + 2;
+    return c;
+}
+
+static int is_countdown(const struct insn *code, u32 pc)
+{
+    const struct insn *branch = code + pc, *first = code + branch->k;
+    u32 length = pc - branch->k;
+    if (branch->op != OP_BRBC || branch->r != 1 || branch->k >= pc || length > 4)
+        return 0;
+    if (length == 1)
+        return first->op == OP_DEC || (first->op == OP_SBIW && first->k == 1);
+    if (first->op != OP_SUBI || first->k != 1)
+        return 0;
+    for (const struct insn *i = first + 1; i < branch; i++)
+        if (i->op != OP_SBCI || i->k != 0 || i->d == first->d || (i > first + 1 && i->d <= i[-1].d))
+            return 0;
+    return 1;
+}
+
+// Pass as many rounds of a countdown as end before `deadline`, and leave one. Return the cycles that pass.
+static u64 count_down(u8 *data, u8 *s, const struct countdown *c, u64 time)
+{
+    u64 value = 0, rounds = time / c->cycles;
+    for (u32 n = 0; n < c->bytes; n++)
+        value |= (u64)data[c->registers[n]] << 8 * n;
+    if (value < 2 || !rounds)
+        return 0;
+    if (rounds > value - 1)
+        rounds = value - 1;
+    value -= rounds;
+    if (c->bytes == 1) // DEC
+        step_flags(s, (u32)value, 0x7F);
+    else if (c->is_word)
+        word_difference(s, (u32)value + 1, 1);
+    else
+        for (u32 n = 0; n < c->bytes; n++)
+            sub_bytes(s, (u32)((value + 1) >> 8 * n) & 0xFF, n ? 0 : 1, n ? *s & 1u : 0, n ? *s >> 1 & 1u : 1);
+    for (u32 n = 0; n < c->bytes; n++)
+        data[c->registers[n]] = (u8)(value >> 8 * n);
+    return rounds * c->cycles;
+}
+
+enum { TRACE_LEAST = 1000, TRACE_WINDOW = 256, TRACE_MOST = 16384, TRACE_PAUSE = 16384, TRACE_PAUSES = 8 };
+
+static void anchor(struct avr *m, u64 cycle, u32 pc)
+{
+    m->trace_from = cycle, m->trace_pc = (u16)pc, m->touched = 0;
+    __builtin_memcpy(m->trace_data, m->data, DATA_BYTES);
+}
+
+// Before a stretch without events: should the interpreter look for a round that repeats?
+static int traces(struct avr *m)
+{
+    if (m->tracing)
+        return 1;
+    if (m->round || m->cycle < m->trace_after || m->next_due - m->cycle < TRACE_LEAST)
+        return 0;
+    m->tracing = 1, m->trace_window = TRACE_WINDOW;
+    anchor(m, m->cycle, m->pc);
+    return 1;
+}
+
+// At the anchor again, or its window is over. Return 1 if the search goes on.
+static int trace_on(struct avr *m, u64 cycle, u32 pc)
+{
+    if (pc == m->trace_pc && !m->touched && !__builtin_memcmp(m->trace_data, m->data, DATA_BYTES)) {
+        m->round = (u32)(cycle - m->trace_from);
+        m->tracing = 0, m->resting = 1, m->trace_failures = 0;
+        return 0;
+    }
+    if (cycle - m->trace_from < m->trace_window)
+        return 1;
+    if (m->trace_window >= TRACE_MOST) { // pause, longer after each failure
+        m->tracing = 0;
+        m->trace_after = cycle + ((u64)TRACE_PAUSE << m->trace_failures);
+        m->trace_failures += m->trace_failures < TRACE_PAUSES;
+        return 0;
+    }
+    m->trace_window *= 2;
+    anchor(m, cycle, pc);
+    return 1;
+}
+
+#define INTERPRETER_BEGIN() \
+    u8 *const data = m->data; \
+    const struct insn *insn; \
+    u64 cycle = m->cycle, deadline = m->deadline; \
+    u32 pc = m->pc; \
+    u8 s = data[SREG_AT]; \
+    DISPATCH()
+#define INTERPRETER_END() \
+do_COUNT_DOWN : { \
+    START(1, 1); \
+    if (!(s & FLAG_Z)) { \
+        struct countdown c = countdown_of(code, insn); \
+        pc = insn->k, cycle++; \
+        if (deadline > cycle + 1) \
+            passed = count_down(data, &s, &c, deadline - cycle - 1), cycle += passed, m->skipped += passed; \
+    } \
+    NEXT(1); \
+} \
+do_ILLEGAL: \
+    FAIL(FAULT_ILLEGAL, insn->word); \
+do_END: \
+    FAIL(FAULT_END, 0); \
+failed: \
+    m->fault_pc = m->pc = (u16)(insn - code); \
+    m->cycle = cycle, data[SREG_AT] = s; \
+    return; \
+leave: \
+    m->cycle = cycle, m->pc = (u16)pc, data[SREG_AT] = s
+
+// Execute instructions up to the deadline.
+static void interpret(struct avr *m, const struct insn *code)
+{
+    INSTRUCTION_LABELS
+    u64 passed;
+    INTERPRETER_BEGIN();
+    INSTRUCTION_BODIES
+    INTERPRETER_END();
+}
+
+#undef NEXT
+#define NEXT(cycles) \
+    do { \
+        cycle += (cycles); \
+        if (cycle >= deadline) \
+            goto leave; \
+        if (pc == m->trace_pc || cycle - m->trace_from >= m->trace_window) { \
+            data[SREG_AT] = s; \
+            if (!trace_on(m, cycle, pc)) \
+                goto leave; \
+        } \
+        DISPATCH(); \
+    } while (0)
+
+// The same, and look for a round: the state of the CPU, of data memory and of the devices is as at the anchor.
+static void interpret_and_trace(struct avr *m, const struct insn *code)
+{
+    INSTRUCTION_LABELS
+    u64 passed;
+    INTERPRETER_BEGIN();
+    INSTRUCTION_BODIES
+    INTERPRETER_END();
+}
+
 // Run until cycle `until` is reached or passed, the log is half full, or the program stops.
 i64 avr_run(struct avr *m, const struct insn *code, u64 until)
 {
-    INSTRUCTION_LABELS
-    u8 *const data = m->data;
-    const struct insn *insn;
     m->until = until;
-    if (m->fault || m->halted)
-        return result_of(m);
-    u64 cycle, deadline;
-    u32 pc;
-    u8 s;
-    goto between;
-leave:
-    m->cycle = cycle, m->pc = (u16)pc, data[SREG_AT] = s;
-    if (m->looping)
-        loop_on_itself(m);
-between:
-    if (!boundary(m))
-        return result_of(m);
-    cycle = m->cycle, deadline = m->deadline, pc = m->pc, s = data[SREG_AT];
-    DISPATCH();
-    INSTRUCTION_BODIES
-do_ILLEGAL:
-    pc++;
-    FAIL(FAULT_ILLEGAL, insn->word);
-do_END:
-    FAIL(FAULT_END, 0);
-failed:
-    m->fault_pc = m->pc = (u16)(insn - code);
-    m->cycle = cycle, data[SREG_AT] = s;
-    return RUN_FAULT;
+    while (!m->halted && boundary(m)) {
+        if (traces(m))
+            interpret_and_trace(m, code);
+        else
+            interpret(m, code);
+        if (m->looping)
+            loop_on_itself(m);
+    }
+    return result_of(m);
 }
 
 static u32 row_of(u32 word)
@@ -446,6 +599,9 @@ void avr_decode(const struct avr *m, struct insn *code, i64 first, i64 last)
         code[pc] = (struct insn){.op = (u8)op, .words = op < OP_ILLEGAL ? rows[op].words : 1, .word = (u16)word};
         operands_of(code + pc, op, word, second, pc);
     }
+    for (u32 pc = (u32)first; pc <= (u32)last; pc++)
+        if (is_countdown(code, pc))
+            code[pc].op = OP_COUNT_DOWN;
     for (u32 n = 1; n <= 2; n++)
         code[PC_MASK + n] = (struct insn){.op = OP_END, .words = 1};
 }

@@ -29,7 +29,8 @@ static void apply_input(struct avr *m, u64 at)
 
 static void apply_event(struct avr *m, u32 event, u64 at)
 {
-    m->resting = 0;
+    m->resting = m->tracing = 0;
+    m->round = 0;
     switch (event) {
     case EVENT_INPUT:
         apply_input(m, at);
@@ -168,10 +169,37 @@ static int is_unmodelled(u32 address, u32 value)
            (address == ASSR && value & 0x60) || (address == CLKPR && value & 0x0F);
 }
 
+// Whether a read gives the same value until the next event and changes nothing.
+static int is_steady(u32 address)
+{
+    switch (address) {
+    case TIFR0: case TIFR1: case TIFR2: case TCNT0: case TCNT2: case TCNT1L: case TCNT1H: case ICR1L: case ICR1H:
+    case ADCL: case ADCH: case UDR0: case EECR: case SPMCSR: case WDTCSR:
+        return 0;
+    default:
+        return 1;
+    }
+}
+
+// Whether writing the value that register `address` already has changes nothing.
+static int is_idempotent(u32 address)
+{
+    switch (address) {
+    case DDRB: case PORTB: case DDRC: case PORTC: case DDRD: case PORTD: case OCR0A: case OCR0B: case OCR2A: case OCR2B:
+    case TCCR0A: case TCCR2A: case TCCR2B: case TIMSK0: case TIMSK1: case TIMSK2: case ADMUX: case SREG_AT: case PCMSK0:
+    case PCMSK1: case PCMSK2: case PCICR: case EIMSK: case SMCR: case EEARL: case EEARH: case EEDR:
+        return 1;
+    default:
+        return 0;
+    }
+}
+
 // Read I/O register `address` at m->cycle.
 static u32 io_read(struct avr *m, u32 address)
 {
     apply_events(m, m->cycle);
+    if (!is_steady(address))
+        m->touched = 1;
     switch (address) {
     case PINB: case PINC: case PIND:
         return port_read(m, (address - PINB) / 3);
@@ -319,6 +347,8 @@ static void io_write(struct avr *m, u32 address, u32 value)
     if (is_unmodelled(address, value))
         m->unmodelled = (u8)address;
     u32 old = m->data[address], is_port = address <= PORTD;
+    if (old != value || !is_idempotent(address))
+        m->touched = 1;
     device_write(m, address, value, m->cycle + 1);
     if (m->watched[address] && !is_port && m->data[address] != old)
         log_change(m, address, m->data[address], m->cycle + 1);

@@ -42,6 +42,15 @@ FIELDS: Final[tuple[tuple[str, str, int], ...]] = (
     ("fault_address", _U16, 1),
     ("asleep", _U8, 1),  # 0: awake, otherwise sleep mode plus 1
     ("resting", _U8, 1),  # 1: the CPU does nothing before the next event
+    ("touched", _U8, 1),  # 1: an access in this round depends on time or changes a device
+    ("tracing", _U8, 1),  # 1: the interpreter looks for a round that repeats
+    ("round", _U32, 1),  # cycles after which the whole state repeats until the next event; 0: unknown
+    ("trace_pc", _U16, 1),
+    ("trace_from", _U64, 1),
+    ("trace_window", _U32, 1),
+    ("trace_failures", _U8, 1),
+    ("trace_after", _U64, 1),  # no new search before this cycle
+    ("trace_data", _U8, DATA_BYTES),  # data memory at trace_from
     ("shadow", _U8, 1),  # 1: one instruction runs before the next interrupt
     ("halted", _U8, 1),  # 1: nothing can wake the CPU
     ("looping", _U8, 1),  # cycles of a jump to itself that was just executed, else 0

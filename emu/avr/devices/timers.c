@@ -236,9 +236,12 @@ static void set_compare(struct avr *m, u32 n, u32 channel, u32 value)
 // A change of the control registers: the count stays, and a mode without buffer takes the compare values at once.
 static void set_control(struct avr *m, u32 n, u32 address, u32 value)
 {
+    struct waveform before = waveform_of(m, n);
     u32 count = timer_count(m, n);
     m->data[address] = (u8)value;
-    m->timer_position[n] = count;
+    struct waveform after = waveform_of(m, n);
+    if (before.kind < PHASE_PWM || after.kind < PHASE_PWM || before.top != after.top)
+        m->timer_position[n] = count; // otherwise it also keeps its direction
     if (waveform_of(m, n).kind < FAST_PWM)
         for (u32 c = 0; c < 2; c++)
             m->timer_compare[2 * n + c] = m->timer_buffer[2 * n + c];

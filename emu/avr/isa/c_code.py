@@ -15,7 +15,7 @@ NAMES: Final = {"Rd": "data[d]", "Rr": "data[r]", "R0": "data[0]"}
 
 def decoder() -> str:
     """Return the C text of the operations, of `row_of` and of `operands_of`."""
-    lines = [f"enum {{ {', '.join('OP_' + row.name for row in ROWS)}, OP_ILLEGAL, OP_END, OPS }};",
+    lines = [f"enum {{ {', '.join('OP_' + row.name for row in ROWS)}, OP_ILLEGAL, OP_END, OP_COUNT_DOWN, OPS }};",
              f"enum {{ ERASED = {ERASED:#06x}, ERASED_BITS = {ERASED_BITS:#06x} }};",
              "static const struct { u16 mask, match; u8 words; } rows[OPS] = {"]  # fmt: skip
     lines += [f"    {{{row.mask:#06x}, {row.match:#06x}, {row.words}}}," for row in ROWS]
@@ -53,7 +53,7 @@ def _value(row: Row, letter: str) -> str:
 def labels() -> str:
     """Return the C text of the interpreter's table of labels, by operation."""
     names = ", ".join(f"&&do_{row.name}" for row in ROWS)
-    return f"static const void *const labels[OPS] = {{{names}, &&do_ILLEGAL, &&do_END}};"
+    return f"static const void *const labels[OPS] = {{{names}, &&do_ILLEGAL, &&do_END, &&do_COUNT_DOWN}};"
 
 
 def bodies() -> str:

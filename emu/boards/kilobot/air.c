@@ -41,6 +41,7 @@ struct air {
     i64 count;
     struct robot *robots;
     struct link *links; // [sender][receiver]
+    u64 *acts;          // when each robot can send light at the earliest
     run_function run;
     input_function input;
     u64 delay, random;
@@ -69,6 +70,23 @@ static u64 tick_of(const struct robot *r, u64 cycle)
     return tick;
 }
 
+// When the robot can send light at the earliest: a sleeping one at its next event.
+static u64 acts_at(const struct robot *r)
+{
+    const struct avr *m = r->avr;
+    if (!m->resting && !m->halted)
+        return r->reached;
+    u64 wakes = m->next_due == ~0ULL ? m->next_due : tick_of(r, m->next_due);
+    u64 light = r->edge_count ? r->edges[0].at : ~0ULL;
+    u64 first = wakes < light ? wakes : light;
+    return first > r->reached ? first : r->reached;
+}
+
+static void note_when_it_acts(struct air *a, const struct robot *r)
+{
+    a->acts[r - a->robots] = acts_at(r);
+}
+
 static void add_edge(struct air *a, struct robot *r, struct edge edge)
 {
     if (r->edge_count == EDGES) {
@@ -81,6 +99,7 @@ static void add_edge(struct air *a, struct robot *r, struct edge edge)
         place--;
     }
     r->edges[place] = edge;
+    note_when_it_acts(a, r);
 }
 
 // Give the edges up to tick `until` to the robot's inputs. The comparator sees light or darkness; strength stays.
@@ -131,18 +150,6 @@ void air_flash(struct air *a, i64 receiver, i64 at, i64 ticks, i64 high_uv, i64 
     add_edge(a, a->robots + receiver, (struct edge){(u64)(at + ticks), (u32)high_uv, (u32)low_uv, -1});
 }
 
-// When the robot can send light at the earliest: a sleeping one at its next event.
-static u64 acts_at(const struct robot *r)
-{
-    const struct avr *m = r->avr;
-    if (!m->resting && !m->halted)
-        return r->reached;
-    u64 wakes = m->next_due == ~0ULL ? m->next_due : tick_of(r, m->next_due);
-    u64 light = r->edge_count ? r->edges[0].at : ~0ULL;
-    u64 first = wakes < light ? wakes : light;
-    return first > r->reached ? first : r->reached;
-}
-
 // Run one robot to tick `goal`. Return 0, or 1 if Python must handle its state (fault, log, new program).
 static int run_robot(struct air *a, i64 index, u64 goal)
 {
@@ -170,23 +177,29 @@ static int run_robot(struct air *a, i64 index, u64 goal)
 // Run all robots to tick `until`. Return -1, or the index of a robot that Python must handle.
 i64 air_run(struct air *a, i64 until)
 {
+    u64 end = (u64)until;
+    for (i64 n = 0; n < a->count; n++)
+        note_when_it_acts(a, a->robots + n);
     for (;;) {
         u64 first = ~0ULL, second = ~0ULL;
-        i64 next = -1;
+        i64 next = 0;
         for (i64 n = 0; n < a->count; n++) {
-            u64 at = acts_at(a->robots + n);
-            if (a->robots[n].reached < (u64)until && (next < 0 || at < first)) {
-                second = first < second ? first : second;
-                first = at, next = n;
-            } else if (at < second)
+            u64 at = a->acts[n];
+            if (at < first)
+                second = first, first = at, next = n;
+            else if (at < second)
                 second = at;
         }
-        if (next < 0)
-            return -1;
-        u64 goal = second > ~0ULL - a->delay ? (u64)until : second + a->delay - MARGIN;
-        if (goal > (u64)until)
-            goal = (u64)until;
-        if (run_robot(a, next, goal))
+        if (first >= end)
+            break;
+        u64 goal = second > end ? end : second + a->delay - MARGIN;
+        int stops = run_robot(a, next, goal < end ? goal : end);
+        note_when_it_acts(a, a->robots + next);
+        if (stops)
             return next;
     }
+    for (i64 n = 0; n < a->count; n++) // none of them sends light before the end
+        if (run_robot(a, n, end))
+            return n;
+    return -1;
 }

@@ -13,6 +13,8 @@ SLOT: Final = 270
 """Ticks of a bit as measured from a compiled image; the nominal value is 269."""
 TOLERANCE: Final = 134
 """Ticks that a pulse may be off the middle of its slot at kilolib's receiver."""
+LEADER_PULSES: Final = 2
+"""Pulses around the silent byte 0."""
 STOP_OF_LEADER: Final = 2_420
 """Ticks from the first pulse to the pulse that ends the silent byte 0."""
 BYTE_AFTER_LEADER: Final = 286

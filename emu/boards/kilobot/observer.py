@@ -5,7 +5,7 @@ Input: `Change`s of one robot. Output: `Report`s in order of time. Pins: kilobot
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -66,10 +66,13 @@ def motors_of(registers: dict[int, int]) -> tuple[int, int]:
 
 
 class KilobotObserver:
-    """Observer of one robot. Give it all changes of the registers in WATCHED, in order."""
+    """Observer of one robot. Give it all changes of the registers in WATCHED, in order.
 
-    def __init__(self) -> None:
-        self._registers: dict[int, int] = {}
+    `registers`: their values now, for a robot that already runs.
+    """
+
+    def __init__(self, registers: Mapping[int, int] | None = None) -> None:
+        self._registers = dict(registers or {})
         self._reported: dict[str, tuple[int, ...]] = {"led": (0, 0, 0), "motors": (0, 0)}
         self._waiting: dict[str, tuple[int, tuple[int, ...]]] = {}
         self._decoder = PulseDecoder()

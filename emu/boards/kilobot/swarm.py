@@ -80,6 +80,8 @@ class _Robot(Structure):
                 ("lights", c_uint32), ("edge_count", c_uint32), ("reached", c_uint64), ("pulses", c_uint64),
                 ("edges", _Edge * EDGES)]  # fmt: skip
     code: int
+    on_at: int
+    period: int
     reached: int
     pulses: int
 
@@ -87,7 +89,7 @@ class _Robot(Structure):
 class _Air(Structure):
     """`struct air` of air.c."""
 
-    _fields_ = [("count", c_int64), *((name, c_void_p) for name in ("robots", "links", "run", "input")),
+    _fields_ = [("count", c_int64), *((name, c_void_p) for name in ("robots", "links", "acts", "run", "input")),
                 ("delay", c_uint64), ("random", c_uint64), ("lost_edges", c_uint64)]  # fmt: skip
     lost_edges: int
 
@@ -149,8 +151,13 @@ class KilobotSwarm:
                    int(robot.clock * ONE_RATE), int(ONE_RATE / robot.clock), reached=int(robot.on_at * HZ))
             for machine, robot in zip(self.robots, robots, strict=True)))  # fmt: skip
         self._links = (_Link * (count * count))()
-        self._air = _Air(count, addressof(self._robots), addressof(self._links), address_of(native()["avr_run"]),
-                         address_of(native()["avr_input"]), delay, seed * 2_654_435_761 % (1 << 63) | 1)  # fmt: skip
+        self._acts = (c_uint64 * count)()
+        functions = native()
+        self._air = _Air(
+            count, addressof(self._robots), addressof(self._links), addressof(self._acts),
+            address_of(functions["avr_run"]), address_of(functions["avr_input"]), delay,
+            seed * 2_654_435_761 % (1 << 63) | 1,
+        )  # fmt: skip
         for index in range(count):
             self._look_at(index)
 
@@ -178,6 +185,10 @@ class KilobotSwarm:
         """Let one robot receive a light pulse at a tick of the future, as `flash`. At most 100 may wait."""
         strengths = [microvolts(counts(gain, distance)) for gain in (HIGH_GAIN_MM, LOW_GAIN_MM)]
         self._functions["air_flash"](addressof(self._air), robot, tick, PULSE_TICKS, *strengths)
+
+    def tick_of(self, robot: int, cycle: int) -> int:
+        """Return the tick of 1/8 MHz of the swarm at a cycle of a robot's own clock."""
+        return self._robots[robot].on_at + cycle * self._robots[robot].period // ONE_RATE
 
     def pulses_sent(self, robot: int) -> int:
         """Return the light pulses that a robot has sent since power-on."""

@@ -1,0 +1,76 @@
+"""Waiting loops are skipped exactly: the run in one call is the run in pieces too short for any skipping."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from emu.avr.core.state import FIELDS
+from emu.avr.machine import Atmega328p
+from tests.emu.avr.conftest import Build
+
+PIECE = 3
+"""Cycles of a call in which nothing can be skipped: a round of the shortest loop takes as many."""
+SEARCH = {"until", "deadline", "next_due", "skipped", "touched", "tracing", "round", "resting", "log_cycle",
+          "log_register", "log_value"}  # fmt: skip
+"""Fields of the calls and of the search for rounds."""
+
+POLLING = """
+    volatile uint8_t ticks; uint8_t last, rounds;
+    ISR(TIMER0_OVF_vect) { ticks++; }
+    int main(void) {
+        TCCR0B = 2; TIMSK0 = 1; OCR2A = 5; sei();
+        for (;;) {
+            if (ticks != last) { last = ticks; PORTB ^= 1; }
+            DDRD = 0x10; OCR2A = 5; rounds = (rounds + 1) & 3;
+        }
+    }"""
+COUNTDOWNS = """
+    #include <util/delay.h>
+    volatile uint8_t n;
+    ISR(TIMER0_OVF_vect) { PORTB ^= 2; }
+    int main(void) {
+        TCCR0B = 1; TIMSK0 = 1; sei();
+        for (;;) {
+            _delay_us(20); PORTC ^= 1; _delay_us(900); PORTC ^= 2; _delay_us(5000); PORTC ^= 4;
+            asm volatile("ldi r24, 0\\n 1: sbiw r24, 1\\n brne 1b" ::: "r24", "r25");
+            asm volatile("ldi r24, 1\\n 1: dec r24\\n brne 1b" ::: "r24");
+            asm volatile("ldi r24, 5\\n ldi r25, 1\\n 1: subi r24, 1\\n sbci r25, 0\\n brne 1b" ::: "r24", "r25");
+            PORTC ^= SREG >> 1 & 8;
+        }
+    }"""
+CLOCKED = """
+    volatile uint16_t seen;
+    int main(void) { TCCR1B = 1; for (;;) { seen = TCNT1; if (seen > 60000) PORTB ^= 1; } }"""
+
+
+def state_of(m: Atmega328p) -> dict[str, Any]:
+    found = {}
+    for name, _, count in FIELDS:
+        if name not in SEARCH and not name.startswith("trace_"):
+            value = getattr(m.state, name)
+            found[name] = value if count == 1 else list(value)
+    return found
+
+
+@pytest.mark.parametrize(("text", "least"), [(POLLING, 0.8), (COUNTDOWNS, 0.8), (CLOCKED, 0.0)])
+def test_skipping_is_exact(build: Build, text: str, least: float) -> None:
+    """Registers, RAM, devices, cycles and pin changes are the same with and without skipping.
+
+    `least` is the part of the cycles that must be skipped; a loop that reads a running counter is not skipped at all.
+    """
+    image = build(text)
+    whole, pieces = Atmega328p(image), Atmega328p(image)
+    for m in (whole, pieces):
+        m.watch([0x25, 0x28])
+    for end in (50_000, 90_001, 170_000):
+        whole.run_until(end)
+        while pieces.cycle < end:
+            pieces.run_until(min(pieces.cycle + PIECE, end))
+        assert state_of(whole) == state_of(pieces)
+    assert whole.changes == pieces.changes
+    assert len(whole.changes) >= 2
+    assert whole.state.skipped >= least * 170_000
+    assert (whole.state.skipped == 0) == (least == 0)
+    assert pieces.state.skipped <= 0.4 * 170_000
