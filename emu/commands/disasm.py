@@ -6,12 +6,12 @@ import argparse
 import json
 import sys
 from collections.abc import Iterator
-from pathlib import Path
 
 from emu.commands.image_option import add_chip_option, image_of
 from emu.dspic30f.state.state import PC_MASK
 from emu.host.command import CommandError, Parser
 from emu.host.exit_status import DONE
+from emu.host.sources import SourceFinder
 from emu.image.model import Image
 from emu.instruments.disassembly import Item, items
 
@@ -40,7 +40,7 @@ def run(options: argparse.Namespace) -> int:
     for warning in image.warnings:
         print(f"emu disasm: warning: {image.path}: {warning}", file=sys.stderr)
     found = items(image, start, end)
-    sources = _Sources(options.source, Path(options.image))
+    sources = _Sources(options.source, options.image)
     lines = _json(image, found) if options.json else listing(image, found, sources)
     for line in lines:
         print(line)
@@ -107,22 +107,18 @@ def _json(image: Image, found: Iterator[Item]) -> Iterator[str]:
 
 
 class _Sources:
-    """Lines of source files. Each file is read once; a missing file has no lines.
+    """Lines of source files. Each file is read once; a missing file has no lines."""
 
-    File names in images are relative to the project folder. They are searched from the current folder and from the
-    parent folders of the image.
-    """
-
-    def __init__(self, wanted: bool, image: Path) -> None:
+    def __init__(self, wanted: bool, image: str) -> None:
         self.wanted = wanted
-        self._roots = [Path(), *image.resolve().parents]
+        self._finder = SourceFinder(image)
         self._files: dict[str, list[str]] = {}
 
     def text(self, file: str, line: int) -> str:
         if not self.wanted:
             return ""
         if file not in self._files:
-            found = next((root / file for root in self._roots if (root / file).is_file()), None)
+            found = self._finder.find(file)
             self._files[file] = found.read_text("utf-8", "replace").splitlines() if found is not None else []
         lines = self._files[file]
         return f": {lines[line - 1].strip()}" if 0 < line <= len(lines) else ""

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from emu.dap.debuggee import Debuggee, StopEvent
@@ -22,6 +21,7 @@ from emu.debug.dwarf.location import Unavailable
 from emu.debug.environment import CheckpointResumedError
 from emu.debug.expressions.expression import ExpressionError
 from emu.debug.history import History
+from emu.host.sources import SourceFinder
 
 if TYPE_CHECKING:
     from emu.machine.machine import Machine
@@ -166,10 +166,9 @@ class Server(RewindingSession):
         if machine.image is None:
             raise RequestRefusedError("the machine has no program")
         self._launch = arguments
-        program = Path(machine.image.path).resolve()
-        roots = [Path(root) for root in arguments.get("sourceRoots", [])] + [Path.cwd(), *program.parents]
+        finder = SourceFinder(machine.image.path, *arguments.get("sourceRoots", []), ".")
         self._target = Debuggee(machine, self._is_stop_requested, self._write_output, self._record(machine))
-        sources = SourceFiles(self._target.inspector, roots)
+        sources = SourceFiles(self._target.inspector, finder)
         world = self._environment_state if self._target.history.environment is not None else None
         self._views = ReferenceTable(self._target.inspector, sources, world), sources
         self._attach_output(machine)

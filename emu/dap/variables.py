@@ -14,6 +14,7 @@ from urllib.parse import unquote
 from emu.debug.dwarf.location import Piece, Unavailable
 from emu.debug.dwarf.types import UNSIGNED, parts_of
 from emu.debug.inspector import Frame, Inspector, Value
+from emu.host.sources import SourceFinder
 from emu.image.lines import SourceLine
 from emu.instruments.disassembly import instruction
 
@@ -198,18 +199,13 @@ class ReferenceTable:
 class SourceFiles:
     """Source files in the line table, and their paths on this host."""
 
-    def __init__(self, inspector: Inspector, roots: list[Path]) -> None:
+    def __init__(self, inspector: Inspector, finder: SourceFinder) -> None:
         self._inspector: Final = inspector
-        self._roots: Final = roots
-        self._paths: Final[dict[str, Path]] = {}
+        self._finder: Final = finder
 
     def path(self, file: str) -> Path:
-        """Return the path of `file`: the path in the line table, or one relative to a root folder."""
-        if file not in self._paths:
-            candidates = [Path(file), *(root / file for root in self._roots)]
-            found = next((one for one in candidates if one.exists()), candidates[0])
-            self._paths[file] = found.resolve() if found.exists() else found
-        return self._paths[file]
+        """Return the path of `file` of the line table; as it is there if the file does not exist."""
+        return self._finder.find(file) or Path(file)
 
     def row(self, file: str) -> Row:
         """Return a source in the form of the protocol."""

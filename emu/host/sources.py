@@ -11,18 +11,18 @@ from typing import Final
 
 from emu.host import paths
 
-LEVELS: Final = 5
-"""Number of folders above an image in which its project is searched (build/cmake/firmware.make/firmware.elf)."""
-
 
 class SourceFinder:
-    """Finds the source files of the image at `image_path`. `root` is searched before all other folders."""
+    """Finds the source files of the image at `image_path`.
 
-    def __init__(self, image_path: str, root: str | Path = ".") -> None:
+    Searches `roots` (the current folder if there are none), the folders above the image, and those of the kernel.
+    """
+
+    def __init__(self, image_path: str, *roots: str | Path) -> None:
         firmware = paths.firmware()
-        self.root: Final = Path(root).resolve()
-        above = Path(image_path).resolve().parents[:LEVELS]
-        self._folders: Final = (self.root, *above, firmware.parent, firmware)
+        first = [Path(root).resolve() for root in roots or (".",)]
+        self.root: Final = first[0]
+        self._folders: Final = (*first, *Path(image_path).resolve().parents, firmware.parent, firmware)
         self._known: Final[dict[str, Path | None]] = {}
 
     def find(self, name: str) -> Path | None:

@@ -1,15 +1,19 @@
-"""Coverage of a program with the kernel: which files are reported, where they exist, and the HTML pages."""
+"""Source files of a program with the kernel: in coverage, HTML pages, `emu disasm --source` and the prompt's `list`."""
 
 from __future__ import annotations
 
+import io
 import json
 import re
 from pathlib import Path
 
 import pytest
 
+import emu
 from emu.cli import main
+from emu.dap.server import Server
 from emu.host.sources import SourceFinder
+from emu.prompt.reader import Prompt
 from toolchain.driver import driver
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -87,3 +91,17 @@ def test_the_root_is_searched_first(tmp_path):
     assert finder.find("src/other.c") is None
     assert finder.path("src/other.c") == tmp_path.resolve() / "src/other.c"
     assert finder.find("openswarm/kernel/event.c") == ROOT / "firmware/openswarm/kernel/event.c"
+
+
+def test_listings_show_the_kernels_sources(image, tmp_path, monkeypatch, capsys):
+    """Wherever the command runs, as for a kernel from a wheel; the stand-in's code is in line 4 of `clock.c`."""
+    monkeypatch.chdir(tmp_path)
+    fourth = (ROOT / "firmware/openswarm/kernel/clock.c").read_text().splitlines()[3]
+    assert main(["disasm", str(image), "--source", "--from", "tick"]) == 0
+    assert f"clock.c:4: {fourth.strip()}" in capsys.readouterr().out
+    prompt = Prompt("emu debug", lambda client: Server(client, lambda _launch: emu.load(image)))
+    assert prompt.serve({}, io.StringIO("break tick\nrun\nlist tick\nlist sum\n")) == 0
+    shown = capsys.readouterr()
+    assert f">    4 {fourth}\n" in shown.out
+    assert "s += n--;" in shown.out
+    assert shown.err == ""
