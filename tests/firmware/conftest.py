@@ -1,4 +1,7 @@
-"""Fixtures that build firmware images, each once per test run, in a temporary folder."""
+"""Fixtures that build firmware images, each once per test run, in a temporary folder.
+
+Images of one run share the IR of kernel and drivers (shared_front_end.py).
+"""
 
 from __future__ import annotations
 
@@ -18,6 +21,7 @@ from tests.watchdog import HANG
 ROOT = Path(__file__).resolve().parents[2]
 FIRMWARE = ROOT / "firmware"
 TARGET_APPS = Path(__file__).parent / "target"
+FRONT_END = Path(__file__).with_name("shared_front_end.py")
 
 Build = Callable[..., Path]
 
@@ -30,12 +34,15 @@ def run_make(folder: Path, *words: str) -> None:
     assert done.returncode == 0, done.stdout + done.stderr
 
 
+def folder_of_run(factory: pytest.TempPathFactory) -> Path:
+    """Return the folder that all worker processes of a test run share."""
+    run = factory.getbasetemp()
+    return run.parent if "PYTEST_XDIST_WORKER" in os.environ else run  # a worker's folder is inside the run's folder
+
+
 def make_once(factory: pytest.TempPathFactory, name: str, product: str, folder: Path, *words: str) -> Path:
     """Run `make` once for all worker processes of a test run, with `OUT` set, and return its product in that folder."""
-    run = factory.getbasetemp()
-    if "PYTEST_XDIST_WORKER" in os.environ:
-        run = run.parent  # a worker's folder is inside the run's folder
-    out = run / f"{name}-{hashlib.sha256(repr(words).encode()).hexdigest()[:16]}"
+    out = folder_of_run(factory) / f"{name}-{hashlib.sha256(repr(words).encode()).hexdigest()[:16]}"
     with out.with_suffix(".lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         if not (out / product).exists():
@@ -45,7 +52,8 @@ def make_once(factory: pytest.TempPathFactory, name: str, product: str, folder: 
 
 def built_once(factory: pytest.TempPathFactory, app: str, *words: str) -> Path:
     """Build an application for the e-puck once for all worker processes of a test run."""
-    words = (f"APP={app}", f"PYTHON={sys.executable}", *words)
+    python = f"{sys.executable} {FRONT_END} {folder_of_run(factory) / 'front-end'}"
+    words = (f"APP={app}", f"PYTHON={python}", *words)
     return make_once(factory, app, "firmware.elf", FIRMWARE, *words)
 
 
