@@ -11,7 +11,7 @@ import pytest
 from arena.infrared.channel import OpticalChannel
 from arena.robots.firmware_controller import FirmwareController
 from arena.scene.loader import FCY, load_scene
-from arena.world.physics import Poses
+from arena.world.poses import Poses
 from emu.machine.machine import Machine
 from tests.firmware.conftest import TARGET_APPS, Build
 from tests.firmware.drivers.test_drivers_on_target import captured, noise, robot, window
