@@ -1,6 +1,7 @@
 """Names of interrupt handlers. The linker binds handlers to vectors by name alone (abi-elf.md §2.7).
 
-`check` refuses functions with a vector's name that are not interrupt functions, and interrupt functions without one.
+`check` refuses functions with a vector's name that are not interrupt functions, interrupt functions without one, and
+calls of interrupt functions.
 """
 
 from __future__ import annotations
@@ -29,6 +30,7 @@ def irq_name(number: int) -> str:
 
 
 _DEFINITION = re.compile(r'^define [^@\n]*@("[^"]+"|[\w$.]+)\([^\n]*?(?: !dbg (!\d+))? \{$', re.MULTILINE)
+_CALL = re.compile(r'^ .*\bcall void @("[^"]+"|[\w$.]+)\(\)[^\n]*?(?:, !dbg (!\d+))?(?:, ![^\n]*)?$', re.MULTILINE)
 _ANNOTATIONS = re.compile(r"^@llvm\.global\.annotations = .*$", re.MULTILINE)
 _ANNOTATED = re.compile(r"\{ ptr @([\w$.]+), ptr (@[\w$.]+), ptr @[\w$.]+, i32 \d+, ptr (@[\w$.]+|null) \}")
 _STRING = re.compile(r'^(@[\w$.]+) = [^\n]*c"interrupt\\00"', re.MULTILINE)
@@ -37,7 +39,10 @@ _ARGUMENT = re.compile(r"^(@[\w$.]+) = [^\n]* constant \{ i32 \} (?:\{ i32 (-?\d
 
 
 def check(ir_text: str, locate: Callable[[str], str]) -> None:
-    """Raise ToolError listing every handler whose name and kind disagree; `locate` returns "file:line" of metadata."""
+    """Raise ToolError for handlers whose name and kind disagree, and for calls of handlers.
+
+    `locate` returns "file:line" of metadata.
+    """
     marks = set(_STRING.findall(ir_text))
     annotations = _ANNOTATIONS.search(ir_text)
     pairs = _ANNOTATED.findall(annotations[0]) if annotations else []
@@ -65,6 +70,12 @@ def check(ir_text: str, locate: Callable[[str], str]) -> None:
         f"(expected 0 to {len(SLOTS) - FIRST_INTERRUPT - 1})"
         for name, number in sorted(numbered.items())
         if not _is_irq(number)
+    ]
+    findings += [
+        f"{f'{locate(ref)}: ' if ref else ''}error: interrupt function '{name}' is called: it ends with RETFIE, "
+        "which needs the frame of an interrupt; set its interrupt flag, or share a function with it"
+        for name, ref in _CALL.findall(ir_text)
+        if name.strip('"') in handlers
     ]
     if findings:
         raise ToolError.of(findings)

@@ -7,6 +7,7 @@ linker. Modules with a long import time are imported by their stage, so that `-E
 from __future__ import annotations
 
 import os
+import re
 import sys
 import tempfile
 from collections.abc import Callable
@@ -176,6 +177,8 @@ def _to_assembly(options: CcOptions, ir_text: str) -> str:
     try:
         return pipeline.compile_module(ir_text, options) + _formats(options) + _double_mark(options)
     except UnsupportedError as error:
+        if re.search(r":\d+$", error.where):
+            raise ToolError.of([f"{error.where}: error: not supported: {error.what}"]) from error
         raise ToolError(f"not supported: {error}") from error
 
 

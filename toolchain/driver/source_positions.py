@@ -13,12 +13,14 @@ from toolchain.errors import ToolError
 
 _DUPLICATE = re.compile(r"error: duplicate symbol '?_?([\w$]+)'?[:,] defined in")
 _IN_SECTION = re.compile(r"(?:error: )?[^:\s]+:\(\.[\w.$]*?\._(\w+)(?:\+0x[0-9a-f]+)?\)")
-_UNDEFINED = re.compile(r"error: undefined symbol (\S+), referenced at ")
+_UNDEFINED = re.compile(r"error: undefined symbol (\S+), referenced at [^;]*(;.*)?")
 _REFUSED = re.compile(r"not supported: (?:LLVM IR line|in function|in variable|function) ")
-_HANDLER = re.compile(r"error: (interrupt )?function '")
+_HANDLER = re.compile(r"error: (?:interrupt )?function '")
 _FUNCTION = re.compile(r'^define .*?@("[^"]+"|[\w$.]+)\(')
 _NAME = re.compile(r'@("[^"]+"|[\w$.]+)')
 _LOCATION = re.compile(r"!dbg (!\d+)")
+_ASSEMBLY = re.compile(r'\basm (?:\w+ )*"([^"]*)"')
+"""Text of inline assembly in a line of LLVM IR."""
 MAX_POSITIONS = 3  # maximum number of positions shown per symbol
 
 
@@ -58,7 +60,8 @@ def with_positions(error: ToolError, modules: Callable[[], Iterable[str]]) -> To
 def _located(finding: str, uses: dict[str, list[str]], definitions: dict[str, list[str]]) -> list[str]:
     """The lines of one finding with the positions that are known."""
     if undefined := _UNDEFINED.search(finding):
-        return [f"{position.split(' ')[0]}: error: undefined symbol {undefined[1]}, {position.split(' ', 1)[1]}"
+        cure = undefined[2] or ""
+        return [f"{position.split(' ')[0]}: error: undefined symbol {undefined[1]}, {position.split(' ', 1)[1]}{cure}"
                 for position in uses.get(undefined[1], [])[:MAX_POSITIONS]] or [finding]  # fmt: skip
     if duplicate := _DUPLICATE.search(finding):
         first, *others = definitions.get(duplicate[1], [""])
@@ -94,6 +97,8 @@ def _uses(text: str) -> Iterable[tuple[str, str]]:
         if start := _FUNCTION.match(line):
             function = start[1].strip('"')
         elif (location := _LOCATION.search(line)) and (position := info.position(location[1])):
+            words = {word for text in _ASSEMBLY.findall(line) for word in re.findall(r"[A-Za-z_]\w*", text)}
+            yield from ((word, f"{position[0]}:{position[1]} used in function '{function}'") for word in words)
             for name in _NAME.findall(line):
                 plain = name.strip('"')
                 symbol = plain[3:] if plain.startswith("\\01") else f"_{plain}"

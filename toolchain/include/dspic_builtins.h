@@ -9,6 +9,11 @@
 extern "C" {
 #endif
 
+/* Qualifiers of XC16 that change how a pointer is read, which this compiler does not have. */
+#define __eds__ _Pragma("GCC error \"__eds__ is not supported: read flash by __builtin_tblrdl, or set PSVPAG\"")
+#define __psv__ _Pragma("GCC error \"__psv__ is not supported: read flash by __builtin_tblrdl, or set PSVPAG\"")
+#define __prog__ _Pragma("GCC error \"__prog__ is not supported: read flash by __builtin_tblrdl, or set PSVPAG\"")
+
 #define __builtin_nop() __asm__ volatile("nop")
 #define __builtin_clrwdt() __asm__ volatile("clrwdt")
 #define __builtin_pwrsav(mode) __asm__ volatile("pwrsav #%0" ::"i"(mode) : "memory")

@@ -195,7 +195,8 @@ class Placer:
         if size > PSV_PAGE_UNITS:
             largest = largest_symbols(self.resolution, const)
             raise ToolError(
-                f"constants (.const) are {size - PSV_PAGE_UNITS} bytes too large for one PSV window of 32 KB{largest}"
+                f"constants (.const) are {size - PSV_PAGE_UNITS} bytes too large for one PSV window of 32 KB{largest}; "
+                "give large tables the attribute space(prog) and read them by __builtin_tblrdl"
             )
         first, end = self.program.start, self.program.end
         at = self.layout.program.allocate(size, align, first, end, PSV_PAGE_UNITS)

@@ -62,6 +62,7 @@ class Resolution:
 
 
 _STRONG = 3
+MAIN = "_main"
 
 
 def _rank(symbol: Symbol) -> int:
@@ -119,6 +120,13 @@ def place_of(obj: ObjectFile, section: Section, offset: int) -> str:
     return f"{obj.name}:({section.name}+{offset:#x}{f' in {name}' if name else ''})"
 
 
+def _cure(name: str) -> str:
+    """Return what to do about an undefined symbol."""
+    if not name.startswith("_"):
+        return "define it; assembly writes a C name with an underscore before it"
+    return f"define '{name[1:]}', or name its source, object or library (-l) on the command line"
+
+
 def check(result: Resolution, provided: set[str], live: set[Section]) -> None:
     """Raise `ToolError` listing every duplicate and every undefined symbol that live sections refer to."""
     findings = [
@@ -137,8 +145,12 @@ def check(result: Resolution, provided: set[str], live: set[Section]) -> None:
                 if symbol.name not in result.globals and symbol.name not in provided:
                     missing.setdefault(symbol.name, []).append(place_of(obj, section, reloc.offset // 2))
     for name, places in missing.items():
+        if name == MAIN and all(".init" in place for place in places):
+            findings.append(f"error: undefined symbol {MAIN}: the program needs a function main")
+            continue
         shown = ", ".join(places[:MAX_REFERENCES])
         more = f" and {len(places) - MAX_REFERENCES} more" if len(places) > MAX_REFERENCES else ""
-        findings.append(f"{places[0].split(':(')[0]}: error: undefined symbol {name}, referenced at {shown}{more}")
+        where = f"{places[0].split(':(')[0]}: error: undefined symbol {name}, referenced at {shown}{more}"
+        findings.append(f"{where}; {_cure(name)}")
     if findings:
         raise ToolError.of(findings)

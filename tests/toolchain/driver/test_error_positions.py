@@ -8,6 +8,7 @@ import pytest
 
 from toolchain.driver import driver
 
+CURE = "define '{}', or name its source, object or library (-l) on the command line"
 OPTIONS = [(), ("-Os",), ("-g",), ("-Os", "-fno-lto"), ("-O2", "-g", "-fno-lto")]
 
 
@@ -22,8 +23,8 @@ def test_an_undefined_symbol_names_the_lines_that_use_it(
     assert driver.main([*options, str(source), "-o", str(image)]) == 2
     said = capsys.readouterr().err.splitlines()
     assert said == [
-        f"{source}:4: error: undefined symbol _missing, used in function 'main'",
-        f"{source}:5: error: undefined symbol _gone, used in function 'main'",
+        f"{source}:4: error: undefined symbol _missing, used in function 'main'; {CURE.format('missing')}",
+        f"{source}:5: error: undefined symbol _gone, used in function 'main'; {CURE.format('gone')}",
     ]
     assert sorted(p.name for p in tmp_path.iterdir()) == ["main.c"]
 
@@ -80,7 +81,7 @@ def test_a_global_variable_in_a_register_is_refused_in_words(
     source.write_text('register int r5 __asm__("w5");\nint main(void) {\n  return r5;\n}\n')
     assert driver.main([str(source), "-o", str(tmp_path / "x")]) == 2
     said = "a global variable in a register: only A and B, the accumulators, can be one"
-    assert capsys.readouterr().err == f"error: not supported: {source}:3: {said}\n"
+    assert capsys.readouterr().err == f"{source}:3: error: not supported: {said}\n"
 
 
 @pytest.mark.parametrize("options", OPTIONS, ids=" ".join)
@@ -98,7 +99,7 @@ def test_a_refused_initialiser_names_the_line_of_its_variable(
     read = "f(n)" if "f(int" in declared else "*odd.p"
     source.write_text(f"volatile int n;\n\n{declared}\nint main(void) {{ return {read}; }}\n")
     assert driver.main([*options, str(source), "-o", str(tmp_path / "x")]) == 2
-    assert capsys.readouterr().err == f"error: not supported: {source}:3: {said}\n"
+    assert capsys.readouterr().err == f"{source}:3: error: not supported: {said}\n"
     assert sorted(p.name for p in tmp_path.iterdir()) == ["main.c"]
 
 

@@ -26,8 +26,9 @@ def test_all_undefined_and_duplicate_symbols_are_listed_with_their_objects(image
     assert lines == [
         "2.o: error: duplicate symbol twice, defined in 0.o, 2.o",
         "0.o: error: undefined symbol one, referenced at 0.o:(.text+0x0 in f), 0.o:(.text+0x2 in f), "
-        "1.o:(.text+0x0), 1.o:(.text+0x2)",
-        "0.o: error: undefined symbol two, referenced at 0.o:(.text+0x4 in f)",
+        "1.o:(.text+0x0), 1.o:(.text+0x2); define it; assembly writes a C name with an underscore before it",
+        "0.o: error: undefined symbol two, referenced at 0.o:(.text+0x4 in f); "
+        "define it; assembly writes a C name with an underscore before it",
     ]
 
 
