@@ -54,6 +54,11 @@ PROGRAMS: Final = (
     Program(("gcc",), "gcc", "the kernel on this host: make TARGET=posix"),
     Program(("avr-gcc",), "gcc-avr", "the kernel on a Kilobot: make PORT=avr (also avr-libc)"),
     Program(("arm-none-eabi-gcc",), "gcc-arm-none-eabi", "an e-puck2: PORT=cortex_m (also libnewlib-arm-none-eabi)"),
+    Program(
+        ("riscv64-unknown-elf-gcc",),
+        "gcc-riscv64-unknown-elf",
+        "a RISC-V: PORT=riscv (also picolibc-riscv64-unknown-elf)",
+    ),
     Program(("xc16-gcc",), "", "make TOOLCHAIN=xc16, Microchip's compiler; not in Debian"),
     Program(("ffmpeg",), "ffmpeg", "films as MP4 without the extra `film`"),
     Program(("chromium", "chromium-browser", "google-chrome"), "chromium", "tests of the pages people look at"),

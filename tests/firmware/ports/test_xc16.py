@@ -42,7 +42,7 @@ DIRECTIVES |= {".set", ".pword", ".include"}
 """Directives of pic30-as, all documented in DS50002106."""
 SECTION = r"\.section \.\w+(, (code|noload|keep|persist|address\(\w+\)))+"
 """Section attributes of pic30-as (DS50002106); the preprocessor expands a macro to the number."""
-OTHER_ROBOTS = {"posix", "template", "host", "avr", "kilobot", "cortex_m", "epuck2"}
+OTHER_ROBOTS = {"posix", "template", "host", "avr", "kilobot", "cortex_m", "epuck2", "riscv", "qemu_virt"}
 """Names of ports and boards that are not built for the dsPIC30F."""
 BUILTINS = ["write_NVM()=((void)0)"]
 BUILTINS += [f"{name}(offset)=((unsigned)(offset))" for name in ("tblrdl", "tblrdh")]

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Memory map of QEMU's virt machine (hw/riscv/virt.c; docs/reference/ports.md, section 4), also for the port. */
+/* Memory map of QEMU's virt machine (hw/riscv/virt.c; docs/reference/ports.md, section 9), also for the port. */
 #ifndef SOC_H
 #define SOC_H
 
