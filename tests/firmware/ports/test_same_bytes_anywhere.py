@@ -15,6 +15,7 @@ from pathlib import Path
 import pytest
 
 from emu.cli import main
+from tests.firmware.conftest import Build
 from tests.watchdog import HANG
 from toolchain.driver import driver
 
@@ -23,56 +24,58 @@ PARTS = ("emu", "toolchain", "firmware")
 
 
 @pytest.fixture(scope="module")
-def checkouts(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
-    """Return two copies of the project in folders whose paths differ in length and depth."""
-    folder = tmp_path_factory.mktemp("checkouts")
-    roots = [folder / "a", folder / "another" / "and deeper".replace(" ", "-")]
-    for root in roots:
-        for part in PARTS:
-            shutil.copytree(ROOT / part, root / part, ignore=shutil.ignore_patterns("__pycache__", "build"))
-    return roots
+def checkout(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a copy of the project, whose path differs from that of this checkout in length and depth."""
+    root = tmp_path_factory.mktemp("checkouts") / "another" / "and-deeper-than-this"
+    for part in PARTS:
+        shutil.copytree(ROOT / part, root / part, ignore=shutil.ignore_patterns("__pycache__", "build"))
+    return root
 
 
-def built(root: Path, app: str, *words: str) -> Path:
-    """Build an application of a checkout with its own run-time library, because the shared cache would hide
-    differences."""
-    out = root / "out" / app
+def built(root: Path, scratch: Path, app: str, *words: str) -> Path:
+    """Build an application of a checkout with the cache of a scratch folder: the shared one has a run-time library of
+    this checkout, which would hide differences."""
+    out = scratch / root.name / app
     command = ["make", "-C", str(root / "firmware"), f"APP={app}", f"OUT={out}", f"PYTHON={sys.executable}", *words]
-    environment = os.environ | {"XDG_CACHE_HOME": str(root / "cache")}
+    environment = os.environ | {"OPENSWARM_CACHE": str(scratch / "cache")}
     done = subprocess.run(command, capture_output=True, text=True, timeout=HANG, env=environment, check=False)
     assert done.returncode == 0, done.stderr
     return out / "firmware.elf"
 
 
 @pytest.mark.slow
-def test_two_checkouts_of_one_commit_build_the_same_bytes(checkouts: list[Path]) -> None:
-    """Two checkouts of one commit build identical bytes from C, assembly, inline functions and library, all with -g."""
-    one, other = (built(root, "clustering").read_bytes() for root in checkouts)
-    assert one == other
+def test_two_checkouts_of_one_commit_build_the_same_bytes(checkout: Path, image: Build) -> None:
+    """Two checkouts of one commit build identical bytes from C, assembly, inline functions and library, all with -g.
+
+    This checkout's image is that of all tests, for which kernel and drivers are compiled once per run.
+    """
+    one = image("clustering").read_bytes()
+    assert built(checkout, checkout.parent, "clustering").read_bytes() == one
     plain = one.replace(b"\0", b"")  # debug information has a phantom byte after every byte
-    for root in (*checkouts, ROOT):
+    for root in (checkout, ROOT):
         assert str(root).encode() not in plain
 
 
 @pytest.mark.slow
-def test_an_application_of_another_folder_does_not_bring_that_folder_along(checkouts: list[Path]) -> None:
+def test_an_application_of_another_folder_does_not_bring_that_folder_along(checkout: Path, tmp_path: Path) -> None:
     """Building an application by absolute path (`APPS=`) does not put that path into the image."""
     images = []
-    for root in checkouts:
-        source = root / "mine" / "tiny" / "main.c"
-        source.parent.mkdir(parents=True, exist_ok=True)
+    for root, folder in ((checkout, tmp_path / "mine"), (ROOT, tmp_path / "some" / "other")):
+        source = folder / "tiny" / "main.c"
+        source.parent.mkdir(parents=True)
         source.write_text("const char *volatile name;\nint main(void) { name = __FILE__; return name[0]; }\n")
         (source.parent / "app.mk").write_text("BARE := none\n")
-        images.append(built(root, "tiny", f"APPS={root / 'mine'}").read_bytes())
+        images.append(built(root, checkout.parent, "tiny", f"APPS={folder}").read_bytes())
     assert images[0] == images[1]
 
 
+@pytest.mark.slow
 def test_source_lines_are_still_found(
-    checkouts: list[Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    checkout: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Source paths start at the project's folder, and the listing with sources resolves them from any working
     folder."""
-    image = built(checkouts[0], "clustering")
+    image = built(checkout, checkout.parent, "clustering")
     monkeypatch.chdir(tmp_path)
     assert main(["disasm", str(image), "--source"]) == 0
     listing = capsys.readouterr().out
