@@ -27,6 +27,7 @@ from emu.dap.wire import Message
 from emu.prompt.client import Client
 from tests.emu.dap.node import mocha, node_modules
 from tests.firmware.conftest import built_once
+from tests.fuzz.seeds import base_seed
 from tests.fuzz.swarm.fuzz_rewind import SWARMS, Swarm, plan_of, walk
 
 FEW = Swarm("clustering", 1.0, (), (), {"robots__count": 2, "objects__count": 2, "start__selector": 8})
@@ -79,14 +80,14 @@ def session_of(plan: Plan, folder: Path, **how: Any) -> Iterator[tuple[DebugSess
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("swarm", SWARMS, ids=[one.scene for one in SWARMS])
-def test_random_walks_restore_equal_worlds(swarm: Swarm, image_of: Callable[[str], Path]) -> None:
+def test_random_walks_restore_equal_worlds(image_of: Callable[[str], Path]) -> None:
     """Random forward and backward runs restore equal worlds, by hash, and leave the record unaffected.
 
-    This is a sample of the fuzz campaign; its robots use cameras, infrared sensors and Bluetooth.
+    This is a sample of the fuzz campaign; the commit determines whether its robots use cameras, infrared sensors or
+    Bluetooth.
     """
     tally: Counter[str] = Counter()
-    walk(5, image_of, 12, tally, swarm)
+    walk(5, image_of, 12, tally, SWARMS[base_seed() % len(SWARMS)])
     assert tally["met again"] >= 2
     assert tally["back"] + tally["reverse"] + tally["last write"] >= 3
 
