@@ -142,6 +142,7 @@ class Events(Threads):
     def announce(self, number: int, value: int) -> None:
         """Send an event of the kernel's own: a failure is no error of the caller."""
         self.queue_message(number, (value & 0xFFFF).to_bytes(2, "little"))
+        self.boundary()
 
     def queue_message(self, number: int, payload: bytes) -> Error:
         event = self.events.get(number)

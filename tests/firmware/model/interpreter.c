@@ -46,7 +46,8 @@ static sys_event_data *results[MOST_PIDS]; /* wait result by PID */
 static const uint16 events[] = {SYS_FIRST_USER_EVENT, SYS_FIRST_USER_EVENT + 1, SYS_FIRST_USER_EVENT + 8,
                                 SYS_1ms_TIMER, SYS_EVENT_TERMINATION, SYS_LEFTMOTOR_SPEED, SYS_DEADLINE_MISSED, 0x99};
 static const uint16 sizes[] = {0, 1, 2, 3, 9, 16, 17, SYS_SMALL_PAYLOAD, SYS_SMALL_PAYLOAD + 1, 1025};
-static uint8 payload[1025];
+enum { LARGEST_FIRST_BYTE = 3 };
+static uint8 counting[1025 + LARGEST_FIRST_BYTE]; /* 0, 1, 2 ...: payloads that no interrupt changes */
 
 static sys_mutex mutexes[] = {SYS_MUTEX(0), SYS_MUTEX(2), SYS_MUTEX(3)};
 static sys_cleanup cleanups[4];
@@ -196,10 +197,7 @@ static sys_process_config configured(uint8 number, uint8 what)
 static uint16 send(uint16 event, uint8 size, uint8 first)
 {
     uint16 bytes = sizes[size];
-    for (uint16 i = 0; i < bytes; i++) {
-        payload[i] = (uint8)(first + i);
-    }
-    return Sys_Send_Event(event, bytes == 9 && first == 0 ? NULL : payload, bytes);
+    return Sys_Send_Event(event, bytes == 9 && first == 0 ? NULL : counting + first, bytes);
 }
 
 /* Where the running script keeps event data: a thread its wait result, a handler or condition its argument. */
@@ -362,6 +360,9 @@ void interpreter_load(const uint8 *program)
 void interpreter_main(void)
 {
     place at = {KIND_MAIN, MAIN, 0, NULL};
+    for (uint16 i = 0; i < sizeof counting; i++) {
+        counting[i] = (uint8)i;
+    }
     Sys_Init_Kernel();
     start_link();
     run_script(&at);
