@@ -5,7 +5,8 @@
  *     output device   event -> post-processor -> lower layer
  *     input device    lower layer -> pre-processor -> event
  *     communication   message -> Tx-processor -> bytes,   bytes -> Rx-processor -> message
- * A setter returns the previous processor; NULL restores the default. A change never splits a message.
+ * A setter returns the previous processor, or NULL if it is refused; setting NULL restores the default. A change never
+ * splits a message.
  */
 #ifndef OPENSWARM_IO_H
 #define OPENSWARM_IO_H
