@@ -1,8 +1,9 @@
 """Memory of an application of OpenSwarm: what its threads, events, messages and drivers allocate in a run.
 
 Input: a machine with an image that contains the kernel; nothing is instrumented. Output: `ApplicationMemory`. The
-kernel paints each stack, so the high-water mark is exact. Messages are counted when they are queued. The allocations
-are read whenever a thread enters the scheduler, where the kernel's lists are consistent.
+kernel paints the stack of each thread, and this module that of `main`, so the high-water marks are exact. Messages are
+counted when they are queued. The allocations are read whenever a thread enters the scheduler, where the kernel's lists
+are consistent.
 """
 
 from __future__ import annotations
@@ -17,7 +18,14 @@ from emu.image.footprint import pieces
 from emu.image.model import Image
 from emu.kernel_metrics.blame import short
 from emu.kernel_metrics.heap import Heap
-from emu.kernel_metrics.kernel_structures import STACK_FILL, KernelMemory, KernelStructures, ThreadMemory, event_name
+from emu.kernel_metrics.kernel_structures import (
+    STACK_FILL,
+    WORD,
+    KernelMemory,
+    KernelStructures,
+    ThreadMemory,
+    event_name,
+)
 from emu.kernel_metrics.observation import HookObservation, Observation, stores_to
 from emu.kernel_metrics.owners import APPLICATION, owner_of_module
 
@@ -29,6 +37,9 @@ RETURNED_BLOCK: Final = -1
 """Event identifier of a queued block that a driver returns to the kernel."""
 ENTRY_REGISTER: Final = 8
 """W8 holds the entry function at `os_thread_start` (firmware/openswarm/port/dspic30f/switch.S)."""
+RETURN_ADDRESS_BYTES: Final = 4
+"""Bytes that CALL pushes (isa.md §7.4)."""
+SYSTEM_THREAD: Final = "main"
 SCHEDULER: Final = ("os_schedule", "os_yield", "os_slice_end")
 """Functions in which the kernel, on its own stack, chooses the next thread (kernel/scheduler.c)."""
 
@@ -38,11 +49,11 @@ class ThreadUse:
     """All threads of one entry function over the whole run; byte counts are the worst of them."""
 
     name: str
-    """The entry function."""
+    """The entry function; `main` for the system thread."""
     pid: int
-    """PID of the first of these threads."""
+    """PID of the first of these threads; 0 for the system thread."""
     stack: int
-    """Configured bytes."""
+    """Configured bytes; for `main` the RAM that the linker leaves to its stack."""
     used: int
     """High-water mark in bytes."""
     free: int
@@ -51,7 +62,7 @@ class ThreadUse:
     """Bytes between the stack limit and the control block."""
     control_block: int
     heap: int
-    """Bytes of the whole heap block: stack, control block and timing of a periodic thread."""
+    """Bytes of the whole heap block: stack, control block and timing of a periodic thread; 0 for `main`."""
     cleanups: int = 0
     """Largest number of cleanup nodes."""
     mutexes: int = 0
@@ -173,11 +184,13 @@ class _Run:
         """Source line that started the thread, by control block."""
         self._inspector: Final = Inspector(machine)
         self._is_changed = False
+        self._stack_of_main = range(0)
+        """Addresses of the stack of `main` up to its limit (SPLIM)."""
         observation = self.observation = Observation(machine) if machine.engine == "plain" else HookObservation(machine)
         observation.at(kernel.code("os_thread_start"), self._thread_starts)
         for name, callback in (
-            ("ring_append", self._enters_ring), ("Sys_Register_Event", self._names_event),
-            ("Sys_Subscribe_to_Event", self._names_event),
+            (SYSTEM_THREAD, self._main_starts), ("ring_append", self._enters_ring),
+            ("Sys_Register_Event", self._names_event), ("Sys_Subscribe_to_Event", self._names_event),
         ):  # fmt: skip
             if machine.image is not None and machine.image.symbols.find(name) is not None:
                 observation.at(kernel.code(name), callback)
@@ -195,13 +208,38 @@ class _Run:
 
     def _enters_ring(self) -> None:
         pcb = self.machine.w[0]
-        if not self.kernel.is_woken(self.machine, pcb):
-            self._lines[pcb] = self._calling_line()
+        if self.kernel.is_woken(self.machine, pcb):
+            return
+        self._lines[pcb] = self._calling_line()
+        memory = self.kernel.thread(self.machine, pcb)
+        if memory.block:  # the thread may be ended before it runs
+            self._thread(memory, self.kernel.function_name(self._entry(memory)))
 
     def _names_event(self) -> None:
         line = self._calling_line()
         if line:
             self._event(self.machine.w[0]).line = line
+
+    def _main_starts(self) -> None:
+        """Paint the unused stack of `main`, which the kernel does not."""
+        if self._stack_of_main:
+            return
+        top, end = self.machine.w[15], self.machine.state.splim + WORD
+        if top < end <= self.machine.record.data_end:
+            self._stack_of_main = range(top - RETURN_ADDRESS_BYTES, end)
+            self.machine.poke(top, int.from_bytes(bytes([STACK_FILL]) * (end - top), "little"), end - top)
+
+    def _measure_main(self) -> None:
+        """Add the system thread."""
+        stack = self._stack_of_main
+        if not stack:
+            return
+        used = len(self.machine.peek_bytes(stack.start, len(stack)).rstrip(bytes([STACK_FILL])))
+        place = self._inspector.image.lines.find(self.kernel.code(SYSTEM_THREAD))
+        self.threads[SYSTEM_THREAD] = ThreadUse(
+            SYSTEM_THREAD, 0, len(stack), used, len(stack) - used, 0, self.kernel.pcb_bytes, 0,
+            line=f"{short(place.file)}:{place.line}" if place is not None else "",
+        )  # fmt: skip
 
     def _thread_starts(self) -> None:
         pcb = self.machine.peek(self.kernel.running)
@@ -292,6 +330,7 @@ class _Run:
             if memory.block:
                 self._thread(memory, self.kernel.function_name(self._entry(memory)))
                 self._measure(memory)
+        self._measure_main()
 
     def _entry(self, memory: ThreadMemory) -> int:
         """Return the entry function of a thread that has not run yet, from its initial frame (cpu.c)."""

@@ -43,8 +43,9 @@ def run_numbers(memory: ApplicationMemory) -> dict[str, Number]:
     numbers: dict[str, Number] = {"threads at once": Number(memory.most_threads, "threads")}
     for thread in memory.threads:
         name = f"thread {thread.name}"
+        has_block = thread.heap > 0  # the stack of main is the rest of RAM, which grows when variables shrink
         numbers |= {
-            f"{name}: stack": Number(thread.stack),
+            f"{name}: stack": Number(thread.stack, is_gated=has_block),
             f"{name}: stack used": Number(thread.used, of=thread.stack),
             f"{name}: stack free": Number(thread.free, of=thread.stack, more_is_better=True, is_gated=False),
             f"{name}: heap block": Number(thread.heap),

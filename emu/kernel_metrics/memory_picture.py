@@ -31,15 +31,18 @@ def ram_parts(memory: ApplicationMemory, ram: int) -> list[Part]:
     variables = own["A_parts"].items()
     parts: list[Part] = [(f"{owner} variables", owner, size) for owner, size in variables if owner in COLOURS]
     for one in memory.threads:
-        parts.append((f"{one.name}: stack used", "stack used", one.used))
-        parts.append((f"{one.name}: stack free", "stack free", one.stack - one.used))
-        parts.append((f"{one.name}: control block", "control blocks", one.heap - one.stack))
+        if one.heap:  # the control block of main is a variable of the kernel
+            parts.append((f"{one.name}: stack used", "stack used", one.used))
+            parts.append((f"{one.name}: stack free", "stack free", one.stack - one.used))
+            parts.append((f"{one.name}: control block", "control blocks", one.heap - one.stack))
     parts.append(("events and subscriptions", "events", heap.events + heap.subscriptions + heap.gates))
     messages, drivers = heap.fullest.get("messages", 0), heap.drivers_peak
     parts += [("messages, fullest moment", "messages", messages), ("drivers, peak", "drivers", drivers)]
     taken = sum(size for _, _, size in parts) - own["A"]
     parts.append(("heap, never used", "free", max(heap.capacity - taken, 0)))
-    parts.append(("rest: stack of main", "free", max(ram - own["A"] - heap.capacity, 0)))
+    used = sum(one.used for one in memory.threads if not one.heap)
+    parts.append(("main: stack used", "stack used", used))
+    parts.append(("main: stack free", "stack free", max(ram - own["A"] - heap.capacity - used, 0)))
     return [part for part in parts if part[2] > 0]
 
 

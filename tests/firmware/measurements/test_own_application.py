@@ -61,9 +61,12 @@ def baseline(courier, tmp_path_factory):
 def test_every_allocation_has_the_bytes_counted_by_hand(courier, capsys):
     run = facts(capsys, "footprint", courier, "--seconds", "0.05")["run"]
     stacks = {"courier": 128, "watcher": 128, "console": 200, "left": 128, "right": 128}
-    assert {one["name"]: one["stack"] for one in run["threads"]} == stacks
-    assert all(one["heap"] == one["stack"] + PCB for one in run["threads"])
+    system, *threads = run["threads"]
+    assert {one["name"]: one["stack"] for one in threads} == stacks
+    assert all(one["heap"] == one["stack"] + PCB for one in threads)
     assert all(one["used"] + one["free"] + one["guard"] == one["stack"] for one in run["threads"])
+    assert (system["name"], system["pid"], system["heap"]) == ("main", 0, 0)
+    assert 4 < system["used"] < system["stack"]
     heap, own = run["heap"], run["equation"]
     assert heap["threads"] == sum(stacks.values()) + len(stacks) * PCB
     assert (own["B"], own["C"], own["D"], own["E"], own["n"]) == (PCB, EVENT, SUBSCRIPTION, MESSAGE, 5)
@@ -102,6 +105,28 @@ def test_a_larger_stack_fails_the_check_with_its_row_and_line(changed, baseline,
         assert f"main.c:{line}" in out[row + 1]
     assert out[-1].startswith("emu footprint: FAIL: ")
     assert out[-1].endswith(f"--update {baseline}")
+
+
+def test_main_and_a_thread_that_never_ran_have_rows(courier, changed, baseline, capsys):
+    """The frame of a new thread takes ten words (hal_stack_init); an array in `main` counts in full."""
+    image = changed(
+        ("static void left(void)", "static void never(void)\n{\n}\n\nstatic void left(void)"),
+        ("    Sys_Init_Kernel();\n", "    Sys_Init_Kernel();\n    volatile uint16 room[40];\n"
+         "    for (uint16 i = 0; i < 40; i++) {\n        room[i] = i;\n    }\n"),
+        ("    Sys_Start_Kernel();\n", "    Sys_Kill_Process(Sys_Start_Process(never));\n    Sys_Start_Kernel();\n"),
+    )  # fmt: skip
+    before = facts(capsys, "footprint", courier, "--seconds", "0.05")["run"]["threads"][0]
+    threads = {one["name"]: one for one in facts(capsys, "footprint", image, "--seconds", "0.05")["run"]["threads"]}
+    assert threads["main"]["used"] >= before["used"] + 80
+    never = threads["never"]
+    assert (never["stack"], never["used"], never["started"], never["heap"]) == (128, 20, 1, 128 + PCB)
+    start = (HERE / "courier/main.c").read_text().splitlines().index("    Sys_Start_Kernel();") + 1
+    assert never["line"].endswith(f"main.c:{start + 8}")
+    assert main(["footprint", image, "--seconds", "0.05", "--check", baseline]) == 1
+    rows = capsys.readouterr().out.splitlines()
+    failed = [line for line in rows if "WORSE" in line or "NOT IN THE BASELINE" in line]
+    assert any(line.startswith("thread main: stack used ") for line in failed)
+    assert not any(line.startswith("thread main: stack ") and "stack used" not in line for line in failed)
 
 
 def test_a_limit_of_a_row_is_checked(courier, baseline, tmp_path, capsys):
