@@ -23,6 +23,7 @@ from arena.scene.loader import FCY, Scene, scene_of
 from arena.trial.strict_json import mismatch
 from arena.trial.trial import Rows
 from emu.host.files import atomic_file, is_standard, read_file
+from emu.host.result_tables import data_frame, html_table
 
 if TYPE_CHECKING:  # pyarrow takes 30 MB in every process that loads it, and running a trial does not need it
     import pyarrow as pa
@@ -67,6 +68,26 @@ class Trial:
     path: Path
     columns: dict[str, Any]
     about: dict[str, Any]
+
+    def __repr__(self) -> str:
+        robots = sum(name.startswith("r") and name.endswith("_heading") for name in self.columns)
+        span = float(self.times[-1]) if len(self.times) else 0.0
+        return f"<trial of {robots} robots, {span:g} s, seed {self.about['seed']}, {len(self.about['faults'])} faults>"
+
+    def frame(self) -> Any:
+        """Return one row per sample as a pandas DataFrame, with the columns and units of the record (arena/README.md).
+
+        Raises ModuleNotFoundError without pandas.
+        """
+        names = list(self.columns)
+        return data_frame([dict(zip(names, row, strict=True)) for row in zip(*self.columns.values(), strict=True)])
+
+    def _repr_html_(self) -> str:
+        """Return the metrics at the last sample as an HTML table for notebooks. Raises SceneError as `scene`."""
+        last = [
+            {"metric": one.label, "at the end": one.shown(self.series.last(one.name))} for one in self.experiment.curves
+        ]
+        return html_table(last, repr(self)[1:-1])
 
     @property
     def times(self) -> NDArray[np.float64]:

@@ -1,0 +1,75 @@
+"""Pages for users: every message exists in the code, every `[10]` and `Eq. (2)` has a source, the notebook runs."""
+
+from __future__ import annotations
+
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from arena.cli import main
+
+ROOT = Path(__file__).resolve().parents[2]
+DOCS = ROOT / "docs"
+
+
+def test_every_message_of_the_troubleshooting_page_exists() -> None:
+    """Each part between `...` is in the text of the Makefile or of one module."""
+    sources = [ROOT / "Makefile"]
+    for package in ("emu", "toolchain", "arena", "openswarm"):
+        sources += [path for path in (ROOT / package).rglob("*.py") if "firmware" not in path.parts[-3:]]
+    texts = [path.read_text(encoding="utf-8") for path in sources]
+    messages = re.findall(r"^\| `([^`]+)` \|", (DOCS / "troubleshooting.md").read_text(encoding="utf-8"), re.MULTILINE)
+    assert len(messages) > 20
+    missing = [one for one in messages if not any(all(part in text for part in one.split("...")) for text in texts)]
+    assert missing == []
+
+
+def test_every_numbered_source_is_in_the_bibliography() -> None:
+    """Pages that cite `[10]` or `Eq. (1)`, `Eq. (2)` count as the paper does; the bibliography explains each number."""
+    known = (DOCS / "bibliography.md").read_text(encoding="utf-8")
+    cited: set[str] = set()
+    for page in (*DOCS.glob("*.md"), *(ROOT / "arena").rglob("*.py")):
+        text = page.read_text(encoding="utf-8")
+        cited.update(re.findall(r"(?:ref\.|reference) (\[\d+\])", text))
+        cited.update(re.findall(r"Eq\. \(\d\)", text))
+    assert {"[10]", "Eq. (2)"} <= cited
+    assert [one for one in sorted(cited) if f"**{one}**" not in known] == []
+
+
+def test_the_systems_page_names_the_version_that_is_needed() -> None:
+    page = (DOCS / "systems.md").read_text(encoding="utf-8")
+    needed = re.search(r'requires-python = ">=(\S+)"', (ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    assert needed is not None
+    assert f"Python {needed[1]} (" in page
+    assert re.findall(r"^\| (\w+)[^|]*\| tested ", page, re.MULTILINE) == ["Linux", "Containers"]
+
+
+@pytest.mark.slow
+def test_the_notebook_page_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """All blocks of docs/notebook.md run in order in one namespace, in an empty folder with a firmware image."""
+    pytest.importorskip("pandas", reason="pandas is not installed (extra: test)")
+    import matplotlib as mpl
+
+    mpl.use("Agg")
+    monkeypatch.chdir(tmp_path)
+    words = ["make", "-s", "-C", str(ROOT / "firmware"), "APP=hello", f"OUT={tmp_path}", f"PYTHON={sys.executable}"]
+    subprocess.run(words, check=True, capture_output=True)
+    blocks = re.findall(r"```(sh|python)\n(.*?)```", (DOCS / "notebook.md").read_text(encoding="utf-8"), re.DOTALL)
+    assert [kind for kind, _ in blocks] == ["sh", "python", "python", "python", "python"]
+    names: dict[str, object] = {}
+    for kind, text in blocks:
+        if kind == "sh":
+            assert main(shlex.split(text)[1:]) == 0
+        else:
+            exec(compile(text, "docs/notebook.md", "exec"), names)
+    assert len(names["trials"]) == 2  # type: ignore[arg-type]
+    assert "metric" in names["trial"]._repr_html_()  # type: ignore[attr-defined]
+    assert len(repr(names["trial"])) <= 200
+    assert names["samples"].shape[0] == 61  # type: ignore[attr-defined]
+    assert "main" in set(names["memory"].frame()["name"])  # type: ignore[attr-defined]
+    assert (tmp_path / "build/path.png").stat().st_size > 5000
+    assert (tmp_path / "build/shares.png").stat().st_size > 5000
