@@ -109,13 +109,16 @@ def _start(robot: Robot, image: Path, **scenario: int) -> Machine:
 
 
 def _follow(machine: Machine, arrived: Callable[[int], bool]) -> int:
-    """Step until the program counter reaches an address; return the cost."""
+    """Step until the program counter reaches an address; return the cost, or PATIENCE if interrupts fill the window.
+
+    On a busy host they do so in QEMU, whose clock runs on to the next tick while the CPU is looked at.
+    """
     begin = machine.now
     for _ in range(PATIENCE):
         machine.step()
         if arrived(machine.pc):
             return machine.now - begin
-    raise Stopped(f"the window does not end within {PATIENCE} instructions")
+    return PATIENCE
 
 
 def _code(image: Path, address: int, size: int) -> bytes:
@@ -165,7 +168,7 @@ def yielding(robot: Robot, image: Path) -> int:
 
 def _settled(seen: list[int]) -> int:
     """Return the window that no other interrupt disturbs: the minimum, seen more than once."""
-    settled = seen[SETTLING:]
+    settled = [taken for taken in seen[SETTLING:] if taken < PATIENCE]
     if not settled or settled.count(min(settled)) < 2:
         raise Stopped(f"no two windows are alike: {seen}")
     return min(settled)
