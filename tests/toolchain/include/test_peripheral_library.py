@@ -99,6 +99,7 @@ class Echo(I2cDevice):
 def board(peripherals: Peripherals) -> Echo:
     """Attach the echoing device to the I2C bus of the chip."""
     device = Echo()
+    assert peripherals.i2c is not None
     peripherals.i2c.wire.attach(MEMORY_ADDRESS, device)
     return device
 

@@ -174,4 +174,4 @@ int main(void)
     machine.run(cycles=20_000)
     machine.uart[2].feed(b"!")
     assert machine.run(cycles=20_000).reason == "halt"
-    assert (machine.w[0], said[1], said[2]) == (ord("!"), b"x", b"42")
+    assert (machine.w[0], bytes(said[1]), bytes(said[2])) == (ord("!"), b"x", b"42")

@@ -46,7 +46,7 @@ def cases(width: int) -> list[tuple[str, tuple[int, ...], int]]:
     edges = [0, 1, -1, 1 << fraction - 1, -(1 << fraction - 1), (1 << fraction) - 1, -(1 << fraction)]
     wide = [0x7FFFFFFF, -0x80000000, 205887, -617661] if width == 16 else []
     numbers = [*edges, *wide, *(generator.randrange(-(1 << fraction), 1 << fraction) for _ in range(6))]
-    out = []
+    out: list[tuple[str, tuple[int, ...], int | None]] = []
     for name, function in {**UNARY, **(ONLY_15 if width == 15 else {})}.items():
         for x in numbers:
             if name == "tanPI" and abs(x) == 1 << fraction - 1:
