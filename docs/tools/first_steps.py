@@ -53,7 +53,7 @@ def install_wheel(wheel: Path, folder: Path) -> dict[str, str]:
     # PYTHONPATH may contain this checkout.
     alone = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
     subprocess.run([sys.executable, "-m", "pip", "--python", python, "install", "--quiet", "--no-deps", "--no-index",
-                    "--disable-pip-version-check", wheel], check=True, env=alone)  # fmt: skip
+                    "--no-compile", "--disable-pip-version-check", wheel], check=True, env=alone)  # fmt: skip
     packages = next((folder / "lib").glob("python*")) / "site-packages"
     (packages / "dependencies.pth").write_text(sysconfig.get_path("purelib") + "\n")
     home = folder.parent / "home"
@@ -61,7 +61,8 @@ def install_wheel(wheel: Path, folder: Path) -> dict[str, str]:
     return {
         "HOME": str(home),
         "PATH": f"{folder / 'bin'}:/usr/bin:/bin",
-        "PYTHONDONTWRITEBYTECODE": "1",
+        # The commands share compiled modules, which are not written beside the installed files.
+        "PYTHONPYCACHEPREFIX": os.environ.get("PYTHONPYCACHEPREFIX", str(folder.parent / "compiled")),
         "LANG": "C.UTF-8",
     }
 

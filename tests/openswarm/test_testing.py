@@ -122,14 +122,17 @@ def test_a_compiler_s_message_reaches_the_report(tests):
 
 @pytest.mark.skipif(shutil.which("git") is None or not (ROOT / ".git").exists(), reason="not a clone, or no git")
 @pytest.mark.slow
-def test_the_action_s_steps_as_they_are_from_the_wheel(wheel, tmp_path):
+def test_the_action_s_steps_as_they_are_from_the_wheel(wheel, baselines, tmp_path):
     """The steps of the CI action work in an environment that contains only the wheel.
 
     A new project passes. With a mistake in its C source, the summary names thread and line, and there is a waveform.
     """
     action = yaml.safe_load((ROOT / "action.yml").read_text())
     environment = first_steps.install_wheel(wheel, tmp_path / "venv") | {"OPENSWARM_CACHE": str(paths.cache())}
-    subprocess.run(["openswarm", "new", "robot"], cwd=tmp_path, env=environment, check=True, capture_output=True)
+    words = ["openswarm", "new", "robot", "--no-baselines"]
+    subprocess.run(words, cwd=tmp_path, env=environment, check=True, capture_output=True)
+    for name, content in baselines.items():
+        (tmp_path / "robot" / name).write_bytes(content)
     source = tmp_path / "robot" / "src" / "main.c"
 
     def play() -> tuple[list[int], str]:
