@@ -38,7 +38,7 @@ def aggregation(runs: Runs) -> Figure:
         shares = np.array([one.series.curves["cluster"] for one in trials])
         spreads = np.array([one.series.curves["dispersion"] for one in trials])
         at = np.searchsorted(trials[0].times, np.array(SECONDS) - 0.3)
-        cells = [f"{100 * share:.1f} %" for share in shares[:, np.minimum(at, shares.shape[1] - 1)].mean(axis=0)]
+        cells = [f"{100 * shares[:, one].mean():.1f} %" if one < shares.shape[1] else "-" for one in at]
         last = 100 * shares[:, -1]
         print(f"| {name} | {len(trials)} | {' | '.join(cells)} | {last.min():.1f}, {last.max():.1f} % | "
               f"{spreads[:, 0].mean():.0f} | {spreads[:, -1].mean():.0f} |")  # fmt: skip
