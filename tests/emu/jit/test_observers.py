@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import io
 import random
+from collections import Counter
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
 import pytest
 from engine_pair import Difference, QuickCompiler, engine_pair
+from observed_runs import check_observed
 from programs import assembled, executable
 from random_firmware import BODY_WORDS, CODE, Firmware, difference, load, random_firmware, started, words_of
 
@@ -231,6 +233,12 @@ def check_acting_hooks(seed: int, stops: int, cold: bool = False) -> int:
 def test_random_programs_with_acting_hooks_run_equally(seed: int, cold: bool) -> None:
     """Random programs with hooks that read and write device registers leave equal snapshots in both engines."""
     assert check_acting_hooks(seed, stops=8, cold=cold) > 0
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_random_observers_change_no_run(seed: int) -> None:
+    """A sample of the campaign `observers`: snapshots and output equal those of the unobserved run."""
+    check_observed(seed, Counter())
 
 
 def arrivals(machines: Iterable[Machine], firmware: Firmware, address: int, cycles: int) -> list[list[int]]:
