@@ -20,15 +20,13 @@ from emu.avr.native import native
 
 HZ: Final = 8_000_000
 """Clock frequency in Hz of the internal oscillator."""
-RAMEND: Final = 0x8FF
 HALT: Final = 2
 """Result RUN_HALT of avr_run (core/interpreter.c)."""
 INPUT_PIN, INPUT_UART, INPUT_ANALOG = 0, 1, 2
 """Kinds of input (core/avr.h). An analog input has the kind INPUT_ANALOG + channel."""
-CHANNEL_TEMPERATURE, CHANNEL_AIN0, CHANNEL_AIN1 = 8, 9, 10
-ERASED_BOOT_WORD: Final = 0x3800
+BOOT_START: Final = 0x3800
 """Word address of the 4 KB boot section (fuses BOOTSZ = 00)."""
-SPL, SREG, UDR0 = 0x5D, 0x5F, 0xC6
+SPL, UDR0 = 0x5D, 0xC6
 _CHUNK: Final = 4_000_000
 """Cycles per native call. A call holds the interpreter lock."""
 _FAULTS: Final = {
@@ -84,7 +82,7 @@ class Atmega328p:
         ctypes.memset(self.state.eeprom, 0xFF, EEPROM_BYTES)
         for address, octet in image.eeprom.items():
             self.state.eeprom[address] = octet
-        self.state.boot_start = ERASED_BOOT_WORD
+        self.state.boot_start = BOOT_START
         self.state.avcc_uv = self.state.aref_uv = 3_300_000
         self.state.random = (seed * 2_654_435_761 & 0xFFFF_FFFF) or 1
         self.changes: Final[list[Change]] = []

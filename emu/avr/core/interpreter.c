@@ -26,9 +26,8 @@ static inline u8 sub_bytes(u8 *s, u32 a, u32 b, u32 carry, u32 zero)
     return (u8)r;
 }
 
-static inline u16 word_flags(u8 *s, u32 before, u32 after, u32 carry, u32 overflow)
+static inline u16 word_flags(u8 *s, u32 after, u32 carry, u32 overflow)
 {
-    (void)before;
     u32 flags = sign_flags(after >> 8 & 0xFF, overflow);
     *s = (u8)((*s & ~SREG_BITS) | flags | carry | ((after & 0xFFFF) == 0) << 1);
     return (u16)after;
@@ -359,13 +358,13 @@ static int boundary(struct avr *m)
 static inline u16 word_sum(u8 *s, u32 a, u32 b)
 {
     u32 r = (a + b) & 0xFFFF;
-    return word_flags(s, a, r, (~r & a) >> 15 & 1, (r & ~a) >> 15 & 1);
+    return word_flags(s, r, (~r & a) >> 15 & 1, (r & ~a) >> 15 & 1);
 }
 
 static inline u16 word_difference(u8 *s, u32 a, u32 b)
 {
     u32 r = (a - b) & 0xFFFF;
-    return word_flags(s, a, r, (r & ~a) >> 15 & 1, (~r & a) >> 15 & 1);
+    return word_flags(s, r, (r & ~a) >> 15 & 1, (~r & a) >> 15 & 1);
 }
 
 static i64 result_of(const struct avr *m)

@@ -1,7 +1,7 @@
 // Timer/counters 0, 1 and 2 (data sheet, chapters on 8-bit and 16-bit timers and on the prescaler).
 //
-// A timer costs nothing while it runs: its count is computed when it is read or written, or when an enabled interrupt is
-// due. The phase of a single-slope timer is its count; that of a dual-slope one runs from 0 over TOP to 2 TOP.
+// A timer costs nothing while it runs: its count is computed when it is read or written, or when an enabled interrupt
+// is due. The phase of a single-slope timer is its count; that of a dual-slope one runs from 0 over TOP to 2 TOP.
 
 enum { OVERFLOW = 1, COMPARE_A = 2, COMPARE_B = 4, CAPTURE = 32 }; // bits of TIFRn and TIMSKn
 
@@ -18,8 +18,8 @@ struct waveform {
 static struct waveform waveform_of(const struct avr *m, u32 n)
 {
     static const u8 kinds8[8] = {NORMAL, PHASE_PWM, CTC, FAST_PWM, NORMAL, PHASE_PWM, NORMAL, FAST_PWM};
-    static const u8 kinds16[16] = {NORMAL,        PHASE_PWM,     PHASE_PWM, PHASE_PWM, CTC, FAST_PWM, FAST_PWM, FAST_PWM,
-                                   FREQUENCY_PWM, FREQUENCY_PWM, PHASE_PWM, PHASE_PWM, CTC, NORMAL,   FAST_PWM, FAST_PWM};
+    static const u8 kinds16[16] = {NORMAL, PHASE_PWM, PHASE_PWM, PHASE_PWM, CTC, FAST_PWM, FAST_PWM, FAST_PWM,
+                                   FREQUENCY_PWM, FREQUENCY_PWM, PHASE_PWM, PHASE_PWM, CTC, NORMAL, FAST_PWM, FAST_PWM};
     u32 a = m->data[control[n]], b = m->data[control[n] + 1], mode = (a & 3) | (n == 1 ? b >> 1 & 12 : b >> 1 & 4);
     if (n != 1) {
         int by_compare = mode == 2 || mode == 5 || mode == 7;

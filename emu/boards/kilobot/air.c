@@ -1,7 +1,7 @@
 // Infrared light between Kilobots: edges of emitters reach the receivers' comparators and converters.
 //
-// Time is counted in ticks of 1/8 MHz since the start of the swarm; each robot has its own clock rate. Light reaches other
-// robots `delay` ticks after the emitter's pin, the robot itself (its echo) ECHO ticks after it. A robot runs only as
+// Time is counted in ticks of 1/8 MHz since the start of the swarm; each robot has its own clock rate. Light reaches
+// other robots `delay` ticks after the emitter's pin, the robot itself (its echo) ECHO ticks after it. A robot runs only as
 // far as no other robot can have sent light before, so light is never late and a run does not depend on how it is cut.
 
 typedef i64 (*run_function)(struct avr *m, const struct insn *code, u64 until);
@@ -110,14 +110,16 @@ static void deliver(struct air *a, struct robot *r, u64 until)
         const struct edge *e = r->edges + done;
         u64 cycle = cycle_at(r, e->at);
         u32 before = r->lights;
+        i64 lost = 0;
         if (e->change > 0) {
             r->lights++;
-            a->input(r->avr, cycle, INPUT_ANALOG + CH_HIGH_GAIN, e->high_uv);
-            a->input(r->avr, cycle, INPUT_ANALOG + CH_LOW_GAIN, e->low_uv);
+            lost |= a->input(r->avr, cycle, INPUT_ANALOG + CH_HIGH_GAIN, e->high_uv);
+            lost |= a->input(r->avr, cycle, INPUT_ANALOG + CH_LOW_GAIN, e->low_uv);
         } else if (r->lights)
             r->lights--;
         if (!before != !r->lights)
-            a->input(r->avr, cycle, INPUT_ANALOG + CH_AIN0, r->lights ? LIT_UV : DARK_UV);
+            lost |= a->input(r->avr, cycle, INPUT_ANALOG + CH_AIN0, r->lights ? LIT_UV : DARK_UV);
+        a->lost_edges += lost != 0;
     }
     for (u32 n = done; n < r->edge_count; n++)
         r->edges[n - done] = r->edges[n];
@@ -138,7 +140,8 @@ static void emit(struct air *a, i64 sender)
         if (change > 0)
             l->hidden = l->loss && (draw(a) & 0xFFFF) < l->loss;
         if (!l->hidden)
-            add_edge(a, a->robots + n, (struct edge){at + (n == sender ? ECHO : a->delay), l->high_uv, l->low_uv, change});
+            add_edge(a, a->robots + n,
+                     (struct edge){at + (n == sender ? ECHO : a->delay), l->high_uv, l->low_uv, change});
     }
     s->avr->light_changed = 0;
 }

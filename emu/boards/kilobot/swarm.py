@@ -199,7 +199,7 @@ class KilobotSwarm:
         self.run_until(self.now + int(seconds * HZ))
 
     def run_until(self, tick: int) -> None:
-        """Run all robots to a tick of 1/8 MHz. Raises KilobotFaultError."""
+        """Run all robots to a tick of 1/8 MHz. Raises KilobotFaultError; ValueError after too many calls of `light`."""
         self.now = tick
         while True:
             index = self._functions["air_run"](addressof(self._air), tick)
@@ -213,6 +213,8 @@ class KilobotSwarm:
                 raise KilobotFaultError(index, f"{fault.message} at {place}, cycle {fault.cycle}")
         for machine in self.robots:
             machine.attend()
+        if self._air.lost_edges:
+            raise ValueError("more pulses of light wait for a robot than there is room for")
 
     def close(self) -> None:
         """End the swarm. It holds memory only."""

@@ -31,7 +31,8 @@ static void setup(void)
 
 static void loop(void)
 {
-    static const uint8_t colours[] = {RGB(1, 0, 0), RGB(1, 1, 0), RGB(0, 1, 0), RGB(0, 1, 1), RGB(0, 0, 1), RGB(1, 0, 1)};
+    static const uint8_t colours[] = {RGB(1, 0, 0), RGB(1, 1, 0), RGB(0, 1, 0),
+                                      RGB(0, 1, 1), RGB(0, 0, 1), RGB(1, 0, 1)};
     if (kilo_uid != 0) {
         if (kilo_ticks > heard_at + PATIENCE) {
             heard = FAR;

@@ -1,4 +1,4 @@
-/* Orbit: the star (UID 0) stands and sends; a planet keeps 60 mm around it, and goes straight when nearer than 40 mm. */
+/* Orbit: the star (UID 0) stands and sends; a planet keeps 60 mm around it, and below 40 mm goes straight. */
 #include <kilolib.h>
 
 enum { NEAR_MM = 40, WANTED_MM = 60, LOST_TICKS = 60 };

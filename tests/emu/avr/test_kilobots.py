@@ -171,5 +171,10 @@ def test_settings_are_checked(program: Program) -> None:
     for settings, text in (({"loss": 1.0}, "loss"), ({"delay": 3}, "delay")):
         with pytest.raises(ValueError, match=text):
             KilobotSwarm([KilobotSetup(image)], **settings)
+    crowded = KilobotSwarm([KilobotSetup(image)])
+    for n in range(200):
+        crowded.light(0, 1_000 + 30 * n)
+    with pytest.raises(ValueError, match="more pulses of light"):
+        crowded.run(0.1)
     with pytest.raises(ValueError, match="9 data bytes"):
         broadcast(KilobotSwarm([KilobotSetup(image)]), Message(b"short", 0), 0.1)
