@@ -1,4 +1,4 @@
-"""The program in the README compiles without a warning and does what its comments say."""
+"""The blocks of the README: its commands run as printed in a fresh shell, its program does what its comments say."""
 
 from __future__ import annotations
 
@@ -10,14 +10,47 @@ from pathlib import Path
 import pytest
 
 from emu.cli import main
+from emu.host import paths
 
 ROOT = Path(__file__).resolve().parents[2]
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+MAKE, PROJECT = re.findall(r"```sh\n(.*?)```", README, re.DOTALL)
+"""The two blocks of commands."""
+
+
+def in_fresh_shell(script: str, folder: Path, home: Path) -> subprocess.CompletedProcess[str]:
+    """Run a script as a user does who has just opened a terminal: no variables but HOME, PATH and the test's cache."""
+    clean = {"HOME": str(home), "PATH": "/usr/local/bin:/usr/bin:/bin", "OPENSWARM_CACHE": str(paths.cache())}
+    words = ["bash", "-ec", script]
+    return subprocess.run(words, cwd=folder, env=clean, capture_output=True, text=True, check=False)
+
+
+def test_every_make_target_of_the_readme_exists(tmp_path: Path) -> None:
+    """`make -n` accepts each line of the first block; the commands themselves install packages and take minutes."""
+    lines = [line.partition("#")[0].strip() for line in MAKE.splitlines()]
+    assert lines == ["make run", "make arena", "make check"]
+    named = set(re.findall(r"`make (\w+)`", README + MAKE))
+    script = "\n".join(f"make -n {target}" for target in sorted(named | {line.split()[1] for line in lines}))
+    done = in_fresh_shell(script, ROOT, tmp_path)
+    assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.slow
+def test_the_project_of_the_readme_runs(tmp_path: Path) -> None:
+    """The second block, in an empty folder whose `.venv` is the environment of the tests."""
+    if not (Path(sys.prefix) / "bin" / "activate").exists():
+        pytest.skip("the tests do not run in a virtual environment")
+    (tmp_path / ".venv").symlink_to(sys.prefix)
+    done = in_fresh_shell(PROJECT, tmp_path, tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "build/myrobot/build/firmware.elf").exists()
+    assert "hello from myrobot" in done.stdout
 
 
 @pytest.mark.slow
 def test_the_program_blinks_and_drives(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """The README's thread toggles the body LED, and its handler drives after the selector is turned at 0.5 s."""
-    (program,) = re.findall(r"```c\n(.*?)```", (ROOT / "README.md").read_text(encoding="utf-8"), re.DOTALL)
+    (program,) = re.findall(r"```c\n(.*?)```", README, re.DOTALL)
     (tmp_path / "src").mkdir()
     (tmp_path / "src" / "main.c").write_text(program)
     (tmp_path / "turn.txt").write_text("0.5s selector 5\n")
