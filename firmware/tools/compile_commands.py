@@ -32,5 +32,9 @@ def commands(arguments: list[str], folder: Path) -> list[dict[str, object]]:
 
 
 if __name__ == "__main__":
-    text = json.dumps(commands(sys.argv[1:-2], Path.cwd()), indent=1)
-    Path(sys.argv[-1]).write_text(text + "\n", encoding="utf-8")
+    *given, option, output = sys.argv[1:]
+    if option != "-o" or not output.endswith(".json"):
+        print(f"expected -o FILE.json at the end, not {option} {output}", file=sys.stderr)
+        sys.exit(2)
+    text = json.dumps(commands(given, Path.cwd()), indent=1)
+    Path(output).write_text(text + "\n", encoding="utf-8")

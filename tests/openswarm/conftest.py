@@ -1,4 +1,4 @@
-"""Fixtures: the wheel and a new project, which all worker processes of a run share."""
+"""Fixtures: the wheel and the baselines of a new project, which all worker processes of a run share."""
 
 from __future__ import annotations
 

@@ -94,6 +94,15 @@ def test_make_and_cmake_build_the_same_bytes(tmp_path):
     assert "DEVICES warp-drive: neither in" in " ".join(done.stderr.split())
 
 
+def test_the_list_of_commands_is_written_over_no_source(tmp_path):
+    source = tmp_path / "main.c"
+    source.write_text("int main(void) { return 0; }\n")
+    script = ROOT / "firmware" / "tools" / "compile_commands.py"
+    done = run_command(tmp_path, sys.executable, str(script), "-o", "list.json", "main.c", PYTHONPATH=str(ROOT))
+    assert (done.returncode, done.stderr) == (2, "expected -o FILE.json at the end, not list.json main.c\n")
+    assert source.read_text() == "int main(void) { return 0; }\n"
+
+
 @pytest.mark.skipif(shutil.which("git") is None or not (ROOT / ".git").exists(), reason="not a clone, or no git")
 @pytest.mark.slow
 def test_the_workflow_s_steps_work_offline_as_they_are_written(wheel, baselines, tmp_path):

@@ -57,7 +57,7 @@ def test_the_wheel_holds_everything_and_repeats(wheel, tmp_path):
 def test_the_first_steps_say_what_happens(wheel, tmp_path):
     """docs/first-steps.md works from the wheel in an empty folder with an empty HOME, and creates files only there.
 
-    The cache is that of all tests, which has the run-time library.
+    Only the caches are those of all tests: the run-time library and compiled Python modules.
     """
     script = ROOT / "docs" / "tools" / "first_steps.py"
     words = [sys.executable, str(script), "--check", "--wheel", str(wheel), "--cache", str(paths.cache()),
