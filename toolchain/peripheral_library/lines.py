@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from string import Template
+from textwrap import dedent, indent
 
 from emu.chips.chip import Chip
 
@@ -85,8 +86,8 @@ def configure_interrupt(source: str, function: str, enable_bit: int = 3) -> str:
 
 
 def inline(prototype: str, body: str) -> str:
-    """Definition of an inline function, one statement per line."""
-    return f"static __inline__ {prototype}\n{{\n{body.strip()}\n}}"
+    """Definition of an inline function with the given lines."""
+    return f"static __inline__ {prototype}\n{{\n{indent(dedent(body), '  ')}\n}}"
 
 
 def functions(text: str, **names: str) -> Iterator[str]:
