@@ -224,7 +224,7 @@ class Qemu:
             raise Stopped(f"QEMU does not write to {address:#x}")
 
     def return_address(self) -> int:
-        return self._register(self.board.link) & ~self.symbols.thumb
+        return self._register(self.board.link) & ~int(self.symbols.thumb)
 
     def uart(self) -> bytes:
         """Return all output of the UART so far."""
