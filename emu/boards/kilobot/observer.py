@@ -13,6 +13,7 @@ from emu.avr.machine import HZ, UDR0, Change
 from emu.boards.kilobot.messages import PulseDecoder
 
 DDRB, PORTB, DDRC, PORTC, DDRD, PORTD = 0x24, 0x25, 0x27, 0x28, 0x2A, 0x2B
+WDRF: Final = 3
 MCUSR, TCCR2A, TCCR2B, OCR2A, OCR2B = 0x54, 0xB0, 0xB1, 0xB3, 0xB4
 WATCHED: Final = (DDRB, PORTB, DDRC, PORTC, DDRD, PORTD, TCCR2A, TCCR2B, OCR2A, OCR2B, UDR0, MCUSR)
 LED_PINS: Final = (((DDRD, PORTD, 5), (DDRD, PORTD, 4)), ((DDRC, PORTC, 3), (DDRC, PORTC, 2)),
@@ -65,6 +66,11 @@ def motors_of(registers: dict[int, int]) -> tuple[int, int]:
     return left, right
 
 
+def _is_reset(before: int, now: int) -> bool:
+    """Whether MCUSR has changed by a watchdog reset, which sets WDRF. A program can only clear bits."""
+    return now & 1 << WDRF != 0 and now & before == before
+
+
 class KilobotObserver:
     """Observer of one robot. Give it all changes of the registers in WATCHED, in order.
 
@@ -115,7 +121,7 @@ class KilobotObserver:
                 yield Report(self._text_at, "uart", {"text": self._text.decode("latin-1")})
                 self._text.clear()
             return
-        if change.register == MCUSR:
+        if change.register == MCUSR and _is_reset(self._registers.get(MCUSR, 0), change.value):
             self._registers.clear()
             yield Report(change.cycle, "reset", {"cause": "watchdog"})
         was_lit = self._is_lit()

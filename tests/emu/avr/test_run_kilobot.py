@@ -53,6 +53,28 @@ def test_reports(build: Build, capsys: pytest.CaptureFixture[str]) -> None:
     assert "(main+" in told.err
 
 
+RESETS = """
+#include <avr/wdt.h>
+static uint8_t count __attribute__((section(".noinit")));
+int main(void) {
+    uint8_t cause = MCUSR;
+    MCUSR = 0;
+    wdt_disable();
+    count = cause & 8 ? count + 1 : 0;
+    if (count < 2) { wdt_enable(WDTO_15MS); for (;;) ; }
+    cli(); sleep_mode(); for (;;) ;
+}
+"""
+
+
+def test_only_resets_are_reported_as_resets(build: Build, capsys: pytest.CaptureFixture[str]) -> None:
+    """Two bites of the watchdog are reported; a program that clears MCUSR causes no report."""
+    assert main(["run", build(RESETS).path, "--board", "kilobot", "--ohc", "none"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.split(" ", 1)[1] for line in lines] == ["reset cause=watchdog"] * 2
+    assert float(lines[0].split()[0]) > 0.015
+
+
 def test_json(build: Build, capsys: pytest.CaptureFixture[str]) -> None:
     """--json gives the same as data, with the limit's reason and status."""
     image = build(BLINK)
