@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 from emu.dap.breakpoints import Breakpoint
+from emu.dap.logged_writes import can_log_writes, logged_writes, site_of
 from emu.debug.expressions.filters import filter_of
 from emu.debug.history import History
 from emu.debug.inspector import Frame, Inspector
@@ -24,6 +25,7 @@ from emu.machine.stops import SLEEP_CYCLES, STILL_ASLEEP
 from emu.system.filters import Filter
 
 if TYPE_CHECKING:
+    from emu.dspic30f.change_log import Change
     from emu.machine.machine import Machine
     from emu.machine.stops import Stop
 
@@ -132,10 +134,18 @@ class Debuggee:
 
     def _run(self) -> StopEvent | None:
         """Run until a stop. Return None for a requested pause and at the target of `run_to`."""
+        data = [one for one in self.all() if one.kind == "data"]
+        is_simple = self.history.environment is None and not self.history.is_past
+        if data and is_simple and can_log_writes(self.machine, data):
+            with logged_writes(self.machine, data) as writes:
+                return self._run_slices(data, writes)
+        return self._run_slices(data, None)
+
+    def _run_slices(self, data: list[Breakpoint], writes: list[Change] | None) -> StopEvent | None:
+        """Run until a stop. Native code logs what the data breakpoints observe to `writes`; None: single steps."""
         while not self._is_stop_requested() and not self._is_limit_reached():
             self._hit = []
-            data = [one for one in self.all() if one.kind == "data"]
-            if data:
+            if data and writes is None:
                 event = self._run_with_data_breakpoints(data)
                 if event is not None or self._is_at_target():
                     return event
@@ -145,6 +155,12 @@ class Debuggee:
                 stop = self.history.advance(min(self.machine.cycle + SLICE_CYCLES, self._limit or sys.maxsize))
             finally:
                 self.machine.replay_condition = None
+            if writes:
+                event = self._event_of_writes(data, writes)
+                writes.clear()
+                if event is not None:
+                    return event
+                stop = None if stop is None or stop.reason == "interrupted" else stop
             if stop is None:
                 continue
             if stop.reason == "breakpoint" and not stop.detail:
@@ -153,6 +169,13 @@ class Debuggee:
             if event is not None:
                 return event
         return None
+
+    def _event_of_writes(self, data: list[Breakpoint], writes: list[Change]) -> StopEvent | None:
+        """Return the event for logged writes; None if every data breakpoint that was hit continues."""
+        hit = [data[number] for number in sorted({one.number for one in writes})]
+        ids = tuple(one.id for one in hit if one.should_stop(self.inspector, self._write_output))
+        place = self.inspector.where(site_of(writes[0]))
+        return StopEvent("data breakpoint", f"write at {place}", ids) if ids else None
 
     def _is_limit_reached(self) -> bool:
         return self._limit is not None and self.machine.cycle >= self._limit

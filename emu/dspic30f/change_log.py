@@ -63,6 +63,7 @@ class ChangeLog:
 
     `leaves` says when native code returns so that the consumer sees a change at once: None means only for a full log,
     () at each change, a filter at changes after which it holds. Its comparisons may name fixed RAM addresses only.
+    With `every_write`, a store to a watched number is logged even if it leaves the value unchanged.
     """
 
     def __init__(
@@ -71,10 +72,14 @@ class ChangeLog:
         watched: Sequence[Watched],
         consumer: Callable[[list[Change]], object],
         leaves: Filter | None = None,
+        every_write: bool = False,
     ) -> None:
         self._core: Final = core
         self.watched: Final = tuple(watched)
         self.leaves: Final = leaves
+        self.every_write: Final = every_write
+        self._stores: Final[list[tuple[int, int]]] = []
+        """Address and size of the stores that the sequencer has made since the last look."""
         self._consumer: Final = consumer
         self.first: Final = SEEN + len(self.watched)
         """Word of the first entry."""
@@ -98,6 +103,20 @@ class ChangeLog:
         ):  # fmt: skip
             vars(sequencer)[name] = wrapper(getattr(sequencer, name))
             self._undo.append(partial(delattr, sequencer, name))
+        if self.every_write:
+            self._record_stores()
+
+    def _record_stores(self) -> None:
+        """Record the stores that the sequencer makes from now on."""
+        space = self._core.data
+        write = space.write
+
+        def recorded(ea: int, value: int, size: int) -> None:
+            self._stores.append((ea, size))
+            write(ea, value, size)
+
+        vars(space)["write"] = recorded
+        self._undo.append(partial(delattr, space, "write"))
 
     def stop(self) -> None:
         """Restore the sequencer and deliver the remaining changes."""
@@ -152,18 +171,26 @@ class ChangeLog:
 
     def _look(self, site: int) -> None:
         """Log the numbers that have changed, and deliver them."""
+        stores = self._stores[:]
+        self._stores.clear()
         if self._is_stale:
             return
         words, state = self._words, self._core.state
         for index, get in enumerate(self._getters):
             value = get()
-            if value != words[SEEN + index]:
+            if value != words[SEEN + index] or any(_is_hit(self.watched[index], store) for store in stores):
                 words[SEEN + index] = value
                 entry = self.first + ENTRY_WORDS * words[COUNT]
                 words[entry : entry + ENTRY_WORDS] = [state.cycle, site << 32 | state.pc, index, value]
                 words[COUNT] += 1
         if words[COUNT]:
             self.after_run()
+
+
+def _is_hit(one: Watched, store: tuple[int, int]) -> bool:
+    """Return whether a store hits a number at a fixed address."""
+    ea, size = store
+    return isinstance(one, WatchedNumber) and ea < one.address + one.size and one.address < ea + size
 
 
 def _getter(core: Core, one: Watched) -> Callable[[], Any]:

@@ -23,12 +23,13 @@ def log_changes(
     watched: Sequence[Watched],
     consumer: Callable[[list[Change]], object],
     leaves: Filter | None = None,
+    every_write: bool = False,
 ) -> Callable[[], None]:
     """Log the changes of `watched` to `consumer` while `machine` runs. Return the function that ends it.
 
-    `leaves` is as for `ChangeLog`. Raises ValueError if another instrument runs.
+    `leaves` and `every_write` are as for `ChangeLog`. Raises ValueError if another instrument runs.
     """
-    log = ChangeLog(machine.core, watched, consumer, leaves)
+    log = ChangeLog(machine.core, watched, consumer, leaves, every_write)
     if machine.engine == "plain":
         log.start()
         return log.stop

@@ -164,7 +164,7 @@ class ChangeCounting:
 
     def identity(self, region: Region) -> Any:
         """Return what is watched."""
-        return "changes", self._log.watched, self._log.leaves
+        return "changes", self._log.watched, self._log.leaves, self._log.every_write
 
 
 class InstructionLogging:

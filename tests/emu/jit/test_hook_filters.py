@@ -7,8 +7,10 @@ from pathlib import Path
 import pytest
 
 import emu
+from emu.dap import debuggee
 from emu.dap.breakpoints import Breakpoint
 from emu.dap.debuggee import Debuggee
+from emu.dap.logged_writes import can_log_writes
 from emu.debug.expressions.expression import evaluate, number_of
 from emu.debug.expressions.filters import filter_of
 from emu.debug.history import History
@@ -113,3 +115,19 @@ def test_a_breakpoint_of_the_debugger_counts_its_hits(image: Path, engine: str) 
     target.set_breakpoints("here", [Breakpoint(1, "function", (address,), condition="count > 10", hit_condition="3")])
     assert target.resume().reason == "breakpoint"
     assert machine.peek("count") == 13
+
+
+@pytest.mark.parametrize("name", ["level", "mask", "letter"])
+def test_a_data_breakpoint_stops_after_every_write(image: Path, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It stops in the same cycles as by single steps, also at writes that leave the value unchanged."""
+    results = []
+    for engine, is_logged in (("jit", True), ("plain", True), ("plain", False)):
+        monkeypatch.setattr(debuggee, "can_log_writes", can_log_writes if is_logged else lambda *_: False)
+        machine = machine_of(image, engine)
+        target = Debuggee(machine, lambda: False, lambda _text: None, History(machine))
+        value = machine.value(name)
+        point = Breakpoint(1, "data", (value.address or 0,), size=value.type.bytes, access="write")
+        target.set_breakpoints("here", [point])
+        results.append([(target.resume().description, machine.cycle, machine.pc) for _ in range(5)])
+    assert results[0] == results[1] == results[2]
+    assert all(text.startswith("write at") for text, _, _ in results[0])

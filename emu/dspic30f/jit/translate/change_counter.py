@@ -29,8 +29,9 @@ class ChangeCounter(CycleCounter):
     def __init__(self, log: ChangeLog, ram: tuple[int, int]) -> None:
         self._log: Final = log
         self._ram: Final = ram
-        self._numbers: Final = [one for one in log.watched if isinstance(one, WatchedNumber)]
         self.looks_asleep = "asleep" in log.watched
+        self._hits: Number = 0
+        """Bit n is set if the instruction has stored to watched number n; used if unchanged values are logged too."""
 
     def begin(self, emitter: Emitter, offset: Mapping[str, int]) -> None:
         """Prepare for the function that `emitter` writes."""
@@ -48,7 +49,7 @@ class ChangeCounter(CycleCounter):
         here = head.load(pointer(head, self._offset["cpu.pc"]), 32)
         head.end(f"br i1 {truth(changed)}, label %{look}, label %{on}")
         head.start(look)
-        leaves = _look(head, cycle, here | BOUNDARY << 32)
+        leaves = _look(head, cycle, here | BOUNDARY << 32, 0)
         head.end(f"br i1 {leaves}, label %{leave}, label %{on}")
         head.start(leave)
         head.end(f"ret i64 {CHANGED}")
@@ -56,12 +57,14 @@ class ChangeCounter(CycleCounter):
 
     def looks_after(self, effects: DeferredEffects) -> Number:
         """Return whether an instruction with these effects may have changed a watched number."""
-        if effects.sr is not None and "ipl" in self._log.watched:
-            return 1
-        found: Number = 0
+        found: Number = int(effects.sr is not None and "ipl" in self._log.watched)
+        self._hits = 0
         for ea, size in effects.ram_stores:
-            for one in self._numbers:
-                found = self._is_hit(ea, size, one) | found
+            for index, one in enumerate(self._log.watched):
+                if isinstance(one, WatchedNumber):
+                    hit = self._is_hit(ea, size, one)
+                    found = hit | found
+                    self._hits = (hit << index) | self._hits if self._log.every_write else 0
         return found
 
     def look(self, site: int, cycle: Number, next_pc: Number) -> str:
@@ -69,7 +72,7 @@ class ChangeCounter(CycleCounter):
 
         Return the truth, as IR operand, that native code must return to Python.
         """
-        return _look(self._e, cycle, next_pc | site << 32)
+        return _look(self._e, cycle, next_pc | site << 32, self._hits)
 
     def definitions(self) -> str:
         """Return the IR of the function that compares all watched numbers and logs the changes."""
@@ -77,7 +80,9 @@ class ChangeCounter(CycleCounter):
         e.start("first")
         for index, one in enumerate(log.watched):
             value, (changed, after) = self._number(e, one), (e.fresh("changed"), e.fresh("after"))
-            e.end(f"br i1 {truth(value == _word(e, '%log', SEEN + index))}, label %{after}, label %{changed}")
+            hit = Value(e, "%hits", False) >> index & 1
+            logs = (value != _word(e, "%log", SEEN + index)) | (hit != 0)
+            e.end(f"br i1 {truth(logs)}, label %{changed}, label %{after}")
             e.start(changed)
             e.store(_place(e, "%log", SEEN + index), value, 64)
             count = _word(e, "%log", COUNT)
@@ -95,7 +100,7 @@ class ChangeCounter(CycleCounter):
                 holds = compare(e, comparison, found) & holds
             leaves = holds | leaves
         e.end(f"ret i1 {truth(leaves)}")
-        parameters = "ptr noalias %rec, ptr noalias %log, i64 %cycle, i64 %where"
+        parameters = "ptr noalias %rec, ptr noalias %log, i64 %cycle, i64 %where, i64 %hits"
         return f"define internal i1 @look({parameters}) noinline {{\n{e.text()}\n}}\n"
 
     def _number(self, e: Emitter, one: Watched) -> Value:
@@ -130,8 +135,9 @@ class ChangeBoundaryCounter(BoundaryCounter):
     returns_after_retfie = True
 
 
-def _look(e: Emitter, cycle: Number, where: Number) -> str:
-    return e.let(f"call i1 @look(ptr %rec, ptr %x.log, i64 {wide(cycle)}, i64 {wide(where)})", bit=True).text
+def _look(e: Emitter, cycle: Number, where: Number, hits: Number) -> str:
+    numbers = ", ".join(f"i64 {wide(one)}" for one in (cycle, where, hits))
+    return e.let(f"call i1 @look(ptr %rec, ptr %x.log, {numbers})", bit=True).text
 
 
 def _place(e: Emitter, log: str, word: Number) -> str:

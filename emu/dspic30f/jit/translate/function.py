@@ -496,7 +496,8 @@ class Translator(FunctionFrame):
         e.store(pointer(e, offset["cpu.mode"]), IDLE, 16)
         e.store(pointer(e, offset["cpu.slept"]), self.v.get("cycle") - 1, 64)
         e.store(pointer(e, offset["events.deadline"]), 0, 64)
-        self.look(self.at, next_pc, int(self.counter.looks_asleep))
+        looks = self.counter.looks_after(self.b.deferred) | int(self.counter.looks_asleep)
+        self.look(self.at, next_pc, looks)
         e.end(f"br label %{self.exit(next_pc, BOUNDARY_WORK)}")
 
     # -- interrupts -------------------------------------------------------------------------------------------------
