@@ -13,7 +13,8 @@ from emu.native_library import ADDRESS, INT, functions_of
 
 HERE: Final = Path(__file__).parent
 PARTS: Final = ("core/avr.h", "devices/timers.c", "devices/analog.c", "devices/ports.c", "devices/uart.c",
-                "devices/memories.c", "devices/system.c", "core/registers.c", "core/interpreter.c")  # fmt: skip
+                "devices/memories.c", "devices/system.c", "core/registers.c", "core/meanings.c", "core/boundary.c",
+                "core/waiting.c", "core/interpreter.c", "core/set_up.c")  # fmt: skip
 TYPES: Final = """#include <stdint.h>
 typedef uint8_t u8;
 typedef uint16_t u16;

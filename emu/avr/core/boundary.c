@@ -1,0 +1,90 @@
+// Work between two instructions: faults, interrupts, sleep.
+
+enum { INTERRUPT_CYCLES = 4 };
+
+static void fault(struct avr *m, u32 kind, u32 address)
+{
+    m->fault = (u16)kind, m->fault_address = (u16)address;
+}
+
+static void enter_interrupt(struct avr *m, u32 pending)
+{
+    u32 vector = (u32)__builtin_ctz(pending), sp = word_at(m, SPL);
+    if (sp < RAM_START + 1 || sp > RAMEND) {
+        m->fault_pc = m->pc;
+        fault(m, FAULT_STACK, sp);
+        return;
+    }
+    m->data[sp] = (u8)m->pc, m->data[sp - 1] = (u8)(m->pc >> 8);
+    set_pair(m->data + SPL, sp - 2);
+    m->data[SREG_AT] &= (u8)~FLAG_I;
+    m->pc = (u16)(2 * vector + (m->data[MCUCR] & 2 ? m->boot_start : 0));
+    m->tracing = 0, m->round = 0;
+    m->cycle += INTERRUPT_CYCLES;
+    acknowledge(m, vector);
+}
+
+// Whether an event can wake the CPU or end its loop. With interrupts off only a reset can.
+static int can_continue(const struct avr *m)
+{
+    if (m->data[SREG_AT] & FLAG_I)
+        return m->next_due != NEVER;
+    return bit_of(m, WDTCSR, WDE) && m->due[EVENT_WATCHDOG] != NEVER;
+}
+
+static void halt(struct avr *m)
+{
+    m->halted = 1;
+    m->halted_at = m->cycle;
+}
+
+// Pass the time of a sleeping CPU. Return 0 if the run ends.
+static int sleep_on(struct avr *m)
+{
+    u64 from = m->cycle;
+    if (m->data[SREG_AT] & FLAG_I && pending_vectors(m) & waking_vectors(m)) {
+        wake_up(m);
+        return 1;
+    }
+    if (!can_continue(m)) {
+        halt(m);
+        return 0;
+    }
+    m->resting = 1;
+    m->cycle = m->next_due < m->until ? m->next_due : m->until;
+    m->slept += m->cycle - from;
+    return 1;
+}
+
+// Work between two instructions. Return 1 and a deadline, or 0 if the run ends.
+static int boundary(struct avr *m)
+{
+    for (;;) {
+        m->deadline = m->until; // until then nothing asks for an early return
+        if (m->fault || m->cycle >= m->until || m->halted || m->program_changed || m->light_changed ||
+            m->log_count >= LOG_ROOM / 2)
+            return 0;
+        apply_events(m, m->cycle);
+        if (m->asleep) {
+            if (!sleep_on(m))
+                return 0;
+            continue;
+        }
+        u32 pending = m->data[SREG_AT] & FLAG_I ? pending_vectors(m) : 0;
+        if (pending && !m->shadow) {
+            enter_interrupt(m, pending);
+            continue;
+        }
+        m->deadline = m->next_due < m->until ? m->next_due : m->until;
+        if (m->round && !m->shadow) {
+            u64 passed = (m->deadline - m->cycle) / m->round * m->round;
+            m->cycle += passed, m->skipped += passed;
+            if (m->cycle >= m->until)
+                continue;
+        }
+        if (m->shadow && m->cycle + 1 < m->deadline)
+            m->deadline = m->cycle + 1;
+        m->shadow = 0;
+        return 1;
+    }
+}
