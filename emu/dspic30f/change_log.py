@@ -47,7 +47,10 @@ Watched = WatchedNumber | Literal["ipl", "asleep"]
 
 
 class Change(NamedTuple):
-    """A logged change. `pc` is the next instruction, `site` the one that made the change, or BOUNDARY."""
+    """A logged change. `pc` is the next instruction, `site` the one that made the change, or BOUNDARY.
+
+    For a change of the CPU's priority by RETFIE, `site` may be either.
+    """
 
     cycle: int
     """Cycle in which the next instruction starts, in Tcy."""
