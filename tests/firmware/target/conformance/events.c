@@ -300,7 +300,7 @@ static void drivers_have_an_owner_of_their_own(void)
     CHECK(Sys_Unsubscribe_from_Event(SYS_LEFTMOTOR_SPEED, 0));
     bool any = false;
     for (uint16 pid = 0xFFF0; pid != 0; pid++) { /* the drivers' own identity is among them */
-        any |= Sys_Unsubscribe_from_Event(SYS_LEFTMOTOR_SPEED, pid) | Sys_Unsubscribe_Handler(SYS_LEFTMOTOR_SPEED, pid, NULL) |
+        any |= Sys_Unsubscribe_from_Event(SYS_LEFTMOTOR_SPEED, pid) || Sys_Unsubscribe_Handler(SYS_LEFTMOTOR_SPEED, pid, NULL) ||
                Sys_Subscribe_to_Event(SYS_LEFTMOTOR_SPEED, pid, count, NULL);
     }
     CHECK(!any && Sys_Get_LastError() == SYS_ERROR_PROCESS);
