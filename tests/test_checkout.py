@@ -31,6 +31,9 @@ __reset: bset   U1MODE, #15
         mov     w0, U1TXREG
 1:      btss    U1STA, #8
         bra     1b
+        mov     #20000, w1  ; long enough that the loop is translated and cached
+2:      dec     w1, w1
+        bra     nz, 2b
         pwrsav  #1
 """
 
