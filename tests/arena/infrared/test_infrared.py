@@ -394,13 +394,13 @@ def test_native_conversions_equal_those_in_python(
         ears = FirmwareController(scene, 1, 0, scanner, 0, channel)
         mouth = FirmwareController(scene, 1, 1, sender, 0, channel)
         ears.machine.runner.threshold, ears.machine.runner.wait = 1, True
-        level = ears._board.ir._level_of
+        prepare = ears._board.ir._prepare
 
-        def counted(*where: int, level: Callable[..., int] = level, count: list[int] = count) -> int:
+        def counted(cycle: int, prepare: Callable[[int], None] = prepare, count: list[int] = count) -> None:
             count[0] += 1
-            return level(*where)
+            prepare(cycle)
 
-        ears._board.ir._level_of = counted  # type: ignore[misc]
+        ears._board.ir._prepare = counted
         for tick in range(150):
             poses = Poses([(100.0, 150.0, UP), (125.0 - tick / 20, 150.0, -UP)], [(300.0, 20.0)])
             ears.control_step(tick, poses)
