@@ -181,6 +181,7 @@ class Robot:
         until: Callable[[], bool] | str | int | None = None,
         *,
         seconds: float | None = None,
+        when: str | None = None,
         ms: float | None = None,
     ) -> emu.Stop:
         """Run as `emu.Machine.run`; `ms` is another unit for `seconds`. Raises FirmwareFault, and its ValueErrors."""
@@ -188,7 +189,7 @@ class Robot:
             if seconds is not None:
                 raise ValueError("give seconds or ms, not both")
             seconds = ms / MILLISECONDS
-        stop: emu.Stop = self.watched(lambda: self.machine.run(cycles, until, seconds=seconds))
+        stop: emu.Stop = self.watched(lambda: self.machine.run(cycles, until, seconds=seconds, when=when))
         return stop
 
     def step(self, limit: int | None = None) -> emu.Stop | None:

@@ -74,7 +74,7 @@ def test_completion_knows_commands_options_and_choices():
 
     assert completed("scr") == ["screenshot"]
     assert completed("run", "--ipl") == ["--ipl-slip"]
-    assert completed("run", "--board", "") == ["epuck", "none"]
+    assert completed("run", "--board", "") == ["epuck", "none", "kilobot"]
 
 
 def test_output_is_never_coloured(spin):

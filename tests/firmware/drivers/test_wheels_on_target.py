@@ -46,8 +46,8 @@ def test_a_minute_is_exact_to_a_step(image: Build, left: int, right: int) -> Non
 
 
 def handlers_error(machine: Machine) -> int:
-    """Return the last error of the handler context, one byte."""
-    at = machine.address_of("errors_of")
+    """Return the last error of the handler context, the first byte of the record."""
+    at = machine.address_of("os_errors")
     return machine.peek(at & ~1) >> 8 * (at & 1) & 0xFF
 
 

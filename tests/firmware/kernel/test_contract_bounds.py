@@ -52,7 +52,7 @@ LINK = ("Sys_Send_Neighbours", "Sys_Get_Neighbours", "Sys_Get_RobotNumber", "Sys
 RETURN_ADDRESS = 4
 CLOSE = ("Sys_Kill_Process", "end_thread", "Sys_Register_Event", "Sys_Unregister_Event", "Sys_Subscribe_to_Event",
          "Sys_Unsubscribe_Handler", "Sys_Send_Event", "Sys_Send_IntEvent", "Sys_Start_ProcessWith",
-         "Sys_Get_ProcessState", "Sys_Start_CriticalSection", "Sys_End_CriticalSection")  # fmt: skip
+         "Sys_Get_ProcessState")  # fmt: skip
 """Calls whose worst case the image `crowded` creates: their bounds are at most 1.3 times the measured cycles."""
 FREE = 1200
 """Maximum Tcy to free a block of memory (g of openswarm.h)."""
