@@ -54,7 +54,10 @@ typedef struct {
 
 static text said[SAID]; /* of late */
 static unsigned talk;
-static bool is_damaged; /* a recent frame had more errors than are corrected: its CRC may match by chance */
+/* Steps in which the receiver may still hold parts of a frame with more errors than are corrected, or of a jump of the
+ * ambient light: its CRC may match by chance. */
+enum { DAMAGED_STEPS = 4 };
+static unsigned damaged;
 
 static text *anything(void)
 {
@@ -87,7 +90,9 @@ static unsigned draw(bool *lit, const text *t, bool is_clear)
         for (unsigned i = 0; i < (bits == CODE_BITS ? errors : 0); i++) {
             flips |= (uint16)(one_in(3) ? 1u << below(CODE_BITS) : 0);
         }
-        is_damaged |= (flips & (flips - 1u)) != 0;
+        if ((flips & (flips - 1u)) != 0) {
+            damaged = DAMAGED_STEPS;
+        }
         for (unsigned i = 0; i < bits; i++) {
             for (unsigned k = 0; k < 3; k++) {
                 lit[length++] = ((word ^ flips) >> i & 1u) != 0;
@@ -112,9 +117,11 @@ static void talk_at_random(void)
         memcpy(other + delay, late, more * sizeof *late);
         length = to = length > more + delay ? length : more + delay;
         also = (uint16)(5 + below(1000));
-        is_damaged = true;
+        damaged = DAMAGED_STEPS;
     }
-    is_damaged |= from != 0 || to != length;
+    if (from != 0 || to != length || depth <= 2u * noise) {
+        damaged = DAMAGED_STEPS;
+    }
     for (unsigned i = from; i < to; i++) {
         scan_noisily(at, one[i] ? depth : 0, also_at, other[i] ? also : 0);
     }
@@ -140,7 +147,7 @@ static bool on_message(uint16 pid, uint16 id, sys_event_data *data)
     CHECK(data->size == sizeof *m && data->value == m->source);
     CHECK(m->source >= 1 && m->source <= 2047);
     CHECK(m->sensor < HAL_INFRARED_SENSORS && m->strength <= 4095 && m->size >= 1 && m->size <= SYS_MESSAGE_BYTES);
-    CHECK(is_damaged || was_said(m->source, FRAME_MESSAGE, m->payload, m->size));
+    CHECK(damaged != 0 || was_said(m->source, FRAME_MESSAGE, m->payload, m->size));
     if (one_in(10)) {
         (void)Sys_Send_Neighbours(m->payload, m->size);
     }
@@ -216,7 +223,7 @@ static void call_something(void)
 static void step(void)
 {
     bool is_held = one_in(8);
-    is_damaged = false;
+    damaged -= damaged != 0;
     if (is_held) {
         Sys_Start_CriticalSection();
     }
@@ -224,6 +231,7 @@ static void step(void)
         for (uint8 i = 0; i < HAL_INFRARED_SENSORS; i++) {
             room[i] = (uint16)(one_in(20) ? below(2) * 4095 : 2000 + below(2000));
         }
+        damaged = DAMAGED_STEPS;
     }
     if (one_in(12)) {
         noise = (uint16)(one_in(4) ? below(200) : below(4));

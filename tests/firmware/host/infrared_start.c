@@ -129,7 +129,7 @@ TEST(a_quota_does_not_hold_back_what_is_shared, "openswarm_remote.h, Sys_Share_E
     scans_in_the_dark(2 * EARLY);
     CHECK(Sys_Keep_Latest(&latest, ALARM));
     Sys_Start_CriticalSection();
-    for (uint8 i = 0; i < SYS_INFRARED_QUEUE / 2; i++) {
+    for (int i = 0; i < SYS_INFRARED_QUEUE / 2; i++) {
         receive_alarm(i, 'x');                 /* replaces what waits */
         CHECK(Sys_Send_Event(ALARM, "x", 1)); /* as this does, with equal contents */
     }
