@@ -90,7 +90,7 @@ def _arms(options: argparse.Namespace) -> list[argparse.Namespace]:
             arguments = [options.scene, "--brain", brain, "--trials", str(trials), "--minutes", str(minutes),
                          "--seed", str(options.seed), "--jobs", str(options.jobs),
                          "--out", str(options.out / f"{Path(brain).stem}-{controller}")]  # fmt: skip
-            if options.controllers != DEFAULT_CONTROLLER:  # a scene may leave no choice of the controller
+            if options.controllers != DEFAULT_CONTROLLER:  # a scene with a fixed controller refuses the option
                 arguments += ["--controller", controller]
             if options.scheduler is not None:
                 arguments += ["--scheduler", options.scheduler]

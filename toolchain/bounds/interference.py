@@ -120,7 +120,7 @@ def report_of(program: Program, functions: Iterable[str]) -> BoundsReport:
 
 
 def _response(report: BoundsReport, one: Bound) -> Response:
-    """Return the response of an interrupt, the sum of the delays that other entries cause.
+    """Return the response time of an interrupt: the sum of the delays that other entries cause.
 
     - the longest time for which code of a lower level masks the interrupt
     - one run of every interrupt of the same or a higher level, and of every trap that returns

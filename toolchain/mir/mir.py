@@ -98,7 +98,7 @@ class OpInfo:
         self.access = tuple(ROLE_ACCESS[role] for role in roles)
 
 
-# By role: whether a register operand is read, is written, is also read by a conditional write; mask of real registers.
+# By role: is the operand read, is it written, does a conditional write read it too; real registers (1: one, 3: a pair).
 ROLE_ACCESS = {
     "n": (False, False, False, 1),
     "s": (True, False, False, 1),

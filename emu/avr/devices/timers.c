@@ -50,8 +50,8 @@ static u64 ticks_until(const struct avr *m, u32 n, int shift, u64 at)
     return (at - m->prescaler_start[n == 2]) >> shift;
 }
 
-// The next point of the period at which flags change: ticks until then. `flags` are set there, `updates` the compare
-// values that were written meanwhile, `wraps` the phase to 0.
+// The next point of the period at which flags change, in `ticks` from now. There the flags `flags` are set, the compare
+// values written meanwhile take effect if `updates`, and the position becomes 0 if `wraps`.
 struct milestone {
     u64 ticks;
     u32 flags, updates, wraps;
@@ -241,7 +241,7 @@ static void set_control(struct avr *m, u32 n, u32 address, u32 value)
     m->data[address] = (u8)value;
     struct waveform after = waveform_of(m, n);
     if (before.kind < PHASE_PWM || after.kind < PHASE_PWM || before.top != after.top)
-        m->timer_position[n] = count; // otherwise it also keeps its direction
+        m->timer_position[n] = count; // an up-down timer with the same top keeps its position
     if (waveform_of(m, n).kind < FAST_PWM)
         for (u32 c = 0; c < 2; c++)
             m->timer_compare[2 * n + c] = m->timer_buffer[2 * n + c];

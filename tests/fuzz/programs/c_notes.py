@@ -56,7 +56,7 @@ class Program:
         self.files["main.c"] = main
 
     def add(self, text: str, **values: object) -> None:
-        """Return lines of the file with each @name@ replaced by its value."""
+        """Append lines to the file, with each @name@ replaced by its value."""
         for key, value in values.items():
             text = text.replace(f"@{key}@", str(value))
         self.lines.append(text)
