@@ -20,6 +20,8 @@ from emu.dspic30f.engines import make_engine
 from emu.dspic30f.exceptions.faults import RESTART, Breakpoint, DeviceReset, Violation
 from emu.dspic30f.state.state import PC_MASK, RUN, W15_INITIALISED
 from emu.image.model import Image
+from emu.machine import saved_state
+from emu.machine.pc_hooks import PcHook, PcHooks
 from emu.machine.state_access import MemoryObserver, NameOrAddress, StateAccess
 from emu.machine.stops import (
     CHECKPOINT_CYCLES,
@@ -39,11 +41,6 @@ from emu.system.filters import Filter
 from emu.system.native_handle import Native, Run
 from emu.system.program import ProgramMemory
 from emu.system.record import Record
-
-PcHook = Callable[[], bool | None]
-
-LENGTH_BYTES: Final = 4
-"""Size of the length of a UART's waiting input in a snapshot."""
 
 
 class _WRegisters(Protocol):
@@ -88,9 +85,7 @@ class Machine(StateAccess):
         """Whether a reset for a fault (illegal opcode, uninitialised pointer, trap conflict) ends a run."""
         self.resets: Final[list[tuple[int, str]]] = []
         """(cycle, cause) of the last resets."""
-        self._pc_hooks: Final[dict[int, list[PcHook]]] = {}
-        self._pc_filters: Final[dict[int, list[Filter | None]]] = {}
-        """Filters of the hooks of each address, in any order."""
+        self._pc_hooks: Final = PcHooks()
         self._last_hook_stop: tuple[int, int] | None = None
         """PC and cycle at which a hook ended the last run."""
         self._last_reset = LastReset()
@@ -113,7 +108,7 @@ class Machine(StateAccess):
         )
         """Hot state of `run_until`: the 64-bit view of the record, and the indices of cycle, deadline and mode."""
         self.memory_observer = observer(self) if observer is not None else None
-        self.runner = make_engine(engine, self.core, self._pc_hooks, self._pc_filters)
+        self.runner = make_engine(engine, self.core, self._pc_hooks.by_address, self._pc_hooks.filters)
         self.reset("POR")
 
     @property
@@ -197,7 +192,7 @@ class Machine(StateAccess):
         if u64[now] < cycle < u64[deadline] < NEVER and self.record.u16[mode] != RUN and not self._interrupt:
             u64[now] = u64[self.events.now_index] = cycle  # the CPU sleeps, and no event is due before `cycle`
             return None
-        state, sequencer, engine, hooks = self.state, self.core.sequencer, self.runner, self._pc_hooks
+        state, sequencer, engine, hooks = self.state, self.core.sequencer, self.runner, self._pc_hooks.by_address
         stop = None
         while stop is None and u64[now] < cycle:
             try:
@@ -352,7 +347,7 @@ class Machine(StateAccess):
             elif self.is_asleep:
                 stop = self._still_asleep()
             else:
-                stop = self._call_hooks() if state.pc in self._pc_hooks else None
+                stop = self._call_hooks() if state.pc in self._pc_hooks.by_address else None
                 if stop is None:
                     self.core.sequencer.execute()
         except Breakpoint as word:
@@ -435,7 +430,7 @@ class Machine(StateAccess):
         if self.events.quiet:
             return self.stopped("breakpoint") if self.replay_condition is not None and self.replay_condition() else None
         hit = False
-        for hook in list(self._pc_hooks[self.state.pc]):
+        for hook in list(self._pc_hooks.by_address[self.state.pc]):
             hit = bool(hook()) or hit
         if not hit:
             return None
@@ -531,42 +526,19 @@ class Machine(StateAccess):
         self.checkpoints.trap = None
 
     def save_state(self) -> bytes:
-        """Return a copy of the record and of the UART input that does not fit into it, and change nothing.
-
-        The input follows the record, for each UART its length and its packed frames; without any, nothing follows.
-        """
-        backlogs = [uart.line.saved_backlog() for uart in self.uart.values()]
-        if not any(backlogs):
-            return self.record.snapshot()
-        return self.record.snapshot() + b"".join(len(one).to_bytes(LENGTH_BYTES, "little") + one for one in backlogs)
+        """Return a copy of the record and of the UART input that does not fit into it, and change nothing."""
+        return saved_state.save(self.record, self.uart.values())
 
     def restore_state(self, state: bytes) -> None:
         """Restore the record and the waiting UART input, from a snapshot of an equally wired machine.
 
         The host-side state that `restore` clears is kept. Raises ValueError for another size.
         """
-        backlogs = self._backlogs_in(state)
         flash = self.program.flash.tobytes()
-        self.record.restore(state[: self.record.used])
-        for uart, backlog in zip(self.uart.values(), backlogs, strict=True):
-            uart.line.restore_backlog(backlog)
+        saved_state.restore(self.record, self.uart.values(), state)
         if self.program.flash.tobytes() != flash:
             self.program.announce_all()
         self.peripherals.restored()
-
-    def _backlogs_in(self, state: bytes) -> list[bytes]:
-        """Return the waiting input of each UART in a snapshot. Raises ValueError for another size."""
-        at = self.record.used
-        if len(state) <= at:
-            return [b""] * len(self.uart)
-        backlogs = []
-        for _ in self.uart:
-            length = int.from_bytes(state[at : at + LENGTH_BYTES], "little")
-            backlogs.append(state[at + LENGTH_BYTES : at + LENGTH_BYTES + length])
-            at += LENGTH_BYTES + length
-        if at != len(state):
-            raise ValueError(f"snapshot has {len(state)} bytes, expected {at} for this machine and its waiting input")
-        return backlogs
 
     def save_host_state(self) -> Callable[[], None]:
         """Save the state that is not in a snapshot. Return a function that restores it."""
@@ -589,21 +561,4 @@ class Machine(StateAccess):
         A true result stops the run. With `when`, the hook need not be called where a comparison does not hold. Returns
         a function that removes the hook. Raises KeyError for an unknown name, ValueError for an odd address.
         """
-        address = self.program_address(place)
-        self._pc_hooks.setdefault(address, []).append(hook)
-        self._pc_filters.setdefault(address, []).append(when)
-        self.runner.forget()
-        removed = False
-
-        def remove() -> None:
-            nonlocal removed
-            if removed:
-                return
-            removed = True
-            self._pc_hooks[address].remove(hook)
-            self._pc_filters[address].remove(when)
-            if not self._pc_hooks[address]:
-                del self._pc_hooks[address], self._pc_filters[address]
-            self.runner.forget()
-
-        return remove
+        return self._pc_hooks.add(self.program_address(place), hook, when, self.runner.forget)
