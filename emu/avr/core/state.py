@@ -32,7 +32,7 @@ FIELDS: Final[tuple[tuple[str, str, int], ...]] = (
     ("deadline", _U64, 1),  # the interpreter leaves its loop at this cycle
     ("next_due", _U64, 1),
     ("due", _U64, len(EVENTS)),
-    ("sleep_from", _U64, 1),  # cycle since which the I/O clock stands still; NEVER: it runs
+    ("sleep_from", _U64, 1),  # cycle at which the I/O clock stopped; NEVER: it runs
     ("halted_at", _U64, 1),  # cycle at which nothing could wake the CPU any more
     ("slept", _U64, 1),  # cycles that the CPU was asleep
     ("skipped", _U64, 1),  # cycles of waiting loops that were not executed one by one

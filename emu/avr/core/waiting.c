@@ -100,7 +100,7 @@ static int traces(struct avr *m)
     return 1;
 }
 
-// At the anchor again, or its window is over. Return 1 if the search goes on.
+// At the anchor again, or its window is over. Return 1 to continue the search.
 static int trace_on(struct avr *m, u64 cycle, u32 pc)
 {
     if (pc == m->trace_pc && !m->touched && !__builtin_memcmp(m->trace_data, m->data, DATA_BYTES)) {

@@ -35,7 +35,7 @@ static struct waveform waveform_of(const struct avr *m, u32 n)
     return (struct waveform){kinds16[mode], top, 0xFFFF};
 }
 
-// Clock cycles of a tick as a power of two; -1: the timer stands still.
+// Clock cycles of a tick as a power of two; -1: the timer is stopped.
 static int tick_shift(const struct avr *m, u32 n)
 {
     u32 select = m->data[control[n] + 1] & 7;

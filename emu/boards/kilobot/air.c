@@ -16,7 +16,7 @@ enum { LIT_UV = 1000000, DARK_UV = 0 };
 struct edge {
     u64 at; // ticks
     u32 high_uv, low_uv;
-    i32 change; // +1: light goes on, -1: off
+    i32 change; // +1: an emitter is switched on, -1: off
 };
 
 struct link { // what a receiver gets of a sender

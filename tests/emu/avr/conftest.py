@@ -18,10 +18,15 @@ Build = Callable[..., AvrImage]
 Machine = Callable[..., Atmega328p]
 
 
+def needs(program: str) -> None:
+    """Skip the test if a program of Debian's binutils-avr or gcc-avr is missing: pip has no compiler for AVR."""
+    if shutil.which(program) is None:
+        pytest.skip(f"{program} is not installed; Debian packages: gcc-avr, binutils-avr, avr-libc")
+
+
 def compiled(source: Path, out: Path, *flags: str) -> AvrImage:
     """Build a C file for the ATmega328P."""
-    if shutil.which("avr-gcc") is None:
-        pytest.skip("avr-gcc is not installed; Debian packages: gcc-avr, avr-libc")
+    needs("avr-gcc")
     command = ["avr-gcc", "-mmcu=atmega328p", "-DF_CPU=8000000UL", "-std=gnu99", "-gdwarf-2", *flags, str(source)]
     subprocess.run([*command, "-lm", "-o", str(out)], check=True)
     return load_avr_image(str(out))

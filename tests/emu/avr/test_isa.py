@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import re
-import shutil
 import struct
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -14,13 +12,13 @@ import pytest
 from emu.avr.isa.codec import decode, row_of
 from emu.avr.isa.rows import ERASED, ROWS
 from emu.avr.isa.text import disassemble, target
+from tests.emu.avr.conftest import needs
 from tests.emu.avr.oracle import Pair, compared_rows
 from tests.fuzz.seeds import base_seed
 
 OTHER_CHIPS = {"elpm", "xch", "las", "lac", "lat", "des", "eijmp", "eicall", "spm Z+"}
 """Instructions of larger or newer AVRs, which the ATmega328P does not have."""
 SECOND = 0x0124
-ROOT = Path(__file__).resolve().parents[3]
 
 
 def test_a_word_has_one_row() -> None:
@@ -39,8 +37,7 @@ def normal(text: str) -> str:
 @pytest.mark.slow
 def test_all_words_are_disassembled_as_by_binutils(tmp_path: Path) -> None:
     """All 65,536 words have the text that avr-objdump prints, or belong to another AVR."""
-    if shutil.which("avr-objdump") is None:
-        pytest.skip("avr-objdump is not installed; Debian package: binutils-avr")
+    needs("avr-objdump")
     raw = tmp_path / "words.bin"
     raw.write_bytes(b"".join(struct.pack("<HH", word, SECOND) for word in range(0x10000)))
     command = ["avr-objdump", "-m", "avr:5", "-b", "binary", "-D", str(raw)]
@@ -76,9 +73,3 @@ def test_every_row_computes_as_simavr(pair: Pair) -> None:
     """300 random cases of every row leave the same registers, SREG, RAM, PC and cycles; new ones per commit."""
     found = [told for row in compared_rows() if (told := pair.row(row, 300, base_seed()))]
     assert found == []
-
-
-def test_the_page_has_the_table() -> None:
-    """docs/reference/avr.md §2 shows the current table."""
-    done = subprocess.run([sys.executable, "docs/tools/avr_table.py"], cwd=ROOT, check=False)
-    assert done.returncode == 0, "run: python docs/tools/avr_table.py --write"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 import subprocess
 from collections.abc import Callable
 from itertools import pairwise
@@ -16,6 +15,7 @@ from emu.boards.kilobot.messages import LEADER_PULSES, SLOT, STOP_OF_LEADER, TOL
 from emu.boards.kilobot.observer import WATCHED, KilobotObserver
 from emu.boards.kilobot.overhead import broadcast
 from emu.boards.kilobot.swarm import KilobotFaultError, KilobotSetup, KilobotSwarm
+from tests.emu.avr.conftest import needs
 
 FIRMWARE = Path(__file__).resolve().parents[3] / "firmware" / "kilobot"
 RUNNING = 2
@@ -25,8 +25,7 @@ Program = Callable[[str], AvrImage]
 @pytest.fixture(scope="module")
 def program(tmp_path_factory: pytest.TempPathFactory) -> Program:
     """Return a function that builds a program of firmware/kilobot."""
-    if shutil.which("avr-gcc") is None:
-        pytest.skip("avr-gcc is not installed; Debian packages: gcc-avr, avr-libc")
+    needs("avr-gcc")
     out = tmp_path_factory.mktemp("kilobot")
 
     def one(name: str) -> AvrImage:
