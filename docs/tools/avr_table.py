@@ -5,10 +5,11 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
+from generated_part import GeneratedPart
+
 from emu.avr.isa.rows import ROWS
 
 PAGE = Path(__file__).parents[1] / "reference" / "avr.md"
-BEGIN, END = "<!-- table -->\n", "<!-- end of table -->"
 
 
 def table() -> str:
@@ -20,18 +21,7 @@ def table() -> str:
     return "\n".join(lines) + "\n"
 
 
-def page() -> str:
-    """Return the page with the current table."""
-    before, _, rest = PAGE.read_text("utf-8").partition(BEGIN)
-    return before + BEGIN + table() + END + rest.partition(END)[2]
-
-
-def main() -> int:
-    if sys.argv[1:] == ["--write"]:
-        PAGE.write_text(page(), "utf-8")
-        return 0
-    return 0 if PAGE.read_text("utf-8") == page() else 1
-
+PART = GeneratedPart(PAGE, "<!-- table -->\n", table, "<!-- end of table -->")
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(PART.command())

@@ -13,10 +13,11 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
+from generated_part import GeneratedPart
+
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "docs" / "porting.md"
 PORTS, BOARDS = ROOT / "firmware/openswarm/port", ROOT / "firmware/openswarm/board"
-BEGIN, END = "<!-- port files -->\n", "<!-- end of port files -->"
 NEWEST = ("riscv", "qemu_virt")
 """Folders of the newest port and its board."""
 NAMES = re.compile(r"\b(riscv|qemu_virt|riscv64-unknown-elf|qemu-system-riscv32)\b")
@@ -69,19 +70,7 @@ def tables() -> str:
     return "\n".join(out) + "\n"
 
 
-def page() -> str:
-    """Return the page with the current tables."""
-    before, _, rest = PAGE.read_text("utf-8").partition(BEGIN)
-    return before + BEGIN + tables() + END + rest.partition(END)[2]
-
-
-def main() -> int:
-    """Run the command."""
-    if sys.argv[1:] == ["--write"]:
-        PAGE.write_text(page(), "utf-8")
-        return 0
-    return 0 if PAGE.read_text("utf-8") == page() else 1
-
+PART = GeneratedPart(PAGE, "<!-- port files -->\n", tables, "<!-- end of port files -->")
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(PART.command())
