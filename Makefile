@@ -23,7 +23,7 @@ APP    ?= listing1
 SECONDS ?= 5
 JOBS   ?= 2
 TYPED  := emu toolchain arena openswarm
-LINTED := $(TYPED) tests bench docs setup.py
+LINTED := $(TYPED) firmware tests bench docs setup.py
 # --no-compile: Python compiles what it imports; compiling every file of the dependencies first takes longer
 PIP    := $(PY) -m pip install --quiet --disable-pip-version-check --no-compile
 

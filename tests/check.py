@@ -16,7 +16,7 @@ from typing import Final
 
 ROOT: Final = Path(__file__).resolve().parents[1]
 TYPED: Final = ("emu", "toolchain", "arena", "openswarm")
-LINTED: Final = (*TYPED, "tests", "bench", "docs", "setup.py")
+LINTED: Final = (*TYPED, "firmware", "tests", "bench", "docs", "setup.py")
 
 
 def changed_packages(listed: str) -> list[str]:

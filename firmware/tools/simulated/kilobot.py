@@ -21,9 +21,8 @@ DATA = 0x800000
 _DONE, _CRASHED, _AT_PLACE = 1, 2, 3
 
 
-@functools.cache
-def library() -> ctypes.CDLL:
-    """Return the library of simavr.c and air.c, compiled once per process. Raises NotInstalled."""
+def compiled(*sources: Path) -> ctypes.CDLL:
+    """Return the library of C files that call simavr. Raises NotInstalled."""
     for program, package in (("gcc", "gcc"), ("pkg-config", "pkg-config")):
         if shutil.which(program) is None:
             raise NotInstalled(f"{program} is not installed; Debian package: {package}")
@@ -33,14 +32,17 @@ def library() -> ctypes.CDLL:
     if found.returncode != 0:
         raise NotInstalled("simavr's library is not installed; Debian package: libsimavr-dev")
     flags = [f"-I{found.stdout.strip()}/simavr", "-lsimavr"]
-    folder = Path(tempfile.mkdtemp(prefix="openswarm-simavr-"))
-    object_ = folder / "simavr.so"
-    command = ["gcc", "-O2", "-shared", "-fPIC", *map(str, SOURCES), *flags, "-o", str(object_)]
-    try:
+    with tempfile.TemporaryDirectory(prefix="openswarm-simavr-") as folder:  # the loaded library stays usable
+        object_ = Path(folder) / "simavr.so"
+        command = ["gcc", "-O2", "-shared", "-fPIC", *map(str, sources), *flags, "-o", str(object_)]
         subprocess.run(command, check=True)
-        made = ctypes.CDLL(str(object_))
-    finally:
-        shutil.rmtree(folder, ignore_errors=True)  # the loaded library stays usable
+        return ctypes.CDLL(str(object_))
+
+
+@functools.cache
+def library() -> ctypes.CDLL:
+    """Return the library of simavr.c and air.c, compiled once per process. Raises NotInstalled."""
+    made = compiled(*SOURCES)
     handle = ctypes.c_void_p
     for name, result, arguments in (
         ("machine_open", handle, [ctypes.c_char_p, ctypes.c_uint32]),

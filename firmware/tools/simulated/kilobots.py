@@ -16,24 +16,20 @@ from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 
+from emu.boards.kilobot.swarm import (
+    CALIBRATED_MM,
+    FULL_SCALE,
+    HIGH_GAIN_AT,
+    HIGH_GAIN_MM,
+    LOSS_ONE,
+    LOW_GAIN_AT,
+    LOW_GAIN_MM,
+    NUMBER_AT,
+    REACH_MM,
+    counts,
+)
 from firmware.tools.simulated.kilobot import HZ, Kilobot, library
 from firmware.tools.simulated.machine import Stopped
-
-REACH_MM = 70.0
-"""Maximum range between the centres of two robots in mm. Public descriptions of the robot state 7 cm."""
-FULL_SCALE = 1023
-HIGH_GAIN_MM, LOW_GAIN_MM = 40.0, 20.0
-"""Distances at which the two gains saturate; beyond, counts fall with its square. UNVERIFIED, docs/accuracy.md."""
-CALIBRATED_MM = tuple(range(33, 99, 5))
-"""Distances of the tables in the EEPROM (kilolib)."""
-NUMBER_AT, LOW_GAIN_AT, HIGH_GAIN_AT = 0xB0, 0x20, 0x50
-"""EEPROM addresses (kilolib): UID, and 14 counts of each gain, high bytes first."""
-PULSE_LOSS = 1 << 16
-
-
-def counts(gain_mm: float, distance_mm: float) -> int:
-    """Return the converter's counts for a neighbour's pulse."""
-    return FULL_SCALE if distance_mm <= gain_mm else round(FULL_SCALE * (gain_mm / distance_mm) ** 2)
 
 
 @dataclass(frozen=True)
@@ -62,7 +58,7 @@ class Kilobots:
             raise ValueError(f"a loss of {loss} is not within 0 and 1")
         self._library = library()
         self._air = self._library.air_open(seed)
-        self._loss = int(loss * PULSE_LOSS)
+        self._loss = int(loss * LOSS_ONE)
         self.robots: list[Kilobot] = []
         self.places = [(robot.x, robot.y) for robot in robots]
         self.now = 0

@@ -11,7 +11,8 @@ import pytest
 
 from emu.avr.image import AvrImage, load_avr_image
 from emu.avr.machine import Atmega328p
-from tests.emu.avr.oracle import NotInstalled, Pair
+from firmware.tools.simulated.machine import NotInstalled
+from tests.emu.avr.oracle import Pair
 
 START = "#include <avr/io.h>\n#include <avr/interrupt.h>\n#include <avr/sleep.h>\n#include <stdint.h>\n"
 Build = Callable[..., AvrImage]

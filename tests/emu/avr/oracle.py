@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import ctypes
 import functools
-import shutil
-import subprocess
 import tempfile
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -15,6 +13,7 @@ from emu.avr.isa.row import Row
 from emu.avr.isa.rows import ROWS
 from emu.avr.native import TYPES, native
 from emu.native_library import address_of
+from firmware.tools.simulated.kilobot import compiled
 
 HERE = Path(__file__).parent
 GPIOR0, GPIOR1, GPIOR2, SREG = 0x3E, 0x4A, 0x4B, 0x5F
@@ -24,27 +23,13 @@ NOT_COMPARED = ("sleep", "wdr", "break", "spm")
 """Rows whose effect is outside the CPU; tests of the devices check them."""
 
 
-class NotInstalled(Exception):
-    """A program that the comparison needs is missing."""
-
-
 @functools.cache
 def library() -> ctypes.CDLL:
     """Return the compiled oracle. Raises NotInstalled."""
-    for program, package in (("gcc", "gcc"), ("pkg-config", "pkg-config")):
-        if shutil.which(program) is None:
-            raise NotInstalled(f"{program} is not installed; Debian package: {package}")
-    asked = ["pkg-config", "--variable=includedir", "simavr"]
-    found = subprocess.run(asked, capture_output=True, text=True, check=False)
-    if found.returncode:
-        raise NotInstalled("simavr's library is not installed; Debian package: libsimavr-dev")
     with tempfile.TemporaryDirectory() as folder:
         text = Path(folder) / "oracle.c"
         text.write_text("\n".join([TYPES, declaration(), (HERE / "oracle.c").read_text()]))
-        made = Path(folder) / "oracle.so"
-        command = ["gcc", "-O2", "-shared", "-fPIC", str(text), f"-I{found.stdout.strip()}/simavr", "-lsimavr"]
-        subprocess.run([*command, "-o", str(made)], check=True)
-        loaded = ctypes.CDLL(str(made))
+        loaded = compiled(text)
     handle = ctypes.c_void_p
     loaded.pair_open.restype, loaded.pair_open.argtypes = handle, [handle] * 4
     loaded.pair_close.argtypes = [handle]

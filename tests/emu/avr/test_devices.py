@@ -191,3 +191,50 @@ def test_flash_is_programmed(machine: Machine) -> None:
     plain = machine(body.replace("WRITE", "__attribute__((noinline))"))
     plain.run_until(1_000_000)
     assert bytes(plain.state.flash[0x3000:0x3080]) == b"\xff" * 128
+
+
+def test_the_watchdog_resets_within_an_instruction(machine: Machine) -> None:
+    """If the time-out comes while STS writes a register, the program starts again at its reset vector."""
+    for nops in range(4):
+        m = machine(f"""
+            #include <avr/wdt.h>
+            static uint8_t starts __attribute__((section(".noinit")));
+            int main(void) {{
+                starts = MCUSR & 8 ? starts + 1 : 0;
+                MCUSR = 0;
+                asm volatile(".rept {nops}\n nop\n .endr");
+                wdt_enable(WDTO_15MS);
+                for (;;) OCR2A = 5;
+            }}""")
+        m.run_until(300_000)
+        assert (m.state.resets, m.peek("starts")) == (2, 2), nops
+
+
+def test_a_reset_switches_the_emitters_off(machine: Machine) -> None:
+    """The reset makes the pins inputs; the end of the light ends the native call as the program's own does."""
+    m = machine("""
+        #include <avr/wdt.h>
+        int main(void) {
+            if (!(MCUSR & 8)) { wdt_enable(WDTO_15MS); DDRB = 1; PORTB = 1; }
+            for (;;) ;
+        }""")
+    m.state.emitters = 1
+    m.run_until(1_000)
+    assert (m.state.lit, m.state.light_changed) == (1, 1)
+    m.state.light_changed = 0
+    m.run_until(200_000)
+    assert (m.state.resets, m.state.lit, m.state.light_changed) == (1, 0, 1)
+
+
+def test_the_signature_is_read_within_four_cycles(machine: Machine) -> None:
+    """LPM reads the signature right behind the write of SPMCSR, later flash."""
+    m = run(machine, """
+        first = boot_signature_byte_get(0), third = boot_signature_byte_get(4);
+        SPMCSR = 1 << SIGRD | 1;
+        asm volatile(".rept 10\\n nop\\n .endr");
+        late = pgm_read_byte(text);""", """
+        #include <avr/boot.h>
+        #include <avr/pgmspace.h>
+        static const char text[] PROGMEM = "U";
+        volatile uint8_t first, third, late;""")  # fmt: skip
+    assert [m.peek(name) for name in ("first", "third", "late")] == [0x1E, 0x0F, ord("U")]

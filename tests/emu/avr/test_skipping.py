@@ -40,6 +40,13 @@ COUNTDOWNS = """
             PORTC ^= SREG >> 1 & 8;
         }
     }"""
+FLAG = """
+    volatile uint8_t ticks, last;
+    ISR(TIMER0_OVF_vect) { ticks++; PORTB ^= 1; }
+    int main(void) {
+        TCCR0B = 2; TIMSK0 = 1; sei();
+        for (;;) { while (ticks == last) asm volatile(".rept NOPS\\n nop\\n .endr"); last = ticks; PORTC++; }
+    }"""
 CLOCKED = """
     volatile uint16_t seen;
     int main(void) { TCCR1B = 1; for (;;) { seen = TCNT1; if (seen > 60000) PORTB ^= 1; } }"""
@@ -74,3 +81,56 @@ def test_skipping_is_exact(build: Build, text: str, least: float) -> None:
     assert whole.state.skipped >= least * 170_000
     assert (whole.state.skipped == 0) == (least == 0)
     assert pieces.state.skipped <= 0.4 * 170_000
+
+
+@pytest.mark.parametrize("nops", range(1, 5))
+def test_interrupts_come_at_their_cycle(build: Build, nops: int) -> None:
+    """An interrupt that is due exactly at the end of the skipped rounds is served there, not an instruction later."""
+    image = build(FLAG.replace("NOPS", str(nops)))
+    whole, pieces = Atmega328p(image), Atmega328p(image)
+    for m in (whole, pieces):
+        m.watch([0x25, 0x28])
+    whole.run_until(90_000)
+    while pieces.cycle < 90_000:
+        pieces.run_until(pieces.cycle + PIECE)
+    assert whole.changes == [change for change in pieces.changes if change.cycle <= whole.cycle]
+    assert whole.state.skipped > 45_000
+
+
+def test_a_fed_watchdog_does_not_bite(build: Build) -> None:
+    """A loop that waits and resets the watchdog in each round is no round that repeats up to the time-out."""
+    m = Atmega328p(build("""
+        #include <avr/wdt.h>
+        volatile uint8_t flag;
+        int main(void) { MCUSR = 0; wdt_enable(WDTO_15MS); while (!flag) wdt_reset(); for (;;) ; }"""))  # fmt: skip
+    m.run_until(1_000_000)
+    assert m.state.resets == 0
+
+
+def test_a_poke_ends_a_waiting_loop(build: Build) -> None:
+    """After `poke_bytes` the loop is executed again, although no event is due."""
+    m = Atmega328p(build("volatile uint8_t flag; int main(void) { while (!flag) ; PORTB = 1; for (;;) PORTC = 1; }"))
+    m.run_until(500_000)
+    m.poke_bytes("flag", b"\1")
+    m.run_until(501_000)
+    assert m.peek(0x25) == 1
+
+
+def test_a_pin_is_read_late_once(build: Build) -> None:
+    """A loop whose first round reads the level before a change ends in the second one.
+
+    The change of an emitter ends the native call, so the search for rounds begins right behind it.
+    """
+    m = Atmega328p(build("""
+        int main(void) {
+            DDRB = 1;
+            asm volatile("ldi r25, 0\\n 1: dec r25\\n brne 1b\\n ldi r24, 0\\n sbi 5, 0\\n"
+                         "1: in r24, 3\\n sbrs r24, 0\\n rjmp 1b" ::: "r24", "r25");
+            PORTC = 1;
+            for (;;) ;
+        }"""))  # fmt: skip
+    m.state.emitters = 1
+    m.run_until(100_000)
+    m.state.light_changed = 0
+    m.run_until(100_000)
+    assert m.peek(0x28) == 1

@@ -11,8 +11,9 @@ from typing import Any
 
 import pytest
 
+from emu.boards.kilobot.swarm import HIGH_GAIN_MM, REACH_MM, counts
 from firmware.tools.simulated.kilobot import HZ, Kilobot
-from firmware.tools.simulated.kilobots import HIGH_GAIN_MM, REACH_MM, Kilobots, Robot, counts
+from firmware.tools.simulated.kilobots import Kilobots, Robot
 from firmware.tools.simulated.machine import NotInstalled, peek, peek_words
 from tests.cases import check_all
 from tests.firmware.conftest import FIRMWARE, TARGET_APPS

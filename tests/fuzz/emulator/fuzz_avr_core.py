@@ -13,7 +13,8 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 
 from emu.avr.image import load_avr_image
-from tests.emu.avr.oracle import NotInstalled, Pair, compared_rows
+from firmware.tools.simulated.machine import NotInstalled
+from tests.emu.avr.oracle import Pair, compared_rows
 from tests.fuzz.seeds import SKIPPED, Campaign, parser
 
 PROGRAMS = Path(__file__).resolve().parents[2] / "emu" / "avr" / "programs.c"
