@@ -13,7 +13,7 @@ from fractions import Fraction
 from typing import TYPE_CHECKING, Any, Final, TextIO
 
 from emu.boards import BOARDS
-from emu.boards.kilobot.messages import TYPES
+from emu.commands import kilobot
 from emu.commands.board_options import add_board_options, add_watch_option, board_of, links_of, set_up, start_watch
 from emu.commands.image_option import add_chip_option, image_of
 from emu.host.command import CommandError, Parser, cycles, seconds
@@ -39,11 +39,6 @@ REFUSED: Final = 6
 """Offset of `refused` in sys_statistics (firmware/openswarm/include/openswarm.h)."""
 CLOCK_RUNS: Final = 1 << 15
 """TON of T1CON, OpenSwarm's clock, which Sys_Start_Kernel starts (firmware/openswarm/port/dspic30f)."""
-
-KILOBOT: Final = "kilobot"
-KILOBOT_OPTIONS: Final = {"image", "board", "ohc", "uid", "seconds", "cycles", "json", "exit_code", "cache"}
-"""Options that apply to a Kilobot, an ATmega328P with its own engine."""
-MOST_UID: Final = 0xFFFF
 
 DESCRIPTION: Final = """\
 Run a firmware image and show its UART output.
@@ -100,17 +95,10 @@ def parser() -> Parser:
         metavar="PLACE",
         help="print the native code compiled for a function or address (0x...), with its source instructions",
     )
-    add_board_options(made, (*BOARDS, KILOBOT))
-    made.add_argument("--ohc", choices=("none", *TYPES), help="kilobot: overhead controller's message (default run)")
-    made.add_argument("--uid", metavar="N", type=_uid, help="kilobot: its UID, 0 to 65535 (default 0)")
+    add_board_options(made, (*BOARDS, kilobot.BOARD))
+    kilobot.add_options(made)
     add_watch_option(made)
     return made
-
-
-def _uid(text: str) -> int:
-    if not text.isdecimal() or int(text) > MOST_UID:
-        raise argparse.ArgumentTypeError(f"a UID is a number from 0 to {MOST_UID}, not {text!r}")
-    return int(text)
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,11 +113,9 @@ class RunResult:
 
 def run(options: argparse.Namespace) -> int:
     """Run the command. Return the exit status as listed in DESCRIPTION."""
-    if options.board == KILOBOT:
-        return _run_kilobot(options)
-    for name in ("ohc", "uid"):
-        if getattr(options, name) is not None:
-            raise CommandError(f"--{name} needs --board {KILOBOT}")
+    if options.board == kilobot.BOARD:
+        return kilobot.run(options, parser())
+    kilobot.refuse_options(options)
     image = image_of(options)
     _print_warnings(image)
     machine = _machine(options, image)
@@ -141,35 +127,6 @@ def run(options: argparse.Namespace) -> int:
     _report(options, machine, image, result, status)
     if native_address is not None:
         _dump_native(native_address, machine, image, options.dump_native)
-    return status
-
-
-def _run_kilobot(options: argparse.Namespace) -> int:
-    """Run an image on a Kilobot. Return the exit status as listed in DESCRIPTION."""
-    given = vars(options)
-    for name in sorted(given.keys() - KILOBOT_OPTIONS):
-        if given[name] != parser().get_default(name):
-            raise CommandError(f"--{name.replace('_', '-')} does not apply to --board {KILOBOT}")
-    from emu.run.kilobot_session import run_kilobot
-
-    done = run_kilobot(options.image, seconds=options.seconds, cycles=options.cycles,
-                       command=options.ohc or "run", uid=options.uid or 0, show=not options.json)  # fmt: skip
-    for text in done.notes:
-        print(f"emu run: note: {text}", file=sys.stderr)
-    status = FAULT if done.reason == "fault" else DONE
-    if options.exit_code:
-        statuses = {"fault": FAULT_AS_STATUS, "halt": DONE, "interrupted": INTERRUPTED}
-        status = statuses.get(done.reason, LIMIT_AS_STATUS)
-    if options.json:
-        print(json.dumps(done.facts() | {"status": status}))
-        return status
-    if done.fault is not None:
-        print(f"emu run: fault: {done.fault.message}", file=sys.stderr)
-    print(
-        f"{done.reason} at {done.image.place(done.pc)} after {done.cycles:,} cycles, {done.seconds:.6f} s simulated,"
-        f" {done.seconds / done.host_seconds if done.host_seconds else 0:.3g} x real time",
-        file=sys.stderr,
-    )
     return status
 
 
