@@ -5,13 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from emu.chips.chip import Chip
-from toolchain.peripheral_library.lines import (
-    configure_interrupt,
-    functions,
-    interrupt_controls,
-    interrupt_settings,
-    settings,
-)
+from toolchain.peripheral_library.lines import interrupt_settings, module, settings
 
 INPUTS = range(16)
 
@@ -118,7 +112,5 @@ def _converter(chip: Chip, name: str) -> Iterator[str]:
     yield "#define ADC_RESULT_FIRST 0"
     yield "#define ADC_RESULT_SECOND 8"
     yield from interrupt_settings("ADC_INT_PRI_", "ADC_INT_ENABLE", "ADC_INT_DISABLE")
-    yield from interrupt_controls("AD", "ADC")
-    yield from functions(FUNCTIONS, adc=name)
-    yield configure_interrupt("AD", f"ConfigInt{name}")
+    yield from module("AD", "ADC", f"ConfigInt{name}", FUNCTIONS, adc=name)
     yield f"#define StopSamp{name} Convert{name}"

@@ -5,13 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from emu.chips.chip import Chip
-from toolchain.peripheral_library.lines import (
-    configure_interrupt,
-    functions,
-    interrupt_controls,
-    interrupt_settings,
-    settings,
-)
+from toolchain.peripheral_library.lines import interrupt_settings, module, settings
 
 CONTROL1 = {
     "EN": ("DCIEN", 1), "DIS": ("DCIEN", 0),
@@ -72,6 +66,4 @@ def dci(chip: Chip) -> Iterator[str]:
     yield "#define DCI_DIS_SLOT_ALL 0x0000"
     yield "#define DCI_EN_SLOT_ALL 0xFFFF"
     yield from interrupt_settings("DCI_INT_PRI_", "DCI_INT_ON", "DCI_INT_OFF")
-    yield from interrupt_controls("DCI", "DCI")
-    yield from functions(FUNCTIONS)
-    yield configure_interrupt("DCI", "ConfigIntDCI")
+    yield from module("DCI", "DCI", "ConfigIntDCI", FUNCTIONS)

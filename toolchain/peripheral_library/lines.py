@@ -100,6 +100,13 @@ def functions(text: str, **names: str) -> Iterator[str]:
         yield inline(prototype + ")", body)
 
 
+def module(source: str, name: str, configure: str, text: str, enable_bit: int = 3, **names: str) -> Iterator[str]:
+    """Interrupt controls and functions of a module with one interrupt; `configure` names its ConfigInt function."""
+    yield from interrupt_controls(source, name)
+    yield from functions(text, **names)
+    yield configure_interrupt(source, configure, enable_bit)
+
+
 def instances(chip: Chip, register: str) -> list[str]:
     """Numbers of the instances of a module that the chip has; `register` has `$n` where the number is."""
     return [n for n in "123456789" if Template(register).substitute(n=n) in chip.sfrs]

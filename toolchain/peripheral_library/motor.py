@@ -6,11 +6,11 @@ from collections.abc import Iterator
 
 from emu.chips.chip import Chip
 from toolchain.peripheral_library.lines import (
-    configure_interrupt,
     functions,
     interrupt_controls,
     interrupt_settings,
     macro,
+    module,
     settings,
 )
 
@@ -161,9 +161,7 @@ def qei(chip: Chip) -> Iterator[str]:
     yield from settings(chip, "DFLTCON", FILTER)
     yield from _index_settings(chip)
     yield from interrupt_settings("QEI_INT_PRI_", "QEI_INT_ENABLE", "QEI_INT_DISABLE", enable_bit=7)
-    yield from interrupt_controls("QEI", "QEI")
-    yield from functions(QEI_FUNCTIONS)
-    yield configure_interrupt("QEI", "ConfigIntQEI", 7)
+    yield from module("QEI", "QEI", "ConfigIntQEI", QEI_FUNCTIONS, 7)
 
 
 def _index_settings(chip: Chip) -> Iterator[str]:

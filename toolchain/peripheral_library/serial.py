@@ -6,11 +6,11 @@ from collections.abc import Iterator
 
 from emu.chips.chip import Chip
 from toolchain.peripheral_library.lines import (
-    configure_interrupt,
     functions,
     instances,
     interrupt_controls,
     interrupt_settings,
+    module,
     settings,
 )
 
@@ -320,9 +320,7 @@ def spi(chip: Chip) -> Iterator[str]:
     yield from settings(chip, "SPI1STAT", SPI_STATUS)
     yield from interrupt_settings("SPI_INT_PRI_", "SPI_INT_EN", "SPI_INT_DIS")
     for n in instances(chip, "SPI${n}CON"):
-        yield from interrupt_controls(f"SPI{n}", f"SPI{n}")
-        yield from functions(SPI_FUNCTIONS, n=n)
-        yield configure_interrupt(f"SPI{n}", f"ConfigIntSPI{n}")
+        yield from module(f"SPI{n}", f"SPI{n}", f"ConfigIntSPI{n}", SPI_FUNCTIONS, n=n)
         yield f"#define getcSPI{n} ReadSPI{n}"
         yield f"#define putcSPI{n} WriteSPI{n}"
 

@@ -9,8 +9,8 @@ from toolchain.peripheral_library.lines import (
     configure_interrupt,
     functions,
     instances,
-    interrupt_controls,
     interrupt_settings,
+    module,
     settings,
 )
 
@@ -132,9 +132,7 @@ def timer(chip: Chip) -> Iterator[str]:
     for n in numbers:
         yield from settings(chip, f"T{n}CON", TIMER, f"T{n}_")
         yield from interrupt_settings(f"T{n}_INT_PRIOR_", f"T{n}_INT_ON", f"T{n}_INT_OFF")
-        yield from interrupt_controls(f"T{n}", f"T{n}")
-        yield from functions(TIMER_FUNCTIONS, n=n)
-        yield configure_interrupt(f"T{n}", f"ConfigIntTimer{n}")
+        yield from module(f"T{n}", f"T{n}", f"ConfigIntTimer{n}", TIMER_FUNCTIONS, n=n)
     for low, high in ("23", "45"):
         if low in numbers and high in numbers:
             yield from functions(PAIR_FUNCTIONS, low=low, high=high)
@@ -146,9 +144,7 @@ def input_capture(chip: Chip) -> Iterator[str]:
     yield from settings(chip, "IC1CON", CAPTURE, "IC_")
     yield from interrupt_settings("IC_INT_PRIOR_", "IC_INT_ON", "IC_INT_OFF")
     for n in instances(chip, "IC${n}CON"):
-        yield from interrupt_controls(f"IC{n}", f"IC{n}")
-        yield from functions(CAPTURE_FUNCTIONS, n=n)
-        yield configure_interrupt(f"IC{n}", f"ConfigIntCapture{n}")
+        yield from module(f"IC{n}", f"IC{n}", f"ConfigIntCapture{n}", CAPTURE_FUNCTIONS, n=n)
 
 
 def output_compare(chip: Chip) -> Iterator[str]:
@@ -156,6 +152,4 @@ def output_compare(chip: Chip) -> Iterator[str]:
     yield from settings(chip, "OC1CON", COMPARE, "OC_")
     yield from interrupt_settings("OC_INT_PRIOR_", "OC_INT_ON", "OC_INT_OFF")
     for n in instances(chip, "OC${n}CON"):
-        yield from interrupt_controls(f"OC{n}", f"OC{n}")
-        yield from functions(COMPARE_FUNCTIONS, n=n)
-        yield configure_interrupt(f"OC{n}", f"ConfigIntOC{n}")
+        yield from module(f"OC{n}", f"OC{n}", f"ConfigIntOC{n}", COMPARE_FUNCTIONS, n=n)
