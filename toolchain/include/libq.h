@@ -88,16 +88,8 @@ _Q16 _Q16atanByPI(_Q16 x);
 _Q16 _Q16atanYByX(_Q16 x, _Q16 y);
 _Q16 _Q16atanYByXByPI(_Q16 x, _Q16 y);
 _Q16 _Q16random(void);
-
-static __inline__ _Q16 _Q16ftoi(float x)
-{
-    return (_Q16)(x * 65536.0f);
-}
-
-static __inline__ float _itofQ16(_Q16 x)
-{
-    return (float)x / 65536.0f;
-}
+_Q16 _Q16ftoi(float x);
+float _itofQ16(_Q16 x);
 
 #ifdef __cplusplus
 }

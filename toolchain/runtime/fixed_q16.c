@@ -3,13 +3,18 @@
 #include <libq.h>
 #include <math.h>
 
+#define FIXED _Q16
+#define WIDE long long
+#define REAL double
+#define F(name) _Q16##name
+#define R(name) name
 #define LARGEST 0x7FFFFFFFl
 #define SMALLEST (-LARGEST - 1)
 #define PI 3.14159265358979324
 #define UNITS 65536.0
 
 long _Q16randomSeed = 21845;
-short _Q16shlSatFlag, _Q16shrSatFlag, _Q16macSatFlag;
+short _Q16macSatFlag;
 
 static _Q16 saturated(long long value)
 {
@@ -27,15 +32,28 @@ static double real(_Q16 x)
     return (double)x * (1 / UNITS);
 }
 
+/* The angle x * pi, reduced to one turn. */
+static double turned(_Q16 x)
+{
+    return real(x & 0x1FFFF) * PI;
+}
+
+#include "fixed_functions.h"
+
+_Q16 _Q16ftoi(float x)
+{
+    return nearest(x);
+}
+
+float _itofQ16(_Q16 x)
+{
+    return (float)real(x);
+}
+
 /* The product with 16 fraction bits, rounded to the nearest. */
 static long long product(_Q16 x, _Q16 y)
 {
     return ((long long)x * y + 0x8000) >> 16;
-}
-
-_Q16 _Q16neg(_Q16 x)
-{
-    return saturated(-(long long)x);
 }
 
 _Q16 _IQ16mpy(_Q16 x, _Q16 y)
@@ -82,154 +100,6 @@ _Q16 _Q16reciprocalQ15(_Q15 x)
 _Q16 _Q16reciprocalQ16(_Q16 x)
 {
     return _Q16div(65536, x);
-}
-
-/* x shifted left, for distances of either sign; `lost` tells whether bits of the value were shifted out on the left. */
-static _Q16 shifted(_Q16 x, short distance, short *lost)
-{
-    if (distance <= 0)
-        return distance <= -31 ? x >> 31 : x >> -distance;
-    *lost = distance > 31 ? x != 0 : saturated((long long)x << distance) != (long long)x << distance;
-    return distance > 31 ? 0 : (_Q16)((unsigned long)x << distance);
-}
-
-_Q16 _Q16shl(_Q16 x, short distance)
-{
-    short lost = 0;
-    _Q16 result = shifted(x, distance, &lost);
-    return lost ? (x < 0 ? SMALLEST : LARGEST) : result;
-}
-
-_Q16 _Q16shr(_Q16 x, short distance)
-{
-    return _Q16shl(x, distance < -32767 ? 32767 : (short)-distance);
-}
-
-_Q16 _Q16shlNoSat(_Q16 x, short distance)
-{
-    short lost = 0;
-    _Q16 result = shifted(x, distance, &lost);
-    if (lost)
-        _Q16shlSatFlag = 1;
-    return result;
-}
-
-_Q16 _Q16shrNoSat(_Q16 x, short distance)
-{
-    short lost = 0;
-    _Q16 result = shifted(x, distance < -32767 ? 32767 : (short)-distance, &lost);
-    if (lost)
-        _Q16shrSatFlag = 1;
-    return result;
-}
-
-_Q16 _Q16norm(_Q16 x)
-{
-    while (x && (x < 0 ? x >= SMALLEST / 2 : x <= LARGEST / 2))
-        x *= 2;
-    return x;
-}
-
-_Q16 _Q16exp(_Q16 x)
-{
-    return nearest(exp(real(x)));
-}
-
-_Q16 _Q16log(_Q16 x)
-{
-    return x <= 0 ? SMALLEST : nearest(log(real(x)));
-}
-
-_Q16 _Q16log10(_Q16 x)
-{
-    return x <= 0 ? SMALLEST : nearest(log10(real(x)));
-}
-
-_Q16 _Q16power(_Q16 x, _Q16 y)
-{
-    return nearest(pow(real(x), real(y)));
-}
-
-_Q16 _Q16sin(_Q16 x)
-{
-    return nearest(sin(real(x)));
-}
-
-_Q16 _Q16cos(_Q16 x)
-{
-    return nearest(cos(real(x)));
-}
-
-_Q16 _Q16tan(_Q16 x)
-{
-    return nearest(tan(real(x)));
-}
-
-/* The angle x * pi, reduced to one turn. */
-static double turned(_Q16 x)
-{
-    return real(x & 0x1FFFF) * PI;
-}
-
-_Q16 _Q16sinPI(_Q16 x)
-{
-    return nearest(sin(turned(x)));
-}
-
-_Q16 _Q16cosPI(_Q16 x)
-{
-    return nearest(cos(turned(x)));
-}
-
-_Q16 _Q16tanPI(_Q16 x)
-{
-    return nearest(tan(turned(x)));
-}
-
-_Q16 _Q16asin(_Q16 x)
-{
-    return nearest(asin(real(x)));
-}
-
-_Q16 _Q16asinByPI(_Q16 x)
-{
-    return nearest(asin(real(x)) / PI);
-}
-
-_Q16 _Q16acos(_Q16 x)
-{
-    return nearest(acos(real(x)));
-}
-
-_Q16 _Q16acosByPI(_Q16 x)
-{
-    return nearest(acos(real(x)) / PI);
-}
-
-_Q16 _Q16atan(_Q16 x)
-{
-    return nearest(atan(real(x)));
-}
-
-_Q16 _Q16atanByPI(_Q16 x)
-{
-    return nearest(atan(real(x)) / PI);
-}
-
-/* atan(y / x) is in the right half plane, whatever the sign of x. */
-static double quotient_angle(_Q16 x, _Q16 y)
-{
-    return x < 0 ? atan2(-(double)y, -(double)x) : atan2(y, x);
-}
-
-_Q16 _Q16atanYByX(_Q16 x, _Q16 y)
-{
-    return nearest(quotient_angle(x, y));
-}
-
-_Q16 _Q16atanYByXByPI(_Q16 x, _Q16 y)
-{
-    return nearest(quotient_angle(x, y) / PI);
 }
 
 _Q16 _Q16random(void)

@@ -99,6 +99,9 @@ int main(void)
     CHECK(_Q15ftoi(__builtin_nanf("")) == 0);
     CHECK(_Q15atoi((const unsigned char *)"-0.25") == -0x2000);
     CHECK(_Q15atoi((const unsigned char *)".12345") == 4045);
+    CHECK(_Q15atoi((const unsigned char *)"0.000049") == 2);
+    CHECK(_Q15atoi((const unsigned char *)"-0.0000457763671875") == -2);
+    CHECK(_Q15atoi((const unsigned char *)"+0.00004577636718749") == 1 && _Q15atoi((const unsigned char *)"-.") == 0);
     CHECK(_Q15atoi((const unsigned char *)"7") == 32767 && _Q15atoi((const unsigned char *)"0.999999") == 32767);
     _itoaQ15(-0x2000, text);
     CHECK(!strcmp((char *)text, "-0.25"));
@@ -117,7 +120,8 @@ int main(void)
     CHECK(_Q16divmod(0x50000, 0x20000, &remainder) == 0x28000 && remainder == 0);
     CHECK(_Q16divmod(1, 0x30000, &remainder) == 0 && remainder == 0x10000);
     CHECK(_Q16reciprocalQ15(0x4000) == 0x20000 && _Q16reciprocalQ16(0x80000) == 0x2000);
-    CHECK(_Q16ftoi(-1.5f) == -0x18000 && _itofQ16(0x8000) == 0.5f);
+    CHECK(_Q16ftoi(-1.5f) == -0x18000 && _itofQ16(0x8000) == 0.5f && _itofQ16(-0x7FFFFFFFL) == -32768.0f);
+    CHECK(_Q16ftoi(0.000012f) == 1 && _Q16ftoi(40000.0f) == 0x7FFFFFFF && _Q16ftoi(-4e9f) == (-0x7FFFFFFFL - 1));
     unsigned seen = 0;
     for (int i = 0; i < 400; i++)
         seen |= (_Q15random() > 0) | (_Q15random() < 0) << 1 | (_Q16random() > 0) << 2 | (_Q16random() < 0) << 3;
