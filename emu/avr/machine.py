@@ -14,6 +14,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Final
 
+from emu.avr.core.addresses import ADDRESSES
 from emu.avr.core.state import EEPROM_BYTES, FLASH_BYTES, LOG_ROOM, PROGRAM_ENTRIES, Avr, Decoded
 from emu.avr.image import AvrImage
 from emu.avr.native import native
@@ -26,7 +27,7 @@ INPUT_PIN, INPUT_UART, INPUT_ANALOG = 0, 1, 2
 """Kinds of input (core/avr.h). An analog input has the kind INPUT_ANALOG + channel."""
 BOOT_START: Final = 0x3800
 """Word address of the 4 KB boot section (fuses BOOTSZ = 00)."""
-SPL, UDR0 = 0x5D, 0xC6
+SPL, UDR0 = ADDRESSES["SPL"], ADDRESSES["UDR0"]
 _CHUNK: Final = 4_000_000
 """Cycles per native call. A call holds the interpreter lock."""
 _FAULTS: Final = {
@@ -179,6 +180,7 @@ class Atmega328p:
         """Write bytes of data memory, without the effects of a write. Raises KeyError."""
         address = self._resolved(place)
         self.state.data[address : address + len(octets)] = list(octets)
+        self.state.tracing = self.state.round = self.state.resting = 0
 
     def write_eeprom(self, address: int, octets: bytes) -> None:
         """Write bytes of the EEPROM. Raises ValueError if they are not within its 1,024 bytes."""

@@ -7,6 +7,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any, Final
 
+from emu.avr.core.addresses import enumeration
 from emu.avr.core.state import declaration
 from emu.avr.isa.c_code import bodies, decoder, labels
 from emu.native_library import ADDRESS, INT, functions_of
@@ -29,7 +30,7 @@ typedef int64_t i64;
 def source() -> str:
     """Return the text of the C file."""
     parts = [f'#line 1 "emu/avr/{part}"\n{(HERE / part).read_text("utf-8")}' for part in PARTS]
-    text = "\n".join([TYPES, declaration(), parts[0], decoder(), *parts[1:]])
+    text = "\n".join([TYPES, declaration(), enumeration(), parts[0], decoder(), *parts[1:]])
     return text.replace("    INSTRUCTION_LABELS\n", labels() + "\n").replace(
         "    INSTRUCTION_BODIES\n", bodies() + "\n"
     )

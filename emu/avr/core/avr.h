@@ -1,21 +1,10 @@
-// One ATmega328P: register addresses, bits, and helpers that all parts use. Python declares `struct avr` (state.py).
+// One ATmega328P: bits, vectors, and helpers that all parts use. Python declares `struct avr` (state.py) and the addresses of
+// registers (addresses.py).
 //
 // Source: ATmega328P data sheet (docs/reference/avr.md names its sections). A write in cycle t acts from cycle t + 1.
 
 enum { PC_MASK = FLASH_BYTES / 2 - 1, IO_START = 0x20, RAMEND = DATA_BYTES - 1 };
 #define NEVER (~(u64)0)
-
-enum {
-    PINB = 0x23, DDRB, PORTB, PINC, DDRC, PORTC, PIND, DDRD, PORTD,
-    TIFR0 = 0x35, TIFR1, TIFR2, PCIFR = 0x3B, EIFR, EIMSK, GPIOR0, EECR, EEDR, EEARL, EEARH, GTCCR,
-    TCCR0A, TCCR0B, TCNT0, OCR0A, OCR0B, GPIOR1 = 0x4A, GPIOR2, SPCR, SPSR, SPDR, ACSR = 0x50,
-    SMCR = 0x53, MCUSR, MCUCR, SPMCSR = 0x57, SPL = 0x5D, SPH, SREG_AT,
-    WDTCSR = 0x60, CLKPR, PRR = 0x64, OSCCAL = 0x66, PCICR = 0x68, EICRA, PCMSK0 = 0x6B, PCMSK1, PCMSK2,
-    TIMSK0, TIMSK1, TIMSK2, ADCL = 0x78, ADCH, ADCSRA, ADCSRB, ADMUX, DIDR0 = 0x7E, DIDR1,
-    TCCR1A, TCCR1B, TCCR1C, TCNT1L = 0x84, TCNT1H, ICR1L, ICR1H, OCR1AL, OCR1AH, OCR1BL, OCR1BH,
-    TCCR2A = 0xB0, TCCR2B, TCNT2, OCR2A, OCR2B, ASSR = 0xB6, TWBR = 0xB8, TWAMR = 0xBD,
-    UCSR0A = 0xC0, UCSR0B, UCSR0C, UBRR0L = 0xC4, UBRR0H, UDR0
-};
 
 // Vectors by number; vector n is at word 2 n.
 enum {

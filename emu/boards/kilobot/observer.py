@@ -9,12 +9,17 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
+from emu.avr.core.addresses import ADDRESSES
 from emu.avr.machine import HZ, UDR0, Change
 from emu.boards.kilobot.messages import PulseDecoder
 
-DDRB, PORTB, DDRC, PORTC, DDRD, PORTD = 0x24, 0x25, 0x27, 0x28, 0x2A, 0x2B
+DDRB, PORTB, DDRC, PORTC, DDRD, PORTD = (
+    ADDRESSES[name] for name in ("DDRB", "PORTB", "DDRC", "PORTC", "DDRD", "PORTD")
+)
 WDRF: Final = 3
-MCUSR, TCCR2A, TCCR2B, OCR2A, OCR2B = 0x54, 0xB0, 0xB1, 0xB3, 0xB4
+MCUSR, TCCR2A, TCCR2B, OCR2A, OCR2B = (
+    ADDRESSES[name] for name in ("MCUSR", "TCCR2A", "TCCR2B", "OCR2A", "OCR2B")
+)
 WATCHED: Final = (DDRB, PORTB, DDRC, PORTC, DDRD, PORTD, TCCR2A, TCCR2B, OCR2A, OCR2B, UDR0, MCUSR)
 LED_PINS: Final = (((DDRD, PORTD, 5), (DDRD, PORTD, 4)), ((DDRC, PORTC, 3), (DDRC, PORTC, 2)),
                    ((DDRC, PORTC, 5), (DDRC, PORTC, 4)))  # fmt: skip

@@ -8,6 +8,7 @@ import tempfile
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
+from emu.avr.core.addresses import ADDRESSES
 from emu.avr.core.state import FLASH_BYTES, PROGRAM_ENTRIES, Avr, Decoded, declaration
 from emu.avr.isa.row import Row
 from emu.avr.isa.rows import ROWS
@@ -16,7 +17,7 @@ from emu.native_library import address_of
 from firmware.tools.simulated.kilobot import compiled
 
 HERE = Path(__file__).parent
-GPIOR0, GPIOR1, GPIOR2, SREG = 0x3E, 0x4A, 0x4B, 0x5F
+GPIOR0, GPIOR1, GPIOR2, SREG = (ADDRESSES[name] for name in ("GPIOR0", "GPIOR1", "GPIOR2", "SREG"))
 MEMORY_REGISTERS = {GPIOR0, GPIOR1, GPIOR2, SREG}
 """Data addresses of I/O registers that are the same plain memory in both emulators."""
 NOT_COMPARED = ("sleep", "wdr", "break", "spm")
