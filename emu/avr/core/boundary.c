@@ -65,6 +65,11 @@ static int boundary(struct avr *m)
             m->log_count >= LOG_ROOM / 2)
             return 0;
         apply_events(m, m->cycle);
+        if (m->must_reset) {
+            watchdog_reset(m);
+            find_next_due(m);
+            continue;
+        }
         if (m->asleep) {
             if (!sleep_on(m))
                 return 0;
@@ -79,7 +84,7 @@ static int boundary(struct avr *m)
         if (m->round && !m->shadow) {
             u64 passed = (m->deadline - m->cycle) / m->round * m->round;
             m->cycle += passed, m->skipped += passed;
-            if (m->cycle >= m->until)
+            if (m->cycle >= m->deadline)
                 continue;
         }
         if (m->shadow && m->cycle + 1 < m->deadline)

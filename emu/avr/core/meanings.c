@@ -192,7 +192,7 @@ static inline u16 word_difference(u8 *s, u32 a, u32 b)
     ({ \
         u32 z_ = (address); \
         u8 w_; \
-        if (data[SPMCSR] & (1u << SIGRD | 1u << BLBSET)) \
+        if (data[SPMCSR] & (1u << SIGRD | 1u << BLBSET) && cycle <= m->spm_window) \
             w_ = (u8)special_row(m, z_); \
         else if (z_ >= FLASH_BYTES) \
             FAIL(FAULT_FLASH, z_); \
@@ -247,6 +247,7 @@ static inline u16 word_difference(u8 *s, u32 a, u32 b)
     do { \
         SAVE(); \
         watchdog_restart(m, cycle + 1); \
+        m->touched |= m->due[EVENT_WATCHDOG] != NEVER; \
         reschedule(m); \
         RESUME(); \
     } while (0)

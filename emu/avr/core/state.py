@@ -53,6 +53,7 @@ FIELDS: Final[tuple[tuple[str, str, int], ...]] = (
     ("trace_data", _U8, DATA_BYTES),  # data memory at trace_from
     ("shadow", _U8, 1),  # 1: one instruction runs before the next interrupt
     ("halted", _U8, 1),  # 1: nothing can wake the CPU
+    ("must_reset", _U8, 1),  # 1: the watchdog resets the microcontroller before the next instruction
     ("looping", _U8, 1),  # cycles of a jump to itself that was just executed, else 0
     ("program_changed", _U8, 1),  # 1: flash was written and must be decoded again
     ("unmodelled", _U8, 1),  # data address of the last access to a register without model, 0: none
@@ -153,6 +154,9 @@ class Avr(ctypes.Structure):
     lit: int
     unmodelled: int
     skipped: int
+    tracing: int
+    round: int
+    resting: int
     data: ctypes.Array[ctypes.c_uint8]
     flash: ctypes.Array[ctypes.c_uint8]
     eeprom: ctypes.Array[ctypes.c_uint8]

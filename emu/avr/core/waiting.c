@@ -6,7 +6,7 @@ static void loop_on_itself(struct avr *m)
     u32 cycles = m->looping;
     m->looping = 0;
     apply_events(m, m->cycle);
-    if (m->shadow || (m->data[SREG_AT] & FLAG_I && pending_vectors(m)))
+    if (m->must_reset || m->shadow || (m->data[SREG_AT] & FLAG_I && pending_vectors(m)))
         return;
     if (!can_continue(m)) {
         halt(m);

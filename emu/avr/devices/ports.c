@@ -36,9 +36,12 @@ static void port_update(struct avr *m, u32 port, u64 at)
 }
 
 // The synchroniser of a pin is one cycle late.
-static u32 port_read(const struct avr *m, u32 port)
+static u32 port_read(struct avr *m, u32 port)
 {
-    return m->cycle <= m->pin_changed[port] && m->pin_changed[port] ? m->pin_before[port] : m->pin_now[port];
+    if (m->cycle > m->pin_changed[port] || !m->pin_changed[port])
+        return m->pin_now[port];
+    m->touched = 1; // the next read may give another value
+    return m->pin_before[port];
 }
 
 static void port_write(struct avr *m, u32 address, u32 value, u64 at)

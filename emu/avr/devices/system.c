@@ -117,6 +117,8 @@ static void reset_cpu(struct avr *m, u32 cause)
     m->comparator_out = m->adc_locked = m->adc_warm = 0;
     m->uart_shifting = m->uart_has_next = m->uart_fifo_count = 0;
     m->eeprom_window = m->spm_window = m->watchdog_window = m->clock_window = m->vector_window = 0;
+    if (m->lit)
+        m->lit = 0, m->light_changed = 1, m->light_cycle = m->cycle, m->deadline = 0;
     for (u32 port = 0; port < 3; port++)
         port_update(m, port, m->cycle);
     erase_page_buffer(m);
@@ -134,8 +136,16 @@ static void watchdog_done(struct avr *m, u64 at)
         watchdog_restart(m, at);
         return;
     }
+    m->due[EVENT_WATCHDOG] = NEVER;
+    m->must_reset = 1; // the event may come within an instruction, which ends first
+    m->deadline = 0;
+}
+
+static void watchdog_reset(struct avr *m)
+{
     u32 cause = m->data[MCUSR] | 1u << WDRF;
+    m->must_reset = 0;
     m->resets++;
     reset_cpu(m, cause);
-    log_change(m, MCUSR, m->data[MCUSR], at);
+    log_change(m, MCUSR, m->data[MCUSR], m->cycle);
 }

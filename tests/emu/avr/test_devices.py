@@ -5,7 +5,8 @@ from __future__ import annotations
 from itertools import pairwise
 
 from emu.avr.machine import Atmega328p
-from tests.emu.avr.conftest import Machine
+from emu.boards.kilobot.swarm import KilobotSetup, KilobotSwarm
+from tests.emu.avr.conftest import Build, Machine
 
 PORTB = 0x25
 AIN0, AIN1 = 9, 10
@@ -202,7 +203,7 @@ def test_the_watchdog_resets_within_an_instruction(machine: Machine) -> None:
             int main(void) {{
                 starts = MCUSR & 8 ? starts + 1 : 0;
                 MCUSR = 0;
-                asm volatile(".rept {nops}\n nop\n .endr");
+                asm volatile(".rept {nops}\\n nop\\n .endr");
                 wdt_enable(WDTO_15MS);
                 for (;;) OCR2A = 5;
             }}""")
@@ -210,20 +211,15 @@ def test_the_watchdog_resets_within_an_instruction(machine: Machine) -> None:
         assert (m.state.resets, m.peek("starts")) == (2, 2), nops
 
 
-def test_a_reset_switches_the_emitters_off(machine: Machine) -> None:
-    """The reset makes the pins inputs; the end of the light ends the native call as the program's own does."""
-    m = machine("""
+def test_a_reset_switches_the_emitters_off(build: Build) -> None:
+    """The reset makes the pins inputs, so the light of the next start is another pulse."""
+    image = build("""
         #include <avr/wdt.h>
-        int main(void) {
-            if (!(MCUSR & 8)) { wdt_enable(WDTO_15MS); DDRB = 1; PORTB = 1; }
-            for (;;) ;
-        }""")
-    m.state.emitters = 1
-    m.run_until(1_000)
-    assert (m.state.lit, m.state.light_changed) == (1, 1)
-    m.state.light_changed = 0
-    m.run_until(200_000)
-    assert (m.state.resets, m.state.lit, m.state.light_changed) == (1, 0, 1)
+        int main(void) { MCUSR = 0; wdt_enable(WDTO_15MS); DDRB = 1; PORTB = 1; for (;;) ; }""")
+    swarm = KilobotSwarm([KilobotSetup(image)])
+    swarm.run(0.1)
+    assert swarm.robots[0].state.resets == 6
+    assert swarm.pulses_sent(0) == 7
 
 
 def test_the_signature_is_read_within_four_cycles(machine: Machine) -> None:

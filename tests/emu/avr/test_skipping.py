@@ -8,6 +8,7 @@ import pytest
 
 from emu.avr.core.state import FIELDS
 from emu.avr.machine import Atmega328p
+from emu.boards.kilobot.swarm import KilobotSetup, KilobotSwarm
 from tests.emu.avr.conftest import Build
 
 PIECE = 3
@@ -121,16 +122,14 @@ def test_a_pin_is_read_late_once(build: Build) -> None:
 
     The change of an emitter ends the native call, so the search for rounds begins right behind it.
     """
-    m = Atmega328p(build("""
+    image = build("""
         int main(void) {
             DDRB = 1;
             asm volatile("ldi r25, 0\\n 1: dec r25\\n brne 1b\\n ldi r24, 0\\n sbi 5, 0\\n"
                          "1: in r24, 3\\n sbrs r24, 0\\n rjmp 1b" ::: "r24", "r25");
             PORTC = 1;
             for (;;) ;
-        }"""))  # fmt: skip
-    m.state.emitters = 1
-    m.run_until(100_000)
-    m.state.light_changed = 0
-    m.run_until(100_000)
-    assert m.peek(0x28) == 1
+        }""")
+    swarm = KilobotSwarm([KilobotSetup(image)])
+    swarm.run(0.01)
+    assert swarm.robots[0].peek(0x28) == 1
