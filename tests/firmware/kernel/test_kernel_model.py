@@ -21,7 +21,7 @@ from tests.firmware.model.compare import Kernels, build, random_programs
 from tests.firmware.model.faults import FAULTS, FOUND_BY, plant
 from tests.firmware.model.generator import MOST_CALLS, Generator
 from tests.firmware.model.on_target import DEFINES, Robot, small_programs
-from tests.firmware.model.program import Program
+from tests.firmware.model.program import Program, named_texts
 from tests.fuzz.seeds import base_seed
 
 PROGRAMS = 600
@@ -118,6 +118,13 @@ def test_drawn_programs_agree(built: Path) -> None:
         assert not differences(kernels, [Generator(random).program()])
 
     agree()
+
+
+@pytest.mark.slow
+def test_interrupts_at_known_boundaries_agree(built: Path) -> None:
+    """Programs whose interrupt comes at a boundary that only one order of the kernel's steps explains."""
+    programs = [Program.parse(text) for text in named_texts("interrupted.txt").values()]
+    assert not differences(Kernels(built / "interpreter"), programs)
 
 
 @pytest.mark.slow

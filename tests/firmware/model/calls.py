@@ -84,15 +84,15 @@ class Calls:
 
     def allocate(self, size: int) -> bool:
         """Take heap memory; False: there is none (a test makes allocations fail)."""
-        self.boundary()
-        if self.allocations_to_skip:
-            self.allocations_to_skip -= 1
-        elif self.allocations_to_fail:
+        fails = not self.allocations_to_skip and self.allocations_to_fail > 0
+        if fails:
             self.allocations_to_fail -= 1
-            return False
-        self.heap += self.sizes.rounded(size)
-        self.peak = max(self.peak, self.heap)
-        return True
+        else:
+            self.allocations_to_skip = max(self.allocations_to_skip - 1, 0)
+            self.heap += self.sizes.rounded(size)
+            self.peak = max(self.peak, self.heap)
+        self.boundary()
+        return not fails
 
     def free(self, size: int) -> None:
         self.boundary()

@@ -167,8 +167,11 @@ class Events(Threads):
     def lose(self, number: int) -> None:
         """Count a lost message: the first events that lose one have counters of their own."""
         self.events_lost = min(self.events_lost + 1, SATURATED)
+        self.boundary()
         if number and (number in self.losses or len(self.losses) < self.sizes.loss_counters):
-            self.losses[number] = min(self.losses.get(number, 0) + 1, SATURATED)
+            self.losses.setdefault(number, 0)
+            self.boundary()
+            self.losses[number] = min(self.losses[number] + 1, SATURATED)
         else:
             self.other_losses = min(self.other_losses + 1, SATURATED)
 
@@ -185,8 +188,8 @@ class Events(Threads):
     def deliver_queued(self) -> None:
         """Deliver the messages queued so far; those that handlers send wait for the next delivery."""
         self.batch, self.queue = self.queue, []
+        self.boundary()
         while self.batch:
-            self.boundary()
             self.deliver(self.batch.pop(0))
 
     def deliver(self, message: Message) -> None:

@@ -158,18 +158,20 @@ class Executor:
             result = self.actions[code](place, a, b, c)
             if type(result) is GeneratorType:
                 result = yield from result
-            k.boundary()
-            while (k.forced or k.slice_over) and not k.depth and k.started:
-                yield "preempted"
-                k.boundary()
-            self.put(place, code, *self.finished(place, code, a, result))
+            yield from self.interrupted()
+            seen = self.finished(place, code, a, result)
+            yield from self.interrupted()
+            self.put(place, code, *seen)
         place.index = len(self.program.scripts[place.number].operations)
         yield from self.interrupted()
         self.put(place, END, 0)
 
     def interrupted(self) -> Iterator[str]:
-        self.k.boundary()
-        yield from self.k.settle()
+        k = self.k
+        k.boundary()
+        while (k.forced or k.slice_over) and not k.depth and k.started:
+            yield "preempted"
+            k.boundary()
 
     def at_once(self, place: Place, result: int = 0) -> bool:
         """Perform the operations of another script and return its answer."""
@@ -181,7 +183,9 @@ class Executor:
             self.k.boundary()
             returned = self.actions[code](place, a, b, c)
             self.k.boundary()
-            self.put(place, code, *self.finished(place, code, a, returned))
+            seen = self.finished(place, code, a, returned)
+            self.k.boundary()
+            self.put(place, code, *seen)
         place.index = len(script.operations)
         self.k.boundary()
         self.put(place, END, 0)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from tests.firmware.model.compare import HERE, Kernels, build, random_programs
-from tests.firmware.model.program import Program
+from tests.firmware.model.program import Program, named_texts
 
 SOURCES = HERE.parents[2] / "firmware" / "openswarm"
 BATCH = 100
@@ -126,12 +126,7 @@ FAULTS = (
 """Those up to "an ISR gets the wrong error" stem from the kernel's history."""
 
 
-def _found_by() -> dict[str, str]:
-    parts = (HERE / "found_by.txt").read_text().split("# ")[1:]
-    return {name.strip(): text for name, _, text in (part.partition("\n") for part in parts)}
-
-
-FOUND_BY = _found_by()
+FOUND_BY = named_texts("found_by.txt")
 """Text of a small program that differs while a fault is planted, by the name of the fault."""
 
 

@@ -90,6 +90,12 @@ class Program:
         return "\n".join(lines)
 
 
+def named_texts(file: str) -> dict[str, str]:
+    """Return the texts of the programs in a file of this folder, by their names."""
+    parts = (HERE / file).read_text().split("# ")[1:]
+    return {name.strip(): text for name, _, text in (part.partition("\n") for part in parts)}
+
+
 def script_name(number: int) -> str:
     """Return a script's kind and number, such as "thread 2"."""
     kind = KIND_OF[number]

@@ -125,7 +125,6 @@ class Threads(Calls):
             self.expire()
             thread.wake = self.now + ms
             self.set_alarm(thread.wake)
-        self.boundary()
         yield "block"
 
     def wake(self, thread: Thread, message: Message | None = None) -> None:
@@ -156,11 +155,13 @@ class Threads(Calls):
         self.deliver_queued()
         if self.alarm_expired:
             self.alarm_expired = False
+            self.boundary()
             self.expire()
             self.expire_timers()
         self.depth = 0
         if self.supervision_due:
             self.supervision_due = False
+            self.boundary()
             self.supervise()
         self.boundary()
         self.serve_posts()
@@ -301,6 +302,7 @@ class Threads(Calls):
         assert thread.period is not None
         thread.period.missed = True
         self.deadlines_missed = min(self.deadlines_missed + 1, SATURATED)
+        self.boundary()
         self.announce(DEADLINE_MISSED, thread.pid)
 
     def announce(self, number: int, value: int) -> None:
@@ -324,6 +326,7 @@ class Threads(Calls):
     def set_alarm(self, moment: int) -> None:
         if self.alarm is None or moment < self.alarm:
             self.alarm = moment
+        self.boundary()
 
     def expire(self) -> None:
         """Wake the threads whose time-out has expired, in order of blocking."""
