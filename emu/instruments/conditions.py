@@ -9,13 +9,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from emu.debug.expressions.expression import evaluate, number_of
+from emu.debug.dwarf.location import Unavailable
+from emu.debug.expressions.expression import ExpressionError, evaluate, number_of
 from emu.debug.expressions.filters import filter_of
 from emu.dspic30f.change_log import Change, WatchedNumber
 from emu.instruments.changes import is_in_ram, log_changes
 
 if TYPE_CHECKING:
-    from emu.debug.inspector import Inspector
+    from emu.debug.inspector import Frame, Inspector
     from emu.machine.machine import Machine
     from emu.machine.stops import Stop
     from emu.system.filters import Filter
@@ -29,7 +30,7 @@ def run_to_place(machine: Machine, inspector: Inspector, address: int, condition
 
     def holds() -> bool:
         frames = inspector.frames()
-        return bool(number_of(evaluate(inspector, condition, frames[0] if frames else None)))
+        return _holds(inspector, condition, frames[0] if frames else None)
 
     return machine.run_to(address, limit, holds, filter_of(inspector, condition, address))
 
@@ -42,7 +43,7 @@ def run_until(machine: Machine, inspector: Inspector, condition: str, limit: int
     """
 
     def holds() -> bool:
-        return bool(number_of(evaluate(inspector, condition)))
+        return _holds(inspector, condition, None)
 
     holds()
     found = filter_of(inspector, condition)
@@ -52,6 +53,14 @@ def run_until(machine: Machine, inspector: Inspector, condition: str, limit: int
     if stop.reason != "limit" or machine.cycle >= limit:
         return stop
     return _run_until_change(machine, found, holds, limit)
+
+
+def _holds(inspector: Inspector, condition: str, frame: Frame | None) -> bool:
+    """Whether a condition holds in a frame. Raises ExpressionError, also for a variable that has no value there."""
+    try:
+        return bool(number_of(evaluate(inspector, condition, frame)))
+    except Unavailable as error:
+        raise ExpressionError(f"{condition!r}: {error}") from None
 
 
 def _run_until_change(machine: Machine, filter_: Filter, holds: Callable[[], bool], limit: int) -> Stop:

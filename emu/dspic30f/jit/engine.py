@@ -149,6 +149,8 @@ class JitEngine:
         self._longest = NATIVE_CYCLES
         self._warm_at = 0 if TRANSLATOR in sys.modules else WARM_UP
         self._counting: Counting | None = None
+        self._count_key: object = None
+        """Value that distinguishes the code of one `start_counting` from that of every other one."""
         self._state: Final = core.state
         self._u16: Final = core.record.u16
         self._words: Final = core.chip.program["flash"].end // 2
@@ -383,6 +385,7 @@ class JitEngine:
         execute = self._core.sequencer.execute
         self._interpret, self._run_cold, self.wait, self._native = execute, lambda _limit: execute(), True, run
         self._counting, self._longest, self._dispatch = counting, counting.longest or NATIVE_CYCLES, None
+        self._count_key = object()
         self._env[ACCOUNTING] = counting.address
         self.forget()
 
@@ -390,6 +393,7 @@ class JitEngine:
             counting.stop()
             self._interpret, self._run_cold, self.wait, self._native = saved
             self._counting, self._longest, self._dispatch = None, NATIVE_CYCLES, None
+            self._count_key = None
             self.forget()
 
         return stop
@@ -467,8 +471,7 @@ class JitEngine:
             self._wiring = core.bus.rules[:], wiring_hash(layout)
         identity = translation_hash(key.context, layout, self._wiring[1])
         program = hashlib.sha256(core.program.flash).digest()
-        counted = 0 if self._counting is None else self._env_address  # counting code depends on the cells
-        switches = core.bus.off, frozenset(core.bus.watched), self.wait, counted, self.share_group
+        switches = core.bus.off, frozenset(core.bus.watched), self.wait, self._count_key, self.share_group
         shared = identity, program, layout.hooks, frozenset(layout.filters.items()), *switches
         code = _shared.get(shared)
         if code is None:

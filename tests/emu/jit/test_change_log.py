@@ -230,6 +230,15 @@ def test_a_run_ends_at_a_place_when_a_condition_holds(path: Path, place: str, wh
     assert native.var(when)
 
 
+def test_runs_that_follow_each_other_have_a_condition_each(path: Path) -> None:
+    """Native code of the first condition would not see a store to the variable of the second one."""
+    native, plain = machine_of(path, "jit"), machine_of(path, "plain")
+    for until in ("letter == 2", "rare == 2"):
+        stops = [machine.run(cycles=CYCLES, until=until) for machine in (native, plain)]
+        assert stops[0].reason == "until"
+        assert stops[0] == stops[1]
+
+
 def test_conditions_that_are_refused(path: Path) -> None:
     machine = machine_of(path, "jit")
     with pytest.raises(ValueError, match="needs a place"):
@@ -238,3 +247,7 @@ def test_conditions_that_are_refused(path: Path) -> None:
         machine.run(cycles=10, until="tocks > 2")
     with pytest.raises(KeyError, match="tocks"):
         machine.run(cycles=10, until="tocks")
+    with pytest.raises(ValueError, match="no 2 bytes of data space at 0x3001"):
+        machine.run(cycles=10, until="*(int *)0x3001 > 3")
+    with pytest.raises(ValueError, match="'n > 3': optimised out"):
+        machine.run(until="deep", when="n > 3")
