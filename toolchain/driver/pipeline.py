@@ -322,12 +322,15 @@ class ModuleCompiler:
         self._emit(c)
 
     def _context(self, f: Function) -> FunctionContext:
-        """Prepare a function for the passes. Raises UnsupportedError for an interrupt function with a signature."""
+        """Prepare a function for the passes. Raises UnsupportedError for a signature that it must not have."""
         notes = self.notes.get(f.name, set())
         interrupt = isr.interrupt_kind(notes, self.declared(f.name))
         probe = isr.wants_probe(notes, self.options.stack_check and not interrupt)
         if interrupt and (f.args or f.ret.kind != "void"):
             raise UnsupportedError("an interrupt function takes and returns nothing", self.declared(f.name))
+        if isr.NAKED in notes and isr.hides_operands(f):
+            what = f"a result or parameter of the naked function {f.name} that only assembly uses"
+            raise UnsupportedError(f"{what}: remove its C statements", self.declared(f.name))
         if not self.options.debug:
             f.dbg_records = []
         bindings.bind(f, self.dwarf.info)

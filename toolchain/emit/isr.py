@@ -13,6 +13,7 @@ from toolchain.ir.model import (
     Function,
     GlobalRef,
     Module,
+    Undef,
     UnsupportedError,
     Value,
 )
@@ -67,6 +68,14 @@ def interrupt_kind(notes: set[str], position: str) -> str:
         raise UnsupportedError("both auto_psv and no_auto_psv", position)
     kind = "no_auto_psv" if "no_auto_psv" in words else "auto_psv"
     return kind + (",shadow" if "shadow" in words else "")
+
+
+def hides_operands(f: Function) -> bool:
+    """Whether the function has a result or a parameter that no statement outside of inline assembly sets or reads."""
+    read = {id(value) for b in f.blocks for i in b.instrs for value in i.args}
+    ends = [b.instrs[-1] for b in f.blocks if f.ret.kind != "void"]
+    unset = any(i.op == "unreachable" or (i.op == "ret" and isinstance(i.args[0], Undef)) for i in ends)
+    return unset or any(id(parameter) not in read for parameter in f.args)
 
 
 def preserved(notes: set[str]) -> tuple[str, ...]:

@@ -102,6 +102,12 @@ NAKED: dict[str, Rewrite] = {"naked": lambda _arguments, _number: ['__annotate__
 """The attribute of functions without prologue and epilogue, for sources whose naked functions contain C statements."""
 NAKED_WITH_STATEMENTS = re.compile(rb"non-ASM statement in naked function|parameter references not allowed in naked")
 """Pattern of clang's messages about such a source."""
+_ASSEMBLY_BODY = re.compile(
+    r"""[^;{]*\{(?:[\s;]|^\#[^\n]*$|\b(?:__asm__|__asm|asm)\b\s*(?:(?:__volatile__|volatile)\s*)?
+    \((?:\s|^\#[^\n]*$|"(?:[^"\\\n]|\\.)*")*\))*\}""",
+    re.MULTILINE | re.VERBOSE,
+)
+"""Pattern of the rest of a function definition whose statements are basic assembly."""
 NAMES = "|".join(REWRITES)
 USED = re.compile(rf"\b(?:__)?(?:{NAMES})(?:__)?\b".encode())
 """Pattern of the names of XC16's attributes in a source."""
@@ -122,12 +128,15 @@ def rewrite(text: str) -> str:
 
 
 def rewrite_naked(text: str) -> str:
-    """Replace the attribute `naked` in preprocessed C. The lines keep their numbers."""
-    return _replace(text, NAKED)
+    """Replace the attribute `naked` in preprocessed C, except where the definition that follows has assembly only.
+
+    The lines keep their numbers.
+    """
+    return _replace(text, NAKED, _ASSEMBLY_BODY)
 
 
-def _replace(text: str, rules: dict[str, Rewrite]) -> str:
-    """Replace the attributes for which there is a rule."""
+def _replace(text: str, rules: dict[str, Rewrite], unchanged: re.Pattern[str] | None = None) -> str:
+    """Replace the attributes for which there is a rule, except in lists before a match of `unchanged`."""
     out: list[str] = []
     at = number = 0
     registers: list[str] = []
@@ -138,6 +147,9 @@ def _replace(text: str, rules: dict[str, Rewrite]) -> str:
         if span is None:
             continue
         start, end = span
+        close = text.index(")", text.index(")", end) + 1) + 1
+        if unchanged and unchanged.match(text, close):
+            continue
         number += 1
         replaced = []
         for attribute in split(_MARKER.sub(" ", text[start:end])):
@@ -146,7 +158,6 @@ def _replace(text: str, rules: dict[str, Rewrite]) -> str:
                 registers += _register(text, token.start(), end, arguments[0])
             rule = rules.get(name)
             replaced += [attribute] if rule is None else rule(arguments, number)
-        close = text.index(")", text.index(")", end) + 1) + 1
         lines = sum(not line.startswith("#") for line in text[token.start() : close].split("\n")[1:])
         out += [text[at : token.start()], f"__attribute__(({', '.join(replaced)}))", "\n" * lines]
         at = close

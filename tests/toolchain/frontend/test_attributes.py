@@ -89,6 +89,30 @@ def test_naked_function_that_needs_a_frame_is_an_error(tmp_path: Path) -> None:
     assert "a.c:2" in built.first_error
 
 
+MIXED = """
+int y;
+int __attribute__((naked)) next(int a) { asm("add w0,#1,w0"); asm volatile("return"); }
+void __attribute__((naked)) with_statements(void) { y = y + 4; asm("return"); }
+int main(void) { with_statements(); return next(3) == 4 && y == 4 ? 0 : 1; }
+"""
+
+
+def test_naked_functions_of_assembly_keep_parameter_and_result(tmp_path: Path) -> None:
+    """A naked function with C statements in the same file does not change one whose operands only assembly uses."""
+    (tmp_path / "a.c").write_text(MIXED)
+    built = build([tmp_path / "a.c"], tmp_path / "a.elf", "-Os", "-Wall")
+    assert (built.status, built.messages) == (0, "")
+    assert run(tmp_path / "a.elf").status == 0
+
+
+@pytest.mark.parametrize("body", ['y = a + 4; asm("mov #1,w0\\n return");', 'y = 4; asm("return"); return 0;'])
+def test_operands_that_only_assembly_of_a_naked_function_uses_are_an_error(body: str, tmp_path: Path) -> None:
+    (tmp_path / "a.c").write_text(f"int y;\nint __attribute__((naked)) f(int a) {{ {body} }}\n")
+    built = build([tmp_path / "a.c"], tmp_path / "a.o", "-c", "-Os")
+    assert built.status == 2
+    assert "a result or parameter of the naked function f that only assembly uses" in built.messages
+
+
 @pytest.mark.parametrize("level", ["-O0", "-Os"])
 def test_program_with_all_attributes(level: str, tmp_path: Path) -> None:
     """The program returns 0, otherwise the number of its first failing check; a copy in a header works, too."""
