@@ -27,8 +27,8 @@ from emu.commands.footprint import _equation as memory_equation  # noqa: E402
 from emu.image.footprint import pieces, totals  # noqa: E402
 from emu.image.loader import load_image  # noqa: E402
 from emu.image.model import Image  # noqa: E402
-from emu.kernel_metrics.latency import run_measures  # noqa: E402
 from emu.kernel_metrics.meter import Meter  # noqa: E402
+from emu.kernel_metrics.suite.latency import run_measures  # noqa: E402
 from emu.kernel_metrics.target import Target  # noqa: E402
 from firmware.tools.simulated.machine import NotInstalled  # noqa: E402
 from firmware.tools.simulated.measure import measure  # noqa: E402

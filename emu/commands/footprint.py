@@ -22,8 +22,6 @@ from emu.host.files import atomic_text_file
 from emu.image.footprint import UNKNOWN, Piece, pieces, totals
 from emu.image.loader import load_image
 from emu.image.model import BYTES_PER_WORD, Image
-from emu.kernel_metrics import memory
-from emu.kernel_metrics import options as kernel_options
 from emu.kernel_metrics.application_memory import ApplicationMemory, engine_for, measure
 from emu.kernel_metrics.baseline import Baseline, Number, Row
 from emu.kernel_metrics.blame import LINES_SHOWN, short
@@ -32,6 +30,8 @@ from emu.kernel_metrics.kernel_structures import KernelStructures
 from emu.kernel_metrics.memory_picture import html, ram_parts, rom_parts, svg
 from emu.kernel_metrics.memory_text import memory_text
 from emu.kernel_metrics.owners import sizes_by_owner
+from emu.kernel_metrics.suite import memory
+from emu.kernel_metrics.suite import options as kernel_options
 from emu.kernel_metrics.target import MeasureError
 
 DESCRIPTION = """\

@@ -1,1 +1,1 @@
-"""Measurements of the OpenSwarm kernel, by means of the applications `footprint`, `latency` and `options`."""
+"""Memory and cycles of the OpenSwarm kernel and its applications."""

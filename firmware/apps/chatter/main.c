@@ -1,4 +1,4 @@
-/* Numbered frames by infra-red, and what of others' arrives: read by docs/tools/infrared_link.py and infrared_swarm.py (README.md). */
+/* Numbered frames by infra-red, and what of others' arrives: read by docs/tools/infrared/link.py and swarm.py (README.md). */
 #include <openswarm.h>
 #include <openswarm_infrared.h>
 #include <openswarm_io.h>

@@ -6,7 +6,7 @@
 
 enum { OPTIONS_EVENT = SYS_FIRST_USER_EVENT, OPTIONS_ELSEWHERE, OPTIONS_NEIGHBOUR = SYS_FIRST_USER_EVENT + 8 };
 
-/* emu/kernel_metrics/options.py has the same names in the same order. */
+/* emu/kernel_metrics/suite/options.py has the same names in the same order. */
 enum {
     LOCK, LOCK_SECOND, LOCK_TAKEN, UNLOCK, UNLOCK_SECOND, UNLOCK_ONE_WAITS, UNLOCK_TWO_WAIT,
     UNLOCK_SECOND_ONE_WAITS, UNLOCK_PRIORITIES, UNLOCK_TO_BETTER, START, START_JOINABLE, JOIN_ZOMBIE, JOIN_LIVING, END, END_JOINED,

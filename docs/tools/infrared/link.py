@@ -1,10 +1,10 @@
 """Measure infrared messages between two robots with the real firmware in the arena, for docs/swarm.md.
 
-    python docs/tools/infrared_link.py [--seconds 3] [--noise 2] [--jobs 2] [--data docs/results/infrared-link.csv]
+    python docs/tools/infrared/link.py [--seconds 3] [--noise 2] [--jobs 2] [--data docs/results/infrared-link.csv]
 
 One robot or both send continuously, at several distances and angles. The same arguments give the same figures.
-infrared_published.py draws the data together with the published values of SwarmCom and libIrcom. infrared_swarm.py
-measures larger swarms.
+published.py draws the data together with the published values of SwarmCom and libIrcom. swarm.py measures larger
+swarms.
 """
 
 from __future__ import annotations
@@ -180,7 +180,7 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, default=3.0)
     parser.add_argument("--noise", type=float, default=2.0, metavar="COUNTS")
     parser.add_argument("--jobs", type=int, default=2)
-    parser.add_argument("--data", type=Path, help="CSV file to write, for infrared_published.py")
+    parser.add_argument("--data", type=Path, help="CSV file to write, for published.py")
     chosen = parser.parse_args()
     image_for("chatter")  # build the image once, before the processes start
     runs = [(2, one, 0.0) for one in DISTANCES] + [(1, one, 0.0) for one in DISTANCES]

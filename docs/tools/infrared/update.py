@@ -1,9 +1,9 @@
 """Measure the time in which a swarm reprograms itself by infrared, with the real firmware in the arena, for
 docs/swarm.md.
 
-    python docs/tools/infrared_update.py [--robots 10] [--rows 1] [--lost 0] [--most 120] [--noise 2]
+    python docs/tools/infrared/update.py [--robots 10] [--rows 1] [--lost 0] [--most 120] [--noise 2]
 
-Robots with apps/spreading are on the grid of infrared_swarm.py, and the first one has a program of `--rows` flash rows.
+Robots with apps/spreading are on the grid of swarm.py, and the first one has a program of `--rows` flash rows.
 The output is the time at which each robot has received the whole program, and the time at which it has restarted and
 calls it. The exit status is 1 if a robot does not call it within `--most` seconds.
 """
@@ -20,7 +20,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from infrared_swarm import grid, word
+from swarm import grid, word
 
 from arena.infrared.channel import OpticalChannel
 from arena.robots.firmware_controller import FirmwareController

@@ -1,6 +1,6 @@
 """Measure infrared messages among 2, 10 and 30 robots with the real firmware in the arena, for docs/swarm.md.
 
-    python docs/tools/infrared_swarm.py [--seconds 5] [--noise 2] [--jobs 2]
+    python docs/tools/infrared/swarm.py [--seconds 5] [--noise 2] [--jobs 2]
 
 The robots are on a triangular grid with a spacing of 11 cm and different headings. Each sends a message of eight bytes
 every 0.75 to 2.25 s. Every run is made twice; the exit status is 1 if the two results differ in any byte.
@@ -31,7 +31,7 @@ ROW = 6
 REACH_COUNTS = 8.0
 """Counts of light from another robot's emitters at which that robot is in reach. They correspond to about 27 cm between
 a sensor and an emitter that face each other. At this distance most frames of two undisturbed robots still arrive
-(docs/tools/infrared_link.py)."""
+(docs/tools/infrared/link.py)."""
 SELECTOR = 6
 """Selector of apps/chatter: a message every 0.75 to 2.25 s."""
 SENDERS, ENTRY = 30, "<5Hih"

@@ -1,8 +1,8 @@
 """Draw our infrared link together with the published values of SwarmCom and libIrcom, for docs/swarm.md.
 
-    python docs/tools/infrared_published.py [--figure docs/figures/infrared-link.png]
+    python docs/tools/infrared/published.py [--figure docs/figures/infrared-link.png]
 
-Input: docs/results/infrared-link.csv, which infrared_link.py measures, and docs/results/infrared-published.csv, which
+Input: docs/results/infrared-link.csv, which link.py measures, and docs/results/infrared-published.csv, which
 lists every published number with its source. Curves of the other systems are not available: only the abstract of the
 SwarmCom article was read, and libIrcom has published rates and a range but no errors. The figure therefore shows single
 numbers, dashed if UNVERIFIED.
@@ -15,12 +15,12 @@ import csv
 from pathlib import Path
 from typing import Any
 
-from infrared_link import CODE, WORDS, Found, Job, expected
+from link import CODE, WORDS, Found, Job, expected
 from scipy.stats import beta
 
 from arena.scene import palette
 
-HERE = Path(__file__).parents[1]
+DOCS = Path(__file__).parents[2]
 MESSAGE_BITS = 64
 SCARCE = 3.0
 """Rule of three: if n bits had no error, the error rate is below 3 / n with a confidence of 95 %."""
@@ -33,7 +33,7 @@ UNSURE = (0, (4, 2))
 
 
 def read_runs(path: Path) -> list[tuple[Job, Found]]:
-    """Return the runs in a data file of infrared_link.py."""
+    """Return the runs in a data file of link.py."""
     with path.open(newline="", encoding="utf-8") as file:
         return [
             (
@@ -169,9 +169,9 @@ def draw(path: Path, runs: list[tuple[Job, Found]], data: Path) -> None:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--measured", type=Path, default=HERE / "results" / "infrared-link.csv")
-    parser.add_argument("--published", type=Path, default=HERE / "results" / "infrared-published.csv")
-    parser.add_argument("--figure", type=Path, default=HERE / "figures" / "infrared-link.png")
+    parser.add_argument("--measured", type=Path, default=DOCS / "results" / "infrared-link.csv")
+    parser.add_argument("--published", type=Path, default=DOCS / "results" / "infrared-published.csv")
+    parser.add_argument("--figure", type=Path, default=DOCS / "figures" / "infrared-link.png")
     chosen = parser.parse_args()
     runs = read_runs(chosen.measured)
     draw(chosen.figure, runs, chosen.published)
