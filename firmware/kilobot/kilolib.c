@@ -19,11 +19,11 @@ enum {
     LATENCY = 40,    /* cycles from a pulse to the reading of its time */
     HALF_SLOT = 134,
     STOP_SLOT = 9,
-    LEADER = 2420,           /* from the first pulse to the one that ends the dark byte 0 */
-    BYTE_AFTER_LEADER = 286, /* from a stop pulse to the next start pulse */
+    LEADER = 2420,           /* cycles from the first pulse to the one that ends byte 0, which is dark */
+    BYTE_AFTER_LEADER = 286, /* cycles from a stop pulse to the next start pulse */
     BYTE_AFTER_BYTE = 282,
-    GIVE_UP = 2959, /* from a start pulse, without another one */
-    SETTLE = 540,   /* after its own first pulse a sender does not look for two slots */
+    GIVE_UP = 2959, /* cycles without a pulse after a start pulse: the frame is lost */
+    SETTLE = 540,   /* cycles, two slots, for which a sender ignores pulses after its own first one */
     FRAME = 12
 };
 enum { BOOT = 0x80, RESET = 0x83, SLEEP = 0x84, WAKEUP = 0x85, VOLTAGE = 0x87, RUN = 0x88, READUID = 0x89 };
@@ -43,7 +43,7 @@ message_rx_t kilo_message_rx;
 
 static volatile uint8_t state = IDLE, receiving, uid_bit;
 static uint8_t emitters, frame[FRAME], octet, random = 0xAA;
-static int8_t place; /* of the next byte in the frame; -1: byte 0 */
+static int8_t place; /* index of the next byte in the frame; -1: byte 0 */
 static uint16_t began, tx_clock;
 static distance_measurement_t strength;
 
@@ -245,7 +245,7 @@ ISR(ANALOG_COMP_vect)
         OCR1A = GIVE_UP;
         TIFR1 = 1 << OCF1A;
         TIMSK1 = 1 << OCIE1A;
-        ADCSRA |= 1 << ADIF; /* of an earlier conversion; that of this pulse takes longer */
+        ADCSRA |= 1 << ADIF; /* clears the flag of an earlier conversion; that of this pulse is not over yet */
         strength.high_gain = converted();
         by_comparator(LOW_GAIN);
         return;
@@ -289,7 +289,7 @@ static int16_t table(uint16_t start, uint8_t n)
     return (int16_t)(eeprom_read_byte(at) << 8 | eeprom_read_byte(at + 1));
 }
 
-/* mm beyond the first entry of a falling table, between its entries; beyond them the last two are extended. */
+/* Returns mm beyond the first entry of a falling table, by linear interpolation, beyond its end by extrapolation. */
 static int16_t in_table(uint16_t start, int16_t counts)
 {
     uint8_t n = 1;
@@ -364,7 +364,7 @@ uint8_t rand_hard(void)
 {
     uint8_t found = 0;
     for (uint8_t bit = 0; bit < 8; bit++) {
-        for (uint8_t tries = 0; tries < 128; tries++) { /* of two different bits the first one is fair */
+        for (uint8_t tries = 0; tries < 128; tries++) { /* the first of two different bits is unbiased (von Neumann) */
             uint8_t one = get_voltage() & 1, two = get_voltage() & 1;
             if (one != two) {
                 found |= (uint8_t)(one << bit);

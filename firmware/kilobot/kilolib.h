@@ -39,7 +39,7 @@ void kilo_start(void (*setup)(void), void (*loop)(void)); /* never returns */
 uint16_t message_crc(const message_t *m);
 uint8_t estimate_distance(const distance_measurement_t *d); /* mm between the centres, 33 to 255 */
 
-/* Duties of the vibration motors, 0 to 255. A motor that stands needs 15 ms of spinup_motors first. */
+/* Duties of the vibration motors, 0 to 255. A stopped motor needs 15 ms of spinup_motors first. */
 void set_motors(uint8_t left, uint8_t right);
 void spinup_motors(void);
 
@@ -50,7 +50,7 @@ void delay(uint16_t ms);
 uint8_t rand_soft(void); /* shift register */
 void rand_seed(uint8_t seed);
 uint8_t rand_hard(void);         /* from the noise of the battery's voltage; takes some ms */
-int16_t get_ambientlight(void);  /* counts, or -1 while a message comes in */
+int16_t get_ambientlight(void);  /* counts, or -1 while a message is received */
 int16_t get_voltage(void);       /* counts of the battery, or -1 */
 
 #endif

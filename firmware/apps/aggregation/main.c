@@ -6,7 +6,7 @@
 #include <remote.h>
 
 enum { KEY_STANDBY = 12, KEY_SLEEP = 42, KEY_OK = 53 }; /* RC-5 (openswarm-original.md §5.6) */
-enum { SELECT_START = 8 }; /* this bit of the switch does not wait for the remote control */
+enum { SELECT_START = 8 }; /* selector bit: start without the remote control */
 
 /* Percent of the greatest speed. Gauci et al., Int. J. Robotics Research 33 (2014): -70, -100 alone, 100, -100 with a
  * robot ahead. Others: DEFINES="-DALONE=-60,-90 -DAHEAD=80,-80". */

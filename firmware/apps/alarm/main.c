@@ -1,5 +1,5 @@
-/* One robot turns its selector, all of them light up: an event that robots share (README.md). The program is that for one
- * robot, but for the line marked below. */
+/* A shared event (README.md): a user turns one robot's selector, and all robots light up. Without the line marked below
+ * this is a program for a single robot. */
 #include <openswarm.h>
 #include <openswarm_infrared.h>
 #include <openswarm_io.h>
@@ -31,7 +31,7 @@ int main(void)
     Sys_Init_Kernel();
     SYS_ASSERT(Sys_Start_Infrared());
     SYS_ASSERT(Sys_Register_Event(ALARM));
-    SYS_ASSERT(Sys_Share_Event(ALARM, HOPS)); /* from here on the alarm is everybody's */
+    SYS_ASSERT(Sys_Share_Event(ALARM, HOPS)); /* from here on other robots receive the alarm, too */
     Sys_Subscribe_to_Event(SYS_IO_SELECTOR, 0, on_selector, NULL);
     SYS_ASSERT(Sys_Start_Process(watch) != 0);
     Sys_Start_Kernel();

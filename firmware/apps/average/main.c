@@ -1,5 +1,5 @@
-/* Gossip average (README.md): a message has the sender's number and those of two other robots, with the ages of their last
- * messages. Each robot keeps a table and computes the mean of the numbers that have not expired. */
+/* Gossip average (README.md): a message contains the values of the sender and of two other robots, with the ages of
+ * their last messages. Each robot keeps a table of values and computes the mean of those that have not expired. */
 #include "rove.h"
 
 #include <openswarm.h>
@@ -9,20 +9,20 @@
 #include <string.h>
 
 enum {
-    OTHERS = 10,       /* robots that are remembered beside the own */
-    TOLD = 2,          /* of them in a message */
-    PACE_MS = 200,     /* between two robots' messages, so the air is busy for half of the time, however many there are */
-    TICK_SHIFT = 6,    /* signs of life are dated in ticks of 64 ms */
-    HOP = 3,           /* ticks: more than a message takes from its first light to its handler, dates being rounded down */
-    FORGET = 208,      /* 13.3 s without a sign of life: that robot is gone, and its number with it */
-    NEAR = 78,         /* 5 s after its last own message a robot is taken to be out of sight */
-    MOST_AGE = 0xFF,   /* ticks, in a message */
-    NUMBER_BITS = 11,  /* of a robot */
-    VALUE_MOST = 15,   /* the selector: so number and value share two bytes */
+    OTHERS = 10,       /* other robots in the table */
+    TOLD = 2,          /* other robots in a message */
+    PACE_MS = 200,     /* pause between messages per near robot: the air is busy for half of the time in any group */
+    TICK_SHIFT = 6,    /* times of messages are in ticks of 64 ms */
+    HOP = 3,           /* ticks added per hop: more than a message takes from its first light to its handler */
+    FORGET = 208,      /* ticks, 13.3 s, without a sign of life: the robot has failed, and its value no longer counts */
+    NEAR = 78,         /* ticks, 5 s, after the last direct message: the robot is out of reach */
+    MOST_AGE = 0xFF,   /* ticks: greatest age in a message */
+    NUMBER_BITS = 11,  /* of a robot's number */
+    VALUE_MOST = 15,   /* greatest selector position: value and number share two bytes */
     LOOK_MS = 50, LINE = 16, STACK = 280
 };
 
-enum { VALUE, QUEUED_AT, OWN_BYTES }; /* the own value, and while the message waits, when it was written */
+enum { VALUE, QUEUED_AT, OWN_BYTES }; /* own value; low byte of the tick at which the message was queued */
 enum { WHO_LOW, WHO_HIGH, AGE, ITEM_BYTES };
 enum { MESSAGE_BYTES = OWN_BYTES + TOLD * ITEM_BYTES };
 
@@ -30,8 +30,8 @@ typedef struct {
     uint16 number; /* 0: free entry */
     uint8 value;
     bool counts;  /* included in the mean */
-    uint16 alive; /* tick of the last sign of life that is known of */
-    uint16 heard; /* tick of its last message that came here */
+    uint16 alive; /* tick of the last known sign of life */
+    uint16 heard; /* tick of its last message that this robot received */
     bool is_near; /* `heard` is no older than NEAR */
 } entry;
 
@@ -42,7 +42,7 @@ static uint16 tick(void)
     return (uint16)(Sys_Get_SystemTime() >> TICK_SHIFT);
 }
 
-/* The place of a robot, or of one that does not count. */
+/* Returns the entry of a robot, or else a free one, or NULL. */
 static entry *place_of(uint16 number)
 {
     entry *best = NULL;
@@ -57,8 +57,8 @@ static entry *place_of(uint16 number)
     return best;
 }
 
-/* Records a sign of life of a certain age in ticks, received from the robot itself or from another one. Ages only grow on
- * their way, so a failed robot's age is never too small. */
+/* Records a sign of life that is `age` ticks old, received from the robot itself or from another one. Each hop adds to
+ * the age, so the age of a failed robot is never too small. */
 static entry *learn(uint16 number, uint8 value, uint16 age, uint16 now)
 {
     uint16 alive = (uint16)(now - age);
@@ -96,7 +96,7 @@ static bool on_message(uint16 pid, uint16 event, sys_event_data *data)
     return true;
 }
 
-/* Others in turn. */
+/* Writes the next TOLD other robots to a message, in turn. */
 static void tell_others(uint8 *to, uint16 now)
 {
     static uint8 turn;
@@ -115,7 +115,7 @@ static void tell_others(uint8 *to, uint16 now)
     }
 }
 
-/* ISR at the begin of a transmission: adds the queueing delay to the ages in it. */
+/* ISR at the start of a transmission: adds the queueing delay to the ages in the message. */
 static void leaves(uint8 *payload, uint8 size)
 {
     uint8 waited = (uint8)((uint8)tick() - payload[QUEUED_AT]);
@@ -124,7 +124,7 @@ static void leaves(uint8 *payload, uint8 size)
     }
 }
 
-/* Hundredths; and how many robots it is of, and how many are near. */
+/* Returns the mean in hundredths; stores how many robots count, and how many of them are near, this one included. */
 static uint16 mean(uint8 own, uint16 now, uint8 *robots, uint8 *near)
 {
     uint16 sum = own;

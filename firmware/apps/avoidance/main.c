@@ -21,7 +21,7 @@ static void drive(sint16 left, sint16 right)
 
 static bool steer(uint16 pid, uint16 event, sys_event_data *data)
 {
-    static bool to_left; /* while both sides are blocked: keep turning the way that was begun */
+    static bool to_left; /* direction of the turn, kept while both sides are blocked */
     const uint8 *mm = data->payload;
     sint16 right = (sint16)(2 * nearness(mm, FRONT_RIGHT) + nearness(mm, RIGHT));
     sint16 left = (sint16)(2 * nearness(mm, FRONT_LEFT) + nearness(mm, LEFT));

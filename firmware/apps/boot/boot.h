@@ -1,5 +1,5 @@
-/* Where the boot loader lies: the last rows of flash. The four words before it are the program's entry, which
- * `openswarm flash` puts there, since word 0 of flash leads into the loader. Erased they lead into it as well. */
+/* Addresses of the boot loader: the last rows of flash. The four words before it are the program's entry.
+ * `openswarm flash` writes them, because word 0 of flash jumps to the loader. Erased, they lead to the loader, too. */
 #ifndef BOOT_H
 #define BOOT_H
 

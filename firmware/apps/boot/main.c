@@ -1,4 +1,4 @@
-/* A boot loader for the e-puck: README.md. One function, so that all of it lies where its address says. */
+/* A boot loader for the e-puck: README.md. One function, so that its address attribute places all code. */
 #include <p30F6014A.h>
 #include <stdbool.h>
 #include <stdint.h>
@@ -8,12 +8,12 @@
 
 enum {
     HELLO = 0xC1,
-    TYPE = 0x91, /* tinybld on this chip is 71 */
+    TYPE = 0x91, /* tinybld on this chip is 0x71 */
     DONE = 'K',
     AGAIN = 'N',
     LAST = 0xFF,           /* fourth byte of a block: start the program */
     BAUD_115200 = 7,       /* 14,745,600 / (16 x 115,200) - 1 */
-    SECOND = 7150,         /* turns of the loop that waits, 2,048 Tcy and some each: the receiver holds four bytes */
+    SECOND = 7150,         /* iterations of the waiting loop, just over 2,048 Tcy each; the receiver holds four bytes */
     HEADER = 4,            /* address, lowest byte first, and command */
     PAGE = BOOT_START >> 16,
     OFFSET = BOOT_START & 0xFFFF,
@@ -29,7 +29,7 @@ FLASH_INLINE void send(uint8_t byte)
     U1TXREG = byte;
 }
 
-/* Whether `count` bytes came, none later than a second after the one before. */
+/* Whether `count` bytes arrived, each within a second of the previous one. */
 FLASH_INLINE bool receive(uint8_t *to, uint8_t count)
 {
     while (count > 0) {
@@ -48,7 +48,7 @@ FLASH_INLINE bool receive(uint8_t *to, uint8_t count)
     return true;
 }
 
-/* Whether a row may be written: not one of the loader's, and the first row still has to lead here. */
+/* Whether a row may be written: it is not in the loader, and row 0 must still jump to the loader. */
 FLASH_INLINE bool may_write(uint16_t page, uint16_t offset, const uint8_t *bytes)
 {
     if (page > PAGE || (page == PAGE && offset >= OFFSET) || offset % FLASH_ROW_UNITS != 0) {
@@ -61,7 +61,7 @@ FLASH_INLINE bool may_write(uint16_t page, uint16_t offset, const uint8_t *bytes
            bytes[4] == 0 && bytes[5] == 0;
 }
 
-/* Answers blocks until the last one, or silence for a second. */
+/* Answers blocks until the last one, or until the line is silent for a second. */
 FLASH_INLINE void converse(void)
 {
     if (!receive(block, 1) || block[0] != HELLO) {

@@ -1,4 +1,4 @@
-/* Numbered frames by infra-red, and what of others' arrives: read by docs/tools/infrared/link.py and swarm.py (README.md). */
+/* Sends numbered infra-red frames, counts received ones (README.md); see docs/tools/infrared/link.py and swarm.py. */
 #include <openswarm.h>
 #include <openswarm_infrared.h>
 #include <openswarm_io.h>
@@ -12,7 +12,7 @@ typedef struct {
 
 typedef struct {
     uint16 source, received, twice, last, repaired;
-    sint32 ms; /* my clock when it came less the sender's when it was queued, summed up */
+    sint32 ms; /* sum of own clock at arrival minus sender's clock at queueing */
     sint16 longest; /* the greatest of these differences */
 } from_sender;
 

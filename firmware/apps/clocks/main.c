@@ -9,21 +9,21 @@
 #include <string.h>
 
 enum {
-    PAUSE_MS = 700, /* and up to as much again between messages: six robots take some 0.4 of the air's time */
-    AIR_MS = 69,    /* of a message of four bytes, less 2: both clocks count whole ms, and a count may come late */
+    PAUSE_MS = 700, /* shortest pause between messages, the longest is twice that: six robots use 0.4 of the time */
+    AIR_MS = 69,    /* duration of a message of four bytes, less 2: both clocks count whole ms, and may count late */
     LINE = 24, STACK = 220
 };
 
-static volatile uint32 ahead; /* of the own clock is the swarm's, ms; modulo 2^32; the link's interrupt writes it */
+static volatile uint32 ahead; /* swarm time minus own time, ms modulo 2^32; the link's interrupt writes it */
 
-/* ISR: a message leaves. */
+/* ISR at the start of a transmission: writes the swarm time to the message. */
 static void tell(uint8 *payload, uint8 size)
 {
     uint32 time = Sys_Get_SystemTime() + ahead;
     memcpy(payload, &time, size);
 }
 
-/* ISR: a message has just ended. Received times are never ahead of the true time, so the latest is right. */
+/* ISR at the end of a reception. Received times are never ahead of the true time, so the latest one is the best. */
 static bool hear(sys_neighbour_message *m)
 {
     uint32 time;

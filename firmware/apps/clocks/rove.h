@@ -1,23 +1,23 @@
-/* Robots that keep moving among each other: slow, turning away from what is near, and in any case now and then. For apps that
- * show what messages do between robots that move; they name this folder in INCLUDES. */
+/* Robots that drive slowly among each other, turn away from near obstacles, and turn at random now and then. For apps
+ * with messages between moving robots; they name this folder in INCLUDES. */
 #ifndef ROVE_H
 #define ROVE_H
 
 #include <openswarm.h>
 #include <openswarm_infrared.h>
 
-/* mm/s, and mm at which a robot turns: chosen slow, so that neighbours stay for some messages, and short, since there are
- * robots all around. */
+/* mm/s, and distance in mm at which a robot turns: slow, so that neighbours stay in reach for some messages, and short,
+ * because there are robots on all sides. */
 enum { ROVE_SPEED = 40, ROVE_NEAR_MM = 35 };
 enum {
     ROVE_STEP_MS = 50,
-    ROVE_TURN = 6,      /* steps after the last look at what is near: 0.5 rad */
-    ROVE_MOST_TURN = 40, /* steps, more than half a turn: then straight on, whatever is near */
-    ROVE_STRAIGHT = 40, /* steps, and at random up to as many more, after which a robot turns for no reason */
+    ROVE_TURN = 6,      /* steps of a turn after the last near reading: 0.5 rad */
+    ROVE_MOST_TURN = 40, /* steps, more than half a turn: then straight on despite obstacles */
+    ROVE_STRAIGHT = 40, /* fewest steps before a random turn, the most are twice that */
     ROVE_STACK = 140
 };
 
-static volatile bool rove_near_right, rove_near_left; /* since the last step; while others talk, looks are rare */
+static volatile bool rove_near_right, rove_near_left; /* since the last step; while others send, readings are rare */
 
 static bool rove_look(uint16 pid, uint16 event, sys_event_data *data)
 {
@@ -39,7 +39,7 @@ static void rove_drive(sint16 left, sint16 right)
 static void rove(void *unused)
 {
     uint16 random = 0;
-    uint8 turning = 0, turned = 0, straight = ROVE_STRAIGHT; /* steps: still to turn, have turned, until the next turn */
+    uint8 turning = 0, turned = 0, straight = ROVE_STRAIGHT; /* steps: left to turn, turned, until the next turn */
     bool to_left = false;
     (void)unused;
     for (;;) {

@@ -32,8 +32,8 @@ static void rest(void)
     }
 }
 
-/* Every call of the paper's Table I and the rest of the interface is linked, whether the load uses it or not. What the
- * calls are given is not known to the compiler, so that it leaves nothing out. */
+/* Links every call of the paper's Table I and of the rest of the interface, whether the load uses it or not. The
+ * compiler does not know the arguments, so it cannot remove a call. */
 static volatile struct {
     uint16 event, pid, ms;
     sys_handler handler;
@@ -83,7 +83,7 @@ static void measure(void)
     footprint_now.thread_stack_unused = pids[0] != 0 ? Sys_Get_UnusedStack(pids[0]) : 0;
 }
 
-/* s subscriptions are spread over the events, two handlers at most to each (thread, event) pair. */
+/* Distributes s subscriptions over the events, with at most two handlers for each (thread, event) pair. */
 static uint16 subscribe(uint16 wanted, uint16 events)
 {
     uint16 done = 0;
@@ -108,7 +108,7 @@ static void build(void)
         footprint_now.events += Sys_Register_Event(FIRST_EVENT + i);
     }
     footprint_now.subscriptions = subscribe(footprint_wanted.subscriptions, footprint_wanted.events);
-    for (uint16 i = 0; i < footprint_wanted.messages; i++) { /* queued: main holds delivery back */
+    for (uint16 i = 0; i < footprint_wanted.messages; i++) { /* queued: main is in a critical section */
         footprint_now.messages += Sys_Send_Event(FIRST_EVENT, payload, footprint_wanted.payload);
     }
 }

@@ -1,6 +1,6 @@
 /* Foraging (README.md): wander until the camera shows food, which is red, drive at it, carry it to the lamp over the
- * nest. That food was found, and that the nest is reached, the robot is told by Bluetooth: "food", "nest". It starts at
- * once. */
+ * nest. The arena reports by Bluetooth that the robot has found food ("food") or has reached the nest ("nest"). The
+ * robot starts at once. */
 #include <analog.h>
 #include <bluetooth.h>
 #include <camera.h>
@@ -49,7 +49,7 @@ static void wander(void)
     }
 }
 
-/* Sensors see the lamp as fewer counts; the pair with the largest difference says to which side it is. */
+/* Light lowers a sensor's counts. If the lamp is behind the robot, it turns on the spot; else it steers to the lamp. */
 static void seek_light(void)
 {
     sint16 right = 0, left = 0, front, rear;
@@ -82,7 +82,7 @@ static bool live(uint16 pid, uint16 event, sys_event_data *data)
     (void)pid;
     (void)event;
     chance ^=
-        (uint16)(Sys_Get_AmbientLight(BACK_LEFT) << 3); /* where the robot is makes it different from the others */
+        (uint16)(Sys_Get_AmbientLight(BACK_LEFT) << 3); /* robots at other places draw other random numbers */
     chance |= chance == 0;
     if (sees_food && !loaded) {
         drive(CRUISE, CRUISE);

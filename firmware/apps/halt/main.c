@@ -1,5 +1,5 @@
-/* All stop together, when one has said so (README.md): a message carries how long it still is until then, as it is when the
- * message leaves. So all stop at the same moment, whenever and from whomever they have heard of it. */
+/* Simultaneous stop (README.md): one robot decides when all stop. A message contains the time that is left at the
+ * moment of its transmission, so all stop together, whichever message told a robot of it. */
 #include "rove.h"
 
 #include <openswarm.h>
@@ -9,10 +9,10 @@
 #include <string.h>
 
 enum {
-    CALL_MS = 1200,  /* after the start: whose selector is not 0 decides */
-    AHEAD_MS = 3000, /* to stop so much later */
-    PAUSE_MS = 400,  /* and up to as much again between messages of each who knows */
-    AIR_MS = 60,     /* of a message of two bytes */
+    CALL_MS = 1200,  /* after the start: a robot whose selector is not 0 decides */
+    AHEAD_MS = 3000, /* from the decision to the stop */
+    PAUSE_MS = 400,  /* shortest pause between messages of an informed robot, the longest is twice that */
+    AIR_MS = 60,     /* duration of a message of two bytes */
     LOOK_MS = 10, LINE = 16, STACK = 220
 };
 
@@ -29,14 +29,14 @@ static bool learn(uint16 at)
     return true;
 }
 
-/* ISR: a message leaves. */
+/* ISR at the start of a transmission: writes the time left to the message. */
 static void tell(uint8 *payload, uint8 size)
 {
     uint16 left = (uint16)(stop_at - (uint16)Sys_Get_SystemTime());
     memcpy(payload, &left, size);
 }
 
-/* ISR: a message has just ended. */
+/* ISR at the end of a reception: learns the time of the stop. */
 static bool hear(sys_neighbour_message *m)
 {
     uint16 left;

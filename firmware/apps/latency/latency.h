@@ -1,4 +1,4 @@
-/* What a measuring program sets and where it looks. README.md lists the scenarios. */
+/* Variables that a measuring program on the host sets, and its breakpoints. README.md lists the scenarios. */
 #ifndef LATENCY_H
 #define LATENCY_H
 
@@ -18,8 +18,8 @@ typedef struct {
 
 extern volatile latency_scenario latency_wanted;
 
-void latency_begin(void); /* a stop: set latency_wanted here */
-void latency_ready(void); /* a stop: the scenario runs from here on */
+void latency_begin(void); /* breakpoint: set latency_wanted here */
+void latency_ready(void); /* breakpoint: the scenario runs from here on */
 void latency_isr(void);   /* INT1, IPL 4: sends LATENCY_EVENT with latency_wanted.payload bytes */
 
 #endif

@@ -14,7 +14,7 @@ static const uint8 payload[24];
 STOP(latency_begin)
 STOP(latency_ready)
 
-/* Each handler and thread function of its own name, so that its first instruction can be found. */
+/* Functions with symbols of their own, by which a host detects the first instruction of a handler or a woken thread. */
 __attribute__((noinline, used)) bool latency_handler(uint16 pid, uint16 event, sys_event_data *data)
 {
     (void)pid;
@@ -70,7 +70,7 @@ static void wait(void)
     }
 }
 
-/* Sending is measured from the call to the return of this. */
+/* The cost of sending is measured from the call of this function to its return. */
 __attribute__((noinline, used)) bool latency_send(uint16 event)
 {
     return Sys_Send_Event(event, payload, latency_wanted.payload);

@@ -9,13 +9,13 @@
 #include <string.h>
 
 enum {
-    PERIOD_MS = 450,    /* of the leader's counts, give or take a quarter */
-    RELAY_MS = 350,     /* within which a count is passed on, */
-    ENOUGH = 2,         /* unless it was heard so often by then */
-    FIRST_MS = 1000,    /* the first claims come at random within it, or not at all if a better one is heard before */
-    ANSWER_MS = 150,    /* within which a leader answers who follows a lower rank */
-    PATIENCE_MS = 5000, /* without a new count: some eleven of them, or robots that are out of each other's sight */
-    SPREAD_MS = 500,    /* and at random up to so much more, so that one claims first */
+    PERIOD_MS = 450,    /* between the leader's counts, up to a quarter more or less */
+    RELAY_MS = 350,     /* longest delay before a follower forwards a count, */
+    ENOUGH = 2,         /* unless it has received this count so often by then */
+    FIRST_MS = 1000,    /* longest delay of a robot's first claim, which it omits if it receives a higher one before */
+    ANSWER_MS = 150,    /* longest delay before a leader answers a robot that follows a lower rank */
+    PATIENCE_MS = 5000, /* without a new count, about eleven periods: the leader has failed or is out of reach */
+    SPREAD_MS = 500,    /* at most added to PATIENCE_MS at random, so that one robot claims first */
     LOOK_MS = 25, LINE = 16, STACK = 240
 };
 
@@ -26,9 +26,9 @@ typedef struct {
 
 enum { WORD_BYTES = 3 };
 
-static word leader, given_up; /* given_up: its count is the last one known when it was missed */
+static word leader, given_up; /* given_up: the lost leader with its last known count */
 static uint16 mine, heard_at, given_up_at, patience, next; /* low words of the system time */
-static uint8 copies; /* heard of the leader's count */
+static uint8 copies; /* received of the leader's count */
 static uint16 random_state;
 
 static uint16 draw(uint16 below)
@@ -37,7 +37,7 @@ static uint16 draw(uint16 below)
     return (uint16)((random_state >> 4) % below);
 }
 
-/* Selector above, so that a user can say who is to lead; the number of the robot decides among equals. */
+/* The selector is in the upper bits, so that a user can choose the leader; the robot number breaks ties. */
 static uint16 rank(void)
 {
     return (uint16)((uint16)Sys_Get_Selector() << 11 | Sys_Get_RobotNumber());
@@ -84,7 +84,7 @@ static bool on_message(uint16 pid, uint16 event, sys_event_data *data)
     return true;
 }
 
-/* What is due now, if anything: the own count, or the leader's for those who have not heard it. */
+/* Whether a message is due: the own count, or the leader's count for robots that have not received it. */
 static bool is_due(word *w, uint16 now)
 {
     if (leader.rank != mine && (uint16)(now - heard_at) > patience) {
@@ -115,8 +115,8 @@ static void say(const char *what, uint16 who)
     Sys_Send_Event(SYS_SEND_UART1, line, (uint16)strlen(line));
 }
 
-/* The robot's number was drawn or drawn again, or a user has turned the selector. */
-static void stand_anew(void)
+/* Starts the election again: the robot has drawn its number, or a user has turned the selector. */
+static void become_candidate(void)
 {
     mine = rank();
     random_state += mine;
@@ -137,7 +137,7 @@ static void lead(void *unused)
         bool is_new = mine != rank();
         Sys_Start_CriticalSection();
         if (is_new) {
-            stand_anew();
+            become_candidate();
         }
         bool speaks = is_due(&w, (uint16)Sys_Get_SystemTime());
         uint16 who = leader.rank;

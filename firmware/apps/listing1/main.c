@@ -40,7 +40,7 @@ bool wait250times(sys_event_data *data)
 
 void loggingThread(void)
 {
-    char message[29]; /* "4294967295:(-32768,-32768)\r\n" and its end: the range of the types */
+    char message[29]; /* "4294967295:(-32768,-32768)\r\n" and the final 0: the longest text */
     while (true) {
         sprintf(message, "%lu:(%d,%d)\r\n", (unsigned long)Sys_Get_SystemTime(), Sys_Get_MotorSpeed_Left(),
                 Sys_Get_MotorSpeed_Right());

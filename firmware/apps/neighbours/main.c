@@ -1,4 +1,4 @@
-/* Robots that exchange a byte: each says a number once a second and tells UART1 what it hears (README.md). */
+/* Robots that exchange a byte: each sends a number once a second and reports received ones on UART1 (README.md). */
 #include <openswarm.h>
 #include <openswarm_infrared.h>
 #include <openswarm_io.h>
@@ -21,7 +21,7 @@ static void listen(void *unused)
     }
 }
 
-/* The body LED is on while anybody is near. */
+/* The body LED is on while another robot is near. */
 static bool on_neighbour(uint16 pid, uint16 event, sys_event_data *data)
 {
     static uint8 near;

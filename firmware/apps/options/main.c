@@ -40,7 +40,7 @@ static sys_cleanup other_cleanups[2];
 static sys_quota other_quota;
 static sys_service other_services[2] = {{.config = &options_spinner, .restarts = SYS_ALWAYS}, {.config = &options_spinner, .restarts = SYS_ALWAYS}};
 
-/* Called through these, so that the compiler writes each function whole, as for a program that calls it often. */
+/* Calls go through these pointers, so that the compiler inlines no function, as in a program with many calls. */
 static bool (*volatile lock)(sys_mutex *) = Sys_Lock_Mutex;
 static bool (*volatile unlock)(sys_mutex *) = Sys_Unlock_Mutex;
 static uint16 (*volatile start)(const sys_process_config *) = Sys_Start_ProcessWith;

@@ -1,4 +1,4 @@
-/* What a measuring program sets and where it looks. README.md lists the scenes. */
+/* Variables that a measuring program on the host sets, and its breakpoints. README.md lists the scenes. */
 #ifndef OPTIONS_H
 #define OPTIONS_H
 
@@ -21,8 +21,8 @@ enum {
 
 extern volatile uint16 options_wanted;
 
-void options_settle(void);                   /* the next tick and the end of the slice are far */
-void options_settle_under_round_robin(void); /* and no call asks for another choice of thread */
+void options_settle(void);                   /* waits until the next tick and the end of the slice are far */
+void options_settle_under_round_robin(void); /* the same, then selects round robin, which is never eager */
 void options_waits(uint16 scene);            /* waits.c: the scenes from TAKE on */
 extern const sys_process_config options_spinner;
 

@@ -11,7 +11,7 @@ sys_notification options_notification __attribute__((used));
 sys_timer options_timer __attribute__((used));
 static sys_timer other_timers[2];
 
-/* Called through these, so that the compiler writes each function whole, as for a program that calls it often. */
+/* Calls go through these pointers, so that the compiler inlines no function, as in a program with many calls. */
 static bool (*volatile signal)(sys_semaphore *) = Sys_Signal_Semaphore;
 static bool (*volatile take)(sys_semaphore *) = Sys_Wait_for_Semaphore;
 static void (*volatile notify)(sys_notification *, uint16) = Sys_Notify;

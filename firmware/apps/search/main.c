@@ -1,5 +1,5 @@
-/* A search that robots share (README.md): which number below 2^16 takes the most steps to 1, halved when even, else tripled
- * and one more. Each robot looks through parts that it does not know to be done, and tells which are and the best so far. */
+/* A search that robots share (README.md): the number below 2^16 with the longest Collatz sequence. Each robot searches
+ * parts that it does not know to be done, and sends the set of done parts and the best number so far. */
 #include "rove.h"
 
 #include <openswarm.h>
@@ -12,7 +12,7 @@ enum {
     PARTS = 32,     /* bits of a word */
     PART_BITS = 11, /* numbers of a part */
     BEST_BYTES = 2,
-    PAUSE_MS = 450, /* and up to as much again between messages: five robots take half of the air's time */
+    PAUSE_MS = 450, /* shortest pause between messages, the longest is twice that: five robots use half of the time */
     LOOK_MS = 50, LINE = 16, SEARCH_STACK = 160, TELL_STACK = 240
 };
 
@@ -28,7 +28,7 @@ enum { WORD_BYTES = sizeof(uint32) + BEST_BYTES };
 static uint32 done, best = 1;
 static uint16 best_steps;
 
-/* No number below 2^16 gets to 2^32. */
+/* Returns the length of a Collatz sequence. None that starts below 2^16 reaches 2^32. */
 static uint16 steps_of(uint32 number)
 {
     uint16 steps = 0;
@@ -39,7 +39,7 @@ static uint16 steps_of(uint32 number)
     return steps;
 }
 
-/* What others say is the best is looked at again: a wrong one changes nothing. */
+/* Adds done parts and a candidate. The steps of a received candidate are computed here: a wrong one has no effect. */
 static void learn(uint32 parts, uint32 number)
 {
     uint16 steps = steps_of(number);
@@ -79,7 +79,7 @@ static uint32 best_of(uint8 part)
     return found;
 }
 
-/* Robots begin anywhere, so that few do the same. */
+/* Robots begin at random parts, so that few search the same one. */
 static void search(void *unused)
 {
     uint16 random = 0;

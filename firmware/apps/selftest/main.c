@@ -19,7 +19,7 @@ static bool camera;
 static void say(const char *line)
 {
     Sys_Send_Event(SYS_SEND_UART1, line, (uint16)strlen(line));
-    Sys_Sleep(PAUSE_MS); /* the line leaves before the next one needs the ring */
+    Sys_Sleep(PAUSE_MS); /* the line is sent before the next one needs the buffer */
 }
 
 static void report(const char *device, sint16 a, sint16 b, sint16 c, bool good)
@@ -84,8 +84,8 @@ static void report_uart(void)
     report("uart", (sint16)s->tx_refused, (sint16)s->rx_lost, (sint16)s->rx_damaged, true);
 }
 
-/* Asked over Bluetooth, beside the commands of its driver: N proximity, A accelerometer and microphones, U what the UART
- * lost. */
+/* Bluetooth commands besides those of the driver: N proximity, A accelerometer and microphones, U errors of the
+ * UART. */
 static void answer(const char *line)
 {
     if (line[0] == 'N') {

@@ -1,5 +1,5 @@
-/* The kernel, one thread and one UART: what the smallest useful robot program costs. The board's list of devices is this
- * file's own (app.mk). */
+/* The kernel, one thread and one UART: the cost of the smallest useful robot program. This file replaces the board's
+ * list of devices (app.mk). */
 #include <openswarm.h>
 
 #include "hal_board.h"

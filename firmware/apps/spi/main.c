@@ -1,5 +1,5 @@
-/* A turret on the SPI bus (README.md): asks it for a measurement every 100 ms and logs the answer. The check byte behind
- * each message is a matter of the processor, which commands on UART1 exchange at run time. */
+/* A turret on the SPI bus (README.md): asks it for a measurement every 100 ms and logs the answer. The SPI processor
+ * adds and verifies a check byte at the end of each message; commands on UART1 exchange the processor at run time. */
 #include <openswarm.h>
 #include <openswarm_io.h>
 #include <spi.h>
@@ -18,7 +18,7 @@ static uint8 sum_of(const uint8 *bytes, uint16 size)
     return sum;
 }
 
-/* The last byte makes the sum of all zero. */
+/* SPI processor: the last byte makes the sum of all bytes 0. */
 static bool checked(uint8 *bytes, uint16 size, bool received)
 {
     if (received) {

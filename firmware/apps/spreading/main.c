@@ -1,5 +1,5 @@
-/* Robots that reprogram each other by infra-red, and take programs from a host by UART1 (README.md): one thread keeps the
- * stores and talks, handlers keep what is heard for it. */
+/* Robots that reprogram each other by infra-red, and accept programs from a host on UART1 (README.md). One thread
+ * manages the stores and sends; handlers queue the received messages for it. */
 #include <openswarm.h>
 #include <openswarm_infrared.h>
 #include <openswarm_io.h>
@@ -12,9 +12,9 @@
 enum { LOOK_MS = 20, HEARD = 16, CONFIRM_MS = 1000, RESTART_MS = 3000, OFFER_MS = 8000, LINE = 24, STACK = 700 };
 
 static uint8 messages[HEARD][SYS_SPREAD_BYTES];
-static volatile uint8 first, last; /* of those that wait */
+static volatile uint8 first, last; /* indices of the queued messages */
 static volatile bool has_host;
-static volatile bool is_waiting; /* a message for the neighbours: another would be old when its turn came */
+static volatile bool is_waiting; /* a message is not sent yet: a second one would be out of date when it is sent */
 
 static bool keep(const uint8 *message, uint16 size)
 {
@@ -41,7 +41,7 @@ static bool on_host(uint16 pid, uint16 event, sys_event_data *data)
     (void)pid;
     (void)event;
     if (keep(data->payload, data->size)) {
-        has_host = true; /* from now on it hears what neighbours do */
+        has_host = true; /* from now on the host receives all messages to neighbours */
     }
     return true;
 }
@@ -71,7 +71,7 @@ static void say(const char *what, uint16 version)
     Sys_Send_Event(SYS_SEND_UART1, line, (uint16)strlen(line));
 }
 
-/* The robot whose selector is not 0 has a program of that version, if it has none. */
+/* Stores the lamp program under a version, unless the version is 0 or the kernel refuses the update. */
 static void provide(uint16 version)
 {
     sys_update facts = {version, sizeof lamp / sizeof *lamp, 0xFFFFFFFFu};
@@ -123,12 +123,12 @@ static void spread(void *unused)
             Sys_Offer_Activation(version);
         }
         if (version != running && is_active && version != in_vain) {
-            restart_at = restart_at != 0 ? restart_at : now + RESTART_MS; /* while the word goes round */
+            restart_at = restart_at != 0 ? restart_at : now + RESTART_MS; /* time for the neighbours to learn of it */
             if (now >= restart_at) {
                 if (Sys_Get_NextVersion() != running) {
                     __asm__ volatile("reset");
                 }
-                in_vain = version; /* it has been tried, or its flag sticks */
+                in_vain = version; /* it was tried before, or its flag cannot be written */
                 restart_at = 0;
             }
         }

@@ -101,7 +101,7 @@ static void take_down(void)
     for (uint16 e = 0; e < EVENTS; e++) {
         Sys_Unregister_Event((uint16)(FIRST + e));
     }
-    Sys_Sleep(5); /* what was queued is delivered or dropped; short threads have ended */
+    Sys_Sleep(5); /* queued messages are delivered or dropped; short threads end */
     SYS_ASSERT(Sys_Get_Statistics()->heap_used == empty_heap);
 }
 
@@ -110,7 +110,7 @@ static void say(const char *format, uint32 a, uint32 b)
     char line[LINE];
     snprintf(line, sizeof line, format, (unsigned long)a, (unsigned long)b);
     Sys_Send_Event(SYS_SEND_UART1, line, (uint16)strlen(line));
-    Sys_Sleep(10); /* the line leaves before the next one needs the ring */
+    Sys_Sleep(10); /* the line is sent before the next one needs the buffer */
 }
 
 static void report(void)

@@ -75,7 +75,7 @@ static void listen(void *unused)
         FFTComplexIP(LOG2_BLOCK, spectrum, factors, COEFFS_IN_DATA);
         BitReverseComplex(LOG2_BLOCK, spectrum);
         VectorScale(2 * BLOCK, &spectrum[0].real, &spectrum[0].real, Q15(0.999));
-        fractional *power = block; /* of the real input half the spectrum is enough */
+        fractional *power = block; /* the input is real, so half of the spectrum is enough */
         for (uint16 i = 0; i < BLOCK / 2; i++) {
             spectrum[i].real *= 16;
             spectrum[i].imag *= 16;

@@ -26,9 +26,9 @@ typedef struct sys_quota {
 } sys_quota;
 
 /* MTH | no | 237 | 48 | EVENT, MEMORY, ARGUMENT: most is 0.  Takes 6 bytes of the heap, which also serve the event's
- * next quota.  Sending the event then takes 107 more, 106 if it is dropped, 121 if the payload of 2 bytes is replaced;
- * 9 more per waiting message of any event and 7 per newer quota. Other events of the same bucket (identifier modulo
- * 8) that were registered before take 84 more. */
+ * next quota.  Sending the event then takes 107 Tcy more, 106 if it is dropped, 121 if the payload of 2 bytes is
+ * replaced; 9 more per waiting message of any event and 7 per newer quota. Other events of the same bucket
+ * (identifier modulo 8) that were registered before take 84 more. */
 bool Sys_Limit_Event(sys_quota *quota, uint16 event, uint16 most);
 /* The same for a queue of one: the newest payload replaces the waiting one. */
 bool Sys_Keep_Latest(sys_quota *quota, uint16 event);

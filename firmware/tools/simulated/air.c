@@ -1,12 +1,12 @@
-/* The infrared between several Kilobots (kilobots.py): what one's emitter does comes to the others' comparators and
- * converters, and all of them run in lock step.
+/* Infrared channel between several Kilobots (kilobots.py): carries light from emitters to the comparators and
+ * converters of other robots, and runs all robots in lock step.
  *
- * Time is counted from when the first was switched on. A robot runs only as far as no other robot can have sent light
- * before: so a pulse is never late, and every run is the same. Light takes DELAY from pin to comparator; it also keeps
- * a pulse in the future of a receiver that is an instruction ahead.
+ * Times are cycles since the first robot's power-on. The robot with the earliest time runs, up to the time of the next
+ * one: so no pulse arrives late, and every run is the same. Light takes DELAY cycles from emitter to comparator, so it
+ * arrives in the future even of a receiver that is an instruction ahead.
  *
- * simavr knows no conversion that the comparator or a capture starts; it is started here. It reads a channel's voltage when the
- * program reads the result, so a voltage stays until the next pulse. */
+ * simavr models no conversion that the comparator or a capture starts; this file starts it. simavr reads a channel's
+ * voltage when the program reads the result, so the voltage is kept until the next pulse. */
 #include "simavr.h"
 
 #include <avr_acomp.h>
@@ -18,7 +18,7 @@
 enum {
     ROBOTS = 32,
     DELAY = 8,       /* cycles */
-    STRAY = 9,       /* cycles of a foreign light: as long as a pulse */
+    STRAY = 9,       /* cycles of a noise pulse, as of any other */
     EMITTERS = 0xC7, /* of port B */
     DARK_MV = 0,
     REFERENCE_MV = 500, /* of the comparator */
@@ -38,19 +38,19 @@ typedef struct air air;
 
 typedef struct {
     struct place *to;
-    uint16_t high, low; /* counts of the two gains; both 0: not heard */
+    uint16_t high, low; /* counts at the two gains; both 0: out of reach */
     uint16_t loss;      /* of 65,536 pulses */
-    bool is_on;         /* what the receiver sees */
-    bool is_hidden;     /* a pulse that is lost */
+    bool is_on;         /* the receiver sees the light */
+    bool is_hidden;     /* the current pulse is lost */
 } path;
 
 typedef struct place {
     air *air;
     machine *machine;
-    uint64_t since; /* its cycle 0 */
+    uint64_t since; /* time of its power-on */
     uint32_t noise;
-    uint8_t lit;  /* lights it sees */
-    uint8_t pins; /* of its emitter that are on */
+    uint8_t lit;  /* number of lights it sees */
+    uint8_t pins; /* emitter pins that are on */
     path to[ROBOTS];
     path stray;
 } place;
@@ -201,7 +201,7 @@ int air_join(air *a, machine *m, uint64_t since)
     return a->count++;
 }
 
-/* What `to` sees of `from`, in counts; a robot may see itself. */
+/* Sets the counts at which `to` receives `from`, and the lost pulses of 65,536; both may be the same robot. */
 void air_link(air *a, int from, int to, uint16_t high, uint16_t low, uint16_t loss)
 {
     path *way = &a->places[from].to[to];
@@ -210,7 +210,7 @@ void air_link(air *a, int from, int to, uint16_t high, uint16_t low, uint16_t lo
     way->loss = loss;
 }
 
-/* A foreign light at one robot, so many cycles from now. */
+/* Adds a noise pulse at one robot, `after` cycles from now. */
 void air_flash(air *a, int at, uint32_t after, uint16_t high, uint16_t low)
 {
     path *way = &a->places[at].stray;
@@ -227,7 +227,7 @@ static avr_cycle_count_t wake(avr_t *avr, avr_cycle_count_t when, void *paramete
     return 0;
 }
 
-/* When a robot does something at the earliest: a sleeping one when its next timer is due. */
+/* Returns the earliest time at which a robot acts: if it sleeps, when its next timer is due. */
 static uint64_t acts_at(const place *p)
 {
     const avr_t *avr = p->machine->avr;
@@ -242,14 +242,14 @@ static int advance(place *p, uint64_t others)
     avr_t *avr = p->machine->avr;
     uint64_t here = now(p);
     bool falls_asleep = avr->flash[avr->pc] == (SLEEP & 0xFF) && avr->flash[avr->pc + 1] == SLEEP >> 8;
-    if (avr->state == cpu_Sleeping || falls_asleep) { /* in this step, and not beyond what the others may do */
+    if (avr->state == cpu_Sleeping || falls_asleep) { /* in this step; ends before another robot acts */
         avr_cycle_timer_register(avr, others > here + 2 ? others - here : 2, wake,
                                  p); /* behind the sleep instruction */
     }
     return machine_step(p->machine);
 }
 
-/* All of them until a time. -1, or the index of a robot that stopped or crashed. */
+/* Runs all robots until a time. Returns -1, or the index of a robot that stopped or crashed. */
 int air_run(air *a, uint64_t until)
 {
     for (;;) {

@@ -188,7 +188,7 @@ def sending(robot: Robot, image: Path, **scenario: int) -> int:
 
 
 def reaching(robot: Robot, image: Path, place: str, **scenario: int) -> int:
-    """Measure from there to the first instruction of a handler or of a waiting thread."""
+    """Measure from the first instruction of the sending function to that of a handler or of a waiting thread."""
     machine = _start(robot, image, **scenario)
     try:
         seen = []

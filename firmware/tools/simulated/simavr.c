@@ -27,7 +27,7 @@ static void from_uart(struct avr_irq_t *irq, uint32_t value, void *parameter)
 
 static void no_sleep(avr_t *avr, avr_cycle_count_t cycles)
 {
-    (void)avr, (void)cycles; /* simulated time passes, the host's does not */
+    (void)avr, (void)cycles; /* sleep takes no time of the host */
 }
 
 machine *machine_open(const char *path, uint32_t hz)
@@ -48,7 +48,7 @@ machine *machine_open(const char *path, uint32_t hz)
     avr_load_firmware(m->avr, &firmware);
     m->avr->frequency = hz;
     m->avr->sleep = no_sleep;
-    for (uint8_t pin = 0; pin < 2; pin++) { /* it would look at a low INT pin in every cycle, enabled or not */
+    for (uint8_t pin = 0; pin < 2; pin++) { /* else simavr polls a low INT pin in every cycle, even if disabled */
         avr_extint_set_strict_lvl_trig(m->avr, pin, 0);
     }
     m->lowest_sp = 0xFFFF;
@@ -65,11 +65,11 @@ void machine_close(machine *m)
     free(m);
 }
 
-/* DONE: sleeping with interrupts off. */
+/* Executes one instruction, or sleeps. Returns RUNS_ON, CRASHED, or DONE: asleep with interrupts off. */
 int machine_step(machine *m)
 {
     int state = avr_run(m->avr);
-    m->avr->run_cycle_count = 1; /* one instruction behind a sleep, too */
+    m->avr->run_cycle_count = 1; /* a single instruction also after a sleep */
     uint16_t sp = (uint16_t)(m->avr->data[0x5D] | m->avr->data[0x5E] << 8);
     m->instructions++;
     if (sp >= m->watch_from && sp <= m->watch_to && sp < m->lowest_sp) {
@@ -78,7 +78,7 @@ int machine_step(machine *m)
     return state == cpu_Done ? DONE : state == cpu_Crashed ? CRASHED : RUNS_ON;
 }
 
-/* That many instructions, or less: as machine_step. */
+/* Executes up to `count` instructions. Returns as machine_step. */
 int machine_steps(machine *m, uint32_t count)
 {
     int stopped = RUNS_ON;
@@ -88,7 +88,7 @@ int machine_steps(machine *m, uint32_t count)
     return stopped;
 }
 
-/* Until the program counter is one of `places` (at least one step), or cycle `end`. As machine_step, or AT_PLACE. */
+/* Runs at least one step, until the PC is in `places` or cycle `end` is over. Returns AT_PLACE, or as machine_step. */
 int machine_run(machine *m, const uint32_t *places, int count, uint64_t end)
 {
     while (m->avr->cycle < end) {
@@ -143,14 +143,14 @@ void machine_receive(machine *m, uint8_t byte)
     avr_raise_irq(avr_io_getirq(m->avr, AVR_IOCTL_UART_GETIRQ('0'), UART_IRQ_INPUT), byte);
 }
 
-/* 0 unless the bytes do not fit. */
+/* Writes the EEPROM. Returns 0, or 1 if the bytes do not fit. */
 int machine_eeprom(machine *m, const uint8_t *bytes, uint32_t offset, uint32_t count)
 {
     avr_eeprom_desc_t d = {(uint8_t *)bytes, (uint16_t)offset, count};
-    return avr_ioctl(m->avr, AVR_IOCTL_EEPROM_SET, &d) == -2; /* -1 is how simavr says that it is done */
+    return avr_ioctl(m->avr, AVR_IOCTL_EEPROM_SET, &d) == -2; /* simavr returns -1 for success */
 }
 
-/* Copies what the UART sent since the last call. */
+/* Copies and removes the bytes that the UART has sent; returns their number. */
 uint32_t machine_uart(machine *m, uint8_t *to, uint32_t room)
 {
     uint32_t count = m->written < room ? m->written : room;
@@ -160,7 +160,7 @@ uint32_t machine_uart(machine *m, uint8_t *to, uint32_t room)
     return count;
 }
 
-/* From now on the lowest stack pointer between two addresses is noted. */
+/* Starts to record the lowest stack pointer between two addresses. */
 void machine_watch(machine *m, uint16_t from, uint16_t to)
 {
     m->watch_from = from;

@@ -1,4 +1,4 @@
-/* What the robots spread: from its start on the body LED is on. Built by `openswarm program`. */
+/* The program that the robots spread: it switches the body LED on. Built by `openswarm program`. */
 #include <openswarm_io.h>
 
 int main(void)

@@ -38,7 +38,7 @@ void hal_motors_init(void)
     DDRD |= PIN_MOTOR_D;
 }
 
-/* Devices locked. Returns what the compare register shall hold now. */
+/* Devices locked. Returns the new value of the compare register. */
 static uint8 set(motor *m, int16_t mm_s)
 {
     uint8 duty = mm_s > 0 ? (uint8)((uint16)mm_s * m->straight / FULL_MM_S) : 0;
@@ -58,7 +58,7 @@ void hal_motors_drive(int16_t left_mm_s, int16_t right_mm_s)
     __asm__ volatile("cli" ::: "memory");
     OCR2A = set(&left, left_mm_s);
     OCR2B = set(&right, right_mm_s);
-    bool turns = (left.duty | right.duty) != 0; /* the timer rests with the motors, and its pins are ports: low */
+    bool turns = (left.duty | right.duty) != 0; /* otherwise the timer is off, and its pins are low ports */
     TCCR2A = turns ? 1 << COM2A1 | 1 << COM2B1 | 1 << WGM20 : 0;
     TCCR2B = turns ? 1 << CS21 : 0;
     SREG = before;

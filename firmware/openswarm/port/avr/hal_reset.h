@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* AVR: what option/reset.c needs (docs/porting.md). The watchdog is not driven: after its reset it must be stopped
- * within 15 ms, by start-up code that every program would have to hold. */
+/* AVR: what option/reset.c needs (docs/porting.md). There is no watchdog driver: it would need start-up code in
+ * every program, because after a watchdog reset the watchdog must be stopped within 15 ms. */
 #ifndef HAL_RESET_H
 #define HAL_RESET_H
 

@@ -1,5 +1,5 @@
-/* Scenes of calls of drivers and options, within which INT1 kills the victim thread at any instruction
- * (tests/firmware/kills.py). The keeper thread then uses every device and option itself and restores the memory. */
+/* Scenes: a victim thread calls drivers and options, and INT1 kills it at any instruction (tests/firmware/kills.py).
+ * The keeper thread then uses every device and option itself and restores the memory. */
 #include <analog.h>
 #include <battery.h>
 #include <bluetooth.h>

@@ -15,27 +15,27 @@ enum {
     PER_COUNT = 61, /* slots, in 1/2048 */
     PER_COUNT_SHIFT = 11,
     HALF_SLOT = 17, /* counts */
-    FIRST_SLOT = 3, /* of the bits: 807 cycles for other interrupts */
+    FIRST_SLOT = 3, /* of the first bit: leaves 807 cycles for other interrupts */
     STOP_SLOT = FIRST_SLOT + 8,
-    LONGEST = 505, /* counts from the first pulse to the last; four slots late, if another interrupt delayed it */
-    WINDOW = 370,  /* counts: STOP_SLOT of the first byte */
+    LONGEST = 505, /* counts from a byte's first pulse to its last, four slots late because of another interrupt */
+    WINDOW = 370,  /* counts from the first pulse of byte 0 to its last, which is in STOP_SLOT */
     PAUSE = 100,   /* counts between bytes: time for all other code on this CPU */
     ECHO = 8,    /* counts behind the own light in which a pulse may be its reflection: UNVERIFIED, docs/accuracy.md */
     TICK = 977,  /* counts */
-    SILENCE = 2, /* ticks without a pulse: no byte of a frame is so far from the next */
+    SILENCE = 2, /* ticks without a pulse: longer than any pause between bytes of a frame */
     CLEAR = 3,   /* ticks without a pulse before an own frame */
     FIRST_SLOTS = 12,
     SLOTS_PER_NEIGHBOUR = 4, /* ticks of back-off */
-    SKEW = 511,              /* counts: most by which robots' ticks part whenever they draw */
+    SKEW = 511,              /* counts: largest random delay of one tick, which separates the ticks of robots */
     HOUSEKEEPING = 16,       /* ticks */
     NO_BYTE = -1
 };
 
 static enum { STARTING, LISTEN, RECEIVE, LEADING, SENDING } state;
 static uint8 quiet = SILENCE; /* ticks without a pulse */
-static uint8 backoff, due;    /* ticks of silence on top before an own frame; since the last housekeeping */
+static uint8 backoff, due;    /* ticks: of further silence before an own frame; since the last housekeeping */
 static uint16 skew;
-static uint16 seen; /* the last pulse that was looked at */
+static uint16 seen; /* time of the last processed pulse */
 static uint16 lit_at;
 static bool collided;
 static uint16 strength;
@@ -44,7 +44,7 @@ static frame_buffer buffer;
 
 uint16 link_random(void)
 {
-    random_state ^= (uint16)(random_state << 7); /* of a full period, without 0 */
+    random_state ^= (uint16)(random_state << 7); /* xorshift of full period, never 0 */
     random_state ^= random_state >> 9;
     random_state ^= (uint16)(random_state << 8);
     return random_state;
@@ -66,7 +66,7 @@ static void draw_backoff(void)
 
 /* -- receiving ----------------------------------------------------------------------------------------------------- */
 
-/* The rest of the byte that began then, or NO_BYTE. */
+/* Receives the rest of a byte whose first pulse was at `began`. Returns the byte, or NO_BYTE. */
 static sint16 read_byte(uint16 began)
 {
     uint8 byte = 0;
@@ -93,7 +93,7 @@ static sint16 read_byte(uint16 began)
 static void listen_again(void)
 {
     pulses_gain(true);
-    if (backoff == 0) { /* others may have an answer as well */
+    if (backoff == 0) { /* other robots may answer the same frame */
         draw_backoff();
     }
     state = LISTEN;
@@ -113,7 +113,7 @@ static void begin_frame(sint16 byte)
         stir(seen);
         frame_begin(&buffer);
         state = RECEIVE;
-    } else if (byte > 0) { /* two have begun */
+    } else if (byte > 0) { /* two robots have begun a frame */
         damaged();
     } else {
         os_count(&infrared_statistics.false_starts);
@@ -138,7 +138,7 @@ static void take_byte(sint16 byte)
 HAL_USED void infrared_pulse_isr(void)
 {
     uint16 at = pulses_seen();
-    if (at == seen) { /* it was read with its byte */
+    if (at == seen) { /* read_byte() has processed it */
         return;
     }
     seen = at;
@@ -148,7 +148,7 @@ HAL_USED void infrared_pulse_isr(void)
         quiet = 0;
         take_byte(read_byte(at));
     } else if (state == LISTEN) {
-        bool was_silent = quiet >= SILENCE; /* otherwise this is the middle of something */
+        bool was_silent = quiet >= SILENCE; /* otherwise this pulse is inside a frame */
         quiet = 0;
         if (was_silent) {
             begin_frame(read_byte(at));
@@ -168,7 +168,7 @@ static void begin_sending(void)
 {
     collided = false;
     pulses_emitter(true);
-    if (pulses_seen() == seen) { /* as late as possible: who begins now is heard only by those who have not */
+    if (pulses_seen() == seen) { /* checked last: only robots that have not begun receive later ones */
         light();
         pulses_alarm(WINDOW);
         state = LEADING;
@@ -207,7 +207,7 @@ static void send_byte(uint8 byte)
     pulses_flash();
 }
 
-static void go_on(void)
+static void send_next(void)
 {
     uint8 byte;
     if (frame_next_byte(&buffer, &byte)) {
@@ -246,10 +246,10 @@ static void tick(void)
     if (quiet < SILENCE) {
         return;
     }
-    if (state == RECEIVE) { /* its sender is gone */
+    if (state == RECEIVE) { /* its sender has stopped */
         damaged();
     }
-    if (due == HOUSEKEEPING) { /* never within a frame, which it could cost a pulse */
+    if (due == HOUSEKEEPING) { /* never within a frame, because a pulse could be missed */
         due = 0;
         infrared_housekeeping();
     }
@@ -267,7 +267,7 @@ HAL_USED void infrared_alarm_isr(void)
     if (state == LEADING) {
         end_window();
     } else if (state == SENDING) {
-        go_on();
+        send_next();
     } else {
         if (state == STARTING) {
             pulses_listen();

@@ -109,7 +109,7 @@ void pulses_flash(void)
 {
     uint8 dark = PORTB;
     PORTB = dark | emitters;
-    __builtin_avr_delay_cycles(8); /* and one for the store: kilolib's 9 cycles */
+    __builtin_avr_delay_cycles(8); /* with the store 9 cycles of light, as in kilolib */
     PORTB = dark;
 }
 
