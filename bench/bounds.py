@@ -140,8 +140,8 @@ class Meter:
         for one in self.under_way:
             _merge(one.most, found)
 
-    def turn_round(self) -> bool:
-        """Set the last PID as used, so that PIDs wrap around."""
+    def set_newest_pid(self) -> bool:
+        """Make the greatest PID the newest one, so that the next PIDs wrap around."""
         self.machine.poke(NEWEST, LAST)
         return False
 
@@ -153,18 +153,18 @@ class Meter:
             top = self.machine.w[15]
             self.record_sizes()
             if (self.machine.peek(top - 4) & ~1) in exchange:
-                self.apart()
+                self.mark_not_plain()
             return False
 
         return hook
 
-    def disturb(self) -> bool:
+    def discard_calls(self) -> bool:
         """Discard the calls in progress: an interrupt or a thread switch disturbs them."""
         for one in self.under_way:
             one.counts = False
         return False
 
-    def apart(self) -> bool:
+    def mark_not_plain(self) -> bool:
         """Mark the calls in progress as not plain."""
         for one in self.under_way:
             one.plain = False
@@ -183,14 +183,14 @@ def measure(path: Path, program: Program, names: list[str], seconds: float) -> M
     machine = emu.load(path)
     meter = Meter(machine, Structures(machine))
     for handler, _, _ in program.interrupts():
-        machine.hook_pc(handler, meter.disturb)
-    for hooked, hook in ((SWITCHES, meter.disturb), (APART, meter.apart)):
+        machine.hook_pc(handler, meter.discard_calls)
+    for hooked, hook in ((SWITCHES, meter.discard_calls), (APART, meter.mark_not_plain)):
         for name in hooked:
             address = program.address(name)
             if address in program.calls.entries:
                 machine.hook_pc(address, hook)
     if program.address(ROUND) in program.calls.entries:
-        machine.hook_pc(ROUND, meter.turn_round)
+        machine.hook_pc(ROUND, meter.set_newest_pid)
     exchange = _extent(program, EXCHANGE)
     for name in TREE:
         address = program.address(name)

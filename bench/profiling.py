@@ -66,8 +66,8 @@ def images(folder: Path, only: str) -> dict[str, Path]:
     return found
 
 
-def spent(image: Path, name: str, cycles: int, how: str) -> float:
-    """Return host seconds of `cycles`, after a warm-up of the same length; kind: "plain", "counted" or "timed"."""
+def machine_seconds(image: Path, name: str, cycles: int, how: str) -> float:
+    """Return host seconds of `cycles`, after a warm-up of the same length; `how`: "plain", "counted" or "timed"."""
     _, selector = FIRMWARE.get(name, ("", 0))
     machine = emu.load(image, board=partial(Epuck, selector=selector))
     machine.board.camera.show(np.full((480, 640, 3), RED, np.uint8))
@@ -83,7 +83,7 @@ def spent(image: Path, name: str, cycles: int, how: str) -> float:
     return time.process_time() - start
 
 
-def of_a_process(image: Path, name: str, seconds: float, how: str) -> float:
+def process_seconds(image: Path, name: str, seconds: float, how: str) -> float:
     """Return host seconds of a whole `emu run` or `emu profile` process."""
     folder = image.parent
     more = {"plain": [], "counted": [], "timed": ["--speedscope", str(folder / "timeline.json")]}[how]
@@ -111,8 +111,8 @@ def main() -> int:
 
     def once(image: Path, name: str, kind: str) -> float:
         if options.cold:
-            return of_a_process(image, name, options.seconds, kind)
-        return spent(image, name, cycles, kind)
+            return process_seconds(image, name, options.seconds, kind)
+        return machine_seconds(image, name, cycles, kind)
 
     ratios = {}
     with tempfile.TemporaryDirectory() as folder:

@@ -77,7 +77,7 @@ def _spread(values: list[float]) -> str:
 
 
 def _equivalence_tables(group: Mapping[str, list[Trial]], at: float) -> list[str]:
-    """Return the registered table of equivalence tests, and the added one: exact intervals, pairs and remarks."""
+    """Return the pre-registered table of equivalence tests, and a second one: exact intervals, pairs and remarks."""
     registered = [
         "| X - Y, same seeds | measure | difference | 90 % interval | margin | equivalent | Wilcoxon p | pairs for 80 %"
         " power |",

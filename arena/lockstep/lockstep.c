@@ -10,8 +10,8 @@ typedef int64_t i64;
 typedef uint64_t u64;
 typedef double f64;
 
-// State of a robot: Python runs it or it has reached the goal; it can run; it waits for the poses of a camera line;
-// Python waits for poses; its native code has returned with an exit reason for Python.
+// States of a robot, in this order: Python runs it, or it has reached the goal; it can run; it waits for the poses of a
+// camera line; Python waits for its poses; its native code has returned with an exit reason for Python.
 enum { IN_PYTHON, RUNNABLE, AWAITS_LINE, AWAITS_POSES, RETURNED };
 
 // Results of `run_all` other than a robot's number.

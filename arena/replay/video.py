@@ -78,8 +78,9 @@ def arena_picture(
 ) -> Image.Image:  # fmt: skip
     """Draw the arena from above, `SCALE` pixels per cm.
 
-    `robots` are poses in cm and rad, `seen` the answers of their sensors, `objects` x and y and of a polygon the
-    heading, `labels` the group of each object."""
+    `robots` are poses in cm and rad, `seen` the values of their line-of-sight sensors. `objects` are x and y in cm, and
+    for polygons the heading in rad. `labels` are the cluster numbers of the objects.
+    """
     width, height = round(scene.arena.width_cm * SCALE), round(scene.arena.height_cm * SCALE)
     image = Image.new("RGB", (width, height), _PAPER)
     draw = ImageDraw.Draw(image)

@@ -18,7 +18,7 @@ def options_of() -> argparse.ArgumentParser:
     )
     p.add_argument("image")
     p.add_argument("-o", dest="output", default="", help="HEX file (default: image name with .hex)")
-    for word in ("-a", "-u", "-v"):  # of XC16's bin2hex: records are always sorted, and addresses those of the chip
+    for word in ("-a", "-u", "-v"):  # ignored: records are always sorted and have the chip's addresses
         p.add_argument(word, action="store_true", help=argparse.SUPPRESS)
     p.add_argument("-omf", default="elf", choices=("elf",), help=argparse.SUPPRESS)
     p.add_argument("-mdfp", default="", help=argparse.SUPPRESS)

@@ -207,7 +207,9 @@ def _list_after(text: str, at: int) -> tuple[int, int] | None:
 
 
 def _register(text: str, start: int, end: int, address: str) -> Iterator[str]:
-    """Definition of the name that `sfr(ADDRESS)` declares, if its address is a number: vendors' headers have both."""
+    """Assembler definition of the register that `sfr(ADDRESS)` declares, if ADDRESS is a number.
+    Vendors' headers write the name before or after the attribute.
+    """
     before = re.search(r"(\w+)\s*$", text[max(0, start - 80) : start])
     after = re.match(r"\s*\)\s*\)\s*(\w+)\s*[;,\[]", text[end : end + 80])
     found = after or before

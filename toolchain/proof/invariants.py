@@ -93,7 +93,9 @@ class OrderInvariant:
 
 
 def candidate_orders(rows: list[dict[ValueWord, int]], sizes: Mapping[ValueWord, int]) -> Iterator[OrderInvariant]:
-    """Yield order invariants that held in all visits, for constant words and for words never greater than another."""
+    """Yield the order invariants that hold in all `rows` (values at each visit of a loop head).
+    A constant word gives two of them. A variable word gives signed and unsigned orders against 0 and other words.
+    """
     moving = [part for part in rows[0] if len({row[part] for row in rows}) > 1]
     for part, number in rows[0].items():
         if part not in moving:

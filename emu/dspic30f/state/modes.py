@@ -34,7 +34,7 @@ class Key(NamedTuple):
 
     @property
     def context(self) -> Context:
-        """Return the modes on which rows may depend."""
+        """Return the modes on which the meaning of an instruction may depend."""
         return context_of(self.corcon, self.modcon, self.reverses, self.trap_enables)
 
 

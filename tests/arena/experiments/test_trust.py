@@ -40,7 +40,7 @@ MEASURES = 'MEASURES = [Measure("half", "half at {at:g} s", lambda series, at: s
 
 
 def arena(*words: object) -> tuple[int, str]:
-    """Run `arena` as in a new process, which has loaded no experiment; return exit status and standard error."""
+    """Run `arena` with empty caches, as in a new process. Return exit status and standard error."""
     experiments._loaded.clear()
     experiments._load_source.cache_clear()
     user_file.run_module.cache_clear()

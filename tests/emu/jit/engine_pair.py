@@ -256,7 +256,7 @@ class InstructionObserver:
 
 
 class Hooks:
-    """Hooks at random addresses in two machines, with their arrivals."""
+    """Hooks at random addresses in two machines, and a log of (PC, cycle) for each machine."""
 
     def __init__(self, machines: tuple[Machine, Machine], addresses: range, generator: random.Random) -> None:
         self._arrivals: tuple[list[Any], list[Any]] = ([], [])
@@ -265,8 +265,7 @@ class Hooks:
                 machine.hook_pc(address, lambda m=machine, s=seen: s.append((m.pc, m.cycle)))  # type: ignore[misc]
 
     def compare(self, tally: Tally) -> None:
-        """Compare the arrivals since the last call: both machines have the same addresses in the same cycles. Raises
-        Difference."""
+        """Compare the logs since the last call. Raises Difference unless they are equal."""
         one, other = self._arrivals
         if one != other:
             raise Difference(f"arrivals at hooks {one[-3:]} {other[-3:]}")

@@ -123,11 +123,11 @@ int main(void)
 
 @pytest.mark.parametrize("target", ["kilobot", *BOARDS])
 def test_an_overflow_of_the_kernel_stack_stops_the_system(target: str, tmp_path: Path) -> None:
-    """An overflow of the kernel stack stops the system: by the MPU at once, on AVR and RISC-V after the handlers.
+    """An overflow of the kernel stack stops the system: at once with an MPU, on AVR and RISC-V after the handlers.
 
-    They detect it by the fill pattern in the last byte of the stack, which requires that what lies below survives. On
-    the AVR these are the kernel's variables: the handler leaves the last bytes of the stack to the tick that
-    interrupts it (port/avr/README.md).
+    AVR and RISC-V detect it by the fill pattern in the last byte of the stack, so the memory below must survive. On the
+    AVR the kernel's variables are below: the handler leaves the last bytes of the stack to the tick that interrupts it
+    (port/avr/README.md).
     """
     (tmp_path / "handler").mkdir()
     (tmp_path / "handler" / "main.c").write_text(IN_A_HANDLER)

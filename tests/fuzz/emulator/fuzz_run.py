@@ -41,7 +41,7 @@ def random_code(rng: random.Random) -> list[int]:
 
 
 def attempt(rng: random.Random, engine: str) -> str:
-    """Run an image with register values that let it run for a while. Return the reason for its end."""
+    """Run an image whose registers often point into RAM, so that it does not fault at once. Return why it ends."""
     code = random_code(rng)
     vectors = [0x100 + 2 * rng.randrange(len(code)) for _ in range(62)]
     reset = SampleSection(".reset", 0, words(0x040100, 0, *vectors))

@@ -227,9 +227,9 @@ def test_frames_of_a_program_with_nested_interrupts(tmp_path: Path, level: str) 
 
 @pytest.mark.slow
 def test_frames_of_the_execution_tests(tmp_path: Path) -> None:
-    """The execution tests, which use further features, are unwound correctly at every instruction.
+    """Programs of the execution tests are unwound correctly at every instruction.
 
-    Each file is tried at two levels, which the commit determines.
+    The commit selects the optimisation levels of each file.
     """
 
     def check(name: str, level: str) -> None:

@@ -312,7 +312,9 @@ def test_products_divide() -> None:
 
 
 def check_product(d: int, bits: int) -> None:
-    """d is a constant, so that all terms are linear."""
+    """Prove for one divisor that unsigned and signed factors of `bits` bits give every quotient.
+    The divisor is a constant, so that all terms are linear.
+    """
     x, half = z3.Int("x"), 1 << bits - 1
     (m, s), (n, t) = unsigned_factor(d, bits), signed_factor(d, bits)
     by_sum = floor_product(x, m - (1 << bits), bits)

@@ -274,8 +274,8 @@ def program(draw: random.Random, machine: Machine, image: Image) -> None:
 
 
 def run(draw: random.Random, machine: Machine, cycles: int) -> list[Stop | int | None]:
-    """Run for `cycles` Tcy: in one piece, divided, or with `run_past`. A sleeping machine runs longer, and as long
-    again after a flash row was programmed. Return how the pieces ended and the cycles of the cuts."""
+    """Run for `cycles` Tcy in one to three calls, or with `run_past`. A sleeping machine runs longer, and as long again
+    after a flash row was programmed. Return the result of each call, and the ends of the periods of `run_past`."""
     end, way = machine.cycle + cycles, draw.random()
     ended: list[Stop | int | None] = []
     if way < 0.4:
