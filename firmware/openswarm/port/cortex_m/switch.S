@@ -41,7 +41,9 @@ PendSV_Handler:
         strb    r1, [r3]
         mov     r0, r2
         bl      os_slice_end
-resume: ldr     r1, [r0, #PCB_LIMIT]
+resume: movs    r1, #0
+        msr     basepri, r1             @ a section that a handler left open ends here
+        ldr     r1, [r0, #PCB_LIMIT]
         ldr     r2, =MPU_RBAR_ADDRESS
         str     r1, [r2]
         ldr     r0, [r0]

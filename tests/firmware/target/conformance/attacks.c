@@ -160,7 +160,7 @@ static void sections_without_their_other_half(void)
     Sys_Yield();
     CHECK(noted("iio"));
     CHECK(Sys_Register_Event(E1) && Sys_Subscribe_to_Event(E1, 0, begin_only, NULL) && Sys_Send_IntEvent(E1, 0));
-    Sys_Yield();
+    Sys_Sleep(1); /* this thread is the next to run after the handler */
     CHECK(others_run());
     CHECK(Sys_Subscribe_to_Event(E1, 0, end_only, NULL) && Sys_Send_IntEvent(E1, 0));
     Sys_Yield();
