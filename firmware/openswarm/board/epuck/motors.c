@@ -48,7 +48,7 @@ void hal_motors_drive(int16_t left_mm_s, int16_t right_mm_s)
     set(&stepper_right, right_mm_s);
     if (left_mm_s == 0 && right_mm_s == 0) {
         IEC0bits.T3IE = 0;
-        T3CON = 0; /* the harmless instruction behind a cleared enable */
+        T3CON = 0; /* one more interrupt may be taken here, which does no harm (isa.md §14.3) */
         LATD &= (uint16)~PIN_MOTORS;
     } else {
         if (!T3CONbits.TON) {

@@ -33,7 +33,7 @@ FLASH_INLINE void flash_operate(uint16_t operation)
     flash_wait();
 }
 
-/* Into the latches that FLASH_PROGRAM_ROW writes. The last table write names the row, as any does. */
+/* Writes a row to the latches that FLASH_PROGRAM_ROW programs. Every table write also selects the row. */
 FLASH_INLINE void flash_latch_row(uint16_t offset, const uint8_t *bytes)
 {
     for (uint16_t end = (uint16_t)(offset + FLASH_ROW_UNITS); offset != end; offset += 2, bytes += 3) {

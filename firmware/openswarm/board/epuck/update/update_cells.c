@@ -14,7 +14,7 @@ enum {
     FLAGS = 0xFFF0
 };
 
-/* Its low half; the page of program memory is set to the rest. */
+/* Sets TBLPAG to the upper half of a row's program address; returns the lower half. */
 static uint16_t find_row(uint8_t slot, uint8_t row)
 {
     TBLPAG = slot == HAL_UPDATE_RUN ? RUN_PAGE : STORE_PAGE;
@@ -22,8 +22,8 @@ static uint16_t find_row(uint8_t slot, uint8_t row)
     return (uint16_t)(base + row * (uint16_t)FLASH_ROW_UNITS);
 }
 
-/* With what the table writes before it have named and latched. Flash stalls the CPU meanwhile, EEPROM does not. No
- * interrupt, of whatever level, may come between the writes of the key. */
+/* Performs an operation on the address and data of the preceding table writes. Flash stalls the CPU meanwhile, EEPROM
+ * does not. No interrupt of any level may occur between the writes of the key. */
 static void __attribute__((noinline)) operate(uint16_t operation)
 {
     uint16_t level = SR & ALL_LEVELS;
